@@ -1,0 +1,178 @@
+//! Triangle meshes.
+
+use glam::DVec3;
+use thiserror::Error;
+
+/// A triangle mesh: shared vertices, facets as vertex triples, and any number of per-facet labels.
+///
+/// Coordinates are metres in whatever frame the owner says. Facets are two-sided.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Vertex positions, m.
+    pub vertices: Vec<DVec3>,
+    /// Three vertex indices per facet.
+    pub facets: Vec<[u32; 3]>,
+    /// Named partitions of the facets: an OBJ material, a PLY face property, a body part.
+    pub labels: Vec<FacetLabels>,
+}
+
+/// One partition of a mesh's facets into named parts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FacetLabels {
+    /// What the partition is by: `usemtl`, `group`, `part`, or a PLY face property's own name.
+    pub property: String,
+    /// The parts' names.
+    pub names: Vec<String>,
+    /// For each facet, an index into `names`.
+    pub name_of_facet: Vec<u32>,
+}
+
+impl FacetLabels {
+    /// Builds labels from one name per facet; names are numbered in order of first appearance.
+    ///
+    /// ```
+    /// use matdb::geometry::FacetLabels;
+    /// let labels = FacetLabels::from_names("part", ["arm", "leg", "arm"]);
+    /// assert_eq!(labels.names, ["arm", "leg"]);
+    /// assert_eq!(labels.name_of_facet, [0, 1, 0]);
+    /// ```
+    pub fn from_names<S: AsRef<str>>(
+        property: &str,
+        names: impl IntoIterator<Item = S>,
+    ) -> FacetLabels {
+        let mut labels = FacetLabels { property: property.to_owned(), ..Default::default() };
+        let mut number = std::collections::HashMap::new();
+        for name in names {
+            let name = name.as_ref();
+            let index = *number.entry(name.to_owned()).or_insert_with(|| {
+                labels.names.push(name.to_owned());
+                labels.names.len() as u32 - 1
+            });
+            labels.name_of_facet.push(index);
+        }
+        labels
+    }
+}
+
+/// Why a mesh cannot be used.
+#[derive(Debug, Error, PartialEq)]
+pub enum MeshError {
+    /// There is nothing to hit.
+    #[error("the mesh has no facets; check that the file holds triangles and not only points")]
+    NoFacets,
+    /// More facets or vertices than 32-bit indices can address.
+    #[error("the mesh has {count} {what}; at most 2³² − 1 can be addressed, so split the mesh")]
+    TooLarge {
+        /// `vertices` or `facets`.
+        what: &'static str,
+        /// How many there are.
+        count: usize,
+    },
+    /// A facet refers to a vertex that does not exist.
+    #[error(
+        "facet {facet} refers to vertex {index}, but the mesh has {vertices} vertices; \
+         re-export the mesh"
+    )]
+    IndexOutOfRange {
+        /// Facet number, from 0.
+        facet: usize,
+        /// The offending vertex index.
+        index: i64,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// A vertex is NaN or infinite.
+    #[error("vertex {vertex} is not finite ({x}, {y}, {z}); repair the mesh")]
+    NotFinite {
+        /// Vertex number, from 0.
+        vertex: usize,
+        /// Its coordinates.
+        x: f64,
+        #[allow(missing_docs)]
+        y: f64,
+        #[allow(missing_docs)]
+        z: f64,
+    },
+}
+
+impl Mesh {
+    /// Checks what every later stage relies on: facets exist, indices are in range, vertices finite.
+    pub fn validate(&self) -> Result<(), MeshError> {
+        for (what, count) in [("vertices", self.vertices.len()), ("facets", self.facets.len())] {
+            if count > u32::MAX as usize {
+                return Err(MeshError::TooLarge { what, count });
+            }
+        }
+        if self.facets.is_empty() {
+            return Err(MeshError::NoFacets);
+        }
+        if let Some(vertex) = self.vertices.iter().position(|v| !v.is_finite()) {
+            let DVec3 { x, y, z } = self.vertices[vertex];
+            return Err(MeshError::NotFinite { vertex, x, y, z });
+        }
+        let vertices = self.vertices.len();
+        for (facet, indices) in self.facets.iter().enumerate() {
+            if let Some(&index) = indices.iter().find(|&&i| i as usize >= vertices) {
+                return Err(MeshError::IndexOutOfRange { facet, index: index.into(), vertices });
+            }
+        }
+        Ok(())
+    }
+
+    /// The corners of a facet, m. Panics when `facet` is out of range.
+    pub fn corners(&self, facet: usize) -> [DVec3; 3] {
+        self.facets[facet].map(|v| self.vertices[v as usize])
+    }
+
+    /// Twice the facet's area times its right-handed unit normal, m²; zero for a degenerate facet.
+    pub fn area_normal(&self, facet: usize) -> DVec3 {
+        let [a, b, c] = self.corners(facet);
+        (b - a).cross(c - a)
+    }
+
+    /// Centroid of a facet, m.
+    pub fn centroid(&self, facet: usize) -> DVec3 {
+        let [a, b, c] = self.corners(facet);
+        (a + b + c) / 3.0
+    }
+
+    /// Whether a facet has no area: repeated or collinear corners.
+    ///
+    /// The bound is relative to the longest edge, so that small and large meshes are judged alike.
+    pub fn is_degenerate(&self, facet: usize) -> bool {
+        const RELATIVE_HEIGHT: f64 = 1e-12;
+        let [a, b, c] = self.corners(facet);
+        let longest2 =
+            (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+        // `!(x > y)` also holds for NaN.
+        !(self.area_normal(facet).length() > RELATIVE_HEIGHT * longest2)
+    }
+
+    /// Appends another mesh. Labels are kept by property; facets without a label get the empty name.
+    pub fn append(&mut self, other: &Mesh) {
+        let vertex_offset = self.vertices.len() as u32;
+        let facets_before = self.facets.len();
+        self.vertices.extend_from_slice(&other.vertices);
+        self.facets.extend(other.facets.iter().map(|f| f.map(|v| v + vertex_offset)));
+        for theirs in &other.labels {
+            if !self.labels.iter().any(|l| l.property == theirs.property) {
+                self.labels.push(FacetLabels::from_names(
+                    &theirs.property,
+                    std::iter::repeat_n("", facets_before),
+                ));
+            }
+        }
+        for ours in &mut self.labels {
+            let theirs = other.labels.iter().find(|l| l.property == ours.property);
+            let names_of = |labels: &FacetLabels| -> Vec<String> {
+                labels.name_of_facet.iter().map(|&n| labels.names[n as usize].clone()).collect()
+            };
+            let mut all = names_of(ours);
+            match theirs {
+                Some(theirs) => all.extend(names_of(theirs)),
+                None => all.resize(self.facets.len(), String::new()),
+            }
+            *ours = FacetLabels::from_names(&ours.property, all);
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! `matdb`: a material database and renderer for 300 GHz imaging radar.
+
+#![warn(missing_docs)]
+
+// The order of these lines is the law: a module uses only modules declared above it
+// (`tests/floors.rs` checks it).
+pub mod units;
+pub mod geometry;
+pub mod formats;
