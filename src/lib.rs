@@ -5,5 +5,7 @@
 // The order of these lines is the law: a module uses only modules declared above it
 // (`tests/floors.rs` checks it).
 pub mod units;
+pub mod frames;
 pub mod geometry;
+pub mod brdf;
 pub mod formats;

@@ -1,0 +1,30 @@
+//! Lambert's law: f = ρ/π, the same from every side.
+//!
+//! Diffuse albedo ρ runs from 0 to 1; chalk or sintered PTFE reach 0.99 in the visible, while at
+//! 300 GHz most surfaces are too smooth to be Lambertian at all.
+
+use serde::{Deserialize, Serialize};
+
+use super::Scattering;
+use super::parameter::{Visitor, visit_number};
+use crate::frames::{Direction, Surface};
+
+/// A perfectly diffuse surface.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lambert {
+    /// Diffuse albedo ρ, 0 to 1.
+    pub albedo: f64,
+}
+
+impl Lambert {
+    pub(super) fn visit(&mut self, prefix: &str, visitor: &mut Visitor) {
+        visit_number(visitor, prefix, "albedo", (0.0, 1.0), &mut self.albedo);
+    }
+}
+
+impl Scattering for Lambert {
+    fn f_per_sr(&self, _i: Direction<Surface>, _o: Direction<Surface>) -> f64 {
+        self.albedo / std::f64::consts::PI
+    }
+}

@@ -1,0 +1,236 @@
+//! Scattering models: bidirectional reflectance f(i, o) in 1/sr, seen from the surface's own frame.
+//!
+//! `i` points to the source and `o` to the receiver, both away from the surface; z is the normal.
+//! Radar data are the monostatic case i = o. Below the horizon every model returns zero.
+//!
+//! | model | file | equation |
+//! |---|---|---|
+//! | [`Mixture`] of a diffuse and a specular part | `mixture.rs` | (12) |
+//! | [`CookTorrance`] | `cook_torrance.rs` | (13), (14) |
+//! | [`BlinnPhong`] | `blinn_phong.rs` | (15) |
+//! | [`Lambert`] | `lambert.rs` | f = ρ/π |
+//! | [`Tabulated`], a measured curve as it is | `tabulated.rs` | (10) solved for f |
+//!
+//! ```
+//! use matdb::brdf::{Lambert, Scattering};
+//! let chalk = Lambert { albedo: 0.8 };
+//! // Equation (10) at 60°: 4π · 0.8/π · cos² 60°.
+//! assert!((chalk.sigma0(60f64.to_radians()) - 0.8).abs() < 1e-12);
+//! ```
+
+mod blinn_phong;
+mod cook_torrance;
+mod lambert;
+mod mixture;
+mod parameter;
+mod tabulated;
+
+use serde::{Deserialize, Serialize};
+
+use crate::frames::{Direction, Surface};
+
+pub use blinn_phong::BlinnPhong;
+pub use cook_torrance::{CookTorrance, Distribution, Shadowing};
+pub use lambert::Lambert;
+pub use mixture::Mixture;
+pub use parameter::{Parameter, ParameterError};
+pub use tabulated::{Tabulated, TabulatedError};
+
+use parameter::Visitor;
+
+/// Anything that scatters. A closure `Fn(i, o) -> f` is one, so a caller's own model needs no type.
+///
+/// ```
+/// use matdb::brdf::Scattering;
+/// use matdb::frames::{Direction, Surface};
+/// let mine = |i: Direction<Surface>, o: Direction<Surface>| 0.1 * i.cos_theta() * o.cos_theta();
+/// assert!((mine.retro_per_sr(0.0) - 0.1).abs() < 1e-15);
+/// ```
+pub trait Scattering: Sync {
+    /// f(i, o), 1/sr: reflected radiance per incident irradiance, equation (9).
+    fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64;
+
+    /// f in exact backscatter at incidence `theta_rad`, 1/sr.
+    fn retro_per_sr(&self, theta_rad: f64) -> f64 {
+        let i = Direction::from_angles(theta_rad, 0.0);
+        self.f_per_sr(i, i)
+    }
+
+    /// Equation (10): differential scattering coefficient σ⁰(θ) = 4π·f(θ)·cos²θ, a pure number.
+    fn sigma0(&self, theta_rad: f64) -> f64 {
+        4.0 * std::f64::consts::PI * self.retro_per_sr(theta_rad) * theta_rad.cos().powi(2)
+    }
+}
+
+impl<F> Scattering for F
+where
+    F: Fn(Direction<Surface>, Direction<Surface>) -> f64 + Sync,
+{
+    fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        self(i, o)
+    }
+}
+
+/// Every model that can be stored in a database or a material file, told apart by `model`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "model", rename_all = "kebab-case")]
+pub enum Brdf {
+    #[allow(missing_docs)]
+    Lambert(Lambert),
+    #[allow(missing_docs)]
+    BlinnPhong(BlinnPhong),
+    #[allow(missing_docs)]
+    CookTorrance(CookTorrance),
+    #[allow(missing_docs)]
+    Tabulated(Tabulated),
+    #[allow(missing_docs)]
+    Mixture(Mixture),
+}
+
+impl Brdf {
+    /// Every free number of the model with its unit and range, in a fixed order.
+    ///
+    /// Paths name the place in a mixture: `k`, `specular.m`, `diffuse.alpha`.
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let mut found = Vec::new();
+        self.clone().visit("", &mut |parameter, _| found.push(parameter));
+        found
+    }
+
+    /// Sets one parameter by its path; `false` when the model has none of that path.
+    pub fn set_parameter(&mut self, path: &str, value: f64) -> bool {
+        let mut known = false;
+        self.visit("", &mut |parameter, slot| {
+            if parameter.path == path {
+                *slot = value;
+                known = true;
+            }
+        });
+        known
+    }
+
+    /// Checks every parameter against its range.
+    pub fn validate(&self) -> Result<(), ParameterError> {
+        self.parameters().iter().try_for_each(Parameter::validate)
+    }
+
+    fn visit(&mut self, prefix: &str, visitor: &mut Visitor) {
+        match self {
+            Brdf::Lambert(model) => model.visit(prefix, visitor),
+            Brdf::BlinnPhong(model) => model.visit(prefix, visitor),
+            Brdf::CookTorrance(model) => model.visit(prefix, visitor),
+            Brdf::Tabulated(_) => {}
+            Brdf::Mixture(model) => model.visit(prefix, visitor),
+        }
+    }
+}
+
+impl Scattering for Brdf {
+    fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        if i.cos_theta() <= 0.0 || o.cos_theta() <= 0.0 {
+            return 0.0;
+        }
+        match self {
+            Brdf::Lambert(model) => model.f_per_sr(i, o),
+            Brdf::BlinnPhong(model) => model.f_per_sr(i, o),
+            Brdf::CookTorrance(model) => model.f_per_sr(i, o),
+            Brdf::Tabulated(model) => model.f_per_sr(i, o),
+            Brdf::Mixture(model) => model.f_per_sr(i, o),
+        }
+    }
+}
+
+/// h = (i + o)/|i + o|, the normal of a facet that would mirror i into o.
+fn half_vector(i: Direction<Surface>, o: Direction<Surface>) -> Direction<Surface> {
+    Direction::new(i.xyz() + o.xyz()).unwrap_or(i)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn every_model() -> Vec<Brdf> {
+        let cook_torrance = |distribution, shadowing| CookTorrance {
+            f_lambda: 0.3,
+            m: 0.2,
+            distribution,
+            shadowing,
+        };
+        let blinn_phong = BlinnPhong { r_s: 0.2, alpha: 3.0 };
+        let beckmann = cook_torrance(Distribution::Beckmann, Shadowing::Separable);
+        let mut models = vec![
+            Brdf::Lambert(Lambert { albedo: 0.7 }),
+            Brdf::BlinnPhong(blinn_phong),
+            Brdf::Tabulated(Tabulated::new(&[(0.0, 2.0), (0.3, 0.1), (1.2, 0.01)]).unwrap()),
+            Brdf::Mixture(Mixture {
+                k: 0.4,
+                diffuse: Box::new(Brdf::BlinnPhong(blinn_phong)),
+                specular: Box::new(Brdf::CookTorrance(beckmann)),
+            }),
+        ];
+        for distribution in [Distribution::Beckmann, Distribution::Ggx] {
+            for shadowing in [Shadowing::Separable, Shadowing::Correlated] {
+                models.push(Brdf::CookTorrance(cook_torrance(distribution, shadowing)));
+            }
+        }
+        models
+    }
+
+    proptest! {
+        #[test]
+        fn every_model_is_reciprocal_finite_and_not_negative(
+            ti in 0.0f64..1.57, to in 0.0f64..1.57, pi in -3.1f64..3.1, po in -3.1f64..3.1,
+        ) {
+            let (i, o) = (Direction::from_angles(ti, pi), Direction::from_angles(to, po));
+            for model in every_model() {
+                let (there, back) = (model.f_per_sr(i, o), model.f_per_sr(o, i));
+                prop_assert!(there >= 0.0 && there.is_finite(), "{model:?}: {there}");
+                prop_assert!((there - back).abs() <= 1e-12 * there.abs(), "{model:?}");
+            }
+        }
+
+        #[test]
+        fn every_model_is_isotropic(ti in 0.0f64..1.5, to in 0.0f64..1.5, turn in -3.0f64..3.0) {
+            for model in every_model() {
+                let f = |azimuth: f64| model.f_per_sr(
+                    Direction::from_angles(ti, azimuth),
+                    Direction::from_angles(to, azimuth + 1.0),
+                );
+                prop_assert!((f(0.0) - f(turn)).abs() <= 1e-9 * f(0.0).abs());
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_is_scattered_below_the_horizon() {
+        let (up, down) = (Direction::from_angles(0.3, 0.0), Direction::from_angles(2.0, 0.0));
+        for model in every_model() {
+            assert_eq!(model.f_per_sr(up, down), 0.0);
+            assert_eq!(model.f_per_sr(down, up), 0.0);
+        }
+    }
+
+    #[test]
+    fn parameters_can_be_read_set_and_checked_by_path() {
+        let mut model = every_model().remove(3);
+        let paths: Vec<_> = model.parameters().into_iter().map(|p| p.path).collect();
+        assert_eq!(paths, ["k", "diffuse.r_s", "diffuse.alpha", "specular.f_lambda", "specular.m"]);
+        assert!(model.set_parameter("specular.m", 0.0));
+        assert!(!model.set_parameter("specular.n", 0.1));
+        let message = model.validate().unwrap_err().to_string();
+        assert!(message.contains("specular.m = 0"), "{message}");
+    }
+
+    #[test]
+    fn models_survive_json() {
+        for model in every_model() {
+            let text = serde_json::to_string(&model).unwrap();
+            let back: Brdf = serde_json::from_str(&text).unwrap();
+            for theta_rad in [0.0, 0.1, 0.5, 1.0, 1.4] {
+                let (a, b) = (model.sigma0(theta_rad), back.sigma0(theta_rad));
+                assert!((a - b).abs() <= 1e-12 * a, "{text}");
+            }
+        }
+    }
+}
