@@ -73,7 +73,16 @@ macro_rules! copy_in_any_frame {
         impl<$($frame),+> Copy for $name<$($frame),+> {}
     )+};
 }
-copy_in_any_frame!(Point<F>, Direction<F>, Pose<To, From>);
+copy_in_any_frame!(Point<F>, Direction<F>, Ray<F>, Pose<To, From>);
+
+/// A half-line in frame `F`.
+#[derive(Debug, PartialEq)]
+pub struct Ray<F> {
+    /// Where it starts.
+    pub origin: Point<F>,
+    /// Where it goes.
+    pub direction: Direction<F>,
+}
 
 impl<F> Point<F> {
     /// A point from its coordinates, m.

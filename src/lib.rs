@@ -8,4 +8,5 @@ pub mod units;
 pub mod frames;
 pub mod geometry;
 pub mod brdf;
+pub mod radar;
 pub mod formats;

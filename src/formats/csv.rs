@@ -1,0 +1,160 @@
+//! CSV tables with a header, and errors that name the line and the column.
+
+use super::FormatError;
+
+/// A table of text cells under named columns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    columns: Vec<String>,
+    rows: Vec<Row>,
+}
+
+/// One line of a [`Table`].
+#[derive(Clone, Debug, PartialEq)]
+struct Row {
+    line: u64,
+    cells: Vec<String>,
+}
+
+/// A cell with its place, for errors.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell<'a> {
+    /// Line in the file, from 1.
+    pub line: u64,
+    /// Name of the column.
+    pub column: &'a str,
+    /// The text, trimmed.
+    pub text: &'a str,
+}
+
+impl Table {
+    /// Reads a table whose header holds all of `required` and nothing beyond those and `optional`.
+    pub fn read(bytes: &[u8], required: &[&str], optional: &[&str]) -> Result<Table, FormatError> {
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
+        let header = reader.headers().map_err(malformed)?.clone();
+        let columns: Vec<String> = header.iter().map(str::to_owned).collect();
+        check_header(&columns, required, optional)?;
+        let rows = reader
+            .records()
+            .map(|record| {
+                let record = record.map_err(malformed)?;
+                let line = record.position().map_or(0, csv::Position::line);
+                Ok(Row { line, cells: record.iter().map(str::to_owned).collect() })
+            })
+            .collect::<Result<_, FormatError>>()?;
+        Ok(Table { columns, rows })
+    }
+
+    /// Number of rows below the header.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there is no row below the header.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// The cell of a row and column; `None` where the column is absent or the cell is empty.
+    pub fn cell<'a>(&'a self, row: usize, column: &'a str) -> Option<Cell<'a>> {
+        let index = self.columns.iter().position(|c| c == column)?;
+        let row = self.rows.get(row)?;
+        let text = row.cells.get(index)?.as_str();
+        (!text.is_empty()).then_some(Cell { line: row.line, column, text })
+    }
+
+    /// A finite number; `None` where the cell is absent or empty.
+    pub fn number(&self, row: usize, column: &str) -> Result<Option<f64>, FormatError> {
+        self.cell(row, column).map(|cell| cell.number()).transpose()
+    }
+
+    /// A finite number that must be there.
+    pub fn required_number(&self, row: usize, column: &str) -> Result<f64, FormatError> {
+        self.number(row, column)?.ok_or_else(|| {
+            let line = self.rows.get(row).map_or(0, |r| r.line);
+            let place = format!("line {line}, column {column}");
+            FormatError::at(place, "the cell is empty", "fill in a number")
+        })
+    }
+}
+
+impl Cell<'_> {
+    /// The cell as a finite number.
+    pub fn number(&self) -> Result<f64, FormatError> {
+        let value: f64 = self.text.parse().unwrap_or(f64::NAN);
+        if value.is_finite() { Ok(value) } else { Err(self.refuse("fill in a finite number")) }
+    }
+
+    /// An error that shows the cell and its place.
+    pub fn refuse(&self, way_out: &str) -> FormatError {
+        FormatError::at(
+            format!("line {}, column {}", self.line, self.column),
+            format!("`{}` is not accepted here", self.text),
+            way_out,
+        )
+    }
+}
+
+fn check_header(
+    columns: &[String],
+    required: &[&str],
+    optional: &[&str],
+) -> Result<(), FormatError> {
+    let known: Vec<&str> = required.iter().chain(optional).copied().collect();
+    let refuse = |problem: String| {
+        Err(FormatError::at("line 1", problem, format!("the columns are {}", known.join(", "))))
+    };
+    if let Some(missing) = required.iter().find(|r| !columns.iter().any(|c| c == *r)) {
+        return refuse(format!("there is no column `{missing}`"));
+    }
+    if let Some(unknown) = columns.iter().find(|c| !known.contains(&c.as_str())) {
+        return refuse(format!("unknown column `{unknown}`"));
+    }
+    let repeated = |(i, c): &(usize, &String)| columns[..*i].contains(c);
+    if let Some((_, twice)) = columns.iter().enumerate().find(repeated) {
+        return refuse(format!("column `{twice}` is there twice"));
+    }
+    Ok(())
+}
+
+fn malformed(error: csv::Error) -> FormatError {
+    let line = error.position().map_or(1, csv::Position::line);
+    let problem = match error.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+            format!("{len} cells under a header of {expected_len}")
+        }
+        csv::ErrorKind::Utf8 { .. } => "the text is not UTF-8".to_owned(),
+        _ => "the text is not CSV".to_owned(),
+    };
+    FormatError::at(format!("line {line}"), problem, "mend the line")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Table, FormatError> {
+        Table::read(text.as_bytes(), &["theta_deg"], &["sigma0_db"])
+    }
+
+    #[test]
+    fn cells_are_found_by_column() {
+        let table = read("sigma0_db,theta_deg\n-3.5, 10\n,20\n").unwrap();
+        assert_eq!(table.len(), 2);
+        assert_eq!(table.required_number(0, "theta_deg").unwrap(), 10.0);
+        assert_eq!(table.number(0, "sigma0_db").unwrap(), Some(-3.5));
+        assert_eq!(table.number(1, "sigma0_db").unwrap(), None);
+    }
+
+    #[test]
+    fn errors_name_line_and_column() {
+        let message = |text: &str| read(text).unwrap_err().to_string();
+        assert!(message("sigma0_db\n1").contains("no column `theta_deg`"));
+        assert!(message("theta_deg,x\n1,2").contains("unknown column `x`"));
+        assert!(message("theta_deg,theta_deg\n1,2").contains("twice"));
+        assert!(message("theta_deg\n1\n2,3\n").starts_with("line 3: 2 cells"));
+        let table = read("theta_deg\n1\nnan\n").unwrap();
+        let refused = table.required_number(1, "theta_deg").unwrap_err().to_string();
+        assert!(refused.starts_with("line 3, column theta_deg: `nan`"), "{refused}");
+    }
+}
