@@ -10,3 +10,4 @@ pub mod geometry;
 pub mod brdf;
 pub mod radar;
 pub mod formats;
+pub mod material;

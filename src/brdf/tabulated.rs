@@ -34,7 +34,7 @@ struct Columns {
 #[derive(Debug, Error, PartialEq)]
 pub enum TabulatedError {
     /// Nothing to interpolate between.
-    #[error("a curve needs at least two points with a detection, but has {points}")]
+    #[error("a curve needs at least two backscatter angles, but has {points}")]
     TooFewPoints {
         /// How many there are.
         points: usize,

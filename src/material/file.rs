@@ -1,0 +1,340 @@
+//! `material.toml`: a material as people write and review it, in degrees, gigahertz and dB.
+//!
+//! Curves stand beside it as CSV with the columns `theta_deg,sigma0_db,censor,threshold_db`; the
+//! last two may be left out, and `theta_r_deg,delta_phi_deg` may be added for bistatic points.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+use thiserror::Error;
+
+use super::{
+    Censor, Covariance, Curve, Fit, Instrument, Material, MaterialError, Observation, Slug, Source,
+    SourceKind,
+};
+use crate::brdf::Brdf;
+use crate::formats::FormatError;
+use crate::formats::csv::Table;
+use crate::formats::text::from_toml;
+use crate::units::ratio_from_db;
+
+/// Why a material file was refused.
+#[derive(Debug, Error)]
+pub enum FileError {
+    /// A file does not follow its format.
+    #[error("{file}: {error}")]
+    Format {
+        /// The file, as the material names it.
+        file: String,
+        /// What is wrong.
+        error: FormatError,
+    },
+    /// The file was read, but says something impossible.
+    #[error("{file}: {error}")]
+    Material {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        error: MaterialError,
+    },
+    /// A curve's file cannot be had.
+    #[error(
+        "{file}: curve `{curve}`: cannot read {csv}: {reason}; put the CSV beside material.toml"
+    )]
+    Curve {
+        /// The material file.
+        file: String,
+        /// Name of the curve.
+        curve: String,
+        /// The CSV that it names.
+        csv: String,
+        /// Why it cannot be had.
+        reason: String,
+    },
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MaterialFile {
+    slug: Slug,
+    name: String,
+    class: String,
+    #[serde(default)]
+    description: String,
+    licence: String,
+    #[serde(default)]
+    tags: Vec<String>,
+    frequency_ghz: [f64; 2],
+    theta_deg: [f64; 2],
+    render: String,
+    source: Vec<SourceFile>,
+    #[serde(default)]
+    instrument: Vec<InstrumentFile>,
+    #[serde(default)]
+    curve: Vec<CurveFile>,
+    #[serde(default)]
+    fit: Vec<FitFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SourceFile {
+    key: String,
+    kind: SourceKind,
+    title: String,
+    doi: Option<String>,
+    url: Option<String>,
+    licence: Option<String>,
+    note: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct InstrumentFile {
+    key: String,
+    name: String,
+    centre_frequency_ghz: f64,
+    bandwidth_ghz: Option<f64>,
+    polarisation: Option<String>,
+    note: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CurveFile {
+    name: String,
+    source: String,
+    instrument: Option<String>,
+    file: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FitFile {
+    name: String,
+    #[serde(default = "stated")]
+    estimator: String,
+    curve: Option<String>,
+    source: String,
+    scattering: Brdf,
+    #[serde(default)]
+    parameter_source: BTreeMap<String, String>,
+    covariance: Option<CovarianceFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CovarianceFile {
+    parameters: Vec<String>,
+    matrix: Vec<Vec<f64>>,
+}
+
+fn stated() -> String {
+    "stated".to_owned()
+}
+
+/// Reads a material file; `read_csv` fetches a curve's file by the name the material gives it.
+///
+/// `file` is only the name that errors show.
+pub fn parse(
+    file: &str,
+    text: &str,
+    read_csv: impl Fn(&str) -> Result<Vec<u8>, String>,
+) -> Result<Material, FileError> {
+    let format = |error| FileError::Format { file: file.to_owned(), error };
+    let toml: MaterialFile = from_toml(text).map_err(format)?;
+    let curve = |entry: CurveFile| {
+        let bytes = read_csv(&entry.file).map_err(|reason| FileError::Curve {
+            file: file.to_owned(),
+            curve: entry.name.clone(),
+            csv: entry.file.clone(),
+            reason,
+        })?;
+        let observations = observations(&bytes)
+            .map_err(|error| FileError::Format { file: entry.file.clone(), error })?;
+        let CurveFile { name, source, instrument, .. } = entry;
+        Ok(Curve { name, source, instrument, observations })
+    };
+    let material = Material {
+        slug: toml.slug,
+        name: toml.name,
+        class: toml.class,
+        description: toml.description.trim().to_owned(),
+        licence: toml.licence,
+        tags: toml.tags,
+        frequency_hz: toml.frequency_ghz.map(|f| f * 1e9),
+        theta_rad: toml.theta_deg.map(f64::to_radians),
+        render: toml.render,
+        sources: toml.source.into_iter().map(Source::from).collect(),
+        instruments: toml.instrument.into_iter().map(Instrument::from).collect(),
+        curves: toml.curve.into_iter().map(curve).collect::<Result<_, FileError>>()?,
+        fits: toml.fit.into_iter().map(Fit::from).collect(),
+    };
+    let refuse = |error| FileError::Material { file: file.to_owned(), error };
+    material.validate().map_err(refuse)?;
+    Ok(material)
+}
+
+impl From<SourceFile> for Source {
+    fn from(entry: SourceFile) -> Source {
+        let SourceFile { key, kind, title, doi, url, licence, note } = entry;
+        Source { key, kind, title, doi, url, licence, note }
+    }
+}
+
+impl From<InstrumentFile> for Instrument {
+    fn from(entry: InstrumentFile) -> Instrument {
+        Instrument {
+            key: entry.key,
+            name: entry.name,
+            centre_frequency_hz: entry.centre_frequency_ghz * 1e9,
+            bandwidth_hz: entry.bandwidth_ghz.map(|f| f * 1e9),
+            polarisation: entry.polarisation,
+            note: entry.note,
+        }
+    }
+}
+
+impl From<FitFile> for Fit {
+    fn from(entry: FitFile) -> Fit {
+        Fit {
+            name: entry.name,
+            model: entry.scattering,
+            estimator: entry.estimator,
+            curve: entry.curve,
+            source: entry.source,
+            parameter_sources: entry.parameter_source.into_iter().collect(),
+            covariance: entry
+                .covariance
+                .map(|CovarianceFile { parameters, matrix }| Covariance { parameters, matrix }),
+        }
+    }
+}
+
+/// Reads a curve's CSV.
+pub fn observations(bytes: &[u8]) -> Result<Vec<Observation>, FormatError> {
+    let optional = ["censor", "threshold_db", "theta_r_deg", "delta_phi_deg"];
+    let table = Table::read(bytes, &["theta_deg", "sigma0_db"], &optional)?;
+    (0..table.len()).map(|row| observation(&table, row)).collect()
+}
+
+fn observation(table: &Table, row: usize) -> Result<Observation, FormatError> {
+    let theta_i_deg = table.required_number(row, "theta_deg")?;
+    let theta_r_deg = table.number(row, "theta_r_deg")?.unwrap_or(theta_i_deg);
+    let delta_phi_deg = table.number(row, "delta_phi_deg")?.unwrap_or(0.0);
+    let censor = match table.cell(row, "censor") {
+        None => Censor::None,
+        Some(cell) => match cell.text {
+            "none" => Censor::None,
+            "left" => Censor::Left,
+            "right" => Censor::Right,
+            _ => return Err(cell.refuse("write none, left or right")),
+        },
+    };
+    Ok(Observation {
+        theta_i_rad: theta_i_deg.to_radians(),
+        theta_r_rad: theta_r_deg.to_radians(),
+        delta_phi_rad: delta_phi_deg.to_radians(),
+        sigma0: table.number(row, "sigma0_db")?.map(ratio_from_db),
+        censor,
+        threshold_sigma0: table.number(row, "threshold_db")?.map(ratio_from_db),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::Scattering;
+
+    const CURVE: &str =
+        "theta_deg,sigma0_db,censor,threshold_db\n0,5,none,-30\n20,-10,,-30\n60,,left,-30\n";
+
+    fn toml(render: &str) -> String {
+        format!(
+            r#"
+slug = "sample"
+name = "Sample"
+class = "paint"
+licence = "CC0-1.0"
+frequency_ghz = [290, 310]
+theta_deg = [0, 80]
+render = "{render}"
+[[source]]
+key = "bench"
+kind = "measured"
+title = "Our bench"
+[[curve]]
+name = "scan"
+source = "bench"
+file = "scan.csv"
+[[fit]]
+name = "lambert"
+source = "bench"
+scattering = {{ model = "lambert", albedo = 0.5 }}
+covariance = {{ parameters = ["albedo"], matrix = [[0.01]] }}
+"#
+        )
+    }
+
+    fn read(text: &str) -> Result<Material, FileError> {
+        parse("material.toml", text, |name| match name {
+            "scan.csv" => Ok(CURVE.as_bytes().to_vec()),
+            _ => Err("no such file".to_owned()),
+        })
+    }
+
+    fn refused(text: &str) -> String {
+        read(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_curve_is_a_material_without_a_fit() {
+        let material = read(&toml("scan")).unwrap();
+        let sigma0 = material.scattering().unwrap().sigma0(20f64.to_radians());
+        assert!((sigma0 - 0.1).abs() < 1e-12);
+        assert_eq!(material.curves[0].observations[2].censor, Censor::Left);
+        assert_eq!(material.render_kind(), Some(SourceKind::Measured));
+    }
+
+    #[test]
+    fn a_fit_is_rendered_by_name() {
+        let material = read(&toml("lambert")).unwrap();
+        assert!((material.scattering().unwrap().sigma0(0.0) - 2.0).abs() < 1e-12);
+        let covariance = material.fits[0].covariance.as_ref().unwrap();
+        assert!((covariance.standard_deviation("albedo").unwrap() - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_its_place() {
+        let base = toml("scan");
+        for (from, to, expected) in [
+            ("\"scan\"\n[[source]]", "\"scam\"\n[[source]]", "render refers to"),
+            ("scan.csv", "scam.csv", "cannot read scam.csv: no such file"),
+            ("albedo = 0.5", "albedo = 1.5", "albedo = 1.5 is out of range"),
+            ("albedo = 0.5", "albedo = nan", "albedo = NaN is out of range"),
+            ("[[0.01]]", "[[-0.01]]", "not a covariance"),
+            ("[[0.01]]", "[[0.01, 0.0]]", "not 1 × 1"),
+            ("class =", "clas =", "did you mean `class`?"),
+            ("kind = \"measured\"", "kind = \"guessed\"", "unknown value `guessed`"),
+            ("slug = \"sample\"", "slug = \"../x\"", "is not a material name"),
+            ("[290, 310]", "[310, 290]", "frequency_ghz"),
+            ("licence = \"CC0-1.0\"", "licence = \" \"", "licence: is empty"),
+            ("source = \"bench\"\nfile", "source = \"desk\"\nfile", "a source `desk`"),
+            ("name = \"lambert\"", "name = \"scan\"", "`scan` is defined twice"),
+        ] {
+            assert!(base.contains(from), "{from}");
+            let message = refused(&base.replacen(from, to, 1));
+            assert!(message.contains(expected), "{message}");
+            assert!(message.contains("material.toml"), "{message}");
+        }
+    }
+
+    #[test]
+    fn the_hash_sees_every_change() {
+        let material = read(&toml("scan")).unwrap();
+        let mut other = material.clone();
+        assert_eq!(material.content_hash(), other.content_hash());
+        other.curves[0].observations[0].theta_i_rad += 1e-9;
+        assert_ne!(material.content_hash(), other.content_hash());
+    }
+}
