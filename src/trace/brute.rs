@@ -1,0 +1,40 @@
+//! The oracle: Möller–Trumbore (J. Graphics Tools 2 (1997) 21) in f64 over all facets, the paper's
+//! own method. Slow, obvious, and the judge of every faster tracer.
+
+use super::Hit;
+use super::facet::measured;
+use crate::frames::{Global, Ray};
+use crate::geometry::Mesh;
+
+/// The closest hit of one ray; of equally near facets the one with the smallest number.
+pub fn closest(mesh: &Mesh, ray: &Ray<Global>) -> Option<Hit> {
+    let mut best: Option<Hit> = None;
+    for facet in 0..mesh.facets.len() {
+        if mesh.is_degenerate(facet) {
+            continue;
+        }
+        if let Some(range_m) = intersect(mesh, facet, ray)
+            && best.is_none_or(|hit| range_m < hit.range_m)
+        {
+            best = Some(measured(mesh, facet as u32, ray, range_m));
+        }
+    }
+    best
+}
+
+/// Distance along the ray to the facet, m.
+fn intersect(mesh: &Mesh, facet: usize, ray: &Ray<Global>) -> Option<f64> {
+    let [a, b, c] = mesh.corners(facet);
+    let (ab, ac, direction) = (b - a, c - a, ray.direction.xyz());
+    let p = direction.cross(ac);
+    let determinant = ab.dot(p);
+    if determinant == 0.0 {
+        return None;
+    }
+    let from_a = ray.origin.xyz - a;
+    let q = from_a.cross(ab);
+    let u = from_a.dot(p) / determinant;
+    let v = direction.dot(q) / determinant;
+    let t = ac.dot(q) / determinant;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some(t)
+}

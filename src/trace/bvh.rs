@@ -1,0 +1,204 @@
+//! Bounding volume hierarchy by `obvhs`: boxes in f32, the decision in f64.
+//!
+//! The library's own triangle tests lose rays on shared edges; ours is in `facet.rs`.
+
+use std::time::Duration;
+
+use glam::{DVec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+use obvhs::ray::{Ray as BoxRay, RayHit};
+
+use super::Hit;
+use super::facet::{crossing_m, measured};
+use crate::frames::{Global, Ray};
+use crate::geometry::Mesh;
+
+/// Boxes are grown by this share of the mesh's radius, some eighty times the rounding of f32.
+const PADDING: f64 = 1e-5;
+
+/// A hierarchy over one mesh.
+pub struct Bvh<'a> {
+    mesh: &'a Mesh,
+    boxes: Bvh2,
+    /// Facet of each leaf entry.
+    facets: Vec<u32>,
+    centre: DVec3,
+    radius_m: f64,
+}
+
+impl<'a> Bvh<'a> {
+    /// Builds the hierarchy over all facets that have an area.
+    pub fn new(mesh: &'a Mesh) -> Bvh<'a> {
+        let (centre, radius_m) = bounding_sphere(mesh);
+        let live: Vec<u32> =
+            (0..mesh.facets.len()).filter(|&f| !mesh.is_degenerate(f)).map(|f| f as u32).collect();
+        let padding = Vec3A::splat((PADDING * radius_m) as f32);
+        let boxes: Vec<Aabb> = live
+            .iter()
+            .map(|&facet| {
+                let corners = mesh.corners(facet as usize).map(|c| (c - centre).as_vec3a());
+                let tight = Aabb::from_points(&corners);
+                Aabb::new(tight.min - padding, tight.max + padding)
+            })
+            .collect();
+        let boxes = build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Duration::default());
+        let facets = boxes.primitive_indices.iter().map(|&entry| live[entry as usize]).collect();
+        Bvh { mesh, boxes, facets, centre, radius_m }
+    }
+
+    /// The closest hit of one ray; of equally near facets the one with the smallest number.
+    pub fn closest(&self, ray: &Ray<Global>) -> Option<Hit> {
+        let start_m = self.entry_m(ray)?;
+        let origin = ray.origin.xyz + start_m * ray.direction.xyz() - self.centre;
+        let box_ray = BoxRay::new_inf(origin.as_vec3a(), ray.direction.xyz().as_vec3a());
+        let mut best: Option<(f64, u32)> = None;
+        self.boxes.ray_traverse(box_ray, &mut RayHit::none(), |_, entry| {
+            let facet = self.facets[entry];
+            if let Some(range_m) = crossing_m(self.mesh, facet as usize, ray)
+                && best.is_none_or(|nearest| (range_m, facet) < nearest)
+            {
+                best = Some((range_m, facet));
+            }
+            // Later boxes are skipped only when they are farther by more than f32 can blur.
+            best.map_or(f32::INFINITY, |(range_m, _)| {
+                (range_m - start_m + 2.0 * PADDING * self.radius_m) as f32
+            })
+        });
+        best.map(|(range_m, facet)| measured(self.mesh, facet, ray, range_m))
+    }
+
+    /// Distance at which the ray reaches the sphere around the mesh, m; f32 is precise from there.
+    fn entry_m(&self, ray: &Ray<Global>) -> Option<f64> {
+        let to_centre = self.centre - ray.origin.xyz;
+        let along_m = to_centre.dot(ray.direction.xyz());
+        let beside2 = (to_centre - along_m * ray.direction.xyz()).length_squared();
+        let radius_m = self.radius_m * (1.0 + PADDING);
+        let half_chord_m = (radius_m * radius_m - beside2).max(0.0).sqrt();
+        let reached = beside2 <= radius_m * radius_m && along_m + half_chord_m > 0.0;
+        reached.then(|| (along_m - half_chord_m).max(0.0))
+    }
+}
+
+fn bounding_sphere(mesh: &Mesh) -> (DVec3, f64) {
+    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for &vertex in &mesh.vertices {
+        min = min.min(vertex);
+        max = max.max(vertex);
+    }
+    let centre = 0.5 * (min + max);
+    let radius_m = mesh.vertices.iter().map(|v| v.distance(centre)).fold(0.0, f64::max);
+    (centre, radius_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::Point;
+    use crate::trace::brute;
+    use proptest::prelude::*;
+
+    fn plate() -> Mesh {
+        Mesh {
+            vertices: [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+                .map(|(x, y)| DVec3::new(x, y, 0.0))
+                .to_vec(),
+            facets: vec![[0, 1, 2], [0, 2, 3]],
+            labels: vec![],
+        }
+    }
+
+    fn ray(origin: DVec3, through: DVec3) -> Ray<Global> {
+        let origin = Point::from(origin);
+        Ray { origin, direction: origin.towards(through.into()).unwrap() }
+    }
+
+    #[test]
+    fn no_ray_slips_through_a_diagonal() {
+        let mesh = plate();
+        let bvh = Bvh::new(&mesh);
+        let origin = DVec3::new(0.3, -0.2, 8.0);
+        for step in 0..=10_000 {
+            let s = f64::from(step) / 5_000.0 - 1.0;
+            let hit = bvh.closest(&ray(origin, DVec3::new(s, s, 0.0)));
+            assert!(hit.is_some_and(|hit| hit.point.xyz.z.abs() < 1e-12), "{s}");
+        }
+    }
+
+    #[test]
+    fn angles_and_ranges_are_those_of_the_plane() {
+        let mesh = plate();
+        let hit = Bvh::new(&mesh).closest(&ray(DVec3::new(0.0, 0.0, 3.0), DVec3::X)).unwrap();
+        assert!((hit.range_m - 10f64.sqrt()).abs() < 1e-14);
+        assert!((hit.theta_rad() - (1.0f64 / 3.0).atan()).abs() < 1e-14);
+    }
+
+    #[test]
+    fn facets_behind_without_area_or_out_of_reach_are_not_hit() {
+        let mut mesh = plate();
+        mesh.facets.push([0, 0, 2]);
+        let bvh = Bvh::new(&mesh);
+        assert!(bvh.closest(&ray(DVec3::Z, 2.0 * DVec3::Z)).is_none());
+        assert!(bvh.closest(&ray(DVec3::Z, DVec3::new(9.0, 0.0, 0.0))).is_none());
+        // Along the plate: parallel to both facets.
+        assert!(bvh.closest(&ray(DVec3::new(-3.0, 0.0, 0.0), DVec3::ZERO)).is_none());
+    }
+
+    #[test]
+    fn from_inside_a_box_the_nearer_wall_is_hit() {
+        let mut mesh = plate();
+        let back = Mesh {
+            vertices: mesh.vertices.iter().map(|v| *v + 4.0 * DVec3::Z).collect(),
+            ..plate()
+        };
+        mesh.append(&back);
+        let hit = Bvh::new(&mesh).closest(&ray(DVec3::new(0.1, 0.2, 3.0), DVec3::ZERO)).unwrap();
+        assert!(hit.facet < 2 && hit.range_m < 3.1);
+    }
+
+    prop_compose! {
+        fn soup()(
+            corners in prop::collection::vec(prop::array::uniform3(-1.0f64..1.0), 3..90),
+            picks in prop::collection::vec(prop::array::uniform3(0usize..90), 1..60),
+        ) -> Mesh {
+            let n = corners.len();
+            Mesh {
+                vertices: corners.into_iter().map(DVec3::from).collect(),
+                facets: picks.into_iter().map(|p| p.map(|i| (i % n) as u32)).collect(),
+                labels: vec![],
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_hierarchy_agrees_with_the_naive_loop(
+            mesh in soup(),
+            // Within a facet: exactly on an outer edge the two may round to different sides.
+            aims in prop::collection::vec((0usize..60, 0.01f64..0.49, 0.01f64..0.49), 20),
+            far in 2.0f64..20.0,
+        ) {
+            let bvh = Bvh::new(&mesh);
+            let origin = DVec3::new(0.4, 0.3, far);
+            for (facet, u, v) in aims {
+                let facet = facet % mesh.facets.len();
+                if mesh.is_degenerate(facet) {
+                    continue;
+                }
+                let [a, b, c] = mesh.corners(facet);
+                let aim = ray(origin, a + u * (b - a) + v * (c - a));
+                match (bvh.closest(&aim), brute::closest(&mesh, &aim)) {
+                    (None, None) => {}
+                    (Some(fast), Some(slow)) => prop_assert!(
+                        fast.facet == slow.facet
+                            || (fast.range_m - slow.range_m).abs() < 1e-9 * slow.range_m,
+                        "{fast:?} {slow:?}"
+                    ),
+                    other => prop_assert!(false, "{other:?}"),
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! Closest hits of rays on a mesh.
+//!
+//! [`Bvh`] finds facets with boxes in f32 and decides and measures in f64; [`brute`] is the naive
+//! loop that judges it. Both take any mesh that passes [`Mesh::validate`]; facets without area are
+//! never hit.
+
+pub mod brute;
+mod bvh;
+mod facet;
+
+use rayon::prelude::*;
+
+use crate::frames::{Global, Point, Ray};
+use crate::geometry::Mesh;
+
+pub use bvh::Bvh;
+
+/// Where a ray meets a facet, in f64.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Facet number in the mesh.
+    pub facet: u32,
+    /// Distance from the ray's origin R, m.
+    pub range_m: f64,
+    /// Where it is.
+    pub point: Point<Global>,
+    /// Cosine of the angle between the reversed ray and the facet's normal turned to the radar.
+    pub cos_theta: f64,
+}
+
+impl Hit {
+    /// Incidence angle θ, rad.
+    pub fn theta_rad(&self) -> f64 {
+        self.cos_theta.min(1.0).acos()
+    }
+}
+
+/// The closest hit of every ray, in order, on all cores. `done` is told how many rays are finished.
+///
+/// The result does not depend on the number of threads.
+pub fn closest_hits(
+    mesh: &Mesh,
+    rays: &[Ray<Global>],
+    done: &(dyn Fn(usize) + Sync),
+) -> Vec<Option<Hit>> {
+    const RAYS_PER_TASK: usize = 1024;
+    let bvh = Bvh::new(mesh);
+    rays.par_chunks(RAYS_PER_TASK)
+        .flat_map_iter(|chunk| {
+            let hits: Vec<_> = chunk.iter().map(|ray| bvh.closest(ray)).collect();
+            done(chunk.len());
+            hits
+        })
+        .collect()
+}
