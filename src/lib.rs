@@ -11,4 +11,5 @@ pub mod brdf;
 pub mod radar;
 pub mod formats;
 pub mod material;
+pub mod scene;
 pub mod trace;

@@ -1,0 +1,4 @@
+//! What the radar looks at.
+
+pub mod mannequin;
+pub mod solids;
