@@ -4,6 +4,11 @@
 //! [`FormatError`] that says where and how to mend it. No reader allocates more than a small
 //! multiple of the bytes it was given, whatever a header claims.
 
+pub mod axis;
+pub mod drawing;
+pub mod exr;
+pub mod figure;
+
 use thiserror::Error;
 
 /// Why a file's bytes could not be read.
