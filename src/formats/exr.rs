@@ -1,0 +1,353 @@
+//! OpenEXR: a raster's channels as 32-bit floats, with where they lie and in which units.
+//!
+//! One layer, ZIP in blocks of 16 lines, NaN kept. The grid is in the attributes `pixelSizeM`,
+//! `xMinM` and `yMinM` (double, m) and a channel's unit in `<channel>.unit`. The same raster
+//! gives the same bytes on every run and any number of threads.
+
+use std::collections::HashMap;
+use std::io::Cursor;
+
+use exr::error::Error;
+use exr::image::read::image::ReadLayers;
+use exr::image::read::layers::ReadChannels;
+use exr::image::write::WritableImage;
+use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
+use exr::meta::MetaData;
+use exr::meta::attribute::{AttributeValue, Text};
+use exr::meta::header::LayerAttributes;
+use thiserror::Error;
+
+use super::FormatError;
+use crate::geometry::raster::{Channel, Raster};
+
+/// How many bytes of pixels one byte of a file may unfold to; deflate stays below 1032.
+const MAX_UNFOLDING: usize = 2048;
+
+/// The endings of channel names that tell a unit, and the unit.
+const UNITS: [(&str, &str); 9] = [
+    ("_dbm", "dBm"),
+    ("_db", "dB"),
+    ("_w", "W"),
+    ("_m", "m"),
+    ("_mm", "mm"),
+    ("_deg", "deg"),
+    ("_rad", "rad"),
+    ("_m2", "m^2"),
+    ("_s", "s"),
+];
+
+/// What a caller adds to a file under a name of its own.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Attribute {
+    /// Text, UTF-8.
+    Text(String),
+    /// A number; its name should tell the unit.
+    Number(f64),
+}
+
+/// Why a raster could not be written as OpenEXR.
+#[derive(Debug, Error)]
+pub enum ExrError {
+    /// A channel has more or fewer values than the raster has pixels.
+    #[error(
+        "write channel {channel:?} of {values} values as {width} × {height} pixels: \
+         give one value per pixel"
+    )]
+    Length {
+        /// The channel's name.
+        channel: String,
+        /// Values in it.
+        values: usize,
+        /// Columns of the raster.
+        width: usize,
+        /// Rows of the raster.
+        height: usize,
+    },
+    /// Two channels or two attributes have one name, or a name is empty or not plain ASCII.
+    #[error("write {name:?} to OpenEXR: names are unique, of 1 to 255 printable ASCII characters")]
+    Name {
+        /// The name.
+        name: String,
+    },
+    /// The encoder refused.
+    #[error("write OpenEXR: {0}")]
+    Encode(#[from] Error),
+}
+
+/// The bytes of an OpenEXR file with all channels of a raster, in alphabetical order, and the
+/// caller's attributes.
+pub fn write(raster: &Raster, attributes: &[(String, Attribute)]) -> Result<Vec<u8>, ExrError> {
+    let layer_attributes = LayerAttributes {
+        software_name: Some(text(concat!("matdb ", env!("CARGO_PKG_VERSION")))),
+        other: named_attributes(raster, attributes)?,
+        ..LayerAttributes::default()
+    };
+    let channels = AnyChannels::sort(samples(raster)?.into_iter().collect());
+    let size = (raster.width, raster.height);
+    let layer = Layer::new(size, layer_attributes, Encoding::SMALL_LOSSLESS, channels);
+    let mut file = Cursor::new(Vec::new());
+    Image::from_layer(layer).write().to_buffered(&mut file)?;
+    Ok(with_sorted_header(file.into_inner()))
+}
+
+/// The raster in an OpenEXR file: its first layer, as written by [`write()`] or by any tool that
+/// keeps the grid's three attributes. Channels come in alphabetical order.
+pub fn read(bytes: &[u8]) -> Result<Raster, FormatError> {
+    check_size(bytes)?;
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .pedantic()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(malformed)?;
+    let layer = image.layer_data;
+    let number = |name| grid_number(name, [&layer.attributes.other, &image.attributes.other]);
+    let (pixel_m, x_min_m, y_min_m) = (number("pixelSizeM")?, number("xMinM")?, number("yMinM")?);
+    let channels = layer.channel_data.list.iter().map(channel).collect();
+    Ok(Raster { width: layer.size.0, height: layer.size.1, x_min_m, y_min_m, pixel_m, channels })
+}
+
+fn samples(raster: &Raster) -> Result<Vec<AnyChannel<FlatSamples>>, ExrError> {
+    let Raster { width, height, ref channels, .. } = *raster;
+    let mut samples: Vec<AnyChannel<FlatSamples>> = Vec::new();
+    for Channel { name, values } in channels {
+        if width.checked_mul(height) != Some(values.len()) {
+            let (channel, values) = (name.clone(), values.len());
+            return Err(ExrError::Length { channel, values, width, height });
+        }
+        let exr_name = checked_name(name)?;
+        if samples.iter().any(|earlier| earlier.name == exr_name) {
+            return Err(ExrError::Name { name: name.clone() });
+        }
+        samples.push(AnyChannel::new(exr_name, FlatSamples::F32(values.clone())));
+    }
+    Ok(samples)
+}
+
+fn named_attributes(
+    raster: &Raster,
+    attributes: &[(String, Attribute)],
+) -> Result<HashMap<Text, AttributeValue>, ExrError> {
+    let grid =
+        [("pixelSizeM", raster.pixel_m), ("xMinM", raster.x_min_m), ("yMinM", raster.y_min_m)];
+    let grid = grid.map(|(name, value)| (name.to_owned(), AttributeValue::F64(value)));
+    let units = raster.channels.iter().filter_map(|channel| {
+        let unit = AttributeValue::Text(text(unit_of(&channel.name)?));
+        Some((format!("{}.unit", channel.name), unit))
+    });
+    let own = attributes.iter().map(|(name, value)| {
+        let value = match value {
+            Attribute::Text(value) => AttributeValue::Text(text(value)),
+            Attribute::Number(value) => AttributeValue::F64(*value),
+        };
+        (name.clone(), value)
+    });
+    let mut named = HashMap::new();
+    for (name, value) in grid.into_iter().chain(units).chain(own) {
+        if named.insert(checked_name(&name)?, value).is_some() {
+            return Err(ExrError::Name { name });
+        }
+    }
+    Ok(named)
+}
+
+fn unit_of(channel: &str) -> Option<&'static str> {
+    UNITS.iter().find(|(ending, _)| channel.ends_with(ending)).map(|&(_, unit)| unit)
+}
+
+fn checked_name(name: &str) -> Result<Text, ExrError> {
+    let printable = name.bytes().all(|byte| byte.is_ascii_graphic() || byte == b' ');
+    if printable && (1..=255).contains(&name.len()) {
+        return Ok(text(name));
+    }
+    Err(ExrError::Name { name: name.into() })
+}
+
+fn text(text: &str) -> Text {
+    Text::from_slice_unchecked(text.as_bytes())
+}
+
+/// The file with its attributes in alphabetical order; the encoder's own order changes from run
+/// to run. No length changes, so every offset in the file stays true.
+fn with_sorted_header(mut file: Vec<u8>) -> Vec<u8> {
+    const MAGIC_AND_VERSION: usize = 8;
+    let mut attributes = Vec::new();
+    let mut start = MAGIC_AND_VERSION;
+    while let Some(length) = attribute_length(&file[start..]) {
+        attributes.push(file[start..start + length].to_vec());
+        start += length;
+    }
+    attributes.sort();
+    file.splice(MAGIC_AND_VERSION..start, attributes.concat());
+    file
+}
+
+/// Bytes of the attribute at the start of a header: name, 0, type, 0, size, value.
+fn attribute_length(header: &[u8]) -> Option<usize> {
+    let name = header.iter().position(|&byte| byte == 0).filter(|&length| length > 0)?;
+    let kind = header.get(name + 1..)?.iter().position(|&byte| byte == 0)?;
+    let value = name + kind + 2;
+    let size = u32::from_le_bytes(header.get(value..value + 4)?.try_into().ok()?) as usize;
+    Some(value + 4 + size).filter(|&length| length <= header.len())
+}
+
+/// Refuses a file whose header claims more pixels than its bytes could hold.
+fn check_size(bytes: &[u8]) -> Result<(), FormatError> {
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), true).map_err(malformed)?;
+    for header in &meta.headers {
+        let (width, height) = (header.layer_size.0, header.layer_size.1);
+        let pixel_bytes = header.channels.bytes_per_pixel;
+        let claimed = width.checked_mul(height).and_then(|n| n.checked_mul(pixel_bytes.max(1)));
+        if claimed.is_none_or(|claimed| claimed > bytes.len().saturating_mul(MAX_UNFOLDING)) {
+            return Err(FormatError::at(
+                "header",
+                format!("{width} × {height} pixels cannot be in {} bytes", bytes.len()),
+                "get the whole file again",
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn malformed(error: Error) -> FormatError {
+    FormatError::at("OpenEXR", error.to_string(), "export it again as one flat layer")
+}
+
+fn grid_number(
+    name: &str,
+    places: [&HashMap<Text, AttributeValue>; 2],
+) -> Result<f64, FormatError> {
+    match places.iter().find_map(|attributes| attributes.get(&text(name))) {
+        Some(&AttributeValue::F64(value)) => Ok(value),
+        Some(&AttributeValue::F32(value)) => Ok(value.into()),
+        _ => Err(FormatError::at(
+            format!("attribute {name}"),
+            "it is missing or not a number",
+            "add it as a double, in metres",
+        )),
+    }
+}
+
+fn channel(channel: &AnyChannel<FlatSamples>) -> Channel {
+    let values = match &channel.sample_data {
+        FlatSamples::F32(values) => values.clone(),
+        FlatSamples::F16(values) => values.iter().map(|value| value.to_f32()).collect(),
+        FlatSamples::U32(values) => values.iter().map(|&value| value as f32).collect(),
+    };
+    Channel { name: channel.name.to_string(), values }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn raster(width: usize, height: usize) -> Raster {
+        let value = |i: usize| if i % 7 == 3 { f32::NAN } else { (i as f32).sin() * 1e-9 - 40.0 };
+        let channel = |name: &str| Channel {
+            name: name.into(),
+            values: (0..width * height).map(value).collect(),
+        };
+        let channels = vec![channel("incidence_deg"), channel("power_dbm"), channel("range_m")];
+        Raster { width, height, x_min_m: -0.25, y_min_m: -0.45, pixel_m: 0.004, channels }
+    }
+
+    fn notes() -> Vec<(String, Attribute)> {
+        vec![
+            ("scene".into(), Attribute::Text("plate at θ = 20°".into())),
+            ("seed".into(), Attribute::Number(7.0)),
+        ]
+    }
+
+    fn bits(raster: &Raster) -> Vec<Vec<u32>> {
+        let channel_bits = |c: &Channel| c.values.iter().map(|v| v.to_bits()).collect();
+        raster.channels.iter().map(channel_bits).collect()
+    }
+
+    #[test]
+    fn a_raster_returns_bit_by_bit() {
+        for (width, height) in [(125, 225), (1, 1), (33, 17)] {
+            let written = raster(width, height);
+            let read = read(&write(&written, &notes()).unwrap()).unwrap();
+            assert_eq!(bits(&read), bits(&written));
+            let without_values = |mut raster: Raster| {
+                raster.channels.iter_mut().for_each(|c| c.values.clear());
+                raster
+            };
+            assert_eq!(without_values(read), without_values(written));
+        }
+    }
+
+    #[test]
+    fn the_same_raster_gives_the_same_bytes() {
+        let bytes = || write(&raster(300, 500), &notes()).unwrap();
+        let first = bytes();
+        assert!((0..8).all(|_| bytes() == first));
+    }
+
+    #[test]
+    fn channels_are_written_in_alphabetical_order() {
+        let mut written = raster(4, 3);
+        written.channels.reverse();
+        let names = |r: &Raster| r.channels.iter().map(|c| c.name.clone()).collect::<Vec<_>>();
+        let read = read(&write(&written, &[]).unwrap()).unwrap();
+        assert_eq!(names(&read), ["incidence_deg", "power_dbm", "range_m"]);
+    }
+
+    #[test]
+    fn names_that_clash_or_cannot_be_written_are_refused() {
+        let refused = |name: &str| {
+            let note = (name.to_owned(), Attribute::Number(1.0));
+            write(&raster(2, 2), &[note]).is_err()
+        };
+        for name in ["pixelSizeM", "power_dbm.unit", "channels", "software", "", "θ", "a\0b"] {
+            assert!(refused(name), "{name:?}");
+        }
+        let mut twice = raster(2, 2);
+        twice.channels[0].name = "range_m".into();
+        assert!(matches!(write(&twice, &[]), Err(ExrError::Name { .. })));
+    }
+
+    #[test]
+    fn rasters_that_contradict_themselves_are_refused() {
+        let mut short = raster(3, 2);
+        short.channels[1].values.pop();
+        assert!(matches!(write(&short, &[]), Err(ExrError::Length { values: 5, .. })));
+        assert!(write(&Raster { channels: Vec::new(), ..raster(3, 2) }, &[]).is_err());
+        assert!(write(&raster(0, 0), &[]).is_err());
+    }
+
+    #[test]
+    fn a_uniform_raster_is_not_taken_for_a_lie() {
+        let mut uniform = raster(600, 600);
+        uniform.channels.iter_mut().for_each(|c| c.values.fill(f32::NAN));
+        assert!(read(&write(&uniform, &[]).unwrap()).is_ok());
+    }
+
+    #[test]
+    fn cut_or_altered_files_give_errors_or_rasters() {
+        let bytes = write(&raster(20, 40), &notes()).unwrap();
+        for length in 0..bytes.len() {
+            assert!(read(&bytes[..length]).is_err(), "cut at {length}");
+        }
+        for place in 0..bytes.len() {
+            for value in [0, 1, 0x7f, 0xff] {
+                let mut altered = bytes.clone();
+                altered[place] = value;
+                let _ = read(&altered);
+            }
+        }
+    }
+
+    #[test]
+    fn huge_claims_are_refused_before_memory_is_taken() {
+        let mut bytes = write(&raster(20, 40), &[]).unwrap();
+        let window = bytes.windows(10).position(|w| w == b"dataWindow").unwrap();
+        let x_max = window + b"dataWindow\0box2i\0".len() + 4 + 8;
+        bytes[x_max..x_max + 4].copy_from_slice(&0x0fff_ffff_u32.to_le_bytes());
+        let error = read(&bytes).unwrap_err().to_string();
+        assert!(error.contains("268435456 × 40"), "{error}");
+    }
+}
