@@ -11,3 +11,4 @@ pub mod brdf;
 pub mod radar;
 pub mod formats;
 pub mod material;
+pub mod store;
