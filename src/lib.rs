@@ -13,3 +13,7 @@ pub mod formats;
 pub mod material;
 pub mod scene;
 pub mod trace;
+pub mod render;
+pub mod store;
+pub mod error;
+pub mod cli;

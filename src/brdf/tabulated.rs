@@ -16,14 +16,15 @@ use crate::units::{db_from_ratio, ratio_from_db};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Columns", into = "Columns")]
 pub struct Tabulated {
+    /// As given: degrees to radians and back is not exact, and a curve must be written as it was read.
+    columns: Columns,
     theta_rad: Vec<f64>,
-    sigma0_db: Vec<f64>,
     /// dB per rad at each point.
     slope_db_per_rad: Vec<f64>,
 }
 
 /// The curve as files have it.
-#[derive(Clone, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Columns {
     theta_deg: Vec<f64>,
@@ -68,25 +69,10 @@ pub enum TabulatedError {
 impl Tabulated {
     /// A curve from (θ in rad, σ⁰ as a ratio) pairs with ascending θ within 0 to π/2.
     pub fn new(points: &[(f64, f64)]) -> Result<Tabulated, TabulatedError> {
-        if points.len() < 2 {
-            return Err(TabulatedError::TooFewPoints { points: points.len() });
-        }
-        let mut before = -f64::MIN_POSITIVE;
-        for (point, &(theta_rad, sigma0)) in points.iter().enumerate() {
-            // `!(a && b)` also refuses NaN.
-            if !(theta_rad > before && theta_rad <= std::f64::consts::FRAC_PI_2) {
-                let theta_deg = theta_rad.to_degrees();
-                return Err(TabulatedError::Angle { point, theta_deg });
-            }
-            if !(sigma0 > 0.0 && sigma0.is_finite()) {
-                return Err(TabulatedError::Level { point, sigma0 });
-            }
-            before = theta_rad;
-        }
-        let theta_rad: Vec<f64> = points.iter().map(|p| p.0).collect();
-        let sigma0_db: Vec<f64> = points.iter().map(|p| db_from_ratio(p.1)).collect();
-        let slope_db_per_rad = monotone_slopes(&theta_rad, &sigma0_db);
-        Ok(Tabulated { theta_rad, sigma0_db, slope_db_per_rad })
+        Tabulated::try_from(Columns {
+            theta_deg: points.iter().map(|p| p.0.to_degrees()).collect(),
+            sigma0_db: points.iter().map(|p| db_from_ratio(p.1)).collect(),
+        })
     }
 
     /// Smallest and largest tabulated angle, rad.
@@ -99,18 +85,18 @@ impl Tabulated {
         let last = self.theta_rad.len() - 1;
         let right = self.theta_rad.partition_point(|&t| t <= theta_rad);
         if right == 0 {
-            return self.sigma0_db[0];
+            return self.columns.sigma0_db[0];
         }
         if right > last {
-            return self.sigma0_db[last];
+            return self.columns.sigma0_db[last];
         }
         let left = right - 1;
         let width = self.theta_rad[right] - self.theta_rad[left];
         let t = (theta_rad - self.theta_rad[left]) / width;
         let (t2, t3) = (t * t, t * t * t);
-        (2.0 * t3 - 3.0 * t2 + 1.0) * self.sigma0_db[left]
+        (2.0 * t3 - 3.0 * t2 + 1.0) * self.columns.sigma0_db[left]
             + (t3 - 2.0 * t2 + t) * width * self.slope_db_per_rad[left]
-            + (3.0 * t2 - 2.0 * t3) * self.sigma0_db[right]
+            + (3.0 * t2 - 2.0 * t3) * self.columns.sigma0_db[right]
             + (t3 - t2) * width * self.slope_db_per_rad[right]
     }
 }
@@ -125,23 +111,42 @@ impl Scattering for Tabulated {
 impl TryFrom<Columns> for Tabulated {
     type Error = TabulatedError;
     fn try_from(columns: Columns) -> Result<Tabulated, TabulatedError> {
-        let (theta, sigma0) = (columns.theta_deg.len(), columns.sigma0_db.len());
-        if theta != sigma0 {
-            return Err(TabulatedError::Unequal { theta, sigma0 });
-        }
-        let points: Vec<(f64, f64)> = std::iter::zip(columns.theta_deg, columns.sigma0_db)
-            .map(|(theta_deg, level_db)| (theta_deg.to_radians(), ratio_from_db(level_db)))
-            .collect();
-        Tabulated::new(&points)
+        columns.validate()?;
+        let theta_rad: Vec<f64> = columns.theta_deg.iter().map(|t| t.to_radians()).collect();
+        let slope_db_per_rad = monotone_slopes(&theta_rad, &columns.sigma0_db);
+        Ok(Tabulated { columns, theta_rad, slope_db_per_rad })
     }
 }
 
 impl From<Tabulated> for Columns {
     fn from(curve: Tabulated) -> Columns {
-        Columns {
-            theta_deg: curve.theta_rad.iter().map(|t| t.to_degrees()).collect(),
-            sigma0_db: curve.sigma0_db,
+        curve.columns
+    }
+}
+
+impl Columns {
+    fn validate(&self) -> Result<(), TabulatedError> {
+        let (points, sigma0) = (self.theta_deg.len(), self.sigma0_db.len());
+        if points != sigma0 {
+            return Err(TabulatedError::Unequal { theta: points, sigma0 });
         }
+        if points < 2 {
+            return Err(TabulatedError::TooFewPoints { points });
+        }
+        let mut before_rad = -f64::MIN_POSITIVE;
+        let pairs = std::iter::zip(&self.theta_deg, &self.sigma0_db);
+        for (point, (&theta_deg, &level_db)) in pairs.enumerate() {
+            let (theta_rad, sigma0) = (theta_deg.to_radians(), ratio_from_db(level_db));
+            // `!(a && b)` also refuses NaN.
+            if !(theta_rad > before_rad && theta_rad <= std::f64::consts::FRAC_PI_2) {
+                return Err(TabulatedError::Angle { point, theta_deg });
+            }
+            if !(sigma0 > 0.0 && sigma0.is_finite()) {
+                return Err(TabulatedError::Level { point, sigma0 });
+            }
+            before_rad = theta_rad;
+        }
+        Ok(())
     }
 }
 
@@ -206,6 +211,15 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn a_curve_is_written_exactly_as_it_was_read(
+            start in 0.0f64..0.5, step in 1e-3f64..0.5, levels in [1e-6f64..1e3, 1e-6f64..1e3],
+        ) {
+            let curve = Tabulated::new(&[(start, levels[0]), (start + step, levels[1])]).unwrap();
+            let back = serde_json::from_str(&serde_json::to_string(&curve).unwrap()).unwrap();
+            prop_assert_eq!(curve, back);
+        }
+
         #[test]
         fn the_curve_never_leaves_its_neighbours(
             levels in prop::collection::vec(-60.0f64..10.0, 3..12), at in 0.0f64..1.0,

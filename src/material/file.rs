@@ -314,6 +314,7 @@ covariance = {{ parameters = ["albedo"], matrix = [[0.01]] }}
             ("albedo = 0.5", "albedo = nan", "albedo = NaN is out of range"),
             ("[[0.01]]", "[[-0.01]]", "not a covariance"),
             ("[[0.01]]", "[[0.01, 0.0]]", "not 1 × 1"),
+            ("[\"albedo\"], matrix = [[0.01]]", "[], matrix = []", "names no parameter"),
             ("class =", "clas =", "did you mean `class`?"),
             ("kind = \"measured\"", "kind = \"guessed\"", "unknown value `guessed`"),
             ("slug = \"sample\"", "slug = \"../x\"", "is not a material name"),
@@ -334,6 +335,8 @@ covariance = {{ parameters = ["albedo"], matrix = [[0.01]] }}
         let material = read(&toml("scan")).unwrap();
         let mut other = material.clone();
         assert_eq!(material.content_hash(), other.content_hash());
+        other.curves[0].observations[0].delta_phi_rad = -0.0;
+        assert_eq!((material.content_hash(), &material), (other.content_hash(), &other));
         other.curves[0].observations[0].theta_i_rad += 1e-9;
         assert_ne!(material.content_hash(), other.content_hash());
     }

@@ -1,13 +1,16 @@
 //! A material as a plain value: what is known of it, from whom, and how it scatters.
 //!
-//! Inside are SI units, linear σ⁰ and radians. [`file`] reads and writes the form people edit;
+//! Inside are SI units, linear σ⁰ and radians. [`mod@file`] reads and writes the form people edit;
 //! [`builtin`] holds the catalogue that comes with the program.
 
 pub mod builtin;
 pub mod file;
 mod slug;
 
+use std::io;
+
 use serde::Serialize;
+use serde_json::ser::{CompactFormatter, Formatter, Serializer};
 use thiserror::Error;
 
 use crate::brdf::{Brdf, ParameterError, Tabulated, TabulatedError};
@@ -263,9 +266,13 @@ impl Material {
     }
 
     /// Hash of everything in the material: equal exactly when nothing differs.
+    ///
+    /// Databases keep it: a field added later must serialise to nothing while it is empty, or what
+    /// was stored before no longer matches its hash.
     pub fn content_hash(&self) -> String {
+        let mut json = Vec::new();
         // Serialising a tree of plain structs into memory has no way to fail.
-        let json = serde_json::to_vec(self).unwrap_or_default();
+        let _ = self.serialize(&mut Serializer::with_formatter(&mut json, OneZero));
         blake3::hash(&json).to_hex().to_string()
     }
 
@@ -351,6 +358,10 @@ impl Material {
                 return Err(self.dangling(&place, "a parameter", path, known));
             }
         }
+        if !fit.parameter_sources.is_sorted_by(|a, b| a.0 < b.0) {
+            let problem = "the sources of parameters are not sorted, or one is given twice";
+            return Err(value(&place, problem, "give each path once, in alphabetical order"));
+        }
         fit.covariance.as_ref().map_or(Ok(()), |covariance| covariance.validate(&place, &known))
     }
 
@@ -378,6 +389,18 @@ impl Material {
     }
 }
 
+/// Angles nearer than this, rad, differ by rounding only.
+const SAME_ANGLE_RAD: f64 = 1e-12;
+
+/// Writes −0 as 0: the two are equal, so they must hash alike.
+struct OneZero;
+
+impl Formatter for OneZero {
+    fn write_f64<W: ?Sized + io::Write>(&mut self, writer: &mut W, value: f64) -> io::Result<()> {
+        CompactFormatter.write_f64(writer, value + 0.0)
+    }
+}
+
 impl Curve {
     /// The curve as a scattering model: its backscatter points, sorted by angle, equal angles
     /// averaged in linear σ⁰. A censored point enters at its threshold, which bounds the true value.
@@ -393,7 +416,7 @@ impl Curve {
             .collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         let merged: Vec<(f64, f64)> = points
-            .chunk_by(|a, b| a.0 == b.0)
+            .chunk_by(|a, b| b.0 - a.0 < SAME_ANGLE_RAD)
             .map(|same| (same[0].0, same.iter().map(|p| p.1).sum::<f64>() / same.len() as f64))
             .collect();
         Tabulated::new(&merged)
@@ -449,6 +472,9 @@ impl Covariance {
     fn validate(&self, place: &str, known: &[String]) -> Result<(), MaterialError> {
         let n = self.parameters.len();
         let place = format!("{place}, covariance");
+        if n == 0 {
+            return Err(value(&place, "names no parameter", "name some or leave it out"));
+        }
         if let Some(stranger) = self.parameters.iter().find(|p| !known.contains(p)) {
             let problem = format!("`{stranger}` is not a parameter of the model");
             return Err(value(

@@ -69,6 +69,13 @@ impl Pattern {
         }
     }
 
+    /// Number of chirps N_r.
+    pub fn chirps(&self) -> usize {
+        match self {
+            Pattern::Elliptical(ellipse) => ellipse.chirps,
+        }
+    }
+
     pub(super) fn checks(&self) -> Vec<Check> {
         let Pattern::Elliptical(e) = self;
         vec![

@@ -1,4 +1,145 @@
-//! What the radar looks at.
+//! What the radar looks at: meshes, where they stand, and which facets are made of what.
 
+pub mod file;
 pub mod mannequin;
+pub mod regions;
 pub mod solids;
+mod target;
+
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use crate::formats::FormatError;
+use crate::geometry::mesh::MeshError;
+use crate::radar::{Radar, RadarError};
+
+pub use file::SceneFile;
+pub use regions::RegionError;
+pub use target::{MeshReport, Region, Target};
+
+/// A scene, ready to be rendered.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// Title for figures.
+    pub name: String,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// The instrument.
+    pub radar: Radar,
+    /// Side of an image pixel, m.
+    pub pixel_m: f64,
+    /// What stands in front of it.
+    pub target: Target,
+}
+
+/// Why a scene cannot be loaded.
+#[derive(Debug, Error)]
+pub enum SceneError {
+    /// A file that cannot be read.
+    #[error("cannot read {}: {reason}; check the path{hint}", file.display())]
+    Unreadable {
+        /// The file.
+        file: PathBuf,
+        /// What the system says.
+        reason: std::io::Error,
+        /// Where the path came from.
+        hint: &'static str,
+    },
+    /// The scene file does not follow its format.
+    #[error("{}: {error}", file.display())]
+    Format {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong.
+        error: FormatError,
+    },
+    /// The radar cannot exist.
+    #[error("{}: {error}", file.display())]
+    Radar {
+        /// The scene file.
+        file: PathBuf,
+        /// What is wrong.
+        error: RadarError,
+    },
+    /// Facets cannot be assigned.
+    #[error("{}: {error}", file.display())]
+    Region {
+        /// The scene file.
+        file: PathBuf,
+        /// What is wrong.
+        error: RegionError,
+    },
+    /// Something else in the scene file has no meaning.
+    #[error("{}: {place}: {problem}; {way_out}", file.display())]
+    Value {
+        /// The scene file.
+        file: PathBuf,
+        /// Where in it.
+        place: String,
+        /// What is wrong.
+        problem: String,
+        /// What to do.
+        way_out: String,
+    },
+    /// A mesh is too large, or has nothing to hit.
+    #[error("{}: {error}", file.display())]
+    Mesh {
+        /// The mesh file.
+        file: PathBuf,
+        /// What is wrong.
+        error: MeshError,
+    },
+}
+
+impl Scene {
+    /// Reads a scene file and every mesh it names.
+    pub fn load(path: &Path) -> Result<Scene, SceneError> {
+        let bytes = read(path, "")?;
+        let at = |error| SceneError::Format { file: path.to_owned(), error };
+        let text = std::str::from_utf8(&bytes).map_err(|error| {
+            let place = format!("byte {}", error.valid_up_to());
+            at(FormatError::at(place, "the text is not UTF-8", "save the file as UTF-8"))
+        })?;
+        Scene::resolve(SceneFile::parse(text).map_err(at)?, path)
+    }
+
+    /// Loads what a scene file describes; relative paths start from the folder of `path`.
+    pub fn resolve(file: SceneFile, path: &Path) -> Result<Scene, SceneError> {
+        file.radar
+            .validate()
+            .map_err(|error| SceneError::Radar { file: path.to_owned(), error })?;
+        let pixel_m = file.image.pixel_m.unwrap_or(file.radar.spot_diameter_m / 4.0);
+        check_pixel(pixel_m, &file.radar, path)?;
+        let name = match file.name.as_str() {
+            "" => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            name => name.to_owned(),
+        };
+        let target = Target::load(&file, path)?;
+        Ok(Scene { name, seed: file.seed, radar: file.radar, pixel_m, target })
+    }
+}
+
+/// A pixel must be positive and the image must fit into memory.
+fn check_pixel(pixel_m: f64, radar: &Radar, file: &Path) -> Result<(), SceneError> {
+    const LARGEST_IMAGE: f64 = 1e8;
+    let [width_m, height_m] = radar.scan.field_m();
+    let pixels = width_m / pixel_m * (height_m / pixel_m);
+    if pixel_m > 0.0 && pixels <= LARGEST_IMAGE {
+        return Ok(());
+    }
+    Err(SceneError::Value {
+        file: file.to_owned(),
+        place: "image.pixel_m".to_owned(),
+        problem: format!("{pixel_m} m does not give an image of 1 to 100 million pixels"),
+        way_out: format!("a quarter of the spot is {} m", radar.spot_diameter_m / 4.0),
+    })
+}
+
+fn read(path: &Path, hint: &'static str) -> Result<Vec<u8>, SceneError> {
+    std::fs::read(path).map_err(|reason| SceneError::Unreadable {
+        file: path.to_owned(),
+        reason,
+        hint,
+    })
+}

@@ -1,0 +1,102 @@
+//! `matdb add`.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::console::Console;
+use super::materials::unknown;
+use crate::error::Error;
+use crate::material::{Material, builtin, file};
+use crate::store::{Added, Store};
+
+/// Put materials into the database, built-in ones by name or your own from files
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb add mannequin-paint ptfe       two built-in materials
+  matdb add --all                      every built-in material
+  matdb add --from my-paint/           the folder's material.toml, or that of each subfolder
+  matdb add --from my-paint/material.toml")]
+#[command(group = clap::ArgGroup::new("what").required(true).multiple(true))]
+pub(super) struct Args {
+    /// Names of built-in materials
+    #[arg(group = "what")]
+    names: Vec<String>,
+    /// Every built-in material
+    #[arg(long, group = "what")]
+    all: bool,
+    /// A material.toml, or a folder with one or with subfolders that have one
+    #[arg(long, value_name = "FILE|DIR", group = "what")]
+    from: Vec<PathBuf>,
+}
+
+pub(super) fn run(args: &Args, db: &Path, console: &Console) -> Result<(), Error> {
+    let materials = wanted(args, db)?;
+    let mut store = Store::open(db)?;
+    let (mut lines, mut records) = (String::new(), Vec::new());
+    for (material, added) in std::iter::zip(&materials, store.add_all(&materials)?) {
+        let slug = &material.slug;
+        let (what, revision) = match added {
+            Added::New => ("added", 1),
+            Added::Revision(number) => ("revised", number),
+            Added::Unchanged(number) => ("unchanged", number),
+        };
+        lines += &format!("{what} {slug}, revision {revision}, in {}\n", db.display());
+        records.push(json!({ "slug": slug, "result": what, "revision": revision }));
+    }
+    console.result(&lines, &records)
+}
+
+/// Reads everything before anything is stored, so that one bad file changes nothing.
+fn wanted(args: &Args, db: &Path) -> Result<Vec<Material>, Error> {
+    let mut materials = Vec::new();
+    let all = builtin::names().map(str::to_owned).filter(|_| args.all);
+    for name in args.names.iter().cloned().chain(all) {
+        match builtin::get(&name) {
+            Some(material) => materials.push(material?),
+            None => {
+                let store = Store::open_existing(db)?;
+                return Err(unknown(store.as_ref(), &name, "")?);
+            }
+        }
+    }
+    for path in &args.from {
+        for file in material_files(path)? {
+            materials.push(read(&file)?);
+        }
+    }
+    Ok(materials)
+}
+
+/// The material files that a path means.
+fn material_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
+    const NAME: &str = "material.toml";
+    if !path.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    if path.join(NAME).exists() {
+        return Ok(vec![path.join(NAME)]);
+    }
+    let entries = std::fs::read_dir(path).map_err(|reason| unreadable(path, reason))?;
+    let mut files: Vec<PathBuf> =
+        entries.flatten().map(|e| e.path().join(NAME)).filter(|f| f.exists()).collect();
+    files.sort();
+    if files.is_empty() {
+        return Err(Error::Usage {
+            problem: format!("{} holds no {NAME}, nor does any folder in it", path.display()),
+            way_out: "give the folder of a material, such as materials/ptfe".to_owned(),
+        });
+    }
+    Ok(files)
+}
+
+fn read(path: &Path) -> Result<Material, Error> {
+    let text = std::fs::read_to_string(path).map_err(|reason| unreadable(path, reason))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let read_csv = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
+    Ok(file::parse(&path.display().to_string(), &text, read_csv)?)
+}
+
+fn unreadable(path: &Path, reason: std::io::Error) -> Error {
+    Error::Io { verb: "read", path: path.to_owned(), reason, way_out: "check the path" }
+}

@@ -1,0 +1,22 @@
+//! `matdb completions`.
+
+use clap::CommandFactory;
+use clap_complete::Shell;
+
+use super::console::{Console, write_out};
+use crate::error::Error;
+
+/// Print a completion script for a shell
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:
+  matdb completions bash > ~/.local/share/bash-completion/completions/matdb")]
+pub(super) struct Args {
+    /// The shell
+    shell: Shell,
+}
+
+pub(super) fn run(args: &Args, _console: &Console) -> Result<(), Error> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut super::Cli::command(), "matdb", &mut script);
+    write_out(&String::from_utf8_lossy(&script))
+}

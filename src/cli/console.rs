@@ -1,0 +1,69 @@
+//! What a command says, and to whom: results to standard output, the rest to standard error.
+
+use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+
+use crate::error::Error;
+
+/// How much a command says.
+pub(super) struct Console {
+    pub json: bool,
+    pub quiet: bool,
+    pub verbose: bool,
+}
+
+impl Console {
+    /// The result of a command: `text` for a person, `value` for a script.
+    pub fn result(&self, text: &str, value: &impl Serialize) -> Result<(), Error> {
+        if self.json {
+            // Our own records always serialise; a failure would be a defect worth seeing.
+            let json = serde_json::to_string_pretty(value).unwrap_or_else(|e| e.to_string());
+            return write_out(&format!("{json}\n"));
+        }
+        if self.quiet { Ok(()) } else { write_out(text) }
+    }
+
+    /// Something a person should know, though it is no error.
+    pub fn notice(&self, text: &str) {
+        if !self.quiet {
+            eprintln!("note: {text}");
+        }
+    }
+
+    /// Something only the curious want to know.
+    pub fn detail(&self, text: &str) {
+        if self.verbose && !self.quiet {
+            eprintln!("{text}");
+        }
+    }
+
+    /// A progress bar over `total` steps; invisible when standard error is no terminal.
+    pub fn progress(&self, what: &'static str, total: usize) -> ProgressBar {
+        let target = match self.quiet {
+            true => ProgressDrawTarget::hidden(),
+            false => ProgressDrawTarget::stderr(),
+        };
+        let style = ProgressStyle::with_template("{msg} {bar:32} {human_pos}/{human_len} {eta}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+        ProgressBar::with_draw_target(Some(total as u64), target)
+            .with_style(style)
+            .with_message(what)
+    }
+}
+
+/// Writes to standard output; a reader that has left, as `head` does, is no error.
+pub(super) fn write_out(text: &str) -> Result<(), Error> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(reason) if reason.kind() != ErrorKind::BrokenPipe => Err(Error::Io {
+            verb: "write",
+            path: PathBuf::from("standard output"),
+            reason,
+            way_out: "make room or redirect it elsewhere",
+        }),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,47 @@
+//! `matdb list`.
+
+use std::path::Path;
+
+use super::console::Console;
+use super::summary::table;
+use crate::error::Error;
+use crate::material::builtin;
+use crate::store::Store;
+
+/// List the materials in the database
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb list
+  matdb list --json | jq '.[].slug'")]
+pub(super) struct Args {}
+
+pub(super) fn run(db: &Path, console: &Console) -> Result<(), Error> {
+    let materials = match Store::open_existing(db)? {
+        Some(store) => store.list()?,
+        None => Vec::new(),
+    };
+    let missing: Vec<&str> =
+        builtin::names().filter(|name| !materials.iter().any(|m| m.slug.as_str() == *name)).collect();
+    let mut text = match materials.len() {
+        0 => format!("no material in {} yet\n", db.display()),
+        _ => table(
+            &["material", "rev", "kind", "class", "curves", "points", "fits", "name"],
+            materials.iter().map(|m| {
+                [
+                    m.slug.to_string(),
+                    m.revision.to_string(),
+                    m.render_kind.as_str().to_owned(),
+                    m.class.clone(),
+                    m.curves.to_string(),
+                    m.observations.to_string(),
+                    m.fits.to_string(),
+                    m.name.clone(),
+                ]
+            }),
+        ),
+    };
+    if !missing.is_empty() {
+        text += &format!("built in, not added: {}\n", missing.join(", "));
+    }
+    console.result(&text, &materials)
+}

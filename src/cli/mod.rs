@@ -1,0 +1,78 @@
+//! The command line: one command per file. Flags die here; the library takes plain values.
+
+mod add;
+mod completions;
+mod console;
+mod list;
+mod materials;
+mod output;
+mod record;
+mod render;
+mod rm;
+mod show;
+mod summary;
+
+use std::path::PathBuf;
+
+use clap::{ArgAction, Parser, Subcommand};
+
+use crate::error::Error;
+use console::Console;
+
+/// A material database and renderer for 300 GHz imaging radar.
+#[derive(Debug, Parser)]
+#[command(name = "matdb", version, arg_required_else_help = true, max_term_width = 100)]
+#[command(after_help = "Examples:
+  matdb render scenes/mannequin.toml -o out     render a scene to images and a point cloud
+  matdb add mannequin-paint                     put a built-in material into the database
+  matdb list                                    see what the database holds")]
+pub struct Cli {
+    #[command(flatten)]
+    options: Options,
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// What every command understands.
+#[derive(Debug, clap::Args)]
+struct Options {
+    /// Database file; created by the first `add`
+    #[arg(long, env = "MATDB", default_value = "matdb.sqlite", global = true, value_name = "FILE")]
+    db: PathBuf,
+    /// Print the result as JSON
+    #[arg(long, global = true)]
+    json: bool,
+    /// Print nothing but errors
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    /// Say more of what is done
+    #[arg(long, short, global = true, action = ArgAction::Count)]
+    verbose: u8,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Render(render::Args),
+    Add(add::Args),
+    List(list::Args),
+    Show(show::Args),
+    Rm(rm::Args),
+    Completions(completions::Args),
+}
+
+/// Runs one command.
+///
+/// # Errors
+/// Whatever went wrong, as one sentence that names the place and the way out.
+pub fn run(cli: &Cli) -> Result<(), Error> {
+    let Options { db, json, quiet, verbose } = &cli.options;
+    let console = Console { json: *json, quiet: *quiet, verbose: *verbose > 0 };
+    match &cli.command {
+        Command::Render(args) => render::run(args, db, &console),
+        Command::Add(args) => add::run(args, db, &console),
+        Command::List(_) => list::run(db, &console),
+        Command::Show(args) => show::run(args, db, &console),
+        Command::Rm(args) => rm::run(args, db, &console),
+        Command::Completions(args) => completions::run(args, &console),
+    }
+}

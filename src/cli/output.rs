@@ -1,0 +1,122 @@
+//! Writing a set of files into a folder: all of them, or none.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use tempfile::{Builder, NamedTempFile};
+
+use crate::error::Error;
+
+/// Writes `files` (name, bytes) into `folder`, creating it when needed.
+///
+/// Every file is written under a temporary name first and renamed when all are complete. On an
+/// error nothing is left behind, and files that were there before are as they were.
+pub(super) fn write_all(folder: &Path, files: &[(&str, Vec<u8>)]) -> Result<(), Error> {
+    let created = create_folder(folder)?;
+    let result = stage(folder, files).and_then(|staged| publish(folder, staged));
+    if result.is_err() {
+        // Deepest first; a folder that has something in it by now stays.
+        created.iter().for_each(|path| drop(std::fs::remove_dir(path)));
+    }
+    result
+}
+
+/// Creates a folder and its parents; the ones that were missing, deepest first.
+fn create_folder(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let missing: Vec<PathBuf> = folder
+        .ancestors()
+        .take_while(|path| !path.as_os_str().is_empty() && !path.exists())
+        .map(Path::to_owned)
+        .collect();
+    std::fs::create_dir_all(folder).map_err(|reason| {
+        missing.iter().for_each(|path| drop(std::fs::remove_dir(path)));
+        Error::Io {
+            verb: "create the folder",
+            path: folder.to_owned(),
+            reason,
+            way_out: "choose another with -o",
+        }
+    })?;
+    Ok(missing)
+}
+
+fn stage<'a>(
+    folder: &Path,
+    files: &'a [(&'a str, Vec<u8>)],
+) -> Result<Vec<(&'a str, NamedTempFile)>, Error> {
+    let write = |(name, bytes): &'a (&'a str, Vec<u8>)| {
+        let mut builder = Builder::new();
+        builder.prefix(".matdb-");
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        let mut file = builder.tempfile_in(folder)?;
+        file.write_all(bytes)?;
+        file.as_file().sync_data()?;
+        Ok((*name, file))
+    };
+    files.iter().map(|file| write(file).map_err(|reason| failed(folder, file.0, reason))).collect()
+}
+
+fn publish(folder: &Path, staged: Vec<(&str, NamedTempFile)>) -> Result<(), Error> {
+    // A folder in a file's place is the one obstacle that writing could not see.
+    if let Some((name, _)) = staged.iter().find(|(name, _)| folder.join(name).is_dir()) {
+        return Err(failed(folder, name, std::io::ErrorKind::IsADirectory.into()));
+    }
+    staged.into_iter().try_for_each(|(name, file)| match file.persist(folder.join(name)) {
+        Ok(_) => Ok(()),
+        Err(error) => Err(failed(folder, name, error.error)),
+    })
+}
+
+fn failed(folder: &Path, name: &str, reason: std::io::Error) -> Error {
+    Error::Io {
+        verb: "write",
+        path: folder.join(name),
+        reason,
+        way_out: "make room or choose another folder with -o",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entries(folder: &Path) -> Vec<String> {
+        let names = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name());
+        let mut names: Vec<String> = names.map(|n| n.to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn all_files_arrive_and_no_temporary_stays() {
+        let root = tempfile::tempdir().unwrap();
+        let folder = root.path().join("a/b");
+        write_all(&folder, &[("one", b"1".to_vec()), ("two", b"2".to_vec())]).unwrap();
+        assert_eq!(entries(&folder), ["one", "two"]);
+        write_all(&folder, &[("one", b"3".to_vec())]).unwrap();
+        assert_eq!(std::fs::read(folder.join("one")).unwrap(), b"3");
+    }
+
+    #[test]
+    fn a_failure_leaves_what_was_there() {
+        let root = tempfile::tempdir().unwrap();
+        std::fs::write(root.path().join("one"), "old").unwrap();
+        std::fs::create_dir(root.path().join("two")).unwrap();
+        let files = [("one", b"new".to_vec()), ("two", b"new".to_vec())];
+        assert!(write_all(root.path(), &files).is_err());
+        assert_eq!(entries(root.path()), ["one", "two"]);
+        assert_eq!(std::fs::read(root.path().join("one")).unwrap(), b"old");
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_made_leaves_no_parents() {
+        let root = tempfile::tempdir().unwrap();
+        std::fs::write(root.path().join("file"), "x").unwrap();
+        assert!(write_all(&root.path().join("file/sub"), &[]).is_err());
+        assert_eq!(entries(root.path()), ["file"]);
+    }
+}

@@ -1,0 +1,244 @@
+//! `scan.json`: every resolved value of a rendering, so that anyone can recompute any point.
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::materials::Found;
+use crate::geometry::Raster;
+use crate::render::{Echo, Scan};
+use crate::scene::{MeshReport, Scene};
+
+/// Version of the layout of `scan.json`; it grows with every change that a reader could trip over.
+const SCHEMA: u32 = 1;
+
+/// How to get from the record to a power, for a reader without the program.
+const EQUATION: &str = "power_w = transmit_power_w * 10^(-system_loss_db/10) * aperture_m2 / range_m^2 \
+    * f_per_sr(incidence) * cos(incidence)^n, n = 2 for footprint \"paper\", 1 for \"projected\"; \
+    f_per_sr is the scattering model of the point's material in backscatter";
+
+/// A rendering, as `scan.json` holds it.
+#[derive(Serialize)]
+pub(super) struct Record<'a> {
+    schema: u32,
+    program: &'static str,
+    version: &'static str,
+    equation: &'static str,
+    scene: Value,
+    radar: &'a crate::radar::Radar,
+    frames: Value,
+    meshes: &'a [MeshReport],
+    regions: Vec<RegionRecord<'a>>,
+    materials: Vec<MaterialRecord<'a>>,
+    counts: Counts,
+    power_dbm: Option<PowerRange>,
+    image: Value,
+}
+
+#[derive(Serialize)]
+pub(super) struct RegionRecord<'a> {
+    pub name: &'a str,
+    /// Index into `materials`.
+    pub material: u16,
+    pub facets: usize,
+    pub hits: usize,
+    pub detections: usize,
+    pub strongest_dbm: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct MaterialRecord<'a> {
+    name: &'a str,
+    revision: Option<u32>,
+    origin: &'static str,
+    kind: Option<&'static str>,
+    content_blake3: String,
+    frequency_ghz: [f64; 2],
+    theta_deg: [f64; 2],
+    /// Detections at an incidence for which the material makes no claim.
+    detections_outside_theta: usize,
+    scattering: &'a crate::brdf::Brdf,
+}
+
+#[derive(Clone, Copy, Serialize)]
+pub(super) struct Counts {
+    pub chirps: usize,
+    pub hits: usize,
+    pub detections: usize,
+    pub below_threshold: usize,
+    pub misses: usize,
+    pub degenerate_facets: usize,
+}
+
+#[derive(Clone, Copy, Serialize)]
+pub(super) struct PowerRange {
+    pub weakest: f64,
+    pub median: f64,
+    pub strongest: f64,
+}
+
+/// A material as one scene uses it.
+pub(super) struct Used {
+    pub found: Found,
+    pub scattering: crate::brdf::Brdf,
+}
+
+impl<'a> Record<'a> {
+    pub fn new(
+        scene: &'a Scene,
+        used: &'a [Used],
+        material_of_region: &'a [u16],
+        scan: &Scan,
+        image: &Raster,
+    ) -> Record<'a> {
+        let regions = regions(scene, material_of_region, scan);
+        let outside = |material: usize| {
+            let [least, most] = used[material].found.material.theta_rad;
+            let of_material =
+                |echo: &&Echo| usize::from(material_of_region[usize::from(echo.region)]) == material;
+            let strange = |echo: &&Echo| !(least..=most).contains(&echo.hit.theta_rad());
+            scan.detections().filter(of_material).filter(strange).count()
+        };
+        Record {
+            schema: SCHEMA,
+            program: env!("CARGO_PKG_NAME"),
+            version: env!("CARGO_PKG_VERSION"),
+            equation: EQUATION,
+            scene: json!({ "name": scene.name, "seed": scene.seed }),
+            radar: &scene.radar,
+            frames: frames(scene),
+            meshes: &scene.target.meshes,
+            counts: Counts::new(scene, scan),
+            power_dbm: PowerRange::new(scan),
+            image: json!({
+                "width": image.width, "height": image.height, "pixel_m": image.pixel_m,
+                "x_min_m": image.x_min_m, "y_min_m": image.y_min_m,
+            }),
+            materials: (0..used.len())
+                .map(|number| MaterialRecord::new(&used[number], outside(number)))
+                .collect(),
+            regions,
+        }
+    }
+
+    /// Sentences about what a person should not overlook.
+    pub fn notices(&self) -> Vec<String> {
+        let mut notices = Vec::new();
+        for material in self.materials.iter().filter(|m| m.detections_outside_theta > 0) {
+            let MaterialRecord { name, theta_deg: [least, most], .. } = material;
+            notices.push(format!(
+                "{} detections on `{name}` lie outside the {least:.0}–{most:.0}° for which it is described",
+                material.detections_outside_theta
+            ));
+        }
+        for mesh in self.meshes.iter().filter(|mesh| mesh.degenerate_facets > 0) {
+            let MeshReport { name, degenerate_facets, .. } = mesh;
+            notices.push(format!("{degenerate_facets} facets of mesh `{name}` have no area and were skipped"));
+        }
+        let frequency_ghz = self.radar.centre_frequency_ghz;
+        for MaterialRecord { name, frequency_ghz: [low, high], .. } in &self.materials {
+            if !(*low..=*high).contains(&frequency_ghz) {
+                notices.push(format!(
+                    "`{name}` is described for {low:.0}–{high:.0} GHz, the radar works at {frequency_ghz} GHz"
+                ));
+            }
+        }
+        notices
+    }
+
+    pub fn regions(&self) -> &[RegionRecord<'a>] {
+        &self.regions
+    }
+
+    pub fn material_names(&self) -> Vec<&'a str> {
+        self.materials.iter().map(|material| material.name).collect()
+    }
+
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    pub fn power_dbm(&self) -> Option<PowerRange> {
+        self.power_dbm
+    }
+}
+
+impl<'a> MaterialRecord<'a> {
+    fn new(used: &'a Used, detections_outside_theta: usize) -> MaterialRecord<'a> {
+        let Found { material, revision } = &used.found;
+        MaterialRecord {
+            name: material.slug.as_str(),
+            revision: *revision,
+            origin: if revision.is_some() { "database" } else { "built-in" },
+            kind: material.render_kind().map(|kind| kind.as_str()),
+            content_blake3: material.content_hash(),
+            frequency_ghz: material.frequency_hz.map(|f| f / 1e9),
+            theta_deg: material.theta_rad.map(f64::to_degrees),
+            detections_outside_theta,
+            scattering: &used.scattering,
+        }
+    }
+}
+
+impl Counts {
+    fn new(scene: &Scene, scan: &Scan) -> Counts {
+        let (chirps, hits) = (scan.chirps, scan.echoes.len());
+        let detections = scan.detections().count();
+        Counts {
+            chirps,
+            hits,
+            detections,
+            below_threshold: hits - detections,
+            misses: chirps - hits,
+            degenerate_facets: scene.target.meshes.iter().map(|m| m.degenerate_facets).sum(),
+        }
+    }
+}
+
+impl PowerRange {
+    fn new(scan: &Scan) -> Option<PowerRange> {
+        let mut powers: Vec<f64> = scan.detections().map(|echo| echo.power_dbm).collect();
+        powers.sort_by(f64::total_cmp);
+        let (weakest, strongest) = (*powers.first()?, *powers.last()?);
+        Some(PowerRange { weakest, median: powers[powers.len() / 2], strongest })
+    }
+}
+
+fn regions<'a>(
+    scene: &'a Scene,
+    material_of_region: &[u16],
+    scan: &Scan,
+) -> Vec<RegionRecord<'a>> {
+    let mut regions: Vec<RegionRecord> = std::iter::zip(&scene.target.regions, material_of_region)
+        .map(|(region, &material)| RegionRecord {
+            name: &region.name,
+            material,
+            facets: region.facets,
+            hits: 0,
+            detections: 0,
+            strongest_dbm: None,
+        })
+        .collect();
+    for echo in &scan.echoes {
+        regions[usize::from(echo.region)].hits += 1;
+    }
+    for echo in scan.detections() {
+        let region = &mut regions[usize::from(echo.region)];
+        region.detections += 1;
+        region.strongest_dbm =
+            Some(region.strongest_dbm.map_or(echo.power_dbm, |p| p.max(echo.power_dbm)));
+    }
+    regions
+}
+
+fn frames(scene: &Scene) -> Value {
+    let frames = scene.radar.frames();
+    let pose = frames.global_from_target;
+    let rows: Vec<[f64; 3]> = (0..3).map(|row| pose.rotation().row(row).to_array()).collect();
+    json!({
+        "origin_global_m": frames.origin().xyz.to_array(),
+        "global_from_target": {
+            "rotation_rows": rows,
+            "translation_m": pose.translation_m().to_array(),
+        },
+    })
+}

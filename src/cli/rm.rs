@@ -1,0 +1,41 @@
+//! `matdb rm`.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use super::console::Console;
+use super::materials::unknown;
+use crate::error::Error;
+use crate::store::{Removed, Store};
+
+/// Remove materials from the database, with all their revisions
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:
+  matdb rm my-paint")]
+pub(super) struct Args {
+    /// Names of the materials
+    #[arg(required = true)]
+    names: Vec<String>,
+}
+
+pub(super) fn run(args: &Args, db: &Path, console: &Console) -> Result<(), Error> {
+    // Opening for reading first: removing from a database that is not there must not create it.
+    let known = Store::open_existing(db)?;
+    let mut slugs = Vec::new();
+    for name in &args.names {
+        let slug = name.parse().ok();
+        match (slug, &known) {
+            (Some(slug), Some(store)) if store.get(&slug, None)?.is_some() => slugs.push(slug),
+            _ => return Err(unknown(known.as_ref(), name, "")?),
+        }
+    }
+    drop(known);
+    let removed = Store::open(db)?.remove_all(&slugs)?;
+    let (mut lines, mut records) = (String::new(), Vec::new());
+    for (name, Removed { revisions }) in std::iter::zip(&args.names, removed) {
+        lines += &format!("removed {name}, {revisions} revision(s), from {}\n", db.display());
+        records.push(json!({ "slug": name, "revisions": revisions }));
+    }
+    console.result(&lines, &records)
+}

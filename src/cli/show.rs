@@ -1,0 +1,109 @@
+//! `matdb show`.
+
+use std::path::Path;
+
+use serde_json::json;
+
+use super::console::Console;
+use super::materials::{Found, find};
+use super::summary::table;
+use crate::brdf::Scattering;
+use crate::error::Error;
+use crate::material::{Fit, Material};
+use crate::store::Store;
+use crate::units::db_from_ratio;
+
+/// Show a material: what is known of it, from whom, and how it scatters
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb show mannequin-paint
+  matdb show mannequin-paint@1 --json      an earlier revision, as JSON")]
+pub(super) struct Args {
+    /// NAME or NAME@REVISION
+    name: String,
+}
+
+pub(super) fn run(args: &Args, db: &Path, console: &Console) -> Result<(), Error> {
+    let store = Store::open_existing(db)?;
+    let Found { material, revision } = find(store.as_ref(), &args.name, "")?;
+    let origin = match revision {
+        Some(number) => format!("revision {number} in {}", db.display()),
+        None => format!("built in; `matdb add {}` puts it into a database", material.slug),
+    };
+    let text = describe(&material, &origin)?;
+    console.result(&text, &json!({ "revision": revision, "material": material }))
+}
+
+fn describe(material: &Material, origin: &str) -> Result<String, Error> {
+    let [low, high] = material.frequency_hz.map(|f| f / 1e9);
+    let [least, most] = material.theta_rad.map(f64::to_degrees);
+    let mut text = format!("{} – {}\n{origin}\n\n", material.slug, material.name);
+    if !material.description.is_empty() {
+        text += &format!("{}\n\n", material.description);
+    }
+    text += &format!(
+        "class {}, licence {}, {low:.0}–{high:.0} GHz, {least:.0}–{most:.0}°\n\n",
+        material.class, material.licence
+    );
+    text += &sources(material);
+    for curve in &material.curves {
+        let censored = curve.observations.iter().filter(|o| o.sigma0.is_none()).count();
+        text += &format!(
+            "\ncurve {}: {} points, {censored} of them censored, from {}\n",
+            curve.name,
+            curve.observations.len(),
+            curve.source
+        );
+    }
+    for fit in &material.fits {
+        text += &format!("\nfit {} ({})\n{}", fit.name, fit.estimator, parameters(fit));
+    }
+    text += &format!("\nscenes render `{}`:\n{}", material.render, curve_table(material)?);
+    Ok(text)
+}
+
+fn sources(material: &Material) -> String {
+    let mut text = String::new();
+    for source in &material.sources {
+        text += &format!("source {} ({}): {}", source.key, source.kind.as_str(), source.title);
+        if let Some(doi) = &source.doi {
+            text += &format!(", doi:{doi}");
+        } else if let Some(url) = &source.url {
+            text += &format!(", {url}");
+        }
+        text += "\n";
+        if let Some(note) = &source.note {
+            text += &format!("    {note}\n");
+        }
+    }
+    text
+}
+
+fn parameters(fit: &Fit) -> String {
+    let source = |path: &str| {
+        let own = fit.parameter_sources.iter().find(|(p, _)| p == path);
+        own.map_or(fit.source.clone(), |(_, source)| source.clone())
+    };
+    let deviation = |path: &str| fit.covariance.as_ref()?.standard_deviation(path);
+    table(
+        &["parameter", "value", "± sd", "range", "source"],
+        fit.model.parameters().iter().map(|p| {
+            [
+                p.path.clone(),
+                format!("{}", p.value),
+                deviation(&p.path).map_or("none given".to_owned(), |sd| format!("{sd:.2e}")),
+                format!("{} to {}", p.min, p.max),
+                source(&p.path),
+            ]
+        }),
+    )
+}
+
+fn curve_table(material: &Material) -> Result<String, Error> {
+    let scattering = material.scattering()?;
+    let levels = [0.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0].map(|theta_deg: f64| {
+        let sigma0_db = db_from_ratio(scattering.sigma0(theta_deg.to_radians()));
+        [format!("{theta_deg:.0}°"), format!("{sigma0_db:.1}")]
+    });
+    Ok(table(&["incidence", "sigma0 dB"], levels.into_iter()))
+}

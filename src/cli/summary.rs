@@ -1,0 +1,54 @@
+//! Text tables.
+
+/// Columns padded to their widest cell, under a header; numbers to the right.
+pub(super) fn table<const N: usize>(
+    header: &[&str; N],
+    rows: impl Iterator<Item = [String; N]>,
+) -> String {
+    let mut lines = vec![header.map(str::to_owned)];
+    lines.extend(rows);
+    let widths: Vec<usize> = (0..N)
+        .map(|column| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0))
+        .collect();
+    let is_number = |text: &str| {
+        !text.is_empty() && text.chars().all(|c| c.is_ascii_digit() || " .-–%°".contains(c))
+    };
+    let right: Vec<bool> = (0..N)
+        .map(|column| lines.len() > 1 && lines[1..].iter().all(|line| is_number(&line[column])))
+        .collect();
+    let cell = |column: usize, text: &str| {
+        let padding = " ".repeat(widths[column] - text.chars().count());
+        if right[column] { padding + text } else { text.to_owned() + &padding }
+    };
+    let line = |cells: &[String; N]| {
+        let cells: Vec<String> = (0..N).map(|column| cell(column, &cells[column])).collect();
+        cells.join("  ").trim_end().to_owned() + "\n"
+    };
+    lines.iter().map(line).collect()
+}
+
+/// A whole number with thin groups of three: `18 529`.
+pub(super) fn grouped(number: usize) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (position, digit) in digits.chars().enumerate() {
+        if position > 0 && (digits.len() - position).is_multiple_of(3) {
+            text.push(' ');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_grouped_and_aligned() {
+        assert_eq!(["1", "999", "1 000", "18 529", "1 234 567"], [1, 999, 1000, 18_529, 1_234_567].map(grouped).each_ref().map(String::as_str));
+        let rows = [["a", "5"], ["bcd", "1 000"]].map(|row| row.map(str::to_owned));
+        let text = table(&["name", "n"], rows.into_iter());
+        assert_eq!(text, "name      n\na         5\nbcd   1 000\n");
+    }
+}

@@ -1,0 +1,73 @@
+//! Everything that can go wrong, in one type, for the program and for callers that want one.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use crate::formats::FormatError;
+use crate::formats::exr::ExrError;
+use crate::formats::figure::FigureError;
+use crate::material::MaterialError;
+use crate::material::file::FileError;
+use crate::render::RenderError;
+use crate::scene::SceneError;
+use crate::store::StoreError;
+
+/// Any error of the library or the program.
+#[derive(Debug, Error)]
+pub enum Error {
+    /// A scene cannot be loaded.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A scene cannot be rendered.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// A material file was refused.
+    #[error(transparent)]
+    MaterialFile(#[from] FileError),
+    /// A material says something impossible.
+    #[error(transparent)]
+    Material(#[from] MaterialError),
+    /// The database refused.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A figure could not be drawn.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    /// An image could not be encoded.
+    #[error(transparent)]
+    Exr(#[from] ExrError),
+    /// A table could not be encoded.
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    /// No such material.
+    #[error("{asked_by}there is no material `{name}`; {way_out}")]
+    UnknownMaterial {
+        /// Who asked, with a colon, or nothing.
+        asked_by: String,
+        /// The name.
+        name: String,
+        /// The nearest name or how to add it.
+        way_out: String,
+    },
+    /// A file or folder cannot be read or written.
+    #[error("cannot {verb} {}: {reason}; {way_out}", path.display())]
+    Io {
+        /// `read`, `write`, `create`.
+        verb: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system says.
+        reason: std::io::Error,
+        /// What to do.
+        way_out: &'static str,
+    },
+    /// A flag that means nothing.
+    #[error("{problem}; {way_out}")]
+    Usage {
+        /// What is wrong.
+        problem: String,
+        /// What to do.
+        way_out: String,
+    },
+}

@@ -1,0 +1,184 @@
+//! Detections on a regular grid of the target plane.
+
+use super::{Echo, Scan};
+use crate::geometry::Raster;
+use crate::geometry::raster::Channel;
+use crate::radar::Radar;
+use crate::units::{dbm_from_watts, watts_from_dbm};
+
+/// Names of the channels of a power image, in order.
+pub const CHANNELS: [&str; 5] = ["power_dbm", "range_m", "incidence_deg", "material", "count"];
+
+/// Sums over the detections whose spot covers one pixel.
+#[derive(Clone, Copy, Default)]
+struct Pixel {
+    weight: f64,
+    power_w: f64,
+    range_m: f64,
+    incidence_rad: f64,
+    nearest_weight: f64,
+    material: u16,
+    count: u32,
+}
+
+/// The power image of a scan: channels [`CHANNELS`] over x_t and y_t, NaN where nothing was detected.
+///
+/// A pixel averages the detections whose spot covers it, each with a Gaussian weight of the spot's
+/// diameter at half height; power is averaged in watts. `material` is that of the nearest
+/// detection, as an index; `count` is how many were averaged. The grid covers the field of view at
+/// 8 m and half a spot around it.
+pub fn power_image(
+    scan: &Scan,
+    radar: &Radar,
+    material_of_region: &[u16],
+    pixel_m: f64,
+) -> Raster {
+    let spot_m = radar.spot_diameter_m;
+    let mut raster = grid(radar, pixel_m);
+    let mut pixels = vec![Pixel::default(); raster.width * raster.height];
+    for echo in scan.detections() {
+        let material = material_of_region[usize::from(echo.region)];
+        for (index, distance_m) in covered(&raster, echo, spot_m) {
+            let weight = (-4.0 * std::f64::consts::LN_2 * (distance_m / spot_m).powi(2)).exp();
+            pixels[index].add(echo, material, weight);
+        }
+    }
+    raster.channels = channels(&pixels);
+    raster
+}
+
+fn grid(radar: &Radar, pixel_m: f64) -> Raster {
+    let sides_m = radar.scan.field_m().map(|side_m| side_m + radar.spot_diameter_m);
+    // A hair less than a pixel too many is rounding, not field of view.
+    let [width, height] = sides_m.map(|side_m| (side_m / pixel_m - 1e-6).ceil().max(1.0));
+    Raster {
+        width: width as usize,
+        height: height as usize,
+        x_min_m: -0.5 * width * pixel_m,
+        y_min_m: -0.5 * height * pixel_m,
+        pixel_m,
+        channels: Vec::new(),
+    }
+}
+
+/// Pixels whose centre lies within the spot of an echo, with their distance from its centre, m.
+fn covered<'a>(
+    raster: &'a Raster,
+    echo: &'a Echo,
+    spot_m: f64,
+) -> impl Iterator<Item = (usize, f64)> + 'a {
+    let radius_m = spot_m / 2.0;
+    let span = |centre_m: f64, min_m: f64, count: usize| {
+        let first = ((centre_m - radius_m - min_m) / raster.pixel_m - 0.5).ceil().max(0.0);
+        let end = ((centre_m + radius_m - min_m) / raster.pixel_m + 0.5).floor();
+        // Float to integer saturates, so that a detection outside the grid gives an empty span.
+        (first as usize).min(count)..(end as usize).min(count)
+    };
+    let columns = span(echo.xt_m, raster.x_min_m, raster.width);
+    let rows_from_below = span(echo.yt_m, raster.y_min_m, raster.height);
+    rows_from_below.flat_map(move |up| {
+        let row = raster.height - 1 - up;
+        columns.clone().filter_map(move |column| {
+            let (dx, dy) = (raster.x_m(column) - echo.xt_m, raster.y_m(row) - echo.yt_m);
+            let distance_m = dx.hypot(dy);
+            (distance_m <= radius_m).then_some((row * raster.width + column, distance_m))
+        })
+    })
+}
+
+impl Pixel {
+    fn add(&mut self, echo: &Echo, material: u16, weight: f64) {
+        self.weight += weight;
+        self.power_w += weight * watts_from_dbm(echo.power_dbm);
+        self.range_m += weight * echo.hit.range_m;
+        self.incidence_rad += weight * echo.hit.theta_rad();
+        self.count += 1;
+        if weight > self.nearest_weight {
+            self.nearest_weight = weight;
+            self.material = material;
+        }
+    }
+}
+
+fn channels(pixels: &[Pixel]) -> Vec<Channel> {
+    let values: [fn(&Pixel) -> f64; 5] = [
+        |p| dbm_from_watts(p.power_w / p.weight),
+        |p| p.range_m / p.weight,
+        |p| (p.incidence_rad / p.weight).to_degrees(),
+        |p| f64::from(p.material),
+        |p| f64::from(p.count),
+    ];
+    let channel = |(name, value): (&str, fn(&Pixel) -> f64)| Channel {
+        name: name.to_owned(),
+        values: pixels
+            .iter()
+            .map(|p| if p.count == 0 { f32::NAN } else { value(p) as f32 })
+            .collect(),
+    };
+    CHANNELS.into_iter().zip(values).map(channel).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::Point;
+    use crate::trace::Hit;
+
+    fn echo(xt_m: f64, yt_m: f64, power_dbm: f64) -> Echo {
+        let point = Point::new(xt_m, yt_m, 0.0);
+        let hit = Hit { facet: 0, range_m: 8.0, point, cos_theta: 0.5 };
+        Echo { chirp: 0, hit, xt_m, yt_m, region: 0, power_dbm }
+    }
+
+    fn image(echoes: Vec<Echo>) -> Raster {
+        let scan = Scan { chirps: echoes.len(), echoes, threshold_dbm: -77.0 };
+        power_image(&scan, &Radar::default(), &[3], 0.004)
+    }
+
+    #[test]
+    fn the_grid_covers_the_field_of_view_and_half_a_spot() {
+        let raster = image(vec![]);
+        assert_eq!((raster.width, raster.height), (129, 229));
+        assert!((raster.x_min_m + 0.258).abs() < 1e-12);
+        assert!(raster.channels.iter().all(|c| c.values.iter().all(|v| v.is_nan())));
+    }
+
+    #[test]
+    fn one_detection_fills_its_spot_with_its_own_values() {
+        let raster = image(vec![echo(0.1, -0.2, -50.0)]);
+        let power = raster.channel("power_dbm").unwrap();
+        let mut filled = 0;
+        for row in 0..raster.height {
+            for column in 0..raster.width {
+                let distance = (raster.x_m(column) - 0.1).hypot(raster.y_m(row) + 0.2);
+                let value = power[row * raster.width + column];
+                assert_eq!(distance <= 0.008, value.is_finite());
+                if value.is_finite() {
+                    filled += 1;
+                    assert!((value + 50.0).abs() < 1e-4);
+                }
+            }
+        }
+        // The area of the spot over that of a pixel: π·8²/4² = 12.6.
+        assert!((10..=15).contains(&filled), "{filled}");
+        let value = |name| raster.channel(name).unwrap().iter().find(|v| v.is_finite()).copied();
+        assert_eq!(value("material"), Some(3.0));
+        assert_eq!(value("count"), Some(1.0));
+        assert!((value("incidence_deg").unwrap() - 60.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn power_is_averaged_in_watts() {
+        let raster = image(vec![echo(0.002, 0.0, -40.0), echo(-0.002, 0.0, -60.0)]);
+        // Half way between two equal weights: 10·lg((10⁻⁴ + 10⁻⁶)/2) = −42.967 dBm.
+        let centre = (raster.height / 2) * raster.width + raster.width / 2;
+        let value = raster.channel("power_dbm").unwrap()[centre];
+        assert!((f64::from(value) + 42.967).abs() < 1e-3, "{value}");
+    }
+
+    #[test]
+    fn what_is_below_the_threshold_or_outside_leaves_no_trace() {
+        let raster = image(vec![echo(0.0, 0.0, -77.1), echo(5.0, 0.0, -40.0), echo(0.0, -9.0, -40.0)]);
+        assert!(raster.channels[0].values.iter().all(|v| v.is_nan()));
+    }
+}

@@ -1,0 +1,160 @@
+//! Scene files: what stands where, of which material, seen by which radar.
+//!
+//! ```toml
+//! [radar]                       # every field of a preset can be overridden
+//! preset = "upm-300ghz"
+//!
+//! [[mesh]]
+//! name = "body"
+//! file = "builtin:mannequin"    # or a PLY, OBJ or STL file beside the scene
+//!
+//! [[region]]                    # later regions win where they overlap
+//! name = "skin"
+//! material = "human-skin"
+//! facets = { part = "head" }    # and, or instead: mesh, box, sphere, half_space
+//! ```
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::formats::FormatError;
+use crate::formats::text::from_toml;
+use crate::radar::Radar;
+
+/// A scene file as written.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFile {
+    /// Title for figures; the file's name when empty.
+    #[serde(default)]
+    pub name: String,
+    /// Seed of everything random.
+    #[serde(default)]
+    pub seed: u64,
+    /// The instrument.
+    #[serde(default)]
+    pub radar: Radar,
+    /// How detections become an image.
+    #[serde(default)]
+    pub image: ImageEntry,
+    /// What stands in front of the radar.
+    #[serde(default)]
+    pub mesh: Vec<MeshEntry>,
+    /// Which facets are made of what.
+    #[serde(default)]
+    pub region: Vec<RegionEntry>,
+}
+
+/// How detections become an image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ImageEntry {
+    /// Side of a pixel, m; a quarter of the spot's diameter when not given.
+    pub pixel_m: Option<f64>,
+}
+
+/// One mesh and where it stands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshEntry {
+    /// Name that regions refer to.
+    pub name: String,
+    /// Path of a PLY, OBJ or STL file, relative to the scene's folder, or `builtin:NAME`.
+    pub file: String,
+    /// Factor from the file's unit to metres; 0.001 for a file in millimetres.
+    #[serde(default = "one")]
+    pub scale: f64,
+    /// Stretches the mesh along its own axes until its bounding box has this size, m. The
+    /// built-in cuboid, plate and sphere are of unit size without it.
+    pub size_m: Option<[f64; 3]>,
+    /// Turns about the fixed axes x, then y, then z, degrees.
+    #[serde(default)]
+    pub rotation_deg: [f64; 3],
+    /// Shift after the turns, m.
+    #[serde(default)]
+    pub translation_m: [f64; 3],
+}
+
+/// A named set of facets and its material. All given selectors must hold; none given selects all.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RegionEntry {
+    /// Name, as clouds and reports show it.
+    pub name: String,
+    /// Material, `NAME` or `NAME@REVISION`.
+    pub material: String,
+    /// Only facets of this mesh.
+    pub mesh: Option<String>,
+    /// Only facets labelled so by the file: `{ part = "head" }`, `{ usemtl = "skin" }`,
+    /// `{ region = 2 }` for a PLY face property.
+    #[serde(default)]
+    pub facets: BTreeMap<String, LabelValue>,
+    /// Only facets whose centroid lies in this box of the global frame.
+    #[serde(rename = "box")]
+    pub within_box: Option<BoxEntry>,
+    /// Only facets whose centroid lies in this ball.
+    pub sphere: Option<SphereEntry>,
+    /// Only facets whose centroid lies on the side of a plane that its normal points to.
+    pub half_space: Option<HalfSpaceEntry>,
+}
+
+/// The value of a facet label.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum LabelValue {
+    /// A name.
+    Text(String),
+    /// A number, for integer properties of PLY faces.
+    Number(i64),
+}
+
+/// An axis-aligned box in the global frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoxEntry {
+    /// Corner with the smallest coordinates, m.
+    pub min_m: [f64; 3],
+    /// Corner with the largest coordinates, m.
+    pub max_m: [f64; 3],
+}
+
+/// A ball in the global frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SphereEntry {
+    /// Centre, m.
+    pub centre_m: [f64; 3],
+    /// Radius, m.
+    pub radius_m: f64,
+}
+
+/// A half space in the global frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HalfSpaceEntry {
+    /// A point of the plane, m.
+    pub point_m: [f64; 3],
+    /// Normal of the plane, of any length.
+    pub normal: [f64; 3],
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl SceneFile {
+    /// Reads a scene file's text. Values are checked when the scene is loaded.
+    pub fn parse(text: &str) -> Result<SceneFile, FormatError> {
+        from_toml(text)
+    }
+}
+
+impl std::fmt::Display for LabelValue {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            LabelValue::Text(text) => f.write_str(text),
+            LabelValue::Number(number) => number.fmt(f),
+        }
+    }
+}

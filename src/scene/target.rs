@@ -1,0 +1,217 @@
+//! The target: all meshes of a scene in the global frame, as one.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::file::{MeshEntry, SceneFile};
+use super::regions::{MeshSpan, assign};
+use super::{SceneError, mannequin, read, solids};
+use crate::formats::MeshFormat;
+use crate::formats::text::nearest;
+use crate::frames::{Global, Model, Point, Pose};
+use crate::geometry::Mesh;
+use crate::geometry::mesh::MeshError;
+
+/// Everything a ray can hit, with a region for every facet.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Target {
+    /// All meshes in the global frame, one after the other.
+    pub mesh: Mesh,
+    /// Where each of them came from.
+    pub meshes: Vec<MeshReport>,
+    /// The regions, in the order of the scene file.
+    pub regions: Vec<Region>,
+    /// Region of every facet.
+    pub region_of_facet: Vec<u16>,
+}
+
+/// A named set of facets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Region {
+    /// Name.
+    pub name: String,
+    /// Material, as the scene file gives it.
+    pub material: String,
+    /// Facets it holds after later regions took theirs.
+    pub facets: usize,
+}
+
+/// Where a mesh came from.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct MeshReport {
+    /// Name in the scene.
+    pub name: String,
+    /// File or built-in, as the scene file gives it.
+    pub file: String,
+    /// BLAKE3 of vertices and facets as placed, so that equal hashes mean equal geometry.
+    pub blake3: String,
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Number of facets.
+    pub facets: usize,
+    /// Number of facets without an area, which no ray hits.
+    pub degenerate_facets: usize,
+    /// Number of its first facet within the whole target.
+    pub first_facet: usize,
+}
+
+/// Built-in meshes. Cuboid, plate and sphere are of unit size: give them a `size_m`.
+pub const BUILTIN_MESHES: [&str; 4] = ["mannequin", "cuboid", "plate", "sphere"];
+
+impl Target {
+    /// Loads, places and joins the meshes of a scene, and assigns its regions.
+    pub(super) fn load(file: &SceneFile, path: &Path) -> Result<Target, SceneError> {
+        if file.mesh.is_empty() {
+            return Err(value(path, "the scene", "has no mesh", "add a [[mesh]] table"));
+        }
+        let mut mesh = Mesh::default();
+        let mut meshes: Vec<MeshReport> = Vec::new();
+        for entry in &file.mesh {
+            if meshes.iter().any(|earlier| earlier.name == entry.name) {
+                let place = format!("mesh `{}`", entry.name);
+                return Err(value(path, &place, "is defined twice", "rename one"));
+            }
+            let placed = place(load_mesh(entry, path)?, entry, path)?;
+            let at = |error| SceneError::Mesh { file: PathBuf::from(&entry.file), error };
+            meshes.push(report(&placed, entry, mesh.facets.len()).map_err(at)?);
+            mesh.append(&placed);
+            mesh.validate().map_err(at)?;
+        }
+        let spans: Vec<MeshSpan> = meshes.iter().map(MeshReport::span).collect();
+        let region_of_facet = assign(&mesh, &spans, &file.region)
+            .map_err(|error| SceneError::Region { file: path.to_owned(), error })?;
+        let regions = count_regions(file, &region_of_facet);
+        Ok(Target { mesh, meshes, regions, region_of_facet })
+    }
+}
+
+impl MeshReport {
+    fn span(&self) -> MeshSpan {
+        let first = self.first_facet;
+        MeshSpan { name: self.name.clone(), first, end: first + self.facets }
+    }
+}
+
+fn count_regions(file: &SceneFile, region_of_facet: &[u16]) -> Vec<Region> {
+    let mut facets = vec![0; file.region.len()];
+    for &region in region_of_facet {
+        facets[usize::from(region)] += 1;
+    }
+    std::iter::zip(&file.region, facets)
+        .map(|(entry, facets)| Region {
+            name: entry.name.clone(),
+            material: entry.material.clone(),
+            facets,
+        })
+        .collect()
+}
+
+fn load_mesh(entry: &MeshEntry, scene: &Path) -> Result<Mesh, SceneError> {
+    if let Some(name) = entry.file.strip_prefix("builtin:") {
+        return builtin(name).ok_or_else(|| {
+            let known = BUILTIN_MESHES.join(", ");
+            let way_out = match nearest(name, BUILTIN_MESHES) {
+                Some(near) => format!("did you mean `builtin:{near}`?"),
+                None => format!("the built-in meshes are {known}"),
+            };
+            value(scene, &format!("mesh `{}`", entry.name), &format!("no built-in mesh `{name}`"), &way_out)
+        });
+    }
+    let file = scene.parent().unwrap_or(Path::new("")).join(&entry.file);
+    let extension = file.extension().unwrap_or_default().to_string_lossy();
+    let Some(format) = MeshFormat::from_extension(&extension) else {
+        let problem = format!("`{}` does not end in .ply, .obj or .stl", entry.file);
+        let way_out = "convert the mesh to one of these";
+        return Err(value(scene, &format!("mesh `{}`", entry.name), &problem, way_out));
+    };
+    let bytes = read(&file, "; meshes are looked for beside the scene file")?;
+    format.read(&bytes).map_err(|error| SceneError::Format { file, error })
+}
+
+fn builtin(name: &str) -> Option<Mesh> {
+    // Coarse cells: a flat side needs no more than its corners.
+    match name {
+        "mannequin" => Some(mannequin::mannequin()),
+        "cuboid" => Some(solids::cuboid(DVec3::ONE, 1.0)),
+        "plate" => Some(solids::plate(1.0, 1.0)),
+        "sphere" => Some(solids::icosphere(0.5, 5)),
+        _ => None,
+    }
+}
+
+/// Scales, stretches, turns and shifts a mesh into the global frame.
+fn place(mut mesh: Mesh, entry: &MeshEntry, scene: &Path) -> Result<Mesh, SceneError> {
+    let refuse = |key: &str, problem: &str, way_out: &str| {
+        value(scene, &format!("mesh `{}`: {key}", entry.name), problem, way_out)
+    };
+    if !(entry.scale > 0.0 && entry.scale.is_finite()) {
+        return Err(refuse("scale", "must be a positive number", "use 0.001 for millimetres"));
+    }
+    let stretch = match entry.size_m.map(DVec3::from) {
+        None => DVec3::ONE,
+        Some(size) if size.is_finite() && size.cmpge(DVec3::ZERO).all() => {
+            let extent = extent(&mesh) * entry.scale;
+            DVec3::select(extent.cmpgt(DVec3::ZERO), size / extent, DVec3::ONE)
+        }
+        Some(_) => return Err(refuse("size_m", "must be three lengths", "give them in metres")),
+    };
+    let turn = DVec3::from(entry.rotation_deg.map(f64::to_radians));
+    let shift = DVec3::from(entry.translation_m);
+    if !turn.is_finite() || !shift.is_finite() {
+        let key = "rotation_deg and translation_m";
+        return Err(refuse(key, "must be finite", "mend the numbers"));
+    }
+    let global_from_model: Pose<Global, Model> = Pose::from_euler_xyz(turn, shift);
+    for vertex in &mut mesh.vertices {
+        *vertex = (global_from_model * Point::from(*vertex * entry.scale * stretch)).xyz;
+    }
+    Ok(mesh)
+}
+
+fn extent(mesh: &Mesh) -> DVec3 {
+    let min = mesh.vertices.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let max = mesh.vertices.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    max - min
+}
+
+fn report(mesh: &Mesh, entry: &MeshEntry, first_facet: usize) -> Result<MeshReport, MeshError> {
+    mesh.validate()?;
+    let degenerate_facets = (0..mesh.facets.len()).filter(|&f| mesh.is_degenerate(f)).count();
+    if degenerate_facets == mesh.facets.len() {
+        return Err(MeshError::NoArea { facets: degenerate_facets });
+    }
+    Ok(MeshReport {
+        name: entry.name.clone(),
+        file: entry.file.clone(),
+        blake3: hash(mesh),
+        vertices: mesh.vertices.len(),
+        facets: mesh.facets.len(),
+        degenerate_facets,
+        first_facet,
+    })
+}
+
+fn hash(mesh: &Mesh) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for vertex in &mesh.vertices {
+        for coordinate in vertex.to_array() {
+            hasher.update(&coordinate.to_le_bytes());
+        }
+    }
+    for facet in &mesh.facets {
+        for index in facet {
+            hasher.update(&index.to_le_bytes());
+        }
+    }
+    hasher.finalize().to_hex().to_string()
+}
+
+fn value(scene: &Path, place: &str, problem: &str, way_out: &str) -> SceneError {
+    SceneError::Value {
+        file: scene.to_owned(),
+        place: place.to_owned(),
+        problem: problem.to_owned(),
+        way_out: way_out.to_owned(),
+    }
+}

@@ -1,0 +1,177 @@
+//! Opening a file: telling ours from others' without touching it, and bringing it up to date.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use rusqlite::{Connection, ErrorCode, OpenFlags, TransactionBehavior};
+use rusqlite_migration::{M, Migrations};
+
+use super::StoreError;
+
+/// "matd" in the file's header.
+const APPLICATION_ID: i64 = 0x6d61_7464;
+
+/// All schemas there ever were, oldest first. Append only: files in the world have stopped at each.
+const SCHEMAS: [M; 1] = [M::up(include_str!("../../migrations/0001_materials.sql"))];
+
+/// How long to wait while another program writes.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Opens a database for reading and writing; makes it when there is none.
+pub(super) fn writable(path: &Path) -> Result<Connection, StoreError> {
+    // A stranger's file is never opened for writing.
+    if size_bytes(path)? > 0 {
+        schema_of(path, &quiet(path)?)?;
+    }
+    let fail = |error| StoreError::new(path, error);
+    let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
+    let mut conn = connect(path, flags).map_err(fail)?;
+    if conn.is_readonly("main").map_err(fail)? {
+        return Err(StoreError::ReadOnly { file: path.to_owned() });
+    }
+    conn.pragma_update(None, "journal_mode", "wal").map_err(fail)?;
+    conn.pragma_update(None, "foreign_keys", true).map_err(fail)?;
+    // Two writers that each read first would stand in the other's way.
+    conn.set_transaction_behavior(TransactionBehavior::Immediate);
+    migrate(path, &mut conn)?;
+    Ok(conn)
+}
+
+/// Opens a database for reading; `None` when there is none, or none with tables.
+pub(super) fn readable(path: &Path) -> Result<Option<Connection>, StoreError> {
+    if size_bytes(path)? == 0 {
+        return Ok(None);
+    }
+    let conn = quiet(path)?;
+    let schema = schema_of(path, &conn)?;
+    Ok((schema > 0).then_some(conn))
+}
+
+/// Size of the file; 0 when there is none.
+fn size_bytes(path: &Path) -> Result<u64, StoreError> {
+    let file = path.to_owned();
+    match fs::metadata(path) {
+        // To SQLite a file of one byte is empty, and it would write over it.
+        Ok(found) if found.is_file() && found.len() != 1 => Ok(found.len()),
+        Ok(_) => Err(StoreError::Foreign { file }),
+        Err(reason) if reason.kind() == io::ErrorKind::NotFound => Ok(0),
+        Err(reason) => Err(StoreError::Open { file, reason }),
+    }
+}
+
+/// Opens an existing file, whosever it is, so that nothing in it can change.
+fn quiet(path: &Path) -> Result<Connection, StoreError> {
+    let fail = |error| StoreError::new(path, error);
+    let log_exists = beside(path, "-wal").exists();
+    // A read-only connection leaves an empty log behind. A writable one clears that away, but would
+    // also write a log that it finds into the database.
+    let flags = if log_exists {
+        OpenFlags::SQLITE_OPEN_READ_ONLY
+    } else {
+        OpenFlags::SQLITE_OPEN_READ_WRITE
+    };
+    let conn = connect(path, flags).map_err(fail)?;
+    conn.pragma_update(None, "query_only", true).map_err(fail)?;
+    match conn.query_row("SELECT count(*) FROM sqlite_schema", [], |_| Ok(())) {
+        // Where no log can be made nobody writes, so the file may be read as if it never changed.
+        Err(error) if !log_exists && wants_a_log(&error) => immutable(path).map_err(fail),
+        result => result.map(|()| conn).map_err(fail),
+    }
+}
+
+fn connect(path: &Path, flags: OpenFlags) -> rusqlite::Result<Connection> {
+    let conn = Connection::open_with_flags(path, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
+    conn.busy_timeout(PATIENCE)?;
+    Ok(conn)
+}
+
+fn immutable(path: &Path) -> rusqlite::Result<Connection> {
+    let escaped: String = path.as_os_str().as_encoded_bytes().iter().map(escape).collect();
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI;
+    connect(Path::new(&format!("file:{escaped}?immutable=1")), flags)
+}
+
+fn escape(byte: &u8) -> String {
+    match byte {
+        b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' => {
+            char::from(*byte).to_string()
+        }
+        _ => format!("%{byte:02x}"),
+    }
+}
+
+fn wants_a_log(error: &rusqlite::Error) -> bool {
+    matches!(error.sqlite_error_code(), Some(ErrorCode::CannotOpen | ErrorCode::ReadOnly))
+}
+
+fn beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(ending);
+    name.into()
+}
+
+/// Number of a database's schema, 0 when it is empty.
+fn schema_of(path: &Path, conn: &Connection) -> Result<usize, StoreError> {
+    let header = "SELECT application_id, user_version, (SELECT count(*) FROM sqlite_schema)
+                  FROM pragma_application_id, pragma_user_version";
+    let (application_id, schema, tables): (i64, i64, i64) = conn
+        .query_row(header, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
+        .map_err(|error| StoreError::new(path, error))?;
+    let (file, known) = (path.to_owned(), SCHEMAS.len());
+    match (application_id, usize::try_from(schema), tables) {
+        (0, Ok(0), 0) => Ok(0),
+        (APPLICATION_ID, Ok(schema), _) if schema > known => {
+            Err(StoreError::Newer { file, found: schema, known })
+        }
+        (APPLICATION_ID, Ok(schema), _) if schema > 0 => Ok(schema),
+        _ => Err(StoreError::Foreign { file }),
+    }
+}
+
+fn migrate(path: &Path, conn: &mut Connection) -> Result<(), StoreError> {
+    let outcome = Migrations::from_slice(&SCHEMAS).to_latest(conn);
+    // Another program may have done it while this one waited for its turn.
+    if schema_of(path, conn)? == SCHEMAS.len() {
+        return Ok(());
+    }
+    outcome.map_err(|error| match error {
+        rusqlite_migration::Error::RusqliteError { err, .. } => StoreError::new(path, err),
+        error => StoreError::Migration { file: path.to_owned(), error },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_schemas_make_a_database_that_is_known_as_ours() {
+        let mut conn = Connection::open_in_memory().unwrap();
+        assert_eq!(schema_of(Path::new(":memory:"), &conn).unwrap(), 0);
+        migrate(Path::new(":memory:"), &mut conn).unwrap();
+        assert_eq!(schema_of(Path::new(":memory:"), &conn).unwrap(), SCHEMAS.len());
+    }
+
+    #[test]
+    fn every_schema_says_why_and_is_listed() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/migrations");
+        let mut names: Vec<_> = fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();
+        names.sort();
+        assert_eq!(names.len(), SCHEMAS.len());
+        for (number, name) in (1..).zip(names) {
+            let stem = name.file_stem().unwrap().to_str().unwrap();
+            assert!(stem.starts_with(&format!("{number:04}_")), "{stem}");
+            assert!(fs::read_to_string(&name).unwrap().starts_with("-- Why: "), "{stem}");
+        }
+    }
+
+    #[test]
+    fn a_file_name_may_hold_anything() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("50 % of #1?mode=memory&ü.sqlite");
+        drop(writable(&path).unwrap());
+        assert_eq!(schema_of(&path, &immutable(&path).unwrap()).unwrap(), SCHEMAS.len());
+    }
+}

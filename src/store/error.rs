@@ -1,0 +1,149 @@
+//! What can go wrong with a database file, in the words of its user.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use rusqlite::ErrorCode;
+use thiserror::Error;
+
+use crate::material::MaterialError;
+
+/// Why a database could not be used. A refused write has changed nothing.
+#[derive(Debug, Error)]
+pub enum StoreError {
+    /// Something else has this name; it was not touched.
+    #[error("{} is not a matdb database; name another file", file.display())]
+    Foreign {
+        /// The file.
+        file: PathBuf,
+    },
+    /// A later program has written it; it was not touched.
+    #[error(
+        "{} has schema {found}, but this program knows schemas up to {known}; install a newer matdb",
+        file.display()
+    )]
+    Newer {
+        /// The file.
+        file: PathBuf,
+        /// Its schema.
+        found: usize,
+        /// The latest schema that this program knows.
+        known: usize,
+    },
+    /// Another program held it for longer than we wait.
+    #[error("{} is in use by another program; try again when that has finished", file.display())]
+    Busy {
+        /// The file.
+        file: PathBuf,
+    },
+    /// It can be read, but not written.
+    #[error("{} cannot be written; make it and its directory writable", file.display())]
+    ReadOnly {
+        /// The file.
+        file: PathBuf,
+    },
+    /// The file contradicts itself.
+    #[error("{} is damaged: {problem}; restore it from a copy", file.display())]
+    Corrupt {
+        /// The file.
+        file: PathBuf,
+        /// What was noticed.
+        problem: String,
+    },
+    /// No room left.
+    #[error("the disk has no room left for {}; free some and try again", file.display())]
+    Full {
+        /// The file.
+        file: PathBuf,
+    },
+    /// The file can be neither opened nor made.
+    #[error("cannot open {}: {reason}; mend that or name another file", file.display())]
+    Open {
+        /// The file.
+        file: PathBuf,
+        /// What the operating system says.
+        reason: io::Error,
+    },
+    /// Reading or writing failed underneath.
+    #[error("cannot read or write {}: {error}; check the disk and its quota", file.display())]
+    Disk {
+        /// The file.
+        file: PathBuf,
+        /// What SQLite says.
+        error: rusqlite::Error,
+    },
+    /// The schema could not be brought up to date; the file is as it was.
+    #[error("cannot bring {} up to date: {error}; report it with this message", file.display())]
+    Migration {
+        /// The file.
+        file: PathBuf,
+        /// What went wrong.
+        error: rusqlite_migration::Error,
+    },
+    /// The material itself is not sound.
+    #[error("material `{slug}`: {error}")]
+    Material {
+        /// Its name.
+        slug: String,
+        /// What is wrong.
+        error: MaterialError,
+    },
+    /// Anything else.
+    #[error("{}: {error}; if it persists, report it with this message", file.display())]
+    Sqlite {
+        /// The file.
+        file: PathBuf,
+        /// What SQLite says.
+        error: rusqlite::Error,
+    },
+}
+
+impl StoreError {
+    /// Sorts SQLite's errors by what the user can do about them.
+    pub(super) fn new(path: &Path, error: rusqlite::Error) -> StoreError {
+        use rusqlite::Error::*;
+        let file = path.to_owned();
+        // The rest of a long problem is SQL, which tells the user nothing.
+        let corrupt = |problem: String| {
+            let problem = problem.lines().next().unwrap_or_default().to_owned();
+            StoreError::Corrupt { file: file.clone(), problem }
+        };
+        let failure = match &error {
+            SqliteFailure(failure, _) => failure,
+            SqlInputError { msg, .. } => return corrupt(msg.clone()),
+            FromSqlConversionFailure(..)
+            | InvalidColumnType(..)
+            | Utf8Error(..)
+            | IntegralValueOutOfRange(..) => return corrupt(error.to_string()),
+            _ => return StoreError::Sqlite { file, error },
+        };
+        match failure.code {
+            // A damaged row may claim to be huge, a damaged schema may no longer suit our SQL, and
+            // what a valid material violates is not a constraint of ours.
+            ErrorCode::DatabaseCorrupt
+            | ErrorCode::OutOfMemory
+            | ErrorCode::Unknown
+            | ErrorCode::ConstraintViolation => corrupt(error.to_string()),
+            ErrorCode::NotADatabase => StoreError::Foreign { file },
+            ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked => StoreError::Busy { file },
+            ErrorCode::ReadOnly => StoreError::ReadOnly { file },
+            ErrorCode::DiskFull => StoreError::Full { file },
+            ErrorCode::CannotOpen => StoreError::Open { file, reason: reason(path) },
+            ErrorCode::SystemIoFailure => StoreError::Disk { file, error },
+            _ => StoreError::Sqlite { file, error },
+        }
+    }
+}
+
+/// Why a file cannot be opened. SQLite does not say, and to try it ourselves would drop the locks
+/// that other connections of this process hold, so this only looks.
+fn reason(path: &Path) -> io::Error {
+    let directory = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match (fs::metadata(path), fs::metadata(directory)) {
+        (_, Err(reason)) => reason,
+        (Err(reason), _) if reason.kind() != io::ErrorKind::NotFound => reason,
+        (_, Ok(found)) if !found.is_dir() => io::ErrorKind::NotADirectory.into(),
+        _ => io::ErrorKind::PermissionDenied.into(),
+    }
+}

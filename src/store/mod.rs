@@ -1,0 +1,159 @@
+//! The database of materials: a file of SQLite, and the only SQL in the crate.
+//!
+//! Plain [`Material`]s go in and come out, bit for bit; a revision once written never changes.
+//! Every call that writes is one transaction: it happens as a whole or not at all, whenever the
+//! program or the machine stops. Several programs may use a file at once.
+//!
+//! ```
+//! use matdb::material::builtin;
+//! use matdb::store::{Added, Store};
+//! # let folder = tempfile::tempdir().unwrap();
+//! # let path = folder.path().join("materials.sqlite");
+//! let paint = builtin::get("mannequin-paint").unwrap().unwrap();
+//! let mut store = Store::open(&path).unwrap();
+//! assert_eq!(store.add(&paint).unwrap(), Added::New);
+//! assert_eq!(store.get(&paint.slug, None).unwrap().unwrap().material, paint);
+//! ```
+
+mod connect;
+mod error;
+mod read;
+mod write;
+
+use std::path::{Path, PathBuf};
+
+use rusqlite::Connection;
+
+use crate::material::{Material, Slug, SourceKind};
+
+pub use error::StoreError;
+
+/// An open database.
+#[derive(Debug)]
+pub struct Store {
+    conn: Connection,
+    path: PathBuf,
+}
+
+/// What adding a material did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Added {
+    /// There was none of that name: this is revision 1.
+    New,
+    /// It differs from the current revision and became the revision of this number.
+    Revision(u32),
+    /// It is what the current revision, of this number, already says.
+    Unchanged(u32),
+}
+
+/// One revision of a material, as stored.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stored {
+    /// The material.
+    pub material: Material,
+    /// Its revision, from 1.
+    pub revision: u32,
+    /// [`Material::content_hash`] when it was added.
+    pub content_hash: String,
+    /// When it was added: UTC, ISO 8601, to the second.
+    pub added_at: String,
+    /// Version of the program that added it.
+    pub program_version: String,
+}
+
+/// A line of [`Store::list`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary {
+    /// Short name.
+    pub slug: Slug,
+    /// Full name.
+    pub name: String,
+    /// Kind of stuff.
+    pub class: String,
+    /// Current revision, from 1.
+    pub revision: u32,
+    /// How the numbers that a scene renders came to be.
+    pub render_kind: SourceKind,
+    /// Number of curves.
+    pub curves: u32,
+    /// Number of points on all curves together.
+    pub observations: u32,
+    /// Number of scattering models with parameters.
+    pub fits: u32,
+}
+
+/// What [`Store::remove`] took away.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Removed {
+    /// Number of revisions.
+    pub revisions: u32,
+}
+
+impl Store {
+    /// Opens a database, makes it when there is none, and brings an older one up to date.
+    ///
+    /// # Errors
+    /// When the file is somebody else's, newer than the program, damaged, locked or cannot be
+    /// written. Somebody else's file and a newer one are left as they are.
+    pub fn open(path: impl AsRef<Path>) -> Result<Store, StoreError> {
+        let path = path.as_ref().to_owned();
+        let conn = connect::writable(&path)?;
+        Ok(Store { conn, path })
+    }
+
+    /// Opens a database for reading only; `None` when there is no file or nothing in it.
+    ///
+    /// Changes nothing, and works where nothing can be written.
+    ///
+    /// # Errors
+    /// As [`Store::open`].
+    pub fn open_existing(path: impl AsRef<Path>) -> Result<Option<Store>, StoreError> {
+        let path = path.as_ref().to_owned();
+        let conn = connect::readable(&path)?;
+        Ok(conn.map(|conn| Store { conn, path }))
+    }
+
+    /// Adds a material, or a revision to the one of its name. What is already current is not
+    /// added again.
+    ///
+    /// # Errors
+    /// When the material is not [valid](Material::validate), or the file cannot be written.
+    pub fn add(&mut self, material: &Material) -> Result<Added, StoreError> {
+        let slug = || material.slug.to_string();
+        material.validate().map_err(|error| StoreError::Material { slug: slug(), error })?;
+        write::add(&mut self.conn, material).map_err(|error| StoreError::new(&self.path, error))
+    }
+
+    /// Every material's current revision, sorted by name.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn list(&self) -> Result<Vec<Summary>, StoreError> {
+        read::list(&self.conn).map_err(|error| StoreError::new(&self.path, error))
+    }
+
+    /// One revision of a material, or the current one; `None` when there is none.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or holds something else than was stored.
+    pub fn get(&self, slug: &Slug, revision: Option<u32>) -> Result<Option<Stored>, StoreError> {
+        let stored = read::get(&self.conn, slug, revision)
+            .map_err(|error| StoreError::new(&self.path, error))?;
+        match stored {
+            Some(stored) if stored.material.content_hash() != stored.content_hash => {
+                let problem =
+                    format!("revision {} of `{slug}` is not what was stored", stored.revision);
+                Err(StoreError::Corrupt { file: self.path.clone(), problem })
+            }
+            stored => Ok(stored),
+        }
+    }
+
+    /// Removes a material with all its revisions; `None` when there is none.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn remove(&mut self, slug: &Slug) -> Result<Option<Removed>, StoreError> {
+        write::remove(&mut self.conn, slug).map_err(|error| StoreError::new(&self.path, error))
+    }
+}

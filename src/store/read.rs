@@ -1,0 +1,238 @@
+//! Rows to plain types.
+
+use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, Type, ValueRef};
+use rusqlite::{
+    Connection, Error, OptionalExtension, Params, Result, Row, Transaction, TransactionBehavior,
+    params,
+};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde::de::value::{Error as WordError, StrDeserializer};
+
+use super::{Stored, Summary};
+use crate::brdf::Brdf;
+use crate::material::{
+    Censor, Covariance, Curve, Fit, Instrument, Material, Observation, Slug, Source, SourceKind,
+};
+
+/// Every material's current revision, sorted by slug.
+pub(super) fn list(conn: &Connection) -> Result<Vec<Summary>> {
+    let sql = "
+        SELECT slug, name, class, number,
+            (SELECT kind FROM source JOIN (
+                SELECT name, source FROM fit WHERE revision_id = revision.id UNION ALL
+                SELECT name, source FROM curve WHERE revision_id = revision.id) AS rendered
+             ON key = rendered.source
+             WHERE revision_id = revision.id AND rendered.name = render) AS render_kind,
+            (SELECT count(*) FROM curve WHERE revision_id = revision.id),
+            (SELECT count(*) FROM observation WHERE revision_id = revision.id),
+            (SELECT count(*) FROM fit WHERE revision_id = revision.id)
+        FROM material JOIN revision ON material_id = material.id AND number = current_revision
+        ORDER BY slug";
+    rows(conn, sql, [], |row| {
+        Ok(Summary {
+            slug: row.get(0)?,
+            name: row.get(1)?,
+            class: row.get(2)?,
+            revision: row.get(3)?,
+            render_kind: row.get(4)?,
+            curves: row.get(5)?,
+            observations: row.get(6)?,
+            fits: row.get(7)?,
+        })
+    })
+}
+
+/// One revision of a material, or the current one.
+pub(super) fn get(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result<Option<Stored>> {
+    // All rows from one moment, whoever writes meanwhile.
+    let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
+    let sql = "
+        SELECT slug, name, class, description, licence, tags, frequency_min_hz, frequency_max_hz,
+            theta_min_rad, theta_max_rad, render, number, content_hash, added_at, program_version,
+            revision.id
+        FROM material JOIN revision ON material_id = material.id
+        WHERE slug = ?1 AND number = coalesce(?2, current_revision)";
+    let found = tx
+        .prepare_cached(sql)?
+        .query_row(params![slug.as_str(), number], |row| Ok((row.get(15)?, stored(row)?)))
+        .optional()?;
+    let Some((revision_id, mut stored)) = found else { return Ok(None) };
+    let material = &mut stored.material;
+    material.sources = sources(&tx, revision_id)?;
+    material.instruments = instruments(&tx, revision_id)?;
+    material.curves = curves(&tx, revision_id)?;
+    material.fits = fits(&tx, revision_id)?;
+    Ok(Some(stored))
+}
+
+/// A revision's own row; what hangs on it is still missing.
+fn stored(row: &Row) -> Result<Stored> {
+    let material = Material {
+        slug: row.get(0)?,
+        name: row.get(1)?,
+        class: row.get(2)?,
+        description: row.get(3)?,
+        licence: row.get(4)?,
+        tags: json(row, 5)?,
+        frequency_hz: [row.get(6)?, row.get(7)?],
+        theta_rad: [row.get(8)?, row.get(9)?],
+        render: row.get(10)?,
+        sources: Vec::new(),
+        instruments: Vec::new(),
+        curves: Vec::new(),
+        fits: Vec::new(),
+    };
+    Ok(Stored {
+        material,
+        revision: row.get(11)?,
+        content_hash: row.get(12)?,
+        added_at: row.get(13)?,
+        program_version: row.get(14)?,
+    })
+}
+
+fn sources(conn: &Connection, revision_id: i64) -> Result<Vec<Source>> {
+    let sql = "SELECT key, kind, title, doi, url, licence, note FROM source
+               WHERE revision_id = ?1 ORDER BY position";
+    rows(conn, sql, [revision_id], |row| {
+        Ok(Source {
+            key: row.get(0)?,
+            kind: row.get(1)?,
+            title: row.get(2)?,
+            doi: row.get(3)?,
+            url: row.get(4)?,
+            licence: row.get(5)?,
+            note: row.get(6)?,
+        })
+    })
+}
+
+fn instruments(conn: &Connection, revision_id: i64) -> Result<Vec<Instrument>> {
+    let sql = "SELECT key, name, centre_frequency_hz, bandwidth_hz, polarisation, note
+               FROM instrument WHERE revision_id = ?1 ORDER BY position";
+    rows(conn, sql, [revision_id], |row| {
+        Ok(Instrument {
+            key: row.get(0)?,
+            name: row.get(1)?,
+            centre_frequency_hz: row.get(2)?,
+            bandwidth_hz: row.get(3)?,
+            polarisation: row.get(4)?,
+            note: row.get(5)?,
+        })
+    })
+}
+
+fn curves(conn: &Connection, revision_id: i64) -> Result<Vec<Curve>> {
+    let sql = "SELECT name, source, instrument FROM curve WHERE revision_id = ?1 ORDER BY position";
+    rows(conn, sql, [revision_id], |row| {
+        let name: String = row.get(0)?;
+        let observations = observations(conn, revision_id, &name)?;
+        Ok(Curve { name, source: row.get(1)?, instrument: row.get(2)?, observations })
+    })
+}
+
+fn observations(conn: &Connection, revision_id: i64, curve: &str) -> Result<Vec<Observation>> {
+    let sql = "SELECT theta_i_rad, theta_r_rad, delta_phi_rad, sigma0, censor, threshold_sigma0
+         FROM observation WHERE revision_id = ?1 AND curve = ?2 ORDER BY position";
+    rows(conn, sql, params![revision_id, curve], |row| {
+        Ok(Observation {
+            theta_i_rad: row.get(0)?,
+            theta_r_rad: row.get(1)?,
+            delta_phi_rad: row.get(2)?,
+            sigma0: row.get(3)?,
+            censor: row.get(4)?,
+            threshold_sigma0: row.get(5)?,
+        })
+    })
+}
+
+fn fits(conn: &Connection, revision_id: i64) -> Result<Vec<Fit>> {
+    let sql = "SELECT name, model, estimator, curve, source FROM fit
+               WHERE revision_id = ?1 ORDER BY position";
+    rows(conn, sql, [revision_id], |row| {
+        let name: String = row.get(0)?;
+        let mut model: Brdf = json(row, 1)?;
+        let parameter_sources = parameters(conn, revision_id, &name, &mut model)?;
+        let covariance = covariance(conn, revision_id, &name)?;
+        Ok(Fit {
+            name,
+            model,
+            estimator: row.get(2)?,
+            curve: row.get(3)?,
+            source: row.get(4)?,
+            parameter_sources,
+            covariance,
+        })
+    })
+}
+
+/// Sets a model's parameters and gives those with a source of their own, sorted by path.
+fn parameters(
+    conn: &Connection,
+    revision_id: i64,
+    fit: &str,
+    model: &mut Brdf,
+) -> Result<Vec<(String, String)>> {
+    let sql = "SELECT path, value, source FROM fit_parameter
+               WHERE revision_id = ?1 AND fit = ?2 ORDER BY path";
+    let sources = rows(conn, sql, params![revision_id, fit], |row| {
+        let path: String = row.get(0)?;
+        if !model.set_parameter(&path, row.get(1)?) {
+            let problem = format!("the model of fit `{fit}` has no parameter `{path}`");
+            return Err(Error::FromSqlConversionFailure(0, Type::Text, problem.into()));
+        }
+        let source: Option<String> = row.get(2)?;
+        Ok(source.map(|source| (path, source)))
+    })?;
+    Ok(sources.into_iter().flatten().collect())
+}
+
+fn covariance(conn: &Connection, revision_id: i64, fit: &str) -> Result<Option<Covariance>> {
+    let sql = "SELECT column_path, covariance FROM fit_covariance
+               WHERE revision_id = ?1 AND fit = ?2 ORDER BY position";
+    let pairs: Vec<(String, f64)> =
+        rows(conn, sql, params![revision_id, fit], |row| Ok((row.get(0)?, row.get(1)?)))?;
+    let (mut paths, values): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
+    paths.truncate(values.len().isqrt());
+    let matrix = values.chunks(paths.len().max(1)).map(<[f64]>::to_vec).collect();
+    Ok((!paths.is_empty()).then_some(Covariance { parameters: paths, matrix }))
+}
+
+fn rows<T>(
+    conn: &Connection,
+    sql: &str,
+    values: impl Params,
+    read: impl FnMut(&Row) -> Result<T>,
+) -> Result<Vec<T>> {
+    conn.prepare_cached(sql)?.query_map(values, read)?.collect()
+}
+
+fn json<T: DeserializeOwned>(row: &Row, column: usize) -> Result<T> {
+    let text: String = row.get(column)?;
+    serde_json::from_str(&text)
+        .map_err(|error| Error::FromSqlConversionFailure(column, Type::Text, error.into()))
+}
+
+/// A value that files and the database write as one word.
+fn word<'de, T: Deserialize<'de>>(value: ValueRef<'de>) -> FromSqlResult<T> {
+    T::deserialize(StrDeserializer::<WordError>::new(value.as_str()?)).map_err(FromSqlError::other)
+}
+
+impl FromSql for Slug {
+    fn column_result(value: ValueRef) -> FromSqlResult<Slug> {
+        word(value)
+    }
+}
+
+impl FromSql for SourceKind {
+    fn column_result(value: ValueRef) -> FromSqlResult<SourceKind> {
+        word(value)
+    }
+}
+
+impl FromSql for Censor {
+    fn column_result(value: ValueRef) -> FromSqlResult<Censor> {
+        word(value)
+    }
+}

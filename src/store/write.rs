@@ -1,0 +1,218 @@
+//! Plain types to rows.
+
+use rusqlite::{Connection, Error, OptionalExtension, Params, Result, Transaction, params};
+use serde::Serialize;
+
+use super::{Added, Removed};
+use crate::material::{Covariance, Curve, Fit, Instrument, Material, Slug, Source};
+
+/// Adds a material or a revision of one.
+pub(super) fn add(conn: &mut Connection, material: &Material) -> Result<Added> {
+    let tx = conn.transaction()?;
+    let content_hash = material.content_hash();
+    let (added, number) = match current(&tx, &material.slug)? {
+        Some((number, stored)) if stored == content_hash => return Ok(Added::Unchanged(number)),
+        Some((number, _)) => (Added::Revision(number + 1), number + 1),
+        None => (Added::New, 1),
+    };
+    let revision_id = revision(&tx, material, number, &content_hash)?;
+    Rows { tx: &tx, revision_id }.material(material)?;
+    tx.commit()?;
+    Ok(added)
+}
+
+/// Removes a material and all that hangs on it.
+pub(super) fn remove(conn: &mut Connection, slug: &Slug) -> Result<Option<Removed>> {
+    let tx = conn.transaction()?;
+    let count = "SELECT count(*) FROM revision JOIN material ON material.id = material_id
+                 WHERE slug = ?1";
+    let revisions = tx.query_row(count, [slug.as_str()], |row| row.get(0))?;
+    let found = tx.execute("DELETE FROM material WHERE slug = ?1", [slug.as_str()])?;
+    tx.commit()?;
+    Ok((found > 0).then_some(Removed { revisions }))
+}
+
+/// Number and content hash of the current revision.
+fn current(tx: &Transaction, slug: &Slug) -> Result<Option<(u32, String)>> {
+    let sql = "SELECT number, content_hash FROM material
+               JOIN revision ON material_id = material.id AND number = current_revision
+               WHERE slug = ?1";
+    tx.prepare_cached(sql)?
+        .query_row([slug.as_str()], |row| Ok((row.get(0)?, row.get(1)?)))
+        .optional()
+}
+
+/// Writes a revision's own row and makes it the current one.
+fn revision(tx: &Transaction, material: &Material, number: u32, hash: &str) -> Result<i64> {
+    let upsert = "INSERT INTO material (slug, current_revision) VALUES (?1, ?2)
+                  ON CONFLICT (slug) DO UPDATE SET current_revision = excluded.current_revision
+                  RETURNING id";
+    let material_id: i64 = tx
+        .prepare_cached(upsert)?
+        .query_row(params![material.slug.as_str(), number], |row| row.get(0))?;
+    let ([frequency_min_hz, frequency_max_hz], [theta_min_rad, theta_max_rad]) =
+        (material.frequency_hz, material.theta_rad);
+    let insert = "INSERT INTO revision
+        (material_id, number, content_hash, name, class, description, licence, tags,
+         frequency_min_hz, frequency_max_hz, theta_min_rad, theta_max_rad, render,
+         added_at, program_version)
+        VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13,
+         strftime('%Y-%m-%dT%H:%M:%SZ', 'now'), ?14)";
+    tx.prepare_cached(insert)?.insert(params![
+        material_id,
+        number,
+        hash,
+        material.name,
+        material.class,
+        material.description,
+        material.licence,
+        json(&material.tags)?,
+        frequency_min_hz,
+        frequency_max_hz,
+        theta_min_rad,
+        theta_max_rad,
+        material.render,
+        env!("CARGO_PKG_VERSION"),
+    ])
+}
+
+/// Writes what hangs on one revision.
+struct Rows<'a> {
+    tx: &'a Transaction<'a>,
+    revision_id: i64,
+}
+
+impl Rows<'_> {
+    fn material(&self, material: &Material) -> Result<()> {
+        numbered(&material.sources, |position, source| self.source(position, source))?;
+        numbered(&material.instruments, |position, entry| self.instrument(position, entry))?;
+        numbered(&material.curves, |position, curve| self.curve(position, curve))?;
+        numbered(&material.fits, |position, fit| self.fit(position, fit))
+    }
+
+    fn insert(&self, sql: &str, values: impl Params) -> Result<()> {
+        self.tx.prepare_cached(sql)?.execute(values).map(|_| ())
+    }
+
+    fn source(&self, position: u32, source: &Source) -> Result<()> {
+        let Source { key, kind, title, doi, url, licence, note } = source;
+        self.insert(
+            "INSERT INTO source
+             (revision_id, position, key, kind, title, doi, url, licence, note)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+            params![self.revision_id, position, key, kind.as_str(), title, doi, url, licence, note],
+        )
+    }
+
+    fn instrument(&self, position: u32, instrument: &Instrument) -> Result<()> {
+        let Instrument { key, name, centre_frequency_hz, bandwidth_hz, polarisation, note } =
+            instrument;
+        self.insert(
+            "INSERT INTO instrument
+             (revision_id, position, key, name, centre_frequency_hz, bandwidth_hz, polarisation,
+              note)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+            params![
+                self.revision_id,
+                position,
+                key,
+                name,
+                centre_frequency_hz,
+                bandwidth_hz,
+                polarisation,
+                note
+            ],
+        )
+    }
+
+    fn curve(&self, position: u32, curve: &Curve) -> Result<()> {
+        let Curve { name, source, instrument, observations } = curve;
+        self.insert(
+            "INSERT INTO curve (revision_id, position, name, source, instrument)
+             VALUES (?1, ?2, ?3, ?4, ?5)",
+            params![self.revision_id, position, name, source, instrument],
+        )?;
+        let mut insert = self.tx.prepare_cached(
+            "INSERT INTO observation
+             (revision_id, curve, position, theta_i_rad, theta_r_rad, delta_phi_rad, sigma0, censor,
+              threshold_sigma0)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+        )?;
+        numbered(observations, |position, o| {
+            let [theta_i_rad, theta_r_rad, delta_phi_rad] =
+                [o.theta_i_rad, o.theta_r_rad, o.delta_phi_rad];
+            let values = params![
+                self.revision_id,
+                name,
+                position,
+                theta_i_rad,
+                theta_r_rad,
+                delta_phi_rad,
+                o.sigma0,
+                o.censor.as_str(),
+                o.threshold_sigma0
+            ];
+            insert.execute(values).map(|_| ())
+        })
+    }
+
+    fn fit(&self, position: u32, fit: &Fit) -> Result<()> {
+        let Fit { name, model, estimator, curve, source, .. } = fit;
+        self.insert(
+            "INSERT INTO fit (revision_id, position, name, model, estimator, curve, source)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+            params![self.revision_id, position, name, json(model)?, estimator, curve, source],
+        )?;
+        self.parameters(fit)?;
+        fit.covariance.as_ref().map_or(Ok(()), |covariance| self.covariance(name, covariance))
+    }
+
+    fn parameters(&self, fit: &Fit) -> Result<()> {
+        numbered(&fit.model.parameters(), |position, parameter| {
+            let path = &parameter.path;
+            let sd = fit.covariance.as_ref().and_then(|c| c.standard_deviation(path));
+            let own = fit.parameter_sources.iter().find(|(of, _)| of == path);
+            let source = own.map(|(_, source)| source);
+            self.insert(
+                "INSERT INTO fit_parameter
+                 (revision_id, fit, position, path, value, unit, sd, source)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+                params![
+                    self.revision_id,
+                    fit.name,
+                    position,
+                    path,
+                    parameter.value,
+                    parameter.unit,
+                    sd,
+                    source
+                ],
+            )
+        })
+    }
+
+    fn covariance(&self, fit: &str, covariance: &Covariance) -> Result<()> {
+        let Covariance { parameters, matrix } = covariance;
+        let pairs = std::iter::zip(parameters, matrix).flat_map(|(row, values)| {
+            std::iter::zip(parameters, values).map(move |(column, value)| (row, column, value))
+        });
+        for (position, (row, column, value)) in (0u32..).zip(pairs) {
+            self.insert(
+                "INSERT INTO fit_covariance
+                 (revision_id, fit, position, row_path, column_path, covariance)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+                params![self.revision_id, fit, position, row, column, value],
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes items in their order, each with its position from 0.
+fn numbered<T>(items: &[T], mut write: impl FnMut(u32, &T) -> Result<()>) -> Result<()> {
+    (0..).zip(items).try_for_each(|(position, item)| write(position, item))
+}
+
+fn json(value: &impl Serialize) -> Result<String> {
+    serde_json::to_string(value).map_err(|error| Error::ToSqlConversionFailure(error.into()))
+}

@@ -1,0 +1,230 @@
+//! Promise: bad input ends with one clear sentence that names the place and the way out, a non-zero
+//! status, and nothing written or changed.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use support::{entries, matdb, refused, root, scene};
+
+const PLATE: &str = "
+[[mesh]]
+name = \"plate\"
+file = \"builtin:plate\"
+size_m = [1, 1, 0]
+translation_m = [0, 1.1, 0]
+
+[[region]]
+name = \"all\"
+material = \"ptfe\"
+";
+
+const TRIANGLE: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+    property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+    0 0.6 0\n1 0.6 0\n0 1.6 0\n3 0 1 2\n";
+
+/// Renders `text` as a scene in a fresh folder with `files` beside it; the error, after checking
+/// that nothing else appeared.
+fn render(text: &str, files: &[(&str, &[u8])]) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("scene.toml"), text).unwrap();
+    for (name, bytes) in files {
+        fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    let before = entries(folder.path());
+    let message = refused(matdb(folder.path()).args(["render", "scene.toml", "-o", "out"]));
+    assert_eq!(entries(folder.path()), before, "{message}");
+    message
+}
+
+fn check(message: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(message.contains(part), "`{part}` is not in: {message}");
+    }
+}
+
+#[test]
+fn a_good_scene_renders_so_that_the_errors_below_mean_something() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("scene.toml"), PLATE).unwrap();
+    matdb(folder.path()).args(["render", "scene.toml", "-o", "out"]).assert().success();
+    let mesh = PLATE.replace("builtin:plate", "mesh.ply").replace("size_m = [1, 1, 0]\n", "");
+    fs::write(folder.path().join("scene.toml"), mesh).unwrap();
+    fs::write(folder.path().join("mesh.ply"), TRIANGLE.replace(" 0.6 ", " -0.5 ")).unwrap();
+    matdb(folder.path()).args(["render", "scene.toml", "-o", "out"]).assert().success();
+}
+
+#[test]
+fn mistakes_in_the_scene_file() {
+    for (from, to, parts) in [
+        ("size_m", "siez_m", &["scene.toml", "line 5", "did you mean `size_m`?"][..]),
+        ("[[mesh]]", "[radar]\nthreshhold_dbm = -70\n[[mesh]]", &["did you mean `threshold_dbm`?"]),
+        ("[[mesh]]", "[radar]\nspot_diameter_m = 0\n[[mesh]]", &["radar.spot_diameter_m = 0", "0.00001"]),
+        ("[[mesh]]", "[radar]\npreset = \"upm\"\n[[mesh]]", &["no radar preset `upm`", "upm-300ghz"]),
+        ("[[mesh]]", "[image]\npixel_m = -1.0\n[[mesh]]", &["image.pixel_m", "0.004"]),
+        ("\"ptfe\"", "\"aluminum\"", &["region `all`", "no material `aluminum`", "did you mean `aluminium`?"]),
+        ("\"ptfe\"", "\"granite\"", &["no material `granite`", "matdb add --from"]),
+        ("\"ptfe\"", "\"ptfe@x\"", &["`ptfe@x`", "ptfe@1"]),
+        ("builtin:plate", "builtin:plat", &["mesh `plate`", "did you mean `builtin:plate`?"]),
+        ("builtin:plate", "plate.step", &["plate.step", ".ply, .obj or .stl"]),
+        ("builtin:plate", "plate.ply", &["cannot read", "plate.ply", "beside the scene file"]),
+        ("[1, 1, 0]", "[1, -1, 0]", &["size_m", "three lengths"]),
+        ("[0, 1.1, 0]", "[3, 1.1, 0]", &["no chirp of the scan hits the target", "x 2.500 to 3.500", "translation_m"]),
+        ("[0, 1.1, 0]", "[0, nan, 0]", &["translation_m", "finite"]),
+        ("name = \"all\"", "name = \"all\"\nmesh = \"plat\"", &["region `all`", "did you mean `plate`?"]),
+        ("name = \"all\"", "name = \"all\"\nbox = { min_m = [5, 5, 5], max_m = [6, 6, 6] }", &["region `all` selects no facet"]),
+        ("[[region]]", "[[regoin]]", &["did you mean `region`?"]),
+    ] {
+        assert!(PLATE.contains(from));
+        let message = render(&PLATE.replacen(from, to, 1), &[]);
+        check(&message, parts);
+        let names_another_file = message.contains("no chirp") || message.contains("cannot read");
+        check(&message, &["scene.toml"][..usize::from(!names_another_file)]);
+    }
+    check(&render("", &[]), &["has no mesh", "[[mesh]]"]);
+    check(&render("radar = 3", &[]), &["scene.toml", "line 1"]);
+}
+
+#[test]
+fn a_scene_that_is_not_there_or_not_text() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |name: &str| refused(matdb(folder.path()).args(["render", name, "-o", "out"]));
+    check(&run("none.toml"), &["cannot read none.toml"]);
+    fs::write(folder.path().join("bytes.toml"), [0xff, 0xfe]).unwrap();
+    check(&run("bytes.toml"), &["bytes.toml: byte 0", "UTF-8"]);
+    fs::create_dir(folder.path().join("folder.toml")).unwrap();
+    check(&run("folder.toml"), &["cannot read folder.toml"]);
+    assert!(!folder.path().join("out").exists());
+}
+
+#[test]
+fn hostile_meshes() {
+    let scene = |file: &str| {
+        PLATE.replace("builtin:plate", file).replace("size_m = [1, 1, 0]\n", "")
+    };
+    let ply = |from: &str, to: &str| TRIANGLE.replacen(from, to, 1);
+    for (text, parts) in [
+        (ply("vertex 3", "vertex 1000000000000"), &["mesh.ply"][..]),
+        (ply("face 1", "face 4000000000"), &["mesh.ply"]),
+        (ply("3 0 1 2", "3 0 1"), &["mesh.ply"]),
+        (ply("3 0 1 2", "3 0 1 9"), &["mesh.ply: face 0", "vertex 9"]),
+        (ply("3 0 1 2", "3 0 1 -2"), &["mesh.ply", "-2"]),
+        (ply("0 0.6 0", "nan 0.6 0"), &["mesh.ply", "vertex 0", "not finite"]),
+        (ply("0 0.6 0", "0 inf 0"), &["mesh.ply", "vertex 0", "not finite"]),
+        (ply("1 0.6 0", "0 0.6 0"), &["mesh.ply", "none of the 1 facets has an area"]),
+        (ply("3 0 1 2\n", "").replace("face 1", "face 0"), &["mesh.ply", "no facets"]),
+        (ply("ply", "plx"), &["mesh.ply"]),
+        (String::new(), &["mesh.ply"]),
+    ] {
+        check(&render(&scene("mesh.ply"), &[("mesh.ply", text.as_bytes())]), parts);
+    }
+    check(&render(&scene("mesh.obj"), &[("mesh.obj", b"v 0 0 0\nf 1 2 3\n")]), &["mesh.obj"]);
+    let mut stl = vec![0; 84];
+    stl[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
+    check(&render(&scene("mesh.stl"), &[("mesh.stl", &stl)]), &["mesh.stl"]);
+}
+
+#[test]
+fn degenerate_facets_are_counted_and_skipped() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = PLATE.replace("builtin:plate", "mesh.ply").replace("size_m = [1, 1, 0]\n", "");
+    fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    let mesh = TRIANGLE.replace(" 0.6 ", " -0.5 ").replace("face 1", "face 2") + "3 0 0 1\n";
+    fs::write(folder.path().join("mesh.ply"), mesh).unwrap();
+    let run = matdb(folder.path()).args(["render", "scene.toml", "-o", "out"]).output().unwrap();
+    assert!(run.status.success());
+    check(&String::from_utf8_lossy(&run.stderr), &["1 facets of mesh `plate` have no area"]);
+}
+
+#[test]
+fn an_output_folder_that_cannot_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("file"), "mine").unwrap();
+    let run = |out: &str| {
+        refused(matdb(folder.path()).arg("render").arg(scene("human.toml")).args(["-o", out]))
+    };
+    check(&run("file"), &["file", "-o"]);
+    check(&run("file/out"), &["file/out", "-o"]);
+    check(&run("/proc/matdb"), &["/proc/matdb", "-o"]);
+    assert_eq!(entries(folder.path()), ["file"]);
+    assert_eq!(fs::read(folder.path().join("file")).unwrap(), b"mine");
+}
+
+/// A limit on the size of files stands in for a full disk: writing fails in the same place.
+#[cfg(unix)]
+fn on_a_full_disk(folder: &Path, blocks: u32, arguments: &str) -> std::process::Output {
+    let program = assert_cmd::cargo::cargo_bin("matdb");
+    let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec '{}' {arguments}", program.display());
+    let mut shell = std::process::Command::new("bash");
+    shell.current_dir(folder).env_remove("MATDB").args(["-c", &script]).output().unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disk_leaves_nothing_half_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = format!("render '{}' -o out", scene("human.toml").display());
+    let run = on_a_full_disk(folder.path(), 16, &arguments);
+    let message = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert_eq!(run.status.code(), Some(1), "{message}");
+    check(&message, &["cannot write", "out/", "make room"]);
+    assert!(entries(folder.path()).is_empty());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disk_leaves_the_database_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    matdb(folder.path()).args(["add", "ptfe", "-q"]).assert().success();
+    let run = on_a_full_disk(folder.path(), 1, "add --all");
+    assert_eq!(run.status.code(), Some(1), "{}", String::from_utf8_lossy(&run.stderr));
+    let listed = matdb(folder.path()).args(["list", "--json"]).output().unwrap();
+    let listed: serde_json::Value = serde_json::from_slice(&listed.stdout).unwrap();
+    assert_eq!(listed.as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn materials_that_are_not_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| refused(matdb(folder.path()).args(arguments));
+    check(&run(&["add", "manequin-paint"]), &["did you mean `mannequin-paint`?"]);
+    check(&run(&["add", "ptfe", "granite"]), &["no material `granite`"]);
+    check(&run(&["show", "granite"]), &["no material `granite`"]);
+    check(&run(&["rm", "ptfe"]), &["no material `ptfe`"]);
+    check(&run(&["add", "--from", "none.toml"]), &["cannot read none.toml"]);
+    check(&run(&["add", "--from", "."]), &["holds no material.toml"]);
+    assert!(entries(folder.path()).is_empty(), "nothing was created");
+}
+
+#[test]
+fn a_bad_material_file_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = fs::read_to_string(root().join("materials/ptfe/material.toml")).unwrap();
+    for (from, to, parts) in [
+        ("class =", "colour =", &["material.toml: line 3", "unknown key `colour`"][..]),
+        ("m = 0.05", "m = 5", &["specular.m = 5", "0.001 to 2"]),
+        ("\"modelled\"", "\"guess\"", &["unknown value `guess`", "measured"]),
+        ("render = \"stated\"", "render = \"best\"", &["render refers to a fit or curve `best`"]),
+    ] {
+        assert!(good.contains(from), "{from}");
+        fs::write(folder.path().join("material.toml"), good.replacen(from, to, 1)).unwrap();
+        check(&refused(matdb(folder.path()).args(["add", "--from", "material.toml", "glass"])), parts);
+        assert_eq!(entries(folder.path()), ["material.toml"]);
+    }
+}
+
+#[test]
+fn databases_that_cannot_be_used() {
+    let folder = tempfile::tempdir().unwrap();
+    let db = folder.path().join("matdb.sqlite");
+    let run = |arguments: &[&str]| refused(matdb(folder.path()).args(arguments));
+    fs::write(&db, "this is a letter, not a database, and it is long enough to look at").unwrap();
+    for arguments in [&["list"][..], &["add", "ptfe"], &["show", "ptfe"], &["rm", "ptfe"]] {
+        check(&run(arguments), &["matdb.sqlite"]);
+        assert!(fs::read_to_string(&db).unwrap().starts_with("this is a letter"));
+    }
+    check(&run(&["add", "ptfe", "--db", "no/such/folder/x.sqlite"]), &["no/such/folder"]);
+    check(&run(&["add", "ptfe", "--db", "."]), &["--db"][..0]);
+    assert_eq!(entries(folder.path()), ["matdb.sqlite"]);
+}

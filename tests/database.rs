@@ -1,0 +1,98 @@
+//! Promise: `add`, `list`, `show` and `rm` keep every revision, change nothing needlessly and answer
+//! scripts in JSON; a scene renders what the database holds.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use support::{entries, matdb, root, scene};
+
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    let output = matdb(folder).args(arguments).arg("--json").output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// A copy of a built-in material's folder with one piece of text replaced.
+fn variant(folder: &Path, slug: &str, from: &str, to: &str) {
+    let text = fs::read_to_string(root().join("materials").join(slug).join("material.toml")).unwrap();
+    assert!(text.contains(from));
+    fs::create_dir_all(folder.join(slug)).unwrap();
+    fs::write(folder.join(slug).join("material.toml"), text.replacen(from, to, 1)).unwrap();
+}
+
+#[test]
+fn adding_twice_changes_nothing_and_a_change_is_a_new_revision() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    assert_eq!(json(folder, &["add", "ptfe"])[0]["result"], "added");
+    let before = fs::read(folder.join("matdb.sqlite")).unwrap();
+    assert_eq!(json(folder, &["add", "ptfe"])[0]["result"], "unchanged");
+    assert_eq!(fs::read(folder.join("matdb.sqlite")).unwrap(), before);
+    variant(folder, "ptfe", "m = 0.05", "m = 0.06");
+    let added = json(folder, &["add", "--from", "ptfe"]);
+    assert_eq!((&added[0]["result"], &added[0]["revision"]), (&"revised".into(), &2.into()));
+    let m = |name: &str| {
+        json(folder, &["show", name])["material"]["fits"][0]["model"]["specular"]["m"].as_f64()
+    };
+    assert_eq!((m("ptfe"), m("ptfe@1"), m("ptfe@2")), (Some(0.06), Some(0.05), Some(0.06)));
+    assert_eq!(json(folder, &["rm", "ptfe"])[0]["revisions"], 2);
+    assert_eq!(json(folder, &["list"]), Value::Array(vec![]));
+}
+
+#[test]
+fn several_materials_are_added_together_or_not_at_all() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(json(folder.path(), &["add", "--all"]).as_array().unwrap().len(), 6);
+    assert_eq!(json(folder.path(), &["list"]).as_array().unwrap().len(), 6);
+    let own = tempfile::tempdir().unwrap();
+    variant(own.path(), "ptfe", "m = 0.05", "m = 0.07");
+    variant(own.path(), "glass", "m = 0.02", "m = 9");
+    let refused = support::refused(matdb(folder.path()).args(["add", "--from"]).arg(own.path()));
+    assert!(refused.contains("glass") && refused.contains("specular.m = 9"), "{refused}");
+    assert_eq!(json(folder.path(), &["show", "ptfe"])["revision"], 1);
+}
+
+#[test]
+fn a_scene_renders_what_the_database_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let render = |out: &str| {
+        let scene = scene("human.toml");
+        json(folder, &["render", scene.to_str().unwrap(), "-o", out]);
+        let record = fs::read(folder.join(out).join("scan.json")).unwrap();
+        serde_json::from_slice::<Value>(&record).unwrap()["materials"][0].clone()
+    };
+    let built_in = render("one");
+    assert_eq!((&built_in["origin"], &built_in["revision"]), (&"built-in".into(), &Value::Null));
+    assert_eq!(entries(folder), ["one"], "rendering creates no database");
+    variant(folder, "human-skin", "m = 0.08", "m = 0.12");
+    json(folder, &["add", "--from", "human-skin"]);
+    let stored = render("two");
+    assert_eq!((&stored["origin"], &stored["revision"]), (&"database".into(), &1.into()));
+    assert_eq!(stored["scattering"]["specular"]["m"], 0.12);
+}
+
+#[test]
+fn the_database_is_where_the_flag_or_the_environment_says() {
+    let folder = tempfile::tempdir().unwrap();
+    matdb(folder.path()).args(["add", "ptfe", "--db", "flag.sqlite"]).assert().success();
+    matdb(folder.path()).args(["add", "ptfe"]).env("MATDB", "variable.sqlite").assert().success();
+    assert_eq!(entries(folder.path()), ["flag.sqlite", "variable.sqlite"]);
+}
+
+#[test]
+fn quiet_says_nothing_and_a_reader_that_leaves_is_no_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = matdb(folder.path()).args(["add", "--all", "--quiet"]).output().unwrap();
+    assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
+    let program = assert_cmd::cargo::cargo_bin("matdb");
+    let script = format!("'{}' completions bash | head -c 10", program.display());
+    let piped = std::process::Command::new("bash")
+        .args(["-o", "pipefail", "-c", &script])
+        .output()
+        .unwrap();
+    assert!(piped.status.success(), "{}", String::from_utf8_lossy(&piped.stderr));
+}

@@ -1,0 +1,107 @@
+//! Promise: every command of the README runs as it stands there, and every example file in the docs
+//! is accepted.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use matdb::brdf::Scattering;
+use support::{entries, matdb, root};
+
+fn read(path: &str) -> String {
+    fs::read_to_string(root().join(path)).unwrap()
+}
+
+/// Code blocks of one language.
+fn blocks<'a>(text: &'a str, language: &str) -> Vec<&'a str> {
+    text.split("```")
+        .skip(1)
+        .step_by(2)
+        .filter_map(|block| block.strip_prefix(language)?.strip_prefix('\n'))
+        .collect()
+}
+
+/// Arguments for the program of every README line that runs it, without comments.
+fn commands() -> Vec<Vec<String>> {
+    let readme = read("README.md");
+    let lines = blocks(&readme, "sh").into_iter().flat_map(str::lines);
+    lines
+        .filter_map(|line| {
+            let line = line.split(" #").next().unwrap_or("").trim();
+            line.strip_prefix("matdb ").or(line.strip_prefix("cargo run --release -- "))
+        })
+        .map(|arguments| arguments.split_whitespace().map(str::to_owned).collect())
+        .collect()
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for name in entries(from) {
+        match from.join(&name) {
+            folder if folder.is_dir() => copy(&folder, &to.join(&name)),
+            file => drop(fs::copy(file, to.join(&name)).unwrap()),
+        }
+    }
+}
+
+#[test]
+fn every_command_of_the_readme_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    copy(&root().join("scenes"), &folder.path().join("scenes"));
+    let commands = commands();
+    assert_eq!(commands.len(), 6, "one to start with and five to go on with: {commands:?}");
+    for arguments in commands {
+        matdb(folder.path()).args(&arguments).assert().success();
+    }
+    for image in ["out/power.png", "person/power.png"] {
+        assert!(folder.path().join(image).exists(), "{image}");
+    }
+}
+
+#[test]
+fn the_readme_names_the_test_command_and_files_that_exist() {
+    let readme = read("README.md");
+    assert!(blocks(&readme, "sh").iter().any(|block| block.lines().any(|l| l == "cargo test")));
+    for link in readme.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+        assert!(link.starts_with("https://") || root().join(link).exists(), "{link}");
+    }
+}
+
+#[test]
+fn the_scene_of_the_docs_is_accepted() {
+    let text = read("docs/scenes.md");
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("scene.toml"), blocks(&text, "toml")[0]).unwrap();
+    matdb(folder.path()).args(["render", "scene.toml", "-o", "out"]).assert().success();
+}
+
+#[test]
+fn the_material_of_the_docs_is_accepted() {
+    let text = read("docs/materials.md");
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("material.toml"), blocks(&text, "toml")[0]).unwrap();
+    fs::write(folder.path().join("scan.csv"), blocks(&text, "csv")[0]).unwrap();
+    matdb(folder.path()).args(["add", "--from", "."]).assert().success();
+    matdb(folder.path()).args(["show", "my-paint@1"]).assert().success();
+}
+
+#[test]
+fn every_command_has_help_with_an_example() {
+    let folder = tempfile::tempdir().unwrap();
+    for command in ["render", "add", "list", "show", "rm", "completions"] {
+        let output = matdb(folder.path()).args(["help", command]).output().unwrap();
+        let text = String::from_utf8(output.stdout).unwrap();
+        assert!(text.contains("Example") && text.contains(&format!("matdb {command}")), "{text}");
+    }
+}
+
+#[test]
+fn the_built_in_table_of_the_docs_is_complete() {
+    let text = read("docs/materials.md");
+    for name in matdb::material::builtin::names() {
+        assert!(text.contains(&format!("| `{name}` |")), "{name}");
+        let material = matdb::material::builtin::get(name).unwrap().unwrap();
+        assert!(material.scattering().unwrap().sigma0(0.0) > 0.0);
+    }
+}

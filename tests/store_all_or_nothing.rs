@@ -1,0 +1,219 @@
+//! A write happens as a whole or not at all: whichever step of SQLite's fails, at whichever
+//! statement the process dies, and wherever the write-ahead log is cut off, the database opens
+//! again and holds what it held before or what it should hold after.
+//!
+//! Faults come through SQLite's own hooks, which an automatic extension puts on every connection
+//! that the library opens; the library needs no hook for it.
+
+mod common;
+
+use std::cell::Cell;
+use std::ffi::{c_char, c_int, c_uint, c_void};
+use std::fs;
+use std::path::Path;
+use std::sync::Once;
+
+use common::{changed, child, contents, given, is_sound, sample};
+use matdb::material::Material;
+use matdb::store::{Store, StoreError};
+use rusqlite::ffi;
+
+/// A call that writes.
+#[derive(Clone, Copy, Debug)]
+enum Write {
+    /// Opening a file that is not there.
+    Make,
+    /// Adding a material that is not there.
+    Add,
+    /// Adding a revision.
+    Revise,
+    /// Removing a material with two revisions.
+    Remove,
+}
+
+const WRITES: [Write; 4] = [Write::Make, Write::Add, Write::Revise, Write::Remove];
+
+impl Write {
+    /// Makes the database as it is before.
+    fn prepare(self, path: &Path) {
+        if let Write::Make = self {
+            return;
+        }
+        let mut store = Store::open(path).unwrap();
+        store.add(&sample("bystander")).unwrap();
+        if let Write::Revise | Write::Remove = self {
+            store.add(&sample("subject")).unwrap();
+        }
+        if let Write::Remove = self {
+            store.add(&changed("subject")).unwrap();
+        }
+    }
+
+    fn run(self, path: &Path) -> Result<(), StoreError> {
+        let mut store = Store::open(path)?;
+        match self {
+            Write::Make => Ok(()),
+            Write::Add => store.add(&sample("subject")).map(drop),
+            Write::Revise => store.add(&changed("subject")).map(drop),
+            Write::Remove => store.remove(&"subject".parse().unwrap()).map(drop),
+        }
+    }
+
+    fn before_and_after(self) -> [Vec<Material>; 2] {
+        let (bystander, first, second) =
+            (sample("bystander"), sample("subject"), changed("subject"));
+        let alone = vec![bystander.clone()];
+        match self {
+            Write::Make => [vec![], vec![]],
+            Write::Add => [alone, vec![bystander, first]],
+            Write::Revise => {
+                [vec![bystander.clone(), first.clone()], vec![bystander, first, second]]
+            }
+            Write::Remove => [vec![bystander, first, second], alone],
+        }
+    }
+
+    /// Whether the database is sound and holds the state after; fails when it holds neither.
+    fn is_done(self, path: &Path, when: &str) -> bool {
+        let held = contents(path);
+        // What a read-only look leaves alone, the next writer must be able to take over.
+        drop(Store::open(path).unwrap());
+        assert!(is_sound(path), "{self:?} {when}");
+        assert_eq!(contents(path), held, "{self:?} {when}");
+        let [before, after] = self.before_and_after();
+        assert!(held == before || held == after, "{self:?} {when}: neither before nor after");
+        held == after
+    }
+}
+
+thread_local! {
+    /// Steps of SQLite until one fails; negative when none shall.
+    static STEPS_LEFT: Cell<i64> = const { Cell::new(-1) };
+    /// Statements until the process dies.
+    static STATEMENTS_LEFT: Cell<i64> = const { Cell::new(-1) };
+}
+
+fn is_due(counter: &'static std::thread::LocalKey<Cell<i64>>) -> bool {
+    counter.set(counter.get().max(0) - 1);
+    counter.get() == 0
+}
+
+extern "C" fn on_step(_: *mut c_void) -> c_int {
+    c_int::from(is_due(&STEPS_LEFT))
+}
+
+extern "C" fn on_statement(_: c_uint, _: *mut c_void, _: *mut c_void, _: *mut c_void) -> c_int {
+    if is_due(&STATEMENTS_LEFT) {
+        std::process::abort();
+    }
+    0
+}
+
+unsafe extern "C" fn hook(
+    db: *mut ffi::sqlite3,
+    _: *mut *mut c_char,
+    _: *const ffi::sqlite3_api_routines,
+) -> c_int {
+    let none = std::ptr::null_mut();
+    // SAFETY: SQLite hands over the connection it is opening; the hooks live as long as the process.
+    unsafe {
+        ffi::sqlite3_progress_handler(db, 1, Some(on_step), none);
+        ffi::sqlite3_trace_v2(db, ffi::SQLITE_TRACE_STMT as c_uint, Some(on_statement), none)
+    }
+}
+
+/// Puts the hooks on every connection opened from now on.
+fn hook_connections() {
+    static ONCE: Once = Once::new();
+    // SAFETY: `hook` neither opens nor closes a connection.
+    ONCE.call_once(|| unsafe { rusqlite::auto_extension::register_auto_extension(hook).unwrap() });
+}
+
+#[test]
+fn any_step_may_fail() {
+    /// A write has some 2000 steps; all of them would take a minute. A prime meets loops unevenly.
+    const EVERY: usize = 7;
+    hook_connections();
+    for write in WRITES {
+        let folder = tempfile::tempdir().unwrap();
+        let before = folder.path().join("before.sqlite");
+        write.prepare(&before);
+        let mut refused = 0;
+        for step in (1..).step_by(EVERY) {
+            let path = folder.path().join("now.sqlite");
+            let _ = fs::copy(&before, &path);
+            STEPS_LEFT.set(step);
+            let result = write.run(&path);
+            let fired = STEPS_LEFT.replace(-1) < 1;
+            let done = write.is_done(&path, &format!("step {step}"));
+            assert!(done || result.is_err(), "{write:?} step {step}: claims to be done");
+            fs::remove_file(&path).unwrap();
+            if !fired {
+                result.unwrap();
+                break;
+            }
+            refused += 1;
+        }
+        assert!(refused > 100, "{write:?}: only {refused} steps");
+    }
+}
+
+#[test]
+fn the_process_may_die_at_any_statement() {
+    for (index, write) in WRITES.into_iter().enumerate() {
+        let folder = tempfile::tempdir().unwrap();
+        let before = folder.path().join("before.sqlite");
+        write.prepare(&before);
+        let mut killed = 0;
+        for statement in 1.. {
+            let path = folder.path().join(format!("{statement}.sqlite"));
+            let _ = fs::copy(&before, &path);
+            let output = child("dying_process", &path)
+                .env("MATDB_TEST_WRITE", index.to_string())
+                .env("MATDB_TEST_STATEMENT", statement.to_string())
+                .output()
+                .unwrap();
+            let done = write.is_done(&path, &format!("statement {statement}"));
+            if output.status.success() {
+                assert!(done);
+                break;
+            }
+            killed += 1;
+        }
+        assert!(killed > 10, "{write:?}: only {killed} statements");
+    }
+}
+
+/// Not a test by itself: the process that `the_process_may_die_at_any_statement` starts.
+#[test]
+fn dying_process() {
+    let Some(path) = given() else { return };
+    let number = |name| std::env::var(name).unwrap().parse::<i64>().unwrap();
+    hook_connections();
+    STATEMENTS_LEFT.set(number("MATDB_TEST_STATEMENT"));
+    WRITES[number("MATDB_TEST_WRITE") as usize].run(&path).unwrap();
+}
+
+#[test]
+fn the_log_may_end_anywhere() {
+    /// Bytes between cuts: no divisor of a log's frame, so that cuts fall everywhere in it.
+    const STEP_BYTES: usize = 1021;
+    for write in [Write::Add, Write::Revise, Write::Remove] {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, log) = (folder.path().join("a.sqlite"), folder.path().join("a.sqlite-wal"));
+        write.prepare(&path);
+        // A second connection keeps the log from being cleared away when the first is closed.
+        let keeper = Store::open(&path).unwrap();
+        write.run(&path).unwrap();
+        let (database, whole) = (fs::read(&path).unwrap(), fs::read(&log).unwrap());
+        drop(keeper);
+        let mut done = Vec::new();
+        for length in (0..=whole.len()).step_by(STEP_BYTES).chain([whole.len()]) {
+            let cut = folder.path().join(format!("{length}.sqlite"));
+            fs::write(&cut, &database).unwrap();
+            fs::write(cut.with_extension("sqlite-wal"), &whole[..length]).unwrap();
+            done.push(write.is_done(&cut, &format!("log of {length} bytes")));
+        }
+        assert!(!done[0] && done[done.len() - 1] && done.is_sorted(), "{write:?}: {done:?}");
+    }
+}

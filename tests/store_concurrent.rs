@@ -1,0 +1,77 @@
+//! Several threads and several programs may make, fill and read one database at once.
+
+mod common;
+
+use std::path::Path;
+
+use common::{child, contents, given, is_sound, sample};
+use matdb::store::{Added, Store};
+
+const WRITERS: usize = 4;
+const MATERIALS: usize = 5;
+
+fn write(path: &Path, writer: usize) {
+    let mut store = Store::open(path).unwrap();
+    for number in 0..MATERIALS {
+        let material = sample(&format!("of-{writer}-{number}"));
+        assert_eq!(store.add(&material).unwrap(), Added::New);
+        assert_eq!(store.get(&material.slug, None).unwrap().unwrap().material, material);
+    }
+}
+
+fn check(path: &Path) {
+    assert_eq!(contents(path).len(), WRITERS * MATERIALS);
+    assert!(is_sound(path));
+}
+
+#[test]
+fn threads_write_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    for round in 0..10 {
+        let path = folder.path().join(format!("{round}.sqlite"));
+        std::thread::scope(|scope| {
+            for writer in 0..WRITERS {
+                let path = &path;
+                scope.spawn(move || write(path, writer));
+            }
+        });
+        check(&path);
+    }
+}
+
+#[test]
+fn programs_write_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("materials.sqlite");
+    let start = |writer: usize| {
+        child("writing_program", &path)
+            .env("MATDB_TEST_WRITER", writer.to_string())
+            .spawn()
+            .unwrap()
+    };
+    let programs: Vec<_> = (0..WRITERS).map(start).collect();
+    for mut program in programs {
+        assert!(program.wait().unwrap().success());
+    }
+    check(&path);
+}
+
+/// Not a test by itself: the program that `programs_write_at_once` starts.
+#[test]
+fn writing_program() {
+    let Some(path) = given() else { return };
+    write(&path, std::env::var("MATDB_TEST_WRITER").unwrap().parse().unwrap());
+}
+
+#[test]
+fn the_same_material_added_twice_at_once_is_there_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("materials.sqlite");
+    let add = || Store::open(&path).unwrap().add(&sample("paint")).unwrap();
+    let [first, second] = std::thread::scope(|scope| {
+        [scope.spawn(add), scope.spawn(add)].map(|thread| thread.join().unwrap())
+    });
+    let mut added = [first, second];
+    added.sort_by_key(|added| *added != Added::New);
+    assert_eq!(added, [Added::New, Added::Unchanged(1)]);
+}

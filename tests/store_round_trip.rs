@@ -1,0 +1,277 @@
+//! What goes into the database comes out again, bit for bit and in the same order: every built-in
+//! material, and materials that proptest makes up within what `Material::validate` allows.
+
+use matdb::brdf::{
+    BlinnPhong, Brdf, CookTorrance, Distribution, Lambert, Mixture, Shadowing, Tabulated,
+};
+use matdb::material::{
+    Censor, Covariance, Curve, Fit, Instrument, Material, Observation, Slug, Source, SourceKind,
+    builtin,
+};
+use matdb::store::{Added, Store};
+use proptest::collection::vec;
+use proptest::option;
+use proptest::prelude::*;
+use proptest::sample::select;
+use proptest::test_runner::TestRunner;
+use std::cell::RefCell;
+use std::f64::consts::FRAC_PI_2;
+
+fn text() -> impl Strategy<Value = String> {
+    prop_oneof![any::<String>(), Just("\0'\";--\n\u{10ffff}".to_owned())]
+}
+
+fn word() -> impl Strategy<Value = String> {
+    text().prop_map(|text| format!("x{text}"))
+}
+
+fn positive() -> impl Strategy<Value = f64> {
+    prop_oneof![f64::MIN_POSITIVE..1e-300, 1e-9f64..1e9, 1e300..f64::MAX, Just(1.0)]
+}
+
+fn angle_rad() -> impl Strategy<Value = f64> {
+    prop_oneof![0.0..FRAC_PI_2, Just(0.0), Just(-0.0), Just(FRAC_PI_2)]
+}
+
+fn fraction() -> impl Strategy<Value = f64> {
+    prop_oneof![0.0f64..1.0, Just(0.0), Just(-0.0), Just(1.0), Just(f64::MIN_POSITIVE)]
+}
+
+prop_compose! {
+    fn source()(
+        kind in select(&[
+            SourceKind::Measured, SourceKind::Literature, SourceKind::Modelled,
+            SourceKind::Synthetic,
+        ]),
+        title in word(), doi in option::of(text()), url in option::of(text()),
+        licence in option::of(text()), note in option::of(text()),
+    ) -> Source {
+        Source { key: String::new(), kind, title, doi, url, licence, note }
+    }
+}
+
+prop_compose! {
+    fn instrument()(
+        name in text(), centre_frequency_hz in positive(), bandwidth_hz in option::of(positive()),
+        polarisation in option::of(text()), note in option::of(text()),
+    ) -> Instrument {
+        let key = String::new();
+        Instrument { key, name, centre_frequency_hz, bandwidth_hz, polarisation, note }
+    }
+}
+
+prop_compose! {
+    fn observation()(
+        theta_i_rad in angle_rad(), theta_r_rad in angle_rad(),
+        delta_phi_rad in prop_oneof![-1e300f64..1e300, Just(-0.0)],
+        level in positive(), threshold in option::of(positive()),
+        censor in select(&[Censor::None, Censor::Left, Censor::Right]),
+    ) -> Observation {
+        let measured = censor == Censor::None;
+        Observation {
+            theta_i_rad, theta_r_rad, delta_phi_rad, censor,
+            sigma0: measured.then_some(level),
+            threshold_sigma0: if measured { threshold } else { Some(level) },
+        }
+    }
+}
+
+prop_compose! {
+    fn tabulated()(
+        start in angle_rad(), steps in vec(1e-6f64..0.1, 1..12), levels in vec(1e-9f64..1e9, 12),
+    ) -> Brdf {
+        let ascend = |angle: &mut f64, step: &f64| { *angle += step; Some(*angle) };
+        let angles: Vec<f64> =
+            std::iter::once(&0.0).chain(&steps).scan(start * 0.2, ascend).collect();
+        let points: Vec<_> = std::iter::zip(angles, levels).collect();
+        Brdf::Tabulated(Tabulated::new(&points).unwrap())
+    }
+}
+
+fn model() -> impl Strategy<Value = Brdf> {
+    let cook_torrance = |(f_lambda, m, ggx, correlated)| {
+        let distribution = if ggx { Distribution::Ggx } else { Distribution::Beckmann };
+        let shadowing = if correlated { Shadowing::Correlated } else { Shadowing::Separable };
+        Brdf::CookTorrance(CookTorrance { f_lambda, m, distribution, shadowing })
+    };
+    let leaf = prop_oneof![
+        fraction().prop_map(|albedo| Brdf::Lambert(Lambert { albedo })),
+        (fraction(), fraction())
+            .prop_map(|(r_s, alpha)| Brdf::BlinnPhong(BlinnPhong { r_s, alpha })),
+        (fraction(), 0.001f64..2.0, any::<bool>(), any::<bool>()).prop_map(cook_torrance),
+        tabulated(),
+    ];
+    leaf.prop_recursive(3, 8, 2, |inner| {
+        (fraction(), inner.clone(), inner).prop_map(|(k, diffuse, specular)| {
+            let (diffuse, specular) = (Box::new(diffuse), Box::new(specular));
+            Brdf::Mixture(Mixture { k, diffuse, specular })
+        })
+    })
+}
+
+prop_compose! {
+    fn fit()(
+        model in model(), estimator in text(), own_source in vec(any::<bool>(), 16),
+        scale in option::of(vec(-1e3f64..1e3, 16)),
+    ) -> Fit {
+        let mut paths: Vec<String> = model.parameters().into_iter().map(|p| p.path).collect();
+        let covariance = scale.filter(|_| !paths.is_empty()).map(|scale| covariance(&paths, &scale));
+        paths.sort();
+        let own = std::iter::zip(paths, own_source).filter(|(_, own)| *own);
+        let parameter_sources = own.map(|(path, _)| (path, String::new())).collect();
+        let (name, curve, source) = (String::new(), None, String::new());
+        Fit { name, model, estimator, curve, source, parameter_sources, covariance }
+    }
+}
+
+/// A sound matrix over some of the parameters, last first.
+fn covariance(paths: &[String], scale: &[f64]) -> Covariance {
+    let parameters: Vec<String> = paths[paths.len() / 2..].iter().rev().cloned().collect();
+    let scale = &scale[..parameters.len()];
+    let row = |a: &f64| scale.iter().map(|b| a * b).collect();
+    Covariance { matrix: scale.iter().map(row).collect(), parameters }
+}
+
+fn curve() -> impl Strategy<Value = Curve> {
+    vec(observation(), 1..20).prop_map(|observations| {
+        let (name, source) = (String::new(), String::new());
+        Curve { name, source, instrument: None, observations }
+    })
+}
+
+prop_compose! {
+    fn material()(
+        texts in (word(), word(), text(), word(), vec(text(), 0..4)),
+        frequency_hz in [positive(), positive()], theta_rad in [angle_rad(), angle_rad()],
+        sources in vec(source(), 1..4), instruments in vec(instrument(), 0..3),
+        curves in vec(curve(), 0..4), fits in vec(fit(), 1..4),
+        key in text(), pick in any::<usize>(),
+    ) -> Material {
+        let (name, class, description, licence, tags) = texts;
+        let slug = "made-up".parse().unwrap();
+        let mut material = Material {
+            slug, name, class, description, licence, tags,
+            frequency_hz: ascending(frequency_hz), theta_rad: ascending(theta_rad),
+            render: String::new(), sources, instruments, curves, fits,
+        };
+        connect(&mut material, &key, pick);
+        material
+    }
+}
+
+fn ascending([a, b]: [f64; 2]) -> [f64; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// Names everything and lets it refer to one another, to different things as `pick` differs.
+fn connect(material: &mut Material, key: &str, mut pick: usize) {
+    // Not in alphabetical order, so that an order by name would show.
+    let name = |what: &str, index: usize| format!("{}{what}{key}", 9 - index);
+    let mut choose = |what: &str, count: usize| {
+        pick = pick.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963);
+        (count > 0).then(|| name(what, (pick >> 33) % count))
+    };
+    let counts = [material.sources.len(), material.instruments.len(), material.curves.len()];
+    for (index, source) in material.sources.iter_mut().enumerate() {
+        source.key = name("source", index);
+    }
+    for (index, instrument) in material.instruments.iter_mut().enumerate() {
+        instrument.key = name("instrument", index);
+    }
+    for (index, curve) in material.curves.iter_mut().enumerate() {
+        curve.name = name("curve", index);
+        curve.source = choose("source", counts[0]).unwrap();
+        curve.instrument = choose("instrument", counts[1]);
+    }
+    for (index, fit) in material.fits.iter_mut().enumerate() {
+        fit.name = name("fit", index);
+        fit.source = choose("source", counts[0]).unwrap();
+        fit.curve = choose("curve", counts[2]);
+        for (_, source) in &mut fit.parameter_sources {
+            *source = choose("source", counts[0]).unwrap();
+        }
+    }
+    material.render = choose("fit", material.fits.len()).unwrap();
+}
+
+fn same(store: &Store, material: &Material) {
+    let stored = store.get(&material.slug, None).unwrap().unwrap();
+    assert_eq!(stored.material, *material);
+    assert_eq!(stored.content_hash, material.content_hash());
+    assert_eq!(stored.material.content_hash(), stored.content_hash);
+}
+
+#[test]
+fn every_built_in_material_comes_back_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("materials.sqlite");
+    let materials: Vec<_> = builtin::names().map(|n| builtin::get(n).unwrap().unwrap()).collect();
+    let mut store = Store::open(&path).unwrap();
+    for material in &materials {
+        assert_eq!(store.add(material).unwrap(), Added::New);
+        same(&store, material);
+    }
+    drop(store);
+    for store in [Store::open_existing(&path).unwrap().unwrap(), Store::open(&path).unwrap()] {
+        materials.iter().for_each(|material| same(&store, material));
+        for (summary, material) in std::iter::zip(store.list().unwrap(), &materials) {
+            let points: usize = material.curves.iter().map(|c| c.observations.len()).sum();
+            assert_eq!((&summary.slug, &summary.name), (&material.slug, &material.name));
+            assert_eq!(Some(summary.render_kind), material.render_kind());
+            assert_eq!((summary.revision, summary.observations as usize), (1, points));
+            assert_eq!(summary.fits as usize, material.fits.len());
+        }
+    }
+}
+
+#[test]
+fn every_material_that_is_valid_comes_back_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = RefCell::new(Store::open(folder.path().join("materials.sqlite")).unwrap());
+    let check = |material: Material| {
+        material.validate().unwrap();
+        let mut store = store.borrow_mut();
+        store.remove(&material.slug).unwrap();
+        assert_eq!(store.add(&material).unwrap(), Added::New);
+        same(&store, &material);
+        assert_eq!(store.add(&material).unwrap(), Added::Unchanged(1));
+        Ok(())
+    };
+    TestRunner::default().run(&material(), check).unwrap();
+}
+
+#[test]
+fn revisions_are_kept_and_removed_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Store::open(folder.path().join("materials.sqlite")).unwrap();
+    let first = builtin::get("cotton").unwrap().unwrap();
+    let mut second = first.clone();
+    second.curves[0].observations[3].sigma0 = Some(0.25);
+    assert_eq!(store.add(&first).unwrap(), Added::New);
+    assert_eq!(store.add(&second).unwrap(), Added::Revision(2));
+    assert_eq!(store.add(&second).unwrap(), Added::Unchanged(2));
+    assert_eq!(store.add(&first).unwrap(), Added::Revision(3));
+    for (revision, material) in [(1, &first), (2, &second), (3, &first)] {
+        let stored = store.get(&first.slug, Some(revision)).unwrap().unwrap();
+        assert_eq!((stored.revision, &stored.material), (revision, material));
+        assert_eq!(stored.program_version, env!("CARGO_PKG_VERSION"));
+    }
+    assert_eq!(store.get(&first.slug, None).unwrap().unwrap().revision, 3);
+    assert!(store.get(&first.slug, Some(4)).unwrap().is_none());
+    assert_eq!(store.remove(&first.slug).unwrap().unwrap().revisions, 3);
+    assert!(store.remove(&first.slug).unwrap().is_none());
+    assert!(store.list().unwrap().is_empty());
+    assert_eq!(store.add(&second).unwrap(), Added::New);
+}
+
+#[test]
+fn an_unsound_material_is_refused_before_it_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Store::open(folder.path().join("materials.sqlite")).unwrap();
+    let mut material = builtin::get("cotton").unwrap().unwrap();
+    material.curves[0].observations[0].theta_i_rad = f64::NAN;
+    let message = store.add(&material).unwrap_err().to_string();
+    assert!(message.starts_with("material `cotton`: curve `backscatter`, observation 1"));
+    assert!(store.list().unwrap().is_empty());
+    assert!(store.get(&"cotton".parse::<Slug>().unwrap(), None).unwrap().is_none());
+}

@@ -1,0 +1,122 @@
+//! Databases written by any released version stay readable: for every schema there ever was, a file
+//! of that schema lies in `tests/fixtures/`. It opens, holds what it should, and once brought up to
+//! date has the very schema of a fresh file.
+//!
+//! `cargo test --test store_schema make_the_fixture -- --ignored` writes the file of the newest
+//! schema; do so once when a schema is added, and never change the file again.
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use common::{changed, contents, sample};
+use matdb::store::{Added, Store};
+use rusqlite::Connection;
+
+const NEWEST: &str = "schema-0001.sqlite";
+
+fn fixtures() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
+}
+
+/// Every table, index, view and trigger with its SQL, and the numbers in the header.
+fn schema(path: &Path) -> (Vec<[Option<String>; 4]>, [i64; 2]) {
+    let conn = Connection::open(path).unwrap();
+    let sql = "SELECT type, name, tbl_name, sql FROM sqlite_schema ORDER BY type, name";
+    let mut statement = conn.prepare(sql).unwrap();
+    let rows = statement
+        .query_map([], |row| Ok([row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?]))
+        .unwrap();
+    let number = |name| conn.pragma_query_value(None, name, |row| row.get(0)).unwrap();
+    (rows.map(Result::unwrap).collect(), ["application_id", "user_version"].map(number))
+}
+
+/// What the file of every schema holds.
+fn fill(path: &Path) {
+    let mut store = Store::open(path).unwrap();
+    for material in [sample("paint"), changed("paint"), sample("primer")] {
+        store.add(&material).unwrap();
+    }
+}
+
+#[test]
+fn files_of_every_schema_open_and_become_the_newest() {
+    let folder = tempfile::tempdir().unwrap();
+    let fresh = folder.path().join("fresh.sqlite");
+    drop(Store::open(&fresh).unwrap());
+    for entry in fs::read_dir(fixtures()).unwrap() {
+        let old = folder.path().join("old.sqlite");
+        fs::write(&old, fs::read(entry.unwrap().path()).unwrap()).unwrap();
+        let mut store = Store::open(&old).unwrap();
+        assert_eq!(store.add(&sample("primer")).unwrap(), Added::Unchanged(1));
+        drop(store);
+        assert_eq!(contents(&old), [sample("paint"), changed("paint"), sample("primer")]);
+        assert_eq!(schema(&old), schema(&fresh));
+    }
+}
+
+#[test]
+fn the_newest_schema_has_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let (fresh, kept) = (folder.path().join("fresh.sqlite"), folder.path().join("kept.sqlite"));
+    fill(&fresh);
+    fs::write(&kept, fs::read(fixtures().join(NEWEST)).unwrap()).unwrap();
+    assert_eq!(contents(&kept), contents(&fresh));
+    assert_eq!(schema(&kept), schema(&fresh));
+}
+
+#[test]
+#[ignore = "writes into the source tree; see the top of this file"]
+fn make_the_fixture() {
+    let path = fixtures().join(NEWEST);
+    assert!(!path.exists(), "{} is never changed again", path.display());
+    fill(&path);
+    // Small pages for a small file.
+    let shrink =
+        "PRAGMA journal_mode = delete; PRAGMA page_size = 1024; VACUUM; PRAGMA journal_mode = wal;";
+    Connection::open(&path).unwrap().execute_batch(shrink).unwrap();
+}
+
+#[test]
+fn numbers_are_kept_with_their_units_and_uncertainty() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.sqlite");
+    fill(&path);
+    let conn = Connection::open(&path).unwrap();
+    let sql = "SELECT path, value, unit, sd FROM fit_parameter ORDER BY revision_id, position";
+    let read = |row: &rusqlite::Row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?));
+    let first: (String, f64, String, Option<f64>) = conn.query_row(sql, [], read).unwrap();
+    let parameter = sample("paint").fits[0].model.parameters().remove(0);
+    assert_eq!(first, (parameter.path, parameter.value, "1".to_owned(), Some(0.1)));
+}
+
+#[test]
+fn the_database_itself_refuses_what_a_material_may_not_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.sqlite");
+    fill(&path);
+    let conn = Connection::open(&path).unwrap();
+    for sql in [
+        "UPDATE observation SET sigma0 = NULL WHERE censor = 'none'",
+        "UPDATE observation SET sigma0 = 1.0 WHERE censor = 'left'",
+        "UPDATE observation SET sigma0 = -1.0 WHERE censor = 'none'",
+        "UPDATE observation SET censor = 'maybe'",
+        "UPDATE observation SET threshold_sigma0 = NULL",
+        "UPDATE observation SET theta_i_rad = 1.6",
+        "UPDATE source SET kind = 'guessed'",
+        "UPDATE source SET key = 'other'",
+        "UPDATE curve SET source = 'other'",
+        "UPDATE curve SET instrument = 'other'",
+        "UPDATE fit SET curve = 'other'",
+        "UPDATE fit_parameter SET source = 'other'",
+        "UPDATE fit_covariance SET row_path = 'other'",
+        "UPDATE material SET slug = 'Upper'",
+        "UPDATE material SET current_revision = 9",
+        "UPDATE revision SET frequency_min_hz = 'low'",
+        "UPDATE revision SET theta_max_rad = 2",
+        "UPDATE revision SET tags = '{}'",
+    ] {
+        assert!(conn.execute(sql, []).is_err(), "{sql}");
+    }
+}

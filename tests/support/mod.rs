@@ -1,0 +1,88 @@
+//! Helpers shared by the tests of the program.
+#![allow(dead_code)]
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+
+/// The crate's folder.
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// A built-in scene file.
+pub fn scene(name: &str) -> PathBuf {
+    root().join("scenes").join(name)
+}
+
+/// The program, working in `folder` with a database of its own.
+pub fn matdb(folder: &Path) -> Command {
+    let mut command = Command::cargo_bin("matdb").unwrap();
+    command.current_dir(folder).env_remove("MATDB");
+    command
+}
+
+/// Standard error of a run that must fail with status 1.
+pub fn refused(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.starts_with("error: ") && text.lines().count() == 1, "one sentence: {text}");
+    assert!(output.stdout.is_empty());
+    text
+}
+
+/// Names of everything in a folder, sorted.
+pub fn entries(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+/// A binary little-endian PLY cloud, read without the library: column name → values.
+pub fn read_cloud(path: &Path) -> BTreeMap<String, Vec<f64>> {
+    let bytes = std::fs::read(path).unwrap();
+    let end = b"end_header\n";
+    let body = bytes.windows(end.len()).position(|w| w == end).unwrap() + end.len();
+    let header = std::str::from_utf8(&bytes[..body]).unwrap();
+    let mut rows = 0;
+    let mut columns: Vec<(String, String)> = Vec::new();
+    for line in header.lines() {
+        let words: Vec<&str> = line.split(' ').collect();
+        match words.as_slice() {
+            ["element", "vertex", count] => rows = count.parse().unwrap(),
+            ["property", kind, name] => columns.push((name.to_string(), kind.to_string())),
+            _ => {}
+        }
+    }
+    let mut at = body;
+    let mut take = |kind: &str| {
+        let width = match kind {
+            "double" => 8,
+            "float" | "uint" | "int" => 4,
+            "ushort" => 2,
+            other => panic!("unexpected type {other}"),
+        };
+        let field = &bytes[at..at + width];
+        at += width;
+        match kind {
+            "double" => f64::from_le_bytes(field.try_into().unwrap()),
+            "float" => f32::from_le_bytes(field.try_into().unwrap()).into(),
+            "uint" => u32::from_le_bytes(field.try_into().unwrap()).into(),
+            "int" => i32::from_le_bytes(field.try_into().unwrap()).into(),
+            _ => u16::from_le_bytes(field.try_into().unwrap()).into(),
+        }
+    };
+    let mut cloud: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    for _ in 0..rows {
+        for (name, kind) in &columns {
+            cloud.entry(name.clone()).or_default().push(take(kind));
+        }
+    }
+    assert_eq!(at, bytes.len(), "the body ends where the header says");
+    cloud
+}
