@@ -1,4 +1,43 @@
 //! `matdb`: a material database and renderer for 300 GHz imaging radar.
+//!
+//! A chirp's ray leaves the centre of the main reflector, meets a facet of the target at range R and
+//! incidence θ, and brings back, by equation (11) of the paper this crate implements
+//! (DOI 10.1109/TTHZ.2017.2702590),
+//!
+//! P_r = P_t · (A_eq/R²) · f(θ) · cos²θ,
+//!
+//! where P_t and A_eq belong to the instrument ([`radar`]) and f, in 1/sr, to the surface ([`brdf`]).
+//! A scan is 18 529 such chirps ([`render`]); what is known of a surface is a
+//! [`Material`](material::Material), kept in a [`Store`](store::Store).
+//!
+//! ```
+//! use matdb::brdf::Scattering;
+//! use matdb::radar::{Link, Radar};
+//! use matdb::units::dbm_from_watts;
+//!
+//! let paint = matdb::material::builtin::get("mannequin-paint").unwrap()?.scattering()?;
+//! let link = Link::new(&Radar::default());
+//! let theta_rad = 30f64.to_radians();
+//! let power_w = link.power_w(8.0, theta_rad.cos(), paint.retro_per_sr(theta_rad));
+//! assert!((dbm_from_watts(power_w) + 65.1).abs() < 0.1);
+//! # Ok::<(), matdb::error::Error>(())
+//! ```
+//!
+//! # Floors
+//!
+//! A module uses only modules above it in this list.
+//!
+//! | | |
+//! |---|---|
+//! | [`units`], [`frames`], [`geometry`] | numbers with units, coordinate frames as types, plain meshes and rasters |
+//! | [`brdf`], [`radar`], [`mod@formats`] | how surfaces scatter; the instrument; bytes to plain data and back |
+//! | [`material`], [`scene`], [`trace`] | what is known of a surface; what is looked at; closest hits |
+//! | [`render`] | scan × target × materials → detections, image, cloud |
+//! | [`store`] | the only SQL |
+//! | [`error`], [`cli`] | every error in one type; one command per file |
+//!
+//! Inside are SI units, watts and radians; dB, dBm and degrees appear where people and files do, and
+//! every name says which.
 
 #![warn(missing_docs)]
 

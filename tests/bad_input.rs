@@ -60,20 +60,44 @@ fn mistakes_in_the_scene_file() {
     for (from, to, parts) in [
         ("size_m", "siez_m", &["scene.toml", "line 5", "did you mean `size_m`?"][..]),
         ("[[mesh]]", "[radar]\nthreshhold_dbm = -70\n[[mesh]]", &["did you mean `threshold_dbm`?"]),
-        ("[[mesh]]", "[radar]\nspot_diameter_m = 0\n[[mesh]]", &["radar.spot_diameter_m = 0", "0.00001"]),
-        ("[[mesh]]", "[radar]\npreset = \"upm\"\n[[mesh]]", &["no radar preset `upm`", "upm-300ghz"]),
+        (
+            "[[mesh]]",
+            "[radar]\nspot_diameter_m = 0\n[[mesh]]",
+            &["radar.spot_diameter_m = 0", "0.00001"],
+        ),
+        (
+            "[[mesh]]",
+            "[radar]\npreset = \"upm\"\n[[mesh]]",
+            &["no radar preset `upm`", "upm-300ghz"],
+        ),
         ("[[mesh]]", "[image]\npixel_m = -1.0\n[[mesh]]", &["image.pixel_m", "0.004"]),
-        ("\"ptfe\"", "\"aluminum\"", &["region `all`", "no material `aluminum`", "did you mean `aluminium`?"]),
+        (
+            "\"ptfe\"",
+            "\"aluminum\"",
+            &["region `all`", "no material `aluminum`", "did you mean `aluminium`?"],
+        ),
         ("\"ptfe\"", "\"granite\"", &["no material `granite`", "matdb add --from"]),
         ("\"ptfe\"", "\"ptfe@x\"", &["`ptfe@x`", "ptfe@1"]),
         ("builtin:plate", "builtin:plat", &["mesh `plate`", "did you mean `builtin:plate`?"]),
         ("builtin:plate", "plate.step", &["plate.step", ".ply, .obj or .stl"]),
         ("builtin:plate", "plate.ply", &["cannot read", "plate.ply", "beside the scene file"]),
         ("[1, 1, 0]", "[1, -1, 0]", &["size_m", "three lengths"]),
-        ("[0, 1.1, 0]", "[3, 1.1, 0]", &["no chirp of the scan hits the target", "x 2.500 to 3.500", "translation_m"]),
+        (
+            "[0, 1.1, 0]",
+            "[3, 1.1, 0]",
+            &["no chirp of the scan hits the target", "x 2.500 to 3.500", "translation_m"],
+        ),
         ("[0, 1.1, 0]", "[0, nan, 0]", &["translation_m", "finite"]),
-        ("name = \"all\"", "name = \"all\"\nmesh = \"plat\"", &["region `all`", "did you mean `plate`?"]),
-        ("name = \"all\"", "name = \"all\"\nbox = { min_m = [5, 5, 5], max_m = [6, 6, 6] }", &["region `all` selects no facet"]),
+        (
+            "name = \"all\"",
+            "name = \"all\"\nmesh = \"plat\"",
+            &["region `all`", "did you mean `plate`?"],
+        ),
+        (
+            "name = \"all\"",
+            "name = \"all\"\nbox = { min_m = [5, 5, 5], max_m = [6, 6, 6] }",
+            &["region `all` selects no facet"],
+        ),
         ("[[region]]", "[[regoin]]", &["did you mean `region`?"]),
     ] {
         assert!(PLATE.contains(from));
@@ -100,9 +124,8 @@ fn a_scene_that_is_not_there_or_not_text() {
 
 #[test]
 fn hostile_meshes() {
-    let scene = |file: &str| {
-        PLATE.replace("builtin:plate", file).replace("size_m = [1, 1, 0]\n", "")
-    };
+    let scene =
+        |file: &str| PLATE.replace("builtin:plate", file).replace("size_m = [1, 1, 0]\n", "");
     let ply = |from: &str, to: &str| TRIANGLE.replacen(from, to, 1);
     for (text, parts) in [
         (ply("vertex 3", "vertex 1000000000000"), &["mesh.ply"][..]),
@@ -155,7 +178,8 @@ fn an_output_folder_that_cannot_be_written() {
 #[cfg(unix)]
 fn on_a_full_disk(folder: &Path, blocks: u32, arguments: &str) -> std::process::Output {
     let program = assert_cmd::cargo::cargo_bin("matdb");
-    let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec '{}' {arguments}", program.display());
+    let script =
+        format!("trap '' XFSZ; ulimit -f {blocks}; exec '{}' {arguments}", program.display());
     let mut shell = std::process::Command::new("bash");
     shell.current_dir(folder).env_remove("MATDB").args(["-c", &script]).output().unwrap()
 }
@@ -209,7 +233,10 @@ fn a_bad_material_file_changes_nothing() {
     ] {
         assert!(good.contains(from), "{from}");
         fs::write(folder.path().join("material.toml"), good.replacen(from, to, 1)).unwrap();
-        check(&refused(matdb(folder.path()).args(["add", "--from", "material.toml", "glass"])), parts);
+        check(
+            &refused(matdb(folder.path()).args(["add", "--from", "material.toml", "glass"])),
+            parts,
+        );
         assert_eq!(entries(folder.path()), ["material.toml"]);
     }
 }

@@ -17,7 +17,8 @@ fn json(folder: &Path, arguments: &[&str]) -> Value {
 
 /// A copy of a built-in material's folder with one piece of text replaced.
 fn variant(folder: &Path, slug: &str, from: &str, to: &str) {
-    let text = fs::read_to_string(root().join("materials").join(slug).join("material.toml")).unwrap();
+    let text =
+        fs::read_to_string(root().join("materials").join(slug).join("material.toml")).unwrap();
     assert!(text.contains(from));
     fs::create_dir_all(folder.join(slug)).unwrap();
     fs::write(folder.join(slug).join("material.toml"), text.replacen(from, to, 1)).unwrap();

@@ -30,7 +30,8 @@ fn f_per_sr(model: &Value, theta: f64) -> f64 {
             k * f_per_sr(&model["diffuse"], theta) + (1.0 - k) * f_per_sr(&model["specular"], theta)
         }
         "tabulated" => {
-            let sigma0_db = pchip(&list(&model["theta_deg"]), &list(&model["sigma0_db"]), theta.to_degrees());
+            let sigma0_db =
+                pchip(&list(&model["theta_deg"]), &list(&model["sigma0_db"]), theta.to_degrees());
             10f64.powf(sigma0_db / 10.0) / (4.0 * PI * theta.cos().powi(2))
         }
         other => panic!("unknown model {other}"),
@@ -90,9 +91,14 @@ fn pchip(x: &[f64], y: &[f64], at: f64) -> f64 {
 
 fn check(scene_name: &str) {
     let folder = tempfile::tempdir().unwrap();
-    matdb(folder.path()).args(["render", "-q", "-o", "out"]).arg(scene(scene_name)).assert().success();
+    matdb(folder.path())
+        .args(["render", "-q", "-o", "out"])
+        .arg(scene(scene_name))
+        .assert()
+        .success();
     let record: Value =
-        serde_json::from_slice(&std::fs::read(folder.path().join("out/scan.json")).unwrap()).unwrap();
+        serde_json::from_slice(&std::fs::read(folder.path().join("out/scan.json")).unwrap())
+            .unwrap();
     let cloud = read_cloud(&folder.path().join("out/cloud.ply"));
     let radar = &record["radar"];
     assert_eq!(radar["footprint"], "paper");

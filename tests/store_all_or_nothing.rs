@@ -40,12 +40,12 @@ impl Write {
             return;
         }
         let mut store = Store::open(path).unwrap();
-        store.add(&sample("bystander")).unwrap();
+        store.add([&sample("bystander")]).unwrap();
         if let Write::Revise | Write::Remove = self {
-            store.add(&sample("subject")).unwrap();
+            store.add([&sample("subject")]).unwrap();
         }
         if let Write::Remove = self {
-            store.add(&changed("subject")).unwrap();
+            store.add([&changed("subject")]).unwrap();
         }
     }
 
@@ -53,9 +53,9 @@ impl Write {
         let mut store = Store::open(path)?;
         match self {
             Write::Make => Ok(()),
-            Write::Add => store.add(&sample("subject")).map(drop),
-            Write::Revise => store.add(&changed("subject")).map(drop),
-            Write::Remove => store.remove(&"subject".parse().unwrap()).map(drop),
+            Write::Add => store.add([&sample("subject")]).map(drop),
+            Write::Revise => store.add([&changed("subject")]).map(drop),
+            Write::Remove => store.remove([&"subject".parse().unwrap()]).map(drop),
         }
     }
 

@@ -14,7 +14,7 @@ fn write(path: &Path, writer: usize) {
     let mut store = Store::open(path).unwrap();
     for number in 0..MATERIALS {
         let material = sample(&format!("of-{writer}-{number}"));
-        assert_eq!(store.add(&material).unwrap(), Added::New);
+        assert_eq!(store.add([&material]).unwrap(), [Added::New]);
         assert_eq!(store.get(&material.slug, None).unwrap().unwrap().material, material);
     }
 }
@@ -67,7 +67,7 @@ fn writing_program() {
 fn the_same_material_added_twice_at_once_is_there_once() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("materials.sqlite");
-    let add = || Store::open(&path).unwrap().add(&sample("paint")).unwrap();
+    let add = || Store::open(&path).unwrap().add([&sample("paint")]).unwrap()[0];
     let [first, second] = std::thread::scope(|scope| {
         [scope.spawn(add), scope.spawn(add)].map(|thread| thread.join().unwrap())
     });

@@ -18,7 +18,7 @@ use rusqlite::{Connection, ffi};
 fn database() -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("materials.sqlite");
-    Store::open(&path).unwrap().add(&sample("subject")).unwrap();
+    Store::open(&path).unwrap().add([&sample("subject")]).unwrap();
     (folder, path)
 }
 
@@ -55,7 +55,7 @@ fn an_empty_file_is_a_database_yet_to_be() {
     fs::write(&path, "").unwrap();
     assert!(Store::open_existing(&path).unwrap().is_none());
     assert_eq!(fs::metadata(&path).unwrap().len(), 0);
-    Store::open(&path).unwrap().add(&sample("subject")).unwrap();
+    Store::open(&path).unwrap().add([&sample("subject")]).unwrap();
     assert_eq!(contents(&path), [sample("subject")]);
 }
 
@@ -66,7 +66,7 @@ fn reading_leaves_no_trace() {
     assert_eq!(contents(&path), [sample("subject")]);
     assert_eq!(bytes(folder.path()), before);
     let mut reader = Store::open_existing(&path).unwrap().unwrap();
-    let error = reader.add(&changed("subject")).unwrap_err();
+    let error = reader.add([&changed("subject")]).unwrap_err();
     assert!(matches!(error, StoreError::ReadOnly { .. }), "{error}");
 }
 
@@ -122,7 +122,7 @@ fn right_or_damaged(path: &Path, case: &str) -> bool {
             }
         }
         drop(store);
-        Store::open(path)?.remove(&"subject".parse().unwrap()).map(drop)
+        Store::open(path)?.remove([&"subject".parse().unwrap()]).map(drop)
     };
     let Err(error) = use_it() else { return false };
     let message = sentence(&error, path);
@@ -169,12 +169,12 @@ fn a_locked_database_is_said_to_be_in_use() {
     let (_folder, path) = database();
     let other = Connection::open(&path).unwrap();
     other.execute_batch("BEGIN IMMEDIATE").unwrap();
-    let error = Store::open(&path).unwrap().add(&changed("subject")).unwrap_err();
+    let error = Store::open(&path).unwrap().add([&changed("subject")]).unwrap_err();
     assert!(sentence(&error, &path).contains("in use by another program"));
     // Who only reads does not wait for who writes.
     assert_eq!(contents(&path), [sample("subject")]);
     other.execute_batch("COMMIT").unwrap();
-    Store::open(&path).unwrap().add(&changed("subject")).unwrap();
+    Store::open(&path).unwrap().add([&changed("subject")]).unwrap();
     assert_eq!(contents(&path), [sample("subject"), changed("subject")]);
 }
 
@@ -263,7 +263,7 @@ fn a_file_that_may_not_grow_is_left_as_it_was() {
 #[test]
 fn writer_without_room() {
     let Some(path) = given() else { return };
-    match Store::open(&path).and_then(|mut store| store.add(&changed("subject"))) {
+    match Store::open(&path).and_then(|mut store| store.add([&changed("subject")])) {
         Ok(_) => println!("all is written"),
         Err(error @ StoreError::Disk { .. }) => println!("{}", sentence(&error, &path)),
         Err(error) => panic!("{error}"),
@@ -303,7 +303,7 @@ fn crowded_process() {
     let (error, before) = (0..)
         .find_map(|number| {
             let before = contents(&path);
-            store.add(&sample(&format!("more-{number}"))).err().map(|error| (error, before))
+            store.add([&sample(&format!("more-{number}"))]).err().map(|error| (error, before))
         })
         .unwrap();
     assert!(sentence(&error, &path).contains("no room left"), "{error}");

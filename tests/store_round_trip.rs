@@ -208,7 +208,7 @@ fn every_built_in_material_comes_back_as_it_was() {
     let materials: Vec<_> = builtin::names().map(|n| builtin::get(n).unwrap().unwrap()).collect();
     let mut store = Store::open(&path).unwrap();
     for material in &materials {
-        assert_eq!(store.add(material).unwrap(), Added::New);
+        assert_eq!(store.add([material]).unwrap(), [Added::New]);
         same(&store, material);
     }
     drop(store);
@@ -231,10 +231,10 @@ fn every_material_that_is_valid_comes_back_as_it_was() {
     let check = |material: Material| {
         material.validate().unwrap();
         let mut store = store.borrow_mut();
-        store.remove(&material.slug).unwrap();
-        assert_eq!(store.add(&material).unwrap(), Added::New);
+        store.remove([&material.slug]).unwrap();
+        assert_eq!(store.add([&material]).unwrap(), [Added::New]);
         same(&store, &material);
-        assert_eq!(store.add(&material).unwrap(), Added::Unchanged(1));
+        assert_eq!(store.add([&material]).unwrap(), [Added::Unchanged(1)]);
         Ok(())
     };
     TestRunner::default().run(&material(), check).unwrap();
@@ -247,10 +247,10 @@ fn revisions_are_kept_and_removed_together() {
     let first = builtin::get("cotton").unwrap().unwrap();
     let mut second = first.clone();
     second.curves[0].observations[3].sigma0 = Some(0.25);
-    assert_eq!(store.add(&first).unwrap(), Added::New);
-    assert_eq!(store.add(&second).unwrap(), Added::Revision(2));
-    assert_eq!(store.add(&second).unwrap(), Added::Unchanged(2));
-    assert_eq!(store.add(&first).unwrap(), Added::Revision(3));
+    assert_eq!(store.add([&first]).unwrap(), [Added::New]);
+    assert_eq!(store.add([&second]).unwrap(), [Added::Revision(2)]);
+    assert_eq!(store.add([&second]).unwrap(), [Added::Unchanged(2)]);
+    assert_eq!(store.add([&first]).unwrap(), [Added::Revision(3)]);
     for (revision, material) in [(1, &first), (2, &second), (3, &first)] {
         let stored = store.get(&first.slug, Some(revision)).unwrap().unwrap();
         assert_eq!((stored.revision, &stored.material), (revision, material));
@@ -258,10 +258,10 @@ fn revisions_are_kept_and_removed_together() {
     }
     assert_eq!(store.get(&first.slug, None).unwrap().unwrap().revision, 3);
     assert!(store.get(&first.slug, Some(4)).unwrap().is_none());
-    assert_eq!(store.remove(&first.slug).unwrap().unwrap().revisions, 3);
-    assert!(store.remove(&first.slug).unwrap().is_none());
+    assert_eq!(store.remove([&first.slug]).unwrap()[0].unwrap().revisions, 3);
+    assert!(store.remove([&first.slug]).unwrap()[0].is_none());
     assert!(store.list().unwrap().is_empty());
-    assert_eq!(store.add(&second).unwrap(), Added::New);
+    assert_eq!(store.add([&second]).unwrap(), [Added::New]);
 }
 
 #[test]
@@ -270,7 +270,7 @@ fn an_unsound_material_is_refused_before_it_is_written() {
     let mut store = Store::open(folder.path().join("materials.sqlite")).unwrap();
     let mut material = builtin::get("cotton").unwrap().unwrap();
     material.curves[0].observations[0].theta_i_rad = f64::NAN;
-    let message = store.add(&material).unwrap_err().to_string();
+    let message = store.add([&material]).unwrap_err().to_string();
     assert!(message.starts_with("material `cotton`: curve `backscatter`, observation 1"));
     assert!(store.list().unwrap().is_empty());
     assert!(store.get(&"cotton".parse::<Slug>().unwrap(), None).unwrap().is_none());

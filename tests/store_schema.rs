@@ -36,7 +36,7 @@ fn schema(path: &Path) -> (Vec<[Option<String>; 4]>, [i64; 2]) {
 fn fill(path: &Path) {
     let mut store = Store::open(path).unwrap();
     for material in [sample("paint"), changed("paint"), sample("primer")] {
-        store.add(&material).unwrap();
+        store.add([&material]).unwrap();
     }
 }
 
@@ -49,7 +49,7 @@ fn files_of_every_schema_open_and_become_the_newest() {
         let old = folder.path().join("old.sqlite");
         fs::write(&old, fs::read(entry.unwrap().path()).unwrap()).unwrap();
         let mut store = Store::open(&old).unwrap();
-        assert_eq!(store.add(&sample("primer")).unwrap(), Added::Unchanged(1));
+        assert_eq!(store.add([&sample("primer")]).unwrap(), [Added::Unchanged(1)]);
         drop(store);
         assert_eq!(contents(&old), [sample("paint"), changed("paint"), sample("primer")]);
         assert_eq!(schema(&old), schema(&fresh));

@@ -34,7 +34,7 @@ pub(super) fn run(args: &Args, db: &Path, console: &Console) -> Result<(), Error
     let materials = wanted(args, db)?;
     let mut store = Store::open(db)?;
     let (mut lines, mut records) = (String::new(), Vec::new());
-    for (material, added) in std::iter::zip(&materials, store.add_all(&materials)?) {
+    for (material, added) in std::iter::zip(&materials, store.add(&materials)?) {
         let slug = &material.slug;
         let (what, revision) = match added {
             Added::New => ("added", 1),

@@ -20,8 +20,9 @@ pub(super) fn run(db: &Path, console: &Console) -> Result<(), Error> {
         Some(store) => store.list()?,
         None => Vec::new(),
     };
-    let missing: Vec<&str> =
-        builtin::names().filter(|name| !materials.iter().any(|m| m.slug.as_str() == *name)).collect();
+    let missing: Vec<&str> = builtin::names()
+        .filter(|name| !materials.iter().any(|m| m.slug.as_str() == *name))
+        .collect();
     let mut text = match materials.len() {
         0 => format!("no material in {} yet\n", db.display()),
         _ => table(

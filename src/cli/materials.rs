@@ -34,18 +34,16 @@ fn split<'a>(wanted: &'a str, asked_by: &str) -> Result<(&'a str, Option<u32>), 
         return Ok((wanted, None));
     };
     let number = revision.parse().map_err(|_| Error::Usage {
-        problem: format!("{asked_by}`{wanted}` asks for revision `{revision}`, which is no whole number"),
+        problem: format!(
+            "{asked_by}`{wanted}` asks for revision `{revision}`, which is no whole number"
+        ),
         way_out: format!("write {name}@1 or just {name}"),
     })?;
     Ok((name, Some(number)))
 }
 
 /// The error for a name that nobody knows, with the nearest known one.
-pub(super) fn unknown(
-    store: Option<&Store>,
-    wanted: &str,
-    asked_by: &str,
-) -> Result<Error, Error> {
+pub(super) fn unknown(store: Option<&Store>, wanted: &str, asked_by: &str) -> Result<Error, Error> {
     let mut known: Vec<String> = builtin::names().map(str::to_owned).collect();
     if let Some(store) = store {
         known.extend(store.list()?.into_iter().map(|summary| summary.slug.into()));

@@ -93,8 +93,9 @@ impl<'a> Record<'a> {
         let regions = regions(scene, material_of_region, scan);
         let outside = |material: usize| {
             let [least, most] = used[material].found.material.theta_rad;
-            let of_material =
-                |echo: &&Echo| usize::from(material_of_region[usize::from(echo.region)]) == material;
+            let of_material = |echo: &&Echo| {
+                usize::from(material_of_region[usize::from(echo.region)]) == material
+            };
             let strange = |echo: &&Echo| !(least..=most).contains(&echo.hit.theta_rad());
             scan.detections().filter(of_material).filter(strange).count()
         };
@@ -132,7 +133,9 @@ impl<'a> Record<'a> {
         }
         for mesh in self.meshes.iter().filter(|mesh| mesh.degenerate_facets > 0) {
             let MeshReport { name, degenerate_facets, .. } = mesh;
-            notices.push(format!("{degenerate_facets} facets of mesh `{name}` have no area and were skipped"));
+            notices.push(format!(
+                "{degenerate_facets} facets of mesh `{name}` have no area and were skipped"
+            ));
         }
         let frequency_ghz = self.radar.centre_frequency_ghz;
         for MaterialRecord { name, frequency_ghz: [low, high], .. } in &self.materials {
@@ -203,11 +206,7 @@ impl PowerRange {
     }
 }
 
-fn regions<'a>(
-    scene: &'a Scene,
-    material_of_region: &[u16],
-    scan: &Scan,
-) -> Vec<RegionRecord<'a>> {
+fn regions<'a>(scene: &'a Scene, material_of_region: &[u16], scan: &Scan) -> Vec<RegionRecord<'a>> {
     let mut regions: Vec<RegionRecord> = std::iter::zip(&scene.target.regions, material_of_region)
         .map(|(region, &material)| RegionRecord {
             name: &region.name,

@@ -192,7 +192,9 @@ fn report(
         grouped(counts.below_threshold),
     );
     let seconds = start.elapsed().as_secs_f64();
-    text += &format!("wrote power.exr, power.png, cloud.ply and scan.json to {folder} in {seconds:.2} s\n");
+    text += &format!(
+        "wrote power.exr, power.png, cloud.ply and scan.json to {folder} in {seconds:.2} s\n"
+    );
     let timings: Map<String, Value> =
         stages.done.iter().map(|(stage, ms)| ((*stage).to_owned(), json!(ms))).collect();
     let value = json!({

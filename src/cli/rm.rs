@@ -31,9 +31,10 @@ pub(super) fn run(args: &Args, db: &Path, console: &Console) -> Result<(), Error
         }
     }
     drop(known);
-    let removed = Store::open(db)?.remove_all(&slugs)?;
+    let removed = Store::open(db)?.remove(&slugs)?;
     let (mut lines, mut records) = (String::new(), Vec::new());
-    for (name, Removed { revisions }) in std::iter::zip(&args.names, removed) {
+    for (name, removed) in std::iter::zip(&args.names, removed) {
+        let revisions = removed.map_or(0, |Removed { revisions }| revisions);
         lines += &format!("removed {name}, {revisions} revision(s), from {}\n", db.display());
         records.push(json!({ "slug": name, "revisions": revisions }));
     }

@@ -46,7 +46,10 @@ mod tests {
 
     #[test]
     fn numbers_are_grouped_and_aligned() {
-        assert_eq!(["1", "999", "1 000", "18 529", "1 234 567"], [1, 999, 1000, 18_529, 1_234_567].map(grouped).each_ref().map(String::as_str));
+        assert_eq!(
+            ["1", "999", "1 000", "18 529", "1 234 567"],
+            [1, 999, 1000, 18_529, 1_234_567].map(grouped).each_ref().map(String::as_str)
+        );
         let rows = [["a", "5"], ["bcd", "1 000"]].map(|row| row.map(str::to_owned));
         let text = table(&["name", "n"], rows.into_iter());
         assert_eq!(text, "name      n\na         5\nbcd   1 000\n");

@@ -27,12 +27,7 @@ struct Pixel {
 /// diameter at half height; power is averaged in watts. `material` is that of the nearest
 /// detection, as an index; `count` is how many were averaged. The grid covers the field of view at
 /// 8 m and half a spot around it.
-pub fn power_image(
-    scan: &Scan,
-    radar: &Radar,
-    material_of_region: &[u16],
-    pixel_m: f64,
-) -> Raster {
+pub fn power_image(scan: &Scan, radar: &Radar, material_of_region: &[u16], pixel_m: f64) -> Raster {
     let spot_m = radar.spot_diameter_m;
     let mut raster = grid(radar, pixel_m);
     let mut pixels = vec![Pixel::default(); raster.width * raster.height];
@@ -178,7 +173,8 @@ mod tests {
 
     #[test]
     fn what_is_below_the_threshold_or_outside_leaves_no_trace() {
-        let raster = image(vec![echo(0.0, 0.0, -77.1), echo(5.0, 0.0, -40.0), echo(0.0, -9.0, -40.0)]);
+        let raster =
+            image(vec![echo(0.0, 0.0, -77.1), echo(5.0, 0.0, -40.0), echo(0.0, -9.0, -40.0)]);
         assert!(raster.channels[0].values.iter().all(|v| v.is_nan()));
     }
 }

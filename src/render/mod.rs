@@ -14,7 +14,7 @@ use crate::trace::{Hit, closest_hits};
 use crate::units::dbm_from_watts;
 
 pub use cloud::cloud_table;
-pub use image::power_image;
+pub use image::{CHANNELS, power_image};
 
 /// One chirp that met a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -187,7 +187,9 @@ fn geometric_tests(region: &RegionEntry) -> Result<Vec<Inside>, RegionError> {
     if let Some(HalfSpaceEntry { point_m, normal }) = region.half_space {
         let (point, normal) = (DVec3::from(point_m), DVec3::from(normal));
         if !(normal.length() > 0.0 && normal.is_finite() && point.is_finite()) {
-            return Err(refuse("half_space.normal has no direction; give a vector such as [0, 1, 0]"));
+            return Err(refuse(
+                "half_space.normal has no direction; give a vector such as [0, 1, 0]",
+            ));
         }
         tests.push(Box::new(move |p| (p - point).dot(normal) >= 0.0));
     }
@@ -230,7 +232,8 @@ mod tests {
 
     /// Four facets along x, labelled a, a, b, b; the last two belong to the second mesh.
     fn row() -> (Mesh, Vec<MeshSpan>) {
-        let corners = |x: f64| [DVec3::new(x, 0.0, 0.0), DVec3::new(x, 1.0, 0.0), DVec3::X * (x + 0.5)];
+        let corners =
+            |x: f64| [DVec3::new(x, 0.0, 0.0), DVec3::new(x, 1.0, 0.0), DVec3::X * (x + 0.5)];
         let mesh = Mesh {
             vertices: (0..4).flat_map(|i| corners(f64::from(i))).collect(),
             facets: (0..4).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
@@ -259,7 +262,10 @@ mod tests {
             ("box = { min_m = [0.5, -1, -1], max_m = [2.5, 2, 1] }", [0, 1, 1, 0]),
             ("sphere = { centre_m = [0, 0, 0], radius_m = 1.0 }", [1, 0, 0, 0]),
             ("half_space = { point_m = [3, 0, 0], normal = [1, 0, 0] }", [0, 0, 0, 1]),
-            ("mesh = \"one\"\nhalf_space = { point_m = [1, 0, 0], normal = [1, 0, 0] }", [0, 1, 0, 0]),
+            (
+                "mesh = \"one\"\nhalf_space = { point_m = [1, 0, 0], normal = [1, 0, 0] }",
+                [0, 1, 0, 0],
+            ),
         ] {
             assert_eq!(with(selector).unwrap(), expected, "{selector}");
         }
@@ -271,7 +277,10 @@ mod tests {
             ("mesh = \"tow\"", "did you mean `two`?"),
             ("facets = { prat = \"a\" }", "did you mean `part`?"),
             ("facets = { part = \"c\" }", "there are: a, b"),
-            ("box = { min_m = [9, 9, 9], max_m = [10, 10, 10] }", "selects no facet; facets lie within x 0.167"),
+            (
+                "box = { min_m = [9, 9, 9], max_m = [10, 10, 10] }",
+                "selects no facet; facets lie within x 0.167",
+            ),
             ("box = { min_m = [1, 0, 0], max_m = [0, 1, 1] }", "swap"),
             ("sphere = { centre_m = [0, 0, 0], radius_m = -1.0 }", "radius_m must be positive"),
             ("half_space = { point_m = [3, 0, 0], normal = [0, 0, 0] }", "no direction"),

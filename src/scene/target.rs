@@ -115,7 +115,12 @@ fn load_mesh(entry: &MeshEntry, scene: &Path) -> Result<Mesh, SceneError> {
                 Some(near) => format!("did you mean `builtin:{near}`?"),
                 None => format!("the built-in meshes are {known}"),
             };
-            value(scene, &format!("mesh `{}`", entry.name), &format!("no built-in mesh `{name}`"), &way_out)
+            value(
+                scene,
+                &format!("mesh `{}`", entry.name),
+                &format!("no built-in mesh `{name}`"),
+                &way_out,
+            )
         });
     }
     let file = scene.parent().unwrap_or(Path::new("")).join(&entry.file);

@@ -11,7 +11,7 @@
 //! # let path = folder.path().join("materials.sqlite");
 //! let paint = builtin::get("mannequin-paint").unwrap().unwrap();
 //! let mut store = Store::open(&path).unwrap();
-//! assert_eq!(store.add(&paint).unwrap(), Added::New);
+//! assert_eq!(store.add([&paint]).unwrap(), [Added::New]);
 //! assert_eq!(store.get(&paint.slug, None).unwrap().unwrap().material, paint);
 //! ```
 
@@ -62,7 +62,7 @@ pub struct Stored {
 }
 
 /// A line of [`Store::list`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Summary {
     /// Short name.
     pub slug: Slug,
@@ -113,15 +113,21 @@ impl Store {
         Ok(conn.map(|conn| Store { conn, path }))
     }
 
-    /// Adds a material, or a revision to the one of its name. What is already current is not
-    /// added again.
+    /// Adds materials, or revisions to those of the same names, in one transaction: all or none.
+    /// What is already current is not added again. The answers are in the order of `materials`.
     ///
     /// # Errors
-    /// When the material is not [valid](Material::validate), or the file cannot be written.
-    pub fn add(&mut self, material: &Material) -> Result<Added, StoreError> {
-        let slug = || material.slug.to_string();
-        material.validate().map_err(|error| StoreError::Material { slug: slug(), error })?;
-        write::add(&mut self.conn, material).map_err(|error| StoreError::new(&self.path, error))
+    /// When a material is not [valid](Material::validate), or the file cannot be written.
+    pub fn add<'a>(
+        &mut self,
+        materials: impl IntoIterator<Item = &'a Material>,
+    ) -> Result<Vec<Added>, StoreError> {
+        let materials: Vec<&Material> = materials.into_iter().collect();
+        for material in &materials {
+            let slug = || material.slug.to_string();
+            material.validate().map_err(|error| StoreError::Material { slug: slug(), error })?;
+        }
+        write::add(&mut self.conn, &materials).map_err(|error| StoreError::new(&self.path, error))
     }
 
     /// Every material's current revision, sorted by name.
@@ -149,11 +155,16 @@ impl Store {
         }
     }
 
-    /// Removes a material with all its revisions; `None` when there is none.
+    /// Removes materials with all their revisions, in one transaction; `None` for each that is not
+    /// there.
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn remove(&mut self, slug: &Slug) -> Result<Option<Removed>, StoreError> {
-        write::remove(&mut self.conn, slug).map_err(|error| StoreError::new(&self.path, error))
+    pub fn remove<'a>(
+        &mut self,
+        slugs: impl IntoIterator<Item = &'a Slug>,
+    ) -> Result<Vec<Option<Removed>>, StoreError> {
+        let slugs: Vec<&Slug> = slugs.into_iter().collect();
+        write::remove(&mut self.conn, &slugs).map_err(|error| StoreError::new(&self.path, error))
     }
 }

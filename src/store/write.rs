@@ -6,29 +6,39 @@ use serde::Serialize;
 use super::{Added, Removed};
 use crate::material::{Covariance, Curve, Fit, Instrument, Material, Slug, Source};
 
-/// Adds a material or a revision of one.
-pub(super) fn add(conn: &mut Connection, material: &Material) -> Result<Added> {
+/// Adds materials or revisions of them, all or none.
+pub(super) fn add(conn: &mut Connection, materials: &[&Material]) -> Result<Vec<Added>> {
     let tx = conn.transaction()?;
-    let content_hash = material.content_hash();
-    let (added, number) = match current(&tx, &material.slug)? {
-        Some((number, stored)) if stored == content_hash => return Ok(Added::Unchanged(number)),
-        Some((number, _)) => (Added::Revision(number + 1), number + 1),
-        None => (Added::New, 1),
-    };
-    let revision_id = revision(&tx, material, number, &content_hash)?;
-    Rows { tx: &tx, revision_id }.material(material)?;
+    let added = materials.iter().map(|material| add_one(&tx, material)).collect::<Result<_>>()?;
     tx.commit()?;
     Ok(added)
 }
 
-/// Removes a material and all that hangs on it.
-pub(super) fn remove(conn: &mut Connection, slug: &Slug) -> Result<Option<Removed>> {
+fn add_one(tx: &Transaction, material: &Material) -> Result<Added> {
+    let content_hash = material.content_hash();
+    let (added, number) = match current(tx, &material.slug)? {
+        Some((number, stored)) if stored == content_hash => return Ok(Added::Unchanged(number)),
+        Some((number, _)) => (Added::Revision(number + 1), number + 1),
+        None => (Added::New, 1),
+    };
+    let revision_id = revision(tx, material, number, &content_hash)?;
+    Rows { tx, revision_id }.material(material)?;
+    Ok(added)
+}
+
+/// Removes materials and all that hangs on them, all or none.
+pub(super) fn remove(conn: &mut Connection, slugs: &[&Slug]) -> Result<Vec<Option<Removed>>> {
     let tx = conn.transaction()?;
+    let removed = slugs.iter().map(|slug| remove_one(&tx, slug)).collect::<Result<_>>()?;
+    tx.commit()?;
+    Ok(removed)
+}
+
+fn remove_one(tx: &Transaction, slug: &Slug) -> Result<Option<Removed>> {
     let count = "SELECT count(*) FROM revision JOIN material ON material.id = material_id
                  WHERE slug = ?1";
     let revisions = tx.query_row(count, [slug.as_str()], |row| row.get(0))?;
     let found = tx.execute("DELETE FROM material WHERE slug = ?1", [slug.as_str()])?;
-    tx.commit()?;
     Ok((found > 0).then_some(Removed { revisions }))
 }
 

@@ -10,11 +10,9 @@ use crate::geometry::Mesh;
 pub fn closest(mesh: &Mesh, ray: &Ray<Global>) -> Option<Hit> {
     let mut best: Option<Hit> = None;
     for facet in 0..mesh.facets.len() {
-        if mesh.is_degenerate(facet) {
-            continue;
-        }
         if let Some(range_m) = intersect(mesh, facet, ray)
             && best.is_none_or(|hit| range_m < hit.range_m)
+            && !mesh.is_degenerate(facet)
         {
             best = Some(measured(mesh, facet as u32, ray, range_m));
         }
