@@ -1,5 +1,7 @@
 //! Triangle meshes.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 use thiserror::Error;
 
@@ -19,7 +21,7 @@ pub struct Mesh {
 /// One partition of a mesh's facets into named parts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FacetLabels {
-    /// What the partition is by: `usemtl`, `group`, `part`, or a PLY face property's own name.
+    /// What the partition is by: `usemtl`, `group`, `solid`, `part`, or a PLY face property's own name.
     pub property: String,
     /// The parts' names.
     pub names: Vec<String>,
@@ -40,17 +42,52 @@ impl FacetLabels {
         property: &str,
         names: impl IntoIterator<Item = S>,
     ) -> FacetLabels {
-        let mut labels = FacetLabels { property: property.to_owned(), ..Default::default() };
-        let mut number = std::collections::HashMap::new();
-        for name in names {
-            let name = name.as_ref();
-            let index = *number.entry(name.to_owned()).or_insert_with(|| {
-                labels.names.push(name.to_owned());
-                labels.names.len() as u32 - 1
-            });
-            labels.name_of_facet.push(index);
+        let mut builder = LabelBuilder::new(property);
+        names.into_iter().for_each(|name| builder.push(name.as_ref(), 1));
+        builder.finish()
+    }
+}
+
+/// Builds [`FacetLabels`] as facets come in.
+#[derive(Debug)]
+pub struct LabelBuilder {
+    labels: FacetLabels,
+    number_of_name: HashMap<String, u32>,
+}
+
+impl LabelBuilder {
+    /// No facets yet.
+    pub fn new(property: &str) -> LabelBuilder {
+        let labels = FacetLabels { property: property.to_owned(), ..Default::default() };
+        LabelBuilder { labels, number_of_name: HashMap::new() }
+    }
+
+    /// Gives the next `facets` facets the name `name`; names are numbered in order of first appearance.
+    pub fn push(&mut self, name: &str, facets: usize) {
+        let number = self.number(name);
+        self.labels.name_of_facet.extend(std::iter::repeat_n(number, facets));
+    }
+
+    /// The labels of all facets so far.
+    pub fn finish(self) -> FacetLabels {
+        self.labels
+    }
+
+    fn number(&mut self, name: &str) -> u32 {
+        // Neighbouring facets mostly share their name.
+        let FacetLabels { names, name_of_facet, .. } = &mut self.labels;
+        if let Some(&last) = name_of_facet.last()
+            && names.get(last as usize).is_some_and(|last| last == name)
+        {
+            return last;
         }
-        labels
+        if let Some(&number) = self.number_of_name.get(name) {
+            return number;
+        }
+        let number = names.len() as u32;
+        names.push(name.to_owned());
+        self.number_of_name.insert(name.to_owned(), number);
+        number
     }
 }
 
@@ -144,8 +181,8 @@ impl Mesh {
         let [a, b, c] = self.corners(facet);
         let longest2 =
             (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-        // `!(x > y)` also holds for NaN.
-        !(self.area_normal(facet).length() > RELATIVE_HEIGHT * longest2)
+        let height2 = self.area_normal(facet).length();
+        height2.is_nan() || height2 <= RELATIVE_HEIGHT * longest2
     }
 
     /// Appends another mesh. Labels are kept by property; facets without a label get the empty name.
