@@ -19,7 +19,7 @@
 //! let link = Link::new(&Radar::default());
 //! let theta_rad = 30f64.to_radians();
 //! let power_w = link.power_w(8.0, theta_rad.cos(), paint.retro_per_sr(theta_rad));
-//! assert!((dbm_from_watts(power_w) + 65.1).abs() < 0.1);
+//! assert!((dbm_from_watts(power_w) + 65.2).abs() < 0.1);
 //! # Ok::<(), matdb::error::Error>(())
 //! ```
 //!

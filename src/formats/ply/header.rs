@@ -1,0 +1,267 @@
+//! What a PLY file says it holds.
+
+use std::io::Cursor;
+
+use ply_rs::parser::{ParseError, Parser, Reader};
+use ply_rs::ply::{DefaultElement, ElementDef, Encoding, PropertyDef, PropertyType, ScalarType};
+
+use crate::formats::{FormatError, excerpt};
+
+/// How a number is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scalar {
+    /// 8-bit signed integer.
+    Char,
+    /// 8-bit unsigned integer.
+    UChar,
+    /// 16-bit signed integer.
+    Short,
+    /// 16-bit unsigned integer.
+    UShort,
+    /// 32-bit signed integer.
+    Int,
+    /// 32-bit unsigned integer.
+    UInt,
+    /// 32-bit floating point.
+    Float,
+    /// 64-bit floating point.
+    Double,
+}
+
+impl Scalar {
+    /// The name a header gives it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Scalar::Char => "char",
+            Scalar::UChar => "uchar",
+            Scalar::Short => "short",
+            Scalar::UShort => "ushort",
+            Scalar::Int => "int",
+            Scalar::UInt => "uint",
+            Scalar::Float => "float",
+            Scalar::Double => "double",
+        }
+    }
+
+    /// Whether `value` can be stored: integers take whole numbers in their range, floats anything.
+    pub fn holds(self, value: f64) -> bool {
+        self.integer_range().is_none_or(|(least, greatest)| {
+            value.fract() == 0.0 && (least..=greatest).contains(&value)
+        })
+    }
+
+    /// The least and greatest integer, or `None` for the floats.
+    pub(super) fn integer_range(self) -> Option<(f64, f64)> {
+        match self {
+            Scalar::Char => Some((i8::MIN.into(), i8::MAX.into())),
+            Scalar::UChar => Some((u8::MIN.into(), u8::MAX.into())),
+            Scalar::Short => Some((i16::MIN.into(), i16::MAX.into())),
+            Scalar::UShort => Some((u16::MIN.into(), u16::MAX.into())),
+            Scalar::Int => Some((i32::MIN.into(), i32::MAX.into())),
+            Scalar::UInt => Some((u32::MIN.into(), u32::MAX.into())),
+            Scalar::Float | Scalar::Double => None,
+        }
+    }
+
+    fn size_bytes(self) -> usize {
+        match self {
+            Scalar::Char | Scalar::UChar => 1,
+            Scalar::Short | Scalar::UShort => 2,
+            Scalar::Int | Scalar::UInt | Scalar::Float => 4,
+            Scalar::Double => 8,
+        }
+    }
+}
+
+impl From<&ScalarType> for Scalar {
+    fn from(scalar: &ScalarType) -> Scalar {
+        match scalar {
+            ScalarType::Char => Scalar::Char,
+            ScalarType::UChar => Scalar::UChar,
+            ScalarType::Short => Scalar::Short,
+            ScalarType::UShort => Scalar::UShort,
+            ScalarType::Int => Scalar::Int,
+            ScalarType::UInt => Scalar::UInt,
+            ScalarType::Float => Scalar::Float,
+            ScalarType::Double => Scalar::Double,
+        }
+    }
+}
+
+/// One number, or as many as a leading count says.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Shape {
+    Scalar(Scalar),
+    List { count: Scalar, item: Scalar },
+}
+
+impl Shape {
+    /// The fewest bytes one value takes: in ascii a digit and a separator.
+    fn least_bytes(self, encoding: Encoding) -> usize {
+        match (encoding, self) {
+            (Encoding::Ascii, _) => 2,
+            (_, Shape::Scalar(scalar) | Shape::List { count: scalar, .. }) => scalar.size_bytes(),
+        }
+    }
+}
+
+pub(super) struct Property {
+    pub name: String,
+    pub shape: Shape,
+}
+
+impl From<PropertyDef> for Property {
+    fn from(property: PropertyDef) -> Property {
+        let shape = match &property.data_type {
+            PropertyType::Scalar(scalar) => Shape::Scalar(scalar.into()),
+            PropertyType::List(count, item) => {
+                Shape::List { count: count.into(), item: item.into() }
+            }
+        };
+        Property { name: property.name, shape }
+    }
+}
+
+pub(super) struct Element {
+    pub name: String,
+    pub count: usize,
+    pub properties: Vec<Property>,
+}
+
+impl Element {
+    /// Where among the properties the scalar `name` is.
+    pub fn scalar(&self, name: &str) -> Result<usize, FormatError> {
+        let is_it = |p: &Property| p.name == name && matches!(p.shape, Shape::Scalar(_));
+        self.properties.iter().position(is_it).ok_or_else(|| {
+            FormatError::at(
+                "header",
+                format!("element {} has no number called {name}", self.name),
+                "export the file again with that property",
+            )
+        })
+    }
+
+    fn least_bytes(&self, encoding: Encoding) -> usize {
+        self.properties.iter().map(|p| p.shape.least_bytes(encoding)).sum()
+    }
+}
+
+impl From<ElementDef> for Element {
+    fn from(element: ElementDef) -> Element {
+        let properties = element.properties.into_values().map(Property::from).collect();
+        Element { name: element.name, count: element.count, properties }
+    }
+}
+
+/// A header whose counts fit the file it came from.
+pub(super) struct Header<'a> {
+    pub encoding: Encoding,
+    pub comments: Vec<String>,
+    pub elements: Vec<Element>,
+    /// Number of lines up to and including `end_header`.
+    pub lines: usize,
+    /// The bytes after the header.
+    pub body: &'a [u8],
+}
+
+impl Header<'_> {
+    /// Parses the header and checks every count against the bytes that follow.
+    pub fn read(bytes: &[u8]) -> Result<Header<'_>, FormatError> {
+        let (text, body) = split(bytes)?;
+        let mut reader = Reader::new(Cursor::new(text.as_bytes()));
+        let parsed = Parser::<DefaultElement>::new()
+            .read_header(&mut reader)
+            .map_err(|error| not_understood(&text, &error))?;
+        let header = Header {
+            encoding: parsed.encoding,
+            comments: parsed.comments,
+            elements: parsed.elements.into_values().map(Element::from).collect(),
+            lines: text.lines().count(),
+            body,
+        };
+        header.check_names(&text)?;
+        header.check_counts()?;
+        Ok(header)
+    }
+
+    pub fn element(&self, name: &str) -> Option<&Element> {
+        self.elements.iter().find(|e| e.name == name)
+    }
+
+    /// The parser lets the later of two equal names replace the earlier, which would shift the data.
+    fn check_names(&self, text: &str) -> Result<(), FormatError> {
+        let declared = |what: &str| text.lines().filter(|line| line.starts_with(what)).count();
+        let properties: usize = self.elements.iter().map(|e| e.properties.len()).sum();
+        if declared("element") == self.elements.len() && declared("property") == properties {
+            return Ok(());
+        }
+        Err(FormatError::at(
+            "header",
+            "an element or one of its properties is declared twice",
+            "give each a name of its own",
+        ))
+    }
+
+    fn check_counts(&self) -> Result<(), FormatError> {
+        // The last number of an ascii file needs no separator.
+        let mut left_bytes = self.body.len() + usize::from(self.encoding == Encoding::Ascii);
+        for Element { name, count, properties } in &self.elements {
+            if *count > 0 && properties.is_empty() {
+                return Err(FormatError::at(
+                    "header",
+                    format!("element {name} has {count} entries but no properties"),
+                    "remove the element",
+                ));
+            }
+        }
+        for element in &self.elements {
+            let needed_bytes = element.count.checked_mul(element.least_bytes(self.encoding));
+            left_bytes = needed_bytes.and_then(|n| left_bytes.checked_sub(n)).ok_or_else(|| {
+                FormatError::at(
+                    "header",
+                    format!(
+                        "{} entries of element {} do not fit the {} bytes of data",
+                        element.count,
+                        element.name,
+                        self.body.len()
+                    ),
+                    "the file is cut short or its header is wrong; copy or export it again",
+                )
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// Splits a file after its `end_header` line.
+fn split(bytes: &[u8]) -> Result<(String, &[u8]), FormatError> {
+    if !bytes.starts_with(b"ply") {
+        return Err(FormatError::at("byte 0", "this is not a PLY file", "check its extension"));
+    }
+    let mut end = 0;
+    for line in bytes.split_inclusive(|&byte| byte == b'\n') {
+        end += line.len();
+        if line.trim_ascii_end() == b"end_header" {
+            let (header, body) = bytes.split_at(end);
+            return Ok((String::from_utf8_lossy(header).into_owned(), body));
+        }
+    }
+    Err(FormatError::at(
+        format!("byte {end}"),
+        "the header has no end_header line",
+        "the file is cut short; copy or export it again",
+    ))
+}
+
+fn not_understood(text: &str, error: &ParseError) -> FormatError {
+    let Some(line) = error.line() else {
+        let problem = error.to_string();
+        return FormatError::at("header", problem.trim_end_matches('.'), "export the file again");
+    };
+    let written = text.lines().nth(line.saturating_sub(1)).unwrap_or("");
+    FormatError::at(
+        format!("line {line}"),
+        format!("cannot understand {} here", excerpt(written)),
+        "mend the header or export the file again",
+    )
+}

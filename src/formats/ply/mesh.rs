@@ -1,0 +1,356 @@
+//! PLY to triangle mesh.
+
+use std::fmt::Write;
+
+use glam::DVec3;
+
+use super::body::{Body, Row};
+use super::header::{Element, Header, Scalar, Shape};
+use crate::formats::FormatError;
+use crate::geometry::Mesh;
+use crate::geometry::mesh::LabelBuilder;
+
+/// Reads the `vertex` and `face` elements of a PLY file.
+///
+/// Polygons become fans of triangles round their first corner. Every integer property of the faces
+/// becomes labels named for it, with the decimal values as names. A file without faces gives a mesh
+/// without facets.
+///
+/// # Errors
+///
+/// Names the line, byte or face (numbered from 0) at which the file breaks its format or its header,
+/// or where a face refers to a vertex that does not exist.
+pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
+    let header = Header::read(bytes)?;
+    let vertices = header.element("vertex").map_or(0, |element| element.count);
+    let mut body = Body::new(&header, bytes.len());
+    let mut mesh = Mesh::default();
+    for element in &header.elements {
+        match element.name.as_str() {
+            "vertex" => mesh.vertices = read_vertices(&mut body, element)?,
+            "face" => {
+                let mut faces = Faces::new(element, vertices, bytes.len());
+                body.for_each_row(element, corner_list(element)?, |n, row| faces.push(n, row))?;
+                mesh.facets = faces.facets;
+                mesh.labels = faces.labels.into_iter().map(|(_, l)| l.finish()).collect();
+            }
+            _ => body.skip(element)?,
+        }
+    }
+    Ok(mesh)
+}
+
+fn read_vertices(body: &mut Body, element: &Element) -> Result<Vec<DVec3>, FormatError> {
+    let (x, y, z) = (element.scalar("x")?, element.scalar("y")?, element.scalar("z")?);
+    let mut vertices = Vec::with_capacity(element.count);
+    body.for_each_row(element, None, |_, Row { scalars, .. }| {
+        vertices.push(DVec3::new(scalars[x], scalars[y], scalars[z]));
+        Ok(())
+    })?;
+    Ok(vertices)
+}
+
+/// Where among a face's properties its corners are.
+fn corner_list(element: &Element) -> Result<Option<usize>, FormatError> {
+    let at = element.properties.iter().position(|property| {
+        matches!(property.shape, Shape::List { .. })
+            && matches!(property.name.as_str(), "vertex_indices" | "vertex_index")
+    });
+    if at.is_none() && element.count > 0 {
+        return Err(FormatError::at(
+            "header",
+            "element face has no list called vertex_indices or vertex_index",
+            "export the mesh as triangles",
+        ));
+    }
+    Ok(at)
+}
+
+/// The faces read so far.
+struct Faces {
+    vertices: usize,
+    facets: Vec<[u32; 3]>,
+    /// Each with the place of its property.
+    labels: Vec<(usize, LabelBuilder)>,
+    most_labels: usize,
+    text: String,
+}
+
+impl Faces {
+    /// A face with many corners repeats all its labels as often, so a small file could ask for very
+    /// many. A triangle has fewer labels than bytes; this is how many the whole file may have per byte.
+    const LABELS_PER_BYTE: usize = 2;
+
+    fn new(element: &Element, vertices: usize, file_bytes: usize) -> Faces {
+        let is_integer = |scalar: Scalar| scalar.integer_range().is_some();
+        let labels = element.properties.iter().enumerate().filter_map(|(at, p)| match p.shape {
+            Shape::Scalar(scalar) if is_integer(scalar) => Some((at, LabelBuilder::new(&p.name))),
+            _ => None,
+        });
+        Faces {
+            vertices,
+            facets: Vec::with_capacity(element.count),
+            labels: labels.collect(),
+            most_labels: file_bytes.saturating_mul(Faces::LABELS_PER_BYTE),
+            text: String::new(),
+        }
+    }
+
+    fn push(&mut self, face: usize, row: &Row) -> Result<(), FormatError> {
+        let corners = row.list.as_slice();
+        let [first, second, others @ ..] = corners else {
+            return Err(too_few_corners(face, corners.len()));
+        };
+        if others.is_empty() {
+            return Err(too_few_corners(face, corners.len()));
+        }
+        if let Some(&stray) = corners.iter().find(|&&corner| !self.is_vertex(corner)) {
+            return Err(self.no_such_vertex(face, stray));
+        }
+        let mut previous = *second;
+        for &next in others {
+            self.facets.push([*first as u32, previous as u32, next as u32]);
+            previous = next;
+        }
+        self.label(face, &row.scalars, others.len())
+    }
+
+    fn is_vertex(&self, corner: f64) -> bool {
+        let index = corner as u32;
+        f64::from(index) == corner && (index as usize) < self.vertices
+    }
+
+    fn no_such_vertex(&self, face: usize, corner: f64) -> FormatError {
+        FormatError::at(
+            format!("face {face}"),
+            format!("refers to vertex {corner}, but the file has {} vertices", self.vertices),
+            "repair or export the mesh again",
+        )
+    }
+
+    fn label(&mut self, face: usize, scalars: &[f64], facets: usize) -> Result<(), FormatError> {
+        if self.facets.len().saturating_mul(self.labels.len()) > self.most_labels {
+            return Err(FormatError::at(
+                format!("face {face}"),
+                format!("{} labels on polygons of so many corners", self.labels.len()),
+                "export the mesh as triangles, or without the face properties",
+            ));
+        }
+        for (at, label) in &mut self.labels {
+            self.text.clear();
+            // Writing to a string cannot fail.
+            let _ = write!(self.text, "{}", scalars[*at] as i64);
+            label.push(&self.text, facets);
+        }
+        Ok(())
+    }
+}
+
+fn too_few_corners(face: usize, corners: usize) -> FormatError {
+    FormatError::at(
+        format!("face {face}"),
+        format!("has {corners} corners, and a surface needs 3"),
+        "repair or export the mesh again",
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::FacetLabels;
+
+    const SQUARE: &str = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+
+    fn ascii(face_properties: &str, faces: &[&str]) -> String {
+        format!(
+            "ply\nformat ascii 1.0\ncomment made by hand\nobj_info none\nelement vertex 4\n\
+             property float x\nproperty float y\nproperty float z\nelement face {}\n\
+             {face_properties}end_header\n{SQUARE}{}\n",
+            faces.len(),
+            faces.join("\n")
+        )
+    }
+
+    fn binary(encoding: &str, properties: &str, body: &[u8]) -> Vec<u8> {
+        let header = format!("ply\nformat binary_{encoding}_endian 1.0\n{properties}end_header\n");
+        [header.as_bytes(), body].concat()
+    }
+
+    fn message(text: &str) -> String {
+        read_mesh(text.as_bytes()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn triangles_and_polygons_in_ascii() {
+        for name in ["vertex_index", "vertex_indices"] {
+            let text =
+                ascii(&format!("property list uchar int {name}\n"), &["3 0 1 2", "4 0 1 2 3"]);
+            let mesh = read_mesh(text.as_bytes()).unwrap();
+            assert_eq!(mesh.facets, [[0, 1, 2], [0, 1, 2], [0, 2, 3]]);
+            assert_eq!(mesh.vertices[2], DVec3::new(1.0, 1.0, 0.0));
+            assert!(mesh.labels.is_empty());
+        }
+    }
+
+    #[test]
+    fn every_encoding_gives_the_same_mesh() {
+        let properties = "element vertex 3\nproperty double x\nproperty double y\nproperty double z\n\
+                          element face 1\nproperty list int ushort vertex_indices\n";
+        let numbers = [0.0, 0.5, -1.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.25f64];
+        let little: Vec<u8> = (numbers.iter().flat_map(|x| x.to_le_bytes()))
+            .chain(3i32.to_le_bytes())
+            .chain([2u16, 1, 0].iter().flat_map(|i| i.to_le_bytes()))
+            .collect();
+        let big: Vec<u8> = (numbers.iter().flat_map(|x| x.to_be_bytes()))
+            .chain(3i32.to_be_bytes())
+            .chain([2u16, 1, 0].iter().flat_map(|i| i.to_be_bytes()))
+            .collect();
+        let text = format!(
+            "ply\nformat ascii 1.0\n{properties}end_header\n0 0.5 -1\n1 2 3\n4 5 6.25\n3 2 1 0"
+        );
+        let mesh = read_mesh(&binary("little", properties, &little)).unwrap();
+        assert_eq!(mesh.facets, [[2, 1, 0]]);
+        assert_eq!(mesh.vertices[0], DVec3::new(0.0, 0.5, -1.0));
+        assert_eq!(read_mesh(&binary("big", properties, &big)).unwrap(), mesh);
+        assert_eq!(read_mesh(text.as_bytes()).unwrap(), mesh);
+    }
+
+    #[test]
+    fn crlf_line_ends() {
+        let text = ascii("property list uchar int vertex_index\n", &["3 0 1 2", "3 0 2 3"]);
+        let crlf = text.replace('\n', "\r\n");
+        assert_eq!(read_mesh(crlf.as_bytes()), read_mesh(text.as_bytes()));
+        assert_eq!(read_mesh(crlf.as_bytes()).unwrap().facets.len(), 2);
+    }
+
+    #[test]
+    fn integer_face_properties_become_labels_of_every_triangle() {
+        let properties = "property int part\nproperty float quality\n\
+                          property list uchar uint vertex_indices\nproperty uint8 red\n\
+                          property list uint8 float32 texcoord\n";
+        let text = ascii(properties, &["-7 0.5 4 0 1 2 3 255 2 0.1 0.2", "9 1 3 0 1 2 255 0"]);
+        let mesh = read_mesh(text.as_bytes()).unwrap();
+        assert_eq!(
+            mesh.labels,
+            [
+                FacetLabels::from_names("part", ["-7", "-7", "9"]),
+                FacetLabels::from_names("red", ["255"; 3]),
+            ]
+        );
+    }
+
+    #[test]
+    fn further_properties_and_elements_are_passed_over() {
+        let properties = "element camera 2\nproperty list uchar float view\nproperty int8 id\n\
+                          element vertex 3\nproperty uint8 flag\nproperty int16 x\n\
+                          property list uchar uchar extra\nproperty float64 y\n\
+                          property int32 z\nelement face 1\n\
+                          property list ushort uint8 vertex_indices\n";
+        let mut body = vec![1, 0, 0, 0, 0, 5, 0, 6];
+        for x in 0..3i16 {
+            body.push(9);
+            body.extend(x.to_le_bytes());
+            body.extend([2, 8, 8]);
+            body.extend((f64::from(x) * 0.25).to_le_bytes());
+            body.extend((-i32::from(x)).to_le_bytes());
+        }
+        body.extend([3, 0, 0, 1, 2]);
+        body.extend(b"bytes after the end");
+        let mesh = read_mesh(&binary("little", properties, &body)).unwrap();
+        assert_eq!(mesh.vertices[2], DVec3::new(2.0, 0.5, -2.0));
+        assert_eq!(mesh.facets, [[0, 1, 2]]);
+    }
+
+    #[test]
+    fn comments_need_not_be_utf8() {
+        let text = ascii("property list uchar int vertex_index\n", &["3 0 1 2"]);
+        let mut bytes = text.into_bytes();
+        let at = bytes.windows(4).position(|w| w == b"made").unwrap();
+        bytes[at] = 0xe9;
+        assert_eq!(read_mesh(&bytes).unwrap().facets.len(), 1);
+    }
+
+    #[test]
+    fn bad_indices_name_the_face() {
+        let properties = "property list uchar int vertex_indices\n";
+        assert_eq!(
+            message(&ascii(properties, &["3 0 1 2", "3 0 1 -2"])),
+            "face 1: refers to vertex -2, but the file has 4 vertices; \
+             repair or export the mesh again"
+        );
+        let bad = ["3 0 1 4", "3 4000000000 1 2", "3 0 1.5 2", "2 0 1", "0"];
+        for face in bad {
+            let text = ascii("property list uchar double vertex_indices\n", &["3 0 1 2", face]);
+            assert!(message(&text).starts_with("face 1: "), "{face}: {}", message(&text));
+        }
+    }
+
+    #[test]
+    fn ascii_errors_name_the_line() {
+        let properties = "property list uchar int vertex_indices\n";
+        let too_long = ascii(properties, &["3 0 1 2", "3 0 1 2 3"]);
+        let too_short = ascii(properties, &["3 0 1 2", "3 0 1"]);
+        let no_number = ascii(properties, &["3 0 1 2", "3 0 1 two"]);
+        for text in [too_long, too_short, no_number] {
+            assert_eq!(
+                message(&text),
+                "line 17: face 1 does not follow the header; copy or export the file again"
+            );
+        }
+        let cut = ascii(properties, &["3 0 1 2", "3"]);
+        assert_eq!(
+            message(cut.trim_end()),
+            "line 17: the file ends inside face 1; copy or export the file again"
+        );
+    }
+
+    #[test]
+    fn binary_errors_name_the_byte() {
+        let properties = "element vertex 0\nproperty float x\nproperty float y\nproperty float z\n\
+                          element face 1\nproperty list uchar int vertex_indices\n";
+        let bytes = binary("little", properties, &[3, 0, 0]);
+        let problem = read_mesh(&bytes).unwrap_err().to_string();
+        assert!(problem.starts_with(&format!("byte {}: face 0", bytes.len() - 2)), "{problem}");
+    }
+
+    #[test]
+    fn header_errors_name_the_line_or_the_name() {
+        let good = ascii("property list uchar int vertex_indices\n", &["3 0 1 2"]);
+        let cases = [
+            (
+                "property float y",
+                "property flat y",
+                "line 7: cannot understand \"property flat y\"",
+            ),
+            ("property float y", "property float x", "header: an element or one of its"),
+            ("element face", "element vertex", "header: an element or one of its"),
+            ("property float y", "property float v", "header: element vertex has no number"),
+            ("vertex_indices", "corners", "header: element face has no list"),
+            ("end_header", "end", "byte 214: the header has no end_header line"),
+            ("format ascii 1.0\n", "", "header: No format line found;"),
+            ("ply\n", "", "byte 0: this is not a PLY file"),
+            ("vertex 4", "vertex 1000000000000", "header: 1000000000000 entries of element vertex"),
+            ("vertex 4", "vertex 99999999999999999999999", "line 5: cannot understand"),
+            ("obj_info", "element ghost 4000000000\nobj_info", "header: element ghost has 4000"),
+        ];
+        for (what, instead, expected) in cases {
+            let problem = message(&good.replacen(what, instead, 1));
+            assert!(problem.starts_with(expected), "{instead}: {problem}");
+        }
+    }
+
+    #[test]
+    fn many_labels_on_large_polygons_are_refused() {
+        let labels: String = (0..50).map(|i| format!("property uchar l{i}\n")).collect();
+        let face = format!("{}1000{}", "1 ".repeat(50), " 0".repeat(1000));
+        let text = ascii(&format!("{labels}property list int int vertex_indices\n"), &[&face]);
+        assert!(message(&text).starts_with("face 0: 50 labels on polygons"));
+    }
+
+    #[test]
+    fn a_cloud_is_a_mesh_without_facets() {
+        let text = ascii("property list uchar int vertex_indices\n", &[]);
+        let mesh = read_mesh(text.as_bytes()).unwrap();
+        assert_eq!((mesh.vertices.len(), mesh.facets.len()), (4, 0));
+    }
+}

@@ -1,0 +1,260 @@
+//! STL, binary and ascii: a soup of triangles, welded here into a mesh.
+//!
+//! Normals and attribute bytes are ignored: a facet's corners say the same, and more exactly.
+
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use super::{FormatError, excerpt, point};
+use crate::geometry::Mesh;
+use crate::geometry::mesh::LabelBuilder;
+
+const HEADER_BYTES: usize = 84;
+const FACET_BYTES: usize = 50;
+
+/// Reads the triangles of an STL file. Corners of equal bits become one vertex.
+///
+/// A file is binary when its length is what its count asks for, even if it begins with `solid`. An
+/// ascii file of several solids gets the label `solid` with their names.
+///
+/// # Errors
+///
+/// Tells when a binary file's length and its count disagree; names the line at which an ascii file
+/// breaks the format or ends too early.
+pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
+    match binary_facets(bytes) {
+        Some(facets) => Ok(read_binary(facets)),
+        None if is_text(bytes) => read_ascii(&String::from_utf8_lossy(bytes)),
+        None => Err(neither(bytes)),
+    }
+}
+
+/// The facets' bytes, if there are as many as the header says.
+fn binary_facets(bytes: &[u8]) -> Option<&[u8]> {
+    let (header, facets) = bytes.split_at_checked(HEADER_BYTES)?;
+    let count = u32::from_le_bytes(*header.last_chunk()?) as usize;
+    (count.checked_mul(FACET_BYTES)? == facets.len()).then_some(facets)
+}
+
+/// Binary files that are cut short may begin with `solid` too, but hold zero bytes.
+fn is_text(bytes: &[u8]) -> bool {
+    let starts_well = bytes
+        .trim_ascii_start()
+        .first_chunk::<5>()
+        .is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    starts_well && !bytes.contains(&0)
+}
+
+fn neither(bytes: &[u8]) -> FormatError {
+    let Some(count) = bytes.get(80..).and_then(|b| b.first_chunk()).copied() else {
+        return FormatError::at("byte 0", "this is not an STL file", "check its extension");
+    };
+    let count = u32::from_le_bytes(count);
+    let expected_bytes = HEADER_BYTES as u64 + FACET_BYTES as u64 * u64::from(count);
+    FormatError::at(
+        "byte 80",
+        format!("{count} facets take {expected_bytes} bytes, but the file has {}", bytes.len()),
+        "copy or export the file again",
+    )
+}
+
+fn read_binary(facets: &[u8]) -> Mesh {
+    let mut welder = Welder::default();
+    let corner = |bytes: &[u8; 12]| {
+        let [x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3] = *bytes;
+        [[x0, x1, x2, x3], [y0, y1, y2, y3], [z0, z1, z2, z3]].map(|b| f32::from_le_bytes(b).into())
+    };
+    let facets = facets.as_chunks::<FACET_BYTES>().0.iter().map(|facet| {
+        let (_normal, corners) = facet.split_at(12);
+        let mut vertices = corners.as_chunks().0.iter().map(|c| welder.vertex(corner(c).into()));
+        std::array::from_fn(|_| vertices.next().unwrap_or_default())
+    });
+    let facets = facets.collect();
+    Mesh { vertices: welder.vertices, facets, labels: Vec::new() }
+}
+
+fn read_ascii(text: &str) -> Result<Mesh, FormatError> {
+    let mut reader = AsciiReader::new();
+    let mut lines = 0;
+    for line in text.lines() {
+        lines += 1;
+        reader.read(line.trim()).map_err(|problem| malformed(lines, problem))?;
+    }
+    reader.finish().map_err(|problem| malformed(lines, problem))
+}
+
+struct AsciiReader {
+    welder: Welder,
+    facets: Vec<[u32; 3]>,
+    /// Of the facet being read.
+    corners: Vec<u32>,
+    /// Name of the solid being read.
+    solid: Option<String>,
+    solids: LabelBuilder,
+}
+
+impl AsciiReader {
+    fn new() -> AsciiReader {
+        AsciiReader {
+            welder: Welder::default(),
+            facets: Vec::new(),
+            corners: Vec::new(),
+            solid: None,
+            solids: LabelBuilder::new("solid"),
+        }
+    }
+
+    fn read(&mut self, line: &str) -> Result<(), String> {
+        let (keyword, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        match keyword.to_ascii_lowercase().as_str() {
+            "vertex" => {
+                let corner = point(rest.split_whitespace())
+                    .ok_or_else(|| format!("vertex {} is not three numbers", excerpt(rest)))?;
+                self.corners.push(self.welder.vertex(corner));
+            }
+            "endloop" => self.end_facet()?,
+            "solid" => self.solid = Some(rest.trim().to_owned()),
+            "endsolid" => self.solid = None,
+            "" | "facet" | "outer" | "endfacet" => {}
+            _ => return Err(format!("{} is not STL", excerpt(line))),
+        }
+        Ok(())
+    }
+
+    fn end_facet(&mut self) -> Result<(), String> {
+        let corners = self.corners.as_slice().try_into();
+        let facet = corners.map_err(|_| format!("a facet has {} corners", self.corners.len()))?;
+        self.facets.push(facet);
+        self.corners.clear();
+        self.solids.push(self.solid.as_deref().unwrap_or(""), 1);
+        Ok(())
+    }
+
+    fn finish(self) -> Result<Mesh, String> {
+        if self.solid.is_some() || !self.corners.is_empty() {
+            return Err("the file ends inside a solid".to_owned());
+        }
+        let solids = self.solids.finish();
+        let labels = if solids.names.len() > 1 { vec![solids] } else { Vec::new() };
+        Ok(Mesh { vertices: self.welder.vertices, facets: self.facets, labels })
+    }
+}
+
+fn malformed(line: usize, problem: String) -> FormatError {
+    FormatError::at(format!("line {line}"), problem, "copy or export the file again")
+}
+
+/// Numbers points, equal ones alike.
+#[derive(Default)]
+struct Welder {
+    vertices: Vec<DVec3>,
+    number_of_bits: HashMap<[u64; 3], u32>,
+}
+
+impl Welder {
+    fn vertex(&mut self, point: DVec3) -> u32 {
+        *self.number_of_bits.entry(point.to_array().map(f64::to_bits)).or_insert_with(|| {
+            self.vertices.push(point);
+            self.vertices.len() as u32 - 1
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRIANGLES: [[[f32; 3]; 3]; 2] = [
+        [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.1]],
+        [[0.0, 0.0, 0.0], [1.0, 1.0, 0.1], [0.0, 1.0, 0.0]],
+    ];
+
+    fn binary(title: &str) -> Vec<u8> {
+        let mut bytes = title.as_bytes().to_vec();
+        bytes.resize(80, b' ');
+        bytes.extend(2u32.to_le_bytes());
+        for corners in TRIANGLES {
+            bytes.extend([f32::NAN; 3].iter().flat_map(|x| x.to_le_bytes()));
+            bytes.extend(corners.iter().flatten().flat_map(|x| x.to_le_bytes()));
+            bytes.extend([0, 0]);
+        }
+        bytes
+    }
+
+    fn solid(name: &str) -> String {
+        let facets: String = (TRIANGLES.iter())
+            .map(|corners| {
+                let vertices: String =
+                    corners.iter().map(|[x, y, z]| format!("      vertex {x} {y} {z}\n")).collect();
+                format!("  facet normal 0 0 1\n    outer loop\n{vertices}    endloop\n  endfacet\n")
+            })
+            .collect();
+        format!("solid {name}\n{facets}endsolid {name}\n")
+    }
+
+    fn message(bytes: &[u8]) -> String {
+        read_mesh(bytes).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn binary_corners_are_welded() {
+        for title in ["made by hand", "solid of a writer that knows no better"] {
+            let mesh = read_mesh(&binary(title)).unwrap();
+            assert_eq!(mesh.facets, [[0, 1, 2], [0, 2, 3]]);
+            assert_eq!(mesh.vertices[2], DVec3::new(1.0, 1.0, f64::from(0.1f32)));
+            assert!(mesh.labels.is_empty());
+        }
+    }
+
+    #[test]
+    fn ascii_corners_are_welded() {
+        for text in [solid("plate"), solid(""), solid("plate").replace('\n', "\r\n")] {
+            for text in [text.to_uppercase(), text] {
+                let mesh = read_mesh(text.as_bytes()).unwrap();
+                assert_eq!(mesh.facets, [[0, 1, 2], [0, 2, 3]]);
+                assert_eq!(mesh.vertices[2], DVec3::new(1.0, 1.0, 0.1));
+                assert!(mesh.labels.is_empty());
+            }
+        }
+    }
+
+    #[test]
+    fn several_solids_are_all_read_and_labelled() {
+        let mesh = read_mesh((solid("left arm") + &solid("right arm")).as_bytes()).unwrap();
+        assert_eq!(mesh.facets.len(), 4);
+        assert_eq!(mesh.vertices.len(), 4);
+        let names = ["left arm", "left arm", "right arm", "right arm"];
+        assert_eq!(mesh.labels, [crate::geometry::FacetLabels::from_names("solid", names)]);
+    }
+
+    #[test]
+    fn a_binary_file_must_be_as_long_as_its_count_says() {
+        for title in ["made by hand", "solid plate"] {
+            let bytes = binary(title);
+            for wrong in [&bytes[..183], &[bytes.as_slice(), &[0]].concat()] {
+                let expected = "byte 80: 2 facets take 184 bytes, but the file has";
+                assert!(message(wrong).starts_with(expected), "{}", message(wrong));
+            }
+        }
+        assert!(message(b"").starts_with("byte 0: this is not an STL file"));
+        assert!(message(&[0; 80]).starts_with("byte 0: this is not an STL file"));
+        assert!(message(&[0xff; 84]).starts_with("byte 80: 4294967295 facets"));
+    }
+
+    #[test]
+    fn ascii_errors_name_the_line() {
+        let good = solid("plate");
+        let cases = [
+            ("vertex 1 0 0", "vertex 1 0", "line 5: vertex \"1 0\" is not three numbers; "),
+            ("vertex 1 0 0", "vertex 1 0,0 0", "line 5: vertex "),
+            ("      vertex 1 0 0\n", "", "line 6: a facet has 2 corners; "),
+            ("outer loop", "inner loop", "line 3: \"inner loop\" is not STL; "),
+            ("endsolid plate\n", "", "line 15: the file ends inside a solid; "),
+        ];
+        for (what, instead, expected) in cases {
+            let problem = message(good.replacen(what, instead, 1).as_bytes());
+            assert!(problem.starts_with(expected), "{instead}: {problem}");
+        }
+    }
+}
