@@ -6,7 +6,6 @@ mod console;
 mod list;
 mod materials;
 mod output;
-mod record;
 mod render;
 mod rm;
 mod show;

@@ -23,7 +23,7 @@ pub enum Pattern {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Elliptical {
-    /// Number of chirps N_r, at most 100 million. 18 529: paper, Sec. III-D.
+    /// Number of chirps N_r, at most 10 million. 18 529: paper, Sec. III-D.
     pub chirps: usize,
     /// Horizontal axis of the ellipse at 8 m, m. 0.5: paper.
     pub ellipse_width_m: f64,
@@ -79,7 +79,7 @@ impl Pattern {
     pub(super) fn checks(&self) -> Vec<Check> {
         let Pattern::Elliptical(e) = self;
         vec![
-            ("scan.chirps", e.chirps as f64, (1.0, 1e8)),
+            ("scan.chirps", e.chirps as f64, (1.0, 1e7)),
             ("scan.ellipse_width_m", e.ellipse_width_m, (1e-4, 100.0)),
             ("scan.ellipse_height_m", e.ellipse_height_m, (1e-4, 100.0)),
             ("scan.field_height_m", e.field_height_m, (e.ellipse_height_m, 100.0)),

@@ -120,19 +120,24 @@ impl Scene {
     }
 }
 
-/// A pixel must be positive and the image must fit into memory.
+/// A pixel shows nothing below a hundredth of the spot, and an image must fit a page and memory.
 fn check_pixel(pixel_m: f64, radar: &Radar, file: &Path) -> Result<(), SceneError> {
-    const LARGEST_IMAGE: f64 = 1e8;
-    let [width_m, height_m] = radar.scan.field_m();
-    let pixels = width_m / pixel_m * (height_m / pixel_m);
-    if pixel_m > 0.0 && pixels <= LARGEST_IMAGE {
+    const LONGEST_SIDE: f64 = 10_000.0;
+    const MOST_PIXELS: f64 = 16e6;
+    let spot_m = radar.spot_diameter_m;
+    let [columns, rows] = radar.scan.field_m().map(|side_m| ((side_m + spot_m) / pixel_m).ceil());
+    let fits = columns.max(rows) <= LONGEST_SIDE && columns * rows <= MOST_PIXELS;
+    if pixel_m >= spot_m / 100.0 && fits {
         return Ok(());
     }
     Err(SceneError::Value {
         file: file.to_owned(),
         place: "image.pixel_m".to_owned(),
-        problem: format!("{pixel_m} m does not give an image of 1 to 100 million pixels"),
-        way_out: format!("a quarter of the spot is {} m", radar.spot_diameter_m / 4.0),
+        problem: format!(
+            "{pixel_m} m is finer than a hundredth of the spot, or gives more than 10 000 pixels on \
+             a side or 16 million in all"
+        ),
+        way_out: format!("a quarter of the spot is {} m", spot_m / 4.0),
     })
 }
 

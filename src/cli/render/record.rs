@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::materials::Found;
+use crate::cli::materials::Found;
 use crate::geometry::Raster;
 use crate::render::{Echo, Scan};
 use crate::scene::{MeshReport, Scene};

@@ -1,0 +1,68 @@
+//! The four files of a rendering, as bytes.
+
+use super::record::Record;
+use crate::cli::summary::grouped;
+use crate::error::Error;
+use crate::formats::exr::{self, Attribute};
+use crate::formats::figure::Figure;
+use crate::formats::ply;
+use crate::geometry::Raster;
+use crate::render::{Echo, Scan, cloud_table};
+use crate::scene::Scene;
+
+/// Names of the files, in the order they are written.
+pub(super) const NAMES: &str = "power.exr, power.png, cloud.ply and scan.json";
+
+/// Encodes every file of a rendering; `all` puts hits below the threshold into the cloud, too.
+pub(super) fn encode(
+    all: bool,
+    scene: &Scene,
+    scan: &Scan,
+    image: &Raster,
+    record: &Record,
+    material_of_region: &[u16],
+) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
+    let regions: Vec<&str> = scene.target.regions.iter().map(|r| r.name.as_str()).collect();
+    let materials = record.material_names();
+    let echoes: Vec<&Echo> =
+        if all { scan.echoes.iter().collect() } else { scan.detections().collect() };
+    let cloud = cloud_table(&echoes, material_of_region, &regions, &materials);
+    let mut json = serde_json::to_vec_pretty(record).unwrap_or_default();
+    json.push(b'\n');
+    Ok(vec![
+        ("power.exr", exr::write(image, &exr_attributes(&materials))?),
+        ("power.png", power_figure(scene, scan, image)?),
+        ("cloud.ply", ply::write_table(&cloud)?),
+        ("scan.json", json),
+    ])
+}
+
+/// Names for the numbers of the `material` channel.
+fn exr_attributes(materials: &[&str]) -> Vec<(String, Attribute)> {
+    let named = |(number, name): (usize, &&str)| {
+        (format!("material{number}"), Attribute::Text((*name).to_owned()))
+    };
+    materials.iter().enumerate().map(named).collect()
+}
+
+fn power_figure(scene: &Scene, scan: &Scan, image: &Raster) -> Result<Vec<u8>, Error> {
+    let radar = &scene.radar;
+    let subtitle = format!(
+        "{}, {} of {} chirps above {} dBm",
+        radar.preset,
+        grouped(scan.detections().count()),
+        grouped(scan.chirps),
+        radar.threshold_dbm
+    );
+    let figure = Figure {
+        raster: image,
+        channel: "power_dbm",
+        title: &scene.name,
+        subtitle: &subtitle,
+        colour_label: "received power, dBm",
+        range: None,
+        x_label: "x_t, m",
+        y_label: "y_t, m",
+    };
+    Ok(figure.png()?)
+}

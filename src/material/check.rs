@@ -1,0 +1,267 @@
+//! What a material must be to be kept: names, references, ranges and values.
+
+use std::collections::HashSet;
+
+use thiserror::Error;
+
+use super::{Censor, Covariance, Curve, Fit, Instrument, Material, Observation};
+use crate::brdf::{ParameterError, TabulatedError};
+
+/// Why a material cannot be kept.
+#[derive(Debug, Error, PartialEq)]
+pub enum MaterialError {
+    /// A parameter outside its range.
+    #[error("fit `{fit}`: {error}")]
+    Parameter {
+        /// Name of the fit.
+        fit: String,
+        /// What is wrong.
+        error: ParameterError,
+    },
+    /// A curve that cannot be rendered, though it is asked for.
+    #[error("curve `{curve}` cannot be rendered: {error}")]
+    Curve {
+        /// Name of the curve.
+        curve: String,
+        /// What is wrong.
+        error: TabulatedError,
+    },
+    /// A key or name that refers to nothing.
+    #[error("{place} refers to {what} `{name}`, which is not defined; define it or name one of: {}", known.join(", "))]
+    Dangling {
+        /// Where the reference stands.
+        place: String,
+        /// What it should name.
+        what: &'static str,
+        /// The name.
+        name: String,
+        /// What there is.
+        known: Vec<String>,
+    },
+    /// The same name twice.
+    #[error("{what} `{name}` is defined twice; rename one")]
+    Twice {
+        /// What is named.
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A value that has no meaning.
+    #[error("{place}: {problem}; {way_out}")]
+    Value {
+        /// Where.
+        place: String,
+        /// What is wrong.
+        problem: String,
+        /// What to do.
+        way_out: String,
+    },
+}
+
+impl Material {
+    /// Checks names, references, ranges and values.
+    pub fn validate(&self) -> Result<(), MaterialError> {
+        self.check_text()?;
+        self.check_limits()?;
+        unique("source", self.sources.iter().map(|s| s.key.as_str()))?;
+        unique("instrument", self.instruments.iter().map(|i| i.key.as_str()))?;
+        unique("fit or curve", self.renderable().iter().map(String::as_str))?;
+        self.instruments.iter().try_for_each(Instrument::validate)?;
+        self.curves.iter().try_for_each(|curve| self.check_curve(curve))?;
+        self.fits.iter().try_for_each(|fit| self.check_fit(fit))?;
+        self.scattering().map(|_| ())
+    }
+
+    fn check_text(&self) -> Result<(), MaterialError> {
+        let texts = [("name", &self.name), ("class", &self.class), ("licence", &self.licence)];
+        let fields = texts
+            .into_iter()
+            .map(|(place, text)| (place.to_owned(), text))
+            .chain(self.sources.iter().map(|s| (format!("source `{}`: title", s.key), &s.title)));
+        for (place, text) in fields {
+            if text.trim().is_empty() {
+                return Err(value(&place, "is empty", "fill it in"));
+            }
+        }
+        if self.sources.is_empty() {
+            return Err(value("material", "has no source", "add a [[source]] table"));
+        }
+        Ok(())
+    }
+
+    fn check_limits(&self) -> Result<(), MaterialError> {
+        let ascending = |[low, high]: [f64; 2], least: f64, most: f64| {
+            low >= least && high <= most && low <= high
+        };
+        if !ascending(self.frequency_hz, f64::MIN_POSITIVE, f64::MAX) {
+            let problem = "must be two positive frequencies, the lower first";
+            return Err(value("frequency_ghz", problem, "mend the range"));
+        }
+        if !ascending(self.theta_rad, 0.0, std::f64::consts::FRAC_PI_2) {
+            let problem = "must be two angles from 0 to 90, the smaller first";
+            return Err(value("theta_deg", problem, "mend the range"));
+        }
+        Ok(())
+    }
+
+    fn check_curve(&self, curve: &Curve) -> Result<(), MaterialError> {
+        let place = format!("curve `{}`", curve.name);
+        self.check_source(&place, &curve.source)?;
+        if let Some(key) = &curve.instrument
+            && !self.instruments.iter().any(|i| i.key == *key)
+        {
+            let known = self.instruments.iter().map(|i| i.key.clone()).collect();
+            return Err(dangling(&place, "an instrument", key, known));
+        }
+        if curve.observations.is_empty() {
+            return Err(value(&place, "has no observation", "give it at least one row"));
+        }
+        for (row, observation) in curve.observations.iter().enumerate() {
+            observation.validate(&format!("{place}, observation {}", row + 1))?;
+        }
+        Ok(())
+    }
+
+    fn check_fit(&self, fit: &Fit) -> Result<(), MaterialError> {
+        let place = format!("fit `{}`", fit.name);
+        let known: Vec<String> = fit.model.parameters().into_iter().map(|p| p.path).collect();
+        fit.model
+            .validate()
+            .map_err(|error| MaterialError::Parameter { fit: fit.name.clone(), error })?;
+        self.check_source(&place, &fit.source)?;
+        if let Some(curve) =
+            fit.curve.as_ref().filter(|c| !self.curves.iter().any(|k| k.name == **c))
+        {
+            let known = self.curves.iter().map(|c| c.name.clone()).collect();
+            return Err(dangling(&place, "a curve", curve, known));
+        }
+        for (path, source) in &fit.parameter_sources {
+            self.check_source(&format!("{place}, parameter `{path}`"), source)?;
+            if !known.contains(path) {
+                return Err(dangling(&place, "a parameter", path, known));
+            }
+        }
+        if !fit.parameter_sources.is_sorted_by(|a, b| a.0 < b.0) {
+            let problem = "the sources of parameters are not sorted, or one is given twice";
+            return Err(value(&place, problem, "give each path once, in alphabetical order"));
+        }
+        fit.covariance.as_ref().map_or(Ok(()), |covariance| covariance.validate(&place, &known))
+    }
+
+    fn check_source(&self, place: &str, key: &str) -> Result<(), MaterialError> {
+        if self.sources.iter().any(|s| s.key == key) {
+            return Ok(());
+        }
+        let known = self.sources.iter().map(|s| s.key.clone()).collect();
+        Err(dangling(place, "a source", key, known))
+    }
+}
+
+impl Observation {
+    fn validate(&self, place: &str) -> Result<(), MaterialError> {
+        let quarter = 0.0..=std::f64::consts::FRAC_PI_2;
+        if !quarter.contains(&self.theta_i_rad) || !quarter.contains(&self.theta_r_rad) {
+            return Err(value(place, "the angle is not within 0–90°", "mend the angle"));
+        }
+        if !self.delta_phi_rad.is_finite() {
+            return Err(value(place, "the azimuth is not finite", "mend the angle"));
+        }
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        if [self.sigma0, self.threshold_sigma0].into_iter().flatten().any(|x| !positive(x)) {
+            return Err(value(place, "σ⁰ is not a positive number", "give a finite level in dB"));
+        }
+        match (self.censor, self.sigma0, self.threshold_sigma0) {
+            (Censor::None, None, _) => {
+                Err(value(place, "has neither a value nor a censor code", "fill in one of them"))
+            }
+            (Censor::Left | Censor::Right, Some(_), _) => {
+                Err(value(place, "is censored and has a value", "leave one of them out"))
+            }
+            (Censor::Left | Censor::Right, None, None) => {
+                Err(value(place, "is censored without a threshold", "fill in threshold_db"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Instrument {
+    fn validate(&self) -> Result<(), MaterialError> {
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        if positive(self.centre_frequency_hz) && self.bandwidth_hz.is_none_or(positive) {
+            return Ok(());
+        }
+        let place = format!("instrument `{}`", self.key);
+        Err(value(&place, "frequency and bandwidth must be positive", "mend the number"))
+    }
+}
+
+impl Covariance {
+    fn validate(&self, place: &str, known: &[String]) -> Result<(), MaterialError> {
+        let n = self.parameters.len();
+        let place = format!("{place}, covariance");
+        if n == 0 {
+            return Err(value(&place, "names no parameter", "name some or leave it out"));
+        }
+        if let Some(stranger) = self.parameters.iter().find(|p| !known.contains(p)) {
+            let problem = format!("`{stranger}` is not a parameter of the model");
+            return Err(value(
+                &place,
+                &problem,
+                &format!("the parameters are {}", known.join(", ")),
+            ));
+        }
+        unique("covariance parameter", self.parameters.iter().map(String::as_str))?;
+        if self.matrix.len() != n || self.matrix.iter().any(|row| row.len() != n) {
+            let problem = format!("the matrix is not {n} × {n}");
+            return Err(value(&place, &problem, "give a row and a column per parameter"));
+        }
+        let at = |i: usize, j: usize| self.matrix[i][j];
+        let pairs = || (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+        // A correlation beyond 1 is the commonest slip; rounding in a file may reach a little past.
+        let sound = pairs().all(|(i, j)| {
+            at(i, j).is_finite()
+                && at(i, j) == at(j, i)
+                && at(i, j).powi(2) <= at(i, i) * at(j, j) * (1.0 + 1e-6)
+                && at(i, i) >= 0.0
+        });
+        if sound {
+            return Ok(());
+        }
+        let problem = "the matrix is not a covariance";
+        Err(value(&place, problem, "it must be symmetric with correlations within −1 and 1"))
+    }
+}
+
+fn unique<'a>(
+    what: &'static str,
+    names: impl Iterator<Item = &'a str>,
+) -> Result<(), MaterialError> {
+    let mut seen = HashSet::new();
+    for name in names {
+        if name.is_empty() {
+            return Err(value(what, "has an empty name", "name it"));
+        }
+        if !seen.insert(name) {
+            return Err(MaterialError::Twice { what, name: name.to_owned() });
+        }
+    }
+    Ok(())
+}
+
+fn value(place: &str, problem: &str, way_out: &str) -> MaterialError {
+    MaterialError::Value {
+        place: place.to_owned(),
+        problem: problem.to_owned(),
+        way_out: way_out.to_owned(),
+    }
+}
+
+pub(super) fn dangling(
+    place: &str,
+    what: &'static str,
+    name: &str,
+    known: Vec<String>,
+) -> MaterialError {
+    MaterialError::Dangling { place: place.to_owned(), what, name: name.to_owned(), known }
+}
