@@ -30,7 +30,7 @@
 //! | | |
 //! |---|---|
 //! | [`units`], [`frames`], [`geometry`] | numbers with units, coordinate frames as types, plain meshes and rasters |
-//! | [`brdf`], [`radar`], [`mod@formats`] | how surfaces scatter; the instrument; bytes to plain data and back |
+//! | [`mod@formats`], [`brdf`], [`radar`] | bytes to plain data and back; how surfaces scatter; the instrument |
 //! | [`material`], [`scene`], [`trace`] | what is known of a surface; what is looked at; closest hits |
 //! | [`render`] | scan × target × materials → detections, image, cloud |
 //! | [`store`] | the only SQL |
@@ -46,9 +46,9 @@
 pub mod units;
 pub mod frames;
 pub mod geometry;
+pub mod formats;
 pub mod brdf;
 pub mod radar;
-pub mod formats;
 pub mod material;
 pub mod scene;
 pub mod trace;

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use matdb::brdf::{CookTorrance, Distribution, Lambert, Scattering, Shadowing};
 use matdb::geometry::Mesh;
-use matdb::radar::Radar;
+use matdb::radar::{Chirps, Radar};
 use matdb::render::{Echo, shade, trace};
 use matdb::scene::solids;
 
@@ -44,8 +44,9 @@ fn echoes(mut mesh: Mesh, turn_rad: f64, surface: &dyn Scattering) -> Vec<Echo> 
         *vertex = turn * *vertex + DVec3::new(0.0, 1.1, 0.0);
     }
     let radar = Radar::default();
-    let hits = trace(&radar, &mesh, &|_| {}).unwrap();
-    shade(&radar, &hits, &vec![0; mesh.facets.len()], &[surface]).echoes
+    let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
+    let hits = trace(&radar, &chirps, &mesh, &|_| {}).unwrap();
+    shade(&radar, &chirps, &hits, &vec![0; mesh.facets.len()], &[surface]).echoes
 }
 
 #[test]

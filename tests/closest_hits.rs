@@ -11,9 +11,9 @@ const RANGE: f64 = 1e-6;
 
 fn check(name: &str) {
     let scene = Scene::load(&support::scene(name)).unwrap();
-    let rays = scene.radar.rays().unwrap();
+    let rays = &scene.chirps.rays;
     let mesh = &scene.target.mesh;
-    let fast = closest_hits(mesh, &rays, &|_| {});
+    let fast = closest_hits(mesh, rays, &|_| {});
     let slow: Vec<_> = rays.par_iter().map(|ray| brute::closest(mesh, ray)).collect();
     assert_eq!(fast.len(), 18_529);
     assert!(slow.iter().flatten().count() > 1000);

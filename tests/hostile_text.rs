@@ -7,6 +7,7 @@ use std::path::Path;
 
 use matdb::brdf::Scattering;
 use matdb::material::file::{observations, parse};
+use matdb::radar::Pattern;
 use matdb::render::{power_image, shade, trace};
 use matdb::scene::{Scene, SceneFile};
 use proptest::prelude::*;
@@ -32,10 +33,13 @@ alpha_deg = -90.0
 [radar.scan]
 pattern = "elliptical"
 chirps = 97
-ellipse_width_m = 0.5
-ellipse_height_m = 0.4
 field_height_m = 0.9
 turns = 5.0
+[radar.optics]
+ellipse_width_m = 0.5
+ellipse_height_m = 0.4
+angular_magnification = 0.25
+offset_deg = [0.0, 0.0]
 [image]
 pixel_m = 0.02
 [[mesh]]
@@ -124,26 +128,28 @@ fn damaged(text: &'static str) -> impl Strategy<Value = String> {
 fn render(text: &str) {
     let Ok(file) = SceneFile::parse(text) else { return };
     // Large counts are legal and slow; what they do to memory is bounded elsewhere.
-    if file.radar.scan.chirps() > 100_000 {
+    if matches!(&file.radar.scan, Pattern::Elliptical(e) if e.chirps > 100_000) {
         return;
     }
     let Ok(scene) = Scene::resolve(file, Path::new("scene.toml")) else { return };
-    let Ok(hits) = trace(&scene.radar, &scene.target.mesh, &|_| {}) else { return };
+    let Ok(hits) = trace(&scene.radar, &scene.chirps, &scene.target.mesh, &|_| {}) else { return };
     let lambert = |_, _| 0.1;
     let surfaces: Vec<&dyn Scattering> =
         scene.target.regions.iter().map(|_| &lambert as _).collect();
-    let scan = shade(&scene.radar, &hits, &scene.target.region_of_facet, &surfaces);
+    let scan = shade(&scene.radar, &scene.chirps, &hits, &scene.target.region_of_facet, &surfaces);
     for echo in &scan.echoes {
         assert!(echo.hit.range_m.is_finite() && echo.hit.theta_rad().is_finite(), "{text}");
         assert!(!echo.power_dbm.is_nan(), "{text}");
     }
-    power_image(&scan, &scene.radar, &vec![0; surfaces.len()], scene.pixel_m);
+    let field = scene.chirps.field(&scene.radar.frames());
+    let spot_m = scene.radar.spot_diameter_m;
+    power_image(&scan, field, spot_m, &vec![0; surfaces.len()], scene.pixel_m);
 }
 
 #[test]
 fn the_texts_are_good_before_they_are_damaged() {
     let scene = Scene::resolve(SceneFile::parse(SCENE).unwrap(), Path::new("scene.toml")).unwrap();
-    trace(&scene.radar, &scene.target.mesh, &|_| {}).unwrap();
+    trace(&scene.radar, &scene.chirps, &scene.target.mesh, &|_| {}).unwrap();
     parse("material.toml", MATERIAL, |_| Err(String::new())).unwrap();
     assert!(tokens(SCENE).len() > 100);
 }

@@ -71,10 +71,26 @@ impl Table {
     /// A finite number that must be there.
     pub fn required_number(&self, row: usize, column: &str) -> Result<f64, FormatError> {
         self.number(row, column)?.ok_or_else(|| {
-            let line = self.rows.get(row).map_or(0, |r| r.line);
-            let place = format!("line {line}, column {column}");
+            let place = format!("{}, column {column}", self.place(row));
             FormatError::at(place, "the cell is empty", "fill in a number")
         })
+    }
+
+    /// A whole number of 32 bits that must be there.
+    pub fn whole_number(&self, row: usize, column: &str) -> Result<u32, FormatError> {
+        let value = self.required_number(row, column)?;
+        match (
+            value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value),
+            self.cell(row, column),
+        ) {
+            (false, Some(cell)) => Err(cell.refuse("fill in a whole number, 0 or greater")),
+            _ => Ok(value as u32),
+        }
+    }
+
+    /// Where a row stands in the file: `line L`.
+    pub fn place(&self, row: usize) -> String {
+        format!("line {}", self.rows.get(row).map_or(0, |r| r.line))
     }
 }
 

@@ -10,7 +10,10 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::f5::{F5, F5Error};
+use super::mirror::Optics;
 use super::{Footprint, Pattern};
+use crate::formats::FormatError;
 use crate::frames::{
     Antenna, Global, Point, Pose, Target, antenna_from_target, global_from_antenna,
 };
@@ -58,6 +61,13 @@ pub struct Radar {
     /// α: yaw of the antenna on the table, degrees. −90: assumed; antenna and global axes are then
     /// parallel, and the radar looks along −z.
     pub alpha_deg: f64,
+    /// Time from one chirp to the next, s. 200e-6: assumed; a scan of 18 529 chirps takes 3.7 s.
+    pub chirp_period_s: f64,
+    /// The scanning mirror and the reflectors behind it.
+    pub optics: Optics,
+    /// Own coefficients of equation (1), in place of those fitted to `optics`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub f5: Option<F5>,
     /// Where the rays go.
     pub scan: Pattern,
 }
@@ -82,6 +92,25 @@ pub enum RadarError {
         min: f64,
         /// Largest accepted value.
         max: f64,
+    },
+    /// Equation (1) cannot be had.
+    #[error(transparent)]
+    F5(#[from] F5Error),
+    /// The file of an explicit scan cannot be read.
+    #[error("cannot read the scan {file}: {reason}; it is looked for beside the scene file")]
+    Unreadable {
+        /// The file, as the scene gives it.
+        file: String,
+        /// Why.
+        reason: String,
+    },
+    /// The file of an explicit scan does not follow its format.
+    #[error("{file}: {error}")]
+    Explicit {
+        /// The file, as the scene gives it.
+        file: String,
+        /// What is wrong.
+        error: FormatError,
     },
     /// Equation (2) has no real root for a chirp.
     #[error(
@@ -126,6 +155,9 @@ impl Default for Radar {
             tau_deg: 0.0,
             primary_focus_m: [0.0, 1.1, 8.0],
             alpha_deg: -90.0,
+            chirp_period_s: 200e-6,
+            optics: Optics::default(),
+            f5: None,
             scan: Pattern::default(),
         }
     }
@@ -160,8 +192,11 @@ impl Radar {
             ("primary_focus_m[2]", z_a, far_m),
             ("tau_deg", self.tau_deg, (-180.0, 180.0)),
             ("alpha_deg", self.alpha_deg, (-360.0, 360.0)),
+            ("chirp_period_s", self.chirp_period_s, (1e-9, 3600.0)),
         ];
-        checks.into_iter().chain(self.scan.checks()).try_for_each(in_range)
+        let parts = self.optics.checks().into_iter().chain(self.scan.checks());
+        checks.into_iter().chain(parts).try_for_each(in_range)?;
+        self.f5.as_ref().map_or(Ok(()), |f5| Ok(f5.validate()?))
     }
 
     /// The typed poses of equations (3) and (4).

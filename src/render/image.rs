@@ -3,7 +3,7 @@
 use super::{Echo, Scan};
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
-use crate::radar::Radar;
+use crate::radar::Field;
 use crate::units::{dbm_from_watts, watts_from_dbm};
 
 /// Names of the channels of a power image, in order.
@@ -25,11 +25,16 @@ struct Pixel {
 ///
 /// A pixel averages the detections whose spot covers it, each with a Gaussian weight of the spot's
 /// diameter at half height; power is averaged in watts. `material` is that of the nearest
-/// detection, as an index; `count` is how many were averaged. The grid covers the field of view at
-/// 8 m and half a spot around it.
-pub fn power_image(scan: &Scan, radar: &Radar, material_of_region: &[u16], pixel_m: f64) -> Raster {
-    let spot_m = radar.spot_diameter_m;
-    let mut raster = grid(radar, pixel_m);
+/// detection, as an index; `count` is how many were averaged. The grid covers `field`, where the
+/// scan looks at 8 m, and half a spot around it.
+pub fn power_image(
+    scan: &Scan,
+    field: Field,
+    spot_m: f64,
+    material_of_region: &[u16],
+    pixel_m: f64,
+) -> Raster {
+    let mut raster = grid(field, spot_m, pixel_m);
     let mut pixels = vec![Pixel::default(); raster.width * raster.height];
     for echo in scan.detections() {
         let material = material_of_region[usize::from(echo.region)];
@@ -42,18 +47,15 @@ pub fn power_image(scan: &Scan, radar: &Radar, material_of_region: &[u16], pixel
     raster
 }
 
-fn grid(radar: &Radar, pixel_m: f64) -> Raster {
-    let sides_m = radar.scan.field_m().map(|side_m| side_m + radar.spot_diameter_m);
-    // A hair less than a pixel too many is rounding, not field of view.
-    let [width, height] = sides_m.map(|side_m| (side_m / pixel_m - 1e-6).ceil().max(1.0));
-    Raster {
-        width: width as usize,
-        height: height as usize,
-        x_min_m: -0.5 * width * pixel_m,
-        y_min_m: -0.5 * height * pixel_m,
-        pixel_m,
-        channels: Vec::new(),
-    }
+/// An empty raster around a field; pixel edges are whole multiples of the pixel.
+fn grid(field: Field, spot_m: f64, pixel_m: f64) -> Raster {
+    // A hair beyond a pixel's edge is rounding, not field of view.
+    const HAIR: f64 = 1e-6;
+    let first = field.min_m.map(|min_m| ((min_m - spot_m / 2.0) / pixel_m + HAIR).floor());
+    let end = field.max_m.map(|max_m| ((max_m + spot_m / 2.0) / pixel_m - HAIR).ceil());
+    let [width, height] = [0, 1].map(|axis| (end[axis] - first[axis]).max(1.0) as usize);
+    let [x_min_m, y_min_m] = first.map(|first| first * pixel_m);
+    Raster { width, height, x_min_m, y_min_m, pixel_m, channels: Vec::new() }
 }
 
 /// Pixels whose centre lies within the spot of an echo, with their distance from its centre, m.
@@ -127,14 +129,16 @@ mod tests {
 
     fn image(echoes: Vec<Echo>) -> Raster {
         let scan = Scan { chirps: echoes.len(), echoes, threshold_dbm: -77.0 };
-        power_image(&scan, &Radar::default(), &[3], 0.004)
+        let field = Field { min_m: [-0.25, -0.45], max_m: [0.25, 0.45] };
+        power_image(&scan, field, 0.016, &[3], 0.004)
     }
 
     #[test]
     fn the_grid_covers_the_field_of_view_and_half_a_spot() {
         let raster = image(vec![]);
-        assert_eq!((raster.width, raster.height), (129, 229));
-        assert!((raster.x_min_m + 0.258).abs() < 1e-12);
+        // 0.258 m and 0.458 m are 64.5 and 114.5 pixels.
+        assert_eq!((raster.width, raster.height), (130, 230));
+        assert!((raster.x_min_m + 0.26).abs() < 1e-12);
         assert!(raster.channels.iter().all(|c| c.values.iter().all(|v| v.is_nan())));
     }
 
@@ -164,10 +168,12 @@ mod tests {
 
     #[test]
     fn power_is_averaged_in_watts() {
-        let raster = image(vec![echo(0.002, 0.0, -40.0), echo(-0.002, 0.0, -60.0)]);
+        let raster = image(vec![echo(0.0, 0.002, -40.0), echo(0.004, 0.002, -60.0)]);
         // Half way between two equal weights: 10·lg((10⁻⁴ + 10⁻⁶)/2) = −42.967 dBm.
-        let centre = (raster.height / 2) * raster.width + raster.width / 2;
-        let value = raster.channel("power_dbm").unwrap()[centre];
+        let (row, column) = (114, 65);
+        assert!((raster.x_m(column) - 0.002).abs() < 1e-12);
+        assert!((raster.y_m(row) - 0.002).abs() < 1e-12);
+        let value = raster.channel("power_dbm").unwrap()[row * raster.width + column];
         assert!((f64::from(value) + 42.967).abs() < 1e-3, "{value}");
     }
 

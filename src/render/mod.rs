@@ -3,13 +3,14 @@
 mod cloud;
 mod image;
 
+use glam::DVec3;
 use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::brdf::Scattering;
 use crate::frames::{Direction, Point};
 use crate::geometry::Mesh;
-use crate::radar::{Link, Radar, RadarError};
+use crate::radar::{Chirps, Field, Link, Radar, RadarFrames};
 use crate::trace::{Hit, closest_hits};
 use crate::units::dbm_from_watts;
 
@@ -47,25 +48,16 @@ pub struct Scan {
 /// Why there is nothing to render.
 #[derive(Debug, Error, PartialEq)]
 pub enum RenderError {
-    /// The scan cannot be drawn.
-    #[error(transparent)]
-    Radar(#[from] RadarError),
     /// No ray meets the target.
     #[error(
-        "no chirp of the scan hits the target: in the target frame the field of view spans x ±{half_width_m:.3} m and \
-         y ±{half_height_m:.3} m around 0, the target x {:.3} to {:.3} m and y {:.3} to {:.3} m; move the mesh with \
-         translation_m or the radar with radar.primary_focus_m",
-        min_m[0], max_m[0], min_m[1], max_m[1]
+        "no chirp of the scan hits the target: at 8 m the scan covers {scan}, the target lies at {target} of the \
+         target frame; move the mesh with translation_m or the radar with radar.primary_focus_m"
     )]
     Miss {
-        /// Half the width of the field of view at 8 m, m.
-        half_width_m: f64,
-        /// Half its height, m.
-        half_height_m: f64,
-        /// Smallest x and y of the target in the target frame, m.
-        min_m: [f64; 2],
-        /// Largest.
-        max_m: [f64; 2],
+        /// Where the scan looks.
+        scan: Field,
+        /// Where the target is.
+        target: Field,
     },
 }
 
@@ -79,15 +71,16 @@ impl Scan {
 /// Traces every chirp of a scan. `done` is told how many chirps are finished.
 ///
 /// # Errors
-/// When the scan cannot be drawn or no ray meets the mesh.
+/// When no ray meets the mesh.
 pub fn trace(
     radar: &Radar,
+    chirps: &Chirps,
     mesh: &Mesh,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Vec<Option<Hit>>, RenderError> {
-    let hits = closest_hits(mesh, &radar.rays()?, done);
+    let hits = closest_hits(mesh, &chirps.rays, done);
     if hits.iter().all(Option::is_none) {
-        return Err(miss(radar, mesh));
+        return Err(miss(&radar.frames(), chirps, mesh));
     }
     Ok(hits)
 }
@@ -98,6 +91,7 @@ pub fn trace(
 /// threads.
 pub fn shade(
     radar: &Radar,
+    chirps: &Chirps,
     hits: &[Option<Hit>],
     region_of_facet: &[u16],
     surfaces: &[&dyn Scattering],
@@ -109,7 +103,7 @@ pub fn shade(
         let region = region_of_facet[hit.facet as usize];
         let in_target = target_from_global * hit.point;
         Some(Echo {
-            chirp: chirp as u32,
+            chirp: chirps.number[chirp],
             hit,
             xt_m: in_target.xyz.x,
             yt_m: in_target.xyz.y,
@@ -130,18 +124,11 @@ fn power_w(link: &Link, hit: &Hit, surface: &dyn Scattering) -> f64 {
     link.power_w(hit.range_m, hit.cos_theta, surface.f_per_sr(retro, retro))
 }
 
-fn miss(radar: &Radar, mesh: &Mesh) -> RenderError {
-    let target_from_global = radar.frames().global_from_target.inverse();
-    let [width_m, height_m] = radar.scan.field_m();
-    let (mut min_m, mut max_m) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for &vertex in &mesh.vertices {
-        let in_target = target_from_global * Point::from(vertex);
-        for (axis, value) in in_target.xyz.truncate().to_array().into_iter().enumerate() {
-            min_m[axis] = min_m[axis].min(value);
-            max_m[axis] = max_m[axis].max(value);
-        }
-    }
-    RenderError::Miss { half_width_m: width_m / 2.0, half_height_m: height_m / 2.0, min_m, max_m }
+fn miss(frames: &RadarFrames, chirps: &Chirps, mesh: &Mesh) -> RenderError {
+    let target_from_global = frames.global_from_target.inverse();
+    let in_target = |&vertex: &DVec3| (target_from_global * Point::from(vertex)).xyz.truncate();
+    let target = Field::around(mesh.vertices.iter().map(in_target));
+    RenderError::Miss { scan: chirps.field(frames), target }
 }
 
 #[cfg(test)]
@@ -149,6 +136,10 @@ mod tests {
     use super::*;
     use crate::brdf::Lambert;
     use crate::scene::solids;
+
+    fn chirps(radar: &Radar) -> Chirps {
+        Chirps::draw(radar, |_| Err("no file".to_owned())).unwrap()
+    }
 
     #[test]
     fn a_plate_at_eight_metres_returns_the_hand_computed_power() {
@@ -159,9 +150,10 @@ mod tests {
         }
         let lambert = Lambert { albedo: 0.5 };
         let regions = vec![0; mesh.facets.len()];
-        let hits = trace(&radar, &mesh, &|_| {}).unwrap();
-        let scan = shade(&radar, &hits, &regions, &[&lambert]);
-        assert_eq!(scan.echoes.len(), radar.scan.target_points_m().len());
+        let chirps = chirps(&radar);
+        let hits = trace(&radar, &chirps, &mesh, &|_| {}).unwrap();
+        let scan = shade(&radar, &chirps, &hits, &regions, &[&lambert]);
+        assert_eq!(scan.echoes.len(), 18_529);
         for echo in &scan.echoes {
             // P = 7 − 15 + 10·lg(0.196 · 0.5/π) − 20·lg R + 20·lg cos θ, with R = 8/cos θ.
             let cos = 8.0 / echo.hit.range_m;
@@ -178,7 +170,8 @@ mod tests {
         for vertex in &mut mesh.vertices {
             vertex.x += 3.0;
         }
-        let missed = trace(&Radar::default(), &mesh, &|_| {}).unwrap_err();
+        let radar = Radar::default();
+        let missed = trace(&radar, &chirps(&radar), &mesh, &|_| {}).unwrap_err();
         assert!(missed.to_string().contains("x 2.950 to 3.050"), "{missed}");
     }
 }

@@ -12,7 +12,7 @@ use thiserror::Error;
 
 use crate::formats::FormatError;
 use crate::geometry::mesh::MeshError;
-use crate::radar::{Radar, RadarError};
+use crate::radar::{Chirps, Radar, RadarError};
 
 pub use file::SceneFile;
 pub use regions::RegionError;
@@ -27,6 +27,8 @@ pub struct Scene {
     pub seed: u64,
     /// The instrument.
     pub radar: Radar,
+    /// One ray per chirp.
+    pub chirps: Chirps,
     /// Side of an image pixel, m.
     pub pixel_m: f64,
     /// What stands in front of it.
@@ -106,26 +108,34 @@ impl Scene {
 
     /// Loads what a scene file describes; relative paths start from the folder of `path`.
     pub fn resolve(file: SceneFile, path: &Path) -> Result<Scene, SceneError> {
-        file.radar
-            .validate()
-            .map_err(|error| SceneError::Radar { file: path.to_owned(), error })?;
+        let at = |error| SceneError::Radar { file: path.to_owned(), error };
+        file.radar.validate().map_err(at)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let read_csv = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
+        let chirps = Chirps::draw(&file.radar, read_csv).map_err(at)?;
         let pixel_m = file.image.pixel_m.unwrap_or(file.radar.spot_diameter_m / 4.0);
-        check_pixel(pixel_m, &file.radar, path)?;
+        check_pixel(pixel_m, &file.radar, &chirps, path)?;
         let name = match file.name.as_str() {
             "" => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
             name => name.to_owned(),
         };
         let target = Target::load(&file, path)?;
-        Ok(Scene { name, seed: file.seed, radar: file.radar, pixel_m, target })
+        Ok(Scene { name, seed: file.seed, radar: file.radar, chirps, pixel_m, target })
     }
 }
 
 /// A pixel shows nothing below a hundredth of the spot, and an image must fit a page and memory.
-fn check_pixel(pixel_m: f64, radar: &Radar, file: &Path) -> Result<(), SceneError> {
+fn check_pixel(
+    pixel_m: f64,
+    radar: &Radar,
+    chirps: &Chirps,
+    file: &Path,
+) -> Result<(), SceneError> {
     const LONGEST_SIDE: f64 = 10_000.0;
     const MOST_PIXELS: f64 = 16e6;
     let spot_m = radar.spot_diameter_m;
-    let [columns, rows] = radar.scan.field_m().map(|side_m| ((side_m + spot_m) / pixel_m).ceil());
+    let sides_m = chirps.field(&radar.frames()).sides_m();
+    let [columns, rows] = sides_m.map(|side_m| ((side_m + spot_m) / pixel_m).ceil());
     let fits = columns.max(rows) <= LONGEST_SIDE && columns * rows <= MOST_PIXELS;
     if pixel_m >= spot_m / 100.0 && fits {
         return Ok(());

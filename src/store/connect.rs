@@ -3,7 +3,7 @@
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use rusqlite::{Connection, ErrorCode, OpenFlags, TransactionBehavior};
 use rusqlite_migration::{M, Migrations};
@@ -21,6 +21,29 @@ const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Opens a database for reading and writing; makes it when there is none.
 pub(super) fn writable(path: &Path) -> Result<Connection, StoreError> {
+    patiently(|| open_writable(path))
+}
+
+/// Opens a database for reading; `None` when there is none, or none with tables.
+pub(super) fn readable(path: &Path) -> Result<Option<Connection>, StoreError> {
+    patiently(|| open_readable(path))
+}
+
+/// Tries again while others are busy. SQLite itself does not wait where waiting could lock two
+/// programs up, as when both turn a new file's log on.
+fn patiently<T>(open: impl Fn() -> Result<T, StoreError>) -> Result<T, StoreError> {
+    let start = Instant::now();
+    loop {
+        match open() {
+            Err(StoreError::Busy { .. }) if start.elapsed() < PATIENCE => {
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            result => return result,
+        }
+    }
+}
+
+fn open_writable(path: &Path) -> Result<Connection, StoreError> {
     // A stranger's file is never opened for writing.
     if size_bytes(path)? > 0 {
         schema_of(path, &quiet(path)?)?;
@@ -39,8 +62,7 @@ pub(super) fn writable(path: &Path) -> Result<Connection, StoreError> {
     Ok(conn)
 }
 
-/// Opens a database for reading; `None` when there is none, or none with tables.
-pub(super) fn readable(path: &Path) -> Result<Option<Connection>, StoreError> {
+fn open_readable(path: &Path) -> Result<Option<Connection>, StoreError> {
     if size_bytes(path)? == 0 {
         return Ok(None);
     }

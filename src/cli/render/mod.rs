@@ -40,17 +40,19 @@ pub(super) fn run(args: &Args, db: &Path, console: &Console) -> Result<(), Error
     let (used, material_of_region) = materials(&scene, &args.scene, db)?;
     stages.end("load", console);
 
-    let bar = console.progress("tracing", scene.radar.scan.chirps());
-    let hits = trace(&scene.radar, &scene.target.mesh, &|chirps| bar.inc(chirps as u64))?;
+    let Scene { radar, chirps, target, .. } = &scene;
+    let bar = console.progress("tracing", chirps.rays.len());
+    let hits = trace(radar, chirps, &target.mesh, &|chirps| bar.inc(chirps as u64))?;
     bar.finish_and_clear();
     stages.end("trace", console);
 
     let surface = |number: &u16| &used[usize::from(*number)].scattering as &dyn Scattering;
     let surfaces: Vec<&dyn Scattering> = material_of_region.iter().map(surface).collect();
-    let scan = shade(&scene.radar, &hits, &scene.target.region_of_facet, &surfaces);
+    let scan = shade(radar, chirps, &hits, &target.region_of_facet, &surfaces);
     stages.end("power", console);
 
-    let image = power_image(&scan, &scene.radar, &material_of_region, scene.pixel_m);
+    let (field, spot_m) = (chirps.field(&radar.frames()), radar.spot_diameter_m);
+    let image = power_image(&scan, field, spot_m, &material_of_region, scene.pixel_m);
     stages.end("image", console);
 
     let record = Record::new(&scene, &used, &material_of_region, &scan, &image);

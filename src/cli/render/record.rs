@@ -32,6 +32,8 @@ pub(super) struct Record<'a> {
     counts: Counts,
     power_dbm: Option<PowerRange>,
     image: Value,
+    #[serde(skip)]
+    scan_notices: &'a [String],
 }
 
 #[derive(Serialize)]
@@ -118,12 +120,13 @@ impl<'a> Record<'a> {
                 .map(|number| MaterialRecord::new(&used[number], outside(number)))
                 .collect(),
             regions,
+            scan_notices: &scene.chirps.notices,
         }
     }
 
     /// Sentences about what a person should not overlook.
     pub fn notices(&self) -> Vec<String> {
-        let mut notices = Vec::new();
+        let mut notices = self.scan_notices.to_vec();
         for material in self.materials.iter().filter(|m| m.detections_outside_theta > 0) {
             let MaterialRecord { name, theta_deg: [least, most], .. } = material;
             notices.push(format!(

@@ -1,0 +1,260 @@
+//! Scan patterns as scene files name them (paper, Sec. II-B and III-B).
+
+use std::f64::consts::TAU;
+
+use serde::{Deserialize, Serialize};
+
+use crate::radar::mirror::{Mirror, MirrorAngles};
+use crate::radar::preset::Check;
+
+/// Where the rays go.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "pattern", rename_all = "kebab-case")]
+pub enum Pattern {
+    /// An ellipse drawn fast and carried slowly upwards, figure 1(a) of the paper.
+    Elliptical(Elliptical),
+    /// Lines from left to right.
+    Raster(Raster),
+    /// Two sines.
+    Lissajous(Lissajous),
+    /// Outwards from the middle, evenly dense.
+    Spiral(Spiral),
+    /// A CSV of rays in the global frame: `chirp,time_s,ox_m,oy_m,oz_m,dx,dy,dz`.
+    Rays(Explicit),
+    /// A CSV of mirror angles: `chirp,time_s,gamma_rad,phi_rad`.
+    Angles(Explicit),
+}
+
+/// The mechanical scan of the paper: the spinning mirror draws its ellipse, a slow tilt carries it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Elliptical {
+    /// Number of chirps N_r, at most 10 million. 18 529: paper, Sec. III-D.
+    pub chirps: usize,
+    /// Height of the field of view at 8 m, m. 0.9: paper.
+    pub field_height_m: f64,
+    /// Turns of the mirror during one scan. 80: assumed, it spaces the spots evenly, about 6 mm
+    /// along and across.
+    pub turns: f64,
+}
+
+/// Lines from left to right and, every other one, back; from the bottom to the top.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Raster {
+    /// Number of lines.
+    pub lines: usize,
+    /// Chirps on each line.
+    pub chirps_per_line: usize,
+    /// Width at 8 m, m.
+    pub width_m: f64,
+    /// Height at 8 m, m.
+    pub height_m: f64,
+}
+
+/// x and y swing as sines of their own frequencies.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Lissajous {
+    /// Number of chirps.
+    pub chirps: usize,
+    /// Width at 8 m, m.
+    pub width_m: f64,
+    /// Height at 8 m, m.
+    pub height_m: f64,
+    /// Swings in x during one scan.
+    pub x_cycles: f64,
+    /// Swings in y during one scan.
+    pub y_cycles: f64,
+    /// Phase of x at the start, degrees.
+    pub phase_deg: f64,
+}
+
+/// A spiral whose radius grows as the square root of time, so that the density is even.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Spiral {
+    /// Number of chirps.
+    pub chirps: usize,
+    /// Diameter at 8 m, m.
+    pub diameter_m: f64,
+    /// Turns from the middle to the rim.
+    pub turns: f64,
+}
+
+/// Chirps from a file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Explicit {
+    /// Path of the CSV, relative to the scene's folder.
+    pub file: String,
+}
+
+impl Default for Elliptical {
+    fn default() -> Self {
+        Elliptical { chirps: 18_529, field_height_m: 0.9, turns: 80.0 }
+    }
+}
+
+impl Default for Raster {
+    fn default() -> Self {
+        Raster { lines: 181, chirps_per_line: 101, width_m: 0.5, height_m: 0.9 }
+    }
+}
+
+impl Default for Lissajous {
+    fn default() -> Self {
+        Lissajous {
+            chirps: 18_529,
+            width_m: 0.5,
+            height_m: 0.9,
+            x_cycles: 83.0,
+            y_cycles: 47.0,
+            phase_deg: 90.0,
+        }
+    }
+}
+
+impl Default for Spiral {
+    fn default() -> Self {
+        Spiral { chirps: 18_529, diameter_m: 0.5, turns: 60.0 }
+    }
+}
+
+impl Default for Pattern {
+    fn default() -> Self {
+        Pattern::Elliptical(Elliptical::default())
+    }
+}
+
+impl Pattern {
+    pub(in crate::radar) fn checks(&self) -> Vec<Check> {
+        let chirps = |name, count: usize| (name, count as f64, (1.0, 1e7));
+        let size = |name, size_m| (name, size_m, (1e-4, 100.0));
+        let turns = |name, turns| (name, turns, (0.0, 1e6));
+        match self {
+            Pattern::Elliptical(e) => vec![
+                chirps("scan.chirps", e.chirps),
+                size("scan.field_height_m", e.field_height_m),
+                turns("scan.turns", e.turns),
+            ],
+            Pattern::Raster(r) => vec![
+                chirps("scan.lines", r.lines),
+                chirps("scan.chirps_per_line", r.chirps_per_line),
+                chirps(
+                    "scan.lines × scan.chirps_per_line",
+                    r.lines.saturating_mul(r.chirps_per_line),
+                ),
+                size("scan.width_m", r.width_m),
+                size("scan.height_m", r.height_m),
+            ],
+            Pattern::Lissajous(l) => vec![
+                chirps("scan.chirps", l.chirps),
+                size("scan.width_m", l.width_m),
+                size("scan.height_m", l.height_m),
+                turns("scan.x_cycles", l.x_cycles),
+                turns("scan.y_cycles", l.y_cycles),
+                ("scan.phase_deg", l.phase_deg, (-360.0, 360.0)),
+            ],
+            Pattern::Spiral(s) => vec![
+                chirps("scan.chirps", s.chirps),
+                size("scan.diameter_m", s.diameter_m),
+                turns("scan.turns", s.turns),
+            ],
+            Pattern::Rays(_) | Pattern::Angles(_) => Vec::new(),
+        }
+    }
+}
+
+/// The middle of each of `count` equal parts of 0 to 1.
+fn progress(count: usize) -> impl Iterator<Item = f64> {
+    (0..count).map(move |step| (step as f64 + 0.5) / count as f64)
+}
+
+impl Elliptical {
+    /// The matrix Ω: tilt and rotation of the mirror for each chirp.
+    pub(super) fn angles(&self, mirror: &Mirror, ellipse_height_m: f64) -> Vec<MirrorAngles> {
+        let travel_m = (self.field_height_m - ellipse_height_m).max(0.0);
+        let tilt_rad = mirror.tilt_for_height_rad(0.5 * travel_m);
+        progress(self.chirps)
+            .map(|progress| MirrorAngles {
+                gamma_rad: (2.0 * progress - 1.0) * tilt_rad,
+                phi_rad: TAU * self.turns * progress,
+            })
+            .collect()
+    }
+}
+
+impl Raster {
+    pub(super) fn target_points_m(&self) -> Vec<[f64; 2]> {
+        let line = |(number, y): (usize, f64)| {
+            let along = move |x: f64| if number.is_multiple_of(2) { x } else { 1.0 - x };
+            progress(self.chirps_per_line)
+                .map(move |x| [self.width_m * (along(x) - 0.5), self.height_m * (y - 0.5)])
+        };
+        progress(self.lines).enumerate().flat_map(line).collect()
+    }
+}
+
+impl Lissajous {
+    pub(super) fn target_points_m(&self) -> Vec<[f64; 2]> {
+        progress(self.chirps)
+            .map(|t| {
+                let x_rad = TAU * self.x_cycles * t + self.phase_deg.to_radians();
+                let y_rad = TAU * self.y_cycles * t;
+                [0.5 * self.width_m * x_rad.sin(), 0.5 * self.height_m * y_rad.sin()]
+            })
+            .collect()
+    }
+}
+
+impl Spiral {
+    pub(super) fn target_points_m(&self) -> Vec<[f64; 2]> {
+        progress(self.chirps)
+            .map(|t| {
+                let (sin, cos) = (TAU * self.turns * t.sqrt()).sin_cos();
+                let radius_m = 0.5 * self.diameter_m * t.sqrt();
+                [radius_m * cos, radius_m * sin]
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn largest(points: &[[f64; 2]], axis: usize) -> f64 {
+        points.iter().map(|p| p[axis].abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn every_pattern_fills_its_size() {
+        // Half a spot.
+        const NEAR_M: f64 = 0.008;
+        for (points, [width_m, height_m]) in [
+            (Raster::default().target_points_m(), [0.5, 0.9]),
+            (Lissajous::default().target_points_m(), [0.5, 0.9]),
+            (Spiral::default().target_points_m(), [0.5, 0.5]),
+        ] {
+            assert!(points.len() > 18_000);
+            assert!((largest(&points, 0) - 0.5 * width_m).abs() < NEAR_M);
+            assert!((largest(&points, 1) - 0.5 * height_m).abs() < NEAR_M);
+        }
+    }
+
+    #[test]
+    fn a_raster_turns_round_at_the_end_of_a_line() {
+        let points =
+            Raster { lines: 2, chirps_per_line: 2, width_m: 4.0, height_m: 4.0 }.target_points_m();
+        assert_eq!(points, [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]);
+    }
+
+    #[test]
+    fn a_spiral_is_evenly_dense() {
+        let points = Spiral::default().target_points_m();
+        let within = |radius_m: f64| points.iter().filter(|[x, y]| x.hypot(*y) < radius_m).count();
+        let quarter = within(0.125) as f64 / points.len() as f64;
+        assert!((quarter - 0.25).abs() < 0.001, "{quarter}");
+    }
+}
