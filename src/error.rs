@@ -20,8 +20,13 @@ pub enum Error {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// A scene cannot be rendered.
-    #[error(transparent)]
-    Render(#[from] RenderError),
+    #[error("{}: {error}", scene.display())]
+    Render {
+        /// The scene file.
+        scene: PathBuf,
+        /// What is wrong.
+        error: RenderError,
+    },
     /// A material file was refused.
     #[error(transparent)]
     MaterialFile(#[from] FileError),
@@ -50,6 +55,9 @@ pub enum Error {
         /// The nearest name or how to add it.
         way_out: String,
     },
+    /// A record could not be written as JSON.
+    #[error("cannot write the record as JSON: {0}; please report this")]
+    Json(#[from] serde_json::Error),
     /// A file or folder cannot be read or written.
     #[error("cannot {verb} {}: {reason}; {way_out}", path.display())]
     Io {

@@ -54,9 +54,12 @@ fn every_command_of_the_readme_runs() {
     for arguments in commands {
         matdb(folder.path()).args(&arguments).assert().success();
     }
-    for image in ["out/power.png", "person/power.png"] {
-        assert!(folder.path().join(image).exists(), "{image}");
-    }
+    assert!(folder.path().join("person/power.png").exists());
+    let made = fs::read(folder.path().join("out/power.png")).unwrap();
+    assert!(
+        made == fs::read(root().join("docs/mannequin.png")).unwrap(),
+        "the README's picture is not what its first command makes; copy out/power.png over it"
+    );
 }
 
 #[test]

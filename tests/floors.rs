@@ -97,6 +97,16 @@ fn an_upward_arrow_is_seen() {
 }
 
 #[test]
+fn no_path_climbs_two_modules() {
+    // `super::super` could reach a floor without naming it.
+    let mut files = Vec::new();
+    rust_files(&source(), &mut files);
+    for file in files {
+        assert!(!code(&file).contains("super::super"), "{}", file.display());
+    }
+}
+
+#[test]
 fn sql_stays_in_the_store() {
     let mut files = Vec::new();
     rust_files(&source(), &mut files);

@@ -41,7 +41,7 @@ ellipse_height_m = 0.4
 angular_magnification = 0.25
 offset_deg = [0.0, 0.0]
 [image]
-pixel_m = 0.02
+pixel_m = 0.01
 [[mesh]]
 name = "a"
 file = "builtin:cuboid"
@@ -132,24 +132,24 @@ fn render(text: &str) {
         return;
     }
     let Ok(scene) = Scene::resolve(file, Path::new("scene.toml")) else { return };
-    let Ok(hits) = trace(&scene.radar, &scene.chirps, &scene.target.mesh, &|_| {}) else { return };
+    let Ok(hits) = trace(scene.radar(), &scene.chirps, &scene.target.mesh, &|_| {}) else { return };
     let lambert = |_, _| 0.1;
     let surfaces: Vec<&dyn Scattering> =
         scene.target.regions.iter().map(|_| &lambert as _).collect();
-    let scan = shade(&scene.radar, &scene.chirps, &hits, &scene.target.region_of_facet, &surfaces);
+    let scan = shade(scene.radar(), &scene.chirps, &hits, &scene.target.region_of_facet, &surfaces);
     for echo in &scan.echoes {
         assert!(echo.hit.range_m.is_finite() && echo.hit.theta_rad().is_finite(), "{text}");
         assert!(!echo.power_dbm.is_nan(), "{text}");
     }
-    let field = scene.chirps.field(&scene.radar.frames());
-    let spot_m = scene.radar.spot_diameter_m;
-    power_image(&scan, field, spot_m, &vec![0; surfaces.len()], scene.pixel_m);
+    let field = scene.chirps.field(&scene.radar().frames());
+    let spot_m = scene.radar().spot_diameter_m;
+    power_image(&scan, field, spot_m, &vec![0; surfaces.len()], scene.pixel_m());
 }
 
 #[test]
 fn the_texts_are_good_before_they_are_damaged() {
     let scene = Scene::resolve(SceneFile::parse(SCENE).unwrap(), Path::new("scene.toml")).unwrap();
-    trace(&scene.radar, &scene.chirps, &scene.target.mesh, &|_| {}).unwrap();
+    trace(scene.radar(), &scene.chirps, &scene.target.mesh, &|_| {}).unwrap();
     parse("material.toml", MATERIAL, |_| Err(String::new())).unwrap();
     assert!(tokens(SCENE).len() > 100);
 }

@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 
 use matdb::formats::MeshFormat;
 
-/// The collection, beside this crate or further up.
+/// The collection, where somebody has put it beside this crate.
 fn collection() -> Option<PathBuf> {
-    let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
-    above.map(|folder| folder.join("shared/data/meshes")).find(|folder| folder.is_dir())
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/meshes");
+    folder.is_dir().then_some(folder)
 }
 
 /// File names and triangle counts from the rows `| name.ply … | 1,234 | …`.

@@ -5,7 +5,7 @@
 //! Faults come through SQLite's own hooks, which an automatic extension puts on every connection
 //! that the library opens; the library needs no hook for it.
 
-mod common;
+mod support;
 
 use std::cell::Cell;
 use std::ffi::{c_char, c_int, c_uint, c_void};
@@ -13,10 +13,10 @@ use std::fs;
 use std::path::Path;
 use std::sync::Once;
 
-use common::{changed, child, contents, given, is_sound, sample};
 use matdb::material::Material;
 use matdb::store::{Store, StoreError};
 use rusqlite::ffi;
+use support::database::{changed, child, contents, given, is_sound, sample};
 
 /// A call that writes.
 #[derive(Clone, Copy, Debug)]

@@ -1,11 +1,11 @@
 //! Several threads and several programs may make, fill and read one database at once.
 
-mod common;
+mod support;
 
 use std::path::Path;
 
-use common::{child, contents, given, is_sound, sample};
 use matdb::store::{Added, Store};
+use support::database::{child, contents, given, is_sound, sample};
 
 const WRITERS: usize = 4;
 const MATERIALS: usize = 5;

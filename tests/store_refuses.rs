@@ -1,7 +1,7 @@
 //! What is not a sound, writable database of ours is refused with one clear sentence that names the
 //! file, and what is not ours is left as it was, byte for byte.
 
-mod common;
+mod support;
 
 use std::ffi::{c_char, c_int};
 use std::fs::{self, Permissions};
@@ -10,9 +10,9 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{bytes, changed, child, contents, given, is_sound, sample};
 use matdb::store::{Store, StoreError};
 use rusqlite::{Connection, ffi};
+use support::database::{bytes, changed, child, contents, given, is_sound, sample};
 
 /// A folder with a database that holds one material.
 fn database() -> (tempfile::TempDir, PathBuf) {

@@ -5,14 +5,14 @@
 //! `cargo test --test store_schema make_the_fixture -- --ignored` writes the file of the newest
 //! schema; do so once when a schema is added, and never change the file again.
 
-mod common;
+mod support;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use common::{changed, contents, sample};
 use matdb::store::{Added, Store};
 use rusqlite::Connection;
+use support::database::{changed, contents, sample};
 
 const NEWEST: &str = "schema-0001.sqlite";
 

@@ -1,9 +1,8 @@
 //! Equation (15), Blinn–Phong: f_d = r_s·(α + 2)/(2π)·(n·h)^α.
 //!
-//! r_s sets the level, α the decay: 0 is nearly Lambertian, 3 to 10 fits the diffuse skirt of paint
-//! and skin near 300 GHz. In backscatter n·h = cos θ. The normalisation is that of a lobe about the
-//! half vector seen along the normal; at grazing incidence the model can reflect more than it
-//! receives.
+//! r_s sets the level, α the decay: 0 is Lambertian, larger values fall off faster. In backscatter
+//! n·h = cos θ. The model does not keep energy: at normal incidence it reflects 1 to 4 times r_s as α
+//! goes from 0 to infinity, less at grazing incidence, so that r_s up to 1/4 is safe for any α.
 
 use std::f64::consts::TAU;
 

@@ -3,8 +3,9 @@
 //!
 //! F is Schlick's approximation, equation (14); D and G1 are Walter's for Beckmann and GGX. f_λ is
 //! the reflectivity at normal incidence (0.998 for aluminium, 0.16 for skin, 0.03 for PTFE near
-//! 300 GHz) and m the roughness: 0.01 is a mirror, 0.1 a lobe some 7° wide, above 0.6 the
-//! single-scattering model loses energy.
+//! 300 GHz) and m the roughness: 0.01 is a mirror, 0.1 a lobe whose backscatter falls to half at 5°
+//! from the normal. Single scattering loses energy on rough surfaces: at normal incidence more than a
+//! tenth from m = 0.6 with Beckmann and from m = 0.3 with GGX.
 
 use std::f64::consts::PI;
 
@@ -20,7 +21,7 @@ use crate::frames::{Direction, Surface};
 pub struct CookTorrance {
     /// Reflectivity at normal incidence f_λ, 0 to 1.
     pub f_lambda: f64,
-    /// Roughness m, 0.001 to 2: the rms slope of the facets times √2 for Beckmann.
+    /// Roughness m, 0.001 to 2; for Beckmann √2 times the rms slope along one direction.
     pub m: f64,
     /// Law of the facet slopes.
     #[serde(default)]

@@ -109,6 +109,18 @@ impl Brdf {
         known
     }
 
+    /// The two levels that monostatic data can tell of the paper's five-parameter mixture, up to the
+    /// calibration: S = (1 − k)·f_λ and R = k·r_s. `None` for other models.
+    pub fn identified_products(&self) -> Option<[f64; 2]> {
+        let Brdf::Mixture(Mixture { k, diffuse, specular }) = self else { return None };
+        match (&**specular, &**diffuse) {
+            (Brdf::CookTorrance(specular), Brdf::BlinnPhong(diffuse)) => {
+                Some([(1.0 - k) * specular.f_lambda, k * diffuse.r_s])
+            }
+            _ => None,
+        }
+    }
+
     /// Checks every parameter against its range.
     pub fn validate(&self) -> Result<(), ParameterError> {
         self.parameters().iter().try_for_each(Parameter::validate)

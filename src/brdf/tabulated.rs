@@ -2,7 +2,9 @@
 //!
 //! Between the points σ⁰ is interpolated in dB over θ by the monotone cubic of Fritsch and Carlson
 //! (SIAM J. Numer. Anal. 17 (1980) 238), which never overshoots the data. Outside the points the
-//! end values are held. A monostatic curve says nothing of other directions; away from backscatter
+//! end values are held, but from `silent_from_deg` on, where the data lie below the threshold, nothing
+//! comes back. f·cos²θ then stays finite, but f itself grows without bound towards grazing incidence
+//! and can exceed what energy allows there. A monostatic curve says nothing of other directions; away from backscatter
 //! the curve is read at the angle of the half vector, which is reciprocal and agrees with the data.
 
 use serde::{Deserialize, Serialize};
@@ -29,7 +31,12 @@ pub struct Tabulated {
 struct Columns {
     theta_deg: Vec<f64>,
     sigma0_db: Vec<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    silent_from_deg: Option<f64>,
 }
+
+/// Nearer angles would make the slope between them meaningless.
+const LEAST_STEP_RAD: f64 = 1e-12;
 
 /// Why points do not make a curve.
 #[derive(Debug, Error, PartialEq)]
@@ -47,6 +54,12 @@ pub enum TabulatedError {
         theta: usize,
         /// Number of levels.
         sigma0: usize,
+    },
+    /// What is known to be silent starts within the points.
+    #[error("silent_from_deg = {silent_from_deg} must lie beyond the last angle, up to 90")]
+    Silent {
+        /// The angle, degrees.
+        silent_from_deg: f64,
     },
     /// Angles must ascend within a quarter turn.
     #[error("point {point}: {theta_deg}° must be above the angle before it and lie in 0–90°")]
@@ -72,7 +85,17 @@ impl Tabulated {
         Tabulated::try_from(Columns {
             theta_deg: points.iter().map(|p| p.0.to_degrees()).collect(),
             sigma0_db: points.iter().map(|p| db_from_ratio(p.1)).collect(),
+            silent_from_deg: None,
         })
+    }
+
+    /// The same curve, of which nothing comes back from `theta_rad` on.
+    ///
+    /// # Errors
+    /// When the angle does not lie beyond the last point, up to π/2.
+    pub fn silent_from(self, theta_rad: f64) -> Result<Tabulated, TabulatedError> {
+        let silent_from_deg = Some(theta_rad.to_degrees());
+        Tabulated::try_from(Columns { silent_from_deg, ..self.columns })
     }
 
     /// Smallest and largest tabulated angle, rad.
@@ -80,8 +103,12 @@ impl Tabulated {
         (self.theta_rad[0], self.theta_rad[self.theta_rad.len() - 1])
     }
 
-    /// σ⁰ at an angle, dB; the end values are held outside [`Tabulated::range_rad`].
+    /// σ⁰ at an angle, dB; the end values are held outside [`Tabulated::range_rad`], and it is −∞
+    /// where the curve is silent.
     pub fn sigma0_db(&self, theta_rad: f64) -> f64 {
+        if self.columns.silent_from_deg.is_some_and(|from| theta_rad >= from.to_radians()) {
+            return f64::NEG_INFINITY;
+        }
         let last = self.theta_rad.len() - 1;
         let right = self.theta_rad.partition_point(|&t| t <= theta_rad);
         if right == 0 {
@@ -133,12 +160,13 @@ impl Columns {
         if points < 2 {
             return Err(TabulatedError::TooFewPoints { points });
         }
-        let mut before_rad = -f64::MIN_POSITIVE;
+        let mut before_rad = -LEAST_STEP_RAD;
         let pairs = std::iter::zip(&self.theta_deg, &self.sigma0_db);
         for (point, (&theta_deg, &level_db)) in pairs.enumerate() {
             let (theta_rad, sigma0) = (theta_deg.to_radians(), ratio_from_db(level_db));
             // `!(a && b)` also refuses NaN.
-            if !(theta_rad > before_rad && theta_rad <= std::f64::consts::FRAC_PI_2) {
+            let ascends = theta_rad - before_rad >= LEAST_STEP_RAD;
+            if !(ascends && theta_rad <= std::f64::consts::FRAC_PI_2) {
                 return Err(TabulatedError::Angle { point, theta_deg });
             }
             if !(sigma0 > 0.0 && sigma0.is_finite()) {
@@ -146,7 +174,12 @@ impl Columns {
             }
             before_rad = theta_rad;
         }
-        Ok(())
+        match self.silent_from_deg {
+            Some(from) if !(from.to_radians() > before_rad && from <= 90.0) => {
+                Err(TabulatedError::Silent { silent_from_deg: from })
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -198,9 +231,21 @@ mod tests {
     }
 
     #[test]
+    fn a_curve_is_silent_where_the_data_lie_below_the_threshold() {
+        let curve = Tabulated::new(&[(0.1, 1.0), (0.2, 0.5)]).unwrap();
+        assert!(curve.clone().silent_from(0.15).is_err());
+        let curve = curve.silent_from(0.5).unwrap();
+        assert!((curve.sigma0(0.4) - 0.5).abs() < 1e-12);
+        assert_eq!(curve.sigma0(0.51), 0.0);
+        let back: Tabulated =
+            serde_json::from_str(&serde_json::to_string(&curve).unwrap()).unwrap();
+        assert_eq!(back, curve);
+    }
+
+    #[test]
     fn curves_that_mean_nothing_are_refused() {
         assert!(matches!(Tabulated::new(&[(0.0, 1.0)]), Err(TabulatedError::TooFewPoints { .. })));
-        for bad in [(0.0, 1.0), (f64::NAN, 1.0), (2.0, 1.0)] {
+        for bad in [(0.0, 1.0), (1e-300, 1.0), (f64::NAN, 1.0), (2.0, 1.0)] {
             let refused = Tabulated::new(&[(0.0, 1.0), bad]);
             assert!(matches!(refused, Err(TabulatedError::Angle { point: 1, .. })));
         }

@@ -1,14 +1,16 @@
 //! `matdb add`.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
 use super::console::Console;
+use super::database::Database;
 use super::materials::unknown;
 use crate::error::Error;
 use crate::material::{Material, builtin, file};
-use crate::store::{Added, Store};
+use crate::store::Added;
 
 /// Put materials into the database, built-in ones by name or your own from files
 #[derive(Debug, clap::Args)]
@@ -30,9 +32,9 @@ pub(super) struct Args {
     from: Vec<PathBuf>,
 }
 
-pub(super) fn run(args: &Args, db: &Path, console: &Console) -> Result<(), Error> {
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let materials = wanted(args, db)?;
-    let mut store = Store::open(db)?;
+    let mut store = db.write()?;
     let (mut lines, mut records) = (String::new(), Vec::new());
     for (material, added) in std::iter::zip(&materials, store.add(&materials)?) {
         let slug = &material.slug;
@@ -41,21 +43,21 @@ pub(super) fn run(args: &Args, db: &Path, console: &Console) -> Result<(), Error
             Added::Revision(number) => ("revised", number),
             Added::Unchanged(number) => ("unchanged", number),
         };
-        lines += &format!("{what} {slug}, revision {revision}, in {}\n", db.display());
+        lines += &format!("{what} {slug}, revision {revision}, in {}\n", db.path().display());
         records.push(json!({ "slug": slug, "result": what, "revision": revision }));
     }
     console.result(&lines, &records)
 }
 
 /// Reads everything before anything is stored, so that one bad file changes nothing.
-fn wanted(args: &Args, db: &Path) -> Result<Vec<Material>, Error> {
+fn wanted(args: &Args, db: &Database) -> Result<Vec<Material>, Error> {
     let mut materials = Vec::new();
     let all = builtin::names().map(str::to_owned).filter(|_| args.all);
     for name in args.names.iter().cloned().chain(all) {
         match builtin::get(&name) {
             Some(material) => materials.push(material?),
             None => {
-                let store = Store::open_existing(db)?;
+                let store = db.read()?;
                 return Err(unknown(store.as_ref(), &name, "")?);
             }
         }
@@ -65,7 +67,14 @@ fn wanted(args: &Args, db: &Path) -> Result<Vec<Material>, Error> {
             materials.push(read(&file)?);
         }
     }
-    Ok(materials)
+    let mut seen = HashSet::new();
+    match materials.iter().find(|material| !seen.insert(&material.slug)) {
+        None => Ok(materials),
+        Some(Material { slug, .. }) => Err(Error::Usage {
+            problem: format!("`{slug}` is named or found twice"),
+            way_out: "name it once, or give one of the files another slug".to_owned(),
+        }),
+    }
 }
 
 /// The material files that a path means.
@@ -91,7 +100,15 @@ fn material_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
 }
 
 fn read(path: &Path) -> Result<Material, Error> {
-    let text = std::fs::read_to_string(path).map_err(|reason| unreadable(path, reason))?;
+    let bytes = std::fs::read(path).map_err(|reason| unreadable(path, reason))?;
+    let text = String::from_utf8(bytes).map_err(|error| Error::Usage {
+        problem: format!(
+            "{}: byte {}: not UTF-8",
+            path.display(),
+            error.utf8_error().valid_up_to()
+        ),
+        way_out: "save the file as UTF-8".to_owned(),
+    })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let read_csv = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
     Ok(file::parse(&path.display().to_string(), &text, read_csv)?)

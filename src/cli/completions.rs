@@ -3,7 +3,7 @@
 use clap::CommandFactory;
 use clap_complete::Shell;
 
-use super::console::{Console, write_out};
+use super::console::write_out;
 use crate::error::Error;
 
 /// Print a completion script for a shell
@@ -15,7 +15,7 @@ pub(super) struct Args {
     shell: Shell,
 }
 
-pub(super) fn run(args: &Args, _console: &Console) -> Result<(), Error> {
+pub(super) fn run(args: &Args) -> Result<(), Error> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut super::Cli::command(), "matdb", &mut script);
     write_out(&String::from_utf8_lossy(&script))

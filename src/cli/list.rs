@@ -1,12 +1,10 @@
 //! `matdb list`.
 
-use std::path::Path;
-
 use super::console::Console;
+use super::database::Database;
 use super::summary::table;
 use crate::error::Error;
 use crate::material::builtin;
-use crate::store::Store;
 
 /// List the materials in the database
 #[derive(Debug, clap::Args)]
@@ -15,8 +13,8 @@ use crate::store::Store;
   matdb list --json | jq '.[].slug'")]
 pub(super) struct Args {}
 
-pub(super) fn run(db: &Path, console: &Console) -> Result<(), Error> {
-    let materials = match Store::open_existing(db)? {
+pub(super) fn run(db: &Database, console: &Console) -> Result<(), Error> {
+    let materials = match db.read()? {
         Some(store) => store.list()?,
         None => Vec::new(),
     };
@@ -24,7 +22,7 @@ pub(super) fn run(db: &Path, console: &Console) -> Result<(), Error> {
         .filter(|name| !materials.iter().any(|m| m.slug.as_str() == *name))
         .collect();
     let mut text = match materials.len() {
-        0 => format!("no material in {} yet\n", db.display()),
+        0 => format!("no material in {} yet\n", db.path().display()),
         _ => table(
             &["material", "rev", "kind", "class", "curves", "points", "fits", "name"],
             materials.iter().map(|m| {

@@ -50,7 +50,7 @@ pub(super) fn unknown(store: Option<&Store>, wanted: &str, asked_by: &str) -> Re
     }
     let name = wanted.split('@').next().unwrap_or(wanted);
     let way_out = if known.iter().any(|k| k == name) && name != wanted {
-        format!("`matdb show {name}` lists its revisions")
+        format!("`matdb show {name}` tells which revisions there are")
     } else if let Some(near) = nearest(name, known.iter().map(String::as_str)) {
         format!("did you mean `{near}`?")
     } else {

@@ -2,6 +2,7 @@
 
 mod add;
 mod completions;
+mod database;
 mod console;
 mod list;
 mod materials;
@@ -17,6 +18,7 @@ use clap::{ArgAction, Parser, Subcommand};
 
 use crate::error::Error;
 use console::Console;
+use database::Database;
 
 /// A material database and renderer for 300 GHz imaging radar.
 #[derive(Debug, Parser)]
@@ -35,9 +37,9 @@ pub struct Cli {
 /// What every command understands.
 #[derive(Debug, clap::Args)]
 struct Options {
-    /// Database file; created by the first `add`
-    #[arg(long, env = "MATDB", default_value = "matdb.sqlite", global = true, value_name = "FILE")]
-    db: PathBuf,
+    /// Database file; created by the first `add` [default: matdb.sqlite]
+    #[arg(long, env = "MATDB", global = true, value_name = "FILE")]
+    db: Option<PathBuf>,
     /// Print the result as JSON
     #[arg(long, global = true)]
     json: bool,
@@ -66,12 +68,13 @@ enum Command {
 pub fn run(cli: &Cli) -> Result<(), Error> {
     let Options { db, json, quiet, verbose } = &cli.options;
     let console = Console { json: *json, quiet: *quiet, verbose: *verbose > 0 };
+    let db = &Database::new(db.as_deref());
     match &cli.command {
         Command::Render(args) => render::run(args, db, &console),
         Command::Add(args) => add::run(args, db, &console),
         Command::List(_) => list::run(db, &console),
         Command::Show(args) => show::run(args, db, &console),
         Command::Rm(args) => rm::run(args, db, &console),
-        Command::Completions(args) => completions::run(args, &console),
+        Command::Completions(args) => completions::run(args),
     }
 }

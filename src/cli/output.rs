@@ -3,14 +3,14 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use tempfile::{Builder, NamedTempFile};
+use tempfile::{Builder, NamedTempFile, TempPath};
 
 use crate::error::Error;
 
 /// Writes `files` (name, bytes) into `folder`, creating it when needed.
 ///
-/// Every file is written under a temporary name first and renamed when all are complete. On an
-/// error nothing is left behind, and files that were there before are as they were.
+/// Every file is written under a temporary name first; when all are complete they take the places
+/// of what was there. On an error everything is as it was before.
 pub(super) fn write_all(folder: &Path, files: &[(&str, Vec<u8>)]) -> Result<(), Error> {
     let created = create_folder(folder)?;
     let result = stage(folder, files).and_then(|staged| publish(folder, staged));
@@ -60,15 +60,53 @@ fn stage<'a>(
     files.iter().map(|file| write(file).map_err(|reason| failed(folder, file.0, reason))).collect()
 }
 
+/// A file that has taken its place, and what was there before.
+struct Placed {
+    path: PathBuf,
+    before: Option<TempPath>,
+}
+
 fn publish(folder: &Path, staged: Vec<(&str, NamedTempFile)>) -> Result<(), Error> {
-    // A folder in a file's place is the one obstacle that writing could not see.
-    if let Some((name, _)) = staged.iter().find(|(name, _)| folder.join(name).is_dir()) {
-        return Err(failed(folder, name, std::io::ErrorKind::IsADirectory.into()));
+    let mut placed = Vec::new();
+    for (name, file) in staged {
+        match place(folder, name, file) {
+            Ok(one) => placed.push(one),
+            Err(reason) => {
+                placed.into_iter().for_each(take_back);
+                return Err(failed(folder, name, reason));
+            }
+        }
     }
-    staged.into_iter().try_for_each(|(name, file)| match file.persist(folder.join(name)) {
-        Ok(_) => Ok(()),
-        Err(error) => Err(failed(folder, name, error.error)),
-    })
+    Ok(())
+}
+
+/// Puts a file in its place; what was there is kept under a temporary name.
+fn place(folder: &Path, name: &str, file: NamedTempFile) -> std::io::Result<Placed> {
+    let path = folder.join(name);
+    let before = match path.symlink_metadata() {
+        Ok(found) if found.is_dir() => return Err(std::io::ErrorKind::IsADirectory.into()),
+        Ok(_) => {
+            let kept = Builder::new().prefix(".matdb-").tempfile_in(folder)?.into_temp_path();
+            std::fs::rename(&path, &kept)?;
+            Some(kept)
+        }
+        Err(_) => None,
+    };
+    match file.persist(&path) {
+        Ok(_) => Ok(Placed { path, before }),
+        Err(error) => {
+            take_back(Placed { path, before });
+            Err(error.error)
+        }
+    }
+}
+
+fn take_back(Placed { path, before }: Placed) {
+    // The error that led here is the one to report; a second one could only hide it.
+    match before {
+        Some(kept) => drop(kept.persist(&path)),
+        None => drop(std::fs::remove_file(&path)),
+    }
 }
 
 fn failed(folder: &Path, name: &str, reason: std::io::Error) -> Error {
@@ -106,7 +144,7 @@ mod tests {
         let root = tempfile::tempdir().unwrap();
         std::fs::write(root.path().join("one"), "old").unwrap();
         std::fs::create_dir(root.path().join("two")).unwrap();
-        let files = [("one", b"new".to_vec()), ("two", b"new".to_vec())];
+        let files = ["none", "one", "two"].map(|name| (name, b"new".to_vec()));
         assert!(write_all(root.path(), &files).is_err());
         assert_eq!(entries(root.path()), ["one", "two"]);
         assert_eq!(std::fs::read(root.path().join("one")).unwrap(), b"old");

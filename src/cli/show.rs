@@ -1,16 +1,15 @@
 //! `matdb show`.
 
-use std::path::Path;
-
 use serde_json::json;
 
 use super::console::Console;
+use super::database::Database;
 use super::materials::{Found, find};
 use super::summary::table;
 use crate::brdf::Scattering;
 use crate::error::Error;
 use crate::material::{Fit, Material};
-use crate::store::Store;
+use crate::store::RevisionSummary;
 use crate::units::db_from_ratio;
 
 /// Show a material: what is known of it, from whom, and how it scatters
@@ -23,15 +22,26 @@ pub(super) struct Args {
     name: String,
 }
 
-pub(super) fn run(args: &Args, db: &Path, console: &Console) -> Result<(), Error> {
-    let store = Store::open_existing(db)?;
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    let store = db.read()?;
     let Found { material, revision } = find(store.as_ref(), &args.name, "")?;
     let origin = match revision {
-        Some(number) => format!("revision {number} in {}", db.display()),
+        Some(number) => format!("revision {number} in {}", db.path().display()),
         None => format!("built in; `matdb add {}` puts it into a database", material.slug),
     };
-    let text = describe(&material, &origin)?;
-    console.result(&text, &json!({ "revision": revision, "material": material }))
+    let history = match &store {
+        Some(store) => store.history(&material.slug)?,
+        None => Vec::new(),
+    };
+    let mut text = describe(&material, &origin)?;
+    if !history.is_empty() {
+        text += "\nrevisions:\n";
+    }
+    for RevisionSummary { revision, added_at, program_version } in &history {
+        text += &format!("{revision}  {added_at}  by matdb {program_version}\n");
+    }
+    console
+        .result(&text, &json!({ "revision": revision, "material": material, "history": history }))
 }
 
 fn describe(material: &Material, origin: &str) -> Result<String, Error> {
@@ -57,6 +67,12 @@ fn describe(material: &Material, origin: &str) -> Result<String, Error> {
     }
     for fit in &material.fits {
         text += &format!("\nfit {} ({})\n{}", fit.name, fit.estimator, parameters(fit));
+        if let Some([specular, diffuse]) = fit.model.identified_products() {
+            text += &format!(
+                "a monostatic measurement tells only (1 − k)·f_lambda = {specular:.3e} and \
+                 k·r_s = {diffuse:.3e}; k itself is a convention\n"
+            );
+        }
     }
     text += &format!("\nscenes render `{}`:\n{}", material.render, curve_table(material)?);
     Ok(text)

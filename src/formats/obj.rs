@@ -35,7 +35,8 @@ fn statements(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
     std::iter::from_fn(move || {
         let (number, line) = lines.next()?;
         let mut statement = Cow::Borrowed(line);
-        while statement.ends_with('\\') {
+        let is_comment = line.trim_start().starts_with('#');
+        while !is_comment && statement.ends_with('\\') {
             let joined = statement.to_mut();
             joined.pop();
             joined.push(' ');

@@ -73,6 +73,12 @@ fn explain(message: &str) -> (String, String) {
         };
         return (problem, way_out);
     }
+    let in_words =
+        [("usize", "a whole number, 0 or greater"), ("u64", "a whole number, 0 or greater")];
+    let in_words = in_words.into_iter().chain([("f64", "a number"), ("i64", "a whole number")]);
+    let message = in_words.fold(message, |text, (word, words)| {
+        text.replace(&format!("expected {word}"), &format!("expected {words}"))
+    });
     (message, "mend the line".to_owned())
 }
 

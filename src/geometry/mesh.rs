@@ -48,6 +48,21 @@ impl FacetLabels {
     }
 }
 
+impl FacetLabels {
+    /// Appends the names of further facets.
+    fn append(&mut self, other: &FacetLabels) {
+        let number_of = |names: &mut Vec<String>, name: &String| {
+            names.iter().position(|known| known == name).unwrap_or_else(|| {
+                names.push(name.clone());
+                names.len() - 1
+            }) as u32
+        };
+        let renumbered: Vec<u32> =
+            other.names.iter().map(|name| number_of(&mut self.names, name)).collect();
+        self.name_of_facet.extend(other.name_of_facet.iter().map(|&n| renumbered[n as usize]));
+    }
+}
+
 /// Builds [`FacetLabels`] as facets come in.
 #[derive(Debug)]
 pub struct LabelBuilder {
@@ -192,30 +207,36 @@ impl Mesh {
     }
 
     /// Appends another mesh. Labels are kept by property; facets without a label get the empty name.
-    pub fn append(&mut self, other: &Mesh) {
-        let vertex_offset = self.vertices.len() as u32;
-        let facets_before = self.facets.len();
-        self.vertices.extend_from_slice(&other.vertices);
-        self.facets.extend(other.facets.iter().map(|f| f.map(|v| v + vertex_offset)));
+    ///
+    /// # Errors
+    /// When the two together have more vertices or facets than 32 bits can number; nothing is
+    /// appended then.
+    pub fn append(&mut self, other: &Mesh) -> Result<(), MeshError> {
+        let facets = self.facets.len() + other.facets.len();
+        let vertices = self.vertices.len() + other.vertices.len();
+        for (what, count) in [("vertices", vertices), ("facets", facets)] {
+            if count > u32::MAX as usize {
+                return Err(MeshError::TooLarge { what, count });
+            }
+        }
         for theirs in &other.labels {
             if !self.labels.iter().any(|l| l.property == theirs.property) {
-                self.labels.push(FacetLabels::from_names(
-                    &theirs.property,
-                    std::iter::repeat_n("", facets_before),
-                ));
+                let unnamed = std::iter::repeat_n("", self.facets.len());
+                self.labels.push(FacetLabels::from_names(&theirs.property, unnamed));
             }
         }
         for ours in &mut self.labels {
-            let theirs = other.labels.iter().find(|l| l.property == ours.property);
-            let names_of = |labels: &FacetLabels| -> Vec<String> {
-                labels.name_of_facet.iter().map(|&n| labels.names[n as usize].clone()).collect()
-            };
-            let mut all = names_of(ours);
-            match theirs {
-                Some(theirs) => all.extend(names_of(theirs)),
-                None => all.resize(self.facets.len(), String::new()),
+            match other.labels.iter().find(|l| l.property == ours.property) {
+                Some(theirs) => ours.append(theirs),
+                None => {
+                    let unnamed = std::iter::repeat_n("", other.facets.len());
+                    ours.append(&FacetLabels::from_names("", unnamed));
+                }
             }
-            *ours = FacetLabels::from_names(&ours.property, all);
         }
+        let vertex_offset = self.vertices.len() as u32;
+        self.vertices.extend_from_slice(&other.vertices);
+        self.facets.extend(other.facets.iter().map(|f| f.map(|v| v + vertex_offset)));
+        Ok(())
     }
 }

@@ -40,6 +40,14 @@ impl Raster {
         self.y_min_m + ((self.height - row) as f64 - 0.5) * self.pixel_m
     }
 
+    /// Whether a point lies on the grid, m.
+    pub fn contains(&self, x_m: f64, y_m: f64) -> bool {
+        let within = |at_m: f64, min_m: f64, pixels: usize| {
+            at_m >= min_m && at_m <= min_m + pixels as f64 * self.pixel_m
+        };
+        within(x_m, self.x_min_m, self.width) && within(y_m, self.y_min_m, self.height)
+    }
+
     /// A channel's values by name.
     pub fn channel(&self, name: &str) -> Option<&[f32]> {
         self.channels.iter().find(|c| c.name == name).map(|c| c.values.as_slice())

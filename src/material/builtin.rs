@@ -67,7 +67,7 @@ mod tests {
 
     #[test]
     fn nothing_built_in_claims_to_be_measured_backscatter() {
-        // No angle-resolved measurement near 300 GHz has been published with a licence.
+        // No angle-resolved measurement near 300 GHz was found with a licence.
         for name in names() {
             assert_ne!(get(name).unwrap().unwrap().render_kind(), Some(SourceKind::Measured));
         }

@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use nalgebra::DMatrix;
 use thiserror::Error;
 
 use super::{Censor, Covariance, Curve, Fit, Instrument, Material, Observation};
@@ -216,20 +217,21 @@ impl Covariance {
             let problem = format!("the matrix is not {n} × {n}");
             return Err(value(&place, &problem, "give a row and a column per parameter"));
         }
-        let at = |i: usize, j: usize| self.matrix[i][j];
-        let pairs = || (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
-        // A correlation beyond 1 is the commonest slip; rounding in a file may reach a little past.
-        let sound = pairs().all(|(i, j)| {
-            at(i, j).is_finite()
-                && at(i, j) == at(j, i)
-                && at(i, j).powi(2) <= at(i, i) * at(j, j) * (1.0 + 1e-6)
-                && at(i, i) >= 0.0
+        let matrix = DMatrix::from_fn(n, n, |i, j| self.matrix[i][j]);
+        let deviations: Vec<f64> = matrix.diagonal().iter().map(|v| v.sqrt()).collect();
+        // As correlations, so that units do not matter; rounding in a file may reach a little past 1.
+        let correlations = DMatrix::from_fn(n, n, |i, j| {
+            let slack = if i == j { 1e-9 } else { 0.0 };
+            matrix[(i, j)] / (deviations[i] * deviations[j]) + slack
         });
+        let sound = matrix == matrix.transpose()
+            && deviations.iter().all(|d| *d > 0.0 && d.is_finite())
+            && correlations.cholesky().is_some();
         if sound {
             return Ok(());
         }
         let problem = "the matrix is not a covariance";
-        Err(value(&place, problem, "it must be symmetric with correlations within −1 and 1"))
+        Err(value(&place, problem, "it must be symmetric and positive definite"))
     }
 }
 
@@ -249,7 +251,7 @@ fn unique<'a>(
     Ok(())
 }
 
-fn value(place: &str, problem: &str, way_out: &str) -> MaterialError {
+pub(super) fn value(place: &str, problem: &str, way_out: &str) -> MaterialError {
     MaterialError::Value {
         place: place.to_owned(),
         problem: problem.to_owned(),

@@ -4,6 +4,7 @@
 //! last two may be left out, and `theta_r_deg,delta_phi_deg` may be added for bistatic points.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde::Deserialize;
 use thiserror::Error;
@@ -150,8 +151,9 @@ pub fn parse(
             csv: entry.file.clone(),
             reason,
         })?;
+        let beside = Path::new(file).with_file_name(&entry.file);
         let observations = observations(&bytes)
-            .map_err(|error| FileError::Format { file: entry.file.clone(), error })?;
+            .map_err(|error| FileError::Format { file: beside.display().to_string(), error })?;
         let CurveFile { name, source, instrument, .. } = entry;
         Ok(Curve { name, source, instrument, observations })
     };

@@ -188,7 +188,7 @@ pub struct Fit {
 pub struct Covariance {
     /// Paths of the parameters.
     pub parameters: Vec<String>,
-    /// Symmetric, positive diagonal, row by row, in the parameters' units.
+    /// Symmetric and positive definite, row by row, in the parameters' units.
     pub matrix: Vec<Vec<f64>>,
 }
 
@@ -250,24 +250,36 @@ impl Formatter for OneZero {
 }
 
 impl Curve {
-    /// The curve as a scattering model: its backscatter points, sorted by angle, equal angles
-    /// averaged in linear σ⁰. A censored point enters at its threshold, which bounds the true value.
+    /// The curve as a scattering model: its detections in backscatter, sorted by angle, equal angles
+    /// averaged in linear σ⁰. Where only left-censored points follow, nothing comes back.
     ///
     /// # Errors
-    /// When fewer than two angles are left.
+    /// When detections at fewer than two angles are left, or a point is right-censored: its true
+    /// value is not known and no bound would render it.
     pub fn tabulated(&self) -> Result<Tabulated, MaterialError> {
-        let mut points: Vec<(f64, f64)> = self
-            .observations
-            .iter()
-            .filter(|o| o.is_retro())
-            .filter_map(|o| Some((o.theta_i_rad, o.sigma0.or(o.threshold_sigma0)?)))
-            .collect();
+        let retro = || self.observations.iter().filter(|o| o.is_retro());
+        if retro().any(|o| o.censor == Censor::Right) {
+            let place = format!("curve `{}`", self.name);
+            let way_out = "fit a model to it and render that";
+            return Err(check::value(&place, "has points above the instrument's range", way_out));
+        }
+        let mut points: Vec<(f64, f64)> =
+            retro().filter_map(|o| Some((o.theta_i_rad, o.sigma0?))).collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         let merged: Vec<(f64, f64)> = points
             .chunk_by(|a, b| b.0 - a.0 < SAME_ANGLE_RAD)
             .map(|same| (same[0].0, same.iter().map(|p| p.1).sum::<f64>() / same.len() as f64))
             .collect();
+        let last_rad = merged.last().map_or(0.0, |point| point.0);
+        let silent_rad = retro()
+            .filter(|o| o.censor == Censor::Left && o.theta_i_rad > last_rad + SAME_ANGLE_RAD)
+            .map(|o| o.theta_i_rad)
+            .min_by(f64::total_cmp);
         Tabulated::new(&merged)
+            .and_then(|curve| match silent_rad {
+                Some(theta_rad) => curve.silent_from(theta_rad),
+                None => Ok(curve),
+            })
             .map_err(|error| MaterialError::Curve { curve: self.name.clone(), error })
     }
 }

@@ -32,7 +32,7 @@ pub struct Radar {
     pub centre_frequency_ghz: f64,
     /// Swept bandwidth, GHz. 27: table in Liang et al. 2022, DOI 10.11972/j.issn.1001-9014.2022.02.011.
     pub bandwidth_ghz: f64,
-    /// Transmitted power P_t, dBm. 7: assumed, within the 5–10 dBm of 300 GHz multiplier chains.
+    /// Transmitted power P_t, dBm. 7: assumed.
     pub transmit_power_dbm: f64,
     /// Equivalent area of the receiving antenna A_eq, m². 0.196: assumed, a 0.5 m aperture, which
     /// is λR over the paper's spot diameter.
@@ -69,6 +69,7 @@ pub struct Radar {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub f5: Option<F5>,
     /// Where the rays go.
+    #[serde(deserialize_with = "super::scan::read_pattern")]
     pub scan: Pattern,
 }
 

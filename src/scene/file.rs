@@ -101,7 +101,7 @@ pub struct RegionEntry {
 
 /// The value of a facet label.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a name in quotes or a whole number")]
 pub enum LabelValue {
     /// A name.
     Text(String),

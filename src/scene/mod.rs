@@ -21,16 +21,10 @@ pub use target::{MeshReport, Region, Target};
 /// A scene, ready to be rendered.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// Title for figures.
-    pub name: String,
-    /// Seed of everything random.
-    pub seed: u64,
-    /// The instrument.
-    pub radar: Radar,
+    /// The scene file, its title and pixel filled in.
+    pub file: SceneFile,
     /// One ray per chirp.
     pub chirps: Chirps,
-    /// Side of an image pixel, m.
-    pub pixel_m: f64,
     /// What stands in front of it.
     pub target: Target,
 }
@@ -95,6 +89,16 @@ pub enum SceneError {
 }
 
 impl Scene {
+    /// The instrument.
+    pub fn radar(&self) -> &Radar {
+        &self.file.radar
+    }
+
+    /// Side of an image pixel, m.
+    pub fn pixel_m(&self) -> f64 {
+        pixel_m(&self.file)
+    }
+
     /// Reads a scene file and every mesh it names.
     pub fn load(path: &Path) -> Result<Scene, SceneError> {
         let bytes = read(path, "")?;
@@ -107,21 +111,26 @@ impl Scene {
     }
 
     /// Loads what a scene file describes; relative paths start from the folder of `path`.
-    pub fn resolve(file: SceneFile, path: &Path) -> Result<Scene, SceneError> {
+    pub fn resolve(mut file: SceneFile, path: &Path) -> Result<Scene, SceneError> {
         let at = |error| SceneError::Radar { file: path.to_owned(), error };
         file.radar.validate().map_err(at)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let read_csv = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
         let chirps = Chirps::draw(&file.radar, read_csv).map_err(at)?;
-        let pixel_m = file.image.pixel_m.unwrap_or(file.radar.spot_diameter_m / 4.0);
+        let pixel_m = pixel_m(&file);
         check_pixel(pixel_m, &file.radar, &chirps, path)?;
-        let name = match file.name.as_str() {
-            "" => path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-            name => name.to_owned(),
-        };
+        file.image.pixel_m = Some(pixel_m);
+        if file.name.is_empty() {
+            file.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        }
         let target = Target::load(&file, path)?;
-        Ok(Scene { name, seed: file.seed, radar: file.radar, chirps, pixel_m, target })
+        Ok(Scene { file, chirps, target })
     }
+}
+
+/// The given pixel, or a quarter of the spot, m.
+fn pixel_m(file: &SceneFile) -> f64 {
+    file.image.pixel_m.unwrap_or(file.radar.spot_diameter_m / 4.0)
 }
 
 /// A pixel shows nothing below a hundredth of the spot, and an image must fit a page and memory.
@@ -137,15 +146,17 @@ fn check_pixel(
     let sides_m = chirps.field(&radar.frames()).sides_m();
     let [columns, rows] = sides_m.map(|side_m| ((side_m + spot_m) / pixel_m).ceil());
     let fits = columns.max(rows) <= LONGEST_SIDE && columns * rows <= MOST_PIXELS;
-    if pixel_m >= spot_m / 100.0 && fits {
+    // Coarser pixels would leave gaps: a spot could lie between all pixel centres.
+    let coarsest_m = spot_m / std::f64::consts::SQRT_2;
+    if pixel_m >= spot_m / 100.0 && pixel_m <= coarsest_m && fits {
         return Ok(());
     }
     Err(SceneError::Value {
         file: file.to_owned(),
         place: "image.pixel_m".to_owned(),
         problem: format!(
-            "{pixel_m} m is finer than a hundredth of the spot, or gives more than 10 000 pixels on \
-             a side or 16 million in all"
+            "{pixel_m} m is not between a hundredth and 0.7 of the spot, or gives more than 10 000 \
+             pixels on a side or 16 million in all"
         ),
         way_out: format!("a quarter of the spot is {} m", spot_m / 4.0),
     })

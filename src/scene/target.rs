@@ -44,8 +44,10 @@ pub struct MeshReport {
     pub name: String,
     /// File or built-in, as the scene file gives it.
     pub file: String,
+    /// BLAKE3 of the mesh file's bytes; none for a built-in mesh.
+    pub file_blake3: Option<String>,
     /// BLAKE3 of vertices and facets as placed, so that equal hashes mean equal geometry.
-    pub blake3: String,
+    pub placed_blake3: String,
     /// Number of vertices.
     pub vertices: usize,
     /// Number of facets.
@@ -55,6 +57,9 @@ pub struct MeshReport {
     /// Number of its first facet within the whole target.
     pub first_facet: usize,
 }
+
+/// No coordinate may be farther out than this, m; beyond, f32 would blur a radar's target.
+const FARTHEST_M: f64 = 1e5;
 
 /// Built-in meshes. Cuboid, plate and sphere are of unit size: give them a `size_m`.
 pub const BUILTIN_MESHES: [&str; 4] = ["mannequin", "cuboid", "plate", "sphere"];
@@ -72,11 +77,11 @@ impl Target {
                 let place = format!("mesh `{}`", entry.name);
                 return Err(value(path, &place, "is defined twice", "rename one"));
             }
-            let placed = place(load_mesh(entry, path)?, entry, path)?;
+            let (loaded, file_blake3) = load_mesh(entry, path)?;
+            let placed = place(loaded, entry, path)?;
             let at = |error| SceneError::Mesh { file: PathBuf::from(&entry.file), error };
-            meshes.push(report(&placed, entry, mesh.facets.len()).map_err(at)?);
-            mesh.append(&placed);
-            mesh.validate().map_err(at)?;
+            meshes.push(report(&placed, entry, file_blake3, mesh.facets.len()).map_err(at)?);
+            mesh.append(&placed).map_err(at)?;
         }
         let spans: Vec<MeshSpan> = meshes.iter().map(MeshReport::span).collect();
         let region_of_facet = assign(&mesh, &spans, &file.region)
@@ -107,9 +112,10 @@ fn count_regions(file: &SceneFile, region_of_facet: &[u16]) -> Vec<Region> {
         .collect()
 }
 
-fn load_mesh(entry: &MeshEntry, scene: &Path) -> Result<Mesh, SceneError> {
+/// A mesh in its own frame, and the hash of its file.
+fn load_mesh(entry: &MeshEntry, scene: &Path) -> Result<(Mesh, Option<String>), SceneError> {
     if let Some(name) = entry.file.strip_prefix("builtin:") {
-        return builtin(name).ok_or_else(|| {
+        return builtin(name).map(|mesh| (mesh, None)).ok_or_else(|| {
             let known = BUILTIN_MESHES.join(", ");
             let way_out = match nearest(name, BUILTIN_MESHES) {
                 Some(near) => format!("did you mean `builtin:{near}`?"),
@@ -131,7 +137,8 @@ fn load_mesh(entry: &MeshEntry, scene: &Path) -> Result<Mesh, SceneError> {
         return Err(value(scene, &format!("mesh `{}`", entry.name), &problem, way_out));
     };
     let bytes = read(&file, "; meshes are looked for beside the scene file")?;
-    format.read(&bytes).map_err(|error| SceneError::Format { file, error })
+    let mesh = format.read(&bytes).map_err(|error| SceneError::Format { file, error })?;
+    Ok((mesh, Some(blake3::hash(&bytes).to_hex().to_string())))
 }
 
 fn builtin(name: &str) -> Option<Mesh> {
@@ -171,7 +178,15 @@ fn place(mut mesh: Mesh, entry: &MeshEntry, scene: &Path) -> Result<Mesh, SceneE
     for vertex in &mut mesh.vertices {
         *vertex = (global_from_model * Point::from(*vertex * entry.scale * stretch)).xyz;
     }
-    Ok(mesh)
+    // `!(a < b)` also finds NaN, from a product of huge and tiny.
+    let lost = mesh.vertices.iter().position(|v| !(v.abs().max_element() < FARTHEST_M));
+    match lost {
+        None => Ok(mesh),
+        Some(vertex) => {
+            let problem = format!("vertex {vertex} ends up more than {FARTHEST_M} m away");
+            Err(refuse("placement", &problem, "check scale, size_m and translation_m"))
+        }
+    }
 }
 
 fn extent(mesh: &Mesh) -> DVec3 {
@@ -180,7 +195,12 @@ fn extent(mesh: &Mesh) -> DVec3 {
     max - min
 }
 
-fn report(mesh: &Mesh, entry: &MeshEntry, first_facet: usize) -> Result<MeshReport, MeshError> {
+fn report(
+    mesh: &Mesh,
+    entry: &MeshEntry,
+    file_blake3: Option<String>,
+    first_facet: usize,
+) -> Result<MeshReport, MeshError> {
     mesh.validate()?;
     let degenerate_facets = (0..mesh.facets.len()).filter(|&f| mesh.is_degenerate(f)).count();
     if degenerate_facets == mesh.facets.len() {
@@ -189,7 +209,8 @@ fn report(mesh: &Mesh, entry: &MeshEntry, first_facet: usize) -> Result<MeshRepo
     Ok(MeshReport {
         name: entry.name.clone(),
         file: entry.file.clone(),
-        blake3: hash(mesh),
+        file_blake3,
+        placed_blake3: hash(mesh),
         vertices: mesh.vertices.len(),
         facets: mesh.facets.len(),
         degenerate_facets,

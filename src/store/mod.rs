@@ -61,6 +61,17 @@ pub struct Stored {
     pub program_version: String,
 }
 
+/// A line of [`Store::history`].
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct RevisionSummary {
+    /// Its number, from 1.
+    pub revision: u32,
+    /// When it was added: UTC, ISO 8601, to the second.
+    pub added_at: String,
+    /// Version of the program that added it.
+    pub program_version: String,
+}
+
 /// A line of [`Store::list`].
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Summary {
@@ -153,6 +164,14 @@ impl Store {
             }
             stored => Ok(stored),
         }
+    }
+
+    /// Every revision of a material, oldest first; none when there is no such material.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn history(&self, slug: &Slug) -> Result<Vec<RevisionSummary>, StoreError> {
+        read::history(&self.conn, slug).map_err(|error| StoreError::new(&self.path, error))
     }
 
     /// Removes materials with all their revisions, in one transaction; `None` for each that is not

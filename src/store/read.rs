@@ -9,7 +9,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde::de::value::{Error as WordError, StrDeserializer};
 
-use super::{Stored, Summary};
+use super::{RevisionSummary, Stored, Summary};
 use crate::brdf::Brdf;
 use crate::material::{
     Censor, Covariance, Curve, Fit, Instrument, Material, Observation, Slug, Source, SourceKind,
@@ -39,6 +39,20 @@ pub(super) fn list(conn: &Connection) -> Result<Vec<Summary>> {
             curves: row.get(5)?,
             observations: row.get(6)?,
             fits: row.get(7)?,
+        })
+    })
+}
+
+/// Every revision of a material, oldest first.
+pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSummary>> {
+    let sql = "SELECT number, added_at, program_version
+               FROM material JOIN revision ON material_id = material.id
+               WHERE slug = ?1 ORDER BY number";
+    rows(conn, sql, [slug.as_str()], |row| {
+        Ok(RevisionSummary {
+            revision: row.get(0)?,
+            added_at: row.get(1)?,
+            program_version: row.get(2)?,
         })
     })
 }

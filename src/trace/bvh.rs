@@ -32,9 +32,9 @@ pub struct Bvh<'a> {
 impl<'a> Bvh<'a> {
     /// Builds the hierarchy over all facets that have an area.
     pub fn new(mesh: &'a Mesh) -> Bvh<'a> {
-        let (centre, radius_m) = bounding_sphere(mesh);
         let live: Vec<u32> =
             (0..mesh.facets.len()).filter(|&f| !mesh.is_degenerate(f)).map(|f| f as u32).collect();
+        let (centre, radius_m) = bounding_sphere(mesh, &live);
         let padding = Vec3A::splat((PADDING * radius_m) as f32);
         let boxes: Vec<Aabb> = live
             .iter()
@@ -82,15 +82,13 @@ impl<'a> Bvh<'a> {
     }
 }
 
-fn bounding_sphere(mesh: &Mesh) -> (DVec3, f64) {
-    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for &vertex in &mesh.vertices {
-        min = min.min(vertex);
-        max = max.max(vertex);
-    }
+/// A sphere around the corners of some facets: centre and radius, m.
+fn bounding_sphere(mesh: &Mesh, facets: &[u32]) -> (DVec3, f64) {
+    let corners = || facets.iter().flat_map(|&facet| mesh.corners(facet as usize));
+    let min = corners().fold(DVec3::INFINITY, DVec3::min);
+    let max = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
     let centre = 0.5 * (min + max);
-    let radius_m = mesh.vertices.iter().map(|v| v.distance(centre)).fold(0.0, f64::max);
-    (centre, radius_m)
+    (centre, corners().map(|corner| corner.distance(centre)).fold(0.0, f64::max))
 }
 
 #[cfg(test)]
@@ -153,7 +151,7 @@ mod tests {
             vertices: mesh.vertices.iter().map(|v| *v + 4.0 * DVec3::Z).collect(),
             ..plate()
         };
-        mesh.append(&back);
+        mesh.append(&back).unwrap();
         let hit = Bvh::new(&mesh).closest(&ray(DVec3::new(0.1, 0.2, 3.0), DVec3::ZERO)).unwrap();
         assert!(hit.facet < 2 && hit.range_m < 3.1);
     }
@@ -191,9 +189,9 @@ mod tests {
                 let aim = ray(origin, a + u * (b - a) + v * (c - a));
                 match (bvh.closest(&aim), brute::closest(&mesh, &aim)) {
                     (None, None) => {}
+                    // Looser than on a good mesh: a sliver's plane is hardly defined.
                     (Some(fast), Some(slow)) => prop_assert!(
-                        fast.facet == slow.facet
-                            || (fast.range_m - slow.range_m).abs() < 1e-9 * slow.range_m,
+                        (fast.range_m - slow.range_m).abs() < 1e-9 * slow.range_m,
                         "{fast:?} {slow:?}"
                     ),
                     other => prop_assert!(false, "{other:?}"),

@@ -1,8 +1,8 @@
 //! Closest hits of rays on a mesh.
 //!
 //! [`Bvh`] finds facets with boxes in f32 and decides and measures in f64; [`brute`] is the naive
-//! loop that judges it. Both take any mesh that passes [`Mesh::validate`]; facets without area are
-//! never hit.
+//! loop that judges it. Both take any mesh that passes [`Mesh::validate`] and lies within 100 km, where
+//! f32 does its work; facets without area are never hit.
 
 pub mod brute;
 mod bvh;

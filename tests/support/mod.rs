@@ -1,5 +1,7 @@
-//! Helpers shared by the tests of the program.
-#![allow(dead_code)]
+//! What tests share.
+#![allow(dead_code)] // Each test file is a crate of its own and uses some of it.
+
+pub mod database;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -24,29 +24,38 @@ pub(super) fn encode(
 ) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
     let regions: Vec<&str> = scene.target.regions.iter().map(|r| r.name.as_str()).collect();
     let materials = record.material_names();
+    let materials: Vec<&str> = materials.iter().map(String::as_str).collect();
     let echoes: Vec<&Echo> =
         if all { scan.echoes.iter().collect() } else { scan.detections().collect() };
     let cloud = cloud_table(&echoes, material_of_region, &regions, &materials);
-    let mut json = serde_json::to_vec_pretty(record).unwrap_or_default();
+    let mut json = serde_json::to_vec_pretty(record)?;
     json.push(b'\n');
     Ok(vec![
-        ("power.exr", exr::write(image, &exr_attributes(&materials))?),
+        ("power.exr", exr::write(image, &exr_attributes(image, &materials))?),
         ("power.png", power_figure(scene, scan, image)?),
         ("cloud.ply", ply::write_table(&cloud)?),
         ("scan.json", json),
     ])
 }
 
-/// Names for the numbers of the `material` channel.
-fn exr_attributes(materials: &[&str]) -> Vec<(String, Attribute)> {
+/// What a raster does not say by itself: its far edges, and names for the `material` channel.
+fn exr_attributes(image: &Raster, materials: &[&str]) -> Vec<(String, Attribute)> {
+    let end_m =
+        |min_m: f64, pixels: usize| Attribute::Number(min_m + pixels as f64 * image.pixel_m);
     let named = |(number, name): (usize, &&str)| {
         (format!("material{number}"), Attribute::Text((*name).to_owned()))
     };
-    materials.iter().enumerate().map(named).collect()
+    [
+        ("xMaxM".to_owned(), end_m(image.x_min_m, image.width)),
+        ("yMaxM".to_owned(), end_m(image.y_min_m, image.height)),
+    ]
+    .into_iter()
+    .chain(materials.iter().enumerate().map(named))
+    .collect()
 }
 
 fn power_figure(scene: &Scene, scan: &Scan, image: &Raster) -> Result<Vec<u8>, Error> {
-    let radar = &scene.radar;
+    let radar = scene.radar();
     let subtitle = format!(
         "{}, {} of {} chirps above {} dBm",
         radar.preset,
@@ -57,7 +66,7 @@ fn power_figure(scene: &Scene, scan: &Scan, image: &Raster) -> Result<Vec<u8>, E
     let figure = Figure {
         raster: image,
         channel: "power_dbm",
-        title: &scene.name,
+        title: &scene.file.name,
         subtitle: &subtitle,
         colour_label: "received power, dBm",
         range: None,

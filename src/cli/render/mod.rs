@@ -8,13 +8,13 @@ mod stages;
 use std::path::{Path, PathBuf};
 
 use super::console::Console;
+use super::database::Database;
 use super::materials::find;
 use super::output::write_all;
 use crate::brdf::Scattering;
 use crate::error::Error;
 use crate::render::{power_image, shade, trace};
 use crate::scene::Scene;
-use crate::store::Store;
 use record::{Record, Used};
 use stages::Stages;
 
@@ -34,16 +34,17 @@ pub(super) struct Args {
     all: bool,
 }
 
-pub(super) fn run(args: &Args, db: &Path, console: &Console) -> Result<(), Error> {
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let mut stages = Stages::start();
     let scene = Scene::load(&args.scene)?;
     let (used, material_of_region) = materials(&scene, &args.scene, db)?;
     stages.end("load", console);
 
-    let Scene { radar, chirps, target, .. } = &scene;
+    let (radar, Scene { chirps, target, .. }) = (scene.radar(), &scene);
     let bar = console.progress("tracing", chirps.rays.len());
-    let hits = trace(radar, chirps, &target.mesh, &|chirps| bar.inc(chirps as u64))?;
+    let hits = trace(radar, chirps, &target.mesh, &|chirps| bar.inc(chirps as u64));
     bar.finish_and_clear();
+    let hits = hits.map_err(|error| Error::Render { scene: args.scene.clone(), error })?;
     stages.end("trace", console);
 
     let surface = |number: &u16| &used[usize::from(*number)].scattering as &dyn Scattering;
@@ -52,10 +53,10 @@ pub(super) fn run(args: &Args, db: &Path, console: &Console) -> Result<(), Error
     stages.end("power", console);
 
     let (field, spot_m) = (chirps.field(&radar.frames()), radar.spot_diameter_m);
-    let image = power_image(&scan, field, spot_m, &material_of_region, scene.pixel_m);
+    let image = power_image(&scan, field, spot_m, &material_of_region, scene.pixel_m());
     stages.end("image", console);
 
-    let record = Record::new(&scene, &used, &material_of_region, &scan, &image);
+    let record = Record::new(&scene, &used, &material_of_region, &scan, &image, args.all);
     let files = files::encode(args.all, &scene, &scan, &image, &record, &material_of_region)?;
     stages.end("encode", console);
 
@@ -65,8 +66,8 @@ pub(super) fn run(args: &Args, db: &Path, console: &Console) -> Result<(), Error
 }
 
 /// The scene's materials, each once, and for every region the number of its material.
-fn materials(scene: &Scene, path: &Path, db: &Path) -> Result<(Vec<Used>, Vec<u16>), Error> {
-    let store = Store::open_existing(db)?;
+fn materials(scene: &Scene, path: &Path, db: &Database) -> Result<(Vec<Used>, Vec<u16>), Error> {
+    let store = db.read()?;
     let mut names: Vec<&str> = Vec::new();
     let mut used = Vec::new();
     let mut of_region = Vec::new();

@@ -26,6 +26,8 @@ pub(super) struct Record<'a> {
     scene: Value,
     radar: &'a crate::radar::Radar,
     frames: Value,
+    /// What `cloud.ply` holds.
+    cloud: &'static str,
     meshes: &'a [MeshReport],
     regions: Vec<RegionRecord<'a>>,
     materials: Vec<MaterialRecord<'a>>,
@@ -68,6 +70,8 @@ pub(super) struct Counts {
     pub detections: usize,
     pub below_threshold: usize,
     pub misses: usize,
+    /// Detections beside the image's grid.
+    pub outside_image: usize,
     pub degenerate_facets: usize,
 }
 
@@ -91,7 +95,9 @@ impl<'a> Record<'a> {
         material_of_region: &'a [u16],
         scan: &Scan,
         image: &Raster,
+        all_hits: bool,
     ) -> Record<'a> {
+        let file = &scene.file;
         let regions = regions(scene, material_of_region, scan);
         let outside = |material: usize| {
             let [least, most] = used[material].found.material.theta_rad;
@@ -106,11 +112,17 @@ impl<'a> Record<'a> {
             program: env!("CARGO_PKG_NAME"),
             version: env!("CARGO_PKG_VERSION"),
             equation: EQUATION,
-            scene: json!({ "name": scene.name, "seed": scene.seed }),
-            radar: &scene.radar,
+            scene: json!({
+                "name": file.name,
+                "seed": file.seed,
+                "mesh": file.mesh,
+                "region": file.region,
+            }),
+            radar: scene.radar(),
             frames: frames(scene),
+            cloud: if all_hits { "every hit" } else { "detections" },
             meshes: &scene.target.meshes,
-            counts: Counts::new(scene, scan),
+            counts: Counts::new(scene, scan, image),
             power_dbm: PowerRange::new(scan),
             image: json!({
                 "width": image.width, "height": image.height, "pixel_m": image.pixel_m,
@@ -137,7 +149,22 @@ impl<'a> Record<'a> {
         for mesh in self.meshes.iter().filter(|mesh| mesh.degenerate_facets > 0) {
             let MeshReport { name, degenerate_facets, .. } = mesh;
             notices.push(format!(
-                "{degenerate_facets} facets of mesh `{name}` have no area and were skipped"
+                "facets of mesh `{name}` without an area, skipped: {degenerate_facets}"
+            ));
+        }
+        let Counts { detections, outside_image, .. } = self.counts;
+        if outside_image > 0 {
+            notices.push(format!(
+                "{outside_image} of {detections} detections lie beside the image, which covers what \
+                 the scan sees at 8 m"
+            ));
+        }
+        if let Some(PowerRange { strongest, .. }) = self.power_dbm
+            && strongest > self.radar.transmit_power_dbm
+        {
+            notices.push(format!(
+                "the strongest detection, {strongest:.1} dBm, exceeds the transmitted power; the \
+                 target is too near or too bright for the power balance to hold"
             ));
         }
         let frequency_ghz = self.radar.centre_frequency_ghz;
@@ -155,8 +182,14 @@ impl<'a> Record<'a> {
         &self.regions
     }
 
-    pub fn material_names(&self) -> Vec<&'a str> {
-        self.materials.iter().map(|material| material.name).collect()
+    /// The materials' names, with their revisions where two of one name are in the scene.
+    pub fn material_names(&self) -> Vec<String> {
+        let twice = |name: &str| self.materials.iter().filter(|m| m.name == name).count() > 1;
+        let name = |material: &MaterialRecord| match material.revision {
+            Some(revision) if twice(material.name) => format!("{}@{revision}", material.name),
+            _ => material.name.to_owned(),
+        };
+        self.materials.iter().map(name).collect()
     }
 
     pub fn counts(&self) -> Counts {
@@ -186,7 +219,7 @@ impl<'a> MaterialRecord<'a> {
 }
 
 impl Counts {
-    fn new(scene: &Scene, scan: &Scan) -> Counts {
+    fn new(scene: &Scene, scan: &Scan, image: &Raster) -> Counts {
         let (chirps, hits) = (scan.chirps, scan.echoes.len());
         let detections = scan.detections().count();
         Counts {
@@ -195,6 +228,7 @@ impl Counts {
             detections,
             below_threshold: hits - detections,
             misses: chirps - hits,
+            outside_image: scan.detections().filter(|e| !image.contains(e.xt_m, e.yt_m)).count(),
             degenerate_facets: scene.target.meshes.iter().map(|m| m.degenerate_facets).sum(),
         }
     }
@@ -233,7 +267,7 @@ fn regions<'a>(scene: &'a Scene, material_of_region: &[u16], scan: &Scan) -> Vec
 }
 
 fn frames(scene: &Scene) -> Value {
-    let frames = scene.radar.frames();
+    let frames = scene.radar().frames();
     let pose = frames.global_from_target;
     let rows: Vec<[f64; 3]> = (0..3).map(|row| pose.rotation().row(row).to_array()).collect();
     json!({

@@ -29,7 +29,7 @@ fn text(folder: &Path, record: &Record, stages: &Stages) -> String {
         record.regions().iter().map(|region| {
             [
                 region.name.to_owned(),
-                materials[usize::from(region.material)].to_owned(),
+                materials[usize::from(region.material)].clone(),
                 grouped(region.facets),
                 grouped(region.hits),
                 grouped(region.detections),

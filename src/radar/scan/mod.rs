@@ -10,6 +10,7 @@ use super::mirror::{Mirror, MirrorAngles};
 use super::{Radar, RadarError, RadarFrames};
 use crate::frames::{Global, Point, Ray, target_z_m};
 
+pub(in crate::radar) use pattern::read as read_pattern;
 pub use pattern::{Elliptical, Explicit, Lissajous, Pattern, Raster, Spiral};
 
 /// Range at which a pattern is drawn in the target plane, m (paper, Sec. III-B).

@@ -2,10 +2,18 @@
 
 use std::f64::consts::TAU;
 
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::radar::mirror::{Mirror, MirrorAngles};
 use crate::radar::preset::Check;
+
+/// Reads a pattern; without the key `pattern` it is the elliptical one.
+pub(in crate::radar) fn read<'de, D: Deserializer<'de>>(from: D) -> Result<Pattern, D::Error> {
+    let mut table = toml::Table::deserialize(from)?;
+    table.entry("pattern").or_insert("elliptical".into());
+    table.try_into().map_err(|error: toml::de::Error| D::Error::custom(error.message()))
+}
 
 /// Where the rays go.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

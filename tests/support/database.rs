@@ -1,5 +1,4 @@
-//! What the tests of the store share.
-#![allow(dead_code)] // Each test file is a crate of its own and uses some of it.
+//! Materials and files for the tests of the store.
 
 use std::fs;
 use std::path::Path;

@@ -1,0 +1,44 @@
+//! Which database a command works on.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::Error;
+use crate::store::Store;
+
+/// The path of the database, and whether somebody asked for it.
+pub(super) struct Database {
+    path: PathBuf,
+    asked_for: bool,
+}
+
+impl Database {
+    /// The database that `--db` or `$MATDB` names, or the one in the working directory.
+    pub fn new(asked: Option<&Path>) -> Database {
+        let path = asked.unwrap_or(Path::new("matdb.sqlite")).to_owned();
+        Database { path, asked_for: asked.is_some() }
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Opens it for reading; `None` when nobody has made one in the working directory.
+    ///
+    /// One that was asked for by name and is not there is an error: it may be a slip, and built-in
+    /// materials must not silently stand in for somebody's own.
+    pub fn read(&self) -> Result<Option<Store>, Error> {
+        let store = Store::open_existing(&self.path)?;
+        if store.is_none() && self.asked_for {
+            return Err(Error::Usage {
+                problem: format!("there is no database {}", self.path.display()),
+                way_out: "check --db and $MATDB; `matdb add NAME` makes one".to_owned(),
+            });
+        }
+        Ok(store)
+    }
+
+    /// Opens it for writing and makes it when it is not there.
+    pub fn write(&self) -> Result<Store, Error> {
+        Ok(Store::open(&self.path)?)
+    }
+}
