@@ -178,8 +178,8 @@ fn place(mut mesh: Mesh, entry: &MeshEntry, scene: &Path) -> Result<Mesh, SceneE
     for vertex in &mut mesh.vertices {
         *vertex = (global_from_model * Point::from(*vertex * entry.scale * stretch)).xyz;
     }
-    // `!(a < b)` also finds NaN, from a product of huge and tiny.
-    let lost = mesh.vertices.iter().position(|v| !(v.abs().max_element() < FARTHEST_M));
+    let near = |v: &DVec3| v.is_finite() && v.abs().max_element() < FARTHEST_M;
+    let lost = mesh.vertices.iter().position(|v| !near(v));
     match lost {
         None => Ok(mesh),
         Some(vertex) => {
