@@ -4,9 +4,7 @@
 //! [`FormatError`] that says where and how to mend it. No reader allocates more than a small
 //! multiple of the bytes it was given, whatever a header claims.
 
-pub mod axis;
 pub mod csv;
-pub mod drawing;
 pub mod exr;
 pub mod figure;
 pub mod obj;

@@ -16,7 +16,7 @@ pub struct Tick {
 ///
 /// ```
 /// let labels: Vec<String> =
-///     matdb::formats::axis::ticks(-0.25, 0.25, 5).into_iter().map(|t| t.label).collect();
+///     matdb::formats::figure::ticks::ticks(-0.25, 0.25, 5).into_iter().map(|t| t.label).collect();
 /// assert_eq!(labels, ["−0.2", "−0.1", "0.0", "0.1", "0.2"]);
 /// ```
 pub fn ticks(low: f64, high: f64, wanted: usize) -> Vec<Tick> {

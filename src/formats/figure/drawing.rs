@@ -172,8 +172,8 @@ pub fn text_width_px(text: &str, size_px: f32, weight: Weight) -> f32 {
 
 fn face(weight: Weight) -> Face<'static> {
     let font: &[u8] = match weight {
-        Weight::Regular => include_bytes!("../../assets/inter/Inter-Regular.otf"),
-        Weight::SemiBold => include_bytes!("../../assets/inter/Inter-SemiBold.otf"),
+        Weight::Regular => include_bytes!("../../../assets/inter/Inter-Regular.otf"),
+        Weight::SemiBold => include_bytes!("../../../assets/inter/Inter-SemiBold.otf"),
     };
     Face::parse(font, 0).expect("the fonts in assets/ are valid")
 }

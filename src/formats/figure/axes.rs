@@ -1,0 +1,125 @@
+//! The frame around data, its two axes, and the title above it.
+
+use super::drawing::{Anchor, Shape, Text, Weight};
+use super::style::{
+    DIGIT_HEIGHT, GAP_PX, INK, LABEL_PX, LINE_SPACING, MARGIN_PX, QUIET_INK, STROKE_PX,
+    TICK_LABEL_PX, TICK_PX, TITLE_PX, frame, line, text, ticks_along, upward, widest, wrapped,
+};
+use super::ticks::{Tick, ticks};
+
+/// One axis: its quantity with its unit, and the values at its two ends.
+#[derive(Clone, Copy)]
+pub(super) struct Axis<'a> {
+    pub label: &'a str,
+    pub low: f64,
+    pub high: f64,
+}
+
+/// Data area and heading of a page, px.
+pub(super) struct Axes<'a> {
+    x: Axis<'a>,
+    y: Axis<'a>,
+    x_ticks: Vec<Tick>,
+    y_ticks: Vec<Tick>,
+    title: Vec<String>,
+    subtitle: Vec<String>,
+    pub left: f32,
+    pub top: f32,
+    pub data_width: f32,
+    pub data_height: f32,
+}
+
+impl<'a> Axes<'a> {
+    /// Lays out a data area of the given size under a heading that is `content_width` wide.
+    pub fn new(
+        [x, y]: [Axis<'a>; 2],
+        [data_width, data_height]: [f32; 2],
+        [title, subtitle]: [&str; 2],
+        content_width: f32,
+    ) -> Axes<'a> {
+        let x_ticks = ticks(x.low, x.high, ticks_along(data_width));
+        let y_ticks = ticks(y.low, y.high, ticks_along(data_height));
+        let y_labels = LINE_SPACING * LABEL_PX + widest(&y_ticks) + TICK_PX + GAP_PX;
+        let title = wrapped(title, TITLE_PX, Weight::SemiBold, content_width);
+        let subtitle = wrapped(subtitle, LABEL_PX, Weight::Regular, content_width);
+        let heading =
+            LINE_SPACING * (TITLE_PX * title.len() as f32 + LABEL_PX * subtitle.len() as f32);
+        Axes {
+            x,
+            y,
+            x_ticks,
+            y_ticks,
+            title,
+            subtitle,
+            left: (MARGIN_PX + y_labels).round(),
+            top: (MARGIN_PX + heading + GAP_PX).round(),
+            data_width,
+            data_height,
+        }
+    }
+
+    /// Height of the data area and what is written below it, px.
+    pub fn height_with_labels(&self) -> f32 {
+        self.data_height + TICK_PX + LINE_SPACING * (TICK_LABEL_PX + LABEL_PX) + 1.5 * GAP_PX
+    }
+
+    /// Where a value stands on the page, px.
+    pub fn at(&self, x: f64, y: f64) -> (f32, f32) {
+        let share = |axis: &Axis, value: f64| ((value - axis.low) / (axis.high - axis.low)) as f32;
+        let up = share(&self.y, y) * self.data_height;
+        (self.left + share(&self.x, x) * self.data_width, self.top + self.data_height - up)
+    }
+
+    /// Frame, ticks, labels and heading.
+    pub fn shapes(&self) -> Vec<Shape> {
+        let mut shapes = self.heading();
+        shapes.push(frame(self.left, self.top, self.data_width, self.data_height));
+        shapes.extend(self.x_axis());
+        shapes.extend(self.y_axis());
+        shapes
+    }
+
+    fn heading(&self) -> Vec<Shape> {
+        let title = self.title.iter().map(|line| (line, TITLE_PX, Weight::SemiBold, INK));
+        let subtitle =
+            self.subtitle.iter().map(|line| (line, LABEL_PX, Weight::Regular, QUIET_INK));
+        let mut y = MARGIN_PX - 0.35 * TITLE_PX;
+        title
+            .chain(subtitle)
+            .map(|(line, size_px, weight, colour)| {
+                y += LINE_SPACING * size_px;
+                let at = (self.left, y.round());
+                let (text, anchor) = (line.clone(), Anchor::Start);
+                Shape::Text(Text { text, at, anchor, size_px, weight, colour, upwards: false })
+            })
+            .collect()
+    }
+
+    fn x_axis(&self) -> Vec<Shape> {
+        let bottom = self.top + self.data_height;
+        let label_y = bottom + TICK_PX + GAP_PX / 2.0 + DIGIT_HEIGHT * TICK_LABEL_PX;
+        let middle = self.left + self.data_width / 2.0;
+        let title_y = label_y + GAP_PX + LABEL_PX;
+        let mut shapes = vec![text(self.x.label, (middle, title_y), Anchor::Middle, LABEL_PX)];
+        for tick in &self.x_ticks {
+            let x = self.at(tick.value, self.y.low).0.round();
+            shapes.push(line((x, bottom), (x, bottom + STROKE_PX + TICK_PX)));
+            shapes.push(text(&tick.label, (x, label_y), Anchor::Middle, TICK_LABEL_PX));
+        }
+        shapes
+    }
+
+    fn y_axis(&self) -> Vec<Shape> {
+        let label_x = self.left - STROKE_PX - TICK_PX - GAP_PX / 2.0;
+        let title_x = label_x - widest(&self.y_ticks) - GAP_PX;
+        let middle = (title_x, self.top + self.data_height / 2.0);
+        let mut shapes = vec![upward(self.y.label, middle)];
+        for tick in &self.y_ticks {
+            let y = self.at(self.x.low, tick.value).1.round();
+            let base_y = y + DIGIT_HEIGHT / 2.0 * TICK_LABEL_PX;
+            shapes.push(line((self.left - STROKE_PX - TICK_PX, y), (self.left, y)));
+            shapes.push(text(&tick.label, (label_x, base_y), Anchor::End, TICK_LABEL_PX));
+        }
+        shapes
+    }
+}

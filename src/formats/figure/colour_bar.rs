@@ -1,0 +1,176 @@
+//! Values to colours, and the bar beside a raster that explains them.
+
+use super::FigureError;
+use super::drawing::{Anchor, Rgb, Shape, Weight, text_width_px};
+use super::style::{
+    DIGIT_HEIGHT, GAP_PX, LABEL_PX, LINE_SPACING, TICK_LABEL_PX, TICK_PX, line, text, ticks_along,
+    upward, widest,
+};
+use super::ticks::{Tick, ticks};
+
+/// The colour of NaN.
+pub(super) const NOTHING: Rgb = [221, 221, 221];
+const NOTHING_NOTE: &str = "no detection";
+
+const BAR_WIDTH_PX: f32 = 24.0;
+const BAR_MIN_HEIGHT_PX: f32 = 240.0;
+/// Height of the triangle that ends a colour bar beyond which there are values.
+const BEYOND_PX: f32 = 16.0;
+
+/// Values to colours.
+pub(super) struct Colours {
+    low: f64,
+    high: f64,
+    steps: Vec<Rgb>,
+}
+
+impl Colours {
+    /// Colours for a range, or for the finite values; `None` where there are neither.
+    pub fn over(values: &[f32], range: Option<(f64, f64)>) -> Result<Option<Colours>, FigureError> {
+        let Some((low, high)) = range.or_else(|| span(values)) else { return Ok(None) };
+        if !(low < high && (high - low).is_finite()) {
+            return Err(FigureError::Range { low, high });
+        }
+        let steps = (0..256).map(|step| colorous::VIRIDIS.eval_rational(step, 256).into_array());
+        Ok(Some(Colours { low, high, steps: steps.collect() }))
+    }
+
+    pub fn of(&self, value: f32) -> Rgb {
+        if value.is_nan() {
+            return NOTHING;
+        }
+        let share = (f64::from(value) - self.low) / (self.high - self.low);
+        self.steps[(255.0 * share.clamp(0.0, 1.0)).round() as usize]
+    }
+}
+
+/// Least and greatest finite value; a little around a single one, which has no span of its own.
+fn span(values: &[f32]) -> Option<(f64, f64)> {
+    let finite = || values.iter().copied().filter(|v| v.is_finite());
+    let low = f64::from(finite().reduce(f32::min)?);
+    let high = f64::from(finite().reduce(f32::max)?);
+    let around = if low == 0.0 { 1.0 } else { 0.05 * low.abs() };
+    Some(if low < high { (low, high) } else { (low - around, high + around) })
+}
+
+/// The column right of the data: the colour bar, and below it the note on what is grey.
+pub(super) struct Bar<'a> {
+    label: &'a str,
+    colours: Option<&'a Colours>,
+    ticks: Vec<Tick>,
+    pub height: f32,
+    below: bool,
+    above: bool,
+    gaps: bool,
+}
+
+impl<'a> Bar<'a> {
+    pub fn new(
+        label: &'a str,
+        colours: Option<&'a Colours>,
+        values: &[f32],
+        data_height: f32,
+    ) -> Self {
+        let label_px = text_width_px(label, LABEL_PX, Weight::Regular);
+        // In f32, so that an end that the data reach exactly is not taken for passed.
+        let any = |beyond: &dyn Fn(&Colours, f32) -> bool| {
+            colours.is_some_and(|c| values.iter().any(|&value| beyond(c, value)))
+        };
+        let mut bar = Bar {
+            label,
+            colours,
+            ticks: Vec::new(),
+            height: data_height.max(BAR_MIN_HEIGHT_PX),
+            below: any(&|c, value| value < c.low as f32),
+            above: any(&|c, value| value > c.high as f32),
+            gaps: values.iter().any(|v| v.is_nan()),
+        };
+        bar.height += (label_px - bar.ramp_height()).max(0.0);
+        if let Some(Colours { low, high, .. }) = colours {
+            bar.ticks = ticks(*low, *high, ticks_along(bar.ramp_height()).max(3));
+        }
+        bar
+    }
+
+    pub fn width(&self) -> f32 {
+        let ticks = TICK_PX + GAP_PX + widest(&self.ticks) + LINE_SPACING * LABEL_PX;
+        let note = GAP_PX + text_width_px(NOTHING_NOTE, TICK_LABEL_PX, Weight::Regular);
+        let note = if self.gaps { note } else { 0.0 };
+        BAR_WIDTH_PX + note.max(if self.colours.is_some() { ticks } else { 0.0 })
+    }
+
+    /// Height of the part that runs through the colours, px.
+    fn ramp_height(&self) -> f32 {
+        let ends = f32::from(u8::from(self.below) + u8::from(self.above)) * BEYOND_PX;
+        let note = if self.gaps { BAR_WIDTH_PX + 2.0 * GAP_PX } else { 0.0 };
+        (self.height - ends - note).round()
+    }
+
+    pub fn shapes(&self, left: f32, top: f32) -> Vec<Shape> {
+        let left = left.round();
+        let mut shapes = Vec::new();
+        if let Some(colours) = self.colours {
+            let top = top + if self.above { BEYOND_PX } else { 0.0 };
+            shapes.extend(self.ramp(colours, left, top));
+            shapes.extend(self.scale(colours, left + BAR_WIDTH_PX, top));
+        }
+        if self.gaps {
+            shapes.extend(note(left, (top + self.height - BAR_WIDTH_PX).round()));
+        }
+        shapes
+    }
+
+    fn ramp(&self, colours: &Colours, left: f32, top: f32) -> Vec<Shape> {
+        let (rows, columns) = (self.ramp_height() as usize, BAR_WIDTH_PX as usize);
+        let bottom = top + rows as f32;
+        let step = |row: usize| colours.steps[255 - 256 * row / rows.max(1)];
+        let cells = Shape::Cells {
+            left_px: left as u32,
+            top_px: top as u32,
+            cell_px: 1,
+            columns,
+            colours: (0..rows).flat_map(|row| std::iter::repeat_n(step(row), columns)).collect(),
+        };
+        let mut shapes = vec![cells];
+        if self.below {
+            shapes.push(beyond(left, bottom, bottom + BEYOND_PX, colours.steps[0]));
+        }
+        if self.above {
+            shapes.push(beyond(left, top, top - BEYOND_PX, colours.steps[255]));
+        }
+        shapes
+    }
+
+    fn scale(&self, colours: &Colours, x: f32, top: f32) -> Vec<Shape> {
+        let label_x = x + TICK_PX + GAP_PX / 2.0;
+        let title_x = label_x + widest(&self.ticks) + GAP_PX / 2.0 + LABEL_PX;
+        let mut shapes = vec![upward(self.label, (title_x, top + self.ramp_height() / 2.0))];
+        for tick in &self.ticks {
+            let share = (tick.value - colours.low) / (colours.high - colours.low);
+            let y = (top + (1.0 - share as f32) * self.ramp_height()).round();
+            shapes.push(line((x, y), (x + TICK_PX, y)));
+            let at = (label_x, y + DIGIT_HEIGHT / 2.0 * TICK_LABEL_PX);
+            shapes.push(text(&tick.label, at, Anchor::Start, TICK_LABEL_PX));
+        }
+        shapes
+    }
+}
+
+/// The triangle that says there are values beyond the end of the bar at `from`.
+fn beyond(left: f32, from: f32, to: f32, colour: Rgb) -> Shape {
+    let corners = [(left, from), (left + BAR_WIDTH_PX, from), (left + BAR_WIDTH_PX / 2.0, to)];
+    Shape::Area { corners: corners.into(), colour }
+}
+
+fn note(left: f32, top: f32) -> [Shape; 2] {
+    let swatch = Shape::Cells {
+        left_px: left as u32,
+        top_px: top as u32,
+        cell_px: BAR_WIDTH_PX as u32,
+        columns: 1,
+        colours: vec![NOTHING],
+    };
+    let base_y = top + BAR_WIDTH_PX / 2.0 + DIGIT_HEIGHT / 2.0 * TICK_LABEL_PX;
+    let at = (left + BAR_WIDTH_PX + GAP_PX, base_y);
+    [swatch, text(NOTHING_NOTE, at, Anchor::Start, TICK_LABEL_PX)]
+}

@@ -1,0 +1,237 @@
+//! Curves and points over two axes.
+
+use super::FigureError;
+use super::axes::{Axes, Axis};
+use super::drawing::{Anchor, Drawing, Rgb, Shape, Weight, text_width_px};
+use super::style::{DIGIT_HEIGHT, GAP_PX, MARGIN_PX, TICK_LABEL_PX, text};
+
+/// Longest sides of the data area, px.
+const DATA_WIDTH_PX: f32 = 780.0;
+const DATA_HEIGHT_PX: f32 = 560.0;
+const EQUAL_SIDE_PX: f32 = 900.0;
+
+const CURVE_PX: f32 = 2.5;
+const POINT_PX: f32 = 3.0;
+/// Length of the sample beside a name in the legend, px.
+const SAMPLE_PX: f32 = 34.0;
+
+/// Colours that stay apart for colour-blind readers: Okabe and Ito, 2008.
+const PALETTE: [Rgb; 6] =
+    [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233]];
+
+/// A plot of any number of series.
+#[derive(Clone, Debug)]
+pub struct Plot<'a> {
+    /// First line, bold; may be empty.
+    pub title: &'a str,
+    /// Second line, quiet; may be empty.
+    pub subtitle: &'a str,
+    /// Quantity and unit along x.
+    pub x_label: &'a str,
+    /// Quantity and unit along y.
+    pub y_label: &'a str,
+    /// Values at the ends of x; those of the data if `None`.
+    pub x_range: Option<(f64, f64)>,
+    /// Values at the ends of y; those of the data if `None`.
+    pub y_range: Option<(f64, f64)>,
+    /// One unit is as long along x as along y, as on a map.
+    pub equal: bool,
+    /// What is drawn, the first lowest.
+    pub series: Vec<Series>,
+}
+
+/// Points that belong together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// Name in the legend; none when empty.
+    pub name: String,
+    /// How the points are drawn.
+    pub style: Style,
+    /// (x, y); a point that is not finite interrupts a curve.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// A line through the points.
+    Curve,
+    /// A small square at each point.
+    Points,
+}
+
+impl Plot<'_> {
+    /// The plot as the bytes of a PNG file.
+    ///
+    /// # Errors
+    /// When there is no finite point and no range.
+    pub fn png(&self) -> Result<Vec<u8>, FigureError> {
+        Ok(self.drawing()?.png()?)
+    }
+
+    /// The plot as the text of an SVG file.
+    ///
+    /// # Errors
+    /// When there is no finite point and no range.
+    pub fn svg(&self) -> Result<String, FigureError> {
+        Ok(self.drawing()?.svg()?)
+    }
+
+    fn drawing(&self) -> Result<Drawing, FigureError> {
+        let x = Axis { label: self.x_label, ..self.axis(self.x_range, |p| p.0)? };
+        let y = Axis { label: self.y_label, ..self.axis(self.y_range, |p| p.1)? };
+        let data = self.size(x.high - x.low, y.high - y.low);
+        let axes = Axes::new([x, y], data, [self.title, self.subtitle], data[0]);
+        let mut shapes: Vec<Shape> = std::iter::zip(&self.series, PALETTE.iter().cycle())
+            .flat_map(|(series, &colour)| series.shapes(&axes, [x, y], colour))
+            .collect();
+        shapes.extend(axes.shapes());
+        shapes.extend(self.legend(&axes));
+        Ok(Drawing {
+            width_px: (axes.left + data[0] + MARGIN_PX).ceil(),
+            height_px: (axes.top + axes.height_with_labels() + MARGIN_PX / 2.0).ceil(),
+            shapes,
+        })
+    }
+
+    /// The given range, or one that holds all finite values with a little room.
+    fn axis(
+        &self,
+        range: Option<(f64, f64)>,
+        of: fn(&(f64, f64)) -> f64,
+    ) -> Result<Axis<'static>, FigureError> {
+        let values =
+            || self.series.iter().flat_map(|s| &s.points).map(of).filter(|v| v.is_finite());
+        let around = || {
+            let (low, high) = (values().reduce(f64::min)?, values().reduce(f64::max)?);
+            let room = if low < high { 0.04 * (high - low) } else { low.abs().max(1.0) };
+            Some((low - room, high + room))
+        };
+        let (low, high) = range.or_else(around).unwrap_or((f64::NAN, f64::NAN));
+        if low < high && (high - low).is_finite() {
+            return Ok(Axis { label: "", low, high });
+        }
+        Err(FigureError::Range { low, high })
+    }
+
+    fn size(&self, width: f64, height: f64) -> [f32; 2] {
+        if !self.equal {
+            return [DATA_WIDTH_PX, DATA_HEIGHT_PX];
+        }
+        let scale = f64::from(EQUAL_SIDE_PX) / width.max(height);
+        // A sliver still needs room for its ticks.
+        [width, height].map(|side| ((side * scale) as f32).max(EQUAL_SIDE_PX / 4.0).round())
+    }
+
+    /// Names of the series in the upper right corner.
+    fn legend(&self, axes: &Axes) -> Vec<Shape> {
+        let named: Vec<(&Series, Rgb)> = std::iter::zip(&self.series, PALETTE.into_iter().cycle())
+            .filter(|(series, _)| !series.name.is_empty())
+            .collect();
+        let width = |name: &str| text_width_px(name, TICK_LABEL_PX, Weight::Regular);
+        let widest = named.iter().map(|(series, _)| width(&series.name)).fold(0.0, f32::max);
+        let left = axes.left + axes.data_width - widest - SAMPLE_PX - 2.0 * GAP_PX;
+        let mut shapes = Vec::new();
+        for (row, (series, colour)) in named.into_iter().enumerate() {
+            let y = axes.top + GAP_PX + (row as f32 + 0.6) * 1.4 * TICK_LABEL_PX;
+            let ends = [(left, y), (left + SAMPLE_PX, y)];
+            shapes.extend(match series.style {
+                Style::Curve => curve(ends.to_vec(), colour),
+                Style::Points => square((left + SAMPLE_PX / 2.0, y), colour),
+            });
+            let base = (left + SAMPLE_PX + GAP_PX, y + DIGIT_HEIGHT / 2.0 * TICK_LABEL_PX);
+            shapes.push(text(&series.name, base, Anchor::Start, TICK_LABEL_PX));
+        }
+        shapes
+    }
+}
+
+impl Series {
+    fn shapes(&self, axes: &Axes, [x, y]: [Axis; 2], colour: Rgb) -> Vec<Shape> {
+        let within = |axis: &Axis, value: f64| value >= axis.low && value <= axis.high;
+        let visible = |&(px, py): &(f64, f64)| within(&x, px) && within(&y, py);
+        match self.style {
+            Style::Points => {
+                let seen = self.points.iter().filter(|p| visible(p));
+                seen.flat_map(|&(px, py)| square(axes.at(px, py), colour)).collect()
+            }
+            Style::Curve => self
+                .points
+                .chunk_by(|a, b| visible(a) && visible(b))
+                .filter(|run| run.len() > 1)
+                .flat_map(|run| {
+                    curve(run.iter().map(|&(px, py)| axes.at(px, py)).collect(), colour)
+                })
+                .collect(),
+        }
+    }
+}
+
+fn curve(points: Vec<(f32, f32)>, colour: Rgb) -> Option<Shape> {
+    Some(Shape::Line { points, colour, thickness_px: CURVE_PX })
+}
+
+fn square((x, y): (f32, f32), colour: Rgb) -> Option<Shape> {
+    let half = POINT_PX / 2.0;
+    let corners = vec![
+        (x - half, y - half),
+        (x + half, y - half),
+        (x + half, y + half),
+        (x - half, y + half),
+    ];
+    Some(Shape::Area { corners, colour })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plot(series: Vec<Series>) -> Plot<'static> {
+        Plot {
+            title: "Lobe",
+            subtitle: "",
+            x_label: "incidence, °",
+            y_label: "σ⁰, dB",
+            x_range: None,
+            y_range: None,
+            equal: false,
+            series,
+        }
+    }
+
+    fn parabola(style: Style) -> Series {
+        let points = (0..50).map(|i| (f64::from(i), -f64::from(i).powi(2))).collect();
+        Series { name: "parabola".into(), style, points }
+    }
+
+    #[test]
+    fn curves_and_points_are_drawn_the_same_way_every_time() {
+        let both = plot(vec![parabola(Style::Curve), parabola(Style::Points)]);
+        let png = both.png().unwrap();
+        assert!(png.starts_with(b"\x89PNG"));
+        assert_eq!(png, both.png().unwrap());
+        assert!(both.svg().unwrap().contains("<svg"));
+    }
+
+    #[test]
+    fn a_gap_interrupts_a_curve() {
+        let gap = (25.0, f64::NAN);
+        let mut series = parabola(Style::Curve);
+        let whole = plot(vec![series.clone()]).drawing().unwrap().shapes.len();
+        series.points[25] = gap;
+        assert_eq!(plot(vec![series]).drawing().unwrap().shapes.len(), whole + 1);
+    }
+
+    #[test]
+    fn a_map_keeps_its_proportions() {
+        let map = Plot { equal: true, ..plot(vec![]) };
+        assert_eq!(map.size(0.5, 0.9), [500.0, 900.0]);
+    }
+
+    #[test]
+    fn nothing_to_draw_is_an_error() {
+        assert!(plot(vec![]).png().is_err());
+        let nan = Series { points: vec![(f64::NAN, 1.0)], ..parabola(Style::Points) };
+        assert!(plot(vec![nan]).png().is_err());
+    }
+}
