@@ -9,6 +9,8 @@ use crate::formats::exr::ExrError;
 use crate::formats::figure::FigureError;
 use crate::material::MaterialError;
 use crate::material::file::FileError;
+use crate::radar::RadarError;
+use crate::radar::f5::F5Error;
 use crate::render::RenderError;
 use crate::scene::SceneError;
 use crate::store::StoreError;
@@ -19,6 +21,12 @@ pub enum Error {
     /// A scene cannot be loaded.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// A radar cannot exist.
+    #[error(transparent)]
+    Radar(#[from] RadarError),
+    /// Equation (1) cannot be had.
+    #[error(transparent)]
+    F5(#[from] F5Error),
     /// A scene cannot be rendered.
     #[error("{}: {error}", scene.display())]
     Render {

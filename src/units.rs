@@ -3,6 +3,9 @@
 //! Inside the crate a power is in watts, a level is a ratio, an angle is in radians. Decibels and
 //! degrees appear only where a person or a file does.
 
+/// Speed of light in vacuum, m/s (exact, SI).
+pub const SPEED_OF_LIGHT_M_PER_S: f64 = 299_792_458.0;
+
 /// Power ratio for a level in decibels: `10^(x/10)`.
 ///
 /// ```

@@ -14,7 +14,7 @@ const ROUNDING: f64 = 1e-9;
 
 fn echoes(radar: &Radar, mesh: &Mesh) -> Vec<Echo> {
     let chirps = Chirps::draw(radar, |_| Err("no file".to_owned())).unwrap();
-    let hits = trace(radar, &chirps, mesh, &|_| {}).unwrap();
+    let hits = trace(radar, &chirps, mesh, 1, &|_| {}).unwrap();
     let chalk = Lambert { albedo: 0.5 };
     let surfaces: [&dyn Scattering; 1] = [&chalk];
     shade(radar, &chirps, &hits, &vec![0; mesh.facets.len()], &surfaces).echoes

@@ -45,7 +45,7 @@ fn echoes(mut mesh: Mesh, turn_rad: f64, surface: &dyn Scattering) -> Vec<Echo> 
     }
     let radar = Radar::default();
     let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
-    let hits = trace(&radar, &chirps, &mesh, &|_| {}).unwrap();
+    let hits = trace(&radar, &chirps, &mesh, 1, &|_| {}).unwrap();
     shade(&radar, &chirps, &hits, &vec![0; mesh.facets.len()], &[surface]).echoes
 }
 

@@ -132,7 +132,9 @@ fn render(text: &str) {
         return;
     }
     let Ok(scene) = Scene::resolve(file, Path::new("scene.toml")) else { return };
-    let Ok(hits) = trace(scene.radar(), &scene.chirps, &scene.target.mesh, &|_| {}) else { return };
+    let Ok(hits) = trace(scene.radar(), &scene.chirps, &scene.target.mesh, 1, &|_| {}) else {
+        return;
+    };
     let lambert = |_, _| 0.1;
     let surfaces: Vec<&dyn Scattering> =
         scene.target.regions.iter().map(|_| &lambert as _).collect();
@@ -149,7 +151,7 @@ fn render(text: &str) {
 #[test]
 fn the_texts_are_good_before_they_are_damaged() {
     let scene = Scene::resolve(SceneFile::parse(SCENE).unwrap(), Path::new("scene.toml")).unwrap();
-    trace(scene.radar(), &scene.chirps, &scene.target.mesh, &|_| {}).unwrap();
+    trace(scene.radar(), &scene.chirps, &scene.target.mesh, 1, &|_| {}).unwrap();
     parse("material.toml", MATERIAL, |_| Err(String::new())).unwrap();
     assert!(tokens(SCENE).len() > 100);
 }

@@ -7,6 +7,7 @@ mod console;
 mod list;
 mod materials;
 mod output;
+mod radar;
 mod render;
 mod rm;
 mod show;
@@ -54,6 +55,7 @@ struct Options {
 #[derive(Debug, Subcommand)]
 enum Command {
     Render(render::Args),
+    Radar(radar::Args),
     Add(add::Args),
     List(list::Args),
     Show(show::Args),
@@ -71,6 +73,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
     let db = &Database::new(db.as_deref());
     match &cli.command {
         Command::Render(args) => render::run(args, db, &console),
+        Command::Radar(args) => radar::run(args, &console),
         Command::Add(args) => add::run(args, db, &console),
         Command::List(_) => list::run(db, &console),
         Command::Show(args) => show::run(args, db, &console),

@@ -22,7 +22,7 @@ pub struct Optics {
     /// Vertical axis of the ellipse, at most the horizontal one, m. 0.4: paper; with it the wave
     /// meets the mirror at arccos(0.4/0.5) = 36.9°.
     pub ellipse_height_m: f64,
-    /// Angle of the outgoing wave per angle of the wave leaving the mirror. 0.25: assumed; the
+    /// Angle of the outgoing wave per angle of the wave leaving the mirror. 0.5: assumed; the
     /// paper's reflectors are not published.
     pub angular_magnification: f64,
     /// Horizontal and vertical direction of the undeflected beam off the line from the main
@@ -35,7 +35,7 @@ impl Default for Optics {
         Optics {
             ellipse_width_m: 0.5,
             ellipse_height_m: 0.4,
-            angular_magnification: 0.25,
+            angular_magnification: 0.5,
             offset_deg: [0.0, 0.0],
         }
     }

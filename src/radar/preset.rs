@@ -10,6 +10,7 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use super::beam::BeamEntry;
 use super::f5::{F5, F5Error};
 use super::mirror::Optics;
 use super::{Footprint, Pattern};
@@ -63,6 +64,8 @@ pub struct Radar {
     pub alpha_deg: f64,
     /// Time from one chirp to the next, s. 200e-6: assumed; a scan of 18 529 chirps takes 3.7 s.
     pub chirp_period_s: f64,
+    /// How the spot grows away from the centre and the focus.
+    pub beam: BeamEntry,
     /// The scanning mirror and the reflectors behind it.
     pub optics: Optics,
     /// Own coefficients of equation (1), in place of those fitted to `optics`.
@@ -157,6 +160,7 @@ impl Default for Radar {
             primary_focus_m: [0.0, 1.1, 8.0],
             alpha_deg: -90.0,
             chirp_period_s: 200e-6,
+            beam: BeamEntry::default(),
             optics: Optics::default(),
             f5: None,
             scan: Pattern::default(),
@@ -195,7 +199,8 @@ impl Radar {
             ("alpha_deg", self.alpha_deg, (-360.0, 360.0)),
             ("chirp_period_s", self.chirp_period_s, (1e-9, 3600.0)),
         ];
-        let parts = self.optics.checks().into_iter().chain(self.scan.checks());
+        let parts = self.beam.checks().into_iter().chain(self.optics.checks());
+        let parts = parts.chain(self.scan.checks());
         checks.into_iter().chain(parts).try_for_each(in_range)?;
         self.f5.as_ref().map_or(Ok(()), |f5| Ok(f5.validate()?))
     }

@@ -28,6 +28,7 @@ pub fn cloud_table(
         column("range_m", Scalar::Float, &|e| e.hit.range_m),
         column("power_dbm", Scalar::Float, &|e| e.power_dbm),
         column("incidence_deg", Scalar::Float, &|e| e.hit.theta_rad().to_degrees()),
+        column("incidence_sd_deg", Scalar::Float, &|e| e.theta_sd_rad.to_degrees()),
         column("chirp", Scalar::UInt, &|e| e.chirp.into()),
         column("facet", Scalar::UInt, &|e| e.hit.facet.into()),
         column("region", Scalar::UShort, &|e| e.region.into()),

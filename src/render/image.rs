@@ -124,7 +124,7 @@ mod tests {
     fn echo(xt_m: f64, yt_m: f64, power_dbm: f64) -> Echo {
         let point = Point::new(xt_m, yt_m, 0.0);
         let hit = Hit { facet: 0, range_m: 8.0, point, cos_theta: 0.5 };
-        Echo { chirp: 0, hit, xt_m, yt_m, region: 0, power_dbm }
+        Echo { chirp: 0, hit, theta_sd_rad: 0.0, xt_m, yt_m, region: 0, power_dbm }
     }
 
     fn image(echoes: Vec<Echo>) -> Raster {

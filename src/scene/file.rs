@@ -35,6 +35,9 @@ pub struct SceneFile {
     /// The instrument.
     #[serde(default)]
     pub radar: Radar,
+    /// How the spot is sampled.
+    #[serde(default)]
+    pub spot: SpotEntry,
     /// How detections become an image.
     #[serde(default)]
     pub image: ImageEntry,
@@ -44,6 +47,20 @@ pub struct SceneFile {
     /// Which facets are made of what.
     #[serde(default)]
     pub region: Vec<RegionEntry>,
+}
+
+/// How the spot is sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SpotEntry {
+    /// Rays per chirp, 1 to 10 000. 1: paper, equation (8); more average over the spot, (7).
+    pub rays: usize,
+}
+
+impl Default for SpotEntry {
+    fn default() -> Self {
+        SpotEntry { rays: 1 }
+    }
 }
 
 /// How detections become an image.

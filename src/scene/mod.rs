@@ -101,13 +101,9 @@ impl Scene {
 
     /// Reads a scene file and every mesh it names.
     pub fn load(path: &Path) -> Result<Scene, SceneError> {
-        let bytes = read(path, "")?;
+        let text = read_text(path)?;
         let at = |error| SceneError::Format { file: path.to_owned(), error };
-        let text = std::str::from_utf8(&bytes).map_err(|error| {
-            let place = format!("byte {}", error.valid_up_to());
-            at(FormatError::at(place, "the text is not UTF-8", "save the file as UTF-8"))
-        })?;
-        Scene::resolve(SceneFile::parse(text).map_err(at)?, path)
+        Scene::resolve(SceneFile::parse(&text).map_err(at)?, path)
     }
 
     /// Loads what a scene file describes; relative paths start from the folder of `path`.
@@ -118,6 +114,7 @@ impl Scene {
         let read_csv = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
         let chirps = Chirps::draw(&file.radar, read_csv).map_err(at)?;
         let pixel_m = pixel_m(&file);
+        check_spot(file.spot.rays, chirps.rays.len(), path)?;
         check_pixel(pixel_m, &file.radar, &chirps, path)?;
         file.image.pixel_m = Some(pixel_m);
         if file.name.is_empty() {
@@ -126,6 +123,21 @@ impl Scene {
         let target = Target::load(&file, path)?;
         Ok(Scene { file, chirps, target })
     }
+}
+
+/// A spot needs a ray, and all rays together must fit into memory.
+fn check_spot(rays: usize, chirps: usize, file: &Path) -> Result<(), SceneError> {
+    const MOST_RAYS_PER_CHIRP: usize = 10_000;
+    const MOST_RAYS: usize = 50_000_000;
+    if (1..=MOST_RAYS_PER_CHIRP).contains(&rays) && rays.saturating_mul(chirps) <= MOST_RAYS {
+        return Ok(());
+    }
+    Err(SceneError::Value {
+        file: file.to_owned(),
+        place: "spot.rays".to_owned(),
+        problem: format!("{rays} rays for each of {chirps} chirps"),
+        way_out: "give 1 to 10 000 rays, at most 50 million in all".to_owned(),
+    })
 }
 
 /// The given pixel, or a quarter of the spot, m.
@@ -159,6 +171,15 @@ fn check_pixel(
              pixels on a side or 16 million in all"
         ),
         way_out: format!("a quarter of the spot is {} m", spot_m / 4.0),
+    })
+}
+
+/// Reads a scene file's text.
+pub fn read_text(path: &Path) -> Result<String, SceneError> {
+    String::from_utf8(read(path, "")?).map_err(|error| {
+        let place = format!("byte {}", error.utf8_error().valid_up_to());
+        let error = FormatError::at(place, "the text is not UTF-8", "save the file as UTF-8");
+        SceneError::Format { file: path.to_owned(), error }
     })
 }
 

@@ -42,7 +42,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 
     let (radar, Scene { chirps, target, .. }) = (scene.radar(), &scene);
     let bar = console.progress("tracing", chirps.rays.len());
-    let hits = trace(radar, chirps, &target.mesh, &|chirps| bar.inc(chirps as u64));
+    let rays = scene.file.spot.rays;
+    let hits = trace(radar, chirps, &target.mesh, rays, &|chirps| bar.inc(chirps as u64));
     bar.finish_and_clear();
     let hits = hits.map_err(|error| Error::Render { scene: args.scene.clone(), error })?;
     stages.end("trace", console);

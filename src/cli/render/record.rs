@@ -14,7 +14,8 @@ const SCHEMA: u32 = 1;
 /// How to get from the record to a power, for a reader without the program.
 const EQUATION: &str = "power_w = transmit_power_w * 10^(-system_loss_db/10) * aperture_m2 / range_m^2 \
     * f_per_sr(incidence) * cos(incidence)^n, n = 2 for footprint \"paper\", 1 for \"projected\"; \
-    f_per_sr is the scattering model of the point's material in backscatter";
+    f_per_sr is the scattering model of the point's material in backscatter; with scene.spot.rays > 1 the power is the \
+    mean of this over the rays of the spot, and range and incidence are no longer those of one ray";
 
 /// A rendering, as `scan.json` holds it.
 #[derive(Serialize)]
@@ -115,6 +116,7 @@ impl<'a> Record<'a> {
             scene: json!({
                 "name": file.name,
                 "seed": file.seed,
+                "spot": file.spot,
                 "mesh": file.mesh,
                 "region": file.region,
             }),

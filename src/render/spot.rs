@@ -1,0 +1,142 @@
+//! Sub-rays: equation (7), the integral over the spot, by samples of its Gaussian.
+//!
+//! The integrand of (7) is weighted by the beam's intensity. Sampling that weight itself leaves a
+//! plain mean: P = (1/N)·Σ P_j with each P_j from equation (11). Sample j of N stands at the share
+//! (j + ½)/N of the beam's power from its axis, and at the golden angle from its neighbour, so that
+//! radius and azimuth are both stratified.
+
+use std::f64::consts::{LN_2, TAU};
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::frames::{Direction, Global, Point, Ray};
+use crate::geometry::Mesh;
+use crate::radar::scan::PATTERN_RANGE_M;
+use crate::radar::{Beam, Chirps, Radar};
+use crate::trace::{Bvh, Hit};
+
+/// 1/φ: successive multiples of it are spread evenly over 0 to 1.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// What the rays of every chirp met. Kept, it can be shaded again with other materials.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Footprints {
+    /// Rays per chirp N.
+    pub rays_per_chirp: usize,
+    /// N entries per chirp; for N = 1 the ray along the beam's axis.
+    pub hits: Vec<Option<Hit>>,
+}
+
+impl Footprints {
+    /// The hits of each chirp.
+    pub fn chirps(&self) -> impl IndexedParallelIterator<Item = &[Option<Hit>]> {
+        self.hits.par_chunks(self.rays_per_chirp.max(1))
+    }
+}
+
+/// Traces N rays for every chirp; `done` is told how many chirps are finished.
+pub(super) fn trace(
+    radar: &Radar,
+    chirps: &Chirps,
+    mesh: &Mesh,
+    rays_per_chirp: usize,
+    done: &(dyn Fn(usize) + Sync),
+) -> Footprints {
+    const CHIRPS_PER_TASK: usize = 256;
+    let (bvh, beam) = (Bvh::new(mesh), Beam::new(radar));
+    let target_from_global = radar.frames().global_from_target.inverse();
+    let chirp = |(number, axis): (usize, &Ray<Global>)| {
+        let hit = bvh.closest(axis);
+        if rays_per_chirp == 1 {
+            return vec![hit];
+        }
+        // The spot is as wide as the beam where its axis meets the target, or at 8 m.
+        let range_m = hit.map_or(PATTERN_RANGE_M, |hit| hit.range_m);
+        let looks_at = Point::from(axis.origin.xyz + PATTERN_RANGE_M * axis.direction.xyz());
+        let aim = (target_from_global * looks_at).xyz;
+        let tangent = beam.diameter_m(aim.x, aim.y, range_m) / range_m;
+        sub_rays(axis, tangent, number, rays_per_chirp).map(|ray| bvh.closest(&ray?)).collect()
+    };
+    let hits = chirps
+        .rays
+        .par_chunks(CHIRPS_PER_TASK)
+        .enumerate()
+        .flat_map_iter(|(task, rays)| {
+            let first = task * CHIRPS_PER_TASK;
+            let hits: Vec<Option<Hit>> =
+                rays.iter().enumerate().flat_map(|(i, ray)| chirp((first + i, ray))).collect();
+            done(rays.len());
+            hits
+        })
+        .collect();
+    Footprints { rays_per_chirp, hits }
+}
+
+/// Rays through the spot; `tangent` is its diameter over the range, `chirp` turns the pattern so
+/// that neighbouring chirps do not repeat it.
+fn sub_rays(
+    axis: &Ray<Global>,
+    tangent: f64,
+    chirp: usize,
+    count: usize,
+) -> impl Iterator<Item = Option<Ray<Global>>> {
+    let forward = axis.direction.xyz();
+    let (right, up) = across(forward);
+    let origin = axis.origin;
+    (0..count).map(move |sample| {
+        let share = (sample as f64 + 0.5) / count as f64;
+        // The share of a Gaussian's power within r is 1 − 2^(−(2r/D)²).
+        let radius = 0.5 * tangent * (-(1.0 - share).ln() / LN_2).sqrt();
+        let turn = TAU * ((chirp + sample) as f64 * GOLDEN).fract();
+        let aside = radius * (turn.cos() * right + turn.sin() * up);
+        Direction::new(forward + aside).map(|direction| Ray { origin, direction })
+    })
+}
+
+/// Two unit vectors across a third, all at right angles.
+fn across(forward: DVec3) -> (DVec3, DVec3) {
+    let right = forward.any_orthonormal_vector();
+    (right, forward.cross(right))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn axis() -> Ray<Global> {
+        let origin = Point::new(0.0, 0.0, 8.0);
+        Ray { origin, direction: origin.towards(Point::new(0.0, 0.0, 0.0)).unwrap() }
+    }
+
+    fn radii_m(count: usize) -> Vec<f64> {
+        sub_rays(&axis(), 0.016 / 8.0, 3, count)
+            .map(|ray| {
+                let direction = ray.unwrap().direction.xyz();
+                8.0 * direction.x.hypot(direction.y) / -direction.z
+            })
+            .collect()
+    }
+
+    #[test]
+    fn half_the_power_lies_within_the_spot_s_diameter() {
+        let within = radii_m(1000).iter().filter(|r| **r < 0.008).count();
+        assert_eq!(within, 500);
+    }
+
+    #[test]
+    fn the_samples_have_the_gaussian_s_second_moment() {
+        // ⟨r²⟩ = D²/(4·ln 2) for an intensity that falls to half at D/2.
+        let mean = radii_m(4000).iter().map(|r| r * r).sum::<f64>() / 4000.0;
+        let expected = 0.016f64.powi(2) / (4.0 * LN_2);
+        assert!((mean / expected - 1.0).abs() < 2e-3, "{mean} is not {expected}");
+    }
+
+    #[test]
+    fn the_samples_are_centred() {
+        let sum = sub_rays(&axis(), 0.002, 0, 1000)
+            .flatten()
+            .fold(DVec3::ZERO, |sum, ray| sum + ray.direction.xyz());
+        assert!((sum / 1000.0).truncate().length() < 0.002 / 100.0);
+    }
+}
