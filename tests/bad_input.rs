@@ -71,6 +71,18 @@ fn mistakes_in_the_scene_file() {
             &["no radar preset `upm`", "upm-300ghz"],
         ),
         ("[[mesh]]", "[image]\npixel_m = -1.0\n[[mesh]]", &["image.pixel_m", "0.004"]),
+        ("[[mesh]]", "[spot]\nrays = 0\n[[mesh]]", &["spot.rays", "1 to 10 000"]),
+        (
+            "[[mesh]]",
+            "[radar.optics]\nellipse_height_m = 0.6\n[[mesh]]",
+            &["radar.optics.ellipse_height_m = 0.6"],
+        ),
+        (
+            "[[mesh]]",
+            "[radar.scan]\npattern = \"rays\"\nfile = \"r.csv\"\n[[mesh]]",
+            &["cannot read the scan r.csv"],
+        ),
+        ("[[mesh]]", "[radar.scan]\npattern = \"spirl\"\n[[mesh]]", &["did you mean `spiral`?"]),
         (
             "\"ptfe\"",
             "\"aluminum\"",
