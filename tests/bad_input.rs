@@ -233,6 +233,12 @@ fn materials_that_are_not_there() {
     check(&run(&["rm", "ptfe"]), &["no material `ptfe`"]);
     check(&run(&["add", "--from", "none.toml"]), &["cannot read none.toml"]);
     check(&run(&["add", "--from", "."]), &["holds no material.toml"]);
+    let plot = |rest: &[&str]| run(&[&["plot", "ptfe"], rest].concat());
+    check(&plot(&["-o", "x.pdf"]), &["x.pdf", ".svg or .png"]);
+    check(&plot(&["-o", "x.png", "--sweep", "m=1"]), &["no parameter `m`", "specular.m"]);
+    check(&plot(&["-o", "x.png", "--sweep", "specular.m"]), &["names no values"]);
+    check(&plot(&["-o", "x.png", "--sweep", "specular.m=x"]), &["`x` is no number"]);
+    check(&plot(&["-o", "x.png", "--sweep", "specular.m=5"]), &["specular.m = 5", "0.001 to 2"]);
     assert!(entries(folder.path()).is_empty(), "nothing was created");
 }
 

@@ -7,6 +7,7 @@ mod console;
 mod list;
 mod materials;
 mod output;
+mod plot;
 mod radar;
 mod render;
 mod rm;
@@ -59,6 +60,7 @@ enum Command {
     Add(add::Args),
     List(list::Args),
     Show(show::Args),
+    Plot(plot::Args),
     Rm(rm::Args),
     Completions(completions::Args),
 }
@@ -77,6 +79,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Add(args) => add::run(args, db, &console),
         Command::List(_) => list::run(db, &console),
         Command::Show(args) => show::run(args, db, &console),
+        Command::Plot(args) => plot::run(args, db, &console),
         Command::Rm(args) => rm::run(args, db, &console),
         Command::Completions(args) => completions::run(args),
     }

@@ -11,7 +11,10 @@ const DATA_HEIGHT_PX: f32 = 560.0;
 const EQUAL_SIDE_PX: f32 = 900.0;
 
 const CURVE_PX: f32 = 2.5;
-const POINT_PX: f32 = 3.0;
+/// Side of a point among few, and among so many that they would hide each other.
+const POINT_PX: f32 = 7.0;
+const DENSE_POINT_PX: f32 = 3.0;
+const DENSE: usize = 1000;
 /// Length of the sample beside a name in the legend, px.
 const SAMPLE_PX: f32 = 34.0;
 
@@ -137,7 +140,7 @@ impl Plot<'_> {
             let ends = [(left, y), (left + SAMPLE_PX, y)];
             shapes.extend(match series.style {
                 Style::Curve => curve(ends.to_vec(), colour),
-                Style::Points => square((left + SAMPLE_PX / 2.0, y), colour),
+                Style::Points => square((left + SAMPLE_PX / 2.0, y), POINT_PX, colour),
             });
             let base = (left + SAMPLE_PX + GAP_PX, y + DIGIT_HEIGHT / 2.0 * TICK_LABEL_PX);
             shapes.push(text(&series.name, base, Anchor::Start, TICK_LABEL_PX));
@@ -152,8 +155,9 @@ impl Series {
         let visible = |&(px, py): &(f64, f64)| within(&x, px) && within(&y, py);
         match self.style {
             Style::Points => {
+                let side = if self.points.len() > DENSE { DENSE_POINT_PX } else { POINT_PX };
                 let seen = self.points.iter().filter(|p| visible(p));
-                seen.flat_map(|&(px, py)| square(axes.at(px, py), colour)).collect()
+                seen.flat_map(|&(px, py)| square(axes.at(px, py), side, colour)).collect()
             }
             Style::Curve => self
                 .points
@@ -171,8 +175,8 @@ fn curve(points: Vec<(f32, f32)>, colour: Rgb) -> Option<Shape> {
     Some(Shape::Line { points, colour, thickness_px: CURVE_PX })
 }
 
-fn square((x, y): (f32, f32), colour: Rgb) -> Option<Shape> {
-    let half = POINT_PX / 2.0;
+fn square((x, y): (f32, f32), side: f32, colour: Rgb) -> Option<Shape> {
+    let half = side / 2.0;
     let corners = vec![
         (x - half, y - half),
         (x + half, y - half),

@@ -1,0 +1,184 @@
+//! `matdb plot`.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::console::Console;
+use super::database::Database;
+use super::materials::{Found, find};
+use super::output::write_all;
+use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Scattering, Shadowing};
+use crate::error::Error;
+use crate::formats::figure::{Plot, Series, Style};
+use crate::material::Material;
+use crate::units::db_from_ratio;
+
+/// Draw how a material scatters, and what its parameters do
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb plot mannequin-paint -o paint.svg
+  matdb plot mannequin-paint --sweep specular.m=0.01,0.05,0.1 -o sweep.png
+  matdb plot --appendix -o figures          figures 16 to 19 of the paper, as PNG and SVG")]
+#[command(group = clap::ArgGroup::new("what").required(true))]
+pub(super) struct Args {
+    /// NAME or NAME@REVISION
+    #[arg(group = "what")]
+    material: Option<String>,
+    /// Figures 16 to 19 of the paper: what f_lambda, m, r_s and alpha do
+    #[arg(long, group = "what")]
+    appendix: bool,
+    /// Draw the fit for several values of one parameter
+    #[arg(long, value_name = "PARAMETER=V1,V2,…", requires = "material")]
+    sweep: Option<String>,
+    /// A .svg or .png file; a folder with --appendix
+    #[arg(long, short, value_name = "FILE")]
+    output: PathBuf,
+}
+
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    let written = match &args.material {
+        None => appendix(&args.output)?,
+        Some(name) => {
+            let store = db.read()?;
+            let Found { material, .. } = find(store.as_ref(), name, "")?;
+            let series = match &args.sweep {
+                None => curves(&material)?,
+                Some(sweep) => swept(&material, sweep)?,
+            };
+            let kind = material.render_kind().map_or("of unknown origin", |kind| kind.as_str());
+            one_file(&args.output, &plot(&material.name, kind, series))?
+        }
+    };
+    let text = format!("wrote {}\n", written.join(", "));
+    console.result(&text, &json!({ "files": written }))
+}
+
+fn plot<'a>(title: &'a str, subtitle: &'a str, series: Vec<Series>) -> Plot<'a> {
+    let (x_label, y_label) = ("incidence, °", "σ⁰, dB");
+    let x_range = Some((0.0, 90.0));
+    Plot { title, subtitle, x_label, y_label, x_range, y_range: None, equal: false, series }
+}
+
+/// Writes a plot to a file whose ending says how.
+fn one_file(path: &Path, plot: &Plot) -> Result<Vec<String>, Error> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let bytes = match path.extension().and_then(|e| e.to_str()) {
+        Some("svg") => plot.svg()?.into_bytes(),
+        Some("png") => plot.png()?,
+        _ => {
+            let problem = format!("`{}` does not end in .svg or .png", path.display());
+            return Err(Error::Usage { problem, way_out: "name the file so".to_owned() });
+        }
+    };
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    write_all(folder, &[(&name, bytes)])?;
+    Ok(vec![path.display().to_string()])
+}
+
+/// Measured or stated points, and every fit.
+fn curves(material: &Material) -> Result<Vec<Series>, Error> {
+    let mut series: Vec<Series> =
+        material.fits.iter().map(|fit| model_curve(&fit.name, &fit.model)).collect();
+    if series.is_empty() {
+        series.push(model_curve("rendered", &material.scattering()?));
+    }
+    for curve in &material.curves {
+        let retro = curve.observations.iter().filter(|o| o.is_retro());
+        let at = |theta_rad: f64, sigma0: f64| (theta_rad.to_degrees(), db_from_ratio(sigma0));
+        let (mut seen, mut below) = (Vec::new(), Vec::new());
+        for o in retro {
+            match (o.sigma0, o.threshold_sigma0) {
+                (Some(sigma0), _) => seen.push(at(o.theta_i_rad, sigma0)),
+                (None, Some(threshold)) => below.push(at(o.theta_i_rad, threshold)),
+                (None, None) => {}
+            }
+        }
+        series.push(Series { name: curve.name.clone(), style: Style::Points, points: seen });
+        if !below.is_empty() {
+            let name = format!("{}, beyond the threshold here", curve.name);
+            series.push(Series { name, style: Style::Points, points: below });
+        }
+    }
+    Ok(series)
+}
+
+/// The rendered fit for several values of one parameter.
+fn swept(material: &Material, sweep: &str) -> Result<Vec<Series>, Error> {
+    let usage = |problem: String, way_out: String| Err(Error::Usage { problem, way_out });
+    let model = material.scattering()?;
+    let paths: Vec<String> = model.parameters().into_iter().map(|p| p.path).collect();
+    let Some((path, values)) = sweep.split_once('=') else {
+        let way_out = "write it as --sweep specular.m=0.01,0.05,0.1".to_owned();
+        return usage(format!("`{sweep}` names no values"), way_out);
+    };
+    let mut series = Vec::new();
+    for text in values.split(',') {
+        let mut model = model.clone();
+        let Ok(value) = text.trim().parse() else {
+            return usage(
+                format!("`{text}` is no number"),
+                "separate numbers by commas".to_owned(),
+            );
+        };
+        if !model.set_parameter(path, value) {
+            let way_out = format!("there are: {}", paths.join(", "));
+            return usage(format!("`{}` has no parameter `{path}`", material.slug), way_out);
+        }
+        if let Err(error) = model.validate() {
+            return usage(error.to_string(), "leave it out of the sweep".to_owned());
+        }
+        series.push(model_curve(&format!("{path} = {}", text.trim()), &model));
+    }
+    Ok(series)
+}
+
+/// σ⁰ in dB every tenth of a degree; the lobe of a smooth surface needs no less.
+fn model_curve(name: &str, model: &dyn Scattering) -> Series {
+    // Below this a level says only that nothing comes back.
+    const FAINTEST_DB: f64 = -80.0;
+    let point = |step: u32| {
+        let theta_deg = f64::from(step) / 10.0;
+        let level_db = db_from_ratio(model.sigma0(theta_deg.to_radians()));
+        (theta_deg, if level_db >= FAINTEST_DB { level_db } else { f64::NAN })
+    };
+    Series { name: name.to_owned(), style: Style::Curve, points: (0..900).map(point).collect() }
+}
+
+/// Figures 16 to 19: one parameter varied, the others as here. The paper prints the values of m
+/// only; the others are ours.
+fn appendix(folder: &Path) -> Result<Vec<String>, Error> {
+    let base = Brdf::Mixture(Mixture {
+        k: 0.1,
+        diffuse: Box::new(Brdf::BlinnPhong(BlinnPhong { r_s: 0.016, alpha: 3.0 })),
+        specular: Box::new(Brdf::CookTorrance(CookTorrance {
+            f_lambda: 0.1,
+            m: 0.05,
+            distribution: Distribution::Beckmann,
+            shadowing: Shadowing::Separable,
+        })),
+    });
+    let mut files = Vec::new();
+    for (number, part, name, values) in [
+        (16, "specular", "f_lambda", [0.001, 0.01, 0.1]),
+        (17, "specular", "m", [0.01, 0.05, 0.1]),
+        (18, "diffuse", "r_s", [0.001, 0.01, 0.1]),
+        (19, "diffuse", "alpha", [1.0, 3.0, 10.0]),
+    ] {
+        let series = values
+            .map(|value| {
+                let mut model = base.clone();
+                model.set_parameter(&format!("{part}.{name}"), value);
+                model_curve(&format!("{name} = {value}"), &model)
+            })
+            .to_vec();
+        let title = format!("Influence of {name}");
+        let plot = Plot { y_range: Some((-70.0, 30.0)), ..plot(&title, "", series) };
+        files.push((format!("figure-{number}.png"), plot.png()?));
+        files.push((format!("figure-{number}.svg"), plot.svg()?.into_bytes()));
+    }
+    let named: Vec<(&str, Vec<u8>)> =
+        files.iter().map(|(name, bytes)| (name.as_str(), bytes.clone())).collect();
+    write_all(folder, &named)?;
+    Ok(files.iter().map(|(name, _)| folder.join(name).display().to_string()).collect())
+}
