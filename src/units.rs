@@ -34,6 +34,18 @@ pub fn dbm_from_watts(power_w: f64) -> f64 {
     db_from_ratio(power_w / 1e-3)
 }
 
+/// A number as a person would write it: powers of ten for the very large and the very small.
+///
+/// ```
+/// use matdb::units::shown;
+/// assert_eq!([0.05, -77.0, 1e300].map(shown), ["0.05", "-77", "1e300"]);
+/// ```
+pub fn shown(value: f64) -> String {
+    let size = value.abs();
+    let plain = size == 0.0 || (1e-6..1e15).contains(&size) || !size.is_finite();
+    if plain { value.to_string() } else { format!("{value:e}") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

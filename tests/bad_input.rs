@@ -230,7 +230,8 @@ fn materials_that_are_not_there() {
     check(&run(&["add", "manequin-paint"]), &["did you mean `mannequin-paint`?"]);
     check(&run(&["add", "ptfe", "granite"]), &["no material `granite`"]);
     check(&run(&["show", "granite"]), &["no material `granite`"]);
-    check(&run(&["rm", "ptfe"]), &["no material `ptfe`"]);
+    check(&run(&["rm", "ptfe"]), &["matdb.sqlite holds no material `ptfe`"]);
+    check(&run(&["add", "ptfe@1"]), &["bare name"]);
     check(&run(&["add", "--from", "none.toml"]), &["cannot read none.toml"]);
     check(&run(&["add", "--from", "."]), &["holds no material.toml"]);
     let plot = |rest: &[&str]| run(&[&["plot", "ptfe"], rest].concat());

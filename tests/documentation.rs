@@ -54,7 +54,7 @@ fn every_command_of_the_readme_runs() {
     for arguments in commands {
         matdb(folder.path()).args(&arguments).assert().success();
     }
-    assert!(folder.path().join("person/power.png").exists());
+    assert!(folder.path().join("out/person/power.png").exists());
     let made = fs::read(folder.path().join("out/power.png")).unwrap();
     assert!(
         made == fs::read(root().join("docs/mannequin.png")).unwrap(),

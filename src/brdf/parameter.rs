@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::units::shown;
+
 /// One free number of a scattering model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
@@ -19,7 +21,7 @@ pub struct Parameter {
 
 /// A parameter outside the range in which it has a meaning.
 #[derive(Debug, Error, PartialEq)]
-#[error("{path} = {value} is out of range; give a value from {min} to {max}")]
+#[error("{path} = {} is out of range; give a value from {min} to {max}", shown(*value))]
 pub struct ParameterError {
     /// The parameter's path.
     pub path: String,

@@ -56,6 +56,12 @@ fn wanted(args: &Args, db: &Database) -> Result<Vec<Material>, Error> {
     for name in args.names.iter().cloned().chain(all) {
         match builtin::get(&name) {
             Some(material) => materials.push(material?),
+            None if name.contains('@') => {
+                return Err(Error::Usage {
+                    problem: format!("`{name}` names a revision"),
+                    way_out: "a built-in material is added by its bare name".to_owned(),
+                });
+            }
             None => {
                 let store = db.read()?;
                 return Err(unknown(store.as_ref(), &name, "")?);

@@ -23,13 +23,13 @@ impl Console {
             let json = serde_json::to_string_pretty(value).unwrap_or_else(|e| e.to_string());
             return write_out(&format!("{json}\n"));
         }
-        if self.quiet { Ok(()) } else { write_out(text) }
+        if self.quiet { Ok(()) } else { write_out(&harmless(text)) }
     }
 
     /// Something a person should know, though it is no error.
     pub fn notice(&self, text: &str) {
         if !self.quiet {
-            eprintln!("note: {text}");
+            eprintln!("note: {}", harmless(text));
         }
     }
 
@@ -52,6 +52,11 @@ impl Console {
             .with_style(style)
             .with_message(what)
     }
+}
+
+/// The text without control characters, which a file could use to write over the terminal.
+pub fn harmless(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control() || *c == '\n').collect()
 }
 
 /// Writes to standard output; a reader that has left, as `head` does, is no error.

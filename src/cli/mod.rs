@@ -20,6 +20,7 @@ use clap::{ArgAction, Parser, Subcommand};
 
 use crate::error::Error;
 use console::Console;
+pub use console::harmless;
 use database::Database;
 
 /// A material database and renderer for 300 GHz imaging radar.

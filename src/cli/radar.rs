@@ -66,7 +66,7 @@ pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     );
     let value = json!({
         "radar": radar, "chirps": chirps.rays.len(), "field_m": [field.min_m, field.max_m],
-        "f5_error": error, "output": args.output,
+        "f5_error": error, "output": args.output.to_string_lossy(),
     });
     console.result(&text, &value)
 }
@@ -123,8 +123,8 @@ fn scan_plot<'a>(radar: &'a Radar, chirps: &Chirps, field: Field) -> Plot<'a> {
     Plot {
         title: "Scan at 8 m",
         subtitle: &radar.preset,
-        x_label: "x_t, m",
-        y_label: "y_t, m",
+        x_label: "x in the target plane, m",
+        y_label: "y in the target plane, m",
         x_range: Some(around(0)),
         y_range: Some(around(1)),
         equal: true,
@@ -176,8 +176,8 @@ fn spot_figure<'a>(spot: &'a Raster, radar: &'a Radar) -> Figure<'a> {
         subtitle: &radar.preset,
         colour_label: "diameter at half intensity, mm",
         range: None,
-        x_label: "x_t, m",
-        y_label: "y_t, m",
+        x_label: "x in the target plane, m",
+        y_label: "y in the target plane, m",
     }
 }
 

@@ -4,9 +4,9 @@ use serde_json::json;
 
 use super::console::Console;
 use super::database::Database;
-use super::materials::unknown;
 use crate::error::Error;
-use crate::store::Removed;
+use crate::formats::text::nearest;
+use crate::store::{Removed, Store};
 
 /// Remove materials from the database, with all their revisions
 #[derive(Debug, clap::Args)]
@@ -30,7 +30,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         let slug = name.parse().ok();
         match (slug, &known) {
             (Some(slug), Some(store)) if store.get(&slug, None)?.is_some() => slugs.push(slug),
-            _ => return Err(unknown(known.as_ref(), name, "")?),
+            _ => return Err(absent(name, known.as_ref(), db)?),
         }
     }
     drop(known);
@@ -43,4 +43,16 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         records.push(json!({ "slug": name, "revisions": revisions }));
     }
     console.result(&lines, &records)
+}
+
+fn absent(name: &str, store: Option<&Store>, db: &Database) -> Result<Error, Error> {
+    let stored = store.map_or(Ok(Vec::new()), Store::list)?;
+    let near = nearest(name, stored.iter().map(|summary| summary.slug.as_str()));
+    let way_out = match (name.split_once('@'), near) {
+        (Some((slug, _)), _) => format!("all revisions go together: `matdb rm {slug}`"),
+        (None, Some(near)) => format!("did you mean `{near}`?"),
+        (None, None) => "`matdb list` shows what it holds".to_owned(),
+    };
+    let problem = format!("{} holds no material `{name}`", db.path().display());
+    Ok(Error::Usage { problem, way_out })
 }

@@ -73,6 +73,10 @@ fn explain(message: &str) -> (String, String) {
         };
         return (problem, way_out);
     }
+    if message.starts_with("invalid type: map, expected a sequence") {
+        let problem = "one table stands where a list of tables is expected".to_owned();
+        return (problem, "write its name in double brackets, as in [[mesh]]".to_owned());
+    }
     let in_words =
         [("usize", "a whole number, 0 or greater"), ("u64", "a whole number, 0 or greater")];
     let in_words = in_words.into_iter().chain([("f64", "a number"), ("i64", "a whole number")]);

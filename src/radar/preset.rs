@@ -18,6 +18,7 @@ use crate::formats::FormatError;
 use crate::frames::{
     Antenna, Global, Point, Pose, Target, antenna_from_target, global_from_antenna,
 };
+use crate::units::shown;
 
 /// Names of the presets.
 pub const PRESETS: [&str; 1] = ["upm-300ghz"];
@@ -86,7 +87,7 @@ pub enum RadarError {
         name: String,
     },
     /// A constant without a physical meaning.
-    #[error("radar.{name} = {value} is out of range; give a value from {min} to {max}")]
+    #[error("radar.{name} = {} is out of range; give a value from {} to {}", shown(*value), shown(*min), shown(*max))]
     OutOfRange {
         /// Name of the field.
         name: &'static str,
@@ -180,7 +181,7 @@ impl Radar {
         let far_m = (-1e4, 1e4);
         let checks = [
             ("centre_frequency_ghz", self.centre_frequency_ghz, (1.0, 1e4)),
-            ("bandwidth_ghz", self.bandwidth_ghz, (1e-3, 1e4)),
+            ("bandwidth_ghz", self.bandwidth_ghz, (1e-3, 2.0 * self.centre_frequency_ghz)),
             ("transmit_power_dbm", self.transmit_power_dbm, (-100.0, 100.0)),
             ("aperture_m2", self.aperture_m2, (1e-9, 1e6)),
             ("system_loss_db", self.system_loss_db, (-200.0, 200.0)),

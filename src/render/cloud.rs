@@ -29,10 +29,10 @@ pub fn cloud_table(
         column("power_dbm", Scalar::Float, &|e| e.power_dbm),
         column("incidence_deg", Scalar::Float, &|e| e.hit.theta_rad().to_degrees()),
         column("incidence_sd_deg", Scalar::Float, &|e| e.theta_sd_rad.to_degrees()),
-        column("chirp", Scalar::UInt, &|e| e.chirp.into()),
-        column("facet", Scalar::UInt, &|e| e.hit.facet.into()),
-        column("region", Scalar::UShort, &|e| e.region.into()),
-        column("material", Scalar::UShort, &material),
+        column("chirp", Scalar::Int, &|e| e.chirp.into()),
+        column("facet", Scalar::Int, &|e| e.hit.facet.into()),
+        column("region", Scalar::Int, &|e| e.region.into()),
+        column("material", Scalar::Int, &material),
     ];
     let named = |kind: &'static str| {
         move |(number, name): (usize, &&str)| format!("{kind} {number} {name}")

@@ -59,13 +59,15 @@ pub enum RenderError {
     /// No ray meets the target.
     #[error(
         "no chirp of the scan hits the target: at 8 m the scan covers {scan}, the target lies at {target} of the \
-         target frame; move the mesh with translation_m or the radar with radar.primary_focus_m"
+         target frame; {way_out}"
     )]
     Miss {
         /// Where the scan looks.
         scan: Field,
         /// Where the target is.
         target: Field,
+        /// What to do.
+        way_out: &'static str,
     },
 }
 
@@ -184,7 +186,21 @@ fn miss(frames: &RadarFrames, chirps: &Chirps, mesh: &Mesh) -> RenderError {
     let target_from_global = frames.global_from_target.inverse();
     let in_target = |&vertex: &DVec3| (target_from_global * Point::from(vertex)).xyz.truncate();
     let target = Field::around(mesh.vertices.iter().map(in_target));
-    RenderError::Miss { scan: chirps.field(frames), target }
+    let scan = chirps.field(frames);
+    // Sixty times the paper's target: surely a mesh in millimetres.
+    const HUGE_M: f64 = 100.0;
+    let ahead = |ray: &Ray<Global>| {
+        let along = |&v: &DVec3| (v - ray.origin.xyz).dot(ray.direction.xyz());
+        mesh.vertices.iter().any(|vertex| along(vertex) > 0.0)
+    };
+    let way_out = if target.sides_m().into_iter().any(|side_m| side_m > HUGE_M) {
+        "is the mesh in millimetres? give it scale = 0.001"
+    } else if !chirps.rays.first().is_some_and(ahead) {
+        "it stands behind the radar: move it with translation_m or turn the radar with radar.alpha_deg"
+    } else {
+        "move the mesh with translation_m or the radar with radar.primary_focus_m"
+    };
+    RenderError::Miss { scan, target, way_out }
 }
 
 #[cfg(test)]

@@ -114,6 +114,11 @@ impl Scene {
         let read_csv = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
         let chirps = Chirps::draw(&file.radar, read_csv).map_err(at)?;
         let pixel_m = pixel_m(&file);
+        if file.name.chars().count() > 200 {
+            let (place, problem) = ("name".to_owned(), "is longer than 200 characters".to_owned());
+            let way_out = "shorten it; it is the title of figures".to_owned();
+            return Err(SceneError::Value { file: path.to_owned(), place, problem, way_out });
+        }
         check_spot(file.spot.rays, chirps.rays.len(), path)?;
         check_pixel(pixel_m, &file.radar, &chirps, path)?;
         file.image.pixel_m = Some(pixel_m);
@@ -184,9 +189,11 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
 }
 
 fn read(path: &Path, hint: &'static str) -> Result<Vec<u8>, SceneError> {
-    std::fs::read(path).map_err(|reason| SceneError::Unreadable {
-        file: path.to_owned(),
-        reason,
-        hint,
-    })
+    // A pipe would never end, and a device has no size to trust.
+    let regular = |found: std::fs::Metadata| match found.is_file() {
+        true => Ok(()),
+        false => Err(std::io::Error::other("it is not a regular file")),
+    };
+    let bytes = std::fs::metadata(path).and_then(regular).and_then(|()| std::fs::read(path));
+    bytes.map_err(|reason| SceneError::Unreadable { file: path.to_owned(), reason, hint })
 }

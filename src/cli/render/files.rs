@@ -57,11 +57,11 @@ fn exr_attributes(image: &Raster, materials: &[&str]) -> Vec<(String, Attribute)
 fn power_figure(scene: &Scene, scan: &Scan, image: &Raster) -> Result<Vec<u8>, Error> {
     let radar = scene.radar();
     let subtitle = format!(
-        "{}, {} of {} chirps above {} dBm",
+        "{}, {} of {} chirps at or above {} dBm",
         radar.preset,
         grouped(scan.detections().count()),
         grouped(scan.chirps),
-        radar.threshold_dbm
+        radar.threshold_dbm.to_string().replace('-', "−")
     );
     let figure = Figure {
         raster: image,
@@ -70,8 +70,8 @@ fn power_figure(scene: &Scene, scan: &Scan, image: &Raster) -> Result<Vec<u8>, E
         subtitle: &subtitle,
         colour_label: "received power, dBm",
         range: None,
-        x_label: "x_t, m",
-        y_label: "y_t, m",
+        x_label: "x in the target plane, m",
+        y_label: "y in the target plane, m",
     };
     Ok(figure.png()?)
 }

@@ -155,6 +155,13 @@ impl<'a> Record<'a> {
             ));
         }
         let Counts { detections, outside_image, .. } = self.counts;
+        if detections == 0 {
+            let threshold_dbm = self.radar.threshold_dbm;
+            notices.push(format!("nothing reaches the threshold of {threshold_dbm} dBm"));
+        }
+        for region in self.regions.iter().filter(|region| region.facets == 0) {
+            notices.push(format!("later regions took all facets of region `{}`", region.name));
+        }
         if outside_image > 0 {
             notices.push(format!(
                 "{outside_image} of {detections} detections lie beside the image, which covers what \
@@ -192,6 +199,15 @@ impl<'a> Record<'a> {
             _ => material.name.to_owned(),
         };
         self.materials.iter().map(name).collect()
+    }
+
+    /// The materials' names with where they come from, for a person.
+    pub fn material_origins(&self) -> Vec<String> {
+        let origin = |material: &MaterialRecord| match material.revision {
+            Some(revision) => format!("{}@{revision}", material.name),
+            None => format!("{}, built in", material.name),
+        };
+        self.materials.iter().map(origin).collect()
     }
 
     pub fn counts(&self) -> Counts {

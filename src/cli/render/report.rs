@@ -23,7 +23,7 @@ pub(super) fn print(
 }
 
 fn text(folder: &Path, record: &Record, stages: &Stages) -> String {
-    let materials = record.material_names();
+    let materials = record.material_origins();
     let regions = table(
         &["region", "material", "facets", "hits", "detections", "strongest dBm"],
         record.regions().iter().map(|region| {
@@ -54,7 +54,7 @@ fn value(folder: &Path, record: &Record, stages: &Stages) -> Value {
     let timings: Map<String, Value> =
         stages.ended().map(|(stage, ms)| (stage.to_owned(), json!(ms))).collect();
     json!({
-        "output": folder,
+        "output": folder.to_string_lossy(),
         "counts": record.counts(),
         "power_dbm": record.power_dbm(),
         "regions": record.regions(),

@@ -64,7 +64,13 @@ fn read(
     let table = Table::read(bytes, columns, &[]).map_err(at)?;
     let mut chirps = Chirps::default();
     for row in 0..table.len() {
-        chirps.number.push(table.whole_number(row, "chirp").map_err(at)?);
+        let number = table.whole_number(row, "chirp").map_err(at)?;
+        if i32::try_from(number).is_err() {
+            let problem = format!("chirp {number} does not fit the cloud's 32-bit numbers");
+            let way_out = "number chirps below 2 147 483 648";
+            return Err(at(FormatError::at(table.place(row), problem, way_out)));
+        }
+        chirps.number.push(number);
         chirps.time_s.push(table.required_number(row, "time_s").map_err(at)?);
         rest(&table, row, &mut chirps).map_err(at)?;
     }
