@@ -10,6 +10,9 @@
 //! | [`BlinnPhong`] | `blinn_phong.rs` | (15) |
 //! | [`Lambert`] | `lambert.rs` | f = ρ/π |
 //! | [`Tabulated`], a measured curve as it is | `tabulated.rs` | (10) solved for f |
+//! | [`Sum`] of any models | `sum.rs` | f = Σ f_p |
+//! | [`Fresnel`], a smooth half space | `fresnel.rs` | R of ε as a narrow lobe |
+//! | [`Layered`], smooth layers on one | `layered.rs` | R of the stack as a narrow lobe |
 //!
 //! ```
 //! use matdb::brdf::{Lambert, Scattering};
@@ -20,9 +23,13 @@
 
 mod blinn_phong;
 mod cook_torrance;
+mod fresnel;
 mod lambert;
+mod layered;
 mod mixture;
 mod parameter;
+mod permittivity;
+mod sum;
 mod tabulated;
 
 use serde::{Deserialize, Serialize};
@@ -31,9 +38,12 @@ use crate::frames::{Direction, Surface};
 
 pub use blinn_phong::BlinnPhong;
 pub use cook_torrance::{CookTorrance, Distribution, Shadowing};
+pub use fresnel::Fresnel;
 pub use lambert::Lambert;
+pub use layered::{Layer, Layered};
 pub use mixture::Mixture;
 pub use parameter::{Parameter, ParameterError};
+pub use sum::Sum;
 pub use tabulated::{Tabulated, TabulatedError};
 
 use parameter::Visitor;
@@ -85,6 +95,12 @@ pub enum Brdf {
     Tabulated(Tabulated),
     #[allow(missing_docs)]
     Mixture(Mixture),
+    #[allow(missing_docs)]
+    Sum(Sum),
+    #[allow(missing_docs)]
+    Fresnel(Fresnel),
+    #[allow(missing_docs)]
+    Layered(Layered),
 }
 
 impl Brdf {
@@ -133,6 +149,9 @@ impl Brdf {
             Brdf::CookTorrance(model) => model.visit(prefix, visitor),
             Brdf::Tabulated(_) => {}
             Brdf::Mixture(model) => model.visit(prefix, visitor),
+            Brdf::Sum(model) => model.visit(prefix, visitor),
+            Brdf::Fresnel(model) => model.visit(prefix, visitor),
+            Brdf::Layered(model) => model.visit(prefix, visitor),
         }
     }
 }
@@ -148,6 +167,9 @@ impl Scattering for Brdf {
             Brdf::CookTorrance(model) => model.f_per_sr(i, o),
             Brdf::Tabulated(model) => model.f_per_sr(i, o),
             Brdf::Mixture(model) => model.f_per_sr(i, o),
+            Brdf::Sum(model) => model.f_per_sr(i, o),
+            Brdf::Fresnel(model) => model.f_per_sr(i, o),
+            Brdf::Layered(model) => model.f_per_sr(i, o),
         }
     }
 }
@@ -181,12 +203,24 @@ mod tests {
                 specular: Box::new(Brdf::CookTorrance(beckmann)),
             }),
         ];
+        models.push(Brdf::Sum(Sum { parts: models.clone() }));
+        models.extend(smooth_models());
         for distribution in [Distribution::Beckmann, Distribution::Ggx] {
             for shadowing in [Shadowing::Separable, Shadowing::Correlated] {
                 models.push(Brdf::CookTorrance(cook_torrance(distribution, shadowing)));
             }
         }
         models
+    }
+
+    fn smooth_models() -> Vec<Brdf> {
+        let (eps_real, eps_imag, lobe_rad) = (4.67, 5.0, 0.1);
+        let layers = vec![Layer { thickness_m: 3e-4, eps_real: 2.6, eps_imag: 0.1 }];
+        let frequency_hz = 300e9;
+        vec![
+            Brdf::Fresnel(Fresnel { eps_real, eps_imag, lobe_rad }),
+            Brdf::Layered(Layered { layers, eps_real, eps_imag, frequency_hz, lobe_rad }),
+        ]
     }
 
     proptest! {
