@@ -4,7 +4,7 @@
 //! *Principles of Optics*, 7th ed., §1.5.2 and §14.2). A perfect mirror is a delta in direction; a
 //! radar sees it as wide as its beam, D: Beckmann's law with `lobe_rad` as m, the tilt at which the
 //! echo has fallen to 1/e (default 0.02 rad: a Gaussian spot of 16 mm at 1 mm wavelength). What is
-//! reflected in all directions is R(θ_i) within 2 % of 1 for lobes up to 0.05 rad, θ_i to 75°.
+//! reflected in all directions is R(θ_i) within 0.002 for lobes up to 0.05 rad, θ_i up to 75°.
 //!
 //! At 300 GHz: PTFE ε = 2.07 − j0.0011 (R = −14.9 dB at normal incidence), glass 5.8 − j0.3, water
 //! 4.67 − j5.00 (−6.2 dB), aluminium −1.9·10⁴ − j2.2·10⁶ (−0.008 dB). A thick piece is meant: an echo
