@@ -237,7 +237,6 @@ mod tests {
     fn the_series_tends_to_geometric_optics() {
         // k·s = 3, 6 and 12.
         let apart = [0.477e-3, 0.955e-3, 1.91e-3].map(|s_m| worst_db(s_m, 0.2));
-        println!("series against rays at k·s = 3, 6, 12: {apart:.4?} dB");
         assert!(apart[0] < 0.5 && apart.is_sorted_by(|a, b| a > b), "{apart:?}");
     }
 
