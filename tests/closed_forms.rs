@@ -16,6 +16,7 @@ const LAMBERT: Lambert = Lambert { albedo: 0.5 };
 const ROUGH: CookTorrance = CookTorrance {
     f_lambda: 0.2,
     m: 0.3,
+    m_across: None,
     distribution: Distribution::Beckmann,
     shadowing: Shadowing::Separable,
 };

@@ -3,12 +3,19 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use matdb::brdf::{BlinnPhong, CookTorrance, Distribution, Lambert, Scattering, Shadowing};
+use matdb::brdf::{
+    BlinnPhong, Brdf, CookTorrance, Correlation, Directive, Distribution, Fresnel, Kirchhoff,
+    KirchhoffGo, Lambert, Layer, Layered, Scattering, Shadowing, Sum,
+};
 use matdb::frames::Direction;
 
 /// ∫ f cos θ_o dω_o over the hemisphere by the midpoint rule.
 fn albedo(model: &dyn Scattering, theta_i_deg: f64) -> f64 {
-    let (thetas, azimuths) = (1500, 360);
+    albedo_on(model, theta_i_deg, (1500, 360))
+}
+
+/// The same on a grid of so many angles from the normal and azimuths: fewer do for a broad lobe.
+fn albedo_on(model: &dyn Scattering, theta_i_deg: f64, (thetas, azimuths): (i32, i32)) -> f64 {
     let (d_theta, d_azimuth) = (FRAC_PI_2 / f64::from(thetas), TAU / f64::from(azimuths));
     let i = Direction::from_angles(theta_i_deg.to_radians(), 0.0);
     let mut sum = 0.0;
@@ -23,8 +30,14 @@ fn albedo(model: &dyn Scattering, theta_i_deg: f64) -> f64 {
 }
 
 fn mirror(m: f64, distribution: Distribution, shadowing: Shadowing) -> CookTorrance {
-    CookTorrance { f_lambda: 1.0, m, distribution, shadowing }
+    CookTorrance { f_lambda: 1.0, m, m_across: None, distribution, shadowing }
 }
+
+/// Broad lobes need no more.
+const BROAD: (i32, i32) = (400, 120);
+
+/// A metal that keeps less than 1e-4.
+const METAL: (f64, f64) = (1.0, 1e9);
 
 #[test]
 fn lambert_reflects_its_albedo() {
@@ -53,6 +66,92 @@ fn cook_torrance_keeps_energy_and_loses_it_with_roughness() {
     let loss = |m, distribution| 1.0 - albedo(&mirror(m, distribution, Shadowing::Separable), 0.0);
     assert!((0.1..0.2).contains(&loss(0.6, Distribution::Beckmann)));
     assert!((0.1..0.2).contains(&loss(0.3, Distribution::Ggx)));
+}
+
+#[test]
+fn cook_torrance_with_a_grain_keeps_energy() {
+    for distribution in [Distribution::Beckmann, Distribution::Ggx] {
+        for m_across in [0.1, 0.6, 1.0] {
+            let isotropic = mirror(0.3, distribution, Shadowing::Separable);
+            let grain = CookTorrance { m_across: Some(m_across), ..isotropic };
+            for theta_deg in [0.0, 30.0, 60.0, 75.0] {
+                let found = albedo_on(&grain, theta_deg, BROAD);
+                assert!((0.3..1.01).contains(&found), "{distribution:?} {theta_deg}°: {found}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_sum_reflects_what_its_parts_do() {
+    let part = |albedo| Brdf::Lambert(Lambert { albedo });
+    let sum = Sum { parts: vec![part(0.2), part(0.5)] };
+    assert!((albedo_on(&sum, 30.0, BROAD) - 0.7).abs() < 1e-5);
+}
+
+#[test]
+fn smooth_surfaces_reflect_their_reflectance_in_all() {
+    /// What the finite lobe and the quadrature change, as a share of the incident power.
+    const SLACK: f64 = 0.002;
+    let (lobe_rad, frequency_hz) = (0.05, 300e9);
+    for (eps_real, eps_imag) in [(2.07, 0.0011), (4.67, 5.0), METAL] {
+        let layers = vec![Layer { thickness_m: 2e-4, eps_real: 2.6, eps_imag: 0.1 }];
+        let bare = Fresnel { eps_real, eps_imag, lobe_rad };
+        let coated = Layered { layers, eps_real, eps_imag, frequency_hz, lobe_rad };
+        for theta_deg in [0.0f64, 30.0, 60.0, 75.0] {
+            let theta_rad = theta_deg.to_radians();
+            let found = albedo(&bare, theta_deg) - bare.reflectance(theta_rad);
+            assert!(found.abs() < SLACK, "ε = {eps_real}, {theta_deg}°: {found}");
+            let found = albedo(&coated, theta_deg) - coated.reflectance(theta_rad);
+            assert!(found.abs() < SLACK, "coated ε = {eps_real}, {theta_deg}°: {found}");
+        }
+    }
+}
+
+#[test]
+fn kirchhoff_without_shadowing_keeps_energy_up_to_60_degrees_and_breaks_it_beyond() {
+    /// The largest excess below 60° is that of the lobe's overlap with the diffuse part.
+    const SLACK: f64 = 0.01;
+    let (eps_real, eps_imag) = METAL;
+    let rays = |rms_slope| KirchhoffGo { rms_slope, eps_real, eps_imag };
+    let waves = |correlation, (rms_height_m, correlation_length_m)| Kirchhoff {
+        rms_height_m,
+        correlation_length_m,
+        correlation,
+        eps_real,
+        eps_imag,
+        frequency_hz: 300e9,
+        lobe_rad: 0.05,
+    };
+    for theta_deg in [0.0, 30.0, 60.0] {
+        for rms_slope in [0.1, 0.2, 0.4] {
+            let found = albedo_on(&rays(rms_slope), theta_deg, BROAD);
+            assert!((0.9..1.0).contains(&found), "slope {rms_slope}, {theta_deg}°: {found}");
+        }
+        for surface in [(5e-5, 1e-3), (1e-4, 1e-3), (3e-4, 2e-3)] {
+            let found = albedo_on(&waves(Correlation::Gaussian, surface), theta_deg, BROAD);
+            assert!((0.94..1.0 + SLACK).contains(&found), "{surface:?}, {theta_deg}°: {found}");
+            let found = albedo_on(&waves(Correlation::Exponential, surface), theta_deg, BROAD);
+            assert!((0.5..1.0 + SLACK).contains(&found), "{surface:?}, {theta_deg}°: {found}");
+        }
+    }
+    // The documented excess at 75°.
+    assert!((albedo_on(&rays(0.4), 75.0, BROAD) - 1.18).abs() < 0.01);
+    let gaussian = waves(Correlation::Gaussian, (3e-4, 2e-3));
+    assert!((albedo_on(&gaussian, 75.0, BROAD) - 1.04).abs() < 0.01);
+    let exponential = waves(Correlation::Exponential, (3e-4, 2e-3));
+    assert!((albedo_on(&exponential, 75.0, BROAD) - 1.40).abs() < 0.01);
+}
+
+#[test]
+fn the_directive_lobes_reflect_at_most_their_share_and_over_three_fifths_of_it() {
+    for (alpha_r, lambda) in [(1.0, 1.0), (4.0, 1.0), (50.0, 1.0), (10.0, 0.5)] {
+        let model = Directive { s: 0.6, alpha_r, lambda, alpha_i: 3.0 };
+        for theta_deg in [0.0, 30.0, 60.0, 80.0] {
+            let found = albedo_on(&model, theta_deg, (200, 60)) / 0.36;
+            assert!((0.6..=1.0).contains(&found), "α = {alpha_r}, {theta_deg}°: {found}");
+        }
+    }
 }
 
 #[test]

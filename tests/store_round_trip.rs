@@ -89,16 +89,17 @@ prop_compose! {
 }
 
 fn model() -> impl Strategy<Value = Brdf> {
-    let cook_torrance = |(f_lambda, m, ggx, correlated)| {
+    let cook_torrance = |(f_lambda, m, m_across, ggx, correlated)| {
         let distribution = if ggx { Distribution::Ggx } else { Distribution::Beckmann };
         let shadowing = if correlated { Shadowing::Correlated } else { Shadowing::Separable };
-        Brdf::CookTorrance(CookTorrance { f_lambda, m, distribution, shadowing })
+        Brdf::CookTorrance(CookTorrance { f_lambda, m, m_across, distribution, shadowing })
     };
     let leaf = prop_oneof![
         fraction().prop_map(|albedo| Brdf::Lambert(Lambert { albedo })),
         (fraction(), fraction())
             .prop_map(|(r_s, alpha)| Brdf::BlinnPhong(BlinnPhong { r_s, alpha })),
-        (fraction(), 0.001f64..2.0, any::<bool>(), any::<bool>()).prop_map(cook_torrance),
+        (fraction(), 0.001f64..2.0, option::of(0.001f64..2.0), any::<bool>(), any::<bool>())
+            .prop_map(cook_torrance),
         tabulated(),
     ];
     leaf.prop_recursive(3, 8, 2, |inner| {

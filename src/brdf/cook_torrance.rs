@@ -6,6 +6,11 @@
 //! 300 GHz) and m the roughness: 0.01 is a mirror, 0.1 a lobe whose backscatter falls to half at 5°
 //! from the normal. Single scattering loses energy on rough surfaces: at normal incidence more than a
 //! tenth from m = 0.6 with Beckmann and from m = 0.3 with GGX.
+//!
+//! Brushed, machined or woven surfaces are rougher across their grain: with `m_across` the slopes along
+//! x (the direction field of the surface) follow m and those along y follow m_across. tan²θ/m² becomes
+//! tan²θ·(cos²φ/m² + sin²φ/m_across²), m² in front of D becomes m·m_across, and G1 takes the roughness
+//! in the azimuth of its direction, m²cos²φ + m_across²sin²φ (Heitz, JCGT 3-2 (2014) 48, §5.3–5.4).
 
 use std::f64::consts::PI;
 
@@ -23,6 +28,9 @@ pub struct CookTorrance {
     pub f_lambda: f64,
     /// Roughness m, 0.001 to 2; for Beckmann √2 times the rms slope along one direction.
     pub m: f64,
+    /// Roughness along y, 0.001 to 2, where m holds only along x; isotropic when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub m_across: Option<f64>,
     /// Law of the facet slopes.
     #[serde(default)]
     pub distribution: Distribution,
@@ -57,6 +65,23 @@ impl CookTorrance {
     pub(super) fn visit(&mut self, prefix: &str, visitor: &mut Visitor) {
         visit_number(visitor, prefix, "f_lambda", (0.0, 1.0), &mut self.f_lambda);
         visit_number(visitor, prefix, "m", (0.001, 2.0), &mut self.m);
+        if let Some(m_across) = &mut self.m_across {
+            visit_number(visitor, prefix, "m_across", (0.001, 2.0), m_across);
+        }
+    }
+
+    /// D(h), facet normals per steradian.
+    fn d_per_sr(&self, h: Direction<Surface>) -> f64 {
+        let Some(m_across) = self.m_across else {
+            return self.distribution.d_per_sr(h.cos_theta(), self.m);
+        };
+        self.distribution.d_anisotropic_per_sr(h, [self.m, m_across])
+    }
+
+    /// G1 of one direction, with the roughness in its azimuth.
+    fn g1(&self, direction: Direction<Surface>) -> f64 {
+        let m = self.m_across.map_or(self.m, |m_across| m_along(direction, [self.m, m_across]));
+        self.distribution.g1(direction.cos_theta(), m)
     }
 
     /// Equation (14), Schlick: F = f_λ + (1 − f_λ)(1 − |o·h|)⁵.
@@ -66,8 +91,7 @@ impl CookTorrance {
 
     /// G(i, o); the correlated form interpolates with van Ginneken et al., Appl. Opt. 37 (1998) 130.
     fn shadowing(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        let g1_i = self.distribution.g1(i.cos_theta(), self.m);
-        let g1_o = self.distribution.g1(o.cos_theta(), self.m);
+        let (g1_i, g1_o) = (self.g1(i), self.g1(o));
         match self.shadowing {
             Shadowing::Separable => g1_i * g1_o,
             Shadowing::Correlated => {
@@ -82,7 +106,7 @@ impl CookTorrance {
 impl Scattering for CookTorrance {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         let h = half_vector(i, o);
-        let d = self.distribution.d_per_sr(h.cos_theta(), self.m);
+        let d = self.d_per_sr(h);
         let f = self.fresnel(o.xyz().dot(h.xyz()));
         f * d * self.shadowing(i, o) / (4.0 * i.cos_theta() * o.cos_theta())
     }
@@ -100,6 +124,20 @@ impl Distribution {
             Distribution::Beckmann => (-tan2 / m2).exp() / (PI * m2 * cos2 * cos2),
             Distribution::Ggx => m2 / (PI * cos2 * cos2 * (m2 + tan2).powi(2)),
         }
+    }
+
+    /// D(h) with a roughness along x and one along y, normalised alike.
+    pub fn d_anisotropic_per_sr(self, h: Direction<Surface>, [m_x, m_y]: [f64; 2]) -> f64 {
+        if h.cos_theta() <= 0.0 {
+            return 0.0;
+        }
+        let h = h.xyz();
+        let slope2 = ((h.x / m_x).powi(2) + (h.y / m_y).powi(2)) / (h.z * h.z);
+        let law = match self {
+            Distribution::Beckmann => (-slope2).exp(),
+            Distribution::Ggx => (1.0 + slope2).powi(-2),
+        };
+        law / (PI * m_x * m_y * h.z.powi(4))
     }
 
     /// Smith's G1: the share of facets that a direction sees, 0 to 1.
@@ -123,6 +161,15 @@ impl Distribution {
     }
 }
 
+/// Roughness in the azimuth of a direction: m_x² cos²φ + m_y² sin²φ, rooted.
+fn m_along(direction: Direction<Surface>, [m_x, m_y]: [f64; 2]) -> f64 {
+    let across = direction.xyz().truncate();
+    match across.try_normalize() {
+        Some(unit) => (m_x * unit.x).hypot(m_y * unit.y),
+        None => m_x,
+    }
+}
+
 /// Angle between the projections of two directions onto the surface, rad; 0 when either is normal.
 fn azimuth_between_rad(i: Direction<Surface>, o: Direction<Surface>) -> f64 {
     let (a, b) = (i.xyz().truncate(), o.xyz().truncate());
@@ -134,7 +181,7 @@ mod tests {
     use super::*;
 
     fn paint(distribution: Distribution, shadowing: Shadowing) -> CookTorrance {
-        CookTorrance { f_lambda: 0.2, m: 0.1, distribution, shadowing }
+        CookTorrance { f_lambda: 0.2, m: 0.1, m_across: None, distribution, shadowing }
     }
 
     /// ∫ D cos θ dω over the hemisphere by the midpoint rule in θ.
@@ -188,5 +235,57 @@ mod tests {
         let rough = paint(Distribution::Beckmann, Shadowing::Separable);
         assert!(smooth.retro_per_sr(0.0) > rough.retro_per_sr(0.0));
         assert!(smooth.retro_per_sr(0.3) < rough.retro_per_sr(0.3));
+    }
+
+    /// ∫ g dω over the hemisphere by the midpoint rule.
+    fn over_hemisphere(g: impl Fn(Direction<Surface>) -> f64) -> f64 {
+        let (thetas, azimuths) = (2000, 200);
+        let (d_theta, d_azimuth) = (PI / 2.0 / f64::from(thetas), 2.0 * PI / f64::from(azimuths));
+        let ring = |t: i32| {
+            let theta = (f64::from(t) + 0.5) * d_theta;
+            let at = |a: i32| g(Direction::from_angles(theta, (f64::from(a) + 0.5) * d_azimuth));
+            (0..azimuths).map(at).sum::<f64>() * theta.sin()
+        };
+        (0..thetas).map(ring).sum::<f64>() * d_theta * d_azimuth
+    }
+
+    #[test]
+    fn the_slope_laws_with_a_grain_are_normalised_and_smiths_g1_fits_them() {
+        for distribution in [Distribution::Beckmann, Distribution::Ggx] {
+            for m in [[0.1, 0.1], [0.1, 0.4], [0.6, 0.2]] {
+                let d = |h| distribution.d_anisotropic_per_sr(h, m);
+                let area = over_hemisphere(|h| d(h) * h.cos_theta());
+                assert!((area - 1.0).abs() < 1e-4, "{distribution:?} {m:?}: {area}");
+                // What a direction sees of the facets is the surface's own projection.
+                let o = Direction::from_angles(1.1, 0.6);
+                let seen = |h: Direction<Surface>| d(h) * o.xyz().dot(h.xyz()).max(0.0);
+                let g1 = o.cos_theta() / over_hemisphere(seen);
+                let found = distribution.g1(o.cos_theta(), m_along(o, m));
+                assert!((found / g1 - 1.0).abs() < 4e-3, "{distribution:?} {m:?}: {found} {g1}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_equal_roughness_across_changes_nothing_and_a_turn_swaps_the_two() {
+        for distribution in [Distribution::Beckmann, Distribution::Ggx] {
+            let isotropic = paint(distribution, Shadowing::Separable);
+            let with = |m, m_across| CookTorrance { m, m_across: Some(m_across), ..isotropic };
+            let quarter = PI / 2.0;
+            for (ti, to, azimuth) in [(0.0, 0.0, 0.0), (0.2, 0.3, 1.0), (0.9, 0.8, 3.0)] {
+                let f = |model: &CookTorrance, turn: f64| {
+                    let i = Direction::from_angles(ti, turn);
+                    model.f_per_sr(i, Direction::from_angles(to, azimuth + turn))
+                };
+                let expected = f(&isotropic, 0.4);
+                assert!((f(&with(0.1, 0.1), 0.4) - expected).abs() <= 1e-9 * expected);
+                let along = f(&with(0.1, 0.3), 0.4);
+                assert!((f(&with(0.3, 0.1), 0.4 + quarter) - along).abs() <= 1e-9 * along);
+            }
+            let wide = Direction::from_angles(0.3, quarter);
+            let narrow = Direction::from_angles(0.3, 0.0);
+            let model = with(0.1, 0.3);
+            assert!(model.f_per_sr(wide, wide) > 10.0 * model.f_per_sr(narrow, narrow));
+        }
     }
 }

@@ -10,6 +10,12 @@
 //! | [`BlinnPhong`] | `blinn_phong.rs` | (15) |
 //! | [`Lambert`] | `lambert.rs` | f = ρ/π |
 //! | [`Tabulated`], a measured curve as it is | `tabulated.rs` | (10) solved for f |
+//! | [`Sum`] of any models | `sum.rs` | f = Σ f_p |
+//! | [`Fresnel`], a smooth half space | `fresnel.rs` | R of ε as a narrow lobe |
+//! | [`Layered`], smooth layers on one | `layered.rs` | R of the stack as a narrow lobe |
+//! | [`Kirchhoff`], a rough surface by its heights | `kirchhoff.rs` | physical optics, series |
+//! | [`KirchhoffGo`], the same by its slopes | `kirchhoff_go.rs` | its geometric-optics limit |
+//! | [`Directive`], lobes of effective roughness | `directive.rs` | Degli-Esposti et al. 2007 |
 //!
 //! ```
 //! use matdb::brdf::{Lambert, Scattering};
@@ -20,9 +26,16 @@
 
 mod blinn_phong;
 mod cook_torrance;
+mod directive;
+mod fresnel;
+mod kirchhoff;
+mod kirchhoff_go;
 mod lambert;
+mod layered;
 mod mixture;
 mod parameter;
+mod permittivity;
+mod sum;
 mod tabulated;
 
 use serde::{Deserialize, Serialize};
@@ -31,9 +44,15 @@ use crate::frames::{Direction, Surface};
 
 pub use blinn_phong::BlinnPhong;
 pub use cook_torrance::{CookTorrance, Distribution, Shadowing};
+pub use directive::Directive;
+pub use fresnel::Fresnel;
+pub use kirchhoff::{Correlation, Kirchhoff};
+pub use kirchhoff_go::KirchhoffGo;
 pub use lambert::Lambert;
+pub use layered::{Layer, Layered};
 pub use mixture::Mixture;
 pub use parameter::{Parameter, ParameterError};
+pub use sum::Sum;
 pub use tabulated::{Tabulated, TabulatedError};
 
 use parameter::Visitor;
@@ -85,6 +104,18 @@ pub enum Brdf {
     Tabulated(Tabulated),
     #[allow(missing_docs)]
     Mixture(Mixture),
+    #[allow(missing_docs)]
+    Sum(Sum),
+    #[allow(missing_docs)]
+    Fresnel(Fresnel),
+    #[allow(missing_docs)]
+    Layered(Layered),
+    #[allow(missing_docs)]
+    Kirchhoff(Kirchhoff),
+    #[allow(missing_docs)]
+    KirchhoffGo(KirchhoffGo),
+    #[allow(missing_docs)]
+    Directive(Directive),
 }
 
 impl Brdf {
@@ -133,6 +164,12 @@ impl Brdf {
             Brdf::CookTorrance(model) => model.visit(prefix, visitor),
             Brdf::Tabulated(_) => {}
             Brdf::Mixture(model) => model.visit(prefix, visitor),
+            Brdf::Sum(model) => model.visit(prefix, visitor),
+            Brdf::Fresnel(model) => model.visit(prefix, visitor),
+            Brdf::Layered(model) => model.visit(prefix, visitor),
+            Brdf::Kirchhoff(model) => model.visit(prefix, visitor),
+            Brdf::KirchhoffGo(model) => model.visit(prefix, visitor),
+            Brdf::Directive(model) => model.visit(prefix, visitor),
         }
     }
 }
@@ -148,6 +185,12 @@ impl Scattering for Brdf {
             Brdf::CookTorrance(model) => model.f_per_sr(i, o),
             Brdf::Tabulated(model) => model.f_per_sr(i, o),
             Brdf::Mixture(model) => model.f_per_sr(i, o),
+            Brdf::Sum(model) => model.f_per_sr(i, o),
+            Brdf::Fresnel(model) => model.f_per_sr(i, o),
+            Brdf::Layered(model) => model.f_per_sr(i, o),
+            Brdf::Kirchhoff(model) => model.f_per_sr(i, o),
+            Brdf::KirchhoffGo(model) => model.f_per_sr(i, o),
+            Brdf::Directive(model) => model.f_per_sr(i, o),
         }
     }
 }
@@ -162,10 +205,11 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn every_model() -> Vec<Brdf> {
+    fn every_isotropic_model() -> Vec<Brdf> {
         let cook_torrance = |distribution, shadowing| CookTorrance {
             f_lambda: 0.3,
             m: 0.2,
+            m_across: None,
             distribution,
             shadowing,
         };
@@ -181,12 +225,64 @@ mod tests {
                 specular: Box::new(Brdf::CookTorrance(beckmann)),
             }),
         ];
+        models.push(Brdf::Sum(Sum { parts: models.clone() }));
+        models.extend(smooth_models());
+        models.extend(rough_models());
         for distribution in [Distribution::Beckmann, Distribution::Ggx] {
             for shadowing in [Shadowing::Separable, Shadowing::Correlated] {
                 models.push(Brdf::CookTorrance(cook_torrance(distribution, shadowing)));
             }
         }
         models
+    }
+
+    fn every_model() -> Vec<Brdf> {
+        let mut models = every_isotropic_model();
+        models.extend(anisotropic_models());
+        models
+    }
+
+    fn smooth_models() -> Vec<Brdf> {
+        let (eps_real, eps_imag, lobe_rad) = (4.67, 5.0, 0.1);
+        let layers = vec![Layer { thickness_m: 3e-4, eps_real: 2.6, eps_imag: 0.1 }];
+        let frequency_hz = 300e9;
+        vec![
+            Brdf::Fresnel(Fresnel { eps_real, eps_imag, lobe_rad }),
+            Brdf::Layered(Layered { layers, eps_real, eps_imag, frequency_hz, lobe_rad }),
+        ]
+    }
+
+    fn rough_models() -> Vec<Brdf> {
+        let (eps_real, eps_imag, lobe_rad, frequency_hz) = (4.67, 5.0, 0.1, 300e9);
+        let kirchhoff = |rms_height_m, correlation| {
+            let correlation_length_m = 1e-3;
+            Brdf::Kirchhoff(Kirchhoff {
+                rms_height_m,
+                correlation_length_m,
+                correlation,
+                eps_real,
+                eps_imag,
+                frequency_hz,
+                lobe_rad,
+            })
+        };
+        vec![
+            kirchhoff(5e-5, Correlation::Gaussian),
+            kirchhoff(3e-4, Correlation::Gaussian),
+            kirchhoff(5e-5, Correlation::Exponential),
+            Brdf::KirchhoffGo(KirchhoffGo { rms_slope: 0.2, eps_real, eps_imag }),
+            Brdf::Directive(Directive { s: 0.4, alpha_r: 4.0, lambda: 1.0, alpha_i: 1.0 }),
+            Brdf::Directive(Directive { s: 0.4, alpha_r: 30.0, lambda: 0.6, alpha_i: 2.5 }),
+        ]
+    }
+
+    fn anisotropic_models() -> Vec<Brdf> {
+        let brushed = |distribution| {
+            let shadowing = Shadowing::Correlated;
+            let (m, m_across) = (0.1, Some(0.4));
+            Brdf::CookTorrance(CookTorrance { f_lambda: 0.9, m, m_across, distribution, shadowing })
+        };
+        vec![brushed(Distribution::Beckmann), brushed(Distribution::Ggx)]
     }
 
     proptest! {
@@ -203,8 +299,8 @@ mod tests {
         }
 
         #[test]
-        fn every_model_is_isotropic(ti in 0.0f64..1.5, to in 0.0f64..1.5, turn in -3.0f64..3.0) {
-            for model in every_model() {
+        fn every_model_without_a_grain_is_isotropic(ti in 0.0f64..1.5, to in 0.0f64..1.5, turn in -3.0f64..3.0) {
+            for model in every_isotropic_model() {
                 let f = |azimuth: f64| model.f_per_sr(
                     Direction::from_angles(ti, azimuth),
                     Direction::from_angles(to, azimuth + 1.0),

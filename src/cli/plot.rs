@@ -154,6 +154,7 @@ fn appendix(folder: &Path) -> Result<Vec<String>, Error> {
         specular: Box::new(Brdf::CookTorrance(CookTorrance {
             f_lambda: 0.1,
             m: 0.05,
+            m_across: None,
             distribution: Distribution::Beckmann,
             shadowing: Shadowing::Separable,
         })),

@@ -307,6 +307,25 @@ covariance = {{ parameters = ["albedo"], matrix = [[0.01]] }}
     }
 
     #[test]
+    fn every_model_can_be_written_in_a_few_words() {
+        let given = "{ model = \"lambert\", albedo = 0.5 }";
+        for scattering in [
+            "{ model = \"cook-torrance\", f_lambda = 0.9, m = 0.1, m_across = 0.3 }",
+            "{ model = \"kirchhoff\", rms_height_m = 5e-5, correlation_length_m = 1e-3, eps_real = 4 }",
+            "{ model = \"kirchhoff-go\", rms_slope = 0.2, eps_real = 4 }",
+            "{ model = \"directive\", s = 0.4, alpha_r = 4 }",
+            "{ model = \"sum\", parts = [{ model = \"lambert\", albedo = 0.5 }] }",
+            "{ model = \"fresnel\", eps_real = 2.07 }",
+            "{ model = \"layered\", eps_real = 4.2, layers = [{ thickness_m = 1e-3, eps_real = 1.5 }] }",
+        ] {
+            let text = toml("lambert").replace(given, scattering);
+            let text = text.lines().filter(|line| !line.starts_with("covariance"));
+            let material = read(&text.collect::<Vec<_>>().join("\n")).unwrap();
+            assert!(material.scattering().unwrap().sigma0(0.0) > 0.0, "{scattering}");
+        }
+    }
+
+    #[test]
     fn what_cannot_be_is_refused_with_its_place() {
         let base = toml("scan");
         for (from, to, expected) in [
