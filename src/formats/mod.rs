@@ -7,6 +7,7 @@
 pub mod csv;
 pub mod exr;
 pub mod figure;
+pub mod npy;
 pub mod obj;
 pub mod ply;
 pub mod stl;

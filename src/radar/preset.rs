@@ -232,7 +232,7 @@ impl RadarFrames {
 /// A named constant with its value and its smallest and largest accepted value.
 pub(super) type Check = (&'static str, f64, (f64, f64));
 
-fn in_range((name, value, (min, max)): Check) -> Result<(), RadarError> {
+pub(super) fn in_range((name, value, (min, max)): Check) -> Result<(), RadarError> {
     if value >= min && value <= max {
         Ok(())
     } else {
