@@ -9,8 +9,8 @@
 //! wherever θ_o = θ_i, hence in backscatter and in the mirror direction; reciprocal; and never above S². What it reflects in all
 //! is 0.62 to 0.96 of S², least for broad lobes at normal incidence.
 //!
-//! S is 0.1–0.6 for building walls and 0.05–0.4 for plaster and wallpaper at 300 GHz by repute; α is
-//! 1 (broad) to 200 (a half width of 10°), Λ 0.5–1 where there is a lobe back. F is published for
+//! Plausible at 300 GHz, but assumed and not measured: S = 0.05–0.6; α from 1 (broad) to 200 (half power
+//! at 7° from the axis); Λ = 0.5–1 where there is a lobe back. F is published for
 //! whole α as a finite sum; here it is an integral and α is any number from 1.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

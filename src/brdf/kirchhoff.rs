@@ -14,9 +14,9 @@
 //! and the slope at the mean plane; in backscatter it is cos⁴θ times as strong.
 //! The coherent part is the mirror of `fresnel` times e^{−g}: in backscatter exp(−(2ks·cos θ)²).
 //!
-//! At 300 GHz (k = 6.28 rad/mm) machined or painted metal has s = 0.5–5 µm, sandblasted or cast
-//! surfaces 5–50 µm, grit and plaster 50–300 µm; l is 0.1–3 mm. The theory wants k·l > 6 and a radius
-//! of curvature beyond λ (for Gaussian correlation l² > 2.8·s·λ); exponential correlation has no
+//! At 300 GHz (k = 6.28 rad/mm) painted or anodised metal has s = 0.5–5 µm and coarse grit 36–280 µm
+//! (Grossman 2017, IEEE Trans. THz Sci. Technol. 7(5)); cast or blasted 5–50 µm is assumed; l is 0.1–3 mm.
+//! The theory wants k·l > 6 and a radius of curvature beyond λ (for Gaussian correlation l² > 2.8·s·λ); exponential correlation has no
 //! curvature, and its results are a habit of the field. There is no shadowing: a metal
 //! with s = 0.3 mm, l = 2 mm reflects at most what it receives up to 60°, but at 75° 1.04 (Gaussian) to
 //! 1.40 (exponential) times that. Rough exponential surfaces lose up to half at normal incidence.
