@@ -38,11 +38,11 @@ pub fn dbm_from_watts(power_w: f64) -> f64 {
 ///
 /// ```
 /// use matdb::units::shown;
-/// assert_eq!([0.05, -77.0, 1e300].map(shown), ["0.05", "-77", "1e300"]);
+/// assert_eq!([0.05, -77.0, 3e11].map(shown), ["0.05", "-77", "3e11"]);
 /// ```
 pub fn shown(value: f64) -> String {
     let size = value.abs();
-    let plain = size == 0.0 || (1e-6..1e15).contains(&size) || !size.is_finite();
+    let plain = size == 0.0 || (1e-4..1e7).contains(&size) || !size.is_finite();
     if plain { value.to_string() } else { format!("{value:e}") }
 }
 

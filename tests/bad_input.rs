@@ -63,7 +63,7 @@ fn mistakes_in_the_scene_file() {
         (
             "[[mesh]]",
             "[radar]\nspot_diameter_m = 0\n[[mesh]]",
-            &["radar.spot_diameter_m = 0", "0.00001"],
+            &["radar.spot_diameter_m = 0", "1e-5"],
         ),
         (
             "[[mesh]]",

@@ -21,7 +21,7 @@ pub struct Parameter {
 
 /// A parameter outside the range in which it has a meaning.
 #[derive(Debug, Error, PartialEq)]
-#[error("{path} = {} is out of range; give a value from {min} to {max}", shown(*value))]
+#[error("{path} = {} is out of range; give a value from {} to {}", shown(*value), shown(*min), shown(*max))]
 pub struct ParameterError {
     /// The parameter's path.
     pub path: String,

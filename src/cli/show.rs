@@ -10,7 +10,7 @@ use crate::brdf::Scattering;
 use crate::error::Error;
 use crate::material::{Fit, Material};
 use crate::store::RevisionSummary;
-use crate::units::db_from_ratio;
+use crate::units::{db_from_ratio, shown};
 
 /// Show a material: what is known of it, from whom, and how it scatters
 #[derive(Debug, clap::Args)]
@@ -102,13 +102,14 @@ fn parameters(fit: &Fit) -> String {
     };
     let deviation = |path: &str| fit.covariance.as_ref()?.standard_deviation(path);
     table(
-        &["parameter", "value", "± sd", "range", "source"],
+        &["parameter", "value", "unit", "± sd", "range", "source"],
         fit.model.parameters().iter().map(|p| {
             [
                 p.path.clone(),
-                format!("{}", p.value),
+                shown(p.value),
+                p.unit.to_owned(),
                 deviation(&p.path).map_or("none given".to_owned(), |sd| format!("{sd:.2e}")),
-                format!("{} to {}", p.min, p.max),
+                format!("{} to {}", shown(p.min), shown(p.max)),
                 source(&p.path),
             ]
         }),
@@ -119,7 +120,11 @@ fn curve_table(material: &Material) -> Result<String, Error> {
     let scattering = material.scattering()?;
     let levels = [0.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0].map(|theta_deg: f64| {
         let sigma0_db = db_from_ratio(scattering.sigma0(theta_deg.to_radians()));
-        [format!("{theta_deg:.0}°"), format!("{sigma0_db:.1}")]
+        let level = match sigma0_db.is_finite() {
+            true => format!("{sigma0_db:.1}"),
+            false => "nothing".to_owned(),
+        };
+        [format!("{theta_deg:.0}°"), level]
     });
     Ok(table(&["incidence", "sigma0 dB"], levels.into_iter()))
 }
