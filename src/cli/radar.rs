@@ -9,7 +9,6 @@ use super::console::Console;
 use super::output::write_all;
 use crate::error::Error;
 use crate::formats::figure::{Figure, Plot, Series, Style};
-use crate::frames::Point;
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
 use crate::radar::scan::PATTERN_RANGE_M;
@@ -89,20 +88,10 @@ fn load(wanted: &str) -> Result<(Radar, Chirps), Error> {
     Ok((radar, chirps))
 }
 
-/// Where each chirp looks at 8 m, m.
-fn target_points_m(radar: &Radar, chirps: &Chirps) -> Vec<[f64; 2]> {
-    let target_from_global = radar.frames().global_from_target.inverse();
-    let rays = chirps.rays.iter();
-    rays.map(|ray| {
-        let point = ray.origin.xyz + PATTERN_RANGE_M * ray.direction.xyz();
-        (target_from_global * Point::from(point)).xyz.truncate().to_array()
-    })
-    .collect()
-}
-
 fn scan_csv(radar: &Radar, chirps: &Chirps) -> String {
     let mut text = "chirp,time_s,gamma_rad,phi_rad,xt_m,yt_m,ox_m,oy_m,oz_m,dx,dy,dz\n".to_owned();
-    for (row, [xt_m, yt_m]) in target_points_m(radar, chirps).into_iter().enumerate() {
+    for (row, at) in chirps.target_points_m(&radar.frames()).enumerate() {
+        let (xt_m, yt_m) = (at.x, at.y);
         let (ray, number, time_s) = (chirps.rays[row], chirps.number[row], chirps.time_s[row]);
         let mirror = chirps.mirror.get(row);
         let angles = mirror.map_or(",".to_owned(), |m| format!("{},{}", m.gamma_rad, m.phi_rad));
@@ -118,7 +107,7 @@ fn scan_csv(radar: &Radar, chirps: &Chirps) -> String {
 }
 
 fn scan_plot<'a>(radar: &'a Radar, chirps: &Chirps, field: Field) -> Plot<'a> {
-    let points = target_points_m(radar, chirps).into_iter().map(|[x, y]| (x, y)).collect();
+    let points = chirps.target_points_m(&radar.frames()).map(|p| (p.x, p.y)).collect();
     let around = |axis: usize| (field.min_m[axis] - 0.02, field.max_m[axis] + 0.02);
     Plot {
         title: "Scan at 8 m",

@@ -82,14 +82,18 @@ impl Chirps {
         }
     }
 
-    /// Where the rays are at 8 m from their origins.
-    pub fn field(&self, frames: &RadarFrames) -> Field {
+    /// (x_t, y_t) of each ray at 8 m from its origin, m.
+    pub fn target_points_m(&self, frames: &RadarFrames) -> impl Iterator<Item = DVec2> {
         let target_from_global = frames.global_from_target.inverse();
-        let at_8m = |ray: &Ray<Global>| {
+        self.rays.iter().map(move |ray| {
             let point = Point::from(ray.origin.xyz + PATTERN_RANGE_M * ray.direction.xyz());
             (target_from_global * point).xyz.truncate()
-        };
-        Field::around(self.rays.iter().map(at_8m))
+        })
+    }
+
+    /// The rectangle that holds all of [`Chirps::target_points_m`].
+    pub fn field(&self, frames: &RadarFrames) -> Field {
+        Field::around(self.target_points_m(frames))
     }
 }
 
