@@ -51,14 +51,18 @@ impl FacetLabels {
 impl FacetLabels {
     /// Appends the names of further facets.
     fn append(&mut self, other: &FacetLabels) {
-        let number_of = |names: &mut Vec<String>, name: &String| {
-            names.iter().position(|known| known == name).unwrap_or_else(|| {
-                names.push(name.clone());
-                names.len() - 1
-            }) as u32
-        };
-        let renumbered: Vec<u32> =
-            other.names.iter().map(|name| number_of(&mut self.names, name)).collect();
+        let mut number_of_name: HashMap<String, u32> =
+            std::iter::zip(self.names.iter().cloned(), 0..).collect();
+        let renumbered: Vec<u32> = other
+            .names
+            .iter()
+            .map(|name| {
+                *number_of_name.entry(name.clone()).or_insert_with(|| {
+                    self.names.push(name.clone());
+                    self.names.len() as u32 - 1
+                })
+            })
+            .collect();
         self.name_of_facet.extend(other.name_of_facet.iter().map(|&n| renumbered[n as usize]));
     }
 }
@@ -238,5 +242,26 @@ impl Mesh {
         self.vertices.extend_from_slice(&other.vertices);
         self.facets.extend(other.facets.iter().map(|f| f.map(|v| v + vertex_offset)));
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_are_joined_by_name() {
+        let part = |names: &[&str]| Mesh {
+            vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+            facets: vec![[0, 1, 2]; names.len()],
+            labels: vec![FacetLabels::from_names("part", names)],
+        };
+        let mut mesh = part(&["arm", "leg"]);
+        mesh.append(&part(&["leg", "head"])).unwrap();
+        mesh.append(&Mesh { labels: vec![], ..part(&["x"]) }).unwrap();
+        let labels = &mesh.labels[0];
+        let names = labels.name_of_facet.iter().map(|&n| labels.names[n as usize].as_str());
+        assert_eq!(names.collect::<Vec<_>>(), ["arm", "leg", "leg", "head", ""]);
+        assert_eq!(mesh.facets[2], [3, 4, 5]);
     }
 }

@@ -74,6 +74,28 @@ mod tests {
     }
 
     #[test]
+    fn every_reflectivity_is_that_of_the_index_its_source_states() {
+        // n and k at 300 GHz as the materials' notes give them, or √ε.
+        for (name, n, k) in [
+            ("aluminium", 1035.0, 1044.0),
+            ("glass", 2.407, 0.0638),
+            ("human-skin", 2.135, 0.583),
+            ("mannequin-paint", 1.619, 0.0305),
+            ("ptfe", 1.439, 0.0),
+        ] {
+            let reflectance: f64 = ((n - 1.0f64).powi(2) + k * k) / ((n + 1.0f64).powi(2) + k * k);
+            let model = get(name).unwrap().unwrap().scattering().unwrap();
+            let parameters = model.parameters();
+            let f_lambda = parameters.iter().find(|p| p.path == "specular.f_lambda").unwrap().value;
+            // The files give three digits.
+            assert!(
+                (f_lambda / reflectance - 1.0).abs() < 5e-3,
+                "{name}: {f_lambda} {reflectance}"
+            );
+        }
+    }
+
+    #[test]
     fn an_unknown_name_is_not_an_error() {
         assert!(get("unobtainium").is_none());
     }

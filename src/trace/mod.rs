@@ -1,17 +1,14 @@
 //! Closest hits of rays on a mesh.
 //!
 //! [`Bvh`] finds facets with boxes in f32 and decides and measures in f64; [`brute`] is the naive
-//! loop that judges it. Both take any mesh that passes [`Mesh::validate`] and lies within 100 km, where
+//! loop that judges it. Both take any mesh that passes [`Mesh::validate`](crate::geometry::Mesh::validate) and lies within 100 km, where
 //! f32 does its work; facets without area are never hit.
 
 pub mod brute;
 mod bvh;
 mod facet;
 
-use rayon::prelude::*;
-
-use crate::frames::{Global, Point, Ray};
-use crate::geometry::Mesh;
+use crate::frames::{Global, Point};
 
 pub use bvh::Bvh;
 
@@ -33,23 +30,4 @@ impl Hit {
     pub fn theta_rad(&self) -> f64 {
         self.cos_theta.min(1.0).acos()
     }
-}
-
-/// The closest hit of every ray, in order, on all cores. `done` is told how many rays are finished.
-///
-/// The result does not depend on the number of threads.
-pub fn closest_hits(
-    mesh: &Mesh,
-    rays: &[Ray<Global>],
-    done: &(dyn Fn(usize) + Sync),
-) -> Vec<Option<Hit>> {
-    const RAYS_PER_TASK: usize = 1024;
-    let bvh = Bvh::new(mesh);
-    rays.par_chunks(RAYS_PER_TASK)
-        .flat_map_iter(|chunk| {
-            let hits: Vec<_> = chunk.iter().map(|ray| bvh.closest(ray)).collect();
-            done(chunk.len());
-            hits
-        })
-        .collect()
 }
