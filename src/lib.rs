@@ -33,6 +33,7 @@
 //! | [`mod@formats`], [`brdf`], [`radar`] | bytes to plain data and back; how surfaces scatter; the instrument |
 //! | [`material`], [`scene`], [`trace`] | what is known of a surface; what is looked at; closest hits |
 //! | [`render`] | scan × target × materials → detections, image, cloud |
+//! | [`measure`], [`fit`] | a measured cloud → pose → curve; a curve → parameters |
 //! | [`store`] | the only SQL |
 //! | [`error`], [`cli`] | every error in one type; one command per file |
 //!
@@ -53,6 +54,8 @@ pub mod material;
 pub mod scene;
 pub mod trace;
 pub mod render;
+pub mod measure;
+pub mod fit;
 pub mod store;
 pub mod error;
 pub mod cli;

@@ -1,0 +1,145 @@
+//! A backscatter curve: one row per chirp that met, or should have met, a material.
+//!
+//! As CSV: `theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored`. σ⁰ is that of
+//! equation (10), 4π·f·cos²θ, so that a curve belongs to the material and not to the radar. A chirp
+//! that should have been detected and was not is a row with `censored` = 1: its power and its σ⁰
+//! are those that it stayed below.
+
+use crate::formats::FormatError;
+use crate::formats::csv::Table;
+use crate::units::{db_from_ratio, dbm_from_watts, ratio_from_db, watts_from_dbm};
+
+/// Columns of a curve file, in order.
+pub const COLUMNS: [&str; 7] =
+    ["theta_deg", "theta_sd_deg", "power_dbm", "sigma0_db", "range_m", "chirp", "censored"];
+
+/// One chirp's evidence of how a material scatters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// Angle of incidence θ, rad, from 0 to π/2.
+    pub theta_rad: f64,
+    /// Standard deviation of each of the two tilts of the normal against the ray, rad. Not that of
+    /// θ itself, which cannot be negative.
+    pub theta_sd_rad: f64,
+    /// Received power, W; for a censored row the least that would have been detected.
+    pub power_w: f64,
+    /// σ⁰ of that power, a pure number.
+    pub sigma0: f64,
+    /// Range R, m.
+    pub range_m: f64,
+    /// Chirp number.
+    pub chirp: u32,
+    /// Nothing was detected: power and σ⁰ are upper limits.
+    pub censored: bool,
+}
+
+/// A backscatter curve, rows in any order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Curve {
+    /// One row per chirp.
+    pub rows: Vec<Row>,
+}
+
+impl Curve {
+    /// Reads a curve file. `theta_deg` and `sigma0_db` must be there. Without the others a row is
+    /// uncensored, its angle exact, its range 0, its power σ⁰ in watts, its chirp its number from 0.
+    ///
+    /// # Errors
+    /// The first cell that cannot be used, with its line and column.
+    pub fn read(bytes: &[u8]) -> Result<Curve, FormatError> {
+        let optional = ["theta_sd_deg", "power_dbm", "range_m", "chirp", "censored"];
+        let table = Table::read(bytes, &["theta_deg", "sigma0_db"], &optional)?;
+        let rows = (0..table.len()).map(|row| read_row(&table, row)).collect::<Result<_, _>>()?;
+        Ok(Curve { rows })
+    }
+
+    /// The curve as a file's bytes.
+    pub fn write(&self) -> Vec<u8> {
+        let mut text = COLUMNS.join(",") + "\n";
+        for row in &self.rows {
+            text += &format!(
+                "{:.4},{:.4},{:.3},{:.3},{:.5},{},{}\n",
+                row.theta_rad.to_degrees(),
+                row.theta_sd_rad.to_degrees(),
+                dbm_from_watts(row.power_w),
+                db_from_ratio(row.sigma0),
+                row.range_m,
+                row.chirp,
+                u8::from(row.censored),
+            );
+        }
+        text.into_bytes()
+    }
+
+    /// Rows with a detection.
+    pub fn detected(&self) -> impl Iterator<Item = &Row> {
+        self.rows.iter().filter(|row| !row.censored)
+    }
+}
+
+fn read_row(table: &Table, row: usize) -> Result<Row, FormatError> {
+    let bounded = |column: &'static str, (min, max): (f64, f64)| {
+        let value = table.number(row, column)?;
+        match (value.is_none_or(|value| (min..=max).contains(&value)), table.cell(row, column)) {
+            (false, Some(cell)) => Err(cell.refuse(&format!("give a value from {min} to {max}"))),
+            _ => Ok(value),
+        }
+    };
+    let theta_deg = table.required_number(row, "theta_deg")?;
+    bounded("theta_deg", (0.0, 90.0))?;
+    let sigma0_db = table.required_number(row, "sigma0_db")?;
+    bounded("sigma0_db", (-300.0, 300.0))?;
+    let censored = bounded("censored", (0.0, 1.0))?.unwrap_or(0.0);
+    if let (true, Some(cell)) = (censored.fract() != 0.0, table.cell(row, "censored")) {
+        return Err(cell.refuse("give 1 for a chirp without a detection, else 0"));
+    }
+    let sigma0 = ratio_from_db(sigma0_db);
+    let chirp = match table.cell(row, "chirp") {
+        Some(_) => table.whole_number(row, "chirp")?,
+        None => row as u32,
+    };
+    Ok(Row {
+        theta_rad: theta_deg.to_radians(),
+        theta_sd_rad: bounded("theta_sd_deg", (0.0, 90.0))?.unwrap_or(0.0).to_radians(),
+        power_w: bounded("power_dbm", (-300.0, 300.0))?.map_or(sigma0, watts_from_dbm),
+        sigma0,
+        range_m: bounded("range_m", (0.0, 1e6))?.unwrap_or(0.0),
+        chirp,
+        censored: censored == 1.0,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_curve_survives_its_file() {
+        let text = "theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored\n\
+                    12.5000,0.3000,-55.250,-9.125,8.01250,17,0\n\
+                    60.0000,0.3000,-77.000,-30.000,8.10000,18,1\n";
+        let curve = Curve::read(text.as_bytes()).unwrap();
+        assert_eq!(curve.detected().count(), 1);
+        assert!((curve.rows[0].theta_rad - 12.5f64.to_radians()).abs() < 1e-15);
+        assert_eq!(String::from_utf8(curve.write()).unwrap(), text);
+    }
+
+    #[test]
+    fn two_columns_are_enough() {
+        let curve = Curve::read(b"theta_deg,sigma0_db\n0,-3\n45,-20\n").unwrap();
+        assert_eq!(curve.rows[1].chirp, 1);
+        assert!(!curve.rows[1].censored && curve.rows[1].theta_sd_rad == 0.0);
+    }
+
+    #[test]
+    fn a_cell_without_meaning_is_named() {
+        for (text, place) in [
+            ("theta_deg,sigma0_db\n91,-3\n", "theta_deg"),
+            ("theta_deg,sigma0_db\n1,nan\n", "sigma0_db"),
+            ("theta_deg,sigma0_db,censored\n1,-3,0.5\n", "censored"),
+        ] {
+            let error = Curve::read(text.as_bytes()).unwrap_err().to_string();
+            assert!(error.contains("line 2") && error.contains(place), "{error}");
+        }
+    }
+}
