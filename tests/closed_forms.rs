@@ -1,12 +1,14 @@
 //! Promise: plates and spheres of known scattering return the power that equation (11) gives by hand.
 
+mod support;
+
 use std::f64::consts::PI;
 
 use glam::DVec3;
 use matdb::brdf::{CookTorrance, Distribution, Lambert, Scattering, Shadowing};
 use matdb::geometry::Mesh;
 use matdb::radar::{Chirps, Radar};
-use matdb::render::{Echo, shade, trace};
+use matdb::render::Echo;
 use matdb::scene::solids;
 
 /// Flat facets are exact: what is left is rounding.
@@ -46,8 +48,7 @@ fn echoes(mut mesh: Mesh, turn_rad: f64, surface: &dyn Scattering) -> Vec<Echo> 
     }
     let radar = Radar::default();
     let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
-    let hits = trace(&radar, &chirps, &mesh, 1, &|_| {}).unwrap();
-    shade(&radar, &chirps, &hits, &vec![0; mesh.facets.len()], &[surface]).echoes
+    support::echoes(&radar, &chirps, &mesh, surface)
 }
 
 #[test]
@@ -63,7 +64,7 @@ fn a_tilted_plate_returns_the_power_computed_by_hand() {
             assert_eq!(echoes.len(), 18_529);
             for echo in echoes {
                 // The radar stands at (0, 1.1, 8), the plate's plane passes through (0, 1.1, 0).
-                let ray = (echo.hit.point.xyz - DVec3::new(0.0, 1.1, 8.0)).normalize();
+                let ray = (echo.point.xyz - DVec3::new(0.0, 1.1, 8.0)).normalize();
                 let range_m = -8.0 * normal.z / ray.dot(normal);
                 let theta_rad = (-ray.dot(normal)).acos();
                 let expected = expected_dbm(range_m, theta_rad, f(theta_rad));
@@ -80,7 +81,7 @@ fn sphere_error_db(subdivisions: u32, surface: &dyn Scattering, f: fn(f64) -> f6
         .into_iter()
         .filter_map(|echo| {
             // Law of sines in the triangle reflector – centre – hit.
-            let ray = (echo.hit.point.xyz - DVec3::new(0.0, 1.1, 8.0)).normalize();
+            let ray = (echo.point.xyz - DVec3::new(0.0, 1.1, 8.0)).normalize();
             let off_axis_rad = (-ray.z).acos();
             let theta_rad = (8.0 / RADIUS_M * off_axis_rad.sin()).asin();
             let range_m = 8.0 * off_axis_rad.cos() - RADIUS_M * theta_rad.cos();

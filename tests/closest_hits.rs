@@ -5,7 +5,7 @@ mod support;
 
 use matdb::render::trace;
 use matdb::scene::Scene;
-use matdb::trace::brute;
+use matdb::trace::{Bvh, brute};
 use rayon::prelude::*;
 
 /// Both measure in f64 by different formulas; at 8 m a unit in the last place is 2e-15 m.
@@ -17,7 +17,7 @@ fn check(name: &str) {
     let scene = Scene::load(&support::scene(name)).unwrap();
     let rays = &scene.chirps.rays;
     let mesh = &scene.target.mesh;
-    let fast = trace(scene.radar(), &scene.chirps, mesh, 1, &|_| {}).unwrap().hits;
+    let fast = trace(scene.radar(), &scene.chirps, &Bvh::new(mesh), 1, &|_| {}).unwrap().hits;
     let slow: Vec<_> = rays.par_iter().map(|ray| brute::closest(mesh, ray)).collect();
     assert_eq!(fast.len(), 18_529);
     assert!(slow.iter().flatten().count() > 1000);

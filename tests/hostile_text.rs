@@ -8,8 +8,9 @@ use std::path::Path;
 use matdb::brdf::Scattering;
 use matdb::material::file::{observations, parse};
 use matdb::radar::Pattern;
-use matdb::render::{power_image, shade, trace};
+use matdb::render::{Bounce, Observer, Setup, Surface, power_image, shade, trace};
 use matdb::scene::{Scene, SceneFile};
+use matdb::trace::Bvh;
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
 
@@ -40,6 +41,28 @@ ellipse_width_m = 0.5
 ellipse_height_m = 0.4
 angular_magnification = 0.25
 offset_deg = [0.0, 0.0]
+[radar.chirp]
+duration_s = 1e-5
+samples = 2048
+[radar.receiver]
+window = "hann"
+zero_padding = 1
+noise_figure_db = 20.0
+temperature_k = 290.0
+false_alarm_probability = 0.01
+gate_m = [6.0, 10.0]
+[radar.speckle]
+looks = 1.0
+coherent_ratio = 0.0
+[spot]
+rays = 2
+[bounce]
+rays = 2
+outside_spot_db = -20.0
+[[receiver]]
+name = "left"
+position_m = [-1.0, 1.1, 5.0]
+aperture_m2 = 0.1
 [image]
 pixel_m = 0.01
 [[mesh]]
@@ -131,16 +154,24 @@ fn render(text: &str) {
     if matches!(&file.radar.scan, Pattern::Elliptical(e) if e.chirps > 100_000) {
         return;
     }
-    let Ok(scene) = Scene::resolve(file, Path::new("scene.toml")) else { return };
-    let Ok(hits) = trace(scene.radar(), &scene.chirps, &scene.target.mesh, 1, &|_| {}) else {
+    let looks = file.radar.speckle.map_or(1.0, |speckle| speckle.looks);
+    if looks * file.radar.chirp.samples as f64 > 1e5 {
         return;
-    };
+    }
+    let Ok(scene) = Scene::resolve(file, Path::new("scene.toml")) else { return };
+    let bvh = Bvh::new(&scene.target.mesh);
+    let rays = scene.file.spot.rays;
+    let Ok(footprints) = trace(scene.radar(), &scene.chirps, &bvh, rays, &|_| {}) else { return };
     let lambert = |_, _| 0.1;
-    let surfaces: Vec<&dyn Scattering> =
-        scene.target.regions.iter().map(|_| &lambert as _).collect();
-    let scan = shade(scene.radar(), &scene.chirps, &hits, &scene.target.region_of_facet, &surfaces);
+    let surfaces: Vec<Surface> =
+        scene.target.regions.iter().map(|_| Surface::new(&lambert)).collect();
+    let regions = &scene.target.region_of_facet;
+    let bounce = scene.file.bounce.map(|b| Bounce { rays: b.rays, outside_spot: 0.1 });
+    let paper = Setup::new(scene.radar(), &scene.chirps, &bvh, regions, &surfaces);
+    let setup = Setup { bounce, ..paper };
+    let Ok(scan) = shade(&setup, &footprints, Observer::Radar, &|_| {}) else { return };
     for echo in &scan.echoes {
-        assert!(echo.hit.range_m.is_finite() && echo.hit.theta_rad().is_finite(), "{text}");
+        assert!(echo.range_m.is_finite() && echo.point.xyz.is_finite(), "{text}");
         assert!(!echo.power_dbm.is_nan(), "{text}");
     }
     let field = scene.chirps.field(&scene.radar().frames());
@@ -151,7 +182,7 @@ fn render(text: &str) {
 #[test]
 fn the_texts_are_good_before_they_are_damaged() {
     let scene = Scene::resolve(SceneFile::parse(SCENE).unwrap(), Path::new("scene.toml")).unwrap();
-    trace(scene.radar(), &scene.chirps, &scene.target.mesh, 1, &|_| {}).unwrap();
+    trace(scene.radar(), &scene.chirps, &Bvh::new(&scene.target.mesh), 1, &|_| {}).unwrap();
     parse("material.toml", MATERIAL, |_| Err(String::new())).unwrap();
     assert!(tokens(SCENE).len() > 100);
 }

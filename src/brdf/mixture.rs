@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::parameter::{Visitor, visit_number};
-use super::{Brdf, Scattering};
+use super::{Brdf, Scattering, specular_share};
 use crate::frames::{Direction, Surface};
 
 /// A diffuse and a specular part.
@@ -32,5 +32,10 @@ impl Mixture {
 impl Scattering for Mixture {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         self.k * self.diffuse.f_per_sr(i, o) + (1.0 - self.k) * self.specular.f_per_sr(i, o)
+    }
+
+    fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        let parts = [(self.k, &*self.diffuse), (1.0 - self.k, &*self.specular)];
+        specular_share(parts.into_iter(), i, o)
     }
 }

@@ -69,6 +69,13 @@ pub trait Scattering: Sync {
     /// f(i, o), 1/sr: reflected radiance per incident irradiance, equation (9).
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64;
 
+    /// Share of f(i, o), 0 to 1, that facets reflect like mirrors, rough or not; the rest is diffuse.
+    /// A model that cannot tell, such as a closure or a measured curve, counts as diffuse.
+    fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        let _ = (i, o);
+        0.0
+    }
+
     /// f in exact backscatter at incidence `theta_rad`, 1/sr.
     fn retro_per_sr(&self, theta_rad: f64) -> f64 {
         let i = Direction::from_angles(theta_rad, 0.0);
@@ -193,6 +200,29 @@ impl Scattering for Brdf {
             Brdf::Directive(model) => model.f_per_sr(i, o),
         }
     }
+
+    fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        match self {
+            Brdf::Lambert(_) | Brdf::BlinnPhong(_) | Brdf::Tabulated(_) | Brdf::Directive(_) => 0.0,
+            Brdf::CookTorrance(_) | Brdf::Fresnel(_) | Brdf::Layered(_) => 1.0,
+            Brdf::Kirchhoff(_) | Brdf::KirchhoffGo(_) => 1.0,
+            Brdf::Mixture(model) => model.specular_share(i, o),
+            Brdf::Sum(model) => model.specular_share(i, o),
+        }
+    }
+}
+
+/// The specular share of weighted parts that add up in power.
+fn specular_share<'a>(
+    parts: impl Iterator<Item = (f64, &'a Brdf)>,
+    i: Direction<Surface>,
+    o: Direction<Surface>,
+) -> f64 {
+    let (all, specular) = parts.fold((0.0, 0.0), |(all, specular), (weight, part)| {
+        let f = weight * part.f_per_sr(i, o);
+        (all + f, specular + f * part.specular_share(i, o))
+    });
+    if all > 0.0 { specular / all } else { 0.0 }
 }
 
 /// h = (i + o)/|i + o|, the normal of a facet that would mirror i into o.
@@ -308,6 +338,20 @@ mod tests {
                 prop_assert!((f(0.0) - f(turn)).abs() <= 1e-9 * f(0.0).abs());
             }
         }
+    }
+
+    #[test]
+    fn the_specular_share_is_that_of_the_powers() {
+        let i = Direction::from_angles(0.2, 0.0);
+        let Brdf::Mixture(mixture) = every_model().remove(3) else { panic!("not the mixture") };
+        let specular = 0.6 * mixture.specular.f_per_sr(i, i);
+        let expected = specular / mixture.f_per_sr(i, i);
+        assert!(expected > 0.1 && expected < 0.9, "{expected}");
+        assert!((mixture.specular_share(i, i) - expected).abs() < 1e-12);
+        let parts = vec![Brdf::Mixture(mixture.clone()), Brdf::Lambert(Lambert { albedo: 0.7 })];
+        let sum = Sum { parts };
+        let expected = specular / sum.f_per_sr(i, i);
+        assert!((sum.specular_share(i, i) - expected).abs() < 1e-12);
     }
 
     #[test]

@@ -6,7 +6,7 @@
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 use super::parameter::Visitor;
-use super::{Brdf, Scattering};
+use super::{Brdf, Scattering, specular_share};
 use crate::frames::{Direction, Surface};
 
 /// Several models at once, at least one.
@@ -29,6 +29,10 @@ impl Sum {
 impl Scattering for Sum {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         self.parts.iter().map(|part| part.f_per_sr(i, o)).sum()
+    }
+
+    fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        specular_share(self.parts.iter().map(|part| (1.0, part)), i, o)
     }
 }
 

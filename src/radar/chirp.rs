@@ -14,13 +14,12 @@
 //! cN/2B; real sampling would halve it and add the noise of the image band.
 
 use num_complex::Complex;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::RadarError;
 use super::preset::in_range;
-
-/// Speed of light in vacuum, m/s; exact.
-pub const SPEED_OF_LIGHT_M_PER_S: f64 = 299_792_458.0;
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// One sweep and its sampling.
 ///
@@ -41,6 +40,23 @@ pub struct Chirp {
     pub start_phase_rad: f64,
 }
 
+/// How a sweep is sampled, as scene files write it; its band is the radar's.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ChirpEntry {
+    /// Duration T of the sweep, s, from 1e-9 to the chirp period. 100e-6: assumed, half of it.
+    pub duration_s: f64,
+    /// Complex samples N in a sweep, from 8 to 2²⁰. 4096: assumed.
+    pub samples: usize,
+}
+
+impl Default for ChirpEntry {
+    fn default() -> Self {
+        let Chirp { duration_s, samples, .. } = Chirp::default();
+        ChirpEntry { duration_s, samples }
+    }
+}
+
 /// An echo: where it comes from and how strong it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Return {
@@ -55,7 +71,7 @@ pub struct Return {
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[error(
     "a return at {range_m:.3} m is {:.3} m outside the unambiguous range of 0 to {max_range_m:.3} m \
-     and would appear at {apparent_range_m:.3} m; raise chirp.samples, lower the bandwidth, or \
+     and would appear at {apparent_range_m:.3} m; raise radar.chirp.samples, lower radar.bandwidth_ghz, or \
      leave the return out",
     excess_m(*range_m, *max_range_m)
 )]
@@ -144,7 +160,11 @@ impl Chirp {
         Ok(signal)
     }
 
-    fn check_range(&self, range_m: f64) -> Result<(), Aliased> {
+    /// Whether a return at a range keeps its place.
+    ///
+    /// # Errors
+    /// When it lies outside the unambiguous range, by how much.
+    pub fn check_range(&self, range_m: f64) -> Result<(), Aliased> {
         let max_range_m = self.max_range_m();
         if (0.0..max_range_m).contains(&range_m) {
             return Ok(());
@@ -231,7 +251,7 @@ mod tests {
         assert_eq!(
             error.to_string(),
             "a return at 25.000 m is 2.260 m outside the unambiguous range of 0 to 22.740 m and \
-             would appear at 2.260 m; raise chirp.samples, lower the bandwidth, or leave the return \
+             would appear at 2.260 m; raise radar.chirp.samples, lower radar.bandwidth_ghz, or leave the return \
              out"
         );
         let error = chirp.beat_signal(&[echo(-0.25)]).unwrap_err();

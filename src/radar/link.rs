@@ -46,13 +46,22 @@ impl Link {
 
     /// Equation (11): received power, W, from range (m), cosine of incidence and f (1/sr).
     pub fn power_w(&self, range_m: f64, cos_theta: f64, f_per_sr: f64) -> f64 {
-        let projection = match self.footprint {
-            Footprint::Paper => cos_theta * cos_theta,
-            Footprint::Projected => cos_theta,
+        self.flux_w(cos_theta) * self.received_per_w(range_m, cos_theta, f_per_sr)
+    }
+
+    /// Power that a surface under the spot is taken to receive, W, losses included.
+    pub fn flux_w(&self, cos_incidence: f64) -> f64 {
+        let spread = match self.footprint {
+            Footprint::Paper => cos_incidence,
+            Footprint::Projected => 1.0,
         };
-        self.transmit_power_w * self.system_gain_ratio * self.aperture_m2 / (range_m * range_m)
-            * f_per_sr
-            * projection
+        self.transmit_power_w * self.system_gain_ratio * spread
+    }
+
+    /// Share of the power on a surface that it sends, with f (1/sr), into the antenna at a distance
+    /// (m): f·cos θ_o·A_eq/R².
+    pub fn received_per_w(&self, range_m: f64, cos_exit: f64, f_per_sr: f64) -> f64 {
+        f_per_sr * cos_exit * self.aperture_m2 / (range_m * range_m)
     }
 }
 

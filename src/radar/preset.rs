@@ -13,7 +13,7 @@ use thiserror::Error;
 use super::beam::BeamEntry;
 use super::f5::{F5, F5Error};
 use super::mirror::Optics;
-use super::{Footprint, Pattern};
+use super::{Chirp, ChirpEntry, Footprint, Noise, Pattern, Receiver, Speckle};
 use crate::formats::FormatError;
 use crate::frames::{
     Antenna, Global, Point, Pose, Target, antenna_from_target, global_from_antenna,
@@ -65,6 +65,17 @@ pub struct Radar {
     pub alpha_deg: f64,
     /// Time from one chirp to the next, s. 200e-6: assumed; a scan of 18 529 chirps takes 3.7 s.
     pub chirp_period_s: f64,
+    /// How a sweep is sampled; of use with a receiver.
+    pub chirp: ChirpEntry,
+    /// From the beat signal to a range and a power. None, the paper's: both are exact.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub receiver: Option<Receiver>,
+    /// Speckle of the echoes. None, the paper's: there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speckle: Option<Speckle>,
+    /// Thermal noise and range error without a beat signal; a receiver has its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<Noise>,
     /// How the spot grows away from the centre and the focus.
     pub beam: BeamEntry,
     /// The scanning mirror and the reflectors behind it.
@@ -97,6 +108,21 @@ pub enum RadarError {
         min: f64,
         /// Largest accepted value.
         max: f64,
+    },
+    /// Noise by its law and by a receiver.
+    #[error(
+        "[radar.noise] and [radar.receiver] both bring thermal noise; remove [radar.noise], the \
+         receiver's is set by radar.receiver.noise_figure_db"
+    )]
+    NoiseTwice,
+    /// A receiver adds up whole looks.
+    #[error(
+        "radar.speckle.looks = {looks} cannot be made of beat signals; give a whole number from 1 \
+         to 10 000, or remove [radar.receiver]"
+    )]
+    PartialLook {
+        /// The looks asked for.
+        looks: f64,
     },
     /// Equation (1) cannot be had.
     #[error(transparent)]
@@ -161,6 +187,10 @@ impl Default for Radar {
             primary_focus_m: [0.0, 1.1, 8.0],
             alpha_deg: -90.0,
             chirp_period_s: 200e-6,
+            chirp: ChirpEntry::default(),
+            receiver: None,
+            speckle: None,
+            noise: None,
             beam: BeamEntry::default(),
             optics: Optics::default(),
             f5: None,
@@ -203,7 +233,38 @@ impl Radar {
         let parts = self.beam.checks().into_iter().chain(self.optics.checks());
         let parts = parts.chain(self.scan.checks());
         checks.into_iter().chain(parts).try_for_each(in_range)?;
+        self.validate_receiver()?;
         self.f5.as_ref().map_or(Ok(()), |f5| Ok(f5.validate()?))
+    }
+
+    fn validate_receiver(&self) -> Result<(), RadarError> {
+        self.chirp().validate()?;
+        if let Some(receiver) = self.receiver {
+            receiver.validate()?;
+            in_range(("chirp.duration_s", self.chirp.duration_s, (1e-9, self.chirp_period_s)))?;
+        }
+        self.speckle.map_or(Ok(()), |speckle| speckle.validate())?;
+        self.noise.map_or(Ok(()), |noise| noise.validate())?;
+        if self.receiver.is_some() && self.noise.is_some() {
+            return Err(RadarError::NoiseTwice);
+        }
+        match (self.receiver, self.speckle) {
+            (Some(_), Some(Speckle { looks, .. })) if looks.fract() != 0.0 || looks > 1e4 => {
+                Err(RadarError::PartialLook { looks })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The sweep, in SI.
+    pub fn chirp(&self) -> Chirp {
+        Chirp {
+            centre_frequency_hz: self.centre_frequency_ghz * 1e9,
+            bandwidth_hz: self.bandwidth_ghz * 1e9,
+            duration_s: self.chirp.duration_s,
+            samples: self.chirp.samples,
+            start_phase_rad: 0.0,
+        }
     }
 
     /// The typed poses of equations (3) and (4).

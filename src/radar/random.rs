@@ -20,10 +20,12 @@ pub enum Purpose {
     Noise = 1,
     /// Speckle of a return.
     Speckle = 2,
-    /// Where in the spot a sub-ray goes.
-    SpotPosition = 3,
     /// Height of a rough surface under a sub-ray, which turns its phase.
     SurfacePhase = 4,
+    /// Where a surface sends a ray on to a second one.
+    Bounce = 5,
+    /// Error of a range.
+    Range = 6,
 }
 
 /// Names one stream of draws.
@@ -73,6 +75,11 @@ impl Draws {
     pub fn complex_gaussian(&mut self) -> Complex<f64> {
         let mut part = || -> f64 { StandardNormal.sample(&mut self.generator) };
         Complex::new(part(), part()) * std::f64::consts::FRAC_1_SQRT_2
+    }
+
+    /// A Gaussian of zero mean and unit variance.
+    pub fn gaussian(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.generator)
     }
 
     /// A Gamma variate of shape `looks` and mean 1, which has the variance 1/`looks`.

@@ -7,12 +7,13 @@
 //! Thermal noise is white over the sampling rate N/T, kTF·N/T in each complex sample, which leaves
 //! kTF·B_n in each bin with B_n the window's noise bandwidth over the sweep's duration.
 //!
-//! A false alarm is a peak of noise over the threshold. In n independent bins of exponential power
-//! of mean N₀, the threshold for the probability P_fa in a gate is −N₀ ln(1 − (1 − P_fa)^(1/n)). The
-//! spectrum of windowed noise, looked at between the bins too, has as many independent looks as it
-//! has upcrossings for each time it is above (Rice 1945, DOI 10.1002/j.1538-7305.1945.tb00453.x):
-//! n = 2√(πv)·√(threshold/N₀) for each bin of the unpadded spectrum, where v is the variance of
-//! n/N under w². So the two equations are solved together.
+//! Averaged over L looks, the power of noise in a bin is Gamma(L, N₀/L). A false alarm is a peak of
+//! it over the threshold T. With u = L·T/N₀ the spectrum of windowed noise, looked at between the
+//! bins too, crosses the threshold upwards 2√(πv)·u^(L−½)·e⁻ᵘ/Γ(L) times for each bin of the unpadded
+//! spectrum, where v is the variance of n/N under w² (Rice 1945,
+//! DOI 10.1002/j.1538-7305.1945.tb00453.x, for L = 1; Sharpe 1978, Adv. Appl. Probab. 10, 373, for
+//! any L).
+//! Crossings so rare are a Poisson process, which gives P_fa over a gate, and so T.
 
 use std::sync::Arc;
 
@@ -43,24 +44,16 @@ pub struct Receiver {
     /// Temperature that the noise figure refers to, K, from 0 to 1e5. 290: its definition. 0 makes
     /// a receiver without noise.
     pub temperature_k: f64,
-    /// What counts as a detection.
-    pub threshold: Threshold,
+    /// Probability, from 1e-15 to 0.5, that a gate full of thermal noise gives a detection; it then
+    /// replaces the radar's threshold. Kept to about 4 % of itself with a zero padding of 2 or more;
+    /// without padding the parabola overshoots, and alarms are 10 to 20 % more frequent than asked
+    /// (100 000 chirps, P_fa 0.01). None: assumed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub false_alarm_probability: Option<f64>,
     /// Nearest and farthest range of a detection, m; none for all that is unambiguous. None:
     /// assumed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gate_m: Option<[f64; 2]>,
-}
-
-/// The least power of a detection.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Threshold {
-    /// A power, dBm, from −300 to 100.
-    PowerDbm(f64),
-    /// Probability, from 1e-15 to 0.5, that a gate full of thermal noise gives a detection.
-    /// Kept to about 4 % of itself with a zero padding of 2 or more; without padding the parabola
-    /// overshoots, and alarms are 10 to 20 % more frequent than asked (100 000 chirps, P_fa 0.01).
-    FalseAlarmProbability(f64),
 }
 
 /// What a chirp gives.
@@ -92,7 +85,7 @@ impl Default for Receiver {
             zero_padding: 2,
             noise_figure_db: 20.0,
             temperature_k: 290.0,
-            threshold: Threshold::PowerDbm(-77.0),
+            false_alarm_probability: None,
             gate_m: None,
         }
     }
@@ -105,19 +98,17 @@ impl Receiver {
     /// The first setting out of range, by name.
     pub fn validate(&self) -> Result<(), RadarError> {
         let [near_m, far_m] = self.gate_m.unwrap_or([0.0, 1.0]);
-        let threshold = match self.threshold {
-            Threshold::PowerDbm(x) => ("receiver.threshold.power_dbm", x, (-300.0, 100.0)),
-            Threshold::FalseAlarmProbability(p) => {
-                ("receiver.threshold.false_alarm_probability", p, (1e-15, 0.5))
-            }
-        };
         let checks = [
             ("receiver.zero_padding", self.zero_padding as f64, (1.0, 16.0)),
             ("receiver.noise_figure_db", self.noise_figure_db, (0.0, 100.0)),
             ("receiver.temperature_k", self.temperature_k, (0.0, 1e5)),
             ("receiver.gate_m[0]", near_m, (0.0, 1e6)),
             ("receiver.gate_m[1]", far_m, (near_m, 1e6)),
-            threshold,
+            (
+                "receiver.false_alarm_probability",
+                self.false_alarm_probability.unwrap_or(0.1),
+                (1e-15, 0.5),
+            ),
         ];
         checks.into_iter().try_for_each(in_range)
     }
@@ -126,9 +117,17 @@ impl Receiver {
 impl RangeProcessor {
     /// Plans the transform and works out noise and threshold, once for all chirps.
     ///
+    /// Each detection averages `looks` profiles. `threshold_dbm` holds where the receiver names no
+    /// probability of false alarms.
+    ///
     /// # Errors
     /// A setting of the receiver or the chirp that is out of range.
-    pub fn new(receiver: &Receiver, chirp: &Chirp) -> Result<RangeProcessor, RadarError> {
+    pub fn new(
+        receiver: &Receiver,
+        chirp: &Chirp,
+        threshold_dbm: f64,
+        looks: u32,
+    ) -> Result<RangeProcessor, RadarError> {
         receiver.validate()?;
         chirp.validate()?;
         let window = receiver.window.samples(chirp.samples);
@@ -141,11 +140,11 @@ impl RangeProcessor {
             density_w_per_hz * window::noise_bandwidth_bins(&window) / chirp.duration_s;
         let searched = (gate_bins[1] + 1).saturating_sub(gate_bins[0]);
         let natural_bins = searched as f64 / receiver.zero_padding as f64;
-        let threshold_w = match receiver.threshold {
-            Threshold::PowerDbm(power_dbm) => watts_from_dbm(power_dbm),
-            Threshold::FalseAlarmProbability(probability) => {
-                let looks_per_root = natural_bins * looks_per_bin(&window);
-                noise_per_bin_w * threshold_over_noise(probability, looks_per_root)
+        let threshold_w = match receiver.false_alarm_probability {
+            None => watts_from_dbm(threshold_dbm),
+            Some(probability) => {
+                let crossings = natural_bins * crossings_per_bin(&window);
+                noise_per_bin_w * threshold_over_noise(probability, crossings, looks.max(1))
             }
         };
         Ok(RangeProcessor {
@@ -214,9 +213,12 @@ impl RangeProcessor {
     /// | Hamming | 90, 0.4 | 9.3, 0.018 | 1.2, 0.0011 |
     /// | Blackman–Harris | 18, 0.032 | 2.2, 0.002 | 0.3, 0.0002 |
     pub fn detect(&self, signal: &[Complex<f64>]) -> Option<Detection> {
-        let profile_w = self.profile_w(signal);
-        let detection = self.interpolate(&profile_w, self.strongest_peak(&profile_w)?);
-        (detection.power_w >= self.threshold_w).then_some(detection)
+        self.peak(&self.profile_w(signal)).filter(|peak| peak.power_w >= self.threshold_w)
+    }
+
+    /// The strongest peak of a profile in the gate, whatever its power.
+    pub fn peak(&self, profile_w: &[f64]) -> Option<Detection> {
+        Some(self.interpolate(profile_w, self.strongest_peak(profile_w)?))
     }
 
     fn strongest_peak(&self, profile_w: &[f64]) -> Option<usize> {
@@ -252,20 +254,35 @@ fn neighbours(profile_w: &[f64], k: usize) -> [f64; 2] {
     [profile_w[(k + count - 1) % count], profile_w[(k + 1) % count]]
 }
 
-/// 2√(πv): independent looks in a bin of the unpadded spectrum, for a threshold at the noise.
-fn looks_per_bin(window: &[f64]) -> f64 {
+/// 2√(πv): upward crossings in a bin of the unpadded spectrum, over u^(L−½)·e⁻ᵘ/Γ(L).
+fn crossings_per_bin(window: &[f64]) -> f64 {
     2.0 * (std::f64::consts::PI * window::energy_spread(window)).sqrt()
 }
 
-/// x = −ln(1 − (1 − P_fa)^(1/n)) with n = `looks_per_root`·√x, but at least one.
-fn threshold_over_noise(probability: f64, looks_per_root: f64) -> f64 {
-    let mut x = 1.0_f64;
-    // A contraction: a step divides the error by 2x, and x is above 5 for any useful probability.
-    for _ in 0..50 {
-        let looks = (looks_per_root * x.sqrt()).max(1.0);
-        x = -(-f64::exp_m1((-probability).ln_1p() / looks)).ln();
+/// T/N₀ at which noise averaged over `looks` raises an alarm with a probability.
+fn threshold_over_noise(probability: f64, crossings: f64, looks: u32) -> f64 {
+    let shape = f64::from(looks);
+    let ln_gamma: f64 = (2..looks).map(|k| f64::from(k).ln()).sum();
+    // −ln of the probability that nothing is above the threshold: neither at once nor by crossing.
+    let alarms = |u: f64| {
+        let density = ((shape - 1.0) * u.ln() - u - ln_gamma).exp();
+        // Q(L, u) = e⁻ᵘ·Σ uᵏ/k!, from its last term down.
+        let mut term = density;
+        let mut above = 0.0;
+        for k in (0..looks).rev() {
+            above += term;
+            term *= f64::from(k) / u;
+        }
+        crossings * density * u.sqrt() - (-above).ln_1p()
+    };
+    let asked = -(-probability).ln_1p();
+    // The law falls from its mode on, and no probability that is accepted lies below it.
+    let (mut low, mut high) = (shape, shape + 1e3 + 10.0 * shape);
+    for _ in 0..200 {
+        let middle = 0.5 * (low + high);
+        if alarms(middle) > asked { low = middle } else { high = middle }
     }
-    x
+    high / shape
 }
 
 #[cfg(test)]
@@ -288,9 +305,13 @@ mod tests {
         zero_padding: 2,
         noise_figure_db: 0.0,
         temperature_k: 0.0,
-        threshold: Threshold::PowerDbm(-200.0),
+        false_alarm_probability: None,
         gate_m: None,
     };
+
+    fn processor(receiver: &Receiver, chirp: &Chirp) -> RangeProcessor {
+        RangeProcessor::new(receiver, chirp, -200.0, 1).unwrap()
+    }
 
     fn echo(range_m: f64) -> Return {
         Return { range_m, amplitude_sqrt_w: Complex::new(POWER_W.sqrt(), 0.0) }
@@ -310,7 +331,7 @@ mod tests {
 
     /// Largest errors of range (µm) and power (dB) over positions between two bins.
     fn worst_errors(receiver: &Receiver, chirp: &Chirp) -> [f64; 2] {
-        let processor = RangeProcessor::new(receiver, chirp).unwrap();
+        let processor = processor(receiver, chirp);
         let middle_m = 0.4 * chirp.max_range_m();
         let errors = (0..200).map(|i| {
             let range_m = middle_m + chirp.range_resolution_m() * i as f64 / 200.0;
@@ -337,7 +358,7 @@ mod tests {
     #[test]
     fn the_default_is_good_to_micrometres_at_eight_metres() {
         let chirp = Chirp::default();
-        let processor = RangeProcessor::new(&Receiver::default(), &chirp).unwrap();
+        let processor = processor(&Receiver::default(), &chirp);
         let found = processor.detect(&chirp.beat_signal(&[echo(8.001_234)]).unwrap()).unwrap();
         assert!((found.range_m - 8.001_234).abs() < 9.1e-6, "{found:?}");
         assert!(db_from_ratio(found.power_w / POWER_W).abs() < 0.014, "{found:?}");
@@ -347,7 +368,7 @@ mod tests {
     fn a_return_at_a_bin_reads_its_power_through_every_window() {
         for window in Window::ALL {
             let receiver = Receiver { window, ..NOISELESS };
-            let processor = RangeProcessor::new(&receiver, &SHORT).unwrap();
+            let processor = processor(&receiver, &SHORT);
             let signal = SHORT.beat_signal(&[echo(20.0 * SHORT.range_resolution_m())]).unwrap();
             let profile_w = processor.profile_w(&signal);
             assert!((profile_w[40] / POWER_W - 1.0).abs() < 1e-9, "{window:?}");
@@ -360,7 +381,7 @@ mod tests {
         const READING_BINS: f64 = 0.01;
         for window in Window::ALL {
             let receiver = Receiver { window, zero_padding: 16, ..NOISELESS };
-            let processor = RangeProcessor::new(&receiver, &SHORT).unwrap();
+            let processor = processor(&receiver, &SHORT);
             let signal = SHORT.beat_signal(&[echo(20.0 * SHORT.range_resolution_m())]).unwrap();
             let profile_w = processor.profile_w(&signal);
             let last = (320..).find(|&k| profile_w[k + 1] < 0.5 * POWER_W).unwrap();
@@ -375,8 +396,7 @@ mod tests {
     /// Peaks above half the power of either of two equal returns in quadrature, which is the mean
     /// over their phase difference.
     fn peaks_of_two(separation_cells: f64) -> usize {
-        let processor =
-            RangeProcessor::new(&Receiver { zero_padding: 16, ..NOISELESS }, &SHORT).unwrap();
+        let processor = processor(&Receiver { zero_padding: 16, ..NOISELESS }, &SHORT);
         let near_m = 20.0 * SHORT.range_resolution_m();
         let far_m = near_m + separation_cells * SHORT.range_resolution_m();
         let turn_rad = SHORT.phase_rad(near_m) - SHORT.phase_rad(far_m);
@@ -398,7 +418,7 @@ mod tests {
         const CHIRPS: u64 = 1000;
         for window in Window::ALL {
             let receiver = Receiver { window, zero_padding: 1, ..Receiver::default() };
-            let processor = RangeProcessor::new(&receiver, &SHORT).unwrap();
+            let processor = processor(&receiver, &SHORT);
             let total: f64 = (0..CHIRPS)
                 .map(|chirp| {
                     let mut signal = vec![Complex::ZERO; 64];
@@ -412,17 +432,26 @@ mod tests {
             assert!((ratio - 1.0).abs() < 5.0 * (2.0f64 / 64e3).sqrt(), "{window:?}: {ratio}");
         }
         // −174 dBm/Hz (−173.975) + 20 dB + 10 kHz · 1.5 (41.761 dB)
-        let processor = RangeProcessor::new(&Receiver::default(), &Chirp::default()).unwrap();
+        let processor = processor(&Receiver::default(), &Chirp::default());
         let noise_dbm = dbm_from_watts(processor.noise_per_bin_w());
         assert!((noise_dbm + 112.214).abs() < 0.01, "{noise_dbm}");
     }
 
-    fn false_alarms(receiver: &Receiver, chirps: u64) -> u64 {
-        let processor = RangeProcessor::new(receiver, &SHORT).unwrap();
-        let alarm = |chirp: &u64| {
+    fn false_alarms(receiver: &Receiver, looks: u32, chirps: u64) -> u64 {
+        let processor = RangeProcessor::new(receiver, &SHORT, 0.0, looks).unwrap();
+        let profile_w = |look: u64| {
             let mut signal = vec![Complex::ZERO; SHORT.samples];
-            processor.add_noise(&mut signal, &mut noise(*chirp));
-            processor.detect(&signal).is_some()
+            processor.add_noise(&mut signal, &mut noise(look));
+            processor.profile_w(&signal)
+        };
+        let alarm = |chirp: &u64| {
+            let first = chirp * u64::from(looks);
+            let mut mean_w = vec![0.0; 2 * SHORT.samples];
+            for look in first..first + u64::from(looks) {
+                let shares = profile_w(look).into_iter().map(|w| w / f64::from(looks));
+                mean_w.iter_mut().zip(shares).for_each(|(sum, share)| *sum += share);
+            }
+            processor.peak(&mean_w).is_some_and(|peak| peak.power_w >= processor.threshold_w())
         };
         (0..chirps).filter(alarm).count() as u64
     }
@@ -433,46 +462,49 @@ mod tests {
         for (window, probability) in
             [(Window::Hann, 1e-2), (Window::BlackmanHarris, 1e-2), (Window::Hann, 1e-3)]
         {
-            let threshold = Threshold::FalseAlarmProbability(probability);
-            let receiver = Receiver { window, threshold, ..Receiver::default() };
-            let expected = probability * CHIRPS as f64;
-            let found = false_alarms(&receiver, CHIRPS) as f64;
-            // Four standard deviations of a binomial count.
-            assert!((found - expected).abs() < 4.0 * expected.sqrt(), "{window:?}: {found}");
+            let false_alarm_probability = Some(probability);
+            let receiver = Receiver { window, false_alarm_probability, ..Receiver::default() };
+            for looks in [1, 4] {
+                let expected = probability * CHIRPS as f64;
+                let found = false_alarms(&receiver, looks, CHIRPS) as f64;
+                // Four standard deviations of a binomial count.
+                let gap = (found - expected).abs();
+                assert!(gap < 4.0 * expected.sqrt(), "{window:?}, {looks} looks: {found}");
+            }
         }
     }
 
     #[test]
     fn the_threshold_tends_to_that_of_one_look() {
-        // One look: −ln P_fa.
-        assert!((threshold_over_noise(1e-6, 0.0) + 1e-6f64.ln()).abs() < 1e-6);
-        // 100 looks or so cost ln 100.
-        let many = threshold_over_noise(1e-6, 100.0);
-        assert!((many - (100.0 * many.sqrt() / 1e-6).ln()).abs() < 1e-5, "{many}");
+        // One bin and no crossings: −ln P_fa.
+        assert!((threshold_over_noise(1e-6, 0.0, 1) + 1e-6f64.ln()).abs() < 1e-5);
+        // 100 crossings or so cost ln 100.
+        let many = threshold_over_noise(1e-6, 100.0, 1);
+        assert!((many - (100.0 * many.sqrt() / 1e-6).ln()).abs() < 0.01, "{many}");
+        // A thousand looks leave hardly more than the mean.
+        let calm = threshold_over_noise(1e-6, 100.0, 1000);
+        assert!(calm > 1.0 && calm < 1.3, "{calm}");
     }
 
     #[test]
     fn what_is_weak_silent_or_outside_the_gate_is_no_detection() {
         let chirp = Chirp { samples: 2048, ..SHORT };
         let signal = chirp.beat_signal(&[echo(8.0)]).unwrap();
-        let detect =
-            |receiver: &Receiver| RangeProcessor::new(receiver, &chirp).unwrap().detect(&signal);
+        let above = |receiver: &Receiver, threshold_dbm| {
+            RangeProcessor::new(receiver, &chirp, threshold_dbm, 1).unwrap().detect(&signal)
+        };
+        let detect = |receiver: &Receiver| above(receiver, dbm_from_watts(POWER_W) - 20.0);
         assert!(detect(&NOISELESS).is_some());
         let power_dbm = dbm_from_watts(POWER_W);
-        let at = |power_dbm| Receiver { threshold: Threshold::PowerDbm(power_dbm), ..NOISELESS };
-        assert!(detect(&at(power_dbm - 0.1)).is_some());
-        assert!(detect(&at(power_dbm + 0.1)).is_none());
-        let gated = |gate_m| Receiver {
-            gate_m: Some(gate_m),
-            threshold: Threshold::PowerDbm(power_dbm - 20.0),
-            ..NOISELESS
-        };
+        assert!(above(&NOISELESS, power_dbm - 0.1).is_some());
+        assert!(above(&NOISELESS, power_dbm + 0.1).is_none());
+        let gated = |gate_m| Receiver { gate_m: Some(gate_m), ..NOISELESS };
         assert!(detect(&gated([7.0, 9.0])).is_some());
         // The edge of this gate is on the flank of the return, only 4 dB below its peak.
         assert!(detect(&gated([8.005, 9.0])).is_none());
         assert!(detect(&gated([8.0001, 8.0002])).is_none());
         assert!(detect(&gated([100.0, 200.0])).is_none());
-        let processor = RangeProcessor::new(&NOISELESS, &chirp).unwrap();
+        let processor = processor(&NOISELESS, &chirp);
         assert_eq!(processor.detect(&[Complex::ZERO; 2048]), None);
         assert_eq!(processor.detect(&[]), None);
     }
@@ -483,7 +515,7 @@ mod tests {
         strong.amplitude_sqrt_w *= 30.0;
         let receiver =
             Receiver { window: Window::BlackmanHarris, gate_m: Some([0.08, 0.3]), ..NOISELESS };
-        let processor = RangeProcessor::new(&receiver, &SHORT).unwrap();
+        let processor = processor(&receiver, &SHORT);
         let signal = SHORT.beat_signal(&[strong, echo(0.2)]).unwrap();
         let found = processor.detect(&signal).unwrap();
         assert!((found.range_m - 0.2).abs() < 20e-6, "{found:?}");
@@ -491,14 +523,16 @@ mod tests {
 
     #[test]
     fn a_setting_without_meaning_is_named() {
-        let refused =
-            |receiver: Receiver| RangeProcessor::new(&receiver, &SHORT).err().unwrap().to_string();
+        let refused = |receiver: Receiver| {
+            RangeProcessor::new(&receiver, &SHORT, 0.0, 1).err().unwrap().to_string()
+        };
         let text = refused(Receiver { zero_padding: 0, ..NOISELESS });
         assert!(text.contains("receiver.zero_padding = 0"), "{text}");
         let text = refused(Receiver { gate_m: Some([5.0, 4.0]), ..NOISELESS });
         assert!(text.contains("receiver.gate_m[1] = 4"), "{text}");
-        let threshold = Threshold::FalseAlarmProbability(0.0);
-        assert!(refused(Receiver { threshold, ..NOISELESS }).contains("false_alarm_probability"));
-        assert!(RangeProcessor::new(&NOISELESS, &Chirp { samples: 0, ..SHORT }).is_err());
+        let never = Receiver { false_alarm_probability: Some(0.0), ..NOISELESS };
+        assert!(refused(never).contains("false_alarm_probability"));
+        let silent = Chirp { samples: 0, ..SHORT };
+        assert!(RangeProcessor::new(&NOISELESS, &silent, 0.0, 1).is_err());
     }
 }

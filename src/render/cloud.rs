@@ -1,10 +1,10 @@
 //! Detections as a point cloud.
 
-use super::Echo;
+use super::{Echo, Truth};
 use crate::formats::ply::{Column, Scalar, Table};
 
 /// The cloud's table: position in the global frame (double), then what the radar and the renderer
-/// know of each point.
+/// know of each point. What caused a false alarm is NaN and −1.
 ///
 /// `regions` and `materials` are written into the header, so that the numbers keep their names.
 pub fn cloud_table(
@@ -18,21 +18,31 @@ pub fn cloud_table(
         scalar,
         values: echoes.iter().map(|echo| value(echo)).collect(),
     };
-    let material = |e: &Echo| f64::from(material_of_region[usize::from(e.region)]);
+    let known = |name: &str, value: &dyn Fn(&Truth) -> f64| {
+        column(name, Scalar::Float, &|echo| echo.truth.as_ref().map_or(f64::NAN, value))
+    };
+    let number = |name: &str, value: &dyn Fn(&Truth) -> i64| {
+        column(name, Scalar::Int, &|echo| echo.truth.as_ref().map_or(-1, value) as f64)
+    };
+    let material = |t: &Truth| material_of_region[usize::from(t.region)].into();
     let columns = vec![
-        column("x", Scalar::Double, &|e| e.hit.point.xyz.x),
-        column("y", Scalar::Double, &|e| e.hit.point.xyz.y),
-        column("z", Scalar::Double, &|e| e.hit.point.xyz.z),
+        column("x", Scalar::Double, &|e| e.point.xyz.x),
+        column("y", Scalar::Double, &|e| e.point.xyz.y),
+        column("z", Scalar::Double, &|e| e.point.xyz.z),
         column("xt_m", Scalar::Float, &|e| e.xt_m),
         column("yt_m", Scalar::Float, &|e| e.yt_m),
-        column("range_m", Scalar::Float, &|e| e.hit.range_m),
+        column("range_m", Scalar::Float, &|e| e.range_m),
         column("power_dbm", Scalar::Float, &|e| e.power_dbm),
-        column("incidence_deg", Scalar::Float, &|e| e.hit.theta_rad().to_degrees()),
-        column("incidence_sd_deg", Scalar::Float, &|e| e.theta_sd_rad.to_degrees()),
+        known("incidence_deg", &|t| t.hit.theta_rad().to_degrees()),
+        known("incidence_sd_deg", &|t| t.theta_sd_rad.to_degrees()),
+        known("azimuth_deg", &|t| t.azimuth_rad.to_degrees()),
+        known("edge_m", &|t| t.edge_m),
+        known("specular_share", &|t| t.specular_share),
         column("chirp", Scalar::Int, &|e| e.chirp.into()),
-        column("facet", Scalar::Int, &|e| e.hit.facet.into()),
-        column("region", Scalar::Int, &|e| e.region.into()),
-        column("material", Scalar::Int, &material),
+        number("surfaces", &|t| t.surfaces.into()),
+        number("facet", &|t| t.hit.facet.into()),
+        number("region", &|t| t.region.into()),
+        number("material", &material),
     ];
     let named = |kind: &'static str| {
         move |(number, name): (usize, &&str)| format!("{kind} {number} {name}")

@@ -16,8 +16,10 @@ struct Pixel {
     power_w: f64,
     range_m: f64,
     incidence_rad: f64,
+    /// Weight of what is not a false alarm.
+    known_weight: f64,
     nearest_weight: f64,
-    material: u16,
+    material: Option<u16>,
     count: u32,
 }
 
@@ -37,7 +39,7 @@ pub fn power_image(
     let mut raster = grid(field, spot_m, pixel_m);
     let mut pixels = vec![Pixel::default(); raster.width * raster.height];
     for echo in scan.detections() {
-        let material = material_of_region[usize::from(echo.region)];
+        let material = echo.truth.map(|truth| material_of_region[usize::from(truth.region)]);
         for (index, distance_m) in covered(&raster, echo, spot_m) {
             let weight = (-4.0 * std::f64::consts::LN_2 * (distance_m / spot_m).powi(2)).exp();
             pixels[index].add(echo, material, weight);
@@ -84,12 +86,15 @@ fn covered<'a>(
 }
 
 impl Pixel {
-    fn add(&mut self, echo: &Echo, material: u16, weight: f64) {
+    fn add(&mut self, echo: &Echo, material: Option<u16>, weight: f64) {
         self.weight += weight;
         self.power_w += weight * watts_from_dbm(echo.power_dbm);
-        self.range_m += weight * echo.hit.range_m;
-        self.incidence_rad += weight * echo.hit.theta_rad();
+        self.range_m += weight * echo.range_m;
         self.count += 1;
+        if let Some(truth) = echo.truth {
+            self.known_weight += weight;
+            self.incidence_rad += weight * truth.hit.theta_rad();
+        }
         if weight > self.nearest_weight {
             self.nearest_weight = weight;
             self.material = material;
@@ -101,8 +106,8 @@ fn channels(pixels: &[Pixel]) -> Vec<Channel> {
     let values: [fn(&Pixel) -> f64; 5] = [
         |p| dbm_from_watts(p.power_w / p.weight),
         |p| p.range_m / p.weight,
-        |p| (p.incidence_rad / p.weight).to_degrees(),
-        |p| f64::from(p.material),
+        |p| (p.incidence_rad / p.known_weight).to_degrees(),
+        |p| p.material.map_or(f64::NAN, f64::from),
         |p| f64::from(p.count),
     ];
     let channel = |(name, value): (&str, fn(&Pixel) -> f64)| Channel {
@@ -119,12 +124,22 @@ fn channels(pixels: &[Pixel]) -> Vec<Channel> {
 mod tests {
     use super::*;
     use crate::frames::Point;
+    use crate::render::Truth;
     use crate::trace::Hit;
 
     fn echo(xt_m: f64, yt_m: f64, power_dbm: f64) -> Echo {
         let point = Point::new(xt_m, yt_m, 0.0);
         let hit = Hit { facet: 0, range_m: 8.0, point, cos_theta: 0.5 };
-        Echo { chirp: 0, hit, theta_sd_rad: 0.0, xt_m, yt_m, region: 0, power_dbm }
+        let truth = Truth {
+            hit,
+            region: 0,
+            theta_sd_rad: 0.0,
+            azimuth_rad: 0.0,
+            surfaces: 1,
+            specular_share: 0.0,
+            edge_m: 0.0,
+        };
+        Echo { chirp: 0, point, range_m: 8.0, xt_m, yt_m, power_dbm, truth: Some(truth) }
     }
 
     fn image(echoes: Vec<Echo>) -> Raster {
@@ -164,6 +179,14 @@ mod tests {
         assert_eq!(value("material"), Some(3.0));
         assert_eq!(value("count"), Some(1.0));
         assert!((value("incidence_deg").unwrap() - 60.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_false_alarm_has_power_and_range_and_nothing_else() {
+        let raster = image(vec![Echo { truth: None, ..echo(0.1, -0.2, -50.0) }]);
+        let known = |name| raster.channel(name).unwrap().iter().any(|v| v.is_finite());
+        assert!(known("power_dbm") && known("range_m") && known("count"));
+        assert!(!known("material") && !known("incidence_deg"));
     }
 
     #[test]

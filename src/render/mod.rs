@@ -1,53 +1,120 @@
 //! Scan × target × materials → detections. Plain values in and out: no files, no database.
+//!
+//! | step | file |
+//! |---|---|
+//! | where the rays of each chirp meet the target | `spot.rs`, equation (7) |
+//! | what scatters there, in its own frame | `surface.rs` |
+//! | what arrives at an antenna, directly | `path.rs`, equation (11) |
+//! | … and by way of a second surface | `bounce.rs` |
+//! | what the receiver makes of it | `detect.rs` |
+//! | image and point cloud | `image.rs`, `cloud.rs` |
 
+mod bounce;
 mod cloud;
+mod detect;
+mod edges;
 mod image;
+mod observer;
+mod path;
 mod spot;
+mod surface;
 
 use glam::DVec3;
+use num_complex::Complex;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use crate::brdf::Scattering;
-use crate::frames::{Direction, Global, Point, Ray};
+use crate::frames::{Global, Point, Pose, Ray, Target};
 use crate::geometry::Mesh;
-use crate::radar::{Chirps, Field, Link, Radar, RadarFrames};
-use crate::trace::Hit;
+use crate::radar::{Aliased, Chirps, Field, Radar, RadarError, RadarFrames};
+use crate::trace::{Bvh, Hit, encloses};
 use crate::units::dbm_from_watts;
+use detect::Detector;
+use path::{Path, Paths};
 
+pub use bounce::Bounce;
 pub use cloud::cloud_table;
 pub use image::{CHANNELS, power_image};
+pub use observer::Observer;
 pub use spot::Footprints;
+pub use surface::Surface;
 
-/// One chirp that met a surface.
-///
-/// With one ray per chirp everything is of that ray. With more, power is their mean, range and point
-/// lie on the beam's axis at the mean range weighted by power, and facet, region and incidence are
-/// those of the strongest ray.
+/// Everything a scan meets and how it is rendered.
+#[derive(Clone, Copy)]
+pub struct Setup<'a> {
+    /// The instrument.
+    pub radar: &'a Radar,
+    /// The rays of the scan.
+    pub chirps: &'a Chirps,
+    /// The target.
+    pub bvh: &'a Bvh<'a>,
+    /// Region of every facet, an index into `surfaces`.
+    pub region_of_facet: &'a [u16],
+    /// What each region is made of.
+    pub surfaces: &'a [Surface<'a>],
+    /// Second-order paths; none, the paper's, for single ones only.
+    pub bounce: Option<Bounce>,
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+impl<'a> Setup<'a> {
+    /// The paper's: single paths only.
+    pub fn new(
+        radar: &'a Radar,
+        chirps: &'a Chirps,
+        bvh: &'a Bvh<'a>,
+        region_of_facet: &'a [u16],
+        surfaces: &'a [Surface<'a>],
+    ) -> Setup<'a> {
+        Setup { radar, chirps, bvh, region_of_facet, surfaces, bounce: None, seed: 0 }
+    }
+}
+
+/// What came back from one chirp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Echo {
     /// Chirp number, from 0 or as an explicit scan gives it.
     pub chirp: u32,
-    /// Where the chirp met the surface: range R, point, facet, incidence.
-    pub hit: Hit,
-    /// Standard deviation of the incidence over the rays of the spot, rad; 0 for a single ray.
-    pub theta_sd_rad: f64,
+    /// Where the radar believes the echo comes from: on the beam's axis, at its range.
+    pub point: Point<Global>,
+    /// Half the way from the radar to the antenna, m.
+    pub range_m: f64,
     /// x in the target frame, m.
     pub xt_m: f64,
     /// y in the target frame, m.
     pub yt_m: f64,
-    /// Region of the facet.
-    pub region: u16,
     /// Received power, dBm; −∞ when nothing comes back.
     pub power_dbm: f64,
+    /// What caused it; none for a false alarm.
+    pub truth: Option<Truth>,
 }
 
-/// What one scan gave.
+/// What caused an echo: the strongest of the paths that the receiver saw as one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Truth {
+    /// Where the path first met the target.
+    pub hit: Hit,
+    /// Region of that facet.
+    pub region: u16,
+    /// Standard deviation of the incidence over the rays of the spot, rad; 0 for a single ray.
+    pub theta_sd_rad: f64,
+    /// Azimuth of the radar about the facet's normal, from the grain of its region, rad.
+    pub azimuth_rad: f64,
+    /// Surfaces that the path met: 1 for a direct echo, 2 for one by way of another surface.
+    pub surfaces: u8,
+    /// Share of the power that the first surface reflects like a mirror, rough or not.
+    pub specular_share: f64,
+    /// Distance in the target plane to the nearest edge in depth, m, at most three spots.
+    pub edge_m: f64,
+}
+
+/// What one scan gave at one antenna.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scan {
     /// Number of chirps sent.
     pub chirps: usize,
-    /// Chirps that met a surface, in the order they were sent, whatever their power.
+    /// Chirps that met a surface, in the order they were sent, whatever their power, and false alarms.
     pub echoes: Vec<Echo>,
     /// Echoes below this power are not detected, dBm.
     pub threshold_dbm: f64,
@@ -69,6 +136,38 @@ pub enum RenderError {
         /// What to do.
         way_out: &'static str,
     },
+    /// An antenna stands inside the target.
+    #[error(
+        "the receiver at ({x_m}, {y_m}, {z_m}) m stands inside the target and sees nothing; move its \
+         position_m"
+    )]
+    Inside {
+        /// x in the global frame, m.
+        x_m: f64,
+        /// y, m.
+        y_m: f64,
+        /// z, m.
+        z_m: f64,
+    },
+    /// A path is longer than the sampling can tell.
+    #[error(transparent)]
+    Aliased(#[from] Aliased),
+    /// A receiver adds amplitudes, and nothing says with which phases.
+    #[error(
+        "the paths of one chirp reach the receiver with unknown phases, which is speckle; add \
+         [radar.speckle] (looks = 64 averages most of it away), or set spot.rays = 1 and remove \
+         [bounce]"
+    )]
+    Phases,
+    /// The coherent part of speckle is that of one path.
+    #[error(
+        "radar.speckle.coherent_ratio is that of a whole echo and cannot be shared out among several \
+         paths; set it to 0, or set spot.rays = 1 and remove [bounce]"
+    )]
+    Coherent,
+    /// The receiver cannot work.
+    #[error(transparent)]
+    Radar(#[from] RadarError),
 }
 
 impl Scan {
@@ -86,100 +185,161 @@ impl Scan {
 pub fn trace(
     radar: &Radar,
     chirps: &Chirps,
-    mesh: &Mesh,
+    bvh: &Bvh,
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Footprints, RenderError> {
-    let footprints = spot::trace(radar, chirps, mesh, rays_per_chirp.max(1), done);
+    let footprints = spot::trace(radar, chirps, bvh, rays_per_chirp.max(1), done);
     if footprints.hits.iter().all(Option::is_none) {
-        return Err(miss(&radar.frames(), chirps, mesh));
+        return Err(miss(&radar.frames(), chirps, bvh.mesh()));
     }
     Ok(footprints)
 }
 
-/// Turns hits into echoes: `region_of_facet` indexes `surfaces`, one scattering law per region.
+/// Turns hits into echoes at an antenna. `done` is told how many chirps are finished.
 ///
 /// The result is the same for any number of threads.
+///
+/// # Errors
+/// When the antenna stands inside the target, a path is too long for the receiver's sampling, or
+/// several paths meet in a receiver that does not know their phases.
 pub fn shade(
-    radar: &Radar,
-    chirps: &Chirps,
+    setup: &Setup,
     footprints: &Footprints,
-    region_of_facet: &[u16],
-    surfaces: &[&dyn Scattering],
-) -> Scan {
-    let target_from_global = radar.frames().global_from_target.inverse();
-    let link = Link::new(radar);
-    let region = |hit: &Hit| region_of_facet[hit.facet as usize];
-    let power_w = |hit: &Hit| power_w(&link, hit, surfaces[usize::from(region(hit))]);
+    observer: Observer,
+    done: &(dyn Fn(usize) + Sync),
+) -> Result<Scan, RenderError> {
+    check(setup, footprints, observer)?;
+    let detector = Detector::new(setup, observer)?;
+    let paths = Paths::new(setup, observer);
+    let target_from_global = setup.radar.frames().global_from_target.inverse();
     let echo = |(chirp, hits): (usize, &[Option<Hit>])| {
-        let seen = Seen::new(hits, power_w)?;
-        let hit = match hits.len() {
-            1 => seen.strongest,
-            _ => seen.on_the_axis(&chirps.rays[chirp]),
-        };
-        let in_target = target_from_global * hit.point;
-        Some(Echo {
+        let paths = paths.of_chirp(chirp, hits);
+        let found = found(setup, &detector, observer, chirp, &paths)?;
+        done(1);
+        Ok(found.map(|found| Echo {
+            truth: found.cause.map(|path| truth(setup, footprints, chirp, hits, path)),
+            ..found.echo(setup.chirps, chirp, &target_from_global)
+        }))
+    };
+    let echoes: Vec<Option<Echo>> =
+        footprints.chirps().enumerate().map(echo).collect::<Result<_, RenderError>>()?;
+    Ok(Scan {
+        chirps: setup.chirps.rays.len(),
+        echoes: echoes.into_iter().flatten().collect(),
+        threshold_dbm: dbm_from_watts(detector.threshold_w()),
+    })
+}
+
+/// The sampled beat signals of a scan at an antenna, chirp after chirp and look after look, as its
+/// receiver has them; none without a `[radar.receiver]`.
+///
+/// # Errors
+/// As [`shade`], at once or when a chirp's turn comes.
+pub fn beat_signals(
+    setup: &Setup,
+    footprints: &Footprints,
+    observer: Observer,
+) -> Result<impl Iterator<Item = Result<Vec<Vec<Complex<f64>>>, RenderError>>, RenderError> {
+    check(setup, footprints, observer)?;
+    let detector = Detector::new(setup, observer)?;
+    let paths = Paths::new(setup, observer);
+    let hits = footprints.hits.chunks(footprints.rays_per_chirp.max(1));
+    Ok(hits
+        .enumerate()
+        .map(move |(chirp, hits)| detector.beats(chirp, &paths.of_chirp(chirp, hits))))
+}
+
+/// A range and a power, and where they come from.
+struct Found<'a> {
+    point: Point<Global>,
+    range_m: f64,
+    power_w: f64,
+    cause: Option<&'a Path>,
+}
+
+/// What the receiver found in one chirp: an echo, weak or strong, or a false alarm.
+fn found<'a>(
+    setup: &Setup,
+    detector: &Detector,
+    observer: Observer,
+    chirp: usize,
+    paths: &'a [Path],
+) -> Result<Option<Found<'a>>, RenderError> {
+    let Some(seen) = detector.observe(chirp, paths)? else { return Ok(None) };
+    let near = |path: &&Path| {
+        detector.reach_m().is_none_or(|reach_m| (path.range_m - seen.range_m).abs() <= reach_m)
+    };
+    let cause = paths.iter().filter(near).reduce(|a, b| if b.power_w > a.power_w { b } else { a });
+    if cause.is_none() && seen.power_w < detector.threshold_w() {
+        return Ok(None);
+    }
+    let point = observer.on_axis(&setup.chirps.rays[chirp], seen.range_m);
+    let (range_m, power_w) = (seen.range_m, seen.power_w);
+    Ok(point.map(|point| Found { point, range_m, power_w, cause }))
+}
+
+impl Found<'_> {
+    fn echo(
+        &self,
+        chirps: &Chirps,
+        chirp: usize,
+        target_from_global: &Pose<Target, Global>,
+    ) -> Echo {
+        let in_target = *target_from_global * self.point;
+        Echo {
             chirp: chirps.number[chirp],
-            hit,
-            theta_sd_rad: seen.theta_sd_rad,
+            point: self.point,
+            range_m: self.range_m,
             xt_m: in_target.xyz.x,
             yt_m: in_target.xyz.y,
-            region: region(&hit),
-            power_dbm: dbm_from_watts(seen.power_w),
-        })
-    };
-    Scan {
-        chirps: chirps.rays.len(),
-        echoes: footprints.chirps().enumerate().filter_map(echo).collect(),
-        threshold_dbm: radar.threshold_dbm,
-    }
-}
-
-/// What the rays of one chirp saw together.
-struct Seen {
-    strongest: Hit,
-    range_m: f64,
-    theta_sd_rad: f64,
-    power_w: f64,
-}
-
-impl Seen {
-    /// `None` when no ray met anything.
-    fn new(rays: &[Option<Hit>], power_w: impl Fn(&Hit) -> f64) -> Option<Seen> {
-        let hits: Vec<(Hit, f64)> = rays.iter().flatten().map(|hit| (*hit, power_w(hit))).collect();
-        let mut strongest = *hits.first()?;
-        for &(hit, power_w) in &hits[1..] {
-            if power_w > strongest.1 {
-                strongest = (hit, power_w);
-            }
+            power_dbm: dbm_from_watts(self.power_w),
+            truth: None,
         }
-        let count = hits.len() as f64;
-        let sum_w: f64 = hits.iter().map(|(_, power_w)| power_w).sum();
-        let range_m = match sum_w > 0.0 {
-            true => hits.iter().map(|(hit, power_w)| hit.range_m * power_w).sum::<f64>() / sum_w,
-            false => hits.iter().map(|(hit, _)| hit.range_m).sum::<f64>() / count,
-        };
-        let mean_rad = hits.iter().map(|(hit, _)| hit.theta_rad()).sum::<f64>() / count;
-        let square = |(hit, _): &(Hit, f64)| (hit.theta_rad() - mean_rad).powi(2);
-        Some(Seen {
-            strongest: strongest.0,
-            range_m,
-            theta_sd_rad: (hits.iter().map(square).sum::<f64>() / count).sqrt(),
-            power_w: sum_w / rays.len() as f64,
-        })
-    }
-
-    /// The strongest hit, moved to where the radar believes it: on the beam's axis.
-    fn on_the_axis(&self, axis: &Ray<Global>) -> Hit {
-        let point = Point::from(axis.origin.xyz + self.range_m * axis.direction.xyz());
-        Hit { range_m: self.range_m, point, ..self.strongest }
     }
 }
 
-/// Equation (11) at a hit: the surface is lit and seen from the same direction.
-fn power_w(link: &Link, hit: &Hit, surface: &dyn Scattering) -> f64 {
-    let retro = Direction::from_angles(hit.theta_rad(), 0.0);
-    link.power_w(hit.range_m, hit.cos_theta, surface.f_per_sr(retro, retro))
+fn truth(
+    setup: &Setup,
+    footprints: &Footprints,
+    chirp: usize,
+    hits: &[Option<Hit>],
+    path: &Path,
+) -> Truth {
+    Truth {
+        hit: path.hit,
+        region: setup.region_of_facet[path.hit.facet as usize],
+        theta_sd_rad: theta_sd_rad(hits),
+        azimuth_rad: path.azimuth_rad,
+        surfaces: path.surfaces,
+        specular_share: path.specular_share,
+        edge_m: footprints.edge_m[chirp],
+    }
+}
+
+fn theta_sd_rad(hits: &[Option<Hit>]) -> f64 {
+    let count = hits.iter().flatten().count() as f64;
+    let mean_rad = hits.iter().flatten().map(Hit::theta_rad).sum::<f64>() / count;
+    let square = |hit: &Hit| (hit.theta_rad() - mean_rad).powi(2);
+    (hits.iter().flatten().map(square).sum::<f64>() / count).sqrt()
+}
+
+/// What must hold before anything is computed.
+fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(), RenderError> {
+    if let Observer::Receiver { position, .. } = observer
+        && encloses(setup.bvh.mesh(), position)
+    {
+        let [x_m, y_m, z_m] = position.xyz.to_array();
+        return Err(RenderError::Inside { x_m, y_m, z_m });
+    }
+    if setup.radar.receiver.is_some() && (footprints.rays_per_chirp > 1 || setup.bounce.is_some()) {
+        return match setup.radar.speckle {
+            None => Err(RenderError::Phases),
+            Some(speckle) if speckle.coherent_ratio > 0.0 => Err(RenderError::Coherent),
+            Some(_) => Ok(()),
+        };
+    }
+    Ok(())
 }
 
 fn miss(frames: &RadarFrames, chirps: &Chirps, mesh: &Mesh) -> RenderError {
@@ -206,7 +366,8 @@ fn miss(frames: &RadarFrames, chirps: &Chirps, mesh: &Mesh) -> RenderError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::Lambert;
+    use crate::brdf::{Lambert, Scattering};
+    use crate::frames::Direction;
     use crate::scene::solids;
 
     fn chirps(radar: &Radar) -> Chirps {
@@ -215,22 +376,18 @@ mod tests {
 
     #[test]
     fn a_plate_at_eight_metres_returns_the_hand_computed_power() {
-        let radar = Radar::default();
         let mut mesh = solids::plate(2.0, 2.0);
         for vertex in &mut mesh.vertices {
             vertex.y += 1.1;
         }
         let lambert = Lambert { albedo: 0.5 };
-        let regions = vec![0; mesh.facets.len()];
-        let chirps = chirps(&radar);
-        let hits = trace(&radar, &chirps, &mesh, 1, &|_| {}).unwrap();
-        let scan = shade(&radar, &chirps, &hits, &regions, &[&lambert]);
+        let scan = shaded(&mesh, 1, &lambert);
         assert_eq!(scan.echoes.len(), 18_529);
         for echo in &scan.echoes {
             // P = 7 − 15 + 10·lg(0.196 · 0.5/π) − 20·lg R + 20·lg cos θ, with R = 8/cos θ.
-            let cos = 8.0 / echo.hit.range_m;
+            let cos = 8.0 / echo.range_m;
             let expected = -8.0 + 10.0 * (0.196 * 0.5 / std::f64::consts::PI).log10()
-                - 20.0 * echo.hit.range_m.log10()
+                - 20.0 * echo.range_m.log10()
                 + 20.0 * cos.log10();
             assert!((echo.power_dbm - expected).abs() < 1e-9);
         }
@@ -243,16 +400,20 @@ mod tests {
             vertex.x += 3.0;
         }
         let radar = Radar::default();
-        let missed = trace(&radar, &chirps(&radar), &mesh, 1, &|_| {}).unwrap_err();
+        let bvh = Bvh::new(&mesh);
+        let missed = trace(&radar, &chirps(&radar), &bvh, 1, &|_| {}).unwrap_err();
         assert!(missed.to_string().contains("x 2.950 to 3.050"), "{missed}");
     }
 
-    /// Mean power, W, and echoes of a plate with many rays per chirp.
+    /// The scan of a mesh with many rays per chirp.
     fn shaded(mesh: &Mesh, rays: usize, surface: &dyn Scattering) -> Scan {
         let radar = Radar::default();
         let chirps = chirps(&radar);
-        let footprints = trace(&radar, &chirps, mesh, rays, &|_| {}).unwrap();
-        shade(&radar, &chirps, &footprints, &vec![0; mesh.facets.len()], &[surface])
+        let (bvh, regions) = (Bvh::new(mesh), vec![0; mesh.facets.len()]);
+        let footprints = trace(&radar, &chirps, &bvh, rays, &|_| {}).unwrap();
+        let surfaces = [Surface::new(surface)];
+        let setup = Setup::new(&radar, &chirps, &bvh, &regions, &surfaces);
+        shade(&setup, &footprints, Observer::Radar, &|_| {}).unwrap()
     }
 
     #[test]
@@ -263,7 +424,7 @@ mod tests {
         let (one, many) = (shaded(&mesh, 1, &lambert), shaded(&mesh, 64, &lambert));
         for (a, b) in std::iter::zip(&one.echoes, &many.echoes) {
             assert!((a.power_dbm - b.power_dbm).abs() < 1e-3, "{a:?} {b:?}");
-            assert!((a.hit.range_m - b.hit.range_m).abs() < 1e-4);
+            assert!((a.range_m - b.range_m).abs() < 1e-4);
         }
     }
 

@@ -10,8 +10,8 @@ use std::f64::consts::{LN_2, TAU};
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::edges;
 use crate::frames::{Direction, Global, Point, Ray};
-use crate::geometry::Mesh;
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Beam, Chirps, Radar};
 use crate::trace::{Bvh, Hit};
@@ -26,6 +26,9 @@ pub struct Footprints {
     pub rays_per_chirp: usize,
     /// N entries per chirp; for N = 1 the ray along the beam's axis.
     pub hits: Vec<Option<Hit>>,
+    /// For each chirp the distance in the target plane to the nearest edge in depth, m, at most
+    /// three spots.
+    pub edge_m: Vec<f64>,
 }
 
 impl Footprints {
@@ -39,12 +42,12 @@ impl Footprints {
 pub(super) fn trace(
     radar: &Radar,
     chirps: &Chirps,
-    mesh: &Mesh,
+    bvh: &Bvh,
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
 ) -> Footprints {
     const CHIRPS_PER_TASK: usize = 256;
-    let (bvh, beam) = (Bvh::new(mesh), Beam::new(radar));
+    let beam = Beam::new(radar);
     let target_from_global = radar.frames().global_from_target.inverse();
     let chirp = |(number, axis): (usize, &Ray<Global>)| {
         let hit = bvh.closest(axis);
@@ -58,7 +61,7 @@ pub(super) fn trace(
         let tangent = beam.diameter_m(aim.x, aim.y, range_m) / range_m;
         sub_rays(axis, tangent, number, rays_per_chirp).map(|ray| bvh.closest(&ray?)).collect()
     };
-    let hits = chirps
+    let hits: Vec<Option<Hit>> = chirps
         .rays
         .par_chunks(CHIRPS_PER_TASK)
         .enumerate()
@@ -70,7 +73,21 @@ pub(super) fn trace(
             hits
         })
         .collect();
-    Footprints { rays_per_chirp, hits }
+    let edge_m = edge_distances_m(radar, chirps, &hits, rays_per_chirp);
+    Footprints { rays_per_chirp, hits, edge_m }
+}
+
+/// By the first ray of each chirp, which is the nearest to its axis.
+fn edge_distances_m(
+    radar: &Radar,
+    chirps: &Chirps,
+    hits: &[Option<Hit>],
+    rays_per_chirp: usize,
+) -> Vec<f64> {
+    const SPOTS: f64 = 3.0;
+    let ranges_m = hits.chunks(rays_per_chirp).map(|hits| hits.first()?.map(|hit| hit.range_m));
+    let looks: Vec<_> = chirps.target_points_m(&radar.frames()).zip(ranges_m).collect();
+    edges::distances_m(&looks, radar.spot_diameter_m, SPOTS * radar.spot_diameter_m)
 }
 
 /// Rays through the spot; `tangent` is its diameter over the range, `chirp` turns the pattern so

@@ -38,6 +38,12 @@ pub struct SceneFile {
     /// How the spot is sampled.
     #[serde(default)]
     pub spot: SpotEntry,
+    /// Second-order paths, radar → A → B → antenna; none, the paper's, without this table.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bounce: Option<BounceEntry>,
+    /// Antennas beside the radar's own that listen to the same scan.
+    #[serde(default)]
+    pub receiver: Vec<ReceiverEntry>,
     /// How detections become an image.
     #[serde(default)]
     pub image: ImageEntry,
@@ -61,6 +67,35 @@ impl Default for SpotEntry {
     fn default() -> Self {
         SpotEntry { rays: 1 }
     }
+}
+
+/// Second-order paths.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BounceEntry {
+    /// Directions followed from each lit point, 1 to 10 000. 64: assumed.
+    pub rays: usize,
+    /// How strongly the radar's own beam sees a surface outside the spot, over one inside, dB, −200
+    /// to 0. −20: assumed; side lobes are not published. Receivers see the whole target alike.
+    pub outside_spot_db: f64,
+}
+
+impl Default for BounceEntry {
+    fn default() -> Self {
+        BounceEntry { rays: 64, outside_spot_db: -20.0 }
+    }
+}
+
+/// An antenna that listens to the radar's scan from elsewhere.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReceiverEntry {
+    /// Name, part of the names of its files: small letters, digits and hyphens.
+    pub name: String,
+    /// Where it stands in the global frame, m.
+    pub position_m: [f64; 3],
+    /// Equivalent area A_eq, m²; that of the radar when not given.
+    pub aperture_m2: Option<f64>,
 }
 
 /// How detections become an image.
@@ -101,6 +136,10 @@ pub struct RegionEntry {
     pub name: String,
     /// Material, `NAME` or `NAME@REVISION`.
     pub material: String,
+    /// Direction of the grain in the global frame, of any length; upwards when not given. It is
+    /// projected onto each facet; `m` of an anisotropic model is along it, azimuth counts from it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grain: Option<[f64; 3]>,
     /// Only facets of this mesh.
     pub mesh: Option<String>,
     /// Only facets labelled so by the file: `{ part = "head" }`, `{ usemtl = "skin" }`,

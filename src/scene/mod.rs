@@ -2,6 +2,7 @@
 
 pub mod file;
 pub mod mannequin;
+mod receivers;
 pub mod regions;
 pub mod solids;
 mod target;
@@ -119,7 +120,8 @@ impl Scene {
             let way_out = "shorten it; it is the title of figures".to_owned();
             return Err(SceneError::Value { file: path.to_owned(), place, problem, way_out });
         }
-        check_spot(file.spot.rays, chirps.rays.len(), path)?;
+        check_spot(&file, chirps.rays.len(), path)?;
+        receivers::check(&file, path)?;
         check_pixel(pixel_m, &file.radar, &chirps, path)?;
         file.image.pixel_m = Some(pixel_m);
         if file.name.is_empty() {
@@ -130,19 +132,39 @@ impl Scene {
     }
 }
 
-/// A spot needs a ray, and all rays together must fit into memory.
-fn check_spot(rays: usize, chirps: usize, file: &Path) -> Result<(), SceneError> {
+/// A spot needs a ray, and all rays together must fit into memory and patience.
+fn check_spot(file: &SceneFile, chirps: usize, path: &Path) -> Result<(), SceneError> {
     const MOST_RAYS_PER_CHIRP: usize = 10_000;
     const MOST_RAYS: usize = 50_000_000;
-    if (1..=MOST_RAYS_PER_CHIRP).contains(&rays) && rays.saturating_mul(chirps) <= MOST_RAYS {
-        return Ok(());
+    const MOST_ONWARD: usize = 5_000_000_000;
+    let fits = |count: usize, paths: usize, most: usize| {
+        (1..=MOST_RAYS_PER_CHIRP).contains(&count) && paths.saturating_mul(chirps) <= most
+    };
+    let refuse = |place: &str, problem: String, way_out: &str| SceneError::Value {
+        file: path.to_owned(),
+        place: place.to_owned(),
+        problem,
+        way_out: way_out.to_owned(),
+    };
+    let rays = file.spot.rays;
+    if !fits(rays, rays, MOST_RAYS) {
+        let problem = format!("{rays} rays for each of {chirps} chirps");
+        return Err(refuse(
+            "spot.rays",
+            problem,
+            "give 1 to 10 000 rays, at most 50 million in all",
+        ));
     }
-    Err(SceneError::Value {
-        file: file.to_owned(),
-        place: "spot.rays".to_owned(),
-        problem: format!("{rays} rays for each of {chirps} chirps"),
-        way_out: "give 1 to 10 000 rays, at most 50 million in all".to_owned(),
-    })
+    let Some(bounce) = file.bounce else { return Ok(()) };
+    if !fits(bounce.rays, rays.saturating_mul(bounce.rays), MOST_ONWARD) {
+        let problem = format!("{} directions from each of {rays} × {chirps} points", bounce.rays);
+        return Err(refuse("bounce.rays", problem, "give 1 to 10 000, at most 5 billion in all"));
+    }
+    if !(-200.0..=0.0).contains(&bounce.outside_spot_db) {
+        let problem = format!("{} dB is not a loss", bounce.outside_spot_db);
+        return Err(refuse("bounce.outside_spot_db", problem, "give a value from -200 to 0"));
+    }
+    Ok(())
 }
 
 /// The given pixel, or a quarter of the spot, m.

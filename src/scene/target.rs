@@ -34,6 +34,8 @@ pub struct Region {
     pub name: String,
     /// Material, as the scene file gives it.
     pub material: String,
+    /// Direction of its grain in the global frame, of any length.
+    pub grain: DVec3,
     /// Facets it holds after later regions took theirs.
     pub facets: usize,
 }
@@ -108,6 +110,7 @@ fn count_regions(file: &SceneFile, region_of_facet: &[u16]) -> Vec<Region> {
         .map(|(entry, facets)| Region {
             name: entry.name.clone(),
             material: entry.material.clone(),
+            grain: entry.grain.map_or(DVec3::Y, DVec3::from_array),
             facets,
         })
         .collect()

@@ -49,6 +49,11 @@ impl<'a> Bvh<'a> {
         Bvh { mesh, boxes, facets, centre, radius_m }
     }
 
+    /// The mesh that it was built over.
+    pub fn mesh(&self) -> &'a Mesh {
+        self.mesh
+    }
+
     /// The closest hit of one ray; of equally near facets the one with the smallest number.
     pub fn closest(&self, ray: &Ray<Global>) -> Option<Hit> {
         let start_m = self.entry_m(ray)?;

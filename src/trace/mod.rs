@@ -7,10 +7,12 @@
 pub mod brute;
 mod bvh;
 mod facet;
+mod inside;
 
 use crate::frames::{Global, Point};
 
 pub use bvh::Bvh;
+pub use inside::encloses;
 
 /// Where a ray meets a facet, in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]

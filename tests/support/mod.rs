@@ -7,6 +7,11 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
+use matdb::brdf::Scattering;
+use matdb::geometry::Mesh;
+use matdb::radar::{Chirps, Radar};
+use matdb::render::{Echo, Observer, Setup, Surface, shade, trace};
+use matdb::trace::Bvh;
 
 /// The crate's folder.
 pub fn root() -> &'static Path {
@@ -23,6 +28,20 @@ pub fn matdb(folder: &Path) -> Command {
     let mut command = Command::cargo_bin("matdb").unwrap();
     command.current_dir(folder).env_remove("MATDB");
     command
+}
+
+/// What the paper's radar sees of a mesh of one material.
+pub fn echoes(
+    radar: &Radar,
+    chirps: &Chirps,
+    mesh: &Mesh,
+    scattering: &dyn Scattering,
+) -> Vec<Echo> {
+    let (bvh, regions) = (Bvh::new(mesh), vec![0; mesh.facets.len()]);
+    let footprints = trace(radar, chirps, &bvh, 1, &|_| {}).unwrap();
+    let surfaces = [Surface::new(scattering)];
+    let setup = Setup::new(radar, chirps, &bvh, &regions, &surfaces);
+    shade(&setup, &footprints, Observer::Radar, &|_| {}).unwrap().echoes
 }
 
 /// Standard error of a run that must fail with status 1.

@@ -1,41 +1,47 @@
-//! The four files of a rendering, as bytes.
+//! The files of a rendering, as bytes: three for each antenna, and the record.
 
 use super::record::Record;
+use super::views::View;
 use crate::cli::summary::grouped;
 use crate::error::Error;
 use crate::formats::exr::{self, Attribute};
 use crate::formats::figure::Figure;
 use crate::formats::ply;
 use crate::geometry::Raster;
-use crate::render::{Echo, Scan, cloud_table};
+use crate::render::{Echo, cloud_table};
 use crate::scene::Scene;
 
-/// Names of the files, in the order they are written.
+/// Names of the radar's files, in the order they are written.
 pub(super) const NAMES: &str = "power.exr, power.png, cloud.ply and scan.json";
 
-/// Encodes every file of a rendering; `all` puts hits below the threshold into the cloud, too.
+/// Encodes every file of a rendering; `all` puts hits below the threshold into the clouds, too.
 pub(super) fn encode(
     all: bool,
     scene: &Scene,
-    scan: &Scan,
-    image: &Raster,
+    views: &[View],
+    images: &[Raster],
     record: &Record,
     material_of_region: &[u16],
-) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
+) -> Result<Vec<(String, Vec<u8>)>, Error> {
     let regions: Vec<&str> = scene.target.regions.iter().map(|r| r.name.as_str()).collect();
     let materials = record.material_names();
     let materials: Vec<&str> = materials.iter().map(String::as_str).collect();
-    let echoes: Vec<&Echo> =
-        if all { scan.echoes.iter().collect() } else { scan.detections().collect() };
-    let cloud = cloud_table(&echoes, material_of_region, &regions, &materials);
+    let mut files = Vec::new();
+    for (view, image) in std::iter::zip(views, images) {
+        let echoes: Vec<&Echo> = match all {
+            true => view.scan.echoes.iter().collect(),
+            false => view.scan.detections().collect(),
+        };
+        let cloud = cloud_table(&echoes, material_of_region, &regions, &materials);
+        let exr = exr::write(image, &exr_attributes(image, &materials))?;
+        files.push((view.file("power", "exr"), exr));
+        files.push((view.file("power", "png"), power_figure(scene, view, image)?));
+        files.push((view.file("cloud", "ply"), ply::write_table(&cloud)?));
+    }
     let mut json = serde_json::to_vec_pretty(record)?;
     json.push(b'\n');
-    Ok(vec![
-        ("power.exr", exr::write(image, &exr_attributes(image, &materials))?),
-        ("power.png", power_figure(scene, scan, image)?),
-        ("cloud.ply", ply::write_table(&cloud)?),
-        ("scan.json", json),
-    ])
+    files.push(("scan.json".to_owned(), json));
+    Ok(files)
 }
 
 /// What a raster does not say by itself: its far edges, and names for the `material` channel.
@@ -54,14 +60,18 @@ fn exr_attributes(image: &Raster, materials: &[&str]) -> Vec<(String, Attribute)
     .collect()
 }
 
-fn power_figure(scene: &Scene, scan: &Scan, image: &Raster) -> Result<Vec<u8>, Error> {
-    let radar = scene.radar();
+fn power_figure(scene: &Scene, view: &View, image: &Raster) -> Result<Vec<u8>, Error> {
+    let scan = &view.scan;
+    let antenna = match view.receiver {
+        None => scene.radar().preset.clone(),
+        Some(receiver) => format!("{}, receiver {}", scene.radar().preset, receiver.name),
+    };
+    let threshold_dbm = (100.0 * scan.threshold_dbm).round() / 100.0;
     let subtitle = format!(
-        "{}, {} of {} chirps at or above {} dBm",
-        radar.preset,
+        "{antenna}, {} of {} chirps at or above {} dBm",
         grouped(scan.detections().count()),
         grouped(scan.chirps),
-        radar.threshold_dbm.to_string().replace('-', "−")
+        threshold_dbm.to_string().replace('-', "−")
     );
     let figure = Figure {
         raster: image,

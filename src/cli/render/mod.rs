@@ -1,9 +1,11 @@
 //! `matdb render`.
 
+mod beat;
 mod files;
 mod record;
 mod report;
 mod stages;
+mod views;
 
 use std::path::{Path, PathBuf};
 
@@ -11,10 +13,12 @@ use super::console::Console;
 use super::database::Database;
 use super::materials::find;
 use super::output::write_all;
-use crate::brdf::Scattering;
 use crate::error::Error;
-use crate::render::{power_image, shade, trace};
+use crate::geometry::Raster;
+use crate::render::{Bounce, Setup, Surface, trace};
 use crate::scene::Scene;
+use crate::trace::Bvh;
+use crate::units::ratio_from_db;
 use record::{Record, Used};
 use stages::Stages;
 
@@ -22,7 +26,8 @@ use stages::Stages;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb render scenes/mannequin.toml -o out
-  matdb render scenes/mannequin.toml -o out --all --json")]
+  matdb render scenes/mannequin.toml -o out --all --json
+  matdb render scenes/showcase.toml -o out      spot, speckle, noise, two receivers, second bounce")]
 pub(super) struct Args {
     /// The scene file
     scene: PathBuf,
@@ -32,38 +37,70 @@ pub(super) struct Args {
     /// Put every hit into cloud.ply, not only those above the threshold
     #[arg(long)]
     all: bool,
+    /// Write the sampled beat signals, too: beat.npy, chirps x samples; needs [radar.receiver]
+    #[arg(long)]
+    beat: bool,
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let mut stages = Stages::start();
     let scene = Scene::load(&args.scene)?;
     let (used, material_of_region) = materials(&scene, &args.scene, db)?;
+    let surfaces = surfaces(&scene, &used, &material_of_region);
+    let at = |error| Error::Render { scene: args.scene.clone(), error };
     stages.end("load", console);
 
-    let (radar, Scene { chirps, target, .. }) = (scene.radar(), &scene);
-    let bar = console.progress("tracing", chirps.rays.len());
+    let bvh = Bvh::new(&scene.target.mesh);
+    let setup = setup(&scene, &bvh, &surfaces);
+    let bar = console.progress("tracing", scene.chirps.rays.len());
     let rays = scene.file.spot.rays;
-    let hits = trace(radar, chirps, &target.mesh, rays, &|chirps| bar.inc(chirps as u64));
+    let footprints = trace(setup.radar, setup.chirps, &bvh, rays, &|chirps| bar.inc(chirps as u64));
     bar.finish_and_clear();
-    let hits = hits.map_err(|error| Error::Render { scene: args.scene.clone(), error })?;
+    let footprints = footprints.map_err(at)?;
     stages.end("trace", console);
 
-    let surface = |number: &u16| &used[usize::from(*number)].scattering as &dyn Scattering;
-    let surfaces: Vec<&dyn Scattering> = material_of_region.iter().map(surface).collect();
-    let scan = shade(radar, chirps, &hits, &target.region_of_facet, &surfaces);
+    let views = views::all(&setup, &footprints, &scene, console).map_err(at)?;
     stages.end("power", console);
-
-    let (field, spot_m) = (chirps.field(&radar.frames()), radar.spot_diameter_m);
-    let image = power_image(&scan, field, spot_m, &material_of_region, scene.pixel_m());
+    let images: Vec<Raster> =
+        views.iter().map(|view| view.image(&scene, &material_of_region)).collect();
     stages.end("image", console);
 
-    let record = Record::new(&scene, &used, &material_of_region, &scan, &image, args.all);
-    let files = files::encode(args.all, &scene, &scan, &image, &record, &material_of_region)?;
+    let record = Record::new(&scene, &used, &material_of_region, &views, &images, args.all);
+    let mut files = files::encode(args.all, &scene, &views, &images, &record, &material_of_region)?;
+    if args.beat {
+        files.extend(beat::encode(&args.scene, &setup, &footprints, &views)?);
+    }
     stages.end("encode", console);
 
-    write_all(&args.output, &files)?;
+    let named: Vec<(&str, Vec<u8>)> =
+        files.iter_mut().map(|(name, bytes)| (name.as_str(), std::mem::take(bytes))).collect();
+    write_all(&args.output, &named)?;
     stages.end("write", console);
     report::print(&args.output, &record, &stages, console)
+}
+
+fn surfaces<'a>(scene: &Scene, used: &'a [Used], material_of_region: &[u16]) -> Vec<Surface<'a>> {
+    std::iter::zip(&scene.target.regions, material_of_region)
+        .map(|(region, &material)| Surface {
+            scattering: &used[usize::from(material)].scattering,
+            grain: region.grain,
+        })
+        .collect()
+}
+
+fn setup<'a>(scene: &'a Scene, bvh: &'a Bvh, surfaces: &'a [Surface]) -> Setup<'a> {
+    Setup {
+        radar: scene.radar(),
+        chirps: &scene.chirps,
+        bvh,
+        region_of_facet: &scene.target.region_of_facet,
+        surfaces,
+        bounce: scene.file.bounce.map(|bounce| Bounce {
+            rays: bounce.rays,
+            outside_spot: ratio_from_db(bounce.outside_spot_db),
+        }),
+        seed: scene.file.seed,
+    }
 }
 
 /// The scene's materials, each once, and for every region the number of its material.

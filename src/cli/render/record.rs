@@ -3,19 +3,21 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::views::View;
 use crate::cli::materials::Found;
 use crate::geometry::Raster;
-use crate::render::{Echo, Scan};
+use crate::render::{Scan, Truth};
 use crate::scene::{MeshReport, Scene};
 
 /// Version of the layout of `scan.json`; it grows with every change that a reader could trip over.
-const SCHEMA: u32 = 1;
+const SCHEMA: u32 = 2;
 
 /// How to get from the record to a power, for a reader without the program.
 const EQUATION: &str = "power_w = transmit_power_w * 10^(-system_loss_db/10) * aperture_m2 / range_m^2 \
     * f_per_sr(incidence) * cos(incidence)^n, n = 2 for footprint \"paper\", 1 for \"projected\"; \
     f_per_sr is the scattering model of the point's material in backscatter; with scene.spot.rays > 1 the power is the \
-    mean of this over the rays of the spot, and range and incidence are no longer those of one ray";
+    mean of this over the rays of the spot, and range and incidence are no longer those of one ray; receivers, speckle, \
+    noise and second surfaces change it as docs/model.md says";
 
 /// A rendering, as `scan.json` holds it.
 #[derive(Serialize)]
@@ -35,6 +37,7 @@ pub(super) struct Record<'a> {
     counts: Counts,
     power_dbm: Option<PowerRange>,
     image: Value,
+    receivers: Vec<ReceiverRecord<'a>>,
     #[serde(skip)]
     scan_notices: &'a [String],
 }
@@ -48,6 +51,16 @@ pub(super) struct RegionRecord<'a> {
     pub hits: usize,
     pub detections: usize,
     pub strongest_dbm: Option<f64>,
+}
+
+/// What a receiver beside the radar got.
+#[derive(Serialize)]
+pub(super) struct ReceiverRecord<'a> {
+    pub name: &'a str,
+    position_m: [f64; 3],
+    aperture_m2: f64,
+    pub counts: Counts,
+    power_dbm: Option<PowerRange>,
 }
 
 #[derive(Serialize)]
@@ -68,7 +81,10 @@ struct MaterialRecord<'a> {
 pub(super) struct Counts {
     pub chirps: usize,
     pub hits: usize,
+    /// Echoes and false alarms at or above the threshold.
     pub detections: usize,
+    /// Detections that no surface caused.
+    pub false_alarms: usize,
     pub below_threshold: usize,
     pub misses: usize,
     /// Detections beside the image's grid.
@@ -94,19 +110,21 @@ impl<'a> Record<'a> {
         scene: &'a Scene,
         used: &'a [Used],
         material_of_region: &'a [u16],
-        scan: &Scan,
-        image: &Raster,
+        views: &[View<'a>],
+        images: &[Raster],
         all_hits: bool,
     ) -> Record<'a> {
         let file = &scene.file;
+        let (scan, image) = (&views[0].scan, &images[0]);
         let regions = regions(scene, material_of_region, scan);
         let outside = |material: usize| {
             let [least, most] = used[material].found.material.theta_rad;
-            let of_material = |echo: &&Echo| {
-                usize::from(material_of_region[usize::from(echo.region)]) == material
+            let of_material = |truth: &&Truth| {
+                usize::from(material_of_region[usize::from(truth.region)]) == material
             };
-            let strange = |echo: &&Echo| !(least..=most).contains(&echo.hit.theta_rad());
-            scan.detections().filter(of_material).filter(strange).count()
+            let strange = |truth: &&Truth| !(least..=most).contains(&truth.hit.theta_rad());
+            let known = scan.detections().filter_map(|echo| echo.truth.as_ref());
+            known.filter(of_material).filter(strange).count()
         };
         Record {
             schema: SCHEMA,
@@ -117,6 +135,7 @@ impl<'a> Record<'a> {
                 "name": file.name,
                 "seed": file.seed,
                 "spot": file.spot,
+                "bounce": file.bounce,
                 "mesh": file.mesh,
                 "region": file.region,
             }),
@@ -134,8 +153,15 @@ impl<'a> Record<'a> {
                 .map(|number| MaterialRecord::new(&used[number], outside(number)))
                 .collect(),
             regions,
+            receivers: std::iter::zip(views, images)
+                .filter_map(|(view, image)| ReceiverRecord::new(scene, view, image))
+                .collect(),
             scan_notices: &scene.chirps.notices,
         }
+    }
+
+    pub fn receivers(&self) -> &[ReceiverRecord<'a>] {
+        &self.receivers
     }
 
     /// Sentences about what a person should not overlook.
@@ -219,6 +245,19 @@ impl<'a> Record<'a> {
     }
 }
 
+impl<'a> ReceiverRecord<'a> {
+    fn new(scene: &Scene, view: &View<'a>, image: &Raster) -> Option<ReceiverRecord<'a>> {
+        let receiver = view.receiver?;
+        Some(ReceiverRecord {
+            name: &receiver.name,
+            position_m: receiver.position_m,
+            aperture_m2: receiver.aperture_m2.unwrap_or(scene.radar().aperture_m2),
+            counts: Counts::new(scene, &view.scan, image),
+            power_dbm: PowerRange::new(&view.scan),
+        })
+    }
+}
+
 impl<'a> MaterialRecord<'a> {
     fn new(used: &'a Used, detections_outside_theta: usize) -> MaterialRecord<'a> {
         let Found { material, revision } = &used.found;
@@ -238,13 +277,16 @@ impl<'a> MaterialRecord<'a> {
 
 impl Counts {
     fn new(scene: &Scene, scan: &Scan, image: &Raster) -> Counts {
-        let (chirps, hits) = (scan.chirps, scan.echoes.len());
+        let chirps = scan.chirps;
+        let hits = scan.echoes.iter().filter(|echo| echo.truth.is_some()).count();
         let detections = scan.detections().count();
+        let false_alarms = scan.detections().filter(|echo| echo.truth.is_none()).count();
         Counts {
             chirps,
             hits,
             detections,
-            below_threshold: hits - detections,
+            false_alarms,
+            below_threshold: hits + false_alarms - detections,
             misses: chirps - hits,
             outside_image: scan.detections().filter(|e| !image.contains(e.xt_m, e.yt_m)).count(),
             degenerate_facets: scene.target.meshes.iter().map(|m| m.degenerate_facets).sum(),
@@ -272,11 +314,12 @@ fn regions<'a>(scene: &'a Scene, material_of_region: &[u16], scan: &Scan) -> Vec
             strongest_dbm: None,
         })
         .collect();
-    for echo in &scan.echoes {
-        regions[usize::from(echo.region)].hits += 1;
+    for truth in scan.echoes.iter().filter_map(|echo| echo.truth) {
+        regions[usize::from(truth.region)].hits += 1;
     }
     for echo in scan.detections() {
-        let region = &mut regions[usize::from(echo.region)];
+        let Some(truth) = echo.truth else { continue };
+        let region = &mut regions[usize::from(truth.region)];
         region.detections += 1;
         region.strongest_dbm =
             Some(region.strongest_dbm.map_or(echo.power_dbm, |p| p.max(echo.power_dbm)));

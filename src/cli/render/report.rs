@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::files::NAMES;
-use super::record::Record;
+use super::record::{Counts, ReceiverRecord, Record};
 use super::stages::Stages;
 use crate::cli::console::Console;
 use crate::cli::summary::{grouped, table};
@@ -37,16 +37,34 @@ fn text(folder: &Path, record: &Record, stages: &Stages) -> String {
             ]
         }),
     );
-    let counts = record.counts();
+    let receivers: String = record.receivers().iter().map(receiver).collect();
+    let more = match record.receivers() {
+        [] => "",
+        _ => ", and the same of each receiver,",
+    };
     format!(
-        "{regions}{} chirps, {} hits, {} detections, {} below the threshold\n\
-         wrote {NAMES} to {} in {:.2} s\n",
-        grouped(counts.chirps),
+        "{regions}{} chirps, {}\n{receivers}wrote {NAMES}{more} to {} in {:.2} s\n",
+        grouped(record.counts().chirps),
+        counted(record.counts()),
+        folder.display(),
+        stages.total_s()
+    )
+}
+
+fn receiver(receiver: &ReceiverRecord) -> String {
+    format!("receiver {}: {}\n", receiver.name, counted(receiver.counts))
+}
+
+fn counted(counts: Counts) -> String {
+    let false_alarms = match counts.false_alarms {
+        0 => String::new(),
+        count => format!(" ({} false alarms)", grouped(count)),
+    };
+    format!(
+        "{} hits, {} detections{false_alarms}, {} below the threshold",
         grouped(counts.hits),
         grouped(counts.detections),
         grouped(counts.below_threshold),
-        folder.display(),
-        stages.total_s()
     )
 }
 
@@ -58,6 +76,7 @@ fn value(folder: &Path, record: &Record, stages: &Stages) -> Value {
         "counts": record.counts(),
         "power_dbm": record.power_dbm(),
         "regions": record.regions(),
+        "receivers": record.receivers(),
         "notices": record.notices(),
         "timings_ms": timings,
     })

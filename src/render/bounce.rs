@@ -1,0 +1,165 @@
+//! Second-order paths: where a lit surface sends its power, and who sees it there.
+//!
+//! The integral over the half space above the first surface is a mean over directions ω drawn from
+//! a density p, each weighted by 1/p. No single density suits all surfaces, so p is a mixture: half of it
+//! the cosine law, which suits diffuse ones, and a sixth each of three lobes cosᵉ about the mirror's
+//! direction, from a broad to a narrow one. Every ω is weighted by the whole mixture (the balance
+//! heuristic of Veach and Guibas 1995, DOI 10.1145/218380.218498), so that the mean is unbiased for
+//! any surface.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::DVec3;
+
+use super::Setup;
+use crate::frames::{Direction, Global, Point, Ray, Surface};
+use crate::radar::Beam;
+use crate::radar::random::Key;
+use crate::radar::scan::PATTERN_RANGE_M;
+
+/// Exponents of the lobes: half widths at half height of 30°, 9.5° and 3°.
+const LOBES: [f64; 3] = [4.8, 50.0, 500.0];
+
+/// 1/φ: successive multiples of it are spread evenly over 0 to 1.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// How second-order paths are followed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounce {
+    /// Directions followed from each point that is lit, 1 or more.
+    pub rays: usize,
+    /// How strongly the radar's own beam sees a surface outside the spot, over one inside, as a
+    /// power ratio.
+    pub outside_spot: f64,
+}
+
+impl Bounce {
+    /// How well the radar's antenna sees a place: as equation (7) has it within the spot, weaker
+    /// outside.
+    pub(super) fn pattern(&self, setup: &Setup, axis: &Ray<Global>, place: DVec3) -> f64 {
+        let to_place = place - axis.origin.xyz;
+        let range_m = to_place.length();
+        let beside_m = to_place.cross(axis.direction.xyz()).length();
+        let looks_at = Point::from(axis.origin.xyz + PATTERN_RANGE_M * axis.direction.xyz());
+        let aim = (setup.radar.frames().global_from_target.inverse() * looks_at).xyz;
+        let spot_m = Beam::new(setup.radar).diameter_m(aim.x, aim.y, range_m);
+        if beside_m <= 0.5 * spot_m { 1.0 } else { self.outside_spot }
+    }
+}
+
+/// Directions above a surface that is lit from `source`, and for each the solid angle, sr, that it
+/// stands for in a sum over all.
+pub(super) fn directions(
+    source: Direction<Surface>,
+    count: usize,
+    key: Key,
+) -> impl Iterator<Item = (Direction<Surface>, f64)> {
+    let [x, y, z] = source.xyz().to_array();
+    let mirrored = DVec3::new(-x, -y, z);
+    let mut draws = key.draws();
+    let (radial, turn) = (draws.uniform(), draws.uniform());
+    (0..count).filter_map(move |number| {
+        let along = (number as f64 * GOLDEN + turn).fract();
+        let direction = sample((number as f64 + radial) / count as f64, along, mirrored);
+        let local = Direction::new(direction)?;
+        let weight = 1.0 / (density_per_sr(direction, mirrored) * count as f64);
+        (local.cos_theta() > 0.0).then_some((local, weight))
+    })
+}
+
+/// A direction from the mixture. `share` from 0 to 1 picks the part and the angle from its axis;
+/// `turn`, from 0 to 1, the azimuth.
+fn sample(share: f64, turn: f64, mirrored: DVec3) -> DVec3 {
+    if share < 0.5 {
+        return about(DVec3::Z, (1.0 - 2.0 * share).sqrt(), turn);
+    }
+    let lobe = (6.0 * (share - 0.5)).min(2.999_999);
+    let exponent = LOBES[lobe as usize];
+    about(mirrored, (1.0 - lobe.fract()).powf(1.0 / (exponent + 1.0)), turn)
+}
+
+/// The direction at an angle from an axis.
+fn about(axis: DVec3, cos: f64, turn: f64) -> DVec3 {
+    let across = axis.any_orthonormal_vector();
+    let sin = (1.0 - cos * cos).max(0.0).sqrt();
+    let azimuth = TAU * turn;
+    cos * axis + sin * (azimuth.cos() * across + azimuth.sin() * axis.cross(across))
+}
+
+fn density_per_sr(direction: DVec3, mirrored: DVec3) -> f64 {
+    let cos = direction.dot(mirrored).max(0.0);
+    let lobe = |exponent: f64| (exponent + 1.0) / TAU * cos.powf(exponent);
+    let lobes: f64 = LOBES.into_iter().map(lobe).sum();
+    0.5 * direction.z.max(0.0) / PI + lobes / 6.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::{CookTorrance, Distribution, Lambert, Scattering, Shadowing};
+    use crate::radar::random::Purpose;
+
+    fn key(chirp: u64) -> Key {
+        Key { seed: 5, chirp, sub_ray: 0, purpose: Purpose::Bounce }
+    }
+
+    /// ∫ f·cos θ_o dω_o by the directions, averaged over many chirps.
+    fn albedo(surface: &dyn Scattering, theta_rad: f64) -> f64 {
+        const CHIRPS: u64 = 200;
+        let source = Direction::from_angles(theta_rad, 0.7);
+        let of_chirp = |chirp| -> f64 {
+            directions(source, 64, key(chirp))
+                .map(|(o, weight_sr)| surface.f_per_sr(source, o) * o.cos_theta() * weight_sr)
+                .sum()
+        };
+        (0..CHIRPS).map(of_chirp).sum::<f64>() / CHIRPS as f64
+    }
+
+    /// The same by midpoints.
+    fn albedo_by_midpoints(surface: &dyn Scattering, theta_rad: f64) -> f64 {
+        const STEPS: usize = 600;
+        let source = Direction::from_angles(theta_rad, 0.7);
+        let (da, db) = (0.5 * PI / STEPS as f64, TAU / STEPS as f64);
+        let at = |i: usize, j: usize| {
+            let theta = (i as f64 + 0.5) * da;
+            let o = Direction::from_angles(theta, (j as f64 + 0.5) * db);
+            surface.f_per_sr(source, o) * theta.cos() * theta.sin() * da * db
+        };
+        (0..STEPS).flat_map(|i| (0..STEPS).map(move |j| at(i, j))).sum()
+    }
+
+    #[test]
+    fn the_mean_is_unbiased_for_dull_and_for_shiny_surfaces() {
+        let shiny = |m| CookTorrance {
+            f_lambda: 0.9,
+            m,
+            m_across: None,
+            distribution: Distribution::Beckmann,
+            shadowing: Shadowing::Separable,
+        };
+        let surfaces: [(&dyn Scattering, f64); 4] = [
+            (&Lambert { albedo: 0.6 }, 0.01),
+            (&shiny(0.4), 0.02),
+            (&shiny(0.1), 0.02),
+            (&shiny(0.03), 0.05),
+        ];
+        for (number, (surface, tolerance)) in surfaces.into_iter().enumerate() {
+            for theta_rad in [0.0, 0.6, 1.2] {
+                let (found, expected) =
+                    (albedo(surface, theta_rad), albedo_by_midpoints(surface, theta_rad));
+                let error = (found / expected - 1.0).abs();
+                assert!(error < tolerance, "{number} at {theta_rad}: {found} is not {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn directions_leave_the_surface_and_repeat_themselves() {
+        let source = Direction::from_angles(1.4, 0.0);
+        let these: Vec<_> = directions(source, 32, key(1)).collect();
+        assert!(these.len() > 16 && these.iter().all(|(o, _)| o.cos_theta() > 0.0));
+        let again: Vec<_> = directions(source, 32, key(1)).collect();
+        assert_eq!(these, again);
+        assert_ne!(these, directions(source, 32, key(2)).collect::<Vec<_>>());
+    }
+}

@@ -1,0 +1,151 @@
+//! From the paths of a chirp to what the receiver reports: range and power.
+//!
+//! Three receivers. Without settings both are exact, the paper's: powers add, and the range is their
+//! mean weighted by power. With speckle or noise they follow their laws. With a `[radar.receiver]`
+//! every path becomes a tone of the beat signal, and range and power are read off its spectrum.
+
+use num_complex::Complex;
+
+use super::path::Path;
+use super::{Observer, RenderError, Setup};
+use crate::radar::noise::measured_w;
+use crate::radar::random::{Draws, Key, Purpose};
+use crate::radar::{Chirp, Detection, Noise, RangeProcessor, Return, Speckle};
+use crate::units::watts_from_dbm;
+
+/// A receiver made ready for a scan.
+pub(super) struct Detector {
+    seed: u64,
+    observer: u64,
+    kind: Kind,
+    threshold_w: f64,
+}
+
+enum Kind {
+    Exact,
+    Laws { speckle: Option<Speckle>, noise_w: f64, range_sd_m: f64 },
+    Beat(Beat),
+}
+
+struct Beat {
+    chirp: Chirp,
+    processor: RangeProcessor,
+    speckle: Option<Speckle>,
+    looks: u32,
+}
+
+impl Detector {
+    pub fn new(setup: &Setup, observer: Observer) -> Result<Detector, RenderError> {
+        let radar = setup.radar;
+        let mut threshold_w = watts_from_dbm(radar.threshold_dbm);
+        let kind = match (radar.receiver, radar.speckle, radar.noise) {
+            (Some(receiver), speckle, _) => {
+                let (chirp, looks) = (radar.chirp(), speckle.map_or(1, |s| s.looks as u32));
+                let processor = RangeProcessor::new(&receiver, &chirp, radar.threshold_dbm, looks)?;
+                threshold_w = processor.threshold_w();
+                Kind::Beat(Beat { chirp, processor, speckle, looks })
+            }
+            (None, None, None) => Kind::Exact,
+            (None, speckle, noise) => {
+                let silent = Noise { level_dbm: f64::NEG_INFINITY, range_sd_m: 0.0 };
+                let Noise { level_dbm, range_sd_m } = noise.unwrap_or(silent);
+                Kind::Laws { speckle, noise_w: watts_from_dbm(level_dbm), range_sd_m }
+            }
+        };
+        Ok(Detector { seed: setup.seed, observer: observer.number(), kind, threshold_w })
+    }
+
+    /// Least power of a detection, W.
+    pub fn threshold_w(&self) -> f64 {
+        self.threshold_w
+    }
+
+    /// What the receiver makes of a chirp, below the threshold, too; `None` for a silent one.
+    pub fn observe(&self, chirp: usize, paths: &[Path]) -> Result<Option<Detection>, RenderError> {
+        match &self.kind {
+            Kind::Beat(beat) => {
+                let signals = self.signals(beat, chirp, paths)?;
+                Ok(beat.processor.peak(&beat.mean_profile_w(&signals)))
+            }
+            _ if paths.is_empty() => Ok(None),
+            Kind::Exact => Ok(Some(sum(paths))),
+            Kind::Laws { speckle, noise_w, range_sd_m } => {
+                let Detection { range_m, power_w } = sum(paths);
+                let mut draws = self.draws(chirp, Purpose::Speckle);
+                let power_w = measured_w(power_w, *noise_w, *speckle, &mut draws);
+                let error_m = range_sd_m * self.draws(chirp, Purpose::Range).gaussian();
+                Ok(Some(Detection { range_m: range_m + error_m, power_w }))
+            }
+        }
+    }
+
+    /// How far a detection may lie from the range of the path that caused it, m; none where a
+    /// receiver does not tell ranges apart.
+    pub fn reach_m(&self) -> Option<f64> {
+        match &self.kind {
+            Kind::Beat(beat) => Some(beat.processor.resolution_m()),
+            _ => None,
+        }
+    }
+
+    /// The beat signals of a chirp, one for each look; none without a receiver.
+    pub fn beats(
+        &self,
+        chirp: usize,
+        paths: &[Path],
+    ) -> Result<Vec<Vec<Complex<f64>>>, RenderError> {
+        match &self.kind {
+            Kind::Beat(beat) => self.signals(beat, chirp, paths),
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    fn signals(
+        &self,
+        beat: &Beat,
+        chirp: usize,
+        paths: &[Path],
+    ) -> Result<Vec<Vec<Complex<f64>>>, RenderError> {
+        let mut phases = self.draws(chirp, Purpose::SurfacePhase);
+        let mut noise = self.draws(chirp, Purpose::Noise);
+        let look = |_| {
+            let returns: Vec<Return> =
+                paths.iter().map(|path| beat.echo(path, &mut phases)).collect();
+            let mut signal = beat.chirp.beat_signal(&returns)?;
+            beat.processor.add_noise(&mut signal, &mut noise);
+            Ok(signal)
+        };
+        (0..beat.looks).map(look).collect()
+    }
+
+    fn draws(&self, chirp: usize, purpose: Purpose) -> Draws {
+        Key { seed: self.seed, chirp: chirp as u64, sub_ray: self.observer, purpose }.draws()
+    }
+}
+
+impl Beat {
+    fn echo(&self, path: &Path, phases: &mut Draws) -> Return {
+        let phasor = self.speckle.map_or(Complex::ONE, |speckle| speckle.phasor(phases));
+        Return { range_m: path.range_m, amplitude_sqrt_w: phasor * path.power_w.sqrt() }
+    }
+
+    fn mean_profile_w(&self, signals: &[Vec<Complex<f64>>]) -> Vec<f64> {
+        let mut profiles = signals.iter().map(|signal| self.processor.profile_w(signal));
+        let mut mean_w = profiles.next().unwrap_or_default();
+        for profile_w in profiles {
+            mean_w.iter_mut().zip(profile_w).for_each(|(sum, power)| *sum += power);
+        }
+        mean_w.iter_mut().for_each(|power| *power /= signals.len() as f64);
+        mean_w
+    }
+}
+
+/// All power, and the mean range weighted by it; where no power comes back, the plain mean.
+fn sum(paths: &[Path]) -> Detection {
+    let power_w: f64 = paths.iter().map(|path| path.power_w).sum();
+    let range_m = match power_w > 0.0 {
+        true => paths.iter().map(|path| path.range_m * path.power_w).sum::<f64>() / power_w,
+        false => paths.iter().map(|path| path.range_m).sum::<f64>() / paths.len() as f64,
+    };
+    Detection { range_m, power_w }
+}

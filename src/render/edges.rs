@@ -1,0 +1,127 @@
+//! How far each look of a scan is from the nearest edge in depth.
+//!
+//! Two neighbouring looks are on two sides of an edge when only one of them meets the target, or
+//! when their ranges differ by more than a spot and a slope of 60° explain. The edge is taken halfway
+//! between them, so that a distance is good to half the spacing of the scan.
+
+use std::collections::HashMap;
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+/// Slope of a surface, as tan 60°, from which on its own range is an edge.
+const STEEPEST: f64 = 1.732_050_807_568_877_2;
+
+/// Looks at most this many mean spacings apart are neighbours.
+const NEIGHBOURHOOD: f64 = 2.5;
+
+/// Distance of every look to the nearest edge in the target plane, m, but at most `reach_m`.
+///
+/// `looks` are points of the target plane, m, and the ranges there, m; none where nothing is met.
+/// `spot_m` is the spot's diameter.
+pub(super) fn distances_m(looks: &[(DVec2, Option<f64>)], spot_m: f64, reach_m: f64) -> Vec<f64> {
+    let near_m = NEIGHBOURHOOD * spacing_m(looks);
+    let places: Vec<DVec2> = looks.iter().map(|look| look.0).collect();
+    let all = Cells::new(&places, near_m);
+    let nearest_across = |look: &(DVec2, Option<f64>)| {
+        let across =
+            all.within(look.0, near_m).filter(|&other| is_across(*look, looks[other], spot_m));
+        let distance_m2 = |other: usize| places[other].distance_squared(look.0);
+        across.min_by(|&a, &b| distance_m2(a).total_cmp(&distance_m2(b)))
+    };
+    let across: Vec<Option<usize>> = looks.par_iter().map(nearest_across).collect();
+    // Only pairs that are nearest to each other; others see past a look on their own side.
+    let edge = |(look, other): (usize, &Option<usize>)| {
+        let other = (*other)?;
+        (across[other] == Some(look)).then(|| 0.5 * (places[look] + places[other]))
+    };
+    let edges: Vec<DVec2> = across.iter().enumerate().filter_map(edge).collect();
+    let cells = Cells::new(&edges, reach_m);
+    let distance_m = |place: &DVec2| {
+        let nearest = cells.within(*place, reach_m).map(|edge| edges[edge].distance(*place));
+        nearest.fold(reach_m, f64::min)
+    };
+    places.par_iter().map(distance_m).collect()
+}
+
+fn is_across(a: (DVec2, Option<f64>), b: (DVec2, Option<f64>), spot_m: f64) -> bool {
+    match (a.1, b.1) {
+        (Some(here_m), Some(there_m)) => {
+            (here_m - there_m).abs() > spot_m + STEEPEST * a.0.distance(b.0)
+        }
+        (None, None) => false,
+        _ => true,
+    }
+}
+
+/// Side of the square that a look has to itself, m.
+fn spacing_m(looks: &[(DVec2, Option<f64>)]) -> f64 {
+    let min = looks.iter().fold(DVec2::INFINITY, |min, look| min.min(look.0));
+    let max = looks.iter().fold(DVec2::NEG_INFINITY, |max, look| max.max(look.0));
+    let sides_m = (max - min).max(DVec2::splat(1e-6));
+    (sides_m.x * sides_m.y / looks.len().max(1) as f64).sqrt()
+}
+
+/// Points sorted into square cells, for look-ups within one cell's side.
+struct Cells<'a> {
+    points: &'a [DVec2],
+    side_m: f64,
+    of_cell: HashMap<[i64; 2], Vec<u32>>,
+}
+
+impl<'a> Cells<'a> {
+    fn new(points: &'a [DVec2], side_m: f64) -> Cells<'a> {
+        let mut cells = Cells { points, side_m, of_cell: HashMap::new() };
+        for (number, point) in points.iter().enumerate() {
+            cells.of_cell.entry(cells.cell(*point)).or_default().push(number as u32);
+        }
+        cells
+    }
+
+    fn cell(&self, point: DVec2) -> [i64; 2] {
+        (point / self.side_m).floor().to_array().map(|x| x as i64)
+    }
+
+    /// Points within `radius_m`, at most a cell's side, of a place.
+    fn within(&self, place: DVec2, radius_m: f64) -> impl Iterator<Item = usize> + '_ {
+        let [column, row] = self.cell(place);
+        let around = (-1..=1).flat_map(move |x| (-1..=1).map(move |y| [column + x, row + y]));
+        let near = around.filter_map(|cell| self.of_cell.get(&cell)).flatten();
+        near.map(|&number| number as usize).filter(move |&number| {
+            self.points[number].distance_squared(place) <= radius_m * radius_m
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SPOT_M: f64 = 0.016;
+    const STEP_M: f64 = 0.005;
+
+    /// Looks on a square grid, with ranges by place.
+    fn looks(range_m: impl Fn(DVec2) -> Option<f64>) -> Vec<(DVec2, Option<f64>)> {
+        let place = |i: usize| DVec2::new((i % 60) as f64, (i / 60) as f64) * STEP_M;
+        (0..3600).map(place).map(|p| (p, range_m(p))).collect()
+    }
+
+    #[test]
+    fn a_step_and_a_rim_are_edges_to_half_a_spacing() {
+        for behind in [Some(8.1), None] {
+            let looks = looks(|p| if p.x < 0.1501 { Some(8.0) } else { behind });
+            for ((place, _), found_m) in looks.iter().zip(distances_m(&looks, SPOT_M, 0.05)) {
+                let expected_m = (place.x - 0.1525).abs().min(0.05);
+                assert!((found_m - expected_m).abs() <= 0.5 * STEP_M, "{place}: {found_m}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_slope_is_no_edge_and_a_lone_look_has_none() {
+        let slope = looks(|p| Some(8.0 + 1.5 * p.x));
+        assert!(distances_m(&slope, SPOT_M, 0.05).iter().all(|&m| m == 0.05));
+        assert_eq!(distances_m(&[(DVec2::ZERO, Some(8.0))], SPOT_M, 0.05), [0.05]);
+        assert!(distances_m(&[], SPOT_M, 0.05).is_empty());
+    }
+}

@@ -1,0 +1,80 @@
+//! Who listens: the radar itself, or a receiver that stands elsewhere.
+
+use glam::DVec3;
+
+use crate::frames::{Global, Point, Ray};
+
+/// Where echoes are received.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Observer {
+    /// The radar, through the antenna that it sends with.
+    Radar,
+    /// Another antenna, which sees the whole target alike.
+    Receiver {
+        /// Its number from 1; receivers have their own noise and speckle.
+        number: u32,
+        /// Where it stands.
+        position: Point<Global>,
+        /// Equivalent area A_eq, m².
+        aperture_m2: f64,
+    },
+}
+
+impl Observer {
+    /// Number of the observer, 0 for the radar.
+    pub(super) fn number(&self) -> u64 {
+        match self {
+            Observer::Radar => 0,
+            Observer::Receiver { number, .. } => (*number).into(),
+        }
+    }
+
+    /// Where it stands, for a radar at `origin`.
+    pub(super) fn position(&self, origin: DVec3) -> DVec3 {
+        match self {
+            Observer::Radar => origin,
+            Observer::Receiver { position, .. } => position.xyz,
+        }
+    }
+
+    /// The point of the beam's axis from which an echo comes that has gone 2·`range_m` in all.
+    ///
+    /// With b from the source to the receiver and s along the axis d, s + |s·d − b| = 2R gives
+    /// s = (4R² − b²)/(4R − 2·b·d). `None` where no point of the axis is so far.
+    pub(super) fn on_axis(&self, axis: &Ray<Global>, range_m: f64) -> Option<Point<Global>> {
+        let (origin, direction) = (axis.origin.xyz, axis.direction.xyz());
+        let base = self.position(origin) - origin;
+        let along_m = match self {
+            Observer::Radar => range_m,
+            Observer::Receiver { .. } => {
+                let path_m = 2.0 * range_m;
+                // Negative where the way is shorter than the straight one between the antennas.
+                let longer_m = path_m - base.length();
+                let left_m2 = longer_m * (path_m + base.length());
+                left_m2 / (2.0 * (path_m - base.dot(direction)).abs())
+            }
+        };
+        (along_m > 0.0 && along_m.is_finite()).then(|| Point::from(origin + along_m * direction))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bistatic_range_leads_back_to_its_point() {
+        let origin = Point::new(0.0, 1.1, 8.0);
+        let target = Point::new(0.1, 1.3, 0.2);
+        let axis = Ray { origin, direction: origin.towards(target).unwrap() };
+        let position = Point::new(2.0, 1.0, 5.0);
+        let receiver = Observer::Receiver { number: 1, position, aperture_m2: 0.1 };
+        let range_m = 0.5 * (origin.distance_m(target) + target.distance_m(position));
+        let found = receiver.on_axis(&axis, range_m).unwrap();
+        assert!(found.distance_m(target) < 1e-12);
+        let direct = Observer::Radar.on_axis(&axis, origin.distance_m(target)).unwrap();
+        assert!(direct.distance_m(target) < 1e-12);
+        // Shorter than the way from one antenna to the other.
+        assert!(receiver.on_axis(&axis, 1.0).is_none());
+    }
+}

@@ -1,0 +1,189 @@
+//! Ways that power takes from the radar to an antenna, and what arrives by each.
+//!
+//! Direct: radar → A → antenna, equation (11) with the bistatic f(i, o). The spot's power P_t falls
+//! on A; of it the antenna at the distance R_o receives f(i, o)·cos θ_o·A_eq/R_o². The paper's further
+//! cos θ_i is part of [`Link::flux_w`].
+//!
+//! Second order: radar → A → B → antenna. A sends f_A(i, ω)·cos θ_ω·dω of its power towards ω, where
+//! B lies, and B sends f_B(−ω, o)·cos θ_o·A_eq/R_o² of that into the antenna. The integral over ω is
+//! estimated in `bounce.rs`. Range is half of the whole way.
+
+use glam::DVec3;
+
+use super::bounce::{Bounce, directions};
+use super::surface::{LocalFrame, Surface};
+use super::{Observer, Setup};
+use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
+use crate::radar::Link;
+use crate::radar::random::{Key, Purpose};
+use crate::trace::Hit;
+
+/// Rays start this far above a surface, m, so as not to meet it again: far above the rounding of
+/// metres in f64, far below a wavelength.
+const LIFT_M: f64 = 1e-7;
+
+/// One way from the radar to the antenna.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Path {
+    /// Half of its length, m.
+    pub range_m: f64,
+    /// Mean power that arrives by it, W, per ray of the spot.
+    pub power_w: f64,
+    /// Where it met the first surface.
+    pub hit: Hit,
+    /// Surfaces met, 1 or 2.
+    pub surfaces: u8,
+    /// Azimuth of the source about the first surface's normal, from its grain, rad.
+    pub azimuth_rad: f64,
+    /// Share of the power that the first surface reflects like a mirror, rough or not.
+    pub specular_share: f64,
+}
+
+/// All paths of a scan to one antenna.
+pub(super) struct Paths<'a> {
+    setup: &'a Setup<'a>,
+    observer: Observer,
+    link: Link,
+}
+
+/// One chirp, on its way.
+struct Sent<'a> {
+    paths: &'a Paths<'a>,
+    number: usize,
+    axis: &'a Ray<Global>,
+    antenna: DVec3,
+    /// Rays that share its power.
+    rays: f64,
+}
+
+/// A lit point of the target.
+struct Lit<'a> {
+    hit: Hit,
+    surface: Surface<'a>,
+    frame: LocalFrame,
+    /// Where the light comes from.
+    source: Direction<Local>,
+    /// Where the antenna is, and how far, m.
+    antenna: Direction<Local>,
+    antenna_m: f64,
+}
+
+impl<'a> Paths<'a> {
+    pub fn new(setup: &'a Setup<'a>, observer: Observer) -> Paths<'a> {
+        let mut link = Link::new(setup.radar);
+        if let Observer::Receiver { aperture_m2, .. } = observer {
+            link.aperture_m2 = aperture_m2;
+        }
+        Paths { setup, observer, link }
+    }
+
+    /// All paths of a chirp through the hits of its rays. A direct path is there even when nothing
+    /// arrives by it.
+    pub fn of_chirp(&self, number: usize, hits: &[Option<Hit>]) -> Vec<Path> {
+        let axis = &self.setup.chirps.rays[number];
+        let antenna = self.observer.position(axis.origin.xyz);
+        let sent = Sent { paths: self, number, axis, antenna, rays: hits.len() as f64 };
+        let mut paths = Vec::with_capacity(hits.len());
+        for (ray, hit) in hits.iter().enumerate() {
+            let Some(hit) = hit else { continue };
+            let lit = sent.lit(*hit, axis.origin.xyz);
+            let direct = sent.direct(&lit);
+            paths.push(direct);
+            if let Some(bounce) = &self.setup.bounce {
+                sent.second_order(&lit, direct, bounce, ray, &mut paths);
+            }
+        }
+        paths
+    }
+}
+
+impl<'a> Sent<'a> {
+    fn lit(&self, hit: Hit, source: DVec3) -> Lit<'a> {
+        let setup = self.paths.setup;
+        let surface = setup.surfaces[usize::from(setup.region_of_facet[hit.facet as usize])];
+        let towards = |place: DVec3| (place - hit.point.xyz).normalize_or(DVec3::Z);
+        let frame = LocalFrame::new(setup.bvh.mesh(), &hit, towards(source), surface.grain);
+        let [source, antenna] = [source, self.antenna].map(|place| frame.local(towards(place)));
+        let antenna_m = self.antenna.distance(hit.point.xyz);
+        Lit { hit, surface, frame, source, antenna, antenna_m }
+    }
+
+    fn direct(&self, lit: &Lit) -> Path {
+        // What the radar lights it also sees.
+        let seen = self.paths.observer == Observer::Radar || self.is_seen(lit);
+        let share = if seen { self.received(lit) } else { 0.0 };
+        let [x, y, _] = lit.source.xyz().to_array();
+        Path {
+            range_m: 0.5 * (lit.hit.range_m + lit.antenna_m),
+            power_w: self.flux_w(lit) * share,
+            hit: lit.hit,
+            surfaces: 1,
+            azimuth_rad: y.atan2(x),
+            specular_share: lit.surface.scattering.specular_share(lit.source, lit.antenna),
+        }
+    }
+
+    fn second_order(
+        &self,
+        lit: &Lit,
+        direct: Path,
+        bounce: &Bounce,
+        ray: usize,
+        paths: &mut Vec<Path>,
+    ) {
+        let flux_w = self.flux_w(lit);
+        for (onward, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
+            let Some(hit) = self.cast(lit, onward) else { continue };
+            let f_per_sr = lit.surface.scattering.f_per_sr(lit.source, onward);
+            let second = self.lit(hit, lit.hit.point.xyz);
+            let seen = weight * self.pattern(bounce, &hit);
+            let power_w = flux_w * f_per_sr * onward.cos_theta() * seen * self.received(&second);
+            if power_w > 0.0 && self.is_seen(&second) {
+                let way_m = lit.hit.range_m + hit.range_m + second.antenna_m;
+                paths.push(Path { range_m: 0.5 * way_m, power_w, surfaces: 2, ..direct });
+            }
+        }
+    }
+
+    /// The same for every observer: where a surface sends its power does not depend on who listens.
+    fn key(&self, ray: usize) -> Key {
+        let (seed, chirp) = (self.paths.setup.seed, self.number as u64);
+        Key { seed, chirp, sub_ray: ray as u64, purpose: Purpose::Bounce }
+    }
+
+    /// Power of one ray on a lit point, W.
+    fn flux_w(&self, lit: &Lit) -> f64 {
+        self.paths.link.flux_w(lit.hit.cos_theta) / self.rays
+    }
+
+    /// Share of the power on a lit point that the antenna receives if nothing is in the way.
+    fn received(&self, lit: &Lit) -> f64 {
+        let cos_exit = lit.antenna.cos_theta();
+        if cos_exit <= 0.0 {
+            return 0.0;
+        }
+        let f_per_sr = lit.surface.scattering.f_per_sr(lit.source, lit.antenna);
+        self.paths.link.received_per_w(lit.antenna_m, cos_exit, f_per_sr)
+    }
+
+    /// What a ray that leaves a lit point meets.
+    fn cast(&self, lit: &Lit, towards: Direction<Local>) -> Option<Hit> {
+        let origin = Point::from(lit.hit.point.xyz + LIFT_M * lit.frame.normal);
+        let direction = Direction::new(lit.frame.world(towards.xyz()))?;
+        self.paths.setup.bvh.closest(&Ray { origin, direction })
+    }
+
+    /// Whether nothing stands between a lit point and the antenna.
+    fn is_seen(&self, lit: &Lit) -> bool {
+        let above = lit.antenna.cos_theta() > 0.0;
+        above && self.cast(lit, lit.antenna).is_none_or(|hit| hit.range_m >= lit.antenna_m)
+    }
+
+    /// How well the antenna sees a second surface. A separate receiver sees all alike.
+    fn pattern(&self, bounce: &Bounce, hit: &Hit) -> f64 {
+        match self.paths.observer {
+            Observer::Receiver { .. } => 1.0,
+            Observer::Radar => bounce.pattern(self.paths.setup, self.axis, hit.point.xyz),
+        }
+    }
+}
