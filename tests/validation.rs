@@ -1,0 +1,51 @@
+//! Promise: docs/validation.md says what the crate computes, number for number, and every number
+//! lies within its tolerance unless the page says that it does not.
+//!
+//! `MATDB_WRITE_VALIDATION=1 cargo test --test validation` writes the page.
+
+mod support;
+
+mod validation {
+    pub mod chirp_chain;
+    pub mod kirchhoff;
+    pub mod microfacet;
+    pub mod page;
+    pub mod quadrature;
+    pub mod reciprocity_energy;
+    pub mod solids;
+    pub mod sub_rays;
+}
+
+use validation::page::{self, Row, Section};
+use validation::{chirp_chain, kirchhoff, microfacet, reciprocity_energy, solids, sub_rays};
+
+const PAGE: &str = "docs/validation.md";
+
+fn sections() -> Vec<Section> {
+    vec![
+        reciprocity_energy::section(),
+        microfacet::section(),
+        solids::section(),
+        kirchhoff::section(),
+        sub_rays::section(),
+        chirp_chain::section(),
+    ]
+}
+
+#[test]
+fn the_page_holds_what_the_crate_computes() {
+    let sections = sections();
+    let surprises: Vec<String> =
+        sections.iter().flat_map(Section::rows).filter_map(Row::surprise).collect();
+    assert!(surprises.is_empty(), "{}", surprises.join("\n"));
+    let (path, made) = (support::root().join(PAGE), page::markdown(&sections));
+    if std::env::var_os("MATDB_WRITE_VALIDATION").is_some() {
+        return std::fs::write(path, made).unwrap();
+    }
+    let committed = std::fs::read_to_string(path).unwrap_or_default();
+    let lines = |text: &str| text.lines().map(str::to_owned).collect::<Vec<_>>();
+    for (number, (made, committed)) in std::iter::zip(lines(&made), lines(&committed)).enumerate() {
+        assert_eq!(made, committed, "line {} of {PAGE} is stale; {}", number + 1, page::COMMAND);
+    }
+    assert!(made == committed, "{PAGE} has other lines than it should; {}", page::COMMAND);
+}

@@ -1,0 +1,181 @@
+//! The page: sections of tables whose rows carry a number, its tolerance and a verdict.
+
+/// Writes the page.
+pub const COMMAND: &str = "`MATDB_WRITE_VALIDATION=1 cargo test --test validation` writes it";
+
+/// Below this a number is rounding and differs from one machine to the next.
+const ROUNDING: f64 = 1e-12;
+
+/// Where a number must lie.
+#[derive(Clone, Copy)]
+pub enum Tolerance {
+    /// At most this.
+    Below(f64),
+    /// Between the two.
+    Within(f64, f64),
+}
+
+/// One number and where it must lie.
+pub struct Row {
+    /// What the number is.
+    pub what: String,
+    value: f64,
+    digits: i32,
+    unit: &'static str,
+    tolerance: Tolerance,
+    /// Why the number is known to lie outside, which the page then lists.
+    fails_because: Option<String>,
+}
+
+/// A table with the reason for its tolerances.
+pub struct Table {
+    /// What is compared and why the tolerance is what it is.
+    pub text: String,
+    /// Its rows.
+    pub rows: Vec<Row>,
+}
+
+/// A section of the page.
+pub struct Section {
+    /// Its heading.
+    pub title: &'static str,
+    /// Its tables.
+    pub tables: Vec<Table>,
+    /// What this section leaves open.
+    pub not_covered: Vec<&'static str>,
+}
+
+impl Section {
+    /// Every row of every table.
+    pub fn rows(&self) -> impl Iterator<Item = &Row> {
+        self.tables.iter().flat_map(|table| &table.rows)
+    }
+}
+
+impl Row {
+    /// A pure number, shown with two digits.
+    pub fn new(what: impl Into<String>, value: f64, tolerance: Tolerance) -> Row {
+        Row { what: what.into(), value, digits: 2, unit: "", tolerance, fails_because: None }
+    }
+
+    /// The same with a unit.
+    pub fn unit(self, unit: &'static str) -> Row {
+        Row { unit, ..self }
+    }
+
+    /// The same with more digits.
+    pub fn digits(self, digits: i32) -> Row {
+        Row { digits, ..self }
+    }
+
+    /// The same, known to lie outside.
+    pub fn fails_because(self, reason: impl Into<String>) -> Row {
+        Row { fails_because: Some(reason.into()), ..self }
+    }
+
+    /// Whether the number lies within its tolerance; NaN does not.
+    pub fn passes(&self) -> bool {
+        match self.tolerance {
+            Tolerance::Below(most) => self.value <= most,
+            Tolerance::Within(least, most) => self.value >= least && self.value <= most,
+        }
+    }
+
+    /// A sentence when the verdict is not the one that is known.
+    pub fn surprise(&self) -> Option<String> {
+        let known = if self.fails_because.is_some() { "fail" } else { "pass" };
+        let surprising = self.passes() == self.fails_because.is_some();
+        surprising.then(|| format!("{} is {}, which should {known}", self.what, self.found()))
+    }
+
+    /// The number as the page shows it.
+    pub fn found(&self) -> String {
+        with_unit(&number(self.value, self.digits), self.unit)
+    }
+
+    fn markdown(&self) -> String {
+        let tolerance = match self.tolerance {
+            Tolerance::Below(most) => format!("≤ {}", plain(most)),
+            Tolerance::Within(least, most) => format!("{} to {}", plain(least), plain(most)),
+        };
+        let verdict = if self.passes() { "passes" } else { "**fails**" };
+        let tolerance = with_unit(&tolerance, self.unit);
+        format!("| {} | {} | {tolerance} | {verdict} |\n", self.what, self.found())
+    }
+}
+
+fn with_unit(text: &str, unit: &str) -> String {
+    format!("{text} {unit}").trim_end().to_owned()
+}
+
+/// So many significant digits; rounding errors are shown as a bound.
+fn number(value: f64, digits: i32) -> String {
+    if value.abs() < ROUNDING {
+        return format!("< {ROUNDING:e}");
+    }
+    let scientific = format!("{value:.*e}", (digits - 1) as usize);
+    let rounded: f64 = scientific.parse().unwrap_or(value);
+    let exponent = rounded.abs().log10().floor() as i32;
+    if !(-3..5).contains(&exponent) {
+        return scientific;
+    }
+    format!("{rounded:.*}", (digits - 1 - exponent).max(0) as usize)
+}
+
+/// A tolerance is a chosen number and is shown as it was written.
+fn plain(value: f64) -> String {
+    if value != 0.0 && value.abs() < 1e-3 { format!("{value:e}") } else { format!("{value}") }
+}
+
+const HEAD: &str = "| what | found | tolerance | verdict |\n|---|---|---|---|\n";
+
+fn introduction() -> String {
+    format!(
+        "What the code computes, against what is known without it: closed forms, published figures, \
+         limits that two models must share, and another renderer. `tests/validation.rs` computes every \
+         number, compares it with its tolerance, and compares this page with the numbers; {COMMAND}. \
+         Nothing here is measured: the code is judged, not whether a model suits a material."
+    )
+}
+
+/// A paragraph in lines of at most 110 characters.
+fn wrapped(text: &str) -> String {
+    const WIDTH: usize = 110;
+    let (mut lines, mut length) = (String::new(), 0);
+    for word in text.split_whitespace() {
+        let count = word.chars().count();
+        let fits = length + 1 + count <= WIDTH;
+        lines += if length == 0 {
+            ""
+        } else if fits {
+            " "
+        } else {
+            "\n"
+        };
+        length = if fits { length + 1 + count } else { count };
+        lines += word;
+    }
+    lines
+}
+
+/// The page.
+pub fn markdown(sections: &[Section]) -> String {
+    let mut page = format!("# Validation\n\n{}\n\n## What fails\n\n", wrapped(&introduction()));
+    for row in sections.iter().flat_map(Section::rows) {
+        if let Some(reason) = &row.fails_because {
+            page += &format!("- {}: {}. {reason}\n", row.what, row.found());
+        }
+    }
+    page += "\n## What is not covered\n\n";
+    for what in sections.iter().flat_map(|section| &section.not_covered) {
+        page += &format!("- {what}\n");
+    }
+    for section in sections {
+        page += &format!("\n## {}\n", section.title);
+        for table in &section.tables {
+            page += &format!("\n{}\n\n{HEAD}", wrapped(&table.text));
+            page.extend(table.rows.iter().map(Row::markdown));
+        }
+    }
+    page
+}
