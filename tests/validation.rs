@@ -9,6 +9,7 @@ mod validation {
     pub mod chirp_chain;
     pub mod kirchhoff;
     pub mod microfacet;
+    pub mod other_paths;
     pub mod page;
     pub mod quadrature;
     pub mod reciprocity_energy;
@@ -17,7 +18,9 @@ mod validation {
 }
 
 use validation::page::{self, Row, Section};
-use validation::{chirp_chain, kirchhoff, microfacet, reciprocity_energy, solids, sub_rays};
+use validation::{
+    chirp_chain, kirchhoff, microfacet, other_paths, reciprocity_energy, solids, sub_rays,
+};
 
 const PAGE: &str = "docs/validation.md";
 
@@ -26,6 +29,7 @@ fn sections() -> Vec<Section> {
         reciprocity_energy::section(),
         microfacet::section(),
         solids::section(),
+        other_paths::section(),
         kirchhoff::section(),
         sub_rays::section(),
         chirp_chain::section(),

@@ -10,7 +10,7 @@ use assert_cmd::Command;
 use matdb::brdf::Scattering;
 use matdb::geometry::Mesh;
 use matdb::radar::{Chirps, Radar};
-use matdb::render::{Echo, Observer, Setup, Surface, shade, trace};
+use matdb::render::{Bounce, Echo, Observer, Setup, Surface, shade, trace};
 use matdb::trace::Bvh;
 
 /// The crate's folder.
@@ -37,11 +37,24 @@ pub fn echoes(
     mesh: &Mesh,
     scattering: &dyn Scattering,
 ) -> Vec<Echo> {
+    echoes_at(radar, chirps, mesh, scattering, 1, None, Observer::Radar)
+}
+
+/// The same with any number of rays per chirp, second-order paths, and any antenna.
+pub fn echoes_at(
+    radar: &Radar,
+    chirps: &Chirps,
+    mesh: &Mesh,
+    scattering: &dyn Scattering,
+    rays: usize,
+    bounce: Option<Bounce>,
+    observer: Observer,
+) -> Vec<Echo> {
     let (bvh, regions) = (Bvh::new(mesh), vec![0; mesh.facets.len()]);
-    let footprints = trace(radar, chirps, &bvh, 1, &|_| {}).unwrap();
+    let footprints = trace(radar, chirps, &bvh, rays, &|_| {}).unwrap();
     let surfaces = [Surface::new(scattering)];
-    let setup = Setup::new(radar, chirps, &bvh, &regions, &surfaces);
-    shade(&setup, &footprints, Observer::Radar, &|_| {}).unwrap().echoes
+    let setup = Setup { bounce, ..Setup::new(radar, chirps, &bvh, &regions, &surfaces) };
+    shade(&setup, &footprints, observer, &|_| {}).unwrap().echoes
 }
 
 /// Standard error of a run that must fail with status 1.

@@ -1,7 +1,7 @@
 //! From beat signal to detection, and speckle, against theory.
 
 use matdb::radar::random::{Draws, Key, Purpose};
-use matdb::radar::{Chirp, RangeProcessor, Receiver, Return, Speckle, Threshold, Window};
+use matdb::radar::{Chirp, RangeProcessor, Receiver, Return, Speckle, Window};
 use num_complex::Complex;
 use rayon::prelude::*;
 
@@ -39,7 +39,7 @@ const QUIET: Receiver = Receiver {
     zero_padding: 1,
     noise_figure_db: 20.0,
     temperature_k: 0.0,
-    threshold: Threshold::PowerDbm(-200.0),
+    false_alarm_probability: None,
     gate_m: None,
 };
 
@@ -62,7 +62,7 @@ fn beat(cells: f64) -> Vec<Complex<f64>> {
 }
 
 fn processor(receiver: Receiver) -> RangeProcessor {
-    RangeProcessor::new(&receiver, &CHIRP).unwrap()
+    RangeProcessor::new(&receiver, &CHIRP, -200.0, 1).unwrap()
 }
 
 /// Half-power width in cells, read off a padded spectrum linearly between its bins.
@@ -114,9 +114,9 @@ fn noise_db(window: Window, bandwidth_bins: f64) -> f64 {
 }
 
 fn false_alarm_rate(window: Window, probability: f64, chirps: u64) -> f64 {
-    let threshold = Threshold::FalseAlarmProbability(probability);
-    let processor =
-        processor(Receiver { window, zero_padding: 2, temperature_k: 290.0, threshold, ..QUIET });
+    let false_alarm_probability = Some(probability);
+    let noisy = Receiver { window, zero_padding: 2, temperature_k: 290.0, ..QUIET };
+    let processor = processor(Receiver { false_alarm_probability, ..noisy });
     let alarm = |chirp: &u64| processor.detect(&noise(&processor, *chirp)).is_some();
     (0..chirps).into_par_iter().filter(alarm).count() as f64 / chirps as f64
 }
@@ -243,7 +243,6 @@ pub fn section() -> Section {
     ];
     let not_covered = vec![
         "Imperfect chirps: phase noise, a curved sweep, leakage between transmitter and receiver.",
-        "Surfaces that see each other.",
     ];
     Section { title: "The chirp chain", tables, not_covered }
 }

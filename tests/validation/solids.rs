@@ -7,9 +7,11 @@ use matdb::brdf::{Lambert, Scattering};
 use matdb::geometry::Mesh;
 use matdb::radar::scan::Raster;
 use matdb::radar::{Chirps, Pattern, Radar};
-use matdb::render::{Echo, shade, trace};
+use matdb::render::{Echo, Observer};
 use matdb::scene::solids::{icosphere, plate};
 use matdb::units::watts_from_dbm;
+
+use crate::support::echoes_at;
 
 use super::page::{Row, Section, Table, Tolerance::Below, Tolerance::Within};
 use super::quadrature::integral;
@@ -34,8 +36,7 @@ pub fn echoes(radar: &Radar, mut mesh: Mesh, rays: usize, surface: &dyn Scatteri
     // The default radar looks along −z from (0, 1.1, 8).
     mesh.vertices.iter_mut().for_each(|vertex| vertex.y += 1.1);
     let chirps = Chirps::draw(radar, |_| Err("no file".to_owned())).unwrap();
-    let hits = trace(radar, &chirps, &mesh, rays, &|_| {}).unwrap();
-    shade(radar, &chirps, &hits, &vec![0; mesh.facets.len()], &[surface]).echoes
+    echoes_at(radar, &chirps, &mesh, surface, rays, None, Observer::Radar)
 }
 
 /// The default radar with a raster of chirps.
@@ -67,7 +68,7 @@ fn plate_error_db(tilt_rad: f64) -> f64 {
     let echoes = echoes(&radar, mesh, 1, &CHALK);
     assert_eq!(echoes.len(), 1600);
     let error = |echo: &Echo| {
-        let ray = (echo.hit.point.xyz - DVec3::new(0.0, 1.1, STAND_OFF_M)).normalize();
+        let ray = (echo.point.xyz - DVec3::new(0.0, 1.1, STAND_OFF_M)).normalize();
         let cos = -ray.dot(normal);
         let expected_w = by_hand_w(STAND_OFF_M * normal.z / cos, cos, 0.5 / PI);
         10.0 * (watts_from_dbm(echo.power_dbm) / expected_w).log10()
@@ -110,9 +111,9 @@ fn errors(
     let incidence: Vec<f64> = echoes
         .iter()
         .filter_map(|echo| {
-            let ray = (echo.hit.point.xyz - DVec3::new(0.0, 1.1, STAND_OFF_M)).normalize();
+            let ray = (echo.point.xyz - DVec3::new(0.0, 1.1, STAND_OFF_M)).normalize();
             let (_, cos) = exact(STAND_OFF_M * ray.x, STAND_OFF_M * ray.y)?;
-            (cos > 0.5).then(|| (echo.hit.theta_rad() - cos.acos()).abs())
+            (cos > 0.5).then(|| (echo.truth.unwrap().hit.theta_rad() - cos.acos()).abs())
         })
         .collect();
     Errors {
@@ -208,7 +209,6 @@ pub fn section() -> Section {
                  incidence (up to 60°) against asin(offset/radius). Inscribed facets of width e err by the order (e/r)² in power, \
                  which is what is tolerated; a facet's normal errs by at most half the turn from one facet to the next, by a \
                  quarter in the mean, and 0.3 is tolerated.";
-    // A dihedral needs echoes of two bounces: its table goes here, between the plate and the round bodies.
     let tables = vec![
         Table { text: plate.to_owned(), rows: plate_rows() },
         Table {
