@@ -176,12 +176,18 @@ impl Chirp {
         let cycles = self.beat_frequency_hz(echo.range_m) * self.duration_s;
         let step_rad = std::f64::consts::TAU * cycles / self.samples as f64;
         let first_rad = self.phase_rad(echo.range_m) - std::f64::consts::PI * cycles;
-        // Turning a phasor costs one product a sample; its error grows to 1e-12 over 4096.
-        let step = Complex::cis(step_rad);
-        let mut phasor = echo.amplitude_sqrt_w * Complex::cis(first_rad);
-        for sample in signal {
-            *sample += phasor;
-            phasor *= step;
+        // Turning a phasor costs one product a sample; its error grows to 1e-12 over 4096. Eight of
+        // them turn side by side, so that none waits for the one before.
+        const LANES: usize = 8;
+        let step = Complex::cis(LANES as f64 * step_rad);
+        let mut phasors: [Complex<f64>; LANES] = std::array::from_fn(|lane| {
+            echo.amplitude_sqrt_w * Complex::cis(first_rad + lane as f64 * step_rad)
+        });
+        for samples in signal.chunks_mut(LANES) {
+            for (sample, phasor) in samples.iter_mut().zip(&mut phasors) {
+                *sample += *phasor;
+                *phasor *= step;
+            }
         }
     }
 }

@@ -108,9 +108,10 @@ impl Detector {
     ) -> Result<Vec<Vec<Complex<f64>>>, RenderError> {
         let mut phases = self.draws(chirp, Purpose::SurfacePhase);
         let mut noise = self.draws(chirp, Purpose::Noise);
+        let together = beat.together(paths);
         let look = |_| {
             let returns: Vec<Return> =
-                paths.iter().map(|path| beat.echo(path, &mut phases)).collect();
+                together.iter().map(|&sum| beat.echo(sum, &mut phases)).collect();
             let mut signal = beat.chirp.beat_signal(&returns)?;
             beat.processor.add_noise(&mut signal, &mut noise);
             Ok(signal)
@@ -124,9 +125,20 @@ impl Detector {
 }
 
 impl Beat {
-    fn echo(&self, path: &Path, phases: &mut Draws) -> Return {
+    /// Paths that no receiver could tell apart, as one: Gaussian phasors add up to a Gaussian phasor
+    /// of all their power. Only a single path can be anything else.
+    fn together(&self, paths: &[Path]) -> Vec<Detection> {
+        const PART_OF_A_CELL: f64 = 1.0 / 16.0;
+        let part_m = PART_OF_A_CELL * self.chirp.range_resolution_m();
+        let part = |path: &Path| (path.range_m / part_m) as u64;
+        let mut sorted = paths.to_vec();
+        sorted.sort_by(|a, b| a.range_m.total_cmp(&b.range_m));
+        sorted.chunk_by(|a, b| part(a) == part(b)).map(sum).collect()
+    }
+
+    fn echo(&self, sum: Detection, phases: &mut Draws) -> Return {
         let phasor = self.speckle.map_or(Complex::ONE, |speckle| speckle.phasor(phases));
-        Return { range_m: path.range_m, amplitude_sqrt_w: phasor * path.power_w.sqrt() }
+        Return { range_m: sum.range_m, amplitude_sqrt_w: phasor * sum.power_w.sqrt() }
     }
 
     fn mean_profile_w(&self, signals: &[Vec<Complex<f64>>]) -> Vec<f64> {
