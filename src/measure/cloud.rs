@@ -67,8 +67,8 @@ pub enum CloudError {
     },
     /// Powers in watts that were announced as dBm.
     #[error(
-        "all {points} powers are positive and none is above {largest:e}: these are watts, not dBm; \
-         state the unit of the power"
+        "all {points} powers lie between 0 and {largest:e}: these are watts, not dBm; \
+         state the unit of the power, and leave out points of 0 W"
     )]
     Watts {
         /// Number of points.
@@ -182,7 +182,7 @@ fn check_size(points: &[CloudPoint]) -> Result<(), CloudError> {
 fn check_powers(points: &[CloudPoint]) -> Result<(), CloudError> {
     let powers = || points.iter().map(|point| point.power_dbm);
     let largest = powers().fold(f64::NEG_INFINITY, f64::max);
-    if powers().all(|power| power > 0.0) && largest <= STRONGEST_W {
+    if powers().all(|power| power >= 0.0) && largest <= STRONGEST_W {
         return Err(CloudError::Watts { points: points.len(), largest });
     }
     match powers().position(|power| power > STRONGEST_DBM) {
@@ -221,6 +221,8 @@ mod tests {
         let error = refused(vec![point(0, 0.0, 2e-11), point(1, 0.1, 3e-7)]);
         assert_eq!(error, CloudError::Watts { points: 2, largest: 3e-7 });
         assert!(error.to_string().contains("these are watts, not dBm"), "{error}");
+        let error = refused(vec![point(0, 0.0, 0.0), point(1, 0.1, 3e-7)]);
+        assert!(matches!(error, CloudError::Watts { .. }), "{error}");
         assert!(Cloud::new(vec![point(0, 0.0, -60.0), point(1, 0.1, 3e-7)]).is_ok());
     }
 

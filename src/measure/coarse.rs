@@ -15,6 +15,8 @@ const LEAST_REACH_M: f64 = 0.02;
 /// A pair further off sideways than so many typical pairs is beyond the edge of what the virtual
 /// scan saw.
 const BEYOND_THE_EDGE: f64 = 4.0;
+/// A smaller share of points near the mesh is no overlap.
+const LEAST_OVERLAP: f64 = 0.2;
 
 /// Where a coarse alignment ended.
 pub(super) struct Aligned {
@@ -73,7 +75,7 @@ fn align_to(
     let mut moved = Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO);
     for step in 1..=settings.max_steps {
         let pairs = pairs(&chosen, &tree, seen, &moved, reach_m);
-        if pairs.len() < chosen.len().min(settings.least_points) / 4 {
+        if (pairs.len() as f64) < LEAST_OVERLAP * chosen.len() as f64 {
             let (near, points) = (pairs.len(), chosen.len());
             return Err(RegistrationError::NoOverlap { near, points, reach_m });
         }

@@ -126,6 +126,10 @@ impl NormalEquations {
 
     /// The motion that closes the gaps best; along directions that no gap feels it stays put.
     pub fn solve(&self) -> Motion {
+        // The decomposition would not end.
+        if !self.information.iter().chain(self.pull_m.iter()).all(|sum| sum.is_finite()) {
+            return Motion::default();
+        }
         let eigen = SymmetricEigen::new(self.information);
         let best = eigen.eigenvalues.max();
         let mut step = Vector6::zeros();
@@ -150,7 +154,7 @@ pub(super) fn jacobian(gap: &Gap, pivot: DVec3, length_m: f64) -> Vector6<f64> {
 }
 
 /// The rigid map that brings the first points of weighted pairs nearest to the second; `None` when
-/// no weight is above 0.
+/// no weight is above 0 or a point is not finite.
 pub fn point_to_point(pairs: &[(DVec3, DVec3)], weights: &[f64]) -> Option<Pose<Global, Global>> {
     let weighted = || std::iter::zip(pairs, weights);
     let total: f64 = weights.iter().sum();
@@ -163,6 +167,10 @@ pub fn point_to_point(pairs: &[(DVec3, DVec3)], weights: &[f64]) -> Option<Pose<
     for ((a, b), w) in weighted() {
         let [a, b] = [*a - from, *b - to].map(|v| nalgebra::Vector3::new(v.x, v.y, v.z));
         covariance += a * b.transpose() * *w;
+    }
+    // The decomposition would not end.
+    if !covariance.iter().all(|sum| sum.is_finite()) {
+        return None;
     }
     let svd = covariance.svd(true, true);
     let (u, v) = (svd.u?, svd.v_t?.transpose());

@@ -86,3 +86,91 @@ impl<'a> Incidence<'a> {
         self.target.region_of_facet.get(hit.facet as usize).copied()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::Pose;
+    use crate::geometry::Mesh;
+    use crate::measure::register::Stop;
+    use crate::scene::solids;
+
+    /// A pose that is known exactly.
+    fn exact() -> Registered {
+        Registered {
+            pose: Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO),
+            covariance: [[0.0; 6]; 6],
+            pivot: Point::new(0.0, 0.0, 0.0),
+            rms_m: 0.0,
+            widened: 1.0,
+            inliers: 1,
+            points: 1,
+            scans: 1,
+            iterations: 1,
+            stop: Stop::Still,
+            converged: true,
+            verdicts: vec![],
+        }
+    }
+
+    fn target(mesh: Mesh) -> Target {
+        let region_of_facet = vec![0; mesh.facets.len()];
+        Target { mesh, meshes: vec![], regions: vec![], region_of_facet }
+    }
+
+    fn ray(x_m: f64, y_m: f64) -> Ray<Global> {
+        let origin = Point::new(0.0, 0.0, 8.0);
+        Ray { origin, direction: origin.towards(Point::new(x_m, y_m, 0.0)).unwrap() }
+    }
+
+    #[test]
+    fn the_flat_facets_of_a_sphere_know_how_wrong_they_are() {
+        const RADIUS_M: f64 = 0.2;
+        let target = target(solids::icosphere(RADIUS_M, 4));
+        let registered = exact();
+        let incidence = Incidence::new(&target, &registered, 0.0);
+        let (mut error2, mut told2) = (0.0, 0.0);
+        for step in 0..400 {
+            let aim =
+                ray(0.15 * (f64::from(step) * 0.71).sin(), 0.15 * (f64::from(step) * 0.37).cos());
+            let sighting = incidence.look(&aim).unwrap();
+            let normal = target.mesh.area_normal(sighting.hit.facet as usize);
+            let off_rad = normal.angle_between(sighting.hit.point.xyz);
+            error2 += 0.5 * off_rad * off_rad;
+            told2 += sighting.theta_sd_rad.powi(2);
+        }
+        // Spread evenly along one direction is a model of the bend within a triangle, no more.
+        let ratio = (told2 / error2).sqrt();
+        assert!((0.6..1.7).contains(&ratio), "{ratio}");
+    }
+
+    #[test]
+    fn what_the_caller_adds_is_added() {
+        let target = target(solids::plate(1.0, 1.0));
+        let registered = exact();
+        let sighting = Incidence::new(&target, &registered, 0.01).look(&ray(0.1, 0.2)).unwrap();
+        assert!((sighting.theta_sd_rad - 0.01).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_margin_ends_at_the_edge_the_step_and_the_region() {
+        const MARGIN_M: f64 = 0.016;
+        let mut mesh = solids::plate(0.4, 0.4);
+        let mut behind = solids::plate(0.4, 0.4);
+        behind.vertices.iter_mut().for_each(|v| *v += DVec3::new(0.4, 0.0, -0.1));
+        mesh.append(&behind).unwrap();
+        let mut target = target(mesh);
+        let registered = exact();
+        let clear = |target: &Target, x_m: f64| {
+            let incidence = Incidence::new(target, &registered, 0.0);
+            let sighting = incidence.look(&ray(x_m, 0.03)).unwrap();
+            incidence.is_clear(&ray(x_m, 0.03), &sighting, MARGIN_M)
+        };
+        // Away from everything; at the outer edge; at the step to the plate behind.
+        assert!(clear(&target, -0.1) && clear(&target, -0.18));
+        assert!(!clear(&target, -0.19) && !clear(&target, 0.19));
+        // The first plate's diagonal becomes a border.
+        target.region_of_facet[0] = 1;
+        assert!(!clear(&target, 0.03) && clear(&target, -0.1));
+    }
+}

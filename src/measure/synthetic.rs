@@ -24,7 +24,7 @@ pub struct Measured {
 
 /// f of every synthetic surface, 1/sr: of −77 dBm at some 60° from 8 m.
 pub fn f_per_sr(theta_rad: f64) -> f64 {
-    0.5 * (-theta_rad / 0.15).exp() + 2e-3
+    0.5 * (-theta_rad / 0.1).exp() + 1.6e-4
 }
 
 impl Measured {

@@ -112,3 +112,63 @@ fn in_words(axis: &Vector6<f64>, sd_m: f64) -> String {
         1e3 * sd_m
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::radar::random::{Draws, Key, Purpose};
+
+    const SD_M: f64 = 2e-3;
+
+    fn normal(draws: &mut Draws) -> f64 {
+        draws.complex_gaussian().re * std::f64::consts::SQRT_2
+    }
+
+    /// Sixteen points in each of 400 cells of a bumpy wall; `shared` of the variance is the cell's.
+    fn wall(shared: f64) -> Vec<Gap> {
+        let key = Key { seed: 8, chirp: 0, sub_ray: 0, purpose: Purpose::Noise };
+        let mut draws = key.draws();
+        let mut gaps = Vec::new();
+        for cell in 0..400 {
+            let corner = DVec3::new(f64::from(cell % 20), f64::from(cell / 20), 0.0) * CELL_M;
+            let common = normal(&mut draws) * shared.sqrt();
+            for _ in 0..16 {
+                let inside = DVec3::new(draws.uniform(), draws.uniform(), draws.uniform());
+                let lean = DVec3::new(normal(&mut draws), normal(&mut draws), 2.0);
+                let own = normal(&mut draws) * (1.0 - shared).sqrt();
+                let at = corner + CELL_M * inside;
+                let gradient = lean.normalize();
+                gaps.push(Gap { at, gradient, size_m: SD_M * (common + own) });
+            }
+        }
+        gaps
+    }
+
+    #[test]
+    fn independent_errors_give_the_textbooks_covariance() {
+        let gaps = wall(0.0);
+        let known = uncertainty(&gaps, DVec3::splat(0.5), 0.4);
+        // The mean of six χ² ratios over 400 cells scatters by some 3 %.
+        assert!(known.widened < 1.1, "{}", known.widened);
+        // z: σ² over Σ n_z², with n_z² = 4/(4 + χ²₂), on average 0.72.
+        let sd_m = known.covariance[2][2].sqrt();
+        let expected_m = SD_M / (0.72 * gaps.len() as f64).sqrt();
+        assert!((sd_m / expected_m - 1.0).abs() < 0.1, "{sd_m} {expected_m}");
+        assert!(known.unknown.is_empty());
+    }
+
+    #[test]
+    fn errors_that_neighbours_share_widen_it() {
+        // With n points a cell and a correlation ρ a common pull grows by 1 + (n − 1)·ρ = 8.5; leaning
+        // normals share less of it: along x and y the signs differ.
+        let known = uncertainty(&wall(0.5), DVec3::splat(0.5), 0.4);
+        assert!((3.0..8.5).contains(&known.widened), "{}", known.widened);
+    }
+
+    #[test]
+    fn nothing_at_all_is_known_of_nothing() {
+        let known = uncertainty(&[], DVec3::ZERO, 0.4);
+        assert_eq!(known.unknown.len(), 6);
+        assert!((known.covariance[0][0] - 0.16).abs() < 1e-12);
+    }
+}
