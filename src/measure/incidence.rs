@@ -132,7 +132,7 @@ mod tests {
         let (mut error2, mut told2) = (0.0, 0.0);
         for step in 0..400 {
             let aim =
-                ray(0.15 * (f64::from(step) * 0.71).sin(), 0.15 * (f64::from(step) * 0.37).cos());
+                ray(0.12 * (f64::from(step) * 0.71).sin(), 0.12 * (f64::from(step) * 0.37).cos());
             let sighting = incidence.look(&aim).unwrap();
             let normal = target.mesh.area_normal(sighting.hit.facet as usize);
             let off_rad = normal.angle_between(sighting.hit.point.xyz);
