@@ -9,6 +9,7 @@ use crate::formats::exr::ExrError;
 use crate::formats::figure::FigureError;
 use crate::material::MaterialError;
 use crate::material::file::FileError;
+use crate::measure::{CloudError, ReductionError, RegistrationError};
 use crate::radar::RadarError;
 use crate::radar::f5::F5Error;
 use crate::render::RenderError;
@@ -53,6 +54,15 @@ pub enum Error {
     /// A table could not be encoded.
     #[error(transparent)]
     Format(#[from] FormatError),
+    /// A measured cloud was refused.
+    #[error(transparent)]
+    Cloud(#[from] CloudError),
+    /// There is no pose.
+    #[error(transparent)]
+    Registration(#[from] RegistrationError),
+    /// There is no curve.
+    #[error(transparent)]
+    Reduction(#[from] ReductionError),
     /// No such material.
     #[error("{asked_by}there is no material `{name}`; {way_out}")]
     UnknownMaterial {

@@ -1,5 +1,34 @@
 //! A measured cloud → pose → angles of incidence → a curve that belongs to a material.
+//!
+//! [`Cloud`] is what the radar measured. [`Registration`] finds where the mesh stood, [`Incidence`]
+//! tells where and how steeply each beam met it, and [`Reduction`] turns powers into σ⁰.
 
+pub mod cloud;
+pub mod cloud_file;
 pub mod curve;
+mod coarse;
+pub mod icp;
 
+pub mod incidence;
+pub mod nearest;
+pub mod normals;
+
+pub mod placed;
+
+pub mod reduce;
+pub mod register;
+mod sights;
+pub mod start;
+mod uncertainty;
+mod view;
+#[cfg(test)]
+mod synthetic;
+
+pub use cloud::{Cloud, CloudError, CloudPoint};
+pub use cloud_file::{CloudFormat, CloudReading, PowerUnit};
 pub use curve::{Curve, Row};
+
+pub use incidence::{Incidence, Sighting};
+pub use reduce::{LeftOut, Reduced, Reduction, ReductionError};
+pub use register::{Metric, Registered, Registration, RegistrationError, Stop};
+pub use start::Start;

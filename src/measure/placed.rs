@@ -1,0 +1,83 @@
+//! A mesh at a pose, as rays see it.
+//!
+//! The mesh itself never moves: rays are carried back into its frame, and hits forward. The
+//! hierarchy over its facets is built once.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::frames::{Global, Pose, Ray};
+use crate::geometry::Mesh;
+use crate::trace::{Bvh, Hit};
+
+/// A mesh that can be looked at from any side.
+pub struct Traced<'a> {
+    mesh: &'a Mesh,
+    bvh: Bvh<'a>,
+}
+
+/// Where a ray meets the mesh at a pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    /// The hit; its point is where the mesh is at the pose.
+    pub hit: Hit,
+    /// Unit normal of the facet, turned to the radar.
+    pub normal: DVec3,
+}
+
+impl<'a> Traced<'a> {
+    /// Builds the hierarchy.
+    pub fn new(mesh: &'a Mesh) -> Traced<'a> {
+        Traced { mesh, bvh: Bvh::new(mesh) }
+    }
+
+    /// Middle of the mesh's bounding box, m.
+    pub fn middle(&self) -> DVec3 {
+        let vertices = || self.mesh.vertices.iter().copied();
+        let min = vertices().fold(DVec3::INFINITY, DVec3::min);
+        let max = vertices().fold(DVec3::NEG_INFINITY, DVec3::max);
+        0.5 * (min + max)
+    }
+
+    /// Where one ray meets the mesh moved by `pose`.
+    pub fn look(&self, pose: &Pose<Global, Global>, ray: &Ray<Global>) -> Option<Seen> {
+        let back = pose.inverse();
+        let there = Ray { origin: back * ray.origin, direction: back * ray.direction };
+        let hit = self.bvh.closest(&there)?;
+        let normal =
+            pose.rotation() * self.mesh.area_normal(hit.facet as usize).normalize_or_zero();
+        let turned = if normal.dot(ray.direction.xyz()) > 0.0 { -normal } else { normal };
+        Some(Seen { hit: Hit { point: *pose * hit.point, ..hit }, normal: turned })
+    }
+
+    /// Where each of many rays meets the mesh moved by `pose`, in their order.
+    pub fn scan(&self, pose: &Pose<Global, Global>, rays: &[Ray<Global>]) -> Vec<Option<Seen>> {
+        const RAYS_PER_TASK: usize = 256;
+        rays.par_iter().with_min_len(RAYS_PER_TASK).map(|ray| self.look(pose, ray)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::Point;
+    use crate::scene::solids;
+
+    #[test]
+    fn moving_the_rays_is_moving_the_mesh() {
+        let pose = Pose::from_euler_xyz(DVec3::new(0.2, -0.4, 1.0), DVec3::new(0.1, 0.2, -0.3));
+        let mesh = solids::icosphere(0.4, 3);
+        let mut moved = mesh.clone();
+        moved.vertices.iter_mut().for_each(|v| *v = (pose * Point::from(*v)).xyz);
+        let origin = Point::new(0.0, 0.0, 8.0);
+        let ray = Ray { origin, direction: origin.towards(Point::new(0.2, 0.3, 0.0)).unwrap() };
+        let (there, here) = (Traced::new(&mesh), Traced::new(&moved));
+        let seen = there.look(&pose, &ray).unwrap();
+        let same = here.look(&Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO), &ray).unwrap();
+        assert_eq!(seen.hit.facet, same.hit.facet);
+        assert!(seen.hit.point.distance_m(same.hit.point) < 1e-12);
+        assert!(seen.normal.distance(same.normal) < 1e-12);
+        assert!((seen.hit.cos_theta - same.hit.cos_theta).abs() < 1e-12);
+        assert!(seen.normal.dot(ray.direction.xyz()) < 0.0);
+    }
+}

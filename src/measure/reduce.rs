@@ -1,0 +1,450 @@
+//! Powers to σ⁰: equation (8) solved for what belongs to the material.
+//!
+//! σ⁰(θ) = P_r · 4πR²/(P_t · A_eq · g), with the system gain g. A curve's σ⁰ is by definition (10),
+//! 4π·f·cos²θ. With [`Footprint::Projected`] the instrument's model is P_r = P_t·A_eq·g/R² · f·cos θ,
+//! and so the quotient is multiplied by cos θ.
+//!
+//! A chirp whose ray meets the registered target and that has no detection is a row too: its echo
+//! stayed below the threshold. A chirp with a detection elsewhere, such as a false alarm, is none.
+
+use std::collections::HashSet;
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use rayon::prelude::*;
+use thiserror::Error;
+
+use super::cloud::{Cloud, CloudPoint};
+use super::curve::{Curve, Row};
+use super::incidence::{Incidence, Sighting};
+use super::nearest::Nearest;
+use super::register::{Registered, RegistrationError};
+use super::sights::sights;
+use crate::frames::{Global, Ray};
+use crate::radar::scan::PATTERN_RANGE_M;
+use crate::radar::{Chirps, Footprint, Link, Radar};
+use crate::scene::Target;
+use crate::units::watts_from_dbm;
+
+/// How to reduce a registered cloud to a curve.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reduction {
+    /// Only this region of the target; `None` for all.
+    pub region: Option<u16>,
+    /// Rows nearer to a silhouette, a step or another region, across the beam, are left out, m; 0
+    /// for none. `None`: the spot's diameter, by which a straight edge leaves less than 1 % of a
+    /// Gaussian beam's power on the other side.
+    pub edge_margin_m: Option<f64>,
+    /// A further standard deviation of each tilt of the normal, rad.
+    pub extra_sd_rad: f64,
+}
+
+/// A curve and what did not enter it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reduced {
+    /// Rows of the detections in the cloud's order, then of the silent chirps in the scan's.
+    pub curve: Curve,
+    /// What did not become a row.
+    pub left_out: LeftOut,
+    /// What a person should know of the curve.
+    pub notices: Vec<String>,
+}
+
+/// Detections and silent chirps that did not become rows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LeftOut {
+    /// Detections whose ray misses the target.
+    pub missed: usize,
+    /// Detections farther from the surface than five times the registration's range error.
+    pub off_surface: usize,
+    /// Detections of another region.
+    pub other_region: usize,
+    /// Detections near a silhouette, a step or another region.
+    pub near_edge: usize,
+    /// Silent chirps near such.
+    pub silent_near_edge: usize,
+}
+
+/// Why there is no curve.
+#[derive(Debug, Error, PartialEq)]
+pub enum ReductionError {
+    /// The pose is not one to build on.
+    #[error("the registration has not converged; a curve needs a pose, so allow more steps")]
+    NotConverged,
+    /// No such region.
+    #[error("there is no region {region}; the target has {regions}")]
+    UnknownRegion {
+        /// What was asked for.
+        region: u16,
+        /// Number of regions.
+        regions: usize,
+    },
+    /// Cloud, radar and scan do not belong together.
+    #[error(transparent)]
+    Cloud(#[from] RegistrationError),
+    /// Nothing was left.
+    #[error(
+        "no detection became a row: {missed} miss the target, {off_surface} lie off its surface, \
+         {other_region} are of other regions and {near_edge} near an edge; choose another region or a \
+         smaller edge margin"
+    )]
+    NoRows {
+        /// See [`LeftOut`].
+        missed: usize,
+        /// See [`LeftOut`].
+        off_surface: usize,
+        /// See [`LeftOut`].
+        other_region: usize,
+        /// See [`LeftOut`].
+        near_edge: usize,
+    },
+}
+
+/// Why a detection is no row.
+enum Fate {
+    Row(Row),
+    Missed,
+    OffSurface,
+    OtherRegion,
+    NearEdge,
+}
+
+/// What all rows need.
+struct Bench<'a> {
+    incidence: Incidence<'a>,
+    link: Link,
+    region: Option<u16>,
+    margin_m: f64,
+    gate_m: f64,
+    threshold_w: f64,
+}
+
+/// Equation (8) solved for σ⁰ by definition (10), a pure number; `range_m` in m.
+pub fn sigma0(link: &Link, range_m: f64, cos_theta: f64, power_w: f64) -> f64 {
+    let lit_w_per_m2 = link.transmit_power_w * link.system_gain_ratio * link.aperture_m2;
+    let quotient = power_w * 4.0 * PI * range_m * range_m / lit_w_per_m2;
+    match link.footprint {
+        Footprint::Paper => quotient,
+        Footprint::Projected => quotient * cos_theta,
+    }
+}
+
+impl Reduction {
+    /// The curve of a cloud that `radar` measured with `chirps`, and that `registered` ties to
+    /// `target`.
+    ///
+    /// # Errors
+    /// When the registration has not converged, the region does not exist, the cloud is of another
+    /// frame or scan, or no detection is left.
+    pub fn run(
+        &self,
+        target: &Target,
+        radar: &Radar,
+        chirps: &Chirps,
+        cloud: &Cloud,
+        registered: &Registered,
+    ) -> Result<Reduced, ReductionError> {
+        if !registered.converged {
+            return Err(ReductionError::NotConverged);
+        }
+        let regions = target.region_of_facet.iter().max().map_or(0, |most| usize::from(*most) + 1);
+        let regions = regions.max(target.regions.len());
+        if let Some(region) = self.region.filter(|region| usize::from(*region) >= regions) {
+            return Err(ReductionError::UnknownRegion { region, regions });
+        }
+        let sights = sights(cloud, radar, chirps)?;
+        let bench = self.bench(target, radar, registered);
+        let told = Told::new(radar, chirps, cloud, &sights);
+        let mut left_out = LeftOut::default();
+        let mut rows = detected(&bench, cloud, &sights, &told, &mut left_out);
+        if rows.is_empty() {
+            let LeftOut { missed, off_surface, other_region, near_edge, .. } = left_out;
+            return Err(ReductionError::NoRows { missed, off_surface, other_region, near_edge });
+        }
+        rows.extend(silent(&bench, chirps, &told, &mut left_out));
+        Ok(Reduced { curve: Curve { rows }, left_out, notices: told.notices })
+    }
+
+    fn bench<'a>(
+        &self,
+        target: &'a Target,
+        radar: &Radar,
+        registered: &'a Registered,
+    ) -> Bench<'a> {
+        // A perfect fit must not refuse its own points.
+        const LEAST_RMS_M: f64 = 1e-3;
+        const GATE_SD: f64 = 5.0;
+        Bench {
+            incidence: Incidence::new(target, registered, self.extra_sd_rad),
+            link: Link::new(radar),
+            region: self.region,
+            margin_m: self.edge_margin_m.unwrap_or(radar.spot_diameter_m),
+            gate_m: GATE_SD * registered.rms_m.max(LEAST_RMS_M),
+            threshold_w: watts_from_dbm(radar.threshold_dbm),
+        }
+    }
+}
+
+impl Bench<'_> {
+    fn wants(&self, sighting: &Sighting) -> bool {
+        self.region.is_none_or(|region| region == sighting.region)
+    }
+
+    fn judge(&self, point: &CloudPoint, ray: &Ray<Global>, chirp: u32) -> Fate {
+        let Some(sighting) = self.incidence.look(ray) else {
+            return Fate::Missed;
+        };
+        let range_m = ray.origin.distance_m(point.point);
+        if (range_m - sighting.hit.range_m).abs() > self.gate_m {
+            return Fate::OffSurface;
+        }
+        if !self.wants(&sighting) {
+            return Fate::OtherRegion;
+        }
+        if !self.incidence.is_clear(ray, &sighting, self.margin_m) {
+            return Fate::NearEdge;
+        }
+        let power_w = watts_from_dbm(point.power_dbm);
+        Fate::Row(self.row(&sighting, range_m, power_w, chirp, false))
+    }
+
+    fn row(
+        &self,
+        sighting: &Sighting,
+        range_m: f64,
+        power_w: f64,
+        chirp: u32,
+        censored: bool,
+    ) -> Row {
+        let Sighting { hit, theta_sd_rad, .. } = *sighting;
+        let sigma0 = sigma0(&self.link, range_m, hit.cos_theta, power_w);
+        Row { theta_rad: hit.theta_rad(), theta_sd_rad, power_w, sigma0, range_m, chirp, censored }
+    }
+}
+
+fn detected(
+    bench: &Bench,
+    cloud: &Cloud,
+    sights: &[Ray<Global>],
+    told: &Told,
+    left_out: &mut LeftOut,
+) -> Vec<Row> {
+    let fates: Vec<Fate> = cloud
+        .points()
+        .par_iter()
+        .zip(sights)
+        .zip(&told.chirp_of_point)
+        .map(|((point, ray), chirp)| bench.judge(point, ray, *chirp))
+        .collect();
+    let mut rows = Vec::new();
+    for fate in fates {
+        match fate {
+            Fate::Row(row) => rows.push(row),
+            Fate::Missed => left_out.missed += 1,
+            Fate::OffSurface => left_out.off_surface += 1,
+            Fate::OtherRegion => left_out.other_region += 1,
+            Fate::NearEdge => left_out.near_edge += 1,
+        }
+    }
+    rows
+}
+
+/// Rows of the chirps that should have hit and gave nothing.
+fn silent(bench: &Bench, chirps: &Chirps, told: &Told, left_out: &mut LeftOut) -> Vec<Row> {
+    let rows: Vec<Option<Option<Row>>> = told
+        .silent
+        .par_iter()
+        .map(|&index| {
+            let (ray, chirp) = (chirps.rays.get(index)?, *chirps.number.get(index)?);
+            let sighting = bench.incidence.look(ray).filter(|sighting| bench.wants(sighting))?;
+            let clear = bench.incidence.is_clear(ray, &sighting, bench.margin_m);
+            let range_m = sighting.hit.range_m;
+            let row = || bench.row(&sighting, range_m, bench.threshold_w, chirp, true);
+            Some(clear.then(row))
+        })
+        .collect();
+    left_out.silent_near_edge = rows.iter().filter(|row| matches!(row, Some(None))).count();
+    rows.into_iter().flatten().flatten().collect()
+}
+
+/// Which chirp gave which point, and which gave none.
+struct Told {
+    chirp_of_point: Vec<u32>,
+    /// Places in the scan.
+    silent: Vec<usize>,
+    notices: Vec<String>,
+}
+
+impl Told {
+    /// Points without a number belong to the chirp whose ray they lie on; a chirp is silent when no
+    /// point has its number and none without a number lies on its ray.
+    fn new(radar: &Radar, chirps: &Chirps, cloud: &Cloud, sights: &[Ray<Global>]) -> Told {
+        // An eighth of a spot: far below the distance of two chirps of a scan.
+        let near_rad = radar.spot_diameter_m / 8.0 / PATTERN_RANGE_M;
+        let directions: Vec<DVec3> = chirps.rays.iter().map(|ray| ray.direction.xyz()).collect();
+        let tree = Nearest::new(&directions);
+        let on_ray = |ray: &Ray<Global>| {
+            let (index, off_rad) = tree.as_ref()?.find(ray.direction.xyz());
+            (off_rad <= near_rad).then(|| chirps.number.get(index).copied()).flatten()
+        };
+        let mut unmatched = 0;
+        let chirp_of_point: Vec<u32> = std::iter::zip(cloud.points(), sights)
+            .zip(0..)
+            .map(|((point, ray), place)| {
+                point.chirp.or_else(|| on_ray(ray)).unwrap_or_else(|| {
+                    unmatched += 1;
+                    place
+                })
+            })
+            .collect();
+        // More strays than false alarms explain: then silence cannot be told.
+        let lost = unmatched * 10 > cloud.points().len();
+        let silent =
+            if lost { Vec::new() } else { unheard(chirps, cloud, sights, &directions, near_rad) };
+        let mut notices = Vec::new();
+        if unmatched > 0 {
+            let effect = if lost { "; no chirp is taken for silent" } else { "" };
+            notices.push(format!(
+                "{unmatched} points lie on no ray of the scan and are numbered by their place in \
+                 the cloud{effect}"
+            ));
+        }
+        Told { chirp_of_point, silent, notices }
+    }
+}
+
+fn unheard(
+    chirps: &Chirps,
+    cloud: &Cloud,
+    sights: &[Ray<Global>],
+    directions: &[DVec3],
+    near_rad: f64,
+) -> Vec<usize> {
+    let numbers: HashSet<u32> = cloud.points().iter().filter_map(|point| point.chirp).collect();
+    let unnumbered: Vec<DVec3> = std::iter::zip(cloud.points(), sights)
+        .filter(|(point, _)| point.chirp.is_none())
+        .map(|(_, ray)| ray.direction.xyz())
+        .collect();
+    let tree = Nearest::new(&unnumbered);
+    let heard = |direction: &DVec3| tree.as_ref().is_some_and(|t| t.find(*direction).1 <= near_rad);
+    std::iter::zip(&chirps.number, directions)
+        .enumerate()
+        .filter(|(_, (number, direction))| !numbers.contains(number) && !heard(direction))
+        .map(|(index, _)| index)
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::register::Registration;
+    use crate::measure::synthetic::{Measured, f_per_sr, mannequin};
+    use crate::units::db_from_ratio;
+
+    fn target(measured: &Measured) -> Target {
+        let region_of_facet =
+            measured.mesh.facets.iter().map(|f| above(measured, f)).collect::<Vec<u16>>();
+        let mesh = measured.mesh.clone();
+        Target { mesh, meshes: vec![], regions: vec![], region_of_facet }
+    }
+
+    /// Two regions, below and above 1.1 m.
+    fn above(measured: &Measured, facet: &[u32; 3]) -> u16 {
+        u16::from(measured.mesh.vertices[facet[0] as usize].y > 1.1)
+    }
+
+    fn reduce(measured: &Measured, settings: Reduction) -> Result<Reduced, ReductionError> {
+        let Measured { mesh, radar, chirps, cloud } = measured;
+        let registered = Registration::default().run(mesh, radar, chirps, cloud).unwrap();
+        settings.run(&target(measured), radar, chirps, cloud, &registered)
+    }
+
+    #[test]
+    fn the_curve_is_the_law_that_made_the_cloud() {
+        let reduced = reduce(&mannequin(2e-3, 1), Reduction::default()).unwrap();
+        let mut off_db: Vec<f64> = reduced
+            .curve
+            .detected()
+            .map(|row| {
+                let law = 4.0 * PI * f_per_sr(row.theta_rad) * row.theta_rad.cos().powi(2);
+                db_from_ratio(row.sigma0 / law).abs()
+            })
+            .collect();
+        assert!(off_db.len() > 5000, "{}", off_db.len());
+        // A hundredth of a degree at 0.5 dB a degree, and 2 mm of range.
+        let middle = off_db.len() / 2;
+        let median_db = *off_db.select_nth_unstable_by(middle, f64::total_cmp).1;
+        assert!(median_db < 0.02, "{median_db}");
+    }
+
+    #[test]
+    fn silent_chirps_are_rows_where_the_law_is_below_the_threshold() {
+        let measured = mannequin(2e-3, 1);
+        let reduced = reduce(&measured, Reduction::default()).unwrap();
+        let link = Link::new(&measured.radar);
+        let censored: Vec<&Row> = reduced.curve.rows.iter().filter(|row| row.censored).collect();
+        assert!(censored.len() > 50, "{}", censored.len());
+        let rightly = censored.iter().filter(|row| {
+            let theta_rad = row.theta_rad;
+            link.power_w(row.range_m, theta_rad.cos(), f_per_sr(theta_rad)) < 1.05 * row.power_w
+        });
+        // A pose that is off by a hundredth of a degree moves few of them across.
+        assert!(rightly.count() as f64 > 0.98 * censored.len() as f64);
+    }
+
+    #[test]
+    fn without_chirp_numbers_the_same_chirps_are_silent() {
+        let measured = mannequin(2e-3, 1);
+        let points = measured.cloud.points();
+        let points = points.iter().map(|point| CloudPoint { chirp: None, ..*point }).collect();
+        let bare = Measured { cloud: Cloud::new(points).unwrap(), ..measured.clone() };
+        let [told, bare] =
+            [&measured, &bare].map(|measured| reduce(measured, Reduction::default()).unwrap());
+        assert_eq!(told.curve.rows.len(), bare.curve.rows.len());
+        let same = std::iter::zip(&told.curve.rows, &bare.curve.rows)
+            .filter(|(a, b)| a.chirp == b.chirp)
+            .count();
+        // Ellipses of the scan cross: a few chirps look at one place.
+        assert!(same as f64 > 0.99 * told.curve.rows.len() as f64);
+    }
+
+    #[test]
+    fn regions_and_edges_are_left_out() {
+        let measured = mannequin(2e-3, 2);
+        let all = Reduction { edge_margin_m: Some(0.0), ..Default::default() };
+        let every = reduce(&measured, all).unwrap();
+        assert_eq!(every.left_out.near_edge, 0);
+        let upper = reduce(&measured, Reduction { region: Some(1), ..all }).unwrap();
+        let lower = reduce(&measured, Reduction { region: Some(0), ..all }).unwrap();
+        let rows = |reduced: &Reduced| reduced.curve.rows.len();
+        assert_eq!(rows(&upper) + rows(&lower), rows(&every));
+        assert!(rows(&upper) > 100 && rows(&lower) > 100);
+        let inner = reduce(&measured, Reduction::default()).unwrap();
+        assert!(inner.left_out.near_edge > 100 && rows(&inner) < rows(&every));
+        let none = reduce(&measured, Reduction { region: Some(2), ..all }).unwrap_err();
+        assert_eq!(none, ReductionError::UnknownRegion { region: 2, regions: 2 });
+    }
+
+    #[test]
+    fn false_alarms_are_neither_rows_nor_silent() {
+        let measured = mannequin(2e-3, 3).with_false_alarms(10, 3);
+        let reduced = reduce(&measured, Reduction::default()).unwrap();
+        // A tenth of the points, and a window of ±10 mm in a metre.
+        let alarms = measured.cloud.points().len().div_ceil(10);
+        let left = reduced.left_out.off_surface + reduced.left_out.missed;
+        assert!(left as f64 > 0.95 * alarms as f64, "{left} of {alarms}");
+        let numbers: HashSet<u32> =
+            measured.cloud.points().iter().filter_map(|point| point.chirp).collect();
+        assert!(reduced.curve.rows.iter().all(|r| !r.censored || !numbers.contains(&r.chirp)));
+    }
+
+    #[test]
+    fn both_footprints_give_back_f() {
+        for footprint in [Footprint::Paper, Footprint::Projected] {
+            let link = Link::new(&Radar { footprint, ..Default::default() });
+            let power_w = link.power_w(8.2, 0.3, 0.07);
+            let expected = 4.0 * PI * 0.07 * 0.09;
+            assert!((sigma0(&link, 8.2, 0.3, power_w) / expected - 1.0).abs() < 1e-12);
+        }
+    }
+}

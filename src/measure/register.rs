@@ -1,0 +1,506 @@
+//! Where the mesh stood when the cloud was measured (paper, Sec. V-B and Fig. 8).
+//!
+//! First the paper's loop: the mesh is scanned with the measurement's own pattern, and its virtual
+//! cloud is aligned to the measured one by nearest neighbours, until the pose stops changing. Nearest
+//! neighbours are biased where the two clouds end at different places. A radar knows more: each point
+//! lies on a known ray, and only its range is noisy. So by default a second loop closes the gaps along
+//! the measured rays themselves, all points at once; at the true pose its expected gaps are zero.
+
+use glam::DVec3;
+use thiserror::Error;
+
+use super::cloud::Cloud;
+use super::coarse::{self, Aligned};
+use super::icp::{Gap, Kernel, Motion, NormalEquations, bulk_sd_m, rigid};
+use super::start::{self, Start};
+use super::uncertainty::{Uncertainty, uncertainty};
+use super::view::{RayGap, View};
+use crate::frames::{Global, Point, Pose};
+use crate::geometry::Mesh;
+use crate::radar::{Chirps, Radar};
+
+/// Widest gap along a ray after the coarse loop, m.
+const RAY_REACH_M: f64 = 0.05;
+/// Gaps beyond so many standard deviations are not of the surface.
+const OUTLIER_SD: f64 = 4.0;
+/// The coarse loop hands over when a virtual scan moves the target by less, m.
+const HAND_OVER_M: f64 = 1e-3;
+/// Far below any range noise: a perfect fit must not divide by zero, m.
+const LEAST_SD_M: f64 = 1e-9;
+/// Errors wider than a range cell of 27 GHz, c/2B, are of the fit and not of the radar, m.
+const RANGE_CELL_M: f64 = 5.55e-3;
+
+/// What is made small.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Metric {
+    /// Distances to the nearest virtual point: the paper's.
+    PointToPoint,
+    /// Distances to the plane of the nearest virtual point.
+    PointToPlane,
+    /// Point to plane first, then gaps along the measured rays.
+    #[default]
+    AlongRay,
+}
+
+/// How to register.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Registration {
+    /// What is made small.
+    pub metric: Metric,
+    /// How much outliers count.
+    pub kernel: Kernel,
+    /// The rough pose.
+    pub start: Start,
+    /// Farthest neighbours at the rough pose, m, above 0.
+    pub reach_m: f64,
+    /// Most virtual scans, 1 or more.
+    pub max_scans: usize,
+    /// Most alignment steps per virtual scan, and along the rays, 1 or more.
+    pub max_steps: usize,
+    /// The pose has stopped changing when a step moves the target by less, m, above 0.
+    pub still_m: f64,
+    /// Most measured points that the coarse loop looks at.
+    pub coarse_points: usize,
+    /// Fewer points are refused.
+    pub least_points: usize,
+    /// A smaller share of points on the surface is refused, 0 to 1.
+    pub least_inliers: f64,
+    /// A pose farther from the rough one has diverged, m.
+    pub farthest_m: f64,
+    /// A pose turned farther from the rough one has diverged, rad.
+    pub farthest_rad: f64,
+}
+
+impl Default for Registration {
+    fn default() -> Self {
+        Registration {
+            metric: Metric::default(),
+            kernel: Kernel::default(),
+            start: Start::default(),
+            reach_m: 0.12,
+            max_scans: 30,
+            max_steps: 40,
+            still_m: 1e-5,
+            coarse_points: 2500,
+            least_points: 50,
+            least_inliers: 0.5,
+            farthest_m: 0.25,
+            farthest_rad: 0.5,
+        }
+    }
+}
+
+impl Registration {
+    /// The paper's: point to point, all points, every pair counts alike.
+    pub fn paper() -> Registration {
+        Registration {
+            metric: Metric::PointToPoint,
+            kernel: Kernel::Square,
+            coarse_points: usize::MAX,
+            max_scans: 100,
+            ..Default::default()
+        }
+    }
+}
+
+/// Why a registration ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// The pose stopped changing.
+    Still,
+    /// It still changed after the most steps allowed.
+    Limit,
+}
+
+/// A registered mesh.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Registered {
+    /// Moves the mesh, as the scene places it, to where the cloud says it was: a vertex v of the
+    /// scene's mesh belongs at pose·v of the global frame.
+    pub pose: Pose<Global, Global>,
+    /// Covariance of the pose: the true one is x ↦ c + t + R(ω)(x − c) after `pose`, with c the
+    /// `pivot`, in the order t_x, t_y, t_z (m), ω_x, ω_y, ω_z (rad). From the gaps along the rays
+    /// under errors of range that neighbours within 5 cm may share; for the other metrics, which
+    /// use the points less well, a bound from below. A direction that the target does not tell has
+    /// the target's size as its standard deviation, see `verdicts`.
+    pub covariance: [[f64; 6]; 6],
+    /// Median of the measured points by axis.
+    pub pivot: Point<Global>,
+    /// Root mean square of the range errors of the inliers, m.
+    pub rms_m: f64,
+    /// By what the variance was widened because neighbouring points share errors, 1 or more.
+    pub widened: f64,
+    /// Points on the surface, within four standard deviations.
+    pub inliers: usize,
+    /// All points.
+    pub points: usize,
+    /// Virtual scans made.
+    pub scans: usize,
+    /// Alignment steps in all.
+    pub iterations: usize,
+    /// Why it ended.
+    pub stop: Stop,
+    /// Whether the pose stopped changing.
+    pub converged: bool,
+    /// What a person should know of the pose.
+    pub verdicts: Vec<String>,
+}
+
+/// Why there is no pose.
+#[derive(Debug, Error, PartialEq)]
+pub enum RegistrationError {
+    /// Too few points.
+    #[error("the cloud has {points} points, a pose needs {least}; measure with more chirps")]
+    TooFew {
+        /// Points of the cloud.
+        points: usize,
+        /// Least number.
+        least: usize,
+    },
+    /// A point where its ray starts.
+    #[error("point {point} lies where the radar's rays start; check the frame of the cloud")]
+    AtTheRadar {
+        /// Point, from 0.
+        point: usize,
+    },
+    /// Ranges contradict positions.
+    #[error(
+        "the ranges of the cloud differ from the distances of its points from the radar by {:.0} mm; \
+         check its frame, its unit and the radar's place", 1e3 * typical_m
+    )]
+    RangesDisagree {
+        /// Typical difference, m.
+        typical_m: f64,
+    },
+    /// Chirp numbers contradict positions.
+    #[error(
+        "{off} of {numbered} points lie beside the ray of their chirp; check the frame of the cloud \
+         and the radar's scan"
+    )]
+    ChirpsDisagree {
+        /// Points off their ray or of an unknown chirp.
+        off: usize,
+        /// Points with a chirp number.
+        numbered: usize,
+    },
+    /// The virtual scan sees nothing.
+    #[error("no chirp hits the mesh at the rough pose; give a rough pose within the field of view")]
+    NothingInView,
+    /// The clouds do not overlap.
+    #[error(
+        "{near} of {points} points are within {:.0} mm of the mesh at the rough pose: no overlap; \
+         give a better rough pose, or check frame and unit", 1e3 * reach_m
+    )]
+    NoOverlap {
+        /// Points with a neighbour.
+        near: usize,
+        /// Points looked at.
+        points: usize,
+        /// Farthest neighbour, m.
+        reach_m: f64,
+    },
+    /// The pose ran away.
+    #[error(
+        "the pose moved {:.0} mm and {:.1}° from the rough one: it diverged; give a better rough pose",
+        1e3 * shift_m, turn_rad.to_degrees()
+    )]
+    Diverged {
+        /// Shift of the target, m.
+        shift_m: f64,
+        /// Turn, rad.
+        turn_rad: f64,
+    },
+    /// The surface does not explain the points.
+    #[error(
+        "only {inliers} of {points} points lie on the registered surface; is this the mesh that was \
+         measured, and the rough pose near?"
+    )]
+    NoFit {
+        /// Points on the surface.
+        inliers: usize,
+        /// All points.
+        points: usize,
+    },
+}
+
+impl Registration {
+    /// Registers `mesh`, in the global frame as the scene places it, to a cloud measured by `radar`
+    /// with the rays of `chirps`.
+    ///
+    /// # Errors
+    /// When there is no pose worth a number.
+    pub fn run(
+        &self,
+        mesh: &Mesh,
+        radar: &Radar,
+        chirps: &Chirps,
+        cloud: &Cloud,
+    ) -> Result<Registered, RegistrationError> {
+        let points = cloud.points().len();
+        if points < self.least_points {
+            return Err(RegistrationError::TooFew { points, least: self.least_points });
+        }
+        let view = View::new(mesh, radar, chirps, cloud)?;
+        let rough = start::rough(&view, self)?;
+        let along_ray = self.metric == Metric::AlongRay;
+        let still_m = if along_ray { HAND_OVER_M } else { self.still_m };
+        let mut aligned = coarse::align(&view, self, rough, still_m)?;
+        self.check_near(&view, &rough, &aligned.pose)?;
+        if along_ray {
+            self.close_along_rays(&view, &mut aligned);
+            self.check_near(&view, &rough, &aligned.pose)?;
+        }
+        self.judge(&view, &aligned)
+    }
+
+    /// The second loop: Gauss and Newton on the gaps along the measured rays.
+    fn close_along_rays(&self, view: &View, aligned: &mut Aligned) {
+        aligned.still = false;
+        for _ in 0..self.max_steps {
+            let gaps: Vec<Gap> =
+                view.ray_gaps(&aligned.pose, RAY_REACH_M).iter().flatten().map(|g| g.gap).collect();
+            let sd_m = bulk_sd_m(gaps.iter().map(|gap| gap.size_m)).max(LEAST_SD_M);
+            let weighted = gaps.iter().map(|gap| (*gap, self.kernel.weight(gap.size_m / sd_m)));
+            let motion = NormalEquations::new(weighted, view.pivot, view.length_m).solve();
+            let moved = motion.about(view.pivot);
+            aligned.pose = rigid(&(moved * aligned.pose));
+            aligned.steps += 1;
+            if coarse::change_m(view, &moved) < self.still_m {
+                aligned.still = true;
+                return;
+            }
+        }
+    }
+
+    fn check_near(
+        &self,
+        view: &View,
+        rough: &Pose<Global, Global>,
+        pose: &Pose<Global, Global>,
+    ) -> Result<(), RegistrationError> {
+        let Motion { shift_m, turn_rad } = Motion::of(&(*pose * rough.inverse()), view.pivot);
+        let (shift_m, turn_rad) = (shift_m.length(), turn_rad.length());
+        // Written so that a NaN is far, too.
+        match shift_m <= self.farthest_m && turn_rad <= self.farthest_rad {
+            true => Ok(()),
+            false => Err(RegistrationError::Diverged { shift_m, turn_rad }),
+        }
+    }
+
+    fn judge(&self, view: &View, aligned: &Aligned) -> Result<Registered, RegistrationError> {
+        let gaps = view.ray_gaps(&aligned.pose, RAY_REACH_M);
+        let sd_m = bulk_sd_m(gaps.iter().flatten().map(|g| g.gap.size_m)).max(LEAST_SD_M);
+        let inside = |gap: &RayGap| gap.gap.size_m.abs() <= OUTLIER_SD * sd_m;
+        let inliers: Vec<RayGap> = gaps.into_iter().flatten().filter(inside).collect();
+        let points = view.points.len();
+        if (inliers.len() as f64) < self.least_inliers * points as f64 || inliers.len() < 6 {
+            return Err(RegistrationError::NoFit { inliers: inliers.len(), points });
+        }
+        let squares_m2: f64 = inliers.iter().map(|gap| gap.range_error_m.powi(2)).sum();
+        let rms_m = (squares_m2 / inliers.len() as f64).sqrt();
+        let used: Vec<Gap> = inliers.iter().map(|gap| gap.gap).collect();
+        let known = uncertainty(&used, view.pivot, view.length_m);
+        Ok(Registered {
+            pose: aligned.pose,
+            covariance: known.covariance,
+            pivot: view.pivot.into(),
+            rms_m,
+            widened: known.widened,
+            inliers: inliers.len(),
+            points,
+            scans: aligned.scans,
+            iterations: aligned.steps,
+            stop: if aligned.still { Stop::Still } else { Stop::Limit },
+            converged: aligned.still,
+            verdicts: verdicts(aligned, known, rms_m),
+        })
+    }
+}
+
+fn verdicts(aligned: &Aligned, known: Uncertainty, rms_m: f64) -> Vec<String> {
+    let mut verdicts = known.unknown;
+    if !aligned.still {
+        verdicts.push("the pose still changed at the last step; allow more".to_owned());
+    }
+    if rms_m > RANGE_CELL_M {
+        verdicts.push(format!(
+            "the points lie {:.1} mm off the surface, more than a range cell; is the mesh exact, and \
+             did the target stand still?",
+            1e3 * rms_m
+        ));
+    }
+    verdicts
+}
+
+impl Registered {
+    /// Variance of the tilt of a surface of unit normal `normal`, mean of its two tilts, rad².
+    pub fn tilt_variance_rad2(&self, normal: DVec3) -> f64 {
+        let turn = |i: usize, j: usize| self.covariance[3 + i][3 + j];
+        let n = normal.to_array();
+        let trace: f64 = (0..3).map(|i| turn(i, i)).sum();
+        let about_normal: f64 = (0..9).map(|ij| n[ij / 3] * n[ij % 3] * turn(ij / 3, ij % 3)).sum();
+        (0.5 * (trace - about_normal)).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::synthetic::{Measured, apart, mannequin, pushed};
+
+    /// The pose is known this well at a range noise of 2 mm.
+    const NEAR_M: f64 = 0.5e-3;
+    const NEAR_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
+
+    fn register(settings: Registration, seed: u64) -> (Measured, Registered) {
+        let measured = mannequin(2e-3, seed);
+        let start = Start::Given(pushed(&measured, 0.03, 5f64.to_radians(), seed));
+        let found = Registration { start, ..settings }
+            .run(&measured.mesh, &measured.radar, &measured.chirps, &measured.cloud)
+            .unwrap();
+        (measured, found)
+    }
+
+    #[test]
+    fn from_30_mm_and_5_degrees_off_the_pose_is_found() {
+        for seed in 0..3 {
+            let (_, found) = register(Registration::default(), seed);
+            let (shift_m, turn_rad) = apart(&found);
+            assert!(found.converged, "{found:?}");
+            assert!(shift_m < NEAR_M && turn_rad < NEAR_RAD, "{shift_m} {turn_rad} {found:?}");
+            // Tukey's and the steepness weights see the noise of 2 mm.
+            assert!((1.9e-3..2.1e-3).contains(&found.rms_m), "{}", found.rms_m);
+            assert!(found.verdicts.is_empty(), "{:?}", found.verdicts);
+        }
+    }
+
+    #[test]
+    fn the_papers_own_method_comes_near() {
+        let (_, found) = register(Registration::paper(), 5);
+        let (shift_m, turn_rad) = apart(&found);
+        // A spot and the angle it spans over the target's half.
+        assert!(shift_m < 5e-3 && turn_rad < 1f64.to_radians(), "{shift_m} {turn_rad}");
+    }
+
+    #[test]
+    fn the_covariance_is_the_spread_over_seeds() {
+        const SEEDS: u64 = 12;
+        let mut normalised = 0.0;
+        for seed in 0..SEEDS {
+            let measured = mannequin(2e-3, 100 + seed);
+            let found = Registration::default()
+                .run(&measured.mesh, &measured.radar, &measured.chirps, &measured.cloud)
+                .unwrap();
+            let error = Motion::of(&found.pose.inverse(), found.pivot.xyz);
+            let covariance = nalgebra::Matrix6::from_fn(|i, j| found.covariance[i][j]);
+            let [t, w] = [error.shift_m, error.turn_rad];
+            let error = nalgebra::Vector6::new(t.x, t.y, t.z, w.x, w.y, w.z);
+            normalised += error.dot(&(covariance.try_inverse().unwrap() * error));
+        }
+        // χ² with 6 degrees of freedom a seed has mean 6 and standard deviation √(12/12) over 12
+        // seeds; five of them, and the widening, which only makes the covariance larger.
+        let mean = normalised / SEEDS as f64;
+        assert!((1.5..11.0).contains(&mean), "{mean}");
+    }
+
+    #[test]
+    fn a_plane_says_what_it_does_not_tell() {
+        let measured = Measured::of(crate::scene::solids::plate(2.0, 2.0), 2e-3, 1);
+        let found = Registration::default()
+            .run(&measured.mesh, &measured.radar, &measured.chirps, &measured.cloud)
+            .unwrap();
+        assert_eq!(found.verdicts.len(), 3, "{:?}", found.verdicts);
+        for words in ["shift along x", "shift along y", "turn about z"] {
+            assert!(found.verdicts.iter().any(|v| v.contains(words)), "{:?}", found.verdicts);
+        }
+        // The tilt of the plate is known all the same: 2 mm over thousands of points.
+        assert!(found.tilt_variance_rad2(DVec3::Z).sqrt() < 1e-3);
+    }
+
+    #[test]
+    fn a_tenth_of_false_alarms_changes_nothing() {
+        let measured = mannequin(2e-3, 3).with_false_alarms(10, 3);
+        let start = Start::Given(pushed(&measured, 0.03, 5f64.to_radians(), 3));
+        let found = Registration { start, ..Default::default() }
+            .run(&measured.mesh, &measured.radar, &measured.chirps, &measured.cloud)
+            .unwrap();
+        let (shift_m, turn_rad) = apart(&found);
+        assert!(shift_m < NEAR_M && turn_rad < NEAR_RAD, "{shift_m} {turn_rad}");
+    }
+
+    fn refused(measured: &Measured, settings: Registration) -> RegistrationError {
+        settings
+            .run(&measured.mesh, &measured.radar, &measured.chirps, &measured.cloud)
+            .unwrap_err()
+    }
+
+    #[test]
+    fn what_gives_no_pose_gives_a_verdict() {
+        let measured = mannequin(2e-3, 4);
+        let few = Measured { cloud: measured.first(20), ..measured.clone() };
+        let error = refused(&few, Registration::default());
+        assert_eq!(error, RegistrationError::TooFew { points: 20, least: 50 });
+
+        let away = |x_m: f64| Registration {
+            start: Start::Given(Pose::from_euler_xyz(DVec3::ZERO, DVec3::new(x_m, 0.0, 0.0))),
+            ..Default::default()
+        };
+        assert_eq!(refused(&measured, away(5.0)), RegistrationError::NothingInView);
+        let behind = Pose::from_euler_xyz(DVec3::ZERO, DVec3::new(0.0, 0.0, -2.0));
+        let behind = Registration { start: Start::Given(behind), ..Default::default() };
+        let error = refused(&measured, behind);
+        assert!(matches!(error, RegistrationError::NoOverlap { .. }), "{error}");
+
+        let short = Registration { farthest_m: 1e-3, ..Default::default() };
+        let start = Start::Given(pushed(&measured, 0.03, 0.0, 1));
+        let error = refused(&measured, Registration { start, ..short });
+        assert!(matches!(error, RegistrationError::Diverged { .. }), "{error}");
+    }
+
+    #[test]
+    fn a_cloud_of_another_frame_or_scan_is_told() {
+        let measured = mannequin(2e-3, 4);
+        let mut moved = measured.clone();
+        moved.radar.primary_focus_m[2] = 7.0;
+        moved.chirps = Chirps::draw(&moved.radar, |_| Err("no file".to_owned())).unwrap();
+        let error = refused(&moved, Registration::default());
+        assert!(matches!(error, RegistrationError::RangesDisagree { .. }), "{error}");
+        let mut renumbered = measured.clone();
+        renumbered.chirps.number.rotate_left(2000);
+        let error = refused(&renumbered, Registration::default());
+        assert!(matches!(error, RegistrationError::ChirpsDisagree { .. }), "{error}");
+    }
+
+    #[test]
+    fn another_shape_does_not_fit() {
+        let measured = mannequin(2e-3, 4);
+        let mut other = measured.clone();
+        other.mesh = crate::scene::solids::icosphere(0.25, 4);
+        other.mesh.vertices.iter_mut().for_each(|v| v.y += 1.1);
+        let error = refused(&other, Registration::default());
+        let told = matches!(
+            error,
+            RegistrationError::NoFit { .. }
+                | RegistrationError::NoOverlap { .. }
+                | RegistrationError::Diverged { .. }
+        );
+        assert!(told, "{error}");
+    }
+
+    #[test]
+    fn without_a_rough_pose_one_is_found() {
+        let measured = mannequin(2e-3, 6);
+        let mut turned = measured.clone();
+        let away = Pose::<Global, Global>::from_euler_xyz(
+            DVec3::new(0.0, 60f64.to_radians(), 0.0),
+            DVec3::new(0.4, 0.1, 0.5),
+        );
+        turned.mesh.vertices.iter_mut().for_each(|v| *v = (away * Point::from(*v)).xyz);
+        let found = Registration { start: Start::Automatic, ..Default::default() }
+            .run(&turned.mesh, &turned.radar, &turned.chirps, &turned.cloud)
+            .unwrap();
+        let error = Motion::of(&(found.pose * away), found.pivot.xyz);
+        let (shift_m, turn_rad) = (error.shift_m.length(), error.turn_rad.length());
+        assert!(shift_m < NEAR_M && turn_rad < NEAR_RAD, "{shift_m} {turn_rad}");
+    }
+}

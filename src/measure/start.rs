@@ -1,0 +1,90 @@
+//! The rough pose from which a registration starts: by hand, or the best of some guesses.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+use super::coarse;
+use super::register::{Registration, RegistrationError};
+use super::view::{View, median_point};
+use crate::frames::{Global, Pose};
+
+/// Yaws that are tried, around the full circle.
+const YAWS: usize = 12;
+/// Along the rays a gap counts no more than this, m.
+const WORST_M: f64 = 0.05;
+
+/// The rough pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// By hand: what moves the mesh, as the scene places it, near to the cloud. The default is to
+    /// leave it where it is.
+    Given(Pose<Global, Global>),
+    /// Twelve yaws about the vertical, from the scene's place and from the middle of the mesh on the
+    /// middle of the cloud, each aligned coarsely; the one that fits best. The mesh must stand
+    /// upright. A symmetric target may be found turned round.
+    Automatic,
+}
+
+impl Default for Start {
+    fn default() -> Self {
+        Start::Given(Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO))
+    }
+}
+
+pub(super) fn rough(
+    view: &View,
+    settings: &Registration,
+) -> Result<Pose<Global, Global>, RegistrationError> {
+    let pose = match settings.start {
+        Start::Given(pose) => return Ok(pose),
+        Start::Automatic => guesses(view)
+            .filter_map(|guess| improved(view, settings, guess))
+            .min_by(|a, b| a.0.total_cmp(&b.0)),
+    };
+    pose.map(|(_, pose)| pose).ok_or(RegistrationError::NothingInView)
+}
+
+/// Every yaw at every place.
+fn guesses<'v>(view: &'v View) -> impl Iterator<Item = Pose<Global, Global>> + 'v {
+    let middle = view.traced.middle();
+    let yaws = (0..YAWS).map(|step| TAU * step as f64 / YAWS as f64);
+    yaws.flat_map(move |yaw_rad| {
+        let turn = Pose::<Global, Global>::from_euler_xyz(DVec3::Y * yaw_rad, DVec3::ZERO);
+        [middle, view.pivot].map(|to| {
+            let from = (turn * crate::frames::Point::from(middle)).xyz;
+            Pose::new(turn.rotation(), to - from)
+        })
+    })
+}
+
+/// A guess after a coarse alignment, and how badly it fits, m.
+fn improved(
+    view: &View,
+    settings: &Registration,
+    guess: Pose<Global, Global>,
+) -> Option<(f64, Pose<Global, Global>)> {
+    let quick = Registration { max_scans: 3, max_steps: 10, coarse_points: 500, ..*settings };
+    let placed = onto_the_cloud(view, guess)?;
+    let pose = coarse::align(view, &quick, placed, settings.still_m).ok()?.pose;
+    let gaps = view.ray_gaps(&pose, WORST_M);
+    let error_m =
+        |gap: &Option<_>| gap.map_or(WORST_M, |gap: super::view::RayGap| gap.range_error_m.abs());
+    Some((gaps.iter().map(error_m).sum::<f64>() / gaps.len().max(1) as f64, pose))
+}
+
+/// Shifts a guess until what the scan sees of the mesh has its middle where the cloud has.
+fn onto_the_cloud(view: &View, mut pose: Pose<Global, Global>) -> Option<Pose<Global, Global>> {
+    // What comes into view changes the middle; it settles soon.
+    const SHIFTS: usize = 3;
+    for _ in 0..SHIFTS {
+        let seen = view.traced.scan(&pose, view.chirps).into_iter().flatten();
+        let places: Vec<DVec3> = seen.map(|seen| seen.hit.point.xyz).collect();
+        if places.is_empty() {
+            return None;
+        }
+        let shift_m = view.pivot - median_point(&places);
+        pose = Pose::new(pose.rotation(), pose.translation_m() + shift_m);
+    }
+    Some(pose)
+}

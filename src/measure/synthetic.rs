@@ -1,0 +1,109 @@
+//! Measurements for tests: what a radar would have measured of a mesh, range noise included.
+
+use glam::DVec3;
+
+use super::cloud::{Cloud, CloudPoint};
+use super::icp::Motion;
+use super::placed::Traced;
+use super::register::Registered;
+use crate::frames::{Global, Point, Pose, Ray};
+use crate::geometry::Mesh;
+use crate::radar::random::{Draws, Key, Purpose};
+use crate::radar::{Chirps, Link, Radar};
+use crate::scene::mannequin;
+use crate::units::dbm_from_watts;
+
+/// A mesh where it stood, and its cloud.
+#[derive(Clone)]
+pub struct Measured {
+    pub mesh: Mesh,
+    pub radar: Radar,
+    pub chirps: Chirps,
+    pub cloud: Cloud,
+}
+
+/// f of every synthetic surface, 1/sr: of −77 dBm at some 60° from 8 m.
+pub fn f_per_sr(theta_rad: f64) -> f64 {
+    0.5 * (-theta_rad / 0.1).exp() + 1.6e-4
+}
+
+impl Measured {
+    /// A mesh around the origin or on the floor of the global frame, detected above the threshold.
+    pub fn of(mut mesh: Mesh, range_sd_m: f64, seed: u64) -> Measured {
+        let lowest_m = mesh.vertices.iter().map(|v| v.y).fold(f64::INFINITY, f64::min);
+        if lowest_m < 0.0 {
+            mesh.vertices.iter_mut().for_each(|v| v.y += 1.1);
+        }
+        let radar = Radar::default();
+        let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
+        let here = Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO);
+        let seen = Traced::new(&mesh).scan(&here, &chirps.rays);
+        let link = Link::new(&radar);
+        let mut draws = draws(seed, 0);
+        let point = |((seen, ray), number): ((_, &Ray<Global>), &u32)| {
+            let hit = Option::<super::placed::Seen>::map(seen, |seen| seen.hit)?;
+            let f_per_sr = f_per_sr(hit.theta_rad());
+            let power_dbm = dbm_from_watts(link.power_w(hit.range_m, hit.cos_theta, f_per_sr));
+            let range_m = hit.range_m + range_sd_m * normal(&mut draws);
+            let point = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
+            let echo =
+                CloudPoint { chirp: Some(*number), point, range_m: Some(range_m), power_dbm };
+            (power_dbm >= radar.threshold_dbm).then_some(echo)
+        };
+        let points: Vec<CloudPoint> =
+            seen.into_iter().zip(&chirps.rays).zip(&chirps.number).filter_map(point).collect();
+        let cloud = Cloud::new(points).unwrap();
+        Measured { mesh, radar, chirps, cloud }
+    }
+
+    /// The first points only.
+    pub fn first(&self, count: usize) -> Cloud {
+        Cloud::new(self.cloud.points()[..count].to_vec()).unwrap()
+    }
+
+    /// Every n-th point becomes a false alarm: at its ray, but anywhere within a metre.
+    pub fn with_false_alarms(mut self, every: usize, seed: u64) -> Measured {
+        let mut draws = draws(seed, 1);
+        let origin = self.radar.frames().origin();
+        let mut points = self.cloud.points().to_vec();
+        for echo in points.iter_mut().step_by(every) {
+            let along = origin.towards(echo.point).unwrap().xyz();
+            let range_m = 7.5 + draws.uniform();
+            echo.point = Point::from(origin.xyz + range_m * along);
+            echo.range_m = Some(range_m);
+        }
+        self.cloud = Cloud::new(points).unwrap();
+        self
+    }
+}
+
+/// The built-in mannequin.
+pub fn mannequin(range_sd_m: f64, seed: u64) -> Measured {
+    Measured::of(mannequin::mannequin(), range_sd_m, seed)
+}
+
+fn draws(seed: u64, sub_ray: u64) -> Draws {
+    Key { seed, chirp: 0, sub_ray, purpose: Purpose::Noise }.draws()
+}
+
+/// A Gaussian of unit variance.
+fn normal(draws: &mut Draws) -> f64 {
+    draws.complex_gaussian().re * std::f64::consts::SQRT_2
+}
+
+/// A rough pose, off by this much in a random direction about the middle of the cloud.
+pub fn pushed(measured: &Measured, off_m: f64, off_rad: f64, seed: u64) -> Pose<Global, Global> {
+    let mut draws = draws(seed, 2);
+    let mut direction =
+        || DVec3::from_array([(); 3].map(|()| normal(&mut draws))).normalize_or(DVec3::X);
+    let motion = Motion { shift_m: off_m * direction(), turn_rad: off_rad * direction() };
+    let points = measured.cloud.points();
+    let middle = points.iter().map(|p| p.point.xyz).sum::<DVec3>() / points.len() as f64;
+    motion.about(middle)
+}
+
+/// Error of a pose whose truth is to stay: shift of the middle of the cloud (m) and turn (rad).
+pub fn apart(found: &Registered) -> (f64, f64) {
+    let error = Motion::of(&found.pose, found.pivot.xyz);
+    (error.shift_m.length(), error.turn_rad.length())
+}

@@ -1,0 +1,91 @@
+//! What an alignment looks at: the mesh, the scan, and the measured points with their rays.
+
+use glam::DVec3;
+
+use super::cloud::Cloud;
+use super::icp::Gap;
+use super::placed::{Seen, Traced};
+use super::register::RegistrationError;
+use super::sights::sights;
+use crate::frames::{Global, Pose, Ray};
+use crate::geometry::Mesh;
+use crate::radar::{Chirps, Radar};
+
+/// Surfaces seen at a flatter angle tell no range: cosine of 80°.
+const FLATTEST_COS: f64 = 0.173_648;
+/// A beam is taken to be off sideways by this share of its error in range, so that a steep surface
+/// does not outweigh all others.
+const SIDEWAYS_SHARE: f64 = 0.5;
+
+/// Mesh, scan and measurement.
+pub(super) struct View<'a> {
+    pub traced: Traced<'a>,
+    pub chirps: &'a [Ray<Global>],
+    pub sights: Vec<Ray<Global>>,
+    pub points: Vec<DVec3>,
+    /// Median of the measured points by axis: turns are about it.
+    pub pivot: DVec3,
+    /// Median distance of the points from the pivot, m.
+    pub length_m: f64,
+}
+
+impl<'a> View<'a> {
+    pub fn new(
+        mesh: &'a Mesh,
+        radar: &Radar,
+        chirps: &'a Chirps,
+        cloud: &Cloud,
+    ) -> Result<View<'a>, RegistrationError> {
+        let sights = sights(cloud, radar, chirps)?;
+        let points: Vec<DVec3> = cloud.points().iter().map(|point| point.point.xyz).collect();
+        let pivot = median_point(&points);
+        // A thousandth of a spot: only coinciding points are nearer, and a length divides.
+        const LEAST_M: f64 = 1e-5;
+        let length_m = median(points.iter().map(|p| p.distance(pivot))).max(LEAST_M);
+        let traced = Traced::new(mesh);
+        Ok(View { traced, chirps: &chirps.rays, sights, points, pivot, length_m })
+    }
+
+    /// Gaps along the measured rays, one per point; `None` where the ray misses, is too flat, or
+    /// the gap is wider than `reach_m`. Sizes and gradients are divided by how steep the surface is.
+    pub fn ray_gaps(&self, pose: &Pose<Global, Global>, reach_m: f64) -> Vec<Option<RayGap>> {
+        let seen = self.traced.scan(pose, &self.sights);
+        let gap = |((seen, ray), point): ((&Option<Seen>, &Ray<Global>), &DVec3)| {
+            let Seen { hit, normal } = (*seen)?;
+            let range_error_m = (*point - ray.origin.xyz).dot(ray.direction.xyz()) - hit.range_m;
+            if hit.cos_theta < FLATTEST_COS || range_error_m.abs() > reach_m {
+                return None;
+            }
+            let tan2 = 1.0 / (hit.cos_theta * hit.cos_theta) - 1.0;
+            let steep = (1.0 + SIDEWAYS_SHARE * SIDEWAYS_SHARE * tan2).sqrt();
+            let gradient = normal / normal.dot(ray.direction.xyz()) / steep;
+            let gap = Gap { at: hit.point.xyz, gradient, size_m: range_error_m / steep };
+            Some(RayGap { gap, range_error_m })
+        };
+        seen.iter().zip(&self.sights).zip(&self.points).map(gap).collect()
+    }
+}
+
+/// A gap along a measured ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct RayGap {
+    pub gap: Gap,
+    /// Measured minus modelled range, m.
+    pub range_error_m: f64,
+}
+
+/// The median; 0 for none.
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Median of each coordinate: a few points far off do not move it.
+pub(super) fn median_point(points: &[DVec3]) -> DVec3 {
+    let axis = |axis: usize| median(points.iter().map(|point| point[axis]));
+    DVec3::new(axis(0), axis(1), axis(2))
+}
