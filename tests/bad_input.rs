@@ -281,3 +281,45 @@ fn databases_that_cannot_be_used() {
     }
     assert_eq!(entries(folder.path()), ["matdb.sqlite"]);
 }
+
+#[test]
+fn instruments_that_cannot_work() {
+    let receiver = "[radar.receiver]\n";
+    let with = |more: &str| PLATE.replacen("[[mesh]]", &format!("{more}\n[[mesh]]"), 1);
+    let left = "[[receiver]]\nname = \"left\"\nposition_m = [-2, 1.1, 7]\n";
+    for (more, parts) in [
+        (
+            format!("{receiver}[radar.chirp]\nsamples = 1024\n"),
+            &["unambiguous", "radar.chirp.samples"][..],
+        ),
+        (format!("{receiver}[spot]\nrays = 4\n"), &["[radar.speckle]", "looks"]),
+        (format!("{receiver}[bounce]\n"), &["[radar.speckle]", "[bounce]"]),
+        (
+            format!("{receiver}[radar.speckle]\ncoherent_ratio = 2\n[spot]\nrays = 4\n"),
+            &["radar.speckle.coherent_ratio", "spot.rays = 1"],
+        ),
+        (
+            format!("{receiver}[radar.speckle]\nlooks = 2.5\n"),
+            &["radar.speckle.looks = 2.5", "whole"],
+        ),
+        (format!("{receiver}[radar.noise]\n"), &["[radar.noise]", "remove"]),
+        (format!("{receiver}gate_m = [9, 7]\n"), &["receiver.gate_m[1] = 7", "from 9"]),
+        (format!("{receiver}[radar.chirp]\nduration_s = 1.0\n"), &["chirp.duration_s = 1"]),
+        ("[bounce]\nrays = 0\n".to_owned(), &["bounce.rays", "1 to 10 000"]),
+        ("[bounce]\noutside_spot_db = 3\n".to_owned(), &["outside_spot_db", "-200 to 0"]),
+        (format!("{left}{left}"), &["receiver `left`", "twice"]),
+        (left.replace("left", "../left"), &["receiver `../left`", "small letters"]),
+        (left.replace("-2", "inf"), &["position_m"]),
+        (left.replace("[-2, 1.1, 7]", "[0, 1.1, 0]").replace("left", "in"), &["inside the target"]),
+    ] {
+        // A solid, so that it has an inside.
+        let scene = with(&more)
+            .replace("builtin:plate", "builtin:cuboid")
+            .replace("size_m = [1, 1, 0]", "size_m = [1, 1, 0.1]");
+        check(&render(&scene, &[]), parts);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("scene.toml"), PLATE).unwrap();
+    let arguments = ["render", "--beat", "scene.toml", "-o", "out"];
+    check(&refused(matdb(folder.path()).args(arguments)), &["--beat", "[radar.receiver]"]);
+}
