@@ -24,6 +24,8 @@ pub enum Purpose {
     SpotPosition = 3,
     /// Height of a rough surface under a sub-ray, which turns its phase.
     SurfacePhase = 4,
+    /// Starting points of a fit and the randomised part of its residuals.
+    Fit = 5,
 }
 
 /// Names one stream of draws.

@@ -1,0 +1,151 @@
+//! Least squares in decibels: the paper's fits, kept for comparison.
+//!
+//! They see detections only and take speckle for a symmetric error, so that a curve cut at a
+//! threshold flattens their tail, and its level comes out 10/ln 10·(ln L − ψ(L)) dB low.
+//!
+//! - Piecewise MSE: the specular coordinates on θ below a split, frozen, then the diffuse ones on the
+//!   rest. A model that is not a mixture has no pieces: all rows, all coordinates.
+//! - TLS, the orthogonal distance: Σ ((y − f(θ + δ))/s_y)² + (δ/s_θ)², least over each row's δ. At that
+//!   least δ = −g·r·s_θ with r the scaled residual and g = f′·s_θ/s_y, so the row costs r²(1 + g²) and
+//!   is one residual r√(1 + g²) with the gradient ∂r/∂p/√(1 + g²) (Boggs, Byrd & Schnabel 1987,
+//!   DOI 10.1137/0908085, with δ eliminated).
+
+use nalgebra::DVector;
+
+use super::coordinates::Coordinates;
+use super::minimise::Local;
+use super::sensitivity::derivatives;
+use super::table::{Place, Table};
+use crate::measure::curve::Row;
+use crate::units::db_from_ratio;
+
+const DB_PER_NEPER: f64 = 10.0 / std::f64::consts::LN_10;
+
+/// Standard deviations of both axes; an angle of 0 is exact.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Deviations {
+    pub theta_sd_rad: f64,
+    pub level_sd_db: f64,
+}
+
+/// ½Σ of squared residuals of detected rows, scaled by the deviations.
+pub(super) fn local(
+    coordinates: &Coordinates,
+    rows: &[Row],
+    deviations: Deviations,
+    at: &DVector<f64>,
+) -> Local {
+    let table = Table::new(&coordinates.model(at));
+    let by_coordinate = derivatives(coordinates, at);
+    let mut sum = Local::zero(at.len());
+    let mut jacobian = vec![0.0; at.len()];
+    for row in rows.iter().filter(|row| !row.censored) {
+        let nearest = nearest(&table, row, deviations);
+        let stretch = nearest.gain.hypot(1.0);
+        for (slot, table) in jacobian.iter_mut().zip(&by_coordinate) {
+            let slope = table.as_ref().map_or(0.0, |table| table.at(&nearest.place));
+            *slot = DB_PER_NEPER * slope / deviations.level_sd_db / stretch;
+        }
+        sum.add_residual(nearest.residual * stretch, &jacobian);
+    }
+    sum
+}
+
+/// The point of the curve that a row is nearest to.
+struct Nearest {
+    place: Place,
+    /// (f − y)/s_y there.
+    residual: f64,
+    /// f′·s_θ/s_y there.
+    gain: f64,
+}
+
+/// First candidates for δ, in standard deviations.
+const CANDIDATES: [f64; 9] = [0.0, -0.5, 0.5, -1.0, 1.0, -2.0, 2.0, -3.0, 3.0];
+/// Newton steps, which converge after a handful.
+const STEPS: usize = 30;
+
+fn nearest(table: &Table, row: &Row, deviations: Deviations) -> Nearest {
+    let level_db = db_from_ratio(row.sigma0);
+    let at = |offset: f64| {
+        let place = Place::new(row.theta_rad + offset * deviations.theta_sd_rad);
+        let residual = (DB_PER_NEPER * table.at(&place) - level_db) / deviations.level_sd_db;
+        let slope = DB_PER_NEPER * table.slope_per_rad(&place);
+        let gain = slope * deviations.theta_sd_rad / deviations.level_sd_db;
+        Nearest { place, residual, gain }
+    };
+    if deviations.theta_sd_rad <= 0.0 {
+        return at(0.0);
+    }
+    let cost = |offset: f64| at(offset).residual.powi(2) + offset * offset;
+    let mut best = (cost(0.0), 0.0);
+    for offset in CANDIDATES {
+        let here = cost(offset);
+        if here < best.0 {
+            best = (here, offset);
+        }
+    }
+    let mut length = 1.0;
+    for _ in 0..STEPS {
+        let Nearest { residual, gain, .. } = at(best.1);
+        let newton = -(gain * residual + best.1) / (1.0 + gain * gain);
+        if newton.abs() < 1e-10 || length < 1e-6 {
+            break;
+        }
+        let offset = best.1 + length * newton;
+        let here = cost(offset);
+        if here < best.0 {
+            best = (here, offset);
+            length = (2.0f64 * length).min(1.0);
+        } else {
+            length *= 0.5;
+        }
+    }
+    at(best.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::twin::{Twin, mixture};
+
+    const TLS: Deviations = Deviations { theta_sd_rad: 0.03, level_sd_db: 3.0 };
+
+    #[test]
+    fn the_gradient_is_that_of_the_value() {
+        let start = mixture(0.06, 4.0, 0.04, 0.003);
+        let coordinates = Coordinates::new(&start, &[], &[], Some(1.0)).unwrap();
+        let curve = Twin { rows: 200, ..Twin::default() }.curve(1);
+        for deviations in [TLS, Deviations { theta_sd_rad: 0.0, ..TLS }] {
+            let at = coordinates.start();
+            let cost = |at: &DVector<f64>| local(&coordinates, &curve.rows, deviations, at);
+            for index in 0..at.len() {
+                let value = |step: f64| {
+                    let mut there = at.clone();
+                    there[index] += step;
+                    cost(&there).value
+                };
+                let slope = (value(1e-5) - value(-1e-5)) / 2e-5;
+                let found = cost(&at).gradient[index];
+                assert!((found - slope).abs() < 1e-3 * (1.0 + slope.abs()), "{found} {slope}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_nearest_point_is_nearer_than_its_neighbours() {
+        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002));
+        for row in (Twin { rows: 100, ..Twin::default() }).curve(3).rows {
+            let found = nearest(&table, &row, TLS);
+            let cost = found.residual.powi(2) * (1.0 + found.gain.powi(2));
+            for step in -400..=400 {
+                let offset = f64::from(step) / 100.0;
+                let theta_rad = row.theta_rad + offset * TLS.theta_sd_rad;
+                let level_db = DB_PER_NEPER * table.at(&Place::new(theta_rad));
+                let gap = (level_db - db_from_ratio(row.sigma0)) / TLS.level_sd_db;
+                // A second valley between the candidates could be deeper by a little.
+                assert!(cost <= gap * gap + offset * offset + 1e-3, "{row:?} {offset}");
+            }
+        }
+    }
+}
