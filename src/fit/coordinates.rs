@@ -186,6 +186,15 @@ impl Coordinates {
         self.vector(|c| c.ends()[1])
     }
 
+    /// Both ends of the ranges, with the looks held where they are.
+    pub fn holding_looks(&self, at: &DVector<f64>) -> [DVector<f64>; 2] {
+        let (mut lower, mut upper) = (self.lower(), self.upper());
+        for index in (0..at.len()).filter(|&i| self.list.get(i).is_some_and(|c| c.name == LOOKS)) {
+            (lower[index], upper[index]) = (at[index], at[index]);
+        }
+        [lower, upper]
+    }
+
     fn vector(&self, value: impl Fn(&Coordinate) -> f64) -> DVector<f64> {
         DVector::from_iterator(self.len(), self.list.iter().map(value))
     }

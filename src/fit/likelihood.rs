@@ -21,6 +21,16 @@ use crate::measure::curve::Row;
 /// Rows that one task sums, fixed so that the sum is the same on any number of threads.
 const CHUNK: usize = 256;
 
+/// Which curvature a search follows. The looks belong to the scores' only.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Curvature {
+    /// d²(−ln g)/d(ln μ)² = L·y/μ along each chirp's mean gradient: long steps from afar, where the
+    /// scores' products would have tiny ones.
+    FromAfar,
+    /// The scores' outer products, which account for what the unknown angles cost.
+    Scores,
+}
+
 /// A curve made ready for many evaluations.
 #[derive(Clone, Debug)]
 pub(super) struct Likelihood<'a> {
@@ -59,8 +69,8 @@ impl<'a> Likelihood<'a> {
         Likelihood { coordinates, chirps: rows.iter().map(chirp).collect() }
     }
 
-    /// −ln likelihood, its gradient and the scores' outer products.
-    pub fn local(&self, at: &DVector<f64>) -> Local {
+    /// −ln likelihood, its gradient and a curvature.
+    pub fn local(&self, curvature: Curvature, at: &DVector<f64>) -> Local {
         let tables = self.tables(at);
         let parts: Vec<Local> = self
             .chirps
@@ -71,7 +81,10 @@ impl<'a> Likelihood<'a> {
                 for chirp in chunk {
                     sum.value -= chirp.score(&tables, &mut scratch);
                     sum.add(-1.0, 0.0, &scratch.score);
-                    sum.add(0.0, 1.0, &scratch.score);
+                    match curvature {
+                        Curvature::Scores => sum.add(0.0, 1.0, &scratch.score),
+                        Curvature::FromAfar => sum.add(0.0, scratch.bend, &scratch.gradient),
+                    }
                 }
                 sum
             })
@@ -105,12 +118,17 @@ impl<'a> Likelihood<'a> {
 struct Scratch {
     terms: Vec<f64>,
     laws: Vec<(LnProbability, f64)>,
+    /// d ln p/du.
     score: Vec<f64>,
+    /// Mean of d ln μ/du over the angles, and of −d² ln p/d(ln μ)².
+    gradient: Vec<f64>,
+    bend: f64,
 }
 
 impl Scratch {
     fn new(len: usize) -> Scratch {
-        Scratch { terms: Vec::new(), laws: Vec::new(), score: vec![0.0; len] }
+        let (score, gradient) = (vec![0.0; len], vec![0.0; len]);
+        Scratch { terms: Vec::new(), laws: Vec::new(), score, gradient, bend: 0.0 }
     }
 }
 
@@ -122,7 +140,7 @@ impl Chirp {
 
     /// ln p of the chirp; its derivatives are left in `scratch.score`.
     fn score(&self, tables: &Tables, scratch: &mut Scratch) -> f64 {
-        let Scratch { terms, laws, score } = scratch;
+        let Scratch { terms, laws, score, gradient, bend } = scratch;
         terms.clear();
         laws.clear();
         for (place, ln_weight) in &self.nodes {
@@ -138,17 +156,22 @@ impl Chirp {
         }
         let total = ln_sum(terms);
         score.fill(0.0);
+        gradient.fill(0.0);
+        *bend = 0.0;
         for (((place, _), term), (law, share)) in self.nodes.iter().zip(&*terms).zip(&*laws) {
             let weight = (term - total).exp();
             if weight < 1e-9 {
                 continue;
             }
-            for (slot, table) in score.iter_mut().zip(&tables.by_coordinate) {
-                *slot += weight
-                    * match table {
-                        Some(table) => law.by_ln_mean * share * table.at(place),
-                        None => law.by_ln_looks,
-                    };
+            *bend += weight * law.bend;
+            for (index, table) in tables.by_coordinate.iter().enumerate() {
+                let Some(table) = table else {
+                    score[index] += weight * law.by_ln_looks;
+                    continue;
+                };
+                let slope = weight * share * table.at(place);
+                gradient[index] += slope;
+                score[index] += law.by_ln_mean * slope;
             }
         }
         total
@@ -177,12 +200,12 @@ mod tests {
             let curve = Twin { rows: 200, ..Twin::default() }.curve(1);
             let likelihood = Likelihood::new(&coordinates, &curve.rows, noise_w);
             let at = coordinates.start();
-            let local = likelihood.local(&at);
+            let local = likelihood.local(Curvature::Scores, &at);
             for index in 0..at.len() {
                 let value = |step: f64| {
                     let mut there = at.clone();
                     there[index] += step;
-                    likelihood.local(&there).value
+                    likelihood.local(Curvature::Scores, &there).value
                 };
                 let slope = (value(1e-4) - value(-1e-4)) / 2e-4;
                 let found = local.gradient[index];

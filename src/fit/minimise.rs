@@ -27,12 +27,6 @@ impl Local {
         Local { value: 0.0, gradient, curvature }
     }
 
-    /// Adds ½r² of a residual with the gradient `jacobian`.
-    pub fn add_residual(&mut self, residual: f64, jacobian: &[f64]) {
-        self.value += 0.5 * residual * residual;
-        self.add(residual, 1.0, jacobian);
-    }
-
     /// Adds `first`·j to the gradient and `second`·j·jᵀ to the curvature.
     pub fn add(&mut self, first: f64, second: f64, j: &[f64]) {
         for (row, a) in j.iter().enumerate() {
@@ -192,11 +186,16 @@ mod tests {
 
     const SEARCH: Minimise = Minimise { iterations: 200, tolerance: 1e-14 };
 
+    fn add_residual(local: &mut Local, residual: f64, jacobian: &[f64]) {
+        local.value += 0.5 * residual * residual;
+        local.add(residual, 1.0, jacobian);
+    }
+
     /// Rosenbrock's valley: residuals 10(y − x²) and 1 − x.
     fn valley(at: &DVector<f64>) -> Local {
         let mut local = Local::zero(2);
-        local.add_residual(10.0 * (at[1] - at[0] * at[0]), &[-20.0 * at[0], 10.0]);
-        local.add_residual(1.0 - at[0], &[-1.0, 0.0]);
+        add_residual(&mut local, 10.0 * (at[1] - at[0] * at[0]), &[-20.0 * at[0], 10.0]);
+        add_residual(&mut local, 1.0 - at[0], &[-1.0, 0.0]);
         local
     }
 
@@ -233,7 +232,7 @@ mod tests {
     fn a_flat_direction_does_not_stop_the_rest() {
         let flat = |at: &DVector<f64>| {
             let mut local = Local::zero(2);
-            local.add_residual(at[0] + at[1] - 1.0, &[1.0, 1.0]);
+            add_residual(&mut local, at[0] + at[1] - 1.0, &[1.0, 1.0]);
             local
         };
         let bounds = [&vector([-5.0, -5.0]), &vector([5.0, 5.0])];

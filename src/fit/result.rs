@@ -460,10 +460,10 @@ mod tests {
         let found = quick().run(&start, &twin.curve(3)).unwrap();
         for theta_deg in [0.0f64, 20.0, 45.0, 60.0] {
             let Band { low, mid, high } = found.band(theta_deg.to_radians());
-            assert!(low < mid && mid < high && high / low < 2.0, "{theta_deg}");
+            assert!(low < mid && mid < high && high / low < 2.0, "{theta_deg}: {found:?}");
             let ratio = truth.sigma0(theta_deg.to_radians()) / mid;
             // A band is 1.96 deviations wide; truth within twice that.
-            assert!(ratio.ln().abs() < 2.0 * (high / mid).ln(), "{theta_deg}: {ratio}");
+            assert!(ratio.ln().abs() < 2.0 * (high / mid).ln(), "{theta_deg}: {ratio} {found:?}");
         }
     }
 
@@ -491,7 +491,7 @@ mod tests {
         let curve = Twin { rows: 40, ..Twin::default() }.curve(1);
         let refused = |curve: &Curve| quick().run(&start(), curve).unwrap_err();
         assert_eq!(refused(&Curve::default()), FitError::Empty);
-        let few = Curve { rows: curve.rows[..3].to_vec() };
+        let few = Curve { rows: curve.detected().take(3).copied().collect() };
         assert_eq!(refused(&few), FitError::TooFewRows { detected: 3, unknowns: 5 });
         let mut censored = curve.clone();
         censored.rows.iter_mut().for_each(|row| row.censored = true);

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::coordinates::Coordinates;
 use super::interval::{End, Profile};
 use super::least_squares::{self, Deviations};
-use super::likelihood::Likelihood;
+use super::likelihood::{Curvature, Likelihood};
 use super::minimise::{Local, Minimise, Minimum, Stop};
 use super::uncertainty::{Uncertainty, observed_information};
 use super::{Fit, Method};
@@ -16,7 +16,10 @@ use crate::radar::random::{Key, Purpose};
 const ITERATIONS: usize = 200;
 /// ln likelihood that is no longer worth a step: a thousandth of what moves an interval.
 const LIKELIHOOD_TOLERANCE: f64 = 1e-6;
-/// The same for least squares, whose parameters are compared with other programs'.
+/// Steps of the approach with held looks, and the ln likelihood that ends it.
+const APPROACH: usize = 40;
+const NEAR: f64 = 1.0;
+/// Cost that is no longer worth a step in least squares, whose parameters are compared with other programs'.
 const SQUARES_TOLERANCE: f64 = 1e-11;
 /// Loss of cost that still counts as the same optimum.
 const SAME: f64 = 0.01;
@@ -54,10 +57,16 @@ impl Fit {
 
     fn search_likelihood(&self, coordinates: &Coordinates, rows: &[Row]) -> Found {
         let likelihood = Likelihood::new(coordinates, rows, self.noise_w.unwrap_or(0.0));
-        let cost = |at: &DVector<f64>| likelihood.local(at);
+        let cost = |at: &DVector<f64>| likelihood.local(Curvature::Scores, at);
+        let far = |at: &DVector<f64>| likelihood.local(Curvature::FromAfar, at);
+        let approach = Minimise { iterations: APPROACH, tolerance: NEAR };
         let search = Minimise { iterations: ITERATIONS, tolerance: LIKELIHOOD_TOLERANCE };
-        let (best, agreeing) =
-            self.best(coordinates, |start| search_freely(&search, coordinates, start, cost));
+        // With free looks a far start is explained by wild speckle before it is improved.
+        let (best, agreeing) = self.best(coordinates, |start| {
+            let [lower, upper] = coordinates.holding_looks(start);
+            let near = approach.run(start, [&lower, &upper], far);
+            search_freely(&search, coordinates, &near.at, cost)
+        });
         let information = observed_information(coordinates, &best.at, &best.local, cost);
         let uncertainty = Uncertainty::new(coordinates, &best.at, &information);
         let search = Minimise { tolerance: 1e3 * LIKELIHOOD_TOLERANCE, ..search };
