@@ -64,8 +64,9 @@ struct Nearest {
     gain: f64,
 }
 
-/// First candidates for δ, in standard deviations.
-const CANDIDATES: [f64; 9] = [0.0, -0.5, 0.5, -1.0, 1.0, -2.0, 2.0, -3.0, 3.0];
+/// Candidates for δ on either side of 0, and how far apart, in standard deviations.
+const CANDIDATES: i32 = 12;
+const APART: f64 = 1.0 / 3.0;
 /// Newton steps, which converge after a handful; the step of their second derivative; the offset that is
 /// no longer worth a step, all in standard deviations.
 const STEPS: usize = 30;
@@ -85,33 +86,49 @@ fn nearest(table: &Table, row: &Row, deviations: Deviations) -> Nearest {
         return at(0.0);
     }
     let cost = |offset: f64| at(offset).residual.powi(2) + offset * offset;
-    let mut best = (cost(0.0), 0.0);
-    for offset in CANDIDATES {
-        let here = cost(offset);
-        if here < best.0 {
-            best = (here, offset);
+    let offset = |candidate: i32| APART * f64::from(candidate);
+    let costs: Vec<f64> = (-CANDIDATES..=CANDIDATES).map(|c| cost(offset(c))).collect();
+    let mut best = at(0.0);
+    let mut least = cost(0.0);
+    // Every valley is followed to its floor: the deepest candidate need not lead to the deepest one.
+    for (candidate, around) in (1 - CANDIDATES..).zip(costs.windows(3)) {
+        if around[1] <= around[0] && around[1] <= around[2] {
+            let found = descend(&at, offset(candidate), around[1]);
+            let there = found.residual.powi(2) + found.offset.powi(2);
+            if there <= least {
+                (best, least) = (found, there);
+            }
         }
     }
+    best
+}
+
+/// The floor of the valley around an offset of known cost.
+fn descend(at: &impl Fn(f64) -> Nearest, offset: f64, cost: f64) -> Nearest {
     // Half the derivative of the cost by the offset.
-    let slope = |offset: f64| at(offset).residual * at(offset).gain + offset;
-    let mut length = 1.0;
+    let slope = |offset: f64| {
+        let Nearest { residual, gain, .. } = at(offset);
+        residual * gain + offset
+    };
+    let (mut best, mut least, mut length) = (at(offset), cost, 1.0f64);
     for _ in 0..STEPS {
-        let here = slope(best.1);
-        let bend = (slope(best.1 + BEND_STEP) - slope(best.1 - BEND_STEP)) / (2.0 * BEND_STEP);
-        let newton = -here / if bend > 0.0 { bend } else { 1.0 + at(best.1).gain.powi(2) };
+        let here = best.residual * best.gain + best.offset;
+        let bend = slope(best.offset + BEND_STEP) - slope(best.offset - BEND_STEP);
+        let bend = bend / (2.0 * BEND_STEP);
+        let newton = -here / if bend > 0.0 { bend } else { 1.0 + best.gain.powi(2) };
         if newton.abs() < NEAR || length < 1e-6 {
             break;
         }
-        let offset = best.1 + length * newton;
-        let there = cost(offset);
-        if there < best.0 {
-            best = (there, offset);
-            length = (2.0f64 * length).min(1.0);
+        let next = at(best.offset + length * newton);
+        let there = next.residual.powi(2) + next.offset.powi(2);
+        if there < least {
+            (best, least) = (next, there);
+            length = (2.0 * length).min(1.0);
         } else {
             length *= 0.5;
         }
     }
-    at(best.1)
+    best
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use super::coordinates::{Coordinates, DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
+use super::coordinates::Coordinates;
 use super::goodness::{Goodness, normal_share, shares};
 use super::interval::{DEVIATE_95, End};
 use super::likelihood::Likelihood;
@@ -314,6 +314,7 @@ mod tests {
     use super::*;
     use crate::brdf::{BlinnPhong, Lambert, Tabulated};
     use crate::fit::FitError;
+    use crate::fit::coordinates::{DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
     use crate::fit::twin::{Twin, mixture};
 
     fn start() -> Brdf {
@@ -353,6 +354,16 @@ mod tests {
             let squares = Fit { method, ..quick() }.run(&start(), &curve).unwrap();
             assert!(value(&squares, "diffuse.alpha") < 4.5, "{squares:?}");
             assert!(squares.verdict.iter().any(|f| matches!(f, Finding::CensoredIgnored { .. })));
+        }
+    }
+
+    #[test]
+    fn the_orthogonal_distance_converges_where_angles_are_vague() {
+        for seed in 0..3 {
+            let curve = Twin { theta_sd_deg: 3.0, ..Twin::default() }.curve(seed);
+            let method = Method::Tls { theta_sd_rad: 3f64.to_radians(), level_sd_db: 5.57 };
+            let found = Fit { method, ..quick() }.run(&start(), &curve).unwrap();
+            assert!(found.converged, "{:?} after {}", found.stop, found.iterations);
         }
     }
 

@@ -20,7 +20,7 @@ const LIKELIHOOD_TOLERANCE: f64 = 1e-6;
 const APPROACH: usize = 40;
 const NEAR: f64 = 1.0;
 /// Cost that is no longer worth a step in least squares, whose parameters are compared with other programs'.
-const SQUARES_TOLERANCE: f64 = 1e-11;
+const SQUARES_TOLERANCE: f64 = 1e-8;
 /// Loss of cost that still counts as the same optimum.
 const SAME: f64 = 0.01;
 
