@@ -26,6 +26,8 @@ pub enum Purpose {
     Bounce = 5,
     /// Error of a range.
     Range = 6,
+    /// Starting points of a fit and the randomised part of its residuals.
+    Fit = 7,
 }
 
 /// Names one stream of draws.

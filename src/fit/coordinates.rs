@@ -1,0 +1,354 @@
+//! What a fit turns: the coordinates of a model that backscatter can tell, on scales that suit a search.
+//!
+//! Of the paper's mixture (12), (13), (15), backscatter sees m, α and the two levels
+//! S = (1 − k)·f_λ and R = k·r_s, so that these are the coordinates, and the gauge says how k is
+//! chosen. Any other model has the coordinates that [`Brdf::parameters`] lists. Levels and widths are
+//! searched as logarithms. The looks L of the speckle are a coordinate too where they are not given.
+
+use nalgebra::DVector;
+
+use super::FitError;
+use crate::brdf::{Brdf, Mixture, Parameter};
+
+/// Name of the specular level S = (1 − k)·f_λ.
+pub(super) const SPECULAR_LEVEL: &str = "S";
+/// Name of the diffuse level R = k·r_s.
+pub(super) const DIFFUSE_LEVEL: &str = "R";
+/// Name of the looks of the speckle.
+pub(super) const LOOKS: &str = "looks";
+/// Levels that have a meaning: a billionth is 60 dB below the weakest detection.
+const LEVEL_RANGE: (f64, f64) = (1e-9, 1.0);
+/// Looks from far spikier than developed speckle to none to speak of.
+const LOOKS_RANGE: (f64, f64) = (0.1, 1e4);
+
+/// How a number is searched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Scale {
+    /// As it is.
+    Linear,
+    /// u = ln(v + offset).
+    Log {
+        /// Keeps zero in reach.
+        offset: f64,
+    },
+    /// u = asinh v: logarithmic on both sides of zero.
+    Asinh,
+}
+
+impl Scale {
+    fn of_range(min: f64, max: f64) -> Scale {
+        match min {
+            _ if min > 0.0 && max >= 100.0 * min => Scale::Log { offset: 0.0 },
+            0.0 if max > 1.0 => Scale::Log { offset: 1.0 },
+            0.0 => Scale::Log { offset: 1e-6 },
+            _ if min < 0.0 && max - min > 100.0 => Scale::Asinh,
+            _ => Scale::Linear,
+        }
+    }
+
+    fn searched(self, value: f64) -> f64 {
+        match self {
+            Scale::Linear => value,
+            Scale::Log { offset } => (value + offset).ln(),
+            Scale::Asinh => value.asinh(),
+        }
+    }
+
+    fn value(self, searched: f64) -> f64 {
+        match self {
+            Scale::Linear => searched,
+            Scale::Log { offset } => searched.exp() - offset,
+            Scale::Asinh => searched.sinh(),
+        }
+    }
+
+    fn slope(self, searched: f64) -> f64 {
+        match self {
+            Scale::Linear => 1.0,
+            Scale::Log { .. } => searched.exp(),
+            Scale::Asinh => searched.cosh(),
+        }
+    }
+}
+
+/// One number that a fit turns.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Coordinate {
+    /// The parameter's path, `S`, `R` or `looks`.
+    pub name: String,
+    /// Smallest value.
+    pub min: f64,
+    /// Largest value.
+    pub max: f64,
+    start: f64,
+    scale: Scale,
+}
+
+impl Coordinate {
+    fn new(name: &str, (min, max): (f64, f64), start: f64) -> Coordinate {
+        let start = start.clamp(min, max);
+        Coordinate { name: name.to_owned(), min, max, start, scale: Scale::of_range(min, max) }
+    }
+
+    /// The value at a point of the search, kept in its range.
+    pub fn value(&self, searched: f64) -> f64 {
+        self.scale.value(searched).clamp(self.min, self.max)
+    }
+
+    /// dv/du.
+    pub fn slope(&self, searched: f64) -> f64 {
+        self.scale.slope(searched)
+    }
+
+    /// Where a value lies in the search.
+    pub fn searched(&self, value: f64) -> f64 {
+        self.scale.searched(value)
+    }
+
+    /// Ends of the range in the search.
+    pub fn ends(&self) -> [f64; 2] {
+        [self.searched(self.min), self.searched(self.max)]
+    }
+
+    /// How far from the start other starts are drawn.
+    pub fn spread(&self) -> f64 {
+        let [lower, upper] = self.ends();
+        let most = match self.scale {
+            Scale::Linear => 0.3 * (upper - lower),
+            Scale::Log { .. } | Scale::Asinh => 1.5,
+        };
+        most.min(upper - lower)
+    }
+}
+
+/// All that a fit turns, and the model that holds the rest.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Coordinates {
+    /// In the order of the search.
+    pub list: Vec<Coordinate>,
+    base: Brdf,
+    /// k of the mixture whose levels are searched as products.
+    gauge: Option<f64>,
+    looks: f64,
+}
+
+impl Coordinates {
+    /// The coordinates of a model; `fixed` parameters keep the values given there, `bounds` narrow ranges.
+    /// Looks are searched for where `looks` is none.
+    pub fn new(
+        start: &Brdf,
+        fixed: &[(String, f64)],
+        bounds: &[(String, [f64; 2])],
+        looks: Option<f64>,
+    ) -> Result<Coordinates, FitError> {
+        start.validate()?;
+        let mut base = start.clone();
+        for (path, value) in fixed {
+            if !base.set_parameter(path, *value) {
+                return Err(FitError::UnknownParameter { name: path.clone() });
+            }
+        }
+        base.validate()?;
+        let is_fixed = |path: &str| fixed.iter().any(|(name, _)| name == path);
+        let gauge = gauge(&base, &is_fixed);
+        let mut list: Vec<Coordinate> = base
+            .parameters()
+            .into_iter()
+            .filter(|parameter| !is_fixed(&parameter.path))
+            .filter_map(|parameter| coordinate(&base, gauge, &parameter))
+            .collect();
+        if looks.is_none() {
+            list.push(Coordinate::new(LOOKS, LOOKS_RANGE, 1.0));
+        }
+        for (name, range) in bounds {
+            narrow(&mut list, name, *range)?;
+        }
+        Ok(Coordinates { list, base, gauge, looks: looks.unwrap_or(1.0) })
+    }
+
+    /// How many numbers are searched.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Where the search begins.
+    pub fn start(&self) -> DVector<f64> {
+        self.vector(|c| c.searched(c.start))
+    }
+
+    /// Lower ends of the ranges, in the search.
+    pub fn lower(&self) -> DVector<f64> {
+        self.vector(|c| c.ends()[0])
+    }
+
+    /// Upper ends of the ranges, in the search.
+    pub fn upper(&self) -> DVector<f64> {
+        self.vector(|c| c.ends()[1])
+    }
+
+    /// Both ends of the ranges, with the looks held where they are.
+    pub fn holding_looks(&self, at: &DVector<f64>) -> [DVector<f64>; 2] {
+        let (mut lower, mut upper) = (self.lower(), self.upper());
+        for index in (0..at.len()).filter(|&i| self.list.get(i).is_some_and(|c| c.name == LOOKS)) {
+            (lower[index], upper[index]) = (at[index], at[index]);
+        }
+        [lower, upper]
+    }
+
+    fn vector(&self, value: impl Fn(&Coordinate) -> f64) -> DVector<f64> {
+        DVector::from_iterator(self.len(), self.list.iter().map(value))
+    }
+
+    /// The values at a point of the search, in the order of [`list`](Self::list).
+    pub fn values(&self, at: &DVector<f64>) -> Vec<f64> {
+        self.list.iter().zip(at.iter()).map(|(c, &u)| c.value(u)).collect()
+    }
+
+    /// The looks at a point of the search.
+    pub fn looks(&self, at: &DVector<f64>) -> f64 {
+        let found = self.list.iter().zip(at.iter()).find(|(c, _)| c.name == LOOKS);
+        found.map_or(self.looks, |(c, &u)| c.value(u))
+    }
+
+    /// The model at a point of the search.
+    pub fn model(&self, at: &DVector<f64>) -> Brdf {
+        let mut model = self.base.clone();
+        let mut levels = [0.0; 2];
+        for (coordinate, value) in self.list.iter().zip(self.values(at)) {
+            match coordinate.name.as_str() {
+                SPECULAR_LEVEL => levels[0] = value,
+                DIFFUSE_LEVEL => levels[1] = value,
+                path => _ = model.set_parameter(path, value),
+            }
+        }
+        if let Some(k) = self.gauge {
+            set_levels(&mut model, k, levels);
+        }
+        model
+    }
+
+    /// How the numbers that backscatter cannot tell were chosen; `None` where the model has no such gauge.
+    pub fn gauge(&self) -> Option<f64> {
+        self.gauge
+    }
+
+    /// Whether the model is a mixture, and which of its coordinates are of its diffuse part.
+    pub fn is_diffuse(&self) -> Option<Vec<bool>> {
+        let diffuse = |c: &Coordinate| c.name.starts_with("diffuse.") || c.name == DIFFUSE_LEVEL;
+        matches!(self.base, Brdf::Mixture(_)).then(|| self.list.iter().map(diffuse).collect())
+    }
+}
+
+/// k, where only the products of the paper's mixture can be found: neither level is fixed.
+fn gauge(base: &Brdf, is_fixed: &impl Fn(&str) -> bool) -> Option<f64> {
+    let Brdf::Mixture(Mixture { k, .. }) = base else { return None };
+    let inside = *k > 0.0 && *k < 1.0;
+    let free = !is_fixed("specular.f_lambda") && !is_fixed("diffuse.r_s");
+    let usable = base.identified_products().is_some() && free && (inside || !is_fixed("k"));
+    usable.then_some(if inside { *k } else { 0.5 })
+}
+
+fn coordinate(base: &Brdf, gauge: Option<f64>, parameter: &Parameter) -> Option<Coordinate> {
+    let levels = base.identified_products().filter(|_| gauge.is_some());
+    match (levels, parameter.path.as_str()) {
+        (Some(_), "k") => None,
+        (Some([s, _]), "specular.f_lambda") => {
+            Some(Coordinate::new(SPECULAR_LEVEL, LEVEL_RANGE, s))
+        }
+        (Some([_, r]), "diffuse.r_s") => Some(Coordinate::new(DIFFUSE_LEVEL, LEVEL_RANGE, r)),
+        (_, path) => Some(Coordinate::new(path, (parameter.min, parameter.max), parameter.value)),
+    }
+}
+
+fn narrow(list: &mut [Coordinate], name: &str, [min, max]: [f64; 2]) -> Result<(), FitError> {
+    let Some(coordinate) = list.iter_mut().find(|c| c.name == name) else {
+        return Err(FitError::UnknownParameter { name: name.to_owned() });
+    };
+    if !(min < max && min >= coordinate.min && max <= coordinate.max) {
+        let range = [coordinate.min, coordinate.max];
+        return Err(FitError::Bounds { name: name.to_owned(), min, max, range });
+    }
+    *coordinate =
+        Coordinate { min, max, start: coordinate.start.clamp(min, max), ..coordinate.clone() };
+    Ok(())
+}
+
+/// Sets k, f_λ and r_s from S and R: k as near to the gauge's as f_λ ≤ 1 and r_s ≤ 1 allow.
+fn set_levels(model: &mut Brdf, k: f64, [s, r]: [f64; 2]) {
+    let k = if r <= 1.0 - s { k.clamp(r, 1.0 - s) } else { r / (r + s) };
+    model.set_parameter("k", k);
+    model.set_parameter("specular.f_lambda", s / (1.0 - k));
+    model.set_parameter("diffuse.r_s", r / k);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::{Lambert, Scattering};
+    use crate::fit::twin::mixture;
+
+    fn names(coordinates: &Coordinates) -> Vec<&str> {
+        coordinates.list.iter().map(|c| c.name.as_str()).collect()
+    }
+
+    #[test]
+    fn a_mixture_is_searched_by_what_backscatter_sees() {
+        let start = mixture(0.05, 6.0, 0.05, 0.002);
+        let coordinates = Coordinates::new(&start, &[], &[], None).unwrap();
+        assert_eq!(names(&coordinates), ["R", "diffuse.alpha", "S", "specular.m", "looks"]);
+        let model = coordinates.model(&coordinates.start());
+        for theta_rad in [0.0, 0.1, 0.5, 1.2] {
+            let ratio = model.sigma0(theta_rad) / start.sigma0(theta_rad);
+            assert!((ratio - 1.0).abs() < 1e-9, "{theta_rad}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn the_gauge_gives_way_before_a_level_leaves_its_range() {
+        let start = mixture(0.05, 6.0, 0.05, 0.002);
+        let coordinates = Coordinates::new(&start, &[], &[], Some(1.0)).unwrap();
+        let mut at = coordinates.start();
+        for (u, c) in at.iter_mut().zip(&coordinates.list) {
+            if c.name == "R" {
+                *u = 0.7f64.ln();
+            }
+        }
+        let model = coordinates.model(&at);
+        model.validate().unwrap();
+        assert!((model.identified_products().unwrap()[1] - 0.7).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_level_by_hand_ends_the_gauge() {
+        let start = mixture(0.05, 6.0, 0.05, 0.002);
+        let fixed = [("specular.f_lambda".to_owned(), 0.056)];
+        let coordinates = Coordinates::new(&start, &fixed, &[], Some(1.0)).unwrap();
+        assert_eq!(coordinates.gauge(), None);
+        assert_eq!(names(&coordinates), ["k", "diffuse.r_s", "diffuse.alpha", "specular.m"]);
+    }
+
+    #[test]
+    fn every_scale_goes_there_and_back() {
+        for (min, max) in [(0.0, 1.0), (0.0, 1000.0), (0.001, 2.0), (-1e6, 1e6), (0.5, 2.0)] {
+            let scale = Scale::of_range(min, max);
+            for share in [0.001, 0.3, 0.999] {
+                let value = min + share * (max - min);
+                let searched = scale.searched(value);
+                assert!((scale.value(searched) - value).abs() < 1e-9 * (max - min), "{scale:?}");
+                let slope = (scale.value(searched + 1e-6) - scale.value(searched - 1e-6)) / 2e-6;
+                let error = scale.slope(searched) - slope;
+                assert!(error.abs() < 1e-6 * slope.abs(), "{scale:?} {value}: {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn names_and_bounds_without_a_meaning_are_refused() {
+        let start = Brdf::Lambert(Lambert { albedo: 0.3 });
+        let unknown = Coordinates::new(&start, &[("m".to_owned(), 0.1)], &[], None);
+        assert!(unknown.unwrap_err().to_string().contains("`m`"));
+        let wide = [("albedo".to_owned(), [0.0, 2.0])];
+        let message = Coordinates::new(&start, &[], &wide, None).unwrap_err().to_string();
+        assert!(message.contains("albedo") && message.contains("from 0 to 1"), "{message}");
+    }
+}

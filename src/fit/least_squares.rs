@@ -1,0 +1,182 @@
+//! Least squares in decibels: the paper's fits, kept for comparison.
+//!
+//! They see detections only and take speckle for a symmetric error, so that a curve cut at a
+//! threshold flattens their tail, and its level comes out 10/ln 10·(ln L − ψ(L)) dB low.
+//!
+//! - Piecewise MSE: the specular coordinates on θ below a split, frozen, then the diffuse ones on the
+//!   rest. A model that is not a mixture has no pieces: all rows, all coordinates.
+//! - TLS, the orthogonal distance: Σ ((y − f(θ + δ))/s_y)² + (δ/s_θ)², least over each row's δ. At that
+//!   least δ = −g·r·s_θ with r the scaled residual and g = f′·s_θ/s_y, so the row costs r²(1 + g²) and
+//!   is one residual r√(1 + g²) with the gradient ∂r/∂p/√(1 + g²) (Boggs, Byrd & Schnabel 1987,
+//!   DOI 10.1137/0908085, with δ eliminated).
+
+use nalgebra::DVector;
+
+use super::coordinates::Coordinates;
+use super::minimise::Local;
+use super::sensitivity::derivatives;
+use super::table::{Place, Table};
+use crate::measure::curve::Row;
+use crate::units::db_from_ratio;
+
+const DB_PER_NEPER: f64 = 10.0 / std::f64::consts::LN_10;
+
+/// Standard deviations of both axes; an angle of 0 is exact.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Deviations {
+    pub theta_sd_rad: f64,
+    pub level_sd_db: f64,
+}
+
+/// ½Σ of squared residuals of detected rows, scaled by the deviations.
+pub(super) fn local(
+    coordinates: &Coordinates,
+    rows: &[Row],
+    deviations: Deviations,
+    at: &DVector<f64>,
+) -> Local {
+    let table = Table::new(&coordinates.model(at));
+    let by_coordinate = derivatives(coordinates, at);
+    let mut sum = Local::zero(at.len());
+    let mut jacobian = vec![0.0; at.len()];
+    for row in rows.iter().filter(|row| !row.censored) {
+        let nearest = nearest(&table, row, deviations);
+        let stretch = nearest.gain.hypot(1.0);
+        for (slot, table) in jacobian.iter_mut().zip(&by_coordinate) {
+            let slope = table.as_ref().map_or(0.0, |table| table.at(&nearest.place));
+            *slot = DB_PER_NEPER * slope / deviations.level_sd_db / stretch;
+        }
+        // Unlike r²(1 + g²)/2 this is not moved by a small error of δ.
+        sum.value += 0.5 * (nearest.residual.powi(2) + nearest.offset.powi(2));
+        sum.add(nearest.residual * stretch, 1.0, &jacobian);
+    }
+    sum
+}
+
+/// The point of the curve that a row is nearest to.
+struct Nearest {
+    place: Place,
+    /// δ/s_θ.
+    offset: f64,
+    /// (f − y)/s_y there.
+    residual: f64,
+    /// f′·s_θ/s_y there.
+    gain: f64,
+}
+
+/// Candidates for δ on either side of 0, and how far apart, in standard deviations.
+const CANDIDATES: i32 = 12;
+const APART: f64 = 1.0 / 3.0;
+/// Newton steps, which converge after a handful; the step of their second derivative; the offset that is
+/// no longer worth a step, all in standard deviations.
+const STEPS: usize = 30;
+const BEND_STEP: f64 = 1e-3;
+const NEAR: f64 = 1e-8;
+
+fn nearest(table: &Table, row: &Row, deviations: Deviations) -> Nearest {
+    let level_db = db_from_ratio(row.sigma0);
+    let at = |offset: f64| {
+        let place = Place::new(row.theta_rad + offset * deviations.theta_sd_rad);
+        let residual = (DB_PER_NEPER * table.at(&place) - level_db) / deviations.level_sd_db;
+        let slope = DB_PER_NEPER * table.slope_per_rad(&place);
+        let gain = slope * deviations.theta_sd_rad / deviations.level_sd_db;
+        Nearest { place, offset, residual, gain }
+    };
+    if deviations.theta_sd_rad <= 0.0 {
+        return at(0.0);
+    }
+    let cost = |offset: f64| at(offset).residual.powi(2) + offset * offset;
+    let offset = |candidate: i32| APART * f64::from(candidate);
+    let costs: Vec<f64> = (-CANDIDATES..=CANDIDATES).map(|c| cost(offset(c))).collect();
+    let mut best = at(0.0);
+    let mut least = cost(0.0);
+    // Every valley is followed to its floor: the deepest candidate need not lead to the deepest one.
+    for (candidate, around) in (1 - CANDIDATES..).zip(costs.windows(3)) {
+        if around[1] <= around[0] && around[1] <= around[2] {
+            let found = descend(&at, offset(candidate), around[1]);
+            let there = found.residual.powi(2) + found.offset.powi(2);
+            if there <= least {
+                (best, least) = (found, there);
+            }
+        }
+    }
+    best
+}
+
+/// The floor of the valley around an offset of known cost.
+fn descend(at: &impl Fn(f64) -> Nearest, offset: f64, cost: f64) -> Nearest {
+    // Half the derivative of the cost by the offset.
+    let slope = |offset: f64| {
+        let Nearest { residual, gain, .. } = at(offset);
+        residual * gain + offset
+    };
+    let (mut best, mut least, mut length) = (at(offset), cost, 1.0f64);
+    for _ in 0..STEPS {
+        let here = best.residual * best.gain + best.offset;
+        let bend = slope(best.offset + BEND_STEP) - slope(best.offset - BEND_STEP);
+        let bend = bend / (2.0 * BEND_STEP);
+        let newton = -here / if bend > 0.0 { bend } else { 1.0 + best.gain.powi(2) };
+        if newton.abs() < NEAR || length < 1e-6 {
+            break;
+        }
+        let next = at(best.offset + length * newton);
+        let there = next.residual.powi(2) + next.offset.powi(2);
+        if there < least {
+            (best, least) = (next, there);
+            length = (2.0 * length).min(1.0);
+        } else {
+            length *= 0.5;
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::twin::{Twin, mixture};
+
+    const TLS: Deviations = Deviations { theta_sd_rad: 0.03, level_sd_db: 3.0 };
+
+    #[test]
+    fn the_gradient_is_that_of_the_value() {
+        let start = mixture(0.06, 4.0, 0.04, 0.003);
+        let coordinates = Coordinates::new(&start, &[], &[], Some(1.0)).unwrap();
+        let curve = Twin { rows: 200, ..Twin::default() }.curve(1);
+        for deviations in [TLS, Deviations { theta_sd_rad: 0.0, ..TLS }] {
+            let at = coordinates.start();
+            let cost = |at: &DVector<f64>| local(&coordinates, &curve.rows, deviations, at);
+            for index in 0..at.len() {
+                let value = |step: f64| {
+                    let mut there = at.clone();
+                    there[index] += step;
+                    cost(&there).value
+                };
+                let slope = (value(1e-5) - value(-1e-5)) / 2e-5;
+                let found = cost(&at).gradient[index];
+                let gap = (found - slope).abs();
+                assert!(
+                    gap < 1e-3 * (1.0 + slope.abs()),
+                    "{index} {deviations:?}: {found} {slope}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_nearest_point_is_nearer_than_its_neighbours() {
+        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002));
+        for row in (Twin { rows: 100, ..Twin::default() }).curve(3).rows {
+            let found = nearest(&table, &row, TLS);
+            let cost = found.residual.powi(2) + found.offset.powi(2);
+            for step in -400..=400 {
+                let offset = f64::from(step) / 100.0;
+                let theta_rad = row.theta_rad + offset * TLS.theta_sd_rad;
+                let level_db = DB_PER_NEPER * table.at(&Place::new(theta_rad));
+                let gap = (level_db - db_from_ratio(row.sigma0)) / TLS.level_sd_db;
+                // A second valley between the candidates could be deeper by a little.
+                assert!(cost <= gap * gap + offset * offset + 1e-3, "{row:?} {offset}");
+            }
+        }
+    }
+}

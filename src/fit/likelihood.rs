@@ -1,0 +1,230 @@
+//! The default: the censored Gamma likelihood with the angle error marginalised.
+//!
+//! A detected power y has the density g(y; L, μ) of Gamma(L, μ/L), a chirp without a detection the
+//! probability G(T; L, μ) of staying below the threshold T. μ = σ⁰(t) + thermal noise, t the true
+//! angle. Each chirp has one unknown but fixed t, so what is averaged over t is the likelihood,
+//! p(y) = Σ_q w_q·g(y; L, μ(t_q)), not the mean: averaging μ would smear the lobe but give each
+//! chirp the scatter of speckle alone. The curvature is the sum of the scores' outer products (Berndt,
+//! Hall, Hall & Hausman 1974).
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use super::angle::true_angles;
+use super::coordinates::Coordinates;
+use super::gamma_law::{GammaLaw, LnProbability};
+use super::minimise::Local;
+use super::sensitivity::derivatives;
+use super::table::{Place, Table};
+use crate::measure::curve::Row;
+
+/// Rows that one task sums, fixed so that the sum is the same on any number of threads.
+const CHUNK: usize = 256;
+
+/// Which curvature a search follows. The looks belong to the scores' only.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Curvature {
+    /// d²(−ln g)/d(ln μ)² = L·y/μ along each chirp's mean gradient: long steps from afar, where the
+    /// scores' products would have tiny ones.
+    FromAfar,
+    /// The scores' outer products, which account for what the unknown angles cost.
+    Scores,
+}
+
+/// A curve made ready for many evaluations.
+#[derive(Clone, Debug)]
+pub(super) struct Likelihood<'a> {
+    coordinates: &'a Coordinates,
+    chirps: Vec<Chirp>,
+}
+
+/// One row, its power as σ⁰.
+#[derive(Clone, Debug)]
+struct Chirp {
+    ln_sigma0: f64,
+    noise: f64,
+    censored: bool,
+    nodes: Vec<(Place, f64)>,
+}
+
+/// Tables for one point of the search.
+struct Tables {
+    ln_sigma0: Table,
+    by_coordinate: Vec<Option<Table>>,
+    law: GammaLaw,
+}
+
+impl<'a> Likelihood<'a> {
+    /// Prepares the rows; `noise_w` is the mean thermal power in each.
+    pub fn new(coordinates: &'a Coordinates, rows: &[Row], noise_w: f64) -> Likelihood<'a> {
+        let chirp = |row: &Row| Chirp {
+            ln_sigma0: row.sigma0.ln(),
+            noise: noise_w * row.sigma0 / row.power_w,
+            censored: row.censored,
+            nodes: true_angles(row.theta_rad, row.theta_sd_rad)
+                .into_iter()
+                .map(|(t, weight)| (Place::new(t), weight.ln()))
+                .collect(),
+        };
+        Likelihood { coordinates, chirps: rows.iter().map(chirp).collect() }
+    }
+
+    /// −ln likelihood, its gradient and a curvature.
+    pub fn local(&self, curvature: Curvature, at: &DVector<f64>) -> Local {
+        let tables = self.tables(at);
+        let parts: Vec<Local> = self
+            .chirps
+            .par_chunks(CHUNK)
+            .map(|chunk| {
+                let mut sum = Local::zero(at.len());
+                let mut scratch = Scratch::new(at.len());
+                for chirp in chunk {
+                    sum.value -= chirp.score(&tables, &mut scratch);
+                    sum.add(-1.0, 0.0, &scratch.score);
+                    match curvature {
+                        Curvature::Scores => sum.add(0.0, 1.0, &scratch.score),
+                        Curvature::FromAfar => sum.add(0.0, scratch.bend, &scratch.gradient),
+                    }
+                }
+                sum
+            })
+            .collect();
+        parts.into_iter().fold(Local::zero(at.len()), Local::merge)
+    }
+
+    fn tables(&self, at: &DVector<f64>) -> Tables {
+        let (by_coordinate, ln_sigma0) = rayon::join(
+            || derivatives(self.coordinates, at),
+            || Table::new(&self.coordinates.model(at)),
+        );
+        Tables { ln_sigma0, by_coordinate, law: GammaLaw::new(self.coordinates.looks(at)) }
+    }
+
+    /// For each row ln of the probability that the power is below what it is, given the fit.
+    pub fn ln_below(&self, at: &DVector<f64>) -> Vec<f64> {
+        let table = Table::new(&self.coordinates.model(at));
+        let law = GammaLaw::new(self.coordinates.looks(at));
+        let below = |chirp: &Chirp| {
+            let terms = chirp.nodes.iter().map(|(place, ln_weight)| {
+                ln_weight + law.below(chirp.ln_sigma0, chirp.ln_mean(&table, place)).value
+            });
+            ln_sum(&terms.collect::<Vec<_>>())
+        };
+        self.chirps.iter().map(below).collect()
+    }
+}
+
+/// Room for one chirp's sums.
+struct Scratch {
+    terms: Vec<f64>,
+    laws: Vec<(LnProbability, f64)>,
+    /// d ln p/du.
+    score: Vec<f64>,
+    /// Mean of d ln μ/du over the angles, and of −d² ln p/d(ln μ)².
+    gradient: Vec<f64>,
+    bend: f64,
+}
+
+impl Scratch {
+    fn new(len: usize) -> Scratch {
+        let (score, gradient) = (vec![0.0; len], vec![0.0; len]);
+        Scratch { terms: Vec::new(), laws: Vec::new(), score, gradient, bend: 0.0 }
+    }
+}
+
+impl Chirp {
+    fn ln_mean(&self, table: &Table, place: &Place) -> f64 {
+        let ln_sigma0 = table.at(place);
+        if self.noise > 0.0 { (ln_sigma0.exp() + self.noise).ln() } else { ln_sigma0 }
+    }
+
+    /// ln p of the chirp; its derivatives are left in `scratch.score`.
+    fn score(&self, tables: &Tables, scratch: &mut Scratch) -> f64 {
+        let Scratch { terms, laws, score, gradient, bend } = scratch;
+        terms.clear();
+        laws.clear();
+        for (place, ln_weight) in &self.nodes {
+            let ln_mean = self.ln_mean(&tables.ln_sigma0, place);
+            let law = match self.censored {
+                true => tables.law.below(self.ln_sigma0, ln_mean),
+                false => tables.law.detected(self.ln_sigma0, ln_mean),
+            };
+            terms.push(ln_weight + law.value);
+            // The share of σ⁰ in the mean, the rest being noise.
+            let share = if self.noise > 0.0 { 1.0 - self.noise / ln_mean.exp() } else { 1.0 };
+            laws.push((law, share));
+        }
+        let total = ln_sum(terms);
+        score.fill(0.0);
+        gradient.fill(0.0);
+        *bend = 0.0;
+        for (((place, _), term), (law, share)) in self.nodes.iter().zip(&*terms).zip(&*laws) {
+            let weight = (term - total).exp();
+            if weight < 1e-9 {
+                continue;
+            }
+            *bend += weight * law.bend;
+            for (index, table) in tables.by_coordinate.iter().enumerate() {
+                let Some(table) = table else {
+                    score[index] += weight * law.by_ln_looks;
+                    continue;
+                };
+                let slope = weight * share * table.at(place);
+                gradient[index] += slope;
+                score[index] += law.by_ln_mean * slope;
+            }
+        }
+        total
+    }
+}
+
+/// ln Σ exp.
+fn ln_sum(terms: &[f64]) -> f64 {
+    let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if largest == f64::NEG_INFINITY {
+        return largest;
+    }
+    largest + terms.iter().map(|term| (term - largest).exp()).sum::<f64>().ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::twin::{Twin, mixture};
+
+    #[test]
+    fn the_gradient_is_that_of_the_value() {
+        let start = mixture(0.06, 4.0, 0.04, 0.003);
+        let coordinates = Coordinates::new(&start, &[], &[], None).unwrap();
+        for noise_w in [0.0, 1e-11] {
+            let curve = Twin { rows: 200, ..Twin::default() }.curve(1);
+            let likelihood = Likelihood::new(&coordinates, &curve.rows, noise_w);
+            let at = coordinates.start();
+            let local = likelihood.local(Curvature::Scores, &at);
+            for index in 0..at.len() {
+                let value = |step: f64| {
+                    let mut there = at.clone();
+                    there[index] += step;
+                    likelihood.local(Curvature::Scores, &there).value
+                };
+                let slope = (value(1e-4) - value(-1e-4)) / 2e-4;
+                let found = local.gradient[index];
+                assert!((found - slope).abs() < 1e-3 * (1.0 + slope.abs()), "{found} {slope}");
+            }
+        }
+    }
+
+    #[test]
+    fn rows_below_their_own_power_are_uniform_under_the_truth() {
+        let twin = Twin { rows: 2000, threshold_dbm: -300.0, ..Twin::default() };
+        let curve = twin.curve(2);
+        let coordinates = Coordinates::new(&twin.model, &[], &[], Some(twin.looks)).unwrap();
+        let likelihood = Likelihood::new(&coordinates, &curve.rows, 0.0);
+        let mut shares: Vec<f64> =
+            likelihood.ln_below(&coordinates.start()).into_iter().map(f64::exp).collect();
+        shares.sort_by(f64::total_cmp);
+        let gap = shares.iter().enumerate().map(|(i, u)| (u - (i as f64 + 0.5) / 2000.0).abs());
+        // Kolmogorov: 1.95/√n is passed once in a thousand.
+        assert!(gap.fold(0.0, f64::max) < 1.95 / 2000f64.sqrt());
+    }
+}

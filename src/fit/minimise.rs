@@ -1,0 +1,242 @@
+//! Levenberg–Marquardt with bounds, on a dozen unknowns.
+//!
+//! A cost is known by its local quadratic: value, gradient g and a curvature H that is never
+//! negative (JᵀJ of least squares, the scores' outer products of a likelihood). A step solves
+//! (H + λ·diag H)·d = −g on the unknowns that are not held by a bound, λ falling with success and
+//! rising with failure (Marquardt 1963, DOI 10.1137/0111030). The end is where the Newton decrement
+//! gᵀH⁻¹g/2, the improvement that a full step still promises, is below a tolerance.
+
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+/// A cost near a point.
+#[derive(Clone, Debug)]
+pub(super) struct Local {
+    /// The cost.
+    pub value: f64,
+    /// Its gradient.
+    pub gradient: DVector<f64>,
+    /// A curvature that is symmetric and never negative.
+    pub curvature: DMatrix<f64>,
+}
+
+impl Local {
+    /// Nothing yet, for a sum.
+    pub fn zero(len: usize) -> Local {
+        let (gradient, curvature) = (DVector::zeros(len), DMatrix::zeros(len, len));
+        Local { value: 0.0, gradient, curvature }
+    }
+
+    /// Adds `first`·j to the gradient and `second`·j·jᵀ to the curvature.
+    pub fn add(&mut self, first: f64, second: f64, j: &[f64]) {
+        for (row, a) in j.iter().enumerate() {
+            self.gradient[row] += first * a;
+            for (column, b) in j.iter().enumerate() {
+                self.curvature[(row, column)] += second * a * b;
+            }
+        }
+    }
+
+    /// Adds another sum.
+    pub fn merge(mut self, other: Local) -> Local {
+        self.value += other.value;
+        self.gradient += other.gradient;
+        self.curvature += other.curvature;
+        self
+    }
+}
+
+/// Why a search ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stop {
+    /// No step promises an improvement: converged.
+    Stationary,
+    /// Every unknown is held by a bound: converged, but the bounds say so and not the data.
+    Bounded,
+    /// No step improves although one should.
+    Stuck,
+    /// The iterations ran out.
+    Iterations,
+    /// The cost has no number at the start.
+    NotFinite,
+}
+
+/// Search settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Minimise {
+    /// Most steps tried.
+    pub iterations: usize,
+    /// Promised improvement that is no longer worth a step, in the unit of the cost.
+    pub tolerance: f64,
+}
+
+/// Where a search ended.
+#[derive(Clone, Debug)]
+pub(super) struct Minimum {
+    /// The point.
+    pub at: DVector<f64>,
+    /// The cost there.
+    pub local: Local,
+    /// Steps tried.
+    pub iterations: usize,
+    /// Why it ended.
+    pub stop: Stop,
+}
+
+/// Smallest, first and largest damping λ, and how it falls and rises.
+const DAMPING: [f64; 3] = [1e-9, 1e-3, 1e9];
+const EASE: f64 = 0.2;
+const TIGHTEN: f64 = 6.0;
+
+impl Minimise {
+    /// Searches from `start` within `[lower, upper]`; equal bounds hold an unknown.
+    pub fn run(
+        &self,
+        start: &DVector<f64>,
+        [lower, upper]: [&DVector<f64>; 2],
+        cost: impl Fn(&DVector<f64>) -> Local,
+    ) -> Minimum {
+        let mut at = clamped(start, lower, upper);
+        let mut local = cost(&at);
+        let mut damping = DAMPING[1];
+        let mut iterations = 0;
+        let stop = loop {
+            if !local.value.is_finite() {
+                break Stop::NotFinite;
+            }
+            let free = free(&at, &local.gradient, lower, upper);
+            if free.is_empty() {
+                break Stop::Bounded;
+            }
+            if self.is_done(&local, &free) {
+                break Stop::Stationary;
+            }
+            if damping > DAMPING[2] {
+                break Stop::Stuck;
+            }
+            if iterations == self.iterations {
+                break Stop::Iterations;
+            }
+            iterations += 1;
+            let next = clamped(&(&at + step(&local, &free, damping)), lower, upper);
+            let there = cost(&next);
+            if there.value < local.value {
+                (at, local) = (next, there);
+                damping = (damping * EASE).max(DAMPING[0]);
+            } else {
+                damping *= TIGHTEN;
+            }
+        };
+        Minimum { at, local, iterations, stop }
+    }
+
+    fn is_done(&self, local: &Local, free: &[usize]) -> bool {
+        let newton = step(local, free, DAMPING[0]);
+        -0.5 * local.gradient.dot(&newton) < self.tolerance
+    }
+}
+
+impl Minimum {
+    /// Whether the search ended where the cost is least nearby.
+    pub fn converged(&self) -> bool {
+        matches!(self.stop, Stop::Stationary | Stop::Bounded)
+    }
+}
+
+fn clamped(at: &DVector<f64>, lower: &DVector<f64>, upper: &DVector<f64>) -> DVector<f64> {
+    at.zip_zip_map(lower, upper, |x, low, high| x.max(low).min(high))
+}
+
+/// Unknowns that no bound holds: those inside, and those that want to go inside.
+fn free(
+    at: &DVector<f64>,
+    gradient: &DVector<f64>,
+    lower: &DVector<f64>,
+    upper: &DVector<f64>,
+) -> Vec<usize> {
+    let is_free = |&i: &usize| {
+        let held_below = at[i] <= lower[i] && gradient[i] >= 0.0;
+        let held_above = at[i] >= upper[i] && gradient[i] <= 0.0;
+        lower[i] < upper[i] && !held_below && !held_above
+    };
+    (0..at.len()).filter(is_free).collect()
+}
+
+fn step(local: &Local, free: &[usize], damping: f64) -> DVector<f64> {
+    let count = free.len();
+    let largest = free.iter().map(|&i| local.curvature[(i, i)]).fold(0.0, f64::max);
+    let matrix = DMatrix::from_fn(count, count, |row, column| {
+        let entry = local.curvature[(free[row], free[column])];
+        let ridge = damping * entry + 1e-14 * largest + f64::MIN_POSITIVE;
+        if row == column { entry + ridge } else { entry }
+    });
+    let downhill = DVector::from_fn(count, |row, _| -local.gradient[free[row]]);
+    let solved = matrix.cholesky().map(|c| c.solve(&downhill));
+    let mut step = DVector::zeros(local.gradient.len());
+    for (&i, d) in free.iter().zip(solved.unwrap_or(downhill).iter()) {
+        step[i] = *d;
+    }
+    step
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SEARCH: Minimise = Minimise { iterations: 200, tolerance: 1e-14 };
+
+    fn add_residual(local: &mut Local, residual: f64, jacobian: &[f64]) {
+        local.value += 0.5 * residual * residual;
+        local.add(residual, 1.0, jacobian);
+    }
+
+    /// Rosenbrock's valley: residuals 10(y − x²) and 1 − x.
+    fn valley(at: &DVector<f64>) -> Local {
+        let mut local = Local::zero(2);
+        add_residual(&mut local, 10.0 * (at[1] - at[0] * at[0]), &[-20.0 * at[0], 10.0]);
+        add_residual(&mut local, 1.0 - at[0], &[-1.0, 0.0]);
+        local
+    }
+
+    fn vector(values: [f64; 2]) -> DVector<f64> {
+        DVector::from_row_slice(&values)
+    }
+
+    #[test]
+    fn the_valley_is_followed_to_its_end() {
+        let bounds = [&vector([-5.0, -5.0]), &vector([5.0, 5.0])];
+        let found = SEARCH.run(&vector([-1.2, 1.0]), bounds, valley);
+        assert_eq!(found.stop, Stop::Stationary);
+        assert!((found.at - vector([1.0, 1.0])).norm() < 1e-6);
+    }
+
+    #[test]
+    fn a_bound_holds_and_the_rest_still_moves() {
+        let bounds = [&vector([-5.0, -5.0]), &vector([0.5, 5.0])];
+        let found = SEARCH.run(&vector([-1.2, 1.0]), bounds, valley);
+        assert!(found.converged());
+        assert!((found.at - vector([0.5, 0.25])).norm() < 1e-6);
+    }
+
+    #[test]
+    fn a_held_unknown_stays_and_no_number_is_said() {
+        let bounds = [&vector([2.0, -5.0]), &vector([2.0, 5.0])];
+        let found = SEARCH.run(&vector([2.0, 0.0]), bounds, valley);
+        assert!((found.at - vector([2.0, 4.0])).norm() < 1e-6);
+        let nan = |_: &DVector<f64>| Local { value: f64::NAN, ..Local::zero(2) };
+        assert_eq!(SEARCH.run(&vector([2.0, 0.0]), bounds, nan).stop, Stop::NotFinite);
+    }
+
+    #[test]
+    fn a_flat_direction_does_not_stop_the_rest() {
+        let flat = |at: &DVector<f64>| {
+            let mut local = Local::zero(2);
+            add_residual(&mut local, at[0] + at[1] - 1.0, &[1.0, 1.0]);
+            local
+        };
+        let bounds = [&vector([-5.0, -5.0]), &vector([5.0, 5.0])];
+        let found = SEARCH.run(&vector([3.0, 1.0]), bounds, flat);
+        assert!(found.converged() && found.local.value < 1e-12);
+    }
+}

@@ -1,0 +1,177 @@
+//! Searches from several starts, for each method.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::coordinates::Coordinates;
+use super::interval::{End, Profile};
+use super::least_squares::{self, Deviations};
+use super::likelihood::{Curvature, Likelihood};
+use super::minimise::{Local, Minimise, Minimum, Stop};
+use super::uncertainty::{Uncertainty, observed_information};
+use super::{Fit, Method};
+use crate::measure::curve::Row;
+use crate::radar::random::{Key, Purpose};
+
+/// Most steps of one search.
+const ITERATIONS: usize = 200;
+/// ln likelihood that is no longer worth a step: a thousandth of what moves an interval.
+const LIKELIHOOD_TOLERANCE: f64 = 1e-6;
+/// Steps of the approach with held looks, and the ln likelihood that ends it.
+const APPROACH: usize = 40;
+const NEAR: f64 = 1.0;
+/// Cost that is no longer worth a step in least squares, whose parameters are compared with other programs'.
+const SQUARES_TOLERANCE: f64 = 1e-8;
+/// Loss of cost that still counts as the same optimum.
+const SAME: f64 = 0.01;
+
+/// What a search found.
+pub(super) struct Found {
+    pub best: Minimum,
+    pub agreeing: usize,
+    pub uncertainty: Uncertainty,
+    /// Profile intervals; empty for least squares.
+    pub profiles: Vec<Option<[End; 2]>>,
+}
+
+impl Fit {
+    /// Searches with this fit's method.
+    pub(super) fn search(&self, coordinates: &Coordinates, rows: &[Row]) -> Found {
+        match self.method {
+            Method::Censored => self.search_likelihood(coordinates, rows),
+            Method::Tls { theta_sd_rad, level_sd_db } => {
+                let deviations = Deviations { theta_sd_rad, level_sd_db };
+                let cost =
+                    |at: &DVector<f64>| least_squares::local(coordinates, rows, deviations, at);
+                let search = squares_search();
+                let (best, agreeing) = self
+                    .best(coordinates, |start| search_freely(&search, coordinates, start, cost));
+                squares_found(coordinates, rows, best, agreeing)
+            }
+            Method::Mse { split_rad } => {
+                let (best, agreeing) =
+                    self.best(coordinates, |start| pieces(coordinates, rows, split_rad, start));
+                squares_found(coordinates, rows, best, agreeing)
+            }
+        }
+    }
+
+    fn search_likelihood(&self, coordinates: &Coordinates, rows: &[Row]) -> Found {
+        let likelihood = Likelihood::new(coordinates, rows, self.noise_w.unwrap_or(0.0));
+        let cost = |at: &DVector<f64>| likelihood.local(Curvature::Scores, at);
+        let far = |at: &DVector<f64>| likelihood.local(Curvature::FromAfar, at);
+        let approach = Minimise { iterations: APPROACH, tolerance: NEAR };
+        let search = Minimise { iterations: ITERATIONS, tolerance: LIKELIHOOD_TOLERANCE };
+        // With free looks a far start is explained by wild speckle before it is improved.
+        let (best, agreeing) = self.best(coordinates, |start| {
+            let [lower, upper] = coordinates.holding_looks(start);
+            let near = approach.run(start, [&lower, &upper], far);
+            search_freely(&search, coordinates, &near.at, cost)
+        });
+        let information = observed_information(coordinates, &best.at, &best.local, cost);
+        let uncertainty = Uncertainty::new(coordinates, &best.at, &information);
+        let search = Minimise { tolerance: 1e3 * LIKELIHOOD_TOLERANCE, ..search };
+        let profile = Profile { coordinates, best: &best, uncertainty: &uncertainty, search, cost };
+        let interval = |index: usize| {
+            let wanted = best.converged() && uncertainty.is_identified(index);
+            wanted.then(|| profile.interval(index)).flatten()
+        };
+        let profiles = (0..coordinates.len()).map(interval).collect();
+        Found { best, agreeing, uncertainty, profiles }
+    }
+
+    /// The least of all starts, and how many came as far.
+    fn best(
+        &self,
+        coordinates: &Coordinates,
+        search: impl Fn(&DVector<f64>) -> Minimum,
+    ) -> (Minimum, usize) {
+        let mut best = search(&coordinates.start());
+        let mut costs = vec![best.local.value];
+        for number in 1..self.starts {
+            let found = search(&self.drawn_start(coordinates, number));
+            costs.push(found.local.value);
+            let improves = found.local.value < best.local.value || !best.local.value.is_finite();
+            if improves && found.local.value.is_finite() {
+                best = found;
+            }
+        }
+        let near = |cost: &&f64| **cost - best.local.value <= SAME;
+        let agreeing = costs.iter().filter(near).count();
+        (best, agreeing)
+    }
+
+    fn drawn_start(&self, coordinates: &Coordinates, number: usize) -> DVector<f64> {
+        let key = Key { seed: self.seed, chirp: number as u64, sub_ray: 1, purpose: Purpose::Fit };
+        let mut draws = key.draws();
+        let start = coordinates.start();
+        let moved = |(u, c): (&f64, &super::coordinates::Coordinate)| {
+            u + c.spread() * (2.0 * draws.uniform() - 1.0)
+        };
+        DVector::from_iterator(start.len(), start.iter().zip(&coordinates.list).map(moved))
+    }
+}
+
+fn squares_search() -> Minimise {
+    Minimise { iterations: ITERATIONS, tolerance: SQUARES_TOLERANCE }
+}
+
+fn search_freely(
+    search: &Minimise,
+    coordinates: &Coordinates,
+    start: &DVector<f64>,
+    cost: impl Fn(&DVector<f64>) -> Local,
+) -> Minimum {
+    search.run(start, [&coordinates.lower(), &coordinates.upper()], cost)
+}
+
+/// Information of least squares: the curvature over the residuals' own variance.
+fn squares_found(coordinates: &Coordinates, rows: &[Row], best: Minimum, agreeing: usize) -> Found {
+    let detected = rows.iter().filter(|row| !row.censored).count();
+    let spare = (detected - coordinates.len().min(detected)).max(1) as f64;
+    let variance = (2.0 * best.local.value / spare).max(f64::MIN_POSITIVE);
+    let information = &best.local.curvature / variance;
+    let uncertainty = Uncertainty::new(coordinates, &best.at, &information);
+    Found { best, agreeing, uncertainty, profiles: Vec::new() }
+}
+
+/// Specular coordinates below the split, then diffuse ones above it; all at once without pieces.
+fn pieces(
+    coordinates: &Coordinates,
+    rows: &[Row],
+    split_rad: f64,
+    start: &DVector<f64>,
+) -> Minimum {
+    let Some(diffuse) = coordinates.is_diffuse() else {
+        let all = vec![true; start.len()];
+        return piece(coordinates, rows, &all, start);
+    };
+    let specular: Vec<bool> = diffuse.iter().map(|is_diffuse| !is_diffuse).collect();
+    let (near, far): (Vec<Row>, Vec<Row>) = rows.iter().partition(|row| row.theta_rad < split_rad);
+    let first = piece(coordinates, &near, &specular, start);
+    let second = piece(coordinates, &far, &diffuse, &first.at);
+    Minimum {
+        iterations: first.iterations + second.iterations,
+        stop: if first.converged() { second.stop } else { first.stop },
+        at: second.at,
+        local: first.local.merge(second.local),
+    }
+}
+
+/// Least squares of some coordinates on some rows; a piece without rows stays at its start.
+fn piece(coordinates: &Coordinates, rows: &[Row], moves: &[bool], start: &DVector<f64>) -> Minimum {
+    const DB: Deviations = Deviations { theta_sd_rad: 0.0, level_sd_db: 1.0 };
+    let (mut lower, mut upper) = (coordinates.lower(), coordinates.upper());
+    let start = start.zip_zip_map(&lower, &upper, |u, low, high| u.max(low).min(high));
+    for (index, _) in moves.iter().enumerate().filter(|(_, moves)| !**moves) {
+        (lower[index], upper[index]) = (start[index], start[index]);
+    }
+    let cost = |at: &DVector<f64>| least_squares::local(coordinates, rows, DB, at);
+    let mut found = squares_search().run(&start, [&lower, &upper], cost);
+    let mask = DVector::from_iterator(moves.len(), moves.iter().map(|&m| f64::from(u8::from(m))));
+    let mask: DMatrix<f64> = &mask * mask.transpose();
+    found.local.curvature.component_mul_assign(&mask);
+    if found.stop == Stop::Bounded && !moves.contains(&true) {
+        found.stop = Stop::Stationary;
+    }
+    found
+}

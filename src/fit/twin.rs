@@ -1,0 +1,76 @@
+//! Synthetic curves of a known truth, drawn by steps that share nothing with the fits.
+//!
+//! A measured angle uniform over the scan, a true normal tilted away from it in two directions, a
+//! Gamma factor of speckle, a threshold in power at 8 m: (measured tilt) + (error) is the truth, as for a
+//! mesh that smooths a rough surface.
+
+use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Scattering, Shadowing};
+use crate::measure::curve::{Curve, Row};
+use crate::radar::random::{Key, Purpose};
+use crate::radar::{Link, Radar};
+use crate::units::watts_from_dbm;
+
+const RANGE_M: f64 = 8.0;
+
+/// The paper's five parameters from those that backscatter sees, with k = 0.1.
+pub(super) fn mixture(m: f64, alpha: f64, s: f64, r: f64) -> Brdf {
+    let specular = CookTorrance {
+        f_lambda: s / 0.9,
+        m,
+        m_across: None,
+        distribution: Distribution::Beckmann,
+        shadowing: Shadowing::Separable,
+    };
+    let diffuse = Brdf::BlinnPhong(BlinnPhong { r_s: r / 0.1, alpha });
+    let specular = Box::new(Brdf::CookTorrance(specular));
+    Brdf::Mixture(Mixture { k: 0.1, diffuse: Box::new(diffuse), specular })
+}
+
+/// A truth and how it is looked at.
+#[derive(Clone, Debug)]
+pub(super) struct Twin {
+    pub model: Brdf,
+    pub rows: usize,
+    pub looks: f64,
+    pub theta_sd_deg: f64,
+    pub threshold_dbm: f64,
+    pub theta_deg: [f64; 2],
+}
+
+impl Default for Twin {
+    fn default() -> Self {
+        Twin {
+            model: mixture(0.07, 6.0, 0.05, 0.0016),
+            rows: 1500,
+            looks: 1.0,
+            theta_sd_deg: 2.0,
+            threshold_dbm: -77.0,
+            theta_deg: [0.0, 70.0],
+        }
+    }
+}
+
+impl Twin {
+    /// A curve of this truth.
+    pub fn curve(&self, seed: u64) -> Curve {
+        Curve { rows: (0..self.rows as u32).map(|chirp| self.row(seed, chirp)).collect() }
+    }
+
+    fn row(&self, seed: u64, chirp: u32) -> Row {
+        let key = Key { seed, chirp: u64::from(chirp), sub_ray: 0, purpose: Purpose::Speckle };
+        let mut draws = key.draws();
+        let [from, to] = self.theta_deg;
+        let theta_rad = (from + (to - from) * draws.uniform()).to_radians();
+        let theta_sd_rad = self.theta_sd_deg.to_radians();
+        let tilt = draws.complex_gaussian() * std::f64::consts::SQRT_2 * theta_sd_rad;
+        let truth_rad = (theta_rad + tilt.re).hypot(tilt.im).min(1.57);
+        let ratio =
+            Link::new(&Radar::default()).power_w(RANGE_M, 1.0, 1.0) / (4.0 * std::f64::consts::PI);
+        let received_w = ratio * self.model.sigma0(truth_rad) * draws.gamma(self.looks);
+        let threshold_w = watts_from_dbm(self.threshold_dbm);
+        let power_w = received_w.max(threshold_w);
+        let censored = received_w < threshold_w;
+        let sigma0 = power_w / ratio;
+        Row { theta_rad, theta_sd_rad, power_w, sigma0, range_m: RANGE_M, chirp, censored }
+    }
+}

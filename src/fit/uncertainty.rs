@@ -1,0 +1,114 @@
+//! What the data know of each coordinate: covariance from the information, and what it cannot tell.
+//!
+//! The information, scaled to a unit diagonal, has the singular values that the result reports. A
+//! direction whose singular value is a millionth of the largest, or less, is one that the data
+//! do not see: its coordinates have no standard deviation, only their combination across it.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::coordinates::Coordinates;
+use super::minimise::Local;
+
+/// Relative singular value of a direction that the data do not see.
+const UNSEEN: f64 = 1e-6;
+/// Share of a unit vector above which a coordinate takes part in a direction.
+const TAKES_PART: f64 = 0.1;
+
+/// Covariance in the search and what is not known.
+#[derive(Clone, Debug)]
+pub(super) struct Uncertainty {
+    /// In the search; zero for coordinates held by a bound and along unseen directions.
+    pub covariance: DMatrix<f64>,
+    /// Of the scaled information, largest first.
+    pub singular_values: Vec<f64>,
+    /// For each coordinate, whether a bound holds it.
+    pub bounded: Vec<bool>,
+    /// Groups of coordinates that act only together.
+    pub together: Vec<Vec<usize>>,
+    /// Coordinates with a standard deviation wider than their range.
+    pub loose: Vec<usize>,
+}
+
+impl Uncertainty {
+    /// Reads the information at a point of the search.
+    pub fn new(coordinates: &Coordinates, at: &DVector<f64>, information: &DMatrix<f64>) -> Self {
+        let ends: Vec<[f64; 2]> = coordinates.list.iter().map(|c| c.ends()).collect();
+        let bounded: Vec<bool> = (ends.iter().zip(at.iter()))
+            .map(|([low, high], u)| u - low < 1e-9 || high - u < 1e-9)
+            .collect();
+        let free: Vec<usize> = (0..at.len()).filter(|&i| !bounded[i]).collect();
+        // A coordinate that the data do not see at all must not be scaled up to one that they do.
+        let scale: Vec<f64> = (free.iter())
+            .map(|&i| information[(i, i)].max((ends[i][1] - ends[i][0]).powi(-2)).sqrt())
+            .collect();
+        let scaled = DMatrix::from_fn(free.len(), free.len(), |a, b| {
+            information[(free[a], free[b])] / (scale[a] * scale[b])
+        });
+        let mut found = Uncertainty {
+            covariance: DMatrix::zeros(at.len(), at.len()),
+            singular_values: Vec::new(),
+            bounded,
+            together: Vec::new(),
+            loose: Vec::new(),
+        };
+        found.read(&free, &scale, scaled);
+        let is_loose = |i: &usize| found.deviation(*i) > ends[*i][1] - ends[*i][0];
+        found.loose = free.iter().copied().filter(is_loose).collect();
+        found
+    }
+
+    fn read(&mut self, free: &[usize], scale: &[f64], scaled: DMatrix<f64>) {
+        let eigen = scaled.symmetric_eigen();
+        let largest = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
+        for (value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            self.singular_values.push(value.abs());
+            if *value <= UNSEEN * largest {
+                let parts = free.iter().zip(direction.iter());
+                let parts = parts.filter(|(_, part)| part.abs() > TAKES_PART);
+                self.together.push(parts.map(|(&i, _)| i).collect());
+                continue;
+            }
+            for (a, &i) in free.iter().enumerate() {
+                for (b, &j) in free.iter().enumerate() {
+                    self.covariance[(i, j)] +=
+                        direction[a] * direction[b] / (value * scale[a] * scale[b]);
+                }
+            }
+        }
+        self.singular_values.sort_by(|a, b| b.total_cmp(a));
+    }
+
+    /// Standard deviation of a coordinate in the search.
+    pub fn deviation(&self, index: usize) -> f64 {
+        self.covariance[(index, index)].max(0.0).sqrt()
+    }
+
+    /// Whether the data know a coordinate by itself.
+    pub fn is_identified(&self, index: usize) -> bool {
+        let apart = !self.together.iter().any(|group| group.contains(&index));
+        apart && !self.bounded[index] && !self.loose.contains(&index)
+    }
+}
+
+/// The observed information: the second derivatives of a cost, by differences of its gradient over
+/// a tenth of a standard deviation.
+pub(super) fn observed_information(
+    coordinates: &Coordinates,
+    at: &DVector<f64>,
+    local: &Local,
+    cost: impl Fn(&DVector<f64>) -> Local,
+) -> DMatrix<f64> {
+    let (lower, upper) = (coordinates.lower(), coordinates.upper());
+    let mut information = DMatrix::zeros(at.len(), at.len());
+    for index in 0..at.len() {
+        let step = (0.1 / local.curvature[(index, index)].sqrt()).clamp(1e-5, 0.1);
+        let moved = |step: f64| {
+            let mut there = at.clone();
+            there[index] = (at[index] + step).max(lower[index]).min(upper[index]);
+            (there[index], cost(&there).gradient)
+        };
+        let ((high, above), (low, below)) = (moved(step), moved(-step));
+        information.set_column(index, &((above - below) / (high - low)));
+    }
+    0.5 * (&information + information.transpose())
+}

@@ -1,0 +1,182 @@
+//! What a fit cannot promise, in sentences.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::minimise::Stop;
+use crate::units::shown;
+
+/// One thing that the reader of a fit must know.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "finding", rename_all = "kebab-case")]
+pub enum Finding {
+    /// Only products of three parameters were found; k was chosen.
+    Gauge {
+        /// The chosen k.
+        k: f64,
+    },
+    /// The search did not end at an optimum.
+    NotConverged {
+        /// Why it ended.
+        stop: Stop,
+    },
+    /// Other starts ended elsewhere with a worse cost.
+    StartsDisagree {
+        /// Starts that reached the best.
+        agreeing: usize,
+        /// All starts.
+        starts: usize,
+    },
+    /// No detection near normal incidence.
+    NoSpecularRows {
+        /// Where the specular part ends, degrees.
+        below_deg: f64,
+    },
+    /// No detection away from normal incidence.
+    NoDiffuseRows {
+        /// Where the diffuse part begins, degrees.
+        above_deg: f64,
+    },
+    /// Censored rows that the method does not use.
+    CensoredIgnored {
+        /// How many.
+        censored: usize,
+        /// Of how many.
+        rows: usize,
+    },
+    /// A number stopped at the end of its range.
+    AtBound {
+        /// Its name.
+        name: String,
+        /// The end.
+        value: f64,
+    },
+    /// The data see only a combination.
+    OnlyTogether {
+        /// Whose.
+        names: Vec<String>,
+    },
+    /// The data say nothing of a number.
+    Unconstrained {
+        /// Its name.
+        name: String,
+    },
+    /// Two numbers that could replace each other.
+    HardToTellApart {
+        /// The two.
+        names: [String; 2],
+        /// Their correlation.
+        correlation: f64,
+    },
+    /// An interval ends where the range ends and not where the data refuse.
+    OpenInterval {
+        /// Whose.
+        name: String,
+        /// The end of the range.
+        value: f64,
+    },
+    /// The fitted model is outside its own range.
+    OutOfRange {
+        /// What is wrong.
+        problem: String,
+    },
+    /// The law of the fit does not explain the rows.
+    PoorFit {
+        /// Distance of the residuals' law from the expected.
+        ks_distance: f64,
+        /// The largest that chance explains once in a hundred times.
+        limit: f64,
+    },
+}
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Finding::Gauge { k } => write!(
+                f,
+                "backscatter sees f_lambda and k only as S = (1 - k) f_lambda, r_s and k only as \
+                 R = k r_s, both up to the calibration; k = {} was chosen",
+                rounded(*k)
+            ),
+            Finding::NotConverged { stop } => {
+                let why = match stop {
+                    Stop::Iterations => "the iterations ran out",
+                    Stop::NotFinite => "the cost has no number",
+                    _ => "no step improves although one should",
+                };
+                write!(f, "the search did not converge: {why}; do not use the numbers")
+            }
+            Finding::StartsDisagree { agreeing, starts } => write!(
+                f,
+                "{agreeing} of {starts} starts reached the best fit; other fits are nearly as good or \
+                 the search is hard"
+            ),
+            Finding::NoSpecularRows { below_deg } => write!(
+                f,
+                "no detection below {} degrees: the data do not show the specular part",
+                rounded(*below_deg)
+            ),
+            Finding::NoDiffuseRows { above_deg } => write!(
+                f,
+                "no detection above {} degrees: the data do not show the diffuse part",
+                rounded(*above_deg)
+            ),
+            Finding::CensoredIgnored { censored, rows } => write!(
+                f,
+                "{censored} of {rows} rows are below the threshold and least squares ignores them: its \
+                 tail is too flat"
+            ),
+            Finding::AtBound { name, value } => {
+                write!(f, "{name} stopped at its bound {}", rounded(*value))
+            }
+            Finding::OnlyTogether { names } => {
+                write!(f, "{} act only together: the data tell their combination", list(names))
+            }
+            Finding::Unconstrained { name } => write!(f, "the data say nothing of {name}"),
+            Finding::HardToTellApart { names: [a, b], correlation } => {
+                write!(f, "{a} and {b} are hard to tell apart: correlation {correlation:.3}")
+            }
+            Finding::OpenInterval { name, value } => {
+                write!(f, "the data do not limit {name} before its bound {}", rounded(*value))
+            }
+            Finding::OutOfRange { problem } => {
+                write!(f, "{problem}: the level asks for a calibration of the radar")
+            }
+            Finding::PoorFit { ks_distance, limit } => write!(
+                f,
+                "the model does not explain the data: the residuals are {ks_distance:.3} away from \
+                 their law, chance explains {limit:.3}"
+            ),
+        }
+    }
+}
+
+fn rounded(value: f64) -> String {
+    shown(format!("{value:.4e}").parse().unwrap_or(value))
+}
+
+fn list(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => one.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn findings_are_sentences_about_named_things() {
+        let names = ["k", "specular.f_lambda", "diffuse.r_s"].map(str::to_owned).to_vec();
+        let text = Finding::OnlyTogether { names }.to_string();
+        assert!(
+            text.starts_with("k, specular.f_lambda and diffuse.r_s act only together"),
+            "{text}"
+        );
+        let text = Finding::AtBound { name: "specular.m".to_owned(), value: 2.0 }.to_string();
+        assert_eq!(text, "specular.m stopped at its bound 2");
+    }
+}
