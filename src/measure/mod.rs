@@ -5,29 +5,25 @@
 
 pub mod cloud;
 pub mod cloud_file;
-pub mod curve;
 mod coarse;
+pub mod curve;
 pub mod icp;
-
 pub mod incidence;
 pub mod nearest;
 pub mod normals;
-
 pub mod placed;
-
 pub mod reduce;
 pub mod register;
 mod sights;
 pub mod start;
-mod uncertainty;
-mod view;
 #[cfg(test)]
 mod synthetic;
+mod uncertainty;
+mod view;
 
 pub use cloud::{Cloud, CloudError, CloudPoint};
 pub use cloud_file::{CloudFormat, CloudReading, PowerUnit};
 pub use curve::{Curve, Row};
-
 pub use incidence::{Incidence, Sighting};
 pub use reduce::{LeftOut, Reduced, Reduction, ReductionError};
 pub use register::{Metric, Registered, Registration, RegistrationError, Stop};

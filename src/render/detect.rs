@@ -7,7 +7,7 @@
 use num_complex::Complex;
 
 use super::path::Path;
-use super::{Observer, RenderError, Setup};
+use super::{Beats, Observer, RenderError, Setup};
 use crate::radar::noise::measured_w;
 use crate::radar::random::{Draws, Key, Purpose};
 use crate::radar::{Chirp, Detection, Noise, RangeProcessor, Return, Speckle};
@@ -89,23 +89,14 @@ impl Detector {
     }
 
     /// The beat signals of a chirp, one for each look; none without a receiver.
-    pub fn beats(
-        &self,
-        chirp: usize,
-        paths: &[Path],
-    ) -> Result<Vec<Vec<Complex<f64>>>, RenderError> {
+    pub fn beats(&self, chirp: usize, paths: &[Path]) -> Result<Beats, RenderError> {
         match &self.kind {
             Kind::Beat(beat) => self.signals(beat, chirp, paths),
             _ => Ok(Vec::new()),
         }
     }
 
-    fn signals(
-        &self,
-        beat: &Beat,
-        chirp: usize,
-        paths: &[Path],
-    ) -> Result<Vec<Vec<Complex<f64>>>, RenderError> {
+    fn signals(&self, beat: &Beat, chirp: usize, paths: &[Path]) -> Result<Beats, RenderError> {
         let mut phases = self.draws(chirp, Purpose::SurfacePhase);
         let mut noise = self.draws(chirp, Purpose::Noise);
         let together = beat.together(paths);

@@ -231,6 +231,9 @@ pub fn shade(
     })
 }
 
+/// The sampled beat signals of one chirp, √W, one for each look.
+pub type Beats = Vec<Vec<Complex<f64>>>;
+
 /// The sampled beat signals of a scan at an antenna, chirp after chirp and look after look, as its
 /// receiver has them; none without a `[radar.receiver]`.
 ///
@@ -240,7 +243,7 @@ pub fn beat_signals(
     setup: &Setup,
     footprints: &Footprints,
     observer: Observer,
-) -> Result<impl Iterator<Item = Result<Vec<Vec<Complex<f64>>>, RenderError>>, RenderError> {
+) -> Result<impl Iterator<Item = Result<Beats, RenderError>>, RenderError> {
     check(setup, footprints, observer)?;
     let detector = Detector::new(setup, observer)?;
     let paths = Paths::new(setup, observer);
