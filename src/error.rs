@@ -55,8 +55,13 @@ pub enum Error {
     #[error(transparent)]
     Format(#[from] FormatError),
     /// A measured cloud was refused.
-    #[error(transparent)]
-    Cloud(#[from] CloudError),
+    #[error("{}: {error}", file.display())]
+    Cloud {
+        /// The cloud's file.
+        file: PathBuf,
+        /// What is wrong.
+        error: CloudError,
+    },
     /// There is no pose.
     #[error(transparent)]
     Registration(#[from] RegistrationError),

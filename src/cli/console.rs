@@ -40,6 +40,14 @@ impl Console {
         }
     }
 
+    /// A sign of life for work without known steps; invisible like [`progress`](Self::progress).
+    pub fn spinner(&self, what: &'static str) -> ProgressBar {
+        let bar = self.progress(what, 0);
+        bar.set_style(ProgressStyle::default_spinner());
+        bar.enable_steady_tick(std::time::Duration::from_millis(100));
+        bar
+    }
+
     /// A progress bar over `total` steps; invisible when standard error is no terminal.
     pub fn progress(&self, what: &'static str, total: usize) -> ProgressBar {
         let target = match self.quiet {

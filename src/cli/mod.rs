@@ -1,17 +1,21 @@
 //! The command line: one command per file. Flags die here; the library takes plain values.
 
 mod add;
+mod cloud;
+mod compare;
 mod completions;
 mod database;
 mod console;
 mod list;
 mod materials;
+mod measure;
 mod output;
 mod plot;
 mod radar;
 mod render;
 mod rm;
 mod show;
+mod staging;
 mod summary;
 
 use std::path::PathBuf;
@@ -58,6 +62,8 @@ struct Options {
 enum Command {
     Render(render::Args),
     Radar(radar::Args),
+    Measure(measure::Args),
+    Compare(compare::Args),
     Add(add::Args),
     List(list::Args),
     Show(show::Args),
@@ -77,6 +83,8 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
     match &cli.command {
         Command::Render(args) => render::run(args, db, &console),
         Command::Radar(args) => radar::run(args, &console),
+        Command::Measure(args) => measure::run(args, &console),
+        Command::Compare(args) => compare::run(args, db, &console),
         Command::Add(args) => add::run(args, db, &console),
         Command::List(_) => list::run(db, &console),
         Command::Show(args) => show::run(args, db, &console),

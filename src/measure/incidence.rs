@@ -43,6 +43,11 @@ impl<'a> Incidence<'a> {
         Incidence { traced, target, registered, facet_tilt_rad2, extra_sd_rad }
     }
 
+    /// The same for a target that is its facets and not a surface that they stand for.
+    pub fn of_facets(self) -> Incidence<'a> {
+        Incidence { facet_tilt_rad2: vec![0.0; self.target.mesh.facets.len()], ..self }
+    }
+
     /// Where a ray meets the target; `None` where it misses.
     pub fn look(&self, ray: &Ray<Global>) -> Option<Sighting> {
         let Seen { hit, normal } = self.traced.look(&self.registered.pose, ray)?;

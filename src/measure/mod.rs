@@ -6,6 +6,7 @@
 pub mod cloud;
 pub mod cloud_file;
 mod coarse;
+pub mod compare;
 pub mod curve;
 pub mod icp;
 pub mod incidence;

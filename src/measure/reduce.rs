@@ -37,6 +37,9 @@ pub struct Reduction {
     pub edge_margin_m: Option<f64>,
     /// A further standard deviation of each tilt of the normal, rad.
     pub extra_sd_rad: f64,
+    /// The target is the facets of the mesh, as in a simulation, and not a surface that they stand
+    /// for: their normals have no error.
+    pub exact_mesh: bool,
 }
 
 /// A curve and what did not enter it.
@@ -175,7 +178,10 @@ impl Reduction {
         const LEAST_RMS_M: f64 = 1e-3;
         const GATE_SD: f64 = 5.0;
         Bench {
-            incidence: Incidence::new(target, registered, self.extra_sd_rad),
+            incidence: match self.exact_mesh {
+                false => Incidence::new(target, registered, self.extra_sd_rad),
+                true => Incidence::new(target, registered, self.extra_sd_rad).of_facets(),
+            },
             link: Link::new(radar),
             region: self.region,
             margin_m: self.edge_margin_m.unwrap_or(radar.spot_diameter_m),

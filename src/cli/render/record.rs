@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 
 use super::views::View;
 use crate::cli::materials::Found;
+use crate::cli::staging::Used;
 use crate::geometry::Raster;
 use crate::render::{Scan, Truth};
 use crate::scene::{MeshReport, Scene};
@@ -97,12 +98,6 @@ pub(super) struct PowerRange {
     pub weakest: f64,
     pub median: f64,
     pub strongest: f64,
-}
-
-/// A material as one scene uses it.
-pub(super) struct Used {
-    pub found: Found,
-    pub scattering: crate::brdf::Brdf,
 }
 
 impl<'a> Record<'a> {

@@ -70,6 +70,33 @@ pub enum Shape {
     Text(Text),
 }
 
+impl Drawing {
+    /// This page with another one to its right.
+    pub fn beside(mut self, mut right: Drawing) -> Drawing {
+        let by_px = self.width_px.ceil();
+        right.shapes.iter_mut().for_each(|shape| shape.move_right(by_px));
+        self.shapes.append(&mut right.shapes);
+        Drawing {
+            width_px: by_px + right.width_px,
+            height_px: self.height_px.max(right.height_px),
+            shapes: self.shapes,
+        }
+    }
+}
+
+impl Shape {
+    /// By whole pixels.
+    fn move_right(&mut self, by_px: f32) {
+        match self {
+            Shape::Area { corners: points, .. } | Shape::Line { points, .. } => {
+                points.iter_mut().for_each(|point| point.0 += by_px);
+            }
+            Shape::Cells { left_px, .. } => *left_px += by_px as u32,
+            Shape::Text(text) => text.at.0 += by_px,
+        }
+    }
+}
+
 /// A line of text on the page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Text {

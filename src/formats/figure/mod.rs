@@ -13,7 +13,7 @@ use thiserror::Error;
 use drawing::DrawingError;
 
 pub use plot::{Plot, Series, Style};
-pub use raster::Figure;
+pub use raster::{Figure, beside};
 
 /// Why a raster gave no figure.
 #[derive(Debug, Error)]

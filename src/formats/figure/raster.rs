@@ -125,6 +125,15 @@ impl Figure<'_> {
     }
 }
 
+/// Figures from left to right on one page, as the bytes of a PNG file.
+pub fn beside(figures: &[Figure]) -> Result<Vec<u8>, FigureError> {
+    let mut page = Drawing::default();
+    for figure in figures {
+        page = page.beside(figure.drawing()?);
+    }
+    Ok(page.png()?)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

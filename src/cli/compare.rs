@@ -1,0 +1,187 @@
+//! `matdb compare`.
+
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+
+use super::cloud::{CloudArgs, pose};
+use super::console::Console;
+use super::database::Database;
+use super::output::write_all;
+use super::staging::{materials, setup, surfaces};
+use super::summary::grouped;
+use crate::error::Error;
+use crate::formats::figure::{Figure, Plot, Series, Style, beside};
+use crate::frames::Point;
+use crate::geometry::Raster;
+use crate::measure::compare::{Agreement, Line, along, difference, measured_scan};
+use crate::render::{Observer, Scan, power_image, shade, trace};
+use crate::scene::Scene;
+use crate::trace::Bvh;
+
+/// Compare a measured cloud with the rendered scene: images side by side, a line scan, the error
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb compare cloud.ply --scene scenes/mannequin.toml -o compared
+  matdb compare cloud.ply --scene scene.toml --pose measured/pose.json --line y=1.1,width=0.02 -o compared")]
+pub(super) struct Args {
+    #[command(flatten)]
+    cloud: CloudArgs,
+    /// The scene that was measured, with the materials to judge
+    #[arg(long, value_name = "SCENE")]
+    scene: PathBuf,
+    /// Where the target stood: the pose.json of `matdb measure`, or X,Y,Z[,RX,RY,RZ]
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    pose: Option<String>,
+    /// Stripe of the line scan in the global frame
+    #[arg(long, value_name = "y=M,width=M", default_value = "y=1.1,width=0.02")]
+    line: String,
+    /// Folder to write into; created when it is not there
+    #[arg(long, short, value_name = "DIR")]
+    output: PathBuf,
+}
+
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    let line = line(&args.line)?;
+    let mut scene = Scene::load(&args.scene)?;
+    let moved = pose(args.pose.as_deref())?;
+    let vertices = scene.target.mesh.vertices.iter_mut();
+    vertices.for_each(|vertex| *vertex = (moved * Point::from(*vertex)).xyz);
+    let cloud = args.cloud.read(scene.radar())?;
+    let (simulated, material_of_region) = simulate(args, &scene, db)?;
+    let measured = measured_scan(scene.radar(), &scene.chirps, &cloud);
+
+    let field = scene.chirps.field(&scene.radar().frames());
+    let image = |scan: &Scan| {
+        let spot_m = scene.radar().spot_diameter_m;
+        power_image(scan, field, spot_m, &material_of_region, scene.pixel_m())
+    };
+    let images = [image(&measured), image(&simulated)];
+    let (error, agreement) = difference(&images[0], &images[1]);
+    if agreement.both == 0 {
+        return Err(Error::Usage {
+            problem: format!("no pixel of `{}` has power in both images", args.scene.display()),
+            way_out: "check the frame of the cloud, or register it with `matdb measure`".to_owned(),
+        });
+    }
+    let record = record(args, &agreement, &cloud.notices);
+    let mut json = serde_json::to_vec_pretty(&record)?;
+    json.push(b'\n');
+    let files = [
+        ("images.png", side_by_side(&scene.file.name, &images, &error, &agreement)?),
+        ("line.svg", line_scan(&scene.file.name, line, &measured, &simulated).svg()?.into_bytes()),
+        ("line.png", line_scan(&scene.file.name, line, &measured, &simulated).png()?),
+        ("error.json", json),
+    ];
+    write_all(&args.output, &files)?;
+    cloud.notices.iter().for_each(|notice| console.notice(notice));
+    console.result(&text(args, &agreement), &record)
+}
+
+fn line(text: &str) -> Result<Line, Error> {
+    let mut line = Line { y_m: f64::NAN, width_m: 0.02 };
+    for part in text.split(',') {
+        match part.split_once('=').map(|(key, value)| (key.trim(), value.trim().parse())) {
+            Some(("y", Ok(y_m))) => line.y_m = y_m,
+            Some(("width", Ok(width_m))) => line.width_m = width_m,
+            _ => line.y_m = f64::NAN,
+        }
+    }
+    match line.y_m.is_finite() && line.width_m > 0.0 && line.width_m.is_finite() {
+        true => Ok(line),
+        false => Err(Error::Usage {
+            problem: format!("--line {text} is no line"),
+            way_out: "write it as --line y=1.1,width=0.02".to_owned(),
+        }),
+    }
+}
+
+fn simulate(args: &Args, scene: &Scene, db: &Database) -> Result<(Scan, Vec<u16>), Error> {
+    let at = |error| Error::Render { scene: args.scene.clone(), error };
+    let (used, material_of_region) = materials(scene, &args.scene, db)?;
+    let surfaces = surfaces(scene, &used, &material_of_region);
+    let bvh = Bvh::new(&scene.target.mesh);
+    let setup = setup(scene, &bvh, &surfaces);
+    let footprints = trace(setup.radar, setup.chirps, &bvh, scene.file.spot.rays, &|_| {});
+    let footprints = footprints.map_err(at)?;
+    let scan = shade(&setup, &footprints, Observer::Radar, &|_| {}).map_err(at)?;
+    Ok((scan, material_of_region))
+}
+
+fn side_by_side(
+    title: &str,
+    images: &[Raster; 2],
+    error: &Raster,
+    agreement: &Agreement,
+) -> Result<Vec<u8>, Error> {
+    let powers = || images.iter().filter_map(|image| image.channel("power_dbm")).flatten();
+    let low = powers().copied().fold(f32::INFINITY, f32::min);
+    let high = powers().copied().fold(f32::NEG_INFINITY, f32::max);
+    // One scale for both; a single power still needs a scale.
+    let range = Some((f64::from(low), f64::from(high).max(f64::from(low) + 1.0)));
+    let power = |raster, subtitle| Figure {
+        raster,
+        channel: "power_dbm",
+        title,
+        subtitle,
+        colour_label: "received power, dBm",
+        range,
+        x_label: "x in the target plane, m",
+        y_label: "y in the target plane, m",
+    };
+    let subtitle = format!(
+        "simulated less measured: mean {:.2} dB, rms {:.2} dB",
+        agreement.bias_db, agreement.rmse_db
+    );
+    let error = Figure {
+        channel: "difference_db",
+        colour_label: "difference, dB",
+        range: Some((-10.0, 10.0)),
+        ..power(error, &subtitle)
+    };
+    Ok(beside(&[power(&images[0], "measured"), power(&images[1], "simulated"), error])?)
+}
+
+fn line_scan<'a>(title: &'a str, line: Line, measured: &Scan, simulated: &Scan) -> Plot<'a> {
+    let series = |name: &str, scan: &Scan| Series {
+        name: format!("{name}, y = {} ± {} m", line.y_m, 0.5 * line.width_m),
+        style: Style::Points,
+        points: along(scan, line),
+    };
+    Plot {
+        title,
+        subtitle: "line scan",
+        x_label: "x, m",
+        y_label: "received power, dBm",
+        // An empty line still has its axes.
+        x_range: Some((-0.3, 0.3)),
+        y_range: Some((-100.0, 0.0)).filter(|_| along(measured, line).is_empty()),
+        equal: false,
+        series: vec![series("measured", measured), series("simulated", simulated)],
+    }
+}
+
+fn record(args: &Args, agreement: &Agreement, notices: &[String]) -> Value {
+    json!({
+        "schema": 1,
+        "cloud": args.cloud.cloud.display().to_string(),
+        "scene": args.scene.display().to_string(),
+        "pixels": agreement,
+        "notices": notices,
+    })
+}
+
+fn text(args: &Args, agreement: &Agreement) -> String {
+    format!(
+        "simulated less measured over {} pixels: mean {:.2} dB, rms {:.2} dB, median size {:.2} dB\n\
+         {} pixels are in the measurement alone, {} in the simulation alone\n\
+         wrote images.png, line.png, line.svg and error.json to {}\n",
+        grouped(agreement.both),
+        agreement.bias_db,
+        agreement.rmse_db,
+        agreement.median_size_db,
+        grouped(agreement.only_measured),
+        grouped(agreement.only_simulated),
+        args.output.display()
+    )
+}

@@ -1,0 +1,212 @@
+//! `matdb measure`.
+
+use std::path::PathBuf;
+
+use serde_json::{Value, json};
+
+use super::cloud::{CloudArgs, start};
+use super::console::Console;
+use super::output::write_all;
+use super::summary::grouped;
+use crate::error::Error;
+use crate::formats::figure::{Plot, Series, Style};
+use crate::measure::{Curve, Metric, Reduced, Reduction, Registered, Registration, Row};
+use crate::scene::Scene;
+use crate::units::db_from_ratio;
+
+/// Turn a measured cloud into a material's curve: register it to the scene, find the angles
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb measure out/cloud.ply --scene scenes/mannequin.toml -o measured
+  matdb measure cloud.csv --scene scene.toml --pose 0.03,0,-0.01,0,5,0 --region body -o measured
+  matdb measure cloud.xyz --unit mm --scene scene.toml --pose auto -o measured
+
+Then: matdb fit measured/curve.csv")]
+pub(super) struct Args {
+    #[command(flatten)]
+    cloud: CloudArgs,
+    /// The scene that was measured: its mesh, its radar and its scan
+    #[arg(long, value_name = "SCENE")]
+    scene: PathBuf,
+    /// Rough pose of the target: X,Y,Z or X,Y,Z,RX,RY,RZ (m, degrees) after the scene's placing,
+    /// `auto`, or a pose.json [default: as the scene places it]
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
+    pose: Option<String>,
+    /// What the registration makes small
+    #[arg(long, default_value = "along-ray")]
+    metric: MetricFlag,
+    /// Only this region of the scene
+    #[arg(long, value_name = "NAME")]
+    region: Option<String>,
+    /// Leave out what is nearer than this to an edge or another region, m [default: a spot]
+    #[arg(long, value_name = "M")]
+    edge_margin: Option<f64>,
+    /// The target is the facets of the mesh, as in a rendered cloud: their normals have no error
+    #[arg(long)]
+    exact_mesh: bool,
+    /// Folder to write into; created when it is not there
+    #[arg(long, short, value_name = "DIR")]
+    output: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum MetricFlag {
+    /// Gaps along the measured rays
+    AlongRay,
+    /// Distances to the planes of nearest neighbours
+    PointToPlane,
+    /// The paper's: distances to nearest neighbours
+    PointToPoint,
+}
+
+pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
+    let scene = Scene::load(&args.scene)?;
+    let cloud = args.cloud.read(scene.radar())?;
+    let reduction = reduction(args, &scene)?;
+    let (radar, chirps, target) = (scene.radar(), &scene.chirps, &scene.target);
+    let bar = console.spinner("registering");
+    let registered = registration(args)?.run(&target.mesh, radar, chirps, &cloud)?;
+    bar.finish_and_clear();
+    let reduced = reduction.run(target, radar, chirps, &cloud, &registered)?;
+
+    let record = record(args, &registered, &reduced);
+    let mut pose = serde_json::to_vec_pretty(&record)?;
+    pose.push(b'\n');
+    let svg = plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
+    let files = [("pose.json", pose), ("curve.csv", reduced.curve.write()), ("curve.svg", svg)];
+    write_all(&args.output, &files)?;
+    let notices = cloud.notices.iter().chain(&registered.verdicts).chain(&reduced.notices);
+    notices.for_each(|notice| console.notice(notice));
+    console.result(&text(args, &registered, &reduced), &record)
+}
+
+fn registration(args: &Args) -> Result<Registration, Error> {
+    let start = start(args.pose.as_deref())?;
+    let registration = match args.metric {
+        MetricFlag::AlongRay => Registration::default(),
+        MetricFlag::PointToPlane => {
+            Registration { metric: Metric::PointToPlane, ..Registration::default() }
+        }
+        MetricFlag::PointToPoint => Registration::paper(),
+    };
+    Ok(Registration { start, ..registration })
+}
+
+fn reduction(args: &Args, scene: &Scene) -> Result<Reduction, Error> {
+    let region = match &args.region {
+        None => None,
+        Some(name) => Some(region(name, scene)?),
+    };
+    match args.edge_margin {
+        Some(margin_m) if !(0.0..=1.0).contains(&margin_m) => Err(Error::Usage {
+            problem: format!("--edge-margin {margin_m} is no margin"),
+            way_out: "give metres from 0 to 1".to_owned(),
+        }),
+        edge_margin_m => {
+            let exact_mesh = args.exact_mesh;
+            Ok(Reduction { region, edge_margin_m, exact_mesh, ..Reduction::default() })
+        }
+    }
+}
+
+fn region(name: &str, scene: &Scene) -> Result<u16, Error> {
+    let names = || scene.target.regions.iter().map(|region| region.name.as_str());
+    let found = names().position(|region| region == name);
+    found.map(|number| number as u16).ok_or_else(|| Error::Usage {
+        problem: format!("the scene has no region `{name}`"),
+        way_out: format!("its regions are: {}", names().collect::<Vec<_>>().join(", ")),
+    })
+}
+
+/// What `pose.json` holds and `--json` prints.
+fn record(args: &Args, registered: &Registered, reduced: &Reduced) -> Value {
+    let pose = &registered.pose;
+    let rows: Vec<[f64; 3]> = (0..3).map(|row| pose.rotation().row(row).to_array()).collect();
+    let left_out = reduced.left_out;
+    json!({
+        "schema": 1,
+        "cloud": args.cloud.cloud.display().to_string(),
+        "scene": args.scene.display().to_string(),
+        "meaning": "a vertex v of the scene's mesh was at rotation*v + translation, global frame, m",
+        "pose": { "rotation_rows": rows, "translation_m": pose.translation_m().to_array() },
+        "covariance": {
+            "order": ["tx_m", "ty_m", "tz_m", "wx_rad", "wy_rad", "wz_rad"],
+            "about_m": registered.pivot.xyz.to_array(),
+            "matrix": registered.covariance,
+            "widened_for_shared_errors": registered.widened,
+        },
+        "rms_m": registered.rms_m,
+        "points": registered.points,
+        "inliers": registered.inliers,
+        "virtual_scans": registered.scans,
+        "iterations": registered.iterations,
+        "converged": registered.converged,
+        "stop": format!("{:?}", registered.stop).to_lowercase(),
+        "verdicts": registered.verdicts,
+        "curve": {
+            "detected": reduced.curve.detected().count(),
+            "censored": reduced.curve.rows.len() - reduced.curve.detected().count(),
+            "left_out": {
+                "missed": left_out.missed,
+                "off_surface": left_out.off_surface,
+                "other_region": left_out.other_region,
+                "near_edge": left_out.near_edge,
+                "silent_near_edge": left_out.silent_near_edge,
+            },
+        },
+    })
+}
+
+fn text(args: &Args, registered: &Registered, reduced: &Reduced) -> String {
+    let shift_mm = registered.pose.translation_m() * 1e3;
+    let sd = |axis: usize| registered.covariance[axis][axis].sqrt();
+    let (shift_sd_m, turn_sd_rad) =
+        ((0..3).map(sd).fold(0.0, f64::max), (3..6).map(sd).fold(0.0, f64::max));
+    let curve = &reduced.curve;
+    let detected = curve.detected().count();
+    format!(
+        "pose: {} of {} points on the surface, rms {:.2} mm, known to {:.2} mm and {:.3}° (1 sd)\n\
+         shift of the scene's origin: {:.2}, {:.2}, {:.2} mm\n\
+         curve: {} detections and {} censored chirps from {:.1}° to {:.1}°\n\
+         wrote pose.json, curve.csv and curve.svg to {}\n",
+        grouped(registered.inliers),
+        grouped(registered.points),
+        1e3 * registered.rms_m,
+        1e3 * shift_sd_m,
+        turn_sd_rad.to_degrees(),
+        shift_mm.x,
+        shift_mm.y,
+        shift_mm.z,
+        grouped(detected),
+        grouped(curve.rows.len() - detected),
+        angles_deg(curve).fold(f64::INFINITY, f64::min),
+        angles_deg(curve).fold(0.0, f64::max),
+        args.output.display()
+    )
+}
+
+fn angles_deg(curve: &Curve) -> impl Iterator<Item = f64> + '_ {
+    curve.rows.iter().map(|row| row.theta_rad.to_degrees())
+}
+
+fn plot<'a>(title: &'a str, curve: &Curve) -> Plot<'a> {
+    let points = |censored: bool| {
+        let rows = curve.rows.iter().filter(|row| row.censored == censored);
+        rows.map(|row: &Row| (row.theta_rad.to_degrees(), db_from_ratio(row.sigma0))).collect()
+    };
+    let series = |name: &str, censored| Series {
+        name: name.to_owned(),
+        style: Style::Points,
+        points: points(censored),
+    };
+    Plot {
+        title,
+        subtitle: "measured cloud, reduced by equation (8)",
+        x_label: "incidence, °",
+        y_label: "σ⁰, dB",
+        x_range: Some((0.0, 90.0)),
+        y_range: None,
+        equal: false,
+        series: vec![series("not detected, below", true), series("detected", false)],
+    }
+}

@@ -1,0 +1,147 @@
+//! How far a simulated scan is from a measured one: pixel by pixel, and along a line (paper, Figs. 10
+//! to 15).
+
+use super::cloud::Cloud;
+use crate::frames::Point;
+use crate::geometry::Raster;
+use crate::geometry::raster::Channel;
+use crate::radar::{Chirps, Radar};
+use crate::render::{Echo, Scan};
+
+/// Agreement of two power images on one grid.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Agreement {
+    /// Pixels with power in both.
+    pub both: usize,
+    /// Pixels with power in the measured image alone.
+    pub only_measured: usize,
+    /// Pixels with power in the simulated image alone.
+    pub only_simulated: usize,
+    /// Mean of simulated less measured over the pixels of both, dB; NaN without any.
+    pub bias_db: f64,
+    /// Root mean square of the same, dB.
+    pub rmse_db: f64,
+    /// Median of its size, dB.
+    pub median_size_db: f64,
+}
+
+/// A horizontal stripe of the global frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line {
+    /// Height of its middle, m.
+    pub y_m: f64,
+    /// How high it is, m.
+    pub width_m: f64,
+}
+
+/// A measured cloud as a scan, so that it can be drawn as simulated ones are. Nothing is known of what
+/// caused its echoes.
+pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
+    let frames = radar.frames();
+    let (origin, target_from_global) = (frames.origin(), frames.global_from_target.inverse());
+    let echo = |(number, point): (usize, &super::CloudPoint)| {
+        let in_target = target_from_global * point.point;
+        Echo {
+            chirp: point.chirp.unwrap_or(number as u32),
+            point: point.point,
+            range_m: point.range_m.unwrap_or(origin.distance_m(point.point)),
+            xt_m: in_target.xyz.x,
+            yt_m: in_target.xyz.y,
+            power_dbm: point.power_dbm,
+            truth: None,
+        }
+    };
+    Scan {
+        chirps: chirps.rays.len(),
+        echoes: cloud.points().iter().enumerate().map(echo).collect(),
+        threshold_dbm: f64::NEG_INFINITY,
+    }
+}
+
+/// Simulated less measured power, dB, as channel `difference_db` (NaN where either has none), and the
+/// agreement. Both images must be on the same grid, as [`power_image`](crate::render::power_image)
+/// draws them for one scene.
+pub fn difference(measured: &Raster, simulated: &Raster) -> (Raster, Agreement) {
+    let power = |raster: &Raster| raster.channel("power_dbm").unwrap_or_default().to_vec();
+    let pairs: Vec<(f32, f32)> = std::iter::zip(power(measured), power(simulated)).collect();
+    let values: Vec<f32> = pairs.iter().map(|(m, s)| s - m).collect();
+    let only = |here: fn(&(f32, f32)) -> f32, there: fn(&(f32, f32)) -> f32| {
+        pairs.iter().filter(|pair| here(pair).is_finite() && !there(pair).is_finite()).count()
+    };
+    let both: Vec<f64> = values.iter().filter(|v| v.is_finite()).map(|&v| f64::from(v)).collect();
+    let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / both.len() as f64;
+    let mut sizes: Vec<f64> = both.iter().map(|d| d.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let agreement = Agreement {
+        both: both.len(),
+        only_measured: only(|pair| pair.0, |pair| pair.1),
+        only_simulated: only(|pair| pair.1, |pair| pair.0),
+        bias_db: mean(&mut both.iter().copied()),
+        rmse_db: mean(&mut both.iter().map(|d| d * d)).sqrt(),
+        median_size_db: sizes.get(sizes.len() / 2).copied().unwrap_or(f64::NAN),
+    };
+    let channel = Channel { name: "difference_db".to_owned(), values };
+    let raster = Raster { channels: vec![channel], ..measured.clone() };
+    (raster, agreement)
+}
+
+/// (x, dBm) of the detections within a line, x in the global frame, m, from left to right.
+pub fn along(scan: &Scan, line: Line) -> Vec<(f64, f64)> {
+    let within =
+        |point: Point<crate::frames::Global>| (point.xyz.y - line.y_m).abs() <= 0.5 * line.width_m;
+    let mut points: Vec<(f64, f64)> = scan
+        .detections()
+        .filter(|echo| within(echo.point))
+        .map(|echo| (echo.point.xyz.x, echo.power_dbm))
+        .collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::CloudPoint;
+
+    fn raster(values: [f32; 4]) -> Raster {
+        let channels = vec![Channel { name: "power_dbm".to_owned(), values: values.to_vec() }];
+        Raster { width: 2, height: 2, x_min_m: 0.0, y_min_m: 0.0, pixel_m: 1.0, channels }
+    }
+
+    #[test]
+    fn pixels_of_both_give_the_error_and_the_others_are_counted() {
+        let measured = raster([-50.0, -60.0, f32::NAN, -70.0]);
+        let simulated = raster([-47.0, -61.0, -50.0, f32::NAN]);
+        let (image, found) = difference(&measured, &simulated);
+        assert_eq!((found.both, found.only_measured, found.only_simulated), (2, 1, 1));
+        assert!((found.bias_db - 1.0).abs() < 1e-9);
+        assert!((found.rmse_db - 5f64.sqrt()).abs() < 1e-9);
+        assert_eq!(image.channel("difference_db").unwrap()[0], 3.0);
+    }
+
+    #[test]
+    fn images_without_a_common_pixel_have_no_error() {
+        let (_, found) = difference(&raster([f32::NAN; 4]), &raster([-50.0; 4]));
+        assert_eq!(found.both, 0);
+        assert!(found.rmse_db.is_nan() && found.bias_db.is_nan());
+    }
+
+    #[test]
+    fn a_line_holds_what_lies_within_it_from_left_to_right() {
+        let radar = Radar::default();
+        let point = |x, y, power_dbm| CloudPoint {
+            chirp: None,
+            point: Point::new(x, y, 0.0),
+            range_m: None,
+            power_dbm,
+        };
+        let points =
+            vec![point(0.1, 1.105, -40.0), point(-0.1, 1.095, -50.0), point(0.0, 1.2, -60.0)];
+        let cloud = Cloud::new(points).unwrap();
+        let scan = measured_scan(&radar, &Chirps::default(), &cloud);
+        let line = along(&scan, Line { y_m: 1.1, width_m: 0.02 });
+        assert_eq!(line, [(-0.1, -50.0), (0.1, -40.0)]);
+        assert!((scan.echoes[2].yt_m - 0.1).abs() < 1e-12);
+        assert!((scan.echoes[2].range_m - 8.0f64.hypot(0.1)).abs() < 1e-12);
+    }
+}
