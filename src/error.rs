@@ -29,10 +29,12 @@ pub enum Error {
     #[error(transparent)]
     F5(#[from] F5Error),
     /// A scene cannot be rendered.
-    #[error("{}: {error}", scene.display())]
+    #[error("{}: {antenna}{error}", scene.display())]
     Render {
         /// The scene file.
         scene: PathBuf,
+        /// The receiver that it is about, with a colon, or nothing.
+        antenna: String,
         /// What is wrong.
         error: RenderError,
     },

@@ -290,7 +290,7 @@ fn instruments_that_cannot_work() {
     for (more, parts) in [
         (
             format!("{receiver}[radar.chirp]\nsamples = 1024\n"),
-            &["unambiguous", "radar.chirp.samples"][..],
+            &["unambiguous", "radar.chirp.samples = 14"][..],
         ),
         (format!("{receiver}[spot]\nrays = 4\n"), &["[radar.speckle]", "looks"]),
         (format!("{receiver}[bounce]\n"), &["[radar.speckle]", "[bounce]"]),
@@ -310,6 +310,13 @@ fn instruments_that_cannot_work() {
         (format!("{left}{left}"), &["receiver `left`", "twice"]),
         (left.replace("left", "../left"), &["receiver `../left`", "small letters"]),
         (left.replace("-2", "inf"), &["position_m"]),
+        (left.replace("[[receiver]]", "[receiver]"), &["[[receiver]]", "[radar.receiver]"]),
+        (format!("{receiver}gate_m = [100, 200]\n"), &["receiver.gate_m[1] = 200", "22.7"]),
+        ("[spot]\nrays = 1000\n[bounce]\nrays = 1000\n".to_owned(), &["bounce.rays", "100 000"]),
+        (
+            (0..33).map(|n| left.replace("left", &format!("r{n}"))).collect(),
+            &["33 receivers", "at most 32"],
+        ),
         (left.replace("[-2, 1.1, 7]", "[0, 1.1, 0]").replace("left", "in"), &["inside the target"]),
     ] {
         // A solid, so that it has an inside.
@@ -317,6 +324,12 @@ fn instruments_that_cannot_work() {
             .replace("builtin:plate", "builtin:cuboid")
             .replace("size_m = [1, 1, 0]", "size_m = [1, 1, 0.1]");
         check(&render(&scene, &[]), parts);
+    }
+    for grain in ["[0, 0, 0]", "[nan, 0, 0]"] {
+        check(
+            &render(&format!("{PLATE}grain = {grain}\n"), &[]),
+            &["region `all`", "grain", "[0, 1, 0]"],
+        );
     }
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("scene.toml"), PLATE).unwrap();

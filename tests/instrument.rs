@@ -67,6 +67,11 @@ fn render(more: &str) -> (Value, impl Fn(&str) -> Cloud) {
     })
 }
 
+/// An empty cloud has no columns here.
+fn points(cloud: &Cloud) -> usize {
+    cloud.get("x").map_or(0, Vec::len)
+}
+
 fn watts(cloud: &Cloud) -> Vec<f64> {
     cloud["power_dbm"].iter().map(|dbm| 10f64.powf(dbm / 10.0)).collect()
 }
@@ -112,8 +117,11 @@ fn noise_adds_its_power_and_its_range_error() {
     let (_, exact) = render("");
     let (_, noisy) = render(more);
     let ratio = 10f64.powf(-5.8) / watts(&exact("cloud.ply"))[0];
-    let (mean, _) = mean_and_contrast(&factors);
-    assert!((mean - 1.0 - ratio).abs() < 0.15, "{mean} for {ratio}");
+    let (mean, contrast) = mean_and_contrast(&factors);
+    // Rice: the variance of the power is N² + 2PN.
+    let spread = (ratio * ratio + 2.0 * ratio).sqrt();
+    assert!((mean - 1.0 - ratio).abs() < 5.0 * spread / 2000f64.sqrt(), "{mean} for {ratio}");
+    assert!((contrast * mean / spread - 1.0).abs() < 0.1, "{contrast} for {spread}");
     let ranges = [exact("cloud.ply"), noisy("cloud.ply")].map(|c| c["range_m"].clone());
     let errors: Vec<f64> = std::iter::zip(&ranges[0], &ranges[1]).map(|(a, b)| b - a).collect();
     let sd_m = (errors.iter().map(|e| e * e).sum::<f64>() / 2000.0).sqrt();
@@ -223,4 +231,102 @@ fn beat_signals_are_an_array_that_holds_the_echo() {
     for sample in [0, 1, 1000, 2047] {
         assert!((power_w(sample) / expected_w - 1.0).abs() < 4e-3);
     }
+}
+
+/// Renders a scene text in a folder of its own.
+fn rendered(scene: &str) -> (tempfile::TempDir, Cloud) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("chalk.toml"), CHALK).unwrap();
+    fs::write(folder.path().join("scene.toml"), scene).unwrap();
+    matdb(folder.path()).args(["add", "-q", "--from", "chalk.toml"]).assert().success();
+    matdb(folder.path()).args(["render", "-q", "scene.toml", "-o", "out"]).assert().success();
+    let cloud = read_cloud(&folder.path().join("out/cloud.ply"));
+    (folder, cloud)
+}
+
+#[test]
+fn an_obstacle_shades_a_receiver_and_not_the_radar() {
+    // A block beside the beam, half way to the receiver.
+    let scene = PLATE.replace(
+        "[[region]]",
+        "[[mesh]]\nname = \"block\"\nfile = \"builtin:cuboid\"\nsize_m = [1, 2, 1]\n\
+         translation_m = [2, 1.1, 3.5]\n[[receiver]]\nname = \"beside\"\nposition_m = [4, 1.1, 7]\n\
+         [[receiver]]\nname = \"other-side\"\nposition_m = [-4, 1.1, 7]\n[[region]]",
+    );
+    let (folder, cloud) = rendered(&scene);
+    let count = |name: &str| points(&read_cloud(&folder.path().join("out").join(name)));
+    assert_eq!(cloud["x"].len(), 2000);
+    assert_eq!((count("cloud-beside.ply"), count("cloud-other-side.ply")), (0, 2000));
+}
+
+#[test]
+fn the_cloud_knows_azimuth_edges_and_shares_of_a_plate() {
+    // A plate of 0.2 m, turned by 30° about the upright axis, so that the radar stands at 90° from an
+    // upright grain.
+    let scene = PLATE
+        .replace("size_m = [1, 1, 0]", "size_m = [0.2, 0.2, 0]\nrotation_deg = [0, 30, 0]")
+        .replace("chalk", "ptfe")
+        .replace("[[mesh]]", "[radar]\nthreshold_dbm = -100\n[spot]\nrays = 9\n[[mesh]]");
+    let (_folder, cloud) = rendered(&scene);
+    let column = |name: &str| cloud[name].iter().copied();
+    assert!(cloud["x"].len() > 200);
+    for azimuth in column("azimuth_deg") {
+        assert!((azimuth.abs() - 90.0).abs() < 2.0, "{azimuth}");
+    }
+    // 40 × 50 looks over 0.4 m: a spacing of 9 mm.
+    let half_width_m = 0.1 * 30f64.to_radians().cos();
+    for ((x, y), edge_m) in column("xt_m").zip(column("yt_m")).zip(column("edge_m")) {
+        let (dx, dy) = (x.abs() - half_width_m, y.abs() - 0.1);
+        let outside_m = dx.max(0.0).hypot(dy.max(0.0));
+        let exact_m = if outside_m > 0.0 { outside_m } else { -dx.max(dy) }.min(0.048);
+        assert!((edge_m - exact_m).abs() < 0.009, "{x} {y}: {edge_m} {exact_m}");
+    }
+    // Built-in PTFE at 30°: the specular lobe of m = 0.05 is long gone.
+    assert!(column("specular_share").all(|share| share < 1e-9));
+    assert!(column("surfaces").all(|surfaces| surfaces == 1.0));
+    // A plane has one incidence but for the spot's own angle, 16 mm at 8 m.
+    for (sd, edge_m) in column("incidence_sd_deg").zip(column("edge_m")) {
+        assert!(sd < 0.1 && (sd > 0.01 || edge_m < 0.02), "{sd}");
+    }
+}
+
+#[test]
+fn a_corner_returns_by_two_surfaces_from_the_range_of_its_edge() {
+    let wing = |name: &str, turn: i32, x: &str| {
+        format!(
+            "[[mesh]]\nname = \"{name}\"\nfile = \"builtin:plate\"\nsize_m = [0.1, 0.4, 0]\n\
+             rotation_deg = [0, {turn}, 0]\ntranslation_m = [{x}, 1.1, 0.035355]\n"
+        )
+    };
+    let scene = format!(
+        "{}{}{}{}",
+        "[radar.scan]\npattern = \"raster\"\nlines = 1\nchirps_per_line = 15\nwidth_m = 0.12\nheight_m = 1e-4\n\
+         [bounce]\nrays = 2000\noutside_spot_db = 0\n",
+        wing("left", 45, "-0.035355"),
+        wing("right", -45, "0.035355"),
+        "[[region]]\nname = \"all\"\nmaterial = \"aluminium\"\n"
+    );
+    let (_folder, cloud) = rendered(&scene);
+    // From the very ends of the wings no way leads over both.
+    assert!(points(&cloud) >= 13);
+    assert!(cloud["surfaces"].iter().all(|&surfaces| surfaces == 2.0));
+    assert!(cloud["specular_share"].iter().all(|&share| share > 0.99));
+    // Every way over both wings is as long as one to the edge, 8 m away; the lobe spreads it.
+    for (x, range_m) in std::iter::zip(&cloud["xt_m"], &cloud["range_m"]) {
+        assert!((range_m - 8.0).abs() < 0.003, "{x}: {range_m}");
+    }
+}
+
+#[test]
+fn chirps_that_hit_stay_hits_however_little_comes_back() {
+    let deaf = "[radar]\nsystem_loss_db = 150\n[radar.receiver]\n[radar.chirp]\nsamples = 2048\n";
+    let (record, clouds) = render(deaf);
+    assert_eq!(record["counts"]["hits"], 2000);
+    assert_eq!(record["counts"]["misses"], 0);
+    assert!(points(&clouds("cloud.ply")) < 3);
+    let (record, _) =
+        render("[radar.receiver]\nfalse_alarm_probability = 1e-3\n[radar.chirp]\nsamples = 2048\n");
+    let threshold_dbm = record["threshold_dbm"].as_f64().unwrap();
+    let noise_dbm = record["noise_dbm"].as_f64().unwrap();
+    assert!(threshold_dbm > noise_dbm + 8.0 && threshold_dbm < noise_dbm + 16.0, "{threshold_dbm}");
 }

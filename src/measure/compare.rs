@@ -53,8 +53,10 @@ pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
     };
     Scan {
         chirps: chirps.rays.len(),
+        hits: cloud.points().len(),
         echoes: cloud.points().iter().enumerate().map(echo).collect(),
         threshold_dbm: f64::NEG_INFINITY,
+        noise_dbm: None,
     }
 }
 

@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use super::Radar;
 use super::preset::Check;
+use super::scan::PATTERN_RANGE_M;
+use crate::frames::{Global, Point, Pose, Ray, Target};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// How the spot grows, as scene files write it.
@@ -51,6 +53,7 @@ pub struct Beam {
     /// Diameter at the centre of the field of view and the focus, m.
     focal_diameter_m: f64,
     rayleigh_m: f64,
+    target_from_global: Pose<Target, Global>,
 }
 
 impl Beam {
@@ -62,6 +65,7 @@ impl Beam {
             entry: radar.beam,
             focal_diameter_m: radar.spot_diameter_m,
             rayleigh_m: PI * waist_m * waist_m / wavelength_m,
+            target_from_global: radar.frames().global_from_target.inverse(),
         }
     }
 
@@ -77,6 +81,13 @@ impl Beam {
         let off_centre = (xt_m * xt_m + yt_m * yt_m) / (edge_m * edge_m);
         let off_focus = ((range_m - focus_m) / self.rayleigh_m).powi(2);
         self.focal_diameter_m * (1.0 + (edge_growth - 1.0) * off_centre) * (1.0 + off_focus).sqrt()
+    }
+
+    /// The same for the beam along a ray, at range R.
+    pub fn diameter_along_m(&self, axis: &Ray<Global>, range_m: f64) -> f64 {
+        let looks_at = Point::from(axis.origin.xyz + PATTERN_RANGE_M * axis.direction.xyz());
+        let aim = (self.target_from_global * looks_at).xyz;
+        self.diameter_m(aim.x, aim.y, range_m)
     }
 }
 

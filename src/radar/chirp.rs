@@ -71,8 +71,8 @@ pub struct Return {
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[error(
     "a return at {range_m:.3} m is {:.3} m outside the unambiguous range of 0 to {max_range_m:.3} m \
-     and would appear at {apparent_range_m:.3} m; raise radar.chirp.samples, lower radar.bandwidth_ghz, or \
-     leave the return out",
+     and would appear at {apparent_range_m:.3} m; give radar.chirp.samples = {samples_needed} or more, \
+     or move what returns it",
     excess_m(*range_m, *max_range_m)
 )]
 pub struct Aliased {
@@ -82,6 +82,8 @@ pub struct Aliased {
     pub max_range_m: f64,
     /// Where it would be seen, m.
     pub apparent_range_m: f64,
+    /// Samples of a chirp that would tell it apart.
+    pub samples_needed: usize,
 }
 
 fn excess_m(range_m: f64, max_range_m: f64) -> f64 {
@@ -169,7 +171,12 @@ impl Chirp {
         if (0.0..max_range_m).contains(&range_m) {
             return Ok(());
         }
-        Err(Aliased { range_m, max_range_m, apparent_range_m: range_m.rem_euclid(max_range_m) })
+        Err(Aliased {
+            range_m,
+            max_range_m,
+            apparent_range_m: range_m.rem_euclid(max_range_m),
+            samples_needed: (range_m / self.range_resolution_m()).floor() as usize + 1,
+        })
     }
 
     fn add_beat(&self, signal: &mut [Complex<f64>], echo: &Return) {

@@ -241,6 +241,8 @@ impl Radar {
         self.chirp().validate()?;
         if let Some(receiver) = self.receiver {
             receiver.validate()?;
+            let far_m = receiver.gate_m.map_or(0.0, |[_, far_m]| far_m);
+            in_range(("receiver.gate_m[1]", far_m, (0.0, self.chirp().max_range_m())))?;
             in_range(("chirp.duration_s", self.chirp.duration_s, (1e-9, self.chirp_period_s)))?;
         }
         self.speckle.map_or(Ok(()), |speckle| speckle.validate())?;

@@ -7,43 +7,51 @@
 //! heuristic of Veach and Guibas 1995, DOI 10.1145/218380.218498), so that the mean is unbiased for
 //! any surface.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{LN_2, PI, TAU};
 
 use glam::DVec3;
 
-use super::Setup;
-use crate::frames::{Direction, Global, Point, Ray, Surface};
+use super::spot::GOLDEN;
+use crate::frames::{Direction, Global, Ray, Surface};
 use crate::radar::Beam;
 use crate::radar::random::Key;
-use crate::radar::scan::PATTERN_RANGE_M;
 
 /// Exponents of the lobes: half widths at half height of 30°, 9.5° and 3°.
 const LOBES: [f64; 3] = [4.8, 50.0, 500.0];
-
-/// 1/φ: successive multiples of it are spread evenly over 0 to 1.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// How second-order paths are followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounce {
     /// Directions followed from each point that is lit, 1 or more.
     pub rays: usize,
-    /// How strongly the radar's own beam sees a surface outside the spot, over one inside, as a
-    /// power ratio.
+    /// Power by way of a surface outside the spot, over one inside, as a ratio: what the side lobes
+    /// of the radar's own beam let through, both senses of the path together.
     pub outside_spot: f64,
 }
 
 impl Bounce {
-    /// How well the radar's antenna sees a place: as equation (7) has it within the spot, weaker
-    /// outside.
-    pub(super) fn pattern(&self, setup: &Setup, axis: &Ray<Global>, place: DVec3) -> f64 {
+    /// How well the radar's antenna sees a second surface at `place`, over how equation (7) sees the
+    /// spot.
+    ///
+    /// The antenna receives as it sends, by the Gaussian g of the spot, and (7) has the mean of that
+    /// over the spot as 1, hence 2g. A single ray stands for the whole spot: then a place at the
+    /// distance d from what the ray hit is seen as the mean over the spot sees it, which is √g(d).
+    pub(super) fn pattern(
+        &self,
+        beam: &Beam,
+        axis: &Ray<Global>,
+        rays: usize,
+        place: DVec3,
+    ) -> f64 {
         let to_place = place - axis.origin.xyz;
-        let range_m = to_place.length();
+        if to_place.dot(axis.direction.xyz()) <= 0.0 {
+            return self.outside_spot;
+        }
         let beside_m = to_place.cross(axis.direction.xyz()).length();
-        let looks_at = Point::from(axis.origin.xyz + PATTERN_RANGE_M * axis.direction.xyz());
-        let aim = (setup.radar.frames().global_from_target.inverse() * looks_at).xyz;
-        let spot_m = Beam::new(setup.radar).diameter_m(aim.x, aim.y, range_m);
-        if beside_m <= 0.5 * spot_m { 1.0 } else { self.outside_spot }
+        let spot_m = beam.diameter_along_m(axis, to_place.length());
+        let gaussian = |factor: f64| (-factor * LN_2 * (2.0 * beside_m / spot_m).powi(2)).exp();
+        let inside = if rays == 1 { gaussian(0.5) } else { 2.0 * gaussian(1.0) };
+        inside.max(self.outside_spot)
     }
 }
 
@@ -97,6 +105,8 @@ fn density_per_sr(direction: DVec3, mirrored: DVec3) -> f64 {
 mod tests {
     use super::*;
     use crate::brdf::{CookTorrance, Distribution, Lambert, Scattering, Shadowing};
+    use crate::frames::Point;
+    use crate::radar::Radar;
     use crate::radar::random::Purpose;
 
     fn key(chirp: u64) -> Key {
@@ -151,6 +161,27 @@ mod tests {
                 assert!(error < tolerance, "{number} at {theta_rad}: {found} is not {expected}");
             }
         }
+    }
+
+    #[test]
+    fn the_beam_receives_as_it_sends() {
+        let radar = Radar::default();
+        let (beam, origin) = (Beam::new(&radar), radar.frames().origin());
+        let axis = Ray { origin, direction: origin.towards(Point::new(0.0, 1.1, 0.0)).unwrap() };
+        let bounce = Bounce { rays: 1, outside_spot: 1e-3 };
+        let seen = |rays, x_m: f64, z_m: f64| {
+            bounce.pattern(&beam, &axis, rays, DVec3::new(x_m, 1.1, z_m))
+        };
+        // Half the spot's diameter off the axis the Gaussian is ½, and 2·½ = 1.
+        assert!((seen(64, 0.008, 0.0) - 1.0).abs() < 1e-4);
+        assert!((seen(64, 0.0, 0.0) - 2.0).abs() < 1e-12 && seen(1, 0.0, 0.0) == 1.0);
+        assert!((seen(1, 0.008, 0.0) - 0.5f64.sqrt()).abs() < 1e-4);
+        // Far off, and behind the radar.
+        assert_eq!([seen(64, 0.1, 0.0), seen(64, 0.0, 9.0)], [1e-3, 1e-3]);
+        // The mean of 2g over the spot's own Gaussian is 1: rings of equal power.
+        let ring = |i: usize| 0.008 * (-(1.0 - (i as f64 + 0.5) / 1e4).ln() / LN_2).sqrt();
+        let mean = (0..10_000).map(|i| seen(64, ring(i), 0.0)).sum::<f64>() / 1e4;
+        assert!((mean - 1.0).abs() < 2e-3, "{mean}");
     }
 
     #[test]

@@ -60,17 +60,28 @@ impl Detector {
         self.threshold_w
     }
 
+    /// Mean thermal power in a range cell, W; none for a receiver without noise.
+    pub fn noise_w(&self) -> Option<f64> {
+        let noise_w = match &self.kind {
+            Kind::Exact => 0.0,
+            Kind::Laws { noise_w, .. } => *noise_w,
+            Kind::Beat(beat) => beat.processor.noise_per_bin_w(),
+        };
+        (noise_w > 0.0).then_some(noise_w)
+    }
+
     /// What the receiver makes of a chirp, below the threshold, too; `None` for a silent one.
     pub fn observe(&self, chirp: usize, paths: &[Path]) -> Result<Option<Detection>, RenderError> {
         match &self.kind {
-            Kind::Beat(beat) => {
-                let signals = self.signals(beat, chirp, paths)?;
-                Ok(beat.processor.peak(&beat.mean_profile_w(&signals)))
-            }
+            Kind::Beat(beat) => Ok(beat.processor.peak(&self.mean_profile_w(beat, chirp, paths)?)),
             _ if paths.is_empty() => Ok(None),
             Kind::Exact => Ok(Some(sum(paths))),
             Kind::Laws { speckle, noise_w, range_sd_m } => {
                 let Detection { range_m, power_w } = sum(paths);
+                if power_w == 0.0 {
+                    // Nothing comes back, and no range is read from noise alone.
+                    return Ok(Some(Detection { range_m, power_w }));
+                }
                 let mut draws = self.draws(chirp, Purpose::Speckle);
                 let power_w = measured_w(power_w, *noise_w, *speckle, &mut draws);
                 let error_m = range_sd_m * self.draws(chirp, Purpose::Range).gaussian();
@@ -91,23 +102,44 @@ impl Detector {
     /// The beat signals of a chirp, one for each look; none without a receiver.
     pub fn beats(&self, chirp: usize, paths: &[Path]) -> Result<Beats, RenderError> {
         match &self.kind {
-            Kind::Beat(beat) => self.signals(beat, chirp, paths),
+            Kind::Beat(beat) => self.signals(beat, chirp, paths).collect(),
             _ => Ok(Vec::new()),
         }
     }
 
-    fn signals(&self, beat: &Beat, chirp: usize, paths: &[Path]) -> Result<Beats, RenderError> {
+    fn signals(
+        &self,
+        beat: &Beat,
+        chirp: usize,
+        paths: &[Path],
+    ) -> impl Iterator<Item = Result<Vec<Complex<f64>>, RenderError>> {
         let mut phases = self.draws(chirp, Purpose::SurfacePhase);
         let mut noise = self.draws(chirp, Purpose::Noise);
         let together = beat.together(paths);
-        let look = |_| {
+        (0..beat.looks).map(move |_| {
             let returns: Vec<Return> =
                 together.iter().map(|&sum| beat.echo(sum, &mut phases)).collect();
             let mut signal = beat.chirp.beat_signal(&returns)?;
             beat.processor.add_noise(&mut signal, &mut noise);
             Ok(signal)
-        };
-        (0..beat.looks).map(look).collect()
+        })
+    }
+
+    /// The mean over the looks of the power spectrum over range.
+    fn mean_profile_w(
+        &self,
+        beat: &Beat,
+        chirp: usize,
+        paths: &[Path],
+    ) -> Result<Vec<f64>, RenderError> {
+        let mut mean_w: Vec<f64> = Vec::new();
+        for signal in self.signals(beat, chirp, paths) {
+            let profile_w = beat.processor.profile_w(&signal?);
+            mean_w.resize(profile_w.len(), 0.0);
+            let shares = profile_w.into_iter().map(|power_w| power_w / f64::from(beat.looks));
+            mean_w.iter_mut().zip(shares).for_each(|(sum, share)| *sum += share);
+        }
+        Ok(mean_w)
     }
 
     fn draws(&self, chirp: usize, purpose: Purpose) -> Draws {
@@ -130,16 +162,6 @@ impl Beat {
     fn echo(&self, sum: Detection, phases: &mut Draws) -> Return {
         let phasor = self.speckle.map_or(Complex::ONE, |speckle| speckle.phasor(phases));
         Return { range_m: sum.range_m, amplitude_sqrt_w: phasor * sum.power_w.sqrt() }
-    }
-
-    fn mean_profile_w(&self, signals: &[Vec<Complex<f64>>]) -> Vec<f64> {
-        let mut profiles = signals.iter().map(|signal| self.processor.profile_w(signal));
-        let mut mean_w = profiles.next().unwrap_or_default();
-        for profile_w in profiles {
-            mean_w.iter_mut().zip(profile_w).for_each(|(sum, power)| *sum += power);
-        }
-        mean_w.iter_mut().for_each(|power| *power /= signals.len() as f64);
-        mean_w
     }
 }
 

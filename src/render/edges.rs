@@ -2,9 +2,9 @@
 //!
 //! Two neighbouring looks are on two sides of an edge when only one of them meets the target, or
 //! when their ranges differ by more than a spot and a slope of 60° explain. The edge is taken halfway
-//! between them, so that a distance is good to half the spacing of the scan.
+//! between them, so that a distance is good to about one spacing of the scan.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -20,7 +20,10 @@ const NEIGHBOURHOOD: f64 = 2.5;
 /// `looks` are points of the target plane, m, and the ranges there, m; none where nothing is met.
 /// `spot_m` is the spot's diameter.
 pub(super) fn distances_m(looks: &[(DVec2, Option<f64>)], spot_m: f64, reach_m: f64) -> Vec<f64> {
-    let near_m = NEIGHBOURHOOD * spacing_m(looks);
+    let spacing_m = spacing_m(looks);
+    let near_m = NEIGHBOURHOOD * spacing_m;
+    let all_places: Vec<DVec2> = looks.iter().map(|look| look.0).collect();
+    let looks = apart(looks, spacing_m / 4.0);
     let places: Vec<DVec2> = looks.iter().map(|look| look.0).collect();
     let all = Cells::new(&places, near_m);
     let nearest_across = |look: &(DVec2, Option<f64>)| {
@@ -41,7 +44,16 @@ pub(super) fn distances_m(looks: &[(DVec2, Option<f64>)], spot_m: f64, reach_m: 
         let nearest = cells.within(*place, reach_m).map(|edge| edges[edge].distance(*place));
         nearest.fold(reach_m, f64::min)
     };
-    places.par_iter().map(distance_m).collect()
+    all_places.par_iter().map(distance_m).collect()
+}
+
+/// One look of each small cell, the first, so that looks on top of each other cost no more than one.
+fn apart(looks: &[(DVec2, Option<f64>)], cell_m: f64) -> Vec<(DVec2, Option<f64>)> {
+    let mut taken = HashSet::new();
+    let is_first = |look: &&(DVec2, Option<f64>)| {
+        taken.insert((look.0 / cell_m).floor().to_array().map(|x| x as i64))
+    };
+    looks.iter().filter(is_first).copied().collect()
 }
 
 fn is_across(a: (DVec2, Option<f64>), b: (DVec2, Option<f64>), spot_m: f64) -> bool {
@@ -54,12 +66,12 @@ fn is_across(a: (DVec2, Option<f64>), b: (DVec2, Option<f64>), spot_m: f64) -> b
     }
 }
 
-/// Side of the square that a look has to itself, m.
+/// Side of the square that a look has to itself, m; along a line, its share of the line.
 fn spacing_m(looks: &[(DVec2, Option<f64>)]) -> f64 {
     let min = looks.iter().fold(DVec2::INFINITY, |min, look| min.min(look.0));
     let max = looks.iter().fold(DVec2::NEG_INFINITY, |max, look| max.max(look.0));
-    let sides_m = (max - min).max(DVec2::splat(1e-6));
-    (sides_m.x * sides_m.y / looks.len().max(1) as f64).sqrt()
+    let (sides_m, count) = ((max - min).max(DVec2::splat(1e-6)), looks.len().max(1) as f64);
+    (sides_m.x * sides_m.y / count).sqrt().max(sides_m.max_element() / count)
 }
 
 /// Points sorted into square cells, for look-ups within one cell's side.
@@ -115,6 +127,23 @@ mod tests {
                 assert!((found_m - expected_m).abs() <= 0.5 * STEP_M, "{place}: {found_m}");
             }
         }
+    }
+
+    #[test]
+    fn a_line_of_looks_sees_the_edges_that_it_crosses() {
+        let place = |i: usize| DVec2::new(1e-3 * i as f64, 0.0);
+        let range_m = |x: f64| (x > 0.1005 && x < 0.2995).then_some(8.0);
+        let looks: Vec<_> = (0..400).map(place).map(|p| (p, range_m(p.x))).collect();
+        for ((place, _), found_m) in looks.iter().zip(distances_m(&looks, SPOT_M, 0.05)) {
+            let nearest_m = (place.x - 0.1005).abs().min((place.x - 0.2995).abs()).min(0.05);
+            assert!((found_m - nearest_m).abs() <= 1e-3, "{place}: {found_m}");
+        }
+    }
+
+    #[test]
+    fn looks_on_top_of_each_other_cost_no_more_than_one() {
+        let staring = vec![(DVec2::ONE, Some(8.0)); 1_000_000];
+        assert!(distances_m(&staring, SPOT_M, 0.05).iter().all(|&m| m == 0.05));
     }
 
     #[test]

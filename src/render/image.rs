@@ -143,7 +143,7 @@ mod tests {
     }
 
     fn image(echoes: Vec<Echo>) -> Raster {
-        let scan = Scan { chirps: echoes.len(), echoes, threshold_dbm: -77.0 };
+        let scan = Scan { chirps: 0, hits: 0, echoes, threshold_dbm: -77.0, noise_dbm: None };
         let field = Field { min_m: [-0.25, -0.45], max_m: [0.25, 0.45] };
         power_image(&scan, field, 0.016, &[3], 0.004)
     }

@@ -6,12 +6,13 @@
 //! | what scatters there, in its own frame | `surface.rs` |
 //! | what arrives at an antenna, directly | `path.rs`, equation (11) |
 //! | … and by way of a second surface | `bounce.rs` |
-//! | what the receiver makes of it | `detect.rs` |
+//! | what the receiver makes of it, and what caused that | `detect.rs`, `echo.rs` |
 //! | image and point cloud | `image.rs`, `cloud.rs` |
 
 mod bounce;
 mod cloud;
 mod detect;
+mod echo;
 mod edges;
 mod image;
 mod observer;
@@ -24,16 +25,18 @@ use num_complex::Complex;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use crate::frames::{Global, Point, Pose, Ray, Target};
+use crate::frames::{Global, Point, Ray};
 use crate::geometry::Mesh;
 use crate::radar::{Aliased, Chirps, Field, Radar, RadarError, RadarFrames};
-use crate::trace::{Bvh, Hit, encloses};
+use crate::trace::{Bvh, Hit, winding_number};
 use crate::units::dbm_from_watts;
 use detect::Detector;
-use path::{Path, Paths};
+use echo::Echoes;
+use path::Paths;
 
 pub use bounce::Bounce;
 pub use cloud::cloud_table;
+pub use echo::{Echo, Truth};
 pub use image::{CHANNELS, power_image};
 pub use observer::Observer;
 pub use spot::Footprints;
@@ -71,53 +74,19 @@ impl<'a> Setup<'a> {
     }
 }
 
-/// What came back from one chirp.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Echo {
-    /// Chirp number, from 0 or as an explicit scan gives it.
-    pub chirp: u32,
-    /// Where the radar believes the echo comes from: on the beam's axis, at its range.
-    pub point: Point<Global>,
-    /// Half the way from the radar to the antenna, m.
-    pub range_m: f64,
-    /// x in the target frame, m.
-    pub xt_m: f64,
-    /// y in the target frame, m.
-    pub yt_m: f64,
-    /// Received power, dBm; −∞ when nothing comes back.
-    pub power_dbm: f64,
-    /// What caused it; none for a false alarm.
-    pub truth: Option<Truth>,
-}
-
-/// What caused an echo: the strongest of the paths that the receiver saw as one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Truth {
-    /// Where the path first met the target.
-    pub hit: Hit,
-    /// Region of that facet.
-    pub region: u16,
-    /// Standard deviation of the incidence over the rays of the spot, rad; 0 for a single ray.
-    pub theta_sd_rad: f64,
-    /// Azimuth of the radar about the facet's normal, from the grain of its region, rad.
-    pub azimuth_rad: f64,
-    /// Surfaces that the path met: 1 for a direct echo, 2 for one by way of another surface.
-    pub surfaces: u8,
-    /// Share of the power that the first surface reflects like a mirror, rough or not.
-    pub specular_share: f64,
-    /// Distance in the target plane to the nearest edge in depth, m, at most three spots.
-    pub edge_m: f64,
-}
-
 /// What one scan gave at one antenna.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scan {
     /// Number of chirps sent.
     pub chirps: usize,
+    /// Number of chirps that met the target.
+    pub hits: usize,
     /// Chirps that met a surface, in the order they were sent, whatever their power, and false alarms.
     pub echoes: Vec<Echo>,
     /// Echoes below this power are not detected, dBm.
     pub threshold_dbm: f64,
+    /// Mean thermal power in a range cell, dBm; none for a receiver without noise.
+    pub noise_dbm: Option<f64>,
 }
 
 /// Why there is nothing to render.
@@ -213,21 +182,21 @@ pub fn shade(
     let detector = Detector::new(setup, observer)?;
     let paths = Paths::new(setup, observer);
     let target_from_global = setup.radar.frames().global_from_target.inverse();
+    let echoes = Echoes { setup, footprints, observer, detector: &detector, target_from_global };
     let echo = |(chirp, hits): (usize, &[Option<Hit>])| {
         let paths = paths.of_chirp(chirp, hits);
-        let found = found(setup, &detector, observer, chirp, &paths)?;
+        let seen = detector.observe(chirp, &paths)?;
         done(1);
-        Ok(found.map(|found| Echo {
-            truth: found.cause.map(|path| truth(setup, footprints, chirp, hits, path)),
-            ..found.echo(setup.chirps, chirp, &target_from_global)
-        }))
+        Ok(echoes.echo(chirp, hits, &paths, seen))
     };
     let echoes: Vec<Option<Echo>> =
         footprints.chirps().enumerate().map(echo).collect::<Result<_, RenderError>>()?;
     Ok(Scan {
         chirps: setup.chirps.rays.len(),
+        hits: footprints.chirps().filter(|hits| hits.iter().any(Option::is_some)).count(),
         echoes: echoes.into_iter().flatten().collect(),
         threshold_dbm: dbm_from_watts(detector.threshold_w()),
+        noise_dbm: detector.noise_w().map(dbm_from_watts),
     })
 }
 
@@ -253,84 +222,10 @@ pub fn beat_signals(
         .map(move |(chirp, hits)| detector.beats(chirp, &paths.of_chirp(chirp, hits))))
 }
 
-/// A range and a power, and where they come from.
-struct Found<'a> {
-    point: Point<Global>,
-    range_m: f64,
-    power_w: f64,
-    cause: Option<&'a Path>,
-}
-
-/// What the receiver found in one chirp: an echo, weak or strong, or a false alarm.
-fn found<'a>(
-    setup: &Setup,
-    detector: &Detector,
-    observer: Observer,
-    chirp: usize,
-    paths: &'a [Path],
-) -> Result<Option<Found<'a>>, RenderError> {
-    let Some(seen) = detector.observe(chirp, paths)? else { return Ok(None) };
-    let near = |path: &&Path| {
-        detector.reach_m().is_none_or(|reach_m| (path.range_m - seen.range_m).abs() <= reach_m)
-    };
-    let cause = paths.iter().filter(near).reduce(|a, b| if b.power_w > a.power_w { b } else { a });
-    if cause.is_none() && seen.power_w < detector.threshold_w() {
-        return Ok(None);
-    }
-    let point = observer.on_axis(&setup.chirps.rays[chirp], seen.range_m);
-    let (range_m, power_w) = (seen.range_m, seen.power_w);
-    Ok(point.map(|point| Found { point, range_m, power_w, cause }))
-}
-
-impl Found<'_> {
-    fn echo(
-        &self,
-        chirps: &Chirps,
-        chirp: usize,
-        target_from_global: &Pose<Target, Global>,
-    ) -> Echo {
-        let in_target = *target_from_global * self.point;
-        Echo {
-            chirp: chirps.number[chirp],
-            point: self.point,
-            range_m: self.range_m,
-            xt_m: in_target.xyz.x,
-            yt_m: in_target.xyz.y,
-            power_dbm: dbm_from_watts(self.power_w),
-            truth: None,
-        }
-    }
-}
-
-fn truth(
-    setup: &Setup,
-    footprints: &Footprints,
-    chirp: usize,
-    hits: &[Option<Hit>],
-    path: &Path,
-) -> Truth {
-    Truth {
-        hit: path.hit,
-        region: setup.region_of_facet[path.hit.facet as usize],
-        theta_sd_rad: theta_sd_rad(hits),
-        azimuth_rad: path.azimuth_rad,
-        surfaces: path.surfaces,
-        specular_share: path.specular_share,
-        edge_m: footprints.edge_m[chirp],
-    }
-}
-
-fn theta_sd_rad(hits: &[Option<Hit>]) -> f64 {
-    let count = hits.iter().flatten().count() as f64;
-    let mean_rad = hits.iter().flatten().map(Hit::theta_rad).sum::<f64>() / count;
-    let square = |hit: &Hit| (hit.theta_rad() - mean_rad).powi(2);
-    (hits.iter().flatten().map(square).sum::<f64>() / count).sqrt()
-}
-
 /// What must hold before anything is computed.
 fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(), RenderError> {
     if let Observer::Receiver { position, .. } = observer
-        && encloses(setup.bvh.mesh(), position)
+        && is_walled_off(setup, position)
     {
         let [x_m, y_m, z_m] = position.xyz.to_array();
         return Err(RenderError::Inside { x_m, y_m, z_m });
@@ -343,6 +238,14 @@ fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(
         };
     }
     Ok(())
+}
+
+/// Whether an antenna is inside something that the radar is outside of. A room around both is no wall
+/// between them.
+fn is_walled_off(setup: &Setup, position: Point<Global>) -> bool {
+    let wound = |point| winding_number(setup.bvh.mesh(), point);
+    // Between 0, outside, and 1, inside; open meshes have anything between.
+    (wound(position) - wound(setup.radar.frames().origin())).abs() > 0.75
 }
 
 fn miss(frames: &RadarFrames, chirps: &Chirps, mesh: &Mesh) -> RenderError {

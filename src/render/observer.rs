@@ -44,14 +44,14 @@ impl Observer {
     pub(super) fn on_axis(&self, axis: &Ray<Global>, range_m: f64) -> Option<Point<Global>> {
         let (origin, direction) = (axis.origin.xyz, axis.direction.xyz());
         let base = self.position(origin) - origin;
+        let path_m = 2.0 * range_m;
         let along_m = match self {
             Observer::Radar => range_m,
+            // Shorter than the straight way between the antennas.
+            Observer::Receiver { .. } if path_m <= base.length() => return None,
             Observer::Receiver { .. } => {
-                let path_m = 2.0 * range_m;
-                // Negative where the way is shorter than the straight one between the antennas.
-                let longer_m = path_m - base.length();
-                let left_m2 = longer_m * (path_m + base.length());
-                left_m2 / (2.0 * (path_m - base.dot(direction)).abs())
+                let left_m2 = path_m * path_m - base.length_squared();
+                left_m2 / (2.0 * (path_m - base.dot(direction)))
             }
         };
         (along_m > 0.0 && along_m.is_finite()).then(|| Point::from(origin + along_m * direction))

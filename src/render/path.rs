@@ -14,8 +14,8 @@ use super::bounce::{Bounce, directions};
 use super::surface::{LocalFrame, Surface};
 use super::{Observer, Setup};
 use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
-use crate::radar::Link;
 use crate::radar::random::{Key, Purpose};
+use crate::radar::{Beam, Link};
 use crate::trace::Hit;
 
 /// Rays start this far above a surface, m, so as not to meet it again: far above the rounding of
@@ -35,7 +35,7 @@ pub(super) struct Path {
     pub surfaces: u8,
     /// Azimuth of the source about the first surface's normal, from its grain, rad.
     pub azimuth_rad: f64,
-    /// Share of the power that the first surface reflects like a mirror, rough or not.
+    /// Share of the power that every surface on the way reflects like a mirror, rough or not.
     pub specular_share: f64,
 }
 
@@ -44,6 +44,7 @@ pub(super) struct Paths<'a> {
     setup: &'a Setup<'a>,
     observer: Observer,
     link: Link,
+    beam: Beam,
 }
 
 /// One chirp, on its way.
@@ -53,7 +54,7 @@ struct Sent<'a> {
     axis: &'a Ray<Global>,
     antenna: DVec3,
     /// Rays that share its power.
-    rays: f64,
+    rays: usize,
 }
 
 /// A lit point of the target.
@@ -74,7 +75,7 @@ impl<'a> Paths<'a> {
         if let Observer::Receiver { aperture_m2, .. } = observer {
             link.aperture_m2 = aperture_m2;
         }
-        Paths { setup, observer, link }
+        Paths { setup, observer, link, beam: Beam::new(setup.radar) }
     }
 
     /// All paths of a chirp through the hits of its rays. A direct path is there even when nothing
@@ -82,7 +83,7 @@ impl<'a> Paths<'a> {
     pub fn of_chirp(&self, number: usize, hits: &[Option<Hit>]) -> Vec<Path> {
         let axis = &self.setup.chirps.rays[number];
         let antenna = self.observer.position(axis.origin.xyz);
-        let sent = Sent { paths: self, number, axis, antenna, rays: hits.len() as f64 };
+        let sent = Sent { paths: self, number, axis, antenna, rays: hits.len() };
         let mut paths = Vec::with_capacity(hits.len());
         for (ray, hit) in hits.iter().enumerate() {
             let Some(hit) = hit else { continue };
@@ -140,7 +141,10 @@ impl<'a> Sent<'a> {
             let power_w = flux_w * f_per_sr * onward.cos_theta() * seen * self.received(&second);
             if power_w > 0.0 && self.is_seen(&second) {
                 let way_m = lit.hit.range_m + hit.range_m + second.antenna_m;
-                paths.push(Path { range_m: 0.5 * way_m, power_w, surfaces: 2, ..direct });
+                let specular_share = lit.surface.scattering.specular_share(lit.source, onward)
+                    * second.surface.scattering.specular_share(second.source, second.antenna);
+                let (range_m, surfaces) = (0.5 * way_m, 2);
+                paths.push(Path { range_m, power_w, surfaces, specular_share, ..direct });
             }
         }
     }
@@ -153,7 +157,7 @@ impl<'a> Sent<'a> {
 
     /// Power of one ray on a lit point, W.
     fn flux_w(&self, lit: &Lit) -> f64 {
-        self.paths.link.flux_w(lit.hit.cos_theta) / self.rays
+        self.paths.link.flux_w(lit.hit.cos_theta) / self.rays as f64
     }
 
     /// Share of the power on a lit point that the antenna receives if nothing is in the way.
@@ -183,7 +187,9 @@ impl<'a> Sent<'a> {
     fn pattern(&self, bounce: &Bounce, hit: &Hit) -> f64 {
         match self.paths.observer {
             Observer::Receiver { .. } => 1.0,
-            Observer::Radar => bounce.pattern(self.paths.setup, self.axis, hit.point.xyz),
+            Observer::Radar => {
+                bounce.pattern(&self.paths.beam, self.axis, self.rays, hit.point.xyz)
+            }
         }
     }
 }

@@ -11,13 +11,13 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::edges;
-use crate::frames::{Direction, Global, Point, Ray};
+use crate::frames::{Direction, Global, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Beam, Chirps, Radar};
 use crate::trace::{Bvh, Hit};
 
 /// 1/φ: successive multiples of it are spread evenly over 0 to 1.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
+pub(super) const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// What the rays of every chirp met. Kept, it can be shaded again with other materials.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,7 +48,6 @@ pub(super) fn trace(
 ) -> Footprints {
     const CHIRPS_PER_TASK: usize = 256;
     let beam = Beam::new(radar);
-    let target_from_global = radar.frames().global_from_target.inverse();
     let chirp = |(number, axis): (usize, &Ray<Global>)| {
         let hit = bvh.closest(axis);
         if rays_per_chirp == 1 {
@@ -56,9 +55,7 @@ pub(super) fn trace(
         }
         // The spot is as wide as the beam where its axis meets the target, or at 8 m.
         let range_m = hit.map_or(PATTERN_RANGE_M, |hit| hit.range_m);
-        let looks_at = Point::from(axis.origin.xyz + PATTERN_RANGE_M * axis.direction.xyz());
-        let aim = (target_from_global * looks_at).xyz;
-        let tangent = beam.diameter_m(aim.x, aim.y, range_m) / range_m;
+        let tangent = beam.diameter_along_m(axis, range_m) / range_m;
         sub_rays(axis, tangent, number, rays_per_chirp).map(|ray| bvh.closest(&ray?)).collect()
     };
     let hits: Vec<Option<Hit>> = chirps
@@ -120,6 +117,7 @@ fn across(forward: DVec3) -> (DVec3, DVec3) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frames::Point;
 
     fn axis() -> Ray<Global> {
         let origin = Point::new(0.0, 0.0, 8.0);

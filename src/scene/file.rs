@@ -16,7 +16,8 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
+use serde::de::{SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::formats::FormatError;
 use crate::formats::text::from_toml;
@@ -42,7 +43,7 @@ pub struct SceneFile {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bounce: Option<BounceEntry>,
     /// Antennas beside the radar's own that listen to the same scan.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "antennas")]
     pub receiver: Vec<ReceiverEntry>,
     /// How detections become an image.
     #[serde(default)]
@@ -75,8 +76,9 @@ impl Default for SpotEntry {
 pub struct BounceEntry {
     /// Directions followed from each lit point, 1 to 10 000. 64: assumed.
     pub rays: usize,
-    /// How strongly the radar's own beam sees a surface outside the spot, over one inside, dB, −200
-    /// to 0. −20: assumed; side lobes are not published. Receivers see the whole target alike.
+    /// Power by way of a surface outside the spot, over one inside, dB, −200 to 0: what side lobes
+    /// let through, both senses of the path together. −20: assumed; side lobes are not published.
+    /// Receivers see the whole target alike.
     pub outside_spot_db: f64,
 }
 
@@ -193,6 +195,29 @@ pub struct HalfSpaceEntry {
     pub point_m: [f64; 3],
     /// Normal of the plane, of any length.
     pub normal: [f64; 3],
+}
+
+/// A list of tables; `[receiver]` is a likely slip for either of two things.
+fn antennas<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<ReceiverEntry>, D::Error> {
+    struct Antennas;
+    impl<'de> Visitor<'de> for Antennas {
+        type Value = Vec<ReceiverEntry>;
+
+        fn expecting(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+            f.write_str(
+                "[[receiver]] for an antenna elsewhere, or [radar.receiver] for the range receiver",
+            )
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
+            let mut entries = Vec::new();
+            while let Some(entry) = list.next_element()? {
+                entries.push(entry);
+            }
+            Ok(entries)
+        }
+    }
+    deserializer.deserialize_seq(Antennas)
 }
 
 fn one() -> f64 {

@@ -136,10 +136,8 @@ impl Scene {
 fn check_spot(file: &SceneFile, chirps: usize, path: &Path) -> Result<(), SceneError> {
     const MOST_RAYS_PER_CHIRP: usize = 10_000;
     const MOST_RAYS: usize = 50_000_000;
-    const MOST_ONWARD: usize = 5_000_000_000;
-    let fits = |count: usize, paths: usize, most: usize| {
-        (1..=MOST_RAYS_PER_CHIRP).contains(&count) && paths.saturating_mul(chirps) <= most
-    };
+    /// Each is kept while its chirp is received.
+    const MOST_PATHS_PER_CHIRP: usize = 100_000;
     let refuse = |place: &str, problem: String, way_out: &str| SceneError::Value {
         file: path.to_owned(),
         place: place.to_owned(),
@@ -147,7 +145,8 @@ fn check_spot(file: &SceneFile, chirps: usize, path: &Path) -> Result<(), SceneE
         way_out: way_out.to_owned(),
     };
     let rays = file.spot.rays;
-    if !fits(rays, rays, MOST_RAYS) {
+    let possible = 1..=MOST_RAYS_PER_CHIRP;
+    if !possible.contains(&rays) || rays.saturating_mul(chirps) > MOST_RAYS {
         let problem = format!("{rays} rays for each of {chirps} chirps");
         return Err(refuse(
             "spot.rays",
@@ -156,9 +155,11 @@ fn check_spot(file: &SceneFile, chirps: usize, path: &Path) -> Result<(), SceneE
         ));
     }
     let Some(bounce) = file.bounce else { return Ok(()) };
-    if !fits(bounce.rays, rays.saturating_mul(bounce.rays), MOST_ONWARD) {
-        let problem = format!("{} directions from each of {rays} × {chirps} points", bounce.rays);
-        return Err(refuse("bounce.rays", problem, "give 1 to 10 000, at most 5 billion in all"));
+    let paths = rays.saturating_mul(bounce.rays);
+    if !possible.contains(&bounce.rays) || paths > MOST_PATHS_PER_CHIRP {
+        let problem = format!("{} directions from each of {rays} points of a spot", bounce.rays);
+        let way_out = "give 1 to 10 000, and no more than 100 000 with spot.rays together";
+        return Err(refuse("bounce.rays", problem, way_out));
     }
     if !(-200.0..=0.0).contains(&bounce.outside_spot_db) {
         let problem = format!("{} dB is not a loss", bounce.outside_spot_db);

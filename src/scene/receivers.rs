@@ -8,9 +8,20 @@ use super::file::{ReceiverEntry, SceneFile};
 /// No antenna may be farther out than this, m.
 const FARTHEST_M: f64 = 1e4;
 
+/// Each keeps its own scan and image in memory.
+const MOST_RECEIVERS: usize = 32;
+
 /// Checks every receiver of a scene.
 pub(super) fn check(file: &SceneFile, path: &Path) -> Result<(), SceneError> {
     let mut names: Vec<&str> = Vec::new();
+    if file.receiver.len() > MOST_RECEIVERS {
+        return Err(SceneError::Value {
+            file: path.to_owned(),
+            place: "the scene".to_owned(),
+            problem: format!("has {} receivers", file.receiver.len()),
+            way_out: format!("give at most {MOST_RECEIVERS}"),
+        });
+    }
     for entry in &file.receiver {
         let refuse = |problem: String, way_out: &str| SceneError::Value {
             file: path.to_owned(),

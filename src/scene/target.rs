@@ -90,6 +90,7 @@ impl Target {
         let region_of_facet = assign(&mesh, &spans, &file.region)
             .map_err(|error| SceneError::Region { file: path.to_owned(), error })?;
         let regions = count_regions(file, &region_of_facet);
+        check_grains(file, path)?;
         Ok(Target { mesh, meshes, regions, region_of_facet })
     }
 }
@@ -98,6 +99,22 @@ impl MeshReport {
     fn span(&self) -> MeshSpan {
         let first = self.first_facet;
         MeshSpan { name: self.name.clone(), first, end: first + self.facets }
+    }
+}
+
+fn check_grains(file: &SceneFile, path: &Path) -> Result<(), SceneError> {
+    let points_nowhere = |grain: [f64; 3]| {
+        let length = DVec3::from_array(grain).length();
+        !length.is_normal()
+    };
+    match file.region.iter().find(|region| region.grain.is_some_and(points_nowhere)) {
+        None => Ok(()),
+        Some(region) => {
+            let place = format!("region `{}`", region.name);
+            let problem =
+                format!("has grain = {:?}, which points nowhere", region.grain.unwrap_or_default());
+            Err(value(path, &place, &problem, "give a direction, such as [0, 1, 0]"))
+        }
     }
 }
 

@@ -1,26 +1,27 @@
-//! Whether a point lies inside a closed mesh.
+//! How often a mesh winds around a point.
+
+use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::facet::crossing_m;
-use crate::frames::{Direction, Global, Point, Ray};
+use crate::frames::{Global, Point};
 use crate::geometry::Mesh;
 
-/// Directions that no edge of a built solid runs along.
-const DIRECTIONS: [[f64; 3]; 3] =
-    [[0.531, 0.677, 0.509], [-0.611, 0.283, 0.739], [0.197, -0.859, -0.473]];
-
-/// Whether rays from a point leave the mesh an odd number of times, in most of three directions.
+/// The winding number: 0 outside, ±1 inside a closed mesh (negative where its facets run clockwise
+/// seen from outside), more inside overlapping ones, and a fraction near an open one.
 ///
-/// Open meshes have no inside; there the answer is a guess.
-pub fn encloses(mesh: &Mesh, point: Point<Global>) -> bool {
-    let is_odd = |direction: &[f64; 3]| {
-        let Some(direction) = Direction::new(DVec3::from_array(*direction)) else { return false };
-        let ray = Ray { origin: point, direction };
-        let crosses = |&facet: &usize| crossing_m(mesh, facet, &ray).is_some();
-        (0..mesh.facets.len()).filter(crosses).count() % 2 == 1
-    };
-    DIRECTIONS.iter().filter(|direction| is_odd(direction)).count() >= 2
+/// The solid angles of all facets over 4π, each by Van Oosterom and Strackee 1983,
+/// DOI 10.1109/TBME.1983.325207.
+pub fn winding_number(mesh: &Mesh, point: Point<Global>) -> f64 {
+    (0..mesh.facets.len()).map(|facet| solid_angle_sr(mesh, facet, point.xyz)).sum::<f64>()
+        / (4.0 * PI)
+}
+
+fn solid_angle_sr(mesh: &Mesh, facet: usize, from: DVec3) -> f64 {
+    let [a, b, c] = mesh.corners(facet).map(|corner| corner - from);
+    let [u, v, w] = [a.length(), b.length(), c.length()];
+    let volume = a.dot(b.cross(c));
+    2.0 * volume.atan2(u * v * w + a.dot(b) * w + b.dot(c) * u + c.dot(a) * v)
 }
 
 #[cfg(test)]
@@ -28,13 +29,26 @@ mod tests {
     use super::*;
     use crate::scene::{mannequin, solids};
 
+    fn wound(mesh: &Mesh, x: f64, y: f64, z: f64) -> f64 {
+        winding_number(mesh, Point::new(x, y, z))
+    }
+
     #[test]
     fn a_sphere_and_a_body_have_an_inside() {
         let sphere = solids::icosphere(0.5, 3);
-        assert!(encloses(&sphere, Point::new(0.1, 0.2, -0.3)));
-        assert!(!encloses(&sphere, Point::new(0.1, 0.2, -0.6)));
+        assert!((wound(&sphere, 0.1, 0.2, -0.3) - 1.0).abs() < 1e-9);
+        assert!(wound(&sphere, 0.1, 0.2, -0.6).abs() < 1e-9);
         let body = mannequin::mannequin();
-        assert!(encloses(&body, Point::new(0.0, 1.2, 0.0)));
-        assert!(!encloses(&body, Point::new(0.0, 1.2, 1.0)));
+        assert!((wound(&body, 0.0, 1.2, 0.0).abs() - 1.0).abs() < 1e-6);
+        assert!(wound(&body, 0.0, 1.2, 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn overlapping_bodies_wind_twice_and_an_open_wall_at_most_half() {
+        let mut two = solids::icosphere(0.5, 3);
+        two.append(&solids::icosphere(0.5, 2)).unwrap();
+        assert!((wound(&two, 0.1, 0.0, 0.0) - 2.0).abs() < 1e-9);
+        let wall = solids::plate(40.0, 40.0);
+        assert!(wound(&wall, 1.0, 1.1, -5.0).abs() < 0.5);
     }
 }

@@ -12,7 +12,7 @@ mod inside;
 use crate::frames::{Global, Point};
 
 pub use bvh::Bvh;
-pub use inside::encloses;
+pub use inside::winding_number;
 
 /// Where a ray meets a facet, in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -66,9 +66,9 @@ fn power_figure(scene: &Scene, view: &View, image: &Raster) -> Result<Vec<u8>, E
         None => scene.radar().preset.clone(),
         Some(receiver) => format!("{}, receiver {}", scene.radar().preset, receiver.name),
     };
-    let threshold_dbm = (100.0 * scan.threshold_dbm).round() / 100.0;
+    let threshold_dbm = (10.0 * scan.threshold_dbm).round() / 10.0;
     let subtitle = format!(
-        "{antenna}, {} of {} chirps at or above {} dBm",
+        "{antenna}, {} of {} chirps ≥ {} dBm",
         grouped(scan.detections().count()),
         grouped(scan.chirps),
         threshold_dbm.to_string().replace('-', "−")

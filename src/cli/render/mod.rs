@@ -46,7 +46,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let scene = Scene::load(&args.scene)?;
     let (used, material_of_region) = materials(&scene, &args.scene, db)?;
     let surfaces = surfaces(&scene, &used, &material_of_region);
-    let at = |error| Error::Render { scene: args.scene.clone(), error };
+    let at = |(antenna, error)| Error::Render { scene: args.scene.clone(), antenna, error };
+    let beat = args.beat.then(|| beat::Shape::new(&scene)).transpose()?;
     stages.end("load", console);
 
     let bvh = Bvh::new(&scene.target.mesh);
@@ -55,7 +56,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let rays = scene.file.spot.rays;
     let footprints = trace(setup.radar, setup.chirps, &bvh, rays, &|chirps| bar.inc(chirps as u64));
     bar.finish_and_clear();
-    let footprints = footprints.map_err(at)?;
+    let footprints = footprints.map_err(|error| at((String::new(), error)))?;
     stages.end("trace", console);
 
     let views = views::all(&setup, &footprints, &scene, console).map_err(at)?;
@@ -66,8 +67,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 
     let record = Record::new(&scene, &used, &material_of_region, &views, &images, args.all);
     let mut files = files::encode(args.all, &scene, &views, &images, &record, &material_of_region)?;
-    if args.beat {
-        files.extend(beat::encode(&args.scene, &setup, &footprints, &views)?);
+    if let Some(shape) = beat {
+        files.extend(beat::encode(&args.scene, shape, &setup, &footprints, &views)?);
     }
     stages.end("encode", console);
 

@@ -17,8 +17,8 @@ const SCHEMA: u32 = 2;
 const EQUATION: &str = "power_w = transmit_power_w * 10^(-system_loss_db/10) * aperture_m2 / range_m^2 \
     * f_per_sr(incidence) * cos(incidence)^n, n = 2 for footprint \"paper\", 1 for \"projected\"; \
     f_per_sr is the scattering model of the point's material in backscatter; with scene.spot.rays > 1 the power is the \
-    mean of this over the rays of the spot, and range and incidence are no longer those of one ray; receivers, speckle, \
-    noise and second surfaces change it as docs/model.md says";
+    mean of this over the rays of the spot, and range and incidence are no longer those of one ray; docs/model.md has receivers elsewhere, \
+    second surfaces, speckle and noise";
 
 /// A rendering, as `scan.json` holds it.
 #[derive(Serialize)]
@@ -35,6 +35,8 @@ pub(super) struct Record<'a> {
     meshes: &'a [MeshReport],
     regions: Vec<RegionRecord<'a>>,
     materials: Vec<MaterialRecord<'a>>,
+    threshold_dbm: f64,
+    noise_dbm: Option<f64>,
     counts: Counts,
     power_dbm: Option<PowerRange>,
     image: Value,
@@ -60,6 +62,8 @@ pub(super) struct ReceiverRecord<'a> {
     pub name: &'a str,
     position_m: [f64; 3],
     aperture_m2: f64,
+    threshold_dbm: f64,
+    noise_dbm: Option<f64>,
     pub counts: Counts,
     power_dbm: Option<PowerRange>,
 }
@@ -81,6 +85,7 @@ struct MaterialRecord<'a> {
 #[derive(Clone, Copy, Serialize)]
 pub(super) struct Counts {
     pub chirps: usize,
+    /// Chirps that met the target.
     pub hits: usize,
     /// Echoes and false alarms at or above the threshold.
     pub detections: usize,
@@ -138,6 +143,8 @@ impl<'a> Record<'a> {
             frames: frames(scene),
             cloud: if all_hits { "every hit" } else { "detections" },
             meshes: &scene.target.meshes,
+            threshold_dbm: scan.threshold_dbm,
+            noise_dbm: scan.noise_dbm,
             counts: Counts::new(scene, scan, image),
             power_dbm: PowerRange::new(scan),
             image: json!({
@@ -176,9 +183,19 @@ impl<'a> Record<'a> {
             ));
         }
         let Counts { detections, outside_image, .. } = self.counts;
-        if detections == 0 {
-            let threshold_dbm = self.radar.threshold_dbm;
-            notices.push(format!("nothing reaches the threshold of {threshold_dbm} dBm"));
+        let silent = |detections: usize, threshold_dbm: f64, antenna: &str| {
+            let gate = self.radar.receiver.and_then(|receiver| receiver.gate_m);
+            let gate = gate.map_or(String::new(), |[near_m, far_m]| {
+                format!(" within the gate of {near_m} to {far_m} m")
+            });
+            (detections == 0).then(|| {
+                format!("nothing{antenna} reaches the threshold of {threshold_dbm:.1} dBm{gate}")
+            })
+        };
+        notices.extend(silent(detections, self.threshold_dbm, ""));
+        for ReceiverRecord { name, counts, threshold_dbm, .. } in &self.receivers {
+            let antenna = format!(" at receiver `{name}`");
+            notices.extend(silent(counts.detections, *threshold_dbm, &antenna));
         }
         for region in self.regions.iter().filter(|region| region.facets == 0) {
             notices.push(format!("later regions took all facets of region `{}`", region.name));
@@ -247,6 +264,8 @@ impl<'a> ReceiverRecord<'a> {
             name: &receiver.name,
             position_m: receiver.position_m,
             aperture_m2: receiver.aperture_m2.unwrap_or(scene.radar().aperture_m2),
+            threshold_dbm: view.scan.threshold_dbm,
+            noise_dbm: view.scan.noise_dbm,
             counts: Counts::new(scene, &view.scan, image),
             power_dbm: PowerRange::new(&view.scan),
         })
@@ -272,8 +291,7 @@ impl<'a> MaterialRecord<'a> {
 
 impl Counts {
     fn new(scene: &Scene, scan: &Scan, image: &Raster) -> Counts {
-        let chirps = scan.chirps;
-        let hits = scan.echoes.iter().filter(|echo| echo.truth.is_some()).count();
+        let Scan { chirps, hits, .. } = *scan;
         let detections = scan.detections().count();
         let false_alarms = scan.detections().filter(|echo| echo.truth.is_none()).count();
         Counts {
@@ -281,7 +299,7 @@ impl Counts {
             hits,
             detections,
             false_alarms,
-            below_threshold: hits + false_alarms - detections,
+            below_threshold: scan.echoes.len() - detections,
             misses: chirps - hits,
             outside_image: scan.detections().filter(|e| !image.contains(e.xt_m, e.yt_m)).count(),
             degenerate_facets: scene.target.meshes.iter().map(|m| m.degenerate_facets).sum(),

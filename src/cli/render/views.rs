@@ -32,13 +32,14 @@ impl View<'_> {
     }
 }
 
-/// The radar's own view first, then those of the receivers.
+/// The radar's own view first, then those of the receivers; an error comes with the receiver it is
+/// about.
 pub(super) fn all<'a>(
     setup: &Setup,
     footprints: &Footprints,
     scene: &'a Scene,
     console: &Console,
-) -> Result<Vec<View<'a>>, RenderError> {
+) -> Result<Vec<View<'a>>, (String, RenderError)> {
     let receivers = &scene.file.receiver;
     let bar = console.progress("receiving", (1 + receivers.len()) * scene.chirps.rays.len());
     let view = |receiver: Option<(usize, &'a ReceiverEntry)>| {
@@ -47,7 +48,10 @@ pub(super) fn all<'a>(
             position: Point::from(glam::DVec3::from_array(entry.position_m)),
             aperture_m2: entry.aperture_m2.unwrap_or(scene.radar().aperture_m2),
         });
-        let scan = shade(setup, footprints, observer, &|chirps| bar.inc(chirps as u64))?;
+        let antenna =
+            receiver.map_or(String::new(), |(_, entry)| format!("receiver `{}`: ", entry.name));
+        let scan = shade(setup, footprints, observer, &|chirps| bar.inc(chirps as u64))
+            .map_err(|error| (antenna, error))?;
         Ok(View { receiver: receiver.map(|(_, entry)| entry), observer, scan })
     };
     let views =
