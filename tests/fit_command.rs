@@ -121,11 +121,26 @@ fn too_little_data_gives_a_verdict_and_no_confident_number() {
     let near = text(folder, &["fit", "near.csv", "--starts", "1"]);
     assert!(near.contains("the data do not show the diffuse part"), "{near}");
     fs::write(folder.join("scan.csv"), curve(0.0, 60.0, 150)).unwrap();
-    // Far from a Kirchhoff surface of one slope, whose permittivity only scales it.
     let arguments = ["fit", "scan.csv", "--model", "kirchhoff-go", "--starts", "1"];
     let go = json(folder, &arguments);
+    assert!(go["verdict"].to_string().contains("only-together"), "{go}");
     let silent = go["estimates"].as_array().unwrap().iter().filter(|e| e["sd"].is_null()).count();
-    assert!(silent > 0 && !go["verdict"].as_array().unwrap().is_empty(), "{go}");
+    assert_eq!(silent, 2, "eps_real and eps_imag only scale the curve: {go}");
+}
+
+#[test]
+fn a_fit_that_did_not_converge_is_printed_and_not_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("scan.csv"), curve(0.0, 60.0, 400)).unwrap();
+    // A single lobe for two: the looks have to explain the tail, slowly.
+    let fit = ["fit", "scan.csv", "--model", "cook-torrance", "--starts", "1", "-o", "fit.svg"];
+    let output = matdb(folder).args(fit).args(SAVE).output().unwrap();
+    let [out, error] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+    assert_eq!(output.status.code(), Some(1), "{out}");
+    assert!(out.contains("did not converge") && out.contains("do not use the numbers"), "{out}");
+    assert!(error.starts_with("error: scan.csv: the fit did not converge"), "{error}");
+    assert_eq!(entries(folder), ["scan.csv"]);
 }
 
 #[test]

@@ -98,7 +98,10 @@ impl FitResult {
         };
         let settings = settings.into_iter().map(|(name, value)| (name.to_owned(), value));
         let looks = self.looks.and(self.fit.looks).map(|looks| ("looks".to_owned(), looks));
-        let all = self.fit.fixed.iter().cloned().chain(settings).chain(looks);
+        let bounds = self.fit.bounds.iter().flat_map(|(name, [min, max])| {
+            [(format!("{name}.min"), *min), (format!("{name}.max"), *max)]
+        });
+        let all = self.fit.fixed.iter().cloned().chain(bounds).chain(settings).chain(looks);
         all.map(|(name, value)| Given { name, value }).collect()
     }
 
@@ -183,15 +186,17 @@ mod tests {
         let curve = Twin { rows: 200, ..Twin::default() }.curve(3);
         let method = Method::Tls { theta_sd_rad: 0.05, level_sd_db: 5.6 };
         let fixed = vec![("diffuse.alpha".to_owned(), 5.0)];
-        let fit = Fit { method, fixed, starts: 1, seed: 7, ..Fit::default() };
+        let bounds = vec![("specular.m".to_owned(), [0.01, 1.0])];
+        let fit = Fit { method, fixed, bounds, starts: 1, seed: 7, ..Fit::default() };
         let found = fit.run(&mixture(0.1, 3.0, 0.02, 0.004), &curve).unwrap();
         let stored = found.stored("fit", "scan", "bench");
         let report = stored.report.unwrap();
         assert_eq!((report.method.as_str(), stored.estimator.as_str()), ("tls-tail", "tls-tail"));
         let given: Vec<(&str, f64)> =
             report.given.iter().map(|g| (g.name.as_str(), g.value)).collect();
+        let held = [("diffuse.alpha", 5.0), ("specular.m.min", 0.01), ("specular.m.max", 1.0)];
         let settings = [("method.theta_sd_rad", 0.05), ("method.level_sd_db", 5.6)];
-        assert_eq!(given, [vec![("diffuse.alpha", 5.0)], settings.to_vec()].concat());
+        assert_eq!(given, [held.to_vec(), settings.to_vec()].concat());
         assert_eq!((report.looks, report.seed, report.starts), (None, 7, 1));
         assert_eq!(report.verdict.len(), found.verdict.len());
         let m = found.estimate("specular.m").unwrap();

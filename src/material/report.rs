@@ -11,7 +11,8 @@ use super::check::value;
 pub struct FitReport {
     /// `mse`, `tls`, `tls-tail` or `censored`.
     pub method: String,
-    /// Numbers that were set and not found: held parameters by their path, settings as `method.…`.
+    /// Numbers that were set and not found: held parameters by their path, narrower ranges as their
+    /// path and `.min` or `.max`, settings as `method.…`, `looks`.
     pub given: Vec<Given>,
     /// Looks L of the speckle, given or found; none for least squares.
     pub looks: Option<f64>,
@@ -53,7 +54,7 @@ pub struct FitReport {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Given {
-    /// A parameter's path, or `method.` and a setting.
+    /// As [`FitReport::given`] says.
     pub name: String,
     /// Its value, in its own unit.
     pub value: f64,
@@ -186,7 +187,8 @@ mod tests {
     #[test]
     fn a_report_without_a_meaning_is_refused() {
         assert_eq!(report().validate("fit"), Ok(()));
-        let cases: [(fn(&mut FitReport), &str); 9] = [
+        type Spoil = fn(&mut FitReport);
+        let cases: [(Spoil, &str); 9] = [
             (|r| r.objective = f64::NAN, "not finite"),
             (|r| r.given[0].value = f64::INFINITY, "not finite"),
             (|r| r.estimates[0].interval_95 = Some([0.0, f64::INFINITY]), "not finite"),

@@ -247,12 +247,24 @@ fn fixed(args: &Args, start: &Brdf) -> Result<Vec<(String, f64)>, Error> {
             let way_out = format!("there are: {}", paths.join(", "));
             return usage(format!("the model has no parameter `{path}`"), way_out);
         }
-        if fixed.iter().any(|(known, _)| known == path) {
+        if is_held(path, &fixed) {
             return usage(format!("`{path}` is held twice"), "hold it once".to_owned());
         }
         fixed.push((path.to_owned(), value));
     }
+    fixed.extend(frequencies(start).filter(|(path, _)| !is_held(path, &fixed)).collect::<Vec<_>>());
     Ok(fixed)
+}
+
+fn is_held(path: &str, fixed: &[(String, f64)]) -> bool {
+    fixed.iter().any(|(known, _)| known == path)
+}
+
+/// The frequencies in a model: they are the radar's, and nothing that a surface could tell.
+fn frequencies(model: &Brdf) -> impl Iterator<Item = (String, f64)> {
+    let is_frequency = |path: &str| path.rsplit('.').next() == Some("frequency_hz");
+    let parameters = model.parameters().into_iter().filter(move |p| is_frequency(&p.path));
+    parameters.map(|parameter| (parameter.path, parameter.value))
 }
 
 fn draw(path: &Path, subject: &Subject, fit: &crate::material::Fit) -> Result<Vec<String>, Error> {
