@@ -4,11 +4,13 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::fit::FitError;
 use crate::formats::FormatError;
 use crate::formats::exr::ExrError;
 use crate::formats::figure::FigureError;
 use crate::material::MaterialError;
 use crate::material::file::FileError;
+use crate::measure::curve::ObservationError;
 use crate::measure::{CloudError, ReductionError, RegistrationError};
 use crate::radar::RadarError;
 use crate::radar::f5::F5Error;
@@ -70,6 +72,41 @@ pub enum Error {
     /// There is no curve.
     #[error(transparent)]
     Reduction(#[from] ReductionError),
+    /// A curve's file was refused.
+    #[error("{}: {error}", file.display())]
+    CurveFile {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong.
+        error: FormatError,
+    },
+    /// A material's curve is no backscatter curve.
+    #[error("{curve}: {error}")]
+    Observation {
+        /// The material and its curve.
+        curve: String,
+        /// What is wrong.
+        error: ObservationError,
+    },
+    /// A curve cannot be fitted.
+    #[error("{curve}: {error}")]
+    Fit {
+        /// The file, or the material and its curve.
+        curve: String,
+        /// What is wrong.
+        error: FitError,
+    },
+    /// A search that found no optimum; nothing was stored.
+    #[error(
+        "{curve}: the fit did not converge ({stop}), so nothing was stored; hold a parameter with \
+         --fix, try more --starts or another --model"
+    )]
+    NotConverged {
+        /// The file, or the material and its curve.
+        curve: String,
+        /// Why the search ended.
+        stop: &'static str,
+    },
     /// No such material.
     #[error("{asked_by}there is no material `{name}`; {way_out}")]
     UnknownMaterial {

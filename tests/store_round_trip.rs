@@ -5,8 +5,8 @@ use matdb::brdf::{
     BlinnPhong, Brdf, CookTorrance, Distribution, Lambert, Mixture, Shadowing, Tabulated,
 };
 use matdb::material::{
-    Censor, Covariance, Curve, Fit, Instrument, Material, Observation, Slug, Source, SourceKind,
-    builtin,
+    Censor, Covariance, Curve, Estimate, Fit, FitReport, Given, Goodness, Instrument, Material,
+    Observation, Slug, Source, SourceKind, builtin,
 };
 use matdb::store::{Added, Store};
 use proptest::collection::vec;
@@ -66,12 +66,15 @@ prop_compose! {
         delta_phi_rad in prop_oneof![-1e300f64..1e300, Just(-0.0)],
         level in positive(), threshold in option::of(positive()),
         censor in select(&[Censor::None, Censor::Left, Censor::Right]),
+        theta_sd_rad in option::of(angle_rad()), power_w in option::of(positive()),
+        range_m in option::of(prop_oneof![positive(), Just(0.0)]), chirp in option::of(any::<u32>()),
     ) -> Observation {
         let measured = censor == Censor::None;
         Observation {
             theta_i_rad, theta_r_rad, delta_phi_rad, censor,
             sigma0: measured.then_some(level),
             threshold_sigma0: if measured { threshold } else { Some(level) },
+            theta_sd_rad, power_w, range_m, chirp,
         }
     }
 }
@@ -110,10 +113,44 @@ fn model() -> impl Strategy<Value = Brdf> {
     })
 }
 
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![-1e300f64..1e300, -1.0f64..1.0, Just(-0.0), Just(f64::MIN_POSITIVE)]
+}
+
+prop_compose! {
+    fn report()(
+        texts in (text(), text(), option::of(text()), text(), vec(text(), 0..3)),
+        named in vec((text(), number(), option::of(positive())), 0..4),
+        looks in option::of(positive()), noise_w in fraction(), objective in number(),
+        singular_values in vec(number(), 0..4), speckle_db in option::of(number()),
+        [rms_db, mean_db, z_mean, z_variance, ks_distance] in [(); 5].map(|()| number()),
+        converged in any::<bool>(), counts in any::<[u32; 4]>(), seed in any::<u64>(),
+    ) -> FitReport {
+        let (method, stop, gauge, version, verdict) = texts;
+        let interval = |sd: f64| [-sd, sd];
+        let estimates: Vec<Estimate> = named.iter().map(|(name, value, sd)| Estimate {
+            name: name.clone(), value: *value, sd: *sd, interval_95: sd.map(interval),
+        }).collect();
+        let row = |_| named.iter().map(|(_, value, _)| *value).collect();
+        let given = named.iter().map(|(name, value, _)| Given { name: name.clone(), value: *value });
+        let [iterations, starts, agreeing_starts, rows] = counts;
+        FitReport {
+            method, given: given.collect(), looks, noise_w, gauge,
+            covariance: estimates.iter().map(row).collect(),
+            estimates, singular_values, objective,
+            goodness: Goodness {
+                rms_db, mean_db, speckle_db, z_mean, z_variance, ks_distance, rows,
+            },
+            converged, stop, iterations, starts, agreeing_starts, verdict,
+            data_hash: "0123456789abcdef".repeat(4), seed, version,
+        }
+    }
+}
+
 prop_compose! {
     fn fit()(
         model in model(), estimator in text(), own_source in vec(any::<bool>(), 16),
-        scale in option::of(vec(-1e3f64..1e3, 16)),
+        scale in option::of(vec(-1e3f64..1e3, 16)), report in option::of(report()),
     ) -> Fit {
         let mut paths: Vec<String> = model.parameters().into_iter().map(|p| p.path).collect();
         let covariance = scale.filter(|_| !paths.is_empty()).map(|scale| covariance(&paths, &scale));
@@ -121,7 +158,7 @@ prop_compose! {
         let own = std::iter::zip(paths, own_source).filter(|(_, own)| *own);
         let parameter_sources = own.map(|(path, _)| (path, String::new())).collect();
         let (name, curve, source) = (String::new(), None, String::new());
-        Fit { name, model, estimator, curve, source, parameter_sources, covariance }
+        Fit { name, model, estimator, curve, source, parameter_sources, covariance, report }
     }
 }
 

@@ -10,11 +10,12 @@ mod support;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use matdb::material::Material;
 use matdb::store::{Added, Store};
 use rusqlite::Connection;
-use support::database::{changed, contents, sample};
+use support::database::{change, contents, fitted, sample};
 
-const NEWEST: &str = "schema-0001.sqlite";
+const NEWEST: &str = "schema-0002.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
@@ -32,10 +33,28 @@ fn schema(path: &Path) -> (Vec<[Option<String>; 4]>, [i64; 2]) {
     (rows.map(Result::unwrap).collect(), ["application_id", "user_version"].map(number))
 }
 
-/// What the file of every schema holds.
+/// What the file of a schema holds: all that the schema can say.
+fn held(file: &str) -> [Material; 3] {
+    let make = match file {
+        "schema-0001.sqlite" => sample,
+        _ => fitted,
+    };
+    [make("paint"), change(make("paint")), make("primer")]
+}
+
+/// The files of all schemas, by name.
+fn files() -> Vec<String> {
+    let names = fs::read_dir(fixtures()).unwrap().map(|entry| entry.unwrap().file_name());
+    let names = names.map(|name| name.into_string().unwrap());
+    let mut files: Vec<String> = names.filter(|name| name.ends_with(".sqlite")).collect();
+    files.sort();
+    files
+}
+
+/// Fills a new file as the newest schema's file is.
 fn fill(path: &Path) {
     let mut store = Store::open(path).unwrap();
-    for material in [sample("paint"), changed("paint"), sample("primer")] {
+    for material in held(NEWEST) {
         store.add([&material]).unwrap();
     }
 }
@@ -45,14 +64,36 @@ fn files_of_every_schema_open_and_become_the_newest() {
     let folder = tempfile::tempdir().unwrap();
     let fresh = folder.path().join("fresh.sqlite");
     drop(Store::open(&fresh).unwrap());
-    for entry in fs::read_dir(fixtures()).unwrap() {
+    for file in files() {
         let old = folder.path().join("old.sqlite");
-        fs::write(&old, fs::read(entry.unwrap().path()).unwrap()).unwrap();
+        fs::write(&old, fs::read(fixtures().join(&file)).unwrap()).unwrap();
         let mut store = Store::open(&old).unwrap();
-        assert_eq!(store.add([&sample("primer")]).unwrap(), [Added::Unchanged(1)]);
+        assert_eq!(store.add([&held(&file)[2]]).unwrap(), [Added::Unchanged(1)]);
         drop(store);
-        assert_eq!(contents(&old), [sample("paint"), changed("paint"), sample("primer")]);
+        assert_eq!(contents(&old), held(&file));
         assert_eq!(schema(&old), schema(&fresh));
+    }
+}
+
+#[test]
+fn files_of_every_schema_are_read_as_they_are_and_not_changed() {
+    for file in files() {
+        let folder = tempfile::tempdir().unwrap();
+        let old = folder.path().join("old.sqlite");
+        let before = fs::read(fixtures().join(&file)).unwrap();
+        fs::write(&old, &before).unwrap();
+        let mut permissions = fs::metadata(&old).unwrap().permissions();
+        permissions.set_readonly(true);
+        fs::set_permissions(&old, permissions).unwrap();
+        assert_eq!(contents(&old), held(&file), "{file}");
+        assert!(fs::read(&old).unwrap() == before, "{file} was written to");
+        assert_eq!(support::entries(folder.path()), ["old.sqlite"]);
+        support::matdb(folder.path()).args(["list", "--db", "old.sqlite"]).assert().success();
+        support::matdb(folder.path())
+            .args(["show", "paint", "--db", "old.sqlite"])
+            .assert()
+            .success();
+        assert!(fs::read(&old).unwrap() == before, "{file} was written to");
     }
 }
 
@@ -116,6 +157,13 @@ fn the_database_itself_refuses_what_a_material_may_not_be() {
         "UPDATE revision SET frequency_min_hz = 'low'",
         "UPDATE revision SET theta_max_rad = 2",
         "UPDATE revision SET tags = '{}'",
+        "UPDATE observation SET theta_sd_rad = 1.6",
+        "UPDATE observation SET power_w = 0.0",
+        "UPDATE observation SET range_m = -1.0",
+        "UPDATE observation SET chirp = -1",
+        "UPDATE observation SET chirp = 4294967296",
+        "UPDATE fit SET report = '[]'",
+        "UPDATE fit SET report = 'nonsense'",
     ] {
         assert!(conn.execute(sql, []).is_err(), "{sql}");
     }

@@ -6,6 +6,7 @@ mod compare;
 mod completions;
 mod database;
 mod console;
+mod fit;
 mod list;
 mod materials;
 mod measure;
@@ -68,6 +69,7 @@ enum Command {
     List(list::Args),
     Show(show::Args),
     Plot(plot::Args),
+    Fit(Box<fit::Args>),
     Rm(rm::Args),
     Completions(completions::Args),
 }
@@ -89,6 +91,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::List(_) => list::run(db, &console),
         Command::Show(args) => show::run(args, db, &console),
         Command::Plot(args) => plot::run(args, db, &console),
+        Command::Fit(args) => fit::run(args, db, &console),
         Command::Rm(args) => rm::run(args, db, &console),
         Command::Completions(args) => completions::run(args),
     }

@@ -10,9 +10,13 @@ use super::materials::{Found, find};
 use super::output::write_all;
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Scattering, Shadowing};
 use crate::error::Error;
+use crate::fit::stored_band;
 use crate::formats::figure::{Plot, Series, Style};
-use crate::material::Material;
+use crate::material::{Censor, Fit, Material, Observation};
 use crate::units::db_from_ratio;
+
+/// Below this a level says only that nothing comes back.
+const FAINTEST_DB: f64 = -80.0;
 
 /// Draw how a material scatters, and what its parameters do
 #[derive(Debug, clap::Args)]
@@ -54,22 +58,37 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     console.result(&text, &json!({ "files": written }))
 }
 
-fn plot<'a>(title: &'a str, subtitle: &'a str, series: Vec<Series>) -> Plot<'a> {
+pub(super) fn plot<'a>(title: &'a str, subtitle: &'a str, series: Vec<Series>) -> Plot<'a> {
     let (x_label, y_label) = ("incidence, °", "σ⁰, dB");
     let x_range = Some((0.0, 90.0));
     Plot { title, subtitle, x_label, y_label, x_range, y_range: None, equal: false, series }
 }
 
-/// Writes a plot to a file whose ending says how.
-fn one_file(path: &Path, plot: &Plot) -> Result<Vec<String>, Error> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let bytes = match path.extension().and_then(|e| e.to_str()) {
-        Some("svg") => plot.svg()?.into_bytes(),
-        Some("png") => plot.png()?,
+/// What a figure's file holds.
+#[derive(Clone, Copy)]
+pub(super) enum Ending {
+    Svg,
+    Png,
+}
+
+/// What the ending of a figure's file asks for.
+pub(super) fn ending(path: &Path) -> Result<Ending, Error> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("svg") => Ok(Ending::Svg),
+        Some("png") => Ok(Ending::Png),
         _ => {
             let problem = format!("`{}` does not end in .svg or .png", path.display());
-            return Err(Error::Usage { problem, way_out: "name the file so".to_owned() });
+            Err(Error::Usage { problem, way_out: "name the file so".to_owned() })
         }
+    }
+}
+
+/// Writes a plot to a file whose ending says how.
+pub(super) fn one_file(path: &Path, plot: &Plot) -> Result<Vec<String>, Error> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let bytes = match ending(path)? {
+        Ending::Svg => plot.svg()?.into_bytes(),
+        Ending::Png => plot.png()?,
     };
     let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     write_all(folder, &[(&name, bytes)])?;
@@ -78,29 +97,60 @@ fn one_file(path: &Path, plot: &Plot) -> Result<Vec<String>, Error> {
 
 /// Measured or stated points, and every fit.
 fn curves(material: &Material) -> Result<Vec<Series>, Error> {
-    let mut series: Vec<Series> =
-        material.fits.iter().map(|fit| model_curve(&fit.name, &fit.model)).collect();
-    if series.is_empty() {
+    let points = material.curves.iter().flat_map(|c| points(&c.name, &c.observations)).collect();
+    let mut series = layers(&material.fits, points);
+    if material.fits.is_empty() {
         series.push(model_curve("rendered", &material.scattering()?));
     }
-    for curve in &material.curves {
-        let retro = curve.observations.iter().filter(|o| o.is_retro());
-        let at = |theta_rad: f64, sigma0: f64| (theta_rad.to_degrees(), db_from_ratio(sigma0));
-        let (mut seen, mut below) = (Vec::new(), Vec::new());
-        for o in retro {
-            match (o.sigma0, o.threshold_sigma0) {
-                (Some(sigma0), _) => seen.push(at(o.theta_i_rad, sigma0)),
-                (None, Some(threshold)) => below.push(at(o.theta_i_rad, threshold)),
-                (None, None) => {}
-            }
-        }
-        series.push(Series { name: curve.name.clone(), style: Style::Points, points: seen });
-        if !below.is_empty() {
-            let name = format!("{}, beyond the threshold here", curve.name);
-            series.push(Series { name, style: Style::Points, points: below });
+    Ok(series)
+}
+
+/// Bands below points below fits, so that each can be seen.
+pub(super) fn layers(fits: &[Fit], points: Vec<Series>) -> Vec<Series> {
+    let curves = fits.iter().map(|fit| model_curve(&fit.name, &fit.model));
+    fits.iter().filter_map(band).chain(points).chain(curves).collect()
+}
+
+/// Backscatter points, those that are only thresholds apart.
+pub(super) fn points(name: &str, observations: &[Observation]) -> Vec<Series> {
+    let at = |theta_rad: f64, sigma0: f64| (theta_rad.to_degrees(), db_from_ratio(sigma0));
+    let (mut seen, mut below, mut above) = (Vec::new(), Vec::new(), Vec::new());
+    for o in observations.iter().filter(|o| o.is_retro()) {
+        match (o.sigma0, o.threshold_sigma0, o.censor) {
+            (Some(sigma0), ..) => seen.push(at(o.theta_i_rad, sigma0)),
+            (None, Some(threshold), Censor::Right) => above.push(at(o.theta_i_rad, threshold)),
+            (None, Some(threshold), _) => below.push(at(o.theta_i_rad, threshold)),
+            (None, None, _) => {}
         }
     }
-    Ok(series)
+    let mut series = vec![Series { name: name.to_owned(), style: Style::Points, points: seen }];
+    for (points, style, side) in [(below, Style::Below, "below"), (above, Style::Points, "above")] {
+        if !points.is_empty() {
+            series.push(Series {
+                name: format!("{name}, {side} the threshold here"),
+                style,
+                points,
+            });
+        }
+    }
+    series
+}
+
+/// The 95 % band of a fit that has a report.
+fn band(fit: &Fit) -> Option<Series> {
+    let angles_deg = || (0..900).map(|step: u32| f64::from(step) / 10.0);
+    let band_db = |theta_deg: f64| {
+        let band = stored_band(fit, theta_deg.to_radians())?;
+        let ends_db = [band.low, band.high].map(db_from_ratio);
+        // Where nothing comes back there is no band either.
+        (ends_db[1] >= FAINTEST_DB).then_some((theta_deg, ends_db.map(|e| e.max(FAINTEST_DB))))
+    };
+    let ends: Vec<(f64, [f64; 2])> = angles_deg().filter_map(band_db).collect();
+    let low = ends.iter().map(|(theta_deg, ends_db)| (*theta_deg, ends_db[0]));
+    let high = ends.iter().rev().map(|(theta_deg, ends_db)| (*theta_deg, ends_db[1]));
+    let outline: Vec<(f64, f64)> = low.chain(high).collect();
+    let band = Series { name: fit.name.clone(), style: Style::Band, points: outline };
+    Some(band).filter(|band| !band.points.is_empty())
 }
 
 /// The rendered fit for several values of one parameter.
@@ -135,8 +185,6 @@ fn swept(material: &Material, sweep: &str) -> Result<Vec<Series>, Error> {
 
 /// σ⁰ in dB every tenth of a degree; the lobe of a smooth surface needs no less.
 fn model_curve(name: &str, model: &dyn Scattering) -> Series {
-    // Below this a level says only that nothing comes back.
-    const FAINTEST_DB: f64 = -80.0;
     let point = |step: u32| {
         let theta_deg = f64::from(step) / 10.0;
         let level_db = db_from_ratio(model.sigma0(theta_deg.to_radians()));

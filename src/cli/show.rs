@@ -4,6 +4,7 @@ use serde_json::json;
 
 use super::console::Console;
 use super::database::Database;
+use super::fit::words::report;
 use super::materials::{Found, find};
 use super::summary::table;
 use crate::brdf::Scattering;
@@ -73,6 +74,7 @@ fn describe(material: &Material, origin: &str) -> Result<String, Error> {
                  k·r_s = {diffuse:.3e}; k itself is a convention\n"
             );
         }
+        text += &fit.report.as_ref().map_or(String::new(), report);
     }
     text += &format!("\nscenes render `{}`:\n{}", material.render, curve_table(material)?);
     Ok(text)

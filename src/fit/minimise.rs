@@ -62,6 +62,19 @@ pub enum Stop {
     NotFinite,
 }
 
+impl Stop {
+    /// The word that JSON uses.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Stop::Stationary => "stationary",
+            Stop::Bounded => "bounded",
+            Stop::Stuck => "stuck",
+            Stop::Iterations => "iterations",
+            Stop::NotFinite => "not-finite",
+        }
+    }
+}
+
 /// Search settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Minimise {

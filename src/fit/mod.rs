@@ -25,9 +25,11 @@ mod interval;
 mod least_squares;
 mod likelihood;
 mod minimise;
+mod models;
 mod result;
 mod search;
 mod sensitivity;
+mod stored;
 mod table;
 #[cfg(test)]
 mod twin;
@@ -43,7 +45,9 @@ use crate::units::shown;
 
 pub use goodness::Goodness;
 pub use minimise::Stop;
+pub use models::{model, model_names};
 pub use result::{Band, Estimate, FitResult};
+pub use stored::stored_band;
 pub use verdict::Finding;
 
 use coordinates::Coordinates;

@@ -96,6 +96,16 @@ mod tests {
     }
 
     #[test]
+    fn what_databases_have_kept_keeps_its_hash() {
+        // As the first released schema stored it: a change here orphans every stored revision.
+        let ptfe = get("ptfe").unwrap().unwrap();
+        assert_eq!(
+            ptfe.content_hash(),
+            "7dca8264fb8c93c5227372b0e3877cf2822b5b1f24f6e0fd0859278efbea1a44"
+        );
+    }
+
+    #[test]
     fn an_unknown_name_is_not_an_error() {
         assert!(get("unobtainium").is_none());
     }

@@ -2,7 +2,6 @@
 
 use std::collections::HashSet;
 
-use nalgebra::DMatrix;
 use thiserror::Error;
 
 use super::{Censor, Covariance, Curve, Fit, Instrument, Material, Observation};
@@ -146,6 +145,7 @@ impl Material {
             let problem = "the sources of parameters are not sorted, or one is given twice";
             return Err(value(&place, problem, "give each path once, in alphabetical order"));
         }
+        fit.report.as_ref().map_or(Ok(()), |report| report.validate(&place))?;
         fit.covariance.as_ref().map_or(Ok(()), |covariance| covariance.validate(&place, &known))
     }
 
@@ -171,6 +171,7 @@ impl Observation {
         if [self.sigma0, self.threshold_sigma0].into_iter().flatten().any(|x| !positive(x)) {
             return Err(value(place, "σ⁰ is not a positive number", "give a finite level in dB"));
         }
+        self.check_circumstances(place)?;
         match (self.censor, self.sigma0, self.threshold_sigma0) {
             (Censor::None, None, _) => {
                 Err(value(place, "has neither a value nor a censor code", "fill in one of them"))
@@ -183,6 +184,21 @@ impl Observation {
             }
             _ => Ok(()),
         }
+    }
+
+    fn check_circumstances(&self, place: &str) -> Result<(), MaterialError> {
+        let quarter = 0.0..=std::f64::consts::FRAC_PI_2;
+        if self.theta_sd_rad.is_some_and(|sd| !quarter.contains(&sd)) {
+            let problem = "the angle's deviation is not within 0–90°";
+            return Err(value(place, problem, "mend it or leave it out"));
+        }
+        if self.power_w.is_some_and(|power_w| !(power_w > 0.0 && power_w.is_finite())) {
+            return Err(value(place, "the power is not positive", "give a finite level in dBm"));
+        }
+        if self.range_m.is_some_and(|range_m| !(range_m >= 0.0 && range_m.is_finite())) {
+            return Err(value(place, "the range is negative", "mend it or leave it out"));
+        }
+        Ok(())
     }
 }
 
@@ -217,17 +233,7 @@ impl Covariance {
             let problem = format!("the matrix is not {n} × {n}");
             return Err(value(&place, &problem, "give a row and a column per parameter"));
         }
-        let matrix = DMatrix::from_fn(n, n, |i, j| self.matrix[i][j]);
-        let deviations: Vec<f64> = matrix.diagonal().iter().map(|v| v.sqrt()).collect();
-        // As correlations, so that units do not matter; rounding in a file may reach a little past 1.
-        let correlations = DMatrix::from_fn(n, n, |i, j| {
-            let slack = if i == j { 1e-9 } else { 0.0 };
-            matrix[(i, j)] / (deviations[i] * deviations[j]) + slack
-        });
-        let sound = matrix == matrix.transpose()
-            && deviations.iter().all(|d| *d > 0.0 && d.is_finite())
-            && correlations.cholesky().is_some();
-        if sound {
+        if self.is_sound() {
             return Ok(());
         }
         let problem = "the matrix is not a covariance";

@@ -209,6 +209,7 @@ impl From<FitFile> for Fit {
             covariance: entry
                 .covariance
                 .map(|CovarianceFile { parameters, matrix }| Covariance { parameters, matrix }),
+            report: None,
         }
     }
 }
@@ -240,6 +241,10 @@ fn observation(table: &Table, row: usize) -> Result<Observation, FormatError> {
         sigma0: table.number(row, "sigma0_db")?.map(ratio_from_db),
         censor,
         threshold_sigma0: table.number(row, "threshold_db")?.map(ratio_from_db),
+        theta_sd_rad: None,
+        power_w: None,
+        range_m: None,
+        chirp: None,
     })
 }
 
@@ -352,6 +357,30 @@ covariance = {{ parameters = ["albedo"], matrix = [[0.01]] }}
     }
 
     #[test]
+    fn circumstances_of_a_point_must_be_possible() {
+        let material = read(&toml("scan")).unwrap();
+        let spoilt = |spoil: fn(&mut Observation)| {
+            let mut material = material.clone();
+            spoil(&mut material.curves[0].observations[0]);
+            material.validate().map_err(|error| error.to_string())
+        };
+        assert_eq!(spoilt(|o| o.theta_sd_rad = Some(0.0)), Ok(()));
+        for (result, expected) in [
+            (spoilt(|o| o.theta_sd_rad = Some(2.0)), "the angle's deviation"),
+            (spoilt(|o| o.power_w = Some(0.0)), "the power"),
+            (spoilt(|o| o.power_w = Some(f64::INFINITY)), "the power"),
+            (spoilt(|o| o.range_m = Some(-1.0)), "the range"),
+            (spoilt(|o| o.range_m = Some(f64::NAN)), "the range"),
+        ] {
+            let message = result.unwrap_err();
+            assert!(
+                message.contains("curve `scan`, observation 1") && message.contains(expected),
+                "{message}"
+            );
+        }
+    }
+
+    #[test]
     fn the_hash_sees_every_change() {
         let material = read(&toml("scan")).unwrap();
         let mut other = material.clone();
@@ -359,6 +388,9 @@ covariance = {{ parameters = ["albedo"], matrix = [[0.01]] }}
         other.curves[0].observations[0].delta_phi_rad = -0.0;
         assert_eq!((material.content_hash(), &material), (other.content_hash(), &other));
         other.curves[0].observations[0].theta_i_rad += 1e-9;
+        assert_ne!(material.content_hash(), other.content_hash());
+        let mut other = material.clone();
+        other.curves[0].observations[0].chirp = Some(0);
         assert_ne!(material.content_hash(), other.content_hash());
     }
 }

@@ -6,16 +6,19 @@
 pub mod builtin;
 mod check;
 pub mod file;
+mod report;
 mod slug;
 
 use std::io;
 
+use nalgebra::DMatrix;
 use serde::Serialize;
 use serde_json::ser::{CompactFormatter, Formatter, Serializer};
 
 use crate::brdf::{Brdf, Tabulated};
 
 pub use check::MaterialError;
+pub use report::{Estimate, FitReport, Given, Goodness};
 pub use slug::Slug;
 
 /// One revision of a material.
@@ -139,6 +142,18 @@ pub struct Observation {
     pub censor: Censor,
     /// Detection limit that applied, σ⁰ as a ratio.
     pub threshold_sigma0: Option<f64>,
+    /// Standard deviation of each of the two tilts of the normal against the ray, rad, 0 to π/2.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub theta_sd_rad: Option<f64>,
+    /// Received power, W, above 0; of a left-censored point the least that would have been detected.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub power_w: Option<f64>,
+    /// Range R, m, 0 or more.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub range_m: Option<f64>,
+    /// Number of the chirp.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chirp: Option<u32>,
 }
 
 /// What an observation says of the true value.
@@ -181,6 +196,9 @@ pub struct Fit {
     pub parameter_sources: Vec<(String, String)>,
     /// Covariance of the values; none when they carry no uncertainty.
     pub covariance: Option<Covariance>,
+    /// What a fit of the curve said of itself; none for values that were stated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub report: Option<FitReport>,
 }
 
 /// Covariance of some of a model's parameters.
@@ -296,5 +314,23 @@ impl Covariance {
     pub fn standard_deviation(&self, path: &str) -> Option<f64> {
         let row = self.parameters.iter().position(|p| p == path)?;
         Some(self.matrix.get(row)?.get(row)?.sqrt())
+    }
+
+    /// Whether the matrix is square, symmetric, finite and positive definite.
+    pub fn is_sound(&self) -> bool {
+        let n = self.parameters.len();
+        if self.matrix.len() != n || self.matrix.iter().any(|row| row.len() != n) {
+            return false;
+        }
+        let matrix = DMatrix::from_fn(n, n, |i, j| self.matrix[i][j]);
+        let deviations: Vec<f64> = matrix.diagonal().iter().map(|v| v.sqrt()).collect();
+        // As correlations, so that units do not matter; rounding in a file may reach a little past 1.
+        let correlations = DMatrix::from_fn(n, n, |i, j| {
+            let slack = if i == j { 1e-9 } else { 0.0 };
+            matrix[(i, j)] / (deviations[i] * deviations[j]) + slack
+        });
+        matrix == matrix.transpose()
+            && deviations.iter().all(|d| *d > 0.0 && d.is_finite())
+            && correlations.cholesky().is_some()
     }
 }

@@ -5,8 +5,11 @@
 //! that should have been detected and was not is a row with `censored` = 1: its power and its σ⁰
 //! are those that it stayed below.
 
+use thiserror::Error;
+
 use crate::formats::FormatError;
 use crate::formats::csv::Table;
+use crate::material::{Censor, Observation};
 use crate::units::{db_from_ratio, dbm_from_watts, ratio_from_db, watts_from_dbm};
 
 /// Columns of a curve file, in order.
@@ -40,7 +43,51 @@ pub struct Curve {
     pub rows: Vec<Row>,
 }
 
+/// A point of a material's curve that is no row of a backscatter curve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum ObservationError {
+    /// Source and receiver looked along different directions.
+    #[error("point {point} (from 1) is bistatic; only backscatter is fitted, so leave it out")]
+    Bistatic {
+        /// Its number from 1.
+        point: usize,
+    },
+    /// The true value lies above a threshold.
+    #[error(
+        "point {point} (from 1) is above the instrument's range, which no row says; leave it out"
+    )]
+    AboveRange {
+        /// Its number from 1.
+        point: usize,
+    },
+    /// Neither a value nor a threshold.
+    #[error("point {point} (from 1) has no value and no threshold; give it one")]
+    Empty {
+        /// Its number from 1.
+        point: usize,
+    },
+}
+
 impl Curve {
+    /// The curve of a material's observations. What an observation leaves out is as in [`Curve::read`].
+    ///
+    /// # Errors
+    /// The first observation that a row cannot say.
+    pub fn from_observations(observations: &[Observation]) -> Result<Curve, ObservationError> {
+        let rows = observations.iter().enumerate().map(|(row, o)| from_observation(row, o));
+        Ok(Curve { rows: rows.collect::<Result<_, _>>()? })
+    }
+
+    /// The curve as a material keeps it.
+    pub fn observations(&self) -> Vec<Observation> {
+        self.rows.iter().map(Row::observation).collect()
+    }
+
+    /// Whether no row has a power of its own, but σ⁰ in its place.
+    pub fn lacks_power(&self) -> bool {
+        self.rows.iter().all(|row| row.power_w == row.sigma0)
+    }
+
     /// Reads a curve file. `theta_deg` and `sigma0_db` must be there. Without the others a row is
     /// uncensored, its angle exact, its range 0, its power σ⁰ in watts, its chirp its number from 0.
     ///
@@ -75,6 +122,46 @@ impl Curve {
     pub fn detected(&self) -> impl Iterator<Item = &Row> {
         self.rows.iter().filter(|row| !row.censored)
     }
+}
+
+impl Row {
+    fn observation(&self) -> Observation {
+        let Row { theta_rad, theta_sd_rad, power_w, sigma0, range_m, chirp, censored } = *self;
+        Observation {
+            theta_i_rad: theta_rad,
+            theta_r_rad: theta_rad,
+            delta_phi_rad: 0.0,
+            sigma0: (!censored).then_some(sigma0),
+            censor: if censored { Censor::Left } else { Censor::None },
+            threshold_sigma0: censored.then_some(sigma0),
+            theta_sd_rad: Some(theta_sd_rad),
+            power_w: Some(power_w),
+            range_m: Some(range_m),
+            chirp: Some(chirp),
+        }
+    }
+}
+
+fn from_observation(index: usize, o: &Observation) -> Result<Row, ObservationError> {
+    let point = index + 1;
+    if !o.is_retro() {
+        return Err(ObservationError::Bistatic { point });
+    }
+    let level = match o.censor {
+        Censor::Right => return Err(ObservationError::AboveRange { point }),
+        Censor::Left => o.threshold_sigma0,
+        Censor::None => o.sigma0,
+    };
+    let Some(sigma0) = level else { return Err(ObservationError::Empty { point }) };
+    Ok(Row {
+        theta_rad: o.theta_i_rad,
+        theta_sd_rad: o.theta_sd_rad.unwrap_or(0.0),
+        power_w: o.power_w.unwrap_or(sigma0),
+        sigma0,
+        range_m: o.range_m.unwrap_or(0.0),
+        chirp: o.chirp.unwrap_or(index as u32),
+        censored: o.censor == Censor::Left,
+    })
 }
 
 fn read_row(table: &Table, row: usize) -> Result<Row, FormatError> {
@@ -122,6 +209,22 @@ mod tests {
         assert_eq!(curve.detected().count(), 1);
         assert!((curve.rows[0].theta_rad - 12.5f64.to_radians()).abs() < 1e-15);
         assert_eq!(String::from_utf8(curve.write()).unwrap(), text);
+    }
+
+    #[test]
+    fn a_material_keeps_a_curve_and_gives_it_back() {
+        let text = b"theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored\n\
+                     12.5,0.3,-55.25,-9.1,8.0,17,0\n60,0.3,-77,-30,8.1,18,1\n";
+        let curve = Curve::read(text).unwrap();
+        let kept = curve.observations();
+        assert_eq!((kept[1].sigma0, kept[1].threshold_sigma0), (None, Some(curve.rows[1].sigma0)));
+        assert_eq!(Curve::from_observations(&kept), Ok(curve));
+        let bistatic = Observation { delta_phi_rad: 1.0, ..kept[0] };
+        let refused = Curve::from_observations(&[kept[0], bistatic]);
+        assert_eq!(refused, Err(ObservationError::Bistatic { point: 2 }));
+        let above = Observation { censor: Censor::Right, ..kept[1] };
+        let refused = Curve::from_observations(&[above]);
+        assert_eq!(refused, Err(ObservationError::AboveRange { point: 1 }));
     }
 
     #[test]

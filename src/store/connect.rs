@@ -5,6 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use rusqlite::backup::{Backup, StepResult};
 use rusqlite::{Connection, ErrorCode, OpenFlags, TransactionBehavior};
 use rusqlite_migration::{M, Migrations};
 
@@ -14,7 +15,13 @@ use super::StoreError;
 const APPLICATION_ID: i64 = 0x6d61_7464;
 
 /// All schemas there ever were, oldest first. Append only: files in the world have stopped at each.
-const SCHEMAS: [M; 1] = [M::up(include_str!("../../migrations/0001_materials.sql"))];
+const SCHEMAS: [M; 2] = [
+    M::up(include_str!("../../migrations/0001_materials.sql")),
+    M::up(include_str!("../../migrations/0002_fits.sql")),
+];
+
+/// What SQLite takes for the whole of a database in one step.
+const ALL_PAGES: i32 = -1;
 
 /// How long to wait while another program writes.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -67,8 +74,29 @@ fn open_readable(path: &Path) -> Result<Option<Connection>, StoreError> {
         return Ok(None);
     }
     let conn = quiet(path)?;
-    let schema = schema_of(path, &conn)?;
-    Ok((schema > 0).then_some(conn))
+    match schema_of(path, &conn)? {
+        0 => Ok(None),
+        schema if schema < SCHEMAS.len() => modern_copy(path, &conn).map(Some),
+        _ => Ok(Some(conn)),
+    }
+}
+
+/// A copy of an older database in memory, brought up to date there. Who only reads changes no file,
+/// and may not even be allowed to.
+fn modern_copy(path: &Path, old: &Connection) -> Result<Connection, StoreError> {
+    let fail = |error| StoreError::new(path, error);
+    let mut copy = Connection::open_in_memory().map_err(fail)?;
+    let whole = |copy: &mut Connection| match Backup::new(old, copy)?.step(ALL_PAGES)? {
+        StepResult::Done => Ok(true),
+        _ => Ok::<_, rusqlite::Error>(false),
+    };
+    if !whole(&mut copy).map_err(fail)? {
+        return Err(StoreError::Busy { file: path.to_owned() });
+    }
+    copy.pragma_update(None, "foreign_keys", true).map_err(fail)?;
+    migrate(path, &mut copy)?;
+    copy.pragma_update(None, "query_only", true).map_err(fail)?;
+    Ok(copy)
 }
 
 /// Size of the file; 0 when there is none.

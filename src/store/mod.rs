@@ -114,7 +114,8 @@ impl Store {
 
     /// Opens a database for reading only; `None` when there is no file or nothing in it.
     ///
-    /// Changes nothing, and works where nothing can be written.
+    /// Changes nothing, and works where nothing can be written: a file of an older schema is brought
+    /// up to date in memory and stays as it is until somebody [opens](Store::open) it for writing.
     ///
     /// # Errors
     /// As [`Store::open`].

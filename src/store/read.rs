@@ -147,7 +147,8 @@ fn curves(conn: &Connection, revision_id: i64) -> Result<Vec<Curve>> {
 }
 
 fn observations(conn: &Connection, revision_id: i64, curve: &str) -> Result<Vec<Observation>> {
-    let sql = "SELECT theta_i_rad, theta_r_rad, delta_phi_rad, sigma0, censor, threshold_sigma0
+    let sql = "SELECT theta_i_rad, theta_r_rad, delta_phi_rad, sigma0, censor, threshold_sigma0,
+             theta_sd_rad, power_w, range_m, chirp
          FROM observation WHERE revision_id = ?1 AND curve = ?2 ORDER BY position";
     rows(conn, sql, params![revision_id, curve], |row| {
         Ok(Observation {
@@ -157,12 +158,16 @@ fn observations(conn: &Connection, revision_id: i64, curve: &str) -> Result<Vec<
             sigma0: row.get(3)?,
             censor: row.get(4)?,
             threshold_sigma0: row.get(5)?,
+            theta_sd_rad: row.get(6)?,
+            power_w: row.get(7)?,
+            range_m: row.get(8)?,
+            chirp: row.get(9)?,
         })
     })
 }
 
 fn fits(conn: &Connection, revision_id: i64) -> Result<Vec<Fit>> {
-    let sql = "SELECT name, model, estimator, curve, source FROM fit
+    let sql = "SELECT name, model, estimator, curve, source, report FROM fit
                WHERE revision_id = ?1 ORDER BY position";
     rows(conn, sql, [revision_id], |row| {
         let name: String = row.get(0)?;
@@ -177,6 +182,7 @@ fn fits(conn: &Connection, revision_id: i64) -> Result<Vec<Fit>> {
             source: row.get(4)?,
             parameter_sources,
             covariance,
+            report: optional_json(row, 5)?,
         })
     })
 }
@@ -223,8 +229,16 @@ fn rows<T>(
 }
 
 fn json<T: DeserializeOwned>(row: &Row, column: usize) -> Result<T> {
-    let text: String = row.get(column)?;
-    serde_json::from_str(&text)
+    parsed(&row.get::<_, String>(column)?, column)
+}
+
+fn optional_json<T: DeserializeOwned>(row: &Row, column: usize) -> Result<Option<T>> {
+    let text: Option<String> = row.get(column)?;
+    text.map(|text| parsed(&text, column)).transpose()
+}
+
+fn parsed<T: DeserializeOwned>(text: &str, column: usize) -> Result<T> {
+    serde_json::from_str(text)
         .map_err(|error| Error::FromSqlConversionFailure(column, Type::Text, error.into()))
 }
 

@@ -145,8 +145,8 @@ impl Rows<'_> {
         let mut insert = self.tx.prepare_cached(
             "INSERT INTO observation
              (revision_id, curve, position, theta_i_rad, theta_r_rad, delta_phi_rad, sigma0, censor,
-              threshold_sigma0)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+              threshold_sigma0, theta_sd_rad, power_w, range_m, chirp)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
         )?;
         numbered(observations, |position, o| {
             let [theta_i_rad, theta_r_rad, delta_phi_rad] =
@@ -160,7 +160,11 @@ impl Rows<'_> {
                 delta_phi_rad,
                 o.sigma0,
                 o.censor.as_str(),
-                o.threshold_sigma0
+                o.threshold_sigma0,
+                o.theta_sd_rad,
+                o.power_w,
+                o.range_m,
+                o.chirp
             ];
             insert.execute(values).map(|_| ())
         })
@@ -168,10 +172,11 @@ impl Rows<'_> {
 
     fn fit(&self, position: u32, fit: &Fit) -> Result<()> {
         let Fit { name, model, estimator, curve, source, .. } = fit;
+        let (model, report) = (json(model)?, fit.report.as_ref().map(json).transpose()?);
         self.insert(
-            "INSERT INTO fit (revision_id, position, name, model, estimator, curve, source)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
-            params![self.revision_id, position, name, json(model)?, estimator, curve, source],
+            "INSERT INTO fit (revision_id, position, name, model, estimator, curve, source, report)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+            params![self.revision_id, position, name, model, estimator, curve, source, report],
         )?;
         self.parameters(fit)?;
         fit.covariance.as_ref().map_or(Ok(()), |covariance| self.covariance(name, covariance))

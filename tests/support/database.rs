@@ -4,7 +4,10 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use matdb::material::{Censor, Covariance, Curve, Instrument, Material, Observation, builtin};
+use matdb::material::{
+    Censor, Covariance, Curve, Estimate, FitReport, Given, Goodness, Instrument, Material,
+    Observation, builtin,
+};
 use matdb::store::Store;
 
 /// A small material with a row in every table.
@@ -33,6 +36,58 @@ pub fn sample(slug: &str) -> Material {
     material
 }
 
+/// The sample with a fit that was made of its curve, and with all that a point can say.
+pub fn fitted(slug: &str) -> Material {
+    let mut material = sample(slug);
+    for (chirp, observation) in (0u32..).zip(&mut material.curves[0].observations) {
+        observation.theta_sd_rad = Some(0.01);
+        observation.power_w = Some(1e-10);
+        observation.range_m = Some(8.0);
+        observation.chirp = Some(chirp);
+    }
+    material.fits[0].curve = Some("scan".to_owned());
+    material.fits[0].report = Some(report());
+    material
+}
+
+fn report() -> FitReport {
+    let estimate = |name: &str, sd: Option<f64>| Estimate {
+        name: name.to_owned(),
+        value: 0.25,
+        sd,
+        interval_95: sd.map(|sd| [0.25 - 2.0 * sd, 0.25 + 2.0 * sd]),
+    };
+    FitReport {
+        method: "censored".to_owned(),
+        given: vec![Given { name: "diffuse.alpha".to_owned(), value: 3.0 }],
+        looks: Some(1.5),
+        noise_w: 1e-12,
+        gauge: Some("k = 0.1 was chosen".to_owned()),
+        estimates: vec![estimate("S", Some(0.01)), estimate("R", None)],
+        covariance: vec![vec![1e-4, 0.0], vec![0.0, 0.0]],
+        singular_values: vec![1.2, 1e-7],
+        objective: -123.456,
+        goodness: Goodness {
+            rms_db: 5.6,
+            mean_db: -2.5,
+            speckle_db: Some(5.57),
+            z_mean: 0.01,
+            z_variance: 1.1,
+            ks_distance: 0.1,
+            rows: 3,
+        },
+        converged: true,
+        stop: "stationary".to_owned(),
+        iterations: 12,
+        starts: 4,
+        agreeing_starts: 3,
+        verdict: vec!["the data say nothing of R".to_owned()],
+        data_hash: "0123456789abcdef".repeat(4),
+        seed: u64::MAX,
+        version: "0.1.0".to_owned(),
+    }
+}
+
 /// A backscatter point with a detection limit.
 pub fn observation(theta_rad: f64, sigma0: Option<f64>, censor: Censor) -> Observation {
     Observation {
@@ -42,12 +97,20 @@ pub fn observation(theta_rad: f64, sigma0: Option<f64>, censor: Censor) -> Obser
         sigma0,
         censor,
         threshold_sigma0: Some(1e-3),
+        theta_sd_rad: None,
+        power_w: None,
+        range_m: None,
+        chirp: None,
     }
 }
 
 /// The sample after somebody has changed it.
 pub fn changed(slug: &str) -> Material {
-    let mut material = sample(slug);
+    change(sample(slug))
+}
+
+/// A material of this file after somebody has changed it.
+pub fn change(mut material: Material) -> Material {
     material.curves[0].observations[1].sigma0 = Some(0.2);
     material
 }

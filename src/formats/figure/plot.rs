@@ -61,6 +61,11 @@ pub enum Style {
     Curve,
     /// A small square at each point.
     Points,
+    /// A small triangle that points down: the truth is below.
+    Below,
+    /// The area that the points go round, in a tint of the colour of the other series of its name.
+    /// It is not in the legend, takes no colour and does not widen the axes.
+    Band,
 }
 
 impl Plot<'_> {
@@ -85,8 +90,8 @@ impl Plot<'_> {
         let y = Axis { label: self.y_label, ..self.axis(self.y_range, |p| p.1)? };
         let data = self.size(x.high - x.low, y.high - y.low);
         let axes = Axes::new([x, y], data, [self.title, self.subtitle], data[0]);
-        let mut shapes: Vec<Shape> = std::iter::zip(&self.series, PALETTE.iter().cycle())
-            .flat_map(|(series, &colour)| series.shapes(&axes, [x, y], colour))
+        let mut shapes: Vec<Shape> = std::iter::zip(&self.series, self.colours())
+            .flat_map(|(series, colour)| series.shapes(&axes, [x, y], colour))
             .collect();
         shapes.extend(axes.shapes());
         shapes.extend(self.legend(&axes));
@@ -97,14 +102,27 @@ impl Plot<'_> {
         })
     }
 
+    /// One colour per series; a band has that of the other series of its name.
+    fn colours(&self) -> Vec<Rgb> {
+        let own = || self.series.iter().filter(|series| series.style != Style::Band);
+        let colour = |series: &Series| {
+            let place = match series.style {
+                Style::Band => own().position(|other| other.name == series.name),
+                _ => own().position(|other| std::ptr::eq(other, series)),
+            };
+            PALETTE[place.unwrap_or(0) % PALETTE.len()]
+        };
+        self.series.iter().map(colour).collect()
+    }
+
     /// The given range, or one that holds all finite values with a little room.
     fn axis(
         &self,
         range: Option<(f64, f64)>,
         of: fn(&(f64, f64)) -> f64,
     ) -> Result<Axis<'static>, FigureError> {
-        let values =
-            || self.series.iter().flat_map(|s| &s.points).map(of).filter(|v| v.is_finite());
+        let data = || self.series.iter().filter(|series| series.style != Style::Band);
+        let values = || data().flat_map(|s| &s.points).map(of).filter(|v| v.is_finite());
         let around = || {
             let (low, high) = (values().reduce(f64::min)?, values().reduce(f64::max)?);
             let room = if low < high { 0.04 * (high - low) } else { low.abs().max(1.0) };
@@ -128,8 +146,8 @@ impl Plot<'_> {
 
     /// Names of the series in the upper right corner.
     fn legend(&self, axes: &Axes) -> Vec<Shape> {
-        let named: Vec<(&Series, Rgb)> = std::iter::zip(&self.series, PALETTE.into_iter().cycle())
-            .filter(|(series, _)| !series.name.is_empty())
+        let named: Vec<(&Series, Rgb)> = std::iter::zip(&self.series, self.colours())
+            .filter(|(series, _)| !series.name.is_empty() && series.style != Style::Band)
             .collect();
         let width = |name: &str| text_width_px(name, TICK_LABEL_PX, Weight::Regular);
         let widest = named.iter().map(|(series, _)| width(&series.name)).fold(0.0, f32::max);
@@ -141,6 +159,8 @@ impl Plot<'_> {
             shapes.extend(match series.style {
                 Style::Curve => curve(ends.to_vec(), colour),
                 Style::Points => square((left + SAMPLE_PX / 2.0, y), POINT_PX, colour),
+                Style::Below => triangle((left + SAMPLE_PX / 2.0, y), POINT_PX, colour),
+                Style::Band => None,
             });
             let base = (left + SAMPLE_PX + GAP_PX, y + DIGIT_HEIGHT / 2.0 * TICK_LABEL_PX);
             shapes.push(text(&series.name, base, Anchor::Start, TICK_LABEL_PX));
@@ -154,10 +174,20 @@ impl Series {
         let within = |axis: &Axis, value: f64| value >= axis.low && value <= axis.high;
         let visible = |&(px, py): &(f64, f64)| within(&x, px) && within(&y, py);
         match self.style {
-            Style::Points => {
+            Style::Points | Style::Below => {
                 let side = if self.points.len() > DENSE { DENSE_POINT_PX } else { POINT_PX };
+                let mark = if self.style == Style::Below { triangle } else { square };
                 let seen = self.points.iter().filter(|p| visible(p));
-                seen.flat_map(|&(px, py)| square(axes.at(px, py), side, colour)).collect()
+                seen.flat_map(|&(px, py)| mark(axes.at(px, py), side, colour)).collect()
+            }
+            Style::Band => {
+                let finite = self.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
+                let within = |&(px, py): &(f64, f64)| {
+                    axes.at(px.clamp(x.low, x.high), py.clamp(y.low, y.high))
+                };
+                let corners: Vec<(f32, f32)> = finite.map(within).collect();
+                let area = Shape::Area { corners, colour: colour.map(tint) };
+                (self.points.len() > 2).then_some(area).into_iter().collect()
             }
             Style::Curve => self
                 .points
@@ -173,6 +203,17 @@ impl Series {
 
 fn curve(points: Vec<(f32, f32)>, colour: Rgb) -> Option<Shape> {
     Some(Shape::Line { points, colour, thickness_px: CURVE_PX })
+}
+
+/// A colour's channel on the way to white.
+fn tint(channel: u8) -> u8 {
+    255 - (255 - channel) / 4
+}
+
+fn triangle((x, y): (f32, f32), side: f32, colour: Rgb) -> Option<Shape> {
+    let half = side / 2.0;
+    let corners = vec![(x - half, y - half), (x + half, y - half), (x, y + half)];
+    Some(Shape::Area { corners, colour })
 }
 
 fn square((x, y): (f32, f32), side: f32, colour: Rgb) -> Option<Shape> {
@@ -215,6 +256,18 @@ mod tests {
         assert!(png.starts_with(b"\x89PNG"));
         assert_eq!(png, both.png().unwrap());
         assert!(both.svg().unwrap().contains("<svg"));
+    }
+
+    #[test]
+    fn a_band_has_the_colour_of_its_curve_and_leaves_the_axes_alone() {
+        let far = vec![(0.0, -1e9), (49.0, -1e9), (49.0, 1e9), (0.0, 1e9)];
+        let band = Series { name: "parabola".into(), style: Style::Band, points: far };
+        let alone = plot(vec![parabola(Style::Curve), parabola(Style::Below)]);
+        let with = plot(vec![band, parabola(Style::Curve), parabola(Style::Below)]);
+        let [without_band, with_band] = [&alone, &with].map(|plot| plot.drawing().unwrap());
+        assert_eq!(with_band.shapes.len(), without_band.shapes.len() + 1);
+        assert_eq!(with_band.shapes[1..], without_band.shapes[..]);
+        assert_eq!(with.colours(), [PALETTE[0], PALETTE[0], PALETTE[1]]);
     }
 
     #[test]

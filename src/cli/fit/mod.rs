@@ -1,0 +1,275 @@
+//! `matdb fit`.
+
+mod save;
+mod subject;
+pub(super) mod words;
+
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use serde::Serialize;
+
+use super::console::Console;
+use super::database::Database;
+use super::materials::find;
+use super::plot::{ending, layers, one_file, plot, points};
+use crate::brdf::Brdf;
+use crate::error::Error;
+use crate::fit::{Fit, FitResult, Method, model, model_names};
+use crate::formats::text::nearest;
+use crate::material::SourceKind;
+use crate::radar::speckle::standard_deviation_db;
+use crate::store::Store;
+use crate::units::watts_from_dbm;
+use save::{Saved, Target};
+use subject::Subject;
+
+/// Fit a scattering model to a curve, and say what the curve cannot tell
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb fit curve.csv                           the paper's five parameters, censored likelihood
+  matdb fit curve.csv --model mixture-ggx -o fit.svg
+  matdb fit curve.csv --method tls-tail --alpha 3
+  matdb fit cotton --fix diffuse.alpha=4 --save
+  matdb fit curve.csv --save my-paint --kind measured --source 'Our bench, 2026'
+
+Methods: censored (speckle and missing chirps by their laws), tls (orthogonal distance in dB),
+tls-tail (the same with alpha given), mse (least squares in two pieces).
+Models: a material's name, or blinn-phong, cook-torrance, cook-torrance-ggx, directive, fresnel,
+kirchhoff, kirchhoff-go, lambert, mixture, mixture-ggx.")]
+pub(super) struct Args {
+    /// A curve's CSV file, or NAME or NAME@REVISION of a material with a curve
+    #[arg(value_name = "MATERIAL|CURVE.csv")]
+    what: String,
+    /// Which curve of the material [default: the longest]; for a file, the name to store it under
+    #[arg(long, value_name = "NAME")]
+    curve: Option<String>,
+    /// What to fit, and where to start [default: what the material renders, else mixture]
+    #[arg(long, value_name = "MODEL|MATERIAL")]
+    model: Option<String>,
+    /// How to fit
+    #[arg(long, value_enum, default_value = "censored")]
+    method: MethodName,
+    /// Hold diffuse.alpha at this; tls-tail needs it
+    #[arg(long, value_name = "X")]
+    alpha: Option<f64>,
+    /// Hold a parameter; may be repeated
+    #[arg(long = "fix", value_name = "PATH=VALUE")]
+    fixed: Vec<String>,
+    /// Looks of the speckle, 0.1 to 10000 [default: found by the fit]
+    #[arg(long, value_name = "L")]
+    looks: Option<f64>,
+    /// Thermal noise in each chirp, dBm [default: none]
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    noise_dbm: Option<f64>,
+    /// Deviation of the angle for tls, degrees [default: that of the curve]
+    #[arg(long, value_name = "X")]
+    theta_sd_deg: Option<f64>,
+    /// Deviation of the level for tls, dB [default: that of speckle of one look]
+    #[arg(long, value_name = "X")]
+    level_sd_db: Option<f64>,
+    /// Where mse parts the specular from the diffuse piece, degrees
+    #[arg(long, value_name = "X", default_value_t = 6.0)]
+    split_deg: f64,
+    /// Points that the search starts from
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    starts: usize,
+    /// Seed of the starts and of the residuals of missing chirps
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Store the fit in the material; a file's curve goes with it, into the material NAME
+    #[arg(long, value_name = "NAME", num_args = 0..=1)]
+    save: Option<Option<String>>,
+    /// Name of the stored fit [default: MODEL-METHOD]
+    #[arg(long, value_name = "NAME", requires = "save")]
+    fit_name: Option<String>,
+    /// Let scenes render what they rendered before
+    #[arg(long, requires = "save")]
+    keep_render: bool,
+    /// How a file's curve came to be
+    #[arg(long, value_enum, requires = "save")]
+    kind: Option<Kind>,
+    /// Who measured or made a file's curve, when and how
+    #[arg(long, value_name = "TITLE", requires = "save")]
+    source: Option<String>,
+    /// Draw points, fit and 95 % band: a .svg or .png file
+    #[arg(long, short, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MethodName {
+    Mse,
+    Tls,
+    TlsTail,
+    Censored,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Kind {
+    Measured,
+    Synthetic,
+}
+
+impl From<Kind> for SourceKind {
+    fn from(kind: Kind) -> SourceKind {
+        match kind {
+            Kind::Measured => SourceKind::Measured,
+            Kind::Synthetic => SourceKind::Synthetic,
+        }
+    }
+}
+
+/// What scripts read: the result of the fit, and what was done with it.
+#[derive(Serialize)]
+struct Record<'a> {
+    #[serde(flatten)]
+    result: &'a FitResult,
+    sentences: Vec<String>,
+    saved: Option<&'a Saved>,
+    files: Vec<String>,
+}
+
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    let store = db.read()?;
+    let subject = Subject::find(args, store.as_ref())?;
+    let start = start(args, &subject, store.as_ref())?;
+    let fit = settings(args, &subject, &start)?;
+    // A fit takes a while: what hinders its storing or drawing is said before.
+    args.output.as_deref().map(ending).transpose()?;
+    let name = fit_name(args, &start);
+    Target::find(args, &subject, &name, store.as_ref())?;
+    drop(store);
+    let fail = |error| Error::Fit { curve: subject.label.clone(), error };
+    let found = fit.run(&start, &subject.curve).map_err(fail)?;
+    let saved = match (&args.save, found.converged) {
+        (Some(_), true) => Some(save::save(args, &subject, &name, &found, db)),
+        _ => None,
+    };
+    let stored = found.stored(&name, &subject.curve_name, "");
+    let files = match (&args.output, found.converged) {
+        (Some(path), true) => draw(path, &subject, &stored)?,
+        _ => Vec::new(),
+    };
+    let done = saved.as_ref().and_then(|saved| saved.as_ref().ok());
+    let text = words::result(&subject, &stored, done, &files);
+    let sentences = found.verdict.iter().map(ToString::to_string).collect();
+    console.result(&text, &Record { result: &found, sentences, saved: done, files })?;
+    saved.transpose()?;
+    match found.converged {
+        true => Ok(()),
+        false => Err(Error::NotConverged { curve: subject.label, stop: found.stop.as_str() }),
+    }
+}
+
+fn fit_name(args: &Args, start: &Brdf) -> String {
+    let method = args.method.to_possible_value().map_or(String::new(), |m| m.get_name().to_owned());
+    let model = args.model.clone().unwrap_or_else(|| model_word(start));
+    args.fit_name.clone().unwrap_or_else(|| format!("{model}-{method}"))
+}
+
+/// The word that files use for a model.
+fn model_word(model: &Brdf) -> String {
+    let value = serde_json::to_value(model).unwrap_or_default();
+    value["model"].as_str().unwrap_or("model").to_owned()
+}
+
+/// The model where the search begins.
+fn start(args: &Args, subject: &Subject, store: Option<&Store>) -> Result<Brdf, Error> {
+    let default = || subject.rendered_model().or_else(|| model("mixture"));
+    let Some(name) = &args.model else { return default().ok_or_else(|| no_model("mixture")) };
+    if let Some(model) = model(name) {
+        return Ok(model);
+    }
+    match find(store, name, "--model: ") {
+        Ok(found) => Ok(found.material.scattering()?),
+        Err(Error::UnknownMaterial { .. }) => Err(no_model(name)),
+        Err(error) => Err(error),
+    }
+}
+
+fn no_model(name: &str) -> Error {
+    let way_out = match nearest(name, model_names()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => {
+            format!("name a material or one of {}", model_names().collect::<Vec<_>>().join(", "))
+        }
+    };
+    Error::Usage { problem: format!("there is no model and no material `{name}`"), way_out }
+}
+
+fn settings(args: &Args, subject: &Subject, start: &Brdf) -> Result<Fit, Error> {
+    if args.noise_dbm.is_some() && subject.curve.lacks_power() {
+        return Err(Error::Usage {
+            problem: format!("{} has no powers that noise could be compared with", subject.label),
+            way_out: "leave --noise-dbm out or give the curve a column power_dbm".to_owned(),
+        });
+    }
+    let fixed = fixed(args, start)?;
+    let tls = Method::Tls {
+        theta_sd_rad: args.theta_sd_deg.map_or(subject.theta_sd_rad(), f64::to_radians),
+        level_sd_db: args.level_sd_db.unwrap_or(standard_deviation_db(1.0)),
+    };
+    let method = match args.method {
+        MethodName::Censored => Method::Censored,
+        MethodName::Mse => Method::Mse { split_rad: args.split_deg.to_radians() },
+        MethodName::Tls | MethodName::TlsTail => tls,
+    };
+    let (looks, noise_w) = (args.looks, args.noise_dbm.map(watts_from_dbm));
+    let (starts, seed) = (args.starts, args.seed);
+    Ok(Fit { method, fixed, bounds: Vec::new(), looks, noise_w, starts, seed })
+}
+
+/// The held parameters, each checked to be one of the model's.
+fn fixed(args: &Args, start: &Brdf) -> Result<Vec<(String, f64)>, Error> {
+    let usage = |problem: String, way_out: String| Err(Error::Usage { problem, way_out });
+    let paths: Vec<String> = start.parameters().into_iter().map(|p| p.path).collect();
+    let alpha = paths.iter().find(|path| *path == "diffuse.alpha" || *path == "alpha");
+    let mut fixed = Vec::new();
+    match (args.alpha, alpha) {
+        (Some(value), Some(path)) => fixed.push((path.clone(), value)),
+        (Some(_), None) => {
+            return usage("this model has no alpha".to_owned(), "leave --alpha out".to_owned());
+        }
+        (None, _) if args.method == MethodName::TlsTail => {
+            let way_out = "give it with --alpha, or use --method tls to find it".to_owned();
+            return usage("tls-tail takes the tail's exponent as given".to_owned(), way_out);
+        }
+        (None, _) => {}
+    }
+    for text in &args.fixed {
+        let parts = text.split_once('=').map(|(path, value)| (path, value.trim().parse()));
+        let Some((path, Ok(value))) = parts else {
+            let way_out = "write it as --fix diffuse.alpha=3".to_owned();
+            return usage(format!("`{text}` is no parameter with a value"), way_out);
+        };
+        if !paths.iter().any(|known| known == path) {
+            let way_out = format!("there are: {}", paths.join(", "));
+            return usage(format!("the model has no parameter `{path}`"), way_out);
+        }
+        if is_held(path, &fixed) {
+            return usage(format!("`{path}` is held twice"), "hold it once".to_owned());
+        }
+        fixed.push((path.to_owned(), value));
+    }
+    fixed.extend(frequencies(start).filter(|(path, _)| !is_held(path, &fixed)).collect::<Vec<_>>());
+    Ok(fixed)
+}
+
+fn is_held(path: &str, fixed: &[(String, f64)]) -> bool {
+    fixed.iter().any(|(known, _)| known == path)
+}
+
+/// The frequencies in a model: they are the radar's, and nothing that a surface could tell.
+fn frequencies(model: &Brdf) -> impl Iterator<Item = (String, f64)> {
+    let is_frequency = |path: &str| path.rsplit('.').next() == Some("frequency_hz");
+    let parameters = model.parameters().into_iter().filter(move |p| is_frequency(&p.path));
+    parameters.map(|parameter| (parameter.path, parameter.value))
+}
+
+fn draw(path: &Path, subject: &Subject, fit: &crate::material::Fit) -> Result<Vec<String>, Error> {
+    let points = points(&subject.curve_name, &subject.curve.observations());
+    let series = layers(std::slice::from_ref(fit), points);
+    let subtitle = format!("{}, with its 95 % band", fit.name);
+    one_file(path, &plot(&subject.label, &subtitle, series))
+}

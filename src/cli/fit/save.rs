@@ -1,0 +1,214 @@
+//! A fit into a material, as a new revision.
+
+use serde::Serialize;
+
+use super::{Args, Subject};
+use crate::cli::database::Database;
+use crate::cli::materials::{Found, find};
+use crate::error::Error;
+use crate::fit::FitResult;
+use crate::material::{Curve, Material, Source, SourceKind};
+use crate::store::{Added, Store};
+
+/// Where a fit was stored.
+#[derive(Serialize)]
+pub(super) struct Saved {
+    pub material: String,
+    pub revision: u32,
+    pub fit: String,
+    pub curve: String,
+    /// What scenes render of the material now.
+    pub render: String,
+    pub database: String,
+}
+
+/// The material that takes the fit in, with its curve and the source of it.
+pub(super) struct Target {
+    material: Material,
+    curve: String,
+    source: String,
+}
+
+impl Target {
+    /// `None` when nothing is to be stored.
+    pub fn find(
+        args: &Args,
+        subject: &Subject,
+        fit_name: &str,
+        store: Option<&Store>,
+    ) -> Result<Option<Target>, Error> {
+        let Some(wanted) = &args.save else { return Ok(None) };
+        let target = match &subject.found {
+            Some(found) => of_material(args, subject, found, wanted.as_deref(), store)?,
+            None => of_file(args, subject, wanted.as_deref(), store)?,
+        };
+        let stated = target.material.fits.iter().any(|f| f.name == fit_name && f.report.is_none());
+        let curve = target.material.curves.iter().any(|c| c.name == fit_name);
+        if stated || curve {
+            let slug = &target.material.slug;
+            return Err(usage(
+                format!("`{slug}` has something else of the name `{fit_name}`"),
+                "give the fit another name with --fit-name",
+            ));
+        }
+        Ok(Some(target))
+    }
+}
+
+fn of_material(
+    args: &Args,
+    subject: &Subject,
+    found: &Found,
+    wanted: Option<&str>,
+    store: Option<&Store>,
+) -> Result<Target, Error> {
+    let slug = &found.material.slug;
+    if wanted.is_some_and(|name| name != slug.as_str()) {
+        return Err(usage(
+            format!("a fit of a curve of `{slug}` belongs to `{slug}`"),
+            "leave the name after --save out",
+        ));
+    }
+    if args.kind.is_some() || args.source.is_some() {
+        return Err(usage(
+            format!("the curve of `{slug}` has a source already"),
+            "leave --kind and --source out",
+        ));
+    }
+    // As it is now: it may have been revised while the fit ran.
+    let material = find(store, slug.as_str(), "")?.material;
+    let same = |curve: &&Curve| curve.name == subject.curve_name;
+    let [fitted, current] =
+        [&found.material, &material].map(|material| material.curves.iter().find(same).cloned());
+    match current {
+        Some(curve) if fitted.as_ref() == Some(&curve) => {
+            Ok(Target { material, curve: curve.name, source: curve.source })
+        }
+        _ => Err(usage(
+            format!("the curve of {} is not that of the current revision", args.what),
+            "fit the current one, or leave --save out",
+        )),
+    }
+}
+
+fn of_file(
+    args: &Args,
+    subject: &Subject,
+    wanted: Option<&str>,
+    store: Option<&Store>,
+) -> Result<Target, Error> {
+    let Some(name) = wanted else {
+        return Err(usage(
+            format!("{} belongs to no material yet", subject.label),
+            "name the one to store it in, as in --save my-paint",
+        ));
+    };
+    if name.contains('@') {
+        return Err(usage(
+            format!("`{name}` names a revision, and a revision never changes"),
+            "give the bare name; the fit becomes a new revision",
+        ));
+    }
+    let (Some(kind), Some(title)) = (args.kind, &args.source) else {
+        return Err(usage(
+            format!("nobody has said where {} comes from", subject.label),
+            "add --kind measured or --kind synthetic, and --source with who, when and how",
+        ));
+    };
+    let mut material = find(store, name, "--save: ")?.material;
+    let observations = subject.curve.observations();
+    let source = source(&mut material, kind.into(), title, &subject.curve_name);
+    let curve = Curve { name: subject.curve_name.clone(), source, instrument: None, observations };
+    let (curve_name, source) = (curve.name.clone(), curve.source.clone());
+    let taken = material.curves.iter().find(|known| known.name == curve.name);
+    let same = |known: &Curve| known.observations == curve.observations && known.source == source;
+    match taken.map(same) {
+        Some(true) => {}
+        None if !material.fits.iter().any(|fit| fit.name == curve.name) => {
+            material.curves.push(curve);
+        }
+        _ => {
+            return Err(usage(
+                format!("`{name}` has something else of the name `{}`", curve.name),
+                "give the curve another name with --curve",
+            ));
+        }
+    }
+    Ok(Target { material, curve: curve_name, source })
+}
+
+/// The key of a source of this kind and title, added under a free key when it is not there.
+fn source(material: &mut Material, kind: SourceKind, title: &str, key: &str) -> String {
+    let same = |source: &&Source| source.kind == kind && source.title == title;
+    if let Some(known) = material.sources.iter().find(same) {
+        return known.key.clone();
+    }
+    let is_free = |key: &String| material.sources.iter().all(|source| source.key != *key);
+    let numbered = (2u32..).map(|number| format!("{key}-{number}"));
+    let key = std::iter::once(key.to_owned()).chain(numbered).find(is_free);
+    let key = key.unwrap_or_default();
+    material.sources.push(Source {
+        key: key.clone(),
+        kind,
+        title: title.to_owned(),
+        doi: None,
+        url: None,
+        licence: None,
+        note: None,
+    });
+    key
+}
+
+/// The source of every parameter that somebody chose and no data gave, by path.
+fn chosen(material: &mut Material, found: &FitResult) -> Vec<(String, String)> {
+    const CHOSEN: &str = "Chosen, while the other parameters were fitted";
+    let held = found.fit.fixed.iter().map(|(path, _)| path.clone());
+    let mut paths: Vec<String> = held.chain(found.gauge_k.map(|_| "k".to_owned())).collect();
+    paths.sort();
+    paths.dedup();
+    if paths.is_empty() {
+        return Vec::new();
+    }
+    let key = source(material, SourceKind::Synthetic, CHOSEN, "chosen");
+    paths.into_iter().map(|path| (path, key.clone())).collect()
+}
+
+/// Stores a fit; a fit of the same name gives way to it, and stays in the revisions before.
+pub(super) fn save(
+    args: &Args,
+    subject: &Subject,
+    name: &str,
+    found: &FitResult,
+    db: &Database,
+) -> Result<Saved, Error> {
+    let mut store = db.write()?;
+    let Some(target) = Target::find(args, subject, name, Some(&store))? else {
+        return Err(usage("nothing is to be stored".to_owned(), "add --save"));
+    };
+    let Target { mut material, curve, source: key } = target;
+    let mut fit = found.stored(name, &curve, &key);
+    fit.parameter_sources = chosen(&mut material, found);
+    match material.fits.iter_mut().find(|known| known.name == name) {
+        Some(known) => *known = fit,
+        None => material.fits.push(fit),
+    }
+    if !args.keep_render {
+        material.render = name.to_owned();
+    }
+    let revision = match store.add([&material])?.first() {
+        Some(Added::Revision(number) | Added::Unchanged(number)) => *number,
+        _ => 1,
+    };
+    Ok(Saved {
+        material: material.slug.to_string(),
+        revision,
+        fit: name.to_owned(),
+        curve,
+        render: material.render,
+        database: db.path().display().to_string(),
+    })
+}
+
+fn usage(problem: String, way_out: &str) -> Error {
+    Error::Usage { problem, way_out: way_out.to_owned() }
+}

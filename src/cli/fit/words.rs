@@ -1,0 +1,109 @@
+//! A fit in words.
+
+use super::save::Saved;
+use super::subject::Subject;
+use crate::cli::summary::{grouped, table};
+use crate::material::{Fit, FitReport, Goodness};
+use crate::units::{dbm_from_watts, shown};
+
+/// All that a person wants to know of a fit.
+pub(super) fn result(
+    subject: &Subject,
+    fit: &Fit,
+    saved: Option<&Saved>,
+    files: &[String],
+) -> String {
+    let rows = subject.curve.rows.len();
+    let censored = rows - subject.curve.detected().count();
+    let mut text = format!(
+        "{}: {} rows, {} of them below the threshold\n",
+        subject.label,
+        grouped(rows),
+        grouped(censored)
+    );
+    text += &fit.report.as_ref().map_or(String::new(), report);
+    if let Some(saved) = saved {
+        text += &format!(
+            "stored as fit {} of {}, revision {}, in {}; scenes render {}\n",
+            saved.fit, saved.material, saved.revision, saved.database, saved.render
+        );
+    }
+    if !files.is_empty() {
+        text += &format!("wrote {}\n", files.join(", "));
+    }
+    text
+}
+
+/// What a fit says of itself.
+pub(in crate::cli) fn report(report: &FitReport) -> String {
+    let end = if report.converged { "converged" } else { "did not converge" };
+    let mut text = format!(
+        "method {}: {end} ({}) after {} steps, {} of {} starts agree\n",
+        report.method, report.stop, report.iterations, report.agreeing_starts, report.starts
+    );
+    if !report.given.is_empty() {
+        let given = report.given.iter().map(|g| format!("{} = {}", g.name, digits(g.value)));
+        text += &format!("given: {}\n", given.collect::<Vec<_>>().join(", "));
+    }
+    text += &estimates(report);
+    text += &level(report);
+    text += &goodness(&report.goodness);
+    let singular: Vec<String> = report.singular_values.iter().map(|v| digits(*v)).collect();
+    text += &format!("singular values: {}\n", singular.join(", "));
+    text += &format!(
+        "data {}, seed {}, matdb {}\n",
+        report.data_hash.get(..12).unwrap_or_default(),
+        report.seed,
+        report.version
+    );
+    match report.verdict.as_slice() {
+        [] => text += "verdict: the data tell every number above\n",
+        sentences => {
+            text += "verdict:\n";
+            sentences.iter().for_each(|sentence| text += &format!("- {sentence}\n"));
+        }
+    }
+    text
+}
+
+fn estimates(report: &FitReport) -> String {
+    let unknown = || "not told".to_owned();
+    table(
+        &["estimate", "value", "± sd", "95 % interval"],
+        report.estimates.iter().map(|e| {
+            let interval =
+                e.interval_95.map(|[low, high]| format!("{} to {}", digits(low), digits(high)));
+            [
+                e.name.clone(),
+                digits(e.value),
+                e.sd.map_or_else(unknown, digits),
+                interval.unwrap_or_else(unknown),
+            ]
+        }),
+    )
+}
+
+fn level(report: &FitReport) -> String {
+    let looks = report.looks.map_or("not used".to_owned(), digits);
+    let noise = match report.noise_w > 0.0 {
+        true => format!("{:.1} dBm", dbm_from_watts(report.noise_w)),
+        false => "none".to_owned(),
+    };
+    format!("looks {looks}, noise floor {noise}\n")
+}
+
+fn goodness(goodness: &Goodness) -> String {
+    let Goodness { rms_db, mean_db, z_mean, z_variance, ks_distance, .. } = *goodness;
+    let speckle = goodness
+        .speckle_db
+        .map_or(String::new(), |speckle_db| format!(" (speckle alone leaves {speckle_db:.2} dB)"));
+    format!(
+        "detections are {rms_db:.2} dB rms{speckle} and {mean_db:.2} dB on average off the model; \
+         residuals: mean {z_mean:.2}, variance {z_variance:.2}, {ks_distance:.3} off their law\n"
+    )
+}
+
+/// Four significant digits.
+fn digits(value: f64) -> String {
+    shown(format!("{value:.3e}").parse().unwrap_or(value))
+}

@@ -1,0 +1,208 @@
+//! A fit as a material keeps it, and the band that can be drawn from what was kept.
+
+use super::interval::DEVIATE_95;
+use super::{Band, FitResult, Method};
+use crate::brdf::{Brdf, Scattering};
+use crate::material::{self, Covariance, FitReport, Given};
+
+/// Relative step of a difference quotient.
+const STEP: f64 = 1e-4;
+
+impl FitResult {
+    /// `mse`, `tls`, `tls-tail` (the tail's exponent held) or `censored`.
+    pub fn method_name(&self) -> &'static str {
+        let tail_is_held =
+            self.fit.fixed.iter().any(|(path, _)| path.rsplit('.').next() == Some("alpha"));
+        match self.fit.method {
+            Method::Mse { .. } => "mse",
+            Method::Tls { .. } if tail_is_held => "tls-tail",
+            Method::Tls { .. } => "tls",
+            Method::Censored => "censored",
+        }
+    }
+
+    /// The fit of a material's curve; `source` is the key of where the curve comes from, which then
+    /// is where the numbers come from.
+    pub fn stored(&self, name: &str, curve: &str, source: &str) -> material::Fit {
+        material::Fit {
+            name: name.to_owned(),
+            model: self.model.clone(),
+            estimator: self.method_name().to_owned(),
+            curve: Some(curve.to_owned()),
+            source: source.to_owned(),
+            parameter_sources: Vec::new(),
+            covariance: self.parameter_covariance(),
+            report: Some(self.report()),
+        }
+    }
+
+    /// Covariance of those estimates that are parameters of the model and have a deviation.
+    fn parameter_covariance(&self) -> Option<Covariance> {
+        let parameters = self.model.parameters();
+        let known: Vec<usize> = self
+            .estimates
+            .iter()
+            .enumerate()
+            .filter(|(_, e)| e.sd.is_some() && parameters.iter().any(|p| p.path == e.name))
+            .map(|(index, _)| index)
+            .collect();
+        let entry = |a: usize, b: usize| self.covariance.get(a)?.get(b).copied();
+        let both = |a: usize, b: usize| Some((entry(a, b)? + entry(b, a)?) / 2.0);
+        let row = |&a: &usize| known.iter().map(|&b| both(a, b)).collect::<Option<Vec<f64>>>();
+        let matrix = known.iter().map(row).collect::<Option<_>>()?;
+        let name = |&index: &usize| Some(self.estimates.get(index)?.name.clone());
+        let parameters = known.iter().map(name).collect::<Option<_>>()?;
+        let covariance = Covariance { parameters, matrix };
+        // What rounding has spoilt is left out here; the report has it as it was found.
+        (!known.is_empty() && covariance.is_sound()).then_some(covariance)
+    }
+
+    fn report(&self) -> FitReport {
+        let estimate = |e: &super::Estimate| material::Estimate {
+            name: e.name.clone(),
+            value: e.value,
+            sd: e.sd,
+            interval_95: e.interval_95,
+        };
+        let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+        FitReport {
+            method: self.method_name().to_owned(),
+            given: self.given(),
+            looks: self.looks,
+            noise_w: self.noise_w,
+            gauge: self.gauge_k.map(|k| format!("k = {k} was chosen; S and R are found")),
+            estimates: self.estimates.iter().map(estimate).collect(),
+            covariance: self.covariance.clone(),
+            singular_values: self.singular_values.clone(),
+            objective: self.objective,
+            goodness: self.stored_goodness(),
+            converged: self.converged,
+            stop: self.stop.as_str().to_owned(),
+            iterations: count(self.iterations),
+            starts: count(self.fit.starts),
+            agreeing_starts: count(self.agreeing_starts),
+            verdict: self.verdict.iter().map(ToString::to_string).collect(),
+            data_hash: self.data_hash.clone(),
+            seed: self.fit.seed,
+            version: self.version.to_owned(),
+        }
+    }
+
+    fn given(&self) -> Vec<Given> {
+        let settings = match self.fit.method {
+            Method::Mse { split_rad } => vec![("method.split_rad", split_rad)],
+            Method::Tls { theta_sd_rad, level_sd_db } => {
+                vec![("method.theta_sd_rad", theta_sd_rad), ("method.level_sd_db", level_sd_db)]
+            }
+            Method::Censored => Vec::new(),
+        };
+        let settings = settings.into_iter().map(|(name, value)| (name.to_owned(), value));
+        let looks = self.looks.and(self.fit.looks).map(|looks| ("looks".to_owned(), looks));
+        let bounds = self.fit.bounds.iter().flat_map(|(name, [min, max])| {
+            [(format!("{name}.min"), *min), (format!("{name}.max"), *max)]
+        });
+        let all = self.fit.fixed.iter().cloned().chain(bounds).chain(settings).chain(looks);
+        all.map(|(name, value)| Given { name, value }).collect()
+    }
+
+    fn stored_goodness(&self) -> material::Goodness {
+        let g = &self.goodness;
+        material::Goodness {
+            rms_db: g.rms_db,
+            mean_db: g.mean_db,
+            speckle_db: g.speckle_db,
+            z_mean: g.z_mean,
+            z_variance: g.z_variance,
+            ks_distance: g.ks_distance,
+            rows: u32::try_from(g.rows).unwrap_or(u32::MAX),
+        }
+    }
+}
+
+/// The 95 % band of a stored fit at an angle (rad), by the delta method on ln σ⁰; `None` for a fit
+/// without a report. The derivatives are difference quotients of the stored model.
+pub fn stored_band(fit: &material::Fit, theta_rad: f64) -> Option<Band> {
+    let report = fit.report.as_ref()?;
+    let slope = |e: &material::Estimate| e.sd.map_or(0.0, |_| slope(&fit.model, e, theta_rad));
+    let slopes: Vec<f64> = report.estimates.iter().map(slope).collect();
+    let terms = report.covariance.iter().zip(&slopes).flat_map(|(row, a)| {
+        row.iter().zip(&slopes).map(move |(covariance, b)| a * b * covariance)
+    });
+    let factor = (DEVIATE_95 * terms.sum::<f64>().max(0.0).sqrt()).exp();
+    let mid = fit.model.sigma0(theta_rad);
+    Some(Band { low: mid / factor, mid, high: mid * factor })
+}
+
+/// d ln σ⁰ / d estimate; 0 where the estimate is no number of the model, as the looks are.
+fn slope(model: &Brdf, estimate: &material::Estimate, theta_rad: f64) -> f64 {
+    // S is proportional to f_λ and R to r_s while k stays.
+    let path = match estimate.name.as_str() {
+        "S" => "specular.f_lambda",
+        "R" => "diffuse.r_s",
+        path => path,
+    };
+    let Some(parameter) = model.parameters().into_iter().find(|p| p.path == path) else {
+        return 0.0;
+    };
+    let scale = if path == estimate.name { 1.0 } else { estimate.value / parameter.value };
+    let step = STEP * parameter.value.abs().max(STEP * (parameter.max - parameter.min));
+    let ends = [-step, step].map(|d| (parameter.value + d).clamp(parameter.min, parameter.max));
+    let level = |value: f64| {
+        let mut moved = model.clone();
+        moved.set_parameter(path, value);
+        moved.sigma0(theta_rad).ln()
+    };
+    let slope = (level(ends[1]) - level(ends[0])) / ((ends[1] - ends[0]) * scale);
+    if slope.is_finite() { slope } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Fit;
+    use super::super::twin::{Twin, mixture};
+    use super::*;
+
+    #[test]
+    fn the_band_of_a_stored_fit_is_that_of_the_fit() {
+        let curve = Twin { rows: 500, ..Twin::default() }.curve(3);
+        let found =
+            Fit { starts: 1, ..Fit::default() }.run(&mixture(0.1, 3.0, 0.02, 0.004), &curve);
+        let found = found.unwrap();
+        let stored = found.stored("fit", "scan", "bench");
+        for theta_deg in [0.0f64, 3.0, 8.0, 30.0, 60.0] {
+            let fresh = found.band(theta_deg.to_radians());
+            let kept = stored_band(&stored, theta_deg.to_radians()).unwrap();
+            let width = |band: Band| (band.high / band.low).ln();
+            // Second-order terms of the difference quotients and of the fit's own table.
+            assert!(
+                (width(kept) / width(fresh) - 1.0).abs() < 0.02,
+                "{theta_deg}: {fresh:?} {kept:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_report_holds_what_the_fit_found_and_was_given() {
+        let curve = Twin { rows: 200, ..Twin::default() }.curve(3);
+        let method = Method::Tls { theta_sd_rad: 0.05, level_sd_db: 5.6 };
+        let fixed = vec![("diffuse.alpha".to_owned(), 5.0)];
+        let bounds = vec![("specular.m".to_owned(), [0.01, 1.0])];
+        let fit = Fit { method, fixed, bounds, starts: 1, seed: 7, ..Fit::default() };
+        let found = fit.run(&mixture(0.1, 3.0, 0.02, 0.004), &curve).unwrap();
+        let stored = found.stored("fit", "scan", "bench");
+        let report = stored.report.unwrap();
+        assert_eq!((report.method.as_str(), stored.estimator.as_str()), ("tls-tail", "tls-tail"));
+        let given: Vec<(&str, f64)> =
+            report.given.iter().map(|g| (g.name.as_str(), g.value)).collect();
+        let held = [("diffuse.alpha", 5.0), ("specular.m.min", 0.01), ("specular.m.max", 1.0)];
+        let settings = [("method.theta_sd_rad", 0.05), ("method.level_sd_db", 5.6)];
+        assert_eq!(given, [held.to_vec(), settings.to_vec()].concat());
+        assert_eq!((report.looks, report.seed, report.starts), (None, 7, 1));
+        assert_eq!(report.verdict.len(), found.verdict.len());
+        let m = found.estimate("specular.m").unwrap();
+        let covariance = stored.covariance.unwrap();
+        let sd = covariance.standard_deviation("specular.m").unwrap();
+        assert!((sd / m.sd.unwrap() - 1.0).abs() < 1e-9, "{sd} {m:?}");
+        assert!(covariance.standard_deviation("k").is_none());
+    }
+}

@@ -1,0 +1,212 @@
+//! What a fit says of itself, kept beside its values so that a reader can tell how far to trust them.
+
+use serde::{Deserialize, Serialize};
+
+use super::MaterialError;
+use super::check::value;
+
+/// The record of one fit to one curve.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitReport {
+    /// `mse`, `tls`, `tls-tail` or `censored`.
+    pub method: String,
+    /// Numbers that were set and not found: held parameters by their path, narrower ranges as their
+    /// path and `.min` or `.max`, settings as `method.…`, `looks`.
+    pub given: Vec<Given>,
+    /// Looks L of the speckle, given or found; none for least squares.
+    pub looks: Option<f64>,
+    /// Mean thermal power that the fit allowed for, W, 0 or more.
+    pub noise_w: f64,
+    /// How numbers that the data cannot tell were chosen; none where there was no choice.
+    pub gauge: Option<String>,
+    /// The numbers found.
+    pub estimates: Vec<Estimate>,
+    /// Their covariance, row by row; rows of estimates without a deviation are 0 and say nothing.
+    pub covariance: Vec<Vec<f64>>,
+    /// Singular values of the information, scaled to a unit diagonal, largest first.
+    pub singular_values: Vec<f64>,
+    /// ln likelihood for `censored`, else half the sum of scaled squares, negative.
+    pub objective: f64,
+    /// How well the curve is explained.
+    pub goodness: Goodness,
+    /// Whether the search ended at an optimum.
+    pub converged: bool,
+    /// Why it ended.
+    pub stop: String,
+    /// Steps of the best start.
+    pub iterations: u32,
+    /// Points that the search started from.
+    pub starts: u32,
+    /// Starts that reached the best fit.
+    pub agreeing_starts: u32,
+    /// What the fit cannot promise, a sentence each.
+    pub verdict: Vec<String>,
+    /// Hash (BLAKE3, hexadecimal) of the rows that were fitted.
+    pub data_hash: String,
+    /// Seed of the search.
+    pub seed: u64,
+    /// Version of the program that fitted.
+    pub version: String,
+}
+
+/// A number that was set and not found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Given {
+    /// As [`FitReport::given`] says.
+    pub name: String,
+    /// Its value, in its own unit.
+    pub value: f64,
+}
+
+/// A number that was found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Estimate {
+    /// A parameter's path; `S` for (1 − k)·f_λ and `R` for k·r_s; `looks`.
+    pub name: String,
+    /// Its value, in its own unit.
+    pub value: f64,
+    /// Standard deviation, 0 or more; none where the data do not tell the number by itself.
+    pub sd: Option<f64>,
+    /// 95 % interval; none as for `sd`.
+    pub interval_95: Option<[f64; 2]>,
+}
+
+/// How well a fit explains its curve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Goodness {
+    /// Root mean square of detections over the model, dB.
+    pub rms_db: f64,
+    /// Mean of the same, dB.
+    pub mean_db: f64,
+    /// What speckle alone leaves to a perfect model, dB; none for least squares.
+    pub speckle_db: Option<f64>,
+    /// Mean of the normal residuals, 0 if the law is right.
+    pub z_mean: f64,
+    /// Their variance, 1 if the law is right.
+    pub z_variance: f64,
+    /// Kolmogorov's distance of the residuals from their law, 0 to 1.
+    pub ks_distance: f64,
+    /// Number of residuals.
+    pub rows: u32,
+}
+
+impl FitReport {
+    /// A found number by its name.
+    pub fn estimate(&self, name: &str) -> Option<&Estimate> {
+        self.estimates.iter().find(|estimate| estimate.name == name)
+    }
+
+    pub(super) fn validate(&self, place: &str) -> Result<(), MaterialError> {
+        let place = format!("{place}, report");
+        let refuse = |problem: &str| Err(value(&place, problem, "fit the curve again"));
+        if self.numbers().any(|number| !number.is_finite()) {
+            return refuse("a number is not finite");
+        }
+        let not_negative = [self.noise_w, self.looks.unwrap_or(0.0)];
+        let deviations = self.estimates.iter().filter_map(|estimate| estimate.sd);
+        if not_negative.into_iter().chain(deviations).any(|number| number < 0.0) {
+            return refuse("the looks, the noise or a deviation is negative");
+        }
+        if self.estimates.iter().filter_map(|e| e.interval_95).any(|[low, high]| low > high) {
+            return refuse("an interval ends before it begins");
+        }
+        let n = self.estimates.len();
+        if self.covariance.len() != n || self.covariance.iter().any(|row| row.len() != n) {
+            return refuse("the covariance has another size than the list of estimates");
+        }
+        let hexadecimal = |c: char| c.is_ascii_digit() || ('a'..='f').contains(&c);
+        if self.data_hash.len() != 64 || !self.data_hash.chars().all(hexadecimal) {
+            return refuse("the hash of the data is not 64 hexadecimal digits");
+        }
+        Ok(())
+    }
+
+    fn numbers(&self) -> impl Iterator<Item = f64> {
+        let Goodness { rms_db, mean_db, speckle_db, z_mean, z_variance, ks_distance, .. } =
+            self.goodness;
+        let estimate = |e: &Estimate| {
+            [Some(e.value), e.sd].into_iter().flatten().chain(e.interval_95.into_iter().flatten())
+        };
+        [rms_db, mean_db, z_mean, z_variance, ks_distance, self.noise_w, self.objective]
+            .into_iter()
+            .chain(speckle_db)
+            .chain(self.looks)
+            .chain(self.given.iter().map(|given| given.value))
+            .chain(self.estimates.iter().flat_map(estimate))
+            .chain(self.covariance.iter().flatten().copied())
+            .chain(self.singular_values.iter().copied())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report() -> FitReport {
+        let estimate = Estimate {
+            name: "S".to_owned(),
+            value: 0.05,
+            sd: Some(0.01),
+            interval_95: Some([0.03, 0.07]),
+        };
+        FitReport {
+            method: "censored".to_owned(),
+            given: vec![Given { name: "looks".to_owned(), value: 1.0 }],
+            looks: Some(1.0),
+            noise_w: 0.0,
+            gauge: None,
+            estimates: vec![estimate],
+            covariance: vec![vec![1e-4]],
+            singular_values: vec![1.0],
+            objective: -1.0,
+            goodness: Goodness {
+                rms_db: 5.6,
+                mean_db: -2.5,
+                speckle_db: Some(5.57),
+                z_mean: 0.0,
+                z_variance: 1.0,
+                ks_distance: 0.1,
+                rows: 9,
+            },
+            converged: true,
+            stop: "stationary".to_owned(),
+            iterations: 3,
+            starts: 1,
+            agreeing_starts: 1,
+            verdict: Vec::new(),
+            data_hash: "0a".repeat(32),
+            seed: 0,
+            version: "0.1.0".to_owned(),
+        }
+    }
+
+    #[test]
+    fn a_report_without_a_meaning_is_refused() {
+        assert_eq!(report().validate("fit"), Ok(()));
+        type Spoil = fn(&mut FitReport);
+        let cases: [(Spoil, &str); 9] = [
+            (|r| r.objective = f64::NAN, "not finite"),
+            (|r| r.given[0].value = f64::INFINITY, "not finite"),
+            (|r| r.estimates[0].interval_95 = Some([0.0, f64::INFINITY]), "not finite"),
+            (|r| r.covariance[0][0] = f64::NAN, "not finite"),
+            (|r| r.estimates[0].sd = Some(-1.0), "negative"),
+            (|r| r.noise_w = -1.0, "negative"),
+            (|r| r.estimates[0].interval_95 = Some([1.0, 0.0]), "ends before it begins"),
+            (|r| r.covariance = Vec::new(), "another size"),
+            (|r| r.data_hash = "0A".repeat(32), "hexadecimal"),
+        ];
+        for (spoil, expected) in cases {
+            let mut spoilt = report();
+            spoil(&mut spoilt);
+            let message = spoilt.validate("fit `a`").unwrap_err().to_string();
+            assert!(
+                message.starts_with("fit `a`, report: ") && message.contains(expected),
+                "{message}"
+            );
+        }
+    }
+}

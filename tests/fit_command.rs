@@ -1,0 +1,192 @@
+//! Promise: `matdb fit` turns a curve into parameters with intervals and a verdict, stores them as a
+//! revision that scenes render, and gives a sentence instead of a number where the data do not suffice.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use matdb::brdf::{Brdf, Scattering};
+use matdb::radar::random::{Key, Purpose};
+use matdb::units::db_from_ratio;
+use serde_json::Value;
+use support::{entries, matdb, refused, scene};
+
+const HEADER: &str = "theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored\n";
+/// σ⁰ of 0 dB in this radar, dBm.
+const OFFSET_DB: f64 = -45.0;
+const THRESHOLD_DB: f64 = -27.0;
+const LOOKS: f64 = 4.0;
+const M: f64 = 0.1;
+const ALPHA: f64 = 5.0;
+
+/// A curve of a known mixture with speckle of four looks, tilted by 1°, cut off at a threshold.
+fn curve(from_deg: f64, to_deg: f64, rows: u32) -> String {
+    let text = format!(
+        r#"{{"model": "mixture", "k": 0.1,
+            "specular": {{"model": "cook-torrance", "f_lambda": 0.06, "m": {M}}},
+            "diffuse": {{"model": "blinn-phong", "r_s": 0.05, "alpha": {ALPHA}}}}}"#
+    );
+    let truth: Brdf = serde_json::from_str(&text).unwrap();
+    let row = |chirp: u32| {
+        let key = Key { seed: 5, chirp: u64::from(chirp), sub_ray: 0, purpose: Purpose::Speckle };
+        let mut draws = key.draws();
+        let theta_deg = from_deg + (to_deg - from_deg) * draws.uniform();
+        let tilt_deg = draws.complex_gaussian() * std::f64::consts::SQRT_2;
+        let true_deg = (theta_deg + tilt_deg.re).hypot(tilt_deg.im).min(89.0);
+        let sigma0 = truth.sigma0(true_deg.to_radians()) * draws.gamma(LOOKS);
+        let level_db = db_from_ratio(sigma0).max(THRESHOLD_DB);
+        let censored = u8::from(level_db == THRESHOLD_DB);
+        let power_dbm = level_db + OFFSET_DB;
+        format!("{theta_deg:.4},1,{power_dbm:.3},{level_db:.3},8,{chirp},{censored}\n")
+    };
+    HEADER.to_owned() + &(0..rows).map(row).collect::<String>()
+}
+
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    let output = matdb(folder).args(arguments).arg("--json").output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn text(folder: &Path, arguments: &[&str]) -> String {
+    let output = matdb(folder).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+const SAVE: [&str; 6] = ["--save", "human-skin", "--kind", "synthetic", "--source", "A test"];
+
+#[test]
+fn a_curve_is_fitted_stored_rendered_and_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("scan.csv"), curve(0.0, 60.0, 400)).unwrap();
+    let drawn = ["fit", "scan.csv", "--starts", "2", "-o", "fit.svg"];
+    let found = json(folder, &[&drawn[..], &SAVE].concat());
+    for (name, truth) in [("specular.m", M), ("diffuse.alpha", ALPHA), ("looks", LOOKS)] {
+        let estimates = found["estimates"].as_array().unwrap();
+        let estimate = estimates.iter().find(|estimate| estimate["name"] == name).unwrap();
+        let [value, sd] = ["value", "sd"].map(|key| estimate[key].as_f64().unwrap());
+        // Four deviations: chance passes it once in 16 000 times.
+        assert!((value - truth).abs() < 4.0 * sd && sd < 0.5 * truth, "{estimate}");
+    }
+    let sentences = found["sentences"].to_string();
+    assert!(sentences.contains("S = (1 - k) f_lambda") && sentences.contains("R = k r_s"));
+    let saved = &found["saved"];
+    assert_eq!((&saved["revision"], &saved["fit"]), (&1.into(), &"mixture-censored".into()));
+    assert!(fs::read_to_string(folder.join("fit.svg")).unwrap().contains("95 % band"));
+
+    let listed = &json(folder, &["list"])[0];
+    assert_eq!(
+        (&listed["slug"], &listed["render_kind"]),
+        (&"human-skin".into(), &"synthetic".into())
+    );
+    assert_eq!((&listed["curves"], &listed["observations"]), (&1.into(), &400.into()));
+    let shown = text(folder, &["show", "human-skin"]);
+    assert!(shown.contains("method censored: converged") && shown.contains("verdict:"), "{shown}");
+    text(folder, &["plot", "human-skin", "-o", "plot.svg"]);
+    let plot = fs::read_to_string(folder.join("plot.svg")).unwrap();
+    assert!(plot.contains("scan, below the threshold here") && plot.contains("mixture-censored"));
+
+    json(folder, &["render", scene("human.toml").to_str().unwrap(), "-o", "out"]);
+    let record: Value =
+        serde_json::from_slice(&fs::read(folder.join("out/scan.json")).unwrap()).unwrap();
+    assert_eq!(record["materials"][0]["scattering"], found["model"]);
+    assert_eq!(record["materials"][0]["origin"], "database");
+
+    // The stored curve gives what the file gave, and a second fit leaves the first in its revision.
+    let again = ["fit", "human-skin", "--method", "tls-tail", "--alpha", "4", "--save"];
+    let again = json(folder, &[&again[..], &["--keep-render", "--starts", "1"]].concat());
+    assert_eq!(again["data_hash"], found["data_hash"]);
+    assert_eq!(again["saved"]["fit"], "mixture-tls-tail");
+    assert_eq!(again["saved"]["render"], "mixture-censored");
+    let shown = json(folder, &["show", "human-skin@2"]);
+    let fits = shown["material"]["fits"].as_array().unwrap();
+    assert_eq!(fits.len(), 3);
+    let report = &fits[2]["report"];
+    assert_eq!(report["given"][0]["name"], "diffuse.alpha");
+    assert!(report["verdict"].to_string().contains("least squares ignores them"), "{report}");
+    let held = fits[2]["parameter_sources"][0][1].as_str().unwrap();
+    let sources = shown["material"]["sources"].as_array().unwrap();
+    let held = sources.iter().find(|source| source["key"] == held).unwrap();
+    assert_eq!(held["kind"], "synthetic", "a number that somebody chose is not measured");
+}
+
+#[test]
+fn too_little_data_gives_a_verdict_and_no_confident_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("near.csv"), curve(0.0, 5.0, 150)).unwrap();
+    let near = text(folder, &["fit", "near.csv", "--starts", "1"]);
+    assert!(near.contains("the data do not show the diffuse part"), "{near}");
+    fs::write(folder.join("scan.csv"), curve(0.0, 60.0, 150)).unwrap();
+    let arguments = ["fit", "scan.csv", "--model", "kirchhoff-go", "--starts", "1"];
+    let go = json(folder, &arguments);
+    assert!(go["verdict"].to_string().contains("only-together"), "{go}");
+    let silent = go["estimates"].as_array().unwrap().iter().filter(|e| e["sd"].is_null()).count();
+    assert_eq!(silent, 2, "eps_real and eps_imag only scale the curve: {go}");
+}
+
+#[test]
+fn a_fit_that_did_not_converge_is_printed_and_not_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("scan.csv"), curve(0.0, 60.0, 400)).unwrap();
+    // A single lobe for two: the looks have to explain the tail, slowly.
+    let fit = ["fit", "scan.csv", "--model", "cook-torrance", "--starts", "1", "-o", "fit.svg"];
+    let output = matdb(folder).args(fit).args(SAVE).output().unwrap();
+    let [out, error] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+    assert_eq!(output.status.code(), Some(1), "{out}");
+    assert!(out.contains("did not converge") && out.contains("do not use the numbers"), "{out}");
+    assert!(error.starts_with("error: scan.csv: the fit did not converge"), "{error}");
+    assert_eq!(entries(folder), ["scan.csv"]);
+}
+
+#[test]
+fn bad_input_is_refused_with_a_sentence_and_nothing_is_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let whole = curve(0.0, 60.0, 40);
+    let censored = "60,1,-80,-35,8,1,1\n61,1,-80,-35,8,2,1\n";
+    fs::write(folder.join("scan.csv"), &whole).unwrap();
+    fs::write(folder.join("censored.csv"), HEADER.to_owned() + censored).unwrap();
+    fs::write(folder.join("few.csv"), "theta_deg,sigma0_db\n1,-3\n20,-20\n40,-25\n").unwrap();
+    fs::write(folder.join("empty.csv"), HEADER).unwrap();
+    fs::write(folder.join("bad.csv"), "theta_deg,sigma0_db\n1,-3\n120,-20\n").unwrap();
+    let before = entries(folder);
+    for (arguments, expected) in [
+        ("censored.csv", "all 2 rows are censored"),
+        ("few.csv", "3 detections cannot give 5 unknowns"),
+        ("empty.csv", "no rows"),
+        ("bad.csv", "line 3"),
+        ("absent.csv", "cannot read absent.csv"),
+        ("few.csv --model lambert --noise-dbm -90", "no powers"),
+        ("ptfe", "`ptfe` has no curve that could be fitted"),
+        ("cotton --curve other", "`cotton` has no curve `other`; there are:"),
+        ("coton", "did you mean `cotton`?"),
+        ("scan.csv --model mixtur", "did you mean `mixture`?"),
+        ("scan.csv --model qqqqqq", "name a material or one of blinn-phong"),
+        ("scan.csv --model cotton", "nothing is left to fit"),
+        ("scan.csv --method tls-tail", "give it with --alpha"),
+        ("scan.csv --model lambert --alpha 3", "this model has no alpha"),
+        ("scan.csv --fix alpha", "write it as --fix diffuse.alpha=3"),
+        ("scan.csv --fix diffuse.alpa=3", "there are: k"),
+        ("scan.csv --fix diffuse.alpha=-3", "diffuse.alpha = -3 is out of range"),
+        ("scan.csv --alpha 3 --fix diffuse.alpha=3", "held twice"),
+        ("scan.csv --starts 0", "fit.starts = 0"),
+        ("scan.csv --looks 0", "fit.looks = 0"),
+        ("scan.csv --save", "belongs to no material yet"),
+        ("scan.csv --save ptfe", "nobody has said where scan.csv comes from"),
+        ("scan.csv --save ptfe --kind measured", "nobody has said where"),
+        ("scan.csv --save ptf --kind measured --source x", "did you mean `ptfe`?"),
+        ("scan.csv --save ptfe@1 --kind measured --source x", "a revision never changes"),
+        ("scan.csv -o fit.pdf", "does not end in .svg or .png"),
+        ("cotton --model mixture --save ptfe", "belongs to `cotton`"),
+    ] {
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        let sentence = refused(matdb(folder).arg("fit").args(&arguments));
+        assert!(sentence.contains(expected), "{arguments:?}: {sentence}");
+        assert_eq!(entries(folder), before, "{arguments:?}");
+    }
+}
