@@ -6,12 +6,16 @@ use serde_json::{Value, json};
 
 use super::cloud::{CloudArgs, start};
 use super::console::Console;
+use super::curves::{Kind, put};
+use super::database::Database;
+use super::materials::find;
 use super::output::write_all;
 use super::summary::grouped;
 use crate::error::Error;
 use crate::formats::figure::{Plot, Series, Style};
 use crate::measure::{Curve, Metric, Reduced, Reduction, Registered, Registration, Row};
 use crate::scene::Scene;
+use crate::store::Added;
 use crate::units::db_from_ratio;
 
 /// Turn a measured cloud into a material's curve: register it to the scene, find the angles
@@ -20,8 +24,9 @@ use crate::units::db_from_ratio;
   matdb measure out/cloud.ply --scene scenes/mannequin.toml -o measured
   matdb measure cloud.csv --scene scene.toml --pose 0.03,0,-0.01,0,5,0 --region body -o measured
   matdb measure cloud.xyz --unit mm --scene scene.toml --pose auto -o measured
+  matdb measure cloud.ply --scene scene.toml --save my-paint --kind measured --source 'Our bench, 2026' -o measured
 
-Then: matdb fit measured/curve.csv")]
+Then: matdb fit measured/curve.csv, or matdb fit my-paint --save")]
 pub(super) struct Args {
     #[command(flatten)]
     cloud: CloudArgs,
@@ -44,6 +49,18 @@ pub(super) struct Args {
     /// The target is the facets of the mesh, as in a rendered cloud: their normals have no error
     #[arg(long)]
     exact_mesh: bool,
+    /// Store the curve in this material as a new revision, too
+    #[arg(long, value_name = "MATERIAL", requires = "kind", requires = "source")]
+    save: Option<String>,
+    /// Name of the stored curve
+    #[arg(long, value_name = "NAME", default_value = "measured")]
+    curve: String,
+    /// How the cloud came to be
+    #[arg(long, value_enum)]
+    kind: Option<Kind>,
+    /// Who measured or made the cloud, when and how
+    #[arg(long, value_name = "TITLE")]
+    source: Option<String>,
     /// Folder to write into; created when it is not there
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
@@ -59,8 +76,10 @@ enum MetricFlag {
     PointToPoint,
 }
 
-pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let scene = Scene::load(&args.scene)?;
+    // A registration takes a while: a name that is not there is said before.
+    args.save.as_ref().map(|name| find(db.read()?.as_ref(), name, "--save: ")).transpose()?;
     let cloud = args.cloud.read(scene.radar())?;
     let reduction = reduction(args, &scene)?;
     let (radar, chirps, target) = (scene.radar(), &scene.chirps, &scene.target);
@@ -75,9 +94,31 @@ pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let svg = plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
     let files = [("pose.json", pose), ("curve.csv", reduced.curve.write()), ("curve.svg", svg)];
     write_all(&args.output, &files)?;
+    let revision = save(args, &reduced.curve, db)?;
     let notices = cloud.notices.iter().chain(&registered.verdicts).chain(&reduced.notices);
     notices.for_each(|notice| console.notice(notice));
-    console.result(&text(args, &registered, &reduced), &record)
+    let saved = match (&args.save, revision) {
+        (Some(name), Some(revision)) => {
+            format!("stored the curve as `{}` in {name}@{revision}\n", args.curve)
+        }
+        _ => String::new(),
+    };
+    console.result(&(text(args, &registered, &reduced) + &saved), &record)
+}
+
+/// Stores the curve when it is asked for; the revision that holds it.
+fn save(args: &Args, curve: &Curve, db: &Database) -> Result<Option<u32>, Error> {
+    let (Some(name), Some(kind), Some(title)) = (&args.save, args.kind, &args.source) else {
+        return Ok(None);
+    };
+    let mut store = db.write()?;
+    let mut material = find(Some(&store), name, "--save: ")?.material;
+    put(&mut material, &args.curve, curve, kind.into(), title)?;
+    let added = store.add([&material])?;
+    Ok(added.first().map(|added| match added {
+        Added::Revision(number) | Added::Unchanged(number) => *number,
+        Added::New => 1,
+    }))
 }
 
 fn registration(args: &Args) -> Result<Registration, Error> {
@@ -140,6 +181,7 @@ fn record(args: &Args, registered: &Registered, reduced: &Reduced) -> Value {
         "inliers": registered.inliers,
         "virtual_scans": registered.scans,
         "iterations": registered.iterations,
+        "given_pose_kept": registered.kept,
         "converged": registered.converged,
         "stop": format!("{:?}", registered.stop).to_lowercase(),
         "verdicts": registered.verdicts,
@@ -152,6 +194,7 @@ fn record(args: &Args, registered: &Registered, reduced: &Reduced) -> Value {
                 "other_region": left_out.other_region,
                 "near_edge": left_out.near_edge,
                 "silent_near_edge": left_out.silent_near_edge,
+                "unsure_of_facet": left_out.unsure_of_facet,
             },
         },
     })

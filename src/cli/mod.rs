@@ -6,6 +6,7 @@ mod compare;
 mod completions;
 mod database;
 mod console;
+mod curves;
 mod fit;
 mod list;
 mod materials;
@@ -85,7 +86,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
     match &cli.command {
         Command::Render(args) => render::run(args, db, &console),
         Command::Radar(args) => radar::run(args, &console),
-        Command::Measure(args) => measure::run(args, &console),
+        Command::Measure(args) => measure::run(args, db, &console),
         Command::Compare(args) => compare::run(args, db, &console),
         Command::Add(args) => add::run(args, db, &console),
         Command::List(_) => list::run(db, &console),

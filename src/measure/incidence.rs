@@ -64,22 +64,14 @@ impl<'a> Incidence<'a> {
     /// A step is a range that differs by more than twice what the tilted surface, or one at 45°,
     /// has over the margin.
     pub fn is_clear(&self, ray: &Ray<Global>, sighting: &Sighting, margin_m: f64) -> bool {
-        const AROUND: usize = 8;
         if margin_m <= 0.0 {
             return true;
         }
         let Hit { range_m, cos_theta, point, .. } = sighting.hit;
         let tangent = (1.0 / (cos_theta * cos_theta) - 1.0).max(0.0).sqrt();
         let step_m = 2.0 * margin_m * tangent.max(1.0);
-        let (u, v) = ray.direction.xyz().any_orthonormal_pair();
-        (0..AROUND).all(|number| {
-            let (sin, cos) = (std::f64::consts::TAU * number as f64 / AROUND as f64).sin_cos();
-            let aside: DVec3 = margin_m * (cos * u + sin * v);
-            let Some(direction) = ray.origin.towards(Point::from(point.xyz + aside)) else {
-                return false;
-            };
-            let beside = Ray { origin: ray.origin, direction };
-            let seen = self.traced.look(&self.registered.pose, &beside);
+        around(ray, point, margin_m).all(|beside| {
+            let seen = beside.and_then(|beside| self.traced.look(&self.registered.pose, &beside));
             seen.is_some_and(|Seen { hit, .. }| {
                 self.region(&hit) == Some(sighting.region)
                     && (hit.range_m - range_m).abs() <= step_m
@@ -87,9 +79,39 @@ impl<'a> Incidence<'a> {
         })
     }
 
+    /// Whether the facet that was hit is the only one within the uncertainty of the pose, three
+    /// standard deviations. Judged by eight rays on a circle; facets of one plane are one.
+    pub fn is_sure_of_its_facet(&self, ray: &Ray<Global>, sighting: &Sighting) -> bool {
+        const SURE_SD: f64 = 3.0;
+        const ONE_PLANE: f64 = 1e-6;
+        let point = sighting.hit.point;
+        let aside_m = SURE_SD * self.registered.shift_sd_m(point);
+        let Some(here) = self.traced.look(&self.registered.pose, ray) else { return false };
+        around(ray, point, aside_m).all(|beside| {
+            let there = beside.and_then(|beside| self.traced.look(&self.registered.pose, &beside));
+            there.is_some_and(|there| there.normal.dot(here.normal) > 1.0 - ONE_PLANE)
+        })
+    }
+
     fn region(&self, hit: &Hit) -> Option<u16> {
         self.target.region_of_facet.get(hit.facet as usize).copied()
     }
+}
+
+/// Eight rays from where a ray starts to a circle about a point, across the beam.
+fn around(
+    ray: &Ray<Global>,
+    point: Point<Global>,
+    radius_m: f64,
+) -> impl Iterator<Item = Option<Ray<Global>>> {
+    const AROUND: usize = 8;
+    let (origin, (u, v)) = (ray.origin, ray.direction.xyz().any_orthonormal_pair());
+    (0..AROUND).map(move |number| {
+        let (sin, cos) = (std::f64::consts::TAU * number as f64 / AROUND as f64).sin_cos();
+        let aside: DVec3 = radius_m * (cos * u + sin * v);
+        let direction = origin.towards(Point::from(point.xyz + aside))?;
+        Some(Ray { origin, direction })
+    })
 }
 
 #[cfg(test)]
@@ -106,6 +128,7 @@ mod tests {
             pose: Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO),
             covariance: [[0.0; 6]; 6],
             pivot: Point::new(0.0, 0.0, 0.0),
+            kept: false,
             rms_m: 0.0,
             widened: 1.0,
             inliers: 1,

@@ -66,6 +66,9 @@ pub struct LeftOut {
     pub near_edge: usize,
     /// Silent chirps near such.
     pub silent_near_edge: usize,
+    /// Detections and silent chirps of which the pose does not tell which facet they met; for an exact
+    /// mesh alone.
+    pub unsure_of_facet: usize,
 }
 
 /// Why there is no curve.
@@ -110,6 +113,7 @@ enum Fate {
     OffSurface,
     OtherRegion,
     NearEdge,
+    Unsure,
 }
 
 /// What all rows need.
@@ -118,6 +122,7 @@ struct Bench<'a> {
     link: Link,
     region: Option<u16>,
     margin_m: f64,
+    exact_mesh: bool,
     gate_m: f64,
     threshold_w: f64,
 }
@@ -185,6 +190,7 @@ impl Reduction {
             link: Link::new(radar),
             region: self.region,
             margin_m: self.edge_margin_m.unwrap_or(radar.spot_diameter_m),
+            exact_mesh: self.exact_mesh,
             gate_m: GATE_SD * registered.rms_m.max(LEAST_RMS_M),
             threshold_w: watts_from_dbm(radar.threshold_dbm),
         }
@@ -194,6 +200,11 @@ impl Reduction {
 impl Bench<'_> {
     fn wants(&self, sighting: &Sighting) -> bool {
         self.region.is_none_or(|region| region == sighting.region)
+    }
+
+    /// Facets that stand for a smooth surface have their error in the angle's deviation.
+    fn is_sure(&self, ray: &Ray<Global>, sighting: &Sighting) -> bool {
+        !self.exact_mesh || self.incidence.is_sure_of_its_facet(ray, sighting)
     }
 
     fn judge(&self, point: &CloudPoint, ray: &Ray<Global>, chirp: u32) -> Fate {
@@ -209,6 +220,9 @@ impl Bench<'_> {
         }
         if !self.incidence.is_clear(ray, &sighting, self.margin_m) {
             return Fate::NearEdge;
+        }
+        if !self.is_sure(ray, &sighting) {
+            return Fate::Unsure;
         }
         let power_w = watts_from_dbm(point.power_dbm);
         Fate::Row(self.row(&sighting, range_m, power_w, chirp, false))
@@ -250,6 +264,7 @@ fn detected(
             Fate::OffSurface => left_out.off_surface += 1,
             Fate::OtherRegion => left_out.other_region += 1,
             Fate::NearEdge => left_out.near_edge += 1,
+            Fate::Unsure => left_out.unsure_of_facet += 1,
         }
     }
     rows
@@ -257,20 +272,31 @@ fn detected(
 
 /// Rows of the chirps that should have hit and gave nothing.
 fn silent(bench: &Bench, chirps: &Chirps, told: &Told, left_out: &mut LeftOut) -> Vec<Row> {
-    let rows: Vec<Option<Option<Row>>> = told
+    let fates: Vec<Option<Fate>> = told
         .silent
         .par_iter()
         .map(|&index| {
             let (ray, chirp) = (chirps.rays.get(index)?, *chirps.number.get(index)?);
             let sighting = bench.incidence.look(ray).filter(|sighting| bench.wants(sighting))?;
-            let clear = bench.incidence.is_clear(ray, &sighting, bench.margin_m);
+            if !bench.incidence.is_clear(ray, &sighting, bench.margin_m) {
+                return Some(Fate::NearEdge);
+            }
+            if !bench.is_sure(ray, &sighting) {
+                return Some(Fate::Unsure);
+            }
             let range_m = sighting.hit.range_m;
-            let row = || bench.row(&sighting, range_m, bench.threshold_w, chirp, true);
-            Some(clear.then(row))
+            Some(Fate::Row(bench.row(&sighting, range_m, bench.threshold_w, chirp, true)))
         })
         .collect();
-    left_out.silent_near_edge = rows.iter().filter(|row| matches!(row, Some(None))).count();
-    rows.into_iter().flatten().flatten().collect()
+    let mut rows = Vec::new();
+    for fate in fates.into_iter().flatten() {
+        match fate {
+            Fate::Row(row) => rows.push(row),
+            Fate::Unsure => left_out.unsure_of_facet += 1,
+            _ => left_out.silent_near_edge += 1,
+        }
+    }
+    rows
 }
 
 /// Which chirp gave which point, and which gave none.

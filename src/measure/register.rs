@@ -7,6 +7,7 @@
 //! the measured rays themselves, all points at once; at the true pose its expected gaps are zero.
 
 use glam::DVec3;
+use nalgebra::{Matrix6, Vector6};
 use thiserror::Error;
 
 use super::cloud::Cloud;
@@ -69,6 +70,9 @@ pub struct Registration {
     pub farthest_m: f64,
     /// A pose turned farther from the rough one has diverged, rad.
     pub farthest_rad: f64,
+    /// Keep a pose given by hand when the points do not speak against it, at 5 %: it may be known
+    /// better than they tell, and on flat facets a tenth of a millimetre moves angles by degrees.
+    pub keep_given: bool,
 }
 
 impl Default for Registration {
@@ -86,6 +90,7 @@ impl Default for Registration {
             least_inliers: 0.5,
             farthest_m: 0.25,
             farthest_rad: 0.5,
+            keep_given: true,
         }
     }
 }
@@ -130,6 +135,8 @@ pub struct Registered {
     pub rms_m: f64,
     /// By what the variance was widened because neighbouring points share errors, 1 or more.
     pub widened: f64,
+    /// Whether the given pose was kept, because it is within chance of the found one.
+    pub kept: bool,
     /// Points on the surface, within four standard deviations.
     pub inliers: usize,
     /// All points.
@@ -250,7 +257,11 @@ impl Registration {
             self.close_along_rays(&view, &mut aligned);
             self.check_near(&view, &rough, &aligned.pose)?;
         }
-        self.judge(&view, &aligned)
+        let found = self.judge(&view, &aligned)?;
+        match self.start {
+            Start::Given(given) if self.keep_given && found.converged => Ok(found.or_given(&given)),
+            _ => Ok(found),
+        }
     }
 
     /// The second loop: Gauss and Newton on the gaps along the measured rays.
@@ -305,6 +316,7 @@ impl Registration {
             covariance: known.covariance,
             pivot: view.pivot.into(),
             rms_m,
+            kept: false,
             widened: known.widened,
             inliers: inliers.len(),
             points,
@@ -333,6 +345,32 @@ fn verdicts(aligned: &Aligned, known: Uncertainty, rms_m: f64) -> Vec<String> {
 }
 
 impl Registered {
+    /// The given pose in place of the found one, when it is within chance of it.
+    fn or_given(mut self, given: &Pose<Global, Global>) -> Registered {
+        // χ² with six degrees of freedom is above this in 5 %.
+        const CHANCE: f64 = 12.592;
+        let Motion { shift_m, turn_rad } =
+            Motion::of(&(*given * self.pose.inverse()), self.pivot.xyz);
+        let apart =
+            Vector6::from_iterator(shift_m.to_array().into_iter().chain(turn_rad.to_array()));
+        let covariance = Matrix6::from_fn(|row, column| self.covariance[row][column]);
+        let distance2 = covariance.try_inverse().map(|inverse| apart.dot(&(inverse * apart)));
+        if distance2.is_some_and(|distance2| distance2 <= CHANCE) {
+            self.pose = *given;
+            self.kept = true;
+            self.verdicts.push("the points agree with the pose as given, which is kept".to_owned());
+        }
+        self
+    }
+
+    /// How far a point of the target may be from where the pose puts it, standard deviation in any
+    /// direction, m.
+    pub fn shift_sd_m(&self, point: Point<Global>) -> f64 {
+        let arm_m = point.distance_m(self.pivot);
+        let trace = |from: usize| (from..from + 3).map(|i| self.covariance[i][i]).sum::<f64>();
+        (trace(0) + arm_m * arm_m * trace(3)).sqrt()
+    }
+
     /// Variance of the tilt of a surface of unit normal `normal`, mean of its two tilts, rad².
     pub fn tilt_variance_rad2(&self, normal: DVec3) -> f64 {
         let turn = |i: usize, j: usize| self.covariance[3 + i][3 + j];

@@ -264,8 +264,7 @@ mod tests {
         assert_eq!(
             error.to_string(),
             "a return at 25.000 m is 2.260 m outside the unambiguous range of 0 to 22.740 m and \
-             would appear at 2.260 m; raise radar.chirp.samples, lower radar.bandwidth_ghz, or leave the return \
-             out"
+             would appear at 2.260 m; give radar.chirp.samples = 4504 or more, or move what returns it"
         );
         let error = chirp.beat_signal(&[echo(-0.25)]).unwrap_err();
         assert!(error.to_string().contains("is 0.250 m outside"), "{error}");

@@ -10,6 +10,7 @@ use clap::ValueEnum;
 use serde::Serialize;
 
 use super::console::Console;
+use super::curves::Kind;
 use super::database::Database;
 use super::materials::find;
 use super::plot::{ending, layers, one_file, plot, points};
@@ -17,7 +18,6 @@ use crate::brdf::Brdf;
 use crate::error::Error;
 use crate::fit::{Fit, FitResult, Method, model, model_names};
 use crate::formats::text::nearest;
-use crate::material::SourceKind;
 use crate::radar::speckle::standard_deviation_db;
 use crate::store::Store;
 use crate::units::watts_from_dbm;
@@ -103,21 +103,6 @@ enum MethodName {
     Tls,
     TlsTail,
     Censored,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Kind {
-    Measured,
-    Synthetic,
-}
-
-impl From<Kind> for SourceKind {
-    fn from(kind: Kind) -> SourceKind {
-        match kind {
-            Kind::Measured => SourceKind::Measured,
-            Kind::Synthetic => SourceKind::Synthetic,
-        }
-    }
 }
 
 /// What scripts read: the result of the fit, and what was done with it.

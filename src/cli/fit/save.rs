@@ -3,11 +3,12 @@
 use serde::Serialize;
 
 use super::{Args, Subject};
+use crate::cli::curves;
 use crate::cli::database::Database;
 use crate::cli::materials::{Found, find};
 use crate::error::Error;
 use crate::fit::FitResult;
-use crate::material::{Curve, Material, Source, SourceKind};
+use crate::material::{Curve, Material, SourceKind};
 use crate::store::{Added, Store};
 
 /// Where a fit was stored.
@@ -116,47 +117,9 @@ fn of_file(
         ));
     };
     let mut material = find(store, name, "--save: ")?.material;
-    let observations = subject.curve.observations();
-    let source = source(&mut material, kind.into(), title, &subject.curve_name);
-    let curve = Curve { name: subject.curve_name.clone(), source, instrument: None, observations };
-    let (curve_name, source) = (curve.name.clone(), curve.source.clone());
-    let taken = material.curves.iter().find(|known| known.name == curve.name);
-    let same = |known: &Curve| known.observations == curve.observations && known.source == source;
-    match taken.map(same) {
-        Some(true) => {}
-        None if !material.fits.iter().any(|fit| fit.name == curve.name) => {
-            material.curves.push(curve);
-        }
-        _ => {
-            return Err(usage(
-                format!("`{name}` has something else of the name `{}`", curve.name),
-                "give the curve another name with --curve",
-            ));
-        }
-    }
-    Ok(Target { material, curve: curve_name, source })
-}
-
-/// The key of a source of this kind and title, added under a free key when it is not there.
-fn source(material: &mut Material, kind: SourceKind, title: &str, key: &str) -> String {
-    let same = |source: &&Source| source.kind == kind && source.title == title;
-    if let Some(known) = material.sources.iter().find(same) {
-        return known.key.clone();
-    }
-    let is_free = |key: &String| material.sources.iter().all(|source| source.key != *key);
-    let numbered = (2u32..).map(|number| format!("{key}-{number}"));
-    let key = std::iter::once(key.to_owned()).chain(numbered).find(is_free);
-    let key = key.unwrap_or_default();
-    material.sources.push(Source {
-        key: key.clone(),
-        kind,
-        title: title.to_owned(),
-        doi: None,
-        url: None,
-        licence: None,
-        note: None,
-    });
-    key
+    let (curve, name) = (&subject.curve, &subject.curve_name);
+    let source = curves::put(&mut material, name, curve, kind.into(), title)?;
+    Ok(Target { material, curve: name.clone(), source })
 }
 
 /// The source of every parameter that somebody chose and no data gave, by path.
@@ -169,7 +132,7 @@ fn chosen(material: &mut Material, found: &FitResult) -> Vec<(String, String)> {
     if paths.is_empty() {
         return Vec::new();
     }
-    let key = source(material, SourceKind::Synthetic, CHOSEN, "chosen");
+    let key = curves::source(material, SourceKind::Synthetic, CHOSEN, "chosen");
     paths.into_iter().map(|path| (path, key.clone())).collect()
 }
 

@@ -1,0 +1,186 @@
+//! Promise: a measured cloud becomes a material that renders like it: registered from a wrong pose,
+//! reduced to a curve, fitted, stored, rendered and compared. Clouds that cannot be used give one
+//! sentence and no number.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use support::{entries, matdb, read_cloud, refused, root};
+
+/// The painted mannequin alone, with speckle, noise and a range error; `paint` is what it is made of.
+const SCENE: &str = "
+seed = 11
+[radar.speckle]
+looks = 4
+[radar.noise]
+level_dbm = -100
+range_sd_m = 0.002
+[[mesh]]
+name = \"body\"
+file = \"builtin:mannequin\"
+[[region]]
+name = \"body\"
+material = \"mannequin-paint\"
+";
+
+/// A folder with a scene as measured, the same without speckle and noise, and the measured cloud.
+fn measured() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = &SCENE[SCENE.find("[[mesh]]").unwrap()..];
+    fs::write(folder.path().join("measured.toml"), SCENE).unwrap();
+    fs::write(folder.path().join("scene.toml"), plain).unwrap();
+    matdb(folder.path()).args(["render", "-q", "measured.toml", "-o", "out"]).assert().success();
+    folder
+}
+
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    let output = matdb(folder).arg("--json").args(arguments).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
+}
+
+/// A fifth of a noise of 2 mm, over thousands of points, at three standard deviations.
+const POSE_M: f64 = 5e-4;
+const POSE_RAD: f64 = 9e-4;
+
+#[test]
+fn a_cloud_becomes_a_material_that_renders_like_it() {
+    let folder = measured();
+    let at = folder.path();
+    matdb(at).args(["add", "-q", "mannequin-paint"]).assert().success();
+    let rough = "--pose=0.02,0.01,-0.015,0.8,1,-0.8";
+    let pose = json(
+        at,
+        &[
+            "measure",
+            "out/cloud.ply",
+            "--scene",
+            "scene.toml",
+            rough,
+            "--exact-mesh",
+            "--save",
+            "mannequin-paint",
+            "--kind",
+            "synthetic",
+            "--source",
+            "made by a test",
+            "-o",
+            "measured",
+        ],
+    );
+    assert_eq!(entries(&at.join("measured")), ["curve.csv", "curve.svg", "pose.json"]);
+    // The mesh stood where the scene has it: at the points the pose moves nothing.
+    let about = &pose["covariance"]["about_m"];
+    for row in 0..3 {
+        let turned: f64 = (0..3)
+            .map(|c| number(&pose["pose"]["rotation_rows"][row][c]) * number(&about[c]))
+            .sum();
+        let shift_m = turned + number(&pose["pose"]["translation_m"][row]) - number(&about[row]);
+        assert!(shift_m.abs() < POSE_M, "{row}: {shift_m}");
+        let diagonal = number(&pose["pose"]["rotation_rows"][row][row]);
+        assert!(diagonal.acos().abs() < POSE_RAD, "{diagonal}");
+    }
+    assert_eq!(pose["converged"], true);
+
+    let fit = json(at, &["fit", "mannequin-paint", "--noise-dbm", "-100", "--save"]);
+    assert_eq!(fit["converged"], true);
+    let truth = json(at, &["show", "mannequin-paint@1"]);
+    let parameter = |path: &str| {
+        let all = truth["fits"][0]["parameters"].as_array().unwrap();
+        number(&all.iter().find(|p| p["path"] == path).unwrap()["value"])
+    };
+    let (k, f_lambda, r_s) =
+        (parameter("k"), parameter("specular.f_lambda"), parameter("diffuse.r_s"));
+    for (name, expected) in [
+        ("specular.m", parameter("specular.m")),
+        ("diffuse.alpha", parameter("diffuse.alpha")),
+        ("S", (1.0 - k) * f_lambda),
+        ("R", k * r_s),
+        ("looks", 4.0),
+    ] {
+        let estimates = fit["estimates"].as_array().unwrap();
+        let estimate = estimates.iter().find(|e| e["name"] == name).unwrap();
+        // Four standard deviations: five numbers, one seed.
+        let (value, sd) = (number(&estimate["value"]), number(&estimate["sd"]));
+        assert!((value - expected).abs() < 4.0 * sd, "{name}: {value} ± {sd} is not {expected}");
+        assert!(sd < 0.2 * expected, "{name}: ± {sd}");
+    }
+
+    // Rendered from the new revision, the scene is as near to the cloud as speckle lets it be.
+    let error = |pose: &str| {
+        let run = ["compare", "out/cloud.ply", "--scene", "scene.toml", pose, "-o", "compared"];
+        json(at, &run)["pixels"].clone()
+    };
+    let fitted = error("--pose=measured/pose.json");
+    assert!(number(&fitted["bias_db"]).abs() < 0.3, "{fitted}");
+    assert!(number(&fitted["rmse_db"]) < 1.6, "{fitted}");
+    assert!(number(&error(rough)["rmse_db"]) > 2.0 * number(&fitted["rmse_db"]));
+    assert_eq!(entries(&at.join("compared")), ["error.json", "images.png", "line.png", "line.svg"]);
+}
+
+/// A CSV of the measured cloud's every `step`-th point, changed by `change(x, y, z, dBm)`.
+fn csv(folder: &Path, step: usize, change: impl Fn([f64; 4]) -> String) -> String {
+    let cloud = read_cloud(&folder.join("out/cloud.ply"));
+    let rows = (0..cloud["x"].len())
+        .step_by(step)
+        .map(|i| change(["x", "y", "z", "power_dbm"].map(|column| cloud[column][i])));
+    let rows: Vec<String> = rows.collect();
+    format!("x_m,y_m,z_m,power_dbm\n{}\n", rows.join("\n"))
+}
+
+#[test]
+fn clouds_that_cannot_be_used() {
+    let folder = measured();
+    let at = folder.path();
+    let as_is = |[x, y, z, p]: [f64; 4]| format!("{x},{y},{z},{p}");
+    let watts = |[x, y, z, p]: [f64; 4]| format!("{x},{y},{z},{:e}", 1e-3 * 10f64.powf(p / 10.0));
+    let far = |[x, y, z, p]: [f64; 4]| format!("{},{y},{z},{p}", x + 3.0);
+    let refuse = |name: &str, text: &str, parts: &[&str]| {
+        fs::write(at.join(name), text).unwrap();
+        let before = entries(at);
+        let run = ["measure", name, "--scene", "scene.toml", "-o", "measured"];
+        let message = refused(matdb(at).args(run));
+        parts
+            .iter()
+            .for_each(|part| assert!(message.contains(part), "`{part}` is not in: {message}"));
+        assert_eq!(entries(at), before);
+    };
+    refuse("few.csv", &csv(at, 1000, as_is), &["11 points", "50"]);
+    refuse("watts.csv", &csv(at, 10, watts), &["watts", "unit"]);
+    refuse("far.csv", &csv(at, 10, far), &["overlap"]);
+    refuse("nan.csv", "x_m,y_m,z_m,power_dbm\n0,1,0,nan\n", &["line 2", "power_dbm"]);
+    refuse("empty.csv", "x_m,y_m,z_m,power_dbm\n", &["no points"]);
+    refuse(
+        "twice.csv",
+        "chirp,x_m,y_m,z_m,power_dbm\n3,0,1,0,-60\n3,0,1.1,0,-61\n",
+        &["chirp 3", "one detection per chirp"],
+    );
+    refuse("cloud.tif", "", &[".ply, .csv or .xyz"]);
+    refuse("millimetres.xyz", "0 1100 100 -60\n100 1200 90 -61\n", &["millimetres"]);
+    fs::write(at.join("good.csv"), csv(at, 1, as_is)).unwrap();
+    for (more, parts) in [
+        (&["--region", "bdy"][..], &["no region `bdy`", "body"][..]),
+        (&["--pose", "1,2"], &["`1,2` is no pose"]),
+        (&["--edge-margin", "7"], &["--edge-margin 7"]),
+        (&["--save", "no-such", "--kind", "measured", "--source", "x"], &["no-such"]),
+    ] {
+        let run = ["measure", "good.csv", "--scene", "scene.toml", "-o", "measured"];
+        let message = refused(matdb(at).args(run).args(more));
+        parts
+            .iter()
+            .for_each(|part| assert!(message.contains(part), "`{part}` is not in: {message}"));
+    }
+    let run = ["compare", "good.csv", "--scene", "scene.toml", "-o", "c", "--line", "x=1"];
+    assert!(refused(matdb(at).args(run)).contains("--line y=1.1,width=0.02"));
+    // A cloud without chirp numbers and without ranges is enough.
+    let run = ["measure", "good.csv", "--scene", "scene.toml", "-q", "-o", "measured"];
+    matdb(at).args(run).assert().success();
+    assert!(root().join("docs").exists());
+}
