@@ -20,7 +20,15 @@ use twins::scenes::Geometry;
 const CHIRPS: usize = 1500;
 
 fn plan(effects: &[&'static str], class: Option<Class>, geometry: Geometry) -> Plan {
-    Plan { seed: 7, number: 0, effects: effects.to_vec(), class, geometry, chirps: CHIRPS }
+    Plan {
+        seed: 7,
+        number: 0,
+        attempt: 0,
+        effects: effects.to_vec(),
+        class,
+        geometry,
+        chirps: CHIRPS,
+    }
 }
 
 fn label(plan: &Plan, out: &Path) -> Value {

@@ -48,11 +48,11 @@ pub struct Local {
 }
 
 impl Base {
-    /// A base law from sensible ranges: lobes of 5° to 14°, a skirt that reaches the threshold
+    /// A base law from sensible ranges: lobes of 5° to 24°, a skirt that reaches the threshold
     /// between 50° and 75°.
     pub fn draw(draws: &mut Draws) -> Base {
         let mut log = |low: f64, high: f64| low * (high / low).powf(draws.uniform());
-        let (m, f_lambda, r) = (log(0.08, 0.25), log(0.03, 0.2), log(0.0015, 0.01));
+        let (m, f_lambda, r) = (log(0.08, 0.45), log(0.03, 0.2), log(0.0015, 0.01));
         let k = 0.08 + 0.22 * draws.uniform();
         let alpha = 2.0 + 6.0 * draws.uniform();
         let slopes = if draws.uniform() < 0.5 { Slopes::Beckmann } else { Slopes::Ggx };

@@ -75,6 +75,8 @@ pub struct Plan {
     pub seed: u64,
     /// Tells plans of one seed apart.
     pub number: usize,
+    /// Tells tries of one plan apart.
+    pub attempt: usize,
     pub effects: Vec<&'static str>,
     pub class: Option<Class>,
     pub geometry: Geometry,
@@ -92,7 +94,10 @@ pub enum Outcome {
 impl Plan {
     /// Draws and names follow from what the plan is, so that cases do not depend on each other.
     fn key(&self) -> (u64, String) {
-        let what = format!("{}/{:?}/{:?}/{}", self.seed, self.effects, self.class, self.number);
+        let what = format!(
+            "{}/{:?}/{:?}/{}/{}",
+            self.seed, self.effects, self.class, self.number, self.attempt
+        );
         let hash = blake3::hash(what.as_bytes());
         let mut seed = [0; 8];
         seed.copy_from_slice(&hash.as_bytes()[..8]);
@@ -222,7 +227,7 @@ fn make(name: &str, seed: u64, world: &World, base: &Base) -> Box<dyn Effect> {
         "multi-bounce" => Box::new(MultiBounce::new(world, seed, base)),
         "pose" => Box::new(Pose::new(random, world)),
         "motion" => Box::new(Motion::new(random)),
-        "compression" => Box::new(Compression),
+        "compression" => Box::new(Compression::new(random)),
         "drift" => Box::new(Drift::new(random)),
         "correlated-shadowing" => Box::new(CorrelatedShadowing),
         "foreign-patch" => Box::new(ForeignPatch::new(random, world)),

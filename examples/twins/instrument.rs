@@ -80,8 +80,17 @@ impl Effect for NoiseFloor {
     }
 }
 
-/// A soft ceiling, P/(1 + P/P_sat); the size is 1/P_sat in 1/W.
-pub struct Compression;
+/// A soft ceiling, P/(1 + (P/P_sat)^p)^(1/p), with the knee p of 1 or 2 (Rapp's amplifier); the size
+/// is 1/P_sat in 1/W.
+pub struct Compression {
+    knee: f64,
+}
+
+impl Compression {
+    pub fn new(random: &mut Draws) -> Compression {
+        Compression { knee: if random.uniform() < 0.5 { 1.0 } else { 2.0 } }
+    }
+}
 
 impl Effect for Compression {
     fn name(&self) -> &'static str {
@@ -91,10 +100,10 @@ impl Effect for Compression {
         [1e3, 3e10]
     }
     fn parameters(&self, size: f64) -> Value {
-        json!({ "saturation_dbm": 10.0 * (1e3 / size).log10(), "form": "P/(1 + P/P_sat)" })
+        json!({ "saturation_dbm": 10.0 * (1e3 / size).log10(), "knee": self.knee })
     }
     fn receive_w(&self, size: f64, _: &Sight, report: Report) -> f64 {
-        report.power_w / (1.0 + size * report.power_w)
+        report.power_w / (1.0 + (size * report.power_w).powf(self.knee)).powf(1.0 / self.knee)
     }
 }
 

@@ -5,7 +5,8 @@
 //! `DIR/cases/NAME/` is what a user would have: `scene.toml` with its meshes and rays, `material/` to
 //! `matdb add --from`, and `cloud.csv`. `DIR/labels/NAME.json` is the truth, in a tree of its own; the
 //! names of the cases say nothing. `DIR/labels/out-of-reach-SEED.json` lists which effect could not be
-//! made as strong as wanted on which geometry; another geometry was tried then.
+//! made as strong as wanted on which geometry, and how strong it got; the other geometries were tried
+//! then, and the same with other base parameters. What fails on all of them is left out.
 //!
 //! Everything here is synthetic. The effects share no code with the program: it lends only its readers
 //! of scenes and meshes, the closest hit of a ray, the constants of the radar, the table values of
@@ -29,11 +30,11 @@
 //! | `noise-floor` | a higher N in the phasors | N |
 //! | `covering-layer` | −loss/cos θ dB on one side of a plane that cuts the target | two-way loss |
 //! | `anisotropy` | D with slopes m√q along a grain and m/√q across, G1 with m in the radar's azimuth | q |
-//! | `thin-film` | a share c of each spot coated: specular × (1 − c + c·R_film(θ)/R_bare(θ)), diffuse × (1 − c + c·((1 − R_film)/(1 − R_bare))²), R by characteristic matrices over 27 GHz | c |
+//! | `thin-film` | a share c of each spot coated: specular × (1 − c + c·R_film(θ)/R_bare(θ)), diffuse × (1 − c + c·((1 − R_film)/(1 − R_bare))²), R by characteristic matrices at 300 GHz, not averaged over the sweep; on a base law with m of 0.35 to 0.7 | c |
 //! | `multi-bounce` | 64 rays onward from each hit, half by the cosine and half by the lobe, weighted by their density; f bistatic at both points; the second is seen by the antenna when nothing hides it; range half the whole way, the reported one the mean by power | coupling |
 //! | `pose` | the mesh shifted and turned about the middle of the lit points, rays traced against it | shift, with a turn in proportion |
 //! | `motion` | the mesh shifted by two slow sines of time | amplitude |
-//! | `compression` | P/(1 + P/P_sat) | 1/P_sat |
+//! | `compression` | P/(1 + (P/P_sat)^p)^(1/p), p = 1 or 2 | 1/P_sat |
 //! | `drift` | a slope and a slow wave in dB along the time of the scan | dB |
 //! | `correlated-shadowing` | G1 instead of G1² | m of the base law |
 //! | `foreign-patch` | a ball's cut through the surface with brighter lobes of another width | dB |
@@ -48,7 +49,7 @@
 //! Weak, moderate and strong leave 0.35, 0.9 and 2.2 dB rms when the base law (S = (1 − k)f_λ, m,
 //! R = k·r_s, α) is refitted by least squares in dB to the noise-free means above the threshold, at the
 //! declared looks of the scan; sizes are bisected on every n-th chirp and the label gives the value over
-//! all. Three kinds have a measure of their own (`own_measure`): `speckle` and `log-normal-speckle`
+//! all. A prediction below the threshold counts as the threshold. Three kinds have a measure of their own (`own_measure`): `speckle` and `log-normal-speckle`
 //! widen the spread in dB by the class in quadrature, `coarse-steps` has steps of √12 times the class,
 //! `dropouts` and `ghost-echo` touch 2, 6 and 15 % of the chirps.
 
@@ -110,7 +111,8 @@ pub fn plans(seed: u64, chirps: usize) -> Vec<Plan> {
         let number = plans.len();
         let turn = (seed as usize).wrapping_add(number + number / 4) % Geometry::ALL.len();
         let geometry = Geometry::ALL[turn];
-        plans.push(Plan { seed, number, effects: effects.to_vec(), class, geometry, chirps });
+        let effects = effects.to_vec();
+        plans.push(Plan { seed, number, attempt: 0, effects, class, geometry, chirps });
     };
     for name in KNOWN.iter().chain(&UNKNOWN) {
         Class::ALL.iter().for_each(|&class| add(&[name], Some(class)));
@@ -123,12 +125,15 @@ pub fn plans(seed: u64, chirps: usize) -> Vec<Plan> {
     plans
 }
 
+/// Base laws that are tried for an effect that does not get strong enough.
+const ATTEMPTS: usize = 4;
+
 /// Runs a plan on its geometry, or on the first other one on which it can be had.
 fn run(plan: &Plan, out: &Path, missed: &mut Vec<serde_json::Value>) -> Result<(), Box<dyn Error>> {
     let first = Geometry::ALL.iter().position(|g| *g == plan.geometry).unwrap_or(0);
-    for turn in 0..Geometry::ALL.len() {
-        let geometry = Geometry::ALL[(first + turn) % Geometry::ALL.len()];
-        let plan = Plan { geometry, ..plan.clone() };
+    for attempt in 0..ATTEMPTS * Geometry::ALL.len() {
+        let geometry = Geometry::ALL[(first + attempt) % Geometry::ALL.len()];
+        let plan = Plan { geometry, attempt, ..plan.clone() };
         let begun = Instant::now();
         match plan.run(out)? {
             Outcome::Written(label) => {
@@ -146,11 +151,11 @@ fn run(plan: &Plan, out: &Path, missed: &mut Vec<serde_json::Value>) -> Result<(
                 return Ok(());
             }
             Outcome::OutOfReach(reached) => {
-                println!("out of reach: {reached}");
                 missed.push(reached);
             }
         }
     }
+    println!("seed {} {} {:?}: out of reach", plan.seed, plan.effects.join("+"), plan.class);
     Ok(())
 }
 

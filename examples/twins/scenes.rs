@@ -105,7 +105,7 @@ fn geometry(geometry: Geometry, random: &mut Draws) -> (String, Vec<(&'static st
             (tables, vec![("torso.ply", torso), ("arm.ply", arm)])
         }
         Geometry::WavyPanel => {
-            let depth = [0.013 + within(0.002), 0.010 + within(0.002)];
+            let depth = [0.022 + within(0.003), 0.018 + within(0.003)];
             let length = [0.13 + within(0.02), 0.19 + within(0.03)];
             let shift = [within(0.1), within(0.1)];
             let at = DVec3::new(0.0, 1.1, 0.0);

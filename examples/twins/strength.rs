@@ -5,7 +5,7 @@
 
 use super::base::Base;
 use super::physics::{Acting, Class, Effect, Report, means};
-use super::refit::{Point, rms_left_db};
+use super::refit::{Floor, Point, rms_left_db};
 use super::scan::World;
 
 /// Chirps that a calibration looks at.
@@ -13,6 +13,8 @@ const CALIBRATED: usize = 4600;
 const HALVINGS: usize = 16;
 /// A strength this near to the class, as a share, is the class.
 const NEAR: f64 = 0.02;
+/// Farther from the class than this, as a share, is another class: the strength jumps there.
+const FAR: f64 = 0.15;
 /// Fewer detections than this measure nothing.
 const FEWEST: usize = 40;
 
@@ -43,7 +45,8 @@ pub fn rms_db(world: &World, seed: u64, base: &Base, acting: &[Acting], stride: 
             (power_w >= world.threshold_w).then_some(Point { cos_theta, watts_per_f, power_db })
         })
         .collect();
-    if points.len() < FEWEST { 0.0 } else { rms_left_db(&points, &base, world.noise_w) }
+    let floor = Floor { noise_w: world.noise_w, threshold_w: world.threshold_w };
+    if points.len() < FEWEST { 0.0 } else { rms_left_db(&points, &base, floor) }
 }
 
 /// The size at which an effect is of a class.
@@ -94,5 +97,7 @@ pub fn size_of(
         }
         if rms > wanted { high = size } else { low = size }
     }
-    Ok((low * high).sqrt())
+    let size = (low * high).sqrt();
+    let rms = strength(size);
+    if (rms / wanted - 1.0).abs() < FAR { Ok(size) } else { Err(rms) }
 }
