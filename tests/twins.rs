@@ -11,8 +11,12 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use matdb::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
+use matdb::radar::Radar;
+use matdb::radar::speckle::{mean_offset_db, standard_deviation_db};
+use matdb::scene::Scene;
 use serde_json::Value;
-use support::{entries, matdb};
+use support::{echoes, entries, matdb};
 use twins::case::{Outcome, Plan};
 use twins::physics::Class;
 use twins::scenes::Geometry;
@@ -102,5 +106,61 @@ fn an_effect_is_as_strong_as_its_class() {
         let rms_db = label["rms_db"].as_f64().unwrap();
         // Two percent of the bisection, and its rounding.
         assert!((rms_db / class.rms_db() - 1.0).abs() < 0.03, "{class:?}: {rms_db}");
+    }
+}
+
+/// The base law of a label as the program writes it.
+fn scattering(base: &Value) -> Brdf {
+    let number = |key: &str| base[key].as_f64().unwrap();
+    let specular = CookTorrance {
+        f_lambda: number("f_lambda"),
+        m: number("m"),
+        m_across: None,
+        distribution: match base["slopes"].as_str().unwrap() {
+            "ggx" => Distribution::Ggx,
+            _ => Distribution::Beckmann,
+        },
+        shadowing: Shadowing::Separable,
+    };
+    let diffuse = BlinnPhong { r_s: number("r_s"), alpha: number("alpha") };
+    Brdf::Mixture(Mixture {
+        k: number("k"),
+        diffuse: Box::new(Brdf::BlinnPhong(diffuse)),
+        specular: Box::new(Brdf::CookTorrance(specular)),
+    })
+}
+
+#[test]
+fn a_complete_case_is_what_the_renderer_predicts_in_speckle() {
+    // So far above the threshold the cut takes nothing off: four looks reach −10 dB once in 3000.
+    const CLEAR_DBM: f64 = -67.0;
+    for geometry in Geometry::ALL {
+        let out = tempfile::tempdir().unwrap();
+        let label = label(&plan(&[], None, geometry), out.path());
+        let case = out.path().join("cases").join(label["case"].as_str().unwrap());
+        let scene = Scene::load(&case.join("scene.toml")).unwrap();
+        let law = scattering(&label["base"]);
+        let exact = Radar { speckle: None, noise: None, ..scene.radar().clone() };
+        let predicted = echoes(&exact, &scene.chirps, &scene.target.mesh, &law);
+        let dbm: BTreeMap<u32, f64> = predicted.iter().map(|e| (e.chirp, e.power_dbm)).collect();
+        let cloud = fs::read_to_string(case.join("cloud.csv")).unwrap();
+        let off_db: Vec<f64> = cloud
+            .lines()
+            .skip(1)
+            .map(|line| line.split(',').collect::<Vec<_>>())
+            .map(|row| (row[5].parse::<f64>().unwrap(), dbm[&row[0].parse().unwrap()]))
+            .filter(|(_, predicted)| *predicted > CLEAR_DBM)
+            .map(|(observed, predicted)| observed - predicted)
+            .collect();
+        let count = off_db.len() as f64;
+        assert!(count > 100.0, "{geometry:?}: {count}");
+        let mean = off_db.iter().sum::<f64>() / count;
+        let sd = (off_db.iter().map(|db| (db - mean).powi(2)).sum::<f64>() / count).sqrt();
+        let looks = scene.radar().speckle.unwrap().looks;
+        let (offset, spread) = (mean_offset_db(looks), standard_deviation_db(looks));
+        // Four standard errors; the spread of a skewed law errs by about one over the root of n.
+        let four = 4.0 * spread / count.sqrt();
+        assert!((mean - offset).abs() < four, "{geometry:?}: {mean} {offset}");
+        assert!((sd - spread).abs() < four, "{geometry:?}: {sd} {spread}");
     }
 }

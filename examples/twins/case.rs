@@ -69,6 +69,9 @@ pub const PAIRS: [[&str; 2]; 10] = [
     ["pose", "subsurface"],
 ];
 
+/// An effect with its size.
+type Scaled = (Box<dyn Effect>, f64);
+
 /// What a case is to be.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -138,12 +141,7 @@ impl Plan {
     }
 
     /// The effects with their sizes.
-    fn effects(
-        &self,
-        seed: u64,
-        world: &World,
-        base: &Base,
-    ) -> Result<Vec<(Box<dyn Effect>, f64)>, Value> {
+    fn effects(&self, seed: u64, world: &World, base: &Base) -> Result<Vec<Scaled>, Value> {
         let sized = |&name: &&'static str| {
             let effect = make(name, seed, world, base);
             let class = self.class.unwrap_or(Class::Moderate);
@@ -166,7 +164,7 @@ impl Plan {
         folder: &Path,
         world: &World,
         base: &Base,
-        effects: &[(Box<dyn Effect>, f64)],
+        effects: &[Scaled],
     ) -> io::Result<Value> {
         let acting: Vec<Acting> = effects.iter().map(|(e, size)| (e.as_ref(), *size)).collect();
         let truth = material(base, &acting);

@@ -13,6 +13,10 @@ const CALIBRATED: usize = 4600;
 const HALVINGS: usize = 16;
 /// A strength this near to the class, as a share, is the class.
 const NEAR: f64 = 0.02;
+/// How far a calibration on some chirps may be off over all, as a share.
+const CLOSE: f64 = 0.08;
+/// A second calibration looks this factor about the first.
+const AROUND: f64 = 1.5;
 /// Farther from the class than this, as a share, is another class: the strength jumps there.
 const FAR: f64 = 0.15;
 /// Fewer detections than this measure nothing.
@@ -65,39 +69,56 @@ pub fn size_of(
         return Ok(size);
     }
     let stride = (world.sights.len() / CALIBRATED).max(1);
-    let strength = |size: f64| rms_db(world, seed, base, &[(effect, size)], stride);
     let wanted = class.rms_db();
-    let [least, most] = effect.sizes();
-    let mut low = least;
-    // The largest size may hide nearly everything below the threshold; the strongest of a few is
-    // what can be reached.
-    let steps = 6;
-    let sizes = (0..=steps).map(|n| least * (most / least).powf(f64::from(n) / f64::from(steps)));
+    let at = |stride: usize| move |size: f64| rms_db(world, seed, base, &[(effect, size)], stride);
+    let [low, high] = bracket(at(stride), effect.sizes(), wanted)?;
+    let size = bisect(at(stride), [low, high], wanted, HALVINGS);
+    if near(at(1)(size), wanted, CLOSE) {
+        return Ok(size);
+    }
+    // The few chirps were not like all.
+    let size = bisect(at(1), [size / AROUND, size * AROUND], wanted, HALVINGS / 2);
+    let rms = at(1)(size);
+    if near(rms, wanted, FAR) { Ok(size) } else { Err(rms) }
+}
+
+fn near(rms: f64, wanted: f64, share: f64) -> bool {
+    (rms / wanted - 1.0).abs() < share
+}
+
+/// The first of a few sizes that is strong enough, and the one before; else the strongest reached.
+/// The largest may hide nearly everything below the threshold.
+fn bracket(
+    strength: impl Fn(f64) -> f64,
+    [least, most]: [f64; 2],
+    wanted: f64,
+) -> Result<[f64; 2], f64> {
+    const STEPS: i32 = 6;
+    let size = |step: i32| least * (most / least).powf(f64::from(step) / f64::from(STEPS));
     let mut reached = 0.0;
-    let mut bracket = None;
-    for size in sizes {
-        let rms = strength(size);
-        reached = f64::max(reached, rms);
+    for step in 0..=STEPS {
+        let rms = strength(size(step));
         if rms >= wanted {
-            bracket = Some(size);
-            break;
+            return if step == 0 { Err(rms) } else { Ok([size(step - 1), size(step)]) };
         }
-        low = size;
+        reached = f64::max(reached, rms);
     }
-    let Some(above) = bracket else { return Err(reached) };
-    if above == least {
-        return Err(reached);
-    }
-    let mut high = above;
-    for _ in 0..HALVINGS {
+    Err(reached)
+}
+
+fn bisect(
+    strength: impl Fn(f64) -> f64,
+    [mut low, mut high]: [f64; 2],
+    wanted: f64,
+    halvings: usize,
+) -> f64 {
+    for _ in 0..halvings {
         let size = (low * high).sqrt();
         let rms = strength(size);
-        if (rms / wanted - 1.0).abs() < NEAR {
-            return Ok(size);
+        if near(rms, wanted, NEAR) {
+            return size;
         }
         if rms > wanted { high = size } else { low = size }
     }
-    let size = (low * high).sqrt();
-    let rms = strength(size);
-    if (rms / wanted - 1.0).abs() < FAR { Ok(size) } else { Err(rms) }
+    (low * high).sqrt()
 }
