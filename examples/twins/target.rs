@@ -1,0 +1,227 @@
+//! Effects of where the target is and of how the beam meets it.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DMat3, DQuat, DVec2, DVec3};
+use matdb::radar::random::Draws;
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use super::base::Base;
+use super::physics::{Displacement, Effect, Report};
+use super::scan::{Look, Sight, Stream, World, draws, look, ray};
+
+/// A random unit vector.
+pub fn direction(random: &mut Draws) -> DVec3 {
+    let z = 2.0 * random.uniform() - 1.0;
+    let (sin, cos) = (TAU * random.uniform()).sin_cos();
+    let across = (1.0 - z * z).sqrt();
+    DVec3::new(across * cos, across * sin, z)
+}
+
+/// The mesh stands elsewhere: v ↦ R·(v − pivot) + pivot + t.
+pub struct Pose {
+    along: DVec3,
+    axis: DVec3,
+    deg_per_m: f64,
+    pivot: DVec3,
+}
+
+impl Pose {
+    pub fn new(random: &mut Draws, world: &World) -> Pose {
+        let (along, axis) = (direction(random), direction(random));
+        Pose { along, axis, deg_per_m: 20.0 + 60.0 * random.uniform(), pivot: world.middle }
+    }
+}
+
+impl Effect for Pose {
+    fn name(&self) -> &'static str {
+        "pose"
+    }
+    fn sizes(&self) -> [f64; 2] {
+        [1e-5, 0.06]
+    }
+    fn parameters(&self, size: f64) -> Value {
+        json!({
+            "translation_m": (size * self.along).to_array(),
+            "rotation_deg": (size * self.deg_per_m * self.axis).to_array(),
+            "pivot_m": self.pivot.to_array(),
+        })
+    }
+    fn displacement(&self, size: f64, _: &Sight) -> Option<Displacement> {
+        let angle_rad = (size * self.deg_per_m).to_radians();
+        let rotation = DMat3::from_quat(DQuat::from_axis_angle(self.axis, angle_rad));
+        Some(Displacement { rotation, translation_m: size * self.along, pivot: self.pivot })
+    }
+}
+
+/// The target sways: two slow sines in two directions.
+pub struct Motion {
+    along: [DVec3; 2],
+    cycles: [f64; 2],
+    phase_rad: [f64; 2],
+}
+
+impl Motion {
+    pub fn new(random: &mut Draws) -> Motion {
+        Motion {
+            along: [direction(random), 0.4 * direction(random)],
+            cycles: [0.7 + 0.8 * random.uniform(), 1.5 + 1.5 * random.uniform()],
+            phase_rad: [TAU * random.uniform(), TAU * random.uniform()],
+        }
+    }
+}
+
+impl Effect for Motion {
+    fn name(&self) -> &'static str {
+        "motion"
+    }
+    fn sizes(&self) -> [f64; 2] {
+        [1e-5, 0.06]
+    }
+    fn parameters(&self, size: f64) -> Value {
+        json!({
+            "amplitude_m": self.along.map(|along| (size * along).to_array()),
+            "cycles_per_scan": self.cycles,
+            "phase_rad": self.phase_rad,
+        })
+    }
+    fn displacement(&self, size: f64, sight: &Sight) -> Option<Displacement> {
+        let sway = |n: usize| {
+            let turn = TAU * self.cycles[n] * sight.share + self.phase_rad[n];
+            size * turn.sin() * self.along[n]
+        };
+        let (rotation, pivot) = (DMat3::IDENTITY, DVec3::ZERO);
+        Some(Displacement { rotation, translation_m: sway(0) + sway(1), pivot })
+    }
+}
+
+/// A Gaussian spot instead of one ray.
+pub struct FiniteSpot;
+
+impl Effect for FiniteSpot {
+    fn name(&self) -> &'static str {
+        "finite-spot"
+    }
+    fn sizes(&self) -> [f64; 2] {
+        [5e-4, 0.1]
+    }
+    fn parameters(&self, size: f64) -> Value {
+        json!({ "diameter_m": size, "meaning": "at half the intensity, the same over the whole field" })
+    }
+    fn spot_diameter_m(&self, size: f64) -> Option<f64> {
+        Some(size)
+    }
+}
+
+/// Every chirp sees its facet under another tilt, Gaussian in two directions.
+pub struct AngleError {
+    pub seed: u64,
+}
+
+impl Effect for AngleError {
+    fn name(&self) -> &'static str {
+        "angle-error"
+    }
+    fn sizes(&self) -> [f64; 2] {
+        [1e-4, 0.15]
+    }
+    fn parameters(&self, size: f64) -> Value {
+        json!({ "sd_deg": size.atan().to_degrees(), "meaning": "in each of two directions" })
+    }
+    fn tilt(&self, size: f64, chirp: usize) -> DVec2 {
+        let mut random = draws(self.seed, chirp, Stream::Tilt);
+        size * DVec2::new(random.gaussian(), random.gaussian())
+    }
+}
+
+/// Second segments, radar → A → B → antenna, for a coupling of 1.
+pub struct MultiBounce {
+    second: Vec<Option<Report>>,
+}
+
+/// Directions that are followed from each lit point.
+const ONWARD: usize = 64;
+
+impl MultiBounce {
+    pub fn new(world: &World, seed: u64, base: &Base) -> MultiBounce {
+        let second = |sight: &Sight| {
+            let mut random = draws(seed, sight.chirp, Stream::Bounce);
+            second_segment(world, base, &sight.look?, &mut random)
+        };
+        MultiBounce { second: world.sights.par_iter().map(second).collect() }
+    }
+}
+
+impl Effect for MultiBounce {
+    fn name(&self) -> &'static str {
+        "multi-bounce"
+    }
+    fn sizes(&self) -> [f64; 2] {
+        [1e-5, 2.0]
+    }
+    fn parameters(&self, size: f64) -> Value {
+        json!({ "coupling_db": 10.0 * size.log10() })
+    }
+    fn detour(&self, size: f64, chirp: usize) -> Option<Report> {
+        let Report { range_m, power_w } = (*self.second.get(chirp)?)?;
+        Some(Report { range_m, power_w: size * power_w })
+    }
+}
+
+/// All that comes back from one lit point by way of a second one.
+fn second_segment(world: &World, base: &Base, a: &Look, random: &mut Draws) -> Option<Report> {
+    let mut sum = Report { range_m: 0.0, power_w: 0.0 };
+    for sample in 0..ONWARD {
+        let [to, facet] = onward(base, a, sample % 2 == 0, random);
+        let cos = a.normal.dot(to);
+        if cos <= 0.0 {
+            continue;
+        }
+        // Two ways of drawing, each as often: the weight divides by their mean density.
+        let lobe = base.slopes.d_per_sr(a.normal.dot(facet), base.m) * a.normal.dot(facet)
+            / (4.0 * a.to_radar.dot(facet).max(1e-6));
+        let density = 0.5 * (cos / PI + lobe);
+        let Some((b, range_m)) = returned(world, a, to) else { continue };
+        let f = base.bistatic_per_sr(a.normal, a.to_radar, to);
+        let g = base.bistatic_per_sr(b.normal, -to, b.to_radar);
+        let received = world.aperture_m2 / (b.range_m * b.range_m) * b.cos_theta();
+        let power_w =
+            world.sent_w * a.cos_theta() * f * cos / density * g * received / ONWARD as f64;
+        sum.power_w += power_w;
+        sum.range_m += power_w * range_m;
+    }
+    let Report { range_m, power_w } = sum;
+    (power_w > 0.0).then(|| Report { range_m: range_m / power_w, power_w })
+}
+
+/// A direction away from A and the facet normal that would mirror the radar's ray into it.
+fn onward(base: &Base, a: &Look, diffuse: bool, random: &mut Draws) -> [DVec3; 2] {
+    let (u, v) = a.normal.any_orthonormal_pair();
+    let (sin, cos) = (TAU * random.uniform()).sin_cos();
+    let uniform = random.uniform();
+    if diffuse {
+        let r = uniform.sqrt();
+        let to = r * (cos * u + sin * v) + (1.0 - uniform).sqrt() * a.normal;
+        return [to, (to + a.to_radar).normalize_or(a.normal)];
+    }
+    let tan = base.slopes.sampled_tan2(uniform, base.m).sqrt();
+    let facet = (a.normal + tan * (cos * u + sin * v)).normalize();
+    [2.0 * a.to_radar.dot(facet) * facet - a.to_radar, facet]
+}
+
+/// The second surface as the antenna sees it, and half the length of the whole way, m.
+fn returned(world: &World, a: &Look, to: DVec3) -> Option<(Look, f64)> {
+    const OFF_SURFACE_M: f64 = 1e-4;
+    let b = look(&world.bvh, &ray(a.point + OFF_SURFACE_M * a.normal, to)?)?;
+    let back = world.origin - b.point;
+    let (range_m, to_radar) = (back.length(), back.normalize());
+    // The side that the first surface lights has to be the one that the antenna sees.
+    if b.normal.dot(to_radar) <= 0.0 {
+        return None;
+    }
+    let seen = look(&world.bvh, &ray(world.origin, -to_radar)?)?;
+    let hidden = seen.range_m < range_m - 10.0 * OFF_SURFACE_M;
+    let half_m = 0.5 * (a.range_m + b.range_m + range_m);
+    (!hidden).then_some((Look { to_radar, range_m, ..b }, half_m))
+}
