@@ -99,8 +99,8 @@ fn a_cloud_becomes_a_material_that_renders_like_it() {
     let (k, f_lambda, r_s) =
         (parameter("k"), parameter("specular.f_lambda"), parameter("diffuse.r_s"));
     for (name, expected) in [
-        ("specular.m", parameter("specular.m")),
-        ("diffuse.alpha", parameter("diffuse.alpha")),
+        ("specular.m", parameter("specular", "m")),
+        ("diffuse.alpha", parameter("diffuse", "alpha")),
         ("S", (1.0 - k) * f_lambda),
         ("R", k * r_s),
         ("looks", 4.0),

@@ -207,8 +207,12 @@ fn text(args: &Args, registered: &Registered, reduced: &Reduced) -> String {
         ((0..3).map(sd).fold(0.0, f64::max), (3..6).map(sd).fold(0.0, f64::max));
     let curve = &reduced.curve;
     let detected = curve.detected().count();
+    let kept = match registered.kept {
+        true => "the points agree with the pose as given, which is kept\n",
+        false => "",
+    };
     format!(
-        "pose: {} of {} points on the surface, rms {:.2} mm, known to {:.2} mm and {:.3}° (1 sd)\n\
+        "{kept}pose: {} of {} points on the surface, rms {:.2} mm, known to {:.2} mm and {:.3}° (1 sd)\n\
          shift of the scene's origin: {:.2}, {:.2}, {:.2} mm\n\
          curve: {} detections and {} censored chirps from {:.1}° to {:.1}°\n\
          wrote pose.json, curve.csv and curve.svg to {}\n",

@@ -358,7 +358,6 @@ impl Registered {
         if distance2.is_some_and(|distance2| distance2 <= CHANCE) {
             self.pose = *given;
             self.kept = true;
-            self.verdicts.push("the points agree with the pose as given, which is kept".to_owned());
         }
         self
     }
@@ -426,7 +425,7 @@ mod tests {
         let mut normalised = 0.0;
         for seed in 0..SEEDS {
             let measured = mannequin(2e-3, 100 + seed);
-            let found = Registration::default()
+            let found = Registration { keep_given: false, ..Default::default() }
                 .run(&measured.mesh, &measured.radar, &measured.chirps, &measured.cloud)
                 .unwrap();
             let error = Motion::of(&found.pose.inverse(), found.pivot.xyz);
@@ -439,6 +438,21 @@ mod tests {
         // seeds; five of them, and the widening, which only makes the covariance larger.
         let mean = normalised / SEEDS as f64;
         assert!((1.5..11.0).contains(&mean), "{mean}");
+    }
+
+    #[test]
+    fn a_given_pose_that_is_right_is_kept_and_a_wrong_one_is_not() {
+        let measured = mannequin(2e-3, 4);
+        let run = |start| {
+            let settings = Registration { start, ..Default::default() };
+            let Measured { mesh, radar, chirps, cloud } = &measured;
+            settings.run(mesh, radar, chirps, cloud).unwrap()
+        };
+        let right = run(Start::default());
+        assert!(right.kept && apart(&right) == (0.0, 0.0));
+        // Five times what the points tell, and far below the range noise.
+        let wrong = Pose::from_euler_xyz(DVec3::ZERO, DVec3::new(0.0, 0.0, 5e-4));
+        assert!(!run(Start::Given(wrong)).kept);
     }
 
     #[test]
