@@ -3,7 +3,8 @@
 //!     cargo run --release --example fitting -- docs/fitting.md
 //!
 //! `--data DIR` adds fits of measured optical scattering, from a folder with the sets that the page
-//! names; `--seeds N` runs fewer than 200 seeds for a quick look.
+//! names; `--seeds N` runs fewer than 200 seeds and `--only PART` one part of `study`,
+//! `registration`, `round-trip` and `measured`, for a quick look.
 
 mod measured;
 mod registration;
@@ -20,6 +21,7 @@ struct Arguments {
     page: Option<PathBuf>,
     data: Option<PathBuf>,
     seeds: usize,
+    only: Option<String>,
 }
 
 fn main() -> Result<(), Failure> {
@@ -33,12 +35,13 @@ fn main() -> Result<(), Failure> {
 }
 
 fn arguments() -> Result<Arguments, Failure> {
-    let mut found = Arguments { page: None, data: None, seeds: 200 };
+    let mut found = Arguments { page: None, data: None, seeds: 200, only: None };
     let mut given = std::env::args().skip(1);
     while let Some(argument) = given.next() {
         match argument.as_str() {
             "--data" => found.data = Some(given.next().ok_or("--data needs a folder")?.into()),
             "--seeds" => found.seeds = given.next().ok_or("--seeds needs a number")?.parse()?,
+            "--only" => found.only = Some(given.next().ok_or("--only needs a part")?),
             path => found.page = Some(path.into()),
         }
     }
@@ -47,15 +50,19 @@ fn arguments() -> Result<Arguments, Failure> {
 
 fn page(arguments: &Arguments) -> Result<String, Failure> {
     let seeds = arguments.seeds;
+    let wanted = |part: &str| arguments.only.as_ref().is_none_or(|only| only == part);
     let mut page = INTRODUCTION.to_owned();
-    page += &study::section(seeds)?;
-    page += "\n";
-    page += &registration::section((seeds / 4).max(1))?;
-    page += "\n";
-    page += &round_trip::section((seeds / 10).max(1))?;
-    if let Some(data) = &arguments.data {
-        page += "\n";
-        page += &measured::section(data)?;
+    if wanted("study") {
+        page += &study::section(seeds)?;
+    }
+    if wanted("registration") {
+        page += &format!("\n{}", registration::section((seeds / 4).max(1))?);
+    }
+    if wanted("round-trip") {
+        page += &format!("\n{}", round_trip::section((seeds / 10).max(1))?);
+    }
+    if let Some(data) = arguments.data.as_ref().filter(|_| wanted("measured")) {
+        page += &format!("\n{}", measured::section(data)?);
     }
     Ok(page)
 }

@@ -44,15 +44,14 @@ pub struct Outcome {
     converged: usize,
 }
 
-/// Every method in one case.
-pub fn outcomes(case: Case, seeds: usize) -> Result<Vec<Outcome>, FitError> {
-    let curves: Vec<_> = (0..seeds as u64).map(|seed| case.curve(seed)).collect();
-    let outcome = |(method, fit): (&'static str, Fit)| {
-        let found: Result<Vec<FitResult>, FitError> =
-            curves.par_iter().map(|curve| fit.run(&start(), curve)).collect();
-        Ok(Outcome::new(case, method, &found?))
-    };
-    methods(case).into_iter().map(outcome).collect()
+/// One method, by its place in [`methods`], in one case.
+pub fn outcome(case: Case, place: usize, seeds: usize) -> Result<Outcome, FitError> {
+    let (method, fit) = &methods(case)[place];
+    let found: Result<Vec<FitResult>, FitError> = (0..seeds as u64)
+        .into_par_iter()
+        .map(|seed| fit.run(&start(), &case.curve(seed)))
+        .collect();
+    Ok(Outcome::new(case, method, &found?))
 }
 
 impl Outcome {
@@ -132,7 +131,10 @@ pub fn section(seeds: usize) -> Result<String, FitError> {
     let mut misses = Vec::new();
     for looks in LOOKS {
         for theta_sd_deg in THETA_SD_DEG {
-            let found = outcomes(Case { looks, theta_sd_deg }, seeds)?;
+            let case = Case { looks, theta_sd_deg };
+            let found: Vec<Outcome> = (0..methods(case).len())
+                .map(|place| outcome(case, place, seeds))
+                .collect::<Result<_, FitError>>()?;
             rows.extend(found.iter().map(Outcome::row));
             misses.extend(found.first().map(Outcome::misses).unwrap_or_default());
             found.iter().for_each(|outcome| eprintln!("{}", outcome.row()));

@@ -106,15 +106,15 @@ mod tests {
             let dense = (0..40_000).map(|i| (f64::from(i) + 0.5) * 1e-5);
             let exact: f64 = dense.map(|t| rice(t / sd, theta / sd) / sd * bell(t) * 1e-5).sum();
             // The bell is about as wide as the nodes are apart.
-            let norm = (2.0 * std::f64::consts::PI).sqrt();
-            assert!((found * norm.recip() / exact - 1.0).abs() < 1e-3, "{centre}: {found} {exact}");
+            assert!((found / exact - 1.0).abs() < 1e-3, "{centre}: {found} {exact}");
         }
     }
 
     #[test]
     fn at_normal_incidence_the_angle_is_rayleighs() {
         let mean: f64 = true_angles(0.0, 0.02).iter().map(|(t, weight)| t * weight).sum();
-        assert!((mean / 0.02 / (std::f64::consts::PI / 2.0).sqrt() - 1.0).abs() < 2e-3, "{mean}");
+        // Nodes a third of s apart, where the density begins with a kink.
+        assert!((mean / 0.02 / (std::f64::consts::PI / 2.0).sqrt() - 1.0).abs() < 5e-3, "{mean}");
     }
 
     #[test]
