@@ -47,7 +47,8 @@ the reduction's own the fit explains scatter by tilts that are not there, and L 
 
 Image error: rms over the detected chirps of measured dBm − rendered dBm. The floor is the same for the true pose and
 the true parameters, where only speckle, noise and the threshold's selection are left; speckle alone has
-{speckle_db:.2} dB about its mean. “Between” compares the mean images of fit and truth themselves.
+{speckle_db:.2} dB about its mean. “Between” compares the mean images of fit and truth themselves. “None”: the fit did not
+converge and gives no interval, which counts as outside.
 "
     );
     for target in ["mannequin", "human"] {
