@@ -11,6 +11,7 @@
 //!   DOI 10.1137/0908085, with δ eliminated).
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use super::coordinates::Coordinates;
 use super::minimise::Local;
@@ -20,6 +21,8 @@ use crate::measure::curve::Row;
 use crate::units::db_from_ratio;
 
 const DB_PER_NEPER: f64 = 10.0 / std::f64::consts::LN_10;
+/// Rows that one task sums, fixed so that the sum is the same on any number of threads.
+const CHUNK: usize = 256;
 
 /// Standard deviations of both axes; an angle of 0 is exact.
 #[derive(Clone, Copy, Debug)]
@@ -36,21 +39,25 @@ pub(super) fn local(
     at: &DVector<f64>,
 ) -> Local {
     let table = Table::new(&coordinates.model(at));
-    let by_coordinate = derivatives(coordinates, at);
-    let mut sum = Local::zero(at.len());
-    let mut jacobian = vec![0.0; at.len()];
-    for row in rows.iter().filter(|row| !row.censored) {
-        let nearest = nearest(&table, row, deviations);
-        let stretch = nearest.gain.hypot(1.0);
-        for (slot, table) in jacobian.iter_mut().zip(&by_coordinate) {
-            let slope = table.as_ref().map_or(0.0, |table| table.at(&nearest.place));
-            *slot = DB_PER_NEPER * slope / deviations.level_sd_db / stretch;
+    let by_coordinate = derivatives(coordinates, at, &table);
+    let sum_of = |rows: &[Row]| {
+        let mut sum = Local::zero(at.len());
+        let mut jacobian = vec![0.0; at.len()];
+        for row in rows.iter().filter(|row| !row.censored) {
+            let nearest = nearest(&table, row, deviations);
+            let stretch = nearest.gain.hypot(1.0);
+            for (slot, table) in jacobian.iter_mut().zip(&by_coordinate) {
+                let slope = table.as_ref().map_or(0.0, |table| table.at(&nearest.place));
+                *slot = DB_PER_NEPER * slope / deviations.level_sd_db / stretch;
+            }
+            // Unlike r²(1 + g²)/2 this is not moved by a small error of δ.
+            sum.value += 0.5 * (nearest.residual.powi(2) + nearest.offset.powi(2));
+            sum.add(nearest.residual * stretch, 1.0, &jacobian);
         }
-        // Unlike r²(1 + g²)/2 this is not moved by a small error of δ.
-        sum.value += 0.5 * (nearest.residual.powi(2) + nearest.offset.powi(2));
-        sum.add(nearest.residual * stretch, 1.0, &jacobian);
-    }
-    sum
+        sum
+    };
+    let parts: Vec<Local> = rows.par_chunks(CHUNK).map(sum_of).collect();
+    parts.into_iter().fold(Local::zero(at.len()), Local::merge)
 }
 
 /// The point of the curve that a row is nearest to.
@@ -64,7 +71,7 @@ struct Nearest {
     gain: f64,
 }
 
-/// Candidates for δ on either side of 0, and how far apart, in standard deviations.
+/// Most candidates for δ on either side of 0, and how far apart, in standard deviations.
 const CANDIDATES: i32 = 12;
 const APART: f64 = 1.0 / 3.0;
 /// Newton steps, which converge after a handful; the step of their second derivative; the offset that is
@@ -87,11 +94,13 @@ fn nearest(table: &Table, row: &Row, deviations: Deviations) -> Nearest {
     }
     let cost = |offset: f64| at(offset).residual.powi(2) + offset * offset;
     let offset = |candidate: i32| APART * f64::from(candidate);
-    let costs: Vec<f64> = (-CANDIDATES..=CANDIDATES).map(|c| cost(offset(c))).collect();
     let mut best = at(0.0);
-    let mut least = cost(0.0);
+    let mut least = best.residual.powi(2);
+    // An offset beyond the residual costs more by itself than none does.
+    let beyond = (best.residual.abs() / APART).min(f64::from(CANDIDATES)) as i32 + 2;
+    let costs: Vec<f64> = (-beyond..=beyond).map(|c| cost(offset(c))).collect();
     // Every valley is followed to its floor: the deepest candidate need not lead to the deepest one.
-    for (candidate, around) in (1 - CANDIDATES..).zip(costs.windows(3)) {
+    for (candidate, around) in (1 - beyond..).zip(costs.windows(3)) {
         if around[1] <= around[0] && around[1] <= around[2] {
             let found = descend(&at, offset(candidate), around[1]);
             let there = found.residual.powi(2) + found.offset.powi(2);

@@ -93,10 +93,8 @@ impl<'a> Likelihood<'a> {
     }
 
     fn tables(&self, at: &DVector<f64>) -> Tables {
-        let (by_coordinate, ln_sigma0) = rayon::join(
-            || derivatives(self.coordinates, at),
-            || Table::new(&self.coordinates.model(at)),
-        );
+        let ln_sigma0 = Table::new(&self.coordinates.model(at));
+        let by_coordinate = derivatives(self.coordinates, at, &ln_sigma0);
         Tables { ln_sigma0, by_coordinate, law: GammaLaw::new(self.coordinates.looks(at)) }
     }
 
@@ -154,12 +152,14 @@ impl Chirp {
             let share = if self.noise > 0.0 { 1.0 - self.noise / ln_mean.exp() } else { 1.0 };
             laws.push((law, share));
         }
-        let total = ln_sum(terms);
+        let largest = terms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        terms.iter_mut().for_each(|term| *term = (*term - largest).exp());
+        let sum: f64 = terms.iter().sum();
         score.fill(0.0);
         gradient.fill(0.0);
         *bend = 0.0;
         for (((place, _), term), (law, share)) in self.nodes.iter().zip(&*terms).zip(&*laws) {
-            let weight = (term - total).exp();
+            let weight = term / sum;
             if weight < 1e-9 {
                 continue;
             }
@@ -174,7 +174,7 @@ impl Chirp {
                 score[index] += law.by_ln_mean * slope;
             }
         }
-        total
+        largest + sum.ln()
     }
 }
 

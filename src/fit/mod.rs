@@ -18,6 +18,7 @@
 //! ```
 
 mod angle;
+pub mod bistatic;
 mod coordinates;
 mod gamma_law;
 mod goodness;

@@ -133,7 +133,8 @@ impl FitResult {
     /// Directions that the data do not see and numbers at a bound add nothing to it.
     pub fn band(&self, theta_rad: f64) -> Band {
         let place = Place::new(theta_rad);
-        let by = derivatives(&self.coordinates, &self.at);
+        let here = Table::new(&self.model);
+        let by = derivatives(&self.coordinates, &self.at, &here);
         let slopes = by.iter().map(|table| table.as_ref().map_or(0.0, |table| table.at(&place)));
         let slopes = DVector::from_iterator(self.at.len(), slopes);
         let variance = slopes.dot(&(&self.covariance_searched * &slopes));

@@ -88,7 +88,7 @@ impl Fit {
         let mut best = search(&coordinates.start());
         let mut costs = vec![best.local.value];
         for number in 1..self.starts {
-            let found = search(&self.drawn_start(coordinates, number));
+            let found = search(&drawn_start(coordinates, self.seed, number));
             costs.push(found.local.value);
             let improves = found.local.value < best.local.value || !best.local.value.is_finite();
             if improves && found.local.value.is_finite() {
@@ -99,16 +99,17 @@ impl Fit {
         let agreeing = costs.iter().filter(near).count();
         (best, agreeing)
     }
+}
 
-    fn drawn_start(&self, coordinates: &Coordinates, number: usize) -> DVector<f64> {
-        let key = Key { seed: self.seed, chirp: number as u64, sub_ray: 1, purpose: Purpose::Fit };
-        let mut draws = key.draws();
-        let start = coordinates.start();
-        let moved = |(u, c): (&f64, &super::coordinates::Coordinate)| {
-            u + c.spread() * (2.0 * draws.uniform() - 1.0)
-        };
-        DVector::from_iterator(start.len(), start.iter().zip(&coordinates.list).map(moved))
-    }
+/// A start drawn around the given one; `number` from 1.
+pub(super) fn drawn_start(coordinates: &Coordinates, seed: u64, number: usize) -> DVector<f64> {
+    let key = Key { seed, chirp: number as u64, sub_ray: 1, purpose: Purpose::Fit };
+    let mut draws = key.draws();
+    let start = coordinates.start();
+    let moved = |(u, c): (&f64, &super::coordinates::Coordinate)| {
+        u + c.spread() * (2.0 * draws.uniform() - 1.0)
+    };
+    DVector::from_iterator(start.len(), start.iter().zip(&coordinates.list).map(moved))
 }
 
 fn squares_search() -> Minimise {

@@ -6,20 +6,22 @@ use rayon::prelude::*;
 use super::coordinates::{Coordinates, LOOKS};
 use super::table::Table;
 
-/// Step in the search: its square is the relative error of a central difference.
-const STEP: f64 = 1e-4;
+/// Step in the search: about the relative error of a one-sided difference, far above that of its rounding.
+const STEP: f64 = 1e-6;
 
-/// d ln σ⁰/du at every knot, for each coordinate; none for the looks, which do not move σ⁰.
-pub(super) fn derivatives(coordinates: &Coordinates, at: &DVector<f64>) -> Vec<Option<Table>> {
-    let (lower, upper) = (coordinates.lower(), coordinates.upper());
+/// d ln σ⁰/du at every knot, for each coordinate, from the table `here`; none for the looks, which do
+/// not move σ⁰.
+pub(super) fn derivatives(
+    coordinates: &Coordinates,
+    at: &DVector<f64>,
+    here: &Table,
+) -> Vec<Option<Table>> {
+    let upper = coordinates.upper();
     let derivative = |index: usize| {
-        let moved = |step: f64| {
-            let mut there = at.clone();
-            there[index] = (at[index] + step).max(lower[index]).min(upper[index]);
-            (there[index], Table::new(&coordinates.model(&there)))
-        };
-        let ((high, above), (low, below)) = (moved(STEP), moved(-STEP));
-        above.difference(&below, high - low)
+        let step = if at[index] + STEP > upper[index] { -STEP } else { STEP };
+        let mut there = at.clone();
+        there[index] += step;
+        Table::new(&coordinates.model(&there)).difference(here, step)
     };
     let is_looks = |index: usize| coordinates.list.get(index).is_some_and(|c| c.name == LOOKS);
     (0..at.len())

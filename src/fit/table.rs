@@ -6,6 +6,7 @@
 //! The curve is even in θ, which gives the knot below the first.
 
 use std::f64::consts::FRAC_PI_2;
+use std::sync::LazyLock;
 
 use crate::brdf::Scattering;
 
@@ -17,6 +18,13 @@ const BETA: f64 = 6.0;
 const THETA_END_RAD: f64 = 0.999 * FRAC_PI_2;
 /// ln σ⁰ of what is too weak to tell from nothing.
 const LN_NOTHING: f64 = -600.0;
+
+/// The angle of every knot, rad.
+static THETA_RAD: LazyLock<Vec<f64>> = LazyLock::new(|| {
+    let knot =
+        |index| THETA_END_RAD * (BETA * index as f64 / INTERVALS as f64).sinh() / BETA.sinh();
+    (0..=INTERVALS).map(knot).collect()
+});
 
 /// ln σ⁰ at every knot.
 #[derive(Clone, Debug)]
@@ -42,12 +50,11 @@ impl Table {
     }
 
     fn from_fn(value: impl Fn(f64) -> f64) -> Table {
-        let knot = |index| {
-            let x = index as f64 / INTERVALS as f64;
-            let value = value(THETA_END_RAD * (BETA * x).sinh() / BETA.sinh());
+        let knot = |&theta_rad: &f64| {
+            let value = value(theta_rad);
             if value.is_nan() { LN_NOTHING } else { value }
         };
-        Table { knots: (0..=INTERVALS).map(knot).collect() }
+        Table { knots: THETA_RAD.iter().map(knot).collect() }
     }
 
     /// (self − other)/width at every knot: a derivative by a parameter.
