@@ -38,7 +38,7 @@ pub enum Error {
         /// The receiver that it is about, with a colon, or nothing.
         antenna: String,
         /// What is wrong.
-        error: RenderError,
+        error: Box<RenderError>,
     },
     /// A material file was refused.
     #[error(transparent)]

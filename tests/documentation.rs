@@ -92,7 +92,19 @@ fn the_material_of_the_docs_is_accepted() {
 #[test]
 fn every_command_has_help_with_an_example() {
     let folder = tempfile::tempdir().unwrap();
-    for command in ["render", "radar", "add", "list", "show", "plot", "fit", "rm", "completions"] {
+    for command in [
+        "render",
+        "radar",
+        "measure",
+        "compare",
+        "add",
+        "list",
+        "show",
+        "plot",
+        "fit",
+        "rm",
+        "completions",
+    ] {
         let output = matdb(folder.path()).args(["help", command]).output().unwrap();
         let text = String::from_utf8(output.stdout).unwrap();
         assert!(text.contains("Example") && text.contains(&format!("matdb {command}")), "{text}");

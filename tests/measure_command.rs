@@ -92,12 +92,10 @@ fn a_cloud_becomes_a_material_that_renders_like_it() {
     let fit = json(at, &["fit", "mannequin-paint", "--noise-dbm", "-100", "--save"]);
     assert_eq!(fit["converged"], true);
     let truth = json(at, &["show", "mannequin-paint@1"]);
-    let parameter = |path: &str| {
-        let all = truth["fits"][0]["parameters"].as_array().unwrap();
-        number(&all.iter().find(|p| p["path"] == path).unwrap()["value"])
-    };
-    let (k, f_lambda, r_s) =
-        (parameter("k"), parameter("specular.f_lambda"), parameter("diffuse.r_s"));
+    let model = &truth["material"]["fits"][0]["model"];
+    let k = number(&model["k"]);
+    let parameter = |part: &str, name: &str| number(&model[part][name]);
+    let (f_lambda, r_s) = (parameter("specular", "f_lambda"), parameter("diffuse", "r_s"));
     for (name, expected) in [
         ("specular.m", parameter("specular", "m")),
         ("diffuse.alpha", parameter("diffuse", "alpha")),

@@ -59,7 +59,7 @@ fn page(arguments: &Arguments) -> Result<String, Failure> {
         page += &format!("\n{}", registration::section((seeds / 4).max(1))?);
     }
     if wanted("round-trip") {
-        page += &format!("\n{}", round_trip::section((seeds / 50).max(1))?);
+        page += &format!("\n{}", round_trip::section((seeds / 10).max(1))?);
     }
     if let Some(data) = arguments.data.as_ref().filter(|_| wanted("measured")) {
         page += &format!("\n{}", measured::section(data)?);

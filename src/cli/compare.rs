@@ -97,7 +97,11 @@ fn line(text: &str) -> Result<Line, Error> {
 }
 
 fn simulate(args: &Args, scene: &Scene, db: &Database) -> Result<(Scan, Vec<u16>), Error> {
-    let at = |error| Error::Render { scene: args.scene.clone(), antenna: String::new(), error };
+    let at = |error| Error::Render {
+        scene: args.scene.clone(),
+        antenna: String::new(),
+        error: Box::new(error),
+    };
     let (used, material_of_region) = materials(scene, &args.scene, db)?;
     let surfaces = surfaces(scene, &used, &material_of_region);
     let bvh = Bvh::new(&scene.target.mesh);

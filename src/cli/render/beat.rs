@@ -53,8 +53,11 @@ pub(super) fn encode(
 ) -> Result<Vec<(String, Vec<u8>)>, Error> {
     let encode = |view: &View| {
         let name = view.file("beat", "npy");
-        let at =
-            |error| Error::Render { scene: scene.to_owned(), antenna: format!("{name}: "), error };
+        let at = |error| Error::Render {
+            scene: scene.to_owned(),
+            antenna: format!("{name}: "),
+            error: Box::new(error),
+        };
         let signals = beat_signals(setup, footprints, view.observer).map_err(at)?;
         let mut failed: Option<RenderError> = None;
         let rows = signals.map_while(|signals| signals.map_err(|e| failed = Some(e)).ok());

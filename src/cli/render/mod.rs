@@ -15,7 +15,7 @@ use super::output::write_all;
 use super::staging::{materials, setup, surfaces};
 use crate::error::Error;
 use crate::geometry::Raster;
-use crate::render::trace;
+use crate::render::{RenderError, trace};
 use crate::scene::Scene;
 use crate::trace::Bvh;
 use record::Record;
@@ -46,7 +46,11 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let scene = Scene::load(&args.scene)?;
     let (used, material_of_region) = materials(&scene, &args.scene, db)?;
     let surfaces = surfaces(&scene, &used, &material_of_region);
-    let at = |(antenna, error)| Error::Render { scene: args.scene.clone(), antenna, error };
+    let at = |(antenna, error): (String, RenderError)| Error::Render {
+        scene: args.scene.clone(),
+        antenna,
+        error: Box::new(error),
+    };
     let beat = args.beat.then(|| beat::Shape::new(&scene)).transpose()?;
     stages.end("load", console);
 
