@@ -123,7 +123,9 @@ fn too_little_data_gives_a_verdict_and_no_confident_number() {
     fs::write(folder.join("scan.csv"), curve(0.0, 60.0, 150)).unwrap();
     let arguments = ["fit", "scan.csv", "--model", "kirchhoff-go", "--starts", "1"];
     let go = json(folder, &arguments);
-    assert!(go["verdict"].to_string().contains("only-together"), "{go}");
+    // The two act only together, or the search leaves them at a bound; either is said.
+    let verdict = go["verdict"].to_string();
+    assert!(verdict.contains("eps_real") && verdict.contains("eps_imag"), "{go}");
     let silent = go["estimates"].as_array().unwrap().iter().filter(|e| e["sd"].is_null()).count();
     assert_eq!(silent, 2, "eps_real and eps_imag only scale the curve: {go}");
 }
