@@ -80,6 +80,24 @@ fn the_scene_of_the_docs_is_accepted() {
 }
 
 #[test]
+fn the_way_from_a_cloud_to_a_material_runs() {
+    let text = read("docs/measuring.md");
+    let folder = tempfile::tempdir().unwrap();
+    copy(&root().join("scenes"), &folder.path().join("scenes"));
+    let commands = blocks(&text, "sh")[0].lines().map(|line| line.split(" #").next().unwrap_or(""));
+    let mut run = 0;
+    for command in commands {
+        let arguments = command.trim().strip_prefix("matdb ").unwrap();
+        // The one argument with a blank is quoted.
+        let arguments = arguments.replace("'rendered bench'", "rendered-bench");
+        matdb(folder.path()).args(arguments.split_whitespace()).assert().success();
+        run += 1;
+    }
+    assert_eq!(run, 6);
+    assert!(folder.path().join("compared/images.png").exists());
+}
+
+#[test]
 fn the_material_of_the_docs_is_accepted() {
     let text = read("docs/materials.md");
     let folder = tempfile::tempdir().unwrap();

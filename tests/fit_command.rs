@@ -131,6 +131,24 @@ fn too_little_data_gives_a_verdict_and_no_confident_number() {
 }
 
 #[test]
+fn data_that_leave_every_number_at_a_bound_are_told_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let bright = "theta_deg,sigma0_db\n0,10\n1,10\n2,10\n3,10\n";
+    fs::write(folder.join("bright.csv"), bright).unwrap();
+    for method in ["censored", "tls", "mse"] {
+        let run = ["fit", "bright.csv", "--model", "lambert", "--method", method, "--starts", "1"];
+        let output = matdb(folder).args(run).output().unwrap();
+        assert!(matches!(output.status.code(), Some(0 | 1)), "{method}: {output:?}");
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(said.contains("bound") || output.status.code() == Some(1), "{method}: {said}");
+    }
+    fs::write(folder.join("four.csv"), curve(0.0, 60.0, 4)).unwrap();
+    let exact = support::refused(matdb(folder).args(["fit", "four.csv", "--method", "tls"]));
+    assert!(exact.contains("4 unknowns and their errors"), "{exact}");
+}
+
+#[test]
 fn a_fit_that_did_not_converge_is_printed_and_not_stored() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
-use support::{entries, matdb, read_cloud, refused, root};
+use support::{entries, matdb, read_cloud, refused};
 
 /// The painted mannequin alone, with speckle, noise and a range error; `paint` is what it is made of.
 const SCENE: &str = "
@@ -150,6 +150,13 @@ fn clouds_that_cannot_be_used() {
             .for_each(|part| assert!(message.contains(part), "`{part}` is not in: {message}"));
         assert_eq!(entries(at), before);
     };
+    let faint = |[x, y, z, p]: [f64; 4]| format!("{x},{y},{z},{}", p - 30.0);
+    let under = |[x, y, z, _]: [f64; 4]| format!("{x},{y},{z},-100000");
+    refuse("faint.csv", &csv(at, 1, faint), &["threshold of -77 dBm", "radar.threshold_dbm"]);
+    refuse("under.csv", &csv(at, 10, under), &["-100000 dBm", "-300"]);
+    let once = csv(at, 1, as_is);
+    let twice = format!("{once}{}", once.split_once('\n').unwrap().1);
+    refuse("doubled.csv", &twice, &["share a chirp", "one detection per chirp"]);
     refuse("few.csv", &csv(at, 1000, as_is), &["11 points", "50"]);
     refuse("watts.csv", &csv(at, 10, watts), &["watts", "unit"]);
     refuse("far.csv", &csv(at, 10, far), &["overlap"]);
@@ -168,6 +175,7 @@ fn clouds_that_cannot_be_used() {
         (&["--pose", "1,2"], &["`1,2` is no pose"]),
         (&["--edge-margin", "7"], &["--edge-margin 7"]),
         (&["--save", "no-such", "--kind", "measured", "--source", "x"], &["no-such"]),
+        (&["--save", "ptfe@1", "--kind", "measured", "--source", "x"], &["`ptfe@1`", "bare name"]),
     ] {
         let run = ["measure", "good.csv", "--scene", "scene.toml", "-o", "measured"];
         let message = refused(matdb(at).args(run).args(more));
@@ -175,10 +183,11 @@ fn clouds_that_cannot_be_used() {
             .iter()
             .for_each(|part| assert!(message.contains(part), "`{part}` is not in: {message}"));
     }
-    let run = ["compare", "good.csv", "--scene", "scene.toml", "-o", "c", "--line", "x=1"];
-    assert!(refused(matdb(at).args(run)).contains("--line y=1.1,width=0.02"));
+    for line in ["x=1", "bogus=3,y=1.1", "width=abc,y=1.1", "y=1,y=2", "width=0.02"] {
+        let run = ["compare", "good.csv", "--scene", "scene.toml", "-o", "c", "--line", line];
+        assert!(refused(matdb(at).args(run)).contains("--line y=1.1,width=0.02"), "{line}");
+    }
     // A cloud without chirp numbers and without ranges is enough.
     let run = ["measure", "good.csv", "--scene", "scene.toml", "-q", "-o", "measured"];
     matdb(at).args(run).assert().success();
-    assert!(root().join("docs").exists());
 }

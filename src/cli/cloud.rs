@@ -142,9 +142,9 @@ fn pose_file(path: &Path) -> Result<Pose<Global, Global>, Error> {
     let error = rotation * rotation.transpose() - DMat3::IDENTITY;
     let rigid = error.to_cols_array().iter().all(|x| x.abs() < ROUNDING)
         && (rotation.determinant() - 1.0).abs() < ROUNDING;
-    match rigid && translation_m.iter().all(|x| x.is_finite()) {
+    match rigid && translation_m.iter().all(|x| x.abs() <= 1e4) {
         true => Ok(Pose::new(rotation, DVec3::from_array(translation_m))),
-        false => Err(no_pose("the matrix is no rotation".to_owned())),
+        false => Err(no_pose("it is no rotation with a shift within 10 km".to_owned())),
     }
 }
 

@@ -44,6 +44,9 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let line = line(&args.line)?;
     let mut scene = Scene::load(&args.scene)?;
+    // The mean: a draw of speckle would add its own error, or hide that of the measurement.
+    let radar = &mut scene.file.radar;
+    (radar.receiver, radar.speckle, radar.noise) = (None, None, None);
     let moved = pose(args.pose.as_deref())?;
     let vertices = scene.target.mesh.vertices.iter_mut();
     vertices.for_each(|vertex| *vertex = (moved * Point::from(*vertex)).xyz);
@@ -79,17 +82,20 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 }
 
 fn line(text: &str) -> Result<Line, Error> {
-    let mut line = Line { y_m: f64::NAN, width_m: 0.02 };
+    let (mut y_m, mut width_m) = (None, None);
+    let mut understood = true;
     for part in text.split(',') {
-        match part.split_once('=').map(|(key, value)| (key.trim(), value.trim().parse())) {
-            Some(("y", Ok(y_m))) => line.y_m = y_m,
-            Some(("width", Ok(width_m))) => line.width_m = width_m,
-            _ => line.y_m = f64::NAN,
-        }
+        let number = |value: &str| value.trim().parse().ok().filter(|x: &f64| x.is_finite());
+        let slot = match part.split_once('=').map(|(key, value)| (key.trim(), number(value))) {
+            Some(("y", Some(value))) => y_m.replace(value),
+            Some(("width", Some(value))) if value > 0.0 => width_m.replace(value),
+            _ => Some(f64::NAN),
+        };
+        understood &= slot.is_none();
     }
-    match line.y_m.is_finite() && line.width_m > 0.0 && line.width_m.is_finite() {
-        true => Ok(line),
-        false => Err(Error::Usage {
+    match (y_m, understood) {
+        (Some(y_m), true) => Ok(Line { y_m, width_m: width_m.unwrap_or(0.02) }),
+        _ => Err(Error::Usage {
             problem: format!("--line {text} is no line"),
             way_out: "write it as --line y=1.1,width=0.02".to_owned(),
         }),
@@ -140,7 +146,7 @@ fn side_by_side(
     let error = Figure {
         channel: "difference_db",
         colour_label: "difference, dB",
-        range: Some((-10.0, 10.0)),
+        range: Some((-5.0, 5.0)),
         ..power(error, &subtitle)
     };
     Ok(beside(&[power(&images[0], "measured"), power(&images[1], "simulated"), error])?)
@@ -152,14 +158,14 @@ fn line_scan<'a>(title: &'a str, line: Line, measured: &Scan, simulated: &Scan) 
         style: Style::Points,
         points: along(scan, line),
     };
+    let empty = along(measured, line).is_empty() && along(simulated, line).is_empty();
     Plot {
         title,
-        subtitle: "line scan",
+        subtitle: if empty { "line scan: no detection lies on it" } else { "line scan" },
         x_label: "x, m",
         y_label: "received power, dBm",
-        // An empty line still has its axes.
-        x_range: Some((-0.3, 0.3)),
-        y_range: Some((-100.0, 0.0)).filter(|_| along(measured, line).is_empty()),
+        x_range: Some((-0.3, 0.3)).filter(|_| empty),
+        y_range: Some((-100.0, 0.0)).filter(|_| empty),
         equal: false,
         series: vec![series("measured", measured), series("simulated", simulated)],
     }

@@ -13,9 +13,10 @@ use super::output::write_all;
 use super::summary::grouped;
 use crate::error::Error;
 use crate::formats::figure::{Plot, Series, Style};
+use crate::material::Material;
 use crate::measure::{Curve, Metric, Reduced, Reduction, Registered, Registration, Row};
 use crate::scene::Scene;
-use crate::store::Added;
+use crate::store::{Added, Store};
 use crate::units::db_from_ratio;
 
 /// Turn a measured cloud into a material's curve: register it to the scene, find the angles
@@ -37,6 +38,9 @@ pub(super) struct Args {
     /// `auto`, or a pose.json [default: as the scene places it]
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
+    /// Use the found pose even where the points agree with the given one
+    #[arg(long)]
+    refine: bool,
     /// What the registration makes small
     #[arg(long, default_value = "along-ray")]
     metric: MetricFlag,
@@ -50,7 +54,7 @@ pub(super) struct Args {
     #[arg(long)]
     exact_mesh: bool,
     /// Store the curve in this material as a new revision, too
-    #[arg(long, value_name = "MATERIAL", requires = "kind", requires = "source")]
+    #[arg(long, value_name = "MATERIAL")]
     save: Option<String>,
     /// Name of the stored curve
     #[arg(long, value_name = "NAME", default_value = "measured")]
@@ -78,8 +82,8 @@ enum MetricFlag {
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let scene = Scene::load(&args.scene)?;
-    // A registration takes a while: a name that is not there is said before.
-    args.save.as_ref().map(|name| find(db.read()?.as_ref(), name, "--save: ")).transpose()?;
+    // A registration takes a while: what hinders its storing is said before.
+    target(args, db.read()?.as_ref())?;
     let cloud = args.cloud.read(scene.radar())?;
     let reduction = reduction(args, &scene)?;
     let (radar, chirps, target) = (scene.radar(), &scene.chirps, &scene.target);
@@ -89,13 +93,17 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let reduced = reduction.run(target, radar, chirps, &cloud, &registered)?;
 
     let record = record(args, &registered, &reduced);
+    // Refused before anything is written, stored after it.
+    prepared(args, &reduced.curve, db.read()?.as_ref())?;
     let mut pose = serde_json::to_vec_pretty(&record)?;
     pose.push(b'\n');
     let svg = plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
     let files = [("pose.json", pose), ("curve.csv", reduced.curve.write()), ("curve.svg", svg)];
     write_all(&args.output, &files)?;
     let revision = save(args, &reduced.curve, db)?;
-    let notices = cloud.notices.iter().chain(&registered.verdicts).chain(&reduced.notices);
+    let mixed = mixed(args, &scene);
+    let notices =
+        mixed.iter().chain(&cloud.notices).chain(&registered.verdicts).chain(&reduced.notices);
     notices.for_each(|notice| console.notice(notice));
     let saved = match (&args.save, revision) {
         (Some(name), Some(revision)) => {
@@ -106,14 +114,54 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     console.result(&(text(args, &registered, &reduced) + &saved), &record)
 }
 
+/// A sentence when the curve mixes what the scene tells apart.
+fn mixed(args: &Args, scene: &Scene) -> Option<String> {
+    let regions = &scene.target.regions;
+    let first = regions.first()?;
+    let is_mixed = regions.iter().any(|region| region.material != first.material);
+    let names: Vec<&str> = regions.iter().map(|region| region.name.as_str()).collect();
+    (args.region.is_none() && is_mixed).then(|| {
+        format!(
+            "the curve mixes the materials of the scene's regions; choose one with --region: {}",
+            names.join(", ")
+        )
+    })
+}
+
+/// The material that takes the curve in, as it is now.
+fn target(args: &Args, store: Option<&Store>) -> Result<Option<Material>, Error> {
+    let Some(name) = &args.save else { return Ok(None) };
+    if name.contains('@') {
+        return Err(Error::Usage {
+            problem: format!("`{name}` names a revision, and a revision never changes"),
+            way_out: "give the bare name; the curve becomes part of a new revision".to_owned(),
+        });
+    }
+    if args.kind.is_none() || args.source.is_none() {
+        return Err(Error::Usage {
+            problem: format!("nobody has said where {} comes from", args.cloud.cloud.display()),
+            way_out: "add --kind measured or --kind synthetic, and --source with who, when and how"
+                .to_owned(),
+        });
+    }
+    Ok(Some(find(store, name, "--save: ")?.material))
+}
+
+/// The material with the curve in it.
+fn prepared(args: &Args, curve: &Curve, store: Option<&Store>) -> Result<Option<Material>, Error> {
+    let (Some(kind), Some(title)) = (args.kind, &args.source) else { return Ok(None) };
+    let Some(mut material) = target(args, store)? else { return Ok(None) };
+    put(&mut material, &args.curve, curve, kind.into(), title)?;
+    Ok(Some(material))
+}
+
 /// Stores the curve when it is asked for; the revision that holds it.
 fn save(args: &Args, curve: &Curve, db: &Database) -> Result<Option<u32>, Error> {
-    let (Some(name), Some(kind), Some(title)) = (&args.save, args.kind, &args.source) else {
+    if args.save.is_none() {
         return Ok(None);
-    };
+    }
     let mut store = db.write()?;
-    let mut material = find(Some(&store), name, "--save: ")?.material;
-    put(&mut material, &args.curve, curve, kind.into(), title)?;
+    let Some(material) = prepared(args, curve, Some(&store))? else { return Ok(None) };
     let added = store.add([&material])?;
     Ok(added.first().map(|added| match added {
         Added::Revision(number) | Added::Unchanged(number) => *number,
@@ -130,7 +178,7 @@ fn registration(args: &Args) -> Result<Registration, Error> {
         }
         MetricFlag::PointToPoint => Registration::paper(),
     };
-    Ok(Registration { start, ..registration })
+    Ok(Registration { start, keep_given: !args.refine, ..registration })
 }
 
 fn reduction(args: &Args, scene: &Scene) -> Result<Reduction, Error> {
@@ -201,20 +249,24 @@ fn record(args: &Args, registered: &Registered, reduced: &Reduced) -> Value {
 }
 
 fn text(args: &Args, registered: &Registered, reduced: &Reduced) -> String {
-    let shift_mm = registered.pose.translation_m() * 1e3;
+    let middle = registered.pivot;
+    let shift_mm = 1e3 * (middle.xyz - (registered.pose.inverse() * middle).xyz);
     let sd = |axis: usize| registered.covariance[axis][axis].sqrt();
     let (shift_sd_m, turn_sd_rad) =
         ((0..3).map(sd).fold(0.0, f64::max), (3..6).map(sd).fold(0.0, f64::max));
-    let curve = &reduced.curve;
+    let (curve, left_out) = (&reduced.curve, reduced.left_out);
     let detected = curve.detected().count();
     let kept = match registered.kept {
-        true => "the points agree with the pose as given, which is kept\n",
+        true => {
+            "the points agree with the given pose, which is kept; --refine uses the found one\n"
+        }
         false => "",
     };
     format!(
         "{kept}pose: {} of {} points on the surface, rms {:.2} mm, known to {:.2} mm and {:.3}° (1 sd)\n\
-         shift of the scene's origin: {:.2}, {:.2}, {:.2} mm\n\
+         shift of the middle of the points: {:.2}, {:.2}, {:.2} mm\n\
          curve: {} detections and {} censored chirps from {:.1}° to {:.1}°\n\
+         left out: {} near an edge or another region, {} off the surface or beside it, {} of an unsure facet\n\
          wrote pose.json, curve.csv and curve.svg to {}\n",
         grouped(registered.inliers),
         grouped(registered.points),
@@ -228,6 +280,9 @@ fn text(args: &Args, registered: &Registered, reduced: &Reduced) -> String {
         grouped(curve.rows.len() - detected),
         angles_deg(curve).fold(f64::INFINITY, f64::min),
         angles_deg(curve).fold(0.0, f64::max),
+        grouped(left_out.near_edge + left_out.silent_near_edge),
+        grouped(left_out.missed + left_out.off_surface),
+        grouped(left_out.unsure_of_facet),
         args.output.display()
     )
 }

@@ -126,8 +126,10 @@ pub enum FitError {
         /// How many.
         rows: usize,
     },
-    /// More unknowns than detections.
-    #[error("{detected} detections cannot give {unknowns} unknowns; fix parameters or add rows")]
+    /// As many unknowns as detections, or more.
+    #[error(
+        "{detected} detections cannot give {unknowns} unknowns and their errors; fix parameters or add rows"
+    )]
     TooFewRows {
         /// Detections.
         detected: usize,
@@ -209,7 +211,8 @@ impl Fit {
         }
         match curve.detected().count() {
             0 => Err(FitError::AllCensored { rows: curve.rows.len() }),
-            detected if detected < unknowns => Err(FitError::TooFewRows { detected, unknowns }),
+            // As many as unknowns are met exactly, and nothing is left to judge the errors by.
+            detected if detected <= unknowns => Err(FitError::TooFewRows { detected, unknowns }),
             _ => Ok(FitResult::new(self, coordinates, curve)),
         }
     }

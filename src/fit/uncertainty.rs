@@ -58,6 +58,14 @@ impl Uncertainty {
     }
 
     fn read(&mut self, free: &[usize], scale: &[f64], scaled: DMatrix<f64>) {
+        if free.is_empty() {
+            return;
+        }
+        if scaled.iter().any(|entry| !entry.is_finite()) {
+            // Rounding has eaten the information: nothing is known of any of them.
+            self.together.extend(free.iter().map(|&index| vec![index]));
+            return;
+        }
         let eigen = scaled.symmetric_eigen();
         let largest = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
         for (value, direction) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {

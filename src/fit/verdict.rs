@@ -90,6 +90,18 @@ pub enum Finding {
     },
 }
 
+impl Finding {
+    /// Whether the curve of the model is open somewhere, and not only how its numbers share it.
+    pub fn leaves_the_curve_open(&self) -> bool {
+        matches!(
+            self,
+            Finding::NoDiffuseRows { .. }
+                | Finding::Unconstrained { .. }
+                | Finding::OpenInterval { .. }
+        )
+    }
+}
+
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
@@ -114,7 +126,7 @@ impl fmt::Display for Finding {
             ),
             Finding::NoSpecularRows { below_deg } => write!(
                 f,
-                "no detection below {} degrees: the data do not show the specular part",
+                "no detection below {} degrees: of the specular part the data show the flank at most",
                 rounded(*below_deg)
             ),
             Finding::NoDiffuseRows { above_deg } => write!(
@@ -124,8 +136,8 @@ impl fmt::Display for Finding {
             ),
             Finding::CensoredIgnored { censored, rows } => write!(
                 f,
-                "{censored} of {rows} rows are below the threshold and least squares ignores them: its \
-                 tail is too flat"
+                "{censored} of {rows} rows are below the threshold and least squares ignores them, which \
+                 flattens the tail; and it takes the mean of decibels, which speckle pulls down"
             ),
             Finding::AtBound { name, value } => {
                 write!(f, "{name} stopped at its bound {}", rounded(*value))

@@ -14,6 +14,8 @@ use crate::frames::{Global, Point};
 const LARGEST_M: f64 = 100.0;
 /// No receiver takes more, dBm.
 const STRONGEST_DBM: f64 = 60.0;
+/// Far below the thermal noise of a hertz, dBm.
+const WEAKEST_DBM: f64 = -300.0;
 /// 10 mW: every received power in watts is below, and hardly one of many levels in dBm lies between
 /// it and zero.
 const STRONGEST_W: f64 = 0.01;
@@ -78,9 +80,10 @@ pub enum CloudError {
     },
     /// A power that cannot have been received.
     #[error(
-        "point {point} has {power_dbm} dBm, more than {STRONGEST_DBM}; check the unit of the power"
+        "point {point} has {power_dbm} dBm, which is not from {WEAKEST_DBM} to {STRONGEST_DBM}; check \
+         the unit of the power"
     )]
-    TooStrong {
+    NoSuchPower {
         /// Point, from 0.
         point: usize,
         /// Its power.
@@ -185,8 +188,11 @@ fn check_powers(points: &[CloudPoint]) -> Result<(), CloudError> {
     if powers().all(|power| power >= 0.0) && largest <= STRONGEST_W {
         return Err(CloudError::Watts { points: points.len(), largest });
     }
-    match powers().position(|power| power > STRONGEST_DBM) {
-        Some(point) => Err(CloudError::TooStrong { point, power_dbm: points[point].power_dbm }),
+    let outside = |power: f64| !(WEAKEST_DBM..=STRONGEST_DBM).contains(&power);
+    match points.iter().enumerate().find(|(_, point)| outside(point.power_dbm)) {
+        Some((point, &CloudPoint { power_dbm, .. })) => {
+            Err(CloudError::NoSuchPower { point, power_dbm })
+        }
         None => Ok(()),
     }
 }
@@ -236,7 +242,7 @@ mod tests {
         let far = refused(vec![point(0, 0.0, -60.0), point(1, 250.0, -60.0)]);
         assert!(far.to_string().contains("millimetres"), "{far}");
         let strong = refused(vec![point(0, 0.0, 75.0)]);
-        assert_eq!(strong, CloudError::TooStrong { point: 0, power_dbm: 75.0 });
+        assert_eq!(strong, CloudError::NoSuchPower { point: 0, power_dbm: 75.0 });
         let twice = refused(vec![point(3, 0.0, -60.0), point(4, 0.0, -60.0), point(3, 0.1, -60.0)]);
         assert_eq!(twice, CloudError::DuplicateChirp { chirp: 3, first: 0, second: 2 });
     }

@@ -104,7 +104,37 @@ pub enum ReductionError {
         /// See [`LeftOut`].
         near_edge: usize,
     },
+    /// The radar of the scene could not have detected this.
+    #[error(
+        "{below} of {points} powers lie below the scene's threshold of {threshold_dbm} dBm, the weakest \
+         at {weakest_dbm:.1} dBm; give the scene the radar.threshold_dbm of the measurement, or check \
+         the unit of the power"
+    )]
+    BelowThreshold {
+        /// Detections below it.
+        below: usize,
+        /// All detections.
+        points: usize,
+        /// The threshold, dBm.
+        threshold_dbm: f64,
+        /// The weakest power, dBm.
+        weakest_dbm: f64,
+    },
+    /// Several detections of one chirp.
+    #[error(
+        "{shared} of {points} points share a chirp with another point; keep one detection per chirp, \
+         or give the scene the scan of the measurement"
+    )]
+    SharedChirps {
+        /// Points beyond the first of their chirp.
+        shared: usize,
+        /// All points.
+        points: usize,
+    },
 }
+
+/// A hundredth of the points may contradict the scene before the cloud is refused.
+const TOLERATED: usize = 100;
 
 /// Why a detection is no row.
 enum Fate {
@@ -160,17 +190,29 @@ impl Reduction {
         if let Some(region) = self.region.filter(|region| usize::from(*region) >= regions) {
             return Err(ReductionError::UnknownRegion { region, regions });
         }
+        check_threshold(radar, cloud)?;
         let sights = sights(cloud, radar, chirps)?;
         let bench = self.bench(target, radar, registered);
         let told = Told::new(radar, chirps, cloud, &sights);
+        told.check_shared()?;
         let mut left_out = LeftOut::default();
         let mut rows = detected(&bench, cloud, &sights, &told, &mut left_out);
         if rows.is_empty() {
             let LeftOut { missed, off_surface, other_region, near_edge, .. } = left_out;
             return Err(ReductionError::NoRows { missed, off_surface, other_region, near_edge });
         }
+        let detections = rows.len();
         rows.extend(silent(&bench, chirps, &told, &mut left_out));
-        Ok(Reduced { curve: Curve { rows }, left_out, notices: told.notices })
+        let mut notices = told.notices;
+        let silent = rows.len() - detections;
+        if silent > detections {
+            notices.push(format!(
+                "{silent} chirps that meet the target gave nothing, {detections} did: if the cloud was \
+                 cropped or thinned out, chirps are missing and not silent, and a fit will be wrong; \
+                 name the part that was kept with a region"
+            ));
+        }
+        Ok(Reduced { curve: Curve { rows }, left_out, notices })
     }
 
     fn bench<'a>(
@@ -335,7 +377,12 @@ impl Told {
             if lost { Vec::new() } else { unheard(chirps, cloud, sights, &directions, near_rad) };
         let mut notices = Vec::new();
         if unmatched > 0 {
-            let effect = if lost { "; no chirp is taken for silent" } else { "" };
+            let effect = if lost {
+                "; no chirp is taken for silent, so that a fit takes the cut at the threshold for \
+                 the material: give the scene the scan of the measurement"
+            } else {
+                ""
+            };
             notices.push(format!(
                 "{unmatched} points lie on no ray of the scan and are numbered by their place in \
                  the cloud{effect}"
@@ -343,6 +390,31 @@ impl Told {
         }
         Told { chirp_of_point, silent, notices }
     }
+
+    fn check_shared(&self) -> Result<(), ReductionError> {
+        let points = self.chirp_of_point.len();
+        let chirps: HashSet<u32> = self.chirp_of_point.iter().copied().collect();
+        let shared = points - chirps.len();
+        match shared * TOLERATED > points {
+            true => Err(ReductionError::SharedChirps { shared, points }),
+            false => Ok(()),
+        }
+    }
+}
+
+/// The threshold of the scene must be that of the measurement, or silence means something else.
+fn check_threshold(radar: &Radar, cloud: &Cloud) -> Result<(), ReductionError> {
+    // Rounding in a file.
+    const ROUNDING_DB: f64 = 0.05;
+    let threshold_dbm = radar.threshold_dbm;
+    let powers = || cloud.points().iter().map(|point| point.power_dbm);
+    let below = powers().filter(|power_dbm| *power_dbm < threshold_dbm - ROUNDING_DB).count();
+    let points = cloud.points().len();
+    if below * TOLERATED <= points {
+        return Ok(());
+    }
+    let weakest_dbm = powers().fold(f64::INFINITY, f64::min);
+    Err(ReductionError::BelowThreshold { below, points, threshold_dbm, weakest_dbm })
 }
 
 fn unheard(

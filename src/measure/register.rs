@@ -191,7 +191,10 @@ pub enum RegistrationError {
         numbered: usize,
     },
     /// The virtual scan sees nothing.
-    #[error("no chirp hits the mesh at the rough pose; give a rough pose within the field of view")]
+    #[error(
+        "no chirp of the scan hits the mesh at the rough pose; give a rough pose within the field of \
+         view, and check that the cloud lies there, too"
+    )]
     NothingInView,
     /// The clouds do not overlap.
     #[error(
@@ -358,6 +361,11 @@ impl Registered {
         if distance2.is_some_and(|distance2| distance2 <= CHANCE) {
             self.pose = *given;
             self.kept = true;
+            // The given pose may be as far off as the found one says.
+            for (row, of_row) in self.covariance.iter_mut().enumerate() {
+                let products = apart.iter().map(|part| apart[row] * part);
+                of_row.iter_mut().zip(products).for_each(|(entry, product)| *entry += product);
+            }
         }
         self
     }

@@ -7,7 +7,7 @@ use crate::cli::curves;
 use crate::cli::database::Database;
 use crate::cli::materials::{Found, find};
 use crate::error::Error;
-use crate::fit::FitResult;
+use crate::fit::{Finding, FitResult};
 use crate::material::{Curve, Material, SourceKind};
 use crate::store::{Added, Store};
 
@@ -20,6 +20,8 @@ pub(super) struct Saved {
     pub curve: String,
     /// What scenes render of the material now.
     pub render: String,
+    /// Whether the fit leaves the curve open somewhere, so that it is not rendered.
+    pub curve_is_open: bool,
     pub database: String,
 }
 
@@ -155,7 +157,8 @@ pub(super) fn save(
         Some(known) => *known = fit,
         None => material.fits.push(fit),
     }
-    if !args.keep_render {
+    let is_open = found.verdict.iter().any(Finding::leaves_the_curve_open);
+    if !args.keep_render && !is_open {
         material.render = name.to_owned();
     }
     let revision = match store.add([&material])?.first() {
@@ -168,6 +171,7 @@ pub(super) fn save(
         fit: name.to_owned(),
         curve,
         render: material.render,
+        curve_is_open: is_open,
         database: db.path().display().to_string(),
     })
 }

@@ -23,8 +23,12 @@ pub(super) fn result(
     );
     text += &fit.report.as_ref().map_or(String::new(), report);
     if let Some(saved) = saved {
+        let open = match saved.curve_is_open {
+            true => ", since this fit leaves the curve open",
+            false => "",
+        };
         text += &format!(
-            "stored as fit {} of {}, revision {}, in {}; scenes render {}\n",
+            "stored as fit {} of {}, revision {}, in {}; scenes render {}{open}\n",
             saved.fit, saved.material, saved.revision, saved.database, saved.render
         );
     }
