@@ -119,6 +119,13 @@ fn a_cloud_becomes_a_material_that_renders_like_it() {
     let fitted = error("--pose=measured/pose.json");
     assert!(number(&fitted["bias_db"]).abs() < 0.3, "{fitted}");
     assert!(number(&fitted["rmse_db"]) < 1.6, "{fitted}");
+    let by = |fit: &str| {
+        let run = ["compare", "out/cloud.ply", "--scene", "scene.toml", "--fit", fit, "-o", "by"];
+        json(at, &run)["pixels"]["rmse_db"].clone()
+    };
+    assert!((number(&by("stated")) / number(&fitted["rmse_db"]) - 1.0).abs() < 0.2);
+    let run = ["compare", "out/cloud.ply", "--scene", "scene.toml", "--fit", "no-such", "-o", "by"];
+    assert!(refused(matdb(at).args(run)).contains("stated, mixture-censored"));
     assert!(number(&error(rough)["rmse_db"]) > 2.0 * number(&fitted["rmse_db"]));
     assert_eq!(entries(&at.join("compared")), ["error.json", "images.png", "line.png", "line.svg"]);
 }

@@ -8,7 +8,7 @@ use super::cloud::{CloudArgs, pose};
 use super::console::Console;
 use super::database::Database;
 use super::output::write_all;
-use super::staging::{materials, setup, surfaces};
+use super::staging::{Used, materials, setup, surfaces};
 use super::summary::grouped;
 use crate::error::Error;
 use crate::formats::figure::{Figure, Plot, Series, Style, beside};
@@ -23,7 +23,8 @@ use crate::trace::Bvh;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb compare cloud.ply --scene scenes/mannequin.toml -o compared
-  matdb compare cloud.ply --scene scene.toml --pose measured/pose.json --line y=1.1,width=0.02 -o compared")]
+  matdb compare cloud.ply --scene scene.toml --pose measured/pose.json --line y=1.1,width=0.02 -o compared
+  matdb compare cloud.ply --scene scene.toml --fit mixture-mse -o by-mse      what another fit makes of it")]
 pub(super) struct Args {
     #[command(flatten)]
     cloud: CloudArgs,
@@ -33,6 +34,9 @@ pub(super) struct Args {
     /// Where the target stood: the pose.json of `matdb measure`, or X,Y,Z[,RX,RY,RZ]
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
+    /// Render this fit of the scene's materials instead of what they render
+    #[arg(long, value_name = "NAME")]
+    fit: Option<String>,
     /// Stripe of the line scan in the global frame
     #[arg(long, value_name = "y=M,width=M", default_value = "y=1.1,width=0.02")]
     line: String,
@@ -108,7 +112,10 @@ fn simulate(args: &Args, scene: &Scene, db: &Database) -> Result<(Scan, Vec<u16>
         antenna: String::new(),
         error: Box::new(error),
     };
-    let (used, material_of_region) = materials(scene, &args.scene, db)?;
+    let (mut used, material_of_region) = materials(scene, &args.scene, db)?;
+    if let Some(name) = &args.fit {
+        choose_fit(name, &mut used)?;
+    }
     let surfaces = surfaces(scene, &used, &material_of_region);
     let bvh = Bvh::new(&scene.target.mesh);
     let setup = setup(scene, &bvh, &surfaces);
@@ -116,6 +123,27 @@ fn simulate(args: &Args, scene: &Scene, db: &Database) -> Result<(Scan, Vec<u16>
     let footprints = footprints.map_err(at)?;
     let scan = shade(&setup, &footprints, Observer::Radar, &|_| {}).map_err(at)?;
     Ok((scan, material_of_region))
+}
+
+/// Takes the fit of this name in every material that has one; at least one must.
+fn choose_fit(name: &str, used: &mut [Used]) -> Result<(), Error> {
+    let mut chosen = 0;
+    for material in used.iter_mut() {
+        let fits = &material.found.material.fits;
+        if let Some(fit) = fits.iter().find(|fit| fit.name == *name) {
+            material.scattering = fit.model.clone();
+            chosen += 1;
+        }
+    }
+    if chosen > 0 {
+        return Ok(());
+    }
+    let fits = used.iter().flat_map(|used| &used.found.material.fits);
+    let names: Vec<&str> = fits.map(|fit| fit.name.as_str()).collect();
+    Err(Error::Usage {
+        problem: format!("no material of the scene has a fit `{name}`"),
+        way_out: format!("there are: {}", names.join(", ")),
+    })
 }
 
 fn side_by_side(

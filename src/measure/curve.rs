@@ -188,7 +188,7 @@ fn read_row(table: &Table, row: usize) -> Result<Row, FormatError> {
     Ok(Row {
         theta_rad: theta_deg.to_radians(),
         theta_sd_rad: bounded("theta_sd_deg", (0.0, 90.0))?.unwrap_or(0.0).to_radians(),
-        power_w: bounded("power_dbm", (-300.0, 300.0))?.map_or(sigma0, watts_from_dbm),
+        power_w: bounded("power_dbm", (-400.0, 400.0))?.map_or(sigma0, watts_from_dbm),
         sigma0,
         range_m: bounded("range_m", (0.0, 1e6))?.unwrap_or(0.0),
         chirp,

@@ -1,0 +1,13 @@
+//! A backscatter curve: read, written and read again it has the same rows.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use matdb::measure::Curve;
+
+fuzz_target!(|bytes: &[u8]| {
+    if let Ok(curve) = Curve::read(bytes) {
+        let again = Curve::read(&curve.write()).unwrap();
+        assert_eq!(again.rows.len(), curve.rows.len());
+    }
+});
