@@ -10,9 +10,13 @@
 //!    compression;
 //! 4. what the receiver makes of it ([`Effect::receive`]): speckle, noise, tilts that vary at random.
 //!
-//! Parameters at their [`absent`](Knob::absent) values are no effect at all, exactly.
+//! Parameters at their [`absent`](Knob::absent) values are no effect at all, exactly. [`library`] has
+//! them all; another one is a file and a line of its list.
 
+mod lobes;
+mod meeting;
 mod model;
+mod spread;
 
 use glam::DVec3;
 
@@ -22,6 +26,54 @@ use crate::radar::{Link, Radar};
 use crate::trace::{Bvh, Hit};
 
 pub use model::{Model, Prediction};
+
+/// Declares the file of every effect and lists them all, in the order in which they act.
+macro_rules! library {
+    ($($file:ident::$effect:ident),+ $(,)?) => {
+        $(mod $file;)+
+
+        /// Every effect, in the order in which they act on a chirp.
+        pub fn library() -> [&'static dyn Effect; [$(stringify!($file)),+].len()] {
+            [$(&$file::$effect),+]
+        }
+    };
+}
+
+// `cargo fmt` does not follow modules in a macro: `rustfmt src/effects/*.rs` does them.
+library! {
+    pose::Pose,
+    motion::Motion,
+    subsurface::Subsurface,
+    thin_film::ThinFilm,
+    anisotropy::Anisotropy,
+    correlated_shadowing::CorrelatedShadowing,
+    covering_layer::CoveringLayer,
+    foreign_patch::ForeignPatch,
+    fov_gain::FovGain,
+    drift::Drift,
+    finite_spot::FiniteSpot,
+    multi_bounce::MultiBounce,
+    compression::Compression,
+    angle_error::AngleError,
+    speckle::Speckle,
+    noise_floor::NoiseFloor,
+}
+
+/// The effect of that name; `None` when the library has none.
+///
+/// ```
+/// assert_eq!(matdb::effects::find("drift").unwrap().name(), "drift");
+/// assert!(matdb::effects::find("witchcraft").is_none());
+/// ```
+pub fn find(name: &str) -> Option<&'static dyn Effect> {
+    library().into_iter().find(|effect| effect.name() == name)
+}
+
+/// Middle of the points where looks meet the target, m, global frame; the origin without looks.
+pub fn middle(looks: &[Look]) -> DVec3 {
+    let sum: DVec3 = looks.iter().map(|look| look.hit.point.xyz).sum();
+    sum / looks.len().max(1) as f64
+}
 
 /// One chirp that meets the target, as far as the scene knows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +115,9 @@ pub struct Stage<'a> {
     pub region_of_facet: &'a [u16],
     /// Direction of the grain of every region, global frame.
     pub grain_of_region: &'a [DVec3],
+    /// What a pose turns about, m, global frame: the [`middle`] of all looks of the scan, whichever
+    /// of them are predicted.
+    pub middle: DVec3,
 }
 
 /// The law of what is received about its mean.
@@ -106,6 +161,18 @@ pub struct Knob {
     pub step: f64,
 }
 
+impl Knob {
+    const fn new(
+        name: &'static str,
+        unit: &'static str,
+        [min, max]: [f64; 2],
+        absent: f64,
+        step: f64,
+    ) -> Knob {
+        Knob { name, unit, min, max, absent, step }
+    }
+}
+
 /// A physical effect that the base model lacks.
 ///
 /// `values` are those of [`knobs`](Effect::knobs), in their order and within their ranges.
@@ -135,21 +202,29 @@ pub trait Effect: Sync {
     }
 
     /// f in backscatter, 1/sr, of a look whose law without this effect has `f_per_sr`.
-    fn scatter(&self, _values: &[f64], _law: &Brdf, _look: &Look, f_per_sr: f64) -> f64 {
-        f_per_sr
-    }
-
-    /// Factor on the power of a look, a ratio.
-    fn gain(&self, _values: &[f64], _look: &Look) -> f64 {
-        1.0
-    }
-
-    /// Changes the mean powers, W, and ranges, m, of all looks together, after all gains.
-    fn arrive(
+    fn scatter(
         &self,
         _values: &[f64],
         _stage: &Stage,
         _law: &Brdf,
+        _look: &Look,
+        f_per_sr: f64,
+    ) -> f64 {
+        f_per_sr
+    }
+
+    /// Factor on the power of a look, a ratio.
+    fn gain(&self, _values: &[f64], _stage: &Stage, _look: &Look) -> f64 {
+        1.0
+    }
+
+    /// Changes the mean powers, W, and ranges, m, of all looks together, after all gains. `laws` are
+    /// those of the regions.
+    fn arrive(
+        &self,
+        _values: &[f64],
+        _stage: &Stage,
+        _laws: &[Brdf],
         _looks: &[Look],
         _arrived: &mut [Arrived],
     ) {
@@ -169,3 +244,6 @@ pub struct Arrived {
     /// Range, m.
     pub range_m: f64,
 }
+
+#[cfg(test)]
+mod testing;

@@ -37,9 +37,7 @@ impl Model<'_> {
         let mut arrived: Vec<Arrived> =
             seen.par_iter().map(|look| self.arrived(stage, look)).collect();
         for (effect, values) in &self.effects {
-            if let Some(law) = self.laws.first() {
-                effect.arrive(values, stage, law, &seen, &mut arrived);
-            }
+            effect.arrive(values, stage, &self.laws, &seen, &mut arrived);
         }
         let slope = |look: &Option<Look>| look.map_or(0.0, |look| self.slope_per_rad(stage, &look));
         let mut arrived = arrived.into_iter();
@@ -68,10 +66,10 @@ impl Model<'_> {
         let retro = Direction::from_angles(look.hit.theta_rad(), look.azimuth_rad);
         let f_per_sr =
             self.effects.iter().fold(law.f_per_sr(retro, retro), |f, (effect, values)| {
-                effect.scatter(values, law, look, f)
+                effect.scatter(values, stage, law, look, f)
             });
         let gain: f64 =
-            self.effects.iter().map(|(effect, values)| effect.gain(values, look)).product();
+            self.effects.iter().map(|(effect, values)| effect.gain(values, stage, look)).product();
         gain * stage.link.power_w(look.hit.range_m, look.hit.cos_theta, f_per_sr)
     }
 
