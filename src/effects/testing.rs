@@ -213,17 +213,3 @@ fn names_and_knobs_are_told_apart() {
         }
     }
 }
-
-#[test]
-fn timing_temporary() {
-    for mut bench in benches() {
-        let few = bench.looks.clone();
-        bench.looks = few.iter().cycle().take(12_000).copied().collect();
-        for effect in library() {
-            let values = effect.starts(&bench.stage(), &bench.looks).remove(0);
-            let begun = std::time::Instant::now();
-            bench.predict(vec![(effect, values)]);
-            eprintln!("{} {:?}", effect.name(), begun.elapsed());
-        }
-    }
-}
