@@ -32,6 +32,7 @@
 //! | [`units`], [`frames`], [`geometry`] | numbers with units, coordinate frames as types, plain meshes and rasters |
 //! | [`mod@formats`], [`brdf`], [`radar`] | bytes to plain data and back; how surfaces scatter; the instrument |
 //! | [`material`], [`scene`], [`trace`] | what is known of a surface; what is looked at; closest hits |
+//! | [`effects`] | physical effects beyond the paper's model, one file each |
 //! | [`render`] | scan × target × materials → detections, image, cloud |
 //! | [`measure`], [`fit`] | a measured cloud → pose → curve; a curve → parameters |
 //! | [`store`] | the only SQL |
@@ -53,6 +54,7 @@ pub mod radar;
 pub mod material;
 pub mod scene;
 pub mod trace;
+pub mod effects;
 pub mod render;
 pub mod measure;
 pub mod fit;

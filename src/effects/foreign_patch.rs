@@ -1,0 +1,124 @@
+//! A round place with another material: so many dB within a radius along the surface.
+
+use super::covering_layer::share_of_spot;
+use super::{Effect, Knob, Level, Look, Stage};
+use crate::radar::scan::PATTERN_RANGE_M;
+use crate::units::ratio_from_db;
+
+/// The effect `foreign-patch`.
+pub(super) struct ForeignPatch;
+
+const KNOBS: [Knob; 4] = [
+    Knob::new("level_db", "dB", [-30.0, 30.0], 0.0, 0.5),
+    Knob::new("centre_x_m", "m", [-3.0, 3.0], 0.0, 0.01),
+    Knob::new("centre_y_m", "m", [-3.0, 3.0], 0.0, 0.01),
+    Knob::new("radius_m", "m", [0.005, 1.0], 0.05, 0.01),
+];
+
+/// Columns and rows of the places where a search begins.
+const GRID: [usize; 2] = [3, 4];
+
+/// Distance from a look to the ray of the centre, along the surface as it lies at the look, m.
+fn apart_m(stage: &Stage, look: &Look, [x_m, y_m]: [f64; 2]) -> f64 {
+    let axes = stage.radar.frames().global_from_target.rotation();
+    let aside = (x_m - look.xt_m) * axes.x_axis + (y_m - look.yt_m) * axes.y_axis;
+    let forward = look.ray.direction.xyz();
+    // At a glancing surface the way along it is long, and its plane holds only near by.
+    let facing = look.normal.dot(-forward).max(0.1);
+    let onto_surface = aside + forward * (look.normal.dot(aside) / facing);
+    onto_surface.length() * look.hit.range_m / PATTERN_RANGE_M
+}
+
+/// Least and largest of some numbers; zeros when there are none.
+fn span(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
+    let (least, most) = (values.clone().reduce(f64::min), values.reduce(f64::max));
+    [least.unwrap_or(0.0), most.unwrap_or(0.0)]
+}
+
+impl Effect for ForeignPatch {
+    fn name(&self) -> &'static str {
+        "foreign-patch"
+    }
+
+    fn level(&self) -> Level {
+        Level::Scene
+    }
+
+    fn knobs(&self) -> &'static [Knob] {
+        &KNOBS
+    }
+
+    fn is(&self) -> &'static str {
+        "A round place on the target is of another material, that returns more or less by so many \
+         dB. Its centre is where the field of view has these x_t and y_t, its radius is along the \
+         surface."
+    }
+
+    fn shows(&self) -> &'static str {
+        "The residual has one compact spot on the surface, at any angle, with a sharp outline. A \
+         covering layer ends at a straight line and its loss grows with the angle; multiple bounces \
+         brighten places too, but concave ones, and with longer ranges."
+    }
+
+    /// The cells of a coarse grid over the target that hold a look.
+    fn starts(&self, _stage: &Stage, looks: &[Look]) -> Vec<Vec<f64>> {
+        let [left, right] = span(looks.iter().map(|look| look.xt_m));
+        let [low, high] = span(looks.iter().map(|look| look.yt_m));
+        let [columns, rows] = GRID;
+        let (width, height) = ((right - left) / columns as f64, (high - low) / rows as f64);
+        let radius_m = (width.min(height) / 2.0).clamp(0.02, 0.3);
+        let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
+        let centre = |(column, row): (usize, usize)| {
+            [left + (column as f64 + 0.5) * width, low + (row as f64 + 0.5) * height]
+        };
+        let near =
+            |at: &[f64; 2]| looks.iter().any(|l| (l.xt_m - at[0]).hypot(l.yt_m - at[1]) < radius_m);
+        let inside = |centre_m: f64| centre_m.clamp(-3.0, 3.0);
+        let start = |[x, y]: [f64; 2]| vec![1.0, inside(x), inside(y), radius_m];
+        cells.map(centre).filter(near).map(start).collect()
+    }
+
+    fn gain(&self, values: &[f64], stage: &Stage, look: &Look) -> f64 {
+        let &[level_db, x_m, y_m, radius_m] = values else { return 1.0 };
+        if level_db == 0.0 {
+            return 1.0;
+        }
+        let beyond_m = radius_m - apart_m(stage, look, [x_m, y_m]);
+        let share = share_of_spot(beyond_m, stage.radar.spot_diameter_m);
+        1.0 + share * (ratio_from_db(level_db) - 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::testing::{Bench, db};
+
+    #[test]
+    fn only_what_lies_within_the_radius_changes() {
+        let bench = Bench::plate();
+        let (bare, with) = (bench.bare(), bench.with(&ForeignPatch, &[4.0, 0.05, -0.1, 0.06]));
+        let mut seen = [0; 2];
+        for ((look, bare), with) in bench.looks.iter().zip(&bare).zip(&with) {
+            let apart_m = (look.xt_m - 0.05).hypot(look.yt_m + 0.1);
+            let change_db = db(with.power_w / bare.power_w);
+            // The plate is seen within 3° of its normal; three spots from the edge all is settled.
+            if apart_m < 0.02 {
+                seen[0] += 1;
+                assert!((change_db - 4.0).abs() < 0.01, "{change_db}");
+            } else if apart_m > 0.11 {
+                seen[1] += 1;
+                assert!(change_db.abs() < 0.01, "{change_db}");
+            }
+        }
+        assert!(seen[0] > 0 && seen[1] > 100, "{seen:?}");
+    }
+
+    #[test]
+    fn searches_begin_on_the_target() {
+        let bench = Bench::plate();
+        let starts = ForeignPatch.starts(&bench.stage(), &bench.looks);
+        assert_eq!(starts.len(), 12);
+        assert!(starts.iter().all(|start| start[1].abs() < 0.25 && start[2].abs() < 0.25));
+    }
+}

@@ -1,0 +1,81 @@
+//! Where another ray meets the target, or the same ray a target that has moved, and what the base law
+//! makes of it.
+
+use glam::{DMat3, DVec3};
+
+use super::{Look, Stage};
+use crate::brdf::{Brdf, Scattering};
+use crate::frames::{Direction, Global, Point, Ray, Surface};
+use crate::trace::Hit;
+
+/// Axes on a surface: along the grain, across it, and the normal.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Axes(DMat3);
+
+impl Axes {
+    /// At a normal; a grain that stands on the surface has no direction along it.
+    pub(super) fn new(normal: DVec3, grain: DVec3) -> Axes {
+        let along = grain - grain.dot(normal) * normal;
+        let stands = along.length() <= 1e-9 * grain.length();
+        let along = if stands { normal.any_orthonormal_vector() } else { along.normalize() };
+        Axes(DMat3::from_cols(along, normal.cross(along), normal))
+    }
+
+    /// Of a look.
+    pub(super) fn of(stage: &Stage, look: &Look) -> Axes {
+        Axes::new(look.normal, grain(stage, look.region))
+    }
+
+    /// A unit vector of the world, seen from the surface.
+    pub(super) fn local(&self, world: DVec3) -> Direction<Surface> {
+        let above = Direction::from_angles(0.0, 0.0);
+        Direction::new(self.0.transpose() * world).unwrap_or(above)
+    }
+
+    /// A vector of the surface, in the world.
+    pub(super) fn world(&self, local: DVec3) -> DVec3 {
+        self.0 * local
+    }
+}
+
+fn grain(stage: &Stage, region: u16) -> DVec3 {
+    stage.grain_of_region.get(usize::from(region)).copied().unwrap_or(DVec3::Y)
+}
+
+/// The look, had its chirp taken another ray.
+pub(super) fn met(stage: &Stage, look: &Look, ray: Ray<Global>) -> Option<Look> {
+    let hit = stage.bvh.closest(&ray)?;
+    let back = -ray.direction.xyz();
+    let outward = stage.bvh.mesh().area_normal(hit.facet as usize).normalize_or(back);
+    let normal = if outward.dot(back) < 0.0 { -outward } else { outward };
+    let region = stage.region_of_facet.get(hit.facet as usize).copied().unwrap_or(0);
+    let to_radar = Axes::new(normal, grain(stage, region)).local(back).xyz();
+    let azimuth_rad = to_radar.y.atan2(to_radar.x);
+    Some(Look { ray, hit, normal, azimuth_rad, region, ..*look })
+}
+
+/// The look at a target turned about `pivot` and then shifted; `None` where the ray misses it then.
+pub(super) fn moved(
+    stage: &Stage,
+    look: &Look,
+    rotation: DMat3,
+    pivot: DVec3,
+    shift_m: DVec3,
+) -> Option<Look> {
+    // The target stands still in its own frame, and the ray moves the other way.
+    let back = rotation.transpose();
+    let origin = Point::from(back * (look.ray.origin.xyz - pivot - shift_m) + pivot);
+    let direction = Direction::new(back * look.ray.direction.xyz())?;
+    let there = met(stage, look, Ray { origin, direction })?;
+    let point = rotation * (there.hit.point.xyz - pivot) + pivot + shift_m;
+    let hit = Hit { point: point.into(), ..there.hit };
+    Some(Look { ray: look.ray, hit, normal: rotation * there.normal, ..there })
+}
+
+/// Equation (11) of the base law at a look, W; nothing where its region has no law.
+pub(super) fn base_power_w(stage: &Stage, laws: &[Brdf], look: &Look) -> f64 {
+    let retro = Direction::from_angles(look.hit.theta_rad(), look.azimuth_rad);
+    laws.get(usize::from(look.region)).map_or(0.0, |law| {
+        stage.link.power_w(look.hit.range_m, look.hit.cos_theta, law.f_per_sr(retro, retro))
+    })
+}

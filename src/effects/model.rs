@@ -1,0 +1,87 @@
+//! A base law with any number of effects, and what it predicts of a scan.
+
+use rayon::prelude::*;
+
+use super::{Arrived, Effect, Look, Receiver, Stage};
+use crate::brdf::{Brdf, Scattering};
+use crate::frames::Direction;
+
+/// The base law and the effects that were added to it, each with its values.
+#[derive(Clone)]
+pub struct Model<'a> {
+    /// Scattering of each region.
+    pub laws: Vec<Brdf>,
+    /// Law of the receiver without effects.
+    pub receiver: Receiver,
+    /// The effects, in the order in which they act.
+    pub effects: Vec<(&'a dyn Effect, Vec<f64>)>,
+}
+
+/// What a model predicts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prediction {
+    /// Mean power and range of every look, without thermal noise; `None` where the ray misses.
+    pub arrived: Vec<Option<Arrived>>,
+    /// d ln(mean power)/dθ of every look, 1/rad, for tilts that vary at random.
+    pub slope_per_rad: Vec<f64>,
+    /// The law about the mean.
+    pub receiver: Receiver,
+}
+
+impl Model<'_> {
+    /// What arrives of every look.
+    pub fn predict(&self, stage: &Stage, looks: &[Look]) -> Prediction {
+        let placed: Vec<Option<Look>> =
+            looks.par_iter().map(|look| self.placed(stage, *look)).collect();
+        let seen: Vec<Look> = placed.iter().flatten().copied().collect();
+        let mut arrived: Vec<Arrived> =
+            seen.par_iter().map(|look| self.arrived(stage, look)).collect();
+        for (effect, values) in &self.effects {
+            effect.arrive(values, stage, &self.laws, &seen, &mut arrived);
+        }
+        let slope = |look: &Option<Look>| look.map_or(0.0, |look| self.slope_per_rad(stage, &look));
+        let mut arrived = arrived.into_iter();
+        Prediction {
+            slope_per_rad: placed.par_iter().map(slope).collect(),
+            arrived: placed.iter().map(|look| look.and_then(|_| arrived.next())).collect(),
+            receiver: self
+                .effects
+                .iter()
+                .fold(self.receiver, |receiver, (effect, values)| effect.receive(values, receiver)),
+        }
+    }
+
+    fn placed(&self, stage: &Stage, look: Look) -> Option<Look> {
+        let mut effects = self.effects.iter();
+        effects.try_fold(look, |look, (effect, values)| effect.place(values, stage, look))
+    }
+
+    fn arrived(&self, stage: &Stage, look: &Look) -> Arrived {
+        Arrived { power_w: self.power_w(stage, look), range_m: look.hit.range_m }
+    }
+
+    /// Equation (11) with every effect on the surface and the gain.
+    fn power_w(&self, stage: &Stage, look: &Look) -> f64 {
+        let Some(law) = self.laws.get(usize::from(look.region)) else { return 0.0 };
+        let retro = Direction::from_angles(look.hit.theta_rad(), look.azimuth_rad);
+        let f_per_sr =
+            self.effects.iter().fold(law.f_per_sr(retro, retro), |f, (effect, values)| {
+                effect.scatter(values, stage, law, look, f)
+            });
+        let gain: f64 =
+            self.effects.iter().map(|(effect, values)| effect.gain(values, stage, look)).product();
+        gain * stage.link.power_w(look.hit.range_m, look.hit.cos_theta, f_per_sr)
+    }
+
+    fn slope_per_rad(&self, stage: &Stage, look: &Look) -> f64 {
+        const STEP_RAD: f64 = 1e-3;
+        let at = |theta_rad: f64| {
+            let mut look = *look;
+            look.hit.cos_theta = theta_rad.cos();
+            self.power_w(stage, &look).max(f64::MIN_POSITIVE).ln()
+        };
+        let theta_rad =
+            look.hit.theta_rad().clamp(STEP_RAD, std::f64::consts::FRAC_PI_2 - 2.0 * STEP_RAD);
+        (at(theta_rad + STEP_RAD) - at(theta_rad - STEP_RAD)) / (2.0 * STEP_RAD)
+    }
+}

@@ -1,0 +1,199 @@
+//! Echoes by way of a second surface: radar → first hit → second hit → radar.
+//!
+//! What leaves the first hit into a direction falls on the second and is scattered to the radar, if
+//! nothing hides it there: P₂ = coupling·∫ Φ·f₁(i, ω)·cos θ_ω · f₂·cos θ_o·A_eq/R₂² dω, over fixed
+//! directions, half spread by the cosine and half by the lobe, each weighed by their joint density (the
+//! balance heuristic: Veach & Guibas, SIGGRAPH 1995). Its range is half the whole way, and what is
+//! reported is the mean by power.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::lobes::first_lobe;
+use super::meeting::{Axes, met};
+use super::spread::sunflower;
+use super::{Arrived, Effect, Knob, Level, Look, Stage};
+use crate::brdf::{Brdf, Distribution, Scattering};
+use crate::frames::{Direction, Point, Ray, Surface};
+use crate::units::ratio_from_db;
+
+/// The effect `multi-bounce`.
+pub(super) struct MultiBounce;
+
+/// A coupling that counts as none, dB.
+const NONE_DB: f64 = -60.0;
+/// Directions of each kind.
+const DIRECTIONS: usize = 16;
+/// Lobes narrower than this are not followed, or a few rays would carry everything.
+const M_RANGE: [f64; 2] = [0.05, 2.0];
+/// A ray leaves so far from its surface, m, and this much is no obstacle.
+const CLEARANCE_M: f64 = 1e-6;
+
+/// Onward directions at a surface whose lobe has the roughness m, with the density of each, 1/sr.
+fn onward(i: Direction<Surface>, m: f64) -> impl Iterator<Item = (Direction<Surface>, f64)> {
+    let by_cosine = sunflower(DIRECTIONS)
+        .map(|(share, azimuth_rad)| Direction::from_angles(share.sqrt().asin(), azimuth_rad));
+    let by_lobe = sunflower(DIRECTIONS).filter_map(move |(share, azimuth_rad)| {
+        let tan = m * (-(1.0 - share).ln()).sqrt();
+        let h = Direction::<Surface>::from_angles(tan.atan(), azimuth_rad).xyz();
+        Direction::new(2.0 * i.xyz().dot(h) * h - i.xyz())
+    });
+    let above = by_cosine.chain(by_lobe).filter(|o| o.cos_theta() > 1e-6);
+    above.map(move |o| (o, (o.cos_theta() / PI + lobe_density(i, o, m)) / 2.0))
+}
+
+/// Density at o of reflections of i on facets by Beckmann's law, 1/sr.
+fn lobe_density(i: Direction<Surface>, o: Direction<Surface>, m: f64) -> f64 {
+    let Some(h) = Direction::<Surface>::new(i.xyz() + o.xyz()) else { return 0.0 };
+    let per_sr = Distribution::Beckmann.d_per_sr(h.cos_theta(), m) * h.cos_theta();
+    per_sr / (4.0 * i.xyz().dot(h.xyz()).max(1e-9))
+}
+
+/// Share of the flux along a path that reaches the radar from the second surface, and the way back, m.
+fn returned(stage: &Stage, laws: &[Brdf], first: &Look, onward: DVec3) -> Option<(f64, f64)> {
+    let start = first.hit.point.xyz + CLEARANCE_M * first.normal;
+    let ray = Ray { origin: Point::from(start), direction: Direction::new(onward)? };
+    let second = met(stage, first, ray)?;
+    let radar = first.ray.origin;
+    let back = second.hit.point.towards(radar)?;
+    let cos_exit = second.normal.dot(back.xyz());
+    let back_m = second.hit.point.distance_m(radar);
+    let sight = Ray { origin: radar, direction: -back };
+    let hidden = stage.bvh.closest(&sight).is_some_and(|hit| hit.range_m < back_m - 1e-5);
+    if cos_exit <= 0.0 || hidden {
+        return None;
+    }
+    let axes = Axes::of(stage, &second);
+    let law = laws.get(usize::from(second.region))?;
+    let f_per_sr = law.f_per_sr(axes.local(-onward), axes.local(back.xyz()));
+    let way_m = first.hit.point.distance_m(second.hit.point) + back_m;
+    Some((stage.link.received_per_w(back_m, cos_exit, f_per_sr), way_m))
+}
+
+/// Power, W, and range, m, of all that a chirp returns by way of a second surface.
+fn detour(stage: &Stage, laws: &[Brdf], look: &Look) -> Option<Arrived> {
+    let first = met(stage, look, look.ray)?;
+    let law = laws.get(usize::from(first.region))?;
+    let [least, most] = M_RANGE;
+    let m = first_lobe(law).map_or(most, |lobe| lobe.m).clamp(least, most);
+    let (axes, flux_w) = (Axes::of(stage, &first), stage.link.flux_w(first.hit.cos_theta));
+    let i = axes.local(-first.ray.direction.xyz());
+    let (mut power_w, mut moment) = (0.0, 0.0);
+    for (o, density_per_sr) in onward(i, m) {
+        if let Some((share, way_m)) = returned(stage, laws, &first, axes.world(o.xyz())) {
+            let sent_w = flux_w * law.f_per_sr(i, o) * o.cos_theta() / density_per_sr;
+            let one_w = sent_w * share / (2 * DIRECTIONS) as f64;
+            power_w += one_w;
+            moment += one_w * (first.hit.range_m + way_m) / 2.0;
+        }
+    }
+    (power_w > 0.0).then(|| Arrived { power_w, range_m: moment / power_w })
+}
+
+impl Effect for MultiBounce {
+    fn name(&self) -> &'static str {
+        "multi-bounce"
+    }
+
+    fn level(&self) -> Level {
+        Level::Scene
+    }
+
+    fn knobs(&self) -> &'static [Knob] {
+        const KNOBS: [Knob; 1] = [Knob::new("coupling_db", "dB", [NONE_DB, 30.0], NONE_DB, 1.0)];
+        &KNOBS
+    }
+
+    fn is(&self) -> &'static str {
+        "Part of the wave goes on from the first surface to a second one and returns from there; 0 dB \
+         is as much as the law of the material makes of it."
+    }
+
+    fn shows(&self) -> &'static str {
+        "Places that face another surface, as in corners and under arms, are too bright and too far \
+         away. A foreign patch is bright without a longer range, and a wrong pose is off in range \
+         without being bright; convex targets never show this."
+    }
+
+    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+        vec![vec![-10.0], vec![0.0], vec![10.0]]
+    }
+
+    fn arrive(
+        &self,
+        values: &[f64],
+        stage: &Stage,
+        laws: &[Brdf],
+        looks: &[Look],
+        arrived: &mut [Arrived],
+    ) {
+        let &[coupling_db] = values else { return };
+        if coupling_db <= NONE_DB {
+            return;
+        }
+        let coupling = ratio_from_db(coupling_db);
+        looks.par_iter().zip(arrived).for_each(|(look, one)| {
+            if let Some(detour) = detour(stage, laws, look) {
+                let (direct_w, detour_w) = (one.power_w, coupling * detour.power_w);
+                one.power_w = direct_w + detour_w;
+                let share = detour_w / one.power_w;
+                one.range_m += share * (detour.range_m - one.range_m);
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::Lambert;
+    use crate::effects::testing::{Bench, dihedral, lobe};
+    use crate::effects::{Model, Receiver};
+
+    #[test]
+    fn it_adds_power_and_way_in_a_corner_and_nothing_on_a_ball() {
+        let corner = Bench::of(dihedral());
+        let (bare, with) = (corner.bare(), corner.with(&MultiBounce, &[0.0]));
+        let mut raised = 0;
+        for (bare, with) in bare.iter().zip(&with) {
+            assert!(with.power_w >= bare.power_w && with.range_m >= bare.range_m - 1e-9);
+            raised += usize::from(with.power_w > 1.05 * bare.power_w);
+        }
+        assert!(raised > bare.len() / 2, "{raised} of {}", bare.len());
+        let ball = Bench::sphere();
+        assert_eq!(ball.with(&MultiBounce, &[0.0]), ball.bare());
+    }
+
+    /// ∫ 1 dω over the hemisphere is 2π whatever the lobe, and ∫ cos θ dω is π.
+    #[test]
+    fn the_directions_integrate_over_the_hemisphere() {
+        let i = Direction::from_angles(0.5, 0.3);
+        for m in [0.1, lobe().m, 1.0] {
+            let sum: f64 = onward(i, m).map(|(o, density)| o.cos_theta() / density).sum();
+            let found = sum / (2 * DIRECTIONS) as f64 / PI;
+            // Half of the directions see the whole, so that a few per cent are left.
+            assert!((found - 1.0).abs() < 0.1, "{m}: {found}");
+        }
+    }
+
+    /// Each bounce takes one factor of the albedo, and what leaves one wall of a right angle meets the
+    /// other by less than half.
+    #[test]
+    fn the_power_of_a_lambertian_corner_follows_its_albedo() {
+        let corner = Bench::of(dihedral());
+        let share = |albedo: f64| {
+            let laws = vec![Brdf::Lambert(Lambert { albedo })];
+            let receiver = Receiver { looks: 4.0, noise_w: 0.0, tilt_sd_rad: 0.0 };
+            let total = |effects| -> f64 {
+                let model = Model { laws: laws.clone(), receiver, effects };
+                let found = model.predict(&corner.stage(), &corner.looks);
+                found.arrived.iter().flatten().map(|one| one.power_w).sum()
+            };
+            total(vec![(&MultiBounce as &dyn Effect, vec![0.0])]) / total(Vec::new()) - 1.0
+        };
+        assert!((share(0.8) / share(0.4) - 2.0).abs() < 1e-9);
+        assert!(share(0.8) > 0.02 && share(0.8) < 0.4, "{}", share(0.8));
+    }
+}

@@ -1,0 +1,106 @@
+//! A target that does not stand where the scene says: turned about the middle of the looks, by roll,
+//! pitch and yaw about the fixed axes x, y, z, and then shifted.
+
+use glam::{DMat3, DVec3};
+
+use super::meeting::moved;
+use super::{Effect, Knob, Level, Look, Stage};
+use crate::frames;
+
+/// The effect `pose`.
+pub(super) struct Pose;
+
+const SHIFT_M: [f64; 2] = [-0.2, 0.2];
+const TURN_DEG: [f64; 2] = [-20.0, 20.0];
+const KNOBS: [Knob; 6] = [
+    Knob::new("translation_x_m", "m", SHIFT_M, 0.0, 2e-3),
+    Knob::new("translation_y_m", "m", SHIFT_M, 0.0, 2e-3),
+    Knob::new("translation_z_m", "m", SHIFT_M, 0.0, 2e-3),
+    Knob::new("rotation_x_deg", "deg", TURN_DEG, 0.0, 0.5),
+    Knob::new("rotation_y_deg", "deg", TURN_DEG, 0.0, 0.5),
+    Knob::new("rotation_z_deg", "deg", TURN_DEG, 0.0, 0.5),
+];
+
+fn rotation(turn_deg: DVec3) -> DMat3 {
+    let turn_rad = turn_deg.map(f64::to_radians);
+    frames::Pose::<frames::Global, frames::Global>::from_euler_xyz(turn_rad, DVec3::ZERO).rotation()
+}
+
+impl Effect for Pose {
+    fn name(&self) -> &'static str {
+        "pose"
+    }
+
+    fn level(&self) -> Level {
+        Level::Scene
+    }
+
+    fn knobs(&self) -> &'static [Knob] {
+        &KNOBS
+    }
+
+    fn is(&self) -> &'static str {
+        "The target stands elsewhere than the scene says: shifted along the global axes and turned \
+         about the middle of what the scan has hit."
+    }
+
+    fn shows(&self) -> &'static str {
+        "The ranges are off, smoothly over the surface, and so are the powers where the angle is \
+         wrong: too strong on one side of the brightest place and too weak on the other. Edges have \
+         hits where none should be. Motion does the same, but changes along the scan."
+    }
+
+    /// Three millimetres along each axis and one degree about it.
+    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+        let weak = [3e-3, 3e-3, 3e-3, 1.0, 1.0, 1.0];
+        let only = |at: usize| (0..6).map(|i| if i == at { weak[i] } else { 0.0 }).collect();
+        (0..6).map(only).collect()
+    }
+
+    fn place(&self, values: &[f64], stage: &Stage, look: Look) -> Option<Look> {
+        let &[x, y, z, roll, pitch, yaw] = values else { return Some(look) };
+        let (shift_m, turn_deg) = (DVec3::new(x, y, z), DVec3::new(roll, pitch, yaw));
+        if shift_m == DVec3::ZERO && turn_deg == DVec3::ZERO {
+            return Some(look);
+        }
+        moved(stage, &look, rotation(turn_deg), stage.middle, shift_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::testing::Bench;
+
+    #[test]
+    fn a_shift_towards_the_radar_shortens_the_range() {
+        let bench = Bench::plate();
+        for look in &bench.looks {
+            let found =
+                Pose.place(&[0.0, 0.0, 0.01, 0.0, 0.0, 0.0], &bench.stage(), *look).unwrap();
+            let shorter_m = look.hit.range_m - found.hit.range_m;
+            assert!((shorter_m * look.hit.cos_theta - 0.01).abs() < 1e-9);
+            assert!((found.hit.point.xyz.z - 0.01).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_turn_leaves_the_middle_and_tilts_the_normal() {
+        let bench = Bench::plate();
+        let look =
+            bench.looks.iter().min_by(|a, b| a.hit.range_m.total_cmp(&b.hit.range_m)).unwrap();
+        let found = Pose.place(&[0.0, 0.0, 0.0, 5.0, 0.0, 0.0], &bench.stage(), *look).unwrap();
+        // The plate turns about its middle, half a row of rays away at most.
+        assert!((found.hit.range_m - look.hit.range_m).abs() < 2e-3);
+        let tilt_deg = found.normal.dot(look.normal).acos().to_degrees();
+        assert!((tilt_deg - 5.0).abs() < 1e-6);
+        assert!((found.normal.dot(-found.ray.direction.xyz()) - found.hit.cos_theta).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_has_moved_out_of_the_way_is_missed() {
+        let bench = Bench::plate();
+        let edge = bench.looks.iter().max_by(|a, b| a.xt_m.total_cmp(&b.xt_m)).unwrap();
+        assert!(Pose.place(&[-0.2, 0.0, 0.0, 0.0, 0.0, 0.0], &bench.stage(), *edge).is_none());
+    }
+}

@@ -1,0 +1,64 @@
+//! Fewer looks of speckle than the radar declares.
+
+use super::{Effect, Knob, Level, Look, Receiver, Stage};
+
+/// The effect `speckle`.
+pub(super) struct Speckle;
+
+/// So many looks leave no speckle, and none are fewer than the declared.
+const ALL: f64 = 1e6;
+
+impl Effect for Speckle {
+    fn name(&self) -> &'static str {
+        "speckle"
+    }
+
+    fn level(&self) -> Level {
+        Level::Instrument
+    }
+
+    fn knobs(&self) -> &'static [Knob] {
+        const KNOBS: [Knob; 1] = [Knob::new("looks", "1", [0.3, ALL], ALL, 0.5)];
+        &KNOBS
+    }
+
+    fn is(&self) -> &'static str {
+        "The echo of a rough surface fluctuates like an average of this many independent looks, fewer \
+         than the radar is said to average."
+    }
+
+    fn shows(&self) -> &'static str {
+        "The powers scatter more than they should, alike at every angle, place and power, and their \
+         mean in watts stays right. An error of the angle scatters only where the curve is steep; a \
+         higher noise floor only the weak echoes."
+    }
+
+    /// As shares of the declared looks, or absolute where the radar declares no speckle.
+    fn starts(&self, stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+        let declared = stage.radar.speckle.map(|speckle| speckle.looks);
+        match declared {
+            Some(looks) => [0.7, 0.35].map(|share| vec![(share * looks).clamp(0.3, ALL)]).to_vec(),
+            None => [8.0, 4.0, 2.0, 1.0].map(|looks| vec![looks]).to_vec(),
+        }
+    }
+
+    fn receive(&self, values: &[f64], receiver: Receiver) -> Receiver {
+        let &[looks] = values else { return receiver };
+        if looks >= ALL {
+            return receiver;
+        }
+        Receiver { looks: receiver.looks.min(looks), ..receiver }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_fewer_looks_change_anything() {
+        let declared = Receiver { looks: 4.0, noise_w: 1e-13, tilt_sd_rad: 0.0 };
+        assert_eq!(Speckle.receive(&[2.5], declared).looks, 2.5);
+        assert_eq!(Speckle.receive(&[9.0], declared), declared);
+    }
+}

@@ -1,0 +1,215 @@
+//! Small scans for the tests of the effects, and what every effect must keep.
+
+use glam::DVec3;
+
+use super::meeting::met;
+use super::{Arrived, Effect, Look, Model, Prediction, Receiver, Stage, library, middle};
+use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
+use crate::frames::{Point, Ray};
+use crate::geometry::Mesh;
+use crate::radar::{Link, Radar};
+use crate::scene::solids;
+use crate::trace::{Bvh, Hit};
+
+/// Decibels of a ratio.
+pub(super) fn db(ratio: f64) -> f64 {
+    crate::units::db_from_ratio(ratio)
+}
+
+/// A specular lobe.
+pub(super) fn lobe() -> CookTorrance {
+    CookTorrance {
+        f_lambda: 0.2,
+        m: 0.2,
+        m_across: None,
+        distribution: Distribution::Beckmann,
+        shadowing: Shadowing::Separable,
+    }
+}
+
+/// A painted surface.
+fn paint(lobe: CookTorrance) -> Brdf {
+    Brdf::Mixture(Mixture {
+        k: 0.3,
+        diffuse: Box::new(Brdf::BlinnPhong(BlinnPhong { r_s: 0.02, alpha: 4.0 })),
+        specular: Box::new(Brdf::CookTorrance(lobe)),
+    })
+}
+
+/// A target 8 m in front of a radar that looks along −z, and the looks that meet it.
+pub(super) struct Bench {
+    bvh: Bvh<'static>,
+    radar: Radar,
+    regions: Vec<u16>,
+    law: Brdf,
+    pub looks: Vec<Look>,
+}
+
+const GRAIN: [DVec3; 1] = [DVec3::Y];
+const SIDE: u32 = 15;
+const HALF_M: f64 = 0.25;
+
+impl Bench {
+    /// A flat plate across the line of sight.
+    pub(super) fn plate() -> Bench {
+        Bench::of(solids::plate(0.6, 0.6))
+    }
+
+    /// A ball of 0.3 m.
+    pub(super) fn sphere() -> Bench {
+        Bench::of(solids::icosphere(0.3, 4))
+    }
+
+    /// Any mesh.
+    pub(super) fn of(mesh: Mesh) -> Bench {
+        let mesh: &'static Mesh = Box::leak(Box::new(mesh));
+        let regions = vec![0; mesh.facets.len()];
+        let (bvh, radar, looks) = (Bvh::new(mesh), Radar::default(), Vec::new());
+        let mut bench = Bench { bvh, radar, regions, law: paint(lobe()), looks };
+        let looks = (0..SIDE * SIDE).filter_map(|chirp| look(&bench.stage(), chirp)).collect();
+        bench.looks = looks;
+        bench
+    }
+
+    pub(super) fn stage(&self) -> Stage<'_> {
+        Stage {
+            radar: &self.radar,
+            link: Link::new(&self.radar),
+            bvh: &self.bvh,
+            region_of_facet: &self.regions,
+            grain_of_region: &GRAIN,
+            middle: middle(&self.looks),
+        }
+    }
+
+    pub(super) fn predict(&self, effects: Vec<(&dyn Effect, Vec<f64>)>) -> Prediction {
+        let receiver = Receiver { looks: 4.0, noise_w: 1e-13, tilt_sd_rad: 0.0 };
+        Model { laws: vec![self.law.clone()], receiver, effects }
+            .predict(&self.stage(), &self.looks)
+    }
+
+    /// What arrives without any effect.
+    pub(super) fn bare(&self) -> Vec<Arrived> {
+        self.predict(Vec::new()).arrived.into_iter().flatten().collect()
+    }
+
+    /// What arrives with one.
+    pub(super) fn with(&self, effect: &dyn Effect, values: &[f64]) -> Vec<Arrived> {
+        self.predict(vec![(effect, values.to_vec())]).arrived.into_iter().flatten().collect()
+    }
+}
+
+fn look(stage: &Stage, chirp: u32) -> Option<Look> {
+    let at = |step: u32| HALF_M * (2.0 * f64::from(step) / f64::from(SIDE - 1) - 1.0);
+    let (xt_m, yt_m) = (at(chirp % SIDE), at(chirp / SIDE));
+    let origin = Point::new(0.0, 0.0, 8.0);
+    let ray = Ray { origin, direction: origin.towards(Point::new(xt_m, yt_m, 0.0))? };
+    let hit = Hit { facet: 0, range_m: 0.0, point: origin, cos_theta: 1.0 };
+    let progress = f64::from(chirp) / f64::from(SIDE * SIDE - 1);
+    let (time_s, normal) = (f64::from(chirp) * 2e-4, DVec3::Z);
+    let (azimuth_rad, region, edge_m) = (0.0, 0, 0.05);
+    let blank =
+        Look { chirp, time_s, progress, ray, hit, normal, azimuth_rad, region, xt_m, yt_m, edge_m };
+    met(stage, &blank, ray)
+}
+
+/// Two walls that face each other at a right angle, open towards the radar.
+pub(super) fn dihedral() -> Mesh {
+    let vertices = vec![
+        DVec3::new(0.0, -0.4, -0.2),
+        DVec3::new(0.0, 0.4, -0.2),
+        DVec3::new(-0.4, 0.4, 0.2),
+        DVec3::new(-0.4, -0.4, 0.2),
+        DVec3::new(0.4, 0.4, 0.2),
+        DVec3::new(0.4, -0.4, 0.2),
+    ];
+    let facets = vec![[0, 1, 2], [0, 2, 3], [0, 4, 1], [0, 5, 4]];
+    Mesh { vertices, facets, labels: Vec::new() }
+}
+
+fn absent(effect: &dyn Effect) -> Vec<f64> {
+    effect.knobs().iter().map(|knob| knob.absent).collect()
+}
+
+fn benches() -> [Bench; 3] {
+    [Bench::plate(), Bench::sphere(), Bench::of(dihedral())]
+}
+
+#[test]
+fn at_absent_values_no_effect_changes_anything() {
+    for bench in benches() {
+        let bare = bench.predict(Vec::new());
+        for effect in library() {
+            let with = bench.predict(vec![(effect, absent(effect))]);
+            assert_eq!(with, bare, "{}", effect.name());
+        }
+        let all = library().map(|effect| (effect, absent(effect))).to_vec();
+        assert_eq!(bench.predict(all), bare);
+    }
+}
+
+fn is_sound(prediction: &Prediction) -> bool {
+    let arrived = prediction.arrived.iter().flatten().all(|arrived| {
+        let Arrived { power_w, range_m } = *arrived;
+        power_w.is_finite() && power_w >= 0.0 && range_m.is_finite() && range_m > 0.0
+    });
+    let Receiver { looks, noise_w, tilt_sd_rad } = prediction.receiver;
+    let receiver = [looks, noise_w, tilt_sd_rad].iter().all(|v| v.is_finite());
+    arrived && receiver && prediction.slope_per_rad.iter().all(|slope| slope.is_finite())
+}
+
+#[test]
+fn every_value_within_the_ranges_gives_finite_numbers() {
+    for bench in benches() {
+        for effect in library() {
+            let starts = effect.starts(&bench.stage(), &bench.looks);
+            let start = starts.first().cloned().unwrap_or_else(|| absent(effect));
+            for (at, knob) in effect.knobs().iter().enumerate() {
+                for value in [knob.min, knob.max, (knob.min + knob.max) / 2.0] {
+                    let mut values = start.clone();
+                    values[at] = value;
+                    let found = bench.predict(vec![(effect, values.clone())]);
+                    assert!(is_sound(&found), "{} at {values:?}", effect.name());
+                }
+            }
+            let ends: [fn(&super::Knob) -> f64; 2] = [|knob| knob.min, |knob| knob.max];
+            for end in ends {
+                let values = effect.knobs().iter().map(end).collect();
+                assert!(is_sound(&bench.predict(vec![(effect, values)])), "{}", effect.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn searches_begin_within_the_ranges_and_where_there_is_an_effect() {
+    // At 45° only a rough surface shadows itself.
+    let law = paint(CookTorrance { m: 0.8, ..lobe() });
+    let bench = Bench { law, ..Bench::of(dihedral()) };
+    let bare = bench.predict(Vec::new());
+    for effect in library() {
+        let starts = effect.starts(&bench.stage(), &bench.looks);
+        assert!((1..=12).contains(&starts.len()), "{}", effect.name());
+        let mut felt = false;
+        for values in starts {
+            assert_eq!(values.len(), effect.knobs().len(), "{}", effect.name());
+            for (value, knob) in values.iter().zip(effect.knobs()) {
+                assert!((knob.min..=knob.max).contains(value), "{} {}", effect.name(), knob.name);
+            }
+            felt |= bench.predict(vec![(effect, values)]) != bare;
+        }
+        assert!(felt, "{}", effect.name());
+    }
+}
+
+#[test]
+fn names_and_knobs_are_told_apart() {
+    let names = library().map(|effect| effect.name());
+    for (position, effect) in library().into_iter().enumerate() {
+        assert_eq!(names.iter().position(|name| *name == effect.name()), Some(position));
+        for knob in effect.knobs() {
+            assert!((knob.min..=knob.max).contains(&knob.absent) && knob.step > 0.0);
+            assert_eq!(effect.knobs().iter().filter(|other| other.name == knob.name).count(), 1);
+        }
+    }
+}

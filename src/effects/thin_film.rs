@@ -1,0 +1,150 @@
+//! A film over a share of every spot: its interference changes the reflectance of the surface.
+//!
+//! With R the reflectance at θ of the film on the substrate, by the characteristic matrix at the centre
+//! frequency, and R₀ that of the bare substrate, the specular part of f is multiplied by
+//! 1 − c + c·R/R₀, and the diffuse part, which crosses the film twice, by 1 − c + c·((1 − R)/(1 − R₀))².
+//! The substrate is lossless with the index that f_λ asks for, n = (1 + √f_λ)/(1 − √f_λ). R is that of a
+//! film as flat as the surface is on average, so that the ripple in θ shows.
+
+use super::lobes::first_lobe;
+use super::{Effect, Knob, Level, Look, Stage};
+use crate::brdf::{Brdf, Fresnel, Layer, Layered, Scattering};
+use crate::frames::Direction;
+
+/// The effect `thin-film`.
+pub(super) struct ThinFilm;
+
+const KNOBS: [Knob; 3] = [
+    Knob::new("coverage", "1", [0.0, 1.0], 0.0, 0.1),
+    Knob::new("thickness_m", "m", [0.0, 5e-3], 3e-4, 2e-5),
+    Knob::new("index", "1", [1.0, 4.0], 1.6, 0.05),
+];
+
+/// Reflectance at normal incidence of a substrate whose law has no f_λ: an index of 2.
+const USUAL_F_LAMBDA: f64 = 0.11;
+/// Beyond these a substrate reflects nothing, or all, and a ratio means nothing.
+const F_LAMBDA_RANGE: [f64; 2] = [1e-3, 0.999];
+const LOBE_RAD: f64 = 0.02;
+const MOST_THETA_RAD: f64 = 1.55;
+
+/// ε of the substrate under a law.
+fn substrate(law: &Brdf) -> f64 {
+    let [least, most] = F_LAMBDA_RANGE;
+    let f_lambda = first_lobe(law).map_or(USUAL_F_LAMBDA, |lobe| lobe.f_lambda);
+    let root = f_lambda.clamp(least, most).sqrt();
+    ((1.0 + root) / (1.0 - root)).powi(2)
+}
+
+/// Reflectance with the film and without, at θ.
+fn reflectances(
+    [thickness_m, index]: [f64; 2],
+    eps_real: f64,
+    frequency_hz: f64,
+    theta_rad: f64,
+) -> [f64; 2] {
+    let theta_rad = theta_rad.min(MOST_THETA_RAD);
+    let layers = vec![Layer { thickness_m, eps_real: index * index, eps_imag: 0.0 }];
+    let coated = Layered { layers, eps_real, eps_imag: 0.0, frequency_hz, lobe_rad: LOBE_RAD };
+    let bare = Fresnel { eps_real, eps_imag: 0.0, lobe_rad: LOBE_RAD };
+    [coated.reflectance(theta_rad), bare.reflectance(theta_rad)]
+}
+
+impl Effect for ThinFilm {
+    fn name(&self) -> &'static str {
+        "thin-film"
+    }
+
+    fn level(&self) -> Level {
+        Level::Material
+    }
+
+    fn knobs(&self) -> &'static [Knob] {
+        &KNOBS
+    }
+
+    fn is(&self) -> &'static str {
+        "A coating of this thickness and refractive index covers a share of the surface; what it \
+         reflects at its two sides interferes, and raises or lowers the echo by the angle."
+    }
+
+    fn shows(&self) -> &'static str {
+        "The residual swings with the angle, with no other covariate, and the opposite way in the \
+         specular and the diffuse part. A film much thinner than a wavelength only shifts the levels, \
+         which the base law absorbs; another frequency moves the swings, which tells it from a wrong \
+         shape of the lobe."
+    }
+
+    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+        let thicknesses_m = [1e-4, 2e-4, 3e-4, 4.5e-4, 6e-4, 8e-4, 1.1e-3, 1.5e-3, 2e-3, 2.7e-3];
+        thicknesses_m.map(|thickness_m| vec![0.3, thickness_m, 1.6]).to_vec()
+    }
+
+    fn scatter(
+        &self,
+        values: &[f64],
+        stage: &Stage,
+        law: &Brdf,
+        look: &Look,
+        f_per_sr: f64,
+    ) -> f64 {
+        let &[coverage, thickness_m, index] = values else { return f_per_sr };
+        if coverage == 0.0 {
+            return f_per_sr;
+        }
+        let theta_rad = look.hit.theta_rad();
+        let frequency_hz = stage.radar.centre_frequency_ghz * 1e9;
+        let [film, bare] =
+            reflectances([thickness_m, index], substrate(law), frequency_hz, theta_rad);
+        let retro = Direction::from_angles(theta_rad, look.azimuth_rad);
+        let share = law.specular_share(retro, retro);
+        let specular = film / bare.max(1e-9);
+        let diffuse = ((1.0 - film) / (1.0 - bare).max(1e-9)).powi(2);
+        f_per_sr * (1.0 - coverage + coverage * (share * specular + (1.0 - share) * diffuse))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::Lambert;
+    use crate::effects::testing::{Bench, lobe};
+    use crate::units::SPEED_OF_LIGHT_M_PER_S;
+
+    fn factor(values: [f64; 3], law: &Brdf, theta_rad: f64) -> f64 {
+        let bench = Bench::plate();
+        let mut look = bench.looks[0];
+        look.hit.cos_theta = theta_rad.cos();
+        ThinFilm.scatter(&values, &bench.stage(), law, &look, 1.0)
+    }
+
+    #[test]
+    fn a_film_of_no_thickness_or_of_the_substrates_index_is_the_bare_surface() {
+        let law = Brdf::CookTorrance(lobe());
+        let index = substrate(&law).sqrt();
+        for theta_rad in [0.0, 0.4, 1.2] {
+            for film in [[1.0, 0.0, 1.6], [1.0, 4e-4, index]] {
+                let found = factor(film, &law, theta_rad);
+                assert!((found - 1.0).abs() < 1e-9, "{film:?} {theta_rad}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_quarter_wave_of_the_mean_index_takes_the_echo_away_and_a_half_wave_gives_it_back() {
+        let law = Brdf::CookTorrance(lobe());
+        let index = substrate(&law).powf(0.25);
+        let quarter_m = SPEED_OF_LIGHT_M_PER_S / 300e9 / 4.0 / index;
+        assert!(factor([1.0, quarter_m, index], &law, 0.0) < 1e-20);
+        assert!((factor([0.4, quarter_m, index], &law, 0.0) - 0.6).abs() < 1e-9);
+        assert!((factor([1.0, 2.0 * quarter_m, index], &law, 0.0) - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_the_surface_reflects_less_the_diffuse_part_gets() {
+        let law = Brdf::Lambert(Lambert { albedo: 0.3 });
+        let index = substrate(&law).powf(0.25);
+        let quarter_m = SPEED_OF_LIGHT_M_PER_S / 300e9 / 4.0 / index;
+        let expected = (1.0 - USUAL_F_LAMBDA).powi(-2);
+        assert!((factor([1.0, quarter_m, index], &law, 0.0) / expected - 1.0).abs() < 1e-9);
+    }
+}
