@@ -33,6 +33,7 @@ use crate::brdf::Brdf;
 use crate::effects::{Effect, Level, Look, Receiver, Stage};
 use crate::fit::FitError;
 use crate::render::RenderError;
+use crate::units::dbm_from_watts;
 
 pub use folds::Folds;
 pub use likelihood::Declared;
@@ -167,6 +168,25 @@ pub struct BaseValue {
     pub value: Value,
 }
 
+/// One look, as a table of residuals has it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Chirp number.
+    pub chirp: u32,
+    /// Received power, dBm; none where nothing was detected.
+    pub observed_dbm: Option<f64>,
+    /// E[dBm | detected] of the base model, from a fit without this look's fold.
+    pub before_dbm: f64,
+    /// The same with the effects.
+    pub after_dbm: f64,
+    /// Randomised quantile residual of the base model, fitted to all looks.
+    pub z_before: f64,
+    /// The same with the effects.
+    pub z_after: f64,
+    /// Fold that it was held out with.
+    pub fold: usize,
+}
+
 /// Everything that was found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
@@ -188,6 +208,12 @@ pub struct Report {
     pub converged: bool,
     /// Patches.
     pub blocks: usize,
+    /// The laws of every region as fitted with the effects.
+    #[serde(skip)]
+    pub laws: Vec<Brdf>,
+    /// Every look.
+    #[serde(skip)]
+    pub rows: Vec<Row>,
 }
 
 /// Why nothing can be said.
@@ -252,36 +278,65 @@ impl Diagnosis {
         let problem = Problem { stage, looks, observations, declared, receiver };
         let selection = Selection { problem, folds: &folds, settings: self };
         let base = selection.base(Space::new(&problem, laws)?);
-        let before = score::errors(&base.held_out);
+        let (before, z_before) = (base.held_out.clone(), self.z(&problem, &base));
         let (state, ranking, added) = selection.run(base, effects);
+        let z_after = self.z(&problem, &state);
         let prediction = problem.predict(&state.space, &state.fitted.at);
-        let z = residual::z(&prediction, declared, observations, self.seed);
-        let unexplained = self.tests().run(&z, looks, &prediction, &folds);
-        let verdict = match (unexplained.is_empty(), added.is_empty()) {
-            (false, _) => Verdict::Unexplained,
-            (true, true) => Verdict::NoMissingEffect,
-            (true, false) => Verdict::Explained,
-        };
+        let unexplained = self.tests().run(&z_after, looks, &prediction, &folds);
         let (base, effects) = values(&problem, &state, added);
-        let error = before_after(before, score::errors(&state.held_out));
-        let (schema, blocks, converged) = (SCHEMA, folds.blocks, state.fitted.converged);
         Ok(Report {
-            schema,
-            verdict,
+            schema: SCHEMA,
+            verdict: verdict(&unexplained, &effects),
             effects,
             ranking,
             unexplained,
-            error,
+            error: before_after(score::errors(&before), score::errors(&state.held_out)),
             base,
-            converged,
-            blocks,
+            converged: state.fitted.converged,
+            blocks: folds.blocks,
+            laws: state.space.model(receiver, &state.fitted.at).laws,
+            rows: rows(subject, &folds, [&before, &state.held_out], [&z_before, &z_after]),
         })
+    }
+
+    fn z(&self, problem: &Problem, state: &select::State) -> Vec<f64> {
+        let prediction = problem.predict(&state.space, &state.fitted.at);
+        residual::z(&prediction, problem.declared, problem.observations, self.seed)
     }
 
     fn tests(&self) -> Tests {
         let Diagnosis { seed, draws, block_m, family_error, least_size_db, .. } = *self;
         Tests { seed, draws, block_m, family_error, least_size_db }
     }
+}
+
+fn verdict(unexplained: &[Unexplained], effects: &[Found]) -> Verdict {
+    match (unexplained.is_empty(), effects.is_empty()) {
+        (false, _) => Verdict::Unexplained,
+        (true, true) => Verdict::NoMissingEffect,
+        (true, false) => Verdict::Explained,
+    }
+}
+
+fn rows(
+    subject: &Subject,
+    folds: &Folds,
+    [before, after]: [&[score::Scored]; 2],
+    [z_before, z_after]: [&[f64]; 2],
+) -> Vec<Row> {
+    let row = |look: usize| {
+        let power_w = subject.observations.get(look)?.power_w;
+        Some(Row {
+            chirp: subject.looks.get(look)?.chirp,
+            observed_dbm: power_w.map(dbm_from_watts),
+            before_dbm: before.get(look)?.expected_dbm,
+            after_dbm: after.get(look)?.expected_dbm,
+            z_before: *z_before.get(look)?,
+            z_after: *z_after.get(look)?,
+            fold: *folds.fold.get(look)?,
+        })
+    };
+    (0..subject.looks.len()).filter_map(row).collect()
 }
 
 fn check(subject: &Subject, folds: &Folds) -> Result<(), DiagnoseError> {
