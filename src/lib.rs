@@ -35,6 +35,7 @@
 //! | [`effects`] | physical effects beyond the paper's model, one file each |
 //! | [`render`] | scan × target × materials → detections, image, cloud |
 //! | [`measure`], [`fit`] | a measured cloud → pose → curve; a curve → parameters |
+//! | [`diagnose`] | a measured cloud → the effect that the model lacks |
 //! | [`store`] | the only SQL |
 //! | [`error`], [`cli`] | every error in one type; one command per file |
 //!
@@ -58,6 +59,7 @@ pub mod effects;
 pub mod render;
 pub mod measure;
 pub mod fit;
+pub mod diagnose;
 pub mod store;
 pub mod error;
 pub mod cli;

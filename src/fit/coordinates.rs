@@ -11,11 +11,11 @@ use super::FitError;
 use crate::brdf::{Brdf, Mixture, Parameter};
 
 /// Name of the specular level S = (1 − k)·f_λ.
-pub(super) const SPECULAR_LEVEL: &str = "S";
+pub(crate) const SPECULAR_LEVEL: &str = "S";
 /// Name of the diffuse level R = k·r_s.
-pub(super) const DIFFUSE_LEVEL: &str = "R";
+pub(crate) const DIFFUSE_LEVEL: &str = "R";
 /// Name of the looks of the speckle.
-pub(super) const LOOKS: &str = "looks";
+pub(crate) const LOOKS: &str = "looks";
 /// Levels that have a meaning: a billionth is 60 dB below the weakest detection.
 const LEVEL_RANGE: (f64, f64) = (1e-9, 1.0);
 /// Looks from far spikier than developed speckle to none to speak of.
@@ -23,7 +23,7 @@ const LOOKS_RANGE: (f64, f64) = (0.1, 1e4);
 
 /// How a number is searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Scale {
+pub(crate) enum Scale {
     /// As it is.
     Linear,
     /// u = ln(v + offset).
@@ -73,7 +73,7 @@ impl Scale {
 
 /// One number that a fit turns.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Coordinate {
+pub(crate) struct Coordinate {
     /// The parameter's path, `S`, `R` or `looks`.
     pub name: String,
     /// Smallest value.
@@ -123,7 +123,7 @@ impl Coordinate {
 
 /// All that a fit turns, and the model that holds the rest.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Coordinates {
+pub(crate) struct Coordinates {
     /// In the order of the search.
     pub list: Vec<Coordinate>,
     base: Brdf,

@@ -12,7 +12,7 @@ use super::table::lagrange;
 const TERMS: usize = 2000;
 
 /// ln P(a, x) for a > 0; −∞ for x ≤ 0.
-pub(super) fn ln_lower_gamma(a: f64, x: f64) -> f64 {
+pub(crate) fn ln_lower_gamma(a: f64, x: f64) -> f64 {
     if x <= 0.0 {
         return f64::NEG_INFINITY;
     }
@@ -54,7 +54,7 @@ fn upper_fraction(a: f64, x: f64) -> f64 {
 
 /// A log probability and its derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct LnProbability {
+pub(crate) struct LnProbability {
     /// ln p.
     pub value: f64,
     /// d ln p/d ln μ, μ the mean power.
@@ -67,7 +67,7 @@ pub(super) struct LnProbability {
 
 /// The law for one number of looks, ready for many chirps.
 #[derive(Clone, Debug)]
-pub(super) struct GammaLaw {
+pub(crate) struct GammaLaw {
     looks: f64,
     ln_constant: f64,
     constant_slope: f64,

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 /// A cost near a point.
 #[derive(Clone, Debug)]
-pub(super) struct Local {
+pub(crate) struct Local {
     /// The cost.
     pub value: f64,
     /// Its gradient.
@@ -77,7 +77,7 @@ impl Stop {
 
 /// Search settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Minimise {
+pub(crate) struct Minimise {
     /// Most steps tried.
     pub iterations: usize,
     /// Promised improvement that is no longer worth a step, in the unit of the cost.
@@ -86,7 +86,7 @@ pub(super) struct Minimise {
 
 /// Where a search ended.
 #[derive(Clone, Debug)]
-pub(super) struct Minimum {
+pub(crate) struct Minimum {
     /// The point.
     pub at: DVector<f64>,
     /// The cost there.

@@ -19,13 +19,13 @@
 
 mod angle;
 pub mod bistatic;
-mod coordinates;
-mod gamma_law;
+pub(crate) mod coordinates;
+pub(crate) mod gamma_law;
 mod goodness;
 mod interval;
 mod least_squares;
 mod likelihood;
-mod minimise;
+pub(crate) mod minimise;
 mod models;
 mod result;
 mod search;

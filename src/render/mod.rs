@@ -40,6 +40,7 @@ pub use echo::{Echo, Truth};
 pub use image::{CHANNELS, power_image};
 pub use observer::Observer;
 pub use spot::Footprints;
+pub(crate) use surface::LocalFrame;
 pub use surface::Surface;
 
 /// Everything a scan meets and how it is rendered.

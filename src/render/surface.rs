@@ -27,7 +27,7 @@ impl<'a> Surface<'a> {
 
 /// A facet where a ray has met it: normal towards where the ray came from, tangent along the grain.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LocalFrame {
+pub(crate) struct LocalFrame {
     pub normal: DVec3,
     tangent: DVec3,
     bitangent: DVec3,

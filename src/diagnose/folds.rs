@@ -1,0 +1,65 @@
+//! Which chirps are held out together: patches of the target plane, never single chirps.
+//!
+//! Neighbouring spots overlap, so that a chirp between two others of the fit is no test of it.
+
+use std::collections::BTreeMap;
+
+use crate::effects::Look;
+use crate::radar::random::{Key, Purpose};
+
+/// A scan in patches, and the patches in folds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Folds {
+    /// Patch of every look.
+    pub block: Vec<usize>,
+    /// Fold of every look.
+    pub fold: Vec<usize>,
+    /// Number of patches.
+    pub blocks: usize,
+    /// Number of folds.
+    pub folds: usize,
+}
+
+impl Folds {
+    /// Square patches of side `block_m`, m, dealt out to `folds` folds of about equal numbers of looks.
+    pub fn new(looks: &[Look], block_m: f64, folds: usize, seed: u64) -> Folds {
+        let folds = folds.max(2);
+        let cell =
+            |look: &Look| [look.yt_m, look.xt_m].map(|x| (x / block_m.max(1e-6)).floor() as i64);
+        let mut members: BTreeMap<[i64; 2], Vec<usize>> = BTreeMap::new();
+        for (index, look) in looks.iter().enumerate() {
+            members.entry(cell(look)).or_default().push(index);
+        }
+        let mut order: Vec<(f64, usize)> = (0..members.len())
+            .map(|block| {
+                let chirp = block as u64;
+                (Key { seed, chirp, sub_ray: 1, purpose: Purpose::Fit }.draws().uniform(), block)
+            })
+            .collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let members: Vec<Vec<usize>> = members.into_values().collect();
+        let mut filled = vec![0usize; folds];
+        let (mut block, mut fold) = (vec![0; looks.len()], vec![0; looks.len()]);
+        for (_, number) in order {
+            let (emptiest, _) = filled.iter().enumerate().min_by_key(|f| *f.1).unwrap_or((0, &0));
+            for &index in &members[number] {
+                (block[index], fold[index]) = (number, emptiest);
+            }
+            filled[emptiest] += members[number].len();
+        }
+        Folds { block, fold, blocks: members.len(), folds }
+    }
+
+    /// Sum and its standard error over patches of one number for each look.
+    pub fn sum(&self, values: &[f64]) -> [f64; 2] {
+        let mut sums = vec![0.0; self.blocks];
+        for (value, &block) in values.iter().zip(&self.block) {
+            sums[block] += value;
+        }
+        let count = sums.len().max(2) as f64;
+        let total: f64 = sums.iter().sum();
+        let variance =
+            sums.iter().map(|s| (s - total / count).powi(2)).sum::<f64>() / (count - 1.0);
+        [total, (count * variance).sqrt()]
+    }
+}

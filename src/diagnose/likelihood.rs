@@ -1,0 +1,125 @@
+//! How probable what was seen is under a prediction.
+//!
+//! A detected power y has the density of Gamma(L, (μ + N)/L) in ln y, a chirp that saw nothing the
+//! probability of staying below the threshold T. Tilts that vary at random shift ln μ by slope·t, t
+//! normal, to first order, and the likelihood is averaged over t by five nodes of Gauss–Hermite. The
+//! first order is not enough within a tilt's size of normal incidence. Ranges are normal about the
+//! predicted ones. A share of one in ten thousand of all chirps may be anything, so that a
+//! silhouette that the mesh misses costs a bounded amount.
+
+use crate::effects::{Arrived, Prediction};
+use crate::fit::gamma_law::GammaLaw;
+
+use super::looks::Observation;
+
+/// Share of chirps that no model explains.
+const OUTLIERS: f64 = 1e-4;
+/// Their density in ln power, as wide as 60 dB.
+const OUTLIER_DENSITY: f64 = 1.0 / 13.8;
+/// Share of ranges that no model explains, and how much wider than the rest these are.
+const STRAY_RANGES: f64 = 0.01;
+const STRAY_WIDTH: f64 = 10.0;
+/// Nodes and weights of five-point Gauss–Hermite quadrature over the standard normal law.
+const NODES: [(f64, f64); 5] = [
+    (-2.856_970_013_872_806, 0.011_257_411_327_721),
+    (-1.355_626_179_974_266, 0.222_075_922_005_613),
+    (0.0, 0.533_333_333_333_333),
+    (1.355_626_179_974_266, 0.222_075_922_005_613),
+    (2.856_970_013_872_806, 0.011_257_411_327_721),
+];
+/// A mean so far below the threshold that nothing is ever detected, for rays that miss.
+const NOTHING: f64 = 1e-9;
+
+/// What is declared of the receiver and no effect changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Declared {
+    /// Least power of a detection, W.
+    pub threshold_w: f64,
+    /// Standard deviation of a range, m; 0 where ranges are not to be used.
+    pub range_sd_m: f64,
+}
+
+/// A law made ready for one prediction.
+pub(super) struct Likelihood<'a> {
+    prediction: &'a Prediction,
+    declared: Declared,
+    law: GammaLaw,
+}
+
+/// One chirp's part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Term {
+    /// ln p.
+    pub ln_p: f64,
+    /// ln(μ + N) without tilt.
+    pub ln_mean: f64,
+    /// −d² ln p/d(ln mean)², never negative.
+    pub bend: f64,
+}
+
+impl<'a> Likelihood<'a> {
+    pub fn new(prediction: &'a Prediction, declared: Declared) -> Likelihood<'a> {
+        Likelihood { prediction, declared, law: GammaLaw::new(prediction.receiver.looks) }
+    }
+
+    /// ln of the mean power of a look and its weight for every tilt.
+    pub fn ln_means(&self, look: usize) -> Vec<(f64, f64)> {
+        let receiver = &self.prediction.receiver;
+        let arrived = self.prediction.arrived.get(look).copied().flatten();
+        let floor_w = NOTHING * self.declared.threshold_w;
+        let power_w = arrived.map_or(0.0, |a| a.power_w).max(0.0);
+        let mean = |factor: f64| (power_w * factor + receiver.noise_w).max(floor_w).ln();
+        let slope = self.prediction.slope_per_rad.get(look).copied().unwrap_or(0.0);
+        let spread = slope * receiver.tilt_sd_rad;
+        if spread == 0.0 {
+            return vec![(mean(1.0), 1.0)];
+        }
+        NODES.iter().map(|(t, weight)| (mean((spread * t).exp()), *weight)).collect()
+    }
+
+    /// One chirp's part of the likelihood.
+    pub fn term(&self, look: usize, seen: &Observation) -> Term {
+        let means = self.ln_means(look);
+        let (mut p, mut bend) = (0.0, 0.0);
+        for &(ln_mean, weight) in &means {
+            let law = match seen.power_w {
+                Some(power_w) => self.law.detected(power_w.ln(), ln_mean),
+                None => self.law.below(self.declared.threshold_w.ln(), ln_mean),
+            };
+            let part = (1.0 - OUTLIERS) * weight * law.value.exp();
+            p += part;
+            bend += part * law.bend;
+        }
+        let anything = if seen.power_w.is_some() { OUTLIER_DENSITY } else { 0.5 };
+        p += OUTLIERS * anything;
+        let middle = means.get(means.len() / 2).map_or(0.0, |mean| mean.0);
+        Term { ln_p: p.ln() + self.ln_range(look, seen), ln_mean: middle, bend: bend / p }
+    }
+
+    /// Probability that the power of a look stays below a level, W.
+    pub fn below(&self, look: usize, level_w: f64) -> f64 {
+        let part = |(ln_mean, weight): &(f64, f64)| {
+            weight * self.law.below(level_w.ln(), *ln_mean).value.exp()
+        };
+        self.ln_means(look).iter().map(part).sum()
+    }
+
+    /// Probability that a power of this mean is detected.
+    pub fn chance(&self, ln_mean: f64) -> f64 {
+        1.0 - self.law.below(self.declared.threshold_w.ln(), ln_mean).value.exp()
+    }
+
+    fn ln_range(&self, look: usize, seen: &Observation) -> f64 {
+        let arrived: Option<Arrived> = self.prediction.arrived.get(look).copied().flatten();
+        let (Some(range_m), Some(arrived)) = (seen.range_m, arrived) else { return 0.0 };
+        let sd_m = self.declared.range_sd_m;
+        if sd_m <= 0.0 {
+            return 0.0;
+        }
+        let x = (range_m - arrived.range_m) / sd_m;
+        let bell = |x: f64| (-0.5 * x * x).exp();
+        ((1.0 - STRAY_RANGES) * bell(x) + STRAY_RANGES / STRAY_WIDTH * bell(x / STRAY_WIDTH))
+            .max(f64::MIN_POSITIVE)
+            .ln()
+    }
+}

@@ -1,0 +1,252 @@
+//! Base laws and effects, fitted together by maximum likelihood.
+//!
+//! Unknowns are the coordinates of every law that enough looks meet and the numbers of every effect in
+//! units of their steps. The score of each chirp is a central difference of ln p. The curvature is
+//! Σ L·(y/μ)·g·gᵀ with g the slope of ln μ for unknowns that move means, and the scores' products for
+//! those that move only the law about the mean; the standard deviations come from the scores'
+//! products at the end (Berndt, Hall, Hall & Hausman 1974).
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::likelihood::{Declared, Likelihood, Term};
+use super::looks::Observation;
+use crate::brdf::Brdf;
+use crate::effects::{Effect, Look, Model, Prediction, Receiver, Stage};
+use crate::fit::FitError;
+use crate::fit::coordinates::Coordinates;
+use crate::fit::minimise::{Local, Minimise};
+
+/// Half the width of a difference quotient: of a law's coordinate in its search, of an effect's
+/// number in its steps.
+const LAW_STEP: f64 = 2e-3;
+const EFFECT_STEP: f64 = 0.25;
+/// Looks that a law must have to be fitted.
+const LEAST_LOOKS: usize = 100;
+
+/// What was seen, and of what.
+#[derive(Clone, Copy)]
+pub(super) struct Problem<'a> {
+    pub stage: &'a Stage<'a>,
+    pub looks: &'a [Look],
+    pub observations: &'a [Observation],
+    pub declared: Declared,
+    pub receiver: Receiver,
+}
+
+/// What is turned.
+#[derive(Clone)]
+pub(super) struct Space<'a> {
+    laws: Vec<Brdf>,
+    turned: Vec<(usize, Coordinates)>,
+    pub effects: Vec<&'a dyn Effect>,
+}
+
+/// Where a search ended.
+#[derive(Clone, Debug)]
+pub(super) struct Fitted {
+    pub at: DVector<f64>,
+    pub ln_likelihood: f64,
+    pub converged: bool,
+}
+
+impl<'a> Space<'a> {
+    /// Laws of regions with few looks stay as they are.
+    pub fn new(problem: &Problem, laws: &[Brdf]) -> Result<Space<'a>, FitError> {
+        let mut turned = Vec::new();
+        for (region, law) in laws.iter().enumerate() {
+            let here = |look: &&Look| usize::from(look.region) == region;
+            if problem.looks.iter().filter(here).count() >= LEAST_LOOKS {
+                let looks = Some(problem.receiver.looks);
+                turned.push((region, Coordinates::new(law, &[], &[], looks)?));
+            }
+        }
+        Ok(Space { laws: laws.to_vec(), turned, effects: Vec::new() })
+    }
+
+    /// With one more effect.
+    pub fn with(&self, effect: &'a dyn Effect) -> Space<'a> {
+        let mut space = self.clone();
+        space.effects.push(effect);
+        space
+    }
+
+    /// Unknowns of the laws; those of the effects follow.
+    pub fn base_len(&self) -> usize {
+        self.turned.iter().map(|(_, coordinates)| coordinates.len()).sum()
+    }
+
+    /// Where the laws' unknowns begin.
+    pub fn start(&self) -> DVector<f64> {
+        let starts =
+            self.turned.iter().flat_map(|(_, c)| c.start().iter().copied().collect::<Vec<_>>());
+        DVector::from_vec(starts.collect())
+    }
+
+    /// A point with the numbers of one more effect.
+    pub fn joined(at: &DVector<f64>, effect: &dyn Effect, values: &[f64]) -> DVector<f64> {
+        let knobs = effect.knobs().iter().zip(values);
+        let more = knobs.map(|(knob, value)| value.clamp(knob.min, knob.max) / knob.step);
+        DVector::from_iterator(at.len() + effect.knobs().len(), at.iter().copied().chain(more))
+    }
+
+    /// Name and value of every unknown of the laws, with its slope in the search.
+    pub fn base_values(&self, at: &DVector<f64>) -> Vec<(usize, String, f64, f64)> {
+        let all =
+            self.turned.iter().flat_map(|(region, c)| c.list.iter().map(move |c| (*region, c)));
+        let value = |((region, c), &u): ((usize, &crate::fit::coordinates::Coordinate), &f64)| {
+            (region, c.name.clone(), c.value(u), c.slope(u))
+        };
+        all.zip(at.iter()).map(value).collect()
+    }
+
+    /// Numbers of every effect.
+    pub fn effect_values(&self, at: &DVector<f64>) -> Vec<Vec<f64>> {
+        let mut rest = at.iter().skip(self.base_len());
+        let values = |effect: &&dyn Effect| {
+            let knobs = effect.knobs().iter().zip(rest.by_ref().take(effect.knobs().len()));
+            knobs.map(|(knob, u)| (u * knob.step).clamp(knob.min, knob.max)).collect()
+        };
+        self.effects.iter().map(values).collect()
+    }
+
+    /// The model at a point.
+    pub fn model(&self, receiver: Receiver, at: &DVector<f64>) -> Model<'a> {
+        let mut laws = self.laws.clone();
+        let mut from = 0;
+        for (region, coordinates) in &self.turned {
+            let part = at.rows(from, coordinates.len()).into_owned();
+            from += coordinates.len();
+            if let Some(law) = laws.get_mut(*region) {
+                *law = coordinates.model(&part);
+            }
+        }
+        let effects = self.effects.iter().copied().zip(self.effect_values(at)).collect();
+        Model { laws, receiver, effects }
+    }
+
+    fn bounds(&self) -> [DVector<f64>; 2] {
+        let knobs = || self.effects.iter().flat_map(|effect| effect.knobs());
+        let laws = |end: fn(&Coordinates) -> DVector<f64>| {
+            self.turned.iter().flat_map(move |(_, c)| end(c).iter().copied().collect::<Vec<_>>())
+        };
+        let lower = laws(Coordinates::lower).chain(knobs().map(|knob| knob.min / knob.step));
+        let upper = laws(Coordinates::upper).chain(knobs().map(|knob| knob.max / knob.step));
+        [DVector::from_vec(lower.collect()), DVector::from_vec(upper.collect())]
+    }
+
+    fn steps(&self) -> Vec<f64> {
+        let base = self.base_len();
+        let all = base + self.effects.iter().map(|effect| effect.knobs().len()).sum::<usize>();
+        (0..all).map(|index| if index < base { LAW_STEP } else { EFFECT_STEP }).collect()
+    }
+}
+
+impl Problem<'_> {
+    /// What a point predicts.
+    pub fn predict(&self, space: &Space, at: &DVector<f64>) -> Prediction {
+        space.model(self.receiver, at).predict(self.stage, self.looks)
+    }
+
+    /// Every chirp's part of the likelihood at a point.
+    pub fn terms(&self, space: &Space, at: &DVector<f64>) -> Vec<Term> {
+        let prediction = self.predict(space, at);
+        let likelihood = Likelihood::new(&prediction, self.declared);
+        let seen = self.observations.par_iter().enumerate();
+        seen.map(|(look, seen)| likelihood.term(look, seen)).collect()
+    }
+
+    /// The most likely point from a start, by the looks in `used`. The first `held` unknowns stay.
+    pub fn fit(
+        &self,
+        space: &Space,
+        start: &DVector<f64>,
+        used: &[bool],
+        held: usize,
+        search: &Minimise,
+    ) -> Fitted {
+        let [mut lower, mut upper] = space.bounds();
+        for index in 0..held.min(start.len()) {
+            (lower[index], upper[index]) = (start[index], start[index]);
+        }
+        let bounds = [&lower, &upper];
+        let found = search.run(start, bounds, |at| self.local(space, at, used, bounds));
+        let (ln_likelihood, converged) = (-found.local.value, found.converged());
+        Fitted { at: found.at, ln_likelihood, converged }
+    }
+
+    /// Standard deviation of every unknown in the search; infinite for those that a bound holds or
+    /// that the data cannot tell.
+    pub fn sd(&self, space: &Space, at: &DVector<f64>, used: &[bool]) -> Vec<f64> {
+        let [lower, upper] = space.bounds();
+        let slopes = self.slopes(space, at, [&lower, &upper]);
+        let inside = |&i: &usize| at[i] > lower[i] && at[i] < upper[i];
+        let free: Vec<usize> = (0..at.len()).filter(inside).collect();
+        let mut products: DMatrix<f64> = DMatrix::zeros(free.len(), free.len());
+        for (look, _) in used.iter().enumerate().filter(|(_, used)| **used) {
+            for (row, &i) in free.iter().enumerate() {
+                for (column, &j) in free.iter().enumerate() {
+                    products[(row, column)] += slopes[i][look].0 * slopes[j][look].0;
+                }
+            }
+        }
+        let mut sd = vec![f64::INFINITY; at.len()];
+        if let Some(inverse) = products.cholesky().map(|c| c.inverse()) {
+            for (row, &i) in free.iter().enumerate() {
+                sd[i] = inverse[(row, row)].sqrt();
+            }
+        }
+        sd
+    }
+
+    /// d ln p and d ln μ of every look by every unknown.
+    fn slopes(
+        &self,
+        space: &Space,
+        at: &DVector<f64>,
+        [lower, upper]: [&DVector<f64>; 2],
+    ) -> Vec<Vec<(f64, f64)>> {
+        let slope = |(index, step): (usize, f64)| {
+            let (mut up, mut down) = (at.clone(), at.clone());
+            up[index] = (at[index] + step).min(upper[index]).max(at[index]);
+            down[index] = (at[index] - step).max(lower[index]).min(at[index]);
+            let width = up[index] - down[index];
+            if width <= 0.0 {
+                return vec![(0.0, 0.0); self.looks.len()];
+            }
+            let pairs = self.terms(space, &up).into_iter().zip(self.terms(space, &down));
+            pairs
+                .map(|(a, b)| ((a.ln_p - b.ln_p) / width, (a.ln_mean - b.ln_mean) / width))
+                .collect()
+        };
+        space.steps().into_iter().enumerate().map(slope).collect()
+    }
+
+    fn local(
+        &self,
+        space: &Space,
+        at: &DVector<f64>,
+        used: &[bool],
+        bounds: [&DVector<f64>; 2],
+    ) -> Local {
+        let terms = self.terms(space, at);
+        let slopes = self.slopes(space, at, bounds);
+        let moves_mean: Vec<bool> =
+            slopes.iter().map(|s| s.iter().any(|(_, mean)| mean.abs() > 1e-9)).collect();
+        let mut local = Local::zero(at.len());
+        for (look, term) in terms.iter().enumerate().filter(|(look, _)| used[*look]) {
+            local.value -= term.ln_p;
+            let mut score = vec![0.0; at.len()];
+            let (mut means, mut laws) = (score.clone(), score.clone());
+            for (index, slope) in slopes.iter().enumerate() {
+                let (by_p, by_mean) = slope[look];
+                score[index] = by_p;
+                if moves_mean[index] { means[index] = by_mean } else { laws[index] = by_p }
+            }
+            local.add(-1.0, 0.0, &score);
+            local.add(0.0, term.bend, &means);
+            local.add(0.0, 1.0, &laws);
+        }
+        local
+    }
+}

@@ -1,0 +1,186 @@
+//! How far predictions are from what was seen, and how far a perfect model's would be.
+//!
+//! A detection is compared, in dB, with E[dB | detected], and a perfect model is off by the
+//! standard deviation of dB about it. Both are integrals over Gamma(L, 1/L) above the threshold, done
+//! once for a table of ln(T/mean).
+
+use serde::Serialize;
+use statrs::function::gamma::ln_gamma;
+
+use super::likelihood::{Declared, Likelihood};
+use super::looks::Observation;
+use crate::effects::Prediction;
+use crate::units::dbm_from_watts;
+
+/// dB in one e-fold.
+pub(super) const DB: f64 = 10.0 / std::f64::consts::LN_10;
+
+/// One look, predicted without having been fitted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Scored {
+    /// ln p.
+    pub ln_p: f64,
+    /// E[dBm | detected].
+    pub expected_dbm: f64,
+    /// Var[dB | detected].
+    pub variance_db2: f64,
+    /// Detected minus expected, dB; none where nothing was detected.
+    pub residual_db: Option<f64>,
+    /// Probability, given a detection, of less power than was detected.
+    pub share: Option<f64>,
+}
+
+/// The error of a model over held-out looks.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Errors {
+    /// Root mean square over detections about E[dB | detected], dB.
+    pub rmse_db: f64,
+    /// Mean of the same, dB.
+    pub bias_db: f64,
+    /// Mean ln p of all looks, the censored ones included.
+    pub log_score: f64,
+    /// Share of detections within the central 90 % of their law.
+    pub coverage_90: f64,
+    /// The rmse of a model that is right, dB.
+    pub noise_floor_db: f64,
+}
+
+/// Mean and variance of ln y over a tabulated threshold.
+pub(super) struct Above {
+    knots: Vec<[f64; 2]>,
+}
+
+const FIRST: f64 = -8.0;
+const LAST: f64 = 6.0;
+const CELLS: usize = 560;
+
+impl Above {
+    /// For L looks.
+    pub fn new(looks: f64) -> Above {
+        let knot =
+            |k: usize| moments_above(looks, FIRST + (LAST - FIRST) * k as f64 / CELLS as f64);
+        Above { knots: (0..=CELLS).map(knot).collect() }
+    }
+
+    /// Mean and variance of ln(y/mean) above ln(T/mean).
+    pub fn at(&self, ln_threshold: f64) -> [f64; 2] {
+        let x = (ln_threshold.clamp(FIRST, LAST) - FIRST) / (LAST - FIRST) * CELLS as f64;
+        let cell = (x as usize).min(CELLS - 1);
+        let t = x - cell as f64;
+        let [a, b] = [cell, cell + 1].map(|k| self.knots.get(k).copied().unwrap_or_default());
+        [(1.0 - t) * a[0] + t * b[0], (1.0 - t) * a[1] + t * b[1]]
+    }
+}
+
+/// By the midpoint rule over ln y, from the threshold or where nothing lies below.
+fn moments_above(looks: f64, ln_threshold: f64) -> [f64; 2] {
+    const STEPS: usize = 400;
+    let reach = 12.0 / looks.sqrt().min(looks);
+    let from = ln_threshold.max(-reach);
+    let to = (from + 1.0 / looks).max(0.0) + 6.0 / looks.sqrt().max(1.0);
+    let width = (to - from) / STEPS as f64;
+    let constant = looks * looks.ln() - ln_gamma(looks);
+    let ln_density = |x: f64| constant + looks * (x - x.exp());
+    let top = ln_density(from.max(0.0));
+    let mut sums = [0.0; 3];
+    for step in 0..STEPS {
+        let x = from + (step as f64 + 0.5) * width;
+        let weight = (ln_density(x) - top).exp();
+        for (sum, power) in sums.iter_mut().zip([1.0, x, x * x]) {
+            *sum += weight * power;
+        }
+    }
+    let mean = sums[1] / sums[0];
+    [mean, (sums[2] / sums[0] - mean * mean).max(0.0)]
+}
+
+/// Scores the looks for which `wanted` holds.
+pub(super) fn scored(
+    prediction: &Prediction,
+    declared: Declared,
+    observations: &[Observation],
+    wanted: &dyn Fn(usize) -> bool,
+) -> Vec<(usize, Scored)> {
+    let likelihood = Likelihood::new(prediction, declared);
+    let above = Above::new(prediction.receiver.looks);
+    let one = |(look, seen): (usize, &Observation)| {
+        let below = |level_w: f64| likelihood.below(look, level_w);
+        let [mean, variance] = detected_moments(&likelihood, &above, declared, look);
+        let expected_dbm = DB * mean + dbm_from_watts(1.0);
+        let missed = below(declared.threshold_w);
+        let share = |power_w: f64| (below(power_w) - missed) / (1.0 - missed).max(1e-300);
+        Scored {
+            ln_p: likelihood.term(look, seen).ln_p,
+            expected_dbm,
+            variance_db2: DB * DB * variance,
+            residual_db: seen.power_w.map(|power_w| dbm_from_watts(power_w) - expected_dbm),
+            share: seen.power_w.map(share),
+        }
+    };
+    let looks = observations.iter().enumerate().filter(|(look, _)| wanted(*look));
+    looks.map(|(look, seen)| (look, one((look, seen)))).collect()
+}
+
+/// Mean and variance of ln y given a detection, over the tilts.
+fn detected_moments(
+    likelihood: &Likelihood,
+    above: &Above,
+    declared: Declared,
+    look: usize,
+) -> [f64; 2] {
+    let ln_threshold = declared.threshold_w.ln();
+    let means = likelihood.ln_means(look);
+    let mut sums = [0.0; 3];
+    for &(ln_mean, weight) in &means {
+        let [mean, variance] = above.at(ln_threshold - ln_mean);
+        let chance = if means.len() == 1 { 1.0 } else { likelihood.chance(ln_mean) };
+        let (mean, weight) = (ln_mean + mean, weight * chance.max(1e-300));
+        for (sum, part) in sums.iter_mut().zip([1.0, mean, variance + mean * mean]) {
+            *sum += weight * part;
+        }
+    }
+    let mean = sums[1] / sums[0];
+    [mean, (sums[2] / sums[0] - mean * mean).max(0.0)]
+}
+
+/// Sums up looks.
+pub(super) fn errors(scored: &[Scored]) -> Errors {
+    let mean = |values: &mut dyn Iterator<Item = f64>| {
+        let (sum, count) = values.fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
+        sum / f64::max(count, 1.0)
+    };
+    let detected = || scored.iter().filter_map(|s| Some((s, s.residual_db?)));
+    let inside = |share: f64| if (0.05..=0.95).contains(&share) { 1.0 } else { 0.0 };
+    Errors {
+        rmse_db: mean(&mut detected().map(|(_, r)| r * r)).sqrt(),
+        bias_db: mean(&mut detected().map(|(_, r)| r)),
+        log_score: mean(&mut scored.iter().map(|s| s.ln_p)),
+        coverage_90: mean(&mut scored.iter().filter_map(|s| s.share).map(inside)),
+        noise_floor_db: mean(&mut detected().map(|(s, _)| s.variance_db2)).sqrt(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::radar::random::{Key, Purpose};
+
+    #[test]
+    fn moments_above_a_threshold_are_those_of_draws() {
+        for (looks, ln_threshold) in [(1.0, -8.0), (1.0, -0.5), (4.0, 0.3), (8.0, -1.0)] {
+            let mut draws =
+                Key { seed: 5, chirp: 0, sub_ray: 0, purpose: Purpose::Speckle }.draws();
+            let x: Vec<f64> = (0..200_000)
+                .map(|_| draws.gamma(looks).ln())
+                .filter(|x| *x > ln_threshold)
+                .collect();
+            let n = x.len() as f64;
+            let mean = x.iter().sum::<f64>() / n;
+            let variance = x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
+            let [m, v] = Above::new(looks).at(ln_threshold);
+            // Five standard errors of the mean; the variance of heavy tails within 3 %.
+            assert!((m - mean).abs() < 5.0 * (variance / n).sqrt(), "{looks}: {m} {mean}");
+            assert!((v / variance - 1.0).abs() < 0.03, "{looks}: {v} {variance}");
+        }
+    }
+}
