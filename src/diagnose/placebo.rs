@@ -59,7 +59,7 @@ impl Effect for Placebo {
         vec![vec![0.0; self.waves.len()]]
     }
 
-    fn gain(&self, values: &[f64], look: &Look) -> f64 {
+    fn gain(&self, values: &[f64], _: &Stage, look: &Look) -> f64 {
         let wave = |([phase, kx, ky], db): (&[f64; 3], &f64)| {
             db * (phase + kx * look.xt_m + ky * look.yt_m).cos()
         };

@@ -101,7 +101,7 @@ impl Effect for Gain {
     fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
         vec![vec![0.3], vec![-0.3]]
     }
-    fn gain(&self, values: &[f64], look: &Look) -> f64 {
+    fn gain(&self, values: &[f64], _: &Stage, look: &Look) -> f64 {
         10f64.powf(0.1 * values.first().unwrap() * (self.db)(look))
     }
 }
@@ -115,7 +115,8 @@ fn diagnosed(truth: &[(&'static dyn Effect, f64)], seed: u64) -> Report {
     let regions = vec![0; mesh.facets.len()];
     let (link, grain_of_region) = (Link::new(&radar), [DVec3::Y]);
     let (region_of_facet, grain_of_region) = (&regions[..], &grain_of_region[..]);
-    let stage = Stage { radar: &radar, link, bvh: &bvh, region_of_facet, grain_of_region };
+    let middle = DVec3::new(0.0, 1.1, 0.0);
+    let stage = Stage { radar: &radar, link, bvh: &bvh, region_of_facet, grain_of_region, middle };
     let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
     let noise_w = watts_from_dbm(-100.0);
     let receiver = Receiver { looks: 4.0, noise_w, tilt_sd_rad: 0.0 };
@@ -222,6 +223,7 @@ fn a_scan_with_too_little_says_so() {
         bvh: &bvh,
         region_of_facet: &regions,
         grain_of_region: &grains,
+        middle: DVec3::new(0.0, 1.1, 0.0),
     };
     let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
     let receiver = Receiver { looks: 4.0, noise_w: 0.0, tilt_sd_rad: 0.0 };
@@ -252,6 +254,7 @@ fn a_cloud_finds_its_looks() {
         bvh: &bvh,
         region_of_facet: &regions,
         grain_of_region: &grains,
+        middle: DVec3::new(0.0, 1.1, 0.0),
     };
     let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
     let missed = (0..(SIDE * SIDE) as u32).find(|c| looks.iter().all(|l| l.chirp != *c)).unwrap();
