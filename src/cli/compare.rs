@@ -74,10 +74,11 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let record = record(args, &agreement, &cloud.notices);
     let mut json = serde_json::to_vec_pretty(&record)?;
     json.push(b'\n');
+    let line_scan = line_scan(&scene.file.name, line, &measured, &simulated);
     let files = [
         ("images.png", side_by_side(&scene.file.name, &images, &error, &agreement)?),
-        ("line.svg", line_scan(&scene.file.name, line, &measured, &simulated).svg()?.into_bytes()),
-        ("line.png", line_scan(&scene.file.name, line, &measured, &simulated).png()?),
+        ("line.svg", line_scan.svg()?.into_bytes()),
+        ("line.png", line_scan.png()?),
         ("error.json", json),
     ];
     write_all(&args.output, &files)?;

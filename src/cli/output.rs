@@ -11,7 +11,10 @@ use crate::error::Error;
 ///
 /// Every file is written under a temporary name first; when all are complete they take the places
 /// of what was there. On an error everything is as it was before.
-pub(super) fn write_all(folder: &Path, files: &[(&str, Vec<u8>)]) -> Result<(), Error> {
+pub(super) fn write_all<Name: AsRef<str>>(
+    folder: &Path,
+    files: &[(Name, Vec<u8>)],
+) -> Result<(), Error> {
     let created = create_folder(folder)?;
     let result = stage(folder, files).and_then(|staged| publish(folder, staged));
     if result.is_err() {
@@ -40,11 +43,11 @@ fn create_folder(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(missing)
 }
 
-fn stage<'a>(
+fn stage<'a, Name: AsRef<str>>(
     folder: &Path,
-    files: &'a [(&'a str, Vec<u8>)],
+    files: &'a [(Name, Vec<u8>)],
 ) -> Result<Vec<(&'a str, NamedTempFile)>, Error> {
-    let write = |(name, bytes): &'a (&'a str, Vec<u8>)| {
+    let write = |(name, bytes): &'a (Name, Vec<u8>)| {
         let mut builder = Builder::new();
         builder.prefix(".matdb-");
         #[cfg(unix)]
@@ -55,9 +58,12 @@ fn stage<'a>(
         let mut file = builder.tempfile_in(folder)?;
         file.write_all(bytes)?;
         file.as_file().sync_data()?;
-        Ok((*name, file))
+        Ok((name.as_ref(), file))
     };
-    files.iter().map(|file| write(file).map_err(|reason| failed(folder, file.0, reason))).collect()
+    files
+        .iter()
+        .map(|file| write(file).map_err(|reason| failed(folder, file.0.as_ref(), reason)))
+        .collect()
 }
 
 /// A file that has taken its place, and what was there before.
@@ -154,7 +160,7 @@ mod tests {
     fn a_folder_that_cannot_be_made_leaves_no_parents() {
         let root = tempfile::tempdir().unwrap();
         std::fs::write(root.path().join("file"), "x").unwrap();
-        assert!(write_all(&root.path().join("file/sub"), &[]).is_err());
+        assert!(write_all::<&str>(&root.path().join("file/sub"), &[]).is_err());
         assert_eq!(entries(root.path()), ["file"]);
     }
 }

@@ -226,8 +226,6 @@ fn appendix(folder: &Path) -> Result<Vec<String>, Error> {
         files.push((format!("figure-{number}.png"), plot.png()?));
         files.push((format!("figure-{number}.svg"), plot.svg()?.into_bytes()));
     }
-    let named: Vec<(&str, Vec<u8>)> =
-        files.iter().map(|(name, bytes)| (name.as_str(), bytes.clone())).collect();
-    write_all(folder, &named)?;
+    write_all(folder, &files)?;
     Ok(files.iter().map(|(name, _)| folder.join(name).display().to_string()).collect())
 }

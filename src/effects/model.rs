@@ -22,7 +22,7 @@ pub struct Model<'a> {
 pub struct Prediction {
     /// Mean power and range of every look, without thermal noise; `None` where the ray misses.
     pub arrived: Vec<Option<Arrived>>,
-    /// d ln(mean power)/dθ of every look, 1/rad, for tilts that vary at random.
+    /// d ln(mean power)/dθ of every look, 1/rad, for tilts that vary at random; 0 where none do.
     pub slope_per_rad: Vec<f64>,
     /// The law about the mean.
     pub receiver: Receiver,
@@ -39,15 +39,19 @@ impl Model<'_> {
         for (effect, values) in &self.effects {
             effect.arrive(values, stage, &self.laws, &seen, &mut arrived);
         }
-        let slope = |look: &Option<Look>| look.map_or(0.0, |look| self.slope_per_rad(stage, &look));
         let mut arrived = arrived.into_iter();
+        let effects = self.effects.iter();
+        let receiver = effects
+            .fold(self.receiver, |receiver, (effect, values)| effect.receive(values, receiver));
+        // Twice the work of the powers themselves, and of use only where tilts vary.
+        let slope = |look: &Option<Look>| match look {
+            Some(look) if receiver.tilt_sd_rad > 0.0 => self.slope_per_rad(stage, look),
+            _ => 0.0,
+        };
         Prediction {
             slope_per_rad: placed.par_iter().map(slope).collect(),
             arrived: placed.iter().map(|look| look.and_then(|_| arrived.next())).collect(),
-            receiver: self
-                .effects
-                .iter()
-                .fold(self.receiver, |receiver, (effect, values)| effect.receive(values, receiver)),
+            receiver,
         }
     }
 

@@ -76,9 +76,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     }
     stages.end("encode", console);
 
-    let named: Vec<(&str, Vec<u8>)> =
-        files.iter_mut().map(|(name, bytes)| (name.as_str(), std::mem::take(bytes))).collect();
-    write_all(&args.output, &named)?;
+    write_all(&args.output, &files)?;
     stages.end("write", console);
     report::print(&args.output, &record, &stages, console)
 }
