@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::diagnose::DiagnoseError;
 use crate::fit::FitError;
 use crate::formats::FormatError;
 use crate::formats::exr::ExrError;
@@ -107,6 +108,9 @@ pub enum Error {
         /// Why the search ended.
         stop: &'static str,
     },
+    /// Nothing can be said about a cloud.
+    #[error(transparent)]
+    Diagnose(#[from] DiagnoseError),
     /// No such material.
     #[error("{asked_by}there is no material `{name}`; {way_out}")]
     UnknownMaterial {

@@ -7,6 +7,7 @@ mod completions;
 mod database;
 mod console;
 mod curves;
+mod diagnose;
 mod fit;
 mod list;
 mod materials;
@@ -66,6 +67,7 @@ enum Command {
     Radar(radar::Args),
     Measure(measure::Args),
     Compare(compare::Args),
+    Diagnose(diagnose::Args),
     Add(add::Args),
     List(list::Args),
     Show(show::Args),
@@ -88,6 +90,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Radar(args) => radar::run(args, &console),
         Command::Measure(args) => measure::run(args, db, &console),
         Command::Compare(args) => compare::run(args, db, &console),
+        Command::Diagnose(args) => diagnose::run(args, db, &console),
         Command::Add(args) => add::run(args, db, &console),
         Command::List(_) => list::run(db, &console),
         Command::Show(args) => show::run(args, db, &console),
