@@ -26,11 +26,13 @@ mod select;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 use thiserror::Error;
 
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Level, Look, Receiver, Stage};
+use crate::effects::{Effect, Knob, Level, Look, Prediction, Receiver, Stage};
 use crate::fit::FitError;
 use crate::render::RenderError;
 use crate::units::dbm_from_watts;
@@ -126,12 +128,27 @@ pub enum Verdict {
 /// A number and its standard deviation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Value {
-    /// Name, with its unit.
-    pub name: String,
     /// Value.
     pub value: f64,
     /// Standard deviation; none where a bound holds the number or the data cannot tell it.
     pub sd: Option<f64>,
+    /// UCUM code of its unit; 1 for a pure number.
+    pub unit: &'static str,
+}
+
+/// Why an effect was added.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Evidence {
+    /// Gain in ln likelihood over the model before.
+    pub gain: f64,
+    /// The largest gain of a placebo with as many numbers.
+    pub placebo_gain: f64,
+    /// Gain in ln p of held-out patches.
+    pub held_out_gain: f64,
+    /// Its standard error over patches.
+    pub held_out_se: f64,
+    /// What it changes: root mean square of mean powers, or of the spread, dB.
+    pub size_db: f64,
 }
 
 /// An effect that was added.
@@ -143,8 +160,10 @@ pub struct Found {
     pub level: Level,
     /// Effects that predict the data as well.
     pub class: Vec<&'static str>,
-    /// Its numbers, fitted together with everything else.
-    pub parameters: Vec<Value>,
+    /// Its numbers by name, fitted together with everything else.
+    pub parameters: BTreeMap<&'static str, Value>,
+    /// Why it was added.
+    pub evidence: Evidence,
 }
 
 /// Errors on held-out patches without and with the effects.
@@ -154,18 +173,81 @@ pub struct BeforeAfter {
     pub before: Errors,
     /// With the effects.
     pub after: Errors,
+    /// The rmse of a model that is right, dB.
+    pub noise_floor_db: f64,
     /// (before − after)/(before − floor) of the squared rmse; none where before is at the floor.
     pub explained_share: Option<f64>,
+    /// Folds that the patches were dealt out to.
+    pub folds: usize,
+    /// Patches.
+    pub blocks: usize,
+    /// Always: no look was predicted by a fit that it took part in.
+    pub held_out: bool,
 }
 
 /// A law's number as fitted.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BaseValue {
-    /// Region.
+    /// First region whose law it is.
     pub region: usize,
+    /// Its name.
+    pub name: String,
     /// The number.
     #[serde(flatten)]
     pub value: Value,
+}
+
+/// What the effects are added to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Base {
+    /// The laws' numbers, as fitted with the effects.
+    pub parameters: Vec<BaseValue>,
+    /// Looks of speckle, as declared.
+    pub looks: f64,
+    /// Threshold, dBm, as declared.
+    pub threshold_dbm: f64,
+    /// Which pose was used.
+    pub pose: &'static str,
+    /// Whether the final fit converged.
+    pub converged: bool,
+}
+
+/// The smallest effect that these data would reveal.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Power {
+    /// Effect.
+    pub name: &'static str,
+    /// Size, dB, from which it would be seen; none where these data never show it.
+    pub least_db: Option<f64>,
+    /// Whether an effect of twice that size, put into drawn data, was found again.
+    pub recovered: Option<bool>,
+}
+
+/// What the answer is to be held against.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Controls {
+    /// Largest held-out gain in ln p, and its standard error, of a random smooth field with as many
+    /// numbers as the best effect.
+    pub placebo: Option<Control>,
+    /// The same of a spline over the best covariate.
+    pub equal_df_spline: Option<Control>,
+    /// For every effect, the size that would be seen.
+    pub injection_recovery: Vec<Power>,
+}
+
+/// A term that means nothing, beside one that is claimed to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Control {
+    /// Its numbers.
+    pub numbers: usize,
+    /// What it goes over.
+    pub over: String,
+    /// Gain in ln likelihood over the base.
+    pub gain: f64,
+    /// Gain in ln p of held-out patches.
+    pub held_out_gain: f64,
+    /// Its standard error.
+    pub held_out_se: f64,
 }
 
 /// One look, as a table of residuals has it.
@@ -185,6 +267,24 @@ pub struct Row {
     pub z_after: f64,
     /// Fold that it was held out with.
     pub fold: usize,
+    /// Incidence, degrees.
+    pub theta_deg: f64,
+    /// Azimuth of the radar about the normal, degrees.
+    pub azimuth_deg: f64,
+    /// Range of the mesh, m.
+    pub range_m: f64,
+    /// Measured less predicted range with the effects, m; none where there is no range.
+    pub range_residual_m: Option<f64>,
+    /// x in the target plane, m.
+    pub xt_m: f64,
+    /// y in the target plane, m.
+    pub yt_m: f64,
+    /// Distance to the nearest edge in depth, m, at most three spots.
+    pub edge_m: f64,
+    /// Time, s.
+    pub time_s: f64,
+    /// Region, from 0.
+    pub region: u16,
 }
 
 /// Everything that was found.
@@ -202,12 +302,10 @@ pub struct Report {
     pub unexplained: Vec<Unexplained>,
     /// Errors on held-out patches.
     pub error: BeforeAfter,
-    /// The laws as fitted with the effects.
-    pub base: Vec<BaseValue>,
-    /// Whether the final fit converged.
-    pub converged: bool,
-    /// Patches.
-    pub blocks: usize,
+    /// What the answer is to be held against.
+    pub controls: Controls,
+    /// What the effects are added to.
+    pub base: Base,
     /// The laws of every region as fitted with the effects.
     #[serde(skip)]
     pub laws: Vec<Brdf>,
@@ -283,19 +381,32 @@ impl Diagnosis {
         let z_after = self.z(&problem, &state);
         let prediction = problem.predict(&state.space, &state.fitted.at);
         let unexplained = self.tests().run(&z_after, looks, &prediction, &folds);
-        let (base, effects) = values(&problem, &state, added);
+        let (parameters, effects) = values(&problem, &state, added);
+        let error = before_after(score::errors(&before), score::errors(&state.held_out), &folds);
+        let base = Base {
+            parameters,
+            looks: receiver.looks,
+            threshold_dbm: dbm_from_watts(declared.threshold_w),
+            pose: "as the scene has it",
+            converged: state.fitted.converged,
+        };
         Ok(Report {
             schema: SCHEMA,
             verdict: verdict(&unexplained, &effects),
             effects,
             ranking,
             unexplained,
-            error: before_after(score::errors(&before), score::errors(&state.held_out)),
+            error,
+            controls: Controls::default(),
             base,
-            converged: state.fitted.converged,
-            blocks: folds.blocks,
             laws: state.space.model(receiver, &state.fitted.at).laws,
-            rows: rows(subject, &folds, [&before, &state.held_out], [&z_before, &z_after]),
+            rows: rows(
+                subject,
+                &prediction,
+                &folds,
+                [&before, &state.held_out],
+                [&z_before, &z_after],
+            ),
         })
     }
 
@@ -320,20 +431,32 @@ fn verdict(unexplained: &[Unexplained], effects: &[Found]) -> Verdict {
 
 fn rows(
     subject: &Subject,
+    prediction: &Prediction,
     folds: &Folds,
     [before, after]: [&[score::Scored]; 2],
     [z_before, z_after]: [&[f64]; 2],
 ) -> Vec<Row> {
-    let row = |look: usize| {
-        let power_w = subject.observations.get(look)?.power_w;
+    let row = |index: usize| {
+        let seen = subject.observations.get(index)?;
+        let look = subject.looks.get(index)?;
+        let arrived = prediction.arrived.get(index).copied().flatten();
         Some(Row {
-            chirp: subject.looks.get(look)?.chirp,
-            observed_dbm: power_w.map(dbm_from_watts),
-            before_dbm: before.get(look)?.expected_dbm,
-            after_dbm: after.get(look)?.expected_dbm,
-            z_before: *z_before.get(look)?,
-            z_after: *z_after.get(look)?,
-            fold: *folds.fold.get(look)?,
+            chirp: look.chirp,
+            observed_dbm: seen.power_w.map(dbm_from_watts),
+            before_dbm: before.get(index)?.expected_dbm,
+            after_dbm: after.get(index)?.expected_dbm,
+            z_before: *z_before.get(index)?,
+            z_after: *z_after.get(index)?,
+            fold: *folds.fold.get(index)?,
+            theta_deg: look.hit.theta_rad().to_degrees(),
+            azimuth_deg: look.azimuth_rad.to_degrees(),
+            range_m: look.hit.range_m,
+            range_residual_m: seen.range_m.zip(arrived).map(|(seen_m, a)| seen_m - a.range_m),
+            xt_m: look.xt_m,
+            yt_m: look.yt_m,
+            edge_m: look.edge_m,
+            time_s: look.time_s,
+            region: look.region,
         })
     };
     (0..subject.looks.len()).filter_map(row).collect()
@@ -368,28 +491,29 @@ fn values(
     let base = space.base_values(at).into_iter().zip(&sd);
     let base = base.map(|((region, name, value, slope), sd)| BaseValue {
         region,
-        value: Value { name, value, sd: finite(sd * slope) },
+        name,
+        value: Value { value, sd: finite(sd * slope), unit: "1" },
     });
     let mut sds = sd.iter().skip(space.base_len());
     let effects = space.effects.iter().zip(space.effect_values(at)).zip(added);
     let found = effects.map(|((effect, values), added)| {
         let knobs = effect.knobs().iter().zip(values).zip(sds.by_ref());
-        let parameters = knobs.map(|((knob, value), sd)| Value {
-            name: knob.name.to_owned(),
-            value,
-            sd: finite(sd * knob.step),
-        });
-        let parameters = parameters.collect();
-        Found { name: effect.name(), level: effect.level(), class: added.class, parameters }
+        let value = |((knob, value), sd): ((&Knob, f64), &f64)| {
+            (knob.name, Value { value, sd: finite(sd * knob.step), unit: knob.unit })
+        };
+        let parameters = knobs.map(value).collect();
+        let select::Added { class, evidence } = added;
+        Found { name: effect.name(), level: effect.level(), class, parameters, evidence }
     });
     let found = found.collect();
     (base.collect(), found)
 }
 
-fn before_after(before: Errors, after: Errors) -> BeforeAfter {
-    let floor = after.noise_floor_db.powi(2);
-    let excess = before.rmse_db.powi(2) - floor;
+fn before_after(before: Errors, after: Errors, folds: &Folds) -> BeforeAfter {
+    let noise_floor_db = after.noise_floor_db;
+    let excess = before.rmse_db.powi(2) - noise_floor_db.powi(2);
     let removed = before.rmse_db.powi(2) - after.rmse_db.powi(2);
     let explained_share = (excess > 0.0).then_some(removed / excess);
-    BeforeAfter { before, after, explained_share }
+    let Folds { folds, blocks, .. } = *folds;
+    BeforeAfter { before, after, noise_floor_db, explained_share, folds, blocks, held_out: true }
 }

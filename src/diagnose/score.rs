@@ -26,6 +26,8 @@ pub(super) struct Scored {
     pub variance_db2: f64,
     /// Detected minus expected, dB; none where nothing was detected.
     pub residual_db: Option<f64>,
+    /// Probability of a detection.
+    pub chance: f64,
     /// Probability, given a detection, of less power than was detected.
     pub share: Option<f64>,
 }
@@ -39,8 +41,12 @@ pub struct Errors {
     pub bias_db: f64,
     /// Mean ln p of all looks, the censored ones included.
     pub log_score: f64,
-    /// Share of detections within the central 90 % of their law.
+    /// Share of detections within the central half of their law.
+    pub coverage_50: f64,
+    /// The same of the central 90 %.
     pub coverage_90: f64,
+    /// Brier score of the probability of a detection, over all looks.
+    pub brier: f64,
     /// The rmse of a model that is right, dB.
     pub noise_floor_db: f64,
 }
@@ -114,6 +120,7 @@ pub(super) fn scored(
             expected_dbm,
             variance_db2: DB * DB * variance,
             residual_db: seen.power_w.map(|power_w| dbm_from_watts(power_w) - expected_dbm),
+            chance: 1.0 - missed,
             share: seen.power_w.map(share),
         }
     };
@@ -150,12 +157,18 @@ pub(super) fn errors(scored: &[Scored]) -> Errors {
         sum / f64::max(count, 1.0)
     };
     let detected = || scored.iter().filter_map(|s| Some((s, s.residual_db?)));
-    let inside = |share: f64| if (0.05..=0.95).contains(&share) { 1.0 } else { 0.0 };
+    let inside = |central: f64| {
+        let within = move |share: f64| (share - 0.5).abs() <= 0.5 * central;
+        mean(&mut scored.iter().filter_map(|s| s.share).map(|s| f64::from(u8::from(within(s)))))
+    };
+    let brier = |s: &Scored| (s.chance - f64::from(u8::from(s.residual_db.is_some()))).powi(2);
     Errors {
         rmse_db: mean(&mut detected().map(|(_, r)| r * r)).sqrt(),
         bias_db: mean(&mut detected().map(|(_, r)| r)),
         log_score: mean(&mut scored.iter().map(|s| s.ln_p)),
-        coverage_90: mean(&mut scored.iter().filter_map(|s| s.share).map(inside)),
+        coverage_50: inside(0.5),
+        coverage_90: inside(0.9),
+        brier: mean(&mut scored.iter().map(brier)),
         noise_floor_db: mean(&mut detected().map(|(s, _)| s.variance_db2)).sqrt(),
     }
 }

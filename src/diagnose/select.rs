@@ -8,12 +8,12 @@
 use nalgebra::DVector;
 use serde::Serialize;
 
-use super::Diagnosis;
 use super::folds::Folds;
 use super::placebo::Placebo;
 use super::refit::{Fitted, Problem, Space};
 use super::residual::speckle_sd_db;
 use super::score::{DB, Scored, scored};
+use super::{Diagnosis, Evidence};
 use crate::effects::Effect;
 use crate::fit::minimise::Minimise;
 
@@ -59,6 +59,7 @@ pub(super) struct State<'a> {
 /// An effect that was added.
 pub(super) struct Added {
     pub class: Vec<&'static str>,
+    pub evidence: Evidence,
 }
 
 /// A fit of one more effect.
@@ -105,7 +106,11 @@ impl Selection<'_> {
                 trial.candidate.accepted = true;
                 let (space, fitted) = (trial.space.clone(), trial.fitted.clone());
                 state = State { space, fitted, held_out };
-                added.push(Added { class });
+                let Candidate { gain, size_db, .. } = trial.candidate;
+                let [held_out_gain, held_out_se] = trial.candidate.held_out.unwrap_or_default();
+                let placebo_gain = trial.candidate.placebo_gain.unwrap_or_default();
+                let evidence = Evidence { gain, placebo_gain, held_out_gain, held_out_se, size_db };
+                added.push(Added { class, evidence });
             }
             ranking.extend(trials.into_iter().map(|trial| trial.candidate));
         }

@@ -168,7 +168,7 @@ fn nothing_is_found_where_nothing_is_missing() {
             alarms.push((seed, report.effects.len(), report.unexplained.clone()));
             continue;
         }
-        assert!(report.converged);
+        assert!(report.base.converged);
         // The sampling error of an rmse over 2400 detections is 1.5 %; four of these.
         let ratio = report.error.before.rmse_db / report.error.before.noise_floor_db;
         assert!((ratio - 1.0).abs() < 0.06, "{ratio}");
@@ -187,7 +187,7 @@ fn a_missing_effect_is_named_and_its_number_found() {
         assert_eq!(report.verdict, Verdict::Explained, "{report:#?}");
         let names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
         assert_eq!(names, [effect.name]);
-        let found = &report.effects[0].parameters[0];
+        let found = &report.effects[0].parameters["edge_db"];
         let sd = found.sd.unwrap();
         assert!((found.value - value).abs() < 4.0 * sd && sd < 0.5, "{found:?}");
         let error = &report.error;

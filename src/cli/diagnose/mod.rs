@@ -48,8 +48,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let laws: Vec<Brdf> =
         material_of_region.iter().map(|&m| used[usize::from(m)].scattering.clone()).collect();
     let bvh = Bvh::new(&scene.target.mesh);
-    let grain_of_region: Vec<_> =
-        scene.target.regions.iter().map(|region| region.grain).collect();
+    let grain_of_region: Vec<_> = scene.target.regions.iter().map(|region| region.grain).collect();
     let radar = scene.radar();
     let mut stage = Stage {
         radar,
