@@ -7,7 +7,7 @@
 //! predicted ones. A share of one in ten thousand of all chirps may be anything, so that a
 //! silhouette that the mesh misses costs a bounded amount.
 
-use crate::effects::{Arrived, Prediction};
+use crate::effects::Prediction;
 use crate::fit::gamma_law::GammaLaw;
 
 use super::looks::Observation;
@@ -53,8 +53,15 @@ pub(super) struct Term {
     pub ln_p: f64,
     /// ln(μ + N) without tilt.
     pub ln_mean: f64,
+    /// d ln p/d ln mean.
+    pub slope: f64,
     /// −d² ln p/d(ln mean)², never negative.
     pub bend: f64,
+    /// Predicted range, m; 0 where nothing arrives.
+    pub range_m: f64,
+    /// d ln p/d range, 1/m, and −d² ln p/d range², 1/m², never negative.
+    pub range_slope: f64,
+    pub range_bend: f64,
 }
 
 impl<'a> Likelihood<'a> {
@@ -80,7 +87,7 @@ impl<'a> Likelihood<'a> {
     /// One chirp's part of the likelihood.
     pub fn term(&self, look: usize, seen: &Observation) -> Term {
         let means = self.ln_means(look);
-        let (mut p, mut bend) = (0.0, 0.0);
+        let (mut p, mut slope, mut bend) = (0.0, 0.0, 0.0);
         for &(ln_mean, weight) in &means {
             let law = match seen.power_w {
                 Some(power_w) => self.law.detected(power_w.ln(), ln_mean),
@@ -88,12 +95,24 @@ impl<'a> Likelihood<'a> {
             };
             let part = (1.0 - OUTLIERS) * weight * law.value.exp();
             p += part;
+            slope += part * law.by_ln_mean;
             bend += part * law.bend;
         }
         let anything = if seen.power_w.is_some() { OUTLIER_DENSITY } else { 0.5 };
         p += OUTLIERS * anything;
-        let middle = means.get(means.len() / 2).map_or(0.0, |mean| mean.0);
-        Term { ln_p: p.ln() + self.ln_range(look, seen), ln_mean: middle, bend: bend / p }
+        let ln_mean = means.get(means.len() / 2).map_or(0.0, |mean| mean.0);
+        let arrived = self.prediction.arrived.get(look).copied().flatten();
+        let range_m = arrived.map_or(0.0, |arrived| arrived.range_m);
+        let [ln_range, range_slope, range_bend] = self.range(range_m, seen);
+        Term {
+            ln_p: p.ln() + ln_range,
+            ln_mean,
+            slope: slope / p,
+            bend: bend / p,
+            range_m,
+            range_slope,
+            range_bend,
+        }
     }
 
     /// Probability that the power of a look stays below a level, W.
@@ -109,17 +128,18 @@ impl<'a> Likelihood<'a> {
         1.0 - self.law.below(self.declared.threshold_w.ln(), ln_mean).value.exp()
     }
 
-    fn ln_range(&self, look: usize, seen: &Observation) -> f64 {
-        let arrived: Option<Arrived> = self.prediction.arrived.get(look).copied().flatten();
-        let (Some(range_m), Some(arrived)) = (seen.range_m, arrived) else { return 0.0 };
+    /// ln p of a range, its slope and its curvature by the predicted range.
+    fn range(&self, predicted_m: f64, seen: &Observation) -> [f64; 3] {
         let sd_m = self.declared.range_sd_m;
-        if sd_m <= 0.0 {
-            return 0.0;
-        }
-        let x = (range_m - arrived.range_m) / sd_m;
+        let Some(range_m) = seen.range_m.filter(|_| sd_m > 0.0 && predicted_m > 0.0) else {
+            return [0.0; 3];
+        };
+        let x = (range_m - predicted_m) / sd_m;
         let bell = |x: f64| (-0.5 * x * x).exp();
-        ((1.0 - STRAY_RANGES) * bell(x) + STRAY_RANGES / STRAY_WIDTH * bell(x / STRAY_WIDTH))
-            .max(f64::MIN_POSITIVE)
-            .ln()
+        let near = (1.0 - STRAY_RANGES) * bell(x);
+        let stray = STRAY_RANGES / STRAY_WIDTH * bell(x / STRAY_WIDTH);
+        let p = (near + stray).max(f64::MIN_POSITIVE);
+        let weight = (near + stray / STRAY_WIDTH.powi(2)) / p;
+        [p.ln(), weight * x / sd_m, weight / (sd_m * sd_m)]
     }
 }

@@ -22,6 +22,7 @@ mod placebo;
 mod refit;
 mod residual;
 mod score;
+mod screen;
 mod select;
 #[cfg(test)]
 mod tests;
@@ -32,7 +33,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Knob, Level, Look, Prediction, Receiver, Stage};
+use crate::effects::{Effect, Knob, Level, Look, Prediction, Receiver, Stage, Surveys};
 use crate::fit::FitError;
 use crate::render::RenderError;
 use crate::units::dbm_from_watts;
@@ -373,7 +374,8 @@ impl Diagnosis {
         let Subject { stage, laws, receiver, declared, looks, observations } = *subject;
         let folds = Folds::new(looks, self.block_m, self.folds, self.seed);
         check(subject, &folds)?;
-        let problem = Problem { stage, looks, observations, declared, receiver };
+        let surveys = &Surveys::default();
+        let problem = Problem { stage, looks, observations, declared, receiver, surveys };
         let selection = Selection { problem, folds: &folds, settings: self };
         let base = selection.base(Space::new(&problem, laws)?);
         let (before, z_before) = (base.held_out.clone(), self.z(&problem, &base));
@@ -486,7 +488,7 @@ fn values(
     added: Vec<select::Added>,
 ) -> (Vec<BaseValue>, Vec<Found>) {
     let (space, at) = (&state.space, &state.fitted.at);
-    let sd = problem.sd(space, at, &vec![true; problem.looks.len()]);
+    let sd = problem.sd(space, at);
     let finite = |sd: f64| sd.is_finite().then_some(sd);
     let base = space.base_values(at).into_iter().zip(&sd);
     let base = base.map(|((region, name, value, slope), sd)| BaseValue {

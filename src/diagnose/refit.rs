@@ -9,17 +9,18 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::folds::Folds;
 use super::likelihood::{Declared, Likelihood, Term};
 use super::looks::Observation;
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Look, Model, Prediction, Receiver, Stage};
+use crate::effects::{Effect, Look, Model, Prediction, Receiver, Stage, Surveys};
 use crate::fit::FitError;
 use crate::fit::coordinates::Coordinates;
 use crate::fit::minimise::{Local, Minimise};
 
-/// Half the width of a difference quotient: of a law's coordinate in its search, of an effect's
-/// number in its steps.
-const LAW_STEP: f64 = 2e-3;
+/// Step of a difference quotient: of a law's coordinate in its search, of an effect's number in its
+/// steps.
+const LAW_STEP: f64 = 5e-4;
 const EFFECT_STEP: f64 = 0.25;
 /// Looks that a law must have to be fitted.
 const LEAST_LOOKS: usize = 100;
@@ -32,6 +33,8 @@ pub(super) struct Problem<'a> {
     pub observations: &'a [Observation],
     pub declared: Declared,
     pub receiver: Receiver,
+    /// Of these looks.
+    pub surveys: &'a Surveys,
 }
 
 /// What is turned.
@@ -125,7 +128,8 @@ impl<'a> Space<'a> {
         Model { laws, receiver, effects }
     }
 
-    fn bounds(&self) -> [DVector<f64>; 2] {
+    /// Least and largest value of every unknown.
+    pub fn bounds(&self) -> [DVector<f64>; 2] {
         let knobs = || self.effects.iter().flat_map(|effect| effect.knobs());
         let laws = |end: fn(&Coordinates) -> DVector<f64>| {
             self.turned.iter().flat_map(move |(_, c)| end(c).iter().copied().collect::<Vec<_>>())
@@ -134,18 +138,12 @@ impl<'a> Space<'a> {
         let upper = laws(Coordinates::upper).chain(knobs().map(|knob| knob.max / knob.step));
         [DVector::from_vec(lower.collect()), DVector::from_vec(upper.collect())]
     }
-
-    fn steps(&self) -> Vec<f64> {
-        let base = self.base_len();
-        let all = base + self.effects.iter().map(|effect| effect.knobs().len()).sum::<usize>();
-        (0..all).map(|index| if index < base { LAW_STEP } else { EFFECT_STEP }).collect()
-    }
 }
 
 impl Problem<'_> {
     /// What a point predicts.
     pub fn predict(&self, space: &Space, at: &DVector<f64>) -> Prediction {
-        space.model(self.receiver, at).predict(self.stage, self.looks)
+        space.model(self.receiver, at).predict_with(self.stage, self.looks, self.surveys)
     }
 
     /// Every chirp's part of the likelihood at a point.
@@ -156,12 +154,11 @@ impl Problem<'_> {
         seen.map(|(look, seen)| likelihood.term(look, seen)).collect()
     }
 
-    /// The most likely point from a start, by the looks in `used`. The first `held` unknowns stay.
+    /// The most likely point from a start. The first `held` unknowns stay.
     pub fn fit(
         &self,
         space: &Space,
         start: &DVector<f64>,
-        used: &[bool],
         held: usize,
         search: &Minimise,
     ) -> Fitted {
@@ -170,24 +167,48 @@ impl Problem<'_> {
             (lower[index], upper[index]) = (start[index], start[index]);
         }
         let bounds = [&lower, &upper];
-        let found = search.run(start, bounds, |at| self.local(space, at, used, bounds));
+        let value = |at: &DVector<f64>| -sum(&self.terms(space, at));
+        let found = search.run_with(start, bounds, value, |at| {
+            let terms = self.terms(space, at);
+            let slopes = self.slopes(space, at, bounds, &terms);
+            local(&terms, &slopes, &|_| true)
+        });
         let (ln_likelihood, converged) = (-found.local.value, found.converged());
         Fitted { at: found.at, ln_likelihood, converged }
     }
 
+    /// The most likely points of fits without each fold in turn, by a full step from the most likely
+    /// point of all looks: the folds' points differ from it by about its standard deviation, over which
+    /// ln likelihood is a parabola.
+    pub fn fit_without(
+        &self,
+        space: &Space,
+        at: &DVector<f64>,
+        folds: &Folds,
+    ) -> Vec<DVector<f64>> {
+        let [lower, upper] = space.bounds();
+        let bounds = [&lower, &upper];
+        let terms = self.terms(space, at);
+        let slopes = self.slopes(space, at, bounds, &terms);
+        let without = |fold: usize| {
+            let local = local(&terms, &slopes, &|look| folds.fold.get(look) != Some(&fold));
+            Minimise::newton(at, bounds, &local)
+        };
+        (0..folds.folds).map(without).collect()
+    }
+
     /// Standard deviation of every unknown in the search; infinite for those that a bound holds or
     /// that the data cannot tell.
-    pub fn sd(&self, space: &Space, at: &DVector<f64>, used: &[bool]) -> Vec<f64> {
+    pub fn sd(&self, space: &Space, at: &DVector<f64>) -> Vec<f64> {
         let [lower, upper] = space.bounds();
-        let slopes = self.slopes(space, at, [&lower, &upper]);
+        let slopes = self.slopes(space, at, [&lower, &upper], &self.terms(space, at));
         let inside = |&i: &usize| at[i] > lower[i] && at[i] < upper[i];
         let free: Vec<usize> = (0..at.len()).filter(inside).collect();
         let mut products: DMatrix<f64> = DMatrix::zeros(free.len(), free.len());
-        for (look, _) in used.iter().enumerate().filter(|(_, used)| **used) {
-            for (row, &i) in free.iter().enumerate() {
-                for (column, &j) in free.iter().enumerate() {
-                    products[(row, column)] += slopes[i][look].0 * slopes[j][look].0;
-                }
+        for (row, &i) in free.iter().enumerate() {
+            for (column, &j) in free.iter().enumerate() {
+                let pairs = slopes[i].iter().zip(&slopes[j]);
+                products[(row, column)] = pairs.map(|(a, b)| a.ln_p * b.ln_p).sum();
             }
         }
         let mut sd = vec![f64::INFINITY; at.len()];
@@ -199,54 +220,75 @@ impl Problem<'_> {
         sd
     }
 
-    /// d ln p and d ln μ of every look by every unknown.
-    fn slopes(
+    /// Slopes of every look by every unknown: forward differences for those of the laws, which are
+    /// smooth, and central ones over felt steps for those of effects, which facets make rough.
+    pub fn slopes(
         &self,
         space: &Space,
         at: &DVector<f64>,
         [lower, upper]: [&DVector<f64>; 2],
-    ) -> Vec<Vec<(f64, f64)>> {
-        let slope = |(index, step): (usize, f64)| {
-            let (mut up, mut down) = (at.clone(), at.clone());
-            up[index] = (at[index] + step).min(upper[index]).max(at[index]);
-            down[index] = (at[index] - step).max(lower[index]).min(at[index]);
-            let width = up[index] - down[index];
+        here: &[Term],
+    ) -> Vec<Vec<Slope>> {
+        let slope = |index: usize| {
+            let step = if index < space.base_len() { LAW_STEP } else { EFFECT_STEP };
+            let moved = |by: f64| {
+                let mut there = at.clone();
+                there[index] = (at[index] + by).clamp(lower[index], upper[index]);
+                let moved = there[index] - at[index];
+                (moved, if moved == 0.0 { here.to_vec() } else { self.terms(space, &there) })
+            };
+            let (more, up) = moved(step);
+            let is_one_sided = index < space.base_len() && more > 0.0;
+            let (less, down) = if is_one_sided { (0.0, here.to_vec()) } else { moved(-step) };
+            let width = more - less;
             if width <= 0.0 {
-                return vec![(0.0, 0.0); self.looks.len()];
+                return vec![Slope::default(); self.looks.len()];
             }
-            let pairs = self.terms(space, &up).into_iter().zip(self.terms(space, &down));
-            pairs
-                .map(|(a, b)| ((a.ln_p - b.ln_p) / width, (a.ln_mean - b.ln_mean) / width))
-                .collect()
+            let slope = |(a, b): (Term, Term)| Slope {
+                ln_p: (a.ln_p - b.ln_p) / width,
+                ln_mean: (a.ln_mean - b.ln_mean) / width,
+                range_m: (a.range_m - b.range_m) / width,
+            };
+            up.into_iter().zip(down).map(slope).collect()
         };
-        space.steps().into_iter().enumerate().map(slope).collect()
+        (0..at.len()).map(slope).collect()
     }
+}
 
-    fn local(
-        &self,
-        space: &Space,
-        at: &DVector<f64>,
-        used: &[bool],
-        bounds: [&DVector<f64>; 2],
-    ) -> Local {
-        let terms = self.terms(space, at);
-        let slopes = self.slopes(space, at, bounds);
-        let moves_mean: Vec<bool> =
-            slopes.iter().map(|s| s.iter().any(|(_, mean)| mean.abs() > 1e-9)).collect();
-        let mut local = Local::zero(at.len());
-        for (look, term) in terms.iter().enumerate().filter(|(look, _)| used[*look]) {
-            local.value -= term.ln_p;
-            let mut score = vec![0.0; at.len()];
-            let (mut means, mut laws) = (score.clone(), score.clone());
-            for (index, slope) in slopes.iter().enumerate() {
-                let (by_p, by_mean) = slope[look];
-                score[index] = by_p;
-                if moves_mean[index] { means[index] = by_mean } else { laws[index] = by_p }
+/// Slopes of one look by one unknown.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Slope {
+    pub ln_p: f64,
+    pub ln_mean: f64,
+    pub range_m: f64,
+}
+
+/// ln likelihood.
+pub(super) fn sum(terms: &[Term]) -> f64 {
+    terms.iter().map(|term| term.ln_p).sum()
+}
+
+/// −ln likelihood near a point, by the looks that count.
+fn local(terms: &[Term], slopes: &[Vec<Slope>], counts: &dyn Fn(usize) -> bool) -> Local {
+    let unknowns = slopes.len();
+    let moves = |s: &Slope| s.ln_mean.abs() > 1e-9 || s.range_m.abs() > 1e-12;
+    let moves_mean: Vec<bool> = slopes.iter().map(|s| s.iter().any(moves)).collect();
+    let mut sum = Local::zero(unknowns);
+    let mut rows = [vec![0.0; unknowns], vec![0.0; unknowns], vec![0.0; unknowns]];
+    for (look, term) in terms.iter().enumerate().filter(|(look, _)| counts(*look)) {
+        sum.value -= term.ln_p;
+        let [means, ranges, laws] = &mut rows;
+        for (index, slopes) in slopes.iter().enumerate() {
+            let slope = slopes[look];
+            sum.gradient[index] -= slope.ln_p;
+            match moves_mean[index] {
+                true => (means[index], ranges[index]) = (slope.ln_mean, slope.range_m),
+                false => laws[index] = slope.ln_p,
             }
-            local.add(-1.0, 0.0, &score);
-            local.add(0.0, term.bend, &means);
-            local.add(0.0, 1.0, &laws);
         }
-        local
+        for (row, weight) in rows.iter().zip([term.bend, term.range_bend, 1.0]) {
+            sum.add(0.0, weight, row);
+        }
     }
+    sum
 }

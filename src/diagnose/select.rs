@@ -10,20 +10,31 @@ use serde::Serialize;
 
 use super::folds::Folds;
 use super::placebo::Placebo;
-use super::refit::{Fitted, Problem, Space};
+use super::refit::{Fitted, Problem, Space, sum};
 use super::residual::speckle_sd_db;
 use super::score::{DB, Scored, scored};
+use super::screen::{Sample, Screen};
 use super::{Diagnosis, Evidence};
-use crate::effects::Effect;
+use crate::effects::{Effect, Prediction, Receiver};
 use crate::fit::minimise::Minimise;
 
-/// Steps of a fit, and of one that only looks whether a start is worth more.
-const SEARCH: Minimise = Minimise { iterations: 40, tolerance: 1e-3 };
-const SCOUT: Minimise = Minimise { iterations: 6, tolerance: 0.1 };
-/// Effects of each round that predict held-out patches.
-const SHORTLIST: usize = 3;
+/// Steps of a fit, and of one on the sample that only shows whether an effect is worth it.
+const SEARCH: Minimise = Minimise { iterations: 30, tolerance: 1e-2 };
+const SCOUT: Minimise = Minimise { iterations: 12, tolerance: 0.1 };
+/// Starts of an effect that are followed.
+const STARTS: usize = 2;
+/// And none that promises less than this share of what the best does.
+const SHARE_OF_START: f64 = 0.7;
+/// Effects that promise less than this share of the best are not fitted at all.
+const SHARE_TO_SCOUT: f64 = 0.1;
+/// Effects of each round that are fitted to all looks and predict held-out patches: at most so many,
+/// and none that gains less than this share of the best.
+const SHORTLIST: usize = 5;
+const SHARE_OF_BEST: f64 = 0.3;
 /// Placebos of each comparison.
 const PLACEBOS: u64 = 3;
+/// Looks of a first fit of the base, that is not caught far from the data.
+const WIDE_LOOKS: f64 = 4.0;
 
 /// One effect of one round.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -36,6 +47,8 @@ pub struct Candidate {
     pub numbers: usize,
     /// Gain in ln likelihood over the model so far.
     pub gain: f64,
+    /// Whether that is from a sample of the looks, too little to be fitted to all of them.
+    pub sampled: bool,
     /// Largest gain of a placebo with as many numbers, at most six; only for effects on the short list.
     pub placebo_gain: Option<f64>,
     /// Gain in ln p of held-out patches and its standard error; only for effects on the short list.
@@ -66,6 +79,8 @@ pub(super) struct Added {
 struct Trial<'a> {
     effect: &'a dyn Effect,
     space: Space<'a>,
+    /// What they promise, and where they are.
+    starts: Vec<(f64, DVector<f64>)>,
     fitted: Fitted,
     candidate: Candidate,
 }
@@ -80,7 +95,12 @@ pub(super) struct Selection<'p> {
 impl Selection<'_> {
     /// The model without effects.
     pub fn base<'a>(&self, space: Space<'a>) -> State<'a> {
-        let fitted = self.problem.fit(&space, &space.start(), &self.all(), 0, &SEARCH);
+        let Receiver { looks, .. } = self.problem.receiver;
+        let receiver = Receiver { looks: looks.min(WIDE_LOOKS), ..self.problem.receiver };
+        let sample = Sample::new(&self.problem);
+        let wide = Problem { receiver, ..sample.problem(&self.problem) };
+        let start = wide.fit(&space, &space.start(), 0, &SEARCH).at;
+        let fitted = self.problem.fit(&space, &start, 0, &SEARCH);
         let held_out = self.held_out(&space, &fitted.at);
         State { space, fitted, held_out }
     }
@@ -117,11 +137,8 @@ impl Selection<'_> {
         (state, ranking, added)
     }
 
-    fn all(&self) -> Vec<bool> {
-        vec![true; self.problem.looks.len()]
-    }
-
-    /// Every effect that is not there yet, best first.
+    /// Every effect that is not there yet, best first. Those worth it are fitted to all looks, the
+    /// rest to a sample.
     fn trials<'a>(
         &self,
         state: &State<'a>,
@@ -131,48 +148,97 @@ impl Selection<'_> {
         let absent = |effect: &&&dyn Effect| {
             state.space.effects.iter().all(|there| there.name() != effect.name())
         };
+        let sample = Sample::new(&self.problem);
+        let screen = Screen::new(sample.problem(&self.problem), &state.space, &state.fitted.at);
         let mut trials: Vec<Trial> = effects
             .iter()
             .filter(absent)
-            .filter_map(|effect| self.trial(state, *effect, round))
+            .filter_map(|effect| self.promised(state, &screen, sample.weight, *effect, round))
             .collect();
-        trials.sort_by(|a, b| b.candidate.gain.total_cmp(&a.candidate.gain));
+        sort(&mut trials);
+        let mut best = 0.25 * self.settings.least_gain / SHARE_TO_SCOUT;
+        for trial in &mut trials {
+            if trial.candidate.gain >= SHARE_TO_SCOUT * best {
+                self.scout(state, &screen, sample.weight, trial);
+                best = best.max(trial.candidate.gain);
+            }
+        }
+        sort(&mut trials);
+        let best = trials.first().map_or(0.0, |trial| trial.candidate.gain);
+        let least = (SHARE_OF_BEST * best).max(0.5 * self.settings.least_gain);
+        for trial in trials.iter_mut().take(SHORTLIST) {
+            if trial.candidate.gain >= least {
+                self.refit(state, trial);
+            }
+        }
+        sort(&mut trials);
         trials
     }
 
-    fn trial<'a>(
+    /// An effect at the start that promises most.
+    fn promised<'a>(
         &self,
         state: &State<'a>,
+        screen: &Screen,
+        weight: f64,
         effect: &'a dyn Effect,
         round: usize,
     ) -> Option<Trial<'a>> {
         let space = state.space.with(effect);
-        let fitted = self.best_fit(state, &space, effect)?;
+        let starts = effect.starts(self.problem.stage, self.problem.looks);
+        let mut starts: Vec<(f64, DVector<f64>)> = starts
+            .iter()
+            .map(|values| {
+                let start = Space::joined(&state.fitted.at, effect, values);
+                (weight * screen.promise(&space, &start), start)
+            })
+            .collect();
+        starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+        starts.truncate(STARTS);
+        let (gain, at) = starts.first()?.clone();
+        // Where the effect is absent there is nothing to promise.
+        let gain = if starts.len() == 1 && gain == 0.0 { f64::INFINITY } else { gain };
         let candidate = Candidate {
             round,
             name: effect.name(),
             numbers: effect.knobs().len(),
-            gain: fitted.ln_likelihood - state.fitted.ln_likelihood,
+            gain,
+            sampled: true,
             placebo_gain: None,
             held_out: None,
-            size_db: self.size_db(state, &space, &fitted.at),
-            converged: fitted.converged,
+            size_db: 0.0,
+            converged: false,
             accepted: false,
         };
-        Some(Trial { effect, space, fitted, candidate })
+        let fitted = Fitted { at, ln_likelihood: f64::NEG_INFINITY, converged: false };
+        Some(Trial { effect, space, starts, fitted, candidate })
     }
 
-    /// From every start a short search with the rest held, from the best of them a full one.
-    fn best_fit(&self, state: &State, space: &Space, effect: &dyn Effect) -> Option<Fitted> {
-        let (all, held) = (self.all(), state.fitted.at.len());
-        let scout = |values: Vec<f64>| {
-            let start = Space::joined(&state.fitted.at, effect, &values);
-            self.problem.fit(space, &start, &all, held, &SCOUT)
-        };
-        let starts = effect.starts(self.problem.stage, self.problem.looks);
-        let scouts = starts.into_iter().map(scout).filter(|fit| fit.ln_likelihood.is_finite());
-        let best = scouts.max_by(|a, b| a.ln_likelihood.total_cmp(&b.ln_likelihood))?;
-        Some(self.problem.fit(space, &best.at, &all, 0, &SEARCH))
+    /// Fits a trial to the sample.
+    fn scout(&self, state: &State, screen: &Screen, weight: f64, trial: &mut Trial) {
+        let space = &trial.space;
+        let here = sum(&screen.problem.terms(&state.space, &state.fitted.at));
+        let most = trial.starts.first().map_or(0.0, |start| start.0);
+        let useful = trial.starts.iter().filter(|start| start.0 >= SHARE_OF_START * most);
+        let scouts = useful.map(|(_, start)| screen.problem.fit(space, start, 0, &SCOUT));
+        let best = scouts
+            .filter(|fit| fit.ln_likelihood.is_finite())
+            .max_by(|a, b| a.ln_likelihood.total_cmp(&b.ln_likelihood));
+        if let Some(best) = best {
+            trial.candidate.gain = weight * (best.ln_likelihood - here);
+            trial.candidate.size_db = self.size_db(state, space, &best.at);
+            trial.candidate.converged = best.converged;
+            trial.fitted = best;
+        }
+    }
+
+    /// Fits a trial to all looks.
+    fn refit(&self, state: &State, trial: &mut Trial) {
+        trial.fitted = self.problem.fit(&trial.space, &trial.fitted.at, 0, &SEARCH);
+        trial.candidate.gain = trial.fitted.ln_likelihood - state.fitted.ln_likelihood;
+        trial.candidate.sampled = false;
+        trial.candidate.size_db = self.size_db(state, &trial.space, &trial.fitted.at);
+        trial.candidate.converged = trial.fitted.converged;
     }
 
     /// The effect to add: its place, its held-out scores, and the names that do as well.
@@ -182,33 +248,36 @@ impl Selection<'_> {
         trials: &mut [Trial],
     ) -> Option<(usize, Vec<Scored>, Vec<&'static str>)> {
         let mut passed: Vec<(usize, Vec<Scored>, f64)> = Vec::new();
-        for (index, trial) in trials.iter_mut().enumerate().take(SHORTLIST) {
-            let least = self.settings.least_gain;
-            if trial.candidate.gain < least || trial.candidate.size_db < self.settings.least_size_db
-            {
+        for (index, trial) in trials.iter_mut().enumerate().filter(|t| !t.1.candidate.sampled) {
+            let Diagnosis { least_gain, least_size_db, standard_errors, .. } = *self.settings;
+            if trial.candidate.gain < least_gain || trial.candidate.size_db < least_size_db {
                 continue;
             }
-            let placebo = self.placebo_gain(state, trial.effect.knobs().len());
             let held_out = self.held_out(&trial.space, &trial.fitted.at);
             let [gain, se] = self.difference(&held_out, &state.held_out);
-            trial.candidate.placebo_gain = Some(placebo);
             trial.candidate.held_out = Some([gain, se]);
-            if gain > self.settings.standard_errors * se && trial.candidate.gain > placebo {
+            if gain > standard_errors * se {
                 passed.push((index, held_out, gain));
             }
         }
-        let best = passed.iter().max_by(|a, b| a.2.total_cmp(&b.2))?;
+        passed.sort_by(|a, b| b.2.total_cmp(&a.2));
+        while let Some(best) = passed.first() {
+            let trial = trials.get_mut(best.0)?;
+            let placebo = self.placebo_gain(state, trial.effect.knobs().len());
+            trial.candidate.placebo_gain = Some(placebo);
+            if trial.candidate.gain > placebo {
+                break;
+            }
+            passed.remove(0);
+        }
+        let best = passed.first()?;
         let as_good = |other: &&(usize, Vec<Scored>, f64)| {
             let [worse, se] = self.difference(&best.1, &other.1);
             worse <= se
         };
-        let class: Vec<&(usize, Vec<Scored>, f64)> = passed.iter().filter(as_good).collect();
-        let numbers = |one: &&&(usize, Vec<Scored>, f64)| trials[one.0].candidate.numbers;
-        // Among equals the simplest; of these the likeliest, which stands first.
-        let simplest = class.iter().min_by_key(numbers)?;
-        let others = class.iter().filter(|one| one.0 != simplest.0);
-        let names = others.map(|one| trials[one.0].candidate.name).collect();
-        Some((simplest.0, simplest.1.clone(), names))
+        let class = passed.iter().skip(1).filter(as_good);
+        let names = class.map(|one| trials[one.0].candidate.name).collect();
+        Some((best.0, best.1.clone(), names))
     }
 
     /// Sum over all looks of a difference in ln p, and its standard error over patches.
@@ -218,27 +287,33 @@ impl Selection<'_> {
     }
 
     fn placebo_gain(&self, state: &State, numbers: usize) -> f64 {
+        let screen = Screen::new(self.problem, &state.space, &state.fitted.at);
         let gain = |draw: u64| {
             let placebo = Placebo::new(numbers, self.settings.seed, draw);
             let mut space = state.space.clone();
             space.effects.push(&placebo);
-            let zero = vec![0.0; placebo.knobs().len()];
-            let start = Space::joined(&state.fitted.at, &placebo, &zero);
-            let fitted = self.problem.fit(&space, &start, &self.all(), 0, &SEARCH);
-            fitted.ln_likelihood - state.fitted.ln_likelihood
+            let knobs = placebo.knobs();
+            let only = |k: usize| {
+                let values: Vec<f64> = knobs
+                    .iter()
+                    .enumerate()
+                    .map(|(i, knob)| if i == k { knob.step } else { 0.0 })
+                    .collect();
+                Space::joined(&state.fitted.at, &placebo, &values)
+            };
+            screen.promise_of_all(&space, &(0..knobs.len()).map(only).collect::<Vec<_>>())
         };
         (0..PLACEBOS).map(gain).fold(0.0, f64::max)
     }
 
     /// Every look, predicted by a fit without its fold.
     fn held_out(&self, space: &Space, at: &DVector<f64>) -> Vec<Scored> {
+        let Problem { declared, observations, .. } = self.problem;
         let mut all: Vec<(usize, Scored)> = Vec::new();
-        for fold in 0..self.folds.folds {
-            let used: Vec<bool> = self.folds.fold.iter().map(|f| *f != fold).collect();
-            let fitted = self.problem.fit(space, at, &used, 0, &SEARCH);
-            let prediction = self.problem.predict(space, &fitted.at);
-            let Problem { declared, observations, .. } = self.problem;
-            all.extend(scored(&prediction, declared, observations, &|look| !used[look]));
+        for (fold, at) in self.problem.fit_without(space, at, self.folds).iter().enumerate() {
+            let prediction = self.problem.predict(space, at);
+            let held_out = |look: usize| self.folds.fold.get(look) == Some(&fold);
+            all.extend(scored(&prediction, declared, observations, &held_out));
         }
         all.sort_by_key(|(look, _)| *look);
         all.into_iter().map(|(_, scored)| scored).collect()
@@ -248,8 +323,10 @@ impl Selection<'_> {
         let before = self.problem.predict(&state.space, &state.fitted.at);
         let after = self.problem.predict(space, at);
         let spread = |looks: f64| speckle_sd_db(looks);
-        let spread_db = (spread(after.receiver.looks) - spread(before.receiver.looks)).abs();
-        let mean = |p: &crate::effects::Prediction, look: usize| {
+        // Spreads add in squares.
+        let wider = |a: f64, b: f64| (a * a - b * b).abs().sqrt();
+        let spread_db = wider(spread(after.receiver.looks), spread(before.receiver.looks));
+        let mean = |p: &Prediction, look: usize| {
             let power_w = p.arrived.get(look).copied().flatten().map_or(0.0, |a| a.power_w);
             (power_w + p.receiver.noise_w).max(f64::MIN_POSITIVE).ln()
         };
@@ -258,10 +335,14 @@ impl Selection<'_> {
         let squares =
             seen.map(|(look, _)| (DB * (mean(&after, look) - mean(&before, look))).powi(2));
         let (sum, count) = squares.fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
-        let tilt_db = DB * after.receiver.tilt_sd_rad * rms(&after.slope_per_rad)
-            - DB * before.receiver.tilt_sd_rad * rms(&before.slope_per_rad);
-        (sum / f64::max(count, 1.0)).sqrt().max(spread_db).max(tilt_db.abs())
+        let tilt = |p: &Prediction| DB * p.receiver.tilt_sd_rad * rms(&p.slope_per_rad);
+        let tilt_db = wider(tilt(&after), tilt(&before));
+        (sum / f64::max(count, 1.0)).sqrt().max(spread_db).max(tilt_db)
     }
+}
+
+fn sort(trials: &mut [Trial]) {
+    trials.sort_by(|a, b| b.candidate.gain.total_cmp(&a.candidate.gain));
 }
 
 fn rms(values: &[f64]) -> f64 {

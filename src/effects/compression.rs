@@ -1,6 +1,6 @@
 //! A receiver that saturates: P becomes P/(1 + P/P_sat).
 
-use super::{Arrived, Effect, Knob, Level, Look, Stage};
+use super::{Arrived, Effect, Knob, Level, Look, Stage, Surveyed};
 use crate::brdf::Brdf;
 use crate::units::watts_from_dbm;
 
@@ -39,11 +39,12 @@ impl Effect for Compression {
         [-25.0, -35.0, -45.0, -55.0].map(|saturation_dbm| vec![saturation_dbm]).to_vec()
     }
 
-    fn arrive(&self, values: &[f64], _: &Stage, _: &[Brdf], _: &[Look], arrived: &mut [Arrived]) {
+    fn arrive(&self, values: &[f64], _: &Surveyed, _: &[Brdf], arrived: &mut [Option<Arrived>]) {
         let &[saturation_dbm] = values else { return };
         if saturation_dbm < NONE_DBM {
             let saturation_w = watts_from_dbm(saturation_dbm);
-            arrived.iter_mut().for_each(|one| one.power_w /= 1.0 + one.power_w / saturation_w);
+            let soft = |one: &mut Arrived| one.power_w /= 1.0 + one.power_w / saturation_w;
+            arrived.iter_mut().flatten().for_each(soft);
         }
     }
 }

@@ -3,10 +3,10 @@
 
 use rayon::prelude::*;
 
-use super::meeting::{base_power_w, met};
+use super::meeting::met;
 use super::spread::sunflower;
-use super::{Arrived, Effect, Knob, Level, Look, Stage};
-use crate::brdf::Brdf;
+use super::{Arrived, Effect, Knob, Level, Look, Stage, Survey, Surveyed};
+use crate::brdf::{Brdf, Scattering};
 use crate::frames::{Direction, Ray};
 
 /// The effect `finite-spot`.
@@ -15,29 +15,62 @@ pub(super) struct FiniteSpot;
 /// Rays that stand for a spot.
 const RAYS: usize = 24;
 
-/// What the spot changes at a look: the factor on its power and what adds to its range, m.
-///
-/// Both are of the base law on the target as the scene has it, so that other effects stay as they are.
-fn averaged(stage: &Stage, laws: &[Brdf], look: &Look, diameter_m: f64) -> Option<(f64, f64)> {
-    let centre = met(stage, look, look.ray)?;
-    let centre_w = base_power_w(stage, laws, &centre);
+/// Where one ray of a spot meets the target.
+#[derive(Clone, Copy)]
+struct Beside {
+    range_m: f64,
+    cos_theta: f64,
+    azimuth_rad: f64,
+    region: u16,
+}
+
+impl Beside {
+    fn of(look: &Look) -> Beside {
+        let Look { hit, azimuth_rad, region, .. } = *look;
+        Beside { range_m: hit.range_m, cos_theta: hit.cos_theta, azimuth_rad, region }
+    }
+
+    /// Equation (11) of the base law, W; nothing where the region has no law.
+    fn power_w(&self, stage: &Stage, laws: &[Brdf]) -> f64 {
+        let retro =
+            Direction::from_angles(self.cos_theta.clamp(-1.0, 1.0).acos(), self.azimuth_rad);
+        laws.get(usize::from(self.region)).map_or(0.0, |law| {
+            stage.link.power_w(self.range_m, self.cos_theta, law.f_per_sr(retro, retro))
+        })
+    }
+}
+
+/// The ray of a look and those of its spot, as far as they meet the target as the scene has it.
+type Spot = (Beside, Vec<Beside>);
+
+fn spot(stage: &Stage, look: &Look, diameter_m: f64) -> Spot {
     // The intensity exp(−4 ln 2·r²/D²) has this standard deviation along each direction.
-    let sd_rad = diameter_m / centre.hit.range_m / (8.0 * std::f64::consts::LN_2).sqrt();
+    let sd_rad = diameter_m / look.hit.range_m / (8.0 * std::f64::consts::LN_2).sqrt();
     let forward = look.ray.direction.xyz();
     let (u, v) = forward.any_orthonormal_pair();
-    let (mut power_w, mut moment) = (0.0, 0.0);
-    for (share, angle_rad) in sunflower(RAYS) {
+    let beside = |(share, angle_rad): (f64, f64)| {
         let off = sd_rad * (-2.0 * (1.0 - share).ln()).sqrt();
         let aside = off * (angle_rad.cos() * u + angle_rad.sin() * v);
-        let Some(direction) = Direction::new(forward + aside) else { continue };
-        if let Some(beside) = met(stage, look, Ray { origin: look.ray.origin, direction }) {
-            let one_w = base_power_w(stage, laws, &beside) / RAYS as f64;
-            power_w += one_w;
-            moment += one_w * beside.hit.range_m;
-        }
+        let direction = Direction::new(forward + aside)?;
+        met(stage, look, Ray { origin: look.ray.origin, direction })
+    };
+    let met = sunflower(RAYS).filter_map(beside).map(|look| Beside::of(&look));
+    (Beside::of(look), met.collect())
+}
+
+/// What a spot changes: the factor on the power and what adds to the range, m.
+///
+/// Both are of the base law on the target as the scene has it, so that other effects stay as they are.
+fn averaged(stage: &Stage, laws: &[Brdf], (centre, beside): &Spot) -> Option<(f64, f64)> {
+    let centre_w = centre.power_w(stage, laws);
+    let (mut power_w, mut moment) = (0.0, 0.0);
+    for ray in beside {
+        let one_w = ray.power_w(stage, laws) / RAYS as f64;
+        power_w += one_w;
+        moment += one_w * ray.range_m;
     }
     let useful = centre_w > 0.0 && power_w > 0.0;
-    useful.then(|| (power_w / centre_w, moment / power_w - centre.hit.range_m))
+    useful.then(|| (power_w / centre_w, moment / power_w - centre.range_m))
 }
 
 impl Effect for FiniteSpot {
@@ -67,23 +100,24 @@ impl Effect for FiniteSpot {
 
     fn starts(&self, stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
         let nominal_m = stage.radar.spot_diameter_m;
-        [0.75, 1.5].map(|share| vec![(share * nominal_m).clamp(1e-3, 0.1)]).to_vec()
+        [0.1, 0.3, 0.75, 1.5].map(|share| vec![(share * nominal_m).clamp(1e-3, 0.1)]).to_vec()
     }
 
-    fn arrive(
-        &self,
-        values: &[f64],
-        stage: &Stage,
-        laws: &[Brdf],
-        looks: &[Look],
-        arrived: &mut [Arrived],
-    ) {
-        let &[diameter_m] = values else { return };
-        if diameter_m == 0.0 {
-            return;
-        }
-        looks.par_iter().zip(arrived).for_each(|(look, one)| {
-            if let Some((factor, longer_m)) = averaged(stage, laws, look, diameter_m) {
+    fn surveyed(&self, values: &[f64]) -> Option<Vec<f64>> {
+        values.first().filter(|diameter_m| **diameter_m > 0.0).map(|_| values.to_vec())
+    }
+
+    fn survey(&self, values: &[f64], stage: &Stage, looks: &[Look]) -> Survey {
+        let diameter_m = values.first().copied().unwrap_or(0.0);
+        let spots: Vec<Spot> = looks.par_iter().map(|look| spot(stage, look, diameter_m)).collect();
+        Box::new(spots)
+    }
+
+    fn arrive(&self, _: &[f64], scan: &Surveyed, laws: &[Brdf], arrived: &mut [Option<Arrived>]) {
+        let Some(spots) = scan.survey.and_then(|s| s.downcast_ref::<Vec<Spot>>()) else { return };
+        spots.par_iter().zip(arrived).for_each(|(spot, one)| {
+            let changed = averaged(scan.stage, laws, spot);
+            if let (Some(one), Some((factor, longer_m))) = (one, changed) {
                 one.power_w *= factor;
                 one.range_m += longer_m;
             }

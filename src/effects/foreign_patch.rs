@@ -15,8 +15,9 @@ const KNOBS: [Knob; 4] = [
     Knob::new("radius_m", "m", [0.005, 1.0], 0.05, 0.01),
 ];
 
-/// Columns and rows of the places where a search begins.
-const GRID: [usize; 2] = [3, 4];
+/// Sides of the cells where a search begins, m, and most of them along an edge of the target.
+const SIDES_M: [f64; 2] = [0.08, 0.16];
+const MOST_CELLS: usize = 14;
 
 /// Distance from a look to the ray of the centre, along the surface as it lies at the look, m.
 fn apart_m(stage: &Stage, look: &Look, [x_m, y_m]: [f64; 2]) -> f64 {
@@ -60,22 +61,27 @@ impl Effect for ForeignPatch {
          brighten places too, but concave ones, and with longer ranges."
     }
 
-    /// The cells of a coarse grid over the target that hold a look.
+    /// The cells of two grids over the target that hold a look, brighter and darker.
     fn starts(&self, _stage: &Stage, looks: &[Look]) -> Vec<Vec<f64>> {
         let [left, right] = span(looks.iter().map(|look| look.xt_m));
         let [low, high] = span(looks.iter().map(|look| look.yt_m));
-        let [columns, rows] = GRID;
-        let (width, height) = ((right - left) / columns as f64, (high - low) / rows as f64);
-        let radius_m = (width.min(height) / 2.0).clamp(0.02, 0.3);
-        let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
-        let centre = |(column, row): (usize, usize)| {
-            [left + (column as f64 + 0.5) * width, low + (row as f64 + 0.5) * height]
-        };
-        let near =
-            |at: &[f64; 2]| looks.iter().any(|l| (l.xt_m - at[0]).hypot(l.yt_m - at[1]) < radius_m);
         let inside = |centre_m: f64| centre_m.clamp(-3.0, 3.0);
-        let start = |[x, y]: [f64; 2]| vec![1.0, inside(x), inside(y), radius_m];
-        cells.map(centre).filter(near).map(start).collect()
+        let mut starts = Vec::new();
+        for side_m in SIDES_M {
+            let count = |length_m: f64| ((length_m / side_m).ceil() as usize).clamp(1, MOST_CELLS);
+            let (columns, rows) = (count(right - left), count(high - low));
+            let (width, height) = ((right - left) / columns as f64, (high - low) / rows as f64);
+            let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
+            for (column, row) in cells {
+                let [x, y] =
+                    [left + (column as f64 + 0.5) * width, low + (row as f64 + 0.5) * height];
+                let radius_m = (0.5 * side_m).clamp(0.02, 0.3);
+                if looks.iter().any(|l| (l.xt_m - x).hypot(l.yt_m - y) < radius_m) {
+                    starts.extend([1.0, -1.0].map(|db| vec![db, inside(x), inside(y), radius_m]));
+                }
+            }
+        }
+        starts
     }
 
     fn gain(&self, values: &[f64], stage: &Stage, look: &Look) -> f64 {

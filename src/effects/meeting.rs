@@ -4,7 +4,6 @@
 use glam::{DMat3, DVec3};
 
 use super::{Look, Stage};
-use crate::brdf::{Brdf, Scattering};
 use crate::frames::{Direction, Global, Point, Ray, Surface};
 use crate::trace::Hit;
 
@@ -70,12 +69,4 @@ pub(super) fn moved(
     let point = rotation * (there.hit.point.xyz - pivot) + pivot + shift_m;
     let hit = Hit { point: point.into(), ..there.hit };
     Some(Look { ray: look.ray, hit, normal: rotation * there.normal, ..there })
-}
-
-/// Equation (11) of the base law at a look, W; nothing where its region has no law.
-pub(super) fn base_power_w(stage: &Stage, laws: &[Brdf], look: &Look) -> f64 {
-    let retro = Direction::from_angles(look.hit.theta_rad(), look.azimuth_rad);
-    laws.get(usize::from(look.region)).map_or(0.0, |law| {
-        stage.link.power_w(look.hit.range_m, look.hit.cos_theta, law.f_per_sr(retro, retro))
-    })
 }

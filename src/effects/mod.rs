@@ -18,6 +18,8 @@ mod meeting;
 mod model;
 mod spread;
 
+use std::any::Any;
+
 use glam::DVec3;
 
 use crate::brdf::Brdf;
@@ -25,7 +27,7 @@ use crate::frames::{Global, Ray};
 use crate::radar::{Link, Radar};
 use crate::trace::{Bvh, Hit};
 
-pub use model::{Model, Prediction};
+pub use model::{Model, Prediction, Surveys};
 
 /// Declares the file of every effect and lists them all, in the order in which they act.
 macro_rules! library {
@@ -218,15 +220,24 @@ pub trait Effect: Sync {
         1.0
     }
 
+    /// The values on which [`survey`](Effect::survey) depends; `None` for an effect without one.
+    fn surveyed(&self, _values: &[f64]) -> Option<Vec<f64>> {
+        None
+    }
+
+    /// Rays beyond a chirp's own, traced once and used for whatever laws: one entry for each look.
+    fn survey(&self, _values: &[f64], _stage: &Stage, _looks: &[Look]) -> Survey {
+        Box::new(())
+    }
+
     /// Changes the mean powers, W, and ranges, m, of all looks together, after all gains. `laws` are
     /// those of the regions.
     fn arrive(
         &self,
         _values: &[f64],
-        _stage: &Stage,
+        _scan: &Surveyed,
         _laws: &[Brdf],
-        _looks: &[Look],
-        _arrived: &mut [Arrived],
+        _arrived: &mut [Option<Arrived>],
     ) {
     }
 
@@ -234,6 +245,19 @@ pub trait Effect: Sync {
     fn receive(&self, _values: &[f64], receiver: Receiver) -> Receiver {
         receiver
     }
+}
+
+/// What an effect has traced: a list of its own with an entry for each look.
+pub type Survey = Box<dyn Any + Send + Sync>;
+
+/// A scan as its effects meet it together.
+pub struct Surveyed<'a> {
+    /// Instrument and target.
+    pub stage: &'a Stage<'a>,
+    /// Every look, on the target as the scene has it.
+    pub looks: &'a [Look],
+    /// What the effect has traced; nothing for one without a survey.
+    pub survey: Option<&'a Survey>,
 }
 
 /// What arrives of one look in the mean.

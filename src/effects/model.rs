@@ -1,8 +1,10 @@
 //! A base law with any number of effects, and what it predicts of a scan.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use rayon::prelude::*;
 
-use super::{Arrived, Effect, Look, Receiver, Stage};
+use super::{Arrived, Effect, Look, Receiver, Stage, Survey, Surveyed};
 use crate::brdf::{Brdf, Scattering};
 use crate::frames::Direction;
 
@@ -28,18 +30,57 @@ pub struct Prediction {
     pub receiver: Receiver,
 }
 
+/// Surveys that were made for one list of looks, for as long as their values come again.
+#[derive(Default)]
+pub struct Surveys(Mutex<Vec<(Key, Arc<Survey>)>>);
+
+/// Name of an effect and the values that its survey depends on.
+type Key = (&'static str, Vec<f64>);
+
+/// Surveys that are kept: those of a difference quotient, of its middle, and of the next.
+const KEPT: usize = 6;
+
+impl Surveys {
+    fn of(
+        &self,
+        effect: &dyn Effect,
+        values: &[f64],
+        stage: &Stage,
+        looks: &[Look],
+    ) -> Option<Arc<Survey>> {
+        let key = (effect.name(), effect.surveyed(values)?);
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(at) = kept.iter().position(|(other, _)| *other == key) {
+            let found = kept.remove(at);
+            kept.push(found.clone());
+            return Some(found.1);
+        }
+        let made = Arc::new(effect.survey(values, stage, looks));
+        if kept.len() == KEPT {
+            kept.remove(0);
+        }
+        kept.push((key, made.clone()));
+        Some(made)
+    }
+}
+
 impl Model<'_> {
     /// What arrives of every look.
     pub fn predict(&self, stage: &Stage, looks: &[Look]) -> Prediction {
+        self.predict_with(stage, looks, &Surveys::default())
+    }
+
+    /// The same with surveys of these very looks that may have been made before.
+    pub fn predict_with(&self, stage: &Stage, looks: &[Look], surveys: &Surveys) -> Prediction {
         let placed: Vec<Option<Look>> =
             looks.par_iter().map(|look| self.placed(stage, *look)).collect();
-        let seen: Vec<Look> = placed.iter().flatten().copied().collect();
-        let mut arrived: Vec<Arrived> =
-            seen.par_iter().map(|look| self.arrived(stage, look)).collect();
+        let mut arrived: Vec<Option<Arrived>> =
+            placed.par_iter().map(|look| Some(self.arrived(stage, look.as_ref()?))).collect();
         for (effect, values) in &self.effects {
-            effect.arrive(values, stage, &self.laws, &seen, &mut arrived);
+            let survey = surveys.of(*effect, values, stage, looks);
+            let scan = Surveyed { stage, looks, survey: survey.as_deref() };
+            effect.arrive(values, &scan, &self.laws, &mut arrived);
         }
-        let mut arrived = arrived.into_iter();
         let effects = self.effects.iter();
         let receiver = effects
             .fold(self.receiver, |receiver, (effect, values)| effect.receive(values, receiver));
@@ -48,11 +89,7 @@ impl Model<'_> {
             Some(look) if receiver.tilt_sd_rad > 0.0 => self.slope_per_rad(stage, look),
             _ => 0.0,
         };
-        Prediction {
-            slope_per_rad: placed.par_iter().map(slope).collect(),
-            arrived: placed.iter().map(|look| look.and_then(|_| arrived.next())).collect(),
-            receiver,
-        }
+        Prediction { slope_per_rad: placed.par_iter().map(slope).collect(), arrived, receiver }
     }
 
     fn placed(&self, stage: &Stage, look: Look) -> Option<Look> {

@@ -56,19 +56,9 @@ impl Effect for Motion {
          drift of the gain leaves the ranges as they are."
     }
 
-    /// Two millimetres of each cosine towards the radar, and of the first along each axis.
-    fn starts(&self, _stage: &Stage, looks: &[Look]) -> Vec<Vec<f64>> {
-        const WEAK_M: f64 = 2e-3;
-        let forward: DVec3 = looks.iter().map(|look| look.ray.direction.xyz()).sum();
-        let depth = forward.try_normalize().unwrap_or(DVec3::Z);
-        let start = |k: usize, along: DVec3| {
-            let mut values = vec![0.0; KNOBS.len()];
-            let shift = (WEAK_M * along).to_array();
-            values.iter_mut().skip(3 * k).zip(shift).for_each(|(value, part)| *value = part);
-            values
-        };
-        let along_axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| start(0, axis));
-        (0..3).map(|k| start(k, depth)).chain(along_axes).collect()
+    /// At rest: ranges say at once where to.
+    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+        vec![vec![0.0; KNOBS.len()]]
     }
 
     fn place(&self, values: &[f64], stage: &Stage, look: Look) -> Option<Look> {

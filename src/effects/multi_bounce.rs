@@ -8,13 +8,11 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
 use rayon::prelude::*;
 
-use super::lobes::first_lobe;
 use super::meeting::{Axes, met};
 use super::spread::sunflower;
-use super::{Arrived, Effect, Knob, Level, Look, Stage};
+use super::{Arrived, Effect, Knob, Level, Look, Stage, Survey, Surveyed};
 use crate::brdf::{Brdf, Distribution, Scattering};
 use crate::frames::{Direction, Point, Ray, Surface};
 use crate::units::ratio_from_db;
@@ -26,8 +24,9 @@ pub(super) struct MultiBounce;
 const NONE_DB: f64 = -60.0;
 /// Directions of each kind.
 const DIRECTIONS: usize = 16;
-/// Lobes narrower than this are not followed, or a few rays would carry everything.
-const M_RANGE: [f64; 2] = [0.05, 2.0];
+/// Roughness of the lobe that directions are spread over, whatever the law's: rays can then be traced
+/// once for all laws.
+const LOBE: f64 = 0.25;
 /// A ray leaves so far from its surface, m, and this much is no obstacle.
 const CLEARANCE_M: f64 = 1e-6;
 
@@ -51,12 +50,43 @@ fn lobe_density(i: Direction<Surface>, o: Direction<Surface>, m: f64) -> f64 {
     per_sr / (4.0 * i.xyz().dot(h.xyz()).max(1e-9))
 }
 
-/// Share of the flux along a path that reaches the radar from the second surface, and the way back, m.
-fn returned(stage: &Stage, laws: &[Brdf], first: &Look, onward: DVec3) -> Option<(f64, f64)> {
-    let start = first.hit.point.xyz + CLEARANCE_M * first.normal;
+/// A way by a second surface: what its laws have to be asked, and all that they do not change.
+#[derive(Clone, Copy)]
+struct Detour {
+    /// Regions of the two surfaces.
+    regions: [u16; 2],
+    /// Into and out of each of them.
+    first: [Direction<Surface>; 2],
+    second: [Direction<Surface>; 2],
+    /// Power received, W, where both f are 1/sr, as one of all directions.
+    watts_per_f2: f64,
+    /// Half the whole way, m.
+    range_m: f64,
+}
+
+impl Detour {
+    fn power_w(&self, laws: &[Brdf]) -> f64 {
+        let f_per_sr = |region: u16, [i, o]: [Direction<Surface>; 2]| {
+            laws.get(usize::from(region)).map_or(0.0, |law| law.f_per_sr(i, o))
+        };
+        let [first, second] = self.regions;
+        self.watts_per_f2 * f_per_sr(first, self.first) * f_per_sr(second, self.second)
+    }
+}
+
+/// Where a ray from the first surface meets a second one that the radar sees.
+fn detour(
+    stage: &Stage,
+    look: &Look,
+    axes: &Axes,
+    o: Direction<Surface>,
+    density_per_sr: f64,
+) -> Option<Detour> {
+    let onward = axes.world(o.xyz());
+    let start = look.hit.point.xyz + CLEARANCE_M * look.normal;
     let ray = Ray { origin: Point::from(start), direction: Direction::new(onward)? };
-    let second = met(stage, first, ray)?;
-    let radar = first.ray.origin;
+    let second = met(stage, look, ray)?;
+    let radar = look.ray.origin;
     let back = second.hit.point.towards(radar)?;
     let cos_exit = second.normal.dot(back.xyz());
     let back_m = second.hit.point.distance_m(radar);
@@ -65,29 +95,33 @@ fn returned(stage: &Stage, laws: &[Brdf], first: &Look, onward: DVec3) -> Option
     if cos_exit <= 0.0 || hidden {
         return None;
     }
-    let axes = Axes::of(stage, &second);
-    let law = laws.get(usize::from(second.region))?;
-    let f_per_sr = law.f_per_sr(axes.local(-onward), axes.local(back.xyz()));
-    let way_m = first.hit.point.distance_m(second.hit.point) + back_m;
-    Some((stage.link.received_per_w(back_m, cos_exit, f_per_sr), way_m))
+    let there = Axes::of(stage, &second);
+    let way_m = look.hit.point.distance_m(second.hit.point) + back_m;
+    let sent_w = stage.link.flux_w(look.hit.cos_theta) * o.cos_theta() / density_per_sr;
+    let share = stage.link.received_per_w(back_m, cos_exit, 1.0) / (2 * DIRECTIONS) as f64;
+    Some(Detour {
+        regions: [look.region, second.region],
+        first: [axes.local(-look.ray.direction.xyz()), o],
+        second: [there.local(-onward), there.local(back.xyz())],
+        watts_per_f2: sent_w * share,
+        range_m: (look.hit.range_m + way_m) / 2.0,
+    })
+}
+
+/// All ways of a chirp by second surfaces of the target as the scene has it.
+fn detours(stage: &Stage, look: &Look) -> Vec<Detour> {
+    let axes = Axes::of(stage, look);
+    let i = axes.local(-look.ray.direction.xyz());
+    onward(i, LOBE).filter_map(|(o, density)| detour(stage, look, &axes, o, density)).collect()
 }
 
 /// Power, W, and range, m, of all that a chirp returns by way of a second surface.
-fn detour(stage: &Stage, laws: &[Brdf], look: &Look) -> Option<Arrived> {
-    let first = met(stage, look, look.ray)?;
-    let law = laws.get(usize::from(first.region))?;
-    let [least, most] = M_RANGE;
-    let m = first_lobe(law).map_or(most, |lobe| lobe.m).clamp(least, most);
-    let (axes, flux_w) = (Axes::of(stage, &first), stage.link.flux_w(first.hit.cos_theta));
-    let i = axes.local(-first.ray.direction.xyz());
+fn returned(laws: &[Brdf], detours: &[Detour]) -> Option<Arrived> {
     let (mut power_w, mut moment) = (0.0, 0.0);
-    for (o, density_per_sr) in onward(i, m) {
-        if let Some((share, way_m)) = returned(stage, laws, &first, axes.world(o.xyz())) {
-            let sent_w = flux_w * law.f_per_sr(i, o) * o.cos_theta() / density_per_sr;
-            let one_w = sent_w * share / (2 * DIRECTIONS) as f64;
-            power_w += one_w;
-            moment += one_w * (first.hit.range_m + way_m) / 2.0;
-        }
+    for detour in detours {
+        let one_w = detour.power_w(laws);
+        power_w += one_w;
+        moment += one_w * detour.range_m;
     }
     (power_w > 0.0).then(|| Arrived { power_w, range_m: moment / power_w })
 }
@@ -121,21 +155,28 @@ impl Effect for MultiBounce {
         vec![vec![-10.0], vec![0.0], vec![10.0]]
     }
 
+    fn surveyed(&self, values: &[f64]) -> Option<Vec<f64>> {
+        values.first().filter(|coupling_db| **coupling_db > NONE_DB).map(|_| Vec::new())
+    }
+
+    fn survey(&self, _: &[f64], stage: &Stage, looks: &[Look]) -> Survey {
+        let all: Vec<Vec<Detour>> = looks.par_iter().map(|look| detours(stage, look)).collect();
+        Box::new(all)
+    }
+
     fn arrive(
         &self,
         values: &[f64],
-        stage: &Stage,
+        scan: &Surveyed,
         laws: &[Brdf],
-        looks: &[Look],
-        arrived: &mut [Arrived],
+        arrived: &mut [Option<Arrived>],
     ) {
-        let &[coupling_db] = values else { return };
-        if coupling_db <= NONE_DB {
+        let Some(all) = scan.survey.and_then(|s| s.downcast_ref::<Vec<Vec<Detour>>>()) else {
             return;
-        }
-        let coupling = ratio_from_db(coupling_db);
-        looks.par_iter().zip(arrived).for_each(|(look, one)| {
-            if let Some(detour) = detour(stage, laws, look) {
+        };
+        let coupling = ratio_from_db(values.first().copied().unwrap_or(NONE_DB));
+        all.par_iter().zip(arrived).for_each(|(detours, one)| {
+            if let (Some(one), Some(detour)) = (one, returned(laws, detours)) {
                 let (direct_w, detour_w) = (one.power_w, coupling * detour.power_w);
                 one.power_w = direct_w + detour_w;
                 let share = detour_w / one.power_w;

@@ -107,7 +107,19 @@ impl Minimise {
     pub fn run(
         &self,
         start: &DVector<f64>,
+        bounds: [&DVector<f64>; 2],
+        cost: impl Fn(&DVector<f64>) -> Local,
+    ) -> Minimum {
+        self.run_with(start, bounds, |_| f64::NEG_INFINITY, cost)
+    }
+
+    /// The same where the cost alone, or a number below it, is much cheaper to have: a step
+    /// that makes it worse ends there.
+    pub fn run_with(
+        &self,
+        start: &DVector<f64>,
         [lower, upper]: [&DVector<f64>; 2],
+        value: impl Fn(&DVector<f64>) -> f64,
         cost: impl Fn(&DVector<f64>) -> Local,
     ) -> Minimum {
         let mut at = clamped(start, lower, upper);
@@ -133,15 +145,26 @@ impl Minimise {
             }
             iterations += 1;
             let next = clamped(&(&at + step(&local, &free, damping)), lower, upper);
-            let there = cost(&next);
-            if there.value < local.value {
-                (at, local) = (next, there);
-                damping = (damping * EASE).max(DAMPING[0]);
-            } else {
-                damping *= TIGHTEN;
+            let there = (value(&next) < local.value).then(|| cost(&next));
+            match there.filter(|there| there.value < local.value) {
+                Some(there) => {
+                    (at, local) = (next, there);
+                    damping = (damping * EASE).max(DAMPING[0]);
+                }
+                None => damping *= TIGHTEN,
             }
         };
         Minimum { at, local, iterations, stop }
+    }
+
+    /// The full step from a point, on the unknowns that no bound holds.
+    pub fn newton(
+        at: &DVector<f64>,
+        [lower, upper]: [&DVector<f64>; 2],
+        local: &Local,
+    ) -> DVector<f64> {
+        let free = free(at, &local.gradient, lower, upper);
+        clamped(&(at + step(local, &free, DAMPING[0])), lower, upper)
     }
 
     fn is_done(&self, local: &Local, free: &[usize]) -> bool {
