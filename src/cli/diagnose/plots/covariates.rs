@@ -126,7 +126,11 @@ fn bins(rows: &[Row], of: fn(&Row) -> f64, predicted: fn(&Row) -> f64) -> Vec<Bi
     let mut bins = Vec::new();
     let mut rest = points.as_slice();
     while let Some(&(last, _)) = rest.get(size - 1).or(rest.last()) {
-        let end = rest.partition_point(|(at, _)| *at <= last);
+        let [before, end] =
+            [rest.partition_point(|p| p.0 < last), rest.partition_point(|p| p.0 <= last)];
+        // Many equal values are a bin of their own, if what comes before them is enough for one.
+        let early = before >= size / 4 && size.saturating_sub(before) < end.saturating_sub(size);
+        let end = if early { before } else { end };
         let (bin, others) = rest.split_at(end);
         // A remainder of a few would have a bar over the whole page.
         if others.len() < size / 2 {
