@@ -115,6 +115,8 @@ fn every_command_has_help_with_an_example() {
         "radar",
         "measure",
         "compare",
+        "diagnose",
+        "effects",
         "add",
         "list",
         "show",

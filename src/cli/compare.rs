@@ -11,7 +11,7 @@ use super::output::write_all;
 use super::staging::{Used, materials, setup, surfaces};
 use super::summary::grouped;
 use crate::error::Error;
-use crate::formats::figure::{Figure, Plot, Series, Style, beside};
+use crate::formats::figure::{Figure, Plot, Scale, Series, Style, beside};
 use crate::frames::Point;
 use crate::geometry::Raster;
 use crate::measure::compare::{Agreement, Line, along, difference, measured_scan};
@@ -165,6 +165,8 @@ fn side_by_side(
         subtitle,
         colour_label: "received power, dBm",
         range,
+        scale: Scale::Sequential,
+        gaps: "no detection",
         x_label: "x in the target plane, m",
         y_label: "y in the target plane, m",
     };
@@ -176,6 +178,7 @@ fn side_by_side(
         channel: "difference_db",
         colour_label: "difference, dB",
         range: Some((-5.0, 5.0)),
+        scale: Scale::Diverging,
         ..power(error, &subtitle)
     };
     Ok(beside(&[power(&images[0], "measured"), power(&images[1], "simulated"), error])?)

@@ -8,6 +8,7 @@ mod database;
 mod console;
 mod curves;
 mod diagnose;
+mod effects;
 mod fit;
 mod list;
 mod materials;
@@ -68,6 +69,7 @@ enum Command {
     Measure(measure::Args),
     Compare(compare::Args),
     Diagnose(diagnose::Args),
+    Effects(effects::Args),
     Add(add::Args),
     List(list::Args),
     Show(show::Args),
@@ -91,6 +93,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Measure(args) => measure::run(args, db, &console),
         Command::Compare(args) => compare::run(args, db, &console),
         Command::Diagnose(args) => diagnose::run(args, db, &console),
+        Command::Effects(args) => effects::run(args, &console),
         Command::Add(args) => add::run(args, db, &console),
         Command::List(_) => list::run(db, &console),
         Command::Show(args) => show::run(args, db, &console),

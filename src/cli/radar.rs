@@ -8,7 +8,7 @@ use serde_json::json;
 use super::console::Console;
 use super::output::write_all;
 use crate::error::Error;
-use crate::formats::figure::{Figure, Plot, Series, Style};
+use crate::formats::figure::{Figure, Plot, Scale, Series, Style};
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
 use crate::radar::scan::PATTERN_RANGE_M;
@@ -165,6 +165,8 @@ fn spot_figure<'a>(spot: &'a Raster, radar: &'a Radar) -> Figure<'a> {
         subtitle: &radar.preset,
         colour_label: "diameter at half intensity, mm",
         range: None,
+        scale: Scale::Sequential,
+        gaps: "nothing here",
         x_label: "x in the target plane, m",
         y_label: "y in the target plane, m",
     }

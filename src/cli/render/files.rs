@@ -5,7 +5,7 @@ use super::views::View;
 use crate::cli::summary::grouped;
 use crate::error::Error;
 use crate::formats::exr::{self, Attribute};
-use crate::formats::figure::Figure;
+use crate::formats::figure::{Figure, Scale};
 use crate::formats::ply;
 use crate::geometry::Raster;
 use crate::render::{Echo, cloud_table};
@@ -80,6 +80,8 @@ fn power_figure(scene: &Scene, view: &View, image: &Raster) -> Result<Vec<u8>, E
         subtitle: &subtitle,
         colour_label: "received power, dBm",
         range: None,
+        scale: Scale::Sequential,
+        gaps: "no detection",
         x_label: "x in the target plane, m",
         y_label: "y in the target plane, m",
     };

@@ -58,6 +58,11 @@ impl<'a> Axes<'a> {
         }
     }
 
+    /// Takes the ticks of y away, where y has names and no scale.
+    pub fn hide_y(&mut self) {
+        self.y_ticks.clear();
+    }
+
     /// Height of the data area and what is written below it, px.
     pub fn height_with_labels(&self) -> f32 {
         self.data_height + TICK_PX + LINE_SPACING * (TICK_LABEL_PX + LABEL_PX) + 1.5 * GAP_PX

@@ -10,7 +10,18 @@ use super::ticks::{Tick, ticks};
 
 /// The colour of NaN.
 pub(super) const NOTHING: Rgb = [221, 221, 221];
-const NOTHING_NOTE: &str = "no detection";
+/// The same beside colours that are nearly white in their middle.
+const NOTHING_BESIDE_WHITE: Rgb = [178, 178, 178];
+
+/// Which colours stand for which values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// Viridis, from the least to the greatest value.
+    Sequential,
+    /// Blue below 0, nearly white at 0, red above: for differences. A range that is not given
+    /// reaches equally far to both sides of 0.
+    Diverging,
+}
 
 const BAR_WIDTH_PX: f32 = 24.0;
 const BAR_MIN_HEIGHT_PX: f32 = 240.0;
@@ -22,33 +33,56 @@ pub(super) struct Colours {
     low: f64,
     high: f64,
     steps: Vec<Rgb>,
+    nothing: Rgb,
 }
 
 impl Colours {
     /// Colours for a range, or for the finite values; `None` where there are neither.
-    pub fn over(values: &[f32], range: Option<(f64, f64)>) -> Result<Option<Colours>, FigureError> {
-        let Some((low, high)) = range.or_else(|| span(values)) else { return Ok(None) };
+    pub fn over(
+        values: &[f32],
+        range: Option<(f64, f64)>,
+        scale: Scale,
+    ) -> Result<Option<Colours>, FigureError> {
+        let Some((low, high)) = range.or_else(|| span(values, scale)) else { return Ok(None) };
         if !(low < high && (high - low).is_finite()) {
             return Err(FigureError::Range { low, high });
         }
-        let steps = (0..256).map(|step| colorous::VIRIDIS.eval_rational(step, 256).into_array());
-        Ok(Some(Colours { low, high, steps: steps.collect() }))
+        let step = |step: usize| match scale {
+            Scale::Sequential => colorous::VIRIDIS.eval_rational(step, 256),
+            Scale::Diverging => colorous::RED_BLUE.eval_rational(255 - step, 256),
+        };
+        let steps = (0..256).map(|number| step(number).into_array()).collect();
+        Ok(Some(Colours { low, high, steps, nothing: nothing(scale) }))
     }
 
     pub fn of(&self, value: f32) -> Rgb {
         if value.is_nan() {
-            return NOTHING;
+            return self.nothing;
         }
         let share = (f64::from(value) - self.low) / (self.high - self.low);
         self.steps[(255.0 * share.clamp(0.0, 1.0)).round() as usize]
     }
 }
 
-/// Least and greatest finite value; a little around a single one, which has no span of its own.
-fn span(values: &[f32]) -> Option<(f64, f64)> {
+/// The colour of NaN on a scale.
+pub(super) fn nothing(scale: Scale) -> Rgb {
+    match scale {
+        Scale::Sequential => NOTHING,
+        Scale::Diverging => NOTHING_BESIDE_WHITE,
+    }
+}
+
+/// Least and greatest finite value, as far to both sides of 0 on a diverging scale; a little around
+/// a single one, which has no span of its own.
+fn span(values: &[f32], scale: Scale) -> Option<(f64, f64)> {
     let finite = || values.iter().copied().filter(|v| v.is_finite());
     let low = f64::from(finite().reduce(f32::min)?);
     let high = f64::from(finite().reduce(f32::max)?);
+    if scale == Scale::Diverging {
+        let reach = low.abs().max(high.abs());
+        let reach = if reach > 0.0 { reach } else { 1.0 };
+        return Some((-reach, reach));
+    }
     let around = if low == 0.0 { 1.0 } else { 0.05 * low.abs() };
     Some(if low < high { (low, high) } else { (low - around, high + around) })
 }
@@ -61,12 +95,14 @@ pub(super) struct Bar<'a> {
     pub height: f32,
     below: bool,
     above: bool,
-    gaps: bool,
+    /// Colour of what has no value, and what the reader is told that means.
+    gaps: Option<(Rgb, &'a str)>,
 }
 
 impl<'a> Bar<'a> {
     pub fn new(
         label: &'a str,
+        gaps: (Rgb, &'a str),
         colours: Option<&'a Colours>,
         values: &[f32],
         data_height: f32,
@@ -83,7 +119,7 @@ impl<'a> Bar<'a> {
             height: data_height.max(BAR_MIN_HEIGHT_PX),
             below: any(&|c, value| value < c.low as f32),
             above: any(&|c, value| value > c.high as f32),
-            gaps: values.iter().any(|v| v.is_nan()),
+            gaps: values.iter().any(|v| v.is_nan()).then_some(gaps),
         };
         bar.height += (label_px - bar.ramp_height()).max(0.0);
         if let Some(Colours { low, high, .. }) = colours {
@@ -94,15 +130,16 @@ impl<'a> Bar<'a> {
 
     pub fn width(&self) -> f32 {
         let ticks = TICK_PX + GAP_PX + widest(&self.ticks) + LINE_SPACING * LABEL_PX;
-        let note = GAP_PX + text_width_px(NOTHING_NOTE, TICK_LABEL_PX, Weight::Regular);
-        let note = if self.gaps { note } else { 0.0 };
+        let note = self.gaps.map_or(0.0, |(_, meaning)| {
+            GAP_PX + text_width_px(meaning, TICK_LABEL_PX, Weight::Regular)
+        });
         BAR_WIDTH_PX + note.max(if self.colours.is_some() { ticks } else { 0.0 })
     }
 
     /// Height of the part that runs through the colours, px.
     fn ramp_height(&self) -> f32 {
         let ends = f32::from(u8::from(self.below) + u8::from(self.above)) * BEYOND_PX;
-        let note = if self.gaps { BAR_WIDTH_PX + 2.0 * GAP_PX } else { 0.0 };
+        let note = if self.gaps.is_some() { BAR_WIDTH_PX + 2.0 * GAP_PX } else { 0.0 };
         (self.height - ends - note).round()
     }
 
@@ -114,8 +151,8 @@ impl<'a> Bar<'a> {
             shapes.extend(self.ramp(colours, left, top));
             shapes.extend(self.scale(colours, left + BAR_WIDTH_PX, top));
         }
-        if self.gaps {
-            shapes.extend(note(left, (top + self.height - BAR_WIDTH_PX).round()));
+        if let Some(gaps) = self.gaps {
+            shapes.extend(note(gaps, left, (top + self.height - BAR_WIDTH_PX).round()));
         }
         shapes
     }
@@ -162,15 +199,38 @@ fn beyond(left: f32, from: f32, to: f32, colour: Rgb) -> Shape {
     Shape::Area { corners: corners.into(), colour }
 }
 
-fn note(left: f32, top: f32) -> [Shape; 2] {
+fn note((colour, meaning): (Rgb, &str), left: f32, top: f32) -> [Shape; 2] {
     let swatch = Shape::Cells {
         left_px: left as u32,
         top_px: top as u32,
         cell_px: BAR_WIDTH_PX as u32,
         columns: 1,
-        colours: vec![NOTHING],
+        colours: vec![colour],
     };
     let base_y = top + BAR_WIDTH_PX / 2.0 + DIGIT_HEIGHT / 2.0 * TICK_LABEL_PX;
     let at = (left + BAR_WIDTH_PX + GAP_PX, base_y);
-    [swatch, text(NOTHING_NOTE, at, Anchor::Start, TICK_LABEL_PX)]
+    [swatch, text(meaning, at, Anchor::Start, TICK_LABEL_PX)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_white_at_0_and_as_strong_below_as_above() {
+        let colours = Colours::over(&[-1.0, 3.0], None, Scale::Diverging).unwrap().unwrap();
+        assert_eq!((colours.low, colours.high), (-3.0, 3.0));
+        assert!(colours.of(0.0).iter().all(|&channel| channel > 230));
+        let [below, above] = [-3.0, 3.0].map(|value| colours.of(value));
+        assert!(below[2] > 2 * below[0] && above[0] > 2 * above[2], "{below:?} {above:?}");
+        let depth = |colour: Rgb| colour.iter().map(|&channel| u32::from(channel)).sum::<u32>();
+        assert!(depth(below).abs_diff(depth(above)) < 60);
+        assert!(depth(colours.of(f32::NAN)) + 150 < depth(colours.of(0.0)));
+    }
+
+    #[test]
+    fn no_difference_at_all_is_white() {
+        let colours = Colours::over(&[0.0, 0.0], None, Scale::Diverging).unwrap().unwrap();
+        assert!(colours.of(0.0).iter().all(|&channel| channel > 230));
+    }
 }

@@ -74,7 +74,7 @@ impl Drawing {
     /// This page with another one to its right.
     pub fn beside(mut self, mut right: Drawing) -> Drawing {
         let by_px = self.width_px.ceil();
-        right.shapes.iter_mut().for_each(|shape| shape.move_right(by_px));
+        right.shapes.iter_mut().for_each(|shape| shape.shift((by_px, 0.0)));
         self.shapes.append(&mut right.shapes);
         Drawing {
             width_px: by_px + right.width_px,
@@ -82,17 +82,39 @@ impl Drawing {
             shapes: self.shapes,
         }
     }
+
+    /// This page with another one below it.
+    pub fn above(mut self, mut below: Drawing) -> Drawing {
+        let by_px = self.height_px.ceil();
+        below.shapes.iter_mut().for_each(|shape| shape.shift((0.0, by_px)));
+        self.shapes.append(&mut below.shapes);
+        Drawing {
+            width_px: self.width_px.max(below.width_px),
+            height_px: by_px + below.height_px,
+            shapes: self.shapes,
+        }
+    }
+
+    /// Pages in rows of so many, from the upper left.
+    pub fn grid(pages: &[Drawing], columns: usize) -> Drawing {
+        let row = |pages: &[Drawing]| pages.iter().cloned().fold(Drawing::default(), Self::beside);
+        pages.chunks(columns.max(1)).map(row).fold(Drawing::default(), Self::above)
+    }
 }
 
 impl Shape {
     /// By whole pixels.
-    fn move_right(&mut self, by_px: f32) {
+    fn shift(&mut self, (right_px, down_px): Point) {
+        let shift = |point: &mut Point| *point = (point.0 + right_px, point.1 + down_px);
         match self {
             Shape::Area { corners: points, .. } | Shape::Line { points, .. } => {
-                points.iter_mut().for_each(|point| point.0 += by_px);
+                points.iter_mut().for_each(shift);
             }
-            Shape::Cells { left_px, .. } => *left_px += by_px as u32,
-            Shape::Text(text) => text.at.0 += by_px,
+            Shape::Cells { left_px, top_px, .. } => {
+                *left_px += right_px as u32;
+                *top_px += down_px as u32;
+            }
+            Shape::Text(text) => shift(&mut text.at),
         }
     }
 }
@@ -472,6 +494,35 @@ mod tests {
         assert!(width("dBm", 20.0) > width("dB", 20.0));
         assert!((width("θ = 3°", 40.0) - 2.0 * width("θ = 3°", 20.0)).abs() < 1e-3);
         assert_eq!(width("", 20.0), 0.0);
+    }
+
+    #[test]
+    fn a_grid_keeps_every_page_apart() {
+        let page = |width_px: f32, colour: Rgb| {
+            let corners = vec![(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)];
+            let area = Shape::Area { corners, colour };
+            let cells = Shape::Cells {
+                left_px: 2,
+                top_px: 3,
+                cell_px: 1,
+                columns: 1,
+                colours: vec![colour],
+            };
+            Drawing { width_px, height_px: 10.0, shapes: vec![area, cells] }
+        };
+        let pages = [page(20.0, [1; 3]), page(30.0, [2; 3]), page(40.0, [3; 3])];
+        let grid = Drawing::grid(&pages, 2);
+        assert_eq!((grid.width_px, grid.height_px), (50.0, 20.0));
+        let corner = |shape: &Shape| match shape {
+            Shape::Area { corners, .. } => corners[0],
+            Shape::Cells { left_px, top_px, .. } => (*left_px as f32, *top_px as f32),
+            _ => (f32::NAN, f32::NAN),
+        };
+        let corners: Vec<Point> = grid.shapes.iter().map(corner).collect();
+        assert_eq!(
+            corners,
+            [(0.0, 0.0), (2.0, 3.0), (20.0, 0.0), (22.0, 3.0), (0.0, 10.0), (2.0, 13.0)]
+        );
     }
 
     #[test]

@@ -1,6 +1,7 @@
-//! Figures for papers: rasters with a colour bar, and plots of curves and points, as PNG and SVG.
+//! Figures for papers: rasters with a colour bar, plots of curves and points, and bars, as PNG and SVG.
 
 mod axes;
+mod bars;
 mod colour_bar;
 pub mod drawing;
 mod plot;
@@ -12,6 +13,8 @@ use thiserror::Error;
 
 use drawing::DrawingError;
 
+pub use bars::{Bar, Bars};
+pub use colour_bar::Scale;
 pub use plot::{Plot, Series, Style};
 pub use raster::{Figure, beside};
 
@@ -48,6 +51,12 @@ pub enum FigureError {
         low: f64,
         /// Value of the last colour, in the channel's unit.
         high: f64,
+    },
+    /// There is no bar, or one without a finite length.
+    #[error("draw {bars} bars: give at least one, each with a finite value")]
+    NoBars {
+        /// Bars asked for.
+        bars: usize,
     },
     /// The page could not be drawn.
     #[error(transparent)]

@@ -3,7 +3,7 @@
 use super::FigureError;
 use super::axes::{Axes, Axis};
 use super::drawing::{Anchor, Drawing, Rgb, Shape, Weight, text_width_px};
-use super::style::{DIGIT_HEIGHT, GAP_PX, MARGIN_PX, TICK_LABEL_PX, text};
+use super::style::{DIGIT_HEIGHT, GAP_PX, MARGIN_PX, PALETTE, STROKE_PX, TICK_LABEL_PX, text};
 
 /// Longest sides of the data area, px.
 const DATA_WIDTH_PX: f32 = 780.0;
@@ -18,9 +18,8 @@ const DENSE: usize = 1000;
 /// Length of the sample beside a name in the legend, px.
 const SAMPLE_PX: f32 = 34.0;
 
-/// Colours that stay apart for colour-blind readers: Okabe and Ito, 2008.
-const PALETTE: [Rgb; 6] =
-    [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233]];
+/// Colour of lines that are no data.
+const GUIDE_INK: Rgb = [140, 140, 140];
 
 /// A plot of any number of series.
 #[derive(Clone, Debug)]
@@ -66,6 +65,18 @@ pub enum Style {
     /// The area that the points go round, in a tint of the colour of the other series of its name.
     /// It is not in the legend, takes no colour and does not widen the axes.
     Band,
+    /// Upright bars, each from one point to the next one, in the colour of the other series of its
+    /// name. They are not in the legend and take no colour.
+    ErrorBars,
+    /// A thin grey line to judge data by, such as zero. It takes no colour and does not widen the axes.
+    Guide,
+}
+
+impl Style {
+    /// Whether a series of this style has a colour of the palette for itself.
+    fn has_a_colour(self) -> bool {
+        !matches!(self, Style::Band | Style::ErrorBars | Style::Guide)
+    }
 }
 
 impl Plot<'_> {
@@ -85,7 +96,11 @@ impl Plot<'_> {
         Ok(self.drawing()?.svg()?)
     }
 
-    fn drawing(&self) -> Result<Drawing, FigureError> {
+    /// The plot as a page.
+    ///
+    /// # Errors
+    /// When there is no finite point and no range.
+    pub fn drawing(&self) -> Result<Drawing, FigureError> {
         let x = Axis { label: self.x_label, ..self.axis(self.x_range, |p| p.0)? };
         let y = Axis { label: self.y_label, ..self.axis(self.y_range, |p| p.1)? };
         let data = self.size(x.high - x.low, y.high - y.low);
@@ -102,15 +117,18 @@ impl Plot<'_> {
         })
     }
 
-    /// One colour per series; a band has that of the other series of its name.
+    /// One colour per series; bands and error bars have that of the other series of their name.
     fn colours(&self) -> Vec<Rgb> {
-        let own = || self.series.iter().filter(|series| series.style != Style::Band);
+        let own = || self.series.iter().filter(|series| series.style.has_a_colour());
         let colour = |series: &Series| {
-            let place = match series.style {
-                Style::Band => own().position(|other| other.name == series.name),
-                _ => own().position(|other| std::ptr::eq(other, series)),
+            let place = match series.style.has_a_colour() {
+                false => own().position(|other| other.name == series.name),
+                true => own().position(|other| std::ptr::eq(other, series)),
             };
-            PALETTE[place.unwrap_or(0) % PALETTE.len()]
+            match series.style {
+                Style::Guide => GUIDE_INK,
+                _ => PALETTE[place.unwrap_or(0) % PALETTE.len()],
+            }
         };
         self.series.iter().map(colour).collect()
     }
@@ -121,7 +139,8 @@ impl Plot<'_> {
         range: Option<(f64, f64)>,
         of: fn(&(f64, f64)) -> f64,
     ) -> Result<Axis<'static>, FigureError> {
-        let data = || self.series.iter().filter(|series| series.style != Style::Band);
+        let is_data = |series: &&Series| !matches!(series.style, Style::Band | Style::Guide);
+        let data = || self.series.iter().filter(is_data);
         let values = || data().flat_map(|s| &s.points).map(of).filter(|v| v.is_finite());
         let around = || {
             let (low, high) = (values().reduce(f64::min)?, values().reduce(f64::max)?);
@@ -144,23 +163,30 @@ impl Plot<'_> {
         [width, height].map(|side| ((side * scale) as f32).max(EQUAL_SIDE_PX / 4.0).round())
     }
 
-    /// Names of the series in the upper right corner.
+    /// Names of the series in the corner that hides the least: the upper right one if it hides nothing.
     fn legend(&self, axes: &Axes) -> Vec<Shape> {
         let named: Vec<(&Series, Rgb)> = std::iter::zip(&self.series, self.colours())
-            .filter(|(series, _)| !series.name.is_empty() && series.style != Style::Band)
+            .filter(|(series, _)| {
+                !series.name.is_empty()
+                    && (series.style.has_a_colour() || series.style == Style::Guide)
+            })
             .collect();
+        let row_px = 1.4 * TICK_LABEL_PX;
         let width = |name: &str| text_width_px(name, TICK_LABEL_PX, Weight::Regular);
         let widest = named.iter().map(|(series, _)| width(&series.name)).fold(0.0, f32::max);
-        let left = axes.left + axes.data_width - widest - SAMPLE_PX - 2.0 * GAP_PX;
+        let size = (widest + SAMPLE_PX + 3.0 * GAP_PX, row_px * named.len() as f32 + 2.0 * GAP_PX);
+        let (left, top) = self.emptiest_corner(axes, size);
+        let left = left + GAP_PX;
         let mut shapes = Vec::new();
         for (row, (series, colour)) in named.into_iter().enumerate() {
-            let y = axes.top + GAP_PX + (row as f32 + 0.6) * 1.4 * TICK_LABEL_PX;
+            let y = top + GAP_PX + (row as f32 + 0.6) * row_px;
             let ends = [(left, y), (left + SAMPLE_PX, y)];
             shapes.extend(match series.style {
                 Style::Curve => curve(ends.to_vec(), colour),
+                Style::Guide => guide(ends.to_vec(), colour),
                 Style::Points => square((left + SAMPLE_PX / 2.0, y), POINT_PX, colour),
                 Style::Below => triangle((left + SAMPLE_PX / 2.0, y), POINT_PX, colour),
-                Style::Band => None,
+                Style::Band | Style::ErrorBars => None,
             });
             let base = (left + SAMPLE_PX + GAP_PX, y + DIGIT_HEIGHT / 2.0 * TICK_LABEL_PX);
             shapes.push(text(&series.name, base, Anchor::Start, TICK_LABEL_PX));
@@ -169,10 +195,28 @@ impl Plot<'_> {
     }
 }
 
+impl Plot<'_> {
+    /// Upper left point of a box of this size in the corner of the data area with the fewest points.
+    fn emptiest_corner(&self, axes: &Axes, (width, height): (f32, f32)) -> (f32, f32) {
+        let is_data = |series: &&Series| series.style.has_a_colour();
+        let points = || self.series.iter().filter(is_data).flat_map(|series| &series.points);
+        let hidden = |(left, top): (f32, f32)| {
+            let inside = |(x, y): (f32, f32)| {
+                (left..=left + width).contains(&x) && (top..=top + height).contains(&y)
+            };
+            points().filter(|&&(x, y)| inside(axes.at(x, y))).count()
+        };
+        let right = axes.left + axes.data_width - width;
+        let bottom = axes.top + axes.data_height - height;
+        let corners =
+            [(right, axes.top), (axes.left, axes.top), (right, bottom), (axes.left, bottom)];
+        corners.into_iter().min_by_key(|&corner| hidden(corner)).unwrap_or(corners[0])
+    }
+}
+
 impl Series {
     fn shapes(&self, axes: &Axes, [x, y]: [Axis; 2], colour: Rgb) -> Vec<Shape> {
-        let within = |axis: &Axis, value: f64| value >= axis.low && value <= axis.high;
-        let visible = |&(px, py): &(f64, f64)| within(&x, px) && within(&y, py);
+        let visible = |&(px, py): &(f64, f64)| inside(&x, px) && inside(&y, py);
         match self.style {
             Style::Points | Style::Below => {
                 let side = if self.points.len() > DENSE { DENSE_POINT_PX } else { POINT_PX };
@@ -189,20 +233,37 @@ impl Series {
                 let area = Shape::Area { corners, colour: colour.map(tint) };
                 (self.points.len() > 2).then_some(area).into_iter().collect()
             }
-            Style::Curve => self
-                .points
-                .chunk_by(|a, b| visible(a) && visible(b))
-                .filter(|run| run.len() > 1)
-                .flat_map(|run| {
-                    curve(run.iter().map(|&(px, py)| axes.at(px, py)).collect(), colour)
-                })
-                .collect(),
+            Style::ErrorBars => {
+                let within = |&(px, py): &(f64, f64)| axes.at(px, py.clamp(y.low, y.high));
+                let pairs = self.points.chunks_exact(2);
+                let seen = pairs
+                    .filter(|pair| pair.iter().all(|&(px, py)| inside(&x, px) && py.is_finite()));
+                seen.flat_map(|pair| curve(pair.iter().map(within).collect(), colour)).collect()
+            }
+            Style::Curve | Style::Guide => {
+                let line = if self.style == Style::Guide { guide } else { curve };
+                self.points
+                    .chunk_by(|a, b| visible(a) && visible(b))
+                    .filter(|run| run.len() > 1)
+                    .flat_map(|run| {
+                        line(run.iter().map(|&(px, py)| axes.at(px, py)).collect(), colour)
+                    })
+                    .collect()
+            }
         }
     }
 }
 
 fn curve(points: Vec<(f32, f32)>, colour: Rgb) -> Option<Shape> {
     Some(Shape::Line { points, colour, thickness_px: CURVE_PX })
+}
+
+fn guide(points: Vec<(f32, f32)>, colour: Rgb) -> Option<Shape> {
+    Some(Shape::Line { points, colour, thickness_px: STROKE_PX })
+}
+
+fn inside(axis: &Axis, value: f64) -> bool {
+    value >= axis.low && value <= axis.high
 }
 
 /// A colour's channel on the way to white.
@@ -268,6 +329,48 @@ mod tests {
         assert_eq!(with_band.shapes.len(), without_band.shapes.len() + 1);
         assert_eq!(with_band.shapes[1..], without_band.shapes[..]);
         assert_eq!(with.colours(), [PALETTE[0], PALETTE[0], PALETTE[1]]);
+    }
+
+    #[test]
+    fn error_bars_have_the_colour_of_their_points_and_widen_the_axes() {
+        let bars: Vec<(f64, f64)> = (0..50).flat_map(|i| [(f64::from(i), 0.0); 2]).collect();
+        let bars = Series { name: "parabola".into(), style: Style::ErrorBars, points: bars };
+        let tall = Series { points: vec![(3.0, -1e4), (3.0, 1e4)], ..bars.clone() };
+        let zero = vec![(0.0, 0.0), (1e9, 0.0)];
+        let guide = Series { name: String::new(), style: Style::Guide, points: zero };
+        let other = Series { name: "other".into(), ..parabola(Style::Points) };
+        let all = plot(vec![guide, parabola(Style::Points), bars, other]);
+        assert_eq!(all.colours(), [GUIDE_INK, PALETTE[0], PALETTE[0], PALETTE[1]]);
+        let y = |plot: &Plot| plot.axis(None, |p| p.1).unwrap().high;
+        let with = plot(vec![parabola(Style::Points), tall]);
+        assert!(y(&all) < 1e3 && y(&with) > 1e4);
+        assert!(all.axis(None, |p| p.0).unwrap().high < 60.0, "a guide widens nothing");
+        let lines = |plot: &Plot| {
+            let shapes = plot.drawing().unwrap().shapes;
+            let is_bar =
+                |s: &&Shape| matches!(s, Shape::Line { colour, .. } if *colour == PALETTE[0]);
+            shapes.iter().filter(is_bar).count()
+        };
+        assert_eq!(lines(&all), 50);
+    }
+
+    #[test]
+    fn the_legend_goes_where_it_hides_nothing() {
+        let line = |slope: f64| {
+            let points = (0..100).map(|i| (f64::from(i), slope * f64::from(i))).collect();
+            plot(vec![Series { name: "line".into(), style: Style::Points, points }])
+        };
+        let name_at = |plot: &Plot| {
+            let shapes = plot.drawing().unwrap().shapes;
+            let name = shapes.iter().find_map(|shape| match shape {
+                Shape::Text(text) if text.text == "line" => Some(text.at),
+                _ => None,
+            });
+            name.unwrap()
+        };
+        let [rising, falling] = [1.0, -1.0].map(|slope| name_at(&line(slope)));
+        assert!(rising.0 < 400.0 && falling.0 > 400.0, "{rising:?} {falling:?}");
+        assert_eq!(rising.1, falling.1);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::FigureError;
 use super::axes::{Axes, Axis};
-use super::colour_bar::{Bar, Colours, NOTHING};
+use super::colour_bar::{Bar, Colours, Scale, nothing};
 use super::drawing::{Drawing, Shape};
 use super::style::{GAP_PX, MARGIN_PX, TITLE_MIN_WIDTH_PX};
 use crate::geometry::raster::Raster;
@@ -13,8 +13,8 @@ const DATA_HEIGHT_PX: usize = 1000;
 
 /// A picture of one channel of a raster.
 ///
-/// Every pixel of the raster is a square of whole image pixels, coloured by viridis. NaN is
-/// light grey with a note beside it; a value beyond the range has the colour of the range's end,
+/// Every pixel of the raster is a square of whole image pixels, coloured by its scale. NaN is
+/// grey with a note beside it; a value beyond the range has the colour of the range's end,
 /// and the colour bar ends in a triangle there.
 #[derive(Clone, Copy, Debug)]
 pub struct Figure<'a> {
@@ -30,6 +30,10 @@ pub struct Figure<'a> {
     pub colour_label: &'a str,
     /// Values of the first and the last colour, in the channel's unit; of the data if `None`.
     pub range: Option<(f64, f64)>,
+    /// Which colours stand for which values.
+    pub scale: Scale,
+    /// What NaN means, such as `no detection`.
+    pub gaps: &'a str,
     /// Quantity and unit along x, such as `x, m`.
     pub x_label: &'a str,
     /// Quantity and unit along y, such as `y, m`.
@@ -47,11 +51,16 @@ impl Figure<'_> {
         Ok(self.drawing()?.svg()?)
     }
 
-    fn drawing(&self) -> Result<Drawing, FigureError> {
+    /// The figure as a page.
+    ///
+    /// # Errors
+    /// When the raster has no such channel, or its numbers or the range make no picture.
+    pub fn drawing(&self) -> Result<Drawing, FigureError> {
         let values = self.values()?;
-        let colours = Colours::over(values, self.range)?;
+        let colours = Colours::over(values, self.range, self.scale)?;
         let data = [self.data_width_px(), self.data_height_px()];
-        let bar = Bar::new(self.colour_label, colours.as_ref(), values, data[1]);
+        let gaps = (nothing(self.scale), self.gaps);
+        let bar = Bar::new(self.colour_label, gaps, colours.as_ref(), values, data[1]);
         let content = (data[0] + 2.5 * GAP_PX + bar.width()).max(TITLE_MIN_WIDTH_PX);
         let axes = Axes::new(self.axes(), data, [self.title, self.subtitle], content);
 
@@ -120,7 +129,10 @@ impl Figure<'_> {
             top_px: axes.top as u32,
             cell_px: self.cell_px() as u32,
             columns: self.raster.width,
-            colours: values.iter().map(|&v| colours.map_or(NOTHING, |c| c.of(v))).collect(),
+            colours: values
+                .iter()
+                .map(|&v| colours.map_or_else(|| nothing(self.scale), |c| c.of(v)))
+                .collect(),
         }
     }
 }
@@ -137,6 +149,7 @@ pub fn beside(figures: &[Figure]) -> Result<Vec<u8>, FigureError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::formats::figure::colour_bar::NOTHING;
     use crate::formats::figure::drawing::Rgb;
     use crate::formats::figure::style::INK;
     use crate::geometry::raster::Channel;
@@ -173,6 +186,8 @@ mod tests {
             subtitle: "300 GHz, θ = 20°",
             colour_label: "received power, dBm",
             range: Some((-70.0, -40.0)),
+            scale: Scale::Sequential,
+            gaps: "no detection",
             x_label: "x, m",
             y_label: "y, m",
         }

@@ -1,0 +1,75 @@
+//! When nothing can be said: why, and what would help.
+
+use serde::Serialize;
+
+use crate::diagnose::{DiagnoseError, SCHEMA};
+
+/// What `report.json` holds instead of a diagnosis.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct CannotTell {
+    /// Version of the schema.
+    schema: u32,
+    /// Always `cannot-tell`.
+    verdict: &'static str,
+    /// Why.
+    pub reason: String,
+    /// Which data or declaration would help.
+    pub would_help: String,
+    /// Always empty.
+    effects: [(); 0],
+}
+
+impl CannotTell {
+    pub fn new(error: &DiagnoseError) -> CannotTell {
+        CannotTell {
+            schema: SCHEMA,
+            verdict: "cannot-tell",
+            reason: error.to_string(),
+            would_help: would_help(error).to_owned(),
+            effects: [],
+        }
+    }
+}
+
+fn would_help(error: &DiagnoseError) -> &'static str {
+    match error {
+        DiagnoseError::TooFew { .. } => {
+            "More detections: a scan with more chirps, a lower threshold, or a target that fills more \
+             of the field of view. If many points of the cloud were set aside, check that cloud and \
+             scene are in one frame; `matdb measure` finds the pose."
+        }
+        DiagnoseError::TooSmall { .. } => {
+            "A target that fills more of the field of view, or several scans of it: held-out patches \
+             need room."
+        }
+        DiagnoseError::Unnumbered { .. } => {
+            "The chirp number of every point, as column `chirp`: without it nobody knows which chirps \
+             saw nothing."
+        }
+        DiagnoseError::Unmatched { .. } => "A cloud of the very scan that the scene describes.",
+        DiagnoseError::Looks { .. } => {
+            "The looks of speckle that the radar averages, as `looks` under [radar.speckle] in the scene."
+        }
+        DiagnoseError::Render(_) => {
+            "A scene whose target the scan meets: check its place, its unit of length and the scan."
+        }
+        // What later reasons say of themselves stands in `reason`.
+        _ => "Check the scene against the measurement, and scan more.",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_record_says_why_and_what_would_help() {
+        let answer = CannotTell::new(&DiagnoseError::TooFew { detected: 12 });
+        let json = serde_json::to_value(&answer).unwrap();
+        assert_eq!(json["verdict"], "cannot-tell");
+        assert_eq!(json["schema"], 1);
+        assert_eq!(json["effects"], serde_json::json!([]));
+        assert!(json["reason"].as_str().unwrap().contains("12 detections"));
+        assert!(json["would_help"].as_str().unwrap().contains("threshold"));
+    }
+}

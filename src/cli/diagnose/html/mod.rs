@@ -1,0 +1,151 @@
+//! `report.html`: the whole diagnosis for a person who has not read the docs.
+
+mod effect;
+mod evidence;
+mod page;
+
+use super::Context;
+use super::cannot_tell::CannotTell;
+use super::plots::Picture;
+use super::words::{sentence, verdict};
+use crate::cli::summary::grouped;
+use crate::diagnose::{Report, Verdict};
+use crate::error::Error;
+use page::{commands, escaped, meanings, paragraph, quiet, section};
+
+/// The page of a diagnosis.
+pub(super) fn report(
+    report: &Report,
+    context: &Context,
+    pictures: &[Picture],
+) -> Result<Vec<u8>, Error> {
+    let mut html = heading(report, context);
+    html += &found(report);
+    html += &section("Error before and after", &evidence::errors(report));
+    html += &section("Pictures", &figures(pictures)?);
+    html += &section("What remains", &evidence::unexplained(&report.unexplained));
+    let controls = evidence::controls(&report.controls);
+    if !controls.is_empty() {
+        html += &section("Controls", &controls);
+    }
+    html += &section("Tried and not supported", &evidence::tried(report));
+    html += &section("The base model", &evidence::base(&report.base, context));
+    html += &section("How to go on", &way_on(report, context));
+    html += &section("Words", &meanings(&WORDS));
+    let title = format!("{}: {}", context.scene, verdict(report));
+    Ok(page::page(&title, &html).into_bytes())
+}
+
+/// The page when nothing can be said.
+pub(super) fn cannot_tell(answer: &CannotTell, scene: &str, cloud: &str) -> Vec<u8> {
+    let html = format!(
+        "<header>\n<p class=\"quiet\">Diagnosis of {} with {}</p>\n<h1>Cannot tell</h1>\n</header>\n",
+        escaped(cloud),
+        escaped(scene)
+    );
+    let html = html
+        + "<p class=\"verdict\">These data do not allow an answer. That is no answer either: an \
+           effect may be missing or not.</p>\n"
+        + &section("Why", &paragraph(&answer.reason))
+        + &section("What would help", &paragraph(&answer.would_help));
+    page::page("Cannot tell", &html).into_bytes()
+}
+
+fn heading(report: &Report, context: &Context) -> String {
+    let detected = report.rows.iter().filter(|row| row.observed_dbm.is_some()).count();
+    let facts = format!(
+        "{} chirps meet the target, {} of them were detected; {} detections that lie elsewhere were \
+         set aside. Everything random follows seed {}.",
+        grouped(report.rows.len()),
+        grouped(detected),
+        grouped(context.false_alarms),
+        context.seed
+    );
+    let heading = match report.verdict {
+        Verdict::NoMissingEffect => "Nothing is missing",
+        Verdict::Explained => "The missing effect is found",
+        Verdict::Unexplained => "Something unknown remains",
+    };
+    let heading = match (report.verdict, report.effects.len()) {
+        (Verdict::Explained, 2..) => "The missing effects are found",
+        _ => heading,
+    };
+    format!(
+        "<header>\n<p class=\"quiet\">{}: diagnosis of {} with {}</p>\n<h1>{heading}</h1>\n\
+         <p class=\"verdict\">{}</p>\n</header>\n",
+        escaped(&context.scene),
+        escaped(&context.cloud_path),
+        escaped(&context.scene_path),
+        escaped(&sentence(report))
+    ) + &quiet(&facts)
+}
+
+fn found(report: &Report) -> String {
+    let html = match report.effects.as_slice() {
+        [] => paragraph(
+            "No effect is supported. An effect is only added when it predicts parts of the scan that \
+             took no part in its fit, by more than two standard errors, gains more than placebos with \
+             as many numbers, and changes the data by a size that counts.",
+        ),
+        found => found.iter().map(effect::article).collect(),
+    };
+    section("What was found", &html)
+}
+
+fn figures(pictures: &[Picture]) -> Result<String, Error> {
+    pictures.iter().map(page::figure).collect()
+}
+
+fn way_on(report: &Report, context: &Context) -> String {
+    let command = &context.command;
+    match (report.verdict, report.effects.is_empty()) {
+        (Verdict::NoMissingEffect, _) => paragraph(
+            "There is nothing to add. Whether a weak effect could hide in these data is a question of \
+             their number: more chirps, more looks of speckle or a second target show less.",
+        ),
+        (_, false) => {
+            let add = format!("{command} --add\nmatdb render after.toml -o after");
+            let more = match report.verdict {
+                Verdict::Unexplained => paragraph(
+                    "For what is still unknown, see where it is on the maps, and in residuals.csv \
+                     chirp by chirp.",
+                ),
+                _ => String::new(),
+            };
+            paragraph(
+                "Store what was found, write the scene that has it as after.toml, and render that:",
+            ) + &commands(&add)
+                + &more
+        }
+        (_, true) => paragraph(
+            "See where it is on the maps, and in residuals.csv chirp by chirp. Check first what the \
+             scene declares: mesh, pose, materials of the regions, threshold and speckle. A second \
+             scan with the target moved or turned tells what stays with the radar from what goes with \
+             the target.",
+        ),
+    }
+}
+
+const WORDS: [(&str, &str); 6] = [
+    (
+        "Held out",
+        "Predicted by a fit that had not seen it. Patches of the target are held out together, because neighbouring spots overlap.",
+    ),
+    (
+        "Supported",
+        "Better than the model without it, on held-out patches, by more than chance. A comparison of models, not a proof.",
+    ),
+    (
+        "ln p, ln likelihood",
+        "Logarithm of the probability that a model gave to what was measured. 8 more is a factor of 3000.",
+    ),
+    (
+        "Noise floor",
+        "The error that speckle and noise leave to a model that is right. Nothing honest gets below it.",
+    ),
+    (
+        "z",
+        "Quantile residual: the place of a measured power within its law, as a normal number. Standard normal if the model is right.",
+    ),
+    ("Placebo", "A random smooth field without meaning, with as many numbers as an effect."),
+];

@@ -1,0 +1,205 @@
+//! Residuals over the target plane, before and after.
+
+use super::{Picture, shown};
+use crate::cli::diagnose::words::signed;
+use crate::diagnose::{Report, Row};
+use crate::formats::figure::{Figure, FigureError, Scale};
+use crate::geometry::Raster;
+use crate::geometry::raster::Channel;
+
+/// Looks in a pixel, in the mean, from which speckle does not hide the rest.
+const LOOKS_PER_PIXEL: f64 = 8.0;
+/// Colours reach as far as this share of the pixels.
+const SHARE: f64 = 0.98;
+
+/// What a map shows.
+struct Subject {
+    file: &'static str,
+    title: &'static str,
+    quantity: &'static str,
+    gaps: &'static str,
+    /// Shortest and longest reach of the colours.
+    reach: [f64; 2],
+    caption: &'static str,
+}
+
+/// What one of two maps shows of a look, and the line under its title.
+type Panel<'a> = (&'a dyn Fn(&Row) -> Option<f64>, String);
+
+/// Observed − predicted, dB, of what was detected.
+pub(super) fn residuals(report: &Report, spot_m: f64) -> Result<Picture, FigureError> {
+    let subject = Subject {
+        file: "residual-map",
+        title: "Residual over the target",
+        quantity: "observed − predicted, dB",
+        gaps: "no detection",
+        reach: [0.5, 10.0],
+        caption: "Observed − predicted power over the target plane, averaged over the detections \
+                  of each pixel. Red is more power than predicted, blue less. A model that is right leaves speckle without shape.",
+    };
+    let residual = |predicted: fn(&Row) -> f64| {
+        move |row: &Row| row.observed_dbm.map(|observed| observed - predicted(row))
+    };
+    let [before, after] = [&report.error.before, &report.error.after]
+        .map(|e| format!("rmse {:.2} dB, mean {} dB", e.rmse_db, signed(e.bias_db, 2)));
+    let before = (&residual(|row| row.before_dbm) as &dyn Fn(&Row) -> Option<f64>, before);
+    let after = (&residual(|row| row.after_dbm) as &dyn Fn(&Row) -> Option<f64>, after);
+    maps(&subject, report, spot_m, [before, after])
+}
+
+/// Mean quantile residual, which chirps that saw nothing have, too.
+pub(super) fn quantiles(report: &Report, spot_m: f64) -> Result<Picture, FigureError> {
+    let subject = Subject {
+        file: "quantile-map",
+        title: "Quantile residual over the target",
+        quantity: "mean z, standard deviations",
+        gaps: "no chirp",
+        reach: [0.5, 3.0],
+        caption: "Mean quantile residual z over the target plane. It counts the chirps that hit the \
+                  target and saw nothing, too: z is standard normal if the model is right, and blue \
+                  where less comes back than the model says.",
+    };
+    let size = |pick: fn(&Row) -> f64| {
+        let rows = &report.rows;
+        let mean = rows.iter().map(pick).sum::<f64>() / rows.len().max(1) as f64;
+        let squares = rows.iter().map(|row| pick(row).powi(2)).sum::<f64>();
+        let rms = (squares / rows.len().max(1) as f64).sqrt();
+        format!("of all chirps: rms {rms:.2}, mean {}", signed(mean, 2))
+    };
+    let (before, after) = (|row: &Row| row.z_before, |row: &Row| row.z_after);
+    let panels: [Panel; 2] =
+        [(&|row| Some(row.z_before), size(before)), (&|row| Some(row.z_after), size(after))];
+    maps(&subject, report, spot_m, panels)
+}
+
+fn maps(
+    subject: &Subject,
+    report: &Report,
+    spot_m: f64,
+    panels: [Panel; 2],
+) -> Result<Picture, FigureError> {
+    let pixel_m = pixel_m(&report.rows, spot_m);
+    let empty = raster(&report.rows, pixel_m);
+    let rasters = panels.each_ref().map(|(pick, _)| filled(&empty, &report.rows, *pick));
+    let reach = reach(&rasters[0], subject.reach);
+    let notes = panels.map(|(_, note)| note);
+    let titles = match report.effects.is_empty() {
+        true => ["Base model", ""],
+        false => ["Before: base model", "After: with the effects"],
+    };
+    let drawing = |((raster, title), note): ((&Raster, &str), &String)| {
+        let figure = Figure {
+            raster,
+            channel: CHANNEL,
+            title,
+            subtitle: note,
+            colour_label: subject.quantity,
+            range: Some((-reach, reach)),
+            scale: Scale::Diverging,
+            gaps: subject.gaps,
+            x_label: "x in the target plane, m",
+            y_label: "y in the target plane, m",
+        };
+        figure.drawing()
+    };
+    let [before, after] = &rasters;
+    let panels = shown(report, [before, after]).into_iter().zip(titles).zip(&notes);
+    let panels = panels.map(drawing).collect::<Result<_, _>>()?;
+    let caption = format!("{} Pixels of {:.0} mm.", subject.caption, 1e3 * pixel_m);
+    let Subject { file, title, .. } = *subject;
+    Ok(Picture { file, title, caption, panels, columns: 2 })
+}
+
+const CHANNEL: &str = "residual";
+
+/// A spot, or more where the scan is sparse.
+fn pixel_m(rows: &[Row], spot_m: f64) -> f64 {
+    let cell = |row: &Row| [row.xt_m, row.yt_m].map(|x| (x / spot_m).floor() as i64);
+    let mut cells: Vec<[i64; 2]> = rows.iter().map(cell).collect();
+    cells.sort_unstable();
+    cells.dedup();
+    let looks = rows.len() as f64 / cells.len().max(1) as f64;
+    let pixel_m = spot_m * (LOOKS_PER_PIXEL / looks.max(1e-3)).sqrt().max(1.0);
+    // Whole millimetres, so that a caption tells it exactly.
+    (1e3 * pixel_m).round().max(1.0) * 1e-3
+}
+
+fn raster(rows: &[Row], pixel_m: f64) -> Raster {
+    // What a scan of a metre needs many times over; a stray look must not ask for more memory.
+    const MOST: f64 = 1000.0;
+    let axis = |pick: fn(&Row) -> f64| {
+        let values = rows.iter().map(pick).filter(|x| x.is_finite());
+        let [low, high] =
+            values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
+        // A pixel more at each side keeps the target off the frame.
+        let first = (low / pixel_m).floor() - 1.0;
+        let count = ((high / pixel_m).floor() - first + 2.0).clamp(1.0, MOST);
+        (first * pixel_m, count as usize)
+    };
+    let ((x_min_m, width), (y_min_m, height)) = (axis(|row| row.xt_m), axis(|row| row.yt_m));
+    Raster { width, height, x_min_m, y_min_m, pixel_m, channels: Vec::new() }
+}
+
+/// The mean of what is picked over the looks of every pixel.
+fn filled(empty: &Raster, rows: &[Row], pick: &dyn Fn(&Row) -> Option<f64>) -> Raster {
+    let mut sums = vec![(0.0, 0u32); empty.width * empty.height];
+    for row in rows {
+        let column = ((row.xt_m - empty.x_min_m) / empty.pixel_m).floor();
+        let up = ((row.yt_m - empty.y_min_m) / empty.pixel_m).floor();
+        let inside =
+            (0.0..empty.width as f64).contains(&column) && (0.0..empty.height as f64).contains(&up);
+        let Some(value) = pick(row).filter(|_| inside) else { continue };
+        let index = (empty.height - 1 - up as usize) * empty.width + column as usize;
+        if let Some((sum, count)) = sums.get_mut(index) {
+            (*sum, *count) = (*sum + value, *count + 1);
+        }
+    }
+    let values = sums.into_iter().map(|(sum, count)| (sum / f64::from(count)) as f32).collect();
+    let channels = vec![Channel { name: CHANNEL.to_owned(), values }];
+    Raster { channels, ..empty.clone() }
+}
+
+/// How far the colours of both maps reach: as far as nearly all of the first, in steps of a half.
+fn reach(raster: &Raster, [least, most]: [f64; 2]) -> f64 {
+    let values = raster.channels.iter().flat_map(|c| &c.values).filter(|v| v.is_finite());
+    let mut sizes: Vec<f32> = values.map(|v| v.abs()).collect();
+    sizes.sort_by(f32::total_cmp);
+    let place = (SHARE * sizes.len() as f64) as usize;
+    let size = sizes.get(place).or(sizes.last()).copied().map_or(0.0, f64::from);
+    (2.0 * size).ceil().clamp(2.0 * least, 2.0 * most) / 2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::diagnose::testing::row;
+
+    #[test]
+    fn a_pixel_is_the_mean_of_its_looks_and_upright() {
+        let at = |xt_m, yt_m, observed_dbm| Row { xt_m, yt_m, observed_dbm, ..row() };
+        let rows =
+            [at(0.005, 0.005, Some(-50.0)), at(0.006, 0.004, Some(-53.0)), at(0.035, 0.025, None)];
+        let empty = raster(&rows, 0.01);
+        assert_eq!((empty.width, empty.height), (6, 5));
+        let map = filled(&empty, &rows, &|row| row.observed_dbm);
+        let values = map.channel(CHANNEL).unwrap();
+        // The lowest row but the margin's is the last but one.
+        assert_eq!(values[3 * 6 + 1], -51.5);
+        assert_eq!(values.iter().filter(|v| v.is_nan()).count(), 29);
+    }
+
+    #[test]
+    fn a_sparse_scan_has_larger_pixels_and_colours_reach_a_round_value() {
+        let place = |i: u32, step_m: f64| Row {
+            xt_m: step_m * f64::from(i % 100),
+            yt_m: step_m * f64::from(i / 100),
+            ..row()
+        };
+        let dense: Vec<Row> = (0..10_000).map(|i| place(i, 0.004)).collect();
+        let sparse: Vec<Row> = (0..10_000).map(|i| place(i, 0.016)).collect();
+        assert_eq!(pixel_m(&dense, 0.016), 0.016);
+        assert!((pixel_m(&sparse, 0.016) / 0.016 - 8f64.sqrt()).abs() < 0.1);
+        let map = filled(&raster(&dense, 0.016), &dense, &|_| Some(-1.3));
+        assert_eq!(reach(&map, [0.5, 10.0]), 1.5);
+    }
+}

@@ -1,0 +1,57 @@
+//! Every look as a line of `residuals.csv`.
+
+use std::fmt::Write;
+
+use crate::diagnose::Row;
+
+const COLUMNS: [&str; 16] = [
+    "chirp",
+    "observed_dbm",
+    "before_dbm",
+    "after_dbm",
+    "z_before",
+    "z_after",
+    "fold",
+    "theta_deg",
+    "azimuth_deg",
+    "range_m",
+    "range_residual_m",
+    "xt_m",
+    "yt_m",
+    "edge_m",
+    "time_s",
+    "region",
+];
+
+/// The table as a file's bytes; a cell is empty where there is nothing.
+pub(super) fn csv(rows: &[Row]) -> Vec<u8> {
+    let mut text = COLUMNS.join(",") + "\n";
+    for row in rows {
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{},{},{:.4},{:.4},{:.4},{:.4},{},{:.4},{:.4},{:.5},{},{:.5},{:.5},{:.5},{:.6},{}",
+            row.chirp,
+            cell(row.observed_dbm, 4),
+            row.before_dbm,
+            row.after_dbm,
+            row.z_before,
+            row.z_after,
+            row.fold,
+            row.theta_deg,
+            row.azimuth_deg,
+            row.range_m,
+            cell(row.range_residual_m, 6),
+            row.xt_m,
+            row.yt_m,
+            row.edge_m,
+            row.time_s,
+            row.region,
+        );
+    }
+    text.into_bytes()
+}
+
+fn cell(value: Option<f64>, decimals: usize) -> String {
+    value.map_or(String::new(), |value| format!("{value:.decimals$}"))
+}

@@ -1,0 +1,25 @@
+//! A report for the tests of what is made of one.
+
+use crate::diagnose::Row;
+
+/// A look at which nothing is special.
+pub(super) fn row() -> Row {
+    Row {
+        chirp: 0,
+        observed_dbm: Some(-60.0),
+        before_dbm: -60.0,
+        after_dbm: -60.0,
+        z_before: 0.0,
+        z_after: 0.0,
+        fold: 0,
+        theta_deg: 10.0,
+        azimuth_deg: 0.0,
+        range_m: 8.0,
+        range_residual_m: Some(0.0),
+        xt_m: 0.0,
+        yt_m: 0.0,
+        edge_m: 0.048,
+        time_s: 0.0,
+        region: 0,
+    }
+}

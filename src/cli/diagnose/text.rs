@@ -1,0 +1,99 @@
+//! The diagnosis on the terminal.
+
+use std::path::Path;
+
+use super::words::{covariate, listed, plus_minus, sentence, value, verdict};
+use crate::cli::effects::level;
+use crate::diagnose::{Found, Report};
+
+/// Lines of what remains that are shown; the page has all.
+const MOST_UNEXPLAINED: usize = 3;
+
+/// About ten lines: the verdict, what was found, the error, what is left, where it stands.
+pub(super) fn text(report: &Report, files: &[String], folder: &Path) -> String {
+    let mut text = format!("{}: {}\n", verdict(report), lower(&sentence(report)));
+    text += &report.effects.iter().map(effect).collect::<String>();
+    text += &error(report);
+    text += &remains(report);
+    let accepted = |name: &str| report.effects.iter().any(|found| found.name == name);
+    let mut others: Vec<&str> =
+        report.ranking.iter().map(|c| c.name).filter(|name| !accepted(name)).collect();
+    others.sort_unstable();
+    others.dedup();
+    if !others.is_empty() {
+        text += &format!("tried and not supported: {}\n", listed(&others));
+    }
+    text + &written(files, folder)
+}
+
+/// A sentence after a colon.
+fn lower(sentence: &str) -> String {
+    let mut letters = sentence.chars();
+    letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
+}
+
+fn effect(found: &Found) -> String {
+    let numbers: Vec<String> = found
+        .parameters
+        .iter()
+        .map(|(name, number)| format!("{name} = {}", value(number)))
+        .collect();
+    let others: Vec<&str> = found.class.iter().copied().filter(|n| *n != found.name).collect();
+    let class = match others.is_empty() {
+        true => String::new(),
+        false => format!("    these data cannot tell it from {}\n", listed(&others)),
+    };
+    format!(
+        "  {} ({}): {}\n    held-out gain in ln p {}, changes the data by {:.2} dB\n{class}",
+        found.name,
+        level(found.level),
+        numbers.join(", "),
+        plus_minus(found.evidence.held_out_gain, found.evidence.held_out_se),
+        found.evidence.size_db
+    )
+}
+
+fn error(report: &Report) -> String {
+    let error = &report.error;
+    let share = match error.explained_share.filter(|_| !report.effects.is_empty()) {
+        Some(share) => format!("; {:.0} % of what lies above the floor is gone", 100.0 * share),
+        None => String::new(),
+    };
+    let change = match report.effects.is_empty() {
+        true => format!("{:.2} dB", error.before.rmse_db),
+        false => format!("{:.2} → {:.2} dB", error.before.rmse_db, error.after.rmse_db),
+    };
+    format!(
+        "error on held-out patches: {change} rms (noise floor {:.2} dB){share}\n",
+        error.noise_floor_db
+    )
+}
+
+fn remains(report: &Report) -> String {
+    let named = |one: &crate::diagnose::Unexplained| {
+        format!("{:.2} dB with {}", one.strength_db, covariate(&one.covariate).0)
+    };
+    let first: Vec<String> = report.unexplained.iter().take(MOST_UNEXPLAINED).map(named).collect();
+    let more = match report.unexplained.len().saturating_sub(MOST_UNEXPLAINED) {
+        0 => String::new(),
+        count => format!(", and {count} more"),
+    };
+    match first.is_empty() {
+        true => "what remains: nothing that is tested for\n".to_owned(),
+        false => format!("what remains: {}{more}\n", first.join(", ")),
+    }
+}
+
+fn written(files: &[String], folder: &Path) -> String {
+    let pictures = files.iter().filter(|name| name.ends_with(".png")).count();
+    let others: Vec<&str> = files
+        .iter()
+        .map(String::as_str)
+        .filter(|name| !name.ends_with(".png") && !name.ends_with(".svg"))
+        .collect();
+    format!(
+        "wrote {} and {pictures} pictures (.svg and .png) to {}\n",
+        others.join(", "),
+        folder.display()
+    )
+}

@@ -1,0 +1,176 @@
+//! Numbers and names of a diagnosis, as a person reads them on the terminal and in the page.
+
+use crate::cli::effects::unit;
+use crate::diagnose::{Report, Value, Verdict};
+use crate::effects::Level;
+
+/// The verdict in a word or two.
+pub(super) fn verdict(report: &Report) -> &'static str {
+    match report.verdict {
+        Verdict::NoMissingEffect => "nothing is missing",
+        Verdict::Explained => "explained",
+        Verdict::Unexplained => "unexplained",
+    }
+}
+
+/// The verdict in a sentence.
+pub(super) fn sentence(report: &Report) -> String {
+    let names: Vec<&str> = report.effects.iter().map(|found| found.name).collect();
+    let (effects, with) = match names.len() {
+        1 => ("effect", "with it"),
+        _ => ("effects", "with them"),
+    };
+    let names = listed(&names);
+    match (report.verdict, report.effects.is_empty()) {
+        (Verdict::NoMissingEffect, _) => "The scene's model explains the cloud: no effect that was \
+             tried predicts unseen parts of the scan better, and nothing that is tested for remains."
+            .to_owned(),
+        (Verdict::Explained, _) => format!(
+            "The scene's model lacks the {effects} {names}: {with} the model predicts unseen parts \
+             of the scan better, and nothing that is tested for remains."
+        ),
+        (Verdict::Unexplained, true) => {
+            "The scene's model does not explain the cloud, and no effect that was tried does: what \
+             remains is unknown."
+                .to_owned()
+        }
+        (Verdict::Unexplained, false) => format!(
+            "The scene's model lacks the {effects} {names}, which the data support, and something \
+             else remains that no effect that was tried explains."
+        ),
+    }
+}
+
+/// `a`, `a and b`, `a, b and c`.
+pub(super) fn listed(names: &[&str]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => (*one).to_owned(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+/// A number with its deviation and its unit.
+pub(super) fn value(value: &Value) -> String {
+    let Value { value, sd, unit } = value;
+    let number = match sd {
+        Some(sd) => plus_minus(*value, *sd),
+        None => format!("{} (deviation not told)", digits(*value)),
+    };
+    in_unit(number, unit)
+}
+
+/// A number with its unit, of which a pure number has none.
+pub(super) fn in_unit(number: String, code: &str) -> String {
+    match code {
+        "1" => number,
+        code => format!("{number} {}", unit(code)),
+    }
+}
+
+/// A number to two digits of its standard deviation.
+pub(super) fn plus_minus(value: f64, sd: f64) -> String {
+    if !(sd > 0.0 && sd.is_finite() && value.is_finite()) {
+        return format!("{} ± {}", digits(value), digits(sd));
+    }
+    let decimals = (1.0 - sd.log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{} ± {sd:.decimals$}", fixed(value, decimals))
+}
+
+/// A number with so many decimals and a true minus; 0 never has a sign.
+pub(super) fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    let is_zero = !text.contains(|c: char| c.is_ascii_digit() && c != '0') && value.is_finite();
+    match text.strip_prefix('-') {
+        Some(size) if is_zero => size.to_owned(),
+        Some(size) => format!("−{size}"),
+        None => text,
+    }
+}
+
+/// A number with so many decimals and always a sign, unless it is 0.
+pub(super) fn signed(value: f64, decimals: usize) -> String {
+    let text = fixed(value, decimals);
+    let is_zero = !text.contains(|c: char| c.is_ascii_digit() && c != '0');
+    match is_zero || text.starts_with('−') {
+        true => text,
+        false => format!("+{text}"),
+    }
+}
+
+/// Four significant digits.
+pub(super) fn digits(value: f64) -> String {
+    let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    crate::units::shown(rounded).replace('-', "−")
+}
+
+/// A probability; below what can be counted it is a bound.
+pub(super) fn probability(p: f64) -> String {
+    if p < 0.001 { "below 0.001".to_owned() } else { format!("{p:.3}") }
+}
+
+/// Where an effect belongs, in a sentence.
+pub(super) fn belongs(level: Level) -> &'static str {
+    match level {
+        Level::Instrument => "It belongs to the instrument: the radar and its calibration.",
+        Level::Material => "It belongs to the material, wherever that is used.",
+        Level::Scene => "It belongs to the scene: what stands where.",
+    }
+}
+
+/// What a covariate of the residual tests is, and what usually makes residuals go with it.
+pub(super) fn covariate(name: &str) -> (String, &'static str) {
+    if let Some(inner) = name.strip_prefix("spread over ") {
+        let (inner, _) = covariate(inner);
+        let hint = "The powers scatter more or less than declared there: speckle, noise or tilts.";
+        return (format!("scatter over {inner}"), hint);
+    }
+    let (words, hint) = match name {
+        "theta" => ("angle of incidence", "The law of scattering has another shape."),
+        "azimuth" => ("azimuth of the radar about the normal", "The surface has a direction."),
+        "range" => ("range", "The power balance or the range calibration is off."),
+        "x_t" => ("x in the target plane", "Something changes across the field of view."),
+        "y_t" => ("y in the target plane", "Something changes along the field of view."),
+        "distance from centre" => {
+            ("distance from the centre of the field of view", "The gain changes in rings.")
+        }
+        "distance from edge" => ("distance from the nearest edge", "The beam has a width."),
+        "progress" => ("time", "Something changed while the scan ran."),
+        "predicted power" => ("predicted power", "The receiver is not linear, or noise is added."),
+        "region" => ("region", "A region has another material than declared."),
+        "map" => ("place on the target", "Something stands at one place and not at others."),
+        other => return (other.to_owned(), ""),
+    };
+    (words.to_owned(), hint)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_two_digits_of_their_deviation() {
+        assert_eq!(plus_minus(-3.0219, 0.1134), "−3.02 ± 0.11");
+        assert_eq!(plus_minus(1234.56, 42.0), "1235 ± 42");
+        assert_eq!(plus_minus(0.001234, 0.0000567), "0.001234 ± 0.000057");
+        assert_eq!(plus_minus(-0.0001, 0.3), "0.00 ± 0.30");
+        let shown = |sd, unit| value(&Value { value: 1.5, sd, unit });
+        assert_eq!(shown(Some(0.25), "deg"), "1.50 ± 0.25 °");
+        assert_eq!(shown(None, "1"), "1.5 (deviation not told)");
+    }
+
+    #[test]
+    fn signs_are_true_and_zero_has_none() {
+        assert_eq!(
+            [-0.004, 0.004, 1.0, -1.0].map(|x| signed(x, 2)),
+            ["0.00", "0.00", "+1.00", "−1.00"]
+        );
+        assert_eq!(listed(&["a", "b", "c"]), "a, b and c");
+    }
+
+    #[test]
+    fn unknown_covariates_keep_their_name() {
+        assert_eq!(covariate("moon phase").0, "moon phase");
+        assert_eq!(covariate("spread over theta").0, "scatter over angle of incidence");
+    }
+}

@@ -1,0 +1,134 @@
+//! `matdb effects`.
+
+use serde::Serialize;
+
+use super::console::Console;
+use super::summary::table;
+use crate::effects::{Effect, Knob, Level, find, library};
+use crate::error::Error;
+use crate::formats::text::nearest;
+use crate::units::shown;
+
+/// List the physical effects that `diagnose` tries, or explain one
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb effects
+  matdb effects drift
+  matdb effects --json | jq '.[].name'")]
+pub(super) struct Args {
+    /// The effect to explain
+    name: Option<String>,
+}
+
+/// An effect as a script reads it.
+#[derive(Serialize)]
+struct Record {
+    name: &'static str,
+    level: Level,
+    is: &'static str,
+    shows: &'static str,
+    parameters: &'static [Knob],
+}
+
+impl Record {
+    fn new(effect: &dyn Effect) -> Record {
+        Record {
+            name: effect.name(),
+            level: effect.level(),
+            is: effect.is(),
+            shows: effect.shows(),
+            parameters: effect.knobs(),
+        }
+    }
+}
+
+pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
+    match &args.name {
+        Some(name) => {
+            let record = Record::new(known(name)?);
+            console.result(&entry(&record), &record)
+        }
+        None => {
+            let records = library().map(Record::new);
+            console.result(&list(&records), &records)
+        }
+    }
+}
+
+/// The effects of these names; all of them without any.
+pub(super) fn chosen(names: &[String]) -> Result<Vec<&'static dyn Effect>, Error> {
+    if names.is_empty() {
+        return Ok(library().to_vec());
+    }
+    names.iter().map(|name| known(name)).collect()
+}
+
+fn known(name: &str) -> Result<&'static dyn Effect, Error> {
+    find(name).ok_or_else(|| {
+        let way_out = match nearest(name, library().map(|effect| effect.name())) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => "`matdb effects` lists them".to_owned(),
+        };
+        Error::Usage { problem: format!("there is no effect `{name}`"), way_out }
+    })
+}
+
+/// Where an effect belongs, in a word.
+pub(super) fn level(level: Level) -> &'static str {
+    match level {
+        Level::Instrument => "instrument",
+        Level::Material => "material",
+        Level::Scene => "scene",
+    }
+}
+
+fn list(records: &[Record]) -> String {
+    let row = |record: &Record| {
+        let names: Vec<&str> = record.parameters.iter().map(|knob| knob.name).collect();
+        let parameters = match names.as_slice() {
+            [first, .., last] if names.len() > 3 => format!("{first} … {last}"),
+            few => few.join(", "),
+        };
+        let level = level(record.level).to_owned();
+        [record.name.to_owned(), level, parameters, short(record.is).to_owned()]
+    };
+    table(&["effect", "level", "parameters", "what it is"], records.iter().map(row))
+        + "`matdb effects NAME` says how one shows, and what its numbers are\n"
+}
+
+/// A sentence up to where it goes into detail.
+fn short(sentence: &'static str) -> &'static str {
+    const LONG: usize = 80;
+    let first = |text: &'static str, ends: &[&str]| {
+        let end = ends.iter().filter_map(|end| text.find(end)).min().unwrap_or(text.len());
+        text.get(..end).unwrap_or(text).trim_end_matches('.')
+    };
+    match first(sentence, &[":", ";", ". "]) {
+        long if long.len() > LONG => first(long, &[", "]),
+        short => short,
+    }
+}
+
+fn entry(record: &Record) -> String {
+    let rows = record.parameters.iter().map(|knob| {
+        [
+            knob.name.to_owned(),
+            unit(knob.unit).to_owned(),
+            shown(knob.min),
+            shown(knob.max),
+            shown(knob.absent),
+        ]
+    });
+    let parameters = table(&["parameter", "unit", "from", "to", "absent or start"], rows);
+    let Record { name, is, shows, .. } = record;
+    format!("{name} ({})\n{is}\n\nHow it shows: {shows}\n\n{parameters}", level(record.level))
+}
+
+/// A UCUM code as people write the unit.
+pub(super) fn unit(code: &str) -> &str {
+    match code {
+        "deg" => "°",
+        "dB[mW]" => "dBm",
+        other => other,
+    }
+}

@@ -1,0 +1,234 @@
+//! Promise: `matdb diagnose` leaves a whole report, or says in files and in one sentence that it cannot
+//! tell; its table gives the errors that it states, and no name in a scene becomes part of its page.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use matdb::effects::library;
+use serde_json::Value;
+use support::{entries, matdb, read_cloud, refused};
+
+/// A sphere and a plate under few chirps with speckle.
+const SCENE: &str = "
+name = \"<script>alert(1)</script> & \\\"x\\\"\"
+seed = 3
+[radar]
+threshold_dbm = -90.0
+[radar.speckle]
+looks = 4
+[radar.noise]
+level_dbm = -110
+range_sd_m = 0.002
+[radar.scan]
+pattern = \"elliptical\"
+chirps = 3000
+[[mesh]]
+name = \"sphere\"
+file = \"builtin:sphere\"
+size_m = [0.5, 0.5, 0.5]
+translation_m = [0.0, 1.25, 0.0]
+[[mesh]]
+name = \"plate\"
+file = \"builtin:cuboid\"
+size_m = [0.45, 0.4, 0.01]
+rotation_deg = [-15, 10, 0]
+translation_m = [0.0, 0.83, 0.0]
+[[region]]
+name = \"<b>skin</b>\"
+material = \"mannequin-paint\"
+";
+
+const FILES: [&str; 15] = [
+    "error.png",
+    "error.svg",
+    "quantile-map.png",
+    "quantile-map.svg",
+    "quantiles.png",
+    "quantiles.svg",
+    "ranking.png",
+    "ranking.svg",
+    "report.html",
+    "report.json",
+    "residual-map.png",
+    "residual-map.svg",
+    "residual-trends.png",
+    "residual-trends.svg",
+    "residuals.csv",
+];
+
+/// A folder with the scene and a cloud that was rendered from it with so many looks of speckle.
+fn rendered(looks: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let measured = SCENE.replace("looks = 4", &format!("looks = {looks}"));
+    fs::write(folder.path().join("measured.toml"), measured).unwrap();
+    fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+    matdb(folder.path()).args(["render", "-q", "measured.toml", "-o", "out"]).assert().success();
+    folder
+}
+
+const DIAGNOSE: [&str; 8] = [
+    "diagnose",
+    "out/cloud.ply",
+    "--scene",
+    "scene.toml",
+    "--effects",
+    "fov-gain,speckle",
+    "-o",
+    "report",
+];
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
+}
+
+/// Columns of a table by name.
+fn column(csv: &str, name: &str) -> Vec<Option<f64>> {
+    let mut lines = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let place = lines.next().unwrap().iter().position(|cell| *cell == name).unwrap();
+    lines.map(|line| (!line[place].is_empty()).then(|| line[place].parse().unwrap())).collect()
+}
+
+/// The table rounds powers to 0.0001 dB.
+const ROUNDING_DB: f64 = 2e-4;
+
+#[test]
+fn a_report_is_complete_and_its_table_gives_its_errors() {
+    let folder = rendered("1");
+    let at = folder.path();
+    let output = matdb(at).args(DIAGNOSE).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(entries(&at.join("report")), FILES);
+    let report = json(&at.join("report/report.json"));
+    assert_eq!(report["schema"], 1);
+    // The speckle is of one look, and the scene says four.
+    assert_eq!(report["verdict"], "explained", "{report}");
+    assert_eq!(report["effects"][0]["name"], "speckle");
+
+    let csv = fs::read_to_string(at.join("report/residuals.csv")).unwrap();
+    let observed = column(&csv, "observed_dbm");
+    for model in ["before", "after"] {
+        let predicted = column(&csv, &format!("{model}_dbm"));
+        let squares: Vec<f64> = observed
+            .iter()
+            .zip(&predicted)
+            .filter_map(|(o, p)| Some((o.as_ref()? - p.as_ref()?).powi(2)))
+            .collect();
+        let rmse_db = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        let stated_db = number(&report["error"][model]["rmse_db"]);
+        assert!((rmse_db - stated_db).abs() < ROUNDING_DB, "{model}: {rmse_db} {stated_db}");
+    }
+    let floor_db = number(&report["error"]["noise_floor_db"]);
+    assert!(floor_db > 0.0 && floor_db <= 1.1 * number(&report["error"]["after"]["rmse_db"]));
+
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.starts_with("explained: ") && (5..=12).contains(&text.lines().count()), "{text}");
+    for part in ["speckle (instrument): looks = ", " ± ", "noise floor", "wrote report.html"] {
+        assert!(text.contains(part), "`{part}` is not in:\n{text}");
+    }
+    page(&at.join("report/report.html"));
+}
+
+#[test]
+fn complete_data_lack_nothing_and_json_is_the_report() {
+    let folder = rendered("4");
+    let at = folder.path();
+    let output = matdb(at).arg("--json").args(DIAGNOSE).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let printed: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(printed, json(&at.join("report/report.json")));
+    assert_eq!(printed["verdict"], "no-missing-effect", "{printed}");
+    let html = page(&at.join("report/report.html"));
+    assert!(html.contains("Nothing is missing") && !html.contains("--add"));
+}
+
+/// The page, after checking that it stands alone, is well-formed and nothing in it is a scene's.
+fn page(path: &Path) -> String {
+    let html = fs::read_to_string(path).unwrap();
+    for outside in ["http", "<script", "<link", "@import", "url("] {
+        assert!(!html.contains(outside), "{outside}");
+    }
+    assert!(!html.contains("<b>") && html.contains("&lt;script&gt;alert(1)"));
+    assert!(html.contains("&lt;b&gt;skin&lt;/b&gt;"));
+    balanced(&html);
+    html
+}
+
+/// Every tag that is opened is closed, in order, and text has no bare sign.
+fn balanced(html: &str) {
+    const VOID: [&str; 2] = ["meta", "!DOCTYPE"];
+    let mut open: Vec<&str> = Vec::new();
+    for part in html.split('<').skip(1) {
+        let (tag, text) = part.split_once('>').unwrap_or_else(|| panic!("not closed: {part}"));
+        assert!(!text.contains('>') || open.last() == Some(&"style"), "a bare sign: {text}");
+        let name = tag.trim_start_matches('/').split([' ', '\n', '/']).next().unwrap();
+        assert_eq!(tag.matches('"').count() % 2, 0, "quotes: {tag}");
+        if VOID.contains(&name) || tag.ends_with('/') {
+            continue;
+        }
+        match tag.starts_with('/') {
+            true => assert_eq!(open.pop(), Some(name), "{tag}"),
+            false => open.push(name),
+        }
+    }
+    assert!(open.is_empty(), "{open:?}");
+}
+
+#[test]
+fn too_few_detections_are_said_in_files_and_one_sentence() {
+    let folder = rendered("4");
+    let at = folder.path();
+    let cloud = read_cloud(&at.join("out/cloud.ply"));
+    let columns = ["x", "y", "z", "power_dbm", "chirp"];
+    let line = |row: usize| columns.map(|name| cloud[name][row].to_string()).join(",") + "\n";
+    let csv = "x_m,y_m,z_m,power_dbm,chirp\n".to_owned() + &(0..80).map(line).collect::<String>();
+    fs::write(at.join("few.csv"), csv).unwrap();
+    let few = ["diagnose", "few.csv", "--scene", "scene.toml", "-o", "report"];
+    let message = refused(matdb(at).args(few));
+    assert!(message.contains("80 detections") && message.contains("300"), "{message}");
+    assert_eq!(entries(&at.join("report")), ["report.html", "report.json"]);
+    let report = json(&at.join("report/report.json"));
+    assert_eq!(report["schema"], 1);
+    assert_eq!(report["verdict"], "cannot-tell");
+    assert_eq!(report["effects"].as_array().unwrap().len(), 0);
+    for key in ["reason", "would_help"] {
+        assert!(report[key].as_str().unwrap().len() > 20, "{report}");
+    }
+    let html = fs::read_to_string(at.join("report/report.html")).unwrap();
+    assert!(html.contains("Cannot tell") && !html.contains("http"));
+    balanced(&html);
+    let output = matdb(at).arg("--json").args(few).output().unwrap();
+    assert!(!output.status.success());
+    assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap(), report);
+}
+
+#[test]
+fn the_library_is_listed_and_every_entry_is_complete() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let output = matdb(folder.path()).args(arguments).output().unwrap();
+        assert!(output.status.success(), "{arguments:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let list = run(&["effects"]);
+    let records: Value = serde_json::from_str(&run(&["effects", "--json"])).unwrap();
+    assert_eq!(records.as_array().unwrap().len(), library().len());
+    for (effect, record) in library().iter().zip(records.as_array().unwrap()) {
+        let name = effect.name();
+        assert!(list.lines().any(|line| line.starts_with(&format!("{name} "))), "{name}");
+        let entry = run(&["effects", name]);
+        assert!(entry.contains(effect.is()) && entry.contains(effect.shows()), "{entry}");
+        for knob in effect.knobs() {
+            assert!(entry.contains(knob.name), "{name}: {}", knob.name);
+        }
+        assert_eq!(record["name"], name);
+        assert_eq!(record["parameters"].as_array().unwrap().len(), effect.knobs().len());
+    }
+    let message = refused(matdb(folder.path()).args(["effects", "drfit"]));
+    assert!(message.contains("did you mean `drift`?"), "{message}");
+}
