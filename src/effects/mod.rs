@@ -13,6 +13,8 @@
 //! Parameters at their [`absent`](Knob::absent) values are no effect at all, exactly. [`library`] has
 //! them all; another one is a file and a line of its list.
 
+mod declared;
+mod entry;
 mod lobes;
 mod meeting;
 mod model;
@@ -25,6 +27,8 @@ use crate::frames::{Global, Ray};
 use crate::radar::{Link, Radar};
 use crate::trace::{Bvh, Hit};
 
+pub use declared::SceneEffects;
+pub use entry::{Chosen, EffectError, entry, resolve};
 pub use model::{Model, Prediction};
 
 /// Declares the file of every effect and lists them all, in the order in which they act.
