@@ -108,7 +108,8 @@ fn effects(material: &Material) -> String {
             text += &format!("    {}\n", effect.is());
         }
         let unit = |parameter: &str| {
-            let knob = crate::effects::find(name)?.knobs().iter().find(|knob| knob.name == parameter)?;
+            let knob =
+                crate::effects::find(name)?.knobs().iter().find(|knob| knob.name == parameter)?;
             Some(knob.unit.to_owned())
         };
         let row = |(parameter, value): (&String, &f64)| {

@@ -120,8 +120,7 @@ mod tests {
         let bench = Bench::sphere();
         for effect in library().into_iter().filter(|e| e.level() == Level::Material) {
             let values = effect.starts(&bench.stage(), &bench.looks).remove(0);
-            for (is_of_it, expected) in
-                [(true, bench.with(effect, &values)), (false, bench.bare())]
+            for (is_of_it, expected) in [(true, bench.with(effect, &values)), (false, bench.bare())]
             {
                 let on = OnRegions { effect, is_of_it: vec![is_of_it] };
                 assert_eq!(bench.with(&on, &values), expected, "{}", effect.name());

@@ -71,9 +71,8 @@ impl Model<'_> {
 
     /// The receiver's law with the effects.
     pub(crate) fn received(&self) -> Receiver {
-        let receive = |receiver, (effect, values): &(&dyn Effect, Vec<f64>)| {
-            effect.receive(values, receiver)
-        };
+        let receive =
+            |receiver, (effect, values): &(&dyn Effect, Vec<f64>)| effect.receive(values, receiver);
         self.effects.iter().fold(self.receiver, receive)
     }
 

@@ -214,7 +214,12 @@ impl<'a> Acting<'a> {
             time_s: chirps.time_s[chirp],
             progress: chirp as f64 / last,
             ray,
-            hit: Hit { facet: NOWHERE, range_m: 0.0, point: Point::from(DVec3::ZERO), cos_theta: 1.0 },
+            hit: Hit {
+                facet: NOWHERE,
+                range_m: 0.0,
+                point: Point::from(DVec3::ZERO),
+                cos_theta: 1.0,
+            },
             normal: -ray.direction.xyz(),
             azimuth_rad: 0.0,
             region: 0,

@@ -23,8 +23,8 @@ use std::collections::BTreeMap;
 use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::formats::{EffectEntry, FormatError};
 use crate::formats::text::from_toml;
+use crate::formats::{EffectEntry, FormatError};
 use crate::radar::Radar;
 
 /// A scene file as written.

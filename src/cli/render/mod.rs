@@ -72,8 +72,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     stages.end("image", console);
 
     let regions = &material_of_region;
-    let record =
-        Record::new(&scene, &used, model.as_ref(), regions, &views, &images, args.all);
+    let record = Record::new(&scene, &used, model.as_ref(), regions, &views, &images, args.all);
     let mut files = files::encode(args.all, &scene, &views, &images, &record, &material_of_region)?;
     if let Some(shape) = beat {
         files.extend(beat::encode(&args.scene, shape, &setup, &footprints, &views)?);
