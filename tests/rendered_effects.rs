@@ -518,6 +518,11 @@ fn mistakes_are_named_with_their_place_and_the_way_out() {
         (table("effect", "multi-bounce", "") + "[bounce]\n", &["`multi-bounce`", "one of the two"]),
         (table("effect", "pose", "") + "[bounce]\n", &["`pose` moves", "translation_m"]),
         (
+            table("effect", "pose", "rotation_x_deg = 1")
+                + &table("effect", "motion", "x1_m = 0.01"),
+            &["would undo `pose`", "rotation_deg"],
+        ),
+        (
             table("radar.effect", "noise-floor", "") + "[radar.receiver]\n",
             &["[radar.receiver] makes", "noise_figure_db"],
         ),
@@ -555,5 +560,19 @@ fn a_material_with_an_effect_that_means_nothing_is_not_added() {
         let message = refused(matdb(folder.path()).args(["add", "--from", "."]));
         assert!(message.contains(part) && message.contains("material.toml"), "{message}");
         assert_eq!(entries(folder.path()), ["material.toml"]);
+    }
+}
+
+#[test]
+fn the_docs_say_where_every_effect_is_written() {
+    let text = fs::read_to_string(support::root().join("docs/scenes.md")).unwrap();
+    for effect in library() {
+        let start = match effect.level() {
+            Level::Scene => "| `[[effect]]` of the scene |",
+            Level::Instrument => "| `[[radar.effect]]` of the scene |",
+            Level::Material => "| `[[effect]]` of a [material]",
+        };
+        let row = text.lines().find(|line| line.starts_with(start)).unwrap();
+        assert!(row.contains(&format!("`{}`", effect.name())), "{}", effect.name());
     }
 }

@@ -198,7 +198,7 @@ mod tests {
             (vec![written("drift", &[])], "write it as [[radar.effect]]"),
             (vec![written("subsurface", &[])], "[[effect]] of a material.toml"),
         ] {
-            let message = resolve(&entries, Level::Scene).unwrap_err().to_string();
+            let message = resolve(&entries, Level::Scene).err().unwrap().to_string();
             assert!(message.contains(expected), "{message}");
         }
     }
