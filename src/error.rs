@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use crate::diagnose::DiagnoseError;
+use crate::effects::EffectError;
 use crate::fit::FitError;
 use crate::formats::FormatError;
 use crate::formats::exr::ExrError;
@@ -40,6 +41,14 @@ pub enum Error {
         antenna: String,
         /// What is wrong.
         error: Box<RenderError>,
+    },
+    /// An entry means no effect.
+    #[error("{place}: {error}")]
+    Effect {
+        /// The file, and where in it.
+        place: String,
+        /// What is wrong.
+        error: EffectError,
     },
     /// A material file was refused.
     #[error(transparent)]

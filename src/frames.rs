@@ -148,6 +148,10 @@ impl<To, From> Pose<To, From> {
         Pose { rotation, translation_m, frames: PhantomData }
     }
 
+    /// Neither turned nor shifted.
+    pub const NONE: Self =
+        Pose { rotation: DMat3::IDENTITY, translation_m: DVec3::ZERO, frames: PhantomData };
+
     /// Rotation by roll, pitch, yaw about the fixed axes x, then y, then z (rad), then a shift (m).
     pub fn from_euler_xyz(rotation_rad: DVec3, translation_m: DVec3) -> Self {
         let quaternion = DQuat::from_rotation_z(rotation_rad.z)

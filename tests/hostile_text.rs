@@ -5,10 +5,11 @@ mod support;
 
 use std::path::Path;
 
-use matdb::brdf::Scattering;
+use matdb::brdf::{Brdf, Lambert, Scattering};
+use matdb::effects::{Level, Receiver, SceneEffects, resolve};
 use matdb::material::file::{observations, parse};
 use matdb::radar::Pattern;
-use matdb::render::{Bounce, Observer, Setup, Surface, power_image, shade, trace};
+use matdb::render::{Bounce, Observer, Setup, Surface, power_image, shade, trace, trace_placed};
 use matdb::scene::{Scene, SceneFile};
 use matdb::trace::Bvh;
 use proptest::prelude::*;
@@ -85,9 +86,28 @@ half_space = { point_m = [0.0, 0.0, 0.0], normal = [0.0, 0.0, 1.0] }
 [[region]]
 name = "t"
 material = "ptfe"
+[[effect]]
+name = "foreign-patch"
+level_db = 3.0
+centre_x_m = 0.1
+centre_y_m = 0.1
+radius_m = 0.1
+[[effect]]
+name = "angle-error"
+sd_deg = 2.0
+[[radar.effect]]
+name = "drift"
+slope_db = 1.0
+waves_per_scan = 2.0
+[[radar.effect]]
+name = "compression"
+saturation_dbm = -30.0
 "#;
 
-const MATERIAL: &str = include_str!("../materials/ptfe/material.toml");
+const MATERIAL: &str = concat!(
+    include_str!("../materials/ptfe/material.toml"),
+    "\n[[effect]]\nname = \"thin-film\"\ncoverage = 0.3\nthickness_m = 4e-4\nindex = 1.6\n"
+);
 const CURVE: &str = include_str!("../materials/cotton/backscatter.csv");
 
 /// What a careless or hostile hand writes in place of a number or a word.
@@ -161,14 +181,22 @@ fn render(text: &str) {
     let Ok(scene) = Scene::resolve(file, Path::new("scene.toml")) else { return };
     let bvh = Bvh::new(&scene.target.mesh);
     let rays = scene.file.spot.rays;
-    let Ok(footprints) = trace(scene.radar(), &scene.chirps, &bvh, rays, &|_| {}) else { return };
-    let lambert = |_, _| 0.1;
+    let lambert = Lambert { albedo: 0.3 };
     let surfaces: Vec<Surface> =
         scene.target.regions.iter().map(|_| Surface::new(&lambert)).collect();
     let regions = &scene.target.region_of_facet;
     let bounce = scene.file.bounce.map(|b| Bounce { rays: b.rays, outside_spot: 0.1 });
     let paper = Setup::new(scene.radar(), &scene.chirps, &bvh, regions, &surfaces);
-    let setup = Setup { bounce, ..paper };
+    let mut effects = SceneEffects::default();
+    let levels = [(&scene.file.effect, Level::Scene), (&scene.radar().effect, Level::Instrument)];
+    for (entries, level) in levels {
+        let Ok(chosen) = resolve(entries, level) else { return };
+        effects.add(chosen);
+    }
+    let laws = surfaces.iter().map(|_| Brdf::Lambert(lambert)).collect();
+    let model = effects.model(laws, Receiver::declared(scene.radar()));
+    let setup = Setup { bounce, effects: Some(&model), ..paper };
+    let Ok(footprints) = trace_placed(&setup, rays, &|_| {}) else { return };
     let Ok(scan) = shade(&setup, &footprints, Observer::Radar, &|_| {}) else { return };
     for echo in &scan.echoes {
         assert!(echo.range_m.is_finite() && echo.point.xyz.is_finite(), "{text}");

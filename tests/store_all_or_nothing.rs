@@ -16,7 +16,11 @@ use std::sync::Once;
 use matdb::material::Material;
 use matdb::store::{Store, StoreError};
 use rusqlite::ffi;
-use support::database::{changed, child, contents, given, is_sound, sample};
+use support::database::{change, child, contents, given, is_sound, with_effects};
+
+fn changed(slug: &str) -> Material {
+    change(with_effects(slug))
+}
 
 /// A call that writes.
 #[derive(Clone, Copy, Debug)]
@@ -40,9 +44,9 @@ impl Write {
             return;
         }
         let mut store = Store::open(path).unwrap();
-        store.add([&sample("bystander")]).unwrap();
+        store.add([&with_effects("bystander")]).unwrap();
         if let Write::Revise | Write::Remove = self {
-            store.add([&sample("subject")]).unwrap();
+            store.add([&with_effects("subject")]).unwrap();
         }
         if let Write::Remove = self {
             store.add([&changed("subject")]).unwrap();
@@ -53,7 +57,7 @@ impl Write {
         let mut store = Store::open(path)?;
         match self {
             Write::Make => Ok(()),
-            Write::Add => store.add([&sample("subject")]).map(drop),
+            Write::Add => store.add([&with_effects("subject")]).map(drop),
             Write::Revise => store.add([&changed("subject")]).map(drop),
             Write::Remove => store.remove([&"subject".parse().unwrap()]).map(drop),
         }
@@ -61,7 +65,7 @@ impl Write {
 
     fn before_and_after(self) -> [Vec<Material>; 2] {
         let (bystander, first, second) =
-            (sample("bystander"), sample("subject"), changed("subject"));
+            (with_effects("bystander"), with_effects("subject"), changed("subject"));
         let alone = vec![bystander.clone()];
         match self {
             Write::Make => [vec![], vec![]],

@@ -4,12 +4,13 @@
 use matdb::brdf::{
     BlinnPhong, Brdf, CookTorrance, Distribution, Lambert, Mixture, Shadowing, Tabulated,
 };
+use matdb::formats::EffectEntry;
 use matdb::material::{
     Censor, Covariance, Curve, Estimate, Fit, FitReport, Given, Goodness, Instrument, Material,
     Observation, Slug, Source, SourceKind, builtin,
 };
 use matdb::store::{Added, Store};
-use proptest::collection::vec;
+use proptest::collection::{btree_map, vec};
 use proptest::option;
 use proptest::prelude::*;
 use proptest::sample::select;
@@ -178,11 +179,17 @@ fn curve() -> impl Strategy<Value = Curve> {
 }
 
 prop_compose! {
+    fn effect()(numbers in btree_map(word(), number(), 0..4)) -> EffectEntry {
+        EffectEntry { name: String::new(), parameters: numbers }
+    }
+}
+
+prop_compose! {
     fn material()(
         texts in (word(), word(), text(), word(), vec(text(), 0..4)),
         frequency_hz in [positive(), positive()], theta_rad in [angle_rad(), angle_rad()],
         sources in vec(source(), 1..4), instruments in vec(instrument(), 0..3),
-        curves in vec(curve(), 0..4), fits in vec(fit(), 1..4),
+        curves in vec(curve(), 0..4), fits in vec(fit(), 1..4), effects in vec(effect(), 0..3),
         key in text(), pick in any::<usize>(),
     ) -> Material {
         let (name, class, description, licence, tags) = texts;
@@ -190,7 +197,7 @@ prop_compose! {
         let mut material = Material {
             slug, name, class, description, licence, tags,
             frequency_hz: ascending(frequency_hz), theta_rad: ascending(theta_rad),
-            render: String::new(), sources, instruments, curves, fits,
+            render: String::new(), sources, instruments, curves, fits, effects,
         };
         connect(&mut material, &key, pick);
         material
@@ -228,6 +235,9 @@ fn connect(material: &mut Material, key: &str, mut pick: usize) {
         for (_, source) in &mut fit.parameter_sources {
             *source = choose("source", counts[0]).unwrap();
         }
+    }
+    for (index, effect) in material.effects.iter_mut().enumerate() {
+        effect.name = name("effect", index);
     }
     material.render = choose("fit", material.fits.len()).unwrap();
 }

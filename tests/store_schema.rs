@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 use matdb::material::Material;
 use matdb::store::{Added, Store};
 use rusqlite::Connection;
-use support::database::{change, contents, fitted, sample};
+use support::database::{change, contents, fitted, sample, with_effects};
 
-const NEWEST: &str = "schema-0002.sqlite";
+const NEWEST: &str = "schema-0003.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
@@ -37,7 +37,8 @@ fn schema(path: &Path) -> (Vec<[Option<String>; 4]>, [i64; 2]) {
 fn held(file: &str) -> [Material; 3] {
     let make = match file {
         "schema-0001.sqlite" => sample,
-        _ => fitted,
+        "schema-0002.sqlite" => fitted,
+        _ => with_effects,
     };
     [make("paint"), change(make("paint")), make("primer")]
 }
@@ -164,6 +165,11 @@ fn the_database_itself_refuses_what_a_material_may_not_be() {
         "UPDATE observation SET chirp = 4294967296",
         "UPDATE fit SET report = '[]'",
         "UPDATE fit SET report = 'nonsense'",
+        "UPDATE effect SET name = ''",
+        "UPDATE effect SET name = 'other'",
+        "UPDATE effect SET revision_id = 99",
+        "UPDATE effect_parameter SET effect = 'other'",
+        "UPDATE effect_parameter SET value = 'much'",
     ] {
         assert!(conn.execute(sql, []).is_err(), "{sql}");
     }

@@ -8,6 +8,8 @@ use serde_json::json;
 use super::console::Console;
 use super::database::Database;
 use super::materials::unknown;
+use super::staging::chosen;
+use crate::effects::Level;
 use crate::error::Error;
 use crate::material::{Material, builtin, file};
 use crate::store::Added;
@@ -117,7 +119,9 @@ fn read(path: &Path) -> Result<Material, Error> {
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let read_csv = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
-    Ok(file::parse(&path.display().to_string(), &text, read_csv)?)
+    let material = file::parse(&path.display().to_string(), &text, read_csv)?;
+    chosen(&material.effects, Level::Material, format!("{}: [[effect]]", path.display()))?;
+    Ok(material)
 }
 
 fn unreadable(path: &Path, reason: std::io::Error) -> Error {

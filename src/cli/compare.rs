@@ -8,14 +8,14 @@ use super::cloud::{CloudArgs, pose};
 use super::console::Console;
 use super::database::Database;
 use super::output::write_all;
-use super::staging::{Used, materials, setup, surfaces};
+use super::staging::{Used, effects, materials, model, setup, surfaces};
 use super::summary::grouped;
 use crate::error::Error;
 use crate::formats::figure::{Figure, Plot, Scale, Series, Style, beside};
 use crate::frames::Point;
 use crate::geometry::Raster;
 use crate::measure::compare::{Agreement, Line, along, difference, measured_scan};
-use crate::render::{Observer, Scan, power_image, shade, trace};
+use crate::render::{Observer, Scan, power_image, shade, trace_placed};
 use crate::scene::Scene;
 use crate::trace::Bvh;
 
@@ -118,10 +118,11 @@ fn simulate(args: &Args, scene: &Scene, db: &Database) -> Result<(Scan, Vec<u16>
         choose_fit(name, &mut used)?;
     }
     let surfaces = surfaces(scene, &used, &material_of_region);
+    let effects = effects(scene, &args.scene, &used, &material_of_region)?;
+    let model = model(&effects, scene, &used, &material_of_region);
     let bvh = Bvh::new(&scene.target.mesh);
-    let setup = setup(scene, &bvh, &surfaces);
-    let footprints = trace(setup.radar, setup.chirps, &bvh, scene.file.spot.rays, &|_| {});
-    let footprints = footprints.map_err(at)?;
+    let setup = setup(scene, &bvh, &surfaces, model.as_ref());
+    let footprints = trace_placed(&setup, scene.file.spot.rays, &|_| {}).map_err(at)?;
     let scan = shade(&setup, &footprints, Observer::Radar, &|_| {}).map_err(at)?;
     Ok((scan, material_of_region))
 }

@@ -9,6 +9,7 @@ use super::materials::{Found, find};
 use super::summary::table;
 use crate::brdf::Scattering;
 use crate::error::Error;
+use crate::formats::EffectEntry;
 use crate::material::{Fit, Material};
 use crate::store::RevisionSummary;
 use crate::units::{db_from_ratio, shown};
@@ -76,6 +77,7 @@ fn describe(material: &Material, origin: &str) -> Result<String, Error> {
         }
         text += &fit.report.as_ref().map_or(String::new(), report);
     }
+    text += &effects(material);
     text += &format!("\nscenes render `{}`:\n{}", material.render, curve_table(material)?);
     Ok(text)
 }
@@ -93,6 +95,27 @@ fn sources(material: &Material) -> String {
         if let Some(note) = &source.note {
             text += &format!("    {note}\n");
         }
+    }
+    text
+}
+
+/// As they are stored: a later program may know more of them than this one.
+fn effects(material: &Material) -> String {
+    let mut text = String::new();
+    for EffectEntry { name, parameters } in &material.effects {
+        text += &format!("\neffect {name}\n");
+        if let Some(effect) = crate::effects::find(name) {
+            text += &format!("    {}\n", effect.is());
+        }
+        let unit = |parameter: &str| {
+            let knob =
+                crate::effects::find(name)?.knobs().iter().find(|knob| knob.name == parameter)?;
+            Some(knob.unit.to_owned())
+        };
+        let row = |(parameter, value): (&String, &f64)| {
+            [parameter.clone(), shown(*value), unit(parameter).unwrap_or_default()]
+        };
+        text += &table(&["parameter", "value", "unit"], parameters.iter().map(row));
     }
     text
 }

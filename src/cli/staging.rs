@@ -4,7 +4,10 @@ use std::path::Path;
 
 use super::database::Database;
 use super::materials::{Found, find};
+use crate::brdf::Brdf;
+use crate::effects::{Chosen, Level, Model, Receiver, SceneEffects, resolve};
 use crate::error::Error;
+use crate::formats::EffectEntry;
 use crate::render::{Bounce, Setup, Surface};
 use crate::scene::Scene;
 use crate::trace::Bvh;
@@ -13,7 +16,9 @@ use crate::units::ratio_from_db;
 /// A material as one scene uses it.
 pub(super) struct Used {
     pub found: Found,
-    pub scattering: crate::brdf::Brdf,
+    pub scattering: Brdf,
+    /// Its own effects.
+    pub effects: Chosen,
 }
 
 /// The surface of each region of a scene.
@@ -30,8 +35,52 @@ pub(super) fn surfaces<'a>(
         .collect()
 }
 
+/// The effects of a scene, of its radar and of its materials.
+pub(super) fn effects(
+    scene: &Scene,
+    path: &Path,
+    used: &[Used],
+    material_of_region: &[u16],
+) -> Result<SceneEffects, Error> {
+    let mut effects = SceneEffects::default();
+    let at = |table: &str| format!("{}: [[{table}]]", path.display());
+    effects.add(chosen(&scene.file.effect, Level::Scene, at("effect"))?);
+    effects.add(chosen(&scene.radar().effect, Level::Instrument, at("radar.effect"))?);
+    for (number, Used { effects: own, .. }) in (0u16..).zip(used) {
+        let on: Vec<bool> = material_of_region.iter().map(|&of| of == number).collect();
+        effects.add_to_regions(own.clone(), &on);
+    }
+    Ok(effects)
+}
+
+/// What the entries at a place mean.
+pub(super) fn chosen(
+    entries: &[EffectEntry],
+    level: Level,
+    place: String,
+) -> Result<Chosen, Error> {
+    resolve(entries, level).map_err(|error| Error::Effect { place, error })
+}
+
+/// The effects on the laws of a scene; `None` when there are none.
+pub(super) fn model<'a>(
+    effects: &'a SceneEffects,
+    scene: &Scene,
+    used: &[Used],
+    material_of_region: &[u16],
+) -> Option<Model<'a>> {
+    let law = |&material: &u16| used[usize::from(material)].scattering.clone();
+    let laws = material_of_region.iter().map(law).collect();
+    (!effects.is_empty()).then(|| effects.model(laws, Receiver::declared(scene.radar())))
+}
+
 /// A scene as the renderer takes it.
-pub(super) fn setup<'a>(scene: &'a Scene, bvh: &'a Bvh, surfaces: &'a [Surface]) -> Setup<'a> {
+pub(super) fn setup<'a>(
+    scene: &'a Scene,
+    bvh: &'a Bvh,
+    surfaces: &'a [Surface],
+    effects: Option<&'a Model>,
+) -> Setup<'a> {
     Setup {
         radar: scene.radar(),
         chirps: &scene.chirps,
@@ -42,6 +91,7 @@ pub(super) fn setup<'a>(scene: &'a Scene, bvh: &'a Bvh, surfaces: &'a [Surface])
             rays: bounce.rays,
             outside_spot: ratio_from_db(bounce.outside_spot_db),
         }),
+        effects,
         seed: scene.file.seed,
     }
 }
@@ -62,7 +112,9 @@ pub(super) fn materials(
             let asked_by = format!("{}: region `{}`: ", path.display(), region.name);
             let found = find(store.as_ref(), &region.material, &asked_by)?;
             let scattering = found.material.scattering()?;
-            used.push(Used { found, scattering });
+            let place = format!("{asked_by}material `{}`", found.material.slug);
+            let effects = chosen(&found.material.effects, Level::Material, place)?;
+            used.push(Used { found, scattering, effects });
             names.push(&region.material);
         }
         of_region.push(known.unwrap_or(names.len() - 1) as u16);

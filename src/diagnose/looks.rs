@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::DiagnoseError;
 use crate::effects::{Look, Stage};
-use crate::frames::Direction;
+use crate::frames::{Direction, Pose};
 use crate::measure::cloud::{Cloud, CloudPoint};
 use crate::radar::{Chirps, Radar};
 use crate::render::{LocalFrame, trace};
@@ -40,7 +40,6 @@ pub struct Matched {
 pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>, DiagnoseError> {
     let footprints = trace(radar, chirps, stage.bvh, 1, &|_| {})?;
     let places: Vec<_> = chirps.target_points_m(&radar.frames()).collect();
-    let last = chirps.rays.len().saturating_sub(1).max(1) as f64;
     let look = |index: usize| {
         let hit = (*footprints.hits.get(index)?)?;
         let ray = *chirps.rays.get(index)?;
@@ -54,10 +53,11 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>,
         Some(Look {
             chirp: *chirps.number.get(index)?,
             time_s: chirps.time_s.get(index).copied().unwrap_or(0.0),
-            progress: index as f64 / last,
+            progress: chirps.progress(index),
             ray,
             hit,
             normal: frame.normal,
+            target: Pose::NONE,
             azimuth_rad: y.atan2(x),
             region,
             xt_m: place.x,

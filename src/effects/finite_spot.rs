@@ -43,9 +43,10 @@ impl Beside {
 /// The ray of a look and those of its spot, as far as they meet the target as the scene has it.
 type Spot = (Beside, Vec<Beside>);
 
-fn spot(stage: &Stage, look: &Look, diameter_m: f64) -> Spot {
+fn spot(stage: &Stage, look: &Look, diameter_m: f64) -> Option<Spot> {
+    let centre = met(stage, look, look.ray)?;
     // The intensity exp(−4 ln 2·r²/D²) has this standard deviation along each direction.
-    let sd_rad = diameter_m / look.hit.range_m / (8.0 * std::f64::consts::LN_2).sqrt();
+    let sd_rad = diameter_m / centre.hit.range_m / (8.0 * std::f64::consts::LN_2).sqrt();
     let forward = look.ray.direction.xyz();
     let (u, v) = forward.any_orthonormal_pair();
     let beside = |(share, angle_rad): (f64, f64)| {
@@ -55,7 +56,7 @@ fn spot(stage: &Stage, look: &Look, diameter_m: f64) -> Spot {
         met(stage, look, Ray { origin: look.ray.origin, direction })
     };
     let met = sunflower(RAYS).filter_map(beside).map(|look| Beside::of(&look));
-    (Beside::of(look), met.collect())
+    Some((Beside::of(&centre), met.collect()))
 }
 
 /// What a spot changes: the factor on the power and what adds to the range, m.
@@ -109,14 +110,17 @@ impl Effect for FiniteSpot {
 
     fn survey(&self, values: &[f64], stage: &Stage, looks: &[Look]) -> Survey {
         let diameter_m = values.first().copied().unwrap_or(0.0);
-        let spots: Vec<Spot> = looks.par_iter().map(|look| spot(stage, look, diameter_m)).collect();
+        let spots: Vec<Option<Spot>> =
+            looks.par_iter().map(|look| spot(stage, look, diameter_m)).collect();
         Box::new(spots)
     }
 
     fn arrive(&self, _: &[f64], scan: &Surveyed, laws: &[Brdf], arrived: &mut [Option<Arrived>]) {
-        let Some(spots) = scan.survey.and_then(|s| s.downcast_ref::<Vec<Spot>>()) else { return };
+        let Some(spots) = scan.survey.and_then(|s| s.downcast_ref::<Vec<Option<Spot>>>()) else {
+            return;
+        };
         spots.par_iter().zip(arrived).for_each(|(spot, one)| {
-            let changed = averaged(scan.stage, laws, spot);
+            let changed = spot.as_ref().and_then(|spot| averaged(scan.stage, laws, spot));
             if let (Some(one), Some((factor, longer_m))) = (one, changed) {
                 one.power_w *= factor;
                 one.range_m += longer_m;

@@ -4,7 +4,7 @@
 use glam::{DMat3, DVec3};
 
 use super::{Look, Stage};
-use crate::frames::{Direction, Global, Point, Ray, Surface};
+use crate::frames::{Direction, Global, Pose, Ray, Surface};
 use crate::trace::Hit;
 
 /// Axes on a surface: along the grain, across it, and the normal.
@@ -53,7 +53,8 @@ pub(super) fn met(stage: &Stage, look: &Look, ray: Ray<Global>) -> Option<Look> 
     Some(Look { ray, hit, normal, azimuth_rad, region, ..*look })
 }
 
-/// The look at a target turned about `pivot` and then shifted; `None` where the ray misses it then.
+/// The look at a target turned about `pivot` and then shifted, on top of what has moved it before;
+/// `None` where the ray misses it then.
 pub(super) fn moved(
     stage: &Stage,
     look: &Look,
@@ -61,12 +62,13 @@ pub(super) fn moved(
     pivot: DVec3,
     shift_m: DVec3,
 ) -> Option<Look> {
+    let motion = Pose::<Global, Global>::new(rotation, pivot + shift_m - rotation * pivot);
+    let target = motion * look.target;
     // The target stands still in its own frame, and the ray moves the other way.
-    let back = rotation.transpose();
-    let origin = Point::from(back * (look.ray.origin.xyz - pivot - shift_m) + pivot);
-    let direction = Direction::new(back * look.ray.direction.xyz())?;
-    let there = met(stage, look, Ray { origin, direction })?;
-    let point = rotation * (there.hit.point.xyz - pivot) + pivot + shift_m;
-    let hit = Hit { point: point.into(), ..there.hit };
-    Some(Look { ray: look.ray, hit, normal: rotation * there.normal, ..there })
+    let back = target.inverse();
+    let ray = Ray { origin: back * look.ray.origin, direction: back * look.ray.direction };
+    let there = met(stage, look, ray)?;
+    let hit = Hit { point: target * there.hit.point, ..there.hit };
+    let normal = target.rotation() * there.normal;
+    Some(Look { ray: look.ray, hit, normal, target, ..there })
 }

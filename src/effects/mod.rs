@@ -13,6 +13,8 @@
 //! Parameters at their [`absent`](Knob::absent) values are no effect at all, exactly. [`library`] has
 //! them all; another one is a file and a line of its list.
 
+mod declared;
+mod entry;
 mod lobes;
 mod meeting;
 mod model;
@@ -23,10 +25,12 @@ use std::any::Any;
 use glam::DVec3;
 
 use crate::brdf::Brdf;
-use crate::frames::{Global, Ray};
+use crate::frames::{Global, Pose, Ray};
 use crate::radar::{Link, Radar};
 use crate::trace::{Bvh, Hit};
 
+pub use declared::SceneEffects;
+pub use entry::{Chosen, EffectError, entry, resolve};
 pub use model::{Model, Prediction, Surveys};
 
 /// Declares the file of every effect and lists them all, in the order in which they act.
@@ -92,6 +96,8 @@ pub struct Look {
     pub hit: Hit,
     /// Unit normal there, towards the radar.
     pub normal: DVec3,
+    /// Where effects have moved the target from where the scene has it.
+    pub target: Pose<Global, Global>,
     /// Azimuth of the radar about the normal, from the grain of the region, rad.
     pub azimuth_rad: f64,
     /// Region of the facet.

@@ -76,14 +76,8 @@ impl Model<'_> {
             looks.par_iter().map(|look| self.placed(stage, *look)).collect();
         let mut arrived: Vec<Option<Arrived>> =
             placed.par_iter().map(|look| Some(self.arrived(stage, look.as_ref()?))).collect();
-        for (effect, values) in &self.effects {
-            let survey = surveys.of(*effect, values, stage, looks);
-            let scan = Surveyed { stage, looks, survey: survey.as_deref() };
-            effect.arrive(values, &scan, &self.laws, &mut arrived);
-        }
-        let effects = self.effects.iter();
-        let receiver = effects
-            .fold(self.receiver, |receiver, (effect, values)| effect.receive(values, receiver));
+        self.arrive(stage, looks, surveys, &mut arrived);
+        let receiver = self.received();
         // Twice the work of the powers themselves, and of use only where tilts vary.
         let slope = |look: &Option<Look>| match look {
             Some(look) if receiver.tilt_sd_rad > 0.0 => self.slope_per_rad(stage, look),
@@ -92,13 +86,37 @@ impl Model<'_> {
         Prediction { slope_per_rad: placed.par_iter().map(slope).collect(), arrived, receiver }
     }
 
-    fn placed(&self, stage: &Stage, look: Look) -> Option<Look> {
+    /// Where a look meets the target, as the effects place it; `None` where its ray misses.
+    pub(crate) fn placed(&self, stage: &Stage, look: Look) -> Option<Look> {
         let mut effects = self.effects.iter();
         effects.try_fold(look, |look, (effect, values)| effect.place(values, stage, look))
     }
 
-    fn arrived(&self, stage: &Stage, look: &Look) -> Arrived {
+    /// What arrives of one look by itself.
+    pub(crate) fn arrived(&self, stage: &Stage, look: &Look) -> Arrived {
         Arrived { power_w: self.power_w(stage, look), range_m: look.hit.range_m }
+    }
+
+    /// What the effects make of all that arrives together.
+    pub(crate) fn arrive(
+        &self,
+        stage: &Stage,
+        looks: &[Look],
+        surveys: &Surveys,
+        arrived: &mut [Option<Arrived>],
+    ) {
+        for (effect, values) in &self.effects {
+            let survey = surveys.of(*effect, values, stage, looks);
+            let scan = Surveyed { stage, looks, survey: survey.as_deref() };
+            effect.arrive(values, &scan, &self.laws, arrived);
+        }
+    }
+
+    /// The receiver's law with the effects.
+    pub(crate) fn received(&self) -> Receiver {
+        let receive =
+            |receiver, (effect, values): &(&dyn Effect, Vec<f64>)| effect.receive(values, receiver);
+        self.effects.iter().fold(self.receiver, receive)
     }
 
     /// Equation (11) with every effect on the surface and the gain.

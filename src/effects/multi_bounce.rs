@@ -110,6 +110,7 @@ fn detour(
 
 /// All ways of a chirp by second surfaces of the target as the scene has it.
 fn detours(stage: &Stage, look: &Look) -> Vec<Detour> {
+    let Some(look) = &met(stage, look, look.ray) else { return Vec::new() };
     let axes = Axes::of(stage, look);
     let i = axes.local(-look.ray.direction.xyz());
     onward(i, LOBE).filter_map(|(o, density)| detour(stage, look, &axes, o, density)).collect()

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::meeting::met;
 use super::{Arrived, Effect, Look, Model, Prediction, Receiver, Stage, library, middle};
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
-use crate::frames::{Point, Ray};
+use crate::frames::{Point, Pose, Ray};
 use crate::geometry::Mesh;
 use crate::radar::{Link, Radar};
 use crate::scene::solids;
@@ -108,8 +108,21 @@ fn look(stage: &Stage, chirp: u32) -> Option<Look> {
     let progress = f64::from(chirp) / f64::from(SIDE * SIDE - 1);
     let (time_s, normal) = (f64::from(chirp) * 2e-4, DVec3::Z);
     let (azimuth_rad, region, edge_m) = (0.0, 0, 0.05);
-    let blank =
-        Look { chirp, time_s, progress, ray, hit, normal, azimuth_rad, region, xt_m, yt_m, edge_m };
+    let target = Pose::NONE;
+    let blank = Look {
+        chirp,
+        time_s,
+        progress,
+        ray,
+        hit,
+        normal,
+        target,
+        azimuth_rad,
+        region,
+        xt_m,
+        yt_m,
+        edge_m,
+    };
     met(stage, &blank, ray)
 }
 

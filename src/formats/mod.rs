@@ -5,6 +5,7 @@
 //! multiple of the bytes it was given, whatever a header claims.
 
 pub mod csv;
+pub mod effect;
 pub mod exr;
 pub mod figure;
 pub mod npy;
@@ -17,6 +18,8 @@ use glam::DVec3;
 use thiserror::Error;
 
 use crate::geometry::Mesh;
+
+pub use effect::EffectEntry;
 
 /// The formats a mesh can be read from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

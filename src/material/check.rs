@@ -6,6 +6,7 @@ use thiserror::Error;
 
 use super::{Censor, Covariance, Curve, Fit, Instrument, Material, Observation};
 use crate::brdf::{ParameterError, TabulatedError};
+use crate::formats::EffectEntry;
 
 /// Why a material cannot be kept.
 #[derive(Debug, Error, PartialEq)]
@@ -69,6 +70,7 @@ impl Material {
         self.instruments.iter().try_for_each(Instrument::validate)?;
         self.curves.iter().try_for_each(|curve| self.check_curve(curve))?;
         self.fits.iter().try_for_each(|fit| self.check_fit(fit))?;
+        self.check_effects()?;
         self.scattering().map(|_| ())
     }
 
@@ -147,6 +149,19 @@ impl Material {
         }
         fit.report.as_ref().map_or(Ok(()), |report| report.validate(&place))?;
         fit.covariance.as_ref().map_or(Ok(()), |covariance| covariance.validate(&place, &known))
+    }
+
+    /// What can be said of effects without knowing any.
+    fn check_effects(&self) -> Result<(), MaterialError> {
+        unique("effect", self.effects.iter().map(|effect| effect.name.as_str()))?;
+        for EffectEntry { name, parameters } in &self.effects {
+            if let Some((key, number)) = parameters.iter().find(|(_, v)| !v.is_finite()) {
+                let place = format!("effect `{name}`");
+                let problem = format!("{key} = {number} is not a finite number");
+                return Err(value(&place, &problem, "mend the number"));
+            }
+        }
+        Ok(())
     }
 
     fn check_source(&self, place: &str, key: &str) -> Result<(), MaterialError> {

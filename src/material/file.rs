@@ -14,9 +14,9 @@ use super::{
     SourceKind,
 };
 use crate::brdf::Brdf;
-use crate::formats::FormatError;
 use crate::formats::csv::Table;
 use crate::formats::text::from_toml;
+use crate::formats::{EffectEntry, FormatError};
 use crate::units::ratio_from_db;
 
 /// Why a material file was refused.
@@ -75,6 +75,8 @@ struct MaterialFile {
     curve: Vec<CurveFile>,
     #[serde(default)]
     fit: Vec<FitFile>,
+    #[serde(default)]
+    effect: Vec<EffectEntry>,
 }
 
 #[derive(Deserialize)]
@@ -171,6 +173,7 @@ pub fn parse(
         instruments: toml.instrument.into_iter().map(Instrument::from).collect(),
         curves: toml.curve.into_iter().map(curve).collect::<Result<_, FileError>>()?,
         fits: toml.fit.into_iter().map(Fit::from).collect(),
+        effects: toml.effect,
     };
     let refuse = |error| FileError::Material { file: file.to_owned(), error };
     material.validate().map_err(refuse)?;

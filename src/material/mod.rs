@@ -16,6 +16,7 @@ use serde::Serialize;
 use serde_json::ser::{CompactFormatter, Formatter, Serializer};
 
 use crate::brdf::{Brdf, Tabulated};
+use crate::formats::EffectEntry;
 
 pub use check::MaterialError;
 pub use report::{Estimate, FitReport, Given, Goodness};
@@ -50,6 +51,9 @@ pub struct Material {
     pub curves: Vec<Curve>,
     /// Scattering models with their parameters.
     pub fits: Vec<Fit>,
+    /// Physical effects beyond the scattering model, each once.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<EffectEntry>,
 }
 
 /// Where numbers come from.

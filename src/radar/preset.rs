@@ -14,7 +14,7 @@ use super::beam::BeamEntry;
 use super::f5::{F5, F5Error};
 use super::mirror::Optics;
 use super::{Chirp, ChirpEntry, Footprint, Noise, Pattern, Receiver, Speckle};
-use crate::formats::FormatError;
+use crate::formats::{EffectEntry, FormatError};
 use crate::frames::{
     Antenna, Global, Point, Pose, Target, antenna_from_target, global_from_antenna,
 };
@@ -76,6 +76,9 @@ pub struct Radar {
     /// Thermal noise and range error without a beat signal; a receiver has its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<Noise>,
+    /// Physical effects of the instrument, each once. None, the paper's.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effect: Vec<EffectEntry>,
     /// How the spot grows away from the centre and the focus.
     pub beam: BeamEntry,
     /// The scanning mirror and the reflectors behind it.
@@ -191,6 +194,7 @@ impl Default for Radar {
             receiver: None,
             speckle: None,
             noise: None,
+            effect: Vec::new(),
             beam: BeamEntry::default(),
             optics: Optics::default(),
             f5: None,

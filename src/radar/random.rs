@@ -28,6 +28,8 @@ pub enum Purpose {
     Range = 6,
     /// Starting points of a fit and the randomised part of its residuals.
     Fit = 7,
+    /// Tilt of the surface's normal under a chirp.
+    Tilt = 8,
 }
 
 /// Names one stream of draws.

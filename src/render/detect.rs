@@ -6,11 +6,13 @@
 
 use num_complex::Complex;
 
+use super::acting::Acting;
 use super::path::Path;
 use super::{Beats, Observer, RenderError, Setup};
+use crate::effects::Receiver;
 use crate::radar::noise::measured_w;
 use crate::radar::random::{Draws, Key, Purpose};
-use crate::radar::{Chirp, Detection, Noise, RangeProcessor, Return, Speckle};
+use crate::radar::{Chirp, Detection, RangeProcessor, Return, Speckle};
 use crate::units::watts_from_dbm;
 
 /// A receiver made ready for a scan.
@@ -35,8 +37,14 @@ struct Beat {
 }
 
 impl Detector {
-    pub fn new(setup: &Setup, observer: Observer) -> Result<Detector, RenderError> {
+    pub fn new(
+        setup: &Setup,
+        observer: Observer,
+        acting: Option<&Acting>,
+    ) -> Result<Detector, RenderError> {
         let radar = setup.radar;
+        let declared = Receiver::declared(radar);
+        let law = acting.map_or(declared, Acting::receiver);
         let mut threshold_w = watts_from_dbm(radar.threshold_dbm);
         let kind = match (radar.receiver, radar.speckle, radar.noise) {
             (Some(receiver), speckle, _) => {
@@ -45,11 +53,14 @@ impl Detector {
                 threshold_w = processor.threshold_w();
                 Kind::Beat(Beat { chirp, processor, speckle, looks })
             }
-            (None, None, None) => Kind::Exact,
+            (None, None, None) if law.looks == declared.looks && law.noise_w == 0.0 => Kind::Exact,
             (None, speckle, noise) => {
-                let silent = Noise { level_dbm: f64::NEG_INFINITY, range_sd_m: 0.0 };
-                let Noise { level_dbm, range_sd_m } = noise.unwrap_or(silent);
-                Kind::Laws { speckle, noise_w: watts_from_dbm(level_dbm), range_sd_m }
+                let speckled = Speckle { looks: law.looks, ..speckle.unwrap_or_default() };
+                Kind::Laws {
+                    speckle: law.looks.is_finite().then_some(speckled),
+                    noise_w: law.noise_w,
+                    range_sd_m: noise.map_or(0.0, |noise| noise.range_sd_m),
+                }
             }
         };
         Ok(Detector { seed: setup.seed, observer: observer.number(), kind, threshold_w })
@@ -166,7 +177,7 @@ impl Beat {
 }
 
 /// All power, and the mean range weighted by it; where no power comes back, the plain mean.
-fn sum(paths: &[Path]) -> Detection {
+pub(super) fn sum(paths: &[Path]) -> Detection {
     let power_w: f64 = paths.iter().map(|path| path.power_w).sum();
     let range_m = match power_w > 0.0 {
         true => paths.iter().map(|path| path.range_m * path.power_w).sum::<f64>() / power_w,

@@ -6,9 +6,11 @@
 //! | what scatters there, in its own frame | `surface.rs` |
 //! | what arrives at an antenna, directly | `path.rs`, equation (11) |
 //! | … and by way of a second surface | `bounce.rs` |
+//! | … with the physical effects that are declared | `acting.rs` |
 //! | what the receiver makes of it, and what caused that | `detect.rs`, `echo.rs` |
 //! | image and point cloud | `image.rs`, `cloud.rs` |
 
+mod acting;
 mod bounce;
 mod cloud;
 mod detect;
@@ -25,15 +27,18 @@ use num_complex::Complex;
 use rayon::prelude::*;
 use thiserror::Error;
 
+use crate::effects::Model;
 use crate::frames::{Global, Point, Ray};
 use crate::geometry::Mesh;
 use crate::radar::{Aliased, Chirps, Field, Radar, RadarError, RadarFrames};
 use crate::trace::{Bvh, Hit, winding_number};
 use crate::units::dbm_from_watts;
+use acting::Acting;
 use detect::Detector;
 use echo::Echoes;
 use path::Paths;
 
+pub use acting::Facing;
 pub use bounce::Bounce;
 pub use cloud::cloud_table;
 pub use echo::{Echo, Truth};
@@ -58,6 +63,9 @@ pub struct Setup<'a> {
     pub surfaces: &'a [Surface<'a>],
     /// Second-order paths; none, the paper's, for single ones only.
     pub bounce: Option<Bounce>,
+    /// Physical effects on the radar's own echoes. The model's laws are those of `surfaces`, its
+    /// receiver is the one that the radar [declares](crate::effects::Receiver::declared).
+    pub effects: Option<&'a Model<'a>>,
     /// Seed of everything random.
     pub seed: u64,
 }
@@ -71,7 +79,8 @@ impl<'a> Setup<'a> {
         region_of_facet: &'a [u16],
         surfaces: &'a [Surface<'a>],
     ) -> Setup<'a> {
-        Setup { radar, chirps, bvh, region_of_facet, surfaces, bounce: None, seed: 0 }
+        let (bounce, effects, seed) = (None, None, 0);
+        Setup { radar, chirps, bvh, region_of_facet, surfaces, bounce, effects, seed }
     }
 }
 
@@ -135,6 +144,16 @@ pub enum RenderError {
          paths; set it to 0, or set spot.rays = 1 and remove [bounce]"
     )]
     Coherent,
+    /// An effect that would count twice, or that cannot be had.
+    #[error("effect `{effect}` {problem}; {way_out}")]
+    Effect {
+        /// The effect.
+        effect: &'static str,
+        /// What is wrong.
+        problem: &'static str,
+        /// What to do.
+        way_out: &'static str,
+    },
     /// The receiver cannot work.
     #[error(transparent)]
     Radar(#[from] RadarError),
@@ -159,20 +178,49 @@ pub fn trace(
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Footprints, RenderError> {
-    let footprints = spot::trace(radar, chirps, bvh, rays_per_chirp.max(1), done);
-    if footprints.hits.iter().all(Option::is_none) {
-        return Err(miss(&radar.frames(), chirps, bvh.mesh()));
-    }
-    Ok(footprints)
+    seen(spot::trace(radar, chirps, bvh, rays_per_chirp.max(1), done), radar, chirps, bvh)
 }
 
-/// Turns hits into echoes at an antenna. `done` is told how many chirps are finished.
+/// As [`trace`], of the target where the setup's effects place it.
+///
+/// # Errors
+/// When no ray meets the mesh, or an effect would count what the setup renders already.
+pub fn trace_placed(
+    setup: &Setup,
+    rays_per_chirp: usize,
+    done: &(dyn Fn(usize) + Sync),
+) -> Result<Footprints, RenderError> {
+    let Setup { radar, chirps, bvh, .. } = *setup;
+    let rays = rays_per_chirp.max(1);
+    acting::check(setup, rays, Observer::Radar)?;
+    let Some(acting) = Acting::new(setup) else {
+        return trace(radar, chirps, bvh, rays, done);
+    };
+    let meet = |chirp, ray: &Ray<Global>| acting.meet(chirp, ray);
+    seen(spot::trace_moved(radar, chirps, rays, done, meet), radar, chirps, bvh)
+}
+
+/// Footprints that are not all empty.
+fn seen(
+    footprints: Footprints,
+    radar: &Radar,
+    chirps: &Chirps,
+    bvh: &Bvh,
+) -> Result<Footprints, RenderError> {
+    match footprints.hits.iter().all(Option::is_none) {
+        true => Err(miss(&radar.frames(), chirps, bvh.mesh())),
+        false => Ok(footprints),
+    }
+}
+
+/// Turns hits into echoes at an antenna. With effects the hits are those of [`trace_placed`]. `done` is told how many chirps are finished.
 ///
 /// The result is the same for any number of threads.
 ///
 /// # Errors
-/// When the antenna stands inside the target, a path is too long for the receiver's sampling, or
-/// several paths meet in a receiver that does not know their phases.
+/// When the antenna stands inside the target, a path is too long for the receiver's sampling,
+/// several paths meet in a receiver that does not know their phases, or an effect would count what the
+/// setup renders already.
 pub fn shade(
     setup: &Setup,
     footprints: &Footprints,
@@ -180,8 +228,9 @@ pub fn shade(
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Scan, RenderError> {
     check(setup, footprints, observer)?;
-    let detector = Detector::new(setup, observer)?;
-    let paths = Paths::new(setup, observer);
+    let acting = Acting::new(setup);
+    let detector = Detector::new(setup, observer, acting.as_ref())?;
+    let paths = Paths::new(setup, observer, footprints, acting);
     let target_from_global = setup.radar.frames().global_from_target.inverse();
     let echoes = Echoes { setup, footprints, observer, detector: &detector, target_from_global };
     let echo = |(chirp, hits): (usize, &[Option<Hit>])| {
@@ -209,14 +258,15 @@ pub type Beats = Vec<Vec<Complex<f64>>>;
 ///
 /// # Errors
 /// As [`shade`], at once or when a chirp's turn comes.
-pub fn beat_signals(
-    setup: &Setup,
-    footprints: &Footprints,
+pub fn beat_signals<'a>(
+    setup: &'a Setup<'a>,
+    footprints: &'a Footprints,
     observer: Observer,
-) -> Result<impl Iterator<Item = Result<Beats, RenderError>>, RenderError> {
+) -> Result<impl Iterator<Item = Result<Beats, RenderError>> + use<'a>, RenderError> {
     check(setup, footprints, observer)?;
-    let detector = Detector::new(setup, observer)?;
-    let paths = Paths::new(setup, observer);
+    let acting = Acting::new(setup);
+    let detector = Detector::new(setup, observer, acting.as_ref())?;
+    let paths = Paths::new(setup, observer, footprints, acting);
     let hits = footprints.hits.chunks(footprints.rays_per_chirp.max(1));
     Ok(hits
         .enumerate()
@@ -225,6 +275,7 @@ pub fn beat_signals(
 
 /// What must hold before anything is computed.
 fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(), RenderError> {
+    acting::check(setup, footprints.rays_per_chirp, observer)?;
     if let Observer::Receiver { position, .. } = observer
         && is_walled_off(setup, position)
     {

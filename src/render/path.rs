@@ -9,13 +9,18 @@
 //! estimated in `bounce.rs`. Range is half of the whole way.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
+use super::acting::{Acting, Change, Facing};
 use super::bounce::{Bounce, directions};
+use super::detect::sum;
+use super::spot::Footprints;
 use super::surface::{LocalFrame, Surface};
 use super::{Observer, Setup};
+use crate::effects::Arrived;
 use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
 use crate::radar::random::{Key, Purpose};
-use crate::radar::{Beam, Link};
+use crate::radar::{Beam, Detection, Link};
 use crate::trace::Hit;
 
 /// Rays start this far above a surface, m, so as not to meet it again: far above the rounding of
@@ -45,6 +50,10 @@ pub(super) struct Paths<'a> {
     observer: Observer,
     link: Link,
     beam: Beam,
+    footprints: &'a Footprints,
+    acting: Option<Acting<'a>>,
+    /// What the effects make of each chirp's echo as a whole.
+    changes: Vec<Option<Change>>,
 }
 
 /// One chirp, on its way.
@@ -70,12 +79,31 @@ struct Lit<'a> {
 }
 
 impl<'a> Paths<'a> {
-    pub fn new(setup: &'a Setup<'a>, observer: Observer) -> Paths<'a> {
+    pub fn new(
+        setup: &'a Setup<'a>,
+        observer: Observer,
+        footprints: &'a Footprints,
+        acting: Option<Acting<'a>>,
+    ) -> Paths<'a> {
         let mut link = Link::new(setup.radar);
         if let Observer::Receiver { aperture_m2, .. } = observer {
             link.aperture_m2 = aperture_m2;
         }
-        Paths { setup, observer, link, beam: Beam::new(setup.radar) }
+        let beam = Beam::new(setup.radar);
+        let mut paths =
+            Paths { setup, observer, link, beam, footprints, acting, changes: Vec::new() };
+        paths.changes = paths.acting.as_ref().map_or(Vec::new(), |acting| paths.changes_by(acting));
+        paths
+    }
+
+    /// Needs every path of the scan before the first can be told, so that all are found twice.
+    fn changes_by(&self, acting: &Acting) -> Vec<Option<Change>> {
+        let arrived = |(chirp, hits): (usize, &[Option<Hit>])| {
+            let paths = self.of_chirp(chirp, hits);
+            let Detection { power_w, range_m } = sum(&paths);
+            (!paths.is_empty()).then_some(Arrived { power_w, range_m })
+        };
+        acting.arrive(self.footprints, self.footprints.chirps().enumerate().map(arrived).collect())
     }
 
     /// All paths of a chirp through the hits of its rays. A direct path is there even when nothing
@@ -84,15 +112,24 @@ impl<'a> Paths<'a> {
         let axis = &self.setup.chirps.rays[number];
         let antenna = self.observer.position(axis.origin.xyz);
         let sent = Sent { paths: self, number, axis, antenna, rays: hits.len() };
+        let tilts = self.acting.as_ref().map_or([0.0; 2], |acting| acting.tilts(number));
         let mut paths = Vec::with_capacity(hits.len());
         for (ray, hit) in hits.iter().enumerate() {
             let Some(hit) = hit else { continue };
+            let facing = sent.facing(ray);
             let lit = sent.lit(*hit, axis.origin.xyz);
-            let direct = sent.direct(&lit);
+            let bare = sent.direct(&lit);
+            let acting = self.acting.as_ref();
+            let direct = acting.map_or(bare, |a| a.direct(bare, number, hits.len(), facing, tilts));
             paths.push(direct);
             if let Some(bounce) = &self.setup.bounce {
-                sent.second_order(&lit, direct, bounce, ray, &mut paths);
+                let gain = acting.map(|a| a.instrument_gain(number, hits.len(), *hit, facing));
+                let flux_w = sent.flux_w(&lit) * gain.unwrap_or(1.0);
+                sent.second_order(&lit, flux_w, direct, bounce, ray, &mut paths);
             }
+        }
+        if let Some(change) = self.changes.get(number).copied().flatten() {
+            change.share_out(&mut paths);
         }
         paths
     }
@@ -127,12 +164,12 @@ impl<'a> Sent<'a> {
     fn second_order(
         &self,
         lit: &Lit,
+        flux_w: f64,
         direct: Path,
         bounce: &Bounce,
         ray: usize,
         paths: &mut Vec<Path>,
     ) {
-        let flux_w = self.flux_w(lit);
         for (onward, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
             let Some(hit) = self.cast(lit, onward) else { continue };
             let f_per_sr = lit.surface.scattering.f_per_sr(lit.source, onward);
@@ -147,6 +184,11 @@ impl<'a> Sent<'a> {
                 paths.push(Path { range_m, power_w, surfaces, specular_share, ..direct });
             }
         }
+    }
+
+    /// How the surface lies at a ray's hit, where effects have moved it.
+    fn facing(&self, ray: usize) -> Option<Facing> {
+        self.paths.footprints.facings.get(self.number * self.rays + ray).copied().flatten()
     }
 
     /// The same for every observer: where a surface sends its power does not depend on who listens.

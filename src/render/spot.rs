@@ -10,6 +10,7 @@ use std::f64::consts::{LN_2, TAU};
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::acting::{Facing, Meeting};
 use super::edges;
 use crate::frames::{Direction, Global, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
@@ -29,6 +30,8 @@ pub struct Footprints {
     /// For each chirp the distance in the target plane to the nearest edge in depth, m, at most
     /// three spots.
     pub edge_m: Vec<f64>,
+    /// How the surface lies at each of `hits` that effects have moved; empty where none do.
+    pub facings: Vec<Option<Facing>>,
 }
 
 impl Footprints {
@@ -46,32 +49,63 @@ pub(super) fn trace(
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
 ) -> Footprints {
+    let meet = |_, ray: &Ray<Global>| bvh.closest(ray);
+    let hits = meetings(radar, chirps, rays_per_chirp, done, meet, |hit| *hit);
+    let edge_m = edge_distances_m(radar, chirps, &hits, rays_per_chirp);
+    Footprints { rays_per_chirp, hits, edge_m, facings: Vec::new() }
+}
+
+/// The same, had the rays of every chirp, by its number, met what `meet` says.
+pub(super) fn trace_moved(
+    radar: &Radar,
+    chirps: &Chirps,
+    rays_per_chirp: usize,
+    done: &(dyn Fn(usize) + Sync),
+    meet: impl Fn(usize, &Ray<Global>) -> Meeting + Sync,
+) -> Footprints {
+    let met = meetings(radar, chirps, rays_per_chirp, done, meet, |met| met.0);
+    let (hits, mut facings): (Vec<_>, Vec<_>) = met.into_iter().unzip();
+    if facings.iter().all(Option::is_none) {
+        facings = Vec::new();
+    }
+    let edge_m = edge_distances_m(radar, chirps, &hits, rays_per_chirp);
+    Footprints { rays_per_chirp, hits, edge_m, facings }
+}
+
+/// What the rays of every chirp meet, by `meet`; `hit` is where.
+fn meetings<T: Default + Send>(
+    radar: &Radar,
+    chirps: &Chirps,
+    rays_per_chirp: usize,
+    done: &(dyn Fn(usize) + Sync),
+    meet: impl Fn(usize, &Ray<Global>) -> T + Sync,
+    hit: impl Fn(&T) -> Option<Hit> + Sync,
+) -> Vec<T> {
     const CHIRPS_PER_TASK: usize = 256;
     let beam = Beam::new(radar);
     let chirp = |(number, axis): (usize, &Ray<Global>)| {
-        let hit = bvh.closest(axis);
+        let met = meet(number, axis);
         if rays_per_chirp == 1 {
-            return vec![hit];
+            return vec![met];
         }
         // The spot is as wide as the beam where its axis meets the target, or at 8 m.
-        let range_m = hit.map_or(PATTERN_RANGE_M, |hit| hit.range_m);
+        let range_m = hit(&met).map_or(PATTERN_RANGE_M, |hit| hit.range_m);
         let tangent = beam.diameter_along_m(axis, range_m) / range_m;
-        sub_rays(axis, tangent, number, rays_per_chirp).map(|ray| bvh.closest(&ray?)).collect()
+        let sub_ray = |ray: Option<Ray<Global>>| ray.map_or(T::default(), |ray| meet(number, &ray));
+        sub_rays(axis, tangent, number, rays_per_chirp).map(sub_ray).collect()
     };
-    let hits: Vec<Option<Hit>> = chirps
+    chirps
         .rays
         .par_chunks(CHIRPS_PER_TASK)
         .enumerate()
         .flat_map_iter(|(task, rays)| {
             let first = task * CHIRPS_PER_TASK;
-            let hits: Vec<Option<Hit>> =
+            let met: Vec<T> =
                 rays.iter().enumerate().flat_map(|(i, ray)| chirp((first + i, ray))).collect();
             done(rays.len());
-            hits
+            met
         })
-        .collect();
-    let edge_m = edge_distances_m(radar, chirps, &hits, rays_per_chirp);
-    Footprints { rays_per_chirp, hits, edge_m }
+        .collect()
 }
 
 /// By the first ray of each chirp, which is the nearest to its axis.

@@ -12,6 +12,10 @@
 //! name = "skin"
 //! material = "human-skin"
 //! facets = { part = "head" }    # and, or instead: mesh, box, sphere, half_space
+//!
+//! [[effect]]                    # a physical effect of what stands where
+//! name = "foreign-patch"
+//! level_db = 3.0                # parameters that are not given are absent
 //! ```
 
 use std::collections::BTreeMap;
@@ -19,8 +23,8 @@ use std::collections::BTreeMap;
 use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::formats::FormatError;
 use crate::formats::text::from_toml;
+use crate::formats::{EffectEntry, FormatError};
 use crate::radar::Radar;
 
 /// A scene file as written.
@@ -54,6 +58,9 @@ pub struct SceneFile {
     /// Which facets are made of what.
     #[serde(default)]
     pub region: Vec<RegionEntry>,
+    /// Physical effects of what stands where, each once.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub effect: Vec<EffectEntry>,
 }
 
 /// How the spot is sampled.

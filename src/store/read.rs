@@ -11,6 +11,7 @@ use serde::de::value::{Error as WordError, StrDeserializer};
 
 use super::{RevisionSummary, Stored, Summary};
 use crate::brdf::Brdf;
+use crate::formats::EffectEntry;
 use crate::material::{
     Censor, Covariance, Curve, Fit, Instrument, Material, Observation, Slug, Source, SourceKind,
 };
@@ -77,6 +78,7 @@ pub(super) fn get(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result
     material.instruments = instruments(&tx, revision_id)?;
     material.curves = curves(&tx, revision_id)?;
     material.fits = fits(&tx, revision_id)?;
+    material.effects = effects(&tx, revision_id)?;
     Ok(Some(stored))
 }
 
@@ -96,6 +98,7 @@ fn stored(row: &Row) -> Result<Stored> {
         instruments: Vec::new(),
         curves: Vec::new(),
         fits: Vec::new(),
+        effects: Vec::new(),
     };
     Ok(Stored {
         material,
@@ -217,6 +220,17 @@ fn covariance(conn: &Connection, revision_id: i64, fit: &str) -> Result<Option<C
     paths.truncate(values.len().isqrt());
     let matrix = values.chunks(paths.len().max(1)).map(<[f64]>::to_vec).collect();
     Ok((!paths.is_empty()).then_some(Covariance { parameters: paths, matrix }))
+}
+
+fn effects(conn: &Connection, revision_id: i64) -> Result<Vec<EffectEntry>> {
+    let sql = "SELECT name FROM effect WHERE revision_id = ?1 ORDER BY position";
+    rows(conn, sql, [revision_id], |row| {
+        let name: String = row.get(0)?;
+        let sql = "SELECT name, value FROM effect_parameter WHERE revision_id = ?1 AND effect = ?2";
+        let number = |row: &Row| Ok((row.get(0)?, row.get(1)?));
+        let parameters = rows(conn, sql, params![revision_id, name], number)?.into_iter().collect();
+        Ok(EffectEntry { name, parameters })
+    })
 }
 
 fn rows<T>(

@@ -4,6 +4,7 @@ use rusqlite::{Connection, Error, OptionalExtension, Params, Result, Transaction
 use serde::Serialize;
 
 use super::{Added, Removed};
+use crate::formats::EffectEntry;
 use crate::material::{Covariance, Curve, Fit, Instrument, Material, Slug, Source};
 
 /// Adds materials or revisions of them, all or none.
@@ -97,7 +98,8 @@ impl Rows<'_> {
         numbered(&material.sources, |position, source| self.source(position, source))?;
         numbered(&material.instruments, |position, entry| self.instrument(position, entry))?;
         numbered(&material.curves, |position, curve| self.curve(position, curve))?;
-        numbered(&material.fits, |position, fit| self.fit(position, fit))
+        numbered(&material.fits, |position, fit| self.fit(position, fit))?;
+        numbered(&material.effects, |position, effect| self.effect(position, effect))
     }
 
     fn insert(&self, sql: &str, values: impl Params) -> Result<()> {
@@ -202,6 +204,21 @@ impl Rows<'_> {
                     sd,
                     source
                 ],
+            )
+        })
+    }
+
+    fn effect(&self, position: u32, effect: &EffectEntry) -> Result<()> {
+        let EffectEntry { name, parameters } = effect;
+        self.insert(
+            "INSERT INTO effect (revision_id, position, name) VALUES (?1, ?2, ?3)",
+            params![self.revision_id, position, name],
+        )?;
+        parameters.iter().try_for_each(|(parameter, value)| {
+            self.insert(
+                "INSERT INTO effect_parameter (revision_id, effect, name, value)
+                 VALUES (?1, ?2, ?3, ?4)",
+                params![self.revision_id, name, parameter, value],
             )
         })
     }

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
+use matdb::formats::EffectEntry;
 use matdb::material::{
     Censor, Covariance, Curve, Estimate, FitReport, Given, Goodness, Instrument, Material,
     Observation, builtin,
@@ -48,6 +49,16 @@ pub fn fitted(slug: &str) -> Material {
     material.fits[0].curve = Some("scan".to_owned());
     material.fits[0].report = Some(report());
     material
+}
+
+/// The fitted sample with effects of its own.
+pub fn with_effects(slug: &str) -> Material {
+    let effect = |name: &str, parameters: &[(&str, f64)]| EffectEntry {
+        name: name.to_owned(),
+        parameters: parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect(),
+    };
+    let film = effect("thin-film", &[("coverage", 0.3), ("thickness_m", 4.5e-4)]);
+    Material { effects: vec![film, effect("subsurface", &[])], ..fitted(slug) }
 }
 
 fn report() -> FitReport {

@@ -12,10 +12,10 @@ use std::path::PathBuf;
 use super::console::Console;
 use super::database::Database;
 use super::output::write_all;
-use super::staging::{materials, setup, surfaces};
+use super::staging::{effects, materials, model, setup, surfaces};
 use crate::error::Error;
 use crate::geometry::Raster;
-use crate::render::{RenderError, trace};
+use crate::render::{RenderError, trace_placed};
 use crate::scene::Scene;
 use crate::trace::Bvh;
 use record::Record;
@@ -46,6 +46,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let scene = Scene::load(&args.scene)?;
     let (used, material_of_region) = materials(&scene, &args.scene, db)?;
     let surfaces = surfaces(&scene, &used, &material_of_region);
+    let effects = effects(&scene, &args.scene, &used, &material_of_region)?;
+    let model = model(&effects, &scene, &used, &material_of_region);
     let at = |(antenna, error): (String, RenderError)| Error::Render {
         scene: args.scene.clone(),
         antenna,
@@ -55,10 +57,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     stages.end("load", console);
 
     let bvh = Bvh::new(&scene.target.mesh);
-    let setup = setup(&scene, &bvh, &surfaces);
+    let setup = setup(&scene, &bvh, &surfaces, model.as_ref());
     let bar = console.progress("tracing", scene.chirps.rays.len());
     let rays = scene.file.spot.rays;
-    let footprints = trace(setup.radar, setup.chirps, &bvh, rays, &|chirps| bar.inc(chirps as u64));
+    let footprints = trace_placed(&setup, rays, &|chirps| bar.inc(chirps as u64));
     bar.finish_and_clear();
     let footprints = footprints.map_err(|error| at((String::new(), error)))?;
     stages.end("trace", console);
@@ -69,7 +71,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         views.iter().map(|view| view.image(&scene, &material_of_region)).collect();
     stages.end("image", console);
 
-    let record = Record::new(&scene, &used, &material_of_region, &views, &images, args.all);
+    let regions = &material_of_region;
+    let record = Record::new(&scene, &used, model.as_ref(), regions, &views, &images, args.all);
     let mut files = files::encode(args.all, &scene, &views, &images, &record, &material_of_region)?;
     if let Some(shape) = beat {
         files.extend(beat::encode(&args.scene, shape, &setup, &footprints, &views)?);

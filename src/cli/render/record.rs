@@ -6,6 +6,8 @@ use serde_json::{Value, json};
 use super::views::View;
 use crate::cli::materials::Found;
 use crate::cli::staging::Used;
+use crate::effects::{Level, Model, entry};
+use crate::formats::EffectEntry;
 use crate::geometry::Raster;
 use crate::render::{Scan, Truth};
 use crate::scene::{MeshReport, Scene};
@@ -35,6 +37,9 @@ pub(super) struct Record<'a> {
     meshes: &'a [MeshReport],
     regions: Vec<RegionRecord<'a>>,
     materials: Vec<MaterialRecord<'a>>,
+    /// Effects of the scene and of the radar, in the order in which they act.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    effects: Vec<EffectRecord>,
     threshold_dbm: f64,
     noise_dbm: Option<f64>,
     counts: Counts,
@@ -80,6 +85,16 @@ struct MaterialRecord<'a> {
     /// Detections at an incidence for which the material makes no claim.
     detections_outside_theta: usize,
     scattering: &'a crate::brdf::Brdf,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    effects: Vec<EffectEntry>,
+}
+
+/// An effect with all of its parameters.
+#[derive(Serialize)]
+struct EffectRecord {
+    level: Level,
+    #[serde(flatten)]
+    effect: EffectEntry,
 }
 
 #[derive(Clone, Copy, Serialize)]
@@ -109,6 +124,7 @@ impl<'a> Record<'a> {
     pub fn new(
         scene: &'a Scene,
         used: &'a [Used],
+        model: Option<&Model>,
         material_of_region: &'a [u16],
         views: &[View<'a>],
         images: &[Raster],
@@ -154,6 +170,7 @@ impl<'a> Record<'a> {
             materials: (0..used.len())
                 .map(|number| MaterialRecord::new(&used[number], outside(number)))
                 .collect(),
+            effects: effects(model),
             regions,
             receivers: std::iter::zip(views, images)
                 .filter_map(|(view, image)| ReceiverRecord::new(scene, view, image))
@@ -275,6 +292,7 @@ impl<'a> ReceiverRecord<'a> {
 impl<'a> MaterialRecord<'a> {
     fn new(used: &'a Used, detections_outside_theta: usize) -> MaterialRecord<'a> {
         let Found { material, revision } = &used.found;
+        let effects = used.effects.iter().map(|(effect, values)| entry(*effect, values));
         MaterialRecord {
             name: material.slug.as_str(),
             revision: *revision,
@@ -285,6 +303,7 @@ impl<'a> MaterialRecord<'a> {
             theta_deg: material.theta_rad.map(f64::to_degrees),
             detections_outside_theta,
             scattering: &used.scattering,
+            effects: effects.collect(),
         }
     }
 }
@@ -338,6 +357,18 @@ fn regions<'a>(scene: &'a Scene, material_of_region: &[u16], scan: &Scan) -> Vec
             Some(region.strongest_dbm.map_or(echo.power_dbm, |p| p.max(echo.power_dbm)));
     }
     regions
+}
+
+/// Those of materials stand with their materials.
+fn effects(model: Option<&Model>) -> Vec<EffectRecord> {
+    let all = model.into_iter().flat_map(|model| &model.effects);
+    let others = all.filter(|(effect, _)| effect.level() != Level::Material);
+    others
+        .map(|(effect, values)| EffectRecord {
+            level: effect.level(),
+            effect: entry(*effect, values),
+        })
+        .collect()
 }
 
 fn frames(scene: &Scene) -> Value {

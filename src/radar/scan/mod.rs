@@ -41,6 +41,18 @@ pub struct Field {
 }
 
 impl Chirps {
+    /// Share of the scan that is over at a chirp, 0 to 1: by time, or by its place where the scan has
+    /// no times.
+    pub fn progress(&self, index: usize) -> f64 {
+        let [first, last] = [self.time_s.first(), self.time_s.last()].map(|t| t.copied());
+        match (first, last, self.time_s.get(index)) {
+            (Some(first), Some(last), Some(time_s)) if last > first => {
+                ((time_s - first) / (last - first)).clamp(0.0, 1.0)
+            }
+            _ => index as f64 / self.rays.len().saturating_sub(1).max(1) as f64,
+        }
+    }
+
     /// The chirps of a radar's pattern; `read` fetches an explicit pattern's file by its path.
     ///
     /// # Errors

@@ -1,0 +1,205 @@
+//! Between effects and how files write them.
+
+use thiserror::Error;
+
+use super::{Effect, Knob, Level, find, library};
+use crate::formats::EffectEntry;
+use crate::formats::text::nearest;
+use crate::units::shown;
+
+/// Effects with the values of their knobs.
+pub type Chosen = Vec<(&'static dyn Effect, Vec<f64>)>;
+
+/// Why an entry means no effect.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum EffectError {
+    /// No such effect.
+    #[error("there is no effect `{name}`; {way_out}")]
+    Unknown {
+        /// The name that was asked for.
+        name: String,
+        /// The nearest name, or all of them.
+        way_out: String,
+    },
+    /// The effect has no such number.
+    #[error("effect `{effect}` has no parameter `{parameter}`; {way_out}")]
+    Parameter {
+        /// The effect.
+        effect: &'static str,
+        /// The parameter that was asked for.
+        parameter: String,
+        /// The nearest name, or all of them.
+        way_out: String,
+    },
+    /// A number beyond its range.
+    #[error(
+        "effect `{effect}`: {parameter} = {} is out of range; give a value from {} to {}",
+        shown(*value), shown(*min), shown(*max)
+    )]
+    OutOfRange {
+        /// The effect.
+        effect: &'static str,
+        /// Its parameter.
+        parameter: &'static str,
+        /// Its value.
+        value: f64,
+        /// Smallest value.
+        min: f64,
+        /// Largest value.
+        max: f64,
+    },
+    /// The same effect again.
+    #[error("effect `{effect}` is given twice; give it once, with all its parameters")]
+    Twice {
+        /// The effect.
+        effect: &'static str,
+    },
+    /// The effect is written where it does not belong.
+    #[error("effect `{effect}` does not belong here; {}", level.place())]
+    Misplaced {
+        /// The effect.
+        effect: &'static str,
+        /// Where it belongs.
+        level: Level,
+    },
+}
+
+impl Level {
+    /// Where effects of this level are written, for a person.
+    fn place(self) -> &'static str {
+        match self {
+            Level::Instrument => "it is the radar's: write it as [[radar.effect]] of a scene",
+            Level::Material => "it is a material's: write it as [[effect]] of a material.toml",
+            Level::Scene => "it is the scene's: write it as [[effect]] of a scene",
+        }
+    }
+}
+
+/// The effects that entries mean, in the order in which they act; parameters that are not given have
+/// their [absent](Knob::absent) values.
+///
+/// # Errors
+/// When an entry names no effect or parameter of the library, a number is beyond its range, an effect
+/// is given twice, or is not of this level.
+///
+/// ```
+/// use matdb::effects::{Level, resolve};
+/// use matdb::formats::EffectEntry;
+/// let parameters = [("slope_db".to_owned(), 2.0)].into();
+/// let drift = EffectEntry { name: "drift".to_owned(), parameters };
+/// let found = resolve(&[drift.clone()], Level::Instrument).unwrap();
+/// assert_eq!(found[0].1, [2.0, 0.0, 0.0, 1.0]);
+/// assert!(resolve(&[drift], Level::Scene).is_err());
+/// ```
+pub fn resolve(entries: &[EffectEntry], level: Level) -> Result<Chosen, EffectError> {
+    let mut chosen: Chosen = Vec::new();
+    for entry in entries {
+        let effect = find(&entry.name).ok_or_else(|| unknown(&entry.name))?;
+        let name = effect.name();
+        if effect.level() != level {
+            return Err(EffectError::Misplaced { effect: name, level: effect.level() });
+        }
+        if chosen.iter().any(|(known, _)| known.name() == name) {
+            return Err(EffectError::Twice { effect: name });
+        }
+        chosen.push((effect, values(effect, entry)?));
+    }
+    chosen.sort_by_key(|(effect, _)| rank(effect.name()));
+    Ok(chosen)
+}
+
+/// How files write an effect with these values: all of its parameters, by name.
+///
+/// ```
+/// use matdb::effects::{Level, entry, find, resolve};
+/// let drift = find("drift").unwrap();
+/// let written = entry(drift, &[2.0, 0.0, 0.0, 1.0]);
+/// assert_eq!(resolve(&[written], Level::Instrument).unwrap()[0].1, [2.0, 0.0, 0.0, 1.0]);
+/// ```
+pub fn entry(effect: &dyn Effect, values: &[f64]) -> EffectEntry {
+    let number = |(knob, value): (&Knob, &f64)| (knob.name.to_owned(), *value);
+    let parameters = std::iter::zip(effect.knobs(), values).map(number).collect();
+    EffectEntry { name: effect.name().to_owned(), parameters }
+}
+
+/// Place of an effect in the order in which effects act.
+pub(super) fn rank(name: &str) -> usize {
+    library().iter().take_while(|effect| effect.name() != name).count()
+}
+
+fn values(effect: &dyn Effect, entry: &EffectEntry) -> Result<Vec<f64>, EffectError> {
+    let (name, knobs) = (effect.name(), effect.knobs());
+    let is_known = |parameter: &&String| knobs.iter().any(|knob| knob.name == **parameter);
+    if let Some(parameter) = entry.parameters.keys().find(|parameter| !is_known(parameter)) {
+        let known: Vec<&str> = knobs.iter().map(|knob| knob.name).collect();
+        let way_out = suggestion(parameter, &known, "its parameters are");
+        return Err(EffectError::Parameter { effect: name, parameter: parameter.clone(), way_out });
+    }
+    let value = |knob: &Knob| {
+        let Knob { name: parameter, min, max, absent, .. } = *knob;
+        let value = entry.parameters.get(parameter).copied().unwrap_or(absent);
+        match (min..=max).contains(&value) {
+            true => Ok(value),
+            false => Err(EffectError::OutOfRange { effect: name, parameter, value, min, max }),
+        }
+    };
+    knobs.iter().map(value).collect()
+}
+
+fn unknown(name: &str) -> EffectError {
+    let way_out = suggestion(name, &library().map(|effect| effect.name()), "the effects are");
+    EffectError::Unknown { name: name.to_owned(), way_out }
+}
+
+fn suggestion(wanted: &str, known: &[&str], all: &str) -> String {
+    match nearest(wanted, known.iter().copied()) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("{all} {}", known.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn written(name: &str, parameters: &[(&str, f64)]) -> EffectEntry {
+        let number = |(name, value): &(&str, f64)| ((*name).to_owned(), *value);
+        EffectEntry { name: name.to_owned(), parameters: parameters.iter().map(number).collect() }
+    }
+
+    #[test]
+    fn every_effect_comes_back_from_what_is_written_of_it() {
+        for effect in library() {
+            let values: Vec<f64> =
+                effect.knobs().iter().map(|k| k.min + 0.3 * (k.max - k.min)).collect();
+            let found = resolve(&[entry(effect, &values)], effect.level()).unwrap();
+            assert_eq!((found[0].0.name(), &found[0].1), (effect.name(), &values));
+        }
+    }
+
+    #[test]
+    fn they_act_in_the_order_of_the_library_however_they_are_written() {
+        let entries = ["compression", "drift", "fov-gain"].map(|name| written(name, &[]));
+        let found = resolve(&entries, Level::Instrument).unwrap();
+        let names: Vec<&str> = found.iter().map(|(effect, _)| effect.name()).collect();
+        assert_eq!(names, ["fov-gain", "drift", "compression"]);
+    }
+
+    #[test]
+    fn what_means_nothing_is_refused_with_the_way_out() {
+        for (entries, expected) in [
+            (vec![written("foreign-pach", &[])], "did you mean `foreign-patch`?"),
+            (vec![written("magic", &[])], "the effects are pose, motion,"),
+            (vec![written("pose", &[("rotation_x", 1.0)])], "did you mean `rotation_x_deg`?"),
+            (vec![written("pose", &[("spin", 1.0)])], "its parameters are translation_x_m,"),
+            (vec![written("foreign-patch", &[("level_db", 99.0)])], "from -30 to 30"),
+            (vec![written("foreign-patch", &[("level_db", f64::NAN)])], "level_db = NaN"),
+            (vec![written("pose", &[]), written("pose", &[])], "`pose` is given twice"),
+            (vec![written("drift", &[])], "write it as [[radar.effect]]"),
+            (vec![written("subsurface", &[])], "[[effect]] of a material.toml"),
+        ] {
+            let message = resolve(&entries, Level::Scene).err().unwrap().to_string();
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! The effects of a setup, acting on the radar's own echoes.
+//!
+//! Every ray of a chirp is a [`Look`] that a [`Model`] predicts: where it meets the target, and the
+//! mean power that comes straight back. What the model makes of a whole echo
+//! ([`Effect::arrive`](crate::effects::Effect::arrive)) it makes of the sum over the paths of the
+//! chirp, and every path has its share of the change. Second-order paths know the gains of the
+//! instrument and nothing else of the effects.
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::path::Path;
+use super::spot::Footprints;
+use super::surface::LocalFrame;
+use super::{Observer, RenderError, Setup};
+use crate::brdf::Scattering;
+use crate::effects::{Arrived, Level, Look, Model, Receiver, Stage, Surveys, middle};
+use crate::frames::{Direction, Global, Point, Pose, Ray, Surface};
+use crate::radar::Link;
+use crate::radar::random::{Key, Purpose};
+use crate::trace::Hit;
+
+/// How the surface lies where a ray meets a target that effects have moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facing {
+    /// Unit normal, towards the radar.
+    pub normal: DVec3,
+    /// Azimuth of the radar about it, from the grain of the region, rad.
+    pub azimuth_rad: f64,
+}
+
+/// What a ray meets, and how it lies where it was moved.
+pub(super) type Meeting = (Option<Hit>, Option<Facing>);
+
+/// The model of a setup, made ready for its scan.
+pub(super) struct Acting<'a> {
+    setup: Setup<'a>,
+    model: &'a Model<'a>,
+    /// The same without effects.
+    bare: Model<'a>,
+    link: Link,
+    grain_of_region: Vec<DVec3>,
+    middle: DVec3,
+    /// Where the ray of every chirp passes 8 m in the target frame, m.
+    places: Vec<DVec2>,
+    receiver: Receiver,
+}
+
+/// The facet of a ray that has met nothing yet.
+const NOWHERE: u32 = u32::MAX;
+
+/// Beyond this a tilted facet shows the radar its back.
+const LEAST_COS_THETA: f64 = 1e-6;
+
+impl<'a> Acting<'a> {
+    /// `None` for a setup without effects.
+    pub fn new(setup: &Setup<'a>) -> Option<Acting<'a>> {
+        let model = setup.effects?;
+        let mut acting = Acting {
+            setup: *setup,
+            model,
+            bare: Model { effects: Vec::new(), ..model.clone() },
+            link: Link::new(setup.radar),
+            grain_of_region: setup.surfaces.iter().map(|surface| surface.grain).collect(),
+            middle: DVec3::ZERO,
+            places: setup.chirps.target_points_m(&setup.radar.frames()).collect(),
+            receiver: model.received(),
+        };
+        acting.middle = middle(&acting.looks());
+        Some(acting)
+    }
+
+    /// The receiver's law with the effects.
+    pub fn receiver(&self) -> Receiver {
+        self.receiver
+    }
+
+    /// What a ray of a chirp meets.
+    pub fn meet(&self, chirp: usize, ray: &Ray<Global>) -> Meeting {
+        let hit = self.setup.bvh.closest(ray);
+        // A ray that misses may still meet a target that has moved.
+        let look = hit.map_or(self.blank(chirp, *ray), |hit| self.look(chirp, *ray, hit, None));
+        match self.model.placed(&self.stage(), look) {
+            Some(placed) if placed == look => (hit, None),
+            Some(Look { hit, normal, azimuth_rad, .. }) if hit.facet != NOWHERE => {
+                (Some(hit), Some(Facing { normal, azimuth_rad }))
+            }
+            _ => (None, None),
+        }
+    }
+
+    /// A direct path, given without effects, with them.
+    pub fn direct(
+        &self,
+        path: Path,
+        chirp: usize,
+        rays: usize,
+        facing: Option<Facing>,
+        tilts: [f64; 2],
+    ) -> Path {
+        let (stage, look) = (self.stage(), self.seen(chirp, rays, path.hit, facing));
+        let power_w = |model: &Model, look: &Look| model.arrived(&stage, look).power_w;
+        let with_w = tilted(&look, tilts).map_or(0.0, |look| power_w(self.model, &look));
+        let Some(Facing { azimuth_rad, .. }) = facing else {
+            // Where nothing acts, not even rounding may differ.
+            let same = with_w == power_w(&self.bare, &look);
+            return if same { path } else { Path { power_w: with_w / rays as f64, ..path } };
+        };
+        let retro = Direction::<Surface>::from_angles(look.hit.theta_rad(), azimuth_rad);
+        let law = self.model.laws.get(usize::from(look.region));
+        let specular_share = law.map_or(0.0, |law| law.specular_share(retro, retro));
+        Path { power_w: with_w / rays as f64, azimuth_rad, specular_share, ..path }
+    }
+
+    /// Factor of the instrument on all that comes back through a ray of a chirp, a ratio.
+    pub fn instrument_gain(
+        &self,
+        chirp: usize,
+        rays: usize,
+        hit: Hit,
+        facing: Option<Facing>,
+    ) -> f64 {
+        let (stage, look) = (self.stage(), self.seen(chirp, rays, hit, facing));
+        let instrument = self.model.effects.iter().filter(|(e, _)| e.level() == Level::Instrument);
+        instrument.map(|(effect, values)| effect.gain(values, &stage, &look)).product()
+    }
+
+    /// Tangents of the two tilts of the normals under a chirp.
+    pub fn tilts(&self, chirp: usize) -> [f64; 2] {
+        let sd_rad = self.receiver.tilt_sd_rad;
+        if sd_rad == 0.0 {
+            return [0.0; 2];
+        }
+        let (seed, chirp, purpose) = (self.setup.seed, chirp as u64, Purpose::Tilt);
+        let mut draws = Key { seed, chirp, sub_ray: Observer::Radar.number(), purpose }.draws();
+        [(); 2].map(|()| (sd_rad * draws.gaussian()).tan())
+    }
+
+    /// What the effects make of the sums over the paths of all chirps.
+    pub fn arrive(
+        &self,
+        footprints: &Footprints,
+        sums: Vec<Option<Arrived>>,
+    ) -> Vec<Option<Change>> {
+        let first = |chirp: usize| {
+            let hits = footprints.hits.iter().zip(0..).skip(chirp * footprints.rays_per_chirp);
+            let mut hits = hits.take(footprints.rays_per_chirp);
+            let (hit, index) = hits.find_map(|(hit, index)| Some(((*hit)?, index)))?;
+            let facing = footprints.facings.get::<usize>(index).copied().flatten();
+            Some(self.seen(chirp, footprints.rays_per_chirp, hit, facing))
+        };
+        let chirps: Vec<(usize, Look, Arrived)> = sums
+            .iter()
+            .enumerate()
+            .filter_map(|(chirp, sum)| Some((chirp, first(chirp)?, (*sum)?)))
+            .collect();
+        let looks: Vec<Look> = chirps.iter().map(|(_, look, _)| *look).collect();
+        let mut after: Vec<Option<Arrived>> = chirps.iter().map(|(_, _, sum)| Some(*sum)).collect();
+        self.model.arrive(&self.stage(), &looks, &Surveys::default(), &mut after);
+        let mut changes = vec![None; sums.len()];
+        for ((chirp, _, before), after) in chirps.into_iter().zip(after.into_iter().flatten()) {
+            changes[chirp] = (before != after).then_some(Change { before, after });
+        }
+        changes
+    }
+
+    fn stage(&self) -> Stage<'_> {
+        Stage {
+            radar: self.setup.radar,
+            link: self.link,
+            bvh: self.setup.bvh,
+            region_of_facet: self.setup.region_of_facet,
+            grain_of_region: &self.grain_of_region,
+            middle: self.middle,
+        }
+    }
+
+    /// One look for every chirp whose axis meets the target as the scene has it.
+    fn looks(&self) -> Vec<Look> {
+        let look = |(chirp, ray): (usize, &Ray<Global>)| {
+            Some(self.look(chirp, *ray, self.setup.bvh.closest(ray)?, None))
+        };
+        self.setup.chirps.rays.par_iter().enumerate().filter_map(look).collect()
+    }
+
+    /// A ray of a chirp where it was traced to.
+    fn seen(&self, chirp: usize, rays: usize, hit: Hit, facing: Option<Facing>) -> Look {
+        let axis = self.setup.chirps.rays[chirp];
+        let ray = match axis.origin.towards(hit.point) {
+            Some(direction) if rays > 1 => Ray { direction, ..axis },
+            _ => axis,
+        };
+        self.look(chirp, ray, hit, facing)
+    }
+
+    fn look(&self, chirp: usize, ray: Ray<Global>, hit: Hit, facing: Option<Facing>) -> Look {
+        let region = self.setup.region_of_facet[hit.facet as usize];
+        let Facing { normal, azimuth_rad } = facing.unwrap_or_else(|| {
+            let back = -ray.direction.xyz();
+            let grain = self.grain_of_region[usize::from(region)];
+            let frame = LocalFrame::new(self.setup.bvh.mesh(), &hit, back, grain);
+            let [x, y, _] = frame.local(back).xyz().to_array();
+            Facing { normal: frame.normal, azimuth_rad: y.atan2(x) }
+        });
+        Look { hit, normal, azimuth_rad, region, ..self.blank(chirp, ray) }
+    }
+
+    /// A ray that has met nothing.
+    fn blank(&self, chirp: usize, ray: Ray<Global>) -> Look {
+        let chirps = self.setup.chirps;
+        Look {
+            chirp: chirps.number[chirp],
+            time_s: chirps.time_s[chirp],
+            progress: chirps.progress(chirp),
+            ray,
+            hit: Hit {
+                facet: NOWHERE,
+                range_m: 0.0,
+                point: Point::from(DVec3::ZERO),
+                cos_theta: 1.0,
+            },
+            normal: -ray.direction.xyz(),
+            target: Pose::NONE,
+            azimuth_rad: 0.0,
+            region: 0,
+            xt_m: self.places[chirp].x,
+            yt_m: self.places[chirp].y,
+            edge_m: 0.0,
+        }
+    }
+}
+
+/// What the effects make of a whole echo.
+#[derive(Clone, Copy)]
+pub(super) struct Change {
+    before: Arrived,
+    after: Arrived,
+}
+
+impl Change {
+    /// Gives every path its share.
+    pub fn share_out(&self, paths: &mut [Path]) {
+        let Change { before, after } = *self;
+        let count = paths.len().max(1) as f64;
+        for path in paths {
+            path.power_w = match before.power_w > 0.0 {
+                true => path.power_w * (after.power_w / before.power_w),
+                false => after.power_w / count,
+            };
+            path.range_m += after.range_m - before.range_m;
+        }
+    }
+}
+
+/// The look with its normal tilted in the plane of incidence and across it; `None` where the facet
+/// then shows its back.
+fn tilted(look: &Look, [along, across]: [f64; 2]) -> Option<Look> {
+    if along == 0.0 && across == 0.0 {
+        return Some(*look);
+    }
+    let theta_rad = look.hit.theta_rad();
+    let length = (1.0 + along * along + across * across).sqrt();
+    let cos_theta = (theta_rad.cos() + along * theta_rad.sin()) / length;
+    let mut look = *look;
+    look.hit.cos_theta = cos_theta;
+    (cos_theta > LEAST_COS_THETA).then_some(look)
+}
+
+/// Refuses what would be counted twice, and what an effect cannot say.
+pub(super) fn check(setup: &Setup, rays: usize, observer: Observer) -> Result<(), RenderError> {
+    let Some(model) = setup.effects else { return Ok(()) };
+    let (radar, bounces) = (setup.radar, setup.bounce.is_some());
+    let is_there = |name: &str| {
+        let knobs_and_values = model.effects.iter().filter(|(effect, _)| effect.name() == name);
+        let mut pairs = knobs_and_values.flat_map(|(e, values)| std::iter::zip(e.knobs(), values));
+        pairs.any(|(knob, value)| knob.absent != *value)
+    };
+    for (effect, _) in &model.effects {
+        let effect = effect.name();
+        let (problem, way_out) = match effect {
+            _ if observer != Observer::Radar => (
+                "acts on the radar's own echoes, and nothing says what it does at another antenna",
+                "remove [[receiver]], or the effect",
+            ),
+            "finite-spot" if rays > 1 => (
+                "averages over the spot, and so do several rays",
+                "set spot.rays = 1, or remove the effect",
+            ),
+            "multi-bounce" if bounces => (
+                "brings echoes by way of a second surface, and so does [bounce]",
+                "remove one of the two",
+            ),
+            "pose" | "motion" if bounces => (
+                "moves the target, and [bounce] follows paths on it where the scene has it",
+                "remove [bounce], or move the mesh by its translation_m and rotation_deg",
+            ),
+            "motion" if is_there("motion") && is_there("pose") => (
+                "moves the target from where the scene has it, and would undo `pose`",
+                "move the mesh by its translation_m and rotation_deg instead of `pose`",
+            ),
+            "noise-floor" if radar.receiver.is_some() => (
+                "adds thermal noise, and [radar.receiver] makes all of its own",
+                "raise radar.receiver.noise_figure_db instead",
+            ),
+            "speckle" if radar.receiver.is_some() => (
+                "sets the looks of speckle, and [radar.receiver] averages whole beat signals",
+                "set radar.speckle.looks instead",
+            ),
+            _ => continue,
+        };
+        return Err(RenderError::Effect { effect, problem, way_out });
+    }
+    Ok(())
+}
