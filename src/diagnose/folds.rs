@@ -18,6 +18,9 @@ pub struct Folds {
     pub blocks: usize,
     /// Number of folds.
     pub folds: usize,
+    /// Smaller patch of every look, two thirds as wide, and how many of them there are.
+    cell: Vec<usize>,
+    cells: usize,
 }
 
 impl Folds {
@@ -47,14 +50,23 @@ impl Folds {
             }
             filled[emptiest] += members[number].len();
         }
-        Folds { block, fold, blocks: members.len(), folds }
+        let mut numbers = BTreeMap::new();
+        let numbered = |look: &Look| {
+            let side_m = 2.0 / 3.0 * block_m.max(1e-6);
+            let place = [look.yt_m, look.xt_m].map(|x| (x / side_m).floor() as i64);
+            let next = numbers.len();
+            *numbers.entry(place).or_insert(next)
+        };
+        let cell = looks.iter().map(numbered).collect();
+        Folds { block, fold, blocks: members.len(), folds, cell, cells: numbers.len() }
     }
 
-    /// Sum and its standard error over patches of one number for each look.
+    /// Sum and its standard error over patches of one number for each look. The patches are smaller
+    /// than those of the folds, or a local effect would lie in one and have no standard error.
     pub fn sum(&self, values: &[f64]) -> [f64; 2] {
-        let mut sums = vec![0.0; self.blocks];
-        for (value, &block) in values.iter().zip(&self.block) {
-            sums[block] += value;
+        let mut sums = vec![0.0; self.cells];
+        for (value, &cell) in values.iter().zip(&self.cell) {
+            sums[cell] += value;
         }
         let count = sums.len().max(2) as f64;
         let total: f64 = sums.iter().sum();

@@ -15,6 +15,8 @@
 //! | held-out patches, controls, selection | `folds.rs`, `placebo.rs`, `select.rs` |
 //! | what remains, and how large the error is | `residual.rs`, `score.rs` |
 
+mod covariates;
+mod field;
 mod folds;
 mod likelihood;
 mod looks;
@@ -45,9 +47,10 @@ pub use residual::Unexplained;
 pub use score::Errors;
 pub use select::Candidate;
 
+use covariates::covariates;
 use refit::{Problem, Space};
 use residual::Tests;
-use select::Selection;
+use select::{Selected, Selection};
 
 /// Version of [`Report`] as JSON.
 pub const SCHEMA: u32 = 1;
@@ -62,19 +65,22 @@ const LEAST_BLOCKS: usize = 15;
 pub struct Diagnosis {
     /// Seed of folds, placebos and randomised residuals.
     pub seed: u64,
-    /// Side of the patches that are held out together, m; three correlation lengths or more. 0.1:
-    /// six spots.
+    /// Side of the patches that are held out together, m; three correlation lengths or more. 0.05:
+    /// three spots.
     pub block_m: f64,
     /// Number of folds, 2 or more.
     pub folds: usize,
     /// Most effects that are added.
     pub most_effects: usize,
-    /// Least gain in ln likelihood that is looked into. 8: by chance once in some 16 000 for one number.
+    /// Least gain in ln likelihood of an effect with one number that is looked into. 5: by chance once
+    /// in some 640.
     pub least_gain: f64,
     /// Standard errors by which a held-out gain must exceed nothing.
     pub standard_errors: f64,
-    /// Least change of the data, dB, of an effect and of what counts as unexplained.
+    /// Least change of the data, dB, of an effect.
     pub least_size_db: f64,
+    /// Least structure of the means, dB, that counts as unexplained.
+    pub least_structure_db: f64,
     /// Probability that a complete model is called unexplained.
     pub family_error: f64,
     /// Random signs drawn for each residual test.
@@ -85,12 +91,13 @@ impl Default for Diagnosis {
     fn default() -> Self {
         Diagnosis {
             seed: 0,
-            block_m: 0.1,
+            block_m: 0.05,
             folds: 5,
             most_effects: 4,
-            least_gain: 8.0,
+            least_gain: 5.0,
             standard_errors: 2.0,
             least_size_db: 0.1,
+            least_structure_db: 0.15,
             family_error: 0.02,
             draws: 4999,
         }
@@ -112,6 +119,8 @@ pub struct Subject<'a> {
     pub looks: &'a [Look],
     /// What each of them saw.
     pub observations: &'a [Observation],
+    /// Detections that belong to no look, or far from where it meets the target.
+    pub false_alarms: usize,
 }
 
 /// The answer.
@@ -366,12 +375,19 @@ pub enum DiagnoseError {
 }
 
 impl Diagnosis {
+    /// Least gain in ln likelihood of an effect with so many numbers, tried from so many starts: about
+    /// as rare by chance as the one of a single number.
+    fn least_gain_of(&self, numbers: usize, starts: usize) -> f64 {
+        self.least_gain + 1.2 * (numbers as f64 - 1.0) + (starts.max(1) as f64).ln()
+    }
+
     /// Diagnoses a scan, trying these effects.
     ///
     /// # Errors
     /// When the data are too few to tell anything, or something declared has no meaning.
     pub fn run(&self, subject: &Subject, effects: &[&dyn Effect]) -> Result<Report, DiagnoseError> {
-        let Subject { stage, laws, receiver, declared, looks, observations } = *subject;
+        let Subject { stage, laws, receiver, declared, looks, observations, false_alarms } =
+            *subject;
         let folds = Folds::new(looks, self.block_m, self.folds, self.seed);
         check(subject, &folds)?;
         let surveys = &Surveys::default();
@@ -379,10 +395,30 @@ impl Diagnosis {
         let selection = Selection { problem, folds: &folds, settings: self };
         let base = selection.base(Space::new(&problem, laws)?);
         let (before, z_before) = (base.held_out.clone(), self.z(&problem, &base));
-        let (state, ranking, added) = selection.run(base, effects);
+        let Selected { state, ranking, added, structure } = selection.run(base, effects);
         let z_after = self.z(&problem, &state);
         let prediction = problem.predict(&state.space, &state.fitted.at);
-        let unexplained = self.tests().run(&z_after, looks, &prediction, &folds);
+        let largest_db = added.iter().map(|a| a.evidence.size_db).fold(0.0, f64::max);
+        let covariates = covariates(looks, &prediction, observations);
+        let mut unexplained = self.tests().run(&z_after, looks, &prediction, &covariates, &folds);
+        if selection.is_structured(&structure, largest_db) {
+            unexplained.extend(residual::of_field(&structure));
+        }
+        let sd_db = residual::speckle_sd_db(prediction.receiver.looks);
+        let neighbours =
+            residual::of_neighbours(&z_after, looks, stage.radar.spot_diameter_m, sd_db, &folds);
+        if selection.is_shared(&neighbours, largest_db) {
+            unexplained.push(neighbours);
+        }
+        unexplained.extend(residual::outliers(
+            &z_after,
+            &prediction,
+            declared,
+            observations,
+            false_alarms,
+        ));
+        unexplained.extend(residual::steps(observations));
+        unexplained.sort_by(|a, b| b.strength_db.total_cmp(&a.strength_db));
         let (parameters, effects) = values(&problem, &state, added);
         let error = before_after(score::errors(&before), score::errors(&state.held_out), &folds);
         let base = Base {

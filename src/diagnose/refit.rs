@@ -22,6 +22,8 @@ use crate::fit::minimise::{Local, Minimise};
 /// steps.
 const LAW_STEP: f64 = 5e-4;
 const EFFECT_STEP: f64 = 0.25;
+/// Times that a step which does not improve is halved.
+const HALVINGS: usize = 5;
 /// Looks that a law must have to be fitted.
 const LEAST_LOOKS: usize = 100;
 
@@ -72,6 +74,16 @@ impl<'a> Space<'a> {
         let mut space = self.clone();
         space.effects.push(effect);
         space
+    }
+
+    /// With one effect less, and a point without its numbers.
+    pub fn without(&self, at: &DVector<f64>, index: usize) -> (Space<'a>, DVector<f64>) {
+        let mut space = self.clone();
+        let before: usize =
+            self.effects.iter().take(index).map(|effect| effect.knobs().len()).sum();
+        let gone = space.effects.remove(index).knobs().len();
+        let first = self.base_len() + before;
+        (space, at.clone().remove_rows(first, gone))
     }
 
     /// Unknowns of the laws; those of the effects follow.
@@ -191,8 +203,20 @@ impl Problem<'_> {
         let terms = self.terms(space, at);
         let slopes = self.slopes(space, at, bounds, &terms);
         let without = |fold: usize| {
-            let local = local(&terms, &slopes, &|look| folds.fold.get(look) != Some(&fold));
-            Minimise::newton(at, bounds, &local)
+            let used = |look: usize| folds.fold.get(look) != Some(&fold);
+            let local = local(&terms, &slopes, &used);
+            let ln_p = |terms: &[Term]| -> f64 {
+                let used = terms.iter().enumerate().filter(|(look, _)| used(*look));
+                used.map(|(_, term)| term.ln_p).sum()
+            };
+            let (here, mut there) = (ln_p(&terms), Minimise::newton(at, bounds, &local));
+            for _ in 0..HALVINGS {
+                if ln_p(&self.terms(space, &there)) >= here {
+                    return there;
+                }
+                there = 0.5 * (there + at);
+            }
+            at.clone()
         };
         (0..folds.folds).map(without).collect()
     }

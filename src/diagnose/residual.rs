@@ -7,19 +7,29 @@
 //! all lean to one side cannot be told so: maps are therefore of cells larger than a patch. A bin's
 //! strength must reach a declared size, too: with thousands of looks everything is significant.
 
+use std::collections::HashMap;
+
+use rayon::prelude::*;
 use serde::Serialize;
-use statrs::function::erf::erfc_inv;
+use statrs::function::erf::{erfc, erfc_inv};
 use statrs::function::gamma::digamma;
 
+use super::covariates::{Covariate, quantiles};
+use super::field::Structure;
 use super::folds::Folds;
 use super::likelihood::{Declared, Likelihood};
 use super::looks::Observation;
 use super::score::DB;
-use crate::effects::{Look, Prediction};
+use crate::effects::{Arrived, Look, Prediction};
 use crate::radar::random::{Key, Purpose};
 
 /// Bins of a covariate, with as many looks each.
 const BINS: usize = 12;
+/// Standard deviations beyond which a look is an outlier, the share of them that is no news, and the
+/// size that one of them stands for, dB.
+const OUTLYING: f64 = 4.5;
+const OUTLIERS: f64 = 1e-3;
+const OUTLYING_DB: f64 = 10.0;
 /// Side of a cell of the map, in patches.
 const MAP_CELL: f64 = 2.0;
 
@@ -76,26 +86,22 @@ impl Tests {
         z: &[f64],
         looks: &[Look],
         prediction: &Prediction,
+        covariates: &[Covariate],
         folds: &Folds,
     ) -> Vec<Unexplained> {
+        // A spread s times the declared one has z² of mean s²: half of the excess is that of s.
         let squares: Vec<f64> = z.iter().map(|z| z * z - 1.0).collect();
-        let bins = self.bins(looks, prediction);
-        let limit = self.family_error / (2.0 * bins.len() as f64).max(1.0);
+        let bins = self.bins(looks, covariates);
+        let limit = self.family_error / (bins.len() as f64).max(1.0);
         let sd_db = speckle_sd_db(prediction.receiver.looks);
-        let mut found = Vec::new();
-        for (number, (name, bin)) in bins.iter().enumerate() {
-            // A spread s times the declared one has z² of mean s²: half of the excess is that of s.
-            let kinds = [(name.clone(), z, 1.0), (format!("spread over {name}"), &squares, 0.5)];
-            for (kind, (covariate, values, scale)) in kinds.into_iter().enumerate() {
-                let (excess, p_value) = self.test(values, bin, folds, (2 * number + kind) as u64);
-                let strength_db = scale * sd_db * excess;
-                if p_value <= limit && strength_db >= self.least_size_db {
-                    found.push(Unexplained { covariate, strength_db, p_value });
-                }
-            }
-        }
-        found.sort_by(|a, b| b.strength_db.total_cmp(&a.strength_db));
-        found
+        let found = bins.iter().zip(0..).filter_map(|((name, bin), number)| {
+            let (excess, p_value) = self.test(&squares, bin, folds, number);
+            let strength_db = 0.5 * sd_db * excess;
+            let covariate = format!("spread over {name}");
+            let counts = p_value <= limit && strength_db >= self.least_size_db;
+            counts.then_some(Unexplained { covariate, strength_db, p_value })
+        });
+        found.collect()
     }
 
     /// Root mean square of the bins' means beyond chance, and the probability of so much by chance.
@@ -136,35 +142,11 @@ impl Tests {
         (excess, (above + 1) as f64 / (self.draws + 1) as f64)
     }
 
-    /// Bin of every look by every covariate that varies.
-    fn bins(&self, looks: &[Look], prediction: &Prediction) -> Vec<(String, Vec<usize>)> {
-        let centre = |pick: fn(&Look) -> f64| {
-            let ends = looks
-                .iter()
-                .map(pick)
-                .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
-            0.5 * (ends[0] + ends[1])
-        };
-        let (x0, y0) = (centre(|look| look.xt_m), centre(|look| look.yt_m));
-        let of_look = |name: &str, pick: &dyn Fn(&Look) -> f64| {
-            (name.to_owned(), quantile_bins(&looks.iter().map(pick).collect::<Vec<_>>()))
-        };
-        let powers: Vec<f64> =
-            prediction.arrived.iter().map(|a| a.map_or(0.0, |a| a.power_w)).collect();
-        let mut bins = vec![
-            of_look("theta", &|look| look.hit.theta_rad()),
-            of_look("azimuth", &|look| look.azimuth_rad),
-            of_look("range", &|look| look.hit.range_m),
-            of_look("x_t", &|look| look.xt_m),
-            of_look("y_t", &|look| look.yt_m),
-            of_look("distance from centre", &|look| (look.xt_m - x0).hypot(look.yt_m - y0)),
-            of_look("distance from edge", &|look| look.edge_m),
-            of_look("progress", &|look| look.progress),
-            ("predicted power".to_owned(), quantile_bins(&powers)),
-            ("region".to_owned(), looks.iter().map(|look| usize::from(look.region)).collect()),
-            ("map".to_owned(), self.map(looks)),
-        ];
-        bins.retain(|(_, bin)| bin.iter().any(|b| Some(b) != bin.first()));
+    /// Bin of every look by every covariate.
+    fn bins(&self, looks: &[Look], covariates: &[Covariate]) -> Vec<(&'static str, Vec<usize>)> {
+        let of = |c: &Covariate| (c.name, quantile_bins(&c.values));
+        let mut bins: Vec<_> = covariates.iter().map(of).collect();
+        bins.push(("map", self.map(looks)));
         bins
     }
 
@@ -181,9 +163,115 @@ impl Tests {
 
 /// Bins of equal numbers of looks; equal values share a bin.
 fn quantile_bins(values: &[f64]) -> Vec<usize> {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let edges: Vec<f64> =
-        (1..BINS).filter_map(|k| sorted.get(k * sorted.len() / BINS)).copied().collect();
-    values.iter().map(|value| edges.iter().filter(|edge| *edge <= value).count()).collect()
+    let ends = quantiles(values, BINS);
+    let inner = ends.get(1..ends.len().saturating_sub(1)).unwrap_or_default();
+    values.iter().map(|value| inner.partition_point(|end| end <= value)).collect()
+}
+
+/// What neighbouring looks have in common, though their noise is their own: the root mean square of a
+/// structure that no field needs to resolve, dB, and how often chance makes as much.
+///
+/// Neighbours are one to two spots apart, beyond the reach of a speckle that two spots share.
+pub(super) fn of_neighbours(
+    z: &[f64],
+    looks: &[Look],
+    spot_m: f64,
+    sd_db: f64,
+    folds: &Folds,
+) -> Unexplained {
+    let cell = |look: &Look| [look.xt_m, look.yt_m].map(|x| (x / (2.0 * spot_m)).floor() as i64);
+    let mut members: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
+    for (index, look) in looks.iter().enumerate() {
+        members.entry(cell(look)).or_default().push(index);
+    }
+    let shared = |(look, z_here): (&Look, &f64)| {
+        let [i, j] = cell(look);
+        let near = (-1..=1).flat_map(|di| (-1..=1).map(move |dj| [i + di, j + dj]));
+        let near = near.filter_map(|at| members.get(&at)).flatten();
+        let apart_m = |other: &Look| (other.xt_m - look.xt_m).hypot(other.yt_m - look.yt_m);
+        let zs = near.filter_map(|&index| {
+            let other = looks.get(index)?;
+            let counts = (spot_m..2.0 * spot_m).contains(&apart_m(other));
+            z.get(index).filter(|_| counts)
+        });
+        let (sum, count) = zs.fold((0.0, 0.0), |(s, n), z| (s + z, n + 1.0));
+        if count > 0.0 { z_here * sum / count } else { 0.0 }
+    };
+    let products: Vec<f64> = looks.par_iter().zip(z).map(shared).collect();
+    let [sum, se] = folds.sum(&products);
+    let covariance = sum / looks.len().max(1) as f64;
+    let strength_db = sd_db * covariance.max(0.0).sqrt();
+    let p_value = 0.5 * erfc(sum / se.max(f64::MIN_POSITIVE) / std::f64::consts::SQRT_2);
+    Unexplained { covariate: "neighbourhood".to_owned(), strength_db, p_value }
+}
+
+/// Looks that no spread explains: beyond [`OUTLYING`] standard deviations in power or in range, or with
+/// a detection far off the target.
+pub(super) fn outliers(
+    z: &[f64],
+    prediction: &Prediction,
+    declared: Declared,
+    observations: &[Observation],
+    false_alarms: usize,
+) -> Option<Unexplained> {
+    let count = z.len().max(1) as f64;
+    let wild = z.iter().filter(|z| z.abs() > OUTLYING).count();
+    let off = |(seen, arrived): (&Observation, &Option<Arrived>)| {
+        let off_m = seen.range_m? - arrived.as_ref()?.range_m;
+        (off_m.abs() > OUTLYING * declared.range_sd_m).then_some(())
+    };
+    let strays = match declared.range_sd_m > 0.0 {
+        true => observations.iter().zip(&prediction.arrived).filter_map(off).count(),
+        false => 0,
+    };
+    let found = [
+        (wild, "outlying powers"),
+        (strays, "outlying ranges"),
+        (false_alarms, "stray detections"),
+    ];
+    let (number, covariate) = found.into_iter().max_by_key(|(number, _)| *number)?;
+    let share = number as f64 / count;
+    // A thousandth of all chirps may be anything.
+    let expected = OUTLIERS * count;
+    let p_value = (0.5 * erfc((number as f64 - expected) / (2.0 * expected).sqrt())).max(1e-300);
+    let strength_db = OUTLYING_DB * share.sqrt();
+    (share > 3.0 * OUTLIERS && number >= 10).then(|| Unexplained {
+        covariate: covariate.to_owned(),
+        strength_db,
+        p_value,
+    })
+}
+
+/// Powers in coarse steps, as of a converter with too few bits: their step, dB.
+pub(super) fn steps(observations: &[Observation]) -> Option<Unexplained> {
+    let powers = observations.iter().filter_map(|seen| seen.power_w);
+    let mut powers: Vec<f64> = powers.map(|power_w| DB * power_w.ln()).collect();
+    powers.sort_by(f64::total_cmp);
+    let span_db = powers.last()? - powers.first()?;
+    let count = powers.len();
+    powers.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
+    let step_db = span_db / powers.len().max(2) as f64;
+    // A uniform error of a step has the standard deviation step/√12.
+    let strength_db = step_db / 12f64.sqrt();
+    (powers.len() * 10 < count && strength_db >= 0.1).then(|| Unexplained {
+        covariate: "steps of the power".to_owned(),
+        strength_db,
+        p_value: 0.0,
+    })
+}
+
+/// Structure of the means that a field has found: what goes with each covariate, the larger parts.
+pub(super) fn of_field(structure: &Structure) -> Vec<Unexplained> {
+    let [gain, se] = structure.gain;
+    let p_value = 0.5 * erfc(gain / se / std::f64::consts::SQRT_2);
+    let most_db = structure.parts_db.first().map_or(0.0, |part| part.1);
+    let large = structure.parts_db.iter().filter(|part| part.1 >= 0.5 * most_db).take(3);
+    let share = structure.size_db / most_db.max(f64::MIN_POSITIVE);
+    large
+        .map(|(name, part_db)| Unexplained {
+            covariate: (*name).to_owned(),
+            strength_db: share * part_db,
+            p_value,
+        })
+        .collect()
 }

@@ -8,10 +8,12 @@
 use nalgebra::DVector;
 use serde::Serialize;
 
+use super::covariates::covariates;
+use super::field::{Field, Structure, terms};
 use super::folds::Folds;
 use super::placebo::Placebo;
-use super::refit::{Fitted, Problem, Space, sum};
-use super::residual::speckle_sd_db;
+use super::refit::{Fitted, Problem, Slope, Space, sum};
+use super::residual::{self, Unexplained, speckle_sd_db};
 use super::score::{DB, Scored, scored};
 use super::screen::{Sample, Screen};
 use super::{Diagnosis, Evidence};
@@ -31,6 +33,18 @@ const SHARE_TO_SCOUT: f64 = 0.1;
 /// and none that gains less than this share of the best.
 const SHORTLIST: usize = 5;
 const SHARE_OF_BEST: f64 = 0.3;
+/// An effect that changes less than this share of what the largest does may be the error of its form.
+const SHARE_OF_LARGEST: f64 = 0.2;
+/// Structure that is left, likewise.
+const SHARE_OF_FORM: f64 = 0.25;
+/// Standard errors by which a field's held-out gain must exceed nothing.
+const FIELD_ERRORS: f64 = 3.0;
+/// Share of its gain that an effect of the scatter must keep where a field has corrected the means.
+const SHARE_BESIDE_FIELD: f64 = 0.5;
+/// Share of the size of such an effect that neighbours may have in common: scatter is each look's own.
+const MOST_SHARED: f64 = 0.6;
+/// Probability by chance of what neighbours have in common.
+const CHANCE: f64 = 1e-3;
 /// Placebos of each comparison.
 const PLACEBOS: u64 = 3;
 /// Looks of a first fit of the base, that is not caught far from the data.
@@ -61,7 +75,19 @@ pub struct Candidate {
     pub accepted: bool,
 }
 
+/// What the selection ends with.
+pub(super) struct Selected<'a> {
+    pub state: State<'a>,
+    /// Every effect of every round.
+    pub ranking: Vec<Candidate>,
+    /// What was added and stayed, in the order of the model's effects.
+    pub added: Vec<Added>,
+    /// What a field finds beside it.
+    pub structure: Structure,
+}
+
 /// A model, fitted to all looks and by folds.
+#[derive(Clone)]
 pub(super) struct State<'a> {
     pub space: Space<'a>,
     pub fitted: Fitted,
@@ -81,6 +107,8 @@ struct Trial<'a> {
     space: Space<'a>,
     /// What they promise, and where they are.
     starts: Vec<(f64, DVector<f64>)>,
+    /// How many starts there were.
+    tried: usize,
     fitted: Fitted,
     candidate: Candidate,
 }
@@ -105,17 +133,16 @@ impl Selection<'_> {
         State { space, fitted, held_out }
     }
 
-    /// Adds effects until none passes. The ranking of every round, and what was added.
-    pub fn run<'a>(
-        &self,
-        mut state: State<'a>,
-        effects: &[&'a dyn Effect],
-    ) -> (State<'a>, Vec<Candidate>, Vec<Added>) {
+    /// Adds effects until none passes, and takes away what the others made superfluous or what is
+    /// smaller than the structure that is left.
+    pub fn run<'a>(&self, base: State<'a>, effects: &[&'a dyn Effect]) -> Selected<'a> {
         let (mut ranking, mut added) = (Vec::new(), Vec::new());
+        let mut state = base.clone();
         for round in 1..=self.settings.most_effects + 1 {
             let mut trials = self.trials(&state, effects, round);
+            let largest_db = added.iter().map(|a: &Added| a.evidence.size_db).fold(0.0, f64::max);
             let chosen = match round <= self.settings.most_effects {
-                true => self.chosen(&state, &mut trials),
+                true => self.chosen(&state, &mut trials, largest_db),
                 false => None,
             };
             let Some((index, held_out, class)) = chosen else {
@@ -134,7 +161,96 @@ impl Selection<'_> {
             }
             ranking.extend(trials.into_iter().map(|trial| trial.candidate));
         }
-        (state, ranking, added)
+        self.prune(&mut state, &mut added);
+        let mut structure = self.structure(&state);
+        while let Some(least) = smallest(&added)
+            && self.is_structured(&structure, 0.0)
+            && added[least].evidence.size_db < structure.size_db
+        {
+            state = self.without(&state, least);
+            added.remove(least);
+            structure = self.structure(&state);
+        }
+        Selected { state, ranking, added, structure }
+    }
+
+    /// Whether what a field finds is more than chance and more than a law's form may be off.
+    pub fn is_structured(&self, structure: &Structure, largest_db: f64) -> bool {
+        let [gain, se] = structure.gain;
+        let least_db = self.settings.least_structure_db.max(SHARE_OF_FORM * largest_db);
+        gain > FIELD_ERRORS * se && structure.size_db >= least_db
+    }
+
+    /// Whether what neighbours have in common is more than chance and than a law's form may be off.
+    pub fn is_shared(&self, neighbours: &Unexplained, largest_db: f64) -> bool {
+        let least_db = self.settings.least_structure_db.max(SHARE_OF_FORM * largest_db);
+        neighbours.p_value < CHANCE && neighbours.strength_db >= least_db
+    }
+
+    /// What neighbours have in common beyond a model, dB.
+    fn shared_db(&self, state: &State) -> f64 {
+        let problem = &self.problem;
+        let prediction = problem.predict(&state.space, &state.fitted.at);
+        let z =
+            residual::z(&prediction, problem.declared, problem.observations, self.settings.seed);
+        let sd_db = speckle_sd_db(prediction.receiver.looks);
+        let spot_m = problem.stage.radar.spot_diameter_m;
+        residual::of_neighbours(&z, problem.looks, spot_m, sd_db, self.folds).strength_db
+    }
+
+    /// The field beside a model.
+    fn structure(&self, state: &State) -> Structure {
+        let problem = &self.problem;
+        let prediction = problem.predict(&state.space, &state.fitted.at);
+        let covariates = covariates(problem.looks, &prediction, problem.observations);
+        let laws = self.mean_slopes(state);
+        Field::new(problem.looks, &covariates).structure(problem, &prediction, &laws, self.folds)
+    }
+
+    fn mean_slopes(&self, state: &State) -> Vec<Vec<Slope>> {
+        let [lower, upper] = state.space.bounds();
+        let at = &state.fitted.at;
+        let here = self.problem.terms(&state.space, at);
+        let mut slopes = self.problem.slopes(&state.space, at, [&lower, &upper], &here);
+        slopes.retain(|slopes| slopes.iter().any(|slope| slope.ln_mean != 0.0));
+        slopes
+    }
+
+    /// The model without one of its effects.
+    fn without<'a>(&self, state: &State<'a>, index: usize) -> State<'a> {
+        let (space, start) = state.space.without(&state.fitted.at, index);
+        let fitted = self.problem.fit(&space, &start, 0, &SEARCH);
+        let held_out = self.held_out(&space, &fitted.at);
+        State { space, fitted, held_out }
+    }
+
+    /// Takes away effects that the later ones made superfluous; the rest in the order of their worth.
+    fn prune(&self, state: &mut State, added: &mut Vec<Added>) {
+        while added.len() > 1 {
+            let mut losses: Vec<(usize, State, f64, bool)> = (0..added.len())
+                .map(|index| {
+                    let without = self.without(state, index);
+                    let loss = state.fitted.ln_likelihood - without.fitted.ln_likelihood;
+                    let [gain, se] = self.difference(&state.held_out, &without.held_out);
+                    let largest_db = added.iter().map(|a| a.evidence.size_db).fold(0.0, f64::max);
+                    let size_db = self.size_db(&without, &state.space, &state.fitted.at);
+                    let least_db = self.settings.least_size_db.max(SHARE_OF_LARGEST * largest_db);
+                    let numbers = state.space.effects[index].knobs().len();
+                    let is_needed = gain > self.settings.standard_errors * se
+                        && loss > self.settings.least_gain_of(numbers, 1)
+                        && size_db >= least_db;
+                    (index, without, loss, is_needed)
+                })
+                .collect();
+            losses.sort_by(|a, b| a.2.total_cmp(&b.2));
+            match losses.into_iter().find(|(.., is_needed)| !is_needed) {
+                Some((index, without, ..)) => {
+                    *state = without;
+                    added.remove(index);
+                }
+                None => return,
+            }
+        }
     }
 
     /// Every effect that is not there yet, best first. Those worth it are fitted to all looks, the
@@ -156,7 +272,7 @@ impl Selection<'_> {
             .filter_map(|effect| self.promised(state, &screen, sample.weight, *effect, round))
             .collect();
         sort(&mut trials);
-        let mut best = 0.25 * self.settings.least_gain / SHARE_TO_SCOUT;
+        let mut best = 0.25 * self.settings.least_gain_of(1, 1) / SHARE_TO_SCOUT;
         for trial in &mut trials {
             if trial.candidate.gain >= SHARE_TO_SCOUT * best {
                 self.scout(state, &screen, sample.weight, trial);
@@ -165,7 +281,7 @@ impl Selection<'_> {
         }
         sort(&mut trials);
         let best = trials.first().map_or(0.0, |trial| trial.candidate.gain);
-        let least = (SHARE_OF_BEST * best).max(0.5 * self.settings.least_gain);
+        let least = (SHARE_OF_BEST * best).max(0.5 * self.settings.least_gain_of(1, 1));
         for trial in trials.iter_mut().take(SHORTLIST) {
             if trial.candidate.gain >= least {
                 self.refit(state, trial);
@@ -194,6 +310,7 @@ impl Selection<'_> {
             })
             .collect();
         starts.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let tried = starts.len();
         starts.truncate(STARTS);
         let (gain, at) = starts.first()?.clone();
         // Where the effect is absent there is nothing to promise.
@@ -211,7 +328,7 @@ impl Selection<'_> {
             accepted: false,
         };
         let fitted = Fitted { at, ln_likelihood: f64::NEG_INFINITY, converged: false };
-        Some(Trial { effect, space, starts, fitted, candidate })
+        Some(Trial { effect, space, starts, tried, fitted, candidate })
     }
 
     /// Fits a trial to the sample.
@@ -246,19 +363,34 @@ impl Selection<'_> {
         &self,
         state: &State,
         trials: &mut [Trial],
+        largest_db: f64,
     ) -> Option<(usize, Vec<Scored>, Vec<&'static str>)> {
         let mut passed: Vec<(usize, Vec<Scored>, f64)> = Vec::new();
+        let (mut structure, mut shared_db) = (None, None);
+        let Diagnosis { least_size_db, standard_errors, .. } = *self.settings;
+        let least_db = least_size_db.max(SHARE_OF_LARGEST * largest_db);
         for (index, trial) in trials.iter_mut().enumerate().filter(|t| !t.1.candidate.sampled) {
-            let Diagnosis { least_gain, least_size_db, standard_errors, .. } = *self.settings;
-            if trial.candidate.gain < least_gain || trial.candidate.size_db < least_size_db {
+            let least = self.settings.least_gain_of(trial.candidate.numbers, trial.tried);
+            if trial.candidate.gain < least || trial.candidate.size_db < least_db {
                 continue;
             }
             let held_out = self.held_out(&trial.space, &trial.fitted.at);
             let [gain, se] = self.difference(&held_out, &state.held_out);
             trial.candidate.held_out = Some([gain, se]);
-            if gain > standard_errors * se {
-                passed.push((index, held_out, gain));
+            if gain <= standard_errors * se {
+                continue;
             }
+            if self.is_spread(state, trial) {
+                let structure = structure.get_or_insert_with(|| self.structure(state));
+                let left = self.gain_beside(state, trial, structure);
+                let shared_db = *shared_db.get_or_insert_with(|| self.shared_db(state));
+                if left < SHARE_BESIDE_FIELD * trial.candidate.gain
+                    || shared_db > MOST_SHARED * trial.candidate.size_db
+                {
+                    continue;
+                }
+            }
+            passed.push((index, held_out, gain));
         }
         passed.sort_by(|a, b| b.2.total_cmp(&a.2));
         while let Some(best) = passed.first() {
@@ -278,6 +410,24 @@ impl Selection<'_> {
         let class = passed.iter().skip(1).filter(as_good);
         let names = class.map(|one| trials[one.0].candidate.name).collect();
         Some((best.0, best.1.clone(), names))
+    }
+
+    /// Whether an effect changes the scatter more than the means.
+    fn is_spread(&self, state: &State, trial: &Trial) -> bool {
+        let [before, after] = [(&state.space, &state.fitted), (&trial.space, &trial.fitted)]
+            .map(|(space, fitted)| self.problem.predict(space, &fitted.at));
+        let [mean_db, spread_db] = self.sizes_db(&before, &after);
+        spread_db > mean_db
+    }
+
+    /// What an effect gains where the means are already corrected by a field: scatter that is only
+    /// structure of the means gains nothing there.
+    fn gain_beside(&self, state: &State, trial: &Trial, structure: &Structure) -> f64 {
+        let ln_p = |space: &Space, fitted: &Fitted| {
+            let prediction = self.problem.predict(space, &fitted.at);
+            sum(&terms(&self.problem, &prediction, &structure.ln_factor))
+        };
+        ln_p(&trial.space, &trial.fitted) - ln_p(&state.space, &state.fitted)
     }
 
     /// Sum over all looks of a difference in ln p, and its standard error over patches.
@@ -321,24 +471,33 @@ impl Selection<'_> {
 
     fn size_db(&self, state: &State, space: &Space, at: &DVector<f64>) -> f64 {
         let before = self.problem.predict(&state.space, &state.fitted.at);
-        let after = self.problem.predict(space, at);
-        let spread = |looks: f64| speckle_sd_db(looks);
+        let [mean_db, spread_db] = self.sizes_db(&before, &self.problem.predict(space, at));
+        mean_db.max(spread_db)
+    }
+
+    /// Root mean square change of the means of all detections, and change of the spread, dB.
+    fn sizes_db(&self, before: &Prediction, after: &Prediction) -> [f64; 2] {
         // Spreads add in squares.
         let wider = |a: f64, b: f64| (a * a - b * b).abs().sqrt();
-        let spread_db = wider(spread(after.receiver.looks), spread(before.receiver.looks));
+        let [now, then] = [after, before].map(|p| speckle_sd_db(p.receiver.looks));
         let mean = |p: &Prediction, look: usize| {
             let power_w = p.arrived.get(look).copied().flatten().map_or(0.0, |a| a.power_w);
             (power_w + p.receiver.noise_w).max(f64::MIN_POSITIVE).ln()
         };
-        let seen =
-            self.problem.observations.iter().enumerate().filter(|(_, o)| o.power_w.is_some());
-        let squares =
-            seen.map(|(look, _)| (DB * (mean(&after, look) - mean(&before, look))).powi(2));
-        let (sum, count) = squares.fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
+        let observations = self.problem.observations.iter().enumerate();
+        let changes: Vec<f64> = observations
+            .filter(|(_, o)| o.power_w.is_some())
+            .map(|(look, _)| DB * (mean(after, look) - mean(before, look)))
+            .collect();
         let tilt = |p: &Prediction| DB * p.receiver.tilt_sd_rad * rms(&p.slope_per_rad);
-        let tilt_db = wider(tilt(&after), tilt(&before));
-        (sum / f64::max(count, 1.0)).sqrt().max(spread_db).max(tilt_db)
+        [rms(&changes), wider(now, then).max(wider(tilt(after), tilt(before)))]
     }
+}
+
+/// Which of the effects is the smallest.
+fn smallest(added: &[Added]) -> Option<usize> {
+    let sizes = added.iter().map(|a| a.evidence.size_db).enumerate();
+    sizes.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)
 }
 
 fn sort(trials: &mut [Trial]) {

@@ -139,7 +139,9 @@ fn diagnosed(truth: &[(&'static dyn Effect, f64)], seed: u64) -> Report {
     let mut start = law();
     start.set_parameter("specular.m", 0.08);
     let (looks, observations, laws) = (&looks[..], &observations[..], &[start][..]);
-    let subject = Subject { stage: &stage, laws, receiver, declared, looks, observations };
+    let false_alarms = 0;
+    let subject =
+        Subject { stage: &stage, laws, receiver, declared, looks, observations, false_alarms };
     let started = std::time::Instant::now();
     let report = Diagnosis { seed, ..Diagnosis::default() }.run(&subject, &LIBRARY).unwrap();
     let detected = observations.iter().filter(|o| o.power_w.is_some()).count();
@@ -236,6 +238,7 @@ fn a_scan_with_too_little_says_so() {
         declared,
         looks: &looks,
         observations: &observations,
+        false_alarms: 0,
     };
     let refused = Diagnosis::default().run(&subject, &LIBRARY).unwrap_err();
     assert!(matches!(refused, DiagnoseError::TooFew { detected: 0 }), "{refused}");

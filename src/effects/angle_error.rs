@@ -31,7 +31,7 @@ impl Effect for AngleError {
     }
 
     fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
-        vec![vec![1.0], vec![3.0]]
+        vec![vec![0.4], vec![1.0], vec![3.0]]
     }
 
     fn receive(&self, values: &[f64], receiver: Receiver) -> Receiver {

@@ -37,7 +37,9 @@ impl Effect for Speckle {
     fn starts(&self, stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
         let declared = stage.radar.speckle.map(|speckle| speckle.looks);
         match declared {
-            Some(looks) => [0.7, 0.35].map(|share| vec![(share * looks).clamp(0.3, ALL)]).to_vec(),
+            Some(looks) => {
+                [0.95, 0.85, 0.6, 0.3].map(|share| vec![(share * looks).clamp(0.3, ALL)]).to_vec()
+            }
             None => [8.0, 4.0, 2.0, 1.0].map(|looks| vec![looks]).to_vec(),
         }
     }

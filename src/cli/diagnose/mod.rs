@@ -119,6 +119,7 @@ fn diagnosed(
         declared,
         looks: &looks,
         observations: &matched.observations,
+        false_alarms: matched.false_alarms,
     };
     let report = Diagnosis { seed, ..Diagnosis::default() }.run(&subject, effects)?;
     Ok((report, matched.false_alarms))

@@ -1,0 +1,67 @@
+//! What residuals may go with.
+
+use super::looks::Observation;
+use crate::effects::{Look, Prediction};
+
+/// One number for each look, and how finely it is looked at.
+pub(super) struct Covariate {
+    pub name: &'static str,
+    pub values: Vec<f64>,
+    pub cells: usize,
+}
+
+/// Every covariate that varies.
+pub(super) fn covariates(
+    looks: &[Look],
+    prediction: &Prediction,
+    observations: &[Observation],
+) -> Vec<Covariate> {
+    let [x0, y0] =
+        [|look: &Look| look.xt_m, |look: &Look| look.yt_m].map(|pick| middle(looks, pick));
+    let of_look = |name, cells, pick: &dyn Fn(&Look) -> f64| Covariate {
+        name,
+        values: looks.iter().map(pick).collect(),
+        cells,
+    };
+    let arrived = || prediction.arrived.iter().map(|arrived| arrived.as_ref());
+    let ln_power = |power_w: f64| power_w.max(f64::MIN_POSITIVE).ln();
+    let powers = arrived().map(|a| a.map_or(f64::MIN_POSITIVE.ln(), |a| ln_power(a.power_w)));
+    let off = observations.iter().zip(arrived());
+    let off_m = |(seen, arrived): (&Observation, Option<&crate::effects::Arrived>)| {
+        seen.range_m.zip(arrived).map_or(0.0, |(seen_m, arrived)| seen_m - arrived.range_m)
+    };
+    let mut all = vec![
+        of_look("theta", 14, &|look| look.hit.theta_rad()),
+        of_look("azimuth", 12, &|look| look.azimuth_rad),
+        of_look("range", 16, &|look| look.hit.range_m),
+        of_look("x_t", 12, &|look| look.xt_m),
+        of_look("y_t", 12, &|look| look.yt_m),
+        of_look("distance from centre", 12, &|look| (look.xt_m - x0).hypot(look.yt_m - y0)),
+        of_look("bearing from centre", 24, &|look| (look.yt_m - y0).atan2(look.xt_m - x0)),
+        of_look("distance from edge", 8, &|look| look.edge_m),
+        of_look("progress", 20, &|look| look.progress),
+        Covariate { name: "predicted power", values: powers.collect(), cells: 12 },
+        Covariate { name: "range residual", values: off.map(off_m).collect(), cells: 8 },
+        of_look("region", 8, &|look| f64::from(look.region)),
+    ];
+    all.retain(|c| c.values.iter().any(|value| Some(value) != c.values.first()));
+    all
+}
+
+fn middle(looks: &[Look], pick: fn(&Look) -> f64) -> f64 {
+    let ends = [f64::INFINITY, f64::NEG_INFINITY];
+    let [low, high] = looks.iter().map(pick).fold(ends, |[low, high], x| [low.min(x), high.max(x)]);
+    0.5 * (low + high)
+}
+
+/// Upper ends of cells of equal numbers of looks, all different.
+pub(super) fn quantiles(values: &[f64], cells: usize) -> Vec<f64> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let mut ends: Vec<f64> = (0..=cells)
+        .filter_map(|k| sorted.get(k * sorted.len().saturating_sub(1) / cells.max(1)))
+        .copied()
+        .collect();
+    ends.dedup();
+    ends
+}
