@@ -63,6 +63,11 @@ struct Args {
 #[allow(dead_code)] // The test that includes this file calls the parts.
 fn main() -> Result<(), Failure> {
     let args = Args::parse();
+    if args.title.len().max(args.made_by.len()) > args.cases.len() {
+        return Err(
+            "there are more titles or commands than folders; give a --cases for each".into()
+        );
+    }
     let scratch = tempfile::tempdir()?;
     let keep = args.keep.as_deref().unwrap_or(scratch.path());
     let runner = Runner::new(&args.matdb, args.jobs.into(), keep)?;

@@ -52,7 +52,7 @@ impl Sorted {
         Sorted(values)
     }
 
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.0.len()
     }
 

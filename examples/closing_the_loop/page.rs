@@ -35,8 +35,12 @@ pub fn page(sets: &[Set], tuned_on: Option<&str>) -> String {
         page += &in_words(set, targets);
     }
     page += &beside(sets, &all);
-    let tuned_on = tuned_on.unwrap_or("it is not stated on which cases");
-    page += &format!("\nSettings of the diagnosis were tuned on: {tuned_on}.\n");
+    page += &match tuned_on {
+        Some(cases) => format!("\nSettings of the diagnosis were tuned on: {cases}.\n"),
+        None => {
+            "\nIt is not stated on which cases the settings of the diagnosis were tuned.\n".into()
+        }
+    };
     page += LEGEND;
     for set in sets {
         page += &section::section(set);
@@ -50,7 +54,7 @@ fn in_words(set: &Set, targets: &[Target]) -> String {
     let missed: Vec<String> = told
         .iter()
         .filter(|target| target.met == Some(false))
-        .map(|target| format!("{} ({} instead of {})", target.what, target.reached, target.aim))
+        .map(|target| format!("{}, {} instead of {}", target.what, target.reached, target.aim))
         .collect();
     let wrong = set.cases.iter().filter(|case| case.missed()).count();
     let missed_text = match missed.is_empty() {
@@ -81,12 +85,25 @@ fn beside(sets: &[Set], all: &[Vec<Target>]) -> String {
     table(&head, rows)
 }
 
-/// A Markdown table: the first column to the left, the others to the right.
+/// A Markdown table of numbers: the first column to the left, the others to the right.
 pub fn table<S: AsRef<str>>(head: &[S], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    aligned(head, "--:|", rows)
+}
+
+/// A Markdown table of words, all to the left.
+pub fn listing<S: AsRef<str>>(head: &[S], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    aligned(head, "---|", rows)
+}
+
+fn aligned<S: AsRef<str>>(
+    head: &[S],
+    others: &str,
+    rows: impl IntoIterator<Item = Vec<String>>,
+) -> String {
     let line = |cells: Vec<&str>| format!("| {} |\n", cells.join(" | "));
     let escape = |cell: &String| cell.replace('|', "\\|").replace('\n', " ");
     let mut text = line(head.iter().map(AsRef::as_ref).collect());
-    text += &format!("|---|{}\n", "--:|".repeat(head.len() - 1));
+    text += &format!("|---|{}\n", others.repeat(head.len() - 1));
     for row in rows {
         let row: Vec<String> = row.iter().map(escape).collect();
         text += &line(row.iter().map(String::as_str).collect());

@@ -46,15 +46,18 @@ fn of_effect(right: &str, label: &Label, run: &Run) -> String {
     if run.has_in_class(right) {
         return "right effect in the class of a later one".into();
     }
-    let Some(tried) = run.tried(right) else {
+    // Effects stand in the order of the rounds that they were added in. What counts is the round in
+    // which a wrong one was, or the last.
+    let wrong = run.found().iter().position(|found| !label.has(&found.name));
+    let round = wrong.unwrap_or(run.found().len()) + 1;
+    let Some(tried) = run.tried(round, right).or(run.tried(1, right)) else {
         return "right effect was not tried".into();
     };
     if let Some(why) = stopped(tried) {
         return why.into();
     }
-    let named = run.found().iter().find(|found| !label.has(&found.name));
-    let named = named.and_then(|found| run.tried(&found.name));
-    match named {
+    let named = wrong.and_then(|wrong| run.found().get(wrong));
+    match named.and_then(|named| run.tried(round, &named.name)) {
         Some(named) if gain(tried) >= ALIKE * gain(named) => {
             "named an effect whose fingerprint is alike".into()
         }

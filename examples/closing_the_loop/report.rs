@@ -119,10 +119,10 @@ impl Run {
         self.first() == name || self.found().first().is_some_and(in_class)
     }
 
-    /// An effect of the first round.
-    pub fn tried(&self, name: &str) -> Option<&Candidate> {
+    /// An effect as it was tried in a round, from 1.
+    pub fn tried(&self, round: usize, name: &str) -> Option<&Candidate> {
         let tried = &self.report.as_ref().ok()?.ranking;
-        tried.iter().find(|candidate| candidate.round == 1 && candidate.name == name)
+        tried.iter().find(|candidate| candidate.round == round && candidate.name == name)
     }
 
     /// Everything that was said, in few words.

@@ -159,7 +159,10 @@ fn name(case: &Path) -> String {
 }
 
 fn folders(cases: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let entries = fs::read_dir(cases).map_err(|error| format!("{}: {error}", cases.display()))?;
+    let missing = |error: std::io::Error| {
+        format!("{}: {error}; give a folder with cases/ and labels/", cases.display())
+    };
+    let entries = fs::read_dir(cases).map_err(missing)?;
     let mut found = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>, Failure>>()?;
     found.retain(|path| path.join("scene.toml").exists());
     found.sort();

@@ -71,7 +71,7 @@ impl Case {
 }
 
 /// Cases that satisfy something.
-pub fn those<'a>(cases: &'a [Case], which: impl Fn(&Label) -> bool) -> Vec<&'a Case> {
+pub fn those(cases: &[Case], which: impl Fn(&Label) -> bool) -> Vec<&Case> {
     cases.iter().filter(|case| which(&case.label)).collect()
 }
 
@@ -153,7 +153,7 @@ pub fn deviations(cases: &[Case]) -> Vec<Deviations> {
         let (off, in_sd) = (Sorted::new(off), Sorted::new(in_sd.into_iter().flatten()));
         Deviations { effect, parameter, scale, off, in_sd }
     };
-    PARAMETERS.iter().map(of).filter(|one| one.off.len() > 0).collect()
+    PARAMETERS.iter().map(of).filter(|one| one.off.count() > 0).collect()
 }
 
 /// Distance at which reports give the gain over the field, m.

@@ -6,7 +6,7 @@ use matdb::effects::library;
 
 use super::label::{Expected, Strength};
 use super::numbers::{Share, Sorted, digits, runs};
-use super::page::{Set, table};
+use super::page::{Set, listing, table};
 use super::reason::reason;
 use super::report::{NO_ANSWER, NONE, Run};
 use super::score::{Case, Scale, confusion, deviations, expecting, mean, pairs, share, singles};
@@ -94,6 +94,9 @@ fn confusions(cases: &[Case]) -> String {
             .to_owned();
     for strength in Strength::ALL {
         let counts = confusion(&singles(cases, strength));
+        if counts.is_empty() {
+            continue;
+        }
         let mut head = vec![strength.name().to_owned()];
         head.extend((1..=names.len()).map(|number| number.to_string()));
         head.extend([NONE, NO_ANSWER].map(str::to_owned));
@@ -114,13 +117,10 @@ fn confusions(cases: &[Case]) -> String {
     text
 }
 
-/// Cases in groups of one name.
-fn groups<'a>(
-    cases: Vec<&'a Case>,
-    of: impl Fn(&Case) -> String,
-) -> BTreeMap<String, Vec<&'a Case>> {
+/// Cases by what was put in.
+fn groups<'a>(cases: &[&'a Case]) -> BTreeMap<String, Vec<&'a Case>> {
     let mut groups = BTreeMap::<String, Vec<&Case>>::new();
-    cases.into_iter().for_each(|case| groups.entry(of(case)).or_default().push(case));
+    cases.iter().for_each(|case| groups.entry(put_in(case)).or_default().push(case));
     groups
 }
 
@@ -142,7 +142,7 @@ fn of_pairs(cases: &[Case]) -> String {
         ]
     };
     let all = row("all".into(), &pairs);
-    let by_pair = groups(pairs, |case| put_in(case));
+    let by_pair = groups(&pairs);
     let rows = by_pair.into_iter().map(|(name, cases)| row(name, &cases)).chain([all]);
     format!("In any order.\n\n{}", table(&head, rows))
 }
@@ -197,7 +197,7 @@ fn unknown(cases: &[Case]) -> String {
         cells
     };
     let all = row("all".into(), &cases);
-    let by_name = groups(cases, |case| put_in(case));
+    let by_name = groups(&cases);
     let rows = by_name.into_iter().map(|(name, cases)| row(name, &cases)).chain([all]);
     format!(
         "“Named” counts cases that got a name nonetheless, whatever their verdict.\n\n{}",
@@ -276,10 +276,10 @@ fn parameters(cases: &[Case]) -> String {
         let off = |value: Option<f64>| format!("{} {unit}", digits(value, 1));
         vec![
             format!("{} `{}`", one.effect, one.parameter),
-            one.off.len().to_string(),
+            one.off.count().to_string(),
             off(one.off.median()),
             off(one.off.worst()),
-            one.in_sd.len().to_string(),
+            one.in_sd.count().to_string(),
             digits(one.in_sd.median(), 1),
             digits(one.in_sd.worst(), 1),
         ]
@@ -293,7 +293,8 @@ fn parameters(cases: &[Case]) -> String {
 }
 
 fn time(cases: &[Case]) -> String {
-    let seconds = Sorted::new(cases.iter().map(|case| case.run.seconds));
+    let answered = cases.iter().filter(|case| case.run.report.is_ok());
+    let seconds = Sorted::new(answered.map(|case| case.run.seconds));
     let jobs: BTreeSet<u64> = cases.iter().map(|case| case.run.jobs as u64).collect();
     let programs: BTreeSet<&str> = cases.iter().map(|case| case.run.program.as_str()).collect();
     let threads = match jobs.last() {
@@ -327,13 +328,14 @@ fn misses(cases: &[Case]) -> String {
         "case",
         "said",
         "gain of the right one",
-        "gain of the named one",
+        "gain of the wrong one",
         "reason",
     ];
     format!(
-        "Gains are in ln likelihood, of the first round; ≈ marks one that is only of a sample of the chirps. The reason follows \
-         from the report by rule.\n\n{}",
-        table(&head, missed.into_iter().map(miss))
+        "Gains are in ln likelihood, of the first round; ≈ marks one that is only of a sample of the chirps. The \
+         reason follows from the report by rule, from the round in which a wrong effect was added, or else the last. \
+         An effect with a measure of its own has an rms of 0.\n\n{}",
+        listing(&head, missed.into_iter().map(miss))
     )
 }
 
@@ -344,7 +346,8 @@ fn miss(case: &Case) -> Vec<String> {
         Expected::Named => right.collect::<Vec<_>>().join(" + "),
         _ => "–".into(),
     };
-    let named = run.found().first().map_or("–".into(), |found| gain(run, &found.name));
+    let wrong = run.found().iter().find(|found| !label.has(&found.name));
+    let named = wrong.map_or("–".into(), |found| gain(run, &found.name));
     vec![
         put_in(case),
         label.strength.map_or("–", Strength::name).to_owned(),
@@ -360,7 +363,7 @@ fn miss(case: &Case) -> Vec<String> {
 }
 
 fn gain(run: &Run, name: &str) -> String {
-    let Some(tried) = run.tried(name) else { return "–".into() };
+    let Some(tried) = run.tried(1, name) else { return "–".into() };
     let about = if tried.sampled { "≈ " } else { "" };
     tried.gain.map_or("–".into(), |gain| format!("{about}{gain:.0}"))
 }
