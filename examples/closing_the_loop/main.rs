@@ -68,6 +68,7 @@ fn main() -> Result<(), Failure> {
             "there are more titles or commands than folders; give a --cases for each".into()
         );
     }
+    checked(&args)?;
     let scratch = tempfile::tempdir()?;
     let keep = args.keep.as_deref().unwrap_or(scratch.path());
     let runner = Runner::new(&args.matdb, args.jobs.into(), keep)?;
@@ -84,6 +85,16 @@ fn main() -> Result<(), Failure> {
     let sets = sets.collect::<Result<Vec<_>, Failure>>()?;
     std::fs::write(&args.output, page::page(&sets, args.tuned_on.as_deref()))?;
     Ok(())
+}
+
+/// What would otherwise be found out when hours of runs are over.
+fn checked(args: &Args) -> Result<(), Failure> {
+    let folders = args.cases.iter().flat_map(|folder| ["cases", "labels"].map(|f| folder.join(f)));
+    let page = args.output.parent().filter(|folder| !folder.as_os_str().is_empty());
+    match folders.chain(page.map(Into::into)).find(|folder| !folder.is_dir()) {
+        Some(absent) => Err(format!("{}: there is no such folder", absent.display()).into()),
+        None => Ok(()),
+    }
 }
 
 /// Every run with its truth.

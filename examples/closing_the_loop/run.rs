@@ -159,10 +159,7 @@ fn name(case: &Path) -> String {
 }
 
 fn folders(cases: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let missing = |error: std::io::Error| {
-        format!("{}: {error}; give a folder with cases/ and labels/", cases.display())
-    };
-    let entries = fs::read_dir(cases).map_err(missing)?;
+    let entries = fs::read_dir(cases).map_err(|error| format!("{}: {error}", cases.display()))?;
     let mut found = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>, Failure>>()?;
     found.retain(|path| path.join("scene.toml").exists());
     found.sort();
