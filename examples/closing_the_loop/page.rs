@@ -1,0 +1,129 @@
+//! The page: a summary, and a section for every set of cases.
+
+use super::score::Case;
+use super::section;
+use super::target::{Target, targets};
+
+/// A folder of cases with everything that is known of it.
+pub struct Set {
+    pub title: String,
+    /// The command that made the cases.
+    pub made_by: Option<String>,
+    pub cases: Vec<Case>,
+    /// Cases that have no label, and labels that have no case.
+    pub unmatched: [usize; 2],
+}
+
+/// The command that writes the page.
+pub const COMMAND: &str = "cargo run --release --example closing_the_loop -- --cases DIR \
+                           --matdb target/release/matdb -o docs/closing-the-loop.md";
+
+/// The whole page.
+pub fn page(sets: &[Set], tuned_on: Option<&str>) -> String {
+    let mut page = format!(
+        "# Closing the loop\n\n\
+         Does `matdb diagnose` name the effect that a model lacks? Scans with a known truth were simulated, the truth \
+         put aside, and the program run on each as a user would: `matdb add --from material/material.toml`, then \
+         `matdb diagnose`. Only when all reports were there the truths were opened and counted. Everything here is \
+         synthetic; nothing was measured. This page is written by\n\n\
+         ```sh\n{COMMAND}\n```\n\n\
+         after `cargo build --release`, with a `--cases` for each set, and no number in it is written by hand.\n\n\
+         ## Summary\n\n"
+    );
+    let all: Vec<Vec<Target>> = sets.iter().map(|set| targets(&set.cases)).collect();
+    for (set, targets) in sets.iter().zip(&all) {
+        page += &in_words(set, targets);
+    }
+    page += &beside(sets, &all);
+    page += &match tuned_on {
+        Some(cases) => format!("\nSettings of the diagnosis were tuned on: {cases}.\n"),
+        None => {
+            "\nIt is not stated on which cases the settings of the diagnosis were tuned.\n".into()
+        }
+    };
+    page += LEGEND;
+    for set in sets {
+        page += &section::section(set);
+    }
+    page
+}
+
+/// What a reader in a hurry wants to know.
+fn in_words(set: &Set, targets: &[Target]) -> String {
+    let told: Vec<&Target> = targets.iter().filter(|target| target.met.is_some()).collect();
+    let missed: Vec<String> = told
+        .iter()
+        .filter(|target| target.met == Some(false))
+        .map(|target| format!("{}, {} instead of {}", target.what, target.reached, target.aim))
+        .collect();
+    let wrong = set.cases.iter().filter(|case| case.missed()).count();
+    let missed_text = match missed.is_empty() {
+        true => "None of them was missed.".to_owned(),
+        false => format!("Missed: {}.", missed.join("; ")),
+    };
+    format!(
+        "**{}**: {} of {} cases came out as they should, and {} of the {} targets that they can tell about are met. \
+         {missed_text}\n\n",
+        set.title,
+        set.cases.len() - wrong,
+        set.cases.len(),
+        told.len() - missed.len(),
+        told.len(),
+    )
+}
+
+fn beside(sets: &[Set], all: &[Vec<Target>]) -> String {
+    let titles: Vec<String> = sets.iter().map(|set| set.title.clone()).collect();
+    let mut head = vec!["what".to_owned(), "target".to_owned()];
+    head.extend(titles);
+    let rows = (0..all.first().map_or(0, Vec::len)).map(|row| {
+        let first = &all[0][row];
+        let mut cells = vec![first.what.to_owned(), first.aim.to_owned()];
+        cells.extend(all.iter().map(|targets| targets[row].cell()));
+        cells
+    });
+    table(&head, rows)
+}
+
+/// A Markdown table of numbers: the first column to the left, the others to the right.
+pub fn table<S: AsRef<str>>(head: &[S], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    aligned(head, "--:|", rows)
+}
+
+/// A Markdown table of words, all to the left.
+pub fn listing<S: AsRef<str>>(head: &[S], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    aligned(head, "---|", rows)
+}
+
+fn aligned<S: AsRef<str>>(
+    head: &[S],
+    others: &str,
+    rows: impl IntoIterator<Item = Vec<String>>,
+) -> String {
+    let line = |cells: Vec<&str>| format!("| {} |\n", cells.join(" | "));
+    let escape = |cell: &String| cell.replace('|', "\\|").replace('\n', " ");
+    let mut text = line(head.iter().map(AsRef::as_ref).collect());
+    text += &format!("|---|{}\n", others.repeat(head.len() - 1));
+    for row in rows {
+        let row: Vec<String> = row.iter().map(escape).collect();
+        text += &line(row.iter().map(String::as_str).collect());
+    }
+    text
+}
+
+const LEGEND: &str = "
+## How it is counted
+
+- Weak, moderate and strong are the size of what the refitted base model leaves without the effect: 0.35, 0.9 and 2.2 dB
+  rms, or as much of the effect's own measure. A label that says what was reached, and not only what was wanted, is
+  taken at its word.
+- *Right name first*: the first effect of the report is the one that was put in. *Exactly*: it is the only one.
+- *Or in its class*: the first name comes with others that predict the data as well, and the right one is among them.
+  No target counts this.
+- *Extra names*: names that are not the truth's, without a wrong first one, which is a miss already. *All wrong names*
+  counts that one, too.
+- *False alarm*: any name, or any verdict but `no-missing-effect`, where nothing is missing.
+- *No answer*: `cannot-tell`, or a command that failed. It counts as a miss, and as a false alarm where nothing is missing.
+- The error is root mean square of observed − expected power over held-out detections. The noise floor is the error of
+  a model that is right.
+";

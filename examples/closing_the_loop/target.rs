@@ -1,0 +1,100 @@
+//! What was aimed at, beside what was reached.
+
+use super::label::{Expected, Strength};
+use super::numbers::{Share, Sorted, digits};
+use super::score::{Case, expecting, mean, pairs, share, singles, those};
+
+/// A target and what became of it.
+pub struct Target {
+    pub what: &'static str,
+    pub aim: &'static str,
+    /// As text.
+    pub reached: String,
+    /// None where there is no case to tell.
+    pub met: Option<bool>,
+}
+
+impl Target {
+    fn at_least(what: &'static str, aim: &'static str, share: Share, least: f64) -> Target {
+        let met = share.ratio().map(|ratio| ratio >= least);
+        Target { what, aim, reached: share.cell(), met }
+    }
+
+    fn at_most(
+        what: &'static str,
+        aim: &'static str,
+        value: Option<f64>,
+        most: f64,
+        text: String,
+    ) -> Target {
+        Target { what, aim, reached: text, met: value.map(|value| value <= most) }
+    }
+
+    /// For a cell of a table.
+    pub fn cell(&self) -> String {
+        match self.met {
+            Some(true) => format!("{}: met", self.reached),
+            Some(false) => format!("**{}: missed**", self.reached),
+            None => "no such case".into(),
+        }
+    }
+}
+
+/// All targets, of one set of cases.
+pub fn targets(cases: &[Case]) -> Vec<Target> {
+    let first = |strength| share(&singles(cases, strength), Case::named_first);
+    let named = those(cases, |label| label.expected == Expected::Named);
+    let one = those(cases, |label| label.single().is_some());
+    let extra = mean(&one, Case::extra);
+    let alarms = share(&expecting(cases, Expected::Complete), Case::alarm);
+    let after = Sorted::new(named.iter().filter_map(|case| case.after_to_floor()));
+    let unknown = expecting(cases, Expected::Unknown);
+    let unexplained = share(&unknown, |case| case.run.verdict() == "unexplained");
+    let both = share(&pairs(cases), Case::all_found);
+    let [middle, most] = [after.median(), after.quantile(0.9)];
+    vec![
+        Target::at_least(
+            "strong effect: right name first",
+            "≥ 97 %",
+            first(Strength::Strong),
+            0.97,
+        ),
+        Target::at_least(
+            "moderate effect: right name first",
+            "≥ 92 %",
+            first(Strength::Moderate),
+            0.92,
+        ),
+        Target::at_least("weak effect: right name first", "≥ 80 %", first(Strength::Weak), 0.80),
+        Target::at_most(
+            "spurious extra names per case with one effect",
+            "≤ 0.10",
+            extra,
+            0.1,
+            digits(extra, 2),
+        ),
+        Target::at_most(
+            "nothing missing: false alarms",
+            "≤ 3 %",
+            alarms.ratio(),
+            0.03,
+            alarms.cell(),
+        ),
+        Target::at_least("two effects: both named", "≥ 80 %", both, 0.80),
+        Target::at_least("unknown effect: called unexplained", "≥ 90 %", unexplained, 0.90),
+        Target::at_most(
+            "error after over noise floor, median",
+            "≤ 1.03",
+            middle,
+            1.03,
+            digits(middle, 3),
+        ),
+        Target::at_most(
+            "error after over noise floor, 90th percentile",
+            "≤ 1.10",
+            most,
+            1.10,
+            digits(most, 3),
+        ),
+    ]
+}
