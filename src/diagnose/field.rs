@@ -37,6 +37,8 @@ pub(super) struct Structure {
     pub ln_factor: Vec<f64>,
     /// Gain in held-out ln p, and its standard error.
     pub gain: [f64; 2],
+    /// Gain in ln likelihood where it has seen all folds.
+    pub fitted_gain: f64,
     /// Root mean square over the detections of what it changes, dB.
     pub size_db: f64,
     /// The same of every covariate's part.
@@ -46,6 +48,18 @@ pub(super) struct Structure {
 impl Field {
     /// Over these covariates and the target plane.
     pub fn new(looks: &[Look], covariates: &[Covariate]) -> Field {
+        let mut field = Field::spline(looks, covariates);
+        field.add_map(looks);
+        field
+    }
+
+    /// How many numbers it has.
+    pub fn numbers(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Over these covariates alone.
+    pub fn spline(looks: &[Look], covariates: &[Covariate]) -> Field {
         let mut field = Field { entries: vec![Vec::new(); looks.len()], names: Vec::new() };
         for covariate in covariates {
             let knots = quantiles(&covariate.values, covariate.cells);
@@ -56,7 +70,6 @@ impl Field {
                 entry.extend([(first + low, share), (first + high.0, high.1)]);
             }
         }
-        field.add_map(looks);
         field
     }
 
@@ -117,7 +130,11 @@ impl Field {
         let mut parts_db: Vec<(&'static str, f64)> = names.iter().map(part).collect();
         parts_db.sort_by(|a, b| b.1.total_cmp(&a.1));
         let size_db = rms_db(&|look| ln_factor.get(look).copied().unwrap_or(0.0));
-        Structure { size_db, ln_factor, gain, parts_db }
+        let factors: Vec<f64> =
+            (0..self.entries.len()).map(|look| self.ln_factor(&numbers, laws, look)).collect();
+        let there = terms(problem, prediction, &factors);
+        let fitted_gain = there.iter().zip(&here).map(|(a, b)| a.ln_p - b.ln_p).sum();
+        Structure { size_db, ln_factor, gain, fitted_gain, parts_db }
     }
 
     /// Most likely numbers of the field, and after them those of the laws.

@@ -18,7 +18,7 @@ pub struct Folds {
     pub blocks: usize,
     /// Number of folds.
     pub folds: usize,
-    /// Smaller patch of every look, two thirds as wide, and how many of them there are.
+    /// Smaller patch of every look, a third as wide, and how many of them there are.
     cell: Vec<usize>,
     cells: usize,
 }
@@ -52,7 +52,7 @@ impl Folds {
         }
         let mut numbers = BTreeMap::new();
         let numbered = |look: &Look| {
-            let side_m = 2.0 / 3.0 * block_m.max(1e-6);
+            let side_m = block_m.max(1e-6) / 3.0;
             let place = [look.yt_m, look.xt_m].map(|x| (x / side_m).floor() as i64);
             let next = numbers.len();
             *numbers.entry(place).or_insert(next)

@@ -16,6 +16,8 @@ use super::looks::Observation;
 const OUTLIERS: f64 = 1e-4;
 /// Their density in ln power, as wide as 60 dB.
 const OUTLIER_DENSITY: f64 = 1.0 / 13.8;
+/// Standard deviations of the score of a look that count at most where a start is sought.
+const MOST_PULL: f64 = 4.0;
 /// Share of ranges that no model explains, and how much wider than the rest these are.
 const STRAY_RANGES: f64 = 0.01;
 const STRAY_WIDTH: f64 = 10.0;
@@ -55,6 +57,8 @@ pub(super) struct Term {
     pub ln_mean: f64,
     /// d ln p/d ln mean.
     pub slope: f64,
+    /// The same as if there were no outliers, but no more than [`MOST_PULL`] standard deviations.
+    pub pull: f64,
     /// −d² ln p/d(ln mean)², never negative.
     pub bend: f64,
     /// Predicted range, m; 0 where nothing arrives.
@@ -84,10 +88,16 @@ impl<'a> Likelihood<'a> {
         NODES.iter().map(|(t, weight)| (mean((spread * t).exp()), *weight)).collect()
     }
 
+    /// Mean power of a look with thermal noise, W.
+    pub fn mean_w(&self, look: usize) -> f64 {
+        let means = self.ln_means(look);
+        means.iter().map(|(ln_mean, weight)| weight * ln_mean.exp()).sum()
+    }
+
     /// One chirp's part of the likelihood.
     pub fn term(&self, look: usize, seen: &Observation) -> Term {
         let means = self.ln_means(look);
-        let (mut p, mut slope, mut bend) = (0.0, 0.0, 0.0);
+        let (mut p, mut slope, mut bend, mut pull) = (0.0, 0.0, 0.0, 0.0);
         for &(ln_mean, weight) in &means {
             let law = match seen.power_w {
                 Some(power_w) => self.law.detected(power_w.ln(), ln_mean),
@@ -96,9 +106,12 @@ impl<'a> Likelihood<'a> {
             let part = (1.0 - OUTLIERS) * weight * law.value.exp();
             p += part;
             slope += part * law.by_ln_mean;
+            pull += weight * law.by_ln_mean;
             bend += part * law.bend;
         }
         let anything = if seen.power_w.is_some() { OUTLIER_DENSITY } else { 0.5 };
+        let most = MOST_PULL * self.prediction.receiver.looks.sqrt();
+        let pull = pull.clamp(-most, most);
         p += OUTLIERS * anything;
         let ln_mean = means.get(means.len() / 2).map_or(0.0, |mean| mean.0);
         let arrived = self.prediction.arrived.get(look).copied().flatten();
@@ -108,6 +121,7 @@ impl<'a> Likelihood<'a> {
             ln_p: p.ln() + ln_range,
             ln_mean,
             slope: slope / p,
+            pull,
             bend: bend / p,
             range_m,
             range_slope,

@@ -5,12 +5,14 @@
 
 use std::collections::HashMap;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::DiagnoseError;
 use crate::effects::{Look, Stage};
-use crate::frames::{Direction, Pose};
+use crate::frames::{Direction, Global, Point, Pose};
 use crate::measure::cloud::{Cloud, CloudPoint};
+use crate::measure::nearest::Nearest;
 use crate::radar::{Chirps, Radar};
 use crate::render::{LocalFrame, trace};
 use crate::units::watts_from_dbm;
@@ -29,7 +31,9 @@ pub struct Observation {
 pub struct Matched {
     /// One for each look.
     pub observations: Vec<Observation>,
-    /// Detections of chirps that meet no target, or far from where they meet it.
+    /// Detections of chirps that meet no target.
+    pub beside: usize,
+    /// Detections far in range from where their chirp meets the target.
     pub false_alarms: usize,
 }
 
@@ -46,7 +50,7 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>,
         let region = stage.region_of_facet.get(hit.facet as usize).copied().unwrap_or(0);
         let grain = stage.grain_of_region.get(usize::from(region)).copied();
         let back = -ray.direction.xyz();
-        let frame = LocalFrame::new(stage.bvh.mesh(), &hit, back, grain.unwrap_or(glam::DVec3::Y));
+        let frame = LocalFrame::new(stage.bvh.mesh(), &hit, back, grain.unwrap_or(DVec3::Y));
         let towards: Direction<_> = frame.local(back);
         let [x, y, _] = towards.xyz().to_array();
         let place = places.get(index)?;
@@ -68,30 +72,71 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>,
     Ok((0..chirps.rays.len()).into_par_iter().filter_map(look).collect())
 }
 
-/// Sorts a cloud by the looks. A detection further than `gate_m` from where its chirp meets the target
-/// is a false alarm, and its chirp then counts as one that saw nothing.
+/// Sorts a cloud by the looks of its scan, by chirp numbers or, without them, by directions. A detection
+/// further than `gate_m` from where its chirp meets the target is a false alarm, and its chirp then
+/// counts as one that saw nothing.
 ///
 /// # Errors
-/// When a point has no chirp number.
-pub fn matched(cloud: &Cloud, looks: &[Look], gate_m: f64) -> Result<Matched, DiagnoseError> {
+/// When points have no chirp number and no direction from a common origin, or when hardly any lies on
+/// the target.
+pub fn matched(
+    cloud: &Cloud,
+    chirps: &Chirps,
+    looks: &[Look],
+    gate_m: f64,
+) -> Result<Matched, DiagnoseError> {
     let index_of_chirp: HashMap<u32, usize> =
         looks.iter().enumerate().map(|(index, look)| (look.chirp, index)).collect();
+    let by_direction = match cloud.points().iter().all(|point| point.chirp.is_some()) {
+        true => None,
+        false => Some(Directions::new(chirps).ok_or(DiagnoseError::Unnumbered)?),
+    };
     let mut observations = vec![Observation::default(); looks.len()];
-    let mut false_alarms = 0;
-    for (number, point) in cloud.points().iter().enumerate() {
-        let chirp = point.chirp.ok_or(DiagnoseError::Unnumbered { point: number })?;
-        let index = index_of_chirp.get(&chirp).copied();
+    let [mut beside, mut false_alarms, mut on_target] = [0, 0, 0];
+    for point in cloud.points() {
+        let chirp = point.chirp.or_else(|| by_direction.as_ref()?.chirp(chirps, point.point));
+        let index = chirp.and_then(|chirp| index_of_chirp.get(&chirp).copied());
         let seen = index.and_then(|index| Some((looks.get(index)?, observations.get_mut(index)?)));
         match seen {
-            Some((look, observation)) if off_m(point, look) <= gate_m => {
+            None => beside += 1,
+            Some((look, observation))
+                if off_m(point, look) <= gate_m && observation.power_w.is_none() =>
+            {
+                on_target += 1;
                 let range_m = Some(range_m(point, look));
                 let power_w = Some(watts_from_dbm(point.power_dbm));
                 *observation = Observation { power_w, range_m };
             }
-            _ => false_alarms += 1,
+            Some(_) => false_alarms += 1,
         }
     }
-    Ok(Matched { observations, false_alarms })
+    let (matched, points) = (on_target, cloud.points().len());
+    match matched * 2 < points {
+        true => Err(DiagnoseError::Elsewhere { matched, points }),
+        false => Ok(Matched { observations, beside, false_alarms }),
+    }
+}
+
+/// The directions of a scan whose rays start from one point.
+struct Directions {
+    origin: Point<Global>,
+    tree: Nearest,
+}
+
+impl Directions {
+    fn new(chirps: &Chirps) -> Option<Directions> {
+        const APART_M: f64 = 1e-6;
+        let origin = chirps.rays.first()?.origin;
+        let common = chirps.rays.iter().all(|ray| ray.origin.distance_m(origin) < APART_M);
+        let directions: Vec<DVec3> = chirps.rays.iter().map(|ray| ray.direction.xyz()).collect();
+        let tree = Nearest::new(&directions)?;
+        common.then_some(Directions { origin, tree })
+    }
+
+    fn chirp(&self, chirps: &Chirps, point: Point<Global>) -> Option<u32> {
+        let direction = self.origin.towards(point)?;
+        chirps.number.get(self.tree.find(direction.xyz()).0).copied()
+    }
 }
 
 fn range_m(point: &CloudPoint, look: &Look) -> f64 {

@@ -15,6 +15,7 @@
 //! | held-out patches, controls, selection | `folds.rs`, `placebo.rs`, `select.rs` |
 //! | what remains, and how large the error is | `residual.rs`, `score.rs` |
 
+mod controls;
 mod covariates;
 mod field;
 mod folds;
@@ -333,11 +334,22 @@ pub enum DiagnoseError {
     /// A law that cannot be fitted.
     #[error(transparent)]
     Fit(#[from] FitError),
-    /// A point that cannot be given to its chirp.
-    #[error("point {point} of the cloud has no chirp number; export the cloud with its chirps")]
-    Unnumbered {
-        /// Point, from 0.
-        point: usize,
+    /// Points that cannot be given to their chirps.
+    #[error(
+        "the cloud has no chirp numbers and the rays of the scan do not start from one point; export \
+         the cloud with a column `chirp`"
+    )]
+    Unnumbered,
+    /// A cloud of something else.
+    #[error(
+        "{matched} of the cloud's {points} points lie where the scan meets the mesh; check the scene, \
+         its pose and the frame and unit of the cloud, or register it with `matdb measure`"
+    )]
+    Elsewhere {
+        /// Points on the mesh.
+        matched: usize,
+        /// Points.
+        points: usize,
     },
     /// Too little was detected.
     #[error(
@@ -378,7 +390,7 @@ impl Diagnosis {
     /// Least gain in ln likelihood of an effect with so many numbers, tried from so many starts: about
     /// as rare by chance as the one of a single number.
     fn least_gain_of(&self, numbers: usize, starts: usize) -> f64 {
-        self.least_gain + 1.2 * (numbers as f64 - 1.0) + (starts.max(1) as f64).ln()
+        self.least_gain + 1.2 * (numbers as f64 - 1.0) + (0.25 * starts as f64).max(1.0).ln()
     }
 
     /// Diagnoses a scan, trying these effects.
@@ -395,7 +407,9 @@ impl Diagnosis {
         let selection = Selection { problem, folds: &folds, settings: self };
         let base = selection.base(Space::new(&problem, laws)?);
         let (before, z_before) = (base.held_out.clone(), self.z(&problem, &base));
-        let Selected { state, ranking, added, structure } = selection.run(base, effects);
+        let Selected { state, ranking, added, structure } = selection.run(base.clone(), effects);
+        let numbers = ranking.first().map_or(1, |candidate| candidate.numbers);
+        let controls = controls::controls(&selection, &base, effects, numbers);
         let z_after = self.z(&problem, &state);
         let prediction = problem.predict(&state.space, &state.fitted.at);
         let largest_db = added.iter().map(|a| a.evidence.size_db).fold(0.0, f64::max);
@@ -435,7 +449,7 @@ impl Diagnosis {
             ranking,
             unexplained,
             error,
-            controls: Controls::default(),
+            controls,
             base,
             laws: state.space.model(receiver, &state.fitted.at).laws,
             rows: rows(

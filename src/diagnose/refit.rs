@@ -86,6 +86,21 @@ impl<'a> Space<'a> {
         (space, at.clone().remove_rows(first, gone))
     }
 
+    /// Unknowns of the effects for which rays would have to be traced anew: few, and hardly moved by
+    /// another effect.
+    pub fn costly(&self, at: &DVector<f64>) -> Vec<usize> {
+        let mut first = self.base_len();
+        let mut costly = Vec::new();
+        for (effect, values) in self.effects.iter().zip(self.effect_values(at)) {
+            let next = first + values.len();
+            if effect.surveyed(&values).is_some_and(|depends| !depends.is_empty()) {
+                costly.extend(first..next);
+            }
+            first = next;
+        }
+        costly
+    }
+
     /// Unknowns of the laws; those of the effects follow.
     pub fn base_len(&self) -> usize {
         self.turned.iter().map(|(_, coordinates)| coordinates.len()).sum()
@@ -166,16 +181,16 @@ impl Problem<'_> {
         seen.map(|(look, seen)| likelihood.term(look, seen)).collect()
     }
 
-    /// The most likely point from a start. The first `held` unknowns stay.
+    /// The most likely point from a start. The unknowns numbered in `held` stay.
     pub fn fit(
         &self,
         space: &Space,
         start: &DVector<f64>,
-        held: usize,
+        held: &[usize],
         search: &Minimise,
     ) -> Fitted {
         let [mut lower, mut upper] = space.bounds();
-        for index in 0..held.min(start.len()) {
+        for &index in held {
             (lower[index], upper[index]) = (start[index], start[index]);
         }
         let bounds = [&lower, &upper];

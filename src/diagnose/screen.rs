@@ -10,10 +10,11 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::likelihood::Term;
 use super::looks::Observation;
 use super::refit::{Problem, Slope, Space, sum};
+use super::score::DB;
 use crate::effects::{Look, Surveys};
 
 /// Looks that a screening needs; more only take time.
-const ENOUGH: usize = 3000;
+const ENOUGH: usize = 2500;
 
 /// A start is scaled at most so far.
 const MOST_SCALE: f64 = 5.0;
@@ -86,6 +87,25 @@ impl<'a> Screen<'a> {
         (scale * score - 0.5 * scale * scale * information).max(gain)
     }
 
+    /// Information on the change that a point makes, beyond what the model absorbs.
+    pub fn information_of(&self, space: &Space, at: &DVector<f64>) -> f64 {
+        let there = self.problem.terms(space, at);
+        let changes: Vec<Change> = self.terms.iter().zip(&there).map(apart).collect();
+        self.information(&changes)
+    }
+
+    /// Root mean square change of the means by a point, dB.
+    pub fn size_db(&self, space: &Space, at: &DVector<f64>) -> f64 {
+        let there = self.problem.terms(space, at);
+        let squares = self.terms.iter().zip(&there).map(|pair| apart(pair)[0].powi(2));
+        DB * (squares.sum::<f64>() / self.terms.len().max(1) as f64).sqrt()
+    }
+
+    /// What a point gains in ln likelihood.
+    pub fn gain(&self, space: &Space, at: &DVector<f64>) -> f64 {
+        sum(&self.problem.terms(space, at)) - sum(&self.terms)
+    }
+
     /// Slope of ln likelihood along a change, less what the model absorbs of it.
     fn score(&self, changes: &[Change]) -> f64 {
         let all: f64 = self.terms.iter().zip(changes).map(|(term, c)| along(term, *c)).sum();
@@ -150,7 +170,7 @@ fn apart((before, after): (&Term, &Term)) -> Change {
 }
 
 fn along(term: &Term, [mean, range]: Change) -> f64 {
-    term.slope * mean + term.range_slope * range
+    term.pull * mean + term.range_slope * range
 }
 
 fn inner(term: &Term, a: Change, b: Change) -> f64 {

@@ -21,10 +21,12 @@ use crate::effects::{Effect, Prediction, Receiver};
 use crate::fit::minimise::Minimise;
 
 /// Steps of a fit, and of one on the sample that only shows whether an effect is worth it.
-const SEARCH: Minimise = Minimise { iterations: 30, tolerance: 1e-2 };
+const SEARCH: Minimise = Minimise { iterations: 20, tolerance: 0.1 };
 const SCOUT: Minimise = Minimise { iterations: 12, tolerance: 0.1 };
 /// Starts of an effect that are followed.
 const STARTS: usize = 2;
+/// Strengths of a start that are tried.
+const STRENGTHS: [f64; 6] = [0.3, 1.0, 3.0, 7.0, 12.0, 20.0];
 /// And none that promises less than this share of what the best does.
 const SHARE_OF_START: f64 = 0.7;
 /// Effects that promise less than this share of the best are not fitted at all.
@@ -35,6 +37,8 @@ const SHORTLIST: usize = 5;
 const SHARE_OF_BEST: f64 = 0.3;
 /// An effect that changes less than this share of what the largest does may be the error of its form.
 const SHARE_OF_LARGEST: f64 = 0.2;
+/// And of the scatter: a form that is off here and there scatters more than it shifts.
+const SHARE_OF_SPREAD: f64 = 0.4;
 /// Structure that is left, likewise.
 const SHARE_OF_FORM: f64 = 0.25;
 /// Standard errors by which a field's held-out gain must exceed nothing.
@@ -127,8 +131,8 @@ impl Selection<'_> {
         let receiver = Receiver { looks: looks.min(WIDE_LOOKS), ..self.problem.receiver };
         let sample = Sample::new(&self.problem);
         let wide = Problem { receiver, ..sample.problem(&self.problem) };
-        let start = wide.fit(&space, &space.start(), 0, &SEARCH).at;
-        let fitted = self.problem.fit(&space, &start, 0, &SEARCH);
+        let start = wide.fit(&space, &space.start(), &[], &SEARCH).at;
+        let fitted = self.problem.fit(&space, &start, &[], &SEARCH);
         let held_out = self.held_out(&space, &fitted.at);
         State { space, fitted, held_out }
     }
@@ -151,7 +155,10 @@ impl Selection<'_> {
             };
             if let Some(trial) = trials.get_mut(index) {
                 trial.candidate.accepted = true;
-                let (space, fitted) = (trial.space.clone(), trial.fitted.clone());
+                let (space, mut fitted) = (trial.space.clone(), trial.fitted.clone());
+                if !state.space.costly(&state.fitted.at).is_empty() {
+                    fitted = self.problem.fit(&space, &fitted.at, &[], &SCOUT);
+                }
                 state = State { space, fitted, held_out };
                 let Candidate { gain, size_db, .. } = trial.candidate;
                 let [held_out_gain, held_out_se] = trial.candidate.held_out.unwrap_or_default();
@@ -207,7 +214,15 @@ impl Selection<'_> {
         Field::new(problem.looks, &covariates).structure(problem, &prediction, &laws, self.folds)
     }
 
-    fn mean_slopes(&self, state: &State) -> Vec<Vec<Slope>> {
+    /// A fit of one more term, and its held-out gain with the standard error.
+    pub fn fitted(&self, base: &State, space: &Space, start: &DVector<f64>) -> (Fitted, [f64; 2]) {
+        let fitted = self.problem.fit(space, start, &[], &SCOUT);
+        let held_out = self.held_out(space, &fitted.at);
+        (fitted, self.difference(&held_out, &base.held_out))
+    }
+
+    /// Slopes of the means by every number of a model.
+    pub fn mean_slopes(&self, state: &State) -> Vec<Vec<Slope>> {
         let [lower, upper] = state.space.bounds();
         let at = &state.fitted.at;
         let here = self.problem.terms(&state.space, at);
@@ -219,7 +234,7 @@ impl Selection<'_> {
     /// The model without one of its effects.
     fn without<'a>(&self, state: &State<'a>, index: usize) -> State<'a> {
         let (space, start) = state.space.without(&state.fitted.at, index);
-        let fitted = self.problem.fit(&space, &start, 0, &SEARCH);
+        let fitted = self.problem.fit(&space, &start, &[], &SEARCH);
         let held_out = self.held_out(&space, &fitted.at);
         State { space, fitted, held_out }
     }
@@ -312,6 +327,10 @@ impl Selection<'_> {
         starts.sort_by(|a, b| b.0.total_cmp(&a.0));
         let tried = starts.len();
         starts.truncate(STARTS);
+        let first = state.fitted.at.len();
+        for (_, start) in &mut starts {
+            self.scale(screen, &space, effect, first, start);
+        }
         let (gain, at) = starts.first()?.clone();
         // Where the effect is absent there is nothing to promise.
         let gain = if starts.len() == 1 && gain == 0.0 { f64::INFINITY } else { gain };
@@ -331,13 +350,36 @@ impl Selection<'_> {
         Some(Trial { effect, space, starts, tried, fitted, candidate })
     }
 
+    /// Makes a start as strong as it gains most: far from the data, outliers would hold it.
+    fn scale(
+        &self,
+        screen: &Screen,
+        space: &Space,
+        effect: &dyn Effect,
+        first: usize,
+        start: &mut DVector<f64>,
+    ) {
+        let Some(knob) = effect.knobs().first() else { return };
+        let scaled = |scale: f64| {
+            let mut scaled = start.clone();
+            let value = knob.absent + scale * (start[first] * knob.step - knob.absent);
+            scaled[first] = value.clamp(knob.min, knob.max) / knob.step;
+            (screen.gain(space, &scaled), scaled)
+        };
+        let best = STRENGTHS.map(scaled).into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, scaled)) = best {
+            *start = scaled;
+        }
+    }
+
     /// Fits a trial to the sample.
     fn scout(&self, state: &State, screen: &Screen, weight: f64, trial: &mut Trial) {
         let space = &trial.space;
         let here = sum(&screen.problem.terms(&state.space, &state.fitted.at));
         let most = trial.starts.first().map_or(0.0, |start| start.0);
         let useful = trial.starts.iter().filter(|start| start.0 >= SHARE_OF_START * most);
-        let scouts = useful.map(|(_, start)| screen.problem.fit(space, start, 0, &SCOUT));
+        let held = state.space.costly(&state.fitted.at);
+        let scouts = useful.map(|(_, start)| screen.problem.fit(space, start, &held, &SCOUT));
         let best = scouts
             .filter(|fit| fit.ln_likelihood.is_finite())
             .max_by(|a, b| a.ln_likelihood.total_cmp(&b.ln_likelihood));
@@ -351,7 +393,8 @@ impl Selection<'_> {
 
     /// Fits a trial to all looks.
     fn refit(&self, state: &State, trial: &mut Trial) {
-        trial.fitted = self.problem.fit(&trial.space, &trial.fitted.at, 0, &SEARCH);
+        let held = state.space.costly(&state.fitted.at);
+        trial.fitted = self.problem.fit(&trial.space, &trial.fitted.at, &held, &SEARCH);
         trial.candidate.gain = trial.fitted.ln_likelihood - state.fitted.ln_likelihood;
         trial.candidate.sampled = false;
         trial.candidate.size_db = self.size_db(state, &trial.space, &trial.fitted.at);
@@ -368,9 +411,11 @@ impl Selection<'_> {
         let mut passed: Vec<(usize, Vec<Scored>, f64)> = Vec::new();
         let (mut structure, mut shared_db) = (None, None);
         let Diagnosis { least_size_db, standard_errors, .. } = *self.settings;
-        let least_db = least_size_db.max(SHARE_OF_LARGEST * largest_db);
         for (index, trial) in trials.iter_mut().enumerate().filter(|t| !t.1.candidate.sampled) {
             let least = self.settings.least_gain_of(trial.candidate.numbers, trial.tried);
+            let is_spread = self.is_spread(state, trial);
+            let share = if is_spread { SHARE_OF_SPREAD } else { SHARE_OF_LARGEST };
+            let least_db = least_size_db.max(share * largest_db);
             if trial.candidate.gain < least || trial.candidate.size_db < least_db {
                 continue;
             }
@@ -380,7 +425,7 @@ impl Selection<'_> {
             if gain <= standard_errors * se {
                 continue;
             }
-            if self.is_spread(state, trial) {
+            if is_spread {
                 let structure = structure.get_or_insert_with(|| self.structure(state));
                 let left = self.gain_beside(state, trial, structure);
                 let shared_db = *shared_db.get_or_insert_with(|| self.shared_db(state));

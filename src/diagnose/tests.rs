@@ -272,8 +272,8 @@ fn a_cloud_finds_its_looks() {
         point(&looks[8], looks[8].chirp, 0.5),
         point(&looks[9], missed, 0.0),
     ];
-    let found = matched(&Cloud::new(points).unwrap(), &looks, 0.05).unwrap();
-    assert_eq!(found.false_alarms, 2);
+    let found = matched(&Cloud::new(points).unwrap(), &chirps(&radar), &looks, 0.05).unwrap();
+    assert_eq!([found.false_alarms, found.beside], [1, 1]);
     assert_eq!(found.observations.iter().filter(|o| o.power_w.is_some()).count(), 1);
     assert!((found.observations[7].power_w.unwrap() - 1e-9).abs() < 1e-20);
     assert!((found.observations[7].range_m.unwrap() - looks[7].hit.range_m - 1e-3).abs() < 1e-9);

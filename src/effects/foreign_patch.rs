@@ -16,10 +16,10 @@ const KNOBS: [Knob; 4] = [
 ];
 
 /// Sides of the cells where a search begins, m, and most of them along an edge of the target.
-const SIDES_M: [f64; 2] = [0.08, 0.16];
-const MOST_CELLS: usize = 14;
+const SIDES_M: [f64; 2] = [0.05, 0.12];
+const MOST_CELLS: usize = 20;
 /// Levels where it begins, dB.
-const LEVELS_DB: [f64; 5] = [1.0, -1.0, 7.0, -7.0, 16.0];
+const LEVELS_DB: [f64; 2] = [1.0, -1.0];
 
 /// Distance from a look to the ray of the centre, along the surface as it lies at the look, m.
 fn apart_m(stage: &Stage, look: &Look, [x_m, y_m]: [f64; 2]) -> f64 {
@@ -63,7 +63,7 @@ impl Effect for ForeignPatch {
          brighten places too, but concave ones, and with longer ranges."
     }
 
-    /// The cells of two grids over the target that hold a look, brighter and darker by little and by much.
+    /// The cells of two grids over the target that hold a look, brighter and darker.
     fn starts(&self, _stage: &Stage, looks: &[Look]) -> Vec<Vec<f64>> {
         let [left, right] = span(looks.iter().map(|look| look.xt_m));
         let [low, high] = span(looks.iter().map(|look| look.yt_m));

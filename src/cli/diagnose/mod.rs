@@ -110,7 +110,7 @@ fn diagnosed(
     };
     let looks = looks(&stage, radar, &scene.chirps)?;
     stage.middle = middle(&looks);
-    let matched = matched(cloud, &looks, GATE_M)?;
+    let matched = matched(cloud, &scene.chirps, &looks, GATE_M)?;
     let (receiver, declared) = receiver(radar);
     let subject = Subject {
         stage: &stage,

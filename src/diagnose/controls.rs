@@ -1,0 +1,146 @@
+//! What an answer is to be held against: terms that mean nothing and gain something all the same, and the
+//! size from which each effect would have been seen.
+
+use nalgebra::DVector;
+
+use super::covariates::covariates;
+use super::field::Field;
+use super::likelihood::Likelihood;
+use super::looks::Observation;
+use super::placebo::Placebo;
+use super::refit::{Problem, Space};
+use super::screen::{Sample, Screen};
+use super::select::{Selection, State};
+use super::{Control, Controls, Power};
+use crate::effects::Effect;
+use crate::radar::random::{Key, Purpose};
+
+/// Strength of an injected effect, in sizes that would just be seen.
+const INJECTED: f64 = 2.0;
+
+/// All controls, beside the base model.
+pub(super) fn controls(
+    selection: &Selection,
+    base: &State,
+    effects: &[&dyn Effect],
+    numbers: usize,
+) -> Controls {
+    Controls {
+        placebo: placebo(selection, base, numbers),
+        equal_df_spline: spline(selection, base, numbers),
+        injection_recovery: powers(selection, base, effects),
+    }
+}
+
+fn placebo(selection: &Selection, base: &State, numbers: usize) -> Option<Control> {
+    let placebo = Placebo::new(numbers, selection.settings.seed, 0);
+    let mut space = base.space.clone();
+    space.effects.push(&placebo);
+    let zero = vec![0.0; placebo.knobs().len()];
+    let start = Space::joined(&base.fitted.at, &placebo, &zero);
+    let (fitted, [held_out_gain, held_out_se]) = selection.fitted(base, &space, &start);
+    Some(Control {
+        numbers: placebo.knobs().len(),
+        over: "random waves over the target plane".to_owned(),
+        gain: fitted.ln_likelihood - base.fitted.ln_likelihood,
+        held_out_gain,
+        held_out_se,
+    })
+}
+
+/// A spline with as many numbers over the covariate that goes with most of what the base leaves.
+fn spline(selection: &Selection, base: &State, numbers: usize) -> Option<Control> {
+    let problem = &selection.problem;
+    let prediction = problem.predict(&base.space, &base.fitted.at);
+    let mut all = covariates(problem.looks, &prediction, problem.observations);
+    let laws = selection.mean_slopes(base);
+    let mut best: Option<Control> = None;
+    for covariate in &mut all {
+        covariate.cells = numbers.max(2);
+        let field = Field::spline(problem.looks, std::slice::from_ref(covariate));
+        let structure = field.structure(problem, &prediction, &laws, selection.folds);
+        let [held_out_gain, held_out_se] = structure.gain;
+        if best.as_ref().is_none_or(|best| held_out_gain > best.held_out_gain) {
+            let over = covariate.name.to_owned();
+            let gain = structure.fitted_gain;
+            best =
+                Some(Control { numbers: field.numbers(), over, gain, held_out_gain, held_out_se });
+        }
+    }
+    best
+}
+
+/// The size from which each effect would be seen beside the base model.
+fn powers(selection: &Selection, base: &State, effects: &[&dyn Effect]) -> Vec<Power> {
+    let sample = Sample::new(&selection.problem);
+    let problem = sample.problem(&selection.problem);
+    let screen = Screen::new(problem, &base.space, &base.fitted.at);
+    let power = |effect: &&dyn Effect| {
+        let least_gain = selection.settings.least_gain_of(effect.knobs().len(), 1);
+        let space = base.space.with(*effect);
+        let starts = effect.starts(problem.stage, problem.looks);
+        let present = |values: &Vec<f64>| {
+            let knobs = effect.knobs().iter().zip(values);
+            // Where an effect starts from nothing, a felt change of all its numbers stands for it.
+            let all_absent = knobs.clone().all(|(knob, value)| knob.absent == *value);
+            let moved =
+                knobs.map(|(k, v)| if all_absent { v + k.step } else { *v }).collect::<Vec<_>>();
+            Space::joined(&base.fitted.at, *effect, &moved)
+        };
+        let found = starts.iter().take(MOST_STARTS).map(present).filter_map(|at| {
+            let gain_of_unit = 0.5 * sample.weight * screen.information_of(&space, &at);
+            let size_db = screen.size_db(&space, &at);
+            let useful = gain_of_unit > 0.0 && size_db > 0.0;
+            useful.then(|| (size_db * (least_gain / gain_of_unit).sqrt(), at))
+        });
+        let least = found.min_by(|a, b| a.0.total_cmp(&b.0));
+        let recovered = least.as_ref().map(|(least_db, at)| {
+            let size_db = screen.size_db(&space, at);
+            recovered(selection, base, &space, at, INJECTED * least_db / size_db)
+        });
+        Power { name: effect.name(), least_db: least.map(|(db, _)| db), recovered }
+    };
+    effects.iter().map(power).collect()
+}
+
+/// Starts of an effect that the power is taken over.
+const MOST_STARTS: usize = 12;
+
+/// Whether the effect, so many times as strong as at a point, is seen again in drawn data.
+fn recovered(
+    selection: &Selection,
+    base: &State,
+    space: &Space,
+    at: &DVector<f64>,
+    scale: f64,
+) -> bool {
+    let problem = &selection.problem;
+    let [bare, full] = [problem.predict(&base.space, &base.fitted.at), problem.predict(space, at)];
+    let law = Likelihood::new(&bare, problem.declared);
+    let looks = bare.receiver.looks;
+    let draw = |look: usize| {
+        let key = Key {
+            seed: selection.settings.seed,
+            chirp: look as u64,
+            sub_ray: 4,
+            purpose: Purpose::Fit,
+        };
+        let mean_w = law.mean_w(look);
+        let changed = |p: &crate::effects::Prediction| p.arrived.get(look).copied().flatten();
+        let ln_factor = match (changed(&bare), changed(&full)) {
+            (Some(bare), Some(full)) if bare.power_w > 0.0 && full.power_w > 0.0 => {
+                scale * (full.power_w / bare.power_w).ln()
+            }
+            _ => 0.0,
+        };
+        let power_w = mean_w * ln_factor.clamp(-5.0, 5.0).exp() * key.draws().gamma(looks);
+        let is_detected = power_w >= problem.declared.threshold_w;
+        Observation { power_w: is_detected.then_some(power_w), range_m: None }
+    };
+    let drawn: Vec<Observation> = (0..problem.looks.len()).map(draw).collect();
+    let problem = Problem { observations: &drawn, ..*problem };
+    let screen = Screen::new(problem, &base.space, &base.fitted.at);
+    let least =
+        selection.settings.least_gain_of(space.effects.last().map_or(1, |e| e.knobs().len()), 1);
+    screen.promise(space, at) >= least
+}
