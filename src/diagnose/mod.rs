@@ -15,6 +15,7 @@
 //! | held-out patches, controls, selection | `folds.rs`, `placebo.rs`, `select.rs` |
 //! | what remains, and how large the error is | `residual.rs`, `score.rs` |
 
+pub mod curve;
 mod folds;
 mod likelihood;
 mod looks;

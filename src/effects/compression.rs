@@ -58,9 +58,10 @@ mod tests {
     fn the_ceiling_is_soft() {
         let bench = Bench::plate();
         let after_db = |power_w: f64| {
-            let mut arrived = [Arrived { power_w, range_m: 8.0 }];
-            Compression.arrive(&[-40.0], &bench.stage(), &[], &[], &mut arrived);
-            db(arrived[0].power_w / 1e-3)
+            let mut arrived = [Some(Arrived { power_w, range_m: 8.0 })];
+            let scan = Surveyed { stage: &bench.stage(), looks: &[], survey: None };
+            Compression.arrive(&[-40.0], &scan, &[], &mut arrived);
+            db(arrived[0].unwrap().power_w / 1e-3)
         };
         assert!((after_db(1e-7) + 40.0 + db(2.0)).abs() < 1e-9);
         assert!((after_db(1.0) + 40.0).abs() < 1e-3);
