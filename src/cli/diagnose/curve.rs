@@ -184,8 +184,11 @@ fn angle_deg(report: &CurveReport, row: &CurveRow) -> f64 {
     }
 }
 
+/// A model's level in a row, dB.
+type LevelDb = fn(&CurveRow) -> f64;
+
 /// Names and levels of the models that a picture shows.
-fn models(report: &CurveReport) -> Vec<(&'static str, fn(&CurveRow) -> f64)> {
+fn models(report: &CurveReport) -> Vec<(&'static str, LevelDb)> {
     match report.effects.is_empty() {
         true => vec![("base law", |row| row.before_db)],
         false => vec![("before", |row| row.before_db), ("after", |row| row.after_db)],
