@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use crate::diagnose::DiagnoseError;
+use crate::diagnose::curve::CurveDiagnoseError;
 use crate::effects::EffectError;
 use crate::fit::FitError;
 use crate::formats::FormatError;
@@ -120,6 +121,14 @@ pub enum Error {
     /// Nothing can be said about a cloud.
     #[error(transparent)]
     Diagnose(#[from] DiagnoseError),
+    /// Nothing can be said about a curve.
+    #[error("{curve}: {error}")]
+    CurveDiagnosis {
+        /// The file.
+        curve: String,
+        /// Why.
+        error: CurveDiagnoseError,
+    },
     /// No such material.
     #[error("{asked_by}there is no material `{name}`; {way_out}")]
     UnknownMaterial {

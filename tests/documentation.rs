@@ -98,6 +98,27 @@ fn the_way_from_a_cloud_to_a_material_runs() {
 }
 
 #[test]
+fn the_diagnosis_of_a_curve_runs_on_the_columns_of_the_docs() {
+    let text = read("docs/diagnosing.md");
+    let folder = tempfile::tempdir().unwrap();
+    let mut table = blocks(&text, "csv")[0].lines().next().unwrap().to_owned() + "\n";
+    for (incidence_deg, receiver_deg) in (-25..=25).flat_map(|k| [(20, 3 * k), (50, 3 * k)]) {
+        let apart = f64::from(receiver_deg - incidence_deg) / 20.0;
+        let brdf_per_sr = 0.01 + 0.1 * (-apart * apart).exp();
+        table += &format!("{incidence_deg},{receiver_deg},{brdf_per_sr}\n");
+    }
+    fs::write(folder.path().join("coating.csv"), table).unwrap();
+    let lines = blocks(&text, "sh").into_iter().flat_map(str::lines);
+    let commands: Vec<&str> = lines.filter(|line| line.contains("--curve")).collect();
+    assert_eq!(commands.len(), 2);
+    for command in commands {
+        let arguments = command.split(" #").next().unwrap_or("").trim();
+        let arguments = arguments.strip_prefix("matdb ").unwrap();
+        matdb(folder.path()).args(arguments.split_whitespace()).assert().success();
+    }
+}
+
+#[test]
 fn the_material_of_the_docs_is_accepted() {
     let text = read("docs/materials.md");
     let folder = tempfile::tempdir().unwrap();

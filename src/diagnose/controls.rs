@@ -133,9 +133,15 @@ fn recovered(
             }
             _ => 0.0,
         };
-        let power_w = mean_w * ln_factor.clamp(-5.0, 5.0).exp() * key.draws().gamma(looks);
+        let mut draws = key.draws();
+        let power_w = mean_w * ln_factor.clamp(-5.0, 5.0).exp() * draws.gamma(looks);
         let is_detected = power_w >= problem.declared.threshold_w;
-        Observation { power_w: is_detected.then_some(power_w), range_m: None }
+        let range_m = changed(&bare).zip(changed(&full)).map(|(bare, full)| {
+            let error_m = problem.declared.range_sd_m * draws.gaussian();
+            bare.range_m + scale * (full.range_m - bare.range_m) + error_m
+        });
+        let (power_w, range_m) = (Some(power_w), range_m);
+        if is_detected { Observation { power_w, range_m } } else { Observation::default() }
     };
     let drawn: Vec<Observation> = (0..problem.looks.len()).map(draw).collect();
     let problem = Problem { observations: &drawn, ..*problem };

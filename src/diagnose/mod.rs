@@ -17,6 +17,7 @@
 
 mod controls;
 mod covariates;
+pub mod curve;
 mod field;
 mod folds;
 mod likelihood;

@@ -17,7 +17,7 @@ use super::residual::{self, Unexplained, speckle_sd_db};
 use super::score::{DB, Scored, scored};
 use super::screen::{Sample, Screen};
 use super::{Diagnosis, Evidence};
-use crate::effects::{Effect, Prediction, Receiver};
+use crate::effects::{Effect, Knob, Prediction, Receiver};
 use crate::fit::minimise::Minimise;
 
 /// Steps of a fit, and of one on the sample that only shows whether an effect is worth it.
@@ -25,6 +25,8 @@ const SEARCH: Minimise = Minimise { iterations: 20, tolerance: 0.1 };
 const SCOUT: Minimise = Minimise { iterations: 12, tolerance: 0.1 };
 /// Starts of an effect that are followed.
 const STARTS: usize = 2;
+/// How far the shape of a start is moved, in felt steps.
+const SHAPE_STEPS: [f64; 3] = [4.0, 2.0, 1.0];
 /// Strengths of a start that are tried.
 const STRENGTHS: [f64; 6] = [0.3, 1.0, 3.0, 7.0, 12.0, 20.0];
 /// And none that promises less than this share of what the best does.
@@ -328,7 +330,8 @@ impl Selection<'_> {
         let tried = starts.len();
         starts.truncate(STARTS);
         let first = state.fitted.at.len();
-        for (_, start) in &mut starts {
+        for (promise, start) in &mut starts {
+            self.shape(screen, &space, effect, weight, (promise, start));
             self.scale(screen, &space, effect, first, start);
         }
         let (gain, at) = starts.first()?.clone();
@@ -348,6 +351,31 @@ impl Selection<'_> {
         };
         let fitted = Fitted { at, ln_likelihood: f64::NEG_INFINITY, converged: false };
         Some(Trial { effect, space, starts, tried, fitted, candidate })
+    }
+
+    /// Moves what only shapes an effect, such as a place, to where the start promises more.
+    fn shape(
+        &self,
+        screen: &Screen,
+        space: &Space,
+        effect: &dyn Effect,
+        weight: f64,
+        (promise, start): (&mut f64, &mut DVector<f64>),
+    ) {
+        let first = start.len().saturating_sub(effect.knobs().len());
+        let shapes = effect.knobs().iter().enumerate().skip(1);
+        let is_shape = |(_, knob): &(usize, &Knob)| knob.absent != knob.max && *promise > 0.0;
+        for (index, knob) in shapes.filter(is_shape).collect::<Vec<_>>().repeat(SHAPE_STEPS.len()) {
+            for steps in SHAPE_STEPS.iter().flat_map(|s| [*s, -*s]) {
+                let mut moved = start.clone();
+                let place = &mut moved[first + index];
+                *place = (*place + steps).clamp(knob.min / knob.step, knob.max / knob.step);
+                let there = weight * screen.promise(space, &moved);
+                if there > *promise {
+                    (*promise, *start) = (there, moved);
+                }
+            }
+        }
     }
 
     /// Makes a start as strong as it gains most: far from the data, outliers would hold it.

@@ -9,6 +9,7 @@ mod coarse;
 pub mod compare;
 pub mod curve;
 pub mod icp;
+pub mod in_plane;
 pub mod incidence;
 pub mod nearest;
 pub mod normals;

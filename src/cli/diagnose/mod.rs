@@ -1,6 +1,7 @@
 //! `matdb diagnose`.
 
 mod cannot_tell;
+mod curve;
 mod html;
 mod plots;
 mod residuals;
@@ -28,21 +29,33 @@ use crate::trace::Bvh;
 use crate::units::watts_from_dbm;
 use cannot_tell::CannotTell;
 
-/// Find the physical effect that a scene lacks to explain a measured cloud
+/// Find the physical effect that a scene lacks to explain a measured cloud, or a law a measured curve
 #[derive(Debug, clap::Args)]
+#[command(mut_arg("cloud", |cloud| cloud.required(false)))]
 #[command(after_help = "Examples:
   matdb diagnose cloud.ply --scene scene.toml -o diagnosis
   matdb diagnose cloud.ply --scene scene.toml --effects drift,fov-gain -o diagnosis
+  matdb diagnose --curve coating.csv -o diagnosis            theta_i_deg,theta_s_deg,brdf_per_sr
   matdb effects                                              what is tried, and how to tell it
 
 Writes report.html (all of it, for a person), report.json, residuals.csv (one line per chirp) and
 pictures (.svg and .png). Too few data: report.html and report.json say so, and the status is not 0.")]
 pub(super) struct Args {
     #[command(flatten)]
-    cloud: CloudArgs,
+    cloud: Option<CloudArgs>,
     /// The scene that was measured: its mesh, materials, radar and scan
     #[arg(long, value_name = "SCENE")]
-    scene: PathBuf,
+    scene: Option<PathBuf>,
+    /// Instead of a cloud: a backscatter curve (.csv of `matdb measure`), a table in the plane of
+    /// incidence (.csv: theta_i_deg,theta_s_deg,brdf_per_sr) or a .bsdf
+    #[arg(long, value_name = "FILE")]
+    curve: Option<PathBuf>,
+    /// Law that a curve is held against [default: one GGX lobe over Lambert]
+    #[arg(long, value_name = "MODEL", requires = "curve")]
+    model: Option<String>,
+    /// Noise of a curve's levels, dB [default: from repeats, the file, or neighbouring angles]
+    #[arg(long, value_name = "DB", requires = "curve")]
+    noise_db: Option<f64>,
     /// Try only these effects [default: all]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     effects: Vec<String>,
@@ -70,10 +83,27 @@ struct Context {
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
-    let scene = Scene::load(&args.scene)?;
+    match (&args.curve, &args.cloud, &args.scene) {
+        (Some(curve), None, None) => curve::run(curve, args, console),
+        (None, Some(cloud), Some(scene)) => of_cloud(cloud, scene, args, db, console),
+        _ => Err(Error::Usage {
+            problem: "a diagnosis is of a cloud and its scene, or of a curve".to_owned(),
+            way_out: "give CLOUD --scene SCENE, or --curve FILE alone".to_owned(),
+        }),
+    }
+}
+
+fn of_cloud(
+    cloud_args: &CloudArgs,
+    scene_path: &Path,
+    args: &Args,
+    db: &Database,
+    console: &Console,
+) -> Result<(), Error> {
+    let scene = Scene::load(scene_path)?;
     let effects = chosen(&args.effects)?;
-    let (used, material_of_region) = materials(&scene, &args.scene, db)?;
-    let cloud = args.cloud.read(scene.radar())?;
+    let (used, material_of_region) = materials(&scene, scene_path, db)?;
+    let cloud = cloud_args.read(scene.radar())?;
     let laws: Vec<Brdf> =
         material_of_region.iter().map(|&m| used[usize::from(m)].scattering.clone()).collect();
     cloud.notices.iter().for_each(|notice| console.notice(notice));
@@ -82,10 +112,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     bar.finish_and_clear();
     match answer {
         Ok((report, false_alarms)) => {
-            let context = context(args, &scene, false_alarms);
+            let context = context([&cloud_args.cloud, scene_path], args, &scene, false_alarms);
             publish(&report, &context, scene.radar().spot_diameter_m, &args.output, console)
         }
-        Err(error) => refuse(error, args, console),
+        Err(error) => refuse(error, [&cloud_args.cloud, scene_path], args, console),
     }
 }
 
@@ -125,13 +155,18 @@ fn diagnosed(
     Ok((report, matched.false_alarms))
 }
 
-fn context(args: &Args, scene: &Scene, false_alarms: usize) -> Context {
+fn context(
+    [cloud_path, scene_path]: [&Path; 2],
+    args: &Args,
+    scene: &Scene,
+    false_alarms: usize,
+) -> Context {
     let regions = &scene.target.regions;
-    let [cloud, path, output] = [&args.cloud.cloud, &args.scene, &args.output].map(|p| typed(p));
+    let [cloud, path, output] = [cloud_path, scene_path, &args.output].map(typed);
     Context {
         scene: scene.file.name.clone(),
-        scene_path: args.scene.display().to_string(),
-        cloud_path: args.cloud.cloud.display().to_string(),
+        scene_path: scene_path.display().to_string(),
+        cloud_path: cloud_path.display().to_string(),
         regions: regions.iter().map(|r| (r.name.clone(), r.material.clone())).collect(),
         false_alarms,
         seed: args.seed,
@@ -173,9 +208,14 @@ fn publish(
 }
 
 /// Writes that nothing can be said, and why; the error is the way out.
-fn refuse(error: DiagnoseError, args: &Args, console: &Console) -> Result<(), Error> {
+fn refuse(
+    error: DiagnoseError,
+    paths: [&Path; 2],
+    args: &Args,
+    console: &Console,
+) -> Result<(), Error> {
     let answer = CannotTell::new(&error);
-    let [cloud, scene] = [&args.cloud.cloud, &args.scene].map(|path| path.display().to_string());
+    let [cloud, scene] = paths.map(|path| path.display().to_string());
     let html = html::cannot_tell(&answer, &scene, &cloud);
     write_all(&args.output, &[("report.html", html), ("report.json", json(&answer)?)])?;
     if console.json {

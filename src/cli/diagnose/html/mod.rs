@@ -1,5 +1,6 @@
 //! `report.html`: the whole diagnosis for a person who has not read the docs.
 
+pub(super) mod curve;
 mod effect;
 mod evidence;
 mod page;

@@ -1,0 +1,14 @@
+//! Values in the plane of incidence, as CSV and as .bsdf: angles and levels that a fit can use, or an
+//! error.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use matdb::measure::in_plane::{read_bsdf, read_table};
+
+fuzz_target!(|bytes: &[u8]| {
+    for value in [read_table(bytes), read_bsdf(bytes)].into_iter().flatten().flatten() {
+        assert!(value.theta_i_rad.cos() > 0.0 && value.theta_s_rad.cos() > 0.0);
+        assert!(value.f_per_sr.is_finite() && value.f_per_sr > 0.0);
+    }
+});

@@ -1,0 +1,157 @@
+//! Which angles are held out together: runs of neighbours, never single angles.
+
+use super::LEAST_BLOCKS;
+use super::points::Points;
+use crate::radar::random::{Key, Purpose};
+
+/// Points of a run at least: fewer are no gap that a smooth curve could not bridge.
+const LEAST_POINTS: f64 = 3.0;
+/// Correlation lengths in a run.
+const LENGTHS: f64 = 3.0;
+
+/// A curve in runs of angles, and the runs in folds.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Folds {
+    pub block: Vec<usize>,
+    pub fold: Vec<usize>,
+    pub blocks: usize,
+    pub folds: usize,
+    /// Width of a run, rad.
+    pub width_rad: f64,
+    /// Where the autocorrelation of what no smooth curve explains is below 1/e, rad.
+    pub correlation_rad: f64,
+}
+
+impl Folds {
+    /// Runs of three correlation lengths of the residual, shorter where there would be too few, and
+    /// of at least three points, dealt out in a drawn order.
+    pub fn new(points: &Points, residual_db: &[f64], folds: usize, seed: u64) -> Folds {
+        let step_rad = step_rad(points);
+        let correlation_rad = correlation_rad(points, residual_db, step_rad);
+        let narrowest_rad = (LEAST_POINTS * step_rad).max(1e-9);
+        let mut width_rad = (LENGTHS * correlation_rad).max(narrowest_rad);
+        let (mut block, mut blocks) = runs(points, width_rad);
+        while blocks < LEAST_BLOCKS && width_rad > narrowest_rad {
+            width_rad = (0.9 * width_rad).max(narrowest_rad);
+            (block, blocks) = runs(points, width_rad);
+        }
+        let mut order: Vec<(f64, usize)> = (0..blocks)
+            .map(|run| {
+                let key = Key { seed, chirp: run as u64, sub_ray: 1, purpose: Purpose::Fit };
+                (key.draws().uniform(), run)
+            })
+            .collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let folds = folds.max(2);
+        let mut fold_of_run = vec![0; blocks];
+        for (place, (_, run)) in order.iter().enumerate() {
+            fold_of_run[*run] = place % folds;
+        }
+        let fold = block.iter().map(|&run| fold_of_run[run]).collect();
+        Folds { block, fold, blocks, folds, width_rad, correlation_rad }
+    }
+
+    /// Sum and its standard error over runs of one number for each point.
+    pub fn sum(&self, values: &[f64]) -> [f64; 2] {
+        let mut sums = vec![0.0; self.blocks];
+        for (value, &block) in values.iter().zip(&self.block) {
+            sums[block] += value;
+        }
+        let count = sums.len().max(2) as f64;
+        let total: f64 = sums.iter().sum();
+        let variance =
+            sums.iter().map(|s| (s - total / count).powi(2)).sum::<f64>() / (count - 1.0);
+        [total, (count * variance).sqrt()]
+    }
+}
+
+/// Runs of about equal width within every scan, by number.
+fn runs(points: &Points, width_rad: f64) -> (Vec<usize>, usize) {
+    let mut block = Vec::with_capacity(points.points.len());
+    let mut first = 0;
+    for scan in points.points.chunk_by(|a, b| a.scan == b.scan) {
+        let ends = [scan.first(), scan.last()].map(|p| p.map_or(0.0, |p| points.angle_rad(p)));
+        let count = ((ends[1] - ends[0]) / width_rad).floor().max(1.0);
+        let span = (ends[1] - ends[0]).max(f64::MIN_POSITIVE);
+        block.extend(scan.iter().map(|point| {
+            let share = (points.angle_rad(point) - ends[0]) / span;
+            first + (share * count).floor().min(count - 1.0) as usize
+        }));
+        first += count as usize;
+    }
+    // A gap of the scan leaves a run empty.
+    let mut used = block.clone();
+    used.dedup();
+    let number = |run: &usize| used.binary_search(run).unwrap_or(0);
+    (block.iter().map(number).collect(), used.len())
+}
+
+/// Median distance of neighbours, rad.
+fn step_rad(points: &Points) -> f64 {
+    let angle = |index: usize| points.points.get(index).map_or(0.0, |p| points.angle_rad(p));
+    let mut steps: Vec<f64> = points.neighbours().map(|[a, b]| angle(b) - angle(a)).collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// Lag at which the autocorrelation falls below 1/e, rad, at least one step.
+fn correlation_rad(points: &Points, residual_db: &[f64], step_rad: f64) -> f64 {
+    let lag = (1..residual_db.len() / 4)
+        .find(|&lag| autocorrelation(points, residual_db, lag) < (-1f64).exp())
+        .unwrap_or(1);
+    lag as f64 * step_rad
+}
+
+/// Correlation of points so many places apart in one scan; 0 without such pairs.
+pub(super) fn autocorrelation(points: &Points, values: &[f64], lag: usize) -> f64 {
+    let seen = |index: usize| points.points.get(index).filter(|point| !point.censored);
+    let (mut products, mut pairs, mut squares, mut count) = (0.0, 0.0, 0.0, 0.0);
+    for (index, value) in values.iter().enumerate() {
+        let Some(here) = seen(index) else { continue };
+        squares += value * value;
+        count += 1.0;
+        let there = seen(index + lag).filter(|there| there.scan == here.scan);
+        if let (Some(_), Some(other)) = (there, values.get(index + lag)) {
+            products += value * other;
+            pairs += 1.0;
+        }
+    }
+    match pairs > 0.0 && squares > 0.0 {
+        true => (products / pairs) / (squares / count),
+        false => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::curve::testing::{curve_of, noisy};
+
+    #[test]
+    fn white_noise_is_held_out_in_short_runs_and_a_smooth_error_in_long_ones() {
+        let points = curve_of(noisy(&[10.0, 30.0, 50.0], 1.0, 0.2, |_| 0.0));
+        let white: Vec<f64> = (0..points.points.len())
+            .map(|k| {
+                let key = Key { seed: 5, chirp: k as u64, sub_ray: 0, purpose: Purpose::Fit };
+                key.draws().uniform() - 0.5
+            })
+            .collect();
+        let short = Folds::new(&points, &white, 5, 0);
+        assert!((short.width_rad.to_degrees() - 3.0).abs() < 1e-6, "{short:?}");
+        let smooth: Vec<f64> =
+            points.points.iter().map(|point| (10.0 * point.theta_s_rad).sin()).collect();
+        let long = Folds::new(&points, &smooth, 5, 0);
+        // cos of 10·lag is 1/e at 6.8°.
+        assert!((long.width_rad.to_degrees() - 21.0).abs() < 1.1, "{}", long.width_rad);
+        for folds in [short, long] {
+            let pairs = folds.block.iter().zip(&folds.fold);
+            let of_block = |run: usize| pairs.clone().filter(move |(b, _)| **b == run);
+            for run in 0..folds.blocks {
+                let mut members = of_block(run).map(|(_, fold)| fold);
+                let first = members.next().unwrap();
+                assert!(members.all(|fold| fold == first), "a run is in one fold");
+            }
+            assert!((0..5).all(|fold| folds.fold.contains(&fold)));
+        }
+    }
+}

@@ -1,0 +1,235 @@
+//! A measured curve as points in the order of its scans, and the noise of its levels.
+//!
+//! The noise is, in this order: what the caller declares; the scatter of repeats; what the file states;
+//! and else the scatter of a point about the line through its two neighbours, which takes every
+//! bend of the curve between them for noise and is an upper bound on coarse scans.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+use serde::Serialize;
+
+use crate::frames::{Direction, Surface};
+use crate::measure::Curve;
+use crate::measure::in_plane::InPlane;
+use crate::units::{db_from_ratio, ratio_from_db};
+
+/// What a curve is measured over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Source and receiver in one direction; levels are σ⁰ in dB.
+    Backscatter,
+    /// In the plane of incidence; levels are f in dB over 1/sr.
+    InPlane,
+}
+
+/// One level of a curve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Point {
+    /// Towards the source.
+    pub i: Direction<Surface>,
+    /// Towards the receiver.
+    pub o: Direction<Surface>,
+    /// Angle of incidence, rad.
+    pub theta_i_rad: f64,
+    /// Angle of the receiver, rad, positive on the mirror's side.
+    pub theta_s_rad: f64,
+    /// 10·lg f, f in 1/sr; where censored f is below that.
+    pub f_db: f64,
+    /// Nothing was detected.
+    pub censored: bool,
+    /// What turns 10·lg f into the level that the file has, dB.
+    pub offset_db: f64,
+    /// Which scan of the curve it belongs to: the number of its angle of incidence, or 0.
+    pub scan: usize,
+}
+
+/// Where the noise comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoiseSource {
+    /// Declared by the caller.
+    Declared,
+    /// Scatter of repeats of one pair of angles.
+    Repeats,
+    /// Stated in the file.
+    File,
+    /// Scatter of neighbouring angles about each other.
+    Neighbours,
+}
+
+/// Noise of the levels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Noise {
+    /// Standard deviation of a level, dB.
+    pub sd_db: f64,
+    /// How it is known.
+    pub source: NoiseSource,
+}
+
+/// A curve to be diagnosed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Points {
+    /// What it is measured over.
+    pub kind: Kind,
+    /// Its points, scan by scan, each by rising angle.
+    pub points: Vec<Point>,
+    /// The noise.
+    pub noise: Noise,
+}
+
+/// Smallest noise of a file that is believed, dB: files round.
+const LEAST_NOISE_DB: f64 = 0.01;
+/// Share of the sizes below the one that tells the noise, and that size of a standard normal number:
+/// twice as sure as the median, and few bends do not count.
+const BELOW: f64 = 0.8;
+const SIZE: f64 = 1.2816;
+
+impl Points {
+    /// Of a backscatter curve. Rows at grazing incidence, where σ⁰ says nothing of f, are left out.
+    pub fn backscatter(curve: &Curve, noise_db: Option<f64>) -> Points {
+        const GRAZING_RAD: f64 = 1.569;
+        let mut points: Vec<Point> = curve
+            .rows
+            .iter()
+            .filter(|row| row.theta_rad < GRAZING_RAD)
+            .map(|row| {
+                let i = Direction::from_angles(row.theta_rad, PI);
+                let offset_db = db_from_ratio(4.0 * PI * i.cos_theta().powi(2));
+                Point {
+                    i,
+                    o: i,
+                    theta_i_rad: row.theta_rad,
+                    theta_s_rad: -row.theta_rad,
+                    f_db: db_from_ratio(row.sigma0) - offset_db,
+                    censored: row.censored,
+                    offset_db,
+                    scan: 0,
+                }
+            })
+            .collect();
+        points.sort_by(|a, b| a.theta_i_rad.total_cmp(&b.theta_i_rad));
+        Points::new(Kind::Backscatter, points, noise_db, None)
+    }
+
+    /// Of values in the plane of incidence; repeats become their mean level.
+    pub fn in_plane(values: &[InPlane], noise_db: Option<f64>) -> Points {
+        let key = |angle_rad: f64| (angle_rad.to_degrees() * 1e4).round() as i64;
+        let mut places: BTreeMap<[i64; 2], Vec<&InPlane>> = BTreeMap::new();
+        for value in values {
+            let place = [key(value.theta_i_rad), key(value.theta_s_rad)];
+            places.entry(place).or_default().push(value);
+        }
+        let mut points: Vec<Point> = Vec::new();
+        let mut scan = None;
+        for (place, values) in &places {
+            if let Some(point) = mean_point(values) {
+                let number = match scan {
+                    Some((incidence, number)) if incidence == place[0] => number,
+                    Some((_, number)) => number + 1,
+                    None => 0,
+                };
+                scan = Some((place[0], number));
+                points.push(Point { scan: number, ..point });
+            }
+        }
+        Points::new(Kind::InPlane, points, noise_db, repeats(&places).or_else(|| stated(values)))
+    }
+
+    fn new(
+        kind: Kind,
+        points: Vec<Point>,
+        noise_db: Option<f64>,
+        of_file: Option<Noise>,
+    ) -> Points {
+        let declared = noise_db.map(|sd_db| Noise { sd_db, source: NoiseSource::Declared });
+        let estimated = || Noise { sd_db: neighbours(&points), source: NoiseSource::Neighbours };
+        let known = of_file.unwrap_or_else(estimated);
+        let known = Noise { sd_db: known.sd_db.max(LEAST_NOISE_DB), ..known };
+        let noise = declared.unwrap_or(known);
+        Points { kind, points, noise }
+    }
+
+    /// The angle that a scan runs over, rad.
+    pub fn angle_rad(&self, point: &Point) -> f64 {
+        match self.kind {
+            Kind::Backscatter => point.theta_i_rad,
+            Kind::InPlane => point.theta_s_rad,
+        }
+    }
+
+    /// Neighbouring points of one scan: numbers of both.
+    pub fn neighbours(&self) -> impl Iterator<Item = [usize; 2]> {
+        let one = |(index, pair): (usize, &[Point])| match pair {
+            [a, b] if a.scan == b.scan => Some([index, index + 1]),
+            _ => None,
+        };
+        self.points.windows(2).enumerate().filter_map(one)
+    }
+}
+
+fn mean_point(values: &[&InPlane]) -> Option<Point> {
+    let first = values.first()?;
+    let side = if first.theta_s_rad < 0.0 { PI } else { 0.0 };
+    let levels = values.iter().map(|value| db_from_ratio(value.f_per_sr));
+    Some(Point {
+        i: Direction::from_angles(first.theta_i_rad, PI),
+        o: Direction::from_angles(first.theta_s_rad.abs(), side),
+        theta_i_rad: first.theta_i_rad,
+        theta_s_rad: first.theta_s_rad,
+        f_db: levels.sum::<f64>() / values.len() as f64,
+        censored: false,
+        offset_db: 0.0,
+        scan: 0,
+    })
+}
+
+/// Noise of a mean of repeats, from their scatter.
+fn repeats(places: &BTreeMap<[i64; 2], Vec<&InPlane>>) -> Option<Noise> {
+    let (mut squares, mut spare, mut inverse) = (0.0, 0.0, 0.0);
+    for values in places.values() {
+        let levels: Vec<f64> = values.iter().map(|value| db_from_ratio(value.f_per_sr)).collect();
+        let count = levels.len() as f64;
+        let mean = levels.iter().sum::<f64>() / count;
+        squares += levels.iter().map(|level| (level - mean).powi(2)).sum::<f64>();
+        spare += count - 1.0;
+        inverse += 1.0 / count;
+    }
+    /// Fewer tell no scatter.
+    const LEAST_SPARE: f64 = 5.0;
+    let sd_db = || (squares / spare * inverse / places.len() as f64).sqrt();
+    (spare >= LEAST_SPARE).then(|| Noise { sd_db: sd_db(), source: NoiseSource::Repeats })
+}
+
+fn stated(values: &[InPlane]) -> Option<Noise> {
+    let known: Option<Vec<f64>> = values.iter().map(|value| value.sd_db).collect();
+    let known = known.filter(|known| !known.is_empty())?;
+    let square = known.iter().map(|sd| sd * sd).sum::<f64>() / known.len() as f64;
+    Some(Noise { sd_db: square.sqrt(), source: NoiseSource::File })
+}
+
+/// Scatter about the line through the neighbours.
+fn neighbours(points: &[Point]) -> f64 {
+    let seen: Vec<&Point> = points.iter().filter(|point| !point.censored).collect();
+    let off = |three: &[&Point]| match three {
+        [a, b, c] if a.scan == c.scan => {
+            let angle = |point: &Point| point.theta_s_rad;
+            let span = angle(c) - angle(a);
+            let share = if span == 0.0 { 0.5 } else { (angle(b) - angle(a)) / span };
+            let level = |point: &Point| point.f_db + point.offset_db;
+            let line_db = (1.0 - share) * level(a) + share * level(c);
+            let width = (1.0 + share * share + (1.0 - share).powi(2)).sqrt();
+            Some((level(b) - line_db).abs() / width)
+        }
+        _ => None,
+    };
+    let mut sizes: Vec<f64> = seen.windows(3).filter_map(off).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.get((BELOW * sizes.len() as f64) as usize).map_or(1.0, |size| size / SIZE)
+}
+
+/// f of a point, 1/sr.
+pub(super) fn f_per_sr(point: &Point) -> f64 {
+    ratio_from_db(point.f_db)
+}

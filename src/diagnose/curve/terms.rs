@@ -1,0 +1,440 @@
+//! What a law of scattering can lack in a curve: one small object each, nested in the law.
+//!
+//! With its numbers at their `absent` values a term changes nothing, exactly.
+
+use std::f64::consts::{PI, TAU};
+
+use super::points::Point;
+use crate::brdf::{Brdf, CookTorrance, Distribution, Scattering, Shadowing};
+use crate::effects::{Knob, Level};
+use crate::frames::{Direction, Surface};
+
+/// Something that a law lacks.
+pub trait Term: Sync {
+    /// Its name, as reports write it.
+    fn name(&self) -> &'static str;
+
+    /// Where it belongs.
+    fn level(&self) -> Level;
+
+    /// Its numbers.
+    fn knobs(&self) -> &'static [Knob];
+
+    /// What it is, in a sentence for a person.
+    fn is(&self) -> &'static str;
+
+    /// What it does to a curve, and what tells it from its neighbours.
+    fn shows(&self) -> &'static str;
+
+    /// Where a search begins.
+    fn starts(&self) -> Vec<Vec<f64>>;
+
+    /// f at a point, 1/sr, where the law without this term has `f_per_sr`.
+    fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64;
+}
+
+/// Every term, in the order in which they act.
+pub fn terms() -> [&'static dyn Term; 10] {
+    [
+        &DiffuseLobe,
+        &LimbDarkening,
+        &SecondLobe,
+        &FresnelGrowth,
+        &Subsurface,
+        &ThinFilm,
+        &Opposition,
+        &AngleOffset,
+        &InstrumentLobe,
+        &StrayLight,
+    ]
+}
+
+/// The term of that name.
+pub fn term(name: &str) -> Option<&'static dyn Term> {
+    terms().into_iter().find(|term| term.name() == name)
+}
+
+const fn knob(
+    name: &'static str,
+    unit: &'static str,
+    [min, max]: [f64; 2],
+    absent: f64,
+    step: f64,
+) -> Knob {
+    Knob { name, unit, min, max, absent, step }
+}
+
+/// Every pair of two lists.
+fn pairs(first: &[f64], second: &[f64]) -> Vec<Vec<f64>> {
+    first.iter().flat_map(|&a| second.iter().map(move |&b| vec![a, b])).collect()
+}
+
+/// Names, level, knobs and words of a term.
+macro_rules! described {
+    ($name:literal, $level:ident, $is:literal, $shows:literal, $($knob:expr),+ $(,)?) => {
+        fn name(&self) -> &'static str {
+            $name
+        }
+
+        fn level(&self) -> Level {
+            Level::$level
+        }
+
+        fn knobs(&self) -> &'static [Knob] {
+            const KNOBS: &[Knob] = &[$($knob),+];
+            KNOBS
+        }
+
+        fn is(&self) -> &'static str {
+            $is
+        }
+
+        fn shows(&self) -> &'static str {
+            $shows
+        }
+    };
+}
+
+/// The diffuse part of a law at a point, 1/sr.
+fn diffuse_per_sr(law: &Brdf, point: &Point) -> f64 {
+    (1.0 - law.specular_share(point.i, point.o)) * law.f_per_sr(point.i, point.o)
+}
+
+/// Cosine between the normal and the direction midway, and between that and the receiver.
+fn half(point: &Point) -> [f64; 2] {
+    let sum = point.i.xyz() + point.o.xyz();
+    let h = sum / sum.length().max(f64::MIN_POSITIVE);
+    [h.z, point.o.xyz().dot(h)].map(|cos: f64| cos.clamp(0.0, 1.0))
+}
+
+/// What the Cook–Torrance lobes of a law give, each times a factor, 1/sr.
+fn lobes_per_sr(law: &Brdf, point: &Point, factor: &dyn Fn(&CookTorrance) -> f64) -> f64 {
+    match law {
+        Brdf::CookTorrance(lobe) => factor(lobe) * law.f_per_sr(point.i, point.o),
+        Brdf::Mixture(mixture) => {
+            mixture.k * lobes_per_sr(&mixture.diffuse, point, factor)
+                + (1.0 - mixture.k) * lobes_per_sr(&mixture.specular, point, factor)
+        }
+        Brdf::Sum(sum) => sum.parts.iter().map(|part| lobes_per_sr(part, point, factor)).sum(),
+        _ => 0.0,
+    }
+}
+
+struct DiffuseLobe;
+
+impl Term for DiffuseLobe {
+    described!(
+        "diffuse-lobe",
+        Material,
+        "The diffuse part is a broad lobe (equation (15)) where the law is flat: facets of many slopes, \
+         or rough layers below the surface.",
+        "The level falls with the angle between the normal and the direction midway between source and \
+         receiver, smoothly and at all incidences alike. Limb darkening goes with both angles apart.",
+        knob("alpha", "1", [0.0, 50.0], 0.0, 0.1),
+    );
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        [0.3, 2.0, 8.0].map(|alpha| vec![alpha]).to_vec()
+    }
+
+    fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+        let &[alpha] = values else { return f_per_sr };
+        let shape = (alpha + 2.0) / 2.0 * half(point)[0].powf(alpha);
+        f_per_sr + diffuse_per_sr(law, point) * (shape - 1.0)
+    }
+}
+
+struct LimbDarkening;
+
+/// Grazing directions see nothing.
+const LEAST_COS: f64 = 1e-3;
+
+impl Term for LimbDarkening {
+    described!(
+        "limb-darkening",
+        Material,
+        "The diffuse part goes as (cos θ_i·cos θ_s)^k (Minnaert's law): shadows between grains, or light \
+         that leaves a deep layer.",
+        "The diffuse level falls (k above 0) or rises (below 0) towards grazing angles of the source \
+         and of the receiver, whatever lies between them.",
+        knob("k", "1", [-0.9, 5.0], 0.0, 0.05),
+    );
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        [-0.3, 0.3].map(|k| vec![k]).to_vec()
+    }
+
+    fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+        let &[k] = values else { return f_per_sr };
+        let shape = (point.i.cos_theta() * point.o.cos_theta()).max(LEAST_COS).powf(k);
+        f_per_sr + diffuse_per_sr(law, point) * (shape - 1.0)
+    }
+}
+
+struct SecondLobe;
+
+impl Term for SecondLobe {
+    described!(
+        "second-lobe",
+        Material,
+        "A second population of facets of another roughness scatters a lobe of its own about the mirror \
+         direction (GGX).",
+        "A narrow core on a broad foot, or the reverse, that follows the mirror direction and grows \
+         towards grazing incidence. Which of two lobes is called the second means nothing. A lobe of the \
+         instrument keeps its width at all incidences.",
+        knob("f_lambda", "1", [0.0, 1.0], 0.0, 1e-3),
+        knob("m", "1", [0.01, 1.5], 0.3, 0.01),
+    );
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        pairs(&[1e-3, 1e-2, 0.1], &[0.03, 0.1, 0.3, 0.8])
+    }
+
+    fn scatter(&self, values: &[f64], _: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+        let &[f_lambda, m] = values else { return f_per_sr };
+        let (distribution, shadowing) = (Distribution::Ggx, Shadowing::Separable);
+        let lobe = CookTorrance { f_lambda, m, m_across: None, distribution, shadowing };
+        // Schlick's term does not vanish with f_λ.
+        let share = f_lambda / (f_lambda + 1e-6);
+        f_per_sr + share * lobe.f_per_sr(point.i, point.o)
+    }
+}
+
+struct FresnelGrowth;
+
+impl Term for FresnelGrowth {
+    described!(
+        "fresnel-growth",
+        Material,
+        "The lobe's level is not the reflectance of its facets: they reflect so many dB less at normal \
+         incidence, and all towards grazing (another index of refraction).",
+        "The specular level rises more steeply (above 0) or less (below 0) from one incidence to \
+         the next than its level says. In backscatter facets are met at right angles, and it does not show.",
+        knob("level_db", "dB", [-30.0, 30.0], 0.0, 0.2),
+    );
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        [-6.0, -1.0, 1.0, 6.0].map(|db| vec![db]).to_vec()
+    }
+
+    fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+        let &[level_db] = values else { return f_per_sr };
+        let amount = 10f64.powf(0.1 * level_db);
+        let growth = (1.0 - half(point)[1]).powi(5);
+        let schlick = |r0: f64| r0 + (1.0 - r0) * growth;
+        let change = |lobe: &CookTorrance| {
+            let f = lobe.f_lambda.max(1e-9);
+            amount * schlick((f / amount).min(1.0)) / schlick(f) - 1.0
+        };
+        f_per_sr + lobes_per_sr(law, point, &change)
+    }
+}
+
+struct Subsurface;
+
+impl Term for Subsurface {
+    described!(
+        "subsurface",
+        Material,
+        "Part of the wave enters the material, scatters inside and comes out with the same strength at \
+         every angle: f rises as 1/(cos θ_i·cos θ_s).",
+        "The curve flattens, or bends upwards, towards grazing angles of source and receiver alike. Stray \
+         light rises with the receiver's angle alone, at every incidence by the same amount.",
+        knob("sigma_v", "1", [0.0, 1.0], 0.0, 5e-4),
+    );
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        [5e-4, 5e-3, 5e-2].map(|sigma_v| vec![sigma_v]).to_vec()
+    }
+
+    fn scatter(&self, values: &[f64], _: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+        let &[sigma_v] = values else { return f_per_sr };
+        let cos = [point.i, point.o].map(|d| d.cos_theta().max(LEAST_COS));
+        f_per_sr + sigma_v / (4.0 * PI * cos[0] * cos[1])
+    }
+}
+
+struct ThinFilm;
+
+/// Index of refraction of a film: paints and oxides have 1.4 to 1.8, and the ripple hardly tells.
+const FILM_INDEX: f64 = 1.5;
+
+impl Term for ThinFilm {
+    described!(
+        "thin-film",
+        Material,
+        "A flat film of index 1.5 interferes with itself: the lobes ripple with the path through it. The \
+         thickness is optical, in wavelengths.",
+        "Maxima and minima that crowd towards grazing angles. No other term goes up and down more than \
+         once. Thicknesses that put the same number of ripples over the angles cannot be told apart.",
+        knob("visibility", "1", [-0.95, 0.95], 0.0, 0.02),
+        knob("thickness", "1", [0.1, 20.0], 1.0, 0.01),
+    );
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        let thicknesses: Vec<f64> = (0..60).map(|k| 0.2 + 0.1 * f64::from(k)).collect();
+        pairs(&[-0.2, 0.2], &thicknesses)
+    }
+
+    fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+        let &[visibility, thickness] = values else { return f_per_sr };
+        let inside = |d: Direction<Surface>| {
+            (1.0 - (1.0 - d.cos_theta().powi(2)) / FILM_INDEX.powi(2)).max(0.0).sqrt()
+        };
+        let phase_rad = TAU * thickness * (inside(point.i) + inside(point.o));
+        f_per_sr + lobes_per_sr(law, point, &|_| visibility * phase_rad.cos())
+    }
+}
+
+struct Opposition;
+
+impl Term for Opposition {
+    described!(
+        "opposition",
+        Material,
+        "More comes straight back than to the sides: no grain's shadow is seen from the source, and waves \
+         that go one way round and the other interfere.",
+        "A peak about the direction of the source at every incidence, where the detector does not hide \
+         it. A backscatter curve is all peak and does not show it.",
+        knob("height", "1", [0.0, 3.0], 0.0, 0.02),
+        knob("width_deg", "deg", [0.5, 30.0], 5.0, 0.2),
+    );
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        pairs(&[0.1, 0.5], &[2.0, 6.0, 15.0])
+    }
+
+    fn scatter(&self, values: &[f64], _: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+        let &[height, width_deg] = values else { return f_per_sr };
+        let apart_rad = point.i.xyz().dot(point.o.xyz()).clamp(-1.0, 1.0).acos();
+        f_per_sr * (1.0 + height * (-apart_rad / width_deg.to_radians()).exp())
+    }
+}
+
+struct AngleOffset;
+
+impl Term for AngleOffset {
+    described!(
+        "angle-offset",
+        Instrument,
+        "The receiver stands at another angle than the file says, or the sample is tilted by half as \
+         much: everything is seen from so much further off the normal.",
+        "The peaks of all incidences are shifted to the same side by the same angle, and each flank errs \
+         by its slope.",
+        knob("offset_deg", "deg", [-10.0, 10.0], 0.0, 0.1),
+    );
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        [-1.0, 1.0].map(|offset| vec![offset]).to_vec()
+    }
+
+    fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+        const GRAZING_RAD: f64 = 1.57;
+        let &[offset_deg] = values else { return f_per_sr };
+        let shifted = |theta_rad: f64, side: f64| {
+            let theta_rad =
+                (theta_rad + side * offset_deg.to_radians()).clamp(-GRAZING_RAD, GRAZING_RAD);
+            Direction::from_angles(theta_rad.abs(), if theta_rad < 0.0 { PI } else { 0.0 })
+        };
+        // In backscatter the source moves with the receiver.
+        let o = match point.i == point.o {
+            true => shifted(-point.theta_i_rad, -1.0),
+            false => shifted(point.theta_s_rad, 1.0),
+        };
+        let i = if point.i == point.o { o } else { point.i };
+        let here = law.f_per_sr(point.i, point.o);
+        if here > 0.0 { f_per_sr * law.f_per_sr(i, o) / here } else { f_per_sr }
+    }
+}
+
+struct InstrumentLobe;
+
+impl Term for InstrumentLobe {
+    described!(
+        "instrument-lobe",
+        Instrument,
+        "A narrow lobe of fixed width in the mirror direction: the mirror image of the source, as wide as \
+         the beam and the receiver's aperture.",
+        "A peak a few degrees wide, and equally wide at all incidences, exactly in the mirror direction.",
+        knob("level_per_sr", "sr-1", [0.0, 1e4], 0.0, 1e-3),
+        knob("width_deg", "deg", [0.1, 5.0], 1.0, 0.05),
+    );
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        pairs(&[1e-3, 1e-1, 10.0], &[0.5, 1.5, 4.0])
+    }
+
+    fn scatter(&self, values: &[f64], _: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+        let &[level_per_sr, width_deg] = values else { return f_per_sr };
+        let (i, o) = (point.i.xyz(), point.o.xyz());
+        let off_rad = (2.0 * i.z * o.z - i.dot(o)).clamp(-1.0, 1.0).acos();
+        f_per_sr + level_per_sr * (-0.5 * (off_rad / width_deg.to_radians()).powi(2)).exp()
+    }
+}
+
+struct StrayLight;
+
+impl Term for StrayLight {
+    described!(
+        "stray-light",
+        Instrument,
+        "The same power is added at every angle, or too much was taken off with the blank; divided by the \
+         receiver's cosine it becomes s/cos θ_s.",
+        "The curve rises (s above 0) or falls (below 0) towards grazing receivers, most where the sample is \
+         darkest, and by the same amount at every incidence.",
+        knob("s_per_sr", "sr-1", [-0.1, 0.1], 0.0, 1e-4),
+    );
+
+    fn starts(&self) -> Vec<Vec<f64>> {
+        [-1e-3, -1e-4, 1e-4, 1e-3].map(|s| vec![s]).to_vec()
+    }
+
+    fn scatter(&self, values: &[f64], _: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
+        let &[s_per_sr] = values else { return f_per_sr };
+        f_per_sr + s_per_sr / point.o.cos_theta().max(LEAST_COS)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diagnose::curve::base_law;
+    use crate::diagnose::curve::testing::in_plane;
+
+    #[test]
+    fn absent_numbers_change_nothing_and_every_start_does() {
+        let law = base_law();
+        let points = in_plane(&law, &[10.0, 40.0, 65.0], 5.0);
+        for term in terms() {
+            let change = |values: &[f64]| {
+                let one = |point: &Point| {
+                    let f = law.f_per_sr(point.i, point.o);
+                    (term.scatter(values, &law, point, f) / f - 1.0).abs()
+                };
+                points.iter().map(one).fold(0.0, f64::max)
+            };
+            let absent: Vec<f64> = term.knobs().iter().map(|knob| knob.absent).collect();
+            assert!(change(&absent) < 1e-12, "{}", term.name());
+            for start in term.starts() {
+                let inside = |(knob, value): (&Knob, &f64)| (knob.min..=knob.max).contains(value);
+                assert!(term.knobs().iter().zip(&start).all(inside), "{}", term.name());
+                assert!(change(&start) > 1e-6, "{} {start:?}", term.name());
+            }
+        }
+    }
+
+    #[test]
+    fn a_shifted_receiver_sees_the_peak_beside_the_mirror() {
+        let mut law = base_law();
+        law.set_parameter("1.m", 0.03);
+        let points = in_plane(&law, &[40.0], 1.0);
+        let seen = |point: &Point| {
+            AngleOffset.scatter(&[3.0], &law, point, law.f_per_sr(point.i, point.o))
+        };
+        let peak = |f: &dyn Fn(&Point) -> f64| {
+            points.iter().max_by(|a, b| f(a).total_cmp(&f(b))).unwrap().theta_s_rad.to_degrees()
+        };
+        let moved = peak(&seen) - peak(&|point| law.f_per_sr(point.i, point.o));
+        assert!((moved + 3.0).abs() < 0.6, "{moved}");
+    }
+}

@@ -1,0 +1,217 @@
+//! Scattering measured in the plane of incidence: f over the angles of source and receiver.
+//!
+//! As CSV: `theta_i_deg,theta_s_deg,brdf_per_sr`, and `sd_db` where it is known. θ_s is positive on the
+//! side of the mirror direction, so that θ_s = θ_i is the mirror and θ_s = −θ_i the way back. A pair of
+//! angles that stands there several times was measured several times. Values that the instrument could
+//! not measure, such as those behind its own detector, are left out.
+//!
+//! Also read are the isotropic tables of optical design programs (`.bsdf`), whose angles are counted from
+//! the mirror direction: azimuth 0 leads towards the normal and past it, 180° away from it.
+
+use crate::formats::FormatError;
+use crate::formats::csv::Table;
+
+/// One measured value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InPlane {
+    /// Angle of incidence θ_i, rad, from 0 to below π/2.
+    pub theta_i_rad: f64,
+    /// Angle of the receiver θ_s, rad, within ±π/2, positive on the mirror's side.
+    pub theta_s_rad: f64,
+    /// f, 1/sr, above 0.
+    pub f_per_sr: f64,
+    /// Standard deviation, dB, where it is known.
+    pub sd_db: Option<f64>,
+}
+
+/// Grazing directions say nothing of a surface, degrees.
+const GRAZING_DEG: f64 = 89.9;
+
+/// Reads the table.
+///
+/// # Errors
+/// The first cell that cannot be used, with its line and column.
+pub fn read_table(bytes: &[u8]) -> Result<Vec<InPlane>, FormatError> {
+    let table = Table::read(bytes, &["theta_i_deg", "theta_s_deg", "brdf_per_sr"], &["sd_db"])?;
+    (0..table.len()).map(|row| read_row(&table, row)).collect()
+}
+
+/// Whether the bytes are a table of bistatic values, by its header.
+pub fn is_table(bytes: &[u8]) -> bool {
+    let header = bytes.split(|byte| *byte == b'\n').next().unwrap_or(&[]);
+    String::from_utf8_lossy(header).split(',').any(|name| name.trim() == "theta_s_deg")
+}
+
+fn read_row(table: &Table, row: usize) -> Result<InPlane, FormatError> {
+    let within = |column: &'static str, [min, max]: [f64; 2]| {
+        let value = table.required_number(row, column)?;
+        match ((min..=max).contains(&value), table.cell(row, column)) {
+            (false, Some(cell)) => Err(cell.refuse(&format!("give a value from {min} to {max}"))),
+            _ => Ok(value),
+        }
+    };
+    let sd_db = match table.cell(row, "sd_db") {
+        Some(_) => Some(within("sd_db", [1e-6, 100.0])?),
+        None => None,
+    };
+    Ok(InPlane {
+        theta_i_rad: within("theta_i_deg", [0.0, GRAZING_DEG])?.to_radians(),
+        theta_s_rad: within("theta_s_deg", [-GRAZING_DEG, GRAZING_DEG])?.to_radians(),
+        f_per_sr: within("brdf_per_sr", [1e-30, 1e30])?,
+        sd_db,
+    })
+}
+
+/// Reads the plane of incidence of a `.bsdf` table at its first sample rotation; zeros, which stand
+/// for nothing measured, are left out.
+///
+/// # Errors
+/// What is missing or cannot be read, with its line.
+pub fn read_bsdf(bytes: &[u8]) -> Result<Vec<InPlane>, FormatError> {
+    let text = String::from_utf8_lossy(bytes);
+    let mut lines = text
+        .lines()
+        .enumerate()
+        .map(|(index, line)| (index + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    let mut header = Header::default();
+    loop {
+        let Some((number, line)) = lines.next() else { return Err(missing("DataBegin")) };
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let axis = match words.first().copied() {
+            Some("DataBegin") => break,
+            Some("AngleOfIncidence") => &mut header.incidences_deg,
+            Some("ScatterAzimuth") => &mut header.azimuths_deg,
+            Some("ScatterRadial") => &mut header.radials_deg,
+            _ => continue,
+        };
+        let Some((below, values)) = lines.next() else { return Err(missing("DataBegin")) };
+        *axis = numbers(below, values)?;
+        if words.get(1).and_then(|count| count.parse().ok()) != Some(axis.len()) {
+            let problem = format!("`{line}` is followed by {} angles", axis.len());
+            return Err(FormatError::at(format!("line {number}"), problem, "mend the count"));
+        }
+    }
+    header.check()?;
+    let mut found = Vec::new();
+    for &incidence_deg in &header.incidences_deg {
+        match lines.next() {
+            Some((_, line)) if line.starts_with("TIS") => {}
+            Some((number, _)) => {
+                let place = format!("line {number}");
+                return Err(FormatError::at(place, "`TIS` was expected", "mend the table"));
+            }
+            None => return Err(missing("TIS")),
+        }
+        for &azimuth_deg in &header.azimuths_deg {
+            let Some((number, line)) = lines.next() else { return Err(missing("row")) };
+            let row = header.row(number, line)?;
+            let towards = match azimuth_deg {
+                0.0 => -1.0,
+                180.0 => 1.0,
+                _ => continue,
+            };
+            let values = header.radials_deg.iter().zip(row);
+            found.extend(values.filter_map(|(radial_deg, f_per_sr)| {
+                let is_double = towards > 0.0 && *radial_deg == 0.0;
+                in_plane(incidence_deg, incidence_deg + towards * radial_deg, f_per_sr)
+                    .filter(|_| !is_double)
+            }));
+        }
+    }
+    Ok(found)
+}
+
+fn in_plane(theta_i_deg: f64, theta_s_deg: f64, f_per_sr: f64) -> Option<InPlane> {
+    (theta_s_deg.abs() <= GRAZING_DEG && f_per_sr > 0.0).then(|| InPlane {
+        theta_i_rad: theta_i_deg.to_radians(),
+        theta_s_rad: theta_s_deg.to_radians(),
+        f_per_sr,
+        sd_db: None,
+    })
+}
+
+/// Angles of a `.bsdf` table, degrees.
+#[derive(Default)]
+struct Header {
+    incidences_deg: Vec<f64>,
+    azimuths_deg: Vec<f64>,
+    radials_deg: Vec<f64>,
+}
+
+impl Header {
+    fn check(&self) -> Result<(), FormatError> {
+        let axes = [
+            ("AngleOfIncidence", &self.incidences_deg),
+            ("ScatterAzimuth", &self.azimuths_deg),
+            ("ScatterRadial", &self.radials_deg),
+        ];
+        if let Some((name, _)) = axes.iter().find(|(_, axis)| axis.is_empty()) {
+            return Err(missing(name));
+        }
+        if self.incidences_deg.iter().all(|angle| (0.0..=GRAZING_DEG).contains(angle)) {
+            return Ok(());
+        }
+        let problem = format!("an angle of incidence is not from 0 to {GRAZING_DEG}");
+        Err(FormatError::at("AngleOfIncidence", problem, "give it in degrees"))
+    }
+
+    fn row(&self, line: usize, text: &str) -> Result<Vec<f64>, FormatError> {
+        let row = numbers(line, text)?;
+        match row.len() == self.radials_deg.len() {
+            true => Ok(row),
+            false => {
+                let problem = format!("{} values for {} angles", row.len(), self.radials_deg.len());
+                Err(FormatError::at(format!("line {line}"), problem, "mend the line"))
+            }
+        }
+    }
+}
+
+fn missing(what: &str) -> FormatError {
+    FormatError::at("the file", format!("there is no `{what}`"), "give a complete .bsdf table")
+}
+
+fn numbers(line: usize, text: &str) -> Result<Vec<f64>, FormatError> {
+    let number = |word: &str| word.parse().ok().filter(|value: &f64| value.is_finite());
+    let all: Option<Vec<f64>> = text.split_whitespace().map(number).collect();
+    all.ok_or_else(|| {
+        FormatError::at(format!("line {line}"), "a word is no finite number", "mend the line")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BSDF: &str = "# by hand\nSource\tMeasured\nAngleOfIncidence\t2\n10 30\nScatterAzimuth 3\n\
+         0 90 180\nScatterRadial 3\n0 20 80\n\nMonochrome\nDataBegin\nTIS 0.1\n\
+         1 2 3\n4 5 6\n1 8 9\nTIS 0.1\n1 2 0\n4 5 6\n1 8 9\n";
+
+    #[test]
+    fn the_plane_of_incidence_is_taken_out_of_a_bsdf() {
+        let found = read_bsdf(BSDF.as_bytes()).unwrap();
+        let rows: Vec<[i64; 3]> = found
+            .iter()
+            .map(|p| [p.theta_i_rad.to_degrees(), p.theta_s_rad.to_degrees(), p.f_per_sr])
+            .map(|row| row.map(|x| x.round() as i64))
+            .collect();
+        let at_10 = [[10, 10, 1], [10, -10, 2], [10, -70, 3], [10, 30, 8]];
+        let at_30 = [[30, 30, 1], [30, 10, 2], [30, 50, 8]];
+        assert_eq!(rows, [&at_10[..], &at_30[..]].concat());
+    }
+
+    #[test]
+    fn what_is_broken_is_named() {
+        let message = |text: &str| read_bsdf(text.as_bytes()).unwrap_err().to_string();
+        assert!(message("").contains("DataBegin"));
+        assert!(message(&BSDF.replace("4 5 6", "4 5")).contains("line 14: 2 values for 3 angles"));
+        assert!(message(&BSDF.replace("0 20 80", "0 x 80")).contains("line 8"));
+        assert!(message(&BSDF.replace("Radial 3", "Radial 4")).contains("3 angles"));
+        let table = |text: &str| read_table(text.as_bytes()).unwrap_err().to_string();
+        let header = "theta_i_deg,theta_s_deg,brdf_per_sr\n";
+        assert!(table(&format!("{header}10,95,0.1\n")).contains("column theta_s_deg"));
+        assert!(table(&format!("{header}10,20,0\n")).contains("column brdf_per_sr"));
+        assert!(is_table(header.as_bytes()) && !is_table(b"theta_deg,sigma0_db\n"));
+    }
+}

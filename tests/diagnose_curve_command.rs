@@ -1,0 +1,184 @@
+//! Promise: `matdb diagnose --curve` names what a curve's law lacks, in files and on the terminal, and
+//! finds in measured coatings the structure that one lobe and Lambert leave.
+
+mod support;
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+use std::fs;
+use std::path::Path;
+
+use matdb::brdf::Scattering;
+use matdb::diagnose::curve::{Points, base_law, term};
+use matdb::measure::in_plane::{InPlane, read_table};
+use serde_json::Value;
+use support::{entries, matdb, refused};
+
+const FILES: [&str; 5] = ["curve.png", "curve.svg", "report.html", "report.json", "residuals.csv"];
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
+}
+
+/// A table in the plane of incidence without noise beyond its digits, of the base law with a term.
+fn table(name: &str, numbers: &[f64]) -> String {
+    let law = base_law();
+    let angles = [20.0f64, 45.0, 65.0];
+    let angles = angles.iter().flat_map(|i| (-38..=38).map(move |k| [*i, 2.0 * f64::from(k)]));
+    let values: Vec<InPlane> = angles
+        .map(|[i, s]| InPlane {
+            theta_i_rad: i.to_radians(),
+            theta_s_rad: s.to_radians(),
+            f_per_sr: 1.0,
+            sd_db: None,
+        })
+        .collect();
+    let mut text = "theta_i_deg,theta_s_deg,brdf_per_sr\n".to_owned();
+    for (k, point) in Points::in_plane(&values, None).points.iter().enumerate() {
+        let f = law.f_per_sr(point.i, point.o);
+        let f = term(name).map_or(f, |term| term.scatter(numbers, &law, point, f));
+        // About 0.2 dB of scatter that has no period.
+        let scatter = 1.0 + 0.07 * ((k * k) as f64 * 0.754_877_666).fract() - 0.035;
+        let [i, s] = [point.theta_i_rad, point.theta_s_rad].map(|x: f64| x.to_degrees().round());
+        text += &format!("{i},{s},{:.6e}\n", f * scatter);
+    }
+    text
+}
+
+#[test]
+fn a_report_is_complete_and_its_table_gives_its_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("coating.csv"), table("stray-light", &[0.01])).unwrap();
+    let command = ["--json", "diagnose", "--curve", "coating.csv", "-o", "out"];
+    let output = matdb(at).args(command).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(entries(&at.join("out")), FILES);
+    let report = json(&at.join("out/report.json"));
+    assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap(), report);
+    assert_eq!((&report["schema"], &report["verdict"]), (&1.into(), &"explained".into()));
+    assert_eq!(report["effects"][0]["name"], "stray-light", "{report}");
+    let csv = fs::read_to_string(at.join("out/residuals.csv")).unwrap();
+    for (column, model) in [(4, "before"), (5, "after")] {
+        let squares: Vec<f64> = csv
+            .lines()
+            .skip(1)
+            .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect::<Vec<f64>>())
+            .map(|cells| (cells[2] - cells[column]).powi(2))
+            .collect();
+        let rmse_db = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        assert!((rmse_db - number(&report["error"][model]["rmse_db"])).abs() < 2e-4, "{model}");
+    }
+    let html = fs::read_to_string(at.join("out/report.html")).unwrap();
+    assert!(html.contains("stray-light") && html.contains("<svg") && !html.contains("http"));
+}
+
+#[test]
+fn what_means_nothing_is_refused_in_a_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("coating.csv"), table("", &[])).unwrap();
+    fs::write(at.join("bad.csv"), "theta_i_deg,theta_s_deg,brdf_per_sr\n10,20,-1\n").unwrap();
+    fs::write(at.join("bad.bsdf"), "Source Measured\n").unwrap();
+    fs::write(at.join("few.csv"), "theta_deg,sigma0_db\n0,1\n10,0\n").unwrap();
+    for (arguments, says) in [
+        (
+            vec!["x.ply", "--curve", "coating.csv"],
+            "give CLOUD --scene SCENE, or --curve FILE alone",
+        ),
+        (vec!["x.ply"], "give CLOUD --scene SCENE, or --curve FILE alone"),
+        (vec!["--curve", "bad.csv"], "line 2, column brdf_per_sr"),
+        (vec!["--curve", "bad.bsdf"], "there is no `DataBegin`"),
+        (vec!["--curve", "coating.csv", "--model", "lamber"], "did you mean `lambert`?"),
+        (vec!["--curve", "coating.csv", "--effects", "stray"], "no effect `stray`"),
+        (vec!["--curve", "coating.csv", "--noise-db", "0"], "above 0 and up to 100"),
+        (vec!["--curve", "few.csv"], "2 detected levels"),
+    ] {
+        let mut command = vec!["diagnose", "-o", "out"];
+        command.extend(arguments);
+        let message = refused(matdb(at).args(&command));
+        assert!(message.contains(says), "{message}");
+    }
+    assert_eq!(json(&at.join("out/report.json"))["verdict"], "cannot-tell");
+}
+
+/// Rows of a CSV by column.
+fn records(path: &Path) -> Vec<BTreeMap<String, String>> {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    reader.deserialize().map(Result::unwrap).collect()
+}
+
+/// Tables in the plane of incidence of the coatings, with the mean blank taken off.
+fn coatings(folder: &Path) -> BTreeMap<String, String> {
+    let place = |r: &BTreeMap<String, String>| {
+        ["scan", "incidence_deg", "receive_deg"].map(|column| r[column].clone())
+    };
+    let in_plane = |r: &BTreeMap<String, String>| r["azimuth_deg"] == "-90";
+    let mut blanks: BTreeMap<[String; 3], Vec<f64>> = BTreeMap::new();
+    for record in records(&folder.join("blanks.csv")).iter().filter(|r| in_plane(r)) {
+        blanks.entry(place(record)).or_default().push(record["rt"].parse().unwrap());
+    }
+    let mut tables = BTreeMap::new();
+    for record in records(&folder.join("samples.csv")).iter().filter(|r| in_plane(r)) {
+        let [i, s, rt] = ["incidence_deg", "receive_deg", "rt"]
+            .map(|column| record[column].parse::<f64>().unwrap());
+        let blank =
+            blanks.get(&place(record)).map_or(0.0, |b| b.iter().sum::<f64>() / b.len() as f64);
+        let f = (rt - blank) / (PI * s.to_radians().cos());
+        // The detector stands in the beam there; below is stray light.
+        if (i + s).abs() > 4.9 && f > 1e-3 {
+            let header = || "theta_i_deg,theta_s_deg,brdf_per_sr\n".to_owned();
+            *tables.entry(record["sample"].clone()).or_insert_with(header) +=
+                &format!("{i},{s},{f}\n");
+        }
+    }
+    tables
+}
+
+#[test]
+fn structure_is_found_in_measured_coatings() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/ua-loft-black-coatings");
+    if !data.exists() {
+        println!("skipped: there is no folder shared/data/ua-loft-black-coatings");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (name, table) in coatings(&data) {
+        assert!(read_table(table.as_bytes()).unwrap().len() > 100, "{name}");
+        fs::write(at.join(format!("{name}.csv")), table).unwrap();
+    }
+    /// What the provenance of the data says that one lobe and Lambert leave, dB, with room.
+    const LEFT_DB: [f64; 2] = [0.4, 2.0];
+    let mut named = Vec::new();
+    for file in entries(at) {
+        matdb(at).args(["diagnose", "-q", "--curve", &file, "-o", "out"]).assert().success();
+        let report = json(&at.join("out/report.json"));
+        let [before, after] =
+            ["before", "after"].map(|model| number(&report["error"][model]["rmse_db"]));
+        let noise_db = number(&report["error"]["noise_floor_db"]);
+        assert_eq!(report["verdict"], "unexplained", "{file}");
+        assert!((LEFT_DB[0]..LEFT_DB[1]).contains(&before), "{file}: {before}");
+        assert!((0.05..0.3).contains(&noise_db) && before > 2.0 * noise_db, "{file}: {noise_db}");
+        assert!(after <= before, "{file}: {before} {after}");
+        for unknown in report["unexplained"].as_array().unwrap() {
+            assert!(number(&unknown["strength_db"]) > noise_db, "{file}: {unknown}");
+        }
+        if report["effects"].as_array().is_some_and(|effects| !effects.is_empty()) {
+            named.push(format!("{file}: {} {before} {after}", report["effects"][0]["name"]));
+            assert!(after < 0.95 * before, "{named:?}");
+        }
+    }
+    println!("{named:#?}");
+    assert!(!named.is_empty(), "nothing was named in any coating");
+    for name in ["AnoBlackEC1onAlum", "AnoBlackEC2onAlum", "AnoBlackNiTEonSteel"] {
+        let file = data.join(format!("{name}.bsdf"));
+        let file = file.to_str().unwrap();
+        matdb(at).args(["diagnose", "-q", "--curve", file, "-o", "out"]).assert().success();
+        assert_eq!(json(&at.join("out/report.json"))["verdict"], "unexplained", "{name}");
+    }
+}
