@@ -148,6 +148,60 @@ pub struct Value {
     pub unit: &'static str,
 }
 
+/// Three numbers that belong together, such as a place.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Triple {
+    /// Values along x, y and z.
+    pub value: [f64; 3],
+    /// Their standard deviations, as those of numbers; none for what follows from other numbers.
+    pub sd: Option<[f64; 3]>,
+    /// UCUM code of their unit.
+    pub unit: &'static str,
+}
+
+/// The numbers of an effect by name.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Parameters {
+    /// Those that were fitted.
+    #[serde(flatten)]
+    pub numbers: BTreeMap<&'static str, Value>,
+    /// The same as vectors in the global frame: `translation_m` and `rotation_deg` of a pose,
+    /// `centre_m` of a place on the target.
+    #[serde(flatten)]
+    pub triples: BTreeMap<&'static str, Triple>,
+}
+
+impl Parameters {
+    fn new(numbers: BTreeMap<&'static str, Value>, looks: &[Look]) -> Parameters {
+        let mut triples = BTreeMap::new();
+        for (name, unit) in [("translation_m", "m"), ("rotation_deg", "deg")] {
+            let (stem, end) = name.split_once('_').unwrap_or((name, ""));
+            let axis = |axis: &str| numbers.get(format!("{stem}_{axis}_{end}").as_str());
+            if let (Some(x), Some(y), Some(z)) = (axis("x"), axis("y"), axis("z")) {
+                let sd = x.sd.zip(y.sd).zip(z.sd).map(|((x, y), z)| [x, y, z]);
+                triples.insert(name, Triple { value: [x.value, y.value, z.value], sd, unit });
+            }
+        }
+        if let (Some(x), Some(y)) = (numbers.get("centre_x_m"), numbers.get("centre_y_m")) {
+            let off = |look: &&Look| (look.xt_m - x.value).hypot(look.yt_m - y.value);
+            let nearest = looks.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+            if let Some(look) = nearest {
+                let value = look.hit.point.xyz.to_array();
+                triples.insert("centre_m", Triple { value, sd: None, unit: "m" });
+            }
+        }
+        Parameters { numbers, triples }
+    }
+}
+
+impl std::ops::Deref for Parameters {
+    type Target = BTreeMap<&'static str, Value>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.numbers
+    }
+}
+
 /// Why an effect was added.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Evidence {
@@ -173,7 +227,7 @@ pub struct Found {
     /// Effects that predict the data as well.
     pub class: Vec<&'static str>,
     /// Its numbers by name, fitted together with everything else.
-    pub parameters: BTreeMap<&'static str, Value>,
+    pub parameters: Parameters,
     /// Why it was added.
     pub evidence: Evidence,
 }
@@ -415,7 +469,8 @@ impl Diagnosis {
         let prediction = problem.predict(&state.space, &state.fitted.at);
         let largest_db = added.iter().map(|a| a.evidence.size_db).fold(0.0, f64::max);
         let covariates = covariates(looks, &prediction, observations);
-        let mut unexplained = self.tests().run(&z_after, looks, &prediction, &covariates, &folds);
+        let mut unexplained =
+            self.tests(largest_db).run(&z_after, looks, &prediction, &covariates, &folds);
         if selection.is_structured(&structure, largest_db) {
             unexplained.extend(residual::of_field(&structure));
         }
@@ -468,8 +523,9 @@ impl Diagnosis {
         residual::z(&prediction, problem.declared, problem.observations, self.seed)
     }
 
-    fn tests(&self) -> Tests {
-        let Diagnosis { seed, draws, block_m, family_error, least_size_db, .. } = *self;
+    fn tests(&self, largest_db: f64) -> Tests {
+        let Diagnosis { seed, draws, block_m, family_error, .. } = *self;
+        let least_size_db = self.least_size_db.max(select::SHARE_OF_FORM * largest_db);
         Tests { seed, draws, block_m, family_error, least_size_db }
     }
 }
@@ -554,7 +610,7 @@ fn values(
         let value = |((knob, value), sd): ((&Knob, f64), &f64)| {
             (knob.name, Value { value, sd: finite(sd * knob.step), unit: knob.unit })
         };
-        let parameters = knobs.map(value).collect();
+        let parameters = Parameters::new(knobs.map(value).collect(), problem.looks);
         let select::Added { class, evidence } = added;
         Found { name: effect.name(), level: effect.level(), class, parameters, evidence }
     });

@@ -42,7 +42,7 @@ const SHARE_OF_LARGEST: f64 = 0.2;
 /// And of the scatter: a form that is off here and there scatters more than it shifts.
 const SHARE_OF_SPREAD: f64 = 0.4;
 /// Structure that is left, likewise.
-const SHARE_OF_FORM: f64 = 0.25;
+pub(super) const SHARE_OF_FORM: f64 = 0.25;
 /// Standard errors by which a field's held-out gain must exceed nothing.
 const FIELD_ERRORS: f64 = 3.0;
 /// Share of its gain that an effect of the scatter must keep where a field has corrected the means.
