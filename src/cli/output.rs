@@ -15,13 +15,53 @@ pub(super) fn write_all<Name: AsRef<str>>(
     folder: &Path,
     files: &[(Name, Vec<u8>)],
 ) -> Result<(), Error> {
-    let created = create_folder(folder)?;
-    let result = stage(folder, files).and_then(|staged| publish(folder, staged));
-    if result.is_err() {
-        // Deepest first; a folder that has something in it by now stays.
-        created.iter().for_each(|path| drop(std::fs::remove_dir(path)));
+    Written::new(&[(folder, files)]).map(Written::keep)
+}
+
+/// Files that have taken their places; what was there comes back when this is dropped before it is
+/// [kept](Written::keep).
+#[derive(Default)]
+#[must_use = "what is not kept is taken back"]
+pub(super) struct Written {
+    placed: Vec<Placed>,
+    /// Folders that were not there, those within others first.
+    created: Vec<PathBuf>,
+}
+
+impl Written {
+    /// Writes files into several folders as [`write_all`] does into one: all of them or none.
+    pub fn new<Name: AsRef<str>>(
+        folders: &[(&Path, &[(Name, Vec<u8>)])],
+    ) -> Result<Written, Error> {
+        let mut written = Written::default();
+        let mut staged = Vec::new();
+        for (folder, files) in folders {
+            written.created.splice(0..0, create_folder(folder)?);
+            staged.push((*folder, stage(folder, files)?));
+        }
+        for (folder, files) in staged {
+            for (name, file) in files {
+                let placed =
+                    place(folder, name, file).map_err(|reason| failed(folder, name, reason))?;
+                written.placed.push(placed);
+            }
+        }
+        Ok(written)
     }
-    result
+
+    /// Leaves the files where they are.
+    pub fn keep(mut self) {
+        self.placed.clear();
+        self.created.clear();
+    }
+}
+
+impl Drop for Written {
+    fn drop(&mut self) {
+        self.placed.drain(..).rev().for_each(take_back);
+        // Deepest first; a folder that has something in it by now stays.
+        self.created.iter().for_each(|path| drop(std::fs::remove_dir(path)));
+    }
 }
 
 /// Creates a folder and its parents; the ones that were missing, deepest first.
@@ -70,20 +110,6 @@ fn stage<'a, Name: AsRef<str>>(
 struct Placed {
     path: PathBuf,
     before: Option<TempPath>,
-}
-
-fn publish(folder: &Path, staged: Vec<(&str, NamedTempFile)>) -> Result<(), Error> {
-    let mut placed = Vec::new();
-    for (name, file) in staged {
-        match place(folder, name, file) {
-            Ok(one) => placed.push(one),
-            Err(reason) => {
-                placed.into_iter().for_each(take_back);
-                return Err(failed(folder, name, reason));
-            }
-        }
-    }
-    Ok(())
 }
 
 /// Puts a file in its place; what was there is kept under a temporary name.

@@ -1,9 +1,12 @@
 //! `matdb diagnose`.
 
+mod after;
 mod cannot_tell;
 mod html;
 mod plots;
+mod publish;
 mod residuals;
+mod takers;
 #[cfg(test)]
 mod testing;
 mod text;
@@ -13,30 +16,33 @@ use std::path::{Path, PathBuf};
 
 use super::cloud::CloudArgs;
 use super::console::Console;
-use super::database::Database;
+use super::database::{Database, USUAL};
 use super::effects::chosen;
 use super::output::write_all;
-use super::staging::materials;
+use super::staging::{materials, model};
 use crate::brdf::Brdf;
 use crate::diagnose::{Declared, DiagnoseError, Diagnosis, Report, Subject, looks, matched};
 use crate::effects::{Effect, Receiver, Stage, middle};
 use crate::error::Error;
 use crate::measure::Cloud;
 use crate::radar::{Link, Radar};
-use crate::scene::Scene;
+use crate::scene::{Scene, read_text};
 use crate::trace::Bvh;
 use crate::units::watts_from_dbm;
 use cannot_tell::CannotTell;
+use publish::Publication;
+use takers::Cast;
 
 /// Find the physical effect that a scene lacks to explain a measured cloud
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb diagnose cloud.ply --scene scene.toml -o diagnosis
   matdb diagnose cloud.ply --scene scene.toml --effects drift,fov-gain -o diagnosis
+  matdb diagnose cloud.ply --scene scene.toml -o diagnosis --add    store what is found
   matdb effects                                              what is tried, and how to tell it
 
 Writes report.html (all of it, for a person), report.json, residuals.csv (one line per chirp) and
-pictures (.svg and .png). Too few data: report.html and report.json say so, and the status is not 0.")]
+pictures (.svg and .png), and after.toml, the scene with what was found. Too few data: report.html and report.json say so, and the status is not 0.")]
 pub(super) struct Args {
     #[command(flatten)]
     cloud: CloudArgs,
@@ -46,6 +52,12 @@ pub(super) struct Args {
     /// Try only these effects [default: all]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     effects: Vec<String>,
+    /// Store what is found: new revisions of the materials, and the scene as SCENE-after.toml beside it
+    #[arg(long)]
+    add: bool,
+    /// The material that takes refitted law and effects in [default: all of the scene with enough looks]
+    #[arg(long, value_name = "NAME")]
+    material: Option<String>,
     /// Seed of folds and of everything random
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -67,12 +79,36 @@ struct Context {
     seed: u64,
     /// This command, as a person would type it again.
     command: String,
+    /// The program with the database that it works on, as a person would type it.
+    program: String,
+    /// The scene with what was found in the folder of the report, as a shell takes it.
+    after: String,
+    /// The one that `--add` puts beside the old scene.
+    beside: String,
+    /// Folder of the report.
+    folder: PathBuf,
+    /// Whether what was found was stored.
+    is_added: bool,
+    /// Materials that were stored, with their revisions.
+    added: Vec<String>,
+    /// Files of materials that were not.
+    material_files: Vec<String>,
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    let given = read_text(&args.scene)?;
     let scene = Scene::load(&args.scene)?;
     let effects = chosen(&args.effects)?;
     let (used, material_of_region) = materials(&scene, &args.scene, db)?;
+    let names: Vec<String> = scene.target.regions.iter().map(|r| r.material.clone()).collect();
+    let cast = Cast { used: &used, names: &names, of_region: &material_of_region };
+    // A diagnosis takes a while: what hinders its storing is said before.
+    after::check_places(&args.scene, &args.output, args.add)?;
+    let wanted = cast.wanted(args.material.as_deref())?;
+    if args.add {
+        cast.check()?;
+    }
+    let effects = undeclared(effects, &scene, &args.scene, cast, console)?;
     let cloud = args.cloud.read(scene.radar())?;
     let laws: Vec<Brdf> =
         material_of_region.iter().map(|&m| used[usize::from(m)].scattering.clone()).collect();
@@ -82,11 +118,43 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     bar.finish_and_clear();
     match answer {
         Ok((report, false_alarms)) => {
-            let context = context(args, &scene, false_alarms);
-            publish(&report, &context, scene.radar().spot_diameter_m, &args.output, console)
+            let context = context(args, &scene, false_alarms, db);
+            let given = given.as_str();
+            let report = &report;
+            Publication { args, scene: &scene, given, cast, wanted, report }
+                .publish(context, db, console)
         }
         Err(error) => refuse(error, args, console),
     }
+}
+
+/// The effects without those that scene, radar or materials declare.
+fn undeclared(
+    effects: Vec<&'static dyn Effect>,
+    scene: &Scene,
+    path: &Path,
+    cast: Cast,
+    console: &Console,
+) -> Result<Vec<&'static dyn Effect>, Error> {
+    let declared = super::staging::effects(scene, path, cast.used, cast.of_region)?;
+    let model = model(&declared, scene, cast.used, cast.of_region);
+    let is_declared = |effect: &&'static dyn Effect| {
+        let mut known = model.iter().flat_map(|model| &model.effects);
+        known.any(|(declared, _)| declared.name() == effect.name())
+    };
+    let (known, tried): (Vec<_>, Vec<_>) = effects.into_iter().partition(is_declared);
+    let names: Vec<&str> = known.iter().map(|effect| effect.name()).collect();
+    let names = names.join(", ");
+    if tried.is_empty() {
+        return Err(Error::Usage {
+            problem: format!("the scene declares {names} already"),
+            way_out: "name other effects, or diagnose with the scene that lacks them".to_owned(),
+        });
+    }
+    if !known.is_empty() {
+        console.notice(&format!("declared already, so neither tried nor at work here: {names}"));
+    }
+    Ok(tried)
 }
 
 /// The diagnosis, and how many detections were set aside.
@@ -125,9 +193,8 @@ fn diagnosed(
     Ok((report, matched.false_alarms))
 }
 
-fn context(args: &Args, scene: &Scene, false_alarms: usize) -> Context {
+fn context(args: &Args, scene: &Scene, false_alarms: usize, db: &Database) -> Context {
     let regions = &scene.target.regions;
-    let [cloud, path, output] = [&args.cloud.cloud, &args.scene, &args.output].map(|p| typed(p));
     Context {
         scene: scene.file.name.clone(),
         scene_path: args.scene.display().to_string(),
@@ -135,8 +202,29 @@ fn context(args: &Args, scene: &Scene, false_alarms: usize) -> Context {
         regions: regions.iter().map(|r| (r.name.clone(), r.material.clone())).collect(),
         false_alarms,
         seed: args.seed,
-        command: format!("matdb diagnose {cloud} --scene {path} -o {output}"),
+        program: program(db),
+        command: command(std::env::args_os().skip(1)),
+        after: typed(&args.output.join(after::AFTER)),
+        beside: typed(&args.scene.with_file_name(after::name_beside(&args.scene))),
+        folder: args.output.clone(),
+        is_added: args.add,
+        added: Vec::new(),
+        material_files: Vec::new(),
     }
+}
+
+/// The program with its database, where that is not the usual one.
+fn program(db: &Database) -> String {
+    match db.path() == Path::new(USUAL) {
+        true => "matdb".to_owned(),
+        false => format!("matdb --db {}", typed(db.path())),
+    }
+}
+
+/// The program with these arguments, as a shell takes it.
+fn command(arguments: impl Iterator<Item = std::ffi::OsString>) -> String {
+    let arguments = arguments.map(|argument| typed(Path::new(&argument)));
+    std::iter::once("matdb".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
 /// A path as a shell takes it.
@@ -147,29 +235,6 @@ fn typed(path: &Path) -> String {
         true => text,
         false => format!("'{}'", text.replace('\'', "'\\''")),
     }
-}
-
-/// Writes everything and says what matters.
-fn publish(
-    report: &Report,
-    context: &Context,
-    spot_m: f64,
-    folder: &Path,
-    console: &Console,
-) -> Result<(), Error> {
-    let (pictures, notices) = plots::pictures(report, spot_m);
-    let mut files = vec![
-        ("report.html".to_owned(), html::report(report, context, &pictures)?),
-        ("report.json".to_owned(), json(report)?),
-        ("residuals.csv".to_owned(), residuals::csv(&report.rows)),
-    ];
-    for picture in &pictures {
-        files.extend(picture.files()?);
-    }
-    write_all(folder, &files)?;
-    notices.iter().for_each(|notice| console.notice(notice));
-    let names: Vec<String> = files.into_iter().map(|(name, _)| name).collect();
-    console.result(&text::text(report, &names, folder), report)
 }
 
 /// Writes that nothing can be said, and why; the error is the way out.
@@ -208,6 +273,7 @@ mod tests {
     #[test]
     fn a_path_can_be_typed_again() {
         assert_eq!(typed(Path::new("out/a-1.ply")), "out/a-1.ply");
+        assert_eq!(command(["a b", "-o"].map(Into::into).into_iter()), "matdb 'a b' -o");
         assert_eq!(typed(Path::new("my cloud.ply")), "'my cloud.ply'");
         assert_eq!(typed(Path::new("it's;rm")), "'it'\\''s;rm'");
     }
