@@ -18,6 +18,9 @@ pub(super) fn write_all<Name: AsRef<str>>(
     Written::new(&[(folder, files)]).map(Written::keep)
 }
 
+/// A folder and the files (name, bytes) that are to stand in it.
+pub(super) type Folder<'a, Name> = (&'a Path, &'a [(Name, Vec<u8>)]);
+
 /// Files that have taken their places; what was there comes back when this is dropped before it is
 /// [kept](Written::keep).
 #[derive(Default)]
@@ -30,9 +33,7 @@ pub(super) struct Written {
 
 impl Written {
     /// Writes files into several folders as [`write_all`] does into one: all of them or none.
-    pub fn new<Name: AsRef<str>>(
-        folders: &[(&Path, &[(Name, Vec<u8>)])],
-    ) -> Result<Written, Error> {
+    pub fn new<Name: AsRef<str>>(folders: &[Folder<Name>]) -> Result<Written, Error> {
         let mut written = Written::default();
         let mut staged = Vec::new();
         for (folder, files) in folders {
@@ -180,6 +181,24 @@ mod tests {
         assert!(write_all(root.path(), &files).is_err());
         assert_eq!(entries(root.path()), ["one", "two"]);
         assert_eq!(std::fs::read(root.path().join("one")).unwrap(), b"old");
+    }
+
+    #[test]
+    fn several_folders_are_written_or_none_and_what_is_not_kept_is_taken_back() {
+        let root = tempfile::tempdir().unwrap();
+        let [new, old] = ["new/sub", "old"].map(|name| root.path().join(name));
+        std::fs::create_dir(&old).unwrap();
+        std::fs::write(old.join("one"), "old").unwrap();
+        let files = [("one", b"new".to_vec())];
+        drop(Written::new(&[(&new, &files), (&old, &files)]).unwrap());
+        assert_eq!(entries(root.path()), ["old"]);
+        assert_eq!(std::fs::read(old.join("one")).unwrap(), b"old");
+        let nowhere = old.join("one/sub");
+        assert!(Written::new(&[(&new, &files), (&nowhere, &files)]).is_err());
+        assert_eq!(entries(root.path()), ["old"]);
+        Written::new(&[(&new, &files), (&old, &files)]).unwrap().keep();
+        assert_eq!(std::fs::read(new.join("one")).unwrap(), b"new");
+        assert_eq!(entries(&old), ["one"]);
     }
 
     #[test]
