@@ -40,9 +40,11 @@ name = \"<b>skin</b>\"
 material = \"mannequin-paint\"
 ";
 
-const FILES: [&str; 15] = [
+const FILES: [&str; 17] = [
+    "after.toml",
     "error.png",
     "error.svg",
+    "material-mannequin-paint.toml",
     "quantile-map.png",
     "quantile-map.svg",
     "quantiles.png",

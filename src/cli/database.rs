@@ -5,6 +5,9 @@ use std::path::{Path, PathBuf};
 use crate::error::Error;
 use crate::store::Store;
 
+/// The database that is used when nobody names one.
+pub(super) const USUAL: &str = "matdb.sqlite";
+
 /// The path of the database, and whether somebody asked for it.
 pub(super) struct Database {
     path: PathBuf,
@@ -14,7 +17,7 @@ pub(super) struct Database {
 impl Database {
     /// The database that `--db` or `$MATDB` names, or the one in the working directory.
     pub fn new(asked: Option<&Path>) -> Database {
-        let path = asked.unwrap_or(Path::new("matdb.sqlite")).to_owned();
+        let path = asked.unwrap_or(Path::new(USUAL)).to_owned();
         Database { path, asked_for: asked.is_some() }
     }
 

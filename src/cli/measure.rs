@@ -16,7 +16,7 @@ use crate::formats::figure::{Plot, Series, Style};
 use crate::material::Material;
 use crate::measure::{Curve, Metric, Reduced, Reduction, Registered, Registration, Row};
 use crate::scene::Scene;
-use crate::store::{Added, Store};
+use crate::store::Store;
 use crate::units::db_from_ratio;
 
 /// Turn a measured cloud into a material's curve: register it to the scene, find the angles
@@ -163,10 +163,7 @@ fn save(args: &Args, curve: &Curve, db: &Database) -> Result<Option<u32>, Error>
     let mut store = db.write()?;
     let Some(material) = prepared(args, curve, Some(&store))? else { return Ok(None) };
     let added = store.add([&material])?;
-    Ok(added.first().map(|added| match added {
-        Added::Revision(number) | Added::Unchanged(number) => *number,
-        Added::New => 1,
-    }))
+    Ok(added.first().map(|added| added.revision()))
 }
 
 fn registration(args: &Args) -> Result<Registration, Error> {

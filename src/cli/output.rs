@@ -15,13 +15,54 @@ pub(super) fn write_all<Name: AsRef<str>>(
     folder: &Path,
     files: &[(Name, Vec<u8>)],
 ) -> Result<(), Error> {
-    let created = create_folder(folder)?;
-    let result = stage(folder, files).and_then(|staged| publish(folder, staged));
-    if result.is_err() {
-        // Deepest first; a folder that has something in it by now stays.
-        created.iter().for_each(|path| drop(std::fs::remove_dir(path)));
+    Written::new(&[(folder, files)]).map(Written::keep)
+}
+
+/// A folder and the files (name, bytes) that are to stand in it.
+pub(super) type Folder<'a, Name> = (&'a Path, &'a [(Name, Vec<u8>)]);
+
+/// Files that have taken their places; what was there comes back when this is dropped before it is
+/// [kept](Written::keep).
+#[derive(Default)]
+#[must_use = "what is not kept is taken back"]
+pub(super) struct Written {
+    placed: Vec<Placed>,
+    /// Folders that were not there, those within others first.
+    created: Vec<PathBuf>,
+}
+
+impl Written {
+    /// Writes files into several folders as [`write_all`] does into one: all of them or none.
+    pub fn new<Name: AsRef<str>>(folders: &[Folder<Name>]) -> Result<Written, Error> {
+        let mut written = Written::default();
+        let mut staged = Vec::new();
+        for (folder, files) in folders {
+            written.created.splice(0..0, create_folder(folder)?);
+            staged.push((*folder, stage(folder, files)?));
+        }
+        for (folder, files) in staged {
+            for (name, file) in files {
+                let placed =
+                    place(folder, name, file).map_err(|reason| failed(folder, name, reason))?;
+                written.placed.push(placed);
+            }
+        }
+        Ok(written)
     }
-    result
+
+    /// Leaves the files where they are.
+    pub fn keep(mut self) {
+        self.placed.clear();
+        self.created.clear();
+    }
+}
+
+impl Drop for Written {
+    fn drop(&mut self) {
+        self.placed.drain(..).rev().for_each(take_back);
+        // Deepest first; a folder that has something in it by now stays.
+        self.created.iter().for_each(|path| drop(std::fs::remove_dir(path)));
+    }
 }
 
 /// Creates a folder and its parents; the ones that were missing, deepest first.
@@ -70,20 +111,6 @@ fn stage<'a, Name: AsRef<str>>(
 struct Placed {
     path: PathBuf,
     before: Option<TempPath>,
-}
-
-fn publish(folder: &Path, staged: Vec<(&str, NamedTempFile)>) -> Result<(), Error> {
-    let mut placed = Vec::new();
-    for (name, file) in staged {
-        match place(folder, name, file) {
-            Ok(one) => placed.push(one),
-            Err(reason) => {
-                placed.into_iter().for_each(take_back);
-                return Err(failed(folder, name, reason));
-            }
-        }
-    }
-    Ok(())
 }
 
 /// Puts a file in its place; what was there is kept under a temporary name.
@@ -154,6 +181,24 @@ mod tests {
         assert!(write_all(root.path(), &files).is_err());
         assert_eq!(entries(root.path()), ["one", "two"]);
         assert_eq!(std::fs::read(root.path().join("one")).unwrap(), b"old");
+    }
+
+    #[test]
+    fn several_folders_are_written_or_none_and_what_is_not_kept_is_taken_back() {
+        let root = tempfile::tempdir().unwrap();
+        let [new, old] = ["new/sub", "old"].map(|name| root.path().join(name));
+        std::fs::create_dir(&old).unwrap();
+        std::fs::write(old.join("one"), "old").unwrap();
+        let files = [("one", b"new".to_vec())];
+        drop(Written::new(&[(&new, &files), (&old, &files)]).unwrap());
+        assert_eq!(entries(root.path()), ["old"]);
+        assert_eq!(std::fs::read(old.join("one")).unwrap(), b"old");
+        let nowhere = old.join("one/sub");
+        assert!(Written::new(&[(&new, &files), (&nowhere, &files)]).is_err());
+        assert_eq!(entries(root.path()), ["old"]);
+        Written::new(&[(&new, &files), (&old, &files)]).unwrap().keep();
+        assert_eq!(std::fs::read(new.join("one")).unwrap(), b"new");
+        assert_eq!(entries(&old), ["one"]);
     }
 
     #[test]

@@ -113,6 +113,8 @@ pub struct Subject<'a> {
     pub stage: &'a Stage<'a>,
     /// Scattering of each region, where the refit begins.
     pub laws: &'a [Brdf],
+    /// Effects that are declared, at fixed values.
+    pub at_work: &'a [(&'a dyn Effect, Vec<f64>)],
     /// The receiver's law without effects; its looks lie between 0.1 and 10⁴.
     pub receiver: Receiver,
     /// Threshold and range error.
@@ -453,14 +455,14 @@ impl Diagnosis {
     /// # Errors
     /// When the data are too few to tell anything, or something declared has no meaning.
     pub fn run(&self, subject: &Subject, effects: &[&dyn Effect]) -> Result<Report, DiagnoseError> {
-        let Subject { stage, laws, receiver, declared, looks, observations, false_alarms } =
-            *subject;
+        let Subject { stage, laws, at_work, receiver, declared, .. } = *subject;
+        let Subject { looks, observations, false_alarms, .. } = *subject;
         let folds = Folds::new(looks, self.block_m, self.folds, self.seed);
         check(subject, &folds)?;
         let surveys = &Surveys::default();
         let problem = Problem { stage, looks, observations, declared, receiver, surveys };
         let selection = Selection { problem, folds: &folds, settings: self };
-        let base = selection.base(Space::new(&problem, laws)?);
+        let base = selection.base(Space::new(&problem, laws, at_work)?);
         let (before, z_before) = (base.held_out.clone(), self.z(&problem, &base));
         let Selected { state, ranking, added, structure } = selection.run(base.clone(), effects);
         let numbers = ranking.first().map_or(1, |candidate| candidate.numbers);

@@ -44,6 +44,8 @@ pub(super) struct Problem<'a> {
 pub(super) struct Space<'a> {
     laws: Vec<Brdf>,
     turned: Vec<(usize, Coordinates)>,
+    /// Effects whose numbers are not turned.
+    at_work: &'a [(&'a dyn Effect, Vec<f64>)],
     pub effects: Vec<&'a dyn Effect>,
 }
 
@@ -57,7 +59,11 @@ pub(super) struct Fitted {
 
 impl<'a> Space<'a> {
     /// Laws of regions with few looks stay as they are.
-    pub fn new(problem: &Problem, laws: &[Brdf]) -> Result<Space<'a>, FitError> {
+    pub fn new(
+        problem: &Problem,
+        laws: &[Brdf],
+        at_work: &'a [(&'a dyn Effect, Vec<f64>)],
+    ) -> Result<Space<'a>, FitError> {
         let mut turned = Vec::new();
         for (region, law) in laws.iter().enumerate() {
             let here = |look: &&Look| usize::from(look.region) == region;
@@ -66,7 +72,7 @@ impl<'a> Space<'a> {
                 turned.push((region, Coordinates::new(law, &[], &[], looks)?));
             }
         }
-        Ok(Space { laws: laws.to_vec(), turned, effects: Vec::new() })
+        Ok(Space { laws: laws.to_vec(), turned, at_work, effects: Vec::new() })
     }
 
     /// With one more effect.
@@ -151,7 +157,8 @@ impl<'a> Space<'a> {
                 *law = coordinates.model(&part);
             }
         }
-        let effects = self.effects.iter().copied().zip(self.effect_values(at)).collect();
+        let found = self.effects.iter().copied().zip(self.effect_values(at));
+        let effects = self.at_work.iter().cloned().chain(found).collect();
         Model { laws, receiver, effects }
     }
 

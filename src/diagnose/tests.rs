@@ -140,8 +140,16 @@ fn diagnosed(truth: &[(&'static dyn Effect, f64)], seed: u64) -> Report {
     start.set_parameter("specular.m", 0.08);
     let (looks, observations, laws) = (&looks[..], &observations[..], &[start][..]);
     let false_alarms = 0;
-    let subject =
-        Subject { stage: &stage, laws, receiver, declared, looks, observations, false_alarms };
+    let subject = Subject {
+        stage: &stage,
+        laws,
+        at_work: &[],
+        receiver,
+        declared,
+        looks,
+        observations,
+        false_alarms,
+    };
     let started = std::time::Instant::now();
     let report = Diagnosis { seed, ..Diagnosis::default() }.run(&subject, &LIBRARY).unwrap();
     let detected = observations.iter().filter(|o| o.power_w.is_some()).count();
@@ -234,6 +242,7 @@ fn a_scan_with_too_little_says_so() {
     let subject = Subject {
         stage: &stage,
         laws: &[law()],
+        at_work: &[],
         receiver,
         declared,
         looks: &looks,

@@ -1,6 +1,8 @@
 //! TOML with errors a person can act on: the line, the column and the nearest valid key.
 
+use serde::Serialize;
 use serde::de::DeserializeOwned;
+use toml::{Table, Value};
 
 use super::FormatError;
 
@@ -25,6 +27,65 @@ pub fn from_toml<T: DeserializeOwned>(text: &str) -> Result<T, FormatError> {
         let (problem, way_out) = explain(error.message());
         FormatError::at(place, problem, way_out)
     })
+}
+
+/// Writes a record as TOML.
+///
+/// # Errors
+/// When the record holds what TOML has no form for.
+pub fn to_toml(record: &impl Serialize) -> Result<String, FormatError> {
+    toml::to_string(record).map_err(|error| unwritable(&error))
+}
+
+/// Writes a record as TOML with the keys of `given`, the text it was once read from, and with those of
+/// these names wherever they are: defaults that nobody wrote stay unwritten.
+///
+/// # Errors
+/// When the record holds what TOML has no form for, or `given` is no TOML.
+///
+/// ```
+/// #[derive(serde::Serialize)]
+/// struct Spot { rays: u32, diameter_m: f64, name: String }
+/// let spot = Spot { rays: 4, diameter_m: 0.016, name: "mine".to_owned() };
+/// let written = matdb::formats::text::to_toml_as(&spot, "rays = 1", &["name"]).unwrap();
+/// assert_eq!(written, "name = \"mine\"\nrays = 4\n");
+/// ```
+pub fn to_toml_as(
+    record: &impl Serialize,
+    given: &str,
+    always: &[&str],
+) -> Result<String, FormatError> {
+    let mut table = Table::try_from(record).map_err(|error| unwritable(&error))?;
+    keep_given(&mut table, &from_toml(given)?, always);
+    to_toml(&table)
+}
+
+fn keep_given(table: &mut Table, given: &Table, always: &[&str]) {
+    table.retain(|key, value| match (value, given.get(key)) {
+        _ if always.contains(&key) => true,
+        (Value::Table(inner), Some(Value::Table(given))) => {
+            keep_given(inner, given, always);
+            true
+        }
+        (Value::Array(list), Some(Value::Array(given))) => {
+            for pair in std::iter::zip(list, given) {
+                if let (Value::Table(inner), Value::Table(given)) = pair {
+                    keep_given(inner, given, always);
+                }
+            }
+            true
+        }
+        (_, Some(_)) => true,
+        (Value::Table(inner), None) => {
+            keep_given(inner, &Table::new(), always);
+            !inner.is_empty()
+        }
+        (_, None) => false,
+    });
+}
+
+fn unwritable(error: &toml::ser::Error) -> FormatError {
+    FormatError::at("the record", format!("TOML cannot hold it: {error}"), "please report this")
 }
 
 /// The name nearest to `wanted`, when one is near enough to be a slip of the finger.

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
@@ -15,7 +15,7 @@ use super::{
 };
 use crate::brdf::Brdf;
 use crate::formats::csv::Table;
-use crate::formats::text::from_toml;
+use crate::formats::text::{from_toml, to_toml};
 use crate::formats::{EffectEntry, FormatError};
 use crate::units::ratio_from_db;
 
@@ -54,7 +54,7 @@ pub enum FileError {
     },
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct MaterialFile {
     slug: Slug,
@@ -69,17 +69,17 @@ struct MaterialFile {
     theta_deg: [f64; 2],
     render: String,
     source: Vec<SourceFile>,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     instrument: Vec<InstrumentFile>,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     curve: Vec<CurveFile>,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     fit: Vec<FitFile>,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     effect: Vec<EffectEntry>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct SourceFile {
     key: String,
@@ -91,7 +91,7 @@ struct SourceFile {
     note: Option<String>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct InstrumentFile {
     key: String,
@@ -102,7 +102,7 @@ struct InstrumentFile {
     note: Option<String>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct CurveFile {
     name: String,
@@ -111,7 +111,7 @@ struct CurveFile {
     file: String,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct FitFile {
     name: String,
@@ -120,12 +120,12 @@ struct FitFile {
     curve: Option<String>,
     source: String,
     scattering: Brdf,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     parameter_source: BTreeMap<String, String>,
     covariance: Option<CovarianceFile>,
 }
 
-#[derive(Deserialize)]
+#[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct CovarianceFile {
     parameters: Vec<String>,
@@ -178,6 +178,67 @@ pub fn parse(
     let refuse = |error| FileError::Material { file: file.to_owned(), error };
     material.validate().map_err(refuse)?;
     Ok(material)
+}
+
+/// Writes a material file. Curves stay out of it, since they stand in files of their own, and so do the
+/// reports of fits.
+///
+/// # Errors
+/// When the material holds what TOML has no form for.
+pub fn write(material: &Material) -> Result<String, FormatError> {
+    let material = material.clone();
+    to_toml(&MaterialFile {
+        slug: material.slug,
+        name: material.name,
+        class: material.class,
+        description: material.description,
+        licence: material.licence,
+        tags: material.tags,
+        frequency_ghz: material.frequency_hz.map(|f| f / 1e9),
+        theta_deg: material.theta_rad.map(f64::to_degrees),
+        render: material.render,
+        source: material.sources.into_iter().map(SourceFile::from).collect(),
+        instrument: material.instruments.into_iter().map(InstrumentFile::from).collect(),
+        curve: Vec::new(),
+        fit: material.fits.into_iter().map(FitFile::from).collect(),
+        effect: material.effects,
+    })
+}
+
+impl From<Source> for SourceFile {
+    fn from(source: Source) -> SourceFile {
+        let Source { key, kind, title, doi, url, licence, note } = source;
+        SourceFile { key, kind, title, doi, url, licence, note }
+    }
+}
+
+impl From<Instrument> for InstrumentFile {
+    fn from(instrument: Instrument) -> InstrumentFile {
+        InstrumentFile {
+            key: instrument.key,
+            name: instrument.name,
+            centre_frequency_ghz: instrument.centre_frequency_hz / 1e9,
+            bandwidth_ghz: instrument.bandwidth_hz.map(|f| f / 1e9),
+            polarisation: instrument.polarisation,
+            note: instrument.note,
+        }
+    }
+}
+
+impl From<Fit> for FitFile {
+    fn from(fit: Fit) -> FitFile {
+        FitFile {
+            name: fit.name,
+            estimator: fit.estimator,
+            curve: fit.curve,
+            source: fit.source,
+            scattering: fit.model,
+            parameter_source: fit.parameter_sources.into_iter().collect(),
+            covariance: fit
+                .covariance
+                .map(|Covariance { parameters, matrix }| CovarianceFile { parameters, matrix }),
+        }
+    }
 }
 
 impl From<SourceFile> for Source {
@@ -312,6 +373,16 @@ covariance = {{ parameters = ["albedo"], matrix = [[0.01]] }}
         assert!((material.scattering().unwrap().sigma0(0.0) - 2.0).abs() < 1e-12);
         let covariance = material.fits[0].covariance.as_ref().unwrap();
         assert!((covariance.standard_deviation("albedo").unwrap() - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let mut material = read(&toml("lambert")).unwrap();
+        material.curves.clear();
+        material.tags = vec!["a \"word\"".to_owned()];
+        let parameters = [("slope".to_owned(), 0.1 + 0.2)].into();
+        material.effects = vec![EffectEntry { name: "any".to_owned(), parameters }];
+        assert_eq!(read(&write(&material).unwrap()).unwrap(), material);
     }
 
     #[test]

@@ -23,7 +23,7 @@ use std::collections::BTreeMap;
 use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-use crate::formats::text::from_toml;
+use crate::formats::text::{from_toml, to_toml_as};
 use crate::formats::{EffectEntry, FormatError};
 use crate::radar::Radar;
 
@@ -235,6 +235,15 @@ impl SceneFile {
     /// Reads a scene file's text. Values are checked when the scene is loaded.
     pub fn parse(text: &str) -> Result<SceneFile, FormatError> {
         from_toml(text)
+    }
+
+    /// Writes it with what `given`, the text it was read from, says, and with its name and effects:
+    /// defaults stay unwritten.
+    ///
+    /// # Errors
+    /// When `given` is no TOML.
+    pub fn write(&self, given: &str) -> Result<String, FormatError> {
+        to_toml_as(self, given, &["name", "effect"])
     }
 }
 

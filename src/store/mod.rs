@@ -46,6 +46,16 @@ pub enum Added {
     Unchanged(u32),
 }
 
+impl Added {
+    /// The revision that is current now, from 1.
+    pub fn revision(self) -> u32 {
+        match self {
+            Added::New => 1,
+            Added::Revision(number) | Added::Unchanged(number) => number,
+        }
+    }
+}
+
 /// One revision of a material, as stored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stored {
@@ -134,12 +144,31 @@ impl Store {
         &mut self,
         materials: impl IntoIterator<Item = &'a Material>,
     ) -> Result<Vec<Added>, StoreError> {
+        self.add_if(materials, |added| Ok(added.to_vec()))
+    }
+
+    /// The same if `then`, which gets the answers before they are kept, succeeds: what it does and what
+    /// is stored happen together. Its result must undo itself when it is dropped after a failure here.
+    ///
+    /// # Errors
+    /// As [`Store::add`], and those of `then`.
+    pub fn add_if<'a, T, E: From<StoreError>>(
+        &mut self,
+        materials: impl IntoIterator<Item = &'a Material>,
+        then: impl FnOnce(&[Added]) -> Result<T, E>,
+    ) -> Result<T, E> {
         let materials: Vec<&Material> = materials.into_iter().collect();
         for material in &materials {
             let slug = || material.slug.to_string();
             material.validate().map_err(|error| StoreError::Material { slug: slug(), error })?;
         }
-        write::add(&mut self.conn, &materials).map_err(|error| StoreError::new(&self.path, error))
+        let Store { conn, path } = self;
+        let failed = |error| StoreError::new(path, error);
+        let tx = conn.transaction().map_err(failed)?;
+        let added = write::add(&tx, &materials).map_err(failed)?;
+        let done = then(&added)?;
+        tx.commit().map_err(failed)?;
+        Ok(done)
     }
 
     /// Every material's current revision, sorted by name.

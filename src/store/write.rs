@@ -7,12 +7,9 @@ use super::{Added, Removed};
 use crate::formats::EffectEntry;
 use crate::material::{Covariance, Curve, Fit, Instrument, Material, Slug, Source};
 
-/// Adds materials or revisions of them, all or none.
-pub(super) fn add(conn: &mut Connection, materials: &[&Material]) -> Result<Vec<Added>> {
-    let tx = conn.transaction()?;
-    let added = materials.iter().map(|material| add_one(&tx, material)).collect::<Result<_>>()?;
-    tx.commit()?;
-    Ok(added)
+/// Adds materials or revisions of them.
+pub(super) fn add(tx: &Transaction, materials: &[&Material]) -> Result<Vec<Added>> {
+    materials.iter().map(|material| add_one(tx, material)).collect()
 }
 
 fn add_one(tx: &Transaction, material: &Material) -> Result<Added> {

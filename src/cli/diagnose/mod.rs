@@ -1,10 +1,13 @@
 //! `matdb diagnose`.
 
+mod after;
 mod cannot_tell;
 mod curve;
 mod html;
 mod plots;
+mod publish;
 mod residuals;
+mod takers;
 #[cfg(test)]
 mod testing;
 mod text;
@@ -14,20 +17,22 @@ use std::path::{Path, PathBuf};
 
 use super::cloud::CloudArgs;
 use super::console::Console;
-use super::database::Database;
+use super::database::{Database, USUAL};
 use super::effects::chosen;
 use super::output::write_all;
-use super::staging::materials;
+use super::staging::{materials, model};
 use crate::brdf::Brdf;
 use crate::diagnose::{Declared, DiagnoseError, Diagnosis, Report, Subject, looks, matched};
 use crate::effects::{Effect, Receiver, Stage, middle};
 use crate::error::Error;
 use crate::measure::Cloud;
 use crate::radar::{Link, Radar};
-use crate::scene::Scene;
+use crate::scene::{Scene, read_text};
 use crate::trace::Bvh;
 use crate::units::watts_from_dbm;
 use cannot_tell::CannotTell;
+use publish::Publication;
+use takers::Cast;
 
 /// Find the physical effect that a scene lacks to explain a measured cloud, or a law a measured curve
 #[derive(Debug, clap::Args)]
@@ -36,10 +41,11 @@ use cannot_tell::CannotTell;
   matdb diagnose cloud.ply --scene scene.toml -o diagnosis
   matdb diagnose cloud.ply --scene scene.toml --effects drift,fov-gain -o diagnosis
   matdb diagnose --curve coating.csv -o diagnosis            theta_i_deg,theta_s_deg,brdf_per_sr
+  matdb diagnose cloud.ply --scene scene.toml -o diagnosis --add    store what is found
   matdb effects                                              what is tried, and how to tell it
 
 Writes report.html (all of it, for a person), report.json, residuals.csv (one line per chirp) and
-pictures (.svg and .png). Too few data: report.html and report.json say so, and the status is not 0.")]
+pictures (.svg and .png), and after.toml, the scene with what was found. Too few data: report.html and report.json say so, and the status is not 0.")]
 pub(super) struct Args {
     #[command(flatten)]
     cloud: Option<CloudArgs>,
@@ -59,6 +65,12 @@ pub(super) struct Args {
     /// Try only these effects [default: all]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     effects: Vec<String>,
+    /// Store what is found: new revisions of the materials, and the scene as SCENE-after.toml beside it
+    #[arg(long)]
+    add: bool,
+    /// The material that takes refitted law and effects in [default: all of the scene with enough looks]
+    #[arg(long, value_name = "NAME")]
+    material: Option<String>,
     /// Seed of folds and of everything random
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -80,12 +92,26 @@ struct Context {
     seed: u64,
     /// This command, as a person would type it again.
     command: String,
+    /// The program with the database that it works on, as a person would type it.
+    program: String,
+    /// The scene with what was found in the folder of the report, as a shell takes it.
+    after: String,
+    /// The one that `--add` puts beside the old scene.
+    beside: String,
+    /// Folder of the report.
+    folder: PathBuf,
+    /// Whether what was found was stored.
+    is_added: bool,
+    /// Materials that were stored, with their revisions.
+    added: Vec<String>,
+    /// Files of materials that were not.
+    material_files: Vec<String>,
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     match (&args.curve, &args.cloud, &args.scene) {
         (Some(curve), None, None) => curve::run(curve, args, console),
-        (None, Some(cloud), Some(scene)) => of_cloud(cloud, scene, args, db, console),
+        (None, Some(cloud), Some(scene)) => of_cloud(Asked { cloud, scene, args }, db, console),
         _ => Err(Error::Usage {
             problem: "a diagnosis is of a cloud and its scene, or of a curve".to_owned(),
             way_out: "give CLOUD --scene SCENE, or --curve FILE alone".to_owned(),
@@ -93,30 +119,75 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     }
 }
 
-fn of_cloud(
-    cloud_args: &CloudArgs,
-    scene_path: &Path,
-    args: &Args,
-    db: &Database,
-    console: &Console,
-) -> Result<(), Error> {
-    let scene = Scene::load(scene_path)?;
+/// What is asked of a cloud.
+#[derive(Clone, Copy)]
+struct Asked<'a> {
+    cloud: &'a CloudArgs,
+    scene: &'a Path,
+    args: &'a Args,
+}
+
+fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error> {
+    let Asked { cloud, scene: path, args } = asked;
+    let given = read_text(path)?;
+    let scene = Scene::load(path)?;
     let effects = chosen(&args.effects)?;
-    let (used, material_of_region) = materials(&scene, scene_path, db)?;
-    let cloud = cloud_args.read(scene.radar())?;
+    let (used, material_of_region) = materials(&scene, path, db)?;
+    let names: Vec<String> = scene.target.regions.iter().map(|r| r.material.clone()).collect();
+    let cast = Cast { used: &used, names: &names, of_region: &material_of_region };
+    // A diagnosis takes a while: what hinders its storing is said before.
+    after::check_places(path, &args.output, args.add)?;
+    let wanted = cast.wanted(args.material.as_deref())?;
+    if args.add {
+        cast.check()?;
+    }
+    let declared = super::staging::effects(&scene, path, cast.used, cast.of_region)?;
+    let at_work = model(&declared, &scene, cast.used, cast.of_region);
+    let at_work = at_work.as_ref().map_or(&[][..], |model| &model.effects);
+    let effects = undeclared(effects, at_work, console)?;
+    let cloud = cloud.read(scene.radar())?;
     let laws: Vec<Brdf> =
         material_of_region.iter().map(|&m| used[usize::from(m)].scattering.clone()).collect();
     cloud.notices.iter().for_each(|notice| console.notice(notice));
     let bar = console.spinner("diagnosing");
-    let answer = diagnosed(&scene, &cloud, &laws, args.seed, &effects);
+    let answer = diagnosed(&scene, &cloud, &laws, at_work, args.seed, &effects);
     bar.finish_and_clear();
     match answer {
         Ok((report, false_alarms)) => {
-            let context = context([&cloud_args.cloud, scene_path], args, &scene, false_alarms);
-            publish(&report, &context, scene.radar().spot_diameter_m, &args.output, console)
+            let context = context(asked, &scene, false_alarms, db);
+            let (given, report) = (given.as_str(), &report);
+            Publication { asked, scene: &scene, given, cast, wanted, report }
+                .publish(context, db, console)
         }
-        Err(error) => refuse(error, [&cloud_args.cloud, scene_path], args, console),
+        Err(error) => refuse(error, asked, console),
     }
+}
+
+/// Effects with their values.
+type AtWork<'a> = [(&'a dyn Effect, Vec<f64>)];
+
+/// The effects without those that scene, radar or materials declare and that are at work already.
+fn undeclared(
+    effects: Vec<&'static dyn Effect>,
+    at_work: &AtWork,
+    console: &Console,
+) -> Result<Vec<&'static dyn Effect>, Error> {
+    let is_declared = |effect: &&'static dyn Effect| {
+        at_work.iter().any(|(declared, _)| declared.name() == effect.name())
+    };
+    let (known, tried): (Vec<_>, Vec<_>) = effects.into_iter().partition(is_declared);
+    let names: Vec<&str> = known.iter().map(|effect| effect.name()).collect();
+    let names = names.join(", ");
+    if tried.is_empty() {
+        return Err(Error::Usage {
+            problem: format!("the scene declares {names} already"),
+            way_out: "name other effects, or diagnose with the scene that lacks them".to_owned(),
+        });
+    }
+    if !known.is_empty() {
+        console.notice(&format!("declared already, so at work and not tried: {names}"));
+    }
+    Ok(tried)
 }
 
 /// The diagnosis, and how many detections were set aside.
@@ -124,6 +195,7 @@ fn diagnosed(
     scene: &Scene,
     cloud: &Cloud,
     laws: &[Brdf],
+    at_work: &AtWork,
     seed: u64,
     effects: &[&dyn Effect],
 ) -> Result<(Report, usize), DiagnoseError> {
@@ -145,6 +217,7 @@ fn diagnosed(
     let subject = Subject {
         stage: &stage,
         laws,
+        at_work,
         receiver,
         declared,
         looks: &looks,
@@ -155,23 +228,39 @@ fn diagnosed(
     Ok((report, matched.false_alarms))
 }
 
-fn context(
-    [cloud_path, scene_path]: [&Path; 2],
-    args: &Args,
-    scene: &Scene,
-    false_alarms: usize,
-) -> Context {
+fn context(asked: Asked, scene: &Scene, false_alarms: usize, db: &Database) -> Context {
+    let Asked { cloud, scene: path, args } = asked;
     let regions = &scene.target.regions;
-    let [cloud, path, output] = [cloud_path, scene_path, &args.output].map(typed);
     Context {
         scene: scene.file.name.clone(),
-        scene_path: scene_path.display().to_string(),
-        cloud_path: cloud_path.display().to_string(),
+        scene_path: path.display().to_string(),
+        cloud_path: cloud.cloud.display().to_string(),
         regions: regions.iter().map(|r| (r.name.clone(), r.material.clone())).collect(),
         false_alarms,
         seed: args.seed,
-        command: format!("matdb diagnose {cloud} --scene {path} -o {output}"),
+        program: program(db),
+        command: command(std::env::args_os().skip(1)),
+        after: typed(&args.output.join(after::AFTER)),
+        beside: typed(&path.with_file_name(after::name_beside(path))),
+        folder: args.output.clone(),
+        is_added: args.add,
+        added: Vec::new(),
+        material_files: Vec::new(),
     }
+}
+
+/// The program with its database, where that is not the usual one.
+fn program(db: &Database) -> String {
+    match db.path() == Path::new(USUAL) {
+        true => "matdb".to_owned(),
+        false => format!("matdb --db {}", typed(db.path())),
+    }
+}
+
+/// The program with these arguments, as a shell takes it.
+fn command(arguments: impl Iterator<Item = std::ffi::OsString>) -> String {
+    let arguments = arguments.map(|argument| typed(Path::new(&argument)));
+    std::iter::once("matdb".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
 /// A path as a shell takes it.
@@ -184,38 +273,11 @@ fn typed(path: &Path) -> String {
     }
 }
 
-/// Writes everything and says what matters.
-fn publish(
-    report: &Report,
-    context: &Context,
-    spot_m: f64,
-    folder: &Path,
-    console: &Console,
-) -> Result<(), Error> {
-    let (pictures, notices) = plots::pictures(report, spot_m);
-    let mut files = vec![
-        ("report.html".to_owned(), html::report(report, context, &pictures)?),
-        ("report.json".to_owned(), json(report)?),
-        ("residuals.csv".to_owned(), residuals::csv(&report.rows)),
-    ];
-    for picture in &pictures {
-        files.extend(picture.files()?);
-    }
-    write_all(folder, &files)?;
-    notices.iter().for_each(|notice| console.notice(notice));
-    let names: Vec<String> = files.into_iter().map(|(name, _)| name).collect();
-    console.result(&text::text(report, &names, folder), report)
-}
-
 /// Writes that nothing can be said, and why; the error is the way out.
-fn refuse(
-    error: DiagnoseError,
-    paths: [&Path; 2],
-    args: &Args,
-    console: &Console,
-) -> Result<(), Error> {
+fn refuse(error: DiagnoseError, asked: Asked, console: &Console) -> Result<(), Error> {
+    let Asked { cloud, scene, args } = asked;
     let answer = CannotTell::new(&error);
-    let [cloud, scene] = paths.map(|path| path.display().to_string());
+    let [cloud, scene] = [&cloud.cloud, scene].map(|path| path.display().to_string());
     let html = html::cannot_tell(&answer, &scene, &cloud);
     write_all(&args.output, &[("report.html", html), ("report.json", json(&answer)?)])?;
     if console.json {
@@ -248,6 +310,7 @@ mod tests {
     #[test]
     fn a_path_can_be_typed_again() {
         assert_eq!(typed(Path::new("out/a-1.ply")), "out/a-1.ply");
+        assert_eq!(command(["a b", "-o"].map(Into::into).into_iter()), "matdb 'a b' -o");
         assert_eq!(typed(Path::new("my cloud.ply")), "'my cloud.ply'");
         assert_eq!(typed(Path::new("it's;rm")), "'it'\\''s;rm'");
     }

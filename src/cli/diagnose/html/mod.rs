@@ -5,10 +5,10 @@ mod effect;
 mod evidence;
 mod page;
 
-use super::Context;
 use super::cannot_tell::CannotTell;
 use super::plots::Picture;
 use super::words::{sentence, verdict};
+use super::{Context, typed};
 use crate::cli::summary::grouped;
 use crate::diagnose::{Report, Verdict};
 use crate::error::Error;
@@ -98,14 +98,12 @@ fn figures(pictures: &[Picture]) -> Result<String, Error> {
 }
 
 fn way_on(report: &Report, context: &Context) -> String {
-    let command = &context.command;
     match (report.verdict, report.effects.is_empty()) {
         (Verdict::NoMissingEffect, _) => paragraph(
             "There is nothing to add. Whether a weak effect could hide in these data is a question of \
              their number: more chirps, more looks of speckle or a second target show less.",
         ),
         (_, false) => {
-            let add = format!("{command} --add\nmatdb render after.toml -o after");
             let more = match report.verdict {
                 Verdict::Unexplained => paragraph(
                     "For what is still unknown, see where it is on the maps, and in residuals.csv \
@@ -113,10 +111,7 @@ fn way_on(report: &Report, context: &Context) -> String {
                 ),
                 _ => String::new(),
             };
-            paragraph(
-                "Store what was found, write the scene that has it as after.toml, and render that:",
-            ) + &commands(&add)
-                + &more
+            way_to_render(context) + &more
         }
         (_, true) => paragraph(
             "See where it is on the maps, and in residuals.csv chirp by chirp. Check first what the \
@@ -125,6 +120,31 @@ fn way_on(report: &Report, context: &Context) -> String {
              the target.",
         ),
     }
+}
+
+/// How to render with what was found.
+fn way_to_render(context: &Context) -> String {
+    let Context { program, command, after, beside, folder, added, material_files, .. } = context;
+    let render = |scene: &str| format!("{program} render {scene} -o rendered");
+    if context.is_added {
+        let what = match added.as_slice() {
+            [] => "What was found is stored. Render the scene that has it:".to_owned(),
+            names => format!("{} stored. Render the scene that has what was found:", are(names)),
+        };
+        return paragraph(&what) + &commands(&render(beside));
+    }
+    let stored = paragraph("Store what was found, and render the scene that has it:")
+        + &commands(&format!("{command} --add\n{}", render(beside)));
+    let froms = material_files.iter().map(|name| format!(" --from {}", typed(&folder.join(name))));
+    let froms: String = froms.collect();
+    let add = if froms.is_empty() { String::new() } else { format!("{program} add{froms}\n") };
+    stored
+        + &paragraph("Or leave the materials as they are, and render what stands beside this page:")
+        + &commands(&format!("{add}{}", render(after)))
+}
+
+fn are(names: &[String]) -> String {
+    format!("{} {}", names.join(", "), if names.len() == 1 { "is" } else { "are" })
 }
 
 const WORDS: [(&str, &str); 6] = [

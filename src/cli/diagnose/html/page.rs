@@ -2,7 +2,7 @@
 //!
 //! Whatever a function takes as `text` is escaped by it; `html` is taken as it is.
 
-use super::super::plots::Picture;
+use crate::cli::diagnose::plots::Picture;
 use crate::error::Error;
 use crate::formats::figure::FigureError;
 

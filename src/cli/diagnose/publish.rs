@@ -1,0 +1,186 @@
+//! Everything that a diagnosis leaves behind: the report, the scene with what was found, and, with
+//! `--add`, revisions of materials; all of it or nothing.
+
+use std::path::Path;
+
+use super::after::{self, AFTER, MARK};
+use super::takers::{Cast, Taker, pinned};
+use super::{Asked, Context, html, json, plots, residuals, text, typed};
+use crate::cli::console::Console;
+use crate::cli::database::Database;
+use crate::cli::output::{Written, write_all};
+use crate::diagnose::Report;
+use crate::error::Error;
+use crate::formats::FormatError;
+use crate::material::file;
+use crate::scene::Scene;
+
+type Files = Vec<(String, Vec<u8>)>;
+
+/// A diagnosis on its way out.
+pub(super) struct Publication<'a> {
+    pub asked: Asked<'a>,
+    pub scene: &'a Scene,
+    /// Text of the scene file.
+    pub given: &'a str,
+    pub cast: Cast<'a>,
+    /// Number of the material that alone takes everything in.
+    pub wanted: Option<usize>,
+    pub report: &'a Report,
+}
+
+impl Publication<'_> {
+    /// Writes everything and says what matters.
+    pub fn publish(
+        &self,
+        mut context: Context,
+        db: &Database,
+        console: &Console,
+    ) -> Result<(), Error> {
+        let (pictures, notices) = plots::pictures(self.report, self.scene.radar().spot_diameter_m);
+        let takers = self.cast.takers(self.report, self.wanted);
+        let is_stored = self.asked.args.add && !self.report.effects.is_empty();
+        let mut files: Files = vec![
+            ("report.json".to_owned(), json(self.report)?),
+            ("residuals.csv".to_owned(), residuals::csv(&self.report.rows)),
+        ];
+        for picture in &pictures {
+            files.extend(picture.files()?);
+        }
+        let page = |context: &Context| html::report(self.report, context, &pictures);
+        if is_stored {
+            self.add(&takers, &mut files, &mut context, &page, db)?;
+        } else {
+            let (more, names) = self.alone(&takers)?;
+            context.material_files = more.iter().map(|(name, _)| name.clone()).collect();
+            files.extend(more);
+            files.push((AFTER.to_owned(), self.after(&names, &head(&context))?));
+            files.push(("report.html".to_owned(), page(&context)?));
+            write_all(&self.asked.args.output, &files)?;
+        }
+        notices.iter().for_each(|notice| console.notice(notice));
+        self.left_out(&takers).iter().for_each(|notice| console.notice(notice));
+        files.sort_by_key(|(name, _)| name != "report.html");
+        let names: Vec<String> = files.into_iter().map(|(name, _)| name).collect();
+        let said = text::text(self.report, &names, &self.asked.args.output);
+        console.result(&(said + &self.stored(&context, db)), self.report)
+    }
+
+    /// Stores what was found in the database and beside the scene, and writes the report.
+    fn add(
+        &self,
+        takers: &[Taker],
+        files: &mut Files,
+        context: &mut Context,
+        page: &dyn Fn(&Context) -> Result<Vec<u8>, Error>,
+        db: &Database,
+    ) -> Result<(), Error> {
+        let mut store = db.write()?;
+        let (mut materials, mut last) = (Vec::new(), Vec::new());
+        for taker in takers {
+            materials.extend(self.cast.revised(taker, self.report, &self.title(), Some(&store))?);
+            last.push(materials.len() - 1);
+        }
+        let scene = self.asked.scene;
+        let written = store.add_if(&materials, |added| {
+            let pin = |&at: &usize| Some(pinned(materials.get(at)?, *added.get(at)?));
+            context.added = last.iter().filter_map(pin).collect();
+            let names = self.names(takers, &context.added);
+            files.push((AFTER.to_owned(), self.after(&names, MARK)?));
+            files.push(("report.html".to_owned(), page(context)?));
+            let file = after::with_found(self.scene, &self.report.effects, &names);
+            let beside = [(after::name_beside(scene), self.text(MARK, &file)?)];
+            Written::new(&[(&self.asked.args.output, files), (after::folder_of(scene), &beside)])
+        })?;
+        written.keep();
+        Ok(())
+    }
+
+    /// The files of materials that are not stored, and the materials of the regions with them.
+    fn alone(&self, takers: &[Taker]) -> Result<(Files, Vec<String>), Error> {
+        let (mut files, mut slugs) = (Vec::new(), Vec::new());
+        for taker in takers {
+            let Some(material) = self.cast.alone(taker, self.report, &self.title())? else {
+                continue;
+            };
+            let name = format!("material-{}.toml", self.cast.name(taker.number).replace('@', "-"));
+            files.push((name, file::write(&material)?.into_bytes()));
+            slugs.push(material.slug.to_string());
+        }
+        Ok((files, self.names(takers, &slugs)))
+    }
+
+    /// The materials of the regions, those of the takers by their new names.
+    fn names(&self, takers: &[Taker], new: &[String]) -> Vec<String> {
+        let name = |(&of, given): (&u16, &String)| {
+            let taken = takers.iter().position(|taker| taker.number == usize::from(of));
+            taken.and_then(|taken| new.get(taken)).unwrap_or(given).clone()
+        };
+        std::iter::zip(self.cast.of_region, self.cast.names).map(name).collect()
+    }
+
+    /// The scene with what was found, to stand beside the report.
+    fn after(&self, materials: &[String], head: &str) -> Result<Vec<u8>, Error> {
+        let file = after::with_found(self.scene, &self.report.effects, materials);
+        self.text(head, &after::moved(file, self.asked.scene, &self.asked.args.output)?)
+    }
+
+    fn text(&self, head: &str, file: &crate::scene::SceneFile) -> Result<Vec<u8>, Error> {
+        let unwritable = |error: FormatError| Error::Usage {
+            problem: format!("{}: {error}", self.asked.scene.display()),
+            way_out: "leave the scene as it is while it is diagnosed".to_owned(),
+        };
+        Ok((head.to_owned() + &file.write(self.given).map_err(unwritable)?).into_bytes())
+    }
+
+    /// Where the stored numbers come from.
+    fn title(&self) -> String {
+        let name =
+            |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let [cloud, scene] = [&self.asked.cloud.cloud, self.asked.scene].map(|path| name(path));
+        format!("Diagnosis of {cloud} with {scene}, seed {}", self.asked.args.seed)
+    }
+
+    /// Sentences on materials that keep what they had.
+    fn left_out(&self, takers: &[Taker]) -> Option<String> {
+        let stays = |number: &usize| takers.iter().all(|taker| taker.number != *number);
+        let names: Vec<&str> =
+            (0..self.cast.used.len()).filter(stays).map(|number| self.cast.name(number)).collect();
+        let is_told = !self.report.effects.is_empty() && !names.is_empty();
+        is_told.then(|| {
+            format!("as before, without a law or effects of their own: {}", names.join(", "))
+        })
+    }
+
+    /// A line on what was stored.
+    fn stored(&self, context: &Context, db: &Database) -> String {
+        match (self.asked.args.add, self.report.effects.is_empty()) {
+            (false, _) => String::new(),
+            (true, true) => "nothing was found, so nothing was stored\n".to_owned(),
+            (true, false) => {
+                let scene = &context.beside;
+                let file = db.path().display();
+                match context.added.join(", ") {
+                    none if none.is_empty() => format!("stored what was found in {scene}\n"),
+                    names => format!("stored {names} in {file}; {scene} renders what was found\n"),
+                }
+            }
+        }
+    }
+}
+
+/// The first lines of a scene whose materials are not stored.
+fn head(context: &Context) -> String {
+    match context.material_files.as_slice() {
+        [] => "# The scene as `matdb diagnose` leaves it; it renders as it stands.\n".to_owned(),
+        files => {
+            let froms: Vec<String> =
+                files.iter().map(|file| format!("--from {}", typed(Path::new(file)))).collect();
+            format!(
+                "# The scene with what `matdb diagnose` found. To render it, add its materials first,\n\
+                 # from the folder of this file:\n# matdb add {}\n",
+                froms.join(" ")
+            )
+        }
+    }
+}

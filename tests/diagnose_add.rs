@@ -1,0 +1,193 @@
+//! Promise: what `matdb diagnose --add` stores is what `matdb render` then uses. The scene that it leaves
+//! renders the powers of the scene with the hidden effect; it stores all or nothing, and writes over
+//! nobody's scene.
+
+mod support;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use matdb::scene::SceneFile;
+use support::database::contents;
+use support::{entries, matdb, read_cloud, refused, root};
+
+/// A ball under few chirps with speckle and noise; its mesh stands in a folder of its own.
+const SCENE: &str = r#"
+seed = 3
+[radar]
+threshold_dbm = -95.0
+[radar.speckle]
+looks = 4
+[radar.noise]
+level_dbm = -110
+range_sd_m = 0.002
+[radar.scan]
+pattern = "elliptical"
+chirps = 3000
+[[mesh]]
+name = "ball"
+file = "meshes/corner.obj"
+[[mesh]]
+name = "sphere"
+file = "builtin:sphere"
+size_m = [0.5, 0.5, 0.5]
+translation_m = [0.0, 1.25, 0.0]
+[[region]]
+name = "skin"
+material = "mannequin-paint"
+"#;
+
+/// A facet far outside the scan: only its file matters.
+const CORNER: &str = "v 5 5 0\nv 6 5 0\nv 5 6 0\nf 1 2 3\n";
+
+const DRIFT: &str = "[[radar.effect]]\nname = \"drift\"\nslope_db = 5.0\n";
+const ANISOTROPY: &str = "[[effect]]\nname = \"anisotropy\"\nratio = 2.5\nturn_deg = 30.0\n";
+
+/// What speckle lets some 2000 detections of 4 looks tell of a scan's powers, dB rms.
+const FOUND_DB: f64 = 0.35;
+/// What the hidden effects do to them at least, dB rms.
+const HIDDEN_DB: f64 = 0.7;
+
+/// A folder with the scene and `out/cloud.ply`, which was rendered from `hidden.toml`.
+fn measured(effect: &str, material: Option<&str>) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::create_dir(at.join("meshes")).unwrap();
+    fs::write(at.join("meshes/corner.obj"), CORNER).unwrap();
+    fs::write(at.join("scene.toml"), SCENE).unwrap();
+    let mut hidden = SCENE.to_owned() + effect;
+    if let Some(effect) = material {
+        let paint = root().join("materials/mannequin-paint/material.toml");
+        let paint = fs::read_to_string(paint).unwrap() + effect;
+        let paint = paint.replace("slug = \"mannequin-paint\"", "slug = \"hidden\"");
+        fs::write(at.join("hidden-paint.toml"), paint).unwrap();
+        run(at, &["--db", "hidden.sqlite", "add", "--from", "hidden-paint.toml"], "");
+        hidden = hidden.replace("mannequin-paint", "hidden");
+    }
+    fs::write(at.join("hidden.toml"), hidden).unwrap();
+    let db: &[&str] = if material.is_some() { &["--db", "hidden.sqlite"] } else { &[] };
+    run(at, &[db, &["render", "hidden.toml", "-o", "out"]].concat(), "");
+    folder
+}
+
+/// Standard output of a run that must succeed and say `expected`.
+fn run(folder: &Path, arguments: &[&str], expected: &str) -> String {
+    let output = matdb(folder).args(arguments).output().unwrap();
+    let [out, error] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+    assert!(output.status.success(), "{arguments:?}: {error}");
+    assert!(out.contains(expected), "`{expected}` is not in:\n{out}");
+    out
+}
+
+/// Power of every chirp of a scene without speckle and noise, dBm.
+fn noiseless(folder: &Path, scene: &str, database: &str) -> BTreeMap<u32, f64> {
+    let text = fs::read_to_string(folder.join(scene)).unwrap();
+    let mut file = SceneFile::parse(&text).unwrap();
+    (file.radar.speckle, file.radar.noise) = (None, None);
+    let bare = Path::new(scene).with_file_name("bare.toml");
+    fs::write(folder.join(&bare), file.write(&text).unwrap()).unwrap();
+    let bare = bare.to_str().unwrap();
+    let db: &[&str] = if folder.join(database).exists() { &["--db", database] } else { &[] };
+    run(folder, &[db, &["render", bare, "-o", "noiseless"]].concat(), "");
+    let cloud = read_cloud(&folder.join("noiseless/cloud.ply"));
+    let number = |chirp: &f64| *chirp as u32;
+    cloud["chirp"].iter().map(number).zip(cloud["power_dbm"].iter().copied()).collect()
+}
+
+fn rms_db(one: &BTreeMap<u32, f64>, other: &BTreeMap<u32, f64>) -> f64 {
+    let squares: Vec<f64> =
+        one.iter().filter_map(|(n, a)| Some((a - other.get(n)?).powi(2))).collect();
+    assert!(squares.len() > 1000, "{}", squares.len());
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+fn diagnose<'a>(scene: &'a str, effects: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    let first =
+        ["diagnose", "out/cloud.ply", "--scene", scene, "--effects", effects, "-o", "report"];
+    [&first, more].concat()
+}
+
+#[test]
+fn an_effect_of_the_instrument_is_rendered_once_it_is_added() {
+    let folder = measured(DRIFT, None);
+    let at = folder.path();
+    let (before, hidden) =
+        (noiseless(at, "scene.toml", "matdb.sqlite"), noiseless(at, "hidden.toml", "matdb.sqlite"));
+    assert!(rms_db(&before, &hidden) > HIDDEN_DB, "{}", rms_db(&before, &hidden));
+    let add = diagnose("scene.toml", "drift,fov-gain", &["--add"]);
+    run(at, &add, "stored mannequin-paint@2 in matdb.sqlite; scene-after.toml renders");
+    assert_eq!(fs::read_to_string(at.join("scene.toml")).unwrap(), SCENE);
+
+    let [builtin, diagnosed] = &contents(&at.join("matdb.sqlite"))[..] else { panic!() };
+    assert_eq!(builtin.render, "stated");
+    assert_eq!((diagnosed.render.as_str(), diagnosed.effects.len()), ("diagnosed", 0));
+    assert_eq!(diagnosed.render_kind().unwrap().as_str(), "modelled");
+    for scene in ["scene-after.toml", "report/after.toml"] {
+        let text = fs::read_to_string(at.join(scene)).unwrap();
+        assert!(text.contains("mannequin-paint@2") && !text.contains("aperture_m2"), "{text}");
+        let after = noiseless(at, scene, "matdb.sqlite");
+        assert!(rms_db(&after, &hidden) < FOUND_DB, "{scene}: {}", rms_db(&after, &hidden));
+    }
+
+    let again = diagnose("scene-after.toml", "drift", &[]);
+    let message = refused(matdb(at).args(again));
+    assert!(message.contains("declares drift already"), "{message}");
+    // Its own file it may write again; the search now begins at revision 2.
+    run(at, &add, "stored mannequin-paint@");
+    assert!(entries(at).contains(&"scene-after.toml".to_owned()));
+}
+
+#[test]
+fn an_effect_of_a_material_becomes_a_revision_or_a_file() {
+    let folder = measured("", Some(ANISOTROPY));
+    let at = folder.path();
+    let hidden = noiseless(at, "hidden.toml", "hidden.sqlite");
+    let before = noiseless(at, "scene.toml", "none.sqlite");
+    assert!(rms_db(&before, &hidden) > HIDDEN_DB, "{}", rms_db(&before, &hidden));
+
+    run(at, &diagnose("scene.toml", "anisotropy,fov-gain", &[]), "after.toml");
+    assert!(!at.join("matdb.sqlite").exists() && !at.join("scene-after.toml").exists());
+    let file = "report/material-mannequin-paint.toml";
+    run(at, &["--db", "other.sqlite", "add", "--from", file], "mannequin-paint-diagnosed");
+    let after = noiseless(at, "report/after.toml", "other.sqlite");
+    assert!(rms_db(&after, &hidden) < FOUND_DB, "{}", rms_db(&after, &hidden));
+
+    let add = ["--add", "--material", "mannequin-paint"];
+    run(at, &diagnose("scene.toml", "anisotropy,fov-gain", &add), "stored mannequin-paint@2");
+    let diagnosed = contents(&at.join("matdb.sqlite")).pop().unwrap();
+    assert_eq!(diagnosed.effects[0].name, "anisotropy");
+    let after = noiseless(at, "scene-after.toml", "matdb.sqlite");
+    assert!(rms_db(&after, &hidden) < FOUND_DB, "{}", rms_db(&after, &hidden));
+}
+
+#[test]
+fn nothing_is_stored_when_nothing_is_missing_or_something_hinders_it() {
+    let folder = measured("", None);
+    let at = folder.path();
+    run(at, &diagnose("scene.toml", "fov-gain", &["--add"]), "so nothing was stored");
+    assert!(!at.join("matdb.sqlite").exists() && !at.join("scene-after.toml").exists());
+    run(at, &["render", "report/after.toml", "-o", "again"], "");
+
+    let stranger = ["--add", "--material", "mannequin-pant"];
+    let message = refused(matdb(at).args(diagnose("scene.toml", "drift", &stranger)));
+    assert!(message.contains("its materials are: mannequin-paint"), "{message}");
+    fs::write(at.join("scene-after.toml"), "name = \"mine\"\n").unwrap();
+    let message = refused(matdb(at).args(diagnose("scene.toml", "drift", &["--add"])));
+    assert!(message.contains("--add did not write it"), "{message}");
+    assert_eq!(fs::read_to_string(at.join("scene-after.toml")).unwrap(), "name = \"mine\"\n");
+}
+
+#[test]
+fn a_file_that_cannot_be_written_leaves_database_and_files_as_they_were() {
+    let folder = measured(DRIFT, None);
+    let at = folder.path();
+    run(at, &["add", "mannequin-paint"], "");
+    // A folder where a picture is to be: found out when the revision is in the transaction already.
+    fs::create_dir_all(at.join("report/residual-map.png/x")).unwrap();
+    let message = refused(matdb(at).args(diagnose("scene.toml", "drift", &["--add"])));
+    assert!(message.contains("residual-map.png"), "{message}");
+    assert_eq!(entries(&at.join("report")), ["residual-map.png"]);
+    assert_eq!(contents(&at.join("matdb.sqlite")).len(), 1);
+    assert!(!at.join("scene-after.toml").exists());
+}
