@@ -7,7 +7,9 @@ use serde::Deserialize;
 /// A fitted number.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Number {
+    #[serde(deserialize_with = "scalar")]
     pub value: Option<f64>,
+    #[serde(default, deserialize_with = "scalar")]
     pub sd: Option<f64>,
 }
 
@@ -137,4 +139,9 @@ impl Run {
             false => format!("{}: {}", self.verdict(), names.join(" + ")),
         }
     }
+}
+
+/// A number; none where there are three of them, as for a place.
+fn scalar<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    Ok(serde_json::Value::deserialize(from)?.as_f64())
 }

@@ -51,6 +51,10 @@ const SHARE_BESIDE_FIELD: f64 = 0.5;
 const MOST_SHARED: f64 = 0.6;
 /// Probability by chance of what neighbours have in common.
 const CHANCE: f64 = 1e-3;
+/// Share of its gain that an effect of one small place keeps where it is held out, and how many least
+/// gains it is worth.
+const SHARE_KEPT: f64 = 0.6;
+const FAR_BEYOND: f64 = 4.0;
 /// Placebos of each comparison.
 const PLACEBOS: u64 = 3;
 /// Looks of a first fit of the base, that is not caught far from the data.
@@ -253,8 +257,10 @@ impl Selection<'_> {
                     let size_db = self.size_db(&without, &state.space, &state.fitted.at);
                     let least_db = self.settings.least_size_db.max(SHARE_OF_LARGEST * largest_db);
                     let numbers = state.space.effects[index].knobs().len();
-                    let is_needed = gain > self.settings.standard_errors * se
-                        && loss > self.settings.least_gain_of(numbers, 1)
+                    let least = self.settings.least_gain_of(numbers, 1);
+                    let is_local = loss > FAR_BEYOND * least && gain > SHARE_KEPT * loss;
+                    let is_needed = (gain > self.settings.standard_errors * se || is_local)
+                        && loss > least
                         && size_db >= least_db;
                     (index, without, loss, is_needed)
                 })
@@ -450,7 +456,11 @@ impl Selection<'_> {
             let held_out = self.held_out(&trial.space, &trial.fitted.at);
             let [gain, se] = self.difference(&held_out, &state.held_out);
             trial.candidate.held_out = Some([gain, se]);
-            if gain <= standard_errors * se {
+            // What acts in one small place has no standard error over places; it must be far beyond
+            // chance and be found again where it was not fitted.
+            let is_kept = gain >= SHARE_KEPT * trial.candidate.gain && gain > se;
+            let is_local = is_kept && trial.candidate.gain >= FAR_BEYOND * least;
+            if gain <= standard_errors * se && !is_local {
                 continue;
             }
             if is_spread {

@@ -275,15 +275,27 @@ fn a_cloud_finds_its_looks() {
         let point = Point::from(look.ray.origin.xyz + range_m * look.ray.direction.xyz());
         CloudPoint { chirp: Some(chirp), point, range_m: None, power_dbm: -60.0 }
     };
-    // One on its look, one half a metre behind its look, one of a chirp that meets nothing.
-    let points = vec![
+    // Two on their looks, one half a metre behind its look, one of a chirp that meets nothing.
+    let mut points = vec![
         point(&looks[7], looks[7].chirp, 1e-3),
+        point(&looks[10], looks[10].chirp, 0.0),
         point(&looks[8], looks[8].chirp, 0.5),
         point(&looks[9], missed, 0.0),
     ];
-    let found = matched(&Cloud::new(points).unwrap(), &chirps(&radar), &looks, 0.05).unwrap();
+    let cloud = Cloud::new(points.clone()).unwrap();
+    let found = matched(&cloud, &chirps(&radar), &looks, 0.05).unwrap();
     assert_eq!([found.false_alarms, found.beside], [1, 1]);
-    assert_eq!(found.observations.iter().filter(|o| o.power_w.is_some()).count(), 1);
+    assert_eq!(found.observations.iter().filter(|o| o.power_w.is_some()).count(), 2);
+    // Without their numbers, points find their chirps by their directions.
+    points.truncate(3);
+    points.iter_mut().for_each(|point| point.chirp = None);
+    let cloud = Cloud::new(points.clone()).unwrap();
+    let by_direction = matched(&cloud, &chirps(&radar), &looks, 0.05).unwrap();
+    assert_eq!(by_direction.observations, found.observations);
+    // A cloud of something else is refused.
+    points.iter_mut().for_each(|p| p.point = Point::from(p.point.xyz + DVec3::new(0.0, 0.0, 3.0)));
+    let elsewhere = matched(&Cloud::new(points).unwrap(), &chirps(&radar), &looks, 0.05);
+    assert!(matches!(elsewhere, Err(DiagnoseError::Elsewhere { matched: 0, points: 3 })));
     assert!((found.observations[7].power_w.unwrap() - 1e-9).abs() < 1e-20);
     assert!((found.observations[7].range_m.unwrap() - looks[7].hit.range_m - 1e-3).abs() < 1e-9);
 }

@@ -126,7 +126,9 @@ mod tests {
     fn searches_begin_on_the_target() {
         let bench = Bench::plate();
         let starts = ForeignPatch.starts(&bench.stage(), &bench.looks);
-        assert_eq!(starts.len(), 12);
+        for sign in [1.0, -1.0] {
+            assert!(starts.iter().filter(|start| start[0] * sign > 0.0).count() >= 12);
+        }
         assert!(starts.iter().all(|start| start[1].abs() < 0.25 && start[2].abs() < 0.25));
     }
 }

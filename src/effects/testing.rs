@@ -202,14 +202,18 @@ fn searches_begin_within_the_ranges_and_where_there_is_an_effect() {
     let bare = bench.predict(Vec::new());
     for effect in library() {
         let starts = effect.starts(&bench.stage(), &bench.looks);
-        assert!((1..=12).contains(&starts.len()), "{}", effect.name());
+        assert!(!starts.is_empty(), "{}", effect.name());
         let mut felt = false;
         for values in starts {
             assert_eq!(values.len(), effect.knobs().len(), "{}", effect.name());
             for (value, knob) in values.iter().zip(effect.knobs()) {
                 assert!((knob.min..=knob.max).contains(value), "{} {}", effect.name(), knob.name);
             }
-            felt |= bench.predict(vec![(effect, values)]) != bare;
+            // A search may begin from nothing, where a step must be felt.
+            let is_absent = values.iter().zip(effect.knobs()).all(|(v, knob)| *v == knob.absent);
+            let steps = effect.knobs().iter().map(|knob| if is_absent { knob.step } else { 0.0 });
+            let there = values.iter().zip(steps).map(|(value, step)| value + step).collect();
+            felt |= bench.predict(vec![(effect, there)]) != bare;
         }
         assert!(felt, "{}", effect.name());
     }
