@@ -42,7 +42,7 @@ fn would_help(error: &DiagnoseError) -> &'static str {
             "A target that fills more of the field of view, or several scans of it: held-out patches \
              need room."
         }
-        DiagnoseError::Unnumbered { .. } => {
+        DiagnoseError::Unnumbered => {
             "The chirp number of every point, as column `chirp`: without it nobody knows which chirps \
              saw nothing."
         }
@@ -52,6 +52,9 @@ fn would_help(error: &DiagnoseError) -> &'static str {
         }
         DiagnoseError::Render(_) => {
             "A scene whose target the scan meets: check its place, its unit of length and the scan."
+        }
+        DiagnoseError::Elsewhere { .. } => {
+            "The scene that was measured, with the target where it stood: `matdb measure` finds the pose."
         }
         // What later reasons say of themselves stands in `reason`.
         _ => "Check the scene against the measurement, and scan more.",

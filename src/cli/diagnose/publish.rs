@@ -137,7 +137,7 @@ impl Publication<'_> {
     fn title(&self) -> String {
         let name =
             |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let [cloud, scene] = [&self.asked.cloud.cloud, self.asked.scene].map(|path| name(path));
+        let [cloud, scene] = [&*self.asked.cloud.cloud, self.asked.scene].map(name);
         format!("Diagnosis of {cloud} with {scene}, seed {}", self.asked.args.seed)
     }
 
