@@ -137,7 +137,10 @@ impl Selection<'_> {
         let receiver = Receiver { looks: looks.min(WIDE_LOOKS), ..self.problem.receiver };
         let sample = Sample::new(&self.problem);
         let wide = Problem { receiver, ..sample.problem(&self.problem) };
-        let start = wide.fit(&space, &space.start(), &[], &SEARCH).at;
+        let near = wide.fit(&space, &space.start(), &[], &SEARCH).at;
+        // The scene's own laws may be right already, as for a cloud without speckle that it rendered.
+        let ln_p = |at: &DVector<f64>| sum(&self.problem.terms(&space, at));
+        let start = if ln_p(&near) > ln_p(&space.start()) { near } else { space.start() };
         let fitted = self.problem.fit(&space, &start, &[], &SEARCH);
         let held_out = self.held_out(&space, &fitted.at);
         State { space, fitted, held_out }
