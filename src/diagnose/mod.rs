@@ -3,17 +3,22 @@
 //!
 //! The observation model comes first (`likelihood.rs`): speckle, thermal noise, and chirps that should
 //! have been detected and were not. The base laws are refitted, so that "before" is the best that can
-//! be had without the effect. Every effect is then fitted with the base, and the best few must
-//! predict patches of the scan that took no part in their fit (`folds.rs`). When none is left that does,
-//! directed tests look for structure in what remains (`residual.rs`).
+//! be had without the effect. A score test screens the library on a sample of the looks; the best few are
+//! fitted with the base and must predict patches of the scan that took no part in their fit. When none
+//! is left that does, effects that the others made superfluous are taken away, and what remains is
+//! looked at: by a smooth field over every covariate, by what neighbours have in common, by the
+//! scatter, by outliers.
 //!
 //! | step | file |
 //! |---|---|
 //! | every chirp against the target, the cloud against the chirps | `looks.rs` |
 //! | probability of what was seen | `likelihood.rs` |
 //! | base and effects together | `refit.rs` |
-//! | held-out patches, controls, selection | `folds.rs`, `placebo.rs`, `select.rs` |
-//! | what remains, and how large the error is | `residual.rs`, `score.rs` |
+//! | what an effect promises | `screen.rs` |
+//! | held-out patches, selection | `folds.rs`, `select.rs` |
+//! | what remains | `covariates.rs`, `field.rs`, `residual.rs` |
+//! | how large the error is, and what the answer is to be held against | `score.rs`, `controls.rs`, `placebo.rs` |
+//! | the same of a measured curve | `curve/` |
 
 mod controls;
 mod covariates;

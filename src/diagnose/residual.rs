@@ -1,11 +1,13 @@
-//! What a model leaves: randomised quantile residuals and directed tests of them.
+//! What a model leaves: randomised quantile residuals, and tests of their scatter, of what neighbours
+//! have in common, and of outliers.
 //!
 //! A detected look has u = F(y), a censored one u uniform below F(T), and z = Φ⁻¹(u) is standard normal
-//! if the model is right (Dunn & Smyth 1996, DOI 10.1080/10618600.1996.10474708). The mean of z and of
-//! z² − 1 is binned over each covariate; Q = Σ n·(mean)² is compared with its law under random
-//! signs of whole patches, which keeps whatever neighbouring looks share. A patch whose looks
-//! all lean to one side cannot be told so: maps are therefore of cells larger than a patch. A bin's
-//! strength must reach a declared size, too: with thousands of looks everything is significant.
+//! if the model is right (Dunn & Smyth 1996, DOI 10.1080/10618600.1996.10474708). The mean of z² − 1 is
+//! binned over each covariate; Q = Σ n·(mean)² is compared with its law under random signs of whole
+//! patches, which keeps whatever neighbouring looks share. A patch whose looks all lean to one side
+//! cannot be told so: maps are therefore of cells larger than a patch. Every strength must reach a
+//! declared size, too: with thousands of looks everything is significant. The means themselves are
+//! looked at by `field.rs`.
 
 use std::collections::HashMap;
 
