@@ -9,7 +9,7 @@ use super::likelihood::Likelihood;
 use super::looks::Observation;
 use super::placebo::Placebo;
 use super::refit::{Problem, Space};
-use super::screen::{Sample, Screen};
+use super::screen::Screen;
 use super::select::{Selection, State};
 use super::{Control, Controls, Power};
 use crate::effects::Effect;
@@ -72,7 +72,7 @@ fn spline(selection: &Selection, base: &State, numbers: usize) -> Option<Control
 
 /// The size from which each effect would be seen beside the base model.
 fn powers(selection: &Selection, base: &State, effects: &[&dyn Effect]) -> Vec<Power> {
-    let sample = Sample::new(&selection.problem);
+    let sample = selection.sample;
     let problem = sample.problem(&selection.problem);
     let screen = Screen::new(problem, &base.space, &base.fitted.at);
     let power = |effect: &&dyn Effect| {
@@ -88,17 +88,17 @@ fn powers(selection: &Selection, base: &State, effects: &[&dyn Effect]) -> Vec<P
             Space::joined(&base.fitted.at, *effect, &moved)
         };
         let found = starts.iter().take(MOST_STARTS).map(present).filter_map(|at| {
-            let gain_of_unit = 0.5 * sample.weight * screen.information_of(&space, &at);
-            let size_db = screen.size_db(&space, &at);
+            let [information, size_db] = screen.felt(&space, &at);
+            let gain_of_unit = 0.5 * sample.weight * information;
             let useful = gain_of_unit > 0.0 && size_db > 0.0;
-            useful.then(|| (size_db * (least_gain / gain_of_unit).sqrt(), at))
+            useful.then(|| ((least_gain / gain_of_unit).sqrt(), size_db, at))
         });
-        let least = found.min_by(|a, b| a.0.total_cmp(&b.0));
-        let recovered = least.as_ref().map(|(least_db, at)| {
-            let size_db = screen.size_db(&space, at);
-            recovered(selection, base, &space, at, INJECTED * least_db / size_db)
-        });
-        Power { name: effect.name(), least_db: least.map(|(db, _)| db), recovered }
+        let least = found.min_by(|a, b| (a.0 * a.1).total_cmp(&(b.0 * b.1)));
+        let recovered = least
+            .as_ref()
+            .map(|(scale, _, at)| recovered(selection, base, &space, at, INJECTED * scale));
+        let least_db = least.map(|(scale, size_db, _)| scale * size_db);
+        Power { name: effect.name(), least_db, recovered }
     };
     effects.iter().map(power).collect()
 }

@@ -17,6 +17,7 @@
 //! | what an effect promises | `screen.rs` |
 //! | held-out patches, selection | `folds.rs`, `select.rs` |
 //! | what remains | `covariates.rs`, `field.rs`, `residual.rs` |
+//! | what is said in the end | `report.rs` |
 //! | how large the error is, and what the answer is to be held against | `score.rs`, `controls.rs`, `placebo.rs` |
 //! | the same of a measured curve | `curve/` |
 
@@ -29,6 +30,7 @@ mod likelihood;
 mod looks;
 mod placebo;
 mod refit;
+mod report;
 mod residual;
 mod score;
 mod screen;
@@ -36,13 +38,11 @@ mod select;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
-
 use serde::Serialize;
 use thiserror::Error;
 
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Knob, Level, Look, Prediction, Receiver, Stage, Surveys};
+use crate::effects::{Effect, Knob, Look, Prediction, Receiver, Stage, Surveys};
 use crate::fit::FitError;
 use crate::render::RenderError;
 use crate::units::dbm_from_watts;
@@ -50,6 +50,11 @@ use crate::units::dbm_from_watts;
 pub use folds::Folds;
 pub use likelihood::Declared;
 pub use looks::{Matched, Observation, looks, matched};
+pub(crate) use refit::LEAST_LOOKS;
+pub use report::{
+    Base, BaseValue, BeforeAfter, Control, Controls, Evidence, Found, Parameters, Power, Report,
+    Row, Triple, Value, Verdict,
+};
 pub use residual::Unexplained;
 pub use score::Errors;
 pub use select::Candidate;
@@ -57,6 +62,7 @@ pub use select::Candidate;
 use covariates::covariates;
 use refit::{Problem, Space};
 use residual::Tests;
+use screen::Sample;
 use select::{Selected, Selection};
 
 /// Version of [`Report`] as JSON.
@@ -130,261 +136,6 @@ pub struct Subject<'a> {
     pub observations: &'a [Observation],
     /// Detections that belong to no look, or far from where it meets the target.
     pub false_alarms: usize,
-}
-
-/// The answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// The base model explains the data.
-    NoMissingEffect,
-    /// With the effects that were added it does.
-    Explained,
-    /// Structure is left that no effect explains.
-    Unexplained,
-}
-
-/// A number and its standard deviation.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Value {
-    /// Value.
-    pub value: f64,
-    /// Standard deviation; none where a bound holds the number or the data cannot tell it.
-    pub sd: Option<f64>,
-    /// UCUM code of its unit; 1 for a pure number.
-    pub unit: &'static str,
-}
-
-/// Three numbers that belong together, such as a place.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Triple {
-    /// Values along x, y and z.
-    pub value: [f64; 3],
-    /// Their standard deviations, as those of numbers; none for what follows from other numbers.
-    pub sd: Option<[f64; 3]>,
-    /// UCUM code of their unit.
-    pub unit: &'static str,
-}
-
-/// The numbers of an effect by name.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Parameters {
-    /// Those that were fitted.
-    #[serde(flatten)]
-    pub numbers: BTreeMap<&'static str, Value>,
-    /// The same as vectors in the global frame: `translation_m` and `rotation_deg` of a pose,
-    /// `centre_m` of a place on the target.
-    #[serde(flatten)]
-    pub triples: BTreeMap<&'static str, Triple>,
-}
-
-impl Parameters {
-    fn new(numbers: BTreeMap<&'static str, Value>, looks: &[Look]) -> Parameters {
-        let mut triples = BTreeMap::new();
-        for (name, unit) in [("translation_m", "m"), ("rotation_deg", "deg")] {
-            let (stem, end) = name.split_once('_').unwrap_or((name, ""));
-            let axis = |axis: &str| numbers.get(format!("{stem}_{axis}_{end}").as_str());
-            if let (Some(x), Some(y), Some(z)) = (axis("x"), axis("y"), axis("z")) {
-                let sd = x.sd.zip(y.sd).zip(z.sd).map(|((x, y), z)| [x, y, z]);
-                triples.insert(name, Triple { value: [x.value, y.value, z.value], sd, unit });
-            }
-        }
-        if let (Some(x), Some(y)) = (numbers.get("centre_x_m"), numbers.get("centre_y_m")) {
-            let off = |look: &&Look| (look.xt_m - x.value).hypot(look.yt_m - y.value);
-            let nearest = looks.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-            if let Some(look) = nearest {
-                let value = look.hit.point.xyz.to_array();
-                triples.insert("centre_m", Triple { value, sd: None, unit: "m" });
-            }
-        }
-        Parameters { numbers, triples }
-    }
-}
-
-impl std::ops::Deref for Parameters {
-    type Target = BTreeMap<&'static str, Value>;
-
-    fn deref(&self) -> &Self::Target {
-        &self.numbers
-    }
-}
-
-/// Why an effect was added.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Evidence {
-    /// Gain in ln likelihood over the model before.
-    pub gain: f64,
-    /// The largest gain of a placebo with as many numbers.
-    pub placebo_gain: f64,
-    /// Gain in ln p of held-out patches.
-    pub held_out_gain: f64,
-    /// Its standard error over patches.
-    pub held_out_se: f64,
-    /// What it changes: root mean square of mean powers, or of the spread, dB.
-    pub size_db: f64,
-}
-
-/// An effect that was added.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Found {
-    /// Its name.
-    pub name: &'static str,
-    /// Where it belongs.
-    pub level: Level,
-    /// Effects that predict the data as well.
-    pub class: Vec<&'static str>,
-    /// Its numbers by name, fitted together with everything else.
-    pub parameters: Parameters,
-    /// Why it was added.
-    pub evidence: Evidence,
-}
-
-/// Errors on held-out patches without and with the effects.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct BeforeAfter {
-    /// Base model, refitted.
-    pub before: Errors,
-    /// With the effects.
-    pub after: Errors,
-    /// The rmse of a model that is right, dB.
-    pub noise_floor_db: f64,
-    /// (before − after)/(before − floor) of the squared rmse; none where before is at the floor.
-    pub explained_share: Option<f64>,
-    /// Folds that the patches were dealt out to.
-    pub folds: usize,
-    /// Patches.
-    pub blocks: usize,
-    /// Always: no look was predicted by a fit that it took part in.
-    pub held_out: bool,
-}
-
-/// A law's number as fitted.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct BaseValue {
-    /// First region whose law it is.
-    pub region: usize,
-    /// Its name.
-    pub name: String,
-    /// The number.
-    #[serde(flatten)]
-    pub value: Value,
-}
-
-/// What the effects are added to.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Base {
-    /// The laws' numbers, as fitted with the effects.
-    pub parameters: Vec<BaseValue>,
-    /// Looks of speckle, as declared.
-    pub looks: f64,
-    /// Threshold, dBm, as declared.
-    pub threshold_dbm: f64,
-    /// Which pose was used.
-    pub pose: &'static str,
-    /// Whether the final fit converged.
-    pub converged: bool,
-}
-
-/// The smallest effect that these data would reveal.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Power {
-    /// Effect.
-    pub name: &'static str,
-    /// Size, dB, from which it would be seen; none where these data never show it.
-    pub least_db: Option<f64>,
-    /// Whether an effect of twice that size, put into drawn data, was found again.
-    pub recovered: Option<bool>,
-}
-
-/// What the answer is to be held against.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Controls {
-    /// Largest held-out gain in ln p, and its standard error, of a random smooth field with as many
-    /// numbers as the best effect.
-    pub placebo: Option<Control>,
-    /// The same of a spline over the best covariate.
-    pub equal_df_spline: Option<Control>,
-    /// For every effect, the size that would be seen.
-    pub injection_recovery: Vec<Power>,
-}
-
-/// A term that means nothing, beside one that is claimed to.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Control {
-    /// Its numbers.
-    pub numbers: usize,
-    /// What it goes over.
-    pub over: String,
-    /// Gain in ln likelihood over the base.
-    pub gain: f64,
-    /// Gain in ln p of held-out patches.
-    pub held_out_gain: f64,
-    /// Its standard error.
-    pub held_out_se: f64,
-}
-
-/// One look, as a table of residuals has it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Row {
-    /// Chirp number.
-    pub chirp: u32,
-    /// Received power, dBm; none where nothing was detected.
-    pub observed_dbm: Option<f64>,
-    /// E[dBm | detected] of the base model, from a fit without this look's fold.
-    pub before_dbm: f64,
-    /// The same with the effects.
-    pub after_dbm: f64,
-    /// Randomised quantile residual of the base model, fitted to all looks.
-    pub z_before: f64,
-    /// The same with the effects.
-    pub z_after: f64,
-    /// Fold that it was held out with.
-    pub fold: usize,
-    /// Incidence, degrees.
-    pub theta_deg: f64,
-    /// Azimuth of the radar about the normal, degrees.
-    pub azimuth_deg: f64,
-    /// Range of the mesh, m.
-    pub range_m: f64,
-    /// Measured less predicted range with the effects, m; none where there is no range.
-    pub range_residual_m: Option<f64>,
-    /// x in the target plane, m.
-    pub xt_m: f64,
-    /// y in the target plane, m.
-    pub yt_m: f64,
-    /// Distance to the nearest edge in depth, m, at most three spots.
-    pub edge_m: f64,
-    /// Time, s.
-    pub time_s: f64,
-    /// Region, from 0.
-    pub region: u16,
-}
-
-/// Everything that was found.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Report {
-    /// Version of the schema.
-    pub schema: u32,
-    /// The answer.
-    pub verdict: Verdict,
-    /// Effects in the order in which they were added.
-    pub effects: Vec<Found>,
-    /// Every effect of every round.
-    pub ranking: Vec<Candidate>,
-    /// What no effect explains.
-    pub unexplained: Vec<Unexplained>,
-    /// Errors on held-out patches.
-    pub error: BeforeAfter,
-    /// What the answer is to be held against.
-    pub controls: Controls,
-    /// What the effects are added to.
-    pub base: Base,
-    /// The laws of every region as fitted with the effects.
-    #[serde(skip)]
-    pub laws: Vec<Brdf>,
-    /// Every look.
-    #[serde(skip)]
-    pub rows: Vec<Row>,
 }
 
 /// Why nothing can be said.
@@ -466,7 +217,8 @@ impl Diagnosis {
         check(subject, &folds)?;
         let surveys = &Surveys::default();
         let problem = Problem { stage, looks, observations, declared, receiver, surveys };
-        let selection = Selection { problem, folds: &folds, settings: self };
+        let sample = &Sample::new(&problem);
+        let selection = Selection { problem, sample, folds: &folds, settings: self };
         let base = selection.base(Space::new(&problem, laws, at_work)?);
         let (before, z_before) = (base.held_out.clone(), self.z(&problem, &base));
         let Selected { state, ranking, added, structure } = selection.run(base.clone(), effects);

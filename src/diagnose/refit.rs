@@ -25,7 +25,7 @@ const EFFECT_STEP: f64 = 0.25;
 /// Times that a step which does not improve is halved.
 const HALVINGS: usize = 5;
 /// Looks that a law must have to be fitted.
-const LEAST_LOOKS: usize = 100;
+pub(crate) const LEAST_LOOKS: usize = 100;
 
 /// What was seen, and of what.
 #[derive(Clone, Copy)]

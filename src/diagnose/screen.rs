@@ -51,6 +51,8 @@ pub(super) struct Screen<'a> {
     terms: Vec<Term>,
     slopes: Vec<Vec<Slope>>,
     absorbs: Option<Cholesky<f64, Dyn>>,
+    /// The step that the model's own numbers would still take.
+    own_step: DVector<f64>,
 }
 
 /// One look's change by an effect: of ln mean, and of the range, m.
@@ -72,7 +74,12 @@ impl<'a> Screen<'a> {
         let ridge = 1e-9 * curvature.diagonal().iter().fold(0.0, |most: f64, x| most.max(*x));
         let curvature = curvature + DMatrix::identity(slopes.len(), slopes.len()) * ridge;
         let absorbs = curvature.cholesky();
-        Screen { problem, terms, slopes, absorbs }
+        let pull = |slopes: &Vec<Slope>| {
+            terms.iter().zip(slopes).map(|(term, s)| along(term, change(s))).sum::<f64>()
+        };
+        let own = DVector::from_iterator(slopes.len(), slopes.iter().map(pull));
+        let own_step = absorbs.as_ref().map_or(DVector::zeros(slopes.len()), |c| c.solve(&own));
+        Screen { problem, terms, slopes, absorbs, own_step }
     }
 
     /// Gain in ln likelihood that a start promises.
@@ -87,18 +94,13 @@ impl<'a> Screen<'a> {
         (scale * score - 0.5 * scale * scale * information).max(gain)
     }
 
-    /// Information on the change that a point makes, beyond what the model absorbs.
-    pub fn information_of(&self, space: &Space, at: &DVector<f64>) -> f64 {
+    /// Information on the change that a point makes, beyond what the model absorbs, and the root mean
+    /// square of that change of the means, dB.
+    pub fn felt(&self, space: &Space, at: &DVector<f64>) -> [f64; 2] {
         let there = self.problem.terms(space, at);
         let changes: Vec<Change> = self.terms.iter().zip(&there).map(apart).collect();
-        self.information(&changes)
-    }
-
-    /// Root mean square change of the means by a point, dB.
-    pub fn size_db(&self, space: &Space, at: &DVector<f64>) -> f64 {
-        let there = self.problem.terms(space, at);
-        let squares = self.terms.iter().zip(&there).map(|pair| apart(pair)[0].powi(2));
-        DB * (squares.sum::<f64>() / self.terms.len().max(1) as f64).sqrt()
+        let squares: f64 = changes.iter().map(|[mean, _]| mean.powi(2)).sum();
+        [self.information(&changes), DB * (squares / changes.len().max(1) as f64).sqrt()]
     }
 
     /// What a point gains in ln likelihood.
@@ -109,13 +111,7 @@ impl<'a> Screen<'a> {
     /// Slope of ln likelihood along a change, less what the model absorbs of it.
     fn score(&self, changes: &[Change]) -> f64 {
         let all: f64 = self.terms.iter().zip(changes).map(|(term, c)| along(term, *c)).sum();
-        let by_model = |slopes: &Vec<Slope>| {
-            self.terms.iter().zip(slopes).map(|(term, s)| along(term, change(s))).sum::<f64>()
-        };
-        let model = DVector::from_iterator(self.slopes.len(), self.slopes.iter().map(by_model));
-        let absorbed =
-            self.absorbs.as_ref().map(|c| self.with_model(changes).dot(&c.solve(&model)));
-        all - absorbed.unwrap_or(0.0)
+        all - self.with_model(changes).dot(&self.own_step)
     }
 
     /// Gain in ln likelihood that several changes promise together, each as far as it is worth it.

@@ -120,12 +120,16 @@ struct Trial<'a> {
     /// How many starts there were.
     tried: usize,
     fitted: Fitted,
+    /// What it changes of the means and of the spread, dB.
+    sizes_db: [f64; 2],
     candidate: Candidate,
 }
 
 /// All that the selection needs.
 pub(super) struct Selection<'p> {
     pub problem: Problem<'p>,
+    /// Some of its looks, for a first view.
+    pub sample: &'p Sample,
     pub folds: &'p Folds,
     pub settings: &'p Diagnosis,
 }
@@ -135,8 +139,7 @@ impl Selection<'_> {
     pub fn base<'a>(&self, space: Space<'a>) -> State<'a> {
         let Receiver { looks, .. } = self.problem.receiver;
         let receiver = Receiver { looks: looks.min(WIDE_LOOKS), ..self.problem.receiver };
-        let sample = Sample::new(&self.problem);
-        let wide = Problem { receiver, ..sample.problem(&self.problem) };
+        let wide = Problem { receiver, ..self.sample.problem(&self.problem) };
         let near = wide.fit(&space, &space.start(), &[], &SEARCH).at;
         // The scene's own laws may be right already, as for a cloud without speckle that it rendered.
         let ln_p = |at: &DVector<f64>| sum(&self.problem.terms(&space, at));
@@ -165,8 +168,10 @@ impl Selection<'_> {
             if let Some(trial) = trials.get_mut(index) {
                 trial.candidate.accepted = true;
                 let (space, mut fitted) = (trial.space.clone(), trial.fitted.clone());
+                let mut held_out = held_out;
                 if !state.space.costly(&state.fitted.at).is_empty() {
                     fitted = self.problem.fit(&space, &fitted.at, &[], &SCOUT);
+                    held_out = self.held_out(&space, &fitted.at);
                 }
                 state = State { space, fitted, held_out };
                 let Candidate { gain, size_db, .. } = trial.candidate;
@@ -248,7 +253,7 @@ impl Selection<'_> {
         State { space, fitted, held_out }
     }
 
-    /// Takes away effects that the later ones made superfluous; the rest in the order of their worth.
+    /// Takes away effects that the later ones made superfluous.
     fn prune(&self, state: &mut State, added: &mut Vec<Added>) {
         while added.len() > 1 {
             let mut losses: Vec<(usize, State, f64, bool)> = (0..added.len())
@@ -257,7 +262,7 @@ impl Selection<'_> {
                     let loss = state.fitted.ln_likelihood - without.fitted.ln_likelihood;
                     let [gain, se] = self.difference(&state.held_out, &without.held_out);
                     let largest_db = added.iter().map(|a| a.evidence.size_db).fold(0.0, f64::max);
-                    let size_db = self.size_db(&without, &state.space, &state.fitted.at);
+                    let size_db = larger(self.sizes_db(&without, &state.space, &state.fitted.at));
                     let least_db = self.settings.least_size_db.max(SHARE_OF_LARGEST * largest_db);
                     let numbers = state.space.effects[index].knobs().len();
                     let least = self.settings.least_gain_of(numbers, 1);
@@ -290,7 +295,7 @@ impl Selection<'_> {
         let absent = |effect: &&&dyn Effect| {
             state.space.effects.iter().all(|there| there.name() != effect.name())
         };
-        let sample = Sample::new(&self.problem);
+        let sample = self.sample;
         let screen = Screen::new(sample.problem(&self.problem), &state.space, &state.fitted.at);
         let mut trials: Vec<Trial> = effects
             .iter()
@@ -359,7 +364,7 @@ impl Selection<'_> {
             accepted: false,
         };
         let fitted = Fitted { at, ln_likelihood: f64::NEG_INFINITY, converged: false };
-        Some(Trial { effect, space, starts, tried, fitted, candidate })
+        Some(Trial { effect, space, starts, tried, fitted, sizes_db: [0.0; 2], candidate })
     }
 
     /// Moves what only shapes an effect, such as a place, to where the start promises more.
@@ -422,9 +427,10 @@ impl Selection<'_> {
             .max_by(|a, b| a.ln_likelihood.total_cmp(&b.ln_likelihood));
         if let Some(best) = best {
             trial.candidate.gain = weight * (best.ln_likelihood - here);
-            trial.candidate.size_db = self.size_db(state, space, &best.at);
             trial.candidate.converged = best.converged;
+            trial.sizes_db = self.sizes_db(state, space, &best.at);
             trial.fitted = best;
+            trial.candidate.size_db = larger(trial.sizes_db);
         }
     }
 
@@ -434,7 +440,8 @@ impl Selection<'_> {
         trial.fitted = self.problem.fit(&trial.space, &trial.fitted.at, &held, &SEARCH);
         trial.candidate.gain = trial.fitted.ln_likelihood - state.fitted.ln_likelihood;
         trial.candidate.sampled = false;
-        trial.candidate.size_db = self.size_db(state, &trial.space, &trial.fitted.at);
+        trial.sizes_db = self.sizes_db(state, &trial.space, &trial.fitted.at);
+        trial.candidate.size_db = larger(trial.sizes_db);
         trial.candidate.converged = trial.fitted.converged;
     }
 
@@ -450,7 +457,8 @@ impl Selection<'_> {
         let Diagnosis { least_size_db, standard_errors, .. } = *self.settings;
         for (index, trial) in trials.iter_mut().enumerate().filter(|t| !t.1.candidate.sampled) {
             let least = self.settings.least_gain_of(trial.candidate.numbers, trial.tried);
-            let is_spread = self.is_spread(state, trial);
+            let [mean_db, spread_db] = trial.sizes_db;
+            let is_spread = spread_db > mean_db;
             let share = if is_spread { SHARE_OF_SPREAD } else { SHARE_OF_LARGEST };
             let least_db = least_size_db.max(share * largest_db);
             if trial.candidate.gain < least || trial.candidate.size_db < least_db {
@@ -479,9 +487,12 @@ impl Selection<'_> {
             passed.push((index, held_out, gain));
         }
         passed.sort_by(|a, b| b.2.total_cmp(&a.2));
+        let mut screen = None;
         while let Some(best) = passed.first() {
             let trial = trials.get_mut(best.0)?;
-            let placebo = self.placebo_gain(state, trial.effect.knobs().len());
+            let screen = screen
+                .get_or_insert_with(|| Screen::new(self.problem, &state.space, &state.fitted.at));
+            let placebo = self.placebo_gain(state, screen, trial.effect.knobs().len());
             trial.candidate.placebo_gain = Some(placebo);
             if trial.candidate.gain > placebo {
                 break;
@@ -496,14 +507,6 @@ impl Selection<'_> {
         let class = passed.iter().skip(1).filter(as_good);
         let names = class.map(|one| trials[one.0].candidate.name).collect();
         Some((best.0, best.1.clone(), names))
-    }
-
-    /// Whether an effect changes the scatter more than the means.
-    fn is_spread(&self, state: &State, trial: &Trial) -> bool {
-        let [before, after] = [(&state.space, &state.fitted), (&trial.space, &trial.fitted)]
-            .map(|(space, fitted)| self.problem.predict(space, &fitted.at));
-        let [mean_db, spread_db] = self.sizes_db(&before, &after);
-        spread_db > mean_db
     }
 
     /// What an effect gains where the means are already corrected by a field: scatter that is only
@@ -522,8 +525,7 @@ impl Selection<'_> {
         self.folds.sum(&differences)
     }
 
-    fn placebo_gain(&self, state: &State, numbers: usize) -> f64 {
-        let screen = Screen::new(self.problem, &state.space, &state.fitted.at);
+    fn placebo_gain(&self, state: &State, screen: &Screen, numbers: usize) -> f64 {
         let gain = |draw: u64| {
             let placebo = Placebo::new(numbers, self.settings.seed, draw);
             let mut space = state.space.clone();
@@ -555,14 +557,10 @@ impl Selection<'_> {
         all.into_iter().map(|(_, scored)| scored).collect()
     }
 
-    fn size_db(&self, state: &State, space: &Space, at: &DVector<f64>) -> f64 {
-        let before = self.problem.predict(&state.space, &state.fitted.at);
-        let [mean_db, spread_db] = self.sizes_db(&before, &self.problem.predict(space, at));
-        mean_db.max(spread_db)
-    }
-
     /// Root mean square change of the means of all detections, and change of the spread, dB.
-    fn sizes_db(&self, before: &Prediction, after: &Prediction) -> [f64; 2] {
+    fn sizes_db(&self, state: &State, space: &Space, at: &DVector<f64>) -> [f64; 2] {
+        let before = &self.problem.predict(&state.space, &state.fitted.at);
+        let after = &self.problem.predict(space, at);
         // Spreads add in squares.
         let wider = |a: f64, b: f64| (a * a - b * b).abs().sqrt();
         let [now, then] = [after, before].map(|p| speckle_sd_db(p.receiver.looks));
@@ -578,6 +576,10 @@ impl Selection<'_> {
         let tilt = |p: &Prediction| DB * p.receiver.tilt_sd_rad * rms(&p.slope_per_rad);
         [rms(&changes), wider(now, then).max(wider(tilt(after), tilt(before)))]
     }
+}
+
+fn larger([a, b]: [f64; 2]) -> f64 {
+    a.max(b)
 }
 
 /// Which of the effects is the smallest.

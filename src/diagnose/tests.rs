@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::*;
 use crate::brdf::{BlinnPhong, CookTorrance, Distribution, Mixture, Shadowing};
-use crate::effects::{Knob, Model};
+use crate::effects::{Knob, Level, Model};
 use crate::frames::{Point, Ray};
 use crate::geometry::Mesh;
 use crate::radar::random::{Key, Purpose};

@@ -295,12 +295,15 @@ fn json(value: &impl serde::Serialize) -> Result<Vec<u8>, Error> {
 /// A detection further than this from where its chirp meets the target is a false alarm, m.
 const GATE_M: f64 = 0.1;
 
+/// Looks that stand for a radar without speckle: a likelihood needs some spread.
+const MOST_LOOKS: f64 = 1e4;
+
 fn receiver(radar: &Radar) -> (Receiver, Declared) {
-    let looks = radar.speckle.map_or(1e4, |speckle| speckle.looks);
-    let noise_w = radar.noise.map_or(0.0, |noise| watts_from_dbm(noise.level_dbm));
+    let receiver = Receiver::declared(radar);
+    let receiver = Receiver { looks: receiver.looks.min(MOST_LOOKS), ..receiver };
     let range_sd_m = radar.noise.map_or(0.0, |noise| noise.range_sd_m);
     let threshold_w = watts_from_dbm(radar.threshold_dbm);
-    (Receiver { looks, noise_w, tilt_sd_rad: 0.0 }, Declared { threshold_w, range_sd_m })
+    (receiver, Declared { threshold_w, range_sd_m })
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use crate::brdf::Brdf;
 use crate::cli::curves::source;
 use crate::cli::materials::{Found, find};
 use crate::cli::staging::Used;
-use crate::diagnose::Report;
+use crate::diagnose::{LEAST_LOOKS, Report};
 use crate::effects::Level;
 use crate::error::Error;
 use crate::material::{Fit, Material, Slug, SourceKind};
@@ -13,9 +13,6 @@ use crate::store::{Added, Store};
 
 /// Name of the fit that holds a refitted law.
 const FIT: &str = "diagnosed";
-
-/// The looks of a region without which its law is not refitted.
-const LEAST_LOOKS: usize = 100;
 
 /// The materials of a scene, each with the name that its regions give it.
 #[derive(Clone, Copy)]
