@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::catalogue::{AboutError, CatalogueError};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::curve::CurveDiagnoseError;
 use crate::effects::EffectError;
@@ -60,6 +61,12 @@ pub enum Error {
     /// The database refused.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// A catalogue could not be published or taken over.
+    #[error(transparent)]
+    Catalogue(#[from] CatalogueError),
+    /// What a catalogue shall say of itself was refused.
+    #[error(transparent)]
+    About(#[from] AboutError),
     /// A figure could not be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),

@@ -37,6 +37,7 @@
 //! | [`measure`], [`fit`] | a measured cloud → pose → curve; a curve → parameters |
 //! | [`diagnose`] | a measured cloud → the effect that the model lacks |
 //! | [`store`] | the only SQL |
+//! | [`catalogue`] | a database as a catalogue for others: site, tables, records |
 //! | [`error`], [`cli`] | every error in one type; one command per file |
 //!
 //! Inside are SI units, watts and radians; dB, dBm and degrees appear where people and files do, and
@@ -61,5 +62,6 @@ pub mod measure;
 pub mod fit;
 pub mod diagnose;
 pub mod store;
+pub mod catalogue;
 pub mod error;
 pub mod cli;

@@ -15,6 +15,7 @@ mod materials;
 mod measure;
 mod output;
 mod plot;
+mod publish;
 mod radar;
 mod render;
 mod rm;
@@ -76,6 +77,7 @@ enum Command {
     Plot(plot::Args),
     Fit(Box<fit::Args>),
     Rm(rm::Args),
+    Publish(publish::Args),
     Completions(completions::Args),
 }
 
@@ -100,6 +102,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Plot(args) => plot::run(args, db, &console),
         Command::Fit(args) => fit::run(args, db, &console),
         Command::Rm(args) => rm::run(args, db, &console),
+        Command::Publish(args) => publish::run(args, db, &console),
         Command::Completions(args) => completions::run(args),
     }
 }

@@ -1,0 +1,87 @@
+//! What a catalogue says of itself: title, people, licence. A small TOML file that a laboratory writes
+//! once.
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// What a catalogue says of itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct About {
+    /// Title.
+    pub title: String,
+    /// A sentence or two below it.
+    pub description: String,
+    /// Version of this publication, as the people who cite it will read it; none: not numbered.
+    pub version: Option<String>,
+    /// SPDX identifier of the licence of the catalogue as a whole; materials may say their own.
+    pub licence: String,
+    /// Address at which the catalogue will stand, if it is known.
+    pub url: Option<String>,
+    /// DOI of the publication, without a resolver in front.
+    pub doi: Option<String>,
+    /// Who answers for it.
+    #[serde(rename = "person")]
+    pub people: Vec<Person>,
+}
+
+/// Somebody who answers for a catalogue.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Person {
+    /// Family name.
+    pub family: String,
+    /// Given names.
+    pub given: String,
+    /// ORCID, sixteen digits in groups of four.
+    pub orcid: Option<String>,
+    /// Where they work.
+    pub affiliation: Option<String>,
+}
+
+impl Default for About {
+    fn default() -> About {
+        About {
+            title: "Materials for 300 GHz imaging radar".to_owned(),
+            description: "How materials scatter, measured or fitted, each number with its source."
+                .to_owned(),
+            version: None,
+            licence: "CC-BY-4.0".to_owned(),
+            url: None,
+            doi: None,
+            people: Vec::new(),
+        }
+    }
+}
+
+/// Why an `about` file was refused.
+#[derive(Debug, Error)]
+#[error("{file}: {problem}")]
+pub struct AboutError {
+    /// The file.
+    file: String,
+    /// What the file says that it should not, and where.
+    problem: String,
+}
+
+impl About {
+    /// Reads the file's text; `file` names it in errors.
+    ///
+    /// # Errors
+    /// When it is no TOML, has a key that means nothing, or lacks a name.
+    ///
+    /// ```
+    /// use matdb::catalogue::About;
+    /// let text = "title = 'Paints of our laboratory'\n[[person]]\nfamily = 'Roe'\ngiven = 'Ann'";
+    /// assert_eq!(About::parse("about.toml", text).unwrap().people[0].family, "Roe");
+    /// assert!(About::parse("about.toml", "titel = 'x'").is_err());
+    /// ```
+    pub fn parse(file: &str, text: &str) -> Result<About, AboutError> {
+        let refused = |problem: String| AboutError { file: file.to_owned(), problem };
+        let about: About = toml::from_str(text).map_err(|error| refused(error.to_string()))?;
+        if about.title.trim().is_empty() {
+            return Err(refused("`title` is empty; give the catalogue a title".to_owned()));
+        }
+        Ok(about)
+    }
+}

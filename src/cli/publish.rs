@@ -1,0 +1,49 @@
+//! `matdb publish`.
+
+use std::path::{Path, PathBuf};
+
+use super::console::Console;
+use super::database::Database;
+use crate::catalogue::{About, publish};
+use crate::error::Error;
+
+/// Publish the database as a catalogue: a static site and the data in open formats
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb publish site                           every material of the database
+  matdb publish site --about about.toml        with your title, names, licence and address")]
+pub(super) struct Args {
+    /// Folder to write; an earlier publication there is replaced
+    folder: PathBuf,
+    /// TOML file with title, description, licence, url and [[person]]s of the catalogue
+    #[arg(long, value_name = "FILE")]
+    about: Option<PathBuf>,
+}
+
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    let about = args.about.as_deref().map_or_else(|| Ok(About::default()), about)?;
+    let Some(store) = db.read()? else {
+        return Err(Error::Usage {
+            problem: format!("there is no database {}", db.path().display()),
+            way_out: "`matdb add --all` makes one of the built-in materials".to_owned(),
+        });
+    };
+    let published = publish(&store, &about, &args.folder, |_| ())?;
+    let text = format!(
+        "published {} materials in {} files: {}\n",
+        published.materials,
+        published.files,
+        args.folder.display()
+    );
+    console.result(&text, &published)
+}
+
+fn about(path: &Path) -> Result<About, Error> {
+    let text = std::fs::read_to_string(path).map_err(|reason| Error::Io {
+        verb: "read",
+        path: path.to_owned(),
+        reason,
+        way_out: "check the path of --about",
+    })?;
+    Ok(About::parse(&path.display().to_string(), &text)?)
+}
