@@ -43,7 +43,9 @@ impl Console {
     /// A sign of life for work without known steps; invisible like [`progress`](Self::progress).
     pub fn spinner(&self, what: &'static str) -> ProgressBar {
         let bar = self.progress(what, 0);
-        bar.set_style(ProgressStyle::default_spinner());
+        let style = ProgressStyle::with_template("{spinner} {elapsed} {msg}")
+            .unwrap_or_else(|_| ProgressStyle::default_spinner());
+        bar.set_style(style);
         bar.enable_steady_tick(std::time::Duration::from_millis(100));
         bar
     }

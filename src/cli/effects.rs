@@ -30,6 +30,23 @@ struct Record {
     parameters: &'static [Knob],
 }
 
+/// What has no name, as a script reads it.
+#[derive(Serialize)]
+struct Unknown {
+    name: &'static str,
+    is: &'static str,
+    shows: &'static str,
+}
+
+const UNKNOWN: Unknown = Unknown {
+    name: "unknown",
+    is: "What no effect in this list does to the data: a smooth term over all covariates and the target \
+         plane, beside the law and the effects that were found, which names nothing.",
+    shows: "The verdict is `unexplained`; `unexplained` in report.json says with which covariates it goes \
+            and how large it is, the picture unknown-map shows where, and residuals.csv has it chirp by \
+            chirp as unknown_db. It is never stored and never rendered.",
+};
+
 impl Record {
     fn new(effect: &dyn Effect) -> Record {
         Record {
@@ -44,6 +61,7 @@ impl Record {
 
 pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     match &args.name {
+        Some(name) if name == UNKNOWN.name => console.result(&unknown(), &UNKNOWN),
         Some(name) => {
             let record = Record::new(known(name)?);
             console.result(&entry(&record), &record)
@@ -93,7 +111,13 @@ fn list(records: &[Record]) -> String {
         [record.name.to_owned(), level, parameters, short(record.is).to_owned()]
     };
     table(&["effect", "level", "parameters", "what it is"], records.iter().map(row))
-        + "`matdb effects NAME` says how one shows, and what its numbers are\n"
+        + "`matdb effects NAME` says how one shows, and what its numbers are; `unknown` is what none of \
+           them explains\n"
+}
+
+fn unknown() -> String {
+    let Unknown { name, is, shows } = UNKNOWN;
+    format!("{name}\n{is}\n\nHow it shows: {shows}\n")
 }
 
 /// A sentence up to where it goes into detail.

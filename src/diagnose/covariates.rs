@@ -26,10 +26,7 @@ pub(super) fn covariates(
     let arrived = || prediction.arrived.iter().map(|arrived| arrived.as_ref());
     let ln_power = |power_w: f64| power_w.max(f64::MIN_POSITIVE).ln();
     let powers = arrived().map(|a| a.map_or(f64::MIN_POSITIVE.ln(), |a| ln_power(a.power_w)));
-    let off = observations.iter().zip(arrived());
-    let off_m = |(seen, arrived): (&Observation, Option<&crate::effects::Arrived>)| {
-        seen.range_m.zip(arrived).map_or(0.0, |(seen_m, arrived)| seen_m - arrived.range_m)
-    };
+    let arrived_m: Vec<Option<f64>> = arrived().map(|a| a.map(|a| a.range_m)).collect();
     let mut all = vec![
         of_look("theta", 14, &|look| look.hit.theta_rad()),
         of_look("azimuth", 12, &|look| look.azimuth_rad),
@@ -41,11 +38,25 @@ pub(super) fn covariates(
         of_look("distance from edge", 8, &|look| look.edge_m),
         of_look("progress", 20, &|look| look.progress),
         Covariate { name: "predicted power", values: powers.collect(), cells: 12 },
-        Covariate { name: "range residual", values: off.map(off_m).collect(), cells: 8 },
+        Covariate { name: "range residual", values: off_m(observations, &arrived_m), cells: 8 },
         of_look("region", 8, &|look| f64::from(look.region)),
     ];
     all.retain(|c| c.values.iter().any(|value| Some(value) != c.values.first()));
     all
+}
+
+/// Measured less expected range, m. A look without one takes that of another look: a number of its own
+/// would tell every field which looks are silent.
+fn off_m(observations: &[Observation], arrived_m: &[Option<f64>]) -> Vec<f64> {
+    let off = |(seen, arrived_m): (&Observation, &Option<f64>)| Some(seen.range_m? - (*arrived_m)?);
+    let own: Vec<Option<f64>> = observations.iter().zip(arrived_m).map(off).collect();
+    let known: Vec<f64> = own.iter().copied().flatten().collect();
+    // Knuth's multiplicative hash spreads the silent looks over the others.
+    let other = |look: usize| {
+        let drawn = look.wrapping_mul(2_654_435_761).checked_rem(known.len());
+        drawn.and_then(|drawn| known.get(drawn)).copied().unwrap_or(0.0)
+    };
+    own.iter().enumerate().map(|(look, own_m)| own_m.unwrap_or_else(|| other(look))).collect()
 }
 
 fn middle(looks: &[Look], pick: fn(&Look) -> f64) -> f64 {

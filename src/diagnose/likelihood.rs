@@ -8,7 +8,7 @@
 //! silhouette that the mesh misses costs a bounded amount.
 
 use crate::effects::Prediction;
-use crate::fit::gamma_law::GammaLaw;
+use crate::fit::gamma_law::{GammaLaw, LnProbability};
 
 use super::looks::Observation;
 
@@ -94,14 +94,20 @@ impl<'a> Likelihood<'a> {
         means.iter().map(|(ln_mean, weight)| weight * ln_mean.exp()).sum()
     }
 
+    /// How much of a relative fluctuation of a look's power the receiver passes.
+    pub fn passes(&self, look: usize) -> f64 {
+        let arrived = self.prediction.arrived.get(look).copied().flatten();
+        self.prediction.receiver.passes(arrived.map_or(0.0, |arrived| arrived.power_w))
+    }
+
     /// One chirp's part of the likelihood.
     pub fn term(&self, look: usize, seen: &Observation) -> Term {
-        let means = self.ln_means(look);
+        let (means, passes) = (self.ln_means(look), self.passes(look));
         let (mut p, mut slope, mut bend, mut pull) = (0.0, 0.0, 0.0, 0.0);
         for &(ln_mean, weight) in &means {
             let law = match seen.power_w {
-                Some(power_w) => self.law.detected(power_w.ln(), ln_mean),
-                None => self.law.below(self.declared.threshold_w.ln(), ln_mean),
+                Some(power_w) => self.detected(power_w, ln_mean, passes),
+                None => self.limited(self.declared.threshold_w, ln_mean, passes),
             };
             let part = (1.0 - OUTLIERS) * weight * law.value.exp();
             p += part;
@@ -110,7 +116,7 @@ impl<'a> Likelihood<'a> {
             bend += part * law.bend;
         }
         let anything = if seen.power_w.is_some() { OUTLIER_DENSITY } else { 0.5 };
-        let most = MOST_PULL * self.prediction.receiver.looks.sqrt();
+        let most = MOST_PULL * self.prediction.receiver.looks.sqrt() / passes;
         let pull = pull.clamp(-most, most);
         p += OUTLIERS * anything;
         let ln_mean = means.get(means.len() / 2).map_or(0.0, |mean| mean.0);
@@ -131,15 +137,28 @@ impl<'a> Likelihood<'a> {
 
     /// Probability that the power of a look stays below a level, W.
     pub fn below(&self, look: usize, level_w: f64) -> f64 {
+        let passes = self.passes(look);
         let part = |(ln_mean, weight): &(f64, f64)| {
-            weight * self.law.below(level_w.ln(), *ln_mean).value.exp()
+            weight * self.limited(level_w, *ln_mean, passes).value.exp()
         };
         self.ln_means(look).iter().map(part).sum()
     }
 
-    /// Probability that a power of this mean is detected.
-    pub fn chance(&self, ln_mean: f64) -> f64 {
-        1.0 - self.law.below(self.declared.threshold_w.ln(), ln_mean).value.exp()
+    /// Probability that a power of this mean is detected where so much of a fluctuation passes.
+    pub fn chance(&self, ln_mean: f64, passes: f64) -> f64 {
+        1.0 - self.limited(self.declared.threshold_w, ln_mean, passes).value.exp()
+    }
+
+    /// ln density of a detected power per unit of ln power: what the receiver has held down is ln y's
+    /// distance from ln mean.
+    fn detected(&self, power_w: f64, ln_mean: f64, passes: f64) -> LnProbability {
+        let law = self.law.detected(ln_mean + (power_w.ln() - ln_mean) / passes, ln_mean);
+        LnProbability { value: law.value - passes.ln(), ..held_down(law, passes) }
+    }
+
+    /// ln probability that the power stays below a limit.
+    fn limited(&self, limit_w: f64, ln_mean: f64, passes: f64) -> LnProbability {
+        held_down(self.law.below(ln_mean + (limit_w.ln() - ln_mean) / passes, ln_mean), passes)
     }
 
     /// ln p of a range, its slope and its curvature by the predicted range.
@@ -156,4 +175,10 @@ impl<'a> Likelihood<'a> {
         let weight = (near + stray / STRAY_WIDTH.powi(2)) / p;
         [p.ln(), weight * x / sd_m, weight / (sd_m * sd_m)]
     }
+}
+
+/// The derivatives where a step of ln mean is so much larger against what fluctuates.
+fn held_down(law: LnProbability, passes: f64) -> LnProbability {
+    let by_ln_mean = law.by_ln_mean / passes;
+    LnProbability { by_ln_mean, bend: law.bend / (passes * passes), ..law }
 }

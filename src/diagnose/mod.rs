@@ -211,6 +211,19 @@ impl Diagnosis {
     /// # Errors
     /// When the data are too few to tell anything, or something declared has no meaning.
     pub fn run(&self, subject: &Subject, effects: &[&dyn Effect]) -> Result<Report, DiagnoseError> {
+        self.run_with(subject, effects, &|_| ())
+    }
+
+    /// The same; `hear` is told in a few words what is being done.
+    ///
+    /// # Errors
+    /// As [`Diagnosis::run`].
+    pub fn run_with(
+        &self,
+        subject: &Subject,
+        effects: &[&dyn Effect],
+        hear: &(dyn Fn(&str) + Sync),
+    ) -> Result<Report, DiagnoseError> {
         let Subject { stage, laws, at_work, receiver, declared, .. } = *subject;
         let Subject { looks, observations, false_alarms, .. } = *subject;
         let folds = Folds::new(looks, self.block_m, self.folds, self.seed);
@@ -218,21 +231,26 @@ impl Diagnosis {
         let surveys = &Surveys::default();
         let problem = Problem { stage, looks, observations, declared, receiver, surveys };
         let sample = &Sample::new(&problem);
-        let selection = Selection { problem, sample, folds: &folds, settings: self };
+        let selection = Selection { problem, sample, folds: &folds, settings: self, hear };
+        hear("refitting the base laws");
         let base = selection.base(Space::new(&problem, laws, at_work)?);
         let (before, z_before) = (base.held_out.clone(), self.z(&problem, &base));
         let Selected { state, ranking, added, structure } = selection.run(base.clone(), effects);
         let numbers = ranking.first().map_or(1, |candidate| candidate.numbers);
+        hear("controls");
         let controls = controls::controls(&selection, &base, effects, numbers);
         let z_after = self.z(&problem, &state);
         let prediction = problem.predict(&state.space, &state.fitted.at);
         let largest_db = added.iter().map(|a| a.evidence.size_db).fold(0.0, f64::max);
         let covariates = covariates(looks, &prediction, observations);
+        hear("testing what is left");
         let mut unexplained =
             self.tests(largest_db).run(&z_after, looks, &prediction, &covariates, &folds);
-        if selection.is_structured(&structure, largest_db) {
+        let is_structured = selection.is_structured(&structure, largest_db);
+        if is_structured {
             unexplained.extend(residual::of_field(&structure));
         }
+        let unknown = if is_structured { structure.ln_factor.as_slice() } else { &[] };
         let sd_db = residual::speckle_sd_db(prediction.receiver.looks);
         let neighbours =
             residual::of_neighbours(&z_after, looks, stage.radar.spot_diameter_m, sd_db, &folds);
@@ -273,6 +291,7 @@ impl Diagnosis {
                 &folds,
                 [&before, &state.held_out],
                 [&z_before, &z_after],
+                unknown,
             ),
         })
     }
@@ -303,6 +322,7 @@ fn rows(
     folds: &Folds,
     [before, after]: [&[score::Scored]; 2],
     [z_before, z_after]: [&[f64]; 2],
+    ln_unknown: &[f64],
 ) -> Vec<Row> {
     let row = |index: usize| {
         let seen = subject.observations.get(index)?;
@@ -325,6 +345,7 @@ fn rows(
             edge_m: look.edge_m,
             time_s: look.time_s,
             region: look.region,
+            unknown_db: score::DB * ln_unknown.get(index).copied().unwrap_or(0.0),
         })
     };
     (0..subject.looks.len()).filter_map(row).collect()

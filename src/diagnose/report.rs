@@ -234,6 +234,9 @@ pub struct Row {
     pub time_s: f64,
     /// Region, from 0.
     pub region: u16,
+    /// What a smooth field over all covariates, fitted without this look's fold, would add to the mean
+    /// power of the final model, dB; 0 where such a field finds nothing.
+    pub unknown_db: f64,
 }
 
 /// Everything that was found.

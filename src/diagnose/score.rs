@@ -136,12 +136,13 @@ fn detected_moments(
     look: usize,
 ) -> [f64; 2] {
     let ln_threshold = declared.threshold_w.ln();
-    let means = likelihood.ln_means(look);
+    let (means, passes) = (likelihood.ln_means(look), likelihood.passes(look));
     let mut sums = [0.0; 3];
     for &(ln_mean, weight) in &means {
-        let [mean, variance] = above.at(ln_threshold - ln_mean);
-        let chance = if means.len() == 1 { 1.0 } else { likelihood.chance(ln_mean) };
-        let (mean, weight) = (ln_mean + mean, weight * chance.max(1e-300));
+        let [mean, variance] = above.at((ln_threshold - ln_mean) / passes);
+        let variance = passes * passes * variance;
+        let chance = if means.len() == 1 { 1.0 } else { likelihood.chance(ln_mean, passes) };
+        let (mean, weight) = (ln_mean + passes * mean, weight * chance.max(1e-300));
         for (sum, part) in sums.iter_mut().zip([1.0, mean, variance + mean * mean]) {
             *sum += weight * part;
         }

@@ -132,6 +132,8 @@ pub(super) struct Selection<'p> {
     pub sample: &'p Sample,
     pub folds: &'p Folds,
     pub settings: &'p Diagnosis,
+    /// Told in a few words what is being done.
+    pub hear: &'p (dyn Fn(&str) + Sync),
 }
 
 impl Selection<'_> {
@@ -182,6 +184,7 @@ impl Selection<'_> {
             }
             ranking.extend(trials.into_iter().map(|trial| trial.candidate));
         }
+        (self.hear)("asking what each effect is needed for");
         self.prune(&mut state, &mut added);
         let mut structure = self.structure(&state);
         while let Some(least) = smallest(&added)
@@ -295,6 +298,7 @@ impl Selection<'_> {
         let absent = |effect: &&&dyn Effect| {
             state.space.effects.iter().all(|there| there.name() != effect.name())
         };
+        (self.hear)(&format!("round {round}: screening {} effects", effects.len()));
         let sample = self.sample;
         let screen = Screen::new(sample.problem(&self.problem), &state.space, &state.fitted.at);
         let mut trials: Vec<Trial> = effects
@@ -306,6 +310,7 @@ impl Selection<'_> {
         let mut best = 0.25 * self.settings.least_gain_of(1, 1) / SHARE_TO_SCOUT;
         for trial in &mut trials {
             if trial.candidate.gain >= SHARE_TO_SCOUT * best {
+                (self.hear)(&format!("round {round}: trying {}", trial.effect.name()));
                 self.scout(state, &screen, sample.weight, trial);
                 best = best.max(trial.candidate.gain);
             }
@@ -315,6 +320,7 @@ impl Selection<'_> {
         let least = (SHARE_OF_BEST * best).max(0.5 * self.settings.least_gain_of(1, 1));
         for trial in trials.iter_mut().take(SHORTLIST) {
             if trial.candidate.gain >= least {
+                (self.hear)(&format!("round {round}: refitting with {}", trial.effect.name()));
                 self.refit(state, trial);
             }
         }
@@ -348,6 +354,11 @@ impl Selection<'_> {
             self.shape(screen, &space, effect, weight, (promise, start));
             self.scale(screen, &space, effect, first, start);
         }
+        if round == 1
+            && let Some(declared) = self.declared(screen, &state.space, effect)
+        {
+            starts.push((starts.first().map_or(0.0, |start| start.0), declared));
+        }
         let (gain, at) = starts.first()?.clone();
         // Where the effect is absent there is nothing to promise.
         let gain = if starts.len() == 1 && gain == 0.0 { f64::INFINITY } else { gain };
@@ -365,6 +376,16 @@ impl Selection<'_> {
         };
         let fitted = Fitted { at, ln_likelihood: f64::NEG_INFINITY, converged: false };
         Some(Trial { effect, space, starts, tried, fitted, sizes_db: [0.0; 2], candidate })
+    }
+
+    /// The best start with the laws as the scene declares them: without an effect that bends the whole
+    /// curve, such as a ceiling, the fitted laws may be far from any that go with it.
+    fn declared(&self, screen: &Screen, base: &Space, effect: &dyn Effect) -> Option<DVector<f64>> {
+        let space = base.with(effect);
+        let starts = effect.starts(self.problem.stage, self.problem.looks);
+        let declared = starts.iter().map(|values| Space::joined(&base.start(), effect, values));
+        let gains = declared.map(|start| (screen.gain(&space, &start), start));
+        gains.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, start)| start)
     }
 
     /// Moves what only shapes an effect, such as a place, to where the start promises more.

@@ -119,7 +119,7 @@ fn diagnosed(truth: &[(&'static dyn Effect, f64)], seed: u64) -> Report {
     let stage = Stage { radar: &radar, link, bvh: &bvh, region_of_facet, grain_of_region, middle };
     let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
     let noise_w = watts_from_dbm(-100.0);
-    let receiver = Receiver { looks: 4.0, noise_w, tilt_sd_rad: 0.0 };
+    let receiver = Receiver { looks: 4.0, noise_w, ..Receiver::LINEAR };
     let declared = Declared { threshold_w: watts_from_dbm(-77.0), range_sd_m: RANGE_SD_M };
     let effects = truth.iter().map(|(effect, value)| (*effect as &dyn Effect, vec![*value]));
     let model = Model { laws: vec![law()], receiver, effects: effects.collect() };
@@ -236,7 +236,7 @@ fn a_scan_with_too_little_says_so() {
         middle: DVec3::new(0.0, 1.1, 0.0),
     };
     let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
-    let receiver = Receiver { looks: 4.0, noise_w: 0.0, tilt_sd_rad: 0.0 };
+    let receiver = Receiver { looks: 4.0, noise_w: 0.0, ..Receiver::LINEAR };
     let declared = Declared { threshold_w: 1e-11, range_sd_m: RANGE_SD_M };
     let observations = vec![Observation::default(); looks.len()];
     let subject = Subject {

@@ -47,7 +47,12 @@ mod tests {
 
     #[test]
     fn independent_tilts_add_in_quadrature() {
-        let declared = Receiver { looks: 4.0, noise_w: 1e-13, tilt_sd_rad: 3f64.to_radians() };
+        let declared = Receiver {
+            looks: 4.0,
+            noise_w: 1e-13,
+            tilt_sd_rad: 3f64.to_radians(),
+            ..Receiver::LINEAR
+        };
         let found = AngleError.receive(&[4.0], declared);
         assert!((found.tilt_sd_rad.to_degrees() - 5.0).abs() < 1e-12);
         assert_eq!(found.looks, 4.0);

@@ -47,7 +47,7 @@ impl Receiver {
         Receiver {
             looks: radar.speckle.map_or(f64::INFINITY, |speckle| speckle.looks),
             noise_w: radar.noise.map_or(0.0, |noise| watts_from_dbm(noise.level_dbm)),
-            tilt_sd_rad: 0.0,
+            ..Receiver::LINEAR
         }
     }
 }

@@ -137,6 +137,37 @@ pub struct Receiver {
     pub noise_w: f64,
     /// Standard deviation of each of the two tilts of a normal that differ from chirp to chirp, rad.
     pub tilt_sd_rad: f64,
+    /// Mean power that no fluctuation passes, W; infinite for a receiver that is linear.
+    pub ceiling_w: f64,
+    /// How suddenly the ceiling comes: the exponent of mean/ceiling in what does not pass.
+    pub knee: f64,
+}
+
+impl Receiver {
+    /// No speckle, no noise, no tilt, no ceiling.
+    pub const LINEAR: Receiver = Receiver {
+        looks: f64::INFINITY,
+        noise_w: 0.0,
+        tilt_sd_rad: 0.0,
+        ceiling_w: f64::INFINITY,
+        knee: 1.0,
+    };
+
+    /// How much of a small relative fluctuation of the power passes where the mean is `mean_w`: 1 in a
+    /// linear receiver, less below a ceiling.
+    pub fn passes(&self, mean_w: f64) -> f64 {
+        const LEAST: f64 = 0.02;
+        (1.0 - (mean_w / self.ceiling_w).powf(self.knee)).max(LEAST)
+    }
+
+    /// What a linear receiver would measure, W, with its fluctuation about the mean held down.
+    pub fn held_down_w(&self, mean_w: f64, linear_w: f64) -> f64 {
+        let level_w = mean_w + self.noise_w;
+        match self.passes(mean_w) {
+            1.0 => linear_w,
+            passes => level_w * (linear_w / level_w).powf(passes),
+        }
+    }
 }
 
 /// Where an effect belongs, and is stored once it is found.

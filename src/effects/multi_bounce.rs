@@ -227,7 +227,7 @@ mod tests {
         let corner = Bench::of(dihedral());
         let share = |albedo: f64| {
             let laws = vec![Brdf::Lambert(Lambert { albedo })];
-            let receiver = Receiver { looks: 4.0, noise_w: 0.0, tilt_sd_rad: 0.0 };
+            let receiver = Receiver { looks: 4.0, noise_w: 0.0, ..Receiver::LINEAR };
             let total = |effects| -> f64 {
                 let model = Model { laws: laws.clone(), receiver, effects };
                 let found = model.predict(&corner.stage(), &corner.looks);

@@ -54,7 +54,7 @@ mod tests {
 
     #[test]
     fn noise_powers_add() {
-        let declared = Receiver { looks: 4.0, noise_w: 1e-12, tilt_sd_rad: 0.0 };
+        let declared = Receiver { looks: 4.0, noise_w: 1e-12, ..Receiver::LINEAR };
         let found = NoiseFloor.receive(&[-90.0], declared).noise_w;
         assert!((found / 2e-12 - 1.0).abs() < 1e-12);
     }

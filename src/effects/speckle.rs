@@ -59,7 +59,7 @@ mod tests {
 
     #[test]
     fn only_fewer_looks_change_anything() {
-        let declared = Receiver { looks: 4.0, noise_w: 1e-13, tilt_sd_rad: 0.0 };
+        let declared = Receiver { looks: 4.0, noise_w: 1e-13, ..Receiver::LINEAR };
         assert_eq!(Speckle.receive(&[2.5], declared).looks, 2.5);
         assert_eq!(Speckle.receive(&[9.0], declared), declared);
     }

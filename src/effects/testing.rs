@@ -83,7 +83,7 @@ impl Bench {
     }
 
     pub(super) fn predict(&self, effects: Vec<(&dyn Effect, Vec<f64>)>) -> Prediction {
-        let receiver = Receiver { looks: 4.0, noise_w: 1e-13, tilt_sd_rad: 0.0 };
+        let receiver = Receiver { looks: 4.0, noise_w: 1e-13, ..Receiver::LINEAR };
         Model { laws: vec![self.law.clone()], receiver, effects }
             .predict(&self.stage(), &self.looks)
     }
@@ -166,8 +166,10 @@ fn is_sound(prediction: &Prediction) -> bool {
         let Arrived { power_w, range_m } = *arrived;
         power_w.is_finite() && power_w >= 0.0 && range_m.is_finite() && range_m > 0.0
     });
-    let Receiver { looks, noise_w, tilt_sd_rad } = prediction.receiver;
-    let receiver = [looks, noise_w, tilt_sd_rad].iter().all(|v| v.is_finite());
+    let Receiver { looks, noise_w, tilt_sd_rad, ceiling_w, knee } = prediction.receiver;
+    let receiver = [looks, noise_w, tilt_sd_rad].iter().all(|v| v.is_finite())
+        && ceiling_w > 0.0
+        && knee > 0.0;
     arrived && receiver && prediction.slope_per_rad.iter().all(|slope| slope.is_finite())
 }
 

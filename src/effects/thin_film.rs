@@ -2,9 +2,11 @@
 //!
 //! With R the reflectance at θ of the film on the substrate, by the characteristic matrix at the centre
 //! frequency, and R₀ that of the bare substrate, the specular part of f is multiplied by
-//! 1 − c + c·R/R₀, and the diffuse part, which crosses the film twice, by 1 − c + c·((1 − R)/(1 − R₀))².
-//! The substrate is lossless with the index that f_λ asks for, n = (1 + √f_λ)/(1 − √f_λ). R is that of a
-//! film as flat as the surface is on average, so that the ripple in θ shows.
+//! 1 − c + c·R/R₀. So is the part of the diffuse return that comes from the rough surface itself; the
+//! part from below crosses the film twice and is multiplied by 1 − c + c·((1 − R)/(1 − R₀))².
+//! The substrate is lossless; where no index is given it has the one that f_λ asks for,
+//! n = (1 + √f_λ)/(1 − √f_λ), though backscatter alone does not tell f_λ. R is that of a film as flat as
+//! the surface is on average, so that the ripple in θ shows.
 
 use super::lobes::first_lobe;
 use super::{Effect, Knob, Level, Look, Stage};
@@ -14,12 +16,16 @@ use crate::frames::Direction;
 /// The effect `thin-film`.
 pub(super) struct ThinFilm;
 
-const KNOBS: [Knob; 3] = [
+const KNOBS: [Knob; 5] = [
     Knob::new("coverage", "1", [0.0, 1.0], 0.0, 0.1),
     Knob::new("thickness_m", "m", [0.0, 5e-3], 3e-4, 2e-5),
     Knob::new("index", "1", [1.0, 4.0], 1.6, 0.05),
+    Knob::new("from_below", "1", [0.0, 1.0], 1.0, 0.2),
+    Knob::new("substrate_index", "1", [1.0, 10.0], BY_F_LAMBDA, 0.2),
 ];
 
+/// A substrate of this index is the one that f_λ asks for.
+const BY_F_LAMBDA: f64 = 1.0;
 /// Reflectance at normal incidence of a substrate whose law has no f_λ: an index of 2.
 const USUAL_F_LAMBDA: f64 = 0.11;
 /// Beyond these a substrate reflects nothing, or all, and a ratio means nothing.
@@ -28,7 +34,10 @@ const LOBE_RAD: f64 = 0.02;
 const MOST_THETA_RAD: f64 = 1.55;
 
 /// ε of the substrate under a law.
-fn substrate(law: &Brdf) -> f64 {
+fn substrate(law: &Brdf, index: f64) -> f64 {
+    if index > BY_F_LAMBDA {
+        return index * index;
+    }
     let [least, most] = F_LAMBDA_RANGE;
     let f_lambda = first_lobe(law).map_or(USUAL_F_LAMBDA, |lobe| lobe.f_lambda);
     let root = f_lambda.clamp(least, most).sqrt();
@@ -76,7 +85,11 @@ impl Effect for ThinFilm {
 
     fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
         let thicknesses_m = [1e-4, 2e-4, 3e-4, 4.5e-4, 6e-4, 8e-4, 1.1e-3, 1.5e-3, 2e-3, 2.7e-3];
-        thicknesses_m.map(|thickness_m| vec![0.3, thickness_m, 1.6]).to_vec()
+        let start = |from_below: f64, substrate_index: f64| {
+            let film = |thickness_m| vec![0.3, thickness_m, 1.6, from_below, substrate_index];
+            thicknesses_m.map(film)
+        };
+        [start(1.0, BY_F_LAMBDA), start(0.0, 2.3)].concat()
     }
 
     fn scatter(
@@ -87,18 +100,25 @@ impl Effect for ThinFilm {
         look: &Look,
         f_per_sr: f64,
     ) -> f64 {
-        let &[coverage, thickness_m, index] = values else { return f_per_sr };
+        let &[coverage, thickness_m, index, from_below, substrate_index] = values else {
+            return f_per_sr;
+        };
         if coverage == 0.0 {
             return f_per_sr;
         }
         let theta_rad = look.hit.theta_rad();
         let frequency_hz = stage.radar.centre_frequency_ghz * 1e9;
-        let [film, bare] =
-            reflectances([thickness_m, index], substrate(law), frequency_hz, theta_rad);
+        let [film, bare] = reflectances(
+            [thickness_m, index],
+            substrate(law, substrate_index),
+            frequency_hz,
+            theta_rad,
+        );
         let retro = Direction::from_angles(theta_rad, look.azimuth_rad);
         let share = law.specular_share(retro, retro);
         let specular = film / bare.max(1e-9);
-        let diffuse = ((1.0 - film) / (1.0 - bare).max(1e-9)).powi(2);
+        let crossed = ((1.0 - film) / (1.0 - bare).max(1e-9)).powi(2);
+        let diffuse = from_below * crossed + (1.0 - from_below) * specular;
         f_per_sr * (1.0 - coverage + coverage * (share * specular + (1.0 - share) * diffuse))
     }
 }
@@ -110,7 +130,11 @@ mod tests {
     use crate::effects::testing::{Bench, lobe};
     use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
-    fn factor(values: [f64; 3], law: &Brdf, theta_rad: f64) -> f64 {
+    fn factor([coverage, thickness_m, index]: [f64; 3], law: &Brdf, theta_rad: f64) -> f64 {
+        factor_of([coverage, thickness_m, index, 1.0, BY_F_LAMBDA], law, theta_rad)
+    }
+
+    fn factor_of(values: [f64; 5], law: &Brdf, theta_rad: f64) -> f64 {
         let bench = Bench::plate();
         let mut look = bench.looks[0];
         look.hit.cos_theta = theta_rad.cos();
@@ -120,7 +144,7 @@ mod tests {
     #[test]
     fn a_film_of_no_thickness_or_of_the_substrates_index_is_the_bare_surface() {
         let law = Brdf::CookTorrance(lobe());
-        let index = substrate(&law).sqrt();
+        let index = substrate(&law, BY_F_LAMBDA).sqrt();
         for theta_rad in [0.0, 0.4, 1.2] {
             for film in [[1.0, 0.0, 1.6], [1.0, 4e-4, index]] {
                 let found = factor(film, &law, theta_rad);
@@ -132,7 +156,7 @@ mod tests {
     #[test]
     fn a_quarter_wave_of_the_mean_index_takes_the_echo_away_and_a_half_wave_gives_it_back() {
         let law = Brdf::CookTorrance(lobe());
-        let index = substrate(&law).powf(0.25);
+        let index = substrate(&law, BY_F_LAMBDA).powf(0.25);
         let quarter_m = SPEED_OF_LIGHT_M_PER_S / 300e9 / 4.0 / index;
         assert!(factor([1.0, quarter_m, index], &law, 0.0) < 1e-20);
         assert!((factor([0.4, quarter_m, index], &law, 0.0) - 0.6).abs() < 1e-9);
@@ -142,9 +166,19 @@ mod tests {
     #[test]
     fn what_the_surface_reflects_less_the_diffuse_part_gets() {
         let law = Brdf::Lambert(Lambert { albedo: 0.3 });
-        let index = substrate(&law).powf(0.25);
+        let index = substrate(&law, BY_F_LAMBDA).powf(0.25);
         let quarter_m = SPEED_OF_LIGHT_M_PER_S / 300e9 / 4.0 / index;
         let expected = (1.0 - USUAL_F_LAMBDA).powi(-2);
         assert!((factor([1.0, quarter_m, index], &law, 0.0) / expected - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_diffuse_return_of_the_surface_itself_swings_with_the_mirror_part() {
+        let law = Brdf::Lambert(Lambert { albedo: 0.3 });
+        let quarter_m = SPEED_OF_LIGHT_M_PER_S / 300e9 / 4.0 / 2f64.sqrt();
+        // A quarter wave of the mean index matches a substrate of index 2.
+        assert!(factor_of([1.0, quarter_m, 2f64.sqrt(), 0.0, 2.0], &law, 0.0) < 1e-20);
+        let lost = factor_of([1.0, quarter_m, 2f64.sqrt(), 0.5, 2.0], &law, 0.0);
+        assert!((lost - 0.5 / (8.0f64 / 9.0).powi(2)).abs() < 1e-9);
     }
 }

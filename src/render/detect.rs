@@ -25,7 +25,7 @@ pub(super) struct Detector {
 
 enum Kind {
     Exact,
-    Laws { speckle: Option<Speckle>, noise_w: f64, range_sd_m: f64 },
+    Laws { law: Receiver, speckle: Option<Speckle>, range_sd_m: f64 },
     Beat(Beat),
 }
 
@@ -58,7 +58,7 @@ impl Detector {
                 let speckled = Speckle { looks: law.looks, ..speckle.unwrap_or_default() };
                 Kind::Laws {
                     speckle: law.looks.is_finite().then_some(speckled),
-                    noise_w: law.noise_w,
+                    law,
                     range_sd_m: noise.map_or(0.0, |noise| noise.range_sd_m),
                 }
             }
@@ -75,7 +75,7 @@ impl Detector {
     pub fn noise_w(&self) -> Option<f64> {
         let noise_w = match &self.kind {
             Kind::Exact => 0.0,
-            Kind::Laws { noise_w, .. } => *noise_w,
+            Kind::Laws { law, .. } => law.noise_w,
             Kind::Beat(beat) => beat.processor.noise_per_bin_w(),
         };
         (noise_w > 0.0).then_some(noise_w)
@@ -87,14 +87,15 @@ impl Detector {
             Kind::Beat(beat) => Ok(beat.processor.peak(&self.mean_profile_w(beat, chirp, paths)?)),
             _ if paths.is_empty() => Ok(None),
             Kind::Exact => Ok(Some(sum(paths))),
-            Kind::Laws { speckle, noise_w, range_sd_m } => {
+            Kind::Laws { law, speckle, range_sd_m } => {
                 let Detection { range_m, power_w } = sum(paths);
                 if power_w == 0.0 {
                     // Nothing comes back, and no range is read from noise alone.
                     return Ok(Some(Detection { range_m, power_w }));
                 }
                 let mut draws = self.draws(chirp, Purpose::Speckle);
-                let power_w = measured_w(power_w, *noise_w, *speckle, &mut draws);
+                let linear_w = measured_w(power_w, law.noise_w, *speckle, &mut draws);
+                let power_w = law.held_down_w(power_w, linear_w);
                 let error_m = range_sd_m * self.draws(chirp, Purpose::Range).gaussian();
                 Ok(Some(Detection { range_m: range_m + error_m, power_w }))
             }

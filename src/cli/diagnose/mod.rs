@@ -150,7 +150,8 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
         material_of_region.iter().map(|&m| used[usize::from(m)].scattering.clone()).collect();
     cloud.notices.iter().for_each(|notice| console.notice(notice));
     let bar = console.spinner("diagnosing");
-    let answer = diagnosed(&scene, &cloud, &laws, at_work, args.seed, &effects);
+    let hear = |what: &str| bar.set_message(format!("diagnosing: {what}"));
+    let answer = diagnosed(&scene, &cloud, &laws, at_work, args.seed, &effects, &hear);
     bar.finish_and_clear();
     match answer {
         Ok((report, false_alarms)) => {
@@ -198,6 +199,7 @@ fn diagnosed(
     at_work: &AtWork,
     seed: u64,
     effects: &[&dyn Effect],
+    hear: &(dyn Fn(&str) + Sync),
 ) -> Result<(Report, usize), DiagnoseError> {
     let bvh = Bvh::new(&scene.target.mesh);
     let grain_of_region: Vec<_> = scene.target.regions.iter().map(|region| region.grain).collect();
@@ -224,7 +226,7 @@ fn diagnosed(
         observations: &matched.observations,
         false_alarms: matched.false_alarms,
     };
-    let report = Diagnosis { seed, ..Diagnosis::default() }.run(&subject, effects)?;
+    let report = Diagnosis { seed, ..Diagnosis::default() }.run_with(&subject, effects, hear)?;
     Ok((report, matched.false_alarms))
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::diagnose::Row;
 
-const COLUMNS: [&str; 16] = [
+const COLUMNS: [&str; 17] = [
     "chirp",
     "observed_dbm",
     "before_dbm",
@@ -21,6 +21,7 @@ const COLUMNS: [&str; 16] = [
     "edge_m",
     "time_s",
     "region",
+    "unknown_db",
 ];
 
 /// The table as a file's bytes; a cell is empty where there is nothing.
@@ -30,7 +31,7 @@ pub(super) fn csv(rows: &[Row]) -> Vec<u8> {
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "{},{},{:.4},{:.4},{:.4},{:.4},{},{:.4},{:.4},{:.5},{},{:.5},{:.5},{:.5},{:.6},{}",
+            "{},{},{:.4},{:.4},{:.4},{:.4},{},{:.4},{:.4},{:.5},{},{:.5},{:.5},{:.5},{:.6},{},{:.4}",
             row.chirp,
             cell(row.observed_dbm, 4),
             row.before_dbm,
@@ -47,6 +48,7 @@ pub(super) fn csv(rows: &[Row]) -> Vec<u8> {
             row.edge_m,
             row.time_s,
             row.region,
+            row.unknown_db,
         );
     }
     text.into_bytes()

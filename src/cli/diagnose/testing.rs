@@ -21,5 +21,6 @@ pub(super) fn row() -> Row {
         edge_m: 0.048,
         time_s: 0.0,
         region: 0,
+        unknown_db: 0.0,
     }
 }

@@ -72,6 +72,56 @@ pub(super) fn quantiles(report: &Report, spot_m: f64) -> Result<Picture, FigureE
     maps(&subject, report, spot_m, panels)
 }
 
+/// The smooth term that the final model lacks; nothing where there is none.
+pub(super) fn unknown(report: &Report, spot_m: f64) -> Result<Picture, FigureError> {
+    let subject = Subject {
+        file: "unknown-map",
+        title: "What is unknown, over the target",
+        quantity: "power that the model lacks, dB",
+        gaps: "no chirp",
+        reach: [0.5, 10.0],
+        caption: "What a smooth term over all covariates would add to the model's mean power, averaged \
+                  over the chirps of each pixel. It has no name: no effect in the library does this to the data.",
+    };
+    if report.rows.iter().all(|row| row.unknown_db == 0.0) {
+        let Subject { file, title, .. } = subject;
+        let caption = String::new();
+        return Ok(Picture { file, title, caption, panels: Vec::new(), columns: 1 });
+    }
+    let pixel_m = pixel_m(&report.rows, spot_m);
+    let empty = raster(&report.rows, pixel_m);
+    let raster = filled(&empty, &report.rows, &|row| Some(row.unknown_db));
+    let squares: f64 = report.rows.iter().map(|row| row.unknown_db.powi(2)).sum();
+    let rms_db = (squares / report.rows.len().max(1) as f64).sqrt();
+    let note = format!("rms {rms_db:.2} dB over all chirps");
+    let reach = reach(&raster, subject.reach);
+    let panels = vec![figure(&subject, &raster, subject.title, &note, reach).drawing()?];
+    let caption = format!("{} Pixels of {:.0} mm.", subject.caption, 1e3 * pixel_m);
+    let Subject { file, title, .. } = subject;
+    Ok(Picture { file, title, caption, panels, columns: 1 })
+}
+
+fn figure<'a>(
+    subject: &Subject,
+    raster: &'a Raster,
+    title: &'a str,
+    note: &'a str,
+    reach: f64,
+) -> Figure<'a> {
+    Figure {
+        raster,
+        channel: CHANNEL,
+        title,
+        subtitle: note,
+        colour_label: subject.quantity,
+        range: Some((-reach, reach)),
+        scale: Scale::Diverging,
+        gaps: subject.gaps,
+        x_label: "x in the target plane, m",
+        y_label: "y in the target plane, m",
+    }
+}
+
 fn maps(
     subject: &Subject,
     report: &Report,
@@ -88,19 +138,7 @@ fn maps(
         false => ["Before: base model", "After: with the effects"],
     };
     let drawing = |((raster, title), note): ((&Raster, &str), &String)| {
-        let figure = Figure {
-            raster,
-            channel: CHANNEL,
-            title,
-            subtitle: note,
-            colour_label: subject.quantity,
-            range: Some((-reach, reach)),
-            scale: Scale::Diverging,
-            gaps: subject.gaps,
-            x_label: "x in the target plane, m",
-            y_label: "y in the target plane, m",
-        };
-        figure.drawing()
+        figure(subject, raster, title, note, reach).drawing()
     };
     let [before, after] = &rasters;
     let panels = shown(report, [before, after]).into_iter().zip(titles).zip(&notes);

@@ -55,6 +55,7 @@ pub(super) fn pictures(report: &Report, spot_m: f64) -> (Vec<Picture>, Vec<Strin
     let drawn = [
         maps::residuals(report, spot_m),
         maps::quantiles(report, spot_m),
+        maps::unknown(report, spot_m),
         covariates::picture(report),
         quantiles::picture(report),
         summary::ranking(report),
