@@ -54,7 +54,16 @@ fn every_command_of_the_readme_runs() {
     for arguments in commands {
         matdb(folder.path()).args(&arguments).assert().success();
     }
-    assert!(folder.path().join("out/person/power.png").exists());
+    for (report, verdict, names) in
+        [("nothing", "no-missing-effect", vec![]), ("why", "explained", vec!["foreign-patch"])]
+    {
+        let text = fs::read(folder.path().join(format!("out/{report}/report.json"))).unwrap();
+        let report: serde_json::Value = serde_json::from_slice(&text).unwrap();
+        assert_eq!(report["verdict"], verdict);
+        let effects = report["effects"].as_array().unwrap();
+        assert_eq!(effects.iter().map(|e| e["name"].as_str().unwrap()).collect::<Vec<_>>(), names);
+    }
+    assert!(folder.path().join("site/SHA256SUMS").exists());
     let made = fs::read(folder.path().join("out/power.png")).unwrap();
     assert!(
         made == fs::read(root().join("docs/mannequin.png")).unwrap(),

@@ -354,14 +354,16 @@ impl Selection<'_> {
             self.shape(screen, &space, effect, weight, (promise, start));
             self.scale(screen, &space, effect, first, start);
         }
+        // A start at which the effect is absent promises nothing, and is tried all the same.
+        let is_absent = tried == 1 && starts.iter().all(|start| start.0 == 0.0);
         if round == 1
+            && !is_absent
             && let Some(declared) = self.declared(screen, &state.space, effect)
         {
             starts.push((starts.first().map_or(0.0, |start| start.0), declared));
         }
         let (gain, at) = starts.first()?.clone();
-        // Where the effect is absent there is nothing to promise.
-        let gain = if starts.len() == 1 && gain == 0.0 { f64::INFINITY } else { gain };
+        let gain = if is_absent { f64::INFINITY } else { gain };
         let candidate = Candidate {
             round,
             name: effect.name(),

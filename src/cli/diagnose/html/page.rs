@@ -28,6 +28,7 @@ caption{text-align:left;padding-bottom:.3rem}
 th,td{padding:.35rem .9rem .35rem 0;text-align:left;vertical-align:top;\
 border-bottom:1px solid var(--line)}
 td.n,th.n{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}
+td:last-child:not(.n){min-width:14rem}
 code,pre{font-family:ui-monospace,monospace;font-size:.92em}
 pre{background:var(--soft);padding:.7rem 1rem;overflow-x:auto}
 figure{margin:1.2rem 0 2rem}
