@@ -112,6 +112,11 @@ impl<'a> Cast<'a> {
             instruments: Vec::new(),
             curves: Vec::new(),
             fits: Vec::new(),
+            roughness: None,
+            layers: Vec::new(),
+            permittivities: Vec::new(),
+            sessions: Vec::new(),
+            findings: Vec::new(),
             ..base.clone()
         };
         with_found(bare, used, taker, report, title).map(Some)
