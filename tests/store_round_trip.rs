@@ -11,6 +11,7 @@ use matdb::material::{
     Permittivity, Roughness, Scale, Session, SessionPose, Slug, Source, SourceKind, Status,
     builtin,
 };
+use matdb::measure::statistics::by_angle;
 use matdb::store::{Added, Store};
 use proptest::collection::{btree_map, vec};
 use proptest::option;
@@ -474,4 +475,21 @@ fn a_revision_knows_which_command_made_it_of_what() {
     assert_eq!(store.add([&second]).unwrap(), [Added::Unchanged(2)]);
     let of = |number| store.get(&first.slug, Some(number)).unwrap().unwrap().activity;
     assert_eq!((of(1), of(2)), (None, Some(activity)));
+}
+
+#[test]
+fn statistics_of_a_curve_are_stored_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Store::open(folder.path().join("materials.sqlite")).unwrap();
+    let mut cotton = builtin::get("cotton").unwrap().unwrap();
+    let once = cotton.curves[0].observations.clone();
+    // Nine times each angle: points enough for intervals.
+    cotton.curves[0].observations = (0..9).flat_map(|_| once.clone()).collect();
+    store.add([&cotton]).unwrap();
+    let stored = store.statistics(&cotton.slug, None, "backscatter").unwrap();
+    assert_eq!(stored, by_angle(&cotton.curves[0].observations));
+    assert_eq!(stored.len(), once.len());
+    assert!(stored.iter().all(|row| row.points == 9 && row.interval_95.is_some()));
+    assert!(store.statistics(&cotton.slug, Some(2), "backscatter").unwrap().is_empty());
+    assert!(store.statistics(&cotton.slug, None, "other").unwrap().is_empty());
 }

@@ -25,6 +25,7 @@ use std::path::{Path, PathBuf};
 use rusqlite::Connection;
 
 use crate::material::{Activity, Material, Slug, SourceKind};
+use crate::measure::AngleStatistics;
 
 pub use error::StoreError;
 
@@ -202,6 +203,31 @@ impl Store {
             }
             stored => Ok(stored),
         }
+    }
+
+    /// Statistics by angle of a curve of a revision, or of the current one, as they were computed when
+    /// it was added; none for a curve or revision that is not there, for a curve without backscatter, or
+    /// with points above the instrument's range, and for what an older program stored.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn statistics(
+        &self,
+        slug: &Slug,
+        revision: Option<u32>,
+        curve: &str,
+    ) -> Result<Vec<AngleStatistics>, StoreError> {
+        read::statistics(&self.conn, slug, revision, curve)
+            .map_err(|error| StoreError::new(&self.path, error))
+    }
+
+    /// What SQLite itself finds wrong with the file, a sentence each: damaged pages and indexes, and
+    /// references to nothing.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn damage(&self) -> Result<Vec<String>, StoreError> {
+        read::damage(&self.conn).map_err(|error| StoreError::new(&self.path, error))
     }
 
     /// Every revision of a material, oldest first; none when there is no such material.

@@ -2,6 +2,8 @@
 
 mod provenance;
 
+pub(super) use provenance::statistics;
+
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, Type, ValueRef};
 use rusqlite::{
     Connection, Error, OptionalExtension, Params, Result, Row, Transaction, TransactionBehavior,
@@ -281,3 +283,13 @@ macro_rules! words {
 }
 
 words!(Censor, FindingVerdict, Geometry, Making, Scale, Slug, SourceKind);
+
+/// What SQLite itself finds wrong: damaged pages, and references to nothing.
+pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
+    let found = rows(conn, "PRAGMA integrity_check", [], |row| row.get::<_, String>(0))?;
+    let dangling = rows(conn, "PRAGMA foreign_key_check", [], |row| {
+        let (table, parent): (String, String) = (row.get(0)?, row.get(2)?);
+        Ok(format!("a row of `{table}` refers to a row of `{parent}` that is not there"))
+    })?;
+    Ok(found.into_iter().filter(|line| line != "ok").chain(dangling).collect())
+}

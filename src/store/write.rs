@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::{Added, Removed};
 use crate::formats::EffectEntry;
 use crate::material::{Activity, Covariance, Curve, Fit, Material, Slug};
+use crate::measure::statistics::by_angle;
 
 /// Adds materials or revisions of them.
 pub(super) fn add(
@@ -159,7 +160,8 @@ impl Rows<'_> {
                 o.chirp
             ];
             insert.execute(values).map(|_| ())
-        })
+        })?;
+        numbered(&by_angle(observations), |position, row| self.statistic(name, position, row))
     }
 
     fn fit(&self, position: u32, fit: &Fit) -> Result<()> {

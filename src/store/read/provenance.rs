@@ -1,12 +1,13 @@
 //! Rows to what a material is made of and where its numbers come from.
 
-use rusqlite::{Connection, OptionalExtension, Result};
+use rusqlite::{Connection, OptionalExtension, Result, params};
 
 use super::{json, optional_json, rows};
 use crate::material::{
     Activity, Citation, Finding, Input, Instrument, Layer, Material, Permittivity, Roughness,
-    Session, Source,
+    Session, Slug, Source,
 };
+use crate::measure::AngleStatistics;
 
 /// Reads what hangs on a revision beside sources, instruments, curves, fits and effects.
 pub(super) fn fill(material: &mut Material, conn: &Connection, revision_id: i64) -> Result<()> {
@@ -173,4 +174,33 @@ pub(super) fn activity(conn: &Connection, revision_id: i64) -> Result<Option<Act
     let inputs =
         rows(conn, sql, [revision_id], |row| Ok(Input { name: row.get(0)?, hash: row.get(1)? }))?;
     Ok(Some(Activity { command, inputs }))
+}
+
+/// Statistics of a curve of a revision, or of the current one.
+pub(in crate::store) fn statistics(
+    conn: &Connection,
+    slug: &Slug,
+    revision: Option<u32>,
+    curve: &str,
+) -> Result<Vec<AngleStatistics>> {
+    let sql = "
+        SELECT curve_statistic.theta_min_rad, curve_statistic.theta_max_rad, points,
+            censored_points, threshold_sigma0, mean_least, mean_greatest, quantile_05, quantile_50,
+            quantile_95, interval_low, interval_high
+        FROM material JOIN revision ON material_id = material.id
+        JOIN curve_statistic ON revision_id = revision.id
+        WHERE slug = ?1 AND number = coalesce(?2, current_revision) AND curve = ?3
+        ORDER BY position";
+    rows(conn, sql, params![slug.as_str(), revision, curve], |row| {
+        let interval: [Option<f64>; 2] = [row.get(10)?, row.get(11)?];
+        Ok(AngleStatistics {
+            theta_rad: [row.get(0)?, row.get(1)?],
+            points: row.get(2)?,
+            censored_points: row.get(3)?,
+            threshold_sigma0: row.get(4)?,
+            mean: [row.get(5)?, row.get(6)?],
+            quantiles: [row.get(7)?, row.get(8)?, row.get(9)?],
+            interval_95: interval[0].zip(interval[1]).map(|(low, high)| [low, high]),
+        })
+    })
 }

@@ -7,6 +7,7 @@ use crate::material::{
     Activity, Citation, Finding, Geometry, Instrument, Layer, Making, Permittivity, Roughness,
     Scale, Session, Source,
 };
+use crate::measure::AngleStatistics;
 
 impl Rows<'_> {
     pub(super) fn source(&self, position: u32, source: &Source) -> Result<()> {
@@ -163,6 +164,41 @@ impl Rows<'_> {
                 finding.rms_after_db,
                 json(&finding.confusable_with)?,
                 finding.source,
+            ],
+        )
+    }
+
+    pub(super) fn statistic(
+        &self,
+        curve: &str,
+        position: u32,
+        row: &AngleStatistics,
+    ) -> Result<()> {
+        let ([theta_min_rad, theta_max_rad], [mean_least, mean_greatest]) =
+            (row.theta_rad, row.mean);
+        let [quantile_05, quantile_50, quantile_95] = row.quantiles;
+        self.insert(
+            "INSERT INTO curve_statistic
+             (revision_id, curve, position, theta_min_rad, theta_max_rad, points, censored_points,
+              threshold_sigma0, mean_least, mean_greatest, quantile_05, quantile_50, quantile_95,
+              interval_low, interval_high)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15)",
+            params![
+                self.revision_id,
+                curve,
+                position,
+                theta_min_rad,
+                theta_max_rad,
+                row.points,
+                row.censored_points,
+                row.threshold_sigma0,
+                mean_least,
+                mean_greatest,
+                quantile_05,
+                quantile_50,
+                quantile_95,
+                row.interval_95.map(|[low, _]| low),
+                row.interval_95.map(|[_, high]| high),
             ],
         )
     }
