@@ -128,7 +128,7 @@ fn the_template_is_accepted_and_shown() {
 fn a_measured_curve_without_its_circumstances_is_refused() {
     let all = "source `bench` has no licence; curve `scan` names no instrument; not every row";
     let lacks = |text: String| {
-        let text = text.replace("licence = \"CC-BY-4.0\"           # SPDX, of", "# of");
+        let text = text.replace("licence = \"CC-BY-4.0\"             # SPDX, of", "# of");
         text.replace("instrument = \"radar\"\n", "")
     };
     for (change, expected) in [
