@@ -300,6 +300,7 @@ fn observation(table: &Table, row: usize) -> Result<Observation, FormatError> {
 mod tests {
     use super::*;
     use crate::brdf::Scattering;
+    use crate::material::SourceKind;
 
     const CURVE: &str =
         "theta_deg,sigma0_db,censor,threshold_db\n0,5,none,-30\n20,-10,,-30\n60,,left,-30\n";
