@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
-use support::{entries, matdb, root, scene};
+use support::{entries, matdb, refused, root, scene};
 
 fn json(folder: &Path, arguments: &[&str]) -> Value {
     let output = matdb(folder).args(arguments).arg("--json").output().unwrap();
@@ -96,4 +96,58 @@ fn quiet_says_nothing_and_a_reader_that_leaves_is_no_error() {
         .output()
         .unwrap();
     assert!(piped.status.success(), "{}", String::from_utf8_lossy(&piped.stderr));
+}
+
+/// A folder with the program's own template, changed, and its curve.
+fn from_template(change: impl Fn(String) -> String, csv: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let output = matdb(folder.path()).args(["add", "--template"]).output().unwrap();
+    let text = change(String::from_utf8(output.stdout).unwrap());
+    fs::write(folder.path().join("material.toml"), text).unwrap();
+    fs::write(folder.path().join("scan.csv"), csv).unwrap();
+    folder
+}
+
+const BARE: &str = "theta_deg,sigma0_db\n0,5\n20,-10\n";
+
+#[test]
+fn the_template_is_accepted_and_shown() {
+    let folder = from_template(|text| text, BARE);
+    matdb(folder.path()).args(["add", "--from", "."]).assert().success();
+    let output = matdb(folder.path()).args(["show", "my-paint"]).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    for said in ["outermost first", "half space", "acrylic", "4.2 um rms", "2026-03-14", "22 °C"]
+        .into_iter()
+        .chain(["not known: The thickness of each coat.", "sprayed", "thin-film", "not found"])
+    {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+}
+
+#[test]
+fn a_measured_curve_without_its_circumstances_is_refused() {
+    let all = "source `bench` has no licence; curve `scan` names no instrument; not every row";
+    let lacks = |text: String| {
+        let text = text.replace("licence = \"CC-BY-4.0\"             # SPDX, of", "# of");
+        text.replace("instrument = \"radar\"\n", "")
+    };
+    for (change, expected) in [
+        (&lacks as &dyn Fn(String) -> String, all),
+        (
+            &|text: String| text.replace("threshold_dbm = -77", "#"),
+            "instrument `radar` has no threshold_dbm",
+        ),
+    ] {
+        let folder = from_template(change, BARE);
+        let message = refused(matdb(folder.path()).args(["add", "--from", "."]));
+        assert!(message.contains(expected) && message.contains("--template"), "{message}");
+        assert!(!folder.path().join("matdb.sqlite").exists());
+    }
+    let synthetic =
+        |text: String| lacks(text).replace("kind = \"measured\"", "kind = \"synthetic\"");
+    let folder = from_template(synthetic, BARE);
+    matdb(folder.path()).args(["add", "--from", "."]).assert().success();
+    let rows = "theta_deg,sigma0_db,censor,threshold_db\n0,5,none,-30\n20,-10,none,-30\n";
+    let folder = from_template(|text: String| text.replace("threshold_dbm = -77", "#"), rows);
+    matdb(folder.path()).args(["add", "--from", "."]).assert().success();
 }

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use matdb::material::FindingVerdict;
 use matdb::scene::SceneFile;
 use support::database::contents;
 use support::{entries, matdb, read_cloud, refused, root};
@@ -157,6 +158,12 @@ fn an_effect_of_a_material_becomes_a_revision_or_a_file() {
     run(at, &diagnose("scene.toml", "anisotropy,fov-gain", &add), "stored mannequin-paint@2");
     let diagnosed = contents(&at.join("matdb.sqlite")).pop().unwrap();
     assert_eq!(diagnosed.effects[0].name, "anisotropy");
+    let verdict = |name: &str| {
+        let found = diagnosed.findings.iter().find(|finding| finding.effect == name);
+        found.map(|finding| (finding.verdict, finding.fit_after.as_deref()))
+    };
+    assert_eq!(verdict("anisotropy"), Some((FindingVerdict::Found, Some("diagnosed"))));
+    assert_eq!(verdict("fov-gain"), Some((FindingVerdict::NotFound, Some("diagnosed"))));
     let after = noiseless(at, "scene-after.toml", "matdb.sqlite");
     assert!(rms_db(&after, &hidden) < FOUND_DB, "{}", rms_db(&after, &hidden));
 }

@@ -6,9 +6,12 @@ use matdb::brdf::{
 };
 use matdb::formats::EffectEntry;
 use matdb::material::{
-    Censor, Covariance, Curve, Estimate, Fit, FitReport, Given, Goodness, Instrument, Material,
-    Observation, Slug, Source, SourceKind, builtin,
+    Activity, Censor, Citation, Covariance, Curve, Estimate, Finding, FindingVerdict, Fit,
+    FitReport, Geometry, Given, Goodness, Input, Instrument, Layer, Making, Material, Observation,
+    Permittivity, Roughness, Scale, Session, SessionPose, Slug, Source, SourceKind, Status,
+    builtin,
 };
+use matdb::measure::statistics::by_angle;
 use matdb::store::{Added, Store};
 use proptest::collection::{btree_map, vec};
 use proptest::option;
@@ -46,18 +49,121 @@ prop_compose! {
         ]),
         title in word(), doi in option::of(text()), url in option::of(text()),
         licence in option::of(text()), note in option::of(text()),
+        authors in vec(word(), 0..3), year in option::of(1000u16..=9999),
+        [container, volume, pages, publisher] in [(); 4].map(|()| option::of(text())),
+        making in option::of(select(&[
+            Making::OwnMeasurement, Making::Copied, Making::Digitised, Making::Computed,
+        ])),
     ) -> Source {
-        Source { key: String::new(), kind, title, doi, url, licence, note }
+        let citation = Citation { authors, year, container, volume, pages, publisher };
+        Source { key: String::new(), kind, title, doi, url, licence, note, citation, making }
     }
 }
 
 prop_compose! {
     fn instrument()(
         name in text(), centre_frequency_hz in positive(), bandwidth_hz in option::of(positive()),
-        polarisation in option::of(text()), note in option::of(text()),
+        [polarisation, note, transmit_polarisation, receive_polarisation, calibration_target,
+         looks_method] in [(); 6].map(|()| option::of(text())),
+        geometry in option::of(select(&[Geometry::Monostatic, Geometry::Bistatic])),
+        scale in option::of(select(&[Scale::Absolute, Scale::Relative])),
+        [stand_off_m, spot_diameter_m, aperture_m, noise_floor_w, threshold_w, looks]
+            in [(); 6].map(|()| option::of(positive())),
+        calibration_sd_factor in option::of(1.0f64..1e9),
+        false_alarm_probability in option::of(f64::MIN_POSITIVE..0.999),
+        range_bins in option::of(1u32..),
     ) -> Instrument {
-        let key = String::new();
-        Instrument { key, name, centre_frequency_hz, bandwidth_hz, polarisation, note }
+        Instrument {
+            key: String::new(), name, centre_frequency_hz, bandwidth_hz, polarisation, note,
+            transmit_polarisation, receive_polarisation, geometry, stand_off_m, spot_diameter_m,
+            aperture_m, calibration_target, calibration_sd_factor, scale, noise_floor_w,
+            threshold_w, false_alarm_probability, range_bins, looks, looks_method,
+        }
+    }
+}
+
+prop_compose! {
+    fn session()(
+        (month, day) in (1u32..=12, 1u32..=28), temperature_k in option::of(positive()),
+        [relative_humidity, registration_rms_m] in [(); 2].map(|()| option::of(fraction())),
+        [cloud_hash, mesh_hash] in [(); 2].map(|()| option::of(Just("0a".repeat(32)))),
+        [normal_sd_rad, footprint_sd_rad] in [(); 2].map(|()| option::of(angle_rad())),
+        shift in option::of([number(), number(), number()]), note in option::of(text()),
+    ) -> Session {
+        let rotation_rows = [[0.6, -0.8, 0.0], [0.8, 0.6, -0.0], [0.0, 0.0, 1.0]];
+        let pose = shift.map(|translation_m| SessionPose { rotation_rows, translation_m });
+        Session {
+            key: String::new(), date: format!("2026-{month:02}-{day:02}"), temperature_k,
+            relative_humidity, cloud_hash, mesh_hash, registration_rms_m, normal_sd_rad,
+            footprint_sd_rad, pose, note,
+        }
+    }
+}
+
+prop_compose! {
+    fn permittivity()(
+        temperature_k in option::of(positive()), real in number(), imaginary in fraction(),
+        [real_sd, imaginary_sd] in [(); 2].map(|()| option::of(fraction())),
+    ) -> Permittivity {
+        let (key, source) = (String::new(), String::new());
+        Permittivity {
+            key, frequency_hz: 1.0, temperature_k, real, imaginary, real_sd, imaginary_sd, source,
+        }
+    }
+}
+
+prop_compose! {
+    fn finding()(
+        effect in word(), confusable_with in vec(text(), 0..3), p in option::of(fraction()),
+        verdict in select(&[
+            FindingVerdict::Found, FindingVerdict::NotFound, FindingVerdict::Unexplained,
+        ]),
+        [gain, placebo_gain, score_difference] in [(); 3].map(|()| option::of(number())),
+        [score_difference_sd, size_db, rms_before_db, rms_after_db]
+            in [(); 4].map(|()| option::of(fraction())),
+    ) -> Finding {
+        Finding {
+            effect, verdict, fit_before: None, fit_after: None, gain, placebo_gain, p,
+            score_difference, score_difference_sd, size_db, rms_before_db, rms_after_db,
+            confusable_with, source: String::new(),
+        }
+    }
+}
+
+/// What a material says beside its curves, fits and effects.
+#[derive(Clone, Debug)]
+struct Rest {
+    status: Status,
+    finish: Option<String>,
+    unknown: Vec<String>,
+    roughness: Option<Roughness>,
+    layers: Vec<Layer>,
+    permittivities: Vec<Permittivity>,
+    sessions: Vec<Session>,
+    findings: Vec<Finding>,
+}
+
+prop_compose! {
+    fn rest()(
+        reason in word(),
+        status in select(&[0, 1, 2]), finish in option::of(word()), unknown in vec(word(), 0..3),
+        rough in option::of((fraction(), option::of(positive()), option::of(text()))),
+        thicknesses in vec((word(), positive()), 0..3), permittivities in vec(permittivity(), 0..3),
+        sessions in vec(session(), 0..3), findings in vec(finding(), 0..3),
+    ) -> Rest {
+        let by = "other".parse().unwrap();
+        let status = [
+            Status::Active, Status::Withdrawn { reason: reason.clone() },
+            Status::Superseded { by, reason },
+        ][status].clone();
+        let roughness = rough.map(|(rms_height_m, correlation_length_m, method)| Roughness {
+            rms_height_m, correlation_length_m, method, source: String::new(),
+        });
+        let layer = |(name, thickness_m)| Layer {
+            name, thickness_m: Some(thickness_m), permittivity: None,
+        };
+        let layers = thicknesses.into_iter().map(layer).collect();
+        Rest { status, finish, unknown, roughness, layers, permittivities, sessions, findings }
     }
 }
 
@@ -174,7 +280,7 @@ fn covariance(paths: &[String], scale: &[f64]) -> Covariance {
 fn curve() -> impl Strategy<Value = Curve> {
     vec(observation(), 1..20).prop_map(|observations| {
         let (name, source) = (String::new(), String::new());
-        Curve { name, source, instrument: None, observations }
+        Curve { name, source, instrument: None, session: None, observations }
     })
 }
 
@@ -190,14 +296,17 @@ prop_compose! {
         frequency_hz in [positive(), positive()], theta_rad in [angle_rad(), angle_rad()],
         sources in vec(source(), 1..4), instruments in vec(instrument(), 0..3),
         curves in vec(curve(), 0..4), fits in vec(fit(), 1..4), effects in vec(effect(), 0..3),
-        key in text(), pick in any::<usize>(),
+        key in text(), pick in any::<usize>(), rest in rest(),
     ) -> Material {
+        let Rest { status, finish, unknown, roughness, layers, .. } = rest;
+        let Rest { permittivities, sessions, findings, .. } = rest;
         let (name, class, description, licence, tags) = texts;
         let slug = "made-up".parse().unwrap();
         let mut material = Material {
             slug, name, class, description, licence, tags,
             frequency_hz: ascending(frequency_hz), theta_rad: ascending(theta_rad),
-            render: String::new(), sources, instruments, curves, fits, effects,
+            render: String::new(), sources, instruments, curves, fits, effects, status, finish,
+            unknown, roughness, layers, permittivities, sessions, findings,
         };
         connect(&mut material, &key, pick);
         material
@@ -217,6 +326,7 @@ fn connect(material: &mut Material, key: &str, mut pick: usize) {
         (count > 0).then(|| name(what, (pick >> 33) % count))
     };
     let counts = [material.sources.len(), material.instruments.len(), material.curves.len()];
+    let (sessions, fits) = (material.sessions.len(), material.fits.len());
     for (index, source) in material.sources.iter_mut().enumerate() {
         source.key = name("source", index);
     }
@@ -227,6 +337,29 @@ fn connect(material: &mut Material, key: &str, mut pick: usize) {
         curve.name = name("curve", index);
         curve.source = choose("source", counts[0]).unwrap();
         curve.instrument = choose("instrument", counts[1]);
+        curve.session = choose("session", sessions);
+    }
+    for (index, session) in material.sessions.iter_mut().enumerate() {
+        session.key = name("session", index);
+    }
+    for (index, entry) in material.permittivities.iter_mut().enumerate() {
+        // The first two are of one substance.
+        entry.key = name("permittivity", index.max(1));
+        entry.frequency_hz = 1e9 * (index + 1) as f64;
+        entry.source = choose("source", counts[0]).unwrap();
+    }
+    for layer in &mut material.layers {
+        layer.permittivity = material.permittivities.first().map(|entry| entry.key.clone());
+    }
+    if let Some(last) = material.layers.last_mut() {
+        last.thickness_m = None;
+    }
+    if let Some(roughness) = &mut material.roughness {
+        roughness.source = choose("source", counts[0]).unwrap();
+    }
+    for finding in &mut material.findings {
+        finding.fit_after = choose("fit", fits);
+        finding.source = choose("source", counts[0]).unwrap();
     }
     for (index, fit) in material.fits.iter_mut().enumerate() {
         fit.name = name("fit", index);
@@ -322,4 +455,41 @@ fn an_unsound_material_is_refused_before_it_is_written() {
     assert!(message.starts_with("material `cotton`: curve `backscatter`, observation 1"));
     assert!(store.list().unwrap().is_empty());
     assert!(store.get(&"cotton".parse::<Slug>().unwrap(), None).unwrap().is_none());
+}
+
+#[test]
+fn a_revision_knows_which_command_made_it_of_what() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("materials.sqlite");
+    let mut store = Store::open(&path).unwrap();
+    let first = builtin::get("cotton").unwrap().unwrap();
+    store.add([&first]).unwrap();
+    let input = |name: &str| Input { name: name.to_owned(), hash: "0e".repeat(32) };
+    let activity =
+        Activity { command: "fit".to_owned(), inputs: vec![input("b.csv"), input("a.csv")] };
+    store.record(activity.clone());
+    let second = Material { finish: Some("washed".to_owned()), ..first.clone() };
+    assert_eq!(store.add([&second]).unwrap(), [Added::Revision(2)]);
+    // It says nothing of the material, so it makes no revision.
+    store.record(Activity::default());
+    assert_eq!(store.add([&second]).unwrap(), [Added::Unchanged(2)]);
+    let of = |number| store.get(&first.slug, Some(number)).unwrap().unwrap().activity;
+    assert_eq!((of(1), of(2)), (None, Some(activity)));
+}
+
+#[test]
+fn statistics_of_a_curve_are_stored_with_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Store::open(folder.path().join("materials.sqlite")).unwrap();
+    let mut cotton = builtin::get("cotton").unwrap().unwrap();
+    let once = cotton.curves[0].observations.clone();
+    // Nine times each angle: points enough for intervals.
+    cotton.curves[0].observations = (0..9).flat_map(|_| once.clone()).collect();
+    store.add([&cotton]).unwrap();
+    let stored = store.statistics(&cotton.slug, None, "backscatter").unwrap();
+    assert_eq!(stored, by_angle(&cotton.curves[0].observations));
+    assert_eq!(stored.len(), once.len());
+    assert!(stored.iter().all(|row| row.points == 9 && row.interval_95.is_some()));
+    assert!(store.statistics(&cotton.slug, Some(2), "backscatter").unwrap().is_empty());
+    assert!(store.statistics(&cotton.slug, None, "other").unwrap().is_empty());
 }

@@ -7,15 +7,17 @@
 
 mod support;
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use matdb::material::Material;
 use matdb::store::{Added, Store};
 use rusqlite::Connection;
-use support::database::{change, contents, fitted, sample, with_effects};
+use rusqlite::functions::FunctionFlags;
+use support::database::{change, complete, contents, fitted, sample, with_effects};
 
-const NEWEST: &str = "schema-0003.sqlite";
+const NEWEST: &str = "schema-0004.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
@@ -38,7 +40,8 @@ fn held(file: &str) -> [Material; 3] {
     let make = match file {
         "schema-0001.sqlite" => sample,
         "schema-0002.sqlite" => fitted,
-        _ => with_effects,
+        "schema-0003.sqlite" => with_effects,
+        _ => complete,
     };
     [make("paint"), change(make("paint")), make("primer")]
 }
@@ -170,7 +173,139 @@ fn the_database_itself_refuses_what_a_material_may_not_be() {
         "UPDATE effect SET revision_id = 99",
         "UPDATE effect_parameter SET effect = 'other'",
         "UPDATE effect_parameter SET value = 'much'",
+        "UPDATE revision SET status = 'doubtful'",
+        "UPDATE revision SET status = 'active'",
+        "UPDATE revision SET status_reason = NULL",
+        "UPDATE revision SET superseded_by = NULL",
+        "UPDATE revision SET unknown = '{}'",
+        "UPDATE source SET authors = 'Doe'",
+        "UPDATE source SET year = 26",
+        "UPDATE source SET making = 'guessed'",
+        "UPDATE instrument SET geometry = 'round'",
+        "UPDATE instrument SET stand_off_m = 0",
+        "UPDATE instrument SET calibration_sd_factor = 0.5",
+        "UPDATE instrument SET scale = 'large'",
+        "UPDATE instrument SET threshold_w = -1",
+        "UPDATE instrument SET false_alarm_probability = 1",
+        "UPDATE instrument SET range_bins = 0",
+        "UPDATE instrument SET looks = 0",
+        "UPDATE permittivity SET imaginary = -0.1",
+        "UPDATE permittivity SET frequency_hz = 0",
+        "UPDATE permittivity SET frequency_hz = 3e11",
+        "UPDATE permittivity SET temperature_k = 0",
+        "UPDATE permittivity SET source = 'other'",
+        "UPDATE layer SET thickness_m = 0",
+        "UPDATE roughness SET rms_height_m = -1",
+        "UPDATE roughness SET correlation_length_m = 0",
+        "UPDATE roughness SET source = 'other'",
+        "UPDATE session SET key = 'other'",
+        "UPDATE session SET date = '2026-02-30'",
+        "UPDATE session SET relative_humidity = 40",
+        "UPDATE session SET cloud_hash = '0c'",
+        "UPDATE session SET normal_sd_rad = 2",
+        "UPDATE session SET pose = '[]'",
+        "UPDATE curve_session SET session = 'other'",
+        "UPDATE curve_statistic SET points = 0",
+        "UPDATE curve_statistic SET censored_points = 2",
+        "UPDATE curve_statistic SET mean_greatest = mean_least - 1",
+        "UPDATE curve_statistic SET theta_min_rad = -1",
+        "UPDATE curve_statistic SET curve = 'other'",
+        "UPDATE finding SET verdict = 'maybe'",
+        "UPDATE finding SET p = 2",
+        "UPDATE finding SET size_db = -1",
+        "UPDATE finding SET fit_after = 'other'",
+        "UPDATE finding SET source = 'other'",
+        "UPDATE finding SET confusable_with = '{}'",
     ] {
         assert!(conn.execute(sql, []).is_err(), "{sql}");
     }
+}
+
+/// The program's own SQLite has no logarithm, which the views need; that of the sqlite3 program has.
+fn with_logarithm(path: &Path) -> Connection {
+    let conn = Connection::open(path).unwrap();
+    conn.create_scalar_function("log10", 1, FunctionFlags::SQLITE_UTF8, |context| {
+        context.get::<Option<f64>>(0).map(|x| x.map(f64::log10))
+    })
+    .unwrap();
+    conn
+}
+
+/// Columns of all tables and views with their declared types; those of views have none where they
+/// are computed.
+fn columns(conn: &Connection) -> Vec<(String, String, String)> {
+    let sql = "SELECT schema.type, info.name, upper(info.type)
+               FROM sqlite_schema AS schema JOIN pragma_table_info(schema.name) AS info
+               WHERE schema.type IN ('table', 'view') AND schema.name NOT LIKE 'sqlite_%'";
+    let mut statement = conn.prepare(sql).unwrap();
+    let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).unwrap();
+    rows.map(Result::unwrap).collect()
+}
+
+#[test]
+fn every_number_has_its_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.sqlite");
+    drop(Store::open(&path).unwrap());
+    let conn = with_logarithm(&path);
+    let mut statement = conn.prepare("SELECT column_name, ucum, meaning FROM unit").unwrap();
+    let units: BTreeMap<String, (Option<String>, String)> = statement
+        .query_map([], |row| Ok((row.get(0)?, (row.get(1)?, row.get(2)?))))
+        .unwrap()
+        .map(Result::unwrap)
+        .collect();
+    let is_number = |kind: &str| matches!(kind, "REAL" | "INTEGER");
+    let columns = columns(&conn);
+    for (_, name, kind) in &columns {
+        let is_converted = ["_db", "_deg", "_ghz"].iter().any(|end| name.ends_with(end));
+        let is_text_elsewhere = kind == "TEXT" && !is_converted;
+        assert!(
+            units.contains_key(name) || is_text_elsewhere || !(is_number(kind) || is_converted),
+            "{name}"
+        );
+    }
+    for (name, (ucum, meaning)) in &units {
+        let kinds = columns.iter().filter(|(_, column, _)| column == name);
+        assert!(kinds.count() > 0, "no column `{name}`");
+        assert!(meaning.len() > 5, "{name}");
+        let ends = [
+            ("_rad", "rad"),
+            ("_deg", "deg"),
+            ("_m", "m"),
+            ("_hz", "Hz"),
+            ("_ghz", "GHz"),
+            ("_w", "W"),
+            ("_k", "K"),
+            ("_db", "dB"),
+        ];
+        if let Some((_, unit)) = ends.into_iter().find(|(end, _)| name.ends_with(end)) {
+            assert_eq!(ucum.as_deref(), Some(unit), "{name}");
+        }
+    }
+}
+
+#[test]
+fn views_show_people_decibels_and_degrees() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.sqlite");
+    fill(&path);
+    let conn = with_logarithm(&path);
+    let sql = "SELECT theta_i_deg, sigma0_db, threshold_db, censor FROM v_curves
+               WHERE slug = 'paint' AND revision = 2";
+    let mut statement = conn.prepare(sql).unwrap();
+    type Point = (f64, Option<f64>, f64, String);
+    let rows: Vec<Point> = statement
+        .query_map([], |r| Ok((r.get(0)?, r.get(1)?, r.get(2)?, r.get(3)?)))
+        .unwrap()
+        .map(Result::unwrap)
+        .collect();
+    assert_eq!(rows.len(), 3);
+    assert!((rows[1].0 - 28.6479).abs() < 1e-4 && (rows[1].1.unwrap() + 6.9897).abs() < 1e-4);
+    assert_eq!((rows[2].1, rows[2].3.as_str()), (None, "left"));
+    assert!((rows[2].2 + 30.0).abs() < 1e-9);
+    let count = |sql: &str| conn.query_row(sql, [], |row| row.get::<_, i64>(0)).unwrap();
+    assert_eq!(count("SELECT count(*) FROM v_materials WHERE status = 'superseded'"), 2);
+    assert_eq!(count("SELECT count(*) FROM v_materials WHERE frequency_min_ghz = 290"), 2);
+    let parameters = sample("paint").fits[0].model.parameters().len() as i64;
+    assert_eq!(count("SELECT count(*) FROM v_fits WHERE is_rendered"), 2 * parameters);
 }

@@ -1,5 +1,7 @@
 //! `matdb add`.
 
+mod door;
+
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
@@ -20,7 +22,8 @@ use crate::store::Added;
   matdb add mannequin-paint ptfe       two built-in materials
   matdb add --all                      every built-in material
   matdb add --from my-paint/           the folder's material.toml, or that of each subfolder
-  matdb add --from my-paint/material.toml")]
+  matdb add --from my-paint/material.toml
+  matdb add --template > my-paint/material.toml    a complete entry to change")]
 #[command(group = clap::ArgGroup::new("what").required(true).multiple(true))]
 pub(super) struct Args {
     /// Names of built-in materials
@@ -32,9 +35,18 @@ pub(super) struct Args {
     /// A material.toml, or a folder with one or with subfolders that have one
     #[arg(long, value_name = "FILE|DIR", group = "what")]
     from: Vec<PathBuf>,
+    /// Print a complete material.toml with comments, to be changed
+    #[arg(long, group = "what", exclusive = true)]
+    template: bool,
 }
 
+/// A complete material.toml; docs/materials.md shows the same.
+const TEMPLATE: &str = include_str!("add/template.toml");
+
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    if args.template {
+        return console.result(TEMPLATE, &json!({ "material_toml": TEMPLATE }));
+    }
     let materials = wanted(args, db)?;
     let mut store = db.write()?;
     let (mut lines, mut records) = (String::new(), Vec::new());
@@ -121,6 +133,7 @@ fn read(path: &Path) -> Result<Material, Error> {
     let read_csv = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
     let material = file::parse(&path.display().to_string(), &text, read_csv)?;
     chosen(&material.effects, Level::Material, format!("{}: [[effect]]", path.display()))?;
+    door::check(&material, path)?;
     Ok(material)
 }
 

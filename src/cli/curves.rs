@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 
 use crate::error::Error;
-use crate::material::{Curve, Material, Source, SourceKind};
+use crate::material::{Citation, Curve, Material, Source, SourceKind};
 use crate::measure;
 
 /// How a curve came to be, as flags say it.
@@ -41,6 +41,7 @@ pub(super) fn put(
                 name,
                 source: source_key,
                 instrument: None,
+                session: None,
                 observations,
             });
             Ok(source)
@@ -70,6 +71,8 @@ pub(super) fn source(material: &mut Material, kind: SourceKind, title: &str, key
         url: None,
         licence: None,
         note: None,
+        citation: Citation::default(),
+        making: None,
     });
     key
 }

@@ -1,6 +1,7 @@
 //! The command line: one command per file. Flags die here; the library takes plain values.
 
 mod add;
+mod check;
 mod cloud;
 mod compare;
 mod completions;
@@ -76,6 +77,7 @@ enum Command {
     Show(show::Args),
     Plot(plot::Args),
     Fit(Box<fit::Args>),
+    Check(check::Args),
     Rm(rm::Args),
     Publish(publish::Args),
     Completions(completions::Args),
@@ -101,6 +103,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Show(args) => show::run(args, db, &console),
         Command::Plot(args) => plot::run(args, db, &console),
         Command::Fit(args) => fit::run(args, db, &console),
+        Command::Check(_) => check::run(db, &console),
         Command::Rm(args) => rm::run(args, db, &console),
         Command::Publish(args) => publish::run(args, db, &console),
         Command::Completions(args) => completions::run(args),

@@ -1,5 +1,7 @@
 //! `matdb show`.
 
+mod about;
+
 use serde_json::json;
 
 use super::console::Console;
@@ -57,7 +59,10 @@ fn describe(material: &Material, origin: &str) -> Result<String, Error> {
         "class {}, licence {}, {low:.0}–{high:.0} GHz, {least:.0}–{most:.0}°\n\n",
         material.class, material.licence
     );
+    text += &status(material);
     text += &sources(material);
+    text += &about::composition(material);
+    text += &about::sessions(material);
     for curve in &material.curves {
         let censored = curve.observations.iter().filter(|o| o.sigma0.is_none()).count();
         text += &format!(
@@ -78,8 +83,24 @@ fn describe(material: &Material, origin: &str) -> Result<String, Error> {
         text += &fit.report.as_ref().map_or(String::new(), report);
     }
     text += &effects(material);
+    text += &about::findings(material);
     text += &format!("\nscenes render `{}`:\n{}", material.render, curve_table(material)?);
     Ok(text)
+}
+
+/// Whether it may still be used, and what is not known of it.
+fn status(material: &Material) -> String {
+    let mut text = String::new();
+    if let Some(reason) = material.status.reason() {
+        text += &format!("{}: {reason}", material.status.as_str());
+        let by = material.status.superseded_by();
+        text += &by.map_or(String::new(), |by| format!("; use {by}"));
+        text += "\n\n";
+    }
+    for sentence in &material.unknown {
+        text += &format!("not known: {sentence}\n");
+    }
+    text + if material.unknown.is_empty() { "" } else { "\n" }
 }
 
 fn sources(material: &Material) -> String {

@@ -17,6 +17,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod again;
 mod angle;
 pub mod bistatic;
 pub(crate) mod coordinates;

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 
 use thiserror::Error;
 
-use super::{Censor, Covariance, Curve, Fit, Instrument, Material, Observation};
+use super::{Censor, Covariance, Curve, Fit, Instrument, Material, Observation, Session, Source};
 use crate::brdf::{ParameterError, TabulatedError};
 use crate::formats::EffectEntry;
 
@@ -66,24 +66,32 @@ impl Material {
         self.check_limits()?;
         unique("source", self.sources.iter().map(|s| s.key.as_str()))?;
         unique("instrument", self.instruments.iter().map(|i| i.key.as_str()))?;
+        unique("session", self.sessions.iter().map(|s| s.key.as_str()))?;
         unique("fit or curve", self.renderable().iter().map(String::as_str))?;
+        self.status.validate(&self.slug)?;
+        self.sources.iter().try_for_each(Source::validate)?;
         self.instruments.iter().try_for_each(Instrument::validate)?;
+        self.sessions.iter().try_for_each(Session::validate)?;
+        self.check_composition()?;
         self.curves.iter().try_for_each(|curve| self.check_curve(curve))?;
         self.fits.iter().try_for_each(|fit| self.check_fit(fit))?;
         self.check_effects()?;
+        self.check_findings()?;
         self.scattering().map(|_| ())
     }
 
     fn check_text(&self) -> Result<(), MaterialError> {
         let texts = [("name", &self.name), ("class", &self.class), ("licence", &self.licence)];
-        let fields = texts
-            .into_iter()
-            .map(|(place, text)| (place.to_owned(), text))
-            .chain(self.sources.iter().map(|s| (format!("source `{}`: title", s.key), &s.title)));
-        for (place, text) in fields {
+        for (place, text) in texts {
             if text.trim().is_empty() {
-                return Err(value(&place, "is empty", "fill it in"));
+                return Err(value(place, "is empty", "fill it in"));
             }
+        }
+        if self.unknown.iter().any(|sentence| sentence.trim().is_empty()) {
+            return Err(value("unknown", "holds an empty sentence", "fill it in or remove it"));
+        }
+        if self.finish.as_ref().is_some_and(|finish| finish.trim().is_empty()) {
+            return Err(value("finish", "is empty", "fill it in or leave it out"));
         }
         if self.sources.is_empty() {
             return Err(value("material", "has no source", "add a [[source]] table"));
@@ -109,12 +117,10 @@ impl Material {
     fn check_curve(&self, curve: &Curve) -> Result<(), MaterialError> {
         let place = format!("curve `{}`", curve.name);
         self.check_source(&place, &curve.source)?;
-        if let Some(key) = &curve.instrument
-            && !self.instruments.iter().any(|i| i.key == *key)
-        {
-            let known = self.instruments.iter().map(|i| i.key.clone()).collect();
-            return Err(dangling(&place, "an instrument", key, known));
-        }
+        let instruments = self.instruments.iter().map(|i| &i.key);
+        refers(&place, "an instrument", curve.instrument.as_ref(), instruments)?;
+        let sessions = self.sessions.iter().map(|s| &s.key);
+        refers(&place, "a session", curve.session.as_ref(), sessions)?;
         if curve.observations.is_empty() {
             return Err(value(&place, "has no observation", "give it at least one row"));
         }
@@ -131,12 +137,7 @@ impl Material {
             .validate()
             .map_err(|error| MaterialError::Parameter { fit: fit.name.clone(), error })?;
         self.check_source(&place, &fit.source)?;
-        if let Some(curve) =
-            fit.curve.as_ref().filter(|c| !self.curves.iter().any(|k| k.name == **c))
-        {
-            let known = self.curves.iter().map(|c| c.name.clone()).collect();
-            return Err(dangling(&place, "a curve", curve, known));
-        }
+        refers(&place, "a curve", fit.curve.as_ref(), self.curves.iter().map(|c| &c.name))?;
         for (path, source) in &fit.parameter_sources {
             self.check_source(&format!("{place}, parameter `{path}`"), source)?;
             if !known.contains(path) {
@@ -164,12 +165,45 @@ impl Material {
         Ok(())
     }
 
-    fn check_source(&self, place: &str, key: &str) -> Result<(), MaterialError> {
-        if self.sources.iter().any(|s| s.key == key) {
-            return Ok(());
+    fn check_composition(&self) -> Result<(), MaterialError> {
+        for (index, entry) in self.permittivities.iter().enumerate() {
+            let place = format!("permittivity `{}`, entry {}", entry.key, index + 1);
+            if entry.key.is_empty() {
+                return Err(value(&place, "has an empty name", "name it"));
+            }
+            entry.validate(&place)?;
+            self.check_source(&place, &entry.source)?;
+            let before = self.permittivities.iter().take(index);
+            if before.into_iter().any(|other| entry.is_same_place(other)) {
+                let problem = "is given twice at one frequency and temperature";
+                return Err(value(&place, problem, "remove one of them"));
+            }
         }
-        let known = self.sources.iter().map(|s| s.key.clone()).collect();
-        Err(dangling(place, "a source", key, known))
+        for (index, layer) in self.layers.iter().enumerate() {
+            let place = format!("layer {}", index + 1);
+            layer.validate(&place, index + 1 == self.layers.len())?;
+            let known = self.permittivities.iter().map(|entry| &entry.key);
+            refers(&place, "a permittivity", layer.permittivity.as_ref(), known)?;
+        }
+        let Some(roughness) = &self.roughness else { return Ok(()) };
+        roughness.validate()?;
+        self.check_source("roughness", &roughness.source)
+    }
+
+    fn check_findings(&self) -> Result<(), MaterialError> {
+        for (index, finding) in self.findings.iter().enumerate() {
+            let place = format!("finding {}, `{}`", index + 1, finding.effect);
+            finding.validate(&place)?;
+            self.check_source(&place, &finding.source)?;
+            for fit in [&finding.fit_before, &finding.fit_after] {
+                refers(&place, "a fit", fit.as_ref(), self.fits.iter().map(|f| &f.name))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn check_source(&self, place: &str, key: &String) -> Result<(), MaterialError> {
+        refers(place, "a source", Some(key), self.sources.iter().map(|s| &s.key))
     }
 }
 
@@ -217,17 +251,6 @@ impl Observation {
     }
 }
 
-impl Instrument {
-    fn validate(&self) -> Result<(), MaterialError> {
-        let positive = |x: f64| x > 0.0 && x.is_finite();
-        if positive(self.centre_frequency_hz) && self.bandwidth_hz.is_none_or(positive) {
-            return Ok(());
-        }
-        let place = format!("instrument `{}`", self.key);
-        Err(value(&place, "frequency and bandwidth must be positive", "mend the number"))
-    }
-}
-
 impl Covariance {
     fn validate(&self, place: &str, known: &[String]) -> Result<(), MaterialError> {
         let n = self.parameters.len();
@@ -270,6 +293,93 @@ fn unique<'a>(
         }
     }
     Ok(())
+}
+
+/// Refuses a name that is given and stands for nothing.
+fn refers<'a>(
+    place: &str,
+    what: &'static str,
+    name: Option<&String>,
+    known: impl Iterator<Item = &'a String> + Clone,
+) -> Result<(), MaterialError> {
+    match name.filter(|name| !known.clone().any(|key| key == *name)) {
+        None => Ok(()),
+        Some(stranger) => {
+            let mut names: Vec<String> = known.cloned().collect();
+            names.dedup();
+            Err(dangling(place, what, stranger, names))
+        }
+    }
+}
+
+/// Ranges of the numbers of one place.
+#[derive(Clone, Copy)]
+pub(super) struct Check<'a> {
+    place: &'a str,
+}
+
+impl<'a> Check<'a> {
+    pub fn new(place: &'a str) -> Check<'a> {
+        Check { place }
+    }
+
+    pub fn positive(
+        self,
+        what: &str,
+        numbers: impl IntoIterator<Item = f64>,
+    ) -> Result<(), MaterialError> {
+        self.all(what, "is not positive", numbers, |x| x > 0.0)
+    }
+
+    pub fn not_negative(
+        self,
+        what: &str,
+        numbers: impl IntoIterator<Item = f64>,
+    ) -> Result<(), MaterialError> {
+        self.all(what, "is negative or no number", numbers, |x| x >= 0.0)
+    }
+
+    pub fn at_least(
+        self,
+        what: &str,
+        least: f64,
+        numbers: impl IntoIterator<Item = f64>,
+    ) -> Result<(), MaterialError> {
+        self.all(what, &format!("is below {least}"), numbers, |x| x >= least)
+    }
+
+    pub fn finite(
+        self,
+        what: &str,
+        numbers: impl IntoIterator<Item = f64>,
+    ) -> Result<(), MaterialError> {
+        self.all(what, "is not finite", numbers, |_| true)
+    }
+
+    pub fn quarter_turn(
+        self,
+        what: &str,
+        numbers: impl IntoIterator<Item = f64>,
+    ) -> Result<(), MaterialError> {
+        let quarter = 0.0..=std::f64::consts::FRAC_PI_2;
+        self.all(what, "is not within 0–90°", numbers, |x| quarter.contains(&x))
+    }
+
+    fn all(
+        self,
+        what: &str,
+        problem: &str,
+        numbers: impl IntoIterator<Item = f64>,
+        good: impl Fn(f64) -> bool,
+    ) -> Result<(), MaterialError> {
+        match numbers.into_iter().find(|x| !(x.is_finite() && good(*x))) {
+            None => Ok(()),
+            Some(_) => {
+                let problem = format!("{what} {problem}");
+                Err(value(self.place, &problem, "mend it or leave it out"))
+            }
+        }
+    }
 }
 
 pub(super) fn value(place: &str, problem: &str, way_out: &str) -> MaterialError {

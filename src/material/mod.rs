@@ -5,9 +5,14 @@
 
 pub mod builtin;
 mod check;
+mod composition;
 pub mod file;
+mod finding;
+mod instrument;
+mod provenance;
 mod report;
 mod slug;
+mod status;
 
 use std::io;
 
@@ -19,8 +24,13 @@ use crate::brdf::{Brdf, Tabulated};
 use crate::formats::EffectEntry;
 
 pub use check::MaterialError;
+pub use composition::{Layer, Permittivity, Roughness};
+pub use finding::{Finding, FindingVerdict};
+pub use instrument::{Geometry, Instrument, Scale};
+pub use provenance::{Activity, Citation, Input, Making, Session, SessionPose, Source, SourceKind};
 pub use report::{Estimate, FitReport, Given, Goodness};
 pub use slug::Slug;
+pub use status::Status;
 
 /// One revision of a material.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -54,68 +64,30 @@ pub struct Material {
     /// Physical effects beyond the scattering model, each once.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub effects: Vec<EffectEntry>,
-}
-
-/// Where numbers come from.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Source {
-    /// Key within the material.
-    pub key: String,
-    /// How the numbers came to be.
-    pub kind: SourceKind,
-    /// Citation or, for our own numbers, how they were made.
-    pub title: String,
-    /// Digital object identifier, without a resolver in front.
-    pub doi: Option<String>,
-    /// Address, where there is no DOI.
-    pub url: Option<String>,
-    /// SPDX identifier of the licence of the source's data.
-    pub licence: Option<String>,
-    /// What was taken and how it was turned into our numbers.
-    pub note: Option<String>,
-}
-
-/// How numbers came to be. The four are never mixed up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum SourceKind {
-    /// Somebody measured this.
-    Measured,
-    /// A publication states it.
-    Literature,
-    /// A physical model computed it from other numbers.
-    Modelled,
-    /// Chosen so that something plausible can be rendered; nobody measured it.
-    Synthetic,
-}
-
-impl SourceKind {
-    /// The word that files and the database use.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            SourceKind::Measured => "measured",
-            SourceKind::Literature => "literature",
-            SourceKind::Modelled => "modelled",
-            SourceKind::Synthetic => "synthetic",
-        }
-    }
-}
-
-/// What a curve was measured with.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Instrument {
-    /// Key within the material.
-    pub key: String,
-    /// Name.
-    pub name: String,
-    /// Centre frequency, Hz.
-    pub centre_frequency_hz: f64,
-    /// Bandwidth, Hz.
-    pub bandwidth_hz: Option<f64>,
-    /// Polarisation, such as `VV`.
-    pub polarisation: Option<String>,
-    /// Anything a reader must know: stand-off, spot, calibration target.
-    pub note: Option<String>,
+    /// Whether it may still be used.
+    #[serde(skip_serializing_if = "Status::is_active")]
+    pub status: Status,
+    /// How the surface was made: rolled, sanded with grit 120, sprayed …
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub finish: Option<String>,
+    /// What is not known, a sentence each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unknown: Vec<String>,
+    /// How rough the outer surface is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roughness: Option<Roughness>,
+    /// What it is made of, the outermost layer first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<Layer>,
+    /// Permittivities of its substances.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub permittivities: Vec<Permittivity>,
+    /// Sittings in which its curves were measured.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sessions: Vec<Session>,
+    /// What diagnoses tried to explain it with.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub findings: Vec<Finding>,
 }
 
 /// A scattering curve: observations in the order of the file.
@@ -127,6 +99,9 @@ pub struct Curve {
     pub source: String,
     /// Key of the instrument; none for a curve that nobody measured.
     pub instrument: Option<String>,
+    /// Key of the session in which it was measured.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub session: Option<String>,
     /// The points.
     pub observations: Vec<Observation>,
 }

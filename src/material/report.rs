@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::MaterialError;
 use super::check::value;
+use super::provenance::is_hash;
 
 /// The record of one fit to one curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -118,8 +119,7 @@ impl FitReport {
         if self.covariance.len() != n || self.covariance.iter().any(|row| row.len() != n) {
             return refuse("the covariance has another size than the list of estimates");
         }
-        let hexadecimal = |c: char| c.is_ascii_digit() || ('a'..='f').contains(&c);
-        if self.data_hash.len() != 64 || !self.data_hash.chars().all(hexadecimal) {
+        if !is_hash(&self.data_hash) {
             return refuse("the hash of the data is not 64 hexadecimal digits");
         }
         Ok(())

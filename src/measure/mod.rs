@@ -18,6 +18,7 @@ pub mod reduce;
 pub mod register;
 mod sights;
 pub mod start;
+pub mod statistics;
 #[cfg(test)]
 mod synthetic;
 mod uncertainty;
@@ -30,3 +31,4 @@ pub use incidence::{Incidence, Sighting};
 pub use reduce::{LeftOut, Reduced, Reduction, ReductionError};
 pub use register::{Metric, Registered, Registration, RegistrationError, Stop};
 pub use start::Start;
+pub use statistics::AngleStatistics;

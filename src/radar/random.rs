@@ -30,6 +30,8 @@ pub enum Purpose {
     Fit = 7,
     /// Tilt of the surface's normal under a chirp.
     Tilt = 8,
+    /// Blocks of a bootstrap.
+    Bootstrap = 9,
 }
 
 /// Names one stream of draws.

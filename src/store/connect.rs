@@ -15,10 +15,11 @@ use super::StoreError;
 const APPLICATION_ID: i64 = 0x6d61_7464;
 
 /// All schemas there ever were, oldest first. Append only: files in the world have stopped at each.
-const SCHEMAS: [M; 3] = [
+const SCHEMAS: [M; 4] = [
     M::up(include_str!("../../migrations/0001_materials.sql")),
     M::up(include_str!("../../migrations/0002_fits.sql")),
     M::up(include_str!("../../migrations/0003_effects.sql")),
+    M::up(include_str!("../../migrations/0004_catalogue.sql")),
 ];
 
 /// What SQLite takes for the whole of a database in one step.

@@ -24,7 +24,8 @@ use std::path::{Path, PathBuf};
 
 use rusqlite::Connection;
 
-use crate::material::{Material, Slug, SourceKind};
+use crate::material::{Activity, Material, Slug, SourceKind};
+use crate::measure::AngleStatistics;
 
 pub use error::StoreError;
 
@@ -33,6 +34,7 @@ pub use error::StoreError;
 pub struct Store {
     conn: Connection,
     path: PathBuf,
+    activity: Option<Activity>,
 }
 
 /// What adding a material did.
@@ -69,6 +71,8 @@ pub struct Stored {
     pub added_at: String,
     /// Version of the program that added it.
     pub program_version: String,
+    /// Which command made it of what; none where that was not recorded.
+    pub activity: Option<Activity>,
 }
 
 /// A line of [`Store::history`].
@@ -119,7 +123,7 @@ impl Store {
     pub fn open(path: impl AsRef<Path>) -> Result<Store, StoreError> {
         let path = path.as_ref().to_owned();
         let conn = connect::writable(&path)?;
-        Ok(Store { conn, path })
+        Ok(Store { conn, path, activity: None })
     }
 
     /// Opens a database for reading only; `None` when there is no file or nothing in it.
@@ -132,7 +136,12 @@ impl Store {
     pub fn open_existing(path: impl AsRef<Path>) -> Result<Option<Store>, StoreError> {
         let path = path.as_ref().to_owned();
         let conn = connect::readable(&path)?;
-        Ok(conn.map(|conn| Store { conn, path }))
+        Ok(conn.map(|conn| Store { conn, path, activity: None }))
+    }
+
+    /// Records with every revision that is added from now on which command made it of what.
+    pub fn record(&mut self, activity: Activity) {
+        self.activity = Some(activity);
     }
 
     /// Adds materials, or revisions to those of the same names, in one transaction: all or none.
@@ -162,10 +171,10 @@ impl Store {
             let slug = || material.slug.to_string();
             material.validate().map_err(|error| StoreError::Material { slug: slug(), error })?;
         }
-        let Store { conn, path } = self;
+        let Store { conn, path, activity } = self;
         let failed = |error| StoreError::new(path, error);
         let tx = conn.transaction().map_err(failed)?;
-        let added = write::add(&tx, &materials).map_err(failed)?;
+        let added = write::add(&tx, &materials, activity.as_ref()).map_err(failed)?;
         let done = then(&added)?;
         tx.commit().map_err(failed)?;
         Ok(done)
@@ -194,6 +203,31 @@ impl Store {
             }
             stored => Ok(stored),
         }
+    }
+
+    /// Statistics by angle of a curve of a revision, or of the current one, as they were computed when
+    /// it was added; none for a curve or revision that is not there, for a curve without backscatter, or
+    /// with points above the instrument's range, and for what an older program stored.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn statistics(
+        &self,
+        slug: &Slug,
+        revision: Option<u32>,
+        curve: &str,
+    ) -> Result<Vec<AngleStatistics>, StoreError> {
+        read::statistics(&self.conn, slug, revision, curve)
+            .map_err(|error| StoreError::new(&self.path, error))
+    }
+
+    /// What SQLite itself finds wrong with the file, a sentence each: damaged pages and indexes, and
+    /// references to nothing.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn damage(&self) -> Result<Vec<String>, StoreError> {
+        read::damage(&self.conn).map_err(|error| StoreError::new(&self.path, error))
     }
 
     /// Every revision of a material, oldest first; none when there is no such material.

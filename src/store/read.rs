@@ -1,5 +1,9 @@
 //! Rows to plain types.
 
+mod provenance;
+
+pub(super) use provenance::statistics;
+
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, Type, ValueRef};
 use rusqlite::{
     Connection, Error, OptionalExtension, Params, Result, Row, Transaction, TransactionBehavior,
@@ -13,7 +17,8 @@ use super::{RevisionSummary, Stored, Summary};
 use crate::brdf::Brdf;
 use crate::formats::EffectEntry;
 use crate::material::{
-    Censor, Covariance, Curve, Fit, Instrument, Material, Observation, Slug, Source, SourceKind,
+    Censor, Covariance, Curve, FindingVerdict, Fit, Geometry, Making, Material, Observation, Scale,
+    Slug, SourceKind, Status,
 };
 
 /// Every material's current revision, sorted by slug.
@@ -65,7 +70,7 @@ pub(super) fn get(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result
     let sql = "
         SELECT slug, name, class, description, licence, tags, frequency_min_hz, frequency_max_hz,
             theta_min_rad, theta_max_rad, render, number, content_hash, added_at, program_version,
-            revision.id
+            revision.id, status, status_reason, superseded_by, finish, unknown
         FROM material JOIN revision ON material_id = material.id
         WHERE slug = ?1 AND number = coalesce(?2, current_revision)";
     let found = tx
@@ -74,11 +79,13 @@ pub(super) fn get(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result
         .optional()?;
     let Some((revision_id, mut stored)) = found else { return Ok(None) };
     let material = &mut stored.material;
-    material.sources = sources(&tx, revision_id)?;
-    material.instruments = instruments(&tx, revision_id)?;
+    material.sources = provenance::sources(&tx, revision_id)?;
+    material.instruments = provenance::instruments(&tx, revision_id)?;
     material.curves = curves(&tx, revision_id)?;
     material.fits = fits(&tx, revision_id)?;
     material.effects = effects(&tx, revision_id)?;
+    provenance::fill(material, &tx, revision_id)?;
+    stored.activity = provenance::activity(&tx, revision_id)?;
     Ok(Some(stored))
 }
 
@@ -99,6 +106,14 @@ fn stored(row: &Row) -> Result<Stored> {
         curves: Vec::new(),
         fits: Vec::new(),
         effects: Vec::new(),
+        status: status(row, 16)?,
+        finish: row.get(19)?,
+        unknown: json(row, 20)?,
+        roughness: None,
+        layers: Vec::new(),
+        permittivities: Vec::new(),
+        sessions: Vec::new(),
+        findings: Vec::new(),
     };
     Ok(Stored {
         material,
@@ -106,46 +121,41 @@ fn stored(row: &Row) -> Result<Stored> {
         content_hash: row.get(12)?,
         added_at: row.get(13)?,
         program_version: row.get(14)?,
+        activity: None,
     })
 }
 
-fn sources(conn: &Connection, revision_id: i64) -> Result<Vec<Source>> {
-    let sql = "SELECT key, kind, title, doi, url, licence, note FROM source
-               WHERE revision_id = ?1 ORDER BY position";
-    rows(conn, sql, [revision_id], |row| {
-        Ok(Source {
-            key: row.get(0)?,
-            kind: row.get(1)?,
-            title: row.get(2)?,
-            doi: row.get(3)?,
-            url: row.get(4)?,
-            licence: row.get(5)?,
-            note: row.get(6)?,
-        })
-    })
-}
-
-fn instruments(conn: &Connection, revision_id: i64) -> Result<Vec<Instrument>> {
-    let sql = "SELECT key, name, centre_frequency_hz, bandwidth_hz, polarisation, note
-               FROM instrument WHERE revision_id = ?1 ORDER BY position";
-    rows(conn, sql, [revision_id], |row| {
-        Ok(Instrument {
-            key: row.get(0)?,
-            name: row.get(1)?,
-            centre_frequency_hz: row.get(2)?,
-            bandwidth_hz: row.get(3)?,
-            polarisation: row.get(4)?,
-            note: row.get(5)?,
-        })
-    })
+/// Three columns: the word, the reason, what has taken its place.
+fn status(row: &Row, column: usize) -> Result<Status> {
+    let word: String = row.get(column)?;
+    let (reason, by) = (row.get(column + 1)?, row.get(column + 2)?);
+    match (word.as_str(), reason, by) {
+        ("active", None, None) => Ok(Status::Active),
+        ("superseded", Some(reason), Some(by)) => Ok(Status::Superseded { by, reason }),
+        ("withdrawn", Some(reason), None) => Ok(Status::Withdrawn { reason }),
+        _ => {
+            let problem = format!("`{word}` with what is beside it is no status");
+            Err(Error::FromSqlConversionFailure(column, Type::Text, problem.into()))
+        }
+    }
 }
 
 fn curves(conn: &Connection, revision_id: i64) -> Result<Vec<Curve>> {
-    let sql = "SELECT name, source, instrument FROM curve WHERE revision_id = ?1 ORDER BY position";
+    let sql = "
+        SELECT name, source, instrument, session FROM curve
+        LEFT JOIN curve_session
+            ON curve_session.revision_id = curve.revision_id AND curve_session.curve = name
+        WHERE curve.revision_id = ?1 ORDER BY position";
     rows(conn, sql, [revision_id], |row| {
         let name: String = row.get(0)?;
         let observations = observations(conn, revision_id, &name)?;
-        Ok(Curve { name, source: row.get(1)?, instrument: row.get(2)?, observations })
+        Ok(Curve {
+            name,
+            source: row.get(1)?,
+            instrument: row.get(2)?,
+            session: row.get(3)?,
+            observations,
+        })
     })
 }
 
@@ -261,20 +271,25 @@ fn word<'de, T: Deserialize<'de>>(value: ValueRef<'de>) -> FromSqlResult<T> {
     T::deserialize(StrDeserializer::<WordError>::new(value.as_str()?)).map_err(FromSqlError::other)
 }
 
-impl FromSql for Slug {
-    fn column_result(value: ValueRef) -> FromSqlResult<Slug> {
-        word(value)
-    }
+/// Words of files that the database keeps as they are.
+macro_rules! words {
+    ($($type:ty),+ $(,)?) => {
+        $(impl FromSql for $type {
+            fn column_result(value: ValueRef) -> FromSqlResult<$type> {
+                word(value)
+            }
+        })+
+    };
 }
 
-impl FromSql for SourceKind {
-    fn column_result(value: ValueRef) -> FromSqlResult<SourceKind> {
-        word(value)
-    }
-}
+words!(Censor, FindingVerdict, Geometry, Making, Scale, Slug, SourceKind);
 
-impl FromSql for Censor {
-    fn column_result(value: ValueRef) -> FromSqlResult<Censor> {
-        word(value)
-    }
+/// What SQLite itself finds wrong: damaged pages, and references to nothing.
+pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
+    let found = rows(conn, "PRAGMA integrity_check", [], |row| row.get::<_, String>(0))?;
+    let dangling = rows(conn, "PRAGMA foreign_key_check", [], |row| {
+        let (table, parent): (String, String) = (row.get(0)?, row.get(2)?);
+        Ok(format!("a row of `{table}` refers to a row of `{parent}` that is not there"))
+    })?;
+    Ok(found.into_iter().filter(|line| line != "ok").chain(dangling).collect())
 }

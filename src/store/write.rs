@@ -1,18 +1,25 @@
 //! Plain types to rows.
 
+mod provenance;
+
 use rusqlite::{Connection, Error, OptionalExtension, Params, Result, Transaction, params};
 use serde::Serialize;
 
 use super::{Added, Removed};
 use crate::formats::EffectEntry;
-use crate::material::{Covariance, Curve, Fit, Instrument, Material, Slug, Source};
+use crate::material::{Activity, Covariance, Curve, Fit, Material, Slug};
+use crate::measure::statistics::by_angle;
 
 /// Adds materials or revisions of them.
-pub(super) fn add(tx: &Transaction, materials: &[&Material]) -> Result<Vec<Added>> {
-    materials.iter().map(|material| add_one(tx, material)).collect()
+pub(super) fn add(
+    tx: &Transaction,
+    materials: &[&Material],
+    activity: Option<&Activity>,
+) -> Result<Vec<Added>> {
+    materials.iter().map(|material| add_one(tx, material, activity)).collect()
 }
 
-fn add_one(tx: &Transaction, material: &Material) -> Result<Added> {
+fn add_one(tx: &Transaction, material: &Material, activity: Option<&Activity>) -> Result<Added> {
     let content_hash = material.content_hash();
     let (added, number) = match current(tx, &material.slug)? {
         Some((number, stored)) if stored == content_hash => return Ok(Added::Unchanged(number)),
@@ -20,7 +27,9 @@ fn add_one(tx: &Transaction, material: &Material) -> Result<Added> {
         None => (Added::New, 1),
     };
     let revision_id = revision(tx, material, number, &content_hash)?;
-    Rows { tx, revision_id }.material(material)?;
+    let rows = Rows { tx, revision_id };
+    rows.material(material)?;
+    activity.map_or(Ok(()), |activity| rows.activity(activity))?;
     Ok(added)
 }
 
@@ -63,9 +72,9 @@ fn revision(tx: &Transaction, material: &Material, number: u32, hash: &str) -> R
     let insert = "INSERT INTO revision
         (material_id, number, content_hash, name, class, description, licence, tags,
          frequency_min_hz, frequency_max_hz, theta_min_rad, theta_max_rad, render,
-         added_at, program_version)
+         added_at, program_version, status, status_reason, superseded_by, finish, unknown)
         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13,
-         strftime('%Y-%m-%dT%H:%M:%SZ', 'now'), ?14)";
+         strftime('%Y-%m-%dT%H:%M:%SZ', 'now'), ?14, ?15, ?16, ?17, ?18, ?19)";
     tx.prepare_cached(insert)?.insert(params![
         material_id,
         number,
@@ -81,6 +90,11 @@ fn revision(tx: &Transaction, material: &Material, number: u32, hash: &str) -> R
         theta_max_rad,
         material.render,
         env!("CARGO_PKG_VERSION"),
+        material.status.as_str(),
+        material.status.reason(),
+        material.status.superseded_by().map(Slug::as_str),
+        material.finish,
+        json(&material.unknown)?,
     ])
 }
 
@@ -94,53 +108,33 @@ impl Rows<'_> {
     fn material(&self, material: &Material) -> Result<()> {
         numbered(&material.sources, |position, source| self.source(position, source))?;
         numbered(&material.instruments, |position, entry| self.instrument(position, entry))?;
+        numbered(&material.sessions, |position, session| self.session(position, session))?;
+        numbered(&material.permittivities, |place, entry| self.permittivity(place, entry))?;
+        numbered(&material.layers, |position, layer| self.layer(position, layer))?;
+        material.roughness.as_ref().map_or(Ok(()), |roughness| self.roughness(roughness))?;
         numbered(&material.curves, |position, curve| self.curve(position, curve))?;
         numbered(&material.fits, |position, fit| self.fit(position, fit))?;
-        numbered(&material.effects, |position, effect| self.effect(position, effect))
+        numbered(&material.effects, |position, effect| self.effect(position, effect))?;
+        numbered(&material.findings, |position, finding| self.finding(position, finding))
     }
 
     fn insert(&self, sql: &str, values: impl Params) -> Result<()> {
         self.tx.prepare_cached(sql)?.execute(values).map(|_| ())
     }
 
-    fn source(&self, position: u32, source: &Source) -> Result<()> {
-        let Source { key, kind, title, doi, url, licence, note } = source;
-        self.insert(
-            "INSERT INTO source
-             (revision_id, position, key, kind, title, doi, url, licence, note)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
-            params![self.revision_id, position, key, kind.as_str(), title, doi, url, licence, note],
-        )
-    }
-
-    fn instrument(&self, position: u32, instrument: &Instrument) -> Result<()> {
-        let Instrument { key, name, centre_frequency_hz, bandwidth_hz, polarisation, note } =
-            instrument;
-        self.insert(
-            "INSERT INTO instrument
-             (revision_id, position, key, name, centre_frequency_hz, bandwidth_hz, polarisation,
-              note)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
-            params![
-                self.revision_id,
-                position,
-                key,
-                name,
-                centre_frequency_hz,
-                bandwidth_hz,
-                polarisation,
-                note
-            ],
-        )
-    }
-
     fn curve(&self, position: u32, curve: &Curve) -> Result<()> {
-        let Curve { name, source, instrument, observations } = curve;
+        let Curve { name, source, instrument, session, observations } = curve;
         self.insert(
             "INSERT INTO curve (revision_id, position, name, source, instrument)
              VALUES (?1, ?2, ?3, ?4, ?5)",
             params![self.revision_id, position, name, source, instrument],
         )?;
+        if let Some(session) = session {
+            self.insert(
+                "INSERT INTO curve_session (revision_id, curve, session) VALUES (?1, ?2, ?3)",
+                params![self.revision_id, name, session],
+            )?;
+        }
         let mut insert = self.tx.prepare_cached(
             "INSERT INTO observation
              (revision_id, curve, position, theta_i_rad, theta_r_rad, delta_phi_rad, sigma0, censor,
@@ -166,7 +160,8 @@ impl Rows<'_> {
                 o.chirp
             ];
             insert.execute(values).map(|_| ())
-        })
+        })?;
+        numbered(&by_angle(observations), |position, row| self.statistic(name, position, row))
     }
 
     fn fit(&self, position: u32, fit: &Fit) -> Result<()> {

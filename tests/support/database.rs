@@ -6,8 +6,9 @@ use std::process::Command;
 
 use matdb::formats::EffectEntry;
 use matdb::material::{
-    Censor, Covariance, Curve, Estimate, FitReport, Given, Goodness, Instrument, Material,
-    Observation, builtin,
+    Censor, Citation, Covariance, Curve, Estimate, Finding, FindingVerdict, FitReport, Geometry,
+    Given, Goodness, Instrument, Layer, Making, Material, Observation, Permittivity, Roughness,
+    Scale, Session, SessionPose, Status, builtin,
 };
 use matdb::store::Store;
 
@@ -22,7 +23,7 @@ pub fn sample(slug: &str) -> Material {
         centre_frequency_hz: 300e9,
         bandwidth_hz: Some(20e9),
         polarisation: Some("VV".to_owned()),
-        note: None,
+        ..Instrument::default()
     }];
     let observations = vec![
         observation(0.0, Some(2.5), Censor::None),
@@ -30,7 +31,8 @@ pub fn sample(slug: &str) -> Material {
         observation(1.0, None, Censor::Left),
     ];
     let instrument = Some("bench".to_owned());
-    material.curves = vec![Curve { name: "scan".to_owned(), source, instrument, observations }];
+    let name = "scan".to_owned();
+    material.curves = vec![Curve { name, source, instrument, session: None, observations }];
     let path = material.fits[0].model.parameters()[0].path.clone();
     material.fits[0].covariance =
         Some(Covariance { parameters: vec![path], matrix: vec![vec![0.01]] });
@@ -59,6 +61,122 @@ pub fn with_effects(slug: &str) -> Material {
     };
     let film = effect("thin-film", &[("coverage", 0.3), ("thickness_m", 4.5e-4)]);
     Material { effects: vec![film, effect("subsurface", &[])], ..fitted(slug) }
+}
+
+/// The sample with effects and with everything else that a material can say.
+pub fn complete(slug: &str) -> Material {
+    let mut material = with_effects(slug);
+    let source = material.sources[0].key.clone();
+    material.sources[0].citation = Citation {
+        authors: vec!["Doe, Jane".to_owned(), "Some Institute".to_owned()],
+        year: Some(2026),
+        container: Some("J. Samples".to_owned()),
+        volume: Some("12".to_owned()),
+        pages: Some("1-9".to_owned()),
+        publisher: Some("A Press".to_owned()),
+    };
+    material.sources[0].making = Some(Making::Digitised);
+    material.instruments[0] = Instrument {
+        transmit_polarisation: Some("V".to_owned()),
+        receive_polarisation: Some("H".to_owned()),
+        geometry: Some(Geometry::Monostatic),
+        stand_off_m: Some(8.0),
+        spot_diameter_m: Some(0.016),
+        aperture_m: Some(0.5),
+        calibration_target: Some("trihedral of 30 mm".to_owned()),
+        calibration_sd_factor: Some(1.25),
+        scale: Some(Scale::Absolute),
+        noise_floor_w: Some(1e-12),
+        threshold_w: Some(2e-11),
+        false_alarm_probability: Some(1e-4),
+        range_bins: Some(512),
+        looks: Some(1.5),
+        looks_method: Some("counted".to_owned()),
+        ..material.instruments[0].clone()
+    };
+    material.sessions = vec![Session {
+        key: "spring".to_owned(),
+        date: "2026-03-14".to_owned(),
+        temperature_k: Some(295.15),
+        relative_humidity: Some(0.4),
+        cloud_hash: Some("0c".repeat(32)),
+        mesh_hash: Some("0d".repeat(32)),
+        registration_rms_m: Some(7e-4),
+        normal_sd_rad: Some(0.01),
+        footprint_sd_rad: Some(0.02),
+        pose: Some(SessionPose {
+            rotation_rows: [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+            translation_m: [0.1, -0.2, 8.0],
+        }),
+        note: Some("door closed".to_owned()),
+    }];
+    material.curves[0].session = Some("spring".to_owned());
+    let permittivity = |frequency_hz: f64, temperature_k: Option<f64>| Permittivity {
+        key: "acrylate".to_owned(),
+        frequency_hz,
+        temperature_k,
+        real: 2.62,
+        imaginary: 0.0987,
+        real_sd: Some(0.02),
+        imaginary_sd: None,
+        source: source.clone(),
+    };
+    material.permittivities =
+        vec![permittivity(300e9, Some(295.15)), permittivity(310e9, Some(295.15))];
+    let layer = |name: &str, thickness_m: Option<f64>, key: Option<&str>| Layer {
+        name: name.to_owned(),
+        thickness_m,
+        permittivity: key.map(str::to_owned),
+    };
+    material.layers =
+        vec![layer("paint", Some(1e-4), Some("acrylate")), layer("glass fibre", None, None)];
+    material.roughness = Some(Roughness {
+        rms_height_m: 2e-5,
+        correlation_length_m: Some(3e-4),
+        method: Some("profilometer".to_owned()),
+        source: source.clone(),
+    });
+    material.finish = Some("sprayed".to_owned());
+    material.unknown = vec!["The thickness of the fibre.".to_owned()];
+    material.status = Status::Superseded {
+        by: "better-paint".parse().unwrap(),
+        reason: "more angles".to_owned(),
+    };
+    let fit = material.fits[0].name.clone();
+    let found = Finding {
+        effect: "thin-film".to_owned(),
+        verdict: FindingVerdict::Found,
+        fit_before: Some(fit.clone()),
+        fit_after: Some(fit),
+        gain: Some(12.5),
+        placebo_gain: Some(3.0),
+        p: Some(0.001),
+        score_difference: Some(9.0),
+        score_difference_sd: Some(2.0),
+        size_db: Some(1.5),
+        rms_before_db: Some(6.1),
+        rms_after_db: Some(5.7),
+        confusable_with: vec!["fov-gain".to_owned()],
+        source,
+    };
+    let absent = Finding {
+        effect: "drift".to_owned(),
+        verdict: FindingVerdict::NotFound,
+        fit_before: None,
+        fit_after: None,
+        gain: Some(-0.5),
+        placebo_gain: None,
+        p: None,
+        score_difference: None,
+        score_difference_sd: None,
+        size_db: None,
+        rms_before_db: None,
+        rms_after_db: None,
+        confusable_with: Vec::new(),
+        source: found.source.clone(),
+    };
+    material.findings = vec![found, absent];
+    material
 }
 
 fn report() -> FitReport {

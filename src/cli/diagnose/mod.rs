@@ -3,6 +3,7 @@
 mod after;
 mod cannot_tell;
 mod curve;
+mod findings;
 mod html;
 mod plots;
 mod publish;

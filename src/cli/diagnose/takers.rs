@@ -1,6 +1,7 @@
 //! Which materials take in what was found, and how they look with it.
 
 use super::after::entries;
+use super::findings::findings;
 use crate::brdf::Brdf;
 use crate::cli::curves::source;
 use crate::cli::materials::{Found, find};
@@ -112,6 +113,11 @@ impl<'a> Cast<'a> {
             instruments: Vec::new(),
             curves: Vec::new(),
             fits: Vec::new(),
+            roughness: None,
+            layers: Vec::new(),
+            permittivities: Vec::new(),
+            sessions: Vec::new(),
+            findings: Vec::new(),
             ..base.clone()
         };
         with_found(bare, used, taker, report, title).map(Some)
@@ -148,12 +154,15 @@ fn with_found(
     report: &Report,
     title: &str,
 ) -> Result<Material, Error> {
+    let key = source(&mut material, SourceKind::Modelled, title, FIT);
+    let is_before = |fit: &&Fit| fit.name == material.render && fit.name != FIT;
+    let before = material.fits.iter().find(is_before).map(|fit| fit.name.clone());
     let fit = Fit {
         name: FIT.to_owned(),
         model: taker.law.clone(),
         estimator: FIT.to_owned(),
         curve: None,
-        source: source(&mut material, SourceKind::Modelled, title, FIT),
+        source: key.clone(),
         parameter_sources: Vec::new(),
         covariance: None,
         report: None,
@@ -163,6 +172,9 @@ fn with_found(
         None => material.fits.push(fit),
     }
     material.render = FIT.to_owned();
+    // The fit that earlier findings speak of has given way.
+    material.findings.retain(|known| known.fit_after.as_deref() != Some(FIT));
+    material.findings.extend(findings(report, before.as_deref(), FIT, &key));
     let declared = used.found.material.effects.iter().cloned();
     material.effects = declared.chain(entries(&report.effects, Level::Material)).collect();
     material.validate()?;

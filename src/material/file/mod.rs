@@ -3,6 +3,9 @@
 //! Curves stand beside it as CSV with the columns `theta_deg,sigma0_db,censor,threshold_db`; the
 //! last two may be left out, and `theta_r_deg,delta_phi_deg` may be added for bistatic points.
 
+mod composition;
+mod provenance;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -10,14 +13,16 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    Censor, Covariance, Curve, Fit, Instrument, Material, MaterialError, Observation, Slug, Source,
-    SourceKind,
+    Censor, Covariance, Curve, Finding, Fit, Instrument, Layer, Material, MaterialError,
+    Observation, Permittivity, Roughness, Session, Slug, Source, Status,
 };
 use crate::brdf::Brdf;
 use crate::formats::csv::Table;
 use crate::formats::text::{from_toml, to_toml};
 use crate::formats::{EffectEntry, FormatError};
 use crate::units::ratio_from_db;
+use composition::{LayerFile, PermittivityFile, RoughnessFile};
+use provenance::{InstrumentFile, SessionFile, SourceFile};
 
 /// Why a material file was refused.
 #[derive(Debug, Error)]
@@ -68,38 +73,29 @@ struct MaterialFile {
     frequency_ghz: [f64; 2],
     theta_deg: [f64; 2],
     render: String,
+    finish: Option<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    unknown: Vec<String>,
+    #[serde(default, skip_serializing_if = "Status::is_active")]
+    status: Status,
+    roughness: Option<RoughnessFile>,
     source: Vec<SourceFile>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    layer: Vec<LayerFile>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    permittivity: Vec<PermittivityFile>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     instrument: Vec<InstrumentFile>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    session: Vec<SessionFile>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     curve: Vec<CurveFile>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     fit: Vec<FitFile>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     effect: Vec<EffectEntry>,
-}
-
-#[derive(Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-struct SourceFile {
-    key: String,
-    kind: SourceKind,
-    title: String,
-    doi: Option<String>,
-    url: Option<String>,
-    licence: Option<String>,
-    note: Option<String>,
-}
-
-#[derive(Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-struct InstrumentFile {
-    key: String,
-    name: String,
-    centre_frequency_ghz: f64,
-    bandwidth_ghz: Option<f64>,
-    polarisation: Option<String>,
-    note: Option<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    finding: Vec<Finding>,
 }
 
 #[derive(Deserialize, Serialize)]
@@ -108,6 +104,7 @@ struct CurveFile {
     name: String,
     source: String,
     instrument: Option<String>,
+    session: Option<String>,
     file: String,
 }
 
@@ -130,6 +127,17 @@ struct FitFile {
 struct CovarianceFile {
     parameters: Vec<String>,
     matrix: Vec<Vec<f64>>,
+}
+
+/// 0 °C, K.
+const FREEZING_K: f64 = 273.15;
+
+fn kelvin(temperature_c: f64) -> f64 {
+    temperature_c + FREEZING_K
+}
+
+fn celsius(temperature_k: f64) -> f64 {
+    temperature_k - FREEZING_K
 }
 
 fn stated() -> String {
@@ -156,8 +164,8 @@ pub fn parse(
         let beside = Path::new(file).with_file_name(&entry.file);
         let observations = observations(&bytes)
             .map_err(|error| FileError::Format { file: beside.display().to_string(), error })?;
-        let CurveFile { name, source, instrument, .. } = entry;
-        Ok(Curve { name, source, instrument, observations })
+        let CurveFile { name, source, instrument, session, .. } = entry;
+        Ok(Curve { name, source, instrument, session, observations })
     };
     let material = Material {
         slug: toml.slug,
@@ -174,6 +182,14 @@ pub fn parse(
         curves: toml.curve.into_iter().map(curve).collect::<Result<_, FileError>>()?,
         fits: toml.fit.into_iter().map(Fit::from).collect(),
         effects: toml.effect,
+        status: toml.status,
+        finish: toml.finish,
+        unknown: toml.unknown,
+        roughness: toml.roughness.map(Roughness::from),
+        layers: toml.layer.into_iter().map(Layer::from).collect(),
+        permittivities: toml.permittivity.into_iter().map(Permittivity::from).collect(),
+        sessions: toml.session.into_iter().map(Session::from).collect(),
+        findings: toml.finding,
     };
     let refuse = |error| FileError::Material { file: file.to_owned(), error };
     material.validate().map_err(refuse)?;
@@ -197,32 +213,20 @@ pub fn write(material: &Material) -> Result<String, FormatError> {
         frequency_ghz: material.frequency_hz.map(|f| f / 1e9),
         theta_deg: material.theta_rad.map(f64::to_degrees),
         render: material.render,
+        finish: material.finish,
+        unknown: material.unknown,
+        status: material.status,
+        roughness: material.roughness.map(RoughnessFile::from),
+        layer: material.layers.into_iter().map(LayerFile::from).collect(),
+        permittivity: material.permittivities.into_iter().map(PermittivityFile::from).collect(),
+        session: material.sessions.into_iter().map(SessionFile::from).collect(),
+        finding: material.findings,
         source: material.sources.into_iter().map(SourceFile::from).collect(),
         instrument: material.instruments.into_iter().map(InstrumentFile::from).collect(),
         curve: Vec::new(),
         fit: material.fits.into_iter().map(FitFile::from).collect(),
         effect: material.effects,
     })
-}
-
-impl From<Source> for SourceFile {
-    fn from(source: Source) -> SourceFile {
-        let Source { key, kind, title, doi, url, licence, note } = source;
-        SourceFile { key, kind, title, doi, url, licence, note }
-    }
-}
-
-impl From<Instrument> for InstrumentFile {
-    fn from(instrument: Instrument) -> InstrumentFile {
-        InstrumentFile {
-            key: instrument.key,
-            name: instrument.name,
-            centre_frequency_ghz: instrument.centre_frequency_hz / 1e9,
-            bandwidth_ghz: instrument.bandwidth_hz.map(|f| f / 1e9),
-            polarisation: instrument.polarisation,
-            note: instrument.note,
-        }
-    }
 }
 
 impl From<Fit> for FitFile {
@@ -237,26 +241,6 @@ impl From<Fit> for FitFile {
             covariance: fit
                 .covariance
                 .map(|Covariance { parameters, matrix }| CovarianceFile { parameters, matrix }),
-        }
-    }
-}
-
-impl From<SourceFile> for Source {
-    fn from(entry: SourceFile) -> Source {
-        let SourceFile { key, kind, title, doi, url, licence, note } = entry;
-        Source { key, kind, title, doi, url, licence, note }
-    }
-}
-
-impl From<InstrumentFile> for Instrument {
-    fn from(entry: InstrumentFile) -> Instrument {
-        Instrument {
-            key: entry.key,
-            name: entry.name,
-            centre_frequency_hz: entry.centre_frequency_ghz * 1e9,
-            bandwidth_hz: entry.bandwidth_ghz.map(|f| f * 1e9),
-            polarisation: entry.polarisation,
-            note: entry.note,
         }
     }
 }
@@ -316,6 +300,7 @@ fn observation(table: &Table, row: usize) -> Result<Observation, FormatError> {
 mod tests {
     use super::*;
     use crate::brdf::Scattering;
+    use crate::material::SourceKind;
 
     const CURVE: &str =
         "theta_deg,sigma0_db,censor,threshold_db\n0,5,none,-30\n20,-10,,-30\n60,,left,-30\n";

@@ -1,0 +1,148 @@
+//! `matdb check`.
+
+use serde::Serialize;
+
+use super::console::Console;
+use super::database::Database;
+use crate::error::Error;
+use crate::fit::again::differences;
+use crate::material::{Curve, Fit, Material};
+use crate::measure::AngleStatistics;
+use crate::measure::curve::Curve as Rows;
+use crate::measure::statistics::by_angle;
+use crate::store::{Store, StoreError, Stored, Summary};
+
+/// Verify the whole database: pages, hashes, values, statistics of curves, and fits by fitting again
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb check
+  matdb check --json | jq '.findings[].place'
+
+Ends with status 1 when anything is wrong.")]
+pub(super) struct Args {}
+
+/// What was looked at, and what is wrong.
+#[derive(Default, Serialize)]
+struct Record {
+    revisions: usize,
+    curves: usize,
+    fits: usize,
+    findings: Vec<Wrong>,
+}
+
+/// One thing that is wrong.
+#[derive(Serialize)]
+struct Wrong {
+    /// The file, or the revision and what in it.
+    place: String,
+    problem: String,
+}
+
+impl Record {
+    fn wrong(&mut self, place: &str, problem: impl ToString) {
+        self.findings.push(Wrong { place: place.to_owned(), problem: problem.to_string() });
+    }
+}
+
+pub(super) fn run(db: &Database, console: &Console) -> Result<(), Error> {
+    let Some(store) = db.read()? else {
+        return Err(Error::Usage {
+            problem: format!("there is no database {}", db.path().display()),
+            way_out: "name one with --db; `matdb add NAME` makes one".to_owned(),
+        });
+    };
+    let file = db.path().display().to_string();
+    let mut record = Record::default();
+    store.damage()?.iter().for_each(|problem| record.wrong(&file, problem));
+    let materials = store.list()?;
+    let total = materials.iter().map(|material| material.revision as usize).sum();
+    let progress = console.progress("checking", total);
+    for Summary { slug, .. } in &materials {
+        for summary in store.history(slug)? {
+            let place = format!("{slug}@{}", summary.revision);
+            match store.get(slug, Some(summary.revision)) {
+                Ok(Some(stored)) => revision(&mut record, &store, &stored, &place)?,
+                Ok(None) => record.wrong(&place, "is not there"),
+                Err(StoreError::Corrupt { problem, .. }) => record.wrong(&place, problem),
+                Err(error) => return Err(error.into()),
+            }
+            progress.inc(1);
+        }
+    }
+    progress.finish_and_clear();
+    console.result(&text(&record, &file), &record)?;
+    match record.findings.len() {
+        0 => Ok(()),
+        count => Err(Error::Usage {
+            problem: format!("{count} thing(s) wrong in {file}"),
+            way_out: "restore it from a copy, or add the materials again".to_owned(),
+        }),
+    }
+}
+
+fn text(record: &Record, file: &str) -> String {
+    let Record { revisions, curves, fits, findings } = record;
+    let mut text: String =
+        findings.iter().map(|wrong| format!("{}: {}\n", wrong.place, wrong.problem)).collect();
+    text += &format!(
+        "looked at {revisions} revision(s), {curves} curve(s) and fitted {fits} again in {file}: {}\n",
+        if findings.is_empty() { "all is well" } else { "see above" }
+    );
+    text
+}
+
+/// The content hash was compared when the revision was read.
+fn revision(record: &mut Record, store: &Store, stored: &Stored, place: &str) -> Result<(), Error> {
+    record.revisions += 1;
+    let material = &stored.material;
+    if let Err(error) = material.validate() {
+        record.wrong(place, error);
+    }
+    for curve in &material.curves {
+        record.curves += 1;
+        let kept = store.statistics(&material.slug, Some(stored.revision), &curve.name)?;
+        // An older program kept none.
+        if !kept.is_empty() && !are_same(&kept, &by_angle(&curve.observations)) {
+            let place = format!("{place}, curve {}", curve.name);
+            record.wrong(&place, "its statistics are not those of its points");
+        }
+    }
+    material.fits.iter().for_each(|fit| again(record, material, fit, place));
+    Ok(())
+}
+
+/// Fits again what says how it was fitted.
+fn again(record: &mut Record, material: &Material, fit: &Fit, place: &str) {
+    let named = |curve: &&Curve| fit.curve.as_ref() == Some(&curve.name);
+    let Some(curve) = material.curves.iter().find(named).filter(|_| fit.report.is_some()) else {
+        return;
+    };
+    record.fits += 1;
+    let place = format!("{place}, fit {}", fit.name);
+    match Rows::from_observations(&curve.observations).map(|rows| differences(fit, &rows)) {
+        Ok(Ok(found)) => found.iter().for_each(|problem| record.wrong(&place, problem)),
+        Ok(Err(error)) => record.wrong(&place, error),
+        Err(error) => record.wrong(&place, error),
+    }
+}
+
+fn are_same(kept: &[AngleStatistics], made: &[AngleStatistics]) -> bool {
+    kept.len() == made.len() && std::iter::zip(kept, made).all(|(a, b)| is_same(a, b))
+}
+
+/// Whether two rows differ by rounding at most.
+fn is_same(a: &AngleStatistics, b: &AngleStatistics) -> bool {
+    const ROUNDING: f64 = 1e-9;
+    let near = |a: f64, b: f64| (a - b).abs() <= ROUNDING * a.abs().max(b.abs());
+    let both = |a: Option<f64>, b: Option<f64>| match (a, b) {
+        (Some(a), Some(b)) => near(a, b),
+        (a, b) => a == b,
+    };
+    let ends = |row: &AngleStatistics| [0, 1].map(|end| row.interval_95.map(|ends| ends[end]));
+    let numbers = |row: &AngleStatistics| {
+        let known = [row.theta_rad, row.mean].concat().into_iter().map(Some);
+        known.chain(row.quantiles).chain(ends(row)).chain([row.threshold_sigma0])
+    };
+    (a.points, a.censored_points) == (b.points, b.censored_points)
+        && numbers(a).zip(numbers(b)).all(|(a, b)| both(a, b))
+}

@@ -1,0 +1,106 @@
+//! A stored fit once more: whether its curve and its settings still give it.
+
+use super::{Fit, FitError, FitResult, Method};
+use crate::material::{self, FitReport};
+use crate::measure::curve::Curve;
+
+/// How far ln likelihoods, or half sums of squares, of two searches for one optimum may differ.
+const SAME_OBJECTIVE: f64 = 0.05;
+/// How far numbers may, in their standard deviations.
+const SAME_NUMBER_SD: f64 = 0.1;
+
+/// The settings that a fit was made with; `None` where its report does not say them.
+pub fn settings(report: &FitReport) -> Option<Fit> {
+    let given = |name: &str| report.given.iter().find(|g| g.name == name).map(|g| g.value);
+    let method = match report.method.as_str() {
+        "censored" => Method::Censored,
+        "mse" => Method::Mse { split_rad: given("method.split_rad")? },
+        "tls" | "tls-tail" => Method::Tls {
+            theta_sd_rad: given("method.theta_sd_rad")?,
+            level_sd_db: given("method.level_sd_db")?,
+        },
+        _ => return None,
+    };
+    let is_setting = |name: &str| name == "looks" || name.starts_with("method.");
+    let is_bound = |name: &str| name.ends_with(".min") || name.ends_with(".max");
+    let held = report.given.iter().filter(|g| !is_setting(&g.name) && !is_bound(&g.name));
+    let fixed = held.map(|g| (g.name.clone(), g.value)).collect();
+    let bounds = report.given.iter().filter_map(|g| {
+        let name = g.name.strip_suffix(".min")?;
+        Some((name.to_owned(), [g.value, given(&format!("{name}.max"))?]))
+    });
+    Some(Fit {
+        method,
+        fixed,
+        bounds: bounds.collect(),
+        looks: given("looks"),
+        noise_w: Some(report.noise_w).filter(|noise_w| *noise_w > 0.0),
+        starts: report.starts as usize,
+        seed: report.seed,
+    })
+}
+
+/// Fits the curve of a stored fit again, from what was found, and says what differs, a sentence each.
+/// Nothing is said of a fit without a report.
+///
+/// # Errors
+/// When the curve cannot be fitted with these settings.
+pub fn differences(stored: &material::Fit, curve: &Curve) -> Result<Vec<String>, FitError> {
+    let Some(report) = &stored.report else { return Ok(Vec::new()) };
+    let Some(fit) = settings(report) else {
+        let method = &report.method;
+        return Ok(vec![format!("the report does not say how the fit `{method}` was made")]);
+    };
+    let found = fit.run(&stored.model, curve)?;
+    if found.data_hash != report.data_hash {
+        return Ok(vec!["the curve is not the one that was fitted".to_owned()]);
+    }
+    Ok(compare(report, &found))
+}
+
+fn compare(report: &FitReport, found: &FitResult) -> Vec<String> {
+    let mut differences = Vec::new();
+    let gap = (report.objective - found.objective).abs();
+    if gap.is_nan() || gap > SAME_OBJECTIVE {
+        differences.push(format!(
+            "its objective is stored as {:.4}, and a new fit reaches {:.4}",
+            report.objective, found.objective
+        ));
+    }
+    for stored in &report.estimates {
+        let Some(sd) = stored.sd else { continue };
+        let new = found.estimate(&stored.name).map(|new| new.value);
+        if !new.is_some_and(|new| (new - stored.value).abs() <= SAME_NUMBER_SD * sd) {
+            let new = new.map_or("none".to_owned(), |new| format!("{new:.4e}"));
+            let (name, value) = (&stored.name, stored.value);
+            differences.push(format!("{name} is stored as {value:.4e}, and a new fit gives {new}"));
+        }
+    }
+    differences
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::twin::{Twin, mixture};
+    use super::*;
+
+    #[test]
+    fn a_fit_is_found_again_and_a_changed_one_is_not() {
+        let curve = Twin { rows: 300, ..Twin::default() }.curve(3);
+        let fixed = vec![("diffuse.alpha".to_owned(), 3.0)];
+        let bounds = vec![("specular.m".to_owned(), [0.01, 1.0])];
+        let fit = Fit { fixed, bounds, looks: Some(1.0), starts: 1, seed: 7, ..Fit::default() };
+        let found = fit.run(&mixture(0.1, 3.0, 0.02, 0.004), &curve).unwrap();
+        let mut stored = found.stored("fit", "scan", "bench");
+        assert_eq!(settings(stored.report.as_ref().unwrap()), Some(fit));
+        assert_eq!(differences(&stored, &curve), Ok(Vec::new()));
+        let other = Twin { rows: 300, ..Twin::default() }.curve(4);
+        let said = differences(&stored, &other).unwrap();
+        assert!(said[0].contains("not the one that was fitted"), "{said:?}");
+        let report = stored.report.as_mut().unwrap();
+        let told = report.estimates.iter_mut().find(|e| e.sd.is_some()).unwrap();
+        told.value += told.sd.unwrap();
+        report.objective += 1.0;
+        assert_eq!(differences(&stored, &curve).unwrap().len(), 2);
+    }
+}

@@ -1,0 +1,98 @@
+//! What a material is made of and how its surface is: layers, permittivities, roughness.
+//!
+//! A permittivity is relative and written ε = ε′ − jε″ for fields that go as exp(+jωt): a passive
+//! material has ε″ ≥ 0.
+
+use serde::Serialize;
+
+use super::check::{Check, MaterialError, value};
+
+/// One layer of a material; they are listed from the outermost inwards.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Layer {
+    /// What it is.
+    pub name: String,
+    /// Thickness, m, above 0; none for a half space, which only the last layer can be.
+    pub thickness_m: Option<f64>,
+    /// Key of its permittivity; none where nobody knows it.
+    pub permittivity: Option<String>,
+}
+
+/// The permittivity of a substance at one frequency and temperature.
+///
+/// A key may stand at several frequencies and temperatures, once at each.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Permittivity {
+    /// The substance, by which layers name it.
+    pub key: String,
+    /// Frequency, Hz, above 0.
+    pub frequency_hz: f64,
+    /// Temperature, K, above 0; none where the source does not say.
+    pub temperature_k: Option<f64>,
+    /// ε′, relative; negative only in metals and plasmas.
+    pub real: f64,
+    /// ε″, relative, 0 or more.
+    pub imaginary: f64,
+    /// Standard deviation of ε′, 0 or more; none where the source gives none.
+    pub real_sd: Option<f64>,
+    /// Standard deviation of ε″, 0 or more; none where the source gives none.
+    pub imaginary_sd: Option<f64>,
+    /// Key of the source.
+    pub source: String,
+}
+
+/// How rough the outer surface is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Roughness {
+    /// Root mean square of heights, m, 0 or more.
+    pub rms_height_m: f64,
+    /// Length over which heights are correlated, m, above 0; none where nobody measured it.
+    pub correlation_length_m: Option<f64>,
+    /// How it was found: profilometer, sampling length, filter, or the standard of a finish.
+    pub method: Option<String>,
+    /// Key of the source.
+    pub source: String,
+}
+
+impl Layer {
+    pub(super) fn validate(&self, place: &str, is_last: bool) -> Result<(), MaterialError> {
+        if self.name.trim().is_empty() {
+            return Err(value(place, "has no name", "say what the layer is"));
+        }
+        if self.thickness_m.is_none() && !is_last {
+            let way_out = "give thickness_mm; only the last layer can be a half space";
+            return Err(value(place, "has no thickness", way_out));
+        }
+        Check::new(place).positive("the thickness", self.thickness_m)
+    }
+}
+
+impl Permittivity {
+    pub(super) fn validate(&self, place: &str) -> Result<(), MaterialError> {
+        let check = Check::new(place);
+        check.positive("the frequency", [self.frequency_hz])?;
+        check.positive("the temperature above absolute zero", self.temperature_k)?;
+        check.finite("the real part", [self.real])?;
+        if self.imaginary < 0.0 {
+            let problem = "the imaginary part is negative, which would amplify";
+            return Err(value(place, problem, "write eps' - j eps'' with eps'' of 0 or more"));
+        }
+        check.not_negative("the imaginary part", [self.imaginary])?;
+        check.not_negative("a deviation", [self.real_sd, self.imaginary_sd].into_iter().flatten())
+    }
+
+    /// Whether two entries speak of the same thing.
+    pub(super) fn is_same_place(&self, other: &Permittivity) -> bool {
+        self.key == other.key
+            && self.frequency_hz == other.frequency_hz
+            && self.temperature_k == other.temperature_k
+    }
+}
+
+impl Roughness {
+    pub(super) fn validate(&self) -> Result<(), MaterialError> {
+        let check = Check::new("roughness");
+        check.not_negative("the rms height", [self.rms_height_m])?;
+        check.positive("the correlation length", self.correlation_length_m)
+    }
+}

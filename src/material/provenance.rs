@@ -1,0 +1,266 @@
+//! Where numbers come from: sources, sessions of measurement, and the commands that made a revision.
+
+use serde::{Deserialize, Serialize};
+
+use super::check::{Check, MaterialError, value};
+
+/// Where numbers come from.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Source {
+    /// Key within the material.
+    pub key: String,
+    /// How the numbers came to be.
+    pub kind: SourceKind,
+    /// Citation or, for our own numbers, how they were made.
+    pub title: String,
+    /// Digital object identifier, without a resolver in front.
+    pub doi: Option<String>,
+    /// Address, where there is no DOI.
+    pub url: Option<String>,
+    /// SPDX identifier of the licence of the source's data.
+    pub licence: Option<String>,
+    /// What was taken and how it was turned into our numbers.
+    pub note: Option<String>,
+    /// What a list of references needs beyond the title.
+    #[serde(skip_serializing_if = "Citation::is_empty")]
+    pub citation: Citation,
+    /// How the numbers got from there to here.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub making: Option<Making>,
+}
+
+/// What a list of references needs beyond a title, a DOI and an address.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Citation {
+    /// Authors, each as `Family, Given`; an organisation as it writes itself.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub authors: Vec<String>,
+    /// Year of publication, 1000 to 9999.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub year: Option<u16>,
+    /// Journal, book, conference or archive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub container: Option<String>,
+    /// Volume of the container.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volume: Option<String>,
+    /// Pages or article number.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pages: Option<String>,
+    /// Publisher or institution.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub publisher: Option<String>,
+}
+
+/// How numbers came to be. The four are never mixed up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SourceKind {
+    /// Somebody measured this.
+    Measured,
+    /// A publication states it.
+    Literature,
+    /// A physical model computed it from other numbers.
+    Modelled,
+    /// Chosen so that something plausible can be rendered; nobody measured it.
+    Synthetic,
+}
+
+impl SourceKind {
+    /// The word that files and the database use.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            SourceKind::Measured => "measured",
+            SourceKind::Literature => "literature",
+            SourceKind::Modelled => "modelled",
+            SourceKind::Synthetic => "synthetic",
+        }
+    }
+}
+
+/// How numbers got from their source into a material.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Making {
+    /// Whoever made this entry measured them.
+    OwnMeasurement,
+    /// Copied from a data file, a table or a text.
+    Copied,
+    /// Read off a printed figure.
+    Digitised,
+    /// Computed from what the source states.
+    Computed,
+}
+
+impl Making {
+    /// The word that files and the database use.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Making::OwnMeasurement => "own-measurement",
+            Making::Copied => "copied",
+            Making::Digitised => "digitised",
+            Making::Computed => "computed",
+        }
+    }
+}
+
+/// One sitting in which curves were measured.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Session {
+    /// Key within the material.
+    pub key: String,
+    /// Day, ISO 8601: `2026-03-14`.
+    pub date: String,
+    /// Temperature of the air, K, above 0.
+    pub temperature_k: Option<f64>,
+    /// Relative humidity of the air, 0 to 1.
+    pub relative_humidity: Option<f64>,
+    /// BLAKE3 of the measured cloud's file, hexadecimal.
+    pub cloud_hash: Option<String>,
+    /// BLAKE3 of the mesh's file, hexadecimal.
+    pub mesh_hash: Option<String>,
+    /// Root mean square of what the registration of cloud to mesh left over, m, 0 or more.
+    pub registration_rms_m: Option<f64>,
+    /// Standard deviation of a normal by the error of measurement, rad, 0 to π/2.
+    pub normal_sd_rad: Option<f64>,
+    /// Standard deviation of the normals within one footprint, rad, 0 to π/2.
+    pub footprint_sd_rad: Option<f64>,
+    /// Where the mesh stood in the radar's frame.
+    pub pose: Option<SessionPose>,
+    /// Anything else that a reader must know.
+    pub note: Option<String>,
+}
+
+/// A rotation and a shift: x → rotation·x + translation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SessionPose {
+    /// Rows of the rotation matrix.
+    pub rotation_rows: [[f64; 3]; 3],
+    /// Shift along x, y and z, m.
+    pub translation_m: [f64; 3],
+}
+
+/// Which command made a revision, and of what.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Activity {
+    /// Name of the command, such as `fit`.
+    pub command: String,
+    /// The files that it read.
+    pub inputs: Vec<Input>,
+}
+
+/// A file that a command read.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Input {
+    /// Name of the file, without its folder.
+    pub name: String,
+    /// BLAKE3 of its bytes, hexadecimal.
+    pub hash: String,
+}
+
+impl Citation {
+    /// Whether nothing is known.
+    pub fn is_empty(&self) -> bool {
+        *self == Citation::default()
+    }
+}
+
+impl Source {
+    pub(super) fn validate(&self) -> Result<(), MaterialError> {
+        let place = format!("source `{}`", self.key);
+        if self.title.trim().is_empty() {
+            return Err(value(&format!("{place}: title"), "is empty", "fill it in"));
+        }
+        if self.citation.year.is_some_and(|year| !(1000..=9999).contains(&year)) {
+            return Err(value(&place, "the year has not four digits", "mend it or leave it out"));
+        }
+        if self.citation.authors.iter().any(|author| author.trim().is_empty()) {
+            return Err(value(&place, "an author has no name", "fill it in or leave it out"));
+        }
+        Ok(())
+    }
+}
+
+impl Session {
+    pub(super) fn validate(&self) -> Result<(), MaterialError> {
+        let place = format!("session `{}`", self.key);
+        let check = Check::new(&place);
+        if !is_date(&self.date) {
+            let problem = format!("`{}` is not a date", self.date.escape_debug());
+            return Err(value(&place, &problem, "write it as 2026-03-14"));
+        }
+        check.positive("the temperature above absolute zero", self.temperature_k)?;
+        if self.relative_humidity.is_some_and(|share| !(0.0..=1.0).contains(&share)) {
+            return Err(value(&place, "the humidity is not within 0–100 %", "mend the number"));
+        }
+        let hashes = [("cloud", &self.cloud_hash), ("mesh", &self.mesh_hash)];
+        for (what, hash) in hashes {
+            if hash.as_ref().is_some_and(|hash| !is_hash(hash)) {
+                let problem = format!("the hash of the {what} is not 64 hexadecimal digits");
+                return Err(value(&place, &problem, "give what `b3sum` prints, or leave it out"));
+            }
+        }
+        check.not_negative("the residual of the registration", self.registration_rms_m)?;
+        check.quarter_turn("the deviation of the normals", self.normal_sd_rad)?;
+        check.quarter_turn("the spread over the footprint", self.footprint_sd_rad)?;
+        match self.pose.is_none_or(|pose| pose.is_rigid()) {
+            true => Ok(()),
+            false => Err(value(&place, "the pose is no rotation with a shift", "mend its rows")),
+        }
+    }
+}
+
+impl SessionPose {
+    fn is_rigid(&self) -> bool {
+        // What a file with six digits leaves of orthogonality.
+        const ROUNDING: f64 = 1e-5;
+        let [x, y, z] = self.rotation_rows.map(glam::DVec3::from_array);
+        let unit = [x, y, z].iter().all(|row| (row.length() - 1.0).abs() < ROUNDING);
+        let right_handed = (x.cross(y) - z).length() < ROUNDING;
+        unit && right_handed && self.translation_m.iter().all(|shift_m| shift_m.is_finite())
+    }
+}
+
+/// Whether a text is 64 lower-case hexadecimal digits.
+pub(super) fn is_hash(text: &str) -> bool {
+    text.len() == 64 && text.chars().all(|c| c.is_ascii_digit() || ('a'..='f').contains(&c))
+}
+
+/// Whether a text is a day of the Gregorian calendar as ISO 8601 writes it.
+fn is_date(text: &str) -> bool {
+    let number = |from: usize, to: usize| {
+        let digits = text.get(from..to).filter(|d| d.chars().all(|c| c.is_ascii_digit()))?;
+        digits.parse::<u32>().ok()
+    };
+    let dashes = text.get(4..5) == Some("-") && text.get(7..8) == Some("-");
+    let (Some(year), Some(month), Some(day)) = (number(0, 4), number(5, 7), number(8, 10)) else {
+        return false;
+    };
+    let is_leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
+    let days = match month {
+        2 if is_leap => 29,
+        2 => 28,
+        4 | 6 | 9 | 11 => 30,
+        1..=12 => 31,
+        _ => 0,
+    };
+    text.len() == 10 && dashes && (1..=days).contains(&day)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_days_of_the_calendar_are_dates() {
+        for day in ["2026-03-14", "2024-02-29", "2000-02-29", "1999-12-31"] {
+            assert!(is_date(day), "{day}");
+        }
+        for text in
+            ["2026-02-29", "1900-02-29", "2026-13-01", "2026-1-1", "14.3.2026", "2026-03-14T00", ""]
+        {
+            assert!(!is_date(text), "{text}");
+        }
+    }
+}
