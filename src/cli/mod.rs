@@ -10,6 +10,7 @@ mod curves;
 mod diagnose;
 mod effects;
 mod fit;
+mod import;
 mod list;
 mod materials;
 mod measure;
@@ -22,6 +23,7 @@ mod rm;
 mod show;
 mod staging;
 mod summary;
+mod verify;
 
 use std::path::PathBuf;
 
@@ -78,6 +80,8 @@ enum Command {
     Fit(Box<fit::Args>),
     Rm(rm::Args),
     Publish(publish::Args),
+    Verify(verify::Args),
+    Import(import::Args),
     Completions(completions::Args),
 }
 
@@ -103,6 +107,8 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Fit(args) => fit::run(args, db, &console),
         Command::Rm(args) => rm::run(args, db, &console),
         Command::Publish(args) => publish::run(args, db, &console),
+        Command::Verify(args) => verify::run(args, &console),
+        Command::Import(args) => import::run(args, db, &console),
         Command::Completions(args) => completions::run(args),
     }
 }
