@@ -9,14 +9,14 @@ use std::path::Path;
 
 use matdb::store::Store;
 use serde_json::Value;
-use support::database::{changed, contents, sample, with_effects};
+use support::database::{changed, contents, sample, sound};
 use support::{entries, list_hashes, matdb, refused};
 
 /// Two folders: theirs with a published `site`, and ours with a database in which `paint` differs.
 fn laboratories() -> (tempfile::TempDir, tempfile::TempDir) {
     let (theirs, ours) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let mut store = Store::open(theirs.path().join("matdb.sqlite")).unwrap();
-    store.add([&sample("paint"), &with_effects("primer"), &sample("same")]).unwrap();
+    store.add([&sample("paint"), &sound("primer"), &sample("same")]).unwrap();
     store.add([&changed("primer")]).unwrap();
     drop(store);
     matdb(theirs.path()).args(["publish", "site", "-q"]).assert().success();
@@ -58,7 +58,7 @@ fn what_is_missing_comes_with_its_revisions_and_what_differs_stays() {
     let after = contents(&database);
     assert_eq!(after.len(), before.len() + 2);
     assert!(before.iter().all(|material| after.contains(material)));
-    assert!([with_effects("primer"), changed("primer")].iter().all(|m| after.contains(m)));
+    assert!([sound("primer"), changed("primer")].iter().all(|m| after.contains(m)));
     let again = import(ours.path(), &site, &[]);
     assert_eq!(results(&again)[1], ("primer", "unchanged"));
     assert_eq!(contents(&database), after);
@@ -193,7 +193,7 @@ fn sql(site: &Path, statement: &str) {
 #[test]
 fn an_effect_that_nobody_knows_takes_everything_back() {
     let (theirs, ours) = laboratories();
-    let mut strange = with_effects("zinc");
+    let mut strange = sound("zinc");
     strange.effects[0].name = "telepathy".to_owned();
     Store::open(theirs.path().join("matdb.sqlite")).unwrap().add([&strange]).unwrap();
     matdb(theirs.path()).args(["publish", "site", "-q"]).assert().success();

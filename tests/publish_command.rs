@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use matdb::store::Store;
 use serde_json::Value;
-use support::database::{bytes, contents, sample, with_effects};
+use support::database::{bytes, contents, sample, sound, with_effects};
 use support::json_schema::problems;
 use support::{matdb, refused};
 
@@ -25,7 +25,7 @@ const ABOUT: &str = "title = 'Paints <of> \"ours\"'\nversion = '1.0'\ndoi = '10.
 fn laboratory() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Store::open(folder.path().join("matdb.sqlite")).unwrap();
-    store.add([&sample("paint"), &with_effects("primer")]).unwrap();
+    store.add([&sample("paint"), &sound("primer")]).unwrap();
     store.add([&support::database::changed("paint")]).unwrap();
     fs::write(folder.path().join("about.toml"), ABOUT).unwrap();
     folder
@@ -89,6 +89,8 @@ fn the_database_beside_the_site_is_the_laboratorys() {
 fn every_json_file_is_as_its_schema_says() {
     let folder = laboratory();
     matdb(folder.path()).args(["add", "--all", "-q"]).assert().success();
+    let mut store = Store::open(folder.path().join("matdb.sqlite")).unwrap();
+    store.add([&with_effects("reported")]).unwrap();
     publish(folder.path());
     let site = folder.path().join("site");
     let mut checked = 0;
@@ -106,7 +108,7 @@ fn every_json_file_is_as_its_schema_says() {
     for entry in fs::read_dir(site.join("api/v1/materials")).unwrap() {
         check("material.json", &entry.unwrap().path());
     }
-    assert_eq!(checked, 10);
+    assert_eq!(checked, 11);
 }
 
 #[test]
@@ -122,7 +124,7 @@ fn a_table_has_every_row_bit_for_bit_and_a_unit_for_every_number() {
     assert_eq!(rows.len(), 9, "three revisions of three points");
     let points: Vec<(f64, Option<f64>)> =
         rows.iter().map(|row| (row[theta].parse().unwrap(), row[sigma0].parse().ok())).collect();
-    let of_paint = with_effects("primer").curves[0].observations.clone();
+    let of_paint = sound("primer").curves[0].observations.clone();
     assert!(of_paint.iter().all(|o| points.contains(&(o.theta_i_rad, o.sigma0))));
     let units = fs::read_to_string(site.join("tables/units.csv")).unwrap();
     assert!(units.contains("observation,theta_i_rad,rad,\n"), "{units}");

@@ -159,7 +159,11 @@ fn stranger(target: &Path) -> io::Result<Option<String>> {
         sums => sums?,
     };
     let listed: BTreeSet<&str> = sums.lines().filter_map(|line| line.get(66..)).collect();
-    let is_ours = |path: &str| listed.contains(INDEX) && (path == SUMS || listed.contains(path));
+    if !listed.contains(INDEX) {
+        let first = fs::read_dir(target)?.next().transpose()?;
+        return Ok(first.map(|entry| entry.file_name().to_string_lossy().into_owned()));
+    }
+    let is_ours = |path: &str| path == SUMS || listed.contains(path);
     Ok(files(target)?.into_iter().map(|(path, _)| path).find(|path| !is_ours(path)))
 }
 

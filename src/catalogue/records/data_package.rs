@@ -106,7 +106,7 @@ fn schema(table: &Table) -> Value {
     let mut schema = json!({
         "fields": fields,
         "missingValues": [""],
-        "foreignKeys": table.references.iter().map(reference).collect::<Vec<_>>(),
+        "foreignKeys": table.references.iter().filter(is_whole).map(reference).collect::<Vec<_>>(),
     });
     if !table.key.is_empty() {
         schema["primaryKey"] = table.key.clone().into();

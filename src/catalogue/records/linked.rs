@@ -115,7 +115,9 @@ pub(super) fn crate_metadata(context: &Context, sums: &BTreeMap<String, Sum>) ->
     let mut root = common(context);
     root["@id"] = "./".into();
     root["license"] = json!({ "@id": licence });
-    root["author"] = ids(&people).into();
+    let mut authors = ids(&people);
+    // A list of one should stand without its brackets.
+    root["author"] = if authors.len() == 1 { authors.remove(0) } else { authors.into() };
     root["hasPart"] = parts.into();
     graph.push(root);
     graph.push(json!({ "@id": licence, "@type": "CreativeWork", "name": context.about.licence,
