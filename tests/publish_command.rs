@@ -2,9 +2,10 @@
 //! are; the same database gives the same bytes; a folder is replaced as a whole or not at all; and
 //! `matdb verify` sees whatever was changed afterwards.
 //!
-//! Checked by hand with the peers' own tools on a publication of a fitted material with a curve:
-//! frictionless 5 (`frictionless validate datapackage.json`), rocrate-validator (`rocrate-validator
-//! validate -p ro-crate-1.1`), cffconvert 2 (`cffconvert --validate`), Python's jsonschema 4, pyarrow.
+//! Checked by hand with the peers' own tools on a publication of the built-in materials, two of them
+//! fitted: frictionless 5.16.1 (`frictionless validate datapackage.json`: all resources valid, keys and
+//! references included), roc-validator 0.13.0 (RO-Crate 1.1, every requirement met), cffconvert 2.0.0
+//! (`--validate`), jsonschema 4.26.0 (schemas by their own schema, every file by them).
 
 mod support;
 
@@ -207,6 +208,38 @@ fn what_cannot_be_written_leaves_everything_as_it_was() {
     refused(matdb(at).args(["publish", "file/site", "-q"]));
     refused(matdb(at).args(["publish", "file", "-q"]));
     assert_eq!(fs::read(at.join("file")).unwrap(), b"x");
+}
+
+#[test]
+fn a_killed_publication_leaves_a_whole_one() {
+    let folder = laboratory();
+    let at = folder.path();
+    let mut store = Store::open(at.join("matdb.sqlite")).unwrap();
+    let many: Vec<_> = (0..200).map(|number| sample(&format!("of-many-{number}"))).collect();
+    store.add(&many).unwrap();
+    publish(at);
+    store.add([&sample("one-more")]).unwrap();
+    drop(store);
+    let site = at.join("site");
+    let old = fs::read(site.join("SHA256SUMS")).unwrap();
+    let mut killed = 0;
+    for delay_ms in [1, 5, 20, 50, 100] {
+        let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("matdb"))
+            .args(["publish", "site", "-q"])
+            .current_dir(at)
+            .env_remove("MATDB")
+            .spawn()
+            .unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(delay_ms));
+        child.kill().unwrap();
+        killed += u32::from(!child.wait().unwrap().success());
+        let said = matdb::catalogue::verify(&site).unwrap();
+        assert_eq!(said.problems, [], "after {delay_ms} ms");
+        if fs::read(site.join("SHA256SUMS")).unwrap() != old {
+            break;
+        }
+    }
+    assert!(killed > 0);
 }
 
 type Spoil = fn(&Path);

@@ -101,6 +101,9 @@ fn resource(path: &str, sum: &Sum, media_type: &str, written: Option<&Written>) 
 }
 
 fn schema(table: &Table) -> Value {
+    // To SQL a reference that lacks one of its values refers to nothing; to a data package it dangles.
+    let is_nullable = |name: &String| table.columns.iter().any(|c| c.name == *name && !c.required);
+    let is_whole = |r: &&Reference| !r.columns.iter().any(is_nullable);
     let reference = |r: &Reference| json!({ "fields": r.columns, "reference": { "resource": r.table, "fields": r.keys } });
     let fields: Vec<Value> = table.columns.iter().map(|column| field(table, column)).collect();
     let mut schema = json!({
