@@ -1,6 +1,6 @@
 //! Promise: a Parquet table of a publication holds, cell for cell, what the CSV beside it holds.
 //!
-//! Also read by hand with pyarrow, which is no relation of the writer.
+//! Also read by hand with pyarrow 26.0.1, which is no relation of the writer.
 
 mod support;
 

@@ -131,12 +131,13 @@ fn copy(conn: &Connection, path: &str) -> Result<()> {
     done.map(|_| ())
 }
 
-fn schema(conn: &Connection) -> Result<Vec<(String, String, String, Option<String>)>> {
+/// Kind, name, table and statement of everything in the file.
+fn schema(conn: &Connection) -> Result<Vec<[Option<String>; 4]>> {
     // What ANALYZE leaves helps to find rows and answers nothing.
     let sql = "SELECT type, name, tbl_name, sql FROM sqlite_schema
                WHERE name NOT LIKE 'sqlite\\_stat%' ESCAPE '\\' ORDER BY type, name";
     conn.prepare(sql)?
-        .query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?)))?
+        .query_map([], |row| Ok([row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?]))?
         .collect()
 }
 

@@ -104,17 +104,20 @@ fn schema(table: &Table) -> Value {
     // To SQL a reference that lacks one of its values refers to nothing; to a data package it dangles.
     let is_nullable = |name: &String| table.columns.iter().any(|c| c.name == *name && !c.required);
     let is_whole = |r: &&Reference| !r.columns.iter().any(is_nullable);
-    let reference = |r: &Reference| json!({ "fields": r.columns, "reference": { "resource": r.table, "fields": r.keys } });
     let fields: Vec<Value> = table.columns.iter().map(|column| field(table, column)).collect();
     let mut schema = json!({
         "fields": fields,
         "missingValues": [""],
-        "foreignKeys": table.references.iter().filter(is_whole).map(reference).collect::<Vec<_>>(),
+        "foreignKeys": table.references.iter().filter(is_whole).map(foreign_key).collect::<Vec<_>>(),
     });
     if !table.key.is_empty() {
         schema["primaryKey"] = table.key.clone().into();
     }
     schema
+}
+
+fn foreign_key(r: &Reference) -> Value {
+    json!({ "fields": r.columns, "reference": { "resource": r.table, "fields": r.keys } })
 }
 
 fn field(table: &Table, column: &Column) -> Value {
