@@ -15,12 +15,65 @@ pub enum CatalogueError {
     Store(#[from] StoreError),
     /// The folder holds something else than an earlier publication; it was not touched.
     #[error(
-        "{} is not empty and holds no publication of matdb; name a new folder, or empty this one",
+        "{} holds `{stranger}`, which no publication of matdb has put there; name a new folder, or move \
+         that away",
         folder.display()
     )]
     Occupied {
         /// The folder.
         folder: PathBuf,
+        /// A file in it, by its path from there.
+        stranger: String,
+    },
+    /// What stands there was published, but its record of changes cannot be continued.
+    #[error(
+        "cannot continue the change log of the earlier publication: {}: {problem}; publish into a new \
+         folder, or put that file back as it was",
+        file.display()
+    )]
+    Earlier {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// A bundle that cannot be trusted.
+    #[error("{}: {problem}; nothing was imported, ask whoever made it for a sound copy", bundle.display())]
+    Unsound {
+        /// The folder or database.
+        bundle: PathBuf,
+        /// The first thing that is wrong.
+        problem: String,
+    },
+    /// What was named is no catalogue.
+    #[error("{} is no catalogue: {problem}; name a published folder or its catalogue.sqlite", path.display())]
+    NoBundle {
+        /// What was named.
+        path: PathBuf,
+        /// Why.
+        problem: String,
+    },
+    /// A prefix that makes no name of a material.
+    #[error("with the prefix `{prefix}`, {problem}")]
+    Prefix {
+        /// The prefix.
+        prefix: String,
+        /// Which name it would make.
+        problem: String,
+    },
+    /// Somebody else has written to the database meanwhile; nothing was imported.
+    #[error("`{slug}` was changed by another program meanwhile; nothing was imported, try again")]
+    Overtaken {
+        /// The material.
+        slug: String,
+    },
+    /// A table cannot be written in its format.
+    #[error("cannot write {}: {problem}; please report this", path.display())]
+    Encoding {
+        /// The file.
+        path: PathBuf,
+        /// What the writer says.
+        problem: String,
     },
     /// A file or folder cannot be read or written.
     #[error("cannot {verb} {}: {reason}; make room or choose another folder", path.display())]

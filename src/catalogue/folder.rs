@@ -1,9 +1,9 @@
 //! The only way in which files of a publication are written: into a folder beside the target, which
 //! takes the target's place when everything is there.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
@@ -11,15 +11,27 @@ use tempfile::{Builder, TempDir};
 
 use super::CatalogueError;
 
-/// Tells a publication from somebody's own folder.
-const MARK: &str = "SHA256SUMS";
+/// The list of hashes, which tells a publication from somebody's own folder.
+pub(super) const SUMS: &str = "SHA256SUMS";
+
+/// A file that every publication has.
+pub(super) const INDEX: &str = "api/v1/index.json";
+
+/// A file of a publication.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Sum {
+    /// SHA-256, hexadecimal.
+    pub sha256: String,
+    /// Its length.
+    pub bytes: u64,
+}
 
 /// A publication that is being written. What is dropped before it is [kept](Folder::keep) leaves no trace.
 #[derive(Debug)]
 pub struct Folder {
     target: PathBuf,
     staged: TempDir,
-    sums: BTreeMap<String, String>,
+    sums: BTreeMap<String, Sum>,
 }
 
 impl Folder {
@@ -32,8 +44,8 @@ impl Folder {
             let path = path.to_owned();
             move |reason| CatalogueError::Io { verb, path, reason }
         };
-        if is_occupied(target).map_err(io("read", target))? {
-            return Err(CatalogueError::Occupied { folder: target.to_owned() });
+        if let Some(stranger) = stranger(target).map_err(io("read", target))? {
+            return Err(CatalogueError::Occupied { folder: target.to_owned(), stranger });
         }
         let beside = match target.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -53,7 +65,7 @@ impl Folder {
 
     /// What stood at the target before, if anything did.
     pub fn before(&self) -> Option<&Path> {
-        self.target.join(MARK).is_file().then_some(self.target.as_path())
+        self.target.join(SUMS).is_file().then_some(self.target.as_path())
     }
 
     /// Writes a whole file; `path` is relative, its parts joined by `/`.
@@ -74,17 +86,37 @@ impl Folder {
         write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), CatalogueError> {
         let place = self.staged.path().join(path);
-        let sum = write_hashed(&place, write).map_err(|reason| CatalogueError::Io {
-            verb: "write",
-            path: self.target.join(path),
-            reason,
-        })?;
+        let sum = write_hashed(&place, write).map_err(|reason| self.unwritable(path, reason))?;
         self.sums.insert(path.to_owned(), sum);
         Ok(())
     }
 
-    /// SHA-256 of every file so far, hexadecimal, by path.
-    pub fn sums(&self) -> &BTreeMap<String, String> {
+    /// Lets `make` write a file by its path, for writers that take nothing else. The file keeps this
+    /// path, which is returned, until everything is put in place, and must not change any more.
+    ///
+    /// # Errors
+    /// When it cannot be written, and those of `make`.
+    pub fn place<E: From<CatalogueError>>(
+        &mut self,
+        path: &str,
+        make: impl FnOnce(&Path) -> Result<(), E>,
+    ) -> Result<PathBuf, E> {
+        let place = self.staged.path().join(path);
+        if let Some(folder) = place.parent() {
+            fs::create_dir_all(folder).map_err(|reason| self.unwritable(path, reason))?;
+        }
+        make(&place)?;
+        let sum = File::open(&place).and_then(hashed);
+        self.sums.insert(path.to_owned(), sum.map_err(|reason| self.unwritable(path, reason))?);
+        Ok(place)
+    }
+
+    fn unwritable(&self, path: &str, reason: io::Error) -> CatalogueError {
+        CatalogueError::Io { verb: "write", path: self.target.join(path), reason }
+    }
+
+    /// Hash and length of every file so far, by path.
+    pub fn sums(&self) -> &BTreeMap<String, Sum> {
         &self.sums
     }
 
@@ -93,8 +125,9 @@ impl Folder {
     /// # Errors
     /// When the places cannot be exchanged; what was there then stays.
     pub fn keep(mut self) -> Result<(), CatalogueError> {
-        let list: String = self.sums.iter().map(|(path, sum)| format!("{sum}  {path}\n")).collect();
-        self.write(MARK, list.as_bytes())?;
+        let list: String =
+            self.sums.iter().map(|(path, sum)| format!("{}  {path}\n", sum.sha256)).collect();
+        self.write(SUMS, list.as_bytes())?;
         let Folder { target, staged, .. } = self;
         let failed = |reason| CatalogueError::Io { verb: "write", path: target.clone(), reason };
         let aside = staged.path().with_extension("before");
@@ -116,36 +149,84 @@ impl Folder {
     }
 }
 
-fn is_occupied(target: &Path) -> io::Result<bool> {
-    if !target.exists() || target.join(MARK).is_file() {
-        return Ok(false);
+/// What in a folder belongs to no publication, so that it may not be replaced.
+fn stranger(target: &Path) -> io::Result<Option<String>> {
+    if !target.exists() {
+        return Ok(None);
     }
-    Ok(fs::read_dir(target)?.next().is_some())
+    let sums = match fs::read_to_string(target.join(SUMS)) {
+        Err(reason) if reason.kind() == io::ErrorKind::NotFound => String::new(),
+        sums => sums?,
+    };
+    let listed: BTreeSet<&str> = sums.lines().filter_map(|line| line.get(66..)).collect();
+    if !listed.contains(INDEX) {
+        let first = fs::read_dir(target)?.next().transpose()?;
+        return Ok(first.map(|entry| entry.file_name().to_string_lossy().into_owned()));
+    }
+    let is_ours = |path: &str| path == SUMS || listed.contains(path);
+    Ok(files(target)?.into_iter().map(|(path, _)| path).find(|path| !is_ours(path)))
+}
+
+/// Every file below a folder, sorted: its path relative to it, the parts joined by `/`, and whether it
+/// is a plain file. Links are not followed.
+pub(super) fn files(root: &Path) -> io::Result<Vec<(String, bool)>> {
+    let mut found = Vec::new();
+    let mut folders = vec![(root.to_owned(), String::new())];
+    while let Some((folder, prefix)) = folders.pop() {
+        for entry in fs::read_dir(folder)? {
+            let entry = entry?;
+            let path = format!("{prefix}{}", entry.file_name().to_string_lossy());
+            let kind = entry.file_type()?;
+            match kind.is_dir() {
+                true => folders.push((entry.path(), format!("{path}/"))),
+                false => found.push((path, kind.is_file())),
+            }
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// Hash and length of what is left to read.
+pub(super) fn hashed(mut file: impl Read) -> io::Result<Sum> {
+    let mut sink = Hashed { out: io::sink(), hash: Sha256::new(), bytes: 0 };
+    io::copy(&mut file, &mut sink)?;
+    Ok(sink.sum())
 }
 
 fn write_hashed(
     place: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> io::Result<String> {
+) -> io::Result<Sum> {
     if let Some(folder) = place.parent() {
         fs::create_dir_all(folder)?;
     }
-    let mut out = Hashed { out: BufWriter::new(File::create(place)?), hash: Sha256::new() };
+    let out = BufWriter::new(File::create(place)?);
+    let mut out = Hashed { out, hash: Sha256::new(), bytes: 0 };
     write(&mut out)?;
-    out.out.flush()?;
-    Ok(out.hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+    out.flush()?;
+    Ok(out.sum())
 }
 
-/// A file whose bytes are hashed on the way.
-struct Hashed {
-    out: BufWriter<File>,
+/// What is written is hashed on the way.
+struct Hashed<W> {
+    out: W,
     hash: Sha256,
+    bytes: u64,
 }
 
-impl Write for Hashed {
+impl<W> Hashed<W> {
+    fn sum(self) -> Sum {
+        let sha256 = self.hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+        Sum { sha256, bytes: self.bytes }
+    }
+}
+
+impl<W: Write> Write for Hashed<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = self.out.write(bytes)?;
         self.hash.update(bytes.get(..written).unwrap_or(bytes));
+        self.bytes += written as u64;
         Ok(written)
     }
 
@@ -164,6 +245,7 @@ mod tests {
         let target = root.path().join("a/site");
         let mut first = Folder::new(&target).unwrap();
         first.write("x/old.txt", b"1").unwrap();
+        first.write(INDEX, b"{}").unwrap();
         assert!(!target.exists());
         first.keep().unwrap();
         assert_eq!(fs::read(target.join("x/old.txt")).unwrap(), b"1");
@@ -172,7 +254,7 @@ mod tests {
         drop(Folder::new(&target).unwrap());
         second.keep().unwrap();
         assert!(!target.join("x").exists());
-        let sums = fs::read_to_string(target.join(MARK)).unwrap();
+        let sums = fs::read_to_string(target.join(SUMS)).unwrap();
         // SHA-256 of "abc", FIPS 180-2 appendix B.1.
         assert!(
             sums.starts_with("ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad")
@@ -183,7 +265,21 @@ mod tests {
     #[test]
     fn somebodys_own_folder_is_left_alone() {
         let root = tempfile::tempdir().unwrap();
+        let occupied = |target: &Path| match Folder::new(target) {
+            Err(CatalogueError::Occupied { stranger, .. }) => stranger,
+            other => panic!("{other:?}"),
+        };
         fs::write(root.path().join("thesis.txt"), "").unwrap();
-        assert!(matches!(Folder::new(root.path()), Err(CatalogueError::Occupied { .. })));
+        assert_eq!(occupied(root.path()), "thesis.txt");
+        // Others hash their files, too.
+        let mine = root.path().join("mine");
+        let sums = |path: &str| fs::write(mine.join(SUMS), format!("{:064}  {path}\n", 0)).unwrap();
+        fs::create_dir(&mine).unwrap();
+        sums("a.iso");
+        assert_eq!(occupied(&mine), SUMS);
+        sums(INDEX);
+        assert!(Folder::new(&mine).is_ok());
+        fs::write(mine.join("note.txt"), "").unwrap();
+        assert_eq!(occupied(&mine), "note.txt");
     }
 }

@@ -5,11 +5,21 @@
 //! the same [`About`] give the same bytes.
 
 mod about;
+mod api;
 mod error;
 mod folder;
+mod import;
 mod publish;
+mod records;
+mod refit;
+mod tables;
+mod verify;
 
 pub use about::{About, AboutError};
 pub use error::CatalogueError;
-pub use folder::Folder;
+pub use folder::{Folder, Sum};
+pub use import::{Import, Imported, Outcome, Taken};
 pub use publish::{Published, publish};
+pub use refit::refit;
+pub use tables::HAS_PARQUET;
+pub use verify::{Checked, Problem, Verified, check_store, verify};

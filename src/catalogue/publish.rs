@@ -2,8 +2,12 @@
 
 use std::path::Path;
 
-use super::{About, CatalogueError, Folder};
+use super::api::{Entry, Index};
+use super::{About, CatalogueError, Folder, api, records, tables};
 use crate::store::Store;
+
+/// The database of a publication.
+pub(super) const DATABASE: &str = "catalogue.sqlite";
 
 /// What was published.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -27,20 +31,23 @@ pub fn publish(
     mut progress: impl FnMut(usize),
 ) -> Result<Published, CatalogueError> {
     let mut folder = Folder::new(target)?;
+    // Everything else is read from the copy: one moment, whoever writes meanwhile.
+    let copy = folder.place(DATABASE, |place| Ok::<(), CatalogueError>(store.copy_to(place)?))?;
+    let copy = Store::open_existing(copy)?;
+    let store = copy.as_ref().unwrap_or(store);
     folder.write("about.json", format!("{}\n", serde_json::json!(about)).as_bytes())?;
-    let summaries = store.list()?;
-    for (number, summary) in summaries.iter().enumerate() {
+    let mut entries = Vec::new();
+    for (number, summary) in store.list()?.iter().enumerate() {
         let Some(stored) = store.get(&summary.slug, None)? else { continue };
-        let record = serde_json::json!({
-            "revision": stored.revision,
-            "content_hash": stored.content_hash,
-            "material": stored.material,
-        });
-        let path = format!("api/v1/materials/{}.json", summary.slug);
-        folder.write(&path, format!("{record}\n").as_bytes())?;
+        api::write(&mut folder, &stored)?;
+        entries.push(Entry::new(summary, &stored));
         progress(number + 1);
     }
-    let published = Published { materials: summaries.len(), files: folder.sums().len() + 1 };
+    let index = Index::new(about, entries);
+    index.write(&mut folder)?;
+    let tables = tables::write(&mut folder, store)?;
+    records::write(&mut folder, about, &index, &tables)?;
+    let published = Published { materials: index.materials.len(), files: folder.sums().len() + 1 };
     folder.keep()?;
     Ok(published)
 }

@@ -11,6 +11,7 @@ mod curves;
 mod diagnose;
 mod effects;
 mod fit;
+mod import;
 mod list;
 mod materials;
 mod measure;
@@ -23,6 +24,7 @@ mod rm;
 mod show;
 mod staging;
 mod summary;
+mod verify;
 
 use std::path::PathBuf;
 
@@ -80,6 +82,8 @@ enum Command {
     Check(check::Args),
     Rm(rm::Args),
     Publish(publish::Args),
+    Verify(verify::Args),
+    Import(import::Args),
     Completions(completions::Args),
 }
 
@@ -106,6 +110,8 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Check(_) => check::run(db, &console),
         Command::Rm(args) => rm::run(args, db, &console),
         Command::Publish(args) => publish::run(args, db, &console),
+        Command::Verify(args) => verify::run(args, &console),
+        Command::Import(args) => import::run(args, db, &console),
         Command::Completions(args) => completions::run(args),
     }
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::console::Console;
 use super::database::Database;
-use crate::catalogue::{About, publish};
+use crate::catalogue::{About, HAS_PARQUET, publish};
 use crate::error::Error;
 
 /// Publish the database as a catalogue: a static site and the data in open formats
@@ -29,6 +29,14 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         });
     };
     let published = publish(&store, &about, &args.folder, |_| ())?;
+    if !HAS_PARQUET {
+        console.notice(
+            "without Parquet tables; `cargo install --path . --features parquet` writes them, too",
+        );
+    }
+    if about.people.is_empty() {
+        console.notice("nobody is named as author; name yourselves as [[person]] in --about FILE");
+    }
     let text = format!(
         "published {} materials in {} files: {}\n",
         published.materials,

@@ -38,6 +38,14 @@ pub(super) fn readable(path: &Path) -> Result<Option<Connection>, StoreError> {
     patiently(|| open_readable(path))
 }
 
+/// An empty database of the latest schema that is nowhere on the disk.
+pub(super) fn in_memory() -> Result<Connection, StoreError> {
+    let path = Path::new(":memory:");
+    let mut conn = Connection::open_in_memory().map_err(|error| StoreError::new(path, error))?;
+    migrate(path, &mut conn)?;
+    Ok(conn)
+}
+
 /// Tries again while others are busy. SQLite itself does not wait where waiting could lock two
 /// programs up, as when both turn a new file's log on.
 fn patiently<T>(open: impl Fn() -> Result<T, StoreError>) -> Result<T, StoreError> {

@@ -18,6 +18,7 @@
 mod connect;
 mod error;
 mod read;
+mod tables;
 mod write;
 
 use std::path::{Path, PathBuf};
@@ -28,6 +29,7 @@ use crate::material::{Activity, Material, Slug, SourceKind};
 use crate::measure::AngleStatistics;
 
 pub use error::StoreError;
+pub use tables::{Cell, Column, ColumnKind, Reference, Table};
 
 /// An open database.
 #[derive(Debug)]
@@ -178,6 +180,30 @@ impl Store {
         let done = then(&added)?;
         tx.commit().map_err(failed)?;
         Ok(done)
+    }
+
+    /// Adds materials as [`Store::add`] does, in one transaction, but holds only one at a time. `then`
+    /// hears what became of each; an error of its own, or of `materials`, takes everything back.
+    ///
+    /// # Errors
+    /// As [`Store::add`], those of `then` and of `materials`.
+    pub fn add_each<E: From<StoreError>>(
+        &mut self,
+        materials: impl IntoIterator<Item = Result<Material, E>>,
+        mut then: impl FnMut(&Material, Added) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Store { conn, path, activity } = self;
+        let failed = |error| StoreError::new(path, error);
+        let tx = conn.transaction().map_err(failed)?;
+        for material in materials {
+            let material = material?;
+            let slug = || material.slug.to_string();
+            material.validate().map_err(|error| StoreError::Material { slug: slug(), error })?;
+            for added in write::add(&tx, &[&material], activity.as_ref()).map_err(failed)? {
+                then(&material, added)?;
+            }
+        }
+        Ok(tx.commit().map_err(failed)?)
     }
 
     /// Every material's current revision, sorted by name.

@@ -2,6 +2,7 @@
 #![allow(dead_code)] // Each test file is a crate of its own and uses some of it.
 
 pub mod database;
+pub mod json_schema;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -119,4 +120,27 @@ pub fn read_cloud(path: &Path) -> BTreeMap<String, Vec<f64>> {
     }
     assert_eq!(at, bytes.len(), "the body ends where the header says");
     cloud
+}
+
+/// Writes a publication's list of hashes anew, as somebody would who wants a change to go unseen.
+pub fn list_hashes(site: &Path) {
+    use sha2::{Digest, Sha256};
+    let mut lines = Vec::new();
+    let mut folders = vec![site.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let name = path.strip_prefix(site).unwrap().to_str().unwrap();
+            let hash = Sha256::digest(std::fs::read(&path).unwrap());
+            let hash: String = hash.iter().map(|byte| format!("{byte:02x}")).collect();
+            if name != "SHA256SUMS" {
+                lines.push(format!("{hash}  {name}\n"));
+            }
+        }
+    }
+    std::fs::write(site.join("SHA256SUMS"), lines.concat()).unwrap();
 }

@@ -1,0 +1,209 @@
+//! Another laboratory's catalogue into one's own: what is not there is added with all its revisions,
+//! and nothing that is there changes.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::publish::DATABASE;
+use super::verify::{database, is_newer};
+use super::{CatalogueError, verify};
+use crate::effects::{Level, resolve};
+use crate::material::{Material, Slug};
+use crate::store::{Added, Store, Stored};
+
+/// Somebody's catalogue that was [verified](super::verify) and may be taken over.
+#[derive(Debug)]
+pub struct Import {
+    path: PathBuf,
+    theirs: Store,
+}
+
+/// What becomes of one material.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Taken {
+    /// Its name in their catalogue.
+    pub slug: Slug,
+    /// Its name here.
+    pub name: Slug,
+    /// What is done with it.
+    #[serde(flatten)]
+    pub outcome: Outcome,
+}
+
+/// What is done with a material.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(tag = "result", rename_all = "kebab-case")]
+pub enum Outcome {
+    /// It is added with its revisions.
+    Added {
+        /// How many.
+        revisions: usize,
+    },
+    /// What they have is what is, or once was, here.
+    Unchanged,
+    /// Something else of this name is here, and stays as it is.
+    Conflict {
+        /// [`Material::content_hash`] of what is here.
+        ours: String,
+        /// That of what they have.
+        theirs: String,
+    },
+}
+
+/// What was, or would be, imported.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Imported {
+    /// Whether nothing was written because nothing should be.
+    pub dry_run: bool,
+    /// Every material of their catalogue.
+    pub materials: Vec<Taken>,
+}
+
+impl Import {
+    /// Opens a published folder or its database after a complete check.
+    ///
+    /// # Errors
+    /// When it is no catalogue, anything in it is wrong, or a newer program has made it.
+    pub fn open(bundle: &Path) -> Result<Import, CatalogueError> {
+        let unsound =
+            |problem: String| CatalogueError::Unsound { bundle: bundle.to_owned(), problem };
+        if bundle.is_dir() && is_newer(bundle) {
+            return Err(unsound("a newer matdb has published it, install that".to_owned()));
+        }
+        let problems = verify(bundle)?.problems;
+        if let Some(first) = problems.first() {
+            let others = match problems.len() - 1 {
+                0 => String::new(),
+                more => format!(" (and {more} more, which `matdb verify` lists)"),
+            };
+            return Err(unsound(format!("{first}{others}")));
+        }
+        let path = if bundle.is_dir() { bundle.join(DATABASE) } else { bundle.to_owned() };
+        Ok(Import { theirs: database(&path)?, path: bundle.to_owned() })
+    }
+
+    /// What becomes of every material. Conflicts get the prefix, if there is one, and are looked at
+    /// again under that name.
+    ///
+    /// # Errors
+    /// When a database cannot be read, or the prefix makes no name.
+    pub fn plan(
+        &self,
+        ours: Option<&Store>,
+        prefix: Option<&str>,
+    ) -> Result<Vec<Taken>, CatalogueError> {
+        let mut plan = Vec::new();
+        let mut names = BTreeSet::new();
+        for summary in self.theirs.list()? {
+            let slug = summary.slug;
+            let mut taken = self.taken(ours, &slug, slug.clone())?;
+            if let (Outcome::Conflict { .. }, Some(prefix)) = (&taken.outcome, prefix) {
+                taken = self.taken(ours, &slug, prefixed(prefix, &slug)?)?;
+            }
+            if !names.insert(taken.name.clone()) {
+                let problem =
+                    format!("two materials would be called `{}`; choose another", taken.name);
+                let prefix = prefix.unwrap_or_default().to_owned();
+                return Err(CatalogueError::Prefix { prefix, problem });
+            }
+            plan.push(taken);
+        }
+        Ok(plan)
+    }
+
+    fn taken(
+        &self,
+        ours: Option<&Store>,
+        slug: &Slug,
+        name: Slug,
+    ) -> Result<Taken, CatalogueError> {
+        let history = self.theirs.history(slug)?;
+        let added = Outcome::Added { revisions: history.len() };
+        let known = ours.map_or(Ok(None), |ours| ours.get(&name, None))?;
+        let outcome = match (ours, known) {
+            (Some(ours), Some(known)) => self.beside(ours, known, slug, &name)?,
+            _ => added,
+        };
+        Ok(Taken { slug: slug.clone(), name, outcome })
+    }
+
+    /// What becomes of a material beside one of the same name.
+    fn beside(
+        &self,
+        ours: &Store,
+        known: Stored,
+        slug: &Slug,
+        name: &Slug,
+    ) -> Result<Outcome, CatalogueError> {
+        let Some(theirs) = self.revision(slug, None, name)? else { return Ok(Outcome::Unchanged) };
+        let theirs = theirs.content_hash();
+        for revision in ours.history(name)? {
+            let once = ours.get(name, Some(revision.revision))?;
+            if once.is_some_and(|once| once.content_hash == theirs) {
+                return Ok(Outcome::Unchanged);
+            }
+        }
+        Ok(Outcome::Conflict { ours: known.content_hash, theirs })
+    }
+
+    /// A revision of theirs under the name that it gets here.
+    fn revision(
+        &self,
+        slug: &Slug,
+        number: Option<u32>,
+        name: &Slug,
+    ) -> Result<Option<Material>, CatalogueError> {
+        let stored = self.theirs.get(slug, number)?;
+        Ok(stored.map(|stored| Material { slug: name.clone(), ..stored.material }))
+    }
+
+    /// Adds what the plan adds, in one transaction: all of it or nothing.
+    ///
+    /// # Errors
+    /// When an effect is not known here, the database cannot be written, or somebody else has added a
+    /// material of the same name since the plan was made.
+    pub fn take(&self, ours: &mut Store, plan: &[Taken]) -> Result<(), CatalogueError> {
+        let wanted = plan.iter().filter(|taken| matches!(taken.outcome, Outcome::Added { .. }));
+        let materials = wanted.flat_map(|taken| self.materials(taken));
+        let mut last: Option<Slug> = None;
+        ours.add_each(materials, |material, added| {
+            let is_first = last.as_ref() != Some(&material.slug);
+            if is_first && added != Added::New {
+                return Err(CatalogueError::Overtaken { slug: material.slug.to_string() });
+            }
+            last = Some(material.slug.clone());
+            Ok(())
+        })
+    }
+
+    /// Every revision of a material, oldest first.
+    fn materials(&self, taken: &Taken) -> Vec<Result<Material, CatalogueError>> {
+        let history = match self.theirs.history(&taken.slug) {
+            Ok(history) => history,
+            Err(error) => return vec![Err(error.into())],
+        };
+        let read = |number: u32| -> Option<Result<Material, CatalogueError>> {
+            let material = self.revision(&taken.slug, Some(number), &taken.name).transpose()?;
+            Some(material.and_then(|material| self.known(material)))
+        };
+        history.into_iter().filter_map(|revision| read(revision.revision)).collect()
+    }
+
+    /// The material, if this program knows its effects.
+    fn known(&self, material: Material) -> Result<Material, CatalogueError> {
+        match resolve(&material.effects, Level::Material) {
+            Ok(_) => Ok(material),
+            Err(error) => Err(CatalogueError::Unsound {
+                bundle: self.path.clone(),
+                problem: format!("{}: {error}", material.slug),
+            }),
+        }
+    }
+}
+
+fn prefixed(prefix: &str, slug: &Slug) -> Result<Slug, CatalogueError> {
+    let name = format!("{prefix}{slug}");
+    name.parse().map_err(|problem| CatalogueError::Prefix { prefix: prefix.to_owned(), problem })
+}

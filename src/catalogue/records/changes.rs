@@ -1,0 +1,148 @@
+//! What was added, changed and withdrawn from one publication to the next: `changes.json`, and
+//! `CHANGES.md` for people. A publication compares itself with the one that stands in its place.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::catalogue::api::{Index, SCHEMA_VERSION};
+use crate::catalogue::folder::INDEX;
+use crate::catalogue::{CatalogueError, Folder, api};
+
+const CHANGES: &str = "changes.json";
+
+#[derive(Serialize, Deserialize)]
+struct Changes {
+    schema_version: u32,
+    /// The newest first.
+    publications: Vec<Publication>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Publication {
+    version: Option<String>,
+    date: Option<String>,
+    added: Vec<Change>,
+    changed: Vec<Change>,
+    /// What is no longer in the catalogue.
+    withdrawn: Vec<Change>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Change {
+    slug: String,
+    /// As it is now.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    now: Option<State>,
+    /// As it was before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    before: Option<State>,
+}
+
+#[derive(Clone, PartialEq, Serialize, Deserialize)]
+struct State {
+    revision: u32,
+    content_hash: String,
+}
+
+/// Only what a later program must go on writing, so that this one can say that it is too old.
+#[derive(Deserialize)]
+struct Version {
+    schema_version: u32,
+}
+
+/// Continues the log of what stood in the folder before. Publishing the same again adds nothing to it.
+pub(super) fn write(folder: &mut Folder, index: &Index) -> Result<(), CatalogueError> {
+    let (before, mut publications) = match folder.before() {
+        Some(earlier) => {
+            let before: Index = read(earlier, INDEX)?;
+            let changes: Changes = read(earlier, CHANGES)?;
+            (states(&before), changes.publications)
+        }
+        None => (BTreeMap::new(), Vec::new()),
+    };
+    let new = publication(index, &before);
+    let is_first = publications.is_empty();
+    if is_first || !(new.added.is_empty() && new.changed.is_empty() && new.withdrawn.is_empty()) {
+        publications.insert(0, new);
+    }
+    let changes = Changes { schema_version: SCHEMA_VERSION, publications };
+    api::json(folder, CHANGES, &changes)?;
+    folder.write("CHANGES.md", text(&changes).as_bytes())
+}
+
+fn read<T: DeserializeOwned>(folder: &Path, name: &str) -> Result<T, CatalogueError> {
+    let file = folder.join(name);
+    let earlier = |problem: String| CatalogueError::Earlier { file: file.clone(), problem };
+    let bytes = fs::read(&file).map_err(|reason| earlier(reason.to_string()))?;
+    let version: Version =
+        serde_json::from_slice(&bytes).map_err(|error| earlier(error.to_string()))?;
+    if version.schema_version > SCHEMA_VERSION {
+        return Err(earlier("a newer matdb has written it".to_owned()));
+    }
+    serde_json::from_slice(&bytes).map_err(|error| earlier(error.to_string()))
+}
+
+fn states(index: &Index) -> BTreeMap<String, State> {
+    let state = |entry: &api::Entry| State {
+        revision: entry.revision,
+        content_hash: entry.content_hash.clone(),
+    };
+    index.materials.iter().map(|entry| (entry.slug.to_string(), state(entry))).collect()
+}
+
+fn publication(index: &Index, before: &BTreeMap<String, State>) -> Publication {
+    let (mut added, mut changed) = (Vec::new(), Vec::new());
+    let now = states(index);
+    for (slug, state) in &now {
+        let was = before.get(slug).cloned();
+        let list = match &was {
+            None => &mut added,
+            Some(was) if was == state => continue,
+            Some(_) => &mut changed,
+        };
+        list.push(Change { slug: slug.clone(), now: Some(state.clone()), before: was });
+    }
+    let gone = before.iter().filter(|(slug, _)| !now.contains_key(*slug));
+    let withdrawn = gone
+        .map(|(slug, was)| Change { slug: slug.clone(), now: None, before: Some(was.clone()) })
+        .collect();
+    let (version, date) = (index.version.clone(), index.date.clone());
+    Publication { version, date, added, changed, withdrawn }
+}
+
+fn text(changes: &Changes) -> String {
+    let mut text =
+        "# Changes\n\nFrom one publication of this catalogue to the next, the newest first.\n"
+            .to_owned();
+    for publication in &changes.publications {
+        let harmless = |text: &String| text.chars().filter(|c| !c.is_control()).collect();
+        let version: String = publication.version.as_ref().map(harmless).unwrap_or_default();
+        let date = publication.date.as_deref().and_then(|date| date.get(..10)).unwrap_or("empty");
+        let words: Vec<&str> =
+            [version.as_str(), date].into_iter().filter(|w| !w.is_empty()).collect();
+        text += &format!("\n## {}\n", words.join(", "));
+        let lists = [
+            ("Added", &publication.added),
+            ("Changed", &publication.changed),
+            ("Withdrawn", &publication.withdrawn),
+        ];
+        for (title, list) in lists.into_iter().filter(|(_, list)| !list.is_empty()) {
+            text += &format!("\n{title}:\n\n");
+            list.iter().for_each(|change| text += &line(change));
+        }
+    }
+    text
+}
+
+fn line(change: &Change) -> String {
+    let revision = match (&change.before, &change.now) {
+        (Some(before), Some(now)) => format!("revision {} to {}", before.revision, now.revision),
+        (Some(state), None) | (None, Some(state)) => format!("revision {}", state.revision),
+        (None, None) => String::new(),
+    };
+    format!("- {}, {revision}\n", change.slug)
+}

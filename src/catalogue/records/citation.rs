@@ -1,0 +1,147 @@
+//! How to cite a publication: `CITATION.cff` (Citation File Format 1.2.0) and `.zenodo.json`, which
+//! Zenodo reads in its place without saying so. Both come from the same record.
+
+use serde_json::{Value, json};
+
+use super::Context;
+use crate::catalogue::about::Person;
+
+/// The DOI's own address.
+pub(super) fn doi_url(doi: &str) -> String {
+    format!("https://doi.org/{doi}")
+}
+
+/// Who is named where nobody named themselves.
+pub(super) fn nobody(context: &Context) -> String {
+    format!("Contributors to {}", context.about.title)
+}
+
+/// `CITATION.cff`.
+pub(super) fn cff(context: &Context) -> String {
+    let about = context.about;
+    let mut text = "cff-version: 1.2.0\n\
+        message: \"If you use these data, please cite them as below, and the source of each number.\"\n\
+        type: dataset\n"
+        .to_owned();
+    let mut line = |key: &str, value: Option<&str>| {
+        if let Some(value) = value {
+            text += &format!("{key}: {}\n", quoted(value));
+        }
+    };
+    line("title", Some(&about.title));
+    line("abstract", Some(&about.description));
+    line("version", about.version.as_deref());
+    line("date-released", context.day());
+    line("license", Some(&about.licence));
+    line("doi", about.doi.as_deref());
+    line("url", about.url.as_deref());
+    text += "authors:\n";
+    if about.people.is_empty() {
+        text += &format!("  - name: {}\n", quoted(&nobody(context)));
+    }
+    for Person { family, given, orcid, affiliation } in &about.people {
+        text += &format!("  - family-names: {}\n", quoted(family));
+        text += &format!("    given-names: {}\n", quoted(given));
+        if let Some(orcid) = orcid {
+            text += &format!("    orcid: {}\n", quoted(&orcid_url(orcid)));
+        }
+        if let Some(affiliation) = affiliation {
+            text += &format!("    affiliation: {}\n", quoted(affiliation));
+        }
+    }
+    text
+}
+
+pub(super) fn orcid_url(orcid: &str) -> String {
+    format!("https://orcid.org/{orcid}")
+}
+
+/// `.zenodo.json`.
+pub(super) fn zenodo(context: &Context) -> Value {
+    let about = context.about;
+    let person = |person: &Person| {
+        let mut creator = json!({ "name": format!("{}, {}", person.family, person.given) });
+        insert(&mut creator, "orcid", person.orcid.as_deref());
+        insert(&mut creator, "affiliation", person.affiliation.as_deref());
+        creator
+    };
+    let creators: Vec<Value> = match about.people.as_slice() {
+        [] => vec![json!({ "name": nobody(context) })],
+        people => people.iter().map(person).collect(),
+    };
+    let mut record = json!({
+        "upload_type": "dataset",
+        "title": about.title,
+        // Zenodo takes it for HTML.
+        "description": escaped(&about.description),
+        "creators": creators,
+        "access_right": "open",
+        "license": about.licence.to_lowercase(),
+    });
+    insert(&mut record, "version", about.version.as_deref());
+    insert(&mut record, "publication_date", context.day());
+    insert(&mut record, "doi", about.doi.as_deref());
+    record
+}
+
+/// Sets a key that says something.
+pub(super) fn insert(record: &mut Value, key: &str, value: Option<&str>) {
+    if let (Some(map), Some(value)) = (record.as_object_mut(), value) {
+        map.insert(key.to_owned(), value.into());
+    }
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+/// A text as YAML's double-quoted scalar: that of JSON, and without what YAML cannot print.
+fn quoted(text: &str) -> String {
+    let plain = Value::from(text).to_string();
+    let printable = |c: char| match c {
+        '\u{7f}'..='\u{9f}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}' | '\u{2028}' | '\u{2029}' => {
+            format!("\\u{:04x}", u32::from(c))
+        }
+        c => c.to_string(),
+    };
+    plain.chars().map(printable).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalogue::About;
+
+    #[test]
+    fn both_say_the_same() {
+        let text =
+            "title = 'A \"b\": c'\ndescription = 'x < y'\nversion = '1.2'\ndoi = '10.5281/zenodo.1'
+            [[person]]\nfamily = 'Roe'\ngiven = 'Ann'\norcid = '0000-0002-1825-0097'";
+        let about = About::parse("about.toml", text).unwrap();
+        let context = Context { about: &about, date: Some("2026-01-02T03:04:05Z"), materials: 1 };
+        let (cff, zenodo) = (cff(&context), zenodo(&context));
+        let value = |key: &str| -> String {
+            let line = cff.lines().find_map(|l| l.trim_start_matches([' ', '-']).strip_prefix(key));
+            serde_json::from_str(line.unwrap().strip_prefix(": ").unwrap()).unwrap()
+        };
+        for (theirs, ours) in [
+            ("title", "title"),
+            ("version", "version"),
+            ("doi", "doi"),
+            ("publication_date", "date-released"),
+        ] {
+            assert_eq!(zenodo[theirs], value(ours), "{ours}");
+        }
+        assert_eq!(zenodo["description"].as_str().unwrap().replace("&lt;", "<"), value("abstract"));
+        assert_eq!(zenodo["license"], value("license").to_lowercase());
+        let creator = &zenodo["creators"][0];
+        assert_eq!(creator["name"], format!("{}, {}", value("family-names"), value("given-names")));
+        assert_eq!(orcid_url(creator["orcid"].as_str().unwrap()), value("orcid"));
+        assert_eq!(value("date-released"), "2026-01-02");
+    }
+
+    #[test]
+    fn what_yaml_cannot_print_is_escaped() {
+        assert_eq!(quoted("a\u{85}\n\"b"), "\"a\\u0085\\n\\\"b\"");
+    }
+}

@@ -1,0 +1,127 @@
+//! Linked data: `dataset.jsonld` (schema.org/Dataset) for search engines and
+//! `ro-crate-metadata.json` (RO-Crate 1.1) for repositories.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+
+use super::citation::{doi_url, insert, nobody, orcid_url};
+use super::{Context, listed};
+use crate::catalogue::about::Person;
+use crate::catalogue::api;
+use crate::catalogue::folder::Sum;
+
+fn licence_url(licence: &str) -> String {
+    format!("https://spdx.org/licenses/{licence}")
+}
+
+/// People as schema.org has them, each with an identifier in this file.
+fn people(context: &Context) -> Vec<Value> {
+    if context.about.people.is_empty() {
+        return vec![
+            json!({ "@id": "#contributors", "@type": "Organization", "name": nobody(context) }),
+        ];
+    }
+    let person = |(number, person): (usize, &Person)| {
+        let id = person.orcid.as_deref().map_or(format!("#person-{}", number + 1), orcid_url);
+        let mut entry = json!({
+            "@id": id,
+            "@type": "Person",
+            "name": format!("{} {}", person.given, person.family),
+            "givenName": person.given,
+            "familyName": person.family,
+        });
+        insert(&mut entry, "affiliation", person.affiliation.as_deref());
+        entry
+    };
+    context.about.people.iter().enumerate().map(person).collect()
+}
+
+/// What both say of the catalogue.
+fn common(context: &Context) -> Value {
+    let about = context.about;
+    let mut record =
+        json!({ "@type": "Dataset", "name": about.title, "description": about.description });
+    insert(&mut record, "version", about.version.as_deref());
+    insert(&mut record, "datePublished", context.day());
+    insert(&mut record, "url", about.url.as_deref());
+    insert(&mut record, "identifier", about.doi.as_deref().map(doi_url).as_deref());
+    record
+}
+
+/// `dataset.jsonld`.
+pub(super) fn dataset(context: &Context, sums: &BTreeMap<String, Sum>) -> Value {
+    let mut record = common(context);
+    record["@context"] = "https://schema.org/".into();
+    record["license"] = licence_url(&context.about.licence).into();
+    record["creator"] = people(context).into();
+    record["isAccessibleForFree"] = true.into();
+    record["keywords"] =
+        json!(["backscatter", "BRDF", "terahertz", "millimetre wave", "300 GHz", "imaging radar"]);
+    record["variableMeasured"] = json!([
+        { "@type": "PropertyValue", "name": "sigma0", "unitCode": "1",
+          "description": "normalised radar cross section 4 pi f cos^2(theta), a ratio of powers" },
+        { "@type": "PropertyValue", "name": "theta_i_rad", "unitCode": "rad",
+          "description": "angle of incidence" }
+    ]);
+    let download = |(path, sum): (&String, &Sum)| {
+        Some(json!({
+            "@type": "DataDownload",
+            "contentUrl": path,
+            "encodingFormat": listed(path)?,
+            "contentSize": sum.bytes.to_string(),
+            "sha256": sum.sha256,
+        }))
+    };
+    record["distribution"] = sums.iter().filter_map(download).collect::<Vec<_>>().into();
+    record
+}
+
+/// `ro-crate-metadata.json`.
+pub(super) fn crate_metadata(context: &Context, sums: &BTreeMap<String, Sum>) -> Value {
+    let file = |(path, sum): (&String, &Sum)| {
+        let name = path.rsplit('/').next();
+        Some(json!({
+            "@id": path,
+            "@type": "File",
+            "name": name,
+            "encodingFormat": listed(path)?,
+            "contentSize": sum.bytes.to_string(),
+        }))
+    };
+    let files: Vec<Value> = sums.iter().filter_map(file).collect();
+    let people = people(context);
+    let licence = licence_url(&context.about.licence);
+    let ids = |entries: &[Value]| -> Vec<Value> {
+        entries.iter().map(|entry| json!({ "@id": entry["@id"] })).collect()
+    };
+    let mut parts = ids(&files);
+    let mut graph = vec![json!({
+        "@id": "ro-crate-metadata.json",
+        "@type": "CreativeWork",
+        "conformsTo": { "@id": "https://w3id.org/ro/crate/1.1" },
+        "about": { "@id": "./" },
+    })];
+    let mut single = Vec::new();
+    if context.materials > 0 {
+        parts.push(json!({ "@id": api::FOLDER }));
+        single.push(json!({
+            "@id": api::FOLDER,
+            "@type": "Dataset",
+            "name": "Materials",
+            "description": "One JSON file per material; api/v1/index.json lists them",
+        }));
+    }
+    let mut root = common(context);
+    root["@id"] = "./".into();
+    root["license"] = json!({ "@id": licence });
+    let mut authors = ids(&people);
+    // A list of one should stand without its brackets.
+    root["author"] = if authors.len() == 1 { authors.remove(0) } else { authors.into() };
+    root["hasPart"] = parts.into();
+    graph.push(root);
+    graph.push(json!({ "@id": licence, "@type": "CreativeWork", "name": context.about.licence,
+        "identifier": context.about.licence }));
+    graph.extend(people.into_iter().chain(single).chain(files));
+    json!({ "@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph })
+}

@@ -1,0 +1,72 @@
+//! Tables as comma-separated values: UTF-8, a header, nothing between two commas where there is no
+//! value, numbers with as many digits as it takes to read them back bit for bit.
+
+use std::io;
+
+use super::units::unit;
+use crate::catalogue::{CatalogueError, Folder};
+use crate::store::{Cell, ColumnKind, Store, StoreError, Table};
+
+/// Writes a table row by row; gives the number of rows.
+pub(super) fn write(
+    folder: &mut Folder,
+    store: &Store,
+    table: &Table,
+    path: &str,
+) -> Result<u64, CatalogueError> {
+    let mut rows = 0;
+    let mut read = Ok(());
+    folder.stream(path, |out| {
+        let mut csv = ::csv::Writer::from_writer(out);
+        csv.write_record(table.columns.iter().map(|column| column.name.as_str()))?;
+        // A failure to read ends the file, too, and is the one to report.
+        match store.rows(table, |cells| {
+            rows += 1;
+            csv.write_record(cells.iter().map(text)).map_err(|e| Failure::Write(e.into()))
+        }) {
+            Ok(()) => csv.flush(),
+            Err(Failure::Write(reason)) => Err(reason),
+            Err(Failure::Read(error)) => {
+                read = Err(error);
+                Ok(())
+            }
+        }
+    })?;
+    read?;
+    Ok(rows)
+}
+
+enum Failure {
+    Read(StoreError),
+    Write(io::Error),
+}
+
+impl From<StoreError> for Failure {
+    fn from(error: StoreError) -> Failure {
+        Failure::Read(error)
+    }
+}
+
+fn text(cell: &Cell) -> String {
+    match cell {
+        Cell::Null => String::new(),
+        Cell::Integer(number) => number.to_string(),
+        Cell::Real(number) => format!("{number:?}"),
+        Cell::Text(text) => (*text).to_owned(),
+    }
+}
+
+/// The units of all numeric columns, one per line.
+pub(super) fn units(tables: &[Table]) -> Vec<u8> {
+    let mut lines = "table,column,ucum,note\n".to_owned();
+    for table in tables {
+        for column in table.columns.iter().filter(|column| column.kind != ColumnKind::Text) {
+            let (code, note) = match unit(&table.name, &column.name) {
+                Ok(code) => (code, String::new()),
+                Err(place) => ("", format!("the unit is in {place}")),
+            };
+            lines += &format!("{},{},{code},{note}\n", table.name, column.name);
+        }
+    }
+    lines.into_bytes()
+}

@@ -1,0 +1,40 @@
+//! The database as plain tables: CSV and, where the program was built with it, Parquet. Tables and
+//! columns are those of the database, whatever it has.
+
+mod csv;
+#[cfg(feature = "parquet")]
+mod parquet;
+mod units;
+
+use super::{CatalogueError, Folder};
+use crate::store::{Store, Table};
+
+pub(super) use units::unit;
+
+/// Whether this program writes Parquet.
+pub const HAS_PARQUET: bool = cfg!(feature = "parquet");
+
+/// A table that was written.
+pub(super) struct Written {
+    pub table: Table,
+    pub rows: u64,
+}
+
+/// Where a table's CSV stands.
+pub(super) fn csv_path(table: &str) -> String {
+    format!("tables/{table}.csv")
+}
+
+/// Writes every table, and `tables/units.csv` with the unit of every numeric column.
+pub(super) fn write(folder: &mut Folder, store: &Store) -> Result<Vec<Written>, CatalogueError> {
+    let tables = store.tables()?;
+    folder.write("tables/units.csv", &csv::units(&tables))?;
+    let mut written = Vec::new();
+    for table in tables {
+        let rows = csv::write(folder, store, &table, &csv_path(&table.name))?;
+        #[cfg(feature = "parquet")]
+        parquet::write(folder, store, &table)?;
+        written.push(Written { table, rows });
+    }
+    Ok(written)
+}

@@ -1,0 +1,44 @@
+//! The unit of every numeric column, as UCUM code, from the ending of its name.
+
+/// Endings of names and their units.
+const ENDINGS: [(&str, &str); 8] = [
+    ("_hz", "Hz"),
+    ("_rad", "rad"),
+    ("_m", "m"),
+    ("_w", "W"),
+    ("_k", "K"),
+    ("_db", "dB"),
+    ("_deg", "deg"),
+    ("_s", "s"),
+];
+
+/// Columns whose unit another column of the same row tells.
+const TOLD: [(&str, &str, &str); 4] = [
+    ("fit_parameter", "value", "the column `unit`"),
+    ("fit_parameter", "sd", "the column `unit`"),
+    ("fit_covariance", "covariance", "the product of the units of `row_path` and `column_path`"),
+    ("effect_parameter", "value", "the ending of the column `name`"),
+];
+
+/// UCUM code of a numeric column; `1` for a pure number. `Err` says where the unit stands when it
+/// differs from row to row.
+pub(in crate::catalogue) fn unit(table: &str, column: &str) -> Result<&'static str, &'static str> {
+    if let Some((.., place)) = TOLD.iter().find(|told| (told.0, told.1) == (table, column)) {
+        return Err(place);
+    }
+    let ending = ENDINGS.iter().find(|(ending, _)| column.ends_with(ending));
+    Ok(ending.map_or("1", |(_, unit)| unit))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_tells_the_unit_or_where_it_stands() {
+        assert_eq!(unit("observation", "theta_i_rad"), Ok("rad"));
+        assert_eq!(unit("observation", "sigma0"), Ok("1"));
+        assert_eq!(unit("instrument", "bandwidth_hz"), Ok("Hz"));
+        assert!(unit("fit_parameter", "value").unwrap_err().contains("`unit`"));
+    }
+}

@@ -1,0 +1,69 @@
+//! `matdb import`.
+
+use std::path::PathBuf;
+
+use super::console::Console;
+use super::database::Database;
+use crate::catalogue::{Import, Imported, Outcome, Taken};
+use crate::error::Error;
+
+/// Take over another laboratory's published catalogue; nothing of yours is overwritten
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb import site --dry-run                  see what would be added
+  matdb import site                            add what is not there, report conflicts
+  matdb import site --as-prefix roe-           add conflicting materials as roe-NAME
+
+The catalogue is verified first. All of it is added, or nothing.")]
+pub(super) struct Args {
+    /// A published folder, or its catalogue.sqlite
+    bundle: PathBuf,
+    /// Put this before the names of materials that differ from yours of the same name
+    #[arg(long, value_name = "PREFIX")]
+    as_prefix: Option<String>,
+    /// Say what would be done, and change nothing
+    #[arg(long)]
+    dry_run: bool,
+}
+
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    let import = Import::open(&args.bundle)?;
+    // The database that is asked for may be made by this.
+    let ours = if db.path().exists() { db.read()? } else { None };
+    let materials = import.plan(ours.as_ref(), args.as_prefix.as_deref())?;
+    drop(ours);
+    let is_new = |taken: &Taken| matches!(taken.outcome, Outcome::Added { .. });
+    if !args.dry_run && materials.iter().any(is_new) {
+        import.take(&mut db.write()?, &materials)?;
+    }
+    let imported = Imported { dry_run: args.dry_run, materials };
+    console.result(&text(&imported, db), &imported)
+}
+
+fn text(imported: &Imported, db: &Database) -> String {
+    let mut text = String::new();
+    let add = if imported.dry_run { "would add" } else { "added" };
+    let mut counts = [0; 3];
+    for Taken { slug, name, outcome } in &imported.materials {
+        let of = if slug == name { String::new() } else { format!(", their {slug}") };
+        match outcome {
+            Outcome::Added { revisions } => {
+                counts[0] += 1;
+                text += &format!("{add} {name}{of}, {revisions} revision(s)\n");
+            }
+            Outcome::Unchanged => counts[1] += 1,
+            Outcome::Conflict { ours, theirs } => {
+                counts[2] += 1;
+                text += &format!(
+                    "conflict {name}{of}: yours has hash {ours}, theirs {theirs}; yours stays, \
+                     --as-prefix adds theirs beside it\n"
+                );
+            }
+        }
+    }
+    let [new, same, conflicts] = counts;
+    text + &format!(
+        "{add} {new} materials to {}; {same} were there, {conflicts} are in conflict\n",
+        db.path().display()
+    )
+}

@@ -1,0 +1,42 @@
+//! `matdb verify`.
+
+use std::path::PathBuf;
+
+use super::console::Console;
+use crate::catalogue::{Verified, verify};
+use crate::error::Error;
+
+/// Check a published catalogue: hashes of files and materials, and every fit made again
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb verify site                            a published folder
+  matdb verify site/catalogue.sqlite           a database by itself
+
+Asks nothing outside the folder. Exits with status 1 if anything is wrong.")]
+pub(super) struct Args {
+    /// A published folder, or a database
+    bundle: PathBuf,
+}
+
+pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
+    let verified = verify(&args.bundle)?;
+    let Verified { files, checked, problems } = &verified;
+    let mut text: String = problems.iter().map(|problem| format!("{problem}\n")).collect();
+    if problems.is_empty() {
+        text += &format!(
+            "{} is sound: {files} files, {} materials in {} revisions, {} fits made again\n",
+            args.bundle.display(),
+            checked.materials,
+            checked.revisions,
+            checked.fits
+        );
+    }
+    console.result(&text, &verified)?;
+    match problems.len() {
+        0 => Ok(()),
+        number => Err(Error::Usage {
+            problem: format!("{} has {number} problem(s)", args.bundle.display()),
+            way_out: "get a sound copy, or publish it again".to_owned(),
+        }),
+    }
+}

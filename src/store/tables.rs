@@ -1,0 +1,291 @@
+//! The file as plain tables, whatever tables a schema has: what exports read.
+
+use std::path::Path;
+
+use rusqlite::types::ValueRef;
+use rusqlite::{Connection, Result, params};
+
+use super::{Store, StoreError};
+
+/// A table as it stands in the file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Table {
+    /// Its name.
+    pub name: String,
+    /// Its columns, in order.
+    pub columns: Vec<Column>,
+    /// Names of the columns that tell rows apart and in whose order rows come.
+    pub key: Vec<String>,
+    /// References to other tables.
+    pub references: Vec<Reference>,
+}
+
+/// A column of a [`Table`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// Its name, which ends in the unit where there is one.
+    pub name: String,
+    /// What it holds.
+    pub kind: ColumnKind,
+    /// Whether every row has a value.
+    pub required: bool,
+}
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ColumnKind {
+    /// Whole numbers.
+    Integer,
+    /// Numbers.
+    Real,
+    /// Text.
+    Text,
+}
+
+/// Columns that name a row of another table.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Reference {
+    /// The columns here.
+    pub columns: Vec<String>,
+    /// The other table.
+    pub table: String,
+    /// The columns there.
+    pub keys: Vec<String>,
+}
+
+/// A cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Cell<'a> {
+    /// No value.
+    Null,
+    /// A whole number.
+    Integer(i64),
+    /// A number.
+    Real(f64),
+    /// A text.
+    Text(&'a str),
+}
+
+impl Store {
+    /// Every table that holds materials, sorted by name; those that SQLite keeps for itself, as search
+    /// indexes do, are left out.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn tables(&self) -> Result<Vec<Table>, StoreError> {
+        tables(&self.conn).map_err(|error| StoreError::new(&self.path, error))
+    }
+
+    /// Gives every row of a table to `take`, in the order of the table's key, one at a time.
+    ///
+    /// # Errors
+    /// When the file cannot be read, and the first of `take`.
+    pub fn rows<E: From<StoreError>>(
+        &self,
+        table: &Table,
+        mut take: impl FnMut(&[Cell]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let failed = |error| StoreError::new(&self.path, error);
+        let sql = select(table);
+        let mut statement = self.conn.prepare(&sql).map_err(failed)?;
+        let mut rows = statement.query([]).map_err(failed)?;
+        while let Some(row) = rows.next().map_err(failed)? {
+            let cells: Result<Vec<Cell>> =
+                (0..table.columns.len()).map(|index| cell(row.get_ref(index)?)).collect();
+            take(&cells.map_err(failed)?)?;
+        }
+        Ok(())
+    }
+
+    /// Writes a copy of the database, as of one moment, to a new file: packed, without a log beside
+    /// it, and byte for byte the same as long as nothing is changed here.
+    ///
+    /// # Errors
+    /// When `path` exists already or cannot be written.
+    pub fn copy_to(&self, path: &Path) -> Result<(), StoreError> {
+        let text = path.to_str().ok_or_else(|| StoreError::Open {
+            file: path.to_owned(),
+            reason: std::io::Error::other("its name is not UTF-8"),
+        })?;
+        copy(&self.conn, text).map_err(|error| StoreError::new(path, error))
+    }
+
+    /// Whether tables, indexes and views are exactly those that this program makes. A file from
+    /// elsewhere could have others of the same names that answer what they like.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn has_own_schema(&self) -> Result<bool, StoreError> {
+        let failed = |error| StoreError::new(&self.path, error);
+        let own = super::connect::in_memory()?;
+        Ok(schema(&self.conn).map_err(failed)? == schema(&own).map_err(failed)?)
+    }
+}
+
+fn copy(conn: &Connection, path: &str) -> Result<()> {
+    let query_only: bool = conn.pragma_query_value(None, "query_only", |row| row.get(0))?;
+    // SQLite counts writing to the other file as writing.
+    conn.pragma_update(None, "query_only", false)?;
+    let done = conn.execute("VACUUM INTO ?1", params![path]);
+    conn.pragma_update(None, "query_only", query_only)?;
+    done.map(|_| ())
+}
+
+/// Kind, name, table and statement of everything in the file.
+fn schema(conn: &Connection) -> Result<Vec<[Option<String>; 4]>> {
+    // What ANALYZE leaves helps to find rows and answers nothing.
+    let sql = "SELECT type, name, tbl_name, sql FROM sqlite_schema
+               WHERE name NOT LIKE 'sqlite\\_stat%' ESCAPE '\\' ORDER BY type, name";
+    conn.prepare(sql)?
+        .query_map([], |row| Ok([row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?]))?
+        .collect()
+}
+
+fn tables(conn: &Connection) -> Result<Vec<Table>> {
+    let sql = "SELECT name FROM pragma_table_list
+               WHERE schema = 'main' AND type = 'table' AND name NOT LIKE 'sqlite\\_%' ESCAPE '\\'
+               ORDER BY name";
+    let names: Vec<String> =
+        conn.prepare(sql)?.query_map([], |row| row.get(0))?.collect::<Result<_>>()?;
+    names.into_iter().map(|name| table(conn, name)).collect()
+}
+
+fn table(conn: &Connection, name: String) -> Result<Table> {
+    let sql =
+        "SELECT name, type, \"notnull\" OR pk > 0, pk FROM pragma_table_info(?1) ORDER BY cid";
+    let columns: Vec<(Column, i64)> = conn
+        .prepare(sql)?
+        .query_map([&name], |row| {
+            let kind = match row.get::<_, String>(1)?.as_str() {
+                "INTEGER" => ColumnKind::Integer,
+                "REAL" => ColumnKind::Real,
+                _ => ColumnKind::Text,
+            };
+            Ok((Column { name: row.get(0)?, kind, required: row.get(2)? }, row.get(3)?))
+        })?
+        .collect::<Result<_>>()?;
+    let mut key: Vec<(i64, String)> =
+        columns.iter().filter(|(_, pk)| *pk > 0).map(|(c, pk)| (*pk, c.name.clone())).collect();
+    key.sort();
+    let references = references(conn, &name)?;
+    let columns = columns.into_iter().map(|(column, _)| column).collect();
+    Ok(Table { name, columns, key: key.into_iter().map(|(_, name)| name).collect(), references })
+}
+
+fn references(conn: &Connection, table: &str) -> Result<Vec<Reference>> {
+    // A reference that names no column there means the key of that table.
+    let sql = "SELECT id, \"table\", \"from\", coalesce(\"to\", 'id')
+               FROM pragma_foreign_key_list(?1) ORDER BY id DESC, seq";
+    let mut statement = conn.prepare(sql)?;
+    let mut rows = statement.query([table])?;
+    let mut found: Vec<(i64, Reference)> = Vec::new();
+    while let Some(row) = rows.next()? {
+        let (id, table, from, to): (i64, String, String, String) =
+            (row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?);
+        match found.last_mut() {
+            Some((last, reference)) if *last == id => {
+                reference.columns.push(from);
+                reference.keys.push(to);
+            }
+            _ => found.push((id, Reference { columns: vec![from], table, keys: vec![to] })),
+        }
+    }
+    Ok(found.into_iter().map(|(_, reference)| reference).collect())
+}
+
+fn select(table: &Table) -> String {
+    let quoted = |name: &String| format!("\"{}\"", name.replace('"', "\"\""));
+    let list = |names: Vec<String>| names.join(", ");
+    let columns = list(table.columns.iter().map(|column| quoted(&column.name)).collect());
+    let order = match table.key.is_empty() {
+        true => "rowid".to_owned(),
+        false => list(table.key.iter().map(quoted).collect()),
+    };
+    format!("SELECT {columns} FROM {} ORDER BY {order}", quoted(&table.name))
+}
+
+fn cell(value: ValueRef) -> Result<Cell> {
+    Ok(match value {
+        ValueRef::Null => Cell::Null,
+        ValueRef::Integer(number) => Cell::Integer(number),
+        ValueRef::Real(number) => Cell::Real(number),
+        ValueRef::Text(_) => Cell::Text(value.as_str()?),
+        ValueRef::Blob(_) => {
+            return Err(rusqlite::Error::InvalidColumnType(
+                0,
+                "cell".to_owned(),
+                value.data_type(),
+            ));
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::builtin;
+
+    fn filled(path: &Path) -> Store {
+        let mut store = Store::open(path).unwrap();
+        let materials: Vec<_> =
+            builtin::names().map(|name| builtin::get(name).unwrap().unwrap()).collect();
+        store.add(&materials).unwrap();
+        store
+    }
+
+    #[test]
+    fn every_table_is_listed_with_its_columns_and_gives_its_rows_in_order() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = filled(&folder.path().join("a.sqlite"));
+        let tables = store.tables().unwrap();
+        let observation = tables.iter().find(|table| table.name == "observation").unwrap();
+        assert_eq!(observation.key, ["revision_id", "curve", "position"]);
+        let sigma0 = observation.columns.iter().find(|c| c.name == "sigma0").unwrap();
+        assert_eq!((sigma0.kind, sigma0.required), (ColumnKind::Real, false));
+        assert_eq!(observation.references[0].keys, ["revision_id", "name"]);
+        let material = tables.iter().find(|table| table.name == "material").unwrap();
+        let mut ids = Vec::new();
+        let mut take = |cells: &[Cell]| -> Result<(), StoreError> {
+            assert_eq!(cells.len(), material.columns.len());
+            ids.push(match cells[0] {
+                Cell::Integer(id) => id,
+                _ => panic!("{cells:?}"),
+            });
+            Ok(())
+        };
+        store.rows(material, &mut take).unwrap();
+        assert_eq!(ids, (1..=builtin::names().count() as i64).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_copy_has_no_log_holds_the_same_and_is_the_same_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.sqlite");
+        let copies = ["b", "c", "d"].map(|name| folder.path().join(name));
+        let store = filled(&path);
+        store.copy_to(&copies[0]).unwrap();
+        drop(store);
+        let reader = Store::open_existing(&path).unwrap().unwrap();
+        reader.copy_to(&copies[1]).unwrap();
+        assert!(reader.copy_to(&copies[1]).is_err(), "nothing is written over");
+        let copy = Store::open_existing(&copies[1]).unwrap().unwrap();
+        assert_eq!(copy.list().unwrap(), reader.list().unwrap());
+        copy.copy_to(&copies[2]).unwrap();
+        let bytes = copies.map(|path| std::fs::read(path).unwrap());
+        assert_eq!(bytes[0], bytes[1]);
+        let log_version = [bytes[0][18], bytes[0][19]];
+        assert_eq!(log_version, [1, 1], "the file format without a log");
+        assert!(!folder.path().join("c-wal").exists());
+    }
+
+    #[test]
+    fn a_stranger_among_the_tables_is_seen() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.sqlite");
+        let store = filled(&path);
+        store.conn.execute_batch("ANALYZE").unwrap();
+        assert!(store.has_own_schema().unwrap());
+        store.conn.execute_batch("CREATE VIEW more AS SELECT 1").unwrap();
+        assert!(!store.has_own_schema().unwrap());
+    }
+}

@@ -1,0 +1,205 @@
+//! Promise: `matdb import` takes over another laboratory's catalogue with all revisions or changes
+//! nothing; what differs from one's own stays as it is and is reported; what cannot be trusted is
+//! refused in one sentence.
+
+mod support;
+
+use std::fs;
+use std::path::Path;
+
+use matdb::store::Store;
+use serde_json::Value;
+use support::database::{changed, contents, sample, sound};
+use support::{entries, list_hashes, matdb, refused};
+
+/// Two folders: theirs with a published `site`, and ours with a database in which `paint` differs.
+fn laboratories() -> (tempfile::TempDir, tempfile::TempDir) {
+    let (theirs, ours) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let mut store = Store::open(theirs.path().join("matdb.sqlite")).unwrap();
+    store.add([&sample("paint"), &sound("primer"), &sample("same")]).unwrap();
+    store.add([&changed("primer")]).unwrap();
+    drop(store);
+    matdb(theirs.path()).args(["publish", "site", "-q"]).assert().success();
+    let mut store = Store::open(ours.path().join("matdb.sqlite")).unwrap();
+    store.add([&changed("paint"), &sample("same")]).unwrap();
+    store.add([&changed("same")]).unwrap();
+    (theirs, ours)
+}
+
+fn import(ours: &Path, site: &Path, more: &[&str]) -> Value {
+    let output = matdb(ours).arg("import").arg(site).args(more).arg("--json").output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn results(said: &Value) -> Vec<(&str, &str)> {
+    let materials = said["materials"].as_array().unwrap();
+    materials
+        .iter()
+        .map(|taken| (taken["name"].as_str().unwrap(), taken["result"].as_str().unwrap()))
+        .collect()
+}
+
+#[test]
+fn what_is_missing_comes_with_its_revisions_and_what_differs_stays() {
+    let (theirs, ours) = laboratories();
+    let site = theirs.path().join("site");
+    let database = ours.path().join("matdb.sqlite");
+    let before = contents(&database);
+    let plan = import(ours.path(), &site, &["--dry-run"]);
+    assert_eq!(contents(&database), before);
+    let said = import(ours.path(), &site, &[]);
+    assert_eq!(said["materials"], plan["materials"]);
+    let expected = [("paint", "conflict"), ("primer", "added"), ("same", "unchanged")];
+    assert_eq!(results(&said), expected);
+    let conflict = &said["materials"][0];
+    assert_eq!(conflict["ours"], changed("paint").content_hash());
+    assert_eq!(conflict["theirs"], sample("paint").content_hash());
+    let after = contents(&database);
+    assert_eq!(after.len(), before.len() + 2);
+    assert!(before.iter().all(|material| after.contains(material)));
+    assert!([sound("primer"), changed("primer")].iter().all(|m| after.contains(m)));
+    let again = import(ours.path(), &site, &[]);
+    assert_eq!(results(&again)[1], ("primer", "unchanged"));
+    assert_eq!(contents(&database), after);
+}
+
+#[test]
+fn a_prefix_puts_what_differs_beside_ones_own() {
+    let (theirs, ours) = laboratories();
+    let site = theirs.path().join("site/catalogue.sqlite");
+    let said = import(ours.path(), &site, &["--as-prefix", "roe-"]);
+    assert_eq!(results(&said)[0], ("roe-paint", "added"));
+    let after = contents(&ours.path().join("matdb.sqlite"));
+    assert!(after.contains(&sample("roe-paint")) && after.contains(&changed("paint")));
+    let again = import(ours.path(), &site, &["--as-prefix", "roe-"]);
+    assert_eq!(results(&again)[0], ("roe-paint", "unchanged"));
+    let said = refused(matdb(ours.path()).arg("import").arg(&site).args(["--as-prefix", "Roe/"]));
+    assert!(said.contains("`Roe/paint` is not a material name"), "{said}");
+}
+
+#[test]
+fn a_catalogue_fills_an_empty_folder_and_a_dry_run_leaves_it_empty() {
+    let (theirs, _) = laboratories();
+    let ours = tempfile::tempdir().unwrap();
+    let site = theirs.path().join("site");
+    import(ours.path(), &site, &["--dry-run"]);
+    assert!(entries(ours.path()).is_empty());
+    import(ours.path(), &site, &[]);
+    let theirs = contents(&theirs.path().join("matdb.sqlite"));
+    assert_eq!(contents(&ours.path().join("matdb.sqlite")), theirs);
+}
+
+type Spoil = fn(&Path);
+
+#[test]
+fn what_cannot_be_trusted_changes_nothing() {
+    let (theirs, ours) = laboratories();
+    let site = theirs.path().join("site");
+    let database = ours.path().join("matdb.sqlite");
+    let before = fs::read(&database).unwrap();
+    let spoils: [(Spoil, &str); 9] = [
+        (
+            |site| {
+                let path = site.join("catalogue.sqlite");
+                let mut bytes = fs::read(&path).unwrap();
+                let last = bytes.len() - 1;
+                bytes[last] ^= 1;
+                fs::write(path, bytes).unwrap();
+            },
+            "its hash differs",
+        ),
+        (
+            |site| {
+                sql(site, "UPDATE observation SET sigma0 = 9 WHERE sigma0 IS NOT NULL");
+                list_hashes(site);
+            },
+            "is not what was stored",
+        ),
+        (
+            |site| {
+                sql(site, "PRAGMA user_version = 999");
+                list_hashes(site);
+            },
+            "newer matdb",
+        ),
+        (
+            |site| {
+                sql(site, "CREATE VIEW more AS SELECT 1");
+                list_hashes(site);
+            },
+            "not those that matdb makes",
+        ),
+        (
+            |site| {
+                let index = fs::read_to_string(site.join("api/v1/index.json")).unwrap();
+                let newer = index.replacen("\"schema_version\":1", "\"schema_version\":2", 1);
+                fs::write(site.join("api/v1/index.json"), newer).unwrap();
+                list_hashes(site);
+            },
+            "newer matdb",
+        ),
+        (
+            |site| {
+                let mut list = fs::read_to_string(site.join("SHA256SUMS")).unwrap();
+                list += &format!("{:064}  ../../matdb.sqlite\n", 0);
+                fs::write(site.join("SHA256SUMS"), list).unwrap();
+            },
+            "outside the folder",
+        ),
+        (
+            |site| {
+                let path = site.join("api/v1/materials/huge.json");
+                fs::File::create(path).unwrap().set_len((32 << 20) + 1).unwrap();
+                let mut list = fs::read_to_string(site.join("SHA256SUMS")).unwrap();
+                list += &format!("{:064}  api/v1/materials/huge.json\n", 0);
+                fs::write(site.join("SHA256SUMS"), list).unwrap();
+            },
+            "is larger than 32 MiB",
+        ),
+        (|site| fs::remove_file(site.join("SHA256SUMS")).unwrap(), "it has no SHA256SUMS"),
+        (
+            |site| {
+                let secret = site.with_file_name("secret");
+                fs::write(&secret, "x").unwrap();
+                #[cfg(unix)]
+                std::os::unix::fs::symlink(&secret, site.join("link.html")).unwrap();
+                #[cfg(not(unix))]
+                fs::write(site.join("link.html"), "is a link").unwrap();
+            },
+            "link.html",
+        ),
+    ];
+    for (spoil, expected) in spoils {
+        spoil(&site);
+        let said = refused(matdb(ours.path()).arg("import").arg(&site));
+        assert!(said.contains(expected), "`{expected}` is not in: {said}");
+        assert!(fs::read(&database).unwrap() == before, "{expected}");
+        fs::remove_dir_all(&site).unwrap();
+        matdb(theirs.path()).args(["publish", "site", "-q"]).assert().success();
+    }
+    let nothing = refused(matdb(ours.path()).args(["import", "nowhere"]));
+    assert!(nothing.contains("nowhere"), "{nothing}");
+    import(ours.path(), &site, &[]);
+}
+
+fn sql(site: &Path, statement: &str) {
+    rusqlite::Connection::open(site.join("catalogue.sqlite"))
+        .unwrap()
+        .execute_batch(statement)
+        .unwrap();
+}
+
+#[test]
+fn an_effect_that_nobody_knows_takes_everything_back() {
+    let (theirs, ours) = laboratories();
+    let mut strange = sound("zinc");
+    strange.effects[0].name = "telepathy".to_owned();
+    Store::open(theirs.path().join("matdb.sqlite")).unwrap().add([&strange]).unwrap();
+    matdb(theirs.path()).args(["publish", "site", "-q"]).assert().success();
+    let database = ours.path().join("matdb.sqlite");
+    let before = contents(&database);
+    let said = refused(matdb(ours.path()).arg("import").arg(theirs.path().join("site")));
+    assert!(said.contains("zinc") && said.contains("telepathy"), "{said}");
+    assert_eq!(contents(&database), before, "primer came first and is not there");
+}

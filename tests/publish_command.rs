@@ -1,0 +1,324 @@
+//! Promise: what `matdb publish` writes is the database and nothing else, in files that say what they
+//! are; the same database gives the same bytes; a folder is replaced as a whole or not at all; and
+//! `matdb verify` sees whatever was changed afterwards.
+//!
+//! Checked by hand with the peers' own tools on a publication of the built-in materials, two of them
+//! fitted: frictionless 5.16.1 (`frictionless validate datapackage.json`: all resources valid, keys and
+//! references included), roc-validator 0.13.0 (RO-Crate 1.1, every requirement met), cffconvert 2.0.0
+//! (`--validate`), jsonschema 4.26.0 (schemas by their own schema, every file by them).
+
+mod support;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use matdb::store::Store;
+use serde_json::Value;
+use support::database::{bytes, contents, sample, sound, with_effects};
+use support::json_schema::problems;
+use support::{matdb, refused};
+
+const ABOUT: &str = "title = 'Paints <of> \"ours\"'\nversion = '1.0'\ndoi = '10.5281/zenodo.123'\n\
+    [[person]]\nfamily = 'Roe'\ngiven = 'Ann'\norcid = '0000-0002-1825-0097'\n";
+
+/// A folder with a database of two materials, one of them with two revisions.
+fn laboratory() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Store::open(folder.path().join("matdb.sqlite")).unwrap();
+    store.add([&sample("paint"), &sound("primer")]).unwrap();
+    store.add([&support::database::changed("paint")]).unwrap();
+    fs::write(folder.path().join("about.toml"), ABOUT).unwrap();
+    folder
+}
+
+fn publish(folder: &Path) {
+    matdb(folder).args(["publish", "site", "--about", "about.toml", "-q"]).assert().success();
+}
+
+/// Every file below a folder, by its path.
+fn tree(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(at) = folders.pop() {
+        for entry in fs::read_dir(&at).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let bytes = fs::read(&path).unwrap();
+                found.insert(path.strip_prefix(folder).unwrap().to_owned(), bytes);
+            }
+        }
+    }
+    found
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+#[test]
+fn the_same_database_gives_the_same_bytes_and_every_hash_holds() {
+    let folder = laboratory();
+    publish(folder.path());
+    let first = tree(&folder.path().join("site"));
+    publish(folder.path());
+    let second = tree(&folder.path().join("site"));
+    for (path, bytes) in &first {
+        assert!(second.get(path) == Some(bytes), "{}", path.display());
+    }
+    assert_eq!(first.len(), second.len());
+    let said = matdb(folder.path()).args(["verify", "site", "--json"]).output().unwrap();
+    assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stdout));
+    let said: Value = serde_json::from_slice(&said.stdout).unwrap();
+    let counts = ["files", "materials", "revisions"].map(|key| said[key].as_u64().unwrap());
+    assert_eq!(counts, [first.len() as u64, 2, 3]);
+}
+
+#[test]
+fn the_database_beside_the_site_is_the_laboratorys() {
+    let folder = laboratory();
+    publish(folder.path());
+    let site = folder.path().join("site");
+    let ours = contents(&folder.path().join("matdb.sqlite"));
+    assert_eq!(contents(&site.join("catalogue.sqlite")), ours);
+    assert!(!site.join("catalogue.sqlite-wal").exists());
+}
+
+#[test]
+fn every_json_file_is_as_its_schema_says() {
+    let folder = laboratory();
+    matdb(folder.path()).args(["add", "--all", "-q"]).assert().success();
+    let mut store = Store::open(folder.path().join("matdb.sqlite")).unwrap();
+    store.add([&with_effects("reported")]).unwrap();
+    publish(folder.path());
+    let site = folder.path().join("site");
+    let mut checked = 0;
+    let mut check = |schema: &str, file: &Path| {
+        let schema = json(&site.join("schema").join(schema));
+        let value = json(file);
+        assert_eq!(problems(&schema, &value), [""; 0], "{}", file.display());
+        let mut spoilt = value;
+        spoilt["titel"] = "x".into();
+        assert_eq!(problems(&schema, &spoilt), ["/titel: means nothing"]);
+        checked += 1;
+    };
+    check("index.json", &site.join("api/v1/index.json"));
+    check("changes.json", &site.join("changes.json"));
+    for entry in fs::read_dir(site.join("api/v1/materials")).unwrap() {
+        check("material.json", &entry.unwrap().path());
+    }
+    assert_eq!(checked, 11);
+}
+
+#[test]
+fn a_table_has_every_row_bit_for_bit_and_a_unit_for_every_number() {
+    let folder = laboratory();
+    publish(folder.path());
+    let site = folder.path().join("site");
+    let mut table = csv::Reader::from_path(site.join("tables/observation.csv")).unwrap();
+    let header = table.headers().unwrap().clone();
+    let at = |name: &str| header.iter().position(|column| column == name).unwrap();
+    let (theta, sigma0) = (at("theta_i_rad"), at("sigma0"));
+    let rows: Vec<csv::StringRecord> = table.records().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), 9, "three revisions of three points");
+    let points: Vec<(f64, Option<f64>)> =
+        rows.iter().map(|row| (row[theta].parse().unwrap(), row[sigma0].parse().ok())).collect();
+    let of_paint = sound("primer").curves[0].observations.clone();
+    assert!(of_paint.iter().all(|o| points.contains(&(o.theta_i_rad, o.sigma0))));
+    let units = fs::read_to_string(site.join("tables/units.csv")).unwrap();
+    assert!(units.contains("observation,theta_i_rad,rad,\n"), "{units}");
+    let package = json(&site.join("datapackage.json"));
+    let resources = package["resources"].as_array().unwrap();
+    for resource in resources {
+        let path = site.join(resource["path"].as_str().unwrap());
+        assert_eq!(resource["bytes"], fs::metadata(&path).unwrap().len(), "{}", path.display());
+    }
+    let fields = resources.iter().filter_map(|resource| resource["schema"]["fields"].as_array());
+    for field in fields.flatten().filter(|field| field["type"] != "string") {
+        assert!(field["unit"].is_string() || field["description"].is_string(), "{field}");
+    }
+}
+
+#[test]
+fn changes_are_told_from_one_publication_to_the_next() {
+    let folder = laboratory();
+    publish(folder.path());
+    let mut store = Store::open(folder.path().join("matdb.sqlite")).unwrap();
+    store.add([&sample("paint"), &sample("new")]).unwrap();
+    store.remove([&"primer".parse().unwrap()]).unwrap();
+    drop(store);
+    publish(folder.path());
+    let changes = json(&folder.path().join("site/changes.json"));
+    let publications = changes["publications"].as_array().unwrap();
+    assert_eq!(publications.len(), 2);
+    let slugs = |which: &str| -> Vec<&str> {
+        let list = publications[0][which].as_array().unwrap();
+        list.iter().map(|change| change["slug"].as_str().unwrap()).collect()
+    };
+    assert_eq!(
+        [slugs("added"), slugs("changed"), slugs("withdrawn")],
+        [["new"], ["paint"], ["primer"]]
+    );
+    assert_eq!(publications[0]["changed"][0]["before"]["revision"], 2);
+    assert_eq!(publications[1]["added"].as_array().unwrap().len(), 2);
+    let text = fs::read_to_string(folder.path().join("site/CHANGES.md")).unwrap();
+    assert!(text.contains("- paint, revision 2 to 3") && text.contains("Withdrawn:"), "{text}");
+}
+
+#[test]
+fn nothing_of_somebody_elses_folder_is_touched() {
+    let folder = laboratory();
+    let at = folder.path();
+    fs::create_dir(at.join("site")).unwrap();
+    fs::write(at.join("site/thesis.tex"), "mine").unwrap();
+    let said = refused(matdb(at).args(["publish", "site"]));
+    assert!(said.contains("thesis.tex"), "{said}");
+    fs::remove_file(at.join("site/thesis.tex")).unwrap();
+    publish(at);
+    fs::write(at.join("site/thesis.tex"), "mine").unwrap();
+    let before = tree(&at.join("site"));
+    let said = refused(matdb(at).args(["publish", "site"]));
+    assert!(said.contains("thesis.tex"), "{said}");
+    assert_eq!(tree(&at.join("site")), before);
+    fs::remove_file(at.join("site/thesis.tex")).unwrap();
+    fs::write(at.join("site/changes.json"), "{\"schema_version\":99}").unwrap();
+    let said = refused(matdb(at).args(["publish", "site"]));
+    assert!(said.contains("newer matdb"), "{said}");
+    assert_eq!(support::entries(at), ["about.toml", "matdb.sqlite", "site"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn what_cannot_be_written_leaves_everything_as_it_was() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = laboratory();
+    let at = folder.path();
+    let target = at.join("shelf");
+    fs::create_dir(&target).unwrap();
+    fs::set_permissions(&target, fs::Permissions::from_mode(0o555)).unwrap();
+    // Root may write anywhere.
+    if fs::write(target.join("probe"), "").is_err() {
+        refused(matdb(at).args(["publish", "shelf/site", "-q"]));
+        assert!(support::entries(&target).is_empty());
+    }
+    fs::set_permissions(&target, fs::Permissions::from_mode(0o755)).unwrap();
+    fs::write(at.join("file"), "x").unwrap();
+    refused(matdb(at).args(["publish", "file/site", "-q"]));
+    refused(matdb(at).args(["publish", "file", "-q"]));
+    assert_eq!(fs::read(at.join("file")).unwrap(), b"x");
+}
+
+#[test]
+fn a_killed_publication_leaves_a_whole_one() {
+    let folder = laboratory();
+    let at = folder.path();
+    let mut store = Store::open(at.join("matdb.sqlite")).unwrap();
+    let many: Vec<_> = (0..200).map(|number| sample(&format!("of-many-{number}"))).collect();
+    store.add(&many).unwrap();
+    publish(at);
+    store.add([&sample("one-more")]).unwrap();
+    drop(store);
+    let site = at.join("site");
+    let old = fs::read(site.join("SHA256SUMS")).unwrap();
+    let mut killed = 0;
+    for delay_ms in [1, 5, 20, 50, 100] {
+        let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("matdb"))
+            .args(["publish", "site", "-q"])
+            .current_dir(at)
+            .env_remove("MATDB")
+            .spawn()
+            .unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(delay_ms));
+        child.kill().unwrap();
+        killed += u32::from(!child.wait().unwrap().success());
+        let said = matdb::catalogue::verify(&site).unwrap();
+        assert_eq!(said.problems, [], "after {delay_ms} ms");
+        if fs::read(site.join("SHA256SUMS")).unwrap() != old {
+            break;
+        }
+    }
+    assert!(killed > 0);
+}
+
+type Spoil = fn(&Path);
+
+#[test]
+fn whatever_is_changed_afterwards_is_seen() {
+    let folder = laboratory();
+    let at = folder.path();
+    publish(at);
+    let site = at.join("site");
+    let spoils: [(Spoil, &str); 7] = [
+        (|site| flip(&site.join("api/v1/materials/paint.json")), "paint.json: is not what"),
+        (|site| flip(&site.join("catalogue.sqlite")), "catalogue.sqlite: is not what"),
+        (|site| fs::remove_file(site.join("CITATION.cff")).unwrap(), "CITATION.cff: is missing"),
+        (|site| fs::write(site.join("more.html"), "").unwrap(), "more.html: is not listed"),
+        (
+            |site| relist(site, "api/v1/materials/paint.json", b"{}\n"),
+            "something else than the data",
+        ),
+        (|site| relist(site, "api/v1/materials/x.json", b"{}\n"), "of no material"),
+        (
+            |site| {
+                let mut list = fs::read_to_string(site.join("SHA256SUMS")).unwrap();
+                list += &format!("{:064}  ../matdb.sqlite\n", 0);
+                fs::write(site.join("SHA256SUMS"), list).unwrap();
+            },
+            "outside the folder",
+        ),
+    ];
+    for (spoil, expected) in spoils {
+        spoil(&site);
+        let output = matdb(at).args(["verify", "site"]).output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{expected}");
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert!(said.contains(expected), "`{expected}` is not in: {said}");
+        fs::remove_dir_all(&site).unwrap();
+        publish(at);
+    }
+    matdb(at).args(["verify", "site", "-q"]).assert().success();
+}
+
+fn flip(path: &Path) {
+    let mut bytes = fs::read(path).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(path, bytes).unwrap();
+}
+
+/// Changes a file and the list of hashes with it.
+fn relist(site: &Path, path: &str, bytes: &[u8]) {
+    fs::write(site.join(path), bytes).unwrap();
+    support::list_hashes(site);
+}
+
+#[test]
+fn a_fit_that_does_not_follow_from_its_curve_is_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut text = "theta_deg,sigma0_db\n".to_owned();
+    for step in 0..80 {
+        text += &format!("{step},{}\n", -20.0 + f64::from((step * 7) % 13) / 2.0);
+    }
+    fs::write(at.join("curve.csv"), text).unwrap();
+    matdb(at).args(["add", "ptfe", "-q"]).assert().success();
+    let fit = ["fit", "curve.csv", "--model", "lambert", "--save", "ptfe", "--kind", "synthetic"];
+    matdb(at).args(fit).args(["--source", "a test", "-q"]).assert().success();
+    let said = matdb(at).args(["verify", "matdb.sqlite", "--json"]).output().unwrap();
+    assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stdout));
+    let said: Value = serde_json::from_slice(&said.stdout).unwrap();
+    assert_eq!((&said["fits"], &said["revisions"]), (&1.into(), &2.into()));
+    let path = at.join("matdb.sqlite");
+    let store = Store::open(&path).unwrap();
+    let mut ptfe = store.get(&"ptfe".parse().unwrap(), None).unwrap().unwrap().material;
+    drop(store);
+    let report = ptfe.fits.last_mut().unwrap().report.as_mut().unwrap();
+    report.objective += 1.0;
+    Store::open(&path).unwrap().add([&ptfe]).unwrap();
+    let output = matdb(at).args(["verify", "matdb.sqlite"]).output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(!output.status.success() && said.contains("ptfe@3, fit `lambert-censored`"), "{said}");
+    assert_eq!(bytes(at).len(), 2, "verifying leaves nothing behind");
+}
