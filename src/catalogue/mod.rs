@@ -8,6 +8,7 @@ mod about;
 mod error;
 mod folder;
 mod publish;
+mod site;
 
 pub use about::{About, AboutError};
 pub use error::CatalogueError;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::site::Site;
 use super::{About, CatalogueError, Folder};
 use crate::store::Store;
 
@@ -29,6 +30,7 @@ pub fn publish(
     let mut folder = Folder::new(target)?;
     folder.write("about.json", format!("{}\n", serde_json::json!(about)).as_bytes())?;
     let summaries = store.list()?;
+    let mut site = Site::new(about)?;
     for (number, summary) in summaries.iter().enumerate() {
         let Some(stored) = store.get(&summary.slug, None)? else { continue };
         let record = serde_json::json!({
@@ -38,8 +40,10 @@ pub fn publish(
         });
         let path = format!("api/v1/materials/{}.json", summary.slug);
         folder.write(&path, format!("{record}\n").as_bytes())?;
+        site.add(&mut folder, &stored, &store.history(&summary.slug)?)?;
         progress(number + 1);
     }
+    site.finish(&mut folder)?;
     let published = Published { materials: summaries.len(), files: folder.sums().len() + 1 };
     folder.keep()?;
     Ok(published)
