@@ -12,8 +12,7 @@ use matdb::material::{Material, SourceKind, builtin};
 use matdb::store::Store;
 use support::database::{fitted, sample, with_effects};
 
-const HOSTILE: &str =
-    "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{7*7}}{% x %}\u{0}\u{1b}[2J\u{202e}abc\u{2028}";
+const HOSTILE: &str = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{7*7}}{% x %}\u{0}\u{1b}[2J\u{202e}abc\u{2028}";
 
 /// A built-in catalogue, a fitted material and one that means harm.
 fn materials() -> Vec<Material> {
@@ -170,7 +169,9 @@ fn nothing_is_loaded_from_elsewhere_and_nothing_runs_inside_a_page() {
     let site = site();
     assert_eq!(site.pages().count(), materials().len() + 3);
     for (path, html) in site.pages() {
-        assert!(html.contains("http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'"));
+        assert!(
+            html.contains("http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'")
+        );
         for (name, attributes) in tags(html) {
             for (key, value) in &attributes {
                 assert!(!key.starts_with("on") && key != "style", "{path}: {name} {key}");
@@ -179,11 +180,14 @@ fn nothing_is_loaded_from_elsewhere_and_nothing_runs_inside_a_page() {
             }
             let is_data = attributes.get("type").is_some_and(|t| t == "application/ld+json");
             assert!(name != "script" || is_data || attributes.contains_key("src"), "{path}");
-            assert!(!["style", "iframe", "object", "embed", "form action"].contains(&name.as_str()));
+            assert!(
+                !["style", "iframe", "object", "embed", "form action"].contains(&name.as_str())
+            );
         }
     }
     for (path, text) in site.files.iter().filter(|(path, _)| path.starts_with("assets/")) {
-        let calls = ["fetch(", "XMLHttpRequest", "@import", "url(", "import(", "innerHTML", "eval("];
+        let calls =
+            ["fetch(", "XMLHttpRequest", "@import", "url(", "import(", "innerHTML", "eval("];
         for word in calls {
             assert!(!text.contains(word), "{path} says {word}");
         }
@@ -242,7 +246,8 @@ fn what_a_database_says_is_shown_and_not_run() {
         }
     }
     for (path, text) in &site.files {
-        let Some(call) = ["index/", "data/"].iter().find(|folder| path.starts_with(**folder)) else {
+        let Some(call) = ["index/", "data/"].iter().find(|folder| path.starts_with(**folder))
+        else {
             continue;
         };
         let name = if *call == "index/" { "matdbIndex(" } else { "matdbMaterial(" };
@@ -321,10 +326,8 @@ fn many_materials_are_read_in_portions() {
     let root = tempfile::tempdir().unwrap();
     let mut store = Store::open(root.path().join("a.sqlite")).unwrap();
     let ptfe = builtin::get("ptfe").unwrap().unwrap();
-    let numbered = |number: usize| Material {
-        slug: format!("m{number:04}").parse().unwrap(),
-        ..ptfe.clone()
-    };
+    let numbered =
+        |number: usize| Material { slug: format!("m{number:04}").parse().unwrap(), ..ptfe.clone() };
     let all: Vec<Material> = (0..1001).map(numbered).collect();
     store.add(&all).unwrap();
     let folder = root.path().join("site");

@@ -42,7 +42,9 @@ impl Browser {
                     std::env::var_os(NEEDED).is_none(),
                     "{NEEDED} is set and chromedriver does not start: {error}"
                 );
-                eprintln!("skipped: there is no chromedriver; install chromium and chromium-driver");
+                eprintln!(
+                    "skipped: there is no chromedriver; install chromium and chromium-driver"
+                );
                 return None;
             }
         };
@@ -197,7 +199,8 @@ fn capabilities(profile: &Path, downloads: &Path) -> Value {
         "--disable-component-update",
         "--disable-sync",
         "--disable-dev-shm-usage",
-        "--hide-scrollbars",
+        // What scrolls slowly is not where a click expects it.
+        "--force-prefers-reduced-motion",
     ];
     let mut arguments: Vec<String> = arguments.iter().map(|a| (*a).to_owned()).collect();
     arguments.push(format!("--user-data-dir={}", profile.display()));

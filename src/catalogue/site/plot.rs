@@ -9,10 +9,10 @@ use crate::formats::figure::ticks::ticks;
 
 const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 420.0;
-const LEFT: f64 = 70.0;
-const RIGHT: f64 = 16.0;
+const LEFT: f64 = 84.0;
+const RIGHT: f64 = 18.0;
 const TOP: f64 = 14.0;
-const BOTTOM: f64 = 58.0;
+const BOTTOM: f64 = 64.0;
 
 /// Points of one series from which on they are drawn small.
 const MANY: usize = 400;
@@ -123,7 +123,7 @@ impl Frame {
         for tick in ticks(self.y[0], self.y[1], 7) {
             let y = self.at((0.0, tick.value)).1;
             let class = if tick.value == 0.0 { "grid zero" } else { "grid" };
-            let (end, beside, base) = (WIDTH - RIGHT, LEFT - 9.0, y + 5.0);
+            let (end, beside, base) = (WIDTH - RIGHT, LEFT - 9.0, y + 6.0);
             put(format_args!(
                 "<path class=\"{class}\" d=\"M{LEFT} {y:.1}H{end}\"/>\
                  <text class=\"tick\" x=\"{beside}\" y=\"{base:.1}\" text-anchor=\"end\">{}</text>",
@@ -131,7 +131,7 @@ impl Frame {
             ));
         }
         for deg in (0..=90u32).step_by(15) {
-            let (x, below) = (x_at(f64::from(deg)), bottom + 21.0);
+            let (x, below) = (x_at(f64::from(deg)), bottom + 26.0);
             put(format_args!(
                 "<path class=\"grid\" d=\"M{x:.1} {top}V{bottom}\"/>\
                  <text class=\"tick\" x=\"{x:.1}\" y=\"{below}\" text-anchor=\"middle\">{deg}</text>"
@@ -141,7 +141,7 @@ impl Frame {
         let halfway = (top + bottom) / 2.0;
         put(format_args!(
             "<text class=\"label\" x=\"{middle}\" y=\"{low}\" text-anchor=\"middle\">angle of incidence, \
-             °</text><text class=\"label\" transform=\"translate(18 {halfway}) rotate(-90)\" \
+             °</text><text class=\"label\" transform=\"translate(22 {halfway}) rotate(-90)\" \
              text-anchor=\"middle\">{y_label}</text>"
         ));
         svg

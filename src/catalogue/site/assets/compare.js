@@ -3,7 +3,7 @@
 (() => {
   const MOST = 6, OFFERED = 12;
   const SVG = 'http://www.w3.org/2000/svg';
-  const WIDTH = 720, HEIGHT = 420, LEFT = 70, RIGHT = 16, TOP = 14, BOTTOM = 58;
+  const WIDTH = 720, HEIGHT = 420, LEFT = 84, RIGHT = 18, TOP = 14, BOTTOM = 64;
   const SLUG = /^[a-z0-9][a-z0-9-]{0,63}$/;
 
   const byId = (id) => document.getElementById(id);
@@ -136,14 +136,14 @@
     const every = step(high - low, 7);
     for (let i = Math.ceil(low / every); i * every <= high; i += 1) {
       svg.append(draw('path', { class: i ? 'grid' : 'grid zero', d: `M${LEFT} ${y(i * every)}H${WIDTH - RIGHT}` }),
-        draw('text', { class: 'tick', x: LEFT - 9, y: Number(y(i * every)) + 5, 'text-anchor': 'end' }, String(i * every).replace('-', '−')));
+        draw('text', { class: 'tick', x: LEFT - 9, y: Number(y(i * every)) + 6, 'text-anchor': 'end' }, String(i * every).replace('-', '−')));
     }
     for (let deg = 0; deg <= 90; deg += 15) {
       svg.append(draw('path', { class: 'grid', d: `M${x(deg)} ${TOP}V${HEIGHT - BOTTOM}` }),
-        draw('text', { class: 'tick', x: x(deg), y: HEIGHT - BOTTOM + 21, 'text-anchor': 'middle' }, String(deg)));
+        draw('text', { class: 'tick', x: x(deg), y: HEIGHT - BOTTOM + 26, 'text-anchor': 'middle' }, String(deg)));
     }
     svg.append(draw('text', { class: 'label', x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 10, 'text-anchor': 'middle' }, 'angle of incidence, °'),
-      draw('text', { class: 'label', transform: `translate(18 ${(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)`, 'text-anchor': 'middle' }, 'σ⁰, dB'));
+      draw('text', { class: 'label', transform: `translate(22 ${(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)`, 'text-anchor': 'middle' }, 'σ⁰, dB'));
     const each = (points, mark) => points.map(([deg, level]) => `M${x(deg)} ${y(level)}${mark}`).join('');
     const put = (name, points, path) => { if (points.length) svg.append(draw('path', { class: `${name}${points.length > 150 ? ' many' : ''}`, d: path })); };
     for (const { ink, material } of there) {
@@ -175,7 +175,7 @@
       ...there.map(({ material }) => make('th', { scope: 'col' }, make('bdi', {}, material.name), ' ', badge(material.kind))));
     const rows = there[0].material.table.deg.map((deg, row) => make('tr', {}, make('th', { scope: 'row' }, `${deg}°`),
       ...there.map(({ material }) => make('td', {}, cell(material, row)))));
-    return make('table', { class: 'numbers' }, make('caption', {}, 'σ⁰, dB, of what scenes render'), make('thead', {}, head), make('tbody', {}, ...rows));
+    return make('table', { class: 'numbers compared' }, make('caption', {}, 'σ⁰, dB, of what scenes render'), make('thead', {}, head), make('tbody', {}, ...rows));
   };
 
   chooser.hidden = false;

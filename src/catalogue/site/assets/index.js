@@ -52,8 +52,9 @@
         if (id === 'class' && value) {
           byId(id).append(make('option', {}, value));
           byId(id).value = value;
-        } else byId(id).selectedIndex = 0;
+        }
       }
+      if (byId(id).selectedIndex === -1) byId(id).selectedIndex = 0;
     }
   };
   const toAddress = () => {
