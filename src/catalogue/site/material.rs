@@ -165,7 +165,7 @@ fn effects(material: &Material) -> Vec<EffectView> {
 fn unknown(material: &Material) -> Vec<String> {
     let mut found = gaps(&material.description);
     if !has_measured_curve(material) {
-        found.push("Nobody's measured curve is in this entry.".to_owned());
+        found.push("This entry holds no measured curve.".to_owned());
     }
     if material.fits.iter().all(|fit| fit.covariance.is_none()) {
         found.push("No number here carries an uncertainty.".to_owned());
