@@ -139,6 +139,20 @@ fn the_material_of_the_docs_is_accepted() {
 }
 
 #[test]
+fn the_way_to_a_catalogue_runs() {
+    let text = read("docs/publishing.md");
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("about.toml"), blocks(&text, "toml")[0]).unwrap();
+    for command in blocks(&text, "sh")[0].lines() {
+        let arguments = command.split(" #").next().unwrap_or("").trim();
+        let arguments = arguments.strip_prefix("matdb ").unwrap();
+        matdb(folder.path()).args(arguments.split_whitespace()).assert().success();
+    }
+    let index = fs::read_to_string(folder.path().join("site/index.html")).unwrap();
+    assert!(index.contains("Paints and cloth at 300 GHz") && index.contains("Ann Roe"));
+}
+
+#[test]
 fn every_command_has_help_with_an_example() {
     let folder = tempfile::tempdir().unwrap();
     for command in [

@@ -85,4 +85,12 @@ pub enum CatalogueError {
         /// What the system says.
         reason: io::Error,
     },
+    /// A page cannot be made.
+    #[error("cannot make the page {name}: {reason}; please report this")]
+    Page {
+        /// Its template.
+        name: String,
+        /// What the template engine says.
+        reason: String,
+    },
 }

@@ -14,6 +14,7 @@ mod records;
 mod refit;
 mod tables;
 mod verify;
+mod site;
 
 pub use about::{About, AboutError};
 pub use error::CatalogueError;

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::api::{Entry, Index};
+use super::site::Site;
 use super::{About, CatalogueError, Folder, api, records, tables};
 use crate::store::Store;
 
@@ -36,13 +37,15 @@ pub fn publish(
     let copy = Store::open_existing(copy)?;
     let store = copy.as_ref().unwrap_or(store);
     folder.write("about.json", format!("{}\n", serde_json::json!(about)).as_bytes())?;
-    let mut entries = Vec::new();
+    let (mut entries, mut site) = (Vec::new(), Site::new(about)?);
     for (number, summary) in store.list()?.iter().enumerate() {
         let Some(stored) = store.get(&summary.slug, None)? else { continue };
         api::write(&mut folder, &stored)?;
+        site.add(&mut folder, &stored, &store.history(&summary.slug)?)?;
         entries.push(Entry::new(summary, &stored));
         progress(number + 1);
     }
+    site.finish(&mut folder)?;
     let index = Index::new(about, entries);
     index.write(&mut folder)?;
     let tables = tables::write(&mut folder, store)?;

@@ -1,8 +1,10 @@
 //! What tests share.
 #![allow(dead_code)] // Each test file is a crate of its own and uses some of it.
 
+pub mod browser;
 pub mod database;
 pub mod json_schema;
+pub mod server;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,0 +1,187 @@
+'use strict';
+// Several materials on one plot. The address holds which, so that it can be kept or sent.
+(() => {
+  const MOST = 6, OFFERED = 12;
+  const SVG = 'http://www.w3.org/2000/svg';
+  const WIDTH = 720, HEIGHT = 420, LEFT = 84, RIGHT = 18, TOP = 14, BOTTOM = 64;
+  const SLUG = /^[a-z0-9][a-z0-9-]{0,63}$/;
+
+  const byId = (id) => document.getElementById(id);
+  const chooser = byId('chooser'), add = byId('add'), matches = byId('matches'), said = byId('found');
+  const portions = Number(chooser.dataset.portions);
+  const index = [];
+  const known = new Map();
+  let chosen = [];
+
+  const plain = (text) => text.normalize('NFKD').replace(/\p{M}/gu, '').toLowerCase();
+  const fill = (element, attributes, inside) => {
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+    element.append(...inside);
+    return element;
+  };
+  const make = (name, attributes, ...inside) => fill(document.createElement(name), attributes, inside);
+  const draw = (name, attributes, ...inside) => fill(document.createElementNS(SVG, name), attributes, inside);
+  const signed = (value) => value.toFixed(1).replace('-', '−');
+  const badge = (kind) => make('span', { class: `badge is-${kind}` }, kind);
+
+  // Loading: a page opened from a folder may load scripts and nothing else.
+  const load = (path) => new Promise((resolve, reject) => {
+    const script = make('script', { src: path });
+    script.onload = () => { script.remove(); resolve(); };
+    script.onerror = () => { script.remove(); reject(new Error(path)); };
+    document.head.append(script);
+  });
+  window.matdbMaterial = (material) => known.set(material.slug, material);
+  window.matdbIndex = ({ entries }) => {
+    for (const { slug, name, class: stuff, kind } of entries) index.push({ slug, name, kind, words: plain(`${slug} ${name} ${stuff}`) });
+  };
+  let reading = null;
+  const readIndex = () => {
+    reading ??= (async () => {
+      for (let part = 1; part <= portions; part += 1) {
+        try { await load(`index/${part}.js`); } catch { said.textContent = `Part ${part} of the index could not be read; reload the page.`; }
+        offer();
+      }
+    })();
+    return reading;
+  };
+
+  // Choosing.
+  const offer = () => {
+    const words = plain(add.value).split(/\s+/).filter(Boolean);
+    const fits = index.filter((entry) => !chosen.includes(entry.slug) && words.every((word) => entry.words.includes(word)));
+    const isFull = chosen.length >= MOST;
+    matches.replaceChildren(...(isFull ? [] : fits.slice(0, OFFERED)).map((entry) => {
+      const button = make('button', { type: 'button', class: 'quiet-button', 'data-slug': entry.slug }, '+ ', make('bdi', {}, entry.name));
+      return make('li', {}, button);
+    }));
+    if (!index.length) return;
+    if (isFull) said.textContent = `${MOST} are on the plot; remove one to add another.`;
+    else if (!fits.length) said.textContent = 'No other material matches.';
+    else said.textContent = fits.length > OFFERED ? `${OFFERED} of ${fits.length} materials; type to narrow them.` : `${fits.length} to choose from.`;
+  };
+  const toAddress = () => {
+    history.replaceState(null, '', chosen.length ? `#m=${chosen.join(',')}` : location.pathname + location.search);
+  };
+  const fromAddress = () => {
+    const wanted = new URLSearchParams(location.hash.slice(1)).get('m') ?? '';
+    chosen = [...new Set(wanted.split(',').filter((slug) => SLUG.test(slug)))].slice(0, MOST);
+    refresh();
+  };
+  matches.addEventListener('click', ({ target }) => {
+    const slug = target.closest('button')?.dataset.slug;
+    if (!slug || chosen.length >= MOST) return;
+    chosen.push(slug);
+    toAddress();
+    refresh();
+    add.focus();
+  });
+  const remove = (slug) => {
+    chosen = chosen.filter((other) => other !== slug);
+    toAddress();
+    refresh();
+    (byId('chosen').querySelector('button') ?? add).focus();
+  };
+  const refresh = async () => {
+    offer();
+    const asked = chosen.join();
+    const missing = chosen.filter((slug) => !known.has(slug));
+    const wrong = [];
+    await Promise.all(missing.map((slug) => load(`data/${slug}.js`).catch(() => wrong.push(slug))));
+    if (asked !== chosen.join()) return;
+    list(wrong);
+    const there = chosen.map((slug, ink) => ({ ink, material: known.get(slug) })).filter(({ material }) => material);
+    byId('figure').hidden = byId('values').hidden = !there.length;
+    byId('plot').replaceChildren();
+    if (!there.length) return;
+    const picture = plot(there);
+    if (picture) byId('plot').append(picture);
+    byId('values').replaceChildren(table(there));
+  };
+
+  // What is shown.
+  const sample = (ink, kind) => {
+    const svg = draw('svg', { class: 'sample', viewBox: '0 0 34 14', 'aria-hidden': 'true' });
+    svg.append(draw('path', { class: `line ink${ink} is-${kind}`, d: 'M1 7h32' }));
+    return svg;
+  };
+  const list = (wrong) => {
+    byId('chosen').replaceChildren(...chosen.map((slug, ink) => {
+      const material = known.get(slug);
+      const name = material?.name ?? slug;
+      const button = make('button', { type: 'button', class: 'quiet-button', 'aria-label': `Remove ${name}` }, 'Remove');
+      button.addEventListener('click', () => remove(slug));
+      if (!material) return make('li', {}, wrong.includes(slug) ? `There is no material ${slug}.` : slug, button);
+      const link = make('a', { href: `material/${slug}.html` }, make('bdi', {}, name));
+      return make('li', {}, sample(ink, material.kind), link, badge(material.kind), button);
+    }));
+  };
+  const step = (span, wanted) => {
+    const rough = span / wanted, power = 10 ** Math.floor(Math.log10(rough));
+    return power * ([1, 2, 5].find((factor) => factor * power >= rough * (1 - 1e-9)) ?? 10);
+  };
+  const plot = (there) => {
+    const levels = there.flatMap(({ material: m }) => [...m.lines.flatMap((line) => line.pieces.flat()), ...m.curves.flatMap((c) => [...c.seen, ...c.below, ...c.above])]).map(([, level]) => level);
+    if (!levels.length) return null;
+    let low = Infinity, high = -Infinity;
+    for (const level of levels) { low = Math.min(low, level); high = Math.max(high, level); }
+    const room = Math.max(1, 0.06 * (high - low));
+    low -= room; high += room;
+    const x = (deg) => (LEFT + deg / 90 * (WIDTH - LEFT - RIGHT)).toFixed(1);
+    const y = (level) => (HEIGHT - BOTTOM - (level - low) / (high - low) * (HEIGHT - TOP - BOTTOM)).toFixed(1);
+    const names = there.map(({ material }) => material.name).join(', ');
+    const svg = draw('svg', { class: 'plot', viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: 'img', 'aria-labelledby': 'plot-title plot-text' },
+      draw('title', { id: 'plot-title' }, `Backscatter of ${names}`),
+      draw('desc', { id: 'plot-text' }, 'σ⁰ in dB over the angle of incidence. The table below holds the levels.'));
+    const every = step(high - low, 7);
+    for (let i = Math.ceil(low / every); i * every <= high; i += 1) {
+      svg.append(draw('path', { class: i ? 'grid' : 'grid zero', d: `M${LEFT} ${y(i * every)}H${WIDTH - RIGHT}` }),
+        draw('text', { class: 'tick', x: LEFT - 9, y: Number(y(i * every)) + 6, 'text-anchor': 'end' }, String(i * every).replace('-', '−')));
+    }
+    for (let deg = 0; deg <= 90; deg += 15) {
+      svg.append(draw('path', { class: 'grid', d: `M${x(deg)} ${TOP}V${HEIGHT - BOTTOM}` }),
+        draw('text', { class: 'tick', x: x(deg), y: HEIGHT - BOTTOM + 26, 'text-anchor': 'middle' }, String(deg)));
+    }
+    svg.append(draw('text', { class: 'label', x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 10, 'text-anchor': 'middle' }, 'angle of incidence, °'),
+      draw('text', { class: 'label', transform: `translate(22 ${(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)`, 'text-anchor': 'middle' }, 'σ⁰, dB'));
+    const each = (points, mark) => points.map(([deg, level]) => `M${x(deg)} ${y(level)}${mark}`).join('');
+    const put = (name, points, path) => { if (points.length) svg.append(draw('path', { class: `${name}${points.length > 150 ? ' many' : ''}`, d: path })); };
+    for (const { ink, material } of there) {
+      for (const { kind, seen, below, above } of material.curves) {
+        const own = `ink${ink} is-${kind}`;
+        put(`dots ${own}`, seen, each(seen, 'h0'));
+        put(`mark ${own}`, below, each(below, 'm-4-3h8l-4 7z'));
+        put(`mark ${own}`, above, each(above, 'm-4 3h8l-4-7z'));
+      }
+    }
+    for (const { ink, material } of there) {
+      for (const line of material.lines) {
+        const faint = line.name === material.render ? '' : ' faint';
+        for (const piece of line.pieces) {
+          const path = piece.map(([deg, level], i) => `${i ? 'L' : 'M'}${x(deg)} ${y(level)}`).join('');
+          svg.append(draw('path', { class: `line ink${ink} is-${line.kind}${faint}`, d: path }));
+        }
+      }
+    }
+    return svg;
+  };
+  const table = (there) => {
+    const cell = (material, row) => {
+      const level = material.table.level[row], deg = material.table.deg[row];
+      if (level !== null) return signed(level);
+      return deg < material.deg[0] || deg > material.deg[1] ? 'not claimed' : 'nothing';
+    };
+    const head = make('tr', {}, make('th', { scope: 'col' }, 'incidence'),
+      ...there.map(({ material }) => make('th', { scope: 'col' }, make('bdi', {}, material.name), ' ', badge(material.kind))));
+    const rows = there[0].material.table.deg.map((deg, row) => make('tr', {}, make('th', { scope: 'row' }, `${deg}°`),
+      ...there.map(({ material }) => make('td', {}, cell(material, row)))));
+    return make('table', { class: 'numbers compared' }, make('caption', {}, 'σ⁰, dB, of what scenes render'), make('thead', {}, head), make('tbody', {}, ...rows));
+  };
+
+  chooser.hidden = false;
+  add.addEventListener('focus', readIndex, { once: true });
+  add.addEventListener('input', () => { readIndex(); offer(); });
+  window.addEventListener('hashchange', fromAddress);
+  fromAddress();
+  if (!chosen.length || portions <= 4) readIndex();
+})();

@@ -1,0 +1,64 @@
+//! What the page of comparisons needs of a material.
+
+use std::collections::BTreeSet;
+
+use serde_json::{Value, json};
+
+use super::curve::marks;
+use super::entry::kind_of;
+use super::levels::{self, TABLE_DEG, claimed_db, range_deg, tenth};
+use super::words::cut;
+use crate::brdf::Scattering;
+use crate::material::{Curve, Material, SourceKind};
+
+/// Lines, points and a few levels, in ° and dB.
+pub(super) fn data(material: &Material) -> Value {
+    let rendered = material.scattering().ok();
+    let level = |&deg: &f64| rendered.as_ref().and_then(|model| claimed_db(material, model, deg));
+    let mut lines: Vec<Value> = Vec::new();
+    for fit in &material.fits {
+        lines.push(line(material, &fit.name, &fit.source, &fit.model));
+    }
+    if let (true, Some(model)) = (lines.is_empty(), &rendered) {
+        let curve = material.curves.iter().find(|curve| curve.name == material.render);
+        let source = curve.map_or("", |curve| curve.source.as_str());
+        lines.push(line(material, &material.render, source, model));
+    }
+    json!({
+        "slug": material.slug,
+        "name": cut(&material.name, 200),
+        "kind": material.render_kind().map_or("unknown", SourceKind::as_str),
+        "render": material.render,
+        "ghz": material.frequency_hz.map(|hz| hz / 1e9),
+        "deg": range_deg(material),
+        "lines": lines,
+        "curves": material.curves.iter().map(|c| curve(material, c)).collect::<Vec<_>>(),
+        "table": { "deg": TABLE_DEG, "level": TABLE_DEG.iter().map(level).collect::<Vec<_>>() },
+    })
+}
+
+fn line(material: &Material, name: &str, source: &str, model: &dyn Scattering) -> Value {
+    json!({
+        "name": cut(name, 200),
+        "kind": kind_of(material, source).map_or("unknown", SourceKind::as_str),
+        "pieces": levels::line(material, model),
+    })
+}
+
+fn curve(material: &Material, curve: &Curve) -> Value {
+    let [seen, below, above] = marks(&curve.observations).map(|(_, points)| thinned(&points));
+    json!({
+        "name": cut(&curve.name, 200),
+        "kind": kind_of(material, &curve.source).map_or("unknown", SourceKind::as_str),
+        "seen": seen, "below": below, "above": above,
+    })
+}
+
+/// Points on a grid of half a degree and half a decibel, each once: finer than several materials on
+/// one plot can show.
+fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let half = |value: f64| (value * 2.0).round() as i64;
+    let cells: BTreeSet<(i64, i64)> =
+        points.iter().filter(|p| p.1.is_finite()).map(|p| (half(p.0), half(p.1))).collect();
+    cells.into_iter().map(|(x, y)| (tenth(x as f64 / 2.0), tenth(y as f64 / 2.0))).collect()
+}

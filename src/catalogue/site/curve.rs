@@ -1,0 +1,226 @@
+//! A material's picture, its curves in words and by steps.
+
+use serde::Serialize;
+
+use super::bins::{Bin, bins};
+use super::entry::{kind_of, place_of};
+use super::levels::{self, FAINTEST_DB, range_deg};
+use super::plot::{Plot, Series, Shape};
+use super::words::{digits, grouped, percent};
+use crate::fit::stored_band;
+use crate::material::{Censor, Curve, Fit, Instrument, Material, Observation, SourceKind};
+use crate::units::db_from_ratio;
+
+/// Number of inks that the style has.
+const INKS: usize = 6;
+
+/// A line of the legend.
+#[derive(Debug, Serialize)]
+pub(super) struct Sample {
+    name: String,
+    kind: &'static str,
+    /// `line`, `dots`, `below` or `above`.
+    shape: &'static str,
+    class: String,
+    /// What stands behind the name.
+    note: &'static str,
+}
+
+/// A curve in words.
+#[derive(Debug, Serialize)]
+pub(super) struct CurveView {
+    name: String,
+    kind: &'static str,
+    source: String,
+    source_place: usize,
+    /// How many points, and how many of them are only bounds.
+    count: String,
+    instrument: Option<InstrumentView>,
+    bins: Vec<Bin>,
+    /// Points that are not backscatter and so not in the picture.
+    bistatic: Option<String>,
+}
+
+/// What a curve was measured with.
+#[derive(Debug, Serialize)]
+pub(super) struct InstrumentView {
+    name: String,
+    facts: Vec<String>,
+    note: Option<String>,
+}
+
+/// Everything drawn together, with its legend.
+pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
+    let mut series: Vec<Series> = Vec::new();
+    let mut samples = Vec::new();
+    let curves = material.curves.len();
+    for (number, fit) in material.fits.iter().enumerate() {
+        series.extend(band(material, fit, &ink(curves + number)));
+    }
+    for (number, curve) in material.curves.iter().enumerate() {
+        let (drawn, named) = points(curve, kind_of(material, &curve.source), &ink(number));
+        series.extend(drawn);
+        samples.extend(named);
+    }
+    for (number, fit) in material.fits.iter().enumerate() {
+        let kind = kind_of(material, &fit.source);
+        let class = format!("{} {}", ink(curves + number), class_of(kind));
+        let pieces = levels::line(material, &fit.model).into_iter();
+        series.extend(pieces.map(|points| Series {
+            shape: Shape::Line,
+            class: class.clone(),
+            points,
+        }));
+        let note = if fit.report.is_some() { "with its 95 % band" } else { "" };
+        samples.push(Sample {
+            name: fit.name.clone(),
+            kind: word(kind),
+            shape: "line",
+            class,
+            note,
+        });
+    }
+    if material.fits.is_empty()
+        && let Ok(model) = material.scattering()
+    {
+        let class = format!("ink0 {}", class_of(material.render_kind()));
+        let pieces = levels::line(material, &model).into_iter();
+        series.extend(pieces.map(|points| Series {
+            shape: Shape::Line,
+            class: class.clone(),
+            points,
+        }));
+        let name = "between the points".to_owned();
+        let kind = word(material.render_kind());
+        samples.push(Sample { name, kind, shape: "line", class, note: "" });
+    }
+    let plot = Plot {
+        id: "curve".to_owned(),
+        title: format!("Backscatter of {}", material.name),
+        description: description(material),
+        y_label: "σ⁰, dB",
+        claimed_deg: range_deg(material),
+        series,
+    };
+    (plot.svg(), samples)
+}
+
+/// The picture for those who do not see it.
+fn description(material: &Material) -> String {
+    let mut text = "σ⁰ in dB over the angle of incidence. ".to_owned();
+    if let Ok(model) = material.scattering() {
+        let named = levels::TABLE_DEG.iter().filter_map(|&deg| {
+            let level_db = levels::claimed_db(material, &model, deg)?;
+            Some(format!("{level_db:.1} dB at {deg:.0}°"))
+        });
+        text += &named.collect::<Vec<_>>().join(", ").replace('-', "−");
+        text += ". ";
+    }
+    text += "The tables below hold the same numbers.";
+    text
+}
+
+/// The class of a series by its place.
+pub(super) fn ink(number: usize) -> String {
+    format!("ink{}", number % INKS)
+}
+
+/// The class of a kind: kinds differ by their line, not only by a word.
+pub(super) fn class_of(kind: Option<SourceKind>) -> String {
+    format!("is-{}", word(kind))
+}
+
+fn word(kind: Option<SourceKind>) -> &'static str {
+    kind.map_or("unknown", SourceKind::as_str)
+}
+
+/// Detections and bounds of a curve, (°, dB), as three kinds of marks.
+pub(super) fn marks(observations: &[Observation]) -> [(Shape, Vec<(f64, f64)>); 3] {
+    let at = |theta_rad: f64, sigma0: f64| (theta_rad.to_degrees(), db_from_ratio(sigma0));
+    let mut found = [Shape::Dots, Shape::Below, Shape::Above].map(|shape| (shape, Vec::new()));
+    for o in observations.iter().filter(|o| o.is_retro()) {
+        let (place, sigma0) = match (o.sigma0, o.threshold_sigma0, o.censor) {
+            (Some(sigma0), ..) => (0, sigma0),
+            (None, Some(threshold), Censor::Right) => (2, threshold),
+            (None, Some(threshold), _) => (1, threshold),
+            (None, None, _) => continue,
+        };
+        found[place].1.push(at(o.theta_i_rad, sigma0));
+    }
+    found
+}
+
+fn points(curve: &Curve, kind: Option<SourceKind>, ink: &str) -> (Vec<Series>, Vec<Sample>) {
+    let class = format!("{ink} {}", class_of(kind));
+    let drawn = marks(&curve.observations).into_iter().filter(|(_, points)| !points.is_empty());
+    let drawn: Vec<Series> =
+        drawn.map(|(shape, points)| Series { shape, class: class.clone(), points }).collect();
+    let sample = |series: &Series| {
+        let (shape, note) = match series.shape {
+            Shape::Below => ("below", "no detection: the value lies below"),
+            Shape::Above => ("above", "beyond the instrument: the value lies above"),
+            _ => ("dots", "detections"),
+        };
+        Sample { name: curve.name.clone(), kind: word(kind), shape, class: class.clone(), note }
+    };
+    let samples = drawn.iter().map(sample).collect();
+    (drawn, samples)
+}
+
+/// The 95 % band of a fit that has a report.
+fn band(material: &Material, fit: &Fit, ink: &str) -> Option<Series> {
+    let ends = |theta_deg: f64| {
+        let band = stored_band(fit, theta_deg.to_radians())?;
+        let [low_db, high_db] = [band.low, band.high].map(db_from_ratio);
+        (high_db >= FAINTEST_DB).then_some((theta_deg, low_db.max(FAINTEST_DB), high_db))
+    };
+    let ends: Vec<(f64, f64, f64)> = levels::angles_deg(material).filter_map(ends).collect();
+    let low = ends.iter().map(|(theta_deg, low_db, _)| (*theta_deg, *low_db));
+    let high = ends.iter().rev().map(|(theta_deg, _, high_db)| (*theta_deg, *high_db));
+    let points: Vec<(f64, f64)> = low.chain(high).collect();
+    (points.len() > 2).then(|| Series { shape: Shape::Band, class: ink.to_owned(), points })
+}
+
+/// A curve in words.
+pub(super) fn view(material: &Material, curve: &Curve) -> CurveView {
+    let instrument = curve.instrument.as_ref();
+    let instrument = instrument.and_then(|key| material.instruments.iter().find(|i| i.key == *key));
+    let bistatic = curve.observations.iter().filter(|o| !o.is_retro()).count();
+    CurveView {
+        name: curve.name.clone(),
+        kind: word(kind_of(material, &curve.source)),
+        source: curve.source.clone(),
+        source_place: place_of(material, &curve.source),
+        count: count(&curve.observations),
+        instrument: instrument.map(instrument_view),
+        bins: bins(curve),
+        bistatic: (bistatic > 0).then(|| grouped(bistatic)),
+    }
+}
+
+fn count(observations: &[Observation]) -> String {
+    let of = |censor: Censor| observations.iter().filter(|o| o.censor == censor).count();
+    let (all, left, right) = (observations.len(), of(Censor::Left), of(Censor::Right));
+    let mut text = format!("{} points.", grouped(all));
+    if left + right == 0 {
+        return text + " All were detected.";
+    }
+    let sides = [
+        (
+            left,
+            "gave no detection: the value lies below the detection limit, drawn as a triangle there",
+        ),
+        (right, "are beyond the instrument's range: the value lies above the level drawn"),
+    ];
+    for (part, what) in sides.into_iter().filter(|(part, _)| *part > 0) {
+        text += &format!(" {} of them ({}) {what}.", grouped(part), percent(part, all));
+    }
+    text
+}
+
+fn instrument_view(instrument: &Instrument) -> InstrumentView {
+    let mut facts = vec![format!("{} GHz", digits(instrument.centre_frequency_hz / 1e9))];
+    facts.extend(instrument.bandwidth_hz.map(|hz| format!("bandwidth {} GHz", digits(hz / 1e9))));
+    facts.extend(instrument.polarisation.as_ref().map(|p| format!("polarisation {p}")));
+    InstrumentView { name: instrument.name.clone(), facts, note: instrument.note.clone() }
+}

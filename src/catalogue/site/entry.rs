@@ -1,0 +1,77 @@
+//! A material in the search index.
+
+use serde::Serialize;
+
+use super::levels::{SMALL_DEG, claimed_db, range_deg};
+use super::words::{clean, cut};
+use crate::material::{Material, SourceKind};
+
+/// Letters of a name and of a description that are searched and shown: nobody types more.
+const NAME: usize = 200;
+const DESCRIPTION: usize = 2000;
+
+/// What the index knows of a material.
+#[derive(Debug, Serialize)]
+pub(super) struct Entry {
+    slug: String,
+    name: String,
+    class: String,
+    tags: Vec<String>,
+    text: String,
+    kind: &'static str,
+    /// Lowest and highest frequency, GHz.
+    ghz: [f64; 2],
+    /// Smallest and largest angle, °.
+    deg: [f64; 2],
+    /// Whether a curve was fitted.
+    fitted: bool,
+    /// Whether somebody measured a curve.
+    measured: bool,
+    /// Points of all curves, and those of them that are only bounds.
+    points: usize,
+    censored: usize,
+    /// dB at the angles of [`SMALL_DEG`].
+    level: Vec<Option<f64>>,
+}
+
+impl Entry {
+    /// Of a material.
+    pub(super) fn new(material: &Material) -> Entry {
+        let observations = || material.curves.iter().flat_map(|c| &c.observations);
+        let model = material.scattering().ok();
+        let level = |&deg: &f64| claimed_db(material, model.as_ref()?, deg);
+        Entry {
+            slug: material.slug.to_string(),
+            name: cut(&material.name, NAME),
+            class: cut(&material.class, NAME),
+            tags: material.tags.iter().map(|tag| cut(tag, NAME)).collect(),
+            text: clean(&cut(&material.description, DESCRIPTION)),
+            kind: material.render_kind().map_or("unknown", SourceKind::as_str),
+            ghz: material.frequency_hz.map(|hz| hz / 1e9),
+            deg: range_deg(material),
+            fitted: material.fits.iter().any(|fit| fit.curve.is_some()),
+            measured: has_measured_curve(material),
+            points: observations().count(),
+            censored: observations().filter(|o| o.sigma0.is_none()).count(),
+            level: SMALL_DEG.iter().map(level).collect(),
+        }
+    }
+}
+
+/// Whether somebody measured one of the curves.
+pub(super) fn has_measured_curve(material: &Material) -> bool {
+    material
+        .curves
+        .iter()
+        .any(|curve| kind_of(material, &curve.source) == Some(SourceKind::Measured))
+}
+
+/// Kind of a source by its key.
+pub(super) fn kind_of(material: &Material, key: &str) -> Option<SourceKind> {
+    material.sources.iter().find(|source| source.key == key).map(|source| source.kind)
+}
+
+/// Place of a source among its material's, from 1; 0 when there is none of that key.
+pub(super) fn place_of(material: &Material, key: &str) -> usize {
+    material.sources.iter().position(|source| source.key == key).map_or(0, |place| place + 1)
+}

@@ -1,0 +1,209 @@
+//! A fit: its numbers, what the data tell of them, and how far to trust it.
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::entry::{kind_of, place_of};
+use super::residuals;
+use super::words::{digits, grouped};
+use crate::brdf::Parameter;
+use crate::material::{Estimate, Fit, FitReport, Material, SourceKind};
+use crate::units::dbm_from_watts;
+
+/// Parameters that backscatter sees only inside a product, and the product's name.
+const PRODUCTS: [(&str, &str); 3] =
+    [("specular.f_lambda", "S"), ("diffuse.r_s", "R"), ("k", "S and R")];
+
+/// A fit as its page shows it.
+#[derive(Debug, Serialize)]
+pub(super) struct FitView {
+    name: String,
+    kind: &'static str,
+    model: String,
+    estimator: String,
+    curve: Option<String>,
+    is_rendered: bool,
+    parameters: Vec<ParameterView>,
+    products: Vec<ProductView>,
+    has_values: bool,
+    report: Option<ReportView>,
+    residuals: Option<String>,
+}
+
+/// A line of the table of parameters.
+#[derive(Debug, Serialize)]
+struct ParameterView {
+    path: String,
+    value: String,
+    unit: &'static str,
+    sd: Option<String>,
+    interval: Option<String>,
+    range: String,
+    source: String,
+    source_place: usize,
+    kind: &'static str,
+    /// What the data tell of it, in words, and as a class of the style.
+    told: String,
+    is_told: bool,
+}
+
+/// A product of parameters that the data can tell.
+#[derive(Debug, Serialize)]
+struct ProductView {
+    name: &'static str,
+    is: &'static str,
+    value: String,
+    sd: Option<String>,
+    interval: Option<String>,
+}
+
+/// What a fit says of itself.
+#[derive(Debug, Serialize)]
+struct ReportView {
+    facts: Vec<(String, String)>,
+    verdict: Vec<String>,
+}
+
+/// A fit as its page shows it; `number` is its place.
+pub(super) fn view(material: &Material, number: usize, fit: &Fit) -> FitView {
+    let parameters: Vec<ParameterView> =
+        fit.model.parameters().iter().map(|p| parameter(material, fit, p)).collect();
+    FitView {
+        name: fit.name.clone(),
+        kind: word(material, &fit.source),
+        model: model_name(fit),
+        estimator: fit.estimator.clone(),
+        curve: fit.curve.clone(),
+        is_rendered: fit.name == material.render,
+        has_values: !parameters.is_empty(),
+        parameters,
+        products: products(fit),
+        report: fit.report.as_ref().map(report),
+        residuals: residuals::picture(material, number, fit),
+    }
+}
+
+fn word(material: &Material, source: &str) -> &'static str {
+    kind_of(material, source).map_or("unknown", SourceKind::as_str)
+}
+
+/// Names of the model and of its parts, as files write them.
+fn model_name(fit: &Fit) -> String {
+    let name = |value: &Value| value.get("model").and_then(Value::as_str).map(str::to_owned);
+    let json = serde_json::to_value(&fit.model).unwrap_or_default();
+    let parts: Vec<String> =
+        json.as_object().into_iter().flatten().filter_map(|(_, part)| name(part)).collect();
+    match (name(&json), parts.is_empty()) {
+        (Some(whole), true) => whole,
+        (Some(whole), false) => format!("{whole} of {}", parts.join(" and ")),
+        (None, _) => "unnamed".to_owned(),
+    }
+}
+
+fn parameter(material: &Material, fit: &Fit, parameter: &Parameter) -> ParameterView {
+    let path = &parameter.path;
+    let own = fit.parameter_sources.iter().find(|(known, _)| known == path);
+    let source = own.map_or(&fit.source, |(_, source)| source);
+    let estimate = fit.report.as_ref().and_then(|report| report.estimate(path));
+    let stored_sd = fit.covariance.as_ref().and_then(|c| c.standard_deviation(path));
+    let (told, is_told) = told(fit, parameter, estimate, stored_sd);
+    ParameterView {
+        path: path.clone(),
+        value: digits(parameter.value),
+        unit: parameter.unit,
+        sd: estimate.and_then(|e| e.sd).or(stored_sd).map(digits),
+        interval: estimate.and_then(|e| e.interval_95).map(interval),
+        range: interval([parameter.min, parameter.max]),
+        source: source.clone(),
+        source_place: place_of(material, source),
+        kind: word(material, source),
+        told,
+        is_told,
+    }
+}
+
+fn interval([low, high]: [f64; 2]) -> String {
+    format!("{} to {}", digits(low), digits(high))
+}
+
+/// Whether the data tell a parameter.
+fn told(
+    fit: &Fit,
+    parameter: &Parameter,
+    estimate: Option<&Estimate>,
+    stored_sd: Option<f64>,
+) -> (String, bool) {
+    let path = parameter.path.as_str();
+    let product = PRODUCTS.iter().find(|(known, _)| *known == path);
+    let is_gauge = fit.report.as_ref().is_some_and(|r| r.gauge.is_some());
+    let is_held = fit.report.as_ref().is_some_and(|r| r.given.iter().any(|g| g.name == path));
+    let is_at_end = [parameter.min, parameter.max].contains(&parameter.value);
+    match (estimate, product) {
+        (Some(Estimate { sd: Some(_), .. }), _) if is_at_end => {
+            ("told, but it ended at the end of its range".to_owned(), false)
+        }
+        (Some(Estimate { sd: Some(_), .. }), _) => ("yes".to_owned(), true),
+        (Some(_), _) => ("no: the data leave it open".to_owned(), false),
+        _ if is_held => ("no: held at this value".to_owned(), false),
+        (None, Some((_, name))) if is_gauge => {
+            (format!("only inside {name}; this value is a convention"), false)
+        }
+        _ if fit.curve.is_none() => ("no fit: stated".to_owned(), false),
+        _ if stored_sd.is_some() => ("yes, as the source states".to_owned(), true),
+        _ => ("not said".to_owned(), false),
+    }
+}
+
+fn products(fit: &Fit) -> Vec<ProductView> {
+    let Some([specular, diffuse]) = fit.model.identified_products() else { return Vec::new() };
+    let view = |name: &'static str, is: &'static str, value: f64| {
+        let estimate = fit.report.as_ref().and_then(|report| report.estimate(name));
+        ProductView {
+            name,
+            is,
+            value: digits(value),
+            sd: estimate.and_then(|e| e.sd).map(digits),
+            interval: estimate.and_then(|e| e.interval_95).map(interval),
+        }
+    };
+    vec![view("S", "(1 − k) · f_lambda", specular), view("R", "k · r_s", diffuse)]
+}
+
+fn report(report: &FitReport) -> ReportView {
+    let g = &report.goodness;
+    let end = if report.converged { "converged" } else { "did not converge" };
+    let speckle =
+        g.speckle_db.map_or(String::new(), |db| format!("; speckle alone leaves {db:.2} dB"));
+    let noise = match report.noise_w > 0.0 {
+        true => format!("{} dBm", digits(dbm_from_watts(report.noise_w))),
+        false => "none".to_owned(),
+    };
+    let given: Vec<String> =
+        report.given.iter().map(|g| format!("{} = {}", g.name, digits(g.value))).collect();
+    let list = |values: &[f64]| values.iter().map(|v| digits(*v)).collect::<Vec<_>>().join(", ");
+    let mut facts = vec![
+        ("Method", report.method.clone()),
+        ("Search", format!("{end} ({}) after {} steps", report.stop, report.iterations)),
+        ("Starts that agree", format!("{} of {}", report.agreeing_starts, report.starts)),
+        ("Looks", report.looks.map_or("not used".to_owned(), digits)),
+        ("Noise floor", noise),
+        ("Set, not found", if given.is_empty() { "nothing".to_owned() } else { given.join(", ") }),
+        ("Detections off the model", format!("{:.2} dB rms{speckle}", g.rms_db)),
+        (
+            "Residuals against their law",
+            format!(
+                "{} rows, mean {}, variance {}, distance {}",
+                grouped(g.rows as usize),
+                digits(g.z_mean),
+                digits(g.z_variance),
+                digits(g.ks_distance)
+            ),
+        ),
+        ("Singular values", list(&report.singular_values)),
+        ("Data, BLAKE3", report.data_hash.clone()),
+        ("Seed and program", format!("{}, matdb {}", report.seed, report.version)),
+    ];
+    facts.extend(report.gauge.as_ref().map(|gauge| ("Convention", gauge.clone())));
+    let facts = facts.into_iter().map(|(name, text)| (name.to_owned(), text)).collect();
+    ReportView { facts, verdict: report.verdict.clone() }
+}

@@ -1,0 +1,63 @@
+//! Levels of a model over the angle, in the range for which a material's numbers are claimed.
+
+use crate::brdf::Scattering;
+use crate::material::Material;
+use crate::units::db_from_ratio;
+
+/// Below this a level says only that nothing comes back, dB.
+pub(super) const FAINTEST_DB: f64 = -80.0;
+
+/// Angles of the small curves, °: dense where lobes are narrow.
+pub(super) const SMALL_DEG: [f64; 27] = [
+    0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0, 12.0, 15.0, 20.0, 25.0, 30.0,
+    35.0, 40.0, 45.0, 50.0, 55.0, 60.0, 70.0, 80.0, 85.0,
+];
+
+/// Angles of tables, °.
+pub(super) const TABLE_DEG: [f64; 9] = [0.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0];
+
+/// σ⁰ in dB to a tenth at an angle; none beyond the range that is claimed, or where nothing comes back.
+pub(super) fn claimed_db(
+    material: &Material,
+    model: &dyn Scattering,
+    theta_deg: f64,
+) -> Option<f64> {
+    let [least, most] = range_deg(material);
+    let level_db = db_from_ratio(model.sigma0(theta_deg.to_radians()));
+    let is_claimed = (least..=most).contains(&theta_deg) && level_db >= FAINTEST_DB;
+    is_claimed.then(|| tenth(level_db))
+}
+
+/// A curve fine enough for the lobe of a smooth surface: (°, dB), one list per unbroken piece.
+pub(super) fn line(material: &Material, model: &dyn Scattering) -> Vec<Vec<(f64, f64)>> {
+    let level = |theta_deg: f64| Some((theta_deg, claimed_db(material, model, theta_deg)?));
+    let mut pieces: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
+    for point in angles_deg(material).map(level) {
+        match (point, pieces.last_mut()) {
+            (Some(point), Some(piece)) => piece.push(point),
+            (None, Some(piece)) if !piece.is_empty() => pieces.push(Vec::new()),
+            _ => {}
+        }
+    }
+    pieces.retain(|piece| piece.len() > 1);
+    pieces
+}
+
+/// Angles from end to end of the claimed range, °: every tenth up to 12°, then every half.
+pub(super) fn angles_deg(material: &Material) -> impl Iterator<Item = f64> {
+    let [least, most] = range_deg(material);
+    let fine = (0..120).map(|step: u32| f64::from(step) / 10.0);
+    let coarse = (24..180).map(|step: u32| f64::from(step) / 2.0);
+    let inner = fine.chain(coarse).filter(move |a| *a > least && *a < most);
+    std::iter::once(least).chain(inner).chain((most > least && most < 90.0).then_some(most))
+}
+
+/// The claimed range, °, as people write it.
+pub(super) fn range_deg(material: &Material) -> [f64; 2] {
+    material.theta_rad.map(|rad| (rad.to_degrees() * 1e6).round() / 1e6)
+}
+
+/// To a tenth, and never −0.
+pub(super) fn tenth(value: f64) -> f64 {
+    (value * 10.0).round() / 10.0 + 0.0
+}

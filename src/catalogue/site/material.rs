@@ -1,0 +1,185 @@
+//! What stands on a material's page.
+
+use serde::Serialize;
+
+use super::cite::Citation;
+use super::curve::{self, CurveView, Sample};
+use super::entry::has_measured_curve;
+use super::fit::{self, FitView};
+use super::levels::{TABLE_DEG, claimed_db, range_deg};
+use super::link::{self, Link};
+use super::script::inert;
+use super::words::{cut, decibels, digits, gaps, meaning};
+use crate::catalogue::About;
+use crate::effects;
+use crate::material::{Material, Source, SourceKind};
+use crate::store::{RevisionSummary, Stored};
+
+/// A page's context.
+#[derive(Serialize)]
+pub(super) struct Page<'a> {
+    about: &'a About,
+    root: &'static str,
+    title: String,
+    material: Head<'a>,
+    kind: &'static str,
+    kind_means: &'static str,
+    revision: u32,
+    content_hash: &'a str,
+    added_at: &'a str,
+    picture: Option<String>,
+    samples: Vec<Sample>,
+    levels: Vec<(String, String)>,
+    curves: Vec<CurveView>,
+    fits: Vec<FitView>,
+    effects: Vec<EffectView>,
+    sources: Vec<SourceView<'a>>,
+    gaps: Vec<String>,
+    validity: [String; 2],
+    citation: &'a Citation,
+    record: String,
+    history: &'a [RevisionSummary],
+}
+
+/// What stands at the top.
+#[derive(Serialize)]
+struct Head<'a> {
+    slug: &'a str,
+    name: &'a str,
+    class: &'a str,
+    description: &'a str,
+    licence: &'a str,
+    tags: &'a [String],
+    render: &'a str,
+}
+
+#[derive(Serialize)]
+struct SourceView<'a> {
+    key: &'a str,
+    kind: &'static str,
+    title: &'a str,
+    link: Option<Link>,
+    licence: Option<&'a str>,
+    note: Option<&'a str>,
+}
+
+#[derive(Serialize)]
+struct EffectView {
+    name: String,
+    is: Option<&'static str>,
+    parameters: Vec<[String; 3]>,
+}
+
+/// The context of a material's page.
+pub(super) fn page<'a>(
+    about: &'a About,
+    stored: &'a Stored,
+    history: &'a [RevisionSummary],
+    citation: &'a Citation,
+) -> Page<'a> {
+    let material = &stored.material;
+    let (picture, samples) = curve::picture(material);
+    let kind = material.render_kind();
+    let fits = material.fits.iter().enumerate();
+    Page {
+        about,
+        root: "../",
+        title: cut(&material.name, 80),
+        material: head(material),
+        kind: kind.map_or("unknown", SourceKind::as_str),
+        kind_means: kind.map_or("of unknown origin", meaning),
+        revision: stored.revision,
+        content_hash: &stored.content_hash,
+        added_at: &stored.added_at,
+        picture,
+        samples,
+        levels: levels(material),
+        curves: material.curves.iter().map(|curve| curve::view(material, curve)).collect(),
+        fits: fits.map(|(number, fit)| fit::view(material, number, fit)).collect(),
+        effects: effects(material),
+        sources: material.sources.iter().map(source).collect(),
+        gaps: unknown(material),
+        validity: validity(material),
+        citation,
+        record: inert(&citation.record),
+        history,
+    }
+}
+
+fn head(material: &Material) -> Head<'_> {
+    Head {
+        slug: material.slug.as_str(),
+        name: &material.name,
+        class: &material.class,
+        description: material.description.trim(),
+        licence: &material.licence,
+        tags: &material.tags,
+        render: &material.render,
+    }
+}
+
+/// Levels of what scenes render.
+fn levels(material: &Material) -> Vec<(String, String)> {
+    let Ok(model) = material.scattering() else { return Vec::new() };
+    let level = |theta_deg: f64| {
+        let [least, most] = range_deg(material);
+        let text = match claimed_db(material, &model, theta_deg) {
+            Some(level_db) => decibels(level_db),
+            None if (least..=most).contains(&theta_deg) => "nothing".to_owned(),
+            None => "not claimed".to_owned(),
+        };
+        (format!("{theta_deg:.0}°"), text)
+    };
+    TABLE_DEG.into_iter().map(level).collect()
+}
+
+fn source(source: &Source) -> SourceView<'_> {
+    SourceView {
+        key: &source.key,
+        kind: source.kind.as_str(),
+        title: &source.title,
+        link: link::of(source),
+        licence: source.licence.as_deref(),
+        note: source.note.as_deref(),
+    }
+}
+
+/// As they are stored: a later program may know more of them than this one.
+fn effects(material: &Material) -> Vec<EffectView> {
+    let view = |entry: &crate::formats::EffectEntry| {
+        let effect = effects::find(&entry.name);
+        let unit = |name: &str| effect?.knobs().iter().find(|k| k.name == name).map(|k| k.unit);
+        let row = |(name, value): (&String, &f64)| {
+            [name.clone(), digits(*value), unit(name).unwrap_or_default().to_owned()]
+        };
+        EffectView {
+            name: entry.name.clone(),
+            is: effect.map(|effect| effect.is()),
+            parameters: entry.parameters.iter().map(row).collect(),
+        }
+    };
+    material.effects.iter().map(view).collect()
+}
+
+/// What is not known: what the entry says, and what follows from what it holds.
+fn unknown(material: &Material) -> Vec<String> {
+    let mut found = gaps(&material.description);
+    if !has_measured_curve(material) {
+        found.push("This entry holds no measured curve.".to_owned());
+    }
+    if material.fits.iter().all(|fit| fit.covariance.is_none()) {
+        found.push("No number here carries an uncertainty.".to_owned());
+    }
+    if material.curves.iter().any(|curve| curve.instrument.is_none()) {
+        found.push("A curve here names no instrument.".to_owned());
+    }
+    found
+}
+
+fn validity(material: &Material) -> [String; 2] {
+    let range = |[low, high]: [f64; 2], unit: &str| match low == high {
+        true => format!("{}{unit}", digits(low)),
+        false => format!("{}–{}{unit}", digits(low), digits(high)),
+    };
+    [range(material.frequency_hz.map(|hz| hz / 1e9), "\u{a0}GHz"), range(range_deg(material), "°")]
+}

@@ -1,0 +1,118 @@
+//! The site: an index, a page per material, and a page that compares. It works from a folder and from
+//! any web server, and loads nothing from anywhere else.
+//!
+//! Everything that a database says is text to a page: [`templates`] escapes it, [`script`] keeps it
+//! inside its quotes, [`words`] takes control characters out and [`link`] decides what may be clicked.
+
+mod bins;
+mod cite;
+mod compare;
+mod curve;
+mod entry;
+mod fit;
+mod levels;
+mod link;
+mod material;
+mod plot;
+mod residuals;
+mod script;
+mod table;
+mod templates;
+mod words;
+
+use serde_json::json;
+
+use super::{About, CatalogueError, Folder};
+use crate::store::{RevisionSummary, Stored};
+
+use cite::Citation;
+use entry::Entry;
+use templates::Templates;
+use words::cut;
+
+/// Materials in one file of the search index and on one page of the plain list.
+const PORTION: usize = 500;
+
+/// What every page needs besides its own.
+const ASSETS: [(&str, &str); 5] = [
+    ("assets/style.css", include_str!("assets/style.css")),
+    ("assets/index.js", include_str!("assets/index.js")),
+    ("assets/compare.js", include_str!("assets/compare.js")),
+    ("assets/material.js", include_str!("assets/material.js")),
+    ("assets/icon.svg", include_str!("assets/icon.svg")),
+];
+
+/// A site that grows by a material at a time and holds only a portion of the index in memory.
+pub(super) struct Site<'a> {
+    about: &'a About,
+    templates: Templates,
+    waiting: Vec<Entry>,
+    portions: usize,
+    materials: usize,
+}
+
+impl<'a> Site<'a> {
+    /// A site without materials.
+    pub(super) fn new(about: &'a About) -> Result<Site<'a>, CatalogueError> {
+        let templates = Templates::new()?;
+        Ok(Site { about, templates, waiting: Vec::new(), portions: 0, materials: 0 })
+    }
+
+    /// Writes the page of a material with what belongs to it, and notes it for the index.
+    pub(super) fn add(
+        &mut self,
+        folder: &mut Folder,
+        stored: &Stored,
+        history: &[RevisionSummary],
+    ) -> Result<(), CatalogueError> {
+        let slug = stored.material.slug.as_str();
+        let citation = Citation::new(self.about, stored);
+        let page = material::page(self.about, stored, history, &citation);
+        let html = self.templates.page("material.html", &page)?;
+        folder.write(&format!("material/{slug}.html"), html.as_bytes())?;
+        folder.write(&format!("material/{slug}.csv"), &table::csv(&stored.material)?)?;
+        let data = script::call("matdbMaterial", &compare::data(&stored.material));
+        folder.write(&format!("data/{slug}.js"), data.as_bytes())?;
+        self.waiting.push(Entry::new(&stored.material));
+        self.materials += 1;
+        if self.waiting.len() == PORTION {
+            self.write_portion(folder)?;
+        }
+        Ok(())
+    }
+
+    /// Writes what belongs to all materials together.
+    pub(super) fn finish(mut self, folder: &mut Folder) -> Result<(), CatalogueError> {
+        if !self.waiting.is_empty() || self.portions == 0 {
+            self.write_portion(folder)?;
+        }
+        for (path, text) in ASSETS {
+            folder.write(path, text.as_bytes())?;
+        }
+        let record = script::inert(&cite::catalogue_record(self.about));
+        let context = json!({
+            "about": self.about, "root": "", "portions": self.portions, "record": record,
+            "materials": self.materials, "angles_deg": levels::SMALL_DEG, "title": cut(&self.about.title, 80),
+            "cite": cite::catalogue(self.about),
+        });
+        for page in ["index.html", "compare.html"] {
+            folder.write(page, self.templates.page(page, &context)?.as_bytes())?;
+        }
+        Ok(())
+    }
+
+    fn write_portion(&mut self, folder: &mut Folder) -> Result<(), CatalogueError> {
+        self.portions += 1;
+        let number = self.portions;
+        let entries = std::mem::take(&mut self.waiting);
+        let text = script::call("matdbIndex", &json!({ "portion": number, "entries": entries }));
+        folder.write(&format!("index/{number}.js"), text.as_bytes())?;
+        let context = json!({
+            "about": self.about, "root": "../", "entries": entries, "number": number,
+            "before": number - 1, "title": cut(&self.about.title, 80),
+            "after": (entries.len() == PORTION).then_some(number + 1),
+        });
+        let html = self.templates.page("list.html", &context)?;
+        folder.write(&format!("list/{number}.html"), html.as_bytes())
+    }
+}

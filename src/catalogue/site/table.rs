@@ -1,0 +1,62 @@
+//! The points of a material's curves as a table for other programs.
+
+use std::io;
+use std::path::PathBuf;
+
+use crate::catalogue::CatalogueError;
+use crate::material::{Material, SourceKind};
+use crate::units::{db_from_ratio, dbm_from_watts};
+
+use super::entry::kind_of;
+
+const COLUMNS: [&str; 12] = [
+    "curve",
+    "kind",
+    "theta_deg",
+    "sigma0_db",
+    "censor",
+    "threshold_db",
+    "theta_r_deg",
+    "delta_phi_deg",
+    "theta_sd_deg",
+    "power_dbm",
+    "range_m",
+    "chirp",
+];
+
+/// Every point, a cell empty where there is nothing.
+pub(super) fn csv(material: &Material) -> Result<Vec<u8>, CatalogueError> {
+    let mut out = csv::Writer::from_writer(Vec::new());
+    let failed = |reason: csv::Error| unwritable(material, io::Error::other(reason));
+    out.write_record(COLUMNS).map_err(failed)?;
+    for curve in &material.curves {
+        let kind = kind_of(material, &curve.source).map_or("unknown", SourceKind::as_str);
+        for o in &curve.observations {
+            let cell = |value: Option<f64>, decimals: usize| {
+                value.map_or(String::new(), |value| format!("{value:.decimals$}"))
+            };
+            let degrees = |rad: f64| cell(Some(rad.to_degrees() + 0.0), 6);
+            let record = [
+                curve.name.clone(),
+                kind.to_owned(),
+                degrees(o.theta_i_rad),
+                cell(o.sigma0.map(db_from_ratio), 4),
+                o.censor.as_str().to_owned(),
+                cell(o.threshold_sigma0.map(db_from_ratio), 4),
+                degrees(o.theta_r_rad),
+                degrees(o.delta_phi_rad),
+                cell(o.theta_sd_rad.map(f64::to_degrees), 6),
+                cell(o.power_w.map(dbm_from_watts), 4),
+                cell(o.range_m, 6),
+                o.chirp.map_or(String::new(), |chirp| chirp.to_string()),
+            ];
+            out.write_record(record).map_err(failed)?;
+        }
+    }
+    out.into_inner().map_err(|error| unwritable(material, error.into_error()))
+}
+
+fn unwritable(material: &Material, reason: io::Error) -> CatalogueError {
+    let path = PathBuf::from(format!("material/{}.csv", material.slug));
+    CatalogueError::Io { verb: "write", path, reason }
+}

@@ -1,0 +1,354 @@
+//! Promise: a published site stands alone, every link of it leads somewhere, whatever a database says
+//! is shown and not run, and the same database gives the same bytes.
+
+mod support;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use matdb::catalogue::{About, publish};
+use matdb::material::{Material, SourceKind, builtin};
+use matdb::store::Store;
+use support::database::{fitted, sample, with_effects};
+
+const HOSTILE: &str = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{7*7}}{% x %}\u{0}\u{1b}[2J\u{202e}abc\u{2028}";
+
+/// A built-in catalogue, a fitted material and one that means harm.
+fn materials() -> Vec<Material> {
+    let mut all: Vec<Material> =
+        builtin::names().map(|name| builtin::get(name).unwrap().unwrap()).collect();
+    all.extend([fitted("fitted"), with_effects("with-effects"), hostile()]);
+    all
+}
+
+/// Every text of it is an attack.
+fn hostile() -> Material {
+    let mut material = sample("hostile");
+    let text = |word: &str| format!("{HOSTILE} {word}");
+    material.name = format!("{HOSTILE}{}", "w".repeat(10_000));
+    material.class = text("class");
+    material.description = format!("{HOSTILE} Not known: {HOSTILE}. שלום עולם.");
+    material.licence = text("licence");
+    material.tags = vec![text("tag"), "#&=?/".to_owned()];
+    for (number, source) in material.sources.iter_mut().enumerate() {
+        source.title = text("title");
+        source.note = Some(text("note"));
+        source.licence = Some(text("source licence"));
+        source.doi = (number == 0).then(|| format!("10.1000/{HOSTILE}"));
+        source.url = Some("javascript:alert(3)".to_owned());
+    }
+    material.instruments[0].name = text("instrument");
+    material.instruments[0].note = Some(text("instrument note"));
+    let renamed = text("scan");
+    material.curves[0].name = renamed;
+    let key = text("key");
+    let old = material.sources[0].key.clone();
+    for source in material.sources.iter_mut().filter(|source| source.key == old) {
+        source.key = key.clone();
+    }
+    material.curves[0].source = key.clone();
+    for fit in &mut material.fits {
+        let sources = std::iter::once(&mut fit.source)
+            .chain(fit.parameter_sources.iter_mut().map(|(_, source)| source));
+        sources.filter(|source| **source == old).for_each(|source| *source = key.clone());
+    }
+    material.validate().unwrap();
+    material
+}
+
+fn about() -> About {
+    let text = format!(
+        "title = 'Catalogue of {0}'\ndescription = '{0}'\nversion = '1'\nurl = 'javascript:alert(4)'\n\
+         [[person]]\nfamily = '<b>Roe</b>'\ngiven = 'Ann'\n",
+        "<script>alert(0)</script>"
+    );
+    About::parse("about.toml", &text).unwrap()
+}
+
+/// Path in the site → text.
+fn read(folder: &Path) -> BTreeMap<String, String> {
+    fn walk(root: &Path, folder: &Path, found: &mut BTreeMap<String, String>) {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                walk(root, &path, found);
+            } else if let Ok(text) = fs::read_to_string(&path) {
+                let name = path.strip_prefix(root).unwrap().to_str().unwrap();
+                found.insert(name.replace('\\', "/"), text);
+            }
+        }
+    }
+    let mut found = BTreeMap::new();
+    walk(folder, folder, &mut found);
+    found
+}
+
+struct Site {
+    files: BTreeMap<String, String>,
+    folder: PathBuf,
+    _root: tempfile::TempDir,
+}
+
+fn site() -> Site {
+    let root = tempfile::tempdir().unwrap();
+    let mut store = Store::open(root.path().join("a.sqlite")).unwrap();
+    store.add(&materials()).unwrap();
+    let folder = root.path().join("site");
+    publish(&store, &about(), &folder, |_| ()).unwrap();
+    Site { files: read(&folder), folder, _root: root }
+}
+
+impl Site {
+    fn pages(&self) -> impl Iterator<Item = (&String, &String)> {
+        self.files.iter().filter(|(path, _)| path.ends_with(".html"))
+    }
+}
+
+/// Tags of a page as (name, attributes by name), the text of attributes read back.
+fn tags(html: &str) -> Vec<(String, BTreeMap<String, String>)> {
+    let mut found = Vec::new();
+    let mut rest = html;
+    while let Some(start) = rest.find('<') {
+        rest = &rest[start + 1..];
+        let mut quoted = false;
+        let end = rest
+            .find(|c: char| {
+                quoted ^= c == '"';
+                c == '>' && !quoted
+            })
+            .expect("every tag ends");
+        found.push(tag(&rest[..end]));
+        rest = &rest[end..];
+    }
+    found
+}
+
+fn tag(text: &str) -> (String, BTreeMap<String, String>) {
+    let (name, mut rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+    let mut attributes = BTreeMap::new();
+    while !rest.trim().is_empty() {
+        rest = rest.trim_start();
+        let end = rest.find(|c: char| c == '=' || c.is_whitespace()).unwrap_or(rest.len());
+        let key = rest[..end].to_owned();
+        rest = &rest[end..];
+        let mut value = String::new();
+        if let Some(quoted) = rest.strip_prefix("=\"") {
+            let close = quoted.find('"').unwrap();
+            value = unescaped(&quoted[..close]);
+            rest = &quoted[close + 1..];
+        }
+        attributes.insert(key, value);
+    }
+    (name.to_owned(), attributes)
+}
+
+fn unescaped(text: &str) -> String {
+    let signs = [("&lt;", "<"), ("&gt;", ">"), ("&quot;", "\""), ("&#x27;", "'"), ("&#39;", "'")];
+    let text = signs.iter().fold(text.to_owned(), |text, (from, to)| text.replace(from, to));
+    text.replace("&#x2f;", "/").replace("&amp;", "&")
+}
+
+/// The file that an address inside the site leads to.
+fn target(page: &str, address: &str) -> String {
+    let address = address.split(['#', '?']).next().unwrap();
+    let mut parts: Vec<&str> = page.split('/').collect();
+    parts.pop();
+    for part in address.split('/') {
+        match part {
+            ".." => drop(parts.pop().expect("a link stays inside the site")),
+            "." | "" => {}
+            part => parts.push(part),
+        }
+    }
+    parts.join("/")
+}
+
+#[test]
+fn nothing_is_loaded_from_elsewhere_and_nothing_runs_inside_a_page() {
+    let site = site();
+    assert_eq!(site.pages().count(), materials().len() + 3);
+    for (path, html) in site.pages() {
+        assert!(
+            html.contains("http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'")
+        );
+        for (name, attributes) in tags(html) {
+            for (key, value) in &attributes {
+                assert!(!key.starts_with("on") && key != "style", "{path}: {name} {key}");
+                let loads = key == "src" || (key == "href" && name == "link");
+                assert!(!loads || !value.contains(':'), "{path} loads {value}");
+            }
+            let is_data = attributes.get("type").is_some_and(|t| t == "application/ld+json");
+            assert!(name != "script" || is_data || attributes.contains_key("src"), "{path}");
+            assert!(
+                !["style", "iframe", "object", "embed", "form action"].contains(&name.as_str())
+            );
+        }
+    }
+    for (path, text) in site.files.iter().filter(|(path, _)| path.starts_with("assets/")) {
+        let calls =
+            ["fetch(", "XMLHttpRequest", "@import", "url(", "import(", "innerHTML", "eval("];
+        for word in calls {
+            assert!(!text.contains(word), "{path} says {word}");
+        }
+        let outside = text.replace("http://www.w3.org/2000/svg", "");
+        assert!(!outside.contains("://"), "{path} names an address");
+    }
+}
+
+#[test]
+fn every_link_leads_somewhere() {
+    let site = site();
+    for (path, html) in site.pages() {
+        let tags = tags(html);
+        let ids: Vec<&String> = tags.iter().filter_map(|(_, a)| a.get("id")).collect();
+        assert_eq!(ids.len(), ids.iter().collect::<BTreeSet<_>>().len(), "{path}: an id twice");
+        for (name, attributes) in &tags {
+            for key in ["href", "src"] {
+                let Some(address) = attributes.get(key) else { continue };
+                match address.split_once(':').map(|(scheme, _)| scheme) {
+                    Some("https" | "http") => assert_eq!(name, "a"),
+                    _ if address.starts_with('#') => {
+                        assert!(ids.iter().any(|id| **id == address[1..]), "{path}: {address}");
+                    }
+                    _ => {
+                        let target = site.folder.join(target(path, address));
+                        assert!(target.is_file(), "{path}: {address}");
+                    }
+                }
+            }
+            for key in ["aria-labelledby", "aria-describedby", "for"] {
+                for id in attributes.get(key).map_or("", String::as_str).split_whitespace() {
+                    assert!(ids.iter().any(|known| *known == id), "{path}: {key} {id}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_a_database_says_is_shown_and_not_run() {
+    let site = site();
+    let page = &site.files["material/hostile.html"];
+    assert!(page.contains("&lt;script&gt;alert(1)"), "it is shown");
+    let control = |c: char| c.is_control() && c != '\n' && c != '\t';
+    for (path, text) in site.files.iter().filter(|(path, _)| !path.ends_with(".json")) {
+        if !path.ends_with(".csv") {
+            assert!(!text.contains(control), "{path} holds a control character");
+            assert!(!text.contains("<script>alert") && !text.contains("<img src=x"), "{path}");
+        }
+    }
+    for (path, html) in site.pages() {
+        for (name, attributes) in tags(html) {
+            assert!(!["img", "b"].contains(&name.as_str()), "{path}: {name}");
+            let href = attributes.get("href").map_or("", String::as_str);
+            assert!(!href.starts_with("javascript"), "{path}: {href}");
+        }
+    }
+    for (path, text) in &site.files {
+        let Some(call) = ["index/", "data/"].iter().find(|folder| path.starts_with(**folder))
+        else {
+            continue;
+        };
+        let name = if *call == "index/" { "matdbIndex(" } else { "matdbMaterial(" };
+        let json = text.trim_end().strip_prefix(name).unwrap().strip_suffix(");").unwrap();
+        serde_json::from_str::<serde_json::Value>(json).unwrap();
+    }
+}
+
+#[test]
+fn the_same_database_gives_the_same_bytes() {
+    let root = tempfile::tempdir().unwrap();
+    let mut store = Store::open(root.path().join("a.sqlite")).unwrap();
+    store.add(&materials()).unwrap();
+    let [one, two] = ["one", "b/two"].map(|name| root.path().join(name));
+    publish(&store, &about(), &one, |_| ()).unwrap();
+    publish(&store, &about(), &two, |_| ()).unwrap();
+    publish(&store, &about(), &two, |_| ()).unwrap();
+    let [one_files, two_files] = [&one, &two].map(|folder| read(folder));
+    assert_eq!(one_files.keys().collect::<Vec<_>>(), two_files.keys().collect::<Vec<_>>());
+    for (path, text) in &one_files {
+        assert!(*text == two_files[path], "{path} differs");
+        assert!(!text.contains(root.path().to_str().unwrap()), "{path} names the machine");
+    }
+}
+
+#[test]
+fn a_page_says_what_is_known_and_how_it_came_to_be() {
+    let site = site();
+    let page = &site.files["material/fitted.html"];
+    for words in [
+        "4π·f·cos²θ",
+        "1 of them (33.3 %) gave no detection",
+        "(1 − k) · f_lambda",
+        "k · r_s",
+        "only inside S",
+        "no: held at this value",
+        "The true reflectivity of the paint",
+        "@misc{matdb-fitted-1",
+        "What this fit cannot promise",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
+    assert!(page.contains("class=\"band") && page.contains("id=\"residuals-0-title\""));
+    let kinds = ["measured", "literature", "modelled", "synthetic"];
+    for material in materials() {
+        let html = &site.files[&format!("material/{}.html", material.slug)];
+        let sources = html.split("<table class=\"sources\">").nth(1).unwrap();
+        let sources = sources.split("</table>").next().unwrap();
+        for kind in kinds {
+            let badge = format!("<span class=\"badge is-{kind}\">{kind}</span>");
+            let stated = material.sources.iter().filter(|s| s.kind.as_str() == kind).count();
+            assert_eq!(sources.matches(&badge).count(), stated, "{} {kind}", material.slug);
+        }
+        assert!(html.contains(&format!("../api/v1/materials/{}.json", material.slug)));
+    }
+    assert_eq!(builtin::get("ptfe").unwrap().unwrap().render_kind(), Some(SourceKind::Synthetic));
+}
+
+#[test]
+fn points_are_in_the_table_for_other_programs() {
+    let site = site();
+    let mut reader = csv::Reader::from_reader(site.files["material/fitted.csv"].as_bytes());
+    let header = reader.headers().unwrap().clone();
+    let column = |name: &str| header.iter().position(|column| column == name).unwrap();
+    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    assert_eq!(rows.len(), 3);
+    let number = |row: usize, name: &str| rows[row][column(name)].parse::<f64>().unwrap();
+    assert!((number(0, "sigma0_db") - 10.0 * 2.5f64.log10()).abs() < 1e-4);
+    assert!((number(1, "theta_deg") - 0.5f64.to_degrees()).abs() < 1e-6);
+    assert_eq!((&rows[2][column("sigma0_db")], &rows[2][column("censor")]), ("", "left"));
+    assert!((number(0, "power_dbm") + 70.0).abs() < 1e-4);
+}
+
+#[test]
+fn many_materials_are_read_in_portions() {
+    let root = tempfile::tempdir().unwrap();
+    let mut store = Store::open(root.path().join("a.sqlite")).unwrap();
+    let ptfe = builtin::get("ptfe").unwrap().unwrap();
+    let numbered =
+        |number: usize| Material { slug: format!("m{number:04}").parse().unwrap(), ..ptfe.clone() };
+    let all: Vec<Material> = (0..1001).map(numbered).collect();
+    store.add(&all).unwrap();
+    let folder = root.path().join("site");
+    publish(&store, &About::default(), &folder, |_| ()).unwrap();
+    let index = fs::read_to_string(folder.join("index.html")).unwrap();
+    assert!(index.contains("data-portions=\"3\""));
+    let entries = |number: usize| {
+        let text = fs::read_to_string(folder.join(format!("index/{number}.js"))).unwrap();
+        text.matches("\"slug\":").count()
+    };
+    assert_eq!([1, 2, 3].map(entries), [500, 500, 1]);
+    let last = fs::read_to_string(folder.join("list/3.html")).unwrap();
+    assert!(last.contains("m1000.html") && last.contains("href=\"2.html\""));
+}
+
+#[test]
+fn an_empty_catalogue_says_so() {
+    let root = tempfile::tempdir().unwrap();
+    let store = Store::open(root.path().join("a.sqlite")).unwrap();
+    let folder = root.path().join("site");
+    publish(&store, &About::default(), &folder, |_| ()).unwrap();
+    let list = fs::read_to_string(folder.join("list/1.html")).unwrap();
+    assert!(list.contains("There is no material"));
+}
