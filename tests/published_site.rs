@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use matdb::catalogue::{About, publish};
 use matdb::material::{Material, SourceKind, builtin};
 use matdb::store::Store;
-use support::database::{fitted, sample, with_effects};
+use support::database::{complete, fitted, sample, with_effects};
 
 const HOSTILE: &str = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{7*7}}{% x %}\u{0}\u{1b}[2J\u{202e}abc\u{2028}";
 
@@ -18,7 +18,7 @@ const HOSTILE: &str = "</script><script>alert(1)</script><img src=x onerror=aler
 fn materials() -> Vec<Material> {
     let mut all: Vec<Material> =
         builtin::names().map(|name| builtin::get(name).unwrap().unwrap()).collect();
-    all.extend([fitted("fitted"), with_effects("with-effects"), hostile()]);
+    all.extend([fitted("fitted"), with_effects("with-effects"), complete("complete"), hostile()]);
     all
 }
 
@@ -304,6 +304,28 @@ fn a_page_says_what_is_known_and_how_it_came_to_be() {
         assert!(html.contains(&format!("../api/v1/materials/{}.json", material.slug)));
     }
     assert_eq!(builtin::get("ptfe").unwrap().unwrap().render_kind(), Some(SourceKind::Synthetic));
+}
+
+#[test]
+fn a_page_says_what_a_material_is_made_of_and_what_was_tried_on_it() {
+    let site = site();
+    let page = &site.files["material/complete.html"];
+    for words in [
+        "This entry is superseded.",
+        "#q=better%2Dpaint",
+        "Finish: <bdi>sprayed</bdi>",
+        "20 µm rms, correlated over 300 µm, profilometer",
+        "<td>0.1</td><td><bdi>acrylate</bdi></td>",
+        "half space",
+        "2.62 ± 0.02",
+        "<td>22</td>",
+        "2026-03-14, at 22 °C, humidity 40 %",
+        "threshold −76.99 dBm",
+        "looked for, not found",
+        "The thickness of the fibre.",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
 }
 
 #[test]

@@ -9,7 +9,7 @@ use super::plot::{Plot, Series, Shape};
 use super::words::{digits, grouped, percent};
 use crate::fit::stored_band;
 use crate::material::{Censor, Curve, Fit, Instrument, Material, Observation, SourceKind};
-use crate::units::db_from_ratio;
+use crate::units::{db_from_ratio, dbm_from_watts};
 
 /// Number of inks that the style has.
 const INKS: usize = 6;
@@ -222,5 +222,29 @@ fn instrument_view(instrument: &Instrument) -> InstrumentView {
     let mut facts = vec![format!("{} GHz", digits(instrument.centre_frequency_hz / 1e9))];
     facts.extend(instrument.bandwidth_hz.map(|hz| format!("bandwidth {} GHz", digits(hz / 1e9))));
     facts.extend(instrument.polarisation.as_ref().map(|p| format!("polarisation {p}")));
+    let number = |value: Option<f64>, what: &str, unit: &str| {
+        value.map(|value| format!("{what} {} {unit}", digits(value)))
+    };
+    let word =
+        |word: &Option<String>, what: &str| word.as_ref().map(|word| format!("{what} {word}"));
+    let i = instrument;
+    let more = [
+        word(&i.transmit_polarisation, "sends"),
+        word(&i.receive_polarisation, "receives"),
+        i.geometry.map(|geometry| geometry.as_str().to_owned()),
+        number(i.stand_off_m, "stand-off", "m"),
+        number(i.spot_diameter_m.map(|m| m * 1e3), "spot", "mm"),
+        number(i.aperture_m, "aperture", "m"),
+        word(&i.calibration_target, "calibrated with"),
+        number(i.calibration_sd_factor.map(db_from_ratio), "calibration known to", "dB"),
+        i.scale.map(|scale| format!("{} levels", scale.as_str())),
+        number(i.noise_floor_w.map(dbm_from_watts), "noise floor", "dBm"),
+        number(i.threshold_w.map(dbm_from_watts), "threshold", "dBm"),
+        number(i.false_alarm_probability, "false-alarm probability", "per chirp"),
+        i.range_bins.map(|bins| format!("{bins} range bins searched")),
+        number(i.looks, "looks", "in one value"),
+        word(&i.looks_method, "looks were"),
+    ];
+    facts.extend(more.into_iter().flatten());
     InstrumentView { name: instrument.name.clone(), facts, note: instrument.note.clone() }
 }

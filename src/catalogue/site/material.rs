@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::cite::Citation;
+use super::composition::{self, Composition};
 use super::curve::{self, CurveView, Sample};
 use super::entry::has_measured_curve;
 use super::fit::{self, FitView};
@@ -12,7 +13,7 @@ use super::script::inert;
 use super::words::{cut, decibels, digits, gaps, meaning};
 use crate::catalogue::About;
 use crate::effects;
-use crate::material::{Material, Source, SourceKind};
+use crate::material::{FindingVerdict, Material, Source, SourceKind};
 use crate::store::{RevisionSummary, Stored};
 
 /// A page's context.
@@ -33,6 +34,7 @@ pub(super) struct Page<'a> {
     curves: Vec<CurveView>,
     fits: Vec<FitView>,
     effects: Vec<EffectView>,
+    composition: Composition,
     sources: Vec<SourceView<'a>>,
     gaps: Vec<String>,
     validity: [String; 2],
@@ -97,6 +99,7 @@ pub(super) fn page<'a>(
         curves: material.curves.iter().map(|curve| curve::view(material, curve)).collect(),
         fits: fits.map(|(number, fit)| fit::view(material, number, fit)).collect(),
         effects: effects(material),
+        composition: composition::view(material),
         sources: material.sources.iter().map(source).collect(),
         gaps: unknown(material),
         validity: validity(material),
@@ -164,6 +167,9 @@ fn effects(material: &Material) -> Vec<EffectView> {
 /// What is not known: what the entry says, and what follows from what it holds.
 fn unknown(material: &Material) -> Vec<String> {
     let mut found = gaps(&material.description);
+    found.extend(material.unknown.iter().cloned());
+    let unexplained = material.findings.iter().filter(|f| f.verdict == FindingVerdict::Unexplained);
+    found.extend(unexplained.map(|f| format!("What goes with {} is not explained.", f.effect)));
     if !has_measured_curve(material) {
         found.push("This entry holds no measured curve.".to_owned());
     }

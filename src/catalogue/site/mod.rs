@@ -7,6 +7,7 @@
 mod bins;
 mod cite;
 mod compare;
+mod composition;
 mod curve;
 mod entry;
 mod fit;

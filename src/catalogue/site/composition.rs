@@ -1,0 +1,151 @@
+//! What a material is made of, whether it may be used, when it was measured and what was tried on it.
+
+use serde::Serialize;
+
+use super::entry::place_of;
+use super::words::digits;
+use crate::material::{Finding, FindingVerdict, Layer, Material, Permittivity, Session, Status};
+
+/// What a page says of these.
+#[derive(Serialize)]
+pub(super) struct Composition {
+    status: Option<StatusView>,
+    finish: Option<String>,
+    /// In a sentence, and the place of its source.
+    roughness: Option<(String, usize)>,
+    layers: Vec<[String; 3]>,
+    permittivities: Vec<PermittivityView>,
+    sessions: Vec<SessionView>,
+    findings: Vec<FindingView>,
+}
+
+/// Why an entry is no longer to be used.
+#[derive(Serialize)]
+struct StatusView {
+    word: &'static str,
+    reason: String,
+    by: Option<String>,
+}
+
+#[derive(Serialize)]
+struct PermittivityView {
+    cells: [String; 5],
+    source: String,
+    source_place: usize,
+}
+
+#[derive(Serialize)]
+struct SessionView {
+    key: String,
+    facts: Vec<String>,
+    note: Option<String>,
+}
+
+#[derive(Serialize)]
+struct FindingView {
+    effect: String,
+    verdict: &'static str,
+    numbers: [Option<String>; 3],
+    confusable: String,
+    source: String,
+    source_place: usize,
+}
+
+/// What the page of a material says of these.
+pub(super) fn view(material: &Material) -> Composition {
+    Composition {
+        status: status(&material.status),
+        finish: material.finish.clone(),
+        roughness: roughness(material),
+        layers: material.layers.iter().map(layer).collect(),
+        permittivities: material.permittivities.iter().map(|p| permittivity(material, p)).collect(),
+        sessions: material.sessions.iter().map(session).collect(),
+        findings: material.findings.iter().map(|f| finding(material, f)).collect(),
+    }
+}
+
+fn status(status: &Status) -> Option<StatusView> {
+    let reason = status.reason()?.to_owned();
+    let by = status.superseded_by().map(ToString::to_string);
+    Some(StatusView { word: status.as_str(), reason, by })
+}
+
+fn roughness(material: &Material) -> Option<(String, usize)> {
+    let roughness = material.roughness.as_ref()?;
+    let mut text = format!("{} µm rms", digits(roughness.rms_height_m * 1e6));
+    if let Some(length_m) = roughness.correlation_length_m {
+        text += &format!(", correlated over {} µm", digits(length_m * 1e6));
+    }
+    text += &roughness.method.as_ref().map_or(String::new(), |method| format!(", {method}"));
+    Some((text, place_of(material, &roughness.source)))
+}
+
+fn layer(layer: &Layer) -> [String; 3] {
+    let thickness = layer.thickness_m.map(|m| digits(m * 1e3));
+    [
+        layer.name.clone(),
+        thickness.unwrap_or("half space".to_owned()),
+        layer.permittivity.clone().unwrap_or("not known".to_owned()),
+    ]
+}
+
+fn permittivity(material: &Material, entry: &Permittivity) -> PermittivityView {
+    let with = |value: f64, sd: Option<f64>| {
+        digits(value) + &sd.map_or(String::new(), |sd| format!(" ± {}", digits(sd)))
+    };
+    let celsius = entry.temperature_k.map(|k| digits(k - 273.15));
+    PermittivityView {
+        cells: [
+            entry.key.clone(),
+            digits(entry.frequency_hz / 1e9),
+            celsius.unwrap_or("not stated".to_owned()),
+            with(entry.real, entry.real_sd),
+            with(entry.imaginary, entry.imaginary_sd),
+        ],
+        source: entry.source.clone(),
+        source_place: place_of(material, &entry.source),
+    }
+}
+
+fn session(session: &Session) -> SessionView {
+    let part = |value: Option<f64>, what: &str, unit: &str| {
+        value.map(|value| format!("{what} {} {unit}", digits(value)))
+    };
+    let parts = [
+        part(session.temperature_k.map(|k| k - 273.15), "at", "°C"),
+        part(session.relative_humidity.map(|share| share * 100.0), "humidity", "%"),
+        part(session.registration_rms_m.map(|m| m * 1e3), "registered to", "mm rms"),
+        part(session.normal_sd_rad.map(f64::to_degrees), "normals known to", "°"),
+        part(
+            session.footprint_sd_rad.map(f64::to_degrees),
+            "normals spread in a footprint by",
+            "°",
+        ),
+        session.cloud_hash.as_ref().map(|hash| format!("cloud {hash}")),
+        session.mesh_hash.as_ref().map(|hash| format!("mesh {hash}")),
+    ];
+    let date = std::iter::once(session.date.clone());
+    SessionView {
+        key: session.key.clone(),
+        facts: date.chain(parts.into_iter().flatten()).collect(),
+        note: session.note.clone(),
+    }
+}
+
+fn finding(material: &Material, finding: &Finding) -> FindingView {
+    let verdict = match finding.verdict {
+        FindingVerdict::Found => "found",
+        FindingVerdict::NotFound => "looked for, not found",
+        FindingVerdict::Unexplained => "there, and no effect explains it",
+    };
+    let error = finding.score_difference_sd.map(|sd| format!(" ± {}", digits(sd)));
+    let score = finding.score_difference.map(|gain| digits(gain) + &error.unwrap_or_default());
+    FindingView {
+        effect: finding.effect.clone(),
+        verdict,
+        numbers: [finding.size_db.map(digits), score, finding.p.map(digits)],
+        confusable: finding.confusable_with.join(", "),
+        source: finding.source.clone(),
+        source_place: place_of(material, &finding.source),
+    }
+}
