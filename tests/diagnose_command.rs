@@ -210,6 +210,31 @@ fn too_few_detections_are_said_in_files_and_one_sentence() {
 }
 
 #[test]
+fn nothing_detected_and_scenes_that_no_diagnosis_predicts_are_said() {
+    let folder = rendered("4");
+    let at = folder.path();
+    fs::write(at.join("none.csv"), "x_m,y_m,z_m,power_dbm,chirp\n").unwrap();
+    let none = ["diagnose", "none.csv", "--scene", "scene.toml", "-o", "report"];
+    assert!(refused(matdb(at).args(none)).contains("0 detections"));
+    assert_eq!(json(&at.join("report/report.json"))["verdict"], "cannot-tell");
+    let scene = fs::read_to_string(at.join("scene.toml")).unwrap();
+    for (more, way_out) in [
+        ("[spot]\nrays = 16\n", "`finite-spot`"),
+        ("[bounce]\n", "`multi-bounce`"),
+        ("[radar.receiver]\n", "[radar.noise]"),
+    ] {
+        fs::write(at.join("more.toml"), format!("{scene}\n{more}")).unwrap();
+        let more = ["diagnose", "out/cloud.ply", "--scene", "more.toml", "-o", "more"];
+        let message = refused(matdb(at).args(more));
+        assert!(message.contains("more.toml") && message.contains(way_out), "{message}");
+        assert!(!at.join("more").exists());
+    }
+    let unknown = ["diagnose", "out/cloud.ply", "--scene", "scene.toml", "-o", "more"];
+    let message = refused(matdb(at).args(unknown).args(["--effects", "unknown"]));
+    assert!(message.contains("always looked for"), "{message}");
+}
+
+#[test]
 fn the_library_is_listed_and_every_entry_is_complete() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {

@@ -190,7 +190,8 @@ fn several_effects_act_together_as_their_model_predicts() {
     let bench = Bench::new(SCENE);
     let mut effects = one("pose", &[0.01, 0.0, 0.02, 1.0, 2.0, 3.0]);
     for (name, values) in [
-        ("compression", &[-45.0][..]),
+        ("motion", &[2e-3, -1e-3, 3e-3][..]),
+        ("compression", &[-45.0]),
         ("drift", &[1.0, 0.3, 0.0, 2.0]),
         ("multi-bounce", &[0.0]),
         ("foreign-patch", &[4.0, 0.1, 0.0, 0.05]),
@@ -199,7 +200,7 @@ fn several_effects_act_together_as_their_model_predicts() {
         effects.add(resolve(&[entry(effect, values)], effect.level()).unwrap());
     }
     let film = find("thin-film").unwrap();
-    let film = resolve(&[entry(film, &[0.5, 3e-4, 1.6])], Level::Material).unwrap();
+    let film = resolve(&[entry(film, &[0.5, 3e-4, 1.6, 0.6, 1.2])], Level::Material).unwrap();
     effects.add_to_regions(film, &[false, true]);
     assert!(agrees(&bench, &effects, "together") > 300);
 }
@@ -522,11 +523,6 @@ fn mistakes_are_named_with_their_place_and_the_way_out() {
         ),
         (table("effect", "multi-bounce", "") + "[bounce]\n", &["`multi-bounce`", "one of the two"]),
         (table("effect", "pose", "") + "[bounce]\n", &["`pose` moves", "translation_m"]),
-        (
-            table("effect", "pose", "rotation_x_deg = 1")
-                + &table("effect", "motion", "x1_m = 0.01"),
-            &["would undo `pose`", "rotation_deg"],
-        ),
         (
             table("radar.effect", "noise-floor", "") + "[radar.receiver]\n",
             &["[radar.receiver] makes", "noise_figure_db"],

@@ -83,6 +83,11 @@ pub(super) fn chosen(names: &[String]) -> Result<Vec<&'static dyn Effect>, Error
 
 fn known(name: &str) -> Result<&'static dyn Effect, Error> {
     find(name).ok_or_else(|| {
+        if name == UNKNOWN.name {
+            let problem = "`unknown` is no effect to try".to_owned();
+            let way_out = "leave it out: what no effect explains is always looked for".to_owned();
+            return Error::Usage { problem, way_out };
+        }
         let way_out = match nearest(name, library().map(|effect| effect.name())) {
             Some(near) => format!("did you mean `{near}`?"),
             None => "`matdb effects` lists them".to_owned(),

@@ -2,6 +2,7 @@
 
 use super::looks::Observation;
 use crate::effects::{Look, Prediction};
+use crate::radar::random::{Key, Purpose};
 
 /// One number for each look, and how finely it is looked at.
 pub(super) struct Covariate {
@@ -38,7 +39,11 @@ pub(super) fn covariates(
         of_look("distance from edge", 8, &|look| look.edge_m),
         of_look("progress", 20, &|look| look.progress),
         Covariate { name: "predicted power", values: powers.collect(), cells: 12 },
-        Covariate { name: "range residual", values: off_m(observations, &arrived_m), cells: 8 },
+        Covariate {
+            name: "range residual",
+            values: range_residuals_m(observations, &arrived_m),
+            cells: 8,
+        },
         of_look("region", 8, &|look| f64::from(look.region)),
     ];
     all.retain(|c| c.values.iter().any(|value| Some(value) != c.values.first()));
@@ -47,14 +52,14 @@ pub(super) fn covariates(
 
 /// Measured less expected range, m. A look without one takes that of another look: a number of its own
 /// would tell every field which looks are silent.
-fn off_m(observations: &[Observation], arrived_m: &[Option<f64>]) -> Vec<f64> {
+fn range_residuals_m(observations: &[Observation], arrived_m: &[Option<f64>]) -> Vec<f64> {
     let off = |(seen, arrived_m): (&Observation, &Option<f64>)| Some(seen.range_m? - (*arrived_m)?);
     let own: Vec<Option<f64>> = observations.iter().zip(arrived_m).map(off).collect();
     let known: Vec<f64> = own.iter().copied().flatten().collect();
-    // Knuth's multiplicative hash spreads the silent looks over the others.
     let other = |look: usize| {
-        let drawn = look.wrapping_mul(2_654_435_761).checked_rem(known.len());
-        drawn.and_then(|drawn| known.get(drawn)).copied().unwrap_or(0.0)
+        let key = Key { seed: 0, chirp: look as u64, sub_ray: 5, purpose: Purpose::Fit };
+        let drawn = (key.draws().uniform() * known.len() as f64) as usize;
+        known.get(drawn).or(known.last()).copied().unwrap_or(0.0)
     };
     own.iter().enumerate().map(|(look, own_m)| own_m.unwrap_or_else(|| other(look))).collect()
 }

@@ -13,7 +13,7 @@ use super::folds::Folds;
 use super::likelihood::{Declared, Likelihood, Term};
 use super::looks::Observation;
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Look, Model, Prediction, Receiver, Stage, Surveys};
+use crate::effects::{Effect, Look, Model, Prediction, Receiver, Stage, Surveys, rank};
 use crate::fit::FitError;
 use crate::fit::coordinates::Coordinates;
 use crate::fit::minimise::{Local, Minimise};
@@ -158,7 +158,8 @@ impl<'a> Space<'a> {
             }
         }
         let found = self.effects.iter().copied().zip(self.effect_values(at));
-        let effects = self.at_work.iter().cloned().chain(found).collect();
+        let mut effects: Vec<_> = self.at_work.iter().cloned().chain(found).collect();
+        effects.sort_by_key(|(effect, _)| rank(effect.name()));
         Model { laws, receiver, effects }
     }
 

@@ -74,7 +74,9 @@ impl Above {
         let cell = (x as usize).min(CELLS - 1);
         let t = x - cell as f64;
         let [a, b] = [cell, cell + 1].map(|k| self.knots.get(k).copied().unwrap_or_default());
-        [(1.0 - t) * a[0] + t * b[0], (1.0 - t) * a[1] + t * b[1]]
+        // So far above the mean, what is detected lies close to the threshold.
+        let beyond = (ln_threshold - LAST).max(0.0);
+        [(1.0 - t) * a[0] + t * b[0] + beyond, (1.0 - t) * a[1] + t * b[1]]
     }
 }
 

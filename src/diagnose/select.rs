@@ -57,6 +57,8 @@ const SHARE_KEPT: f64 = 0.6;
 const FAR_BEYOND: f64 = 4.0;
 /// Placebos of each comparison.
 const PLACEBOS: u64 = 3;
+/// Difference in ln p of all held-out looks that tells no two effects apart: odds of twenty to one.
+const SAME: f64 = 3.0;
 /// Looks of a first fit of the base, that is not caught far from the data.
 const WIDE_LOOKS: f64 = 4.0;
 
@@ -525,7 +527,7 @@ impl Selection<'_> {
         let best = passed.first()?;
         let as_good = |other: &&(usize, Vec<Scored>, f64)| {
             let [worse, se] = self.difference(&best.1, &other.1);
-            worse <= se
+            worse <= se.max(SAME)
         };
         let class = passed.iter().skip(1).filter(as_good);
         let names = class.map(|one| trials[one.0].candidate.name).collect();

@@ -123,7 +123,7 @@ pub fn entry(effect: &dyn Effect, values: &[f64]) -> EffectEntry {
 }
 
 /// Place of an effect in the order in which effects act.
-pub(super) fn rank(name: &str) -> usize {
+pub(crate) fn rank(name: &str) -> usize {
     library().iter().take_while(|effect| effect.name() != name).count()
 }
 

@@ -30,6 +30,7 @@ use crate::radar::{Link, Radar};
 use crate::trace::{Bvh, Hit};
 
 pub use declared::SceneEffects;
+pub(crate) use entry::rank;
 pub use entry::{Chosen, EffectError, entry, resolve};
 pub use model::{Model, Prediction, Surveys};
 

@@ -4,9 +4,9 @@
 //! frequency, and R₀ that of the bare substrate, the specular part of f is multiplied by
 //! 1 − c + c·R/R₀. So is the part of the diffuse return that comes from the rough surface itself; the
 //! part from below crosses the film twice and is multiplied by 1 − c + c·((1 − R)/(1 − R₀))².
-//! The substrate is lossless; where no index is given it has the one that f_λ asks for,
-//! n = (1 + √f_λ)/(1 − √f_λ), though backscatter alone does not tell f_λ. R is that of a film as flat as
-//! the surface is on average, so that the ripple in θ shows.
+//! The substrate is lossless. Its index is the one that f_λ asks for, n = (1 + √f_λ)/(1 − √f_λ), times a
+//! ratio, since backscatter alone does not tell f_λ. R is that of a film as flat as the surface is on
+//! average, so that the ripple in θ shows.
 
 use super::lobes::first_lobe;
 use super::{Effect, Knob, Level, Look, Stage};
@@ -21,11 +21,9 @@ const KNOBS: [Knob; 5] = [
     Knob::new("thickness_m", "m", [0.0, 5e-3], 3e-4, 2e-5),
     Knob::new("index", "1", [1.0, 4.0], 1.6, 0.05),
     Knob::new("from_below", "1", [0.0, 1.0], 1.0, 0.2),
-    Knob::new("substrate_index", "1", [1.0, 10.0], BY_F_LAMBDA, 0.2),
+    Knob::new("substrate_ratio", "1", [0.5, 5.0], 1.0, 0.1),
 ];
 
-/// A substrate of this index is the one that f_λ asks for.
-const BY_F_LAMBDA: f64 = 1.0;
 /// Reflectance at normal incidence of a substrate whose law has no f_λ: an index of 2.
 const USUAL_F_LAMBDA: f64 = 0.11;
 /// Beyond these a substrate reflects nothing, or all, and a ratio means nothing.
@@ -33,15 +31,15 @@ const F_LAMBDA_RANGE: [f64; 2] = [1e-3, 0.999];
 const LOBE_RAD: f64 = 0.02;
 const MOST_THETA_RAD: f64 = 1.55;
 
-/// ε of the substrate under a law.
-fn substrate(law: &Brdf, index: f64) -> f64 {
-    if index > BY_F_LAMBDA {
-        return index * index;
-    }
+/// Less than any solid has.
+const LEAST_INDEX: f64 = 1.05;
+
+/// ε of the substrate under a law, whose index is `ratio` times the one that f_λ asks for.
+fn substrate(law: &Brdf, ratio: f64) -> f64 {
     let [least, most] = F_LAMBDA_RANGE;
     let f_lambda = first_lobe(law).map_or(USUAL_F_LAMBDA, |lobe| lobe.f_lambda);
     let root = f_lambda.clamp(least, most).sqrt();
-    ((1.0 + root) / (1.0 - root)).powi(2)
+    (ratio * (1.0 + root) / (1.0 - root)).max(LEAST_INDEX).powi(2)
 }
 
 /// Reflectance with the film and without, at θ.
@@ -77,19 +75,20 @@ impl Effect for ThinFilm {
     }
 
     fn shows(&self) -> &'static str {
-        "The residual swings with the angle, with no other covariate, and the opposite way in the \
-         specular and the diffuse part. A film much thinner than a wavelength only shifts the levels, \
+        "The residual swings with the angle, with no other covariate; a diffuse return from below swings \
+         against the specular part. A film much thinner than a wavelength only shifts the levels, \
          which the base law absorbs; another frequency moves the swings, which tells it from a wrong \
          shape of the lobe."
     }
 
     fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
         let thicknesses_m = [1e-4, 2e-4, 3e-4, 4.5e-4, 6e-4, 8e-4, 1.1e-3, 1.5e-3, 2e-3, 2.7e-3];
-        let start = |from_below: f64, substrate_index: f64| {
-            let film = |thickness_m| vec![0.3, thickness_m, 1.6, from_below, substrate_index];
+        let start = |from_below: f64, substrate_ratio: f64| {
+            let film = |thickness_m| vec![0.3, thickness_m, 1.6, from_below, substrate_ratio];
             thicknesses_m.map(film)
         };
-        [start(1.0, BY_F_LAMBDA), start(0.0, 2.3)].concat()
+        // Without a mirror part of its own the fitted f_λ is lower than the substrate's.
+        [start(1.0, 1.0), start(0.0, 1.6)].concat()
     }
 
     fn scatter(
@@ -100,7 +99,7 @@ impl Effect for ThinFilm {
         look: &Look,
         f_per_sr: f64,
     ) -> f64 {
-        let &[coverage, thickness_m, index, from_below, substrate_index] = values else {
+        let &[coverage, thickness_m, index, from_below, substrate_ratio] = values else {
             return f_per_sr;
         };
         if coverage == 0.0 {
@@ -110,7 +109,7 @@ impl Effect for ThinFilm {
         let frequency_hz = stage.radar.centre_frequency_ghz * 1e9;
         let [film, bare] = reflectances(
             [thickness_m, index],
-            substrate(law, substrate_index),
+            substrate(law, substrate_ratio),
             frequency_hz,
             theta_rad,
         );
@@ -131,7 +130,7 @@ mod tests {
     use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
     fn factor([coverage, thickness_m, index]: [f64; 3], law: &Brdf, theta_rad: f64) -> f64 {
-        factor_of([coverage, thickness_m, index, 1.0, BY_F_LAMBDA], law, theta_rad)
+        factor_of([coverage, thickness_m, index, 1.0, 1.0], law, theta_rad)
     }
 
     fn factor_of(values: [f64; 5], law: &Brdf, theta_rad: f64) -> f64 {
@@ -144,7 +143,7 @@ mod tests {
     #[test]
     fn a_film_of_no_thickness_or_of_the_substrates_index_is_the_bare_surface() {
         let law = Brdf::CookTorrance(lobe());
-        let index = substrate(&law, BY_F_LAMBDA).sqrt();
+        let index = substrate(&law, 1.0).sqrt();
         for theta_rad in [0.0, 0.4, 1.2] {
             for film in [[1.0, 0.0, 1.6], [1.0, 4e-4, index]] {
                 let found = factor(film, &law, theta_rad);
@@ -156,7 +155,7 @@ mod tests {
     #[test]
     fn a_quarter_wave_of_the_mean_index_takes_the_echo_away_and_a_half_wave_gives_it_back() {
         let law = Brdf::CookTorrance(lobe());
-        let index = substrate(&law, BY_F_LAMBDA).powf(0.25);
+        let index = substrate(&law, 1.0).powf(0.25);
         let quarter_m = SPEED_OF_LIGHT_M_PER_S / 300e9 / 4.0 / index;
         assert!(factor([1.0, quarter_m, index], &law, 0.0) < 1e-20);
         assert!((factor([0.4, quarter_m, index], &law, 0.0) - 0.6).abs() < 1e-9);
@@ -166,7 +165,7 @@ mod tests {
     #[test]
     fn what_the_surface_reflects_less_the_diffuse_part_gets() {
         let law = Brdf::Lambert(Lambert { albedo: 0.3 });
-        let index = substrate(&law, BY_F_LAMBDA).powf(0.25);
+        let index = substrate(&law, 1.0).powf(0.25);
         let quarter_m = SPEED_OF_LIGHT_M_PER_S / 300e9 / 4.0 / index;
         let expected = (1.0 - USUAL_F_LAMBDA).powi(-2);
         assert!((factor([1.0, quarter_m, index], &law, 0.0) / expected - 1.0).abs() < 1e-9);
@@ -177,8 +176,9 @@ mod tests {
         let law = Brdf::Lambert(Lambert { albedo: 0.3 });
         let quarter_m = SPEED_OF_LIGHT_M_PER_S / 300e9 / 4.0 / 2f64.sqrt();
         // A quarter wave of the mean index matches a substrate of index 2.
-        assert!(factor_of([1.0, quarter_m, 2f64.sqrt(), 0.0, 2.0], &law, 0.0) < 1e-20);
-        let lost = factor_of([1.0, quarter_m, 2f64.sqrt(), 0.5, 2.0], &law, 0.0);
+        let ratio = 2.0 / substrate(&law, 1.0).sqrt();
+        assert!(factor_of([1.0, quarter_m, 2f64.sqrt(), 0.0, ratio], &law, 0.0) < 1e-20);
+        let lost = factor_of([1.0, quarter_m, 2f64.sqrt(), 0.5, ratio], &law, 0.0);
         assert!((lost - 0.5 / (8.0f64 / 9.0).powi(2)).abs() < 1e-9);
     }
 }

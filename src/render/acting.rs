@@ -270,11 +270,6 @@ fn tilted(look: &Look, [along, across]: [f64; 2]) -> Option<Look> {
 pub(super) fn check(setup: &Setup, rays: usize, observer: Observer) -> Result<(), RenderError> {
     let Some(model) = setup.effects else { return Ok(()) };
     let (radar, bounces) = (setup.radar, setup.bounce.is_some());
-    let is_there = |name: &str| {
-        let knobs_and_values = model.effects.iter().filter(|(effect, _)| effect.name() == name);
-        let mut pairs = knobs_and_values.flat_map(|(e, values)| std::iter::zip(e.knobs(), values));
-        pairs.any(|(knob, value)| knob.absent != *value)
-    };
     for (effect, _) in &model.effects {
         let effect = effect.name();
         let (problem, way_out) = match effect {
@@ -293,10 +288,6 @@ pub(super) fn check(setup: &Setup, rays: usize, observer: Observer) -> Result<()
             "pose" | "motion" if bounces => (
                 "moves the target, and [bounce] follows paths on it where the scene has it",
                 "remove [bounce], or move the mesh by its translation_m and rotation_deg",
-            ),
-            "motion" if is_there("motion") && is_there("pose") => (
-                "moves the target from where the scene has it, and would undo `pose`",
-                "move the mesh by its translation_m and rotation_deg instead of `pose`",
             ),
             "noise-floor" if radar.receiver.is_some() => (
                 "adds thermal noise, and [radar.receiver] makes all of its own",

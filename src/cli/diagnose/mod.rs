@@ -26,7 +26,7 @@ use crate::brdf::Brdf;
 use crate::diagnose::{Declared, DiagnoseError, Diagnosis, Report, Subject, looks, matched};
 use crate::effects::{Effect, Receiver, Stage, middle};
 use crate::error::Error;
-use crate::measure::Cloud;
+use crate::measure::{Cloud, CloudError};
 use crate::radar::{Link, Radar};
 use crate::scene::{Scene, read_text};
 use crate::trace::Bvh;
@@ -132,6 +132,7 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     let Asked { cloud, scene: path, args } = asked;
     let given = read_text(path)?;
     let scene = Scene::load(path)?;
+    check_declared(&scene, path)?;
     let effects = chosen(&args.effects)?;
     let (used, material_of_region) = materials(&scene, path, db)?;
     let names: Vec<String> = scene.target.regions.iter().map(|r| r.material.clone()).collect();
@@ -146,7 +147,13 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     let at_work = model(&declared, &scene, cast.used, cast.of_region);
     let at_work = at_work.as_ref().map_or(&[][..], |model| &model.effects);
     let effects = undeclared(effects, at_work, console)?;
-    let cloud = cloud.read(scene.radar())?;
+    let cloud = match cloud.read(scene.radar()) {
+        // That nothing was detected is an answer, too.
+        Err(Error::Cloud { error: CloudError::Empty, .. }) => {
+            return refuse(DiagnoseError::TooFew { detected: 0 }, asked, console);
+        }
+        read => read?,
+    };
     let laws: Vec<Brdf> =
         material_of_region.iter().map(|&m| used[usize::from(m)].scattering.clone()).collect();
     cloud.notices.iter().for_each(|notice| console.notice(notice));
@@ -163,6 +170,24 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
         }
         Err(error) => refuse(error, asked, console),
     }
+}
+
+/// Refuses what a scene declares and no diagnosis predicts: it would be found as an effect.
+fn check_declared(scene: &Scene, path: &Path) -> Result<(), Error> {
+    let radar = scene.radar();
+    let (what, way_out) = if scene.file.spot.rays > 1 {
+        ("several rays in a spot", "set spot.rays = 1 and declare [[radar.effect]] `finite-spot`")
+    } else if scene.file.bounce.is_some() {
+        ("a second bounce", "replace [bounce] by [[effect]] `multi-bounce`")
+    } else if radar.receiver.is_some() {
+        ("a range receiver", "replace [radar.receiver] by [radar.noise] and [radar.speckle]")
+    } else if !scene.file.receiver.is_empty() {
+        ("other antennas", "remove [[receiver]]; a diagnosis is of the radar's own echoes")
+    } else {
+        return Ok(());
+    };
+    let problem = format!("{}: no diagnosis predicts {what}", path.display());
+    Err(Error::Usage { problem, way_out: way_out.to_owned() })
 }
 
 /// Effects with their values.
@@ -225,10 +250,10 @@ fn diagnosed(
         declared,
         looks: &looks,
         observations: &matched.observations,
-        false_alarms: matched.false_alarms,
+        false_alarms: matched.false_alarms + matched.beside,
     };
     let report = Diagnosis { seed, ..Diagnosis::default() }.run_with(&subject, effects, hear)?;
-    Ok((report, matched.false_alarms))
+    Ok((report, matched.false_alarms + matched.beside))
 }
 
 fn context(asked: Asked, scene: &Scene, false_alarms: usize, db: &Database) -> Context {

@@ -15,7 +15,9 @@ pub(super) fn text(report: &Report, files: &[String], folder: &Path) -> String {
     text += &report.effects.iter().map(effect).collect::<String>();
     text += &error(report);
     text += &remains(report);
-    let accepted = |name: &str| report.effects.iter().any(|found| found.name == name);
+    let accepted = |name: &str| {
+        report.effects.iter().any(|found| found.name == name || found.class.contains(&name))
+    };
     let mut others: Vec<&str> =
         report.ranking.iter().map(|c| c.name).filter(|name| !accepted(name)).collect();
     others.sort_unstable();

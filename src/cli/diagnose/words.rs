@@ -139,6 +139,19 @@ pub(super) fn covariate(name: &str) -> (String, &'static str) {
         "predicted power" => ("predicted power", "The receiver is not linear, or noise is added."),
         "region" => ("region", "A region has another material than declared."),
         "map" => ("place on the target", "Something stands at one place and not at others."),
+        "bearing from centre" => {
+            ("bearing from the centre of the field of view", "The beam or the antenna is lopsided.")
+        }
+        "range residual" => {
+            ("measured less expected range", "What is strong or weak also lies elsewhere in range.")
+        }
+        "neighbourhood" => {
+            ("what neighbours share", "Something small and rough on the target has another power.")
+        }
+        "outlying powers" => ("powers far from any law", "Silhouettes, or echoes of other things."),
+        "outlying ranges" => ("ranges far off", "Silhouettes, echoes of other things, or detours."),
+        "stray detections" => ("detections off the target", "False alarms, or a mesh that is cut."),
+        "steps of the power" => ("powers in steps", "The receiver or the file rounds them."),
         other => return (other.to_owned(), ""),
     };
     (words.to_owned(), hint)
