@@ -18,7 +18,7 @@ pub(super) struct ThinFilm;
 
 const KNOBS: [Knob; 5] = [
     Knob::new("coverage", "1", [0.0, 1.0], 0.0, 0.1),
-    Knob::new("thickness_m", "m", [0.0, 5e-3], 3e-4, 2e-5),
+    Knob::new("thickness_m", "m", [0.0, 8e-3], 3e-4, 2e-5),
     Knob::new("index", "1", [1.0, 4.0], 1.6, 0.05),
     Knob::new("from_below", "1", [0.0, 1.0], 1.0, 0.2),
     Knob::new("substrate_ratio", "1", [0.5, 5.0], 1.0, 0.1),
@@ -82,10 +82,14 @@ impl Effect for ThinFilm {
     }
 
     fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
-        let thicknesses_m = [1e-4, 2e-4, 3e-4, 4.5e-4, 6e-4, 8e-4, 1.1e-3, 1.5e-3, 2e-3, 2.7e-3];
+        // A ripple is found only from within half a fringe.
+        let thin_m = [1e-4, 2e-4, 3e-4, 4.5e-4, 6e-4, 8e-4].into_iter();
+        let thicknesses_m: Vec<f64> =
+            thin_m.chain((4..=28).map(|quarter| 0.25e-3 * f64::from(quarter))).collect();
         let start = |from_below: f64, substrate_ratio: f64| {
-            let film = |thickness_m| vec![0.3, thickness_m, 1.6, from_below, substrate_ratio];
-            thicknesses_m.map(film)
+            let film =
+                |&thickness_m: &f64| vec![0.3, thickness_m, 1.6, from_below, substrate_ratio];
+            thicknesses_m.iter().map(film).collect::<Vec<_>>()
         };
         // Without a mirror part of its own the fitted f_λ is lower than the substrate's.
         [start(1.0, 1.0), start(0.0, 1.6)].concat()
