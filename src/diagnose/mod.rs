@@ -265,6 +265,7 @@ impl Diagnosis {
             false_alarms,
         ));
         unexplained.extend(residual::steps(observations));
+        unexplained.extend(residual::lopsided(&z_after, sd_db));
         unexplained.sort_by(|a, b| b.strength_db.total_cmp(&a.strength_db));
         let (parameters, effects) = values(&problem, &state, added);
         let error = before_after(score::errors(&before), score::errors(&state.held_out), &folds);

@@ -32,6 +32,11 @@ const BINS: usize = 12;
 const OUTLYING: f64 = 4.5;
 const OUTLIERS: f64 = 1e-3;
 const OUTLYING_DB: f64 = 10.0;
+/// Third moment of z from which its law is called lopsided, how far out it is looked at, and how rare it
+/// must be by chance. A Gamma law of 8 looks taken for a log-normal one, or the other way, has 0.3.
+const LOPSIDED: f64 = 0.2;
+const LOPSIDED_REACH: f64 = 3.5;
+const LOPSIDED_BY_CHANCE: f64 = 1e-6;
 /// Side of a cell of the map, in patches.
 const MAP_CELL: f64 = 2.0;
 
@@ -244,6 +249,23 @@ pub(super) fn outliers(
     })
 }
 
+/// Scatter of another form than the declared law's, such as a speckle that is not Gamma: z is lopsided,
+/// though no mean and no spread is wrong. Its third moment is 0 under the model, with the standard
+/// deviation √(6/n); the displacement that it means is (z² − 1)/6 of it (Cornish and Fisher).
+pub(super) fn lopsided(z: &[f64], sd_db: f64) -> Option<Unexplained> {
+    // A few looks far out are told as outliers.
+    let inner: Vec<f64> = z.iter().map(|z| z.clamp(-LOPSIDED_REACH, LOPSIDED_REACH)).collect();
+    let count = inner.len().max(1) as f64;
+    let mean = inner.iter().sum::<f64>() / count;
+    let third = inner.iter().map(|z| (z - mean).powi(3)).sum::<f64>() / count;
+    let chance = erfc(third.abs() / (6.0 / count).sqrt() / std::f64::consts::SQRT_2);
+    (third.abs() > LOPSIDED && chance < LOPSIDED_BY_CHANCE).then(|| Unexplained {
+        covariate: "form of the scatter".to_owned(),
+        strength_db: sd_db * std::f64::consts::SQRT_2 * third.abs() / 6.0,
+        p_value: chance,
+    })
+}
+
 /// Powers in coarse steps, as of a converter with too few bits: their step, dB.
 pub(super) fn steps(observations: &[Observation]) -> Option<Unexplained> {
     let powers = observations.iter().filter_map(|seen| seen.power_w);
@@ -276,4 +298,23 @@ pub(super) fn of_field(structure: &Structure) -> Vec<Unexplained> {
             p_value,
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_law_of_another_form_is_told_and_a_normal_one_is_not() {
+        let z = |look: u64| {
+            let key = Key { seed: 4, chirp: look, sub_ray: 9, purpose: Purpose::Fit };
+            key.draws().gaussian()
+        };
+        let normal: Vec<f64> = (0..10_000).map(z).collect();
+        assert_eq!(lopsided(&normal, 2.0), None);
+        // About as lopsided as ln y of a Gamma law of 8 looks: the third moment is six times 0.06.
+        let bent: Vec<f64> = normal.iter().map(|z| z - 0.06 * (z * z - 1.0)).collect();
+        let found = lopsided(&bent, 2.0).unwrap();
+        assert!((found.strength_db - 2.0 * 2f64.sqrt() * 0.06).abs() < 0.03, "{found:?}");
+    }
 }

@@ -17,7 +17,7 @@ use super::residual::{self, Unexplained, speckle_sd_db};
 use super::score::{DB, Scored, scored};
 use super::screen::{Sample, Screen};
 use super::{Diagnosis, Evidence};
-use crate::effects::{Effect, Knob, Prediction, Receiver};
+use crate::effects::{Effect, Knob, Level, Prediction, Receiver};
 use crate::fit::minimise::Minimise;
 
 /// Steps of a fit, and of one on the sample that only shows whether an effect is worth it.
@@ -524,13 +524,23 @@ impl Selection<'_> {
             }
             passed.remove(0);
         }
-        let best = passed.first()?;
-        let as_good = |other: &&(usize, Vec<Scored>, f64)| {
-            let [worse, se] = self.difference(&best.1, &other.1);
+        let first = passed.first()?;
+        let behind = |other: &(usize, Vec<Scored>, f64)| self.difference(&first.1, &other.1);
+        // Of those that the data do not tell apart the simplest comes first.
+        let tied = passed.iter().filter(|other| behind(other)[0] <= SAME);
+        let best = tied.min_by_key(|one| plainness(trials[one.0].effect))?;
+        let class = passed.iter().filter(|other| other.0 != best.0).filter(|other| {
+            let [worse, se] = behind(other);
             worse <= se.max(SAME)
-        };
-        let class = passed.iter().skip(1).filter(as_good);
+        });
         let names = class.map(|one| trials[one.0].candidate.name).collect();
+        if trials[best.0].candidate.placebo_gain.is_none()
+            && let Some(screen) = &screen
+        {
+            let numbers = trials[best.0].candidate.numbers;
+            let placebo = self.placebo_gain(state, screen, numbers);
+            trials[best.0].candidate.placebo_gain = Some(placebo);
+        }
         Some((best.0, best.1.clone(), names))
     }
 
@@ -605,6 +615,16 @@ impl Selection<'_> {
 
 fn larger([a, b]: [f64; 2]) -> f64 {
     a.max(b)
+}
+
+/// Fewer numbers come first, then what is least known beforehand: of an instrument most is.
+fn plainness(effect: &dyn Effect) -> (usize, u8) {
+    let known = match effect.level() {
+        Level::Material => 0,
+        Level::Scene => 1,
+        Level::Instrument => 2,
+    };
+    (effect.knobs().len(), known)
 }
 
 /// Which of the effects is the smallest.

@@ -151,6 +151,9 @@ pub(super) fn covariate(name: &str) -> (String, &'static str) {
         "outlying powers" => ("powers far from any law", "Silhouettes, or echoes of other things."),
         "outlying ranges" => ("ranges far off", "Silhouettes, echoes of other things, or detours."),
         "stray detections" => ("detections off the target", "False alarms, or a mesh that is cut."),
+        "form of the scatter" => {
+            ("form of the scatter", "The fluctuation follows another law than speckle.")
+        }
         "steps of the power" => ("powers in steps", "The receiver or the file rounds them."),
         other => return (other.to_owned(), ""),
     };
