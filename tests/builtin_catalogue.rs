@@ -46,7 +46,12 @@ fn used(material: &Material) -> Vec<&String> {
     let permittivities = material.permittivities.iter().map(|entry| &entry.source);
     let curves = material.curves.iter().map(|curve| &curve.source);
     let roughness = material.roughness.iter().map(|roughness| &roughness.source);
-    fits.map(|f| &f.source).chain(parameters).chain(permittivities).chain(curves).chain(roughness).collect()
+    fits.map(|f| &f.source)
+        .chain(parameters)
+        .chain(permittivities)
+        .chain(curves)
+        .chain(roughness)
+        .collect()
 }
 
 fn near(found: f64, expected: f64, tolerance: f64) -> bool {
@@ -128,7 +133,7 @@ fn each_number_has_a_source_that_can_be_found_and_that_show_prints() {
             }
         }
         for key in material.sources.iter().map(|s| &s.key).filter(|key| *key != BOUND_ONLY) {
-            assert!(used(&material).contains(key), "{} {key}", material.slug);
+            assert!(used(&material).contains(&key), "{} {key}", material.slug);
         }
     }
 }
