@@ -46,6 +46,25 @@ pub fn shown(value: f64) -> String {
     if plain { value.to_string() } else { format!("{value:e}") }
 }
 
+/// Without what a change of unit leaves in the last digits: six places.
+///
+/// ```
+/// assert_eq!(matdb::units::rounded(0.3e-3 * 1e3), 0.3);
+/// ```
+pub fn rounded(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
+}
+
+/// A range as a person would write it: `90–270`, and `140` where both ends are one.
+///
+/// ```
+/// assert_eq!([[90.0, 270.0], [140.0, 140.0]].map(matdb::units::range), ["90–270", "140"]);
+/// ```
+pub fn range(ends: [f64; 2]) -> String {
+    let [low, high] = ends.map(|end| shown(rounded(end)));
+    if low == high { low } else { format!("{low}–{high}") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -40,7 +40,23 @@ pub(super) fn run(db: &Database, console: &Console) -> Result<(), Error> {
         ),
     };
     if !missing.is_empty() {
-        text += &format!("built in, not added: {}\n", missing.join(", "));
+        text += &wrapped("built in, not added:", &missing);
     }
     console.result(&text, &materials)
+}
+
+/// Names after a title, on lines that a narrow terminal holds.
+fn wrapped(title: &str, names: &[&str]) -> String {
+    const WIDTH: usize = 80;
+    let mut lines = vec![title.to_owned()];
+    for (number, name) in names.iter().enumerate() {
+        let comma = if number + 1 < names.len() { "," } else { "" };
+        match lines.last_mut() {
+            Some(line) if line.len() + name.len() + 2 <= WIDTH => {
+                *line += &format!(" {name}{comma}")
+            }
+            _ => lines.push(format!("  {name}{comma}")),
+        }
+    }
+    lines.join("\n") + "\n"
 }

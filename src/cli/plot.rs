@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::fit::stored_band;
 use crate::formats::figure::{Plot, Series, Style};
 use crate::material::{Censor, Fit, Material, Observation};
-use crate::units::db_from_ratio;
+use crate::units::{db_from_ratio, rounded};
 
 /// Below this a level says only that nothing comes back.
 const FAINTEST_DB: f64 = -80.0;
@@ -102,7 +102,27 @@ fn curves(material: &Material) -> Result<Vec<Series>, Error> {
     if material.fits.is_empty() {
         series.push(model_curve("rendered", &material.scattering()?));
     }
-    Ok(series)
+    Ok(series.into_iter().flat_map(|series| claimed(material, series)).collect())
+}
+
+/// A curve as far as the material answers for it, and the rest of it in dashes.
+fn claimed(material: &Material, series: Series) -> Vec<Series> {
+    if series.style != Style::Curve {
+        return vec![series];
+    }
+    let [least_deg, most_deg] = material.theta_rad.map(|rad| rounded(rad.to_degrees()));
+    let part = |style: Style, wanted: &dyn Fn(f64) -> bool| {
+        let kept = |&(theta_deg, level_db): &(f64, f64)| {
+            (theta_deg, if wanted(theta_deg) { level_db } else { f64::NAN })
+        };
+        let points = series.points.iter().map(kept).collect();
+        Series { name: series.name.clone(), style, points }
+    };
+    // The ends belong to both, or a gap would show.
+    vec![
+        part(Style::Beyond, &|deg| deg <= least_deg || deg >= most_deg),
+        part(Style::Curve, &|deg| (least_deg..=most_deg).contains(&deg)),
+    ]
 }
 
 /// Bands below points below fits, so that each can be seen.
@@ -180,7 +200,7 @@ fn swept(material: &Material, sweep: &str) -> Result<Vec<Series>, Error> {
         }
         series.push(model_curve(&format!("{path} = {}", text.trim()), &model));
     }
-    Ok(series)
+    Ok(series.into_iter().flat_map(|series| claimed(material, series)).collect())
 }
 
 /// σ⁰ in dB every tenth of a degree; the lobe of a smooth surface needs no less.

@@ -14,7 +14,7 @@ use crate::error::Error;
 use crate::formats::EffectEntry;
 use crate::material::{Fit, Material};
 use crate::store::RevisionSummary;
-use crate::units::{db_from_ratio, shown};
+use crate::units::{db_from_ratio, range, rounded, shown};
 
 /// Show a material: what is known of it, from whom, and how it scatters
 #[derive(Debug, clap::Args)]
@@ -49,15 +49,16 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 }
 
 fn describe(material: &Material, origin: &str) -> Result<String, Error> {
-    let [low, high] = material.frequency_hz.map(|f| f / 1e9);
-    let [least, most] = material.theta_rad.map(f64::to_degrees);
     let mut text = format!("{} – {}\n{origin}\n\n", material.slug, material.name);
     if !material.description.is_empty() {
         text += &format!("{}\n\n", material.description);
     }
     text += &format!(
-        "class {}, licence {}, {low:.0}–{high:.0} GHz, {least:.0}–{most:.0}°\n\n",
-        material.class, material.licence
+        "class {}, licence {}, {} GHz, {}°\n\n",
+        material.class,
+        material.licence,
+        range(material.frequency_hz.map(|f| f / 1e9)),
+        range(material.theta_rad.map(f64::to_degrees))
     );
     text += &status(material);
     text += &sources(material);
@@ -170,7 +171,12 @@ fn curve_table(material: &Material) -> Result<String, Error> {
             true => format!("{sigma0_db:.1}"),
             false => "nothing".to_owned(),
         };
-        [format!("{theta_deg:.0}°"), level]
+        let outside_deg = rounded(material.theta_outside_rad(theta_deg.to_radians()).to_degrees());
+        let said = match outside_deg > 0.0 {
+            true => format!("{}° outside the range", shown(outside_deg)),
+            false => String::new(),
+        };
+        [format!("{theta_deg:.0}°"), level, said]
     });
-    Ok(table(&["incidence", "sigma0 dB"], levels.into_iter()))
+    Ok(table(&["incidence", "sigma0 dB", ""], levels.into_iter()))
 }

@@ -217,6 +217,16 @@ impl Material {
         self.sources.iter().find(|s| s.key == *key).map(|s| s.kind)
     }
 
+    /// How far a frequency, Hz, lies outside [`frequency_hz`](Material::frequency_hz), Hz; 0 within.
+    pub fn frequency_outside_hz(&self, frequency_hz: f64) -> f64 {
+        outside(self.frequency_hz, frequency_hz)
+    }
+
+    /// How far an incidence, rad, lies outside [`theta_rad`](Material::theta_rad), rad; 0 within.
+    pub fn theta_outside_rad(&self, theta_rad: f64) -> f64 {
+        outside(self.theta_rad, theta_rad)
+    }
+
     /// Hash of everything in the material: equal exactly when nothing differs.
     ///
     /// Databases keep it: a field added later must serialise to nothing while it is empty, or what
@@ -232,6 +242,11 @@ impl Material {
         let fits = self.fits.iter().map(|f| f.name.clone());
         fits.chain(self.curves.iter().map(|c| c.name.clone())).collect()
     }
+}
+
+/// Distance of a number from a range, 0 within.
+fn outside([low, high]: [f64; 2], x: f64) -> f64 {
+    (low - x).max(x - high).max(0.0)
 }
 
 /// Angles nearer than this, rad, differ by rounding only.

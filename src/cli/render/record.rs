@@ -9,8 +9,10 @@ use crate::cli::staging::Used;
 use crate::effects::{Level, Model, entry};
 use crate::formats::EffectEntry;
 use crate::geometry::Raster;
+use crate::radar::Radar;
 use crate::render::{Scan, Truth};
 use crate::scene::{MeshReport, Scene};
+use crate::units::{range, rounded, shown};
 
 /// Version of the layout of `scan.json`; it grows with every change that a reader could trip over.
 const SCHEMA: u32 = 2;
@@ -30,7 +32,7 @@ pub(super) struct Record<'a> {
     version: &'static str,
     equation: &'static str,
     scene: Value,
-    radar: &'a crate::radar::Radar,
+    radar: &'a Radar,
     frames: Value,
     /// What `cloud.ply` holds.
     cloud: &'static str,
@@ -81,9 +83,13 @@ struct MaterialRecord<'a> {
     kind: Option<&'static str>,
     content_blake3: String,
     frequency_ghz: [f64; 2],
+    /// How far the radar's centre frequency lies outside of these, 0 within.
+    frequency_outside_ghz: f64,
     theta_deg: [f64; 2],
     /// Detections at an incidence for which the material makes no claim.
     detections_outside_theta: usize,
+    /// How far the farthest of them lies outside.
+    theta_outside_deg: f64,
     scattering: &'a crate::brdf::Brdf,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     effects: Vec<EffectEntry>,
@@ -134,13 +140,15 @@ impl<'a> Record<'a> {
         let (scan, image) = (&views[0].scan, &images[0]);
         let regions = regions(scene, material_of_region, scan);
         let outside = |material: usize| {
-            let [least, most] = used[material].found.material.theta_rad;
             let of_material = |truth: &&Truth| {
                 usize::from(material_of_region[usize::from(truth.region)]) == material
             };
-            let strange = |truth: &&Truth| !(least..=most).contains(&truth.hit.theta_rad());
+            let beyond_rad = |truth: &Truth| {
+                used[material].found.material.theta_outside_rad(truth.hit.theta_rad())
+            };
             let known = scan.detections().filter_map(|echo| echo.truth.as_ref());
-            known.filter(of_material).filter(strange).count()
+            let strange = known.filter(of_material).map(beyond_rad).filter(|rad| *rad > 0.0);
+            strange.fold((0, 0.0), |(count, most), rad| (count + 1, rad.max(most)))
         };
         Record {
             schema: SCHEMA,
@@ -168,7 +176,7 @@ impl<'a> Record<'a> {
                 "x_min_m": image.x_min_m, "y_min_m": image.y_min_m,
             }),
             materials: (0..used.len())
-                .map(|number| MaterialRecord::new(&used[number], outside(number)))
+                .map(|number| MaterialRecord::new(&used[number], scene.radar(), outside(number)))
                 .collect(),
             effects: effects(model),
             regions,
@@ -187,10 +195,11 @@ impl<'a> Record<'a> {
     pub fn notices(&self) -> Vec<String> {
         let mut notices = self.scan_notices.to_vec();
         for material in self.materials.iter().filter(|m| m.detections_outside_theta > 0) {
-            let MaterialRecord { name, theta_deg: [least, most], .. } = material;
+            let MaterialRecord { name, theta_deg, theta_outside_deg, .. } = material;
             notices.push(format!(
-                "{} detections on `{name}` lie outside the {least:.0}–{most:.0}° for which it is described",
-                material.detections_outside_theta
+                "{} detections on `{name}` lie outside the {}° for which it is described, by up to {theta_outside_deg:.1}°",
+                material.detections_outside_theta,
+                range(*theta_deg)
             ));
         }
         for mesh in self.meshes.iter().filter(|mesh| mesh.degenerate_facets > 0) {
@@ -232,12 +241,14 @@ impl<'a> Record<'a> {
             ));
         }
         let frequency_ghz = self.radar.centre_frequency_ghz;
-        for MaterialRecord { name, frequency_ghz: [low, high], .. } in &self.materials {
-            if !(*low..=*high).contains(&frequency_ghz) {
-                notices.push(format!(
-                    "`{name}` is described for {low:.0}–{high:.0} GHz, the radar works at {frequency_ghz} GHz"
-                ));
-            }
+        for material in self.materials.iter().filter(|m| m.frequency_outside_ghz > 0.0) {
+            notices.push(format!(
+                "`{}` is described for {} GHz, the radar works at {frequency_ghz} GHz, {} GHz away: what it \
+                 returns is extrapolated",
+                material.name,
+                range(material.frequency_ghz),
+                shown(rounded(material.frequency_outside_ghz))
+            ));
         }
         notices
     }
@@ -290,8 +301,13 @@ impl<'a> ReceiverRecord<'a> {
 }
 
 impl<'a> MaterialRecord<'a> {
-    fn new(used: &'a Used, detections_outside_theta: usize) -> MaterialRecord<'a> {
+    fn new(
+        used: &'a Used,
+        radar: &Radar,
+        (detections_outside_theta, theta_outside_rad): (usize, f64),
+    ) -> MaterialRecord<'a> {
         let Found { material, revision } = &used.found;
+        let outside_hz = material.frequency_outside_hz(radar.centre_frequency_ghz * 1e9);
         let effects = used.effects.iter().map(|(effect, values)| entry(*effect, values));
         MaterialRecord {
             name: material.slug.as_str(),
@@ -300,8 +316,10 @@ impl<'a> MaterialRecord<'a> {
             kind: material.render_kind().map(|kind| kind.as_str()),
             content_blake3: material.content_hash(),
             frequency_ghz: material.frequency_hz.map(|f| f / 1e9),
+            frequency_outside_ghz: outside_hz / 1e9,
             theta_deg: material.theta_rad.map(f64::to_degrees),
             detections_outside_theta,
+            theta_outside_deg: theta_outside_rad.to_degrees(),
             scattering: &used.scattering,
             effects: effects.collect(),
         }

@@ -2,7 +2,7 @@
 
 use crate::cli::summary::table;
 use crate::material::{Finding, FindingVerdict, Layer, Material, Permittivity, Session};
-use crate::units::shown;
+use crate::units::{rounded, shown};
 
 /// Layers, permittivities, roughness and finish.
 pub(super) fn composition(material: &Material) -> String {
@@ -54,11 +54,6 @@ fn permittivity(entry: &Permittivity) -> [String; 6] {
 
 fn micro(length_m: f64) -> f64 {
     rounded(length_m * 1e6)
-}
-
-/// Without what a change of unit leaves in the last digits.
-fn rounded(value: f64) -> f64 {
-    (value * 1e6).round() / 1e6
 }
 
 /// Sittings of measurement.

@@ -17,6 +17,8 @@ const DENSE_POINT_PX: f32 = 3.0;
 const DENSE: usize = 1000;
 /// Length of the sample beside a name in the legend, px.
 const SAMPLE_PX: f32 = 34.0;
+/// Length of a dash and of the gap after it, px.
+const DASH_PX: f32 = 7.0;
 
 /// Colour of lines that are no data.
 const GUIDE_INK: Rgb = [140, 140, 140];
@@ -68,6 +70,9 @@ pub enum Style {
     /// Upright bars, each from one point to the next one, in the colour of the other series of its
     /// name. They are not in the legend and take no colour.
     ErrorBars,
+    /// Dashes through the points in the colour of the other series of its name: a curve where nobody
+    /// answers for it. It is not in the legend and takes no colour.
+    Beyond,
     /// A thin grey line to judge data by, such as zero. It takes no colour and does not widen the axes.
     Guide,
 }
@@ -75,7 +80,7 @@ pub enum Style {
 impl Style {
     /// Whether a series of this style has a colour of the palette for itself.
     fn has_a_colour(self) -> bool {
-        !matches!(self, Style::Band | Style::ErrorBars | Style::Guide)
+        !matches!(self, Style::Band | Style::ErrorBars | Style::Beyond | Style::Guide)
     }
 }
 
@@ -117,7 +122,7 @@ impl Plot<'_> {
         })
     }
 
-    /// One colour per series; bands and error bars have that of the other series of their name.
+    /// One colour per series; bands, error bars and dashes have that of the other series of their name.
     fn colours(&self) -> Vec<Rgb> {
         let own = || self.series.iter().filter(|series| series.style.has_a_colour());
         let colour = |series: &Series| {
@@ -186,7 +191,7 @@ impl Plot<'_> {
                 Style::Guide => guide(ends.to_vec(), colour),
                 Style::Points => square((left + SAMPLE_PX / 2.0, y), POINT_PX, colour),
                 Style::Below => triangle((left + SAMPLE_PX / 2.0, y), POINT_PX, colour),
-                Style::Band | Style::ErrorBars => None,
+                Style::Band | Style::ErrorBars | Style::Beyond => None,
             });
             let base = (left + SAMPLE_PX + GAP_PX, y + DIGIT_HEIGHT / 2.0 * TICK_LABEL_PX);
             shapes.push(text(&series.name, base, Anchor::Start, TICK_LABEL_PX));
@@ -240,15 +245,16 @@ impl Series {
                     .filter(|pair| pair.iter().all(|&(px, py)| inside(&x, px) && py.is_finite()));
                 seen.flat_map(|pair| curve(pair.iter().map(within).collect(), colour)).collect()
             }
-            Style::Curve | Style::Guide => {
+            Style::Curve | Style::Beyond | Style::Guide => {
                 let line = if self.style == Style::Guide { guide } else { curve };
-                self.points
-                    .chunk_by(|a, b| visible(a) && visible(b))
-                    .filter(|run| run.len() > 1)
-                    .flat_map(|run| {
-                        line(run.iter().map(|&(px, py)| axes.at(px, py)).collect(), colour)
-                    })
-                    .collect()
+                let runs = self.points.chunk_by(|a, b| visible(a) && visible(b));
+                let on_page =
+                    runs.map(|run| run.iter().map(|&(px, py)| axes.at(px, py)).collect::<Vec<_>>());
+                let lines = on_page.flat_map(|run| match self.style {
+                    Style::Beyond => dashes(&run),
+                    _ => vec![run],
+                });
+                lines.filter(|run| run.len() > 1).flat_map(|run| line(run, colour)).collect()
             }
         }
     }
@@ -256,6 +262,25 @@ impl Series {
 
 fn curve(points: Vec<(f32, f32)>, colour: Rgb) -> Option<Shape> {
     Some(Shape::Line { points, colour, thickness_px: CURVE_PX })
+}
+
+/// Every other piece of a line, each as long as [`DASH_PX`] along it or from one point to the next one.
+fn dashes(points: &[(f32, f32)]) -> Vec<Vec<(f32, f32)>> {
+    let mut pieces = vec![Vec::new()];
+    let (mut drawn_px, mut before) = (0.0, None);
+    for &point in points {
+        let step_px = before.map_or(0.0, |(x, y): (f32, f32)| (point.0 - x).hypot(point.1 - y));
+        drawn_px += step_px;
+        before = Some(point);
+        if let Some(piece) = pieces.last_mut() {
+            piece.push(point);
+        }
+        if drawn_px >= DASH_PX {
+            pieces.push(vec![point]);
+            drawn_px = 0.0;
+        }
+    }
+    pieces.into_iter().step_by(2).collect()
 }
 
 fn guide(points: Vec<(f32, f32)>, colour: Rgb) -> Option<Shape> {
@@ -352,6 +377,22 @@ mod tests {
             shapes.iter().filter(is_bar).count()
         };
         assert_eq!(lines(&all), 50);
+    }
+
+    #[test]
+    fn dashes_have_the_colour_of_their_curve_no_name_and_as_much_gap_as_line() {
+        let beyond = Series { style: Style::Beyond, ..parabola(Style::Curve) };
+        let with = plot(vec![beyond, parabola(Style::Curve)]);
+        assert_eq!(with.colours(), [PALETTE[0], PALETTE[0]]);
+        let names = |plot: &Plot| {
+            let shapes = plot.drawing().unwrap().shapes;
+            shapes.iter().filter(|s| matches!(s, Shape::Text(t) if t.text == "parabola")).count()
+        };
+        assert_eq!(names(&with), 1);
+        let line: Vec<(f32, f32)> = (0..=700_u16).map(|x| (f32::from(x), 0.0)).collect();
+        let dashes = dashes(&line);
+        let drawn_px: f32 = dashes.iter().map(|d| d.last().unwrap().0 - d[0].0).sum();
+        assert_eq!((dashes.len(), drawn_px), (51, 350.0));
     }
 
     #[test]

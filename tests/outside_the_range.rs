@@ -1,0 +1,117 @@
+//! Promise: what is asked of a material outside the range that it claims is answered with the distance
+//! stated, never silently: in frequency and in angle, by `render`, `show` and `plot`.
+
+mod support;
+
+use std::fs;
+
+use serde_json::Value;
+use support::{matdb, scene};
+
+const PLATE: &str = "
+seed = 7
+[radar.scan]
+pattern = \"raster\"
+lines = 10
+chirps_per_line = 10
+width_m = 0.2
+height_m = 0.2
+[[mesh]]
+name = \"plate\"
+file = \"builtin:plate\"
+size_m = [1, 1, 0]
+translation_m = [0, 1.1, 0]
+[[region]]
+name = \"all\"
+material = \"ptfe\"
+";
+
+/// Standard error and the record of the one material of a scene.
+fn rendered(text: &str) -> (String, Value) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("scene.toml"), text).unwrap();
+    let output = matdb(folder.path()).args(["render", "scene.toml", "-o", "out"]).output().unwrap();
+    assert!(output.status.success());
+    let record = fs::read(folder.path().join("out/scan.json")).unwrap();
+    let record: Value = serde_json::from_slice(&record).unwrap();
+    (String::from_utf8(output.stderr).unwrap(), record["materials"][0].clone())
+}
+
+#[test]
+fn a_radar_outside_the_frequencies_is_told_how_far() {
+    let (said, record) = rendered(PLATE);
+    let words = "`ptfe` is described for 90–270 GHz, the radar works at 300 GHz, 30 GHz away";
+    assert!(said.contains(words), "{said}");
+    assert_eq!(record["frequency_outside_ghz"], 30.0);
+    let (said, record) = rendered(&PLATE.replace("ptfe", "polystyrene"));
+    assert!(said.contains("described for 140 GHz,") && said.contains("160 GHz away"), "{said}");
+    assert_eq!(record["frequency_outside_ghz"], 160.0);
+    let (said, record) = rendered(&PLATE.replace("ptfe", "glass"));
+    assert!(!said.contains("GHz"), "{said}");
+    assert_eq!(record["frequency_outside_ghz"], 0.0);
+}
+
+#[test]
+fn detections_outside_the_angles_are_counted_and_the_farthest_is_stated() {
+    let turned = PLATE.replace("ptfe", "cotton");
+    let (_, record) = rendered(&turned);
+    assert_eq!(
+        (&record["detections_outside_theta"], &record["theta_outside_deg"]),
+        (&0.into(), &0.0.into())
+    );
+    let folder = tempfile::tempdir().unwrap();
+    let narrow = fs::read_to_string(support::root().join("materials/glass/material.toml")).unwrap();
+    let narrow = narrow.replace("theta_deg = [0, 80]", "theta_deg = [0, 0.1]");
+    fs::write(folder.path().join("material.toml"), narrow).unwrap();
+    fs::write(folder.path().join("scene.toml"), PLATE.replace("ptfe", "glass")).unwrap();
+    matdb(folder.path()).args(["add", "-q", "--from", "material.toml"]).assert().success();
+    let output = matdb(folder.path()).args(["render", "scene.toml", "-o", "out"]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    let record = fs::read(folder.path().join("out/scan.json")).unwrap();
+    let record: Value = serde_json::from_slice(&record).unwrap();
+    let material = &record["materials"][0];
+    let farthest_deg = material["theta_outside_deg"].as_f64().unwrap();
+    assert!(material["detections_outside_theta"].as_u64() > Some(0), "{material}");
+    // The scan reaches 0.1 m to each side at 8 m: 1° at most from the plate's normal, and a little.
+    assert!(farthest_deg > 0.1 && farthest_deg < 3.0, "{farthest_deg}");
+    let words =
+        format!("lie outside the 0–0.1° for which it is described, by up to {farthest_deg:.1}°");
+    assert!(said.contains(&words), "{said}");
+}
+
+#[test]
+fn show_and_plot_tell_what_is_claimed_from_what_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = matdb(folder.path()).args(["show", "ptfe"]).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("90–270 GHz, 0–80°") && !text.contains("outside the range"), "{text}");
+    let output = matdb(folder.path()).args(["show", "cotton"]).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        text.contains("15° outside the range") && text.matches("outside").count() == 1,
+        "{text}"
+    );
+    let lines = || {
+        matdb(folder.path()).args(["plot", "glass", "-o", "plot.svg"]).assert().success();
+        fs::read_to_string(folder.path().join("plot.svg")).unwrap().matches("<polyline").count()
+    };
+    let claimed_to_80 = lines();
+    let glass = fs::read_to_string(support::root().join("materials/glass/material.toml")).unwrap();
+    let wide = glass.replace("theta_deg = [0, 80]", "theta_deg = [0, 90]");
+    fs::write(folder.path().join("material.toml"), wide).unwrap();
+    matdb(folder.path()).args(["add", "-q", "--from", "material.toml"]).assert().success();
+    assert!(claimed_to_80 > lines(), "what is not claimed is drawn in dashes");
+}
+
+#[test]
+fn the_scenes_that_come_with_the_program_still_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = scene("human.toml");
+    let arguments = ["render", scene.to_str().unwrap(), "-o", "out"];
+    let output = matdb(folder.path()).args(arguments).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{said}");
+    assert!(
+        said.contains("`human-skin` is described for 100 GHz") && said.contains("200 GHz away")
+    );
+}
