@@ -17,6 +17,7 @@
 
 mod connect;
 mod error;
+mod find;
 mod read;
 mod tables;
 mod write;
@@ -29,6 +30,7 @@ use crate::material::{Activity, Material, Slug, SourceKind};
 use crate::measure::AngleStatistics;
 
 pub use error::StoreError;
+pub use find::{Filter, Hit};
 pub use tables::{Cell, Column, ColumnKind, Reference, Table};
 
 /// An open database.
@@ -101,6 +103,8 @@ pub struct Summary {
     pub revision: u32,
     /// How the numbers that a scene renders came to be.
     pub render_kind: SourceKind,
+    /// `active`, `superseded` or `withdrawn`.
+    pub status: String,
     /// Number of curves.
     pub curves: u32,
     /// Number of points on all curves together.
@@ -139,6 +143,15 @@ impl Store {
         let path = path.as_ref().to_owned();
         let conn = connect::readable(&path)?;
         Ok(conn.map(|conn| Store { conn, path, activity: None }))
+    }
+
+    /// An empty database in memory, gone when it is dropped.
+    ///
+    /// # Errors
+    /// When there is no memory.
+    pub fn in_memory() -> Result<Store, StoreError> {
+        let conn = connect::in_memory()?;
+        Ok(Store { conn, path: PathBuf::from(":memory:"), activity: None })
     }
 
     /// Records with every revision that is added from now on which command made it of what.
@@ -211,7 +224,7 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn list(&self) -> Result<Vec<Summary>, StoreError> {
-        read::list(&self.conn).map_err(|error| StoreError::new(&self.path, error))
+        self.find(&Filter::default())
     }
 
     /// One revision of a material, or the current one; `None` when there is none.
@@ -247,8 +260,8 @@ impl Store {
             .map_err(|error| StoreError::new(&self.path, error))
     }
 
-    /// What SQLite itself finds wrong with the file, a sentence each: damaged pages and indexes, and
-    /// references to nothing.
+    /// What is wrong with the file as such, a sentence each: damaged pages and indexes, references to
+    /// nothing, and what lists and searches say without being so.
     ///
     /// # Errors
     /// When the file cannot be read.

@@ -13,41 +13,14 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde::de::value::{Error as WordError, StrDeserializer};
 
-use super::{RevisionSummary, Stored, Summary};
+use super::find::stale;
+use super::{RevisionSummary, Stored};
 use crate::brdf::Brdf;
 use crate::formats::EffectEntry;
 use crate::material::{
     Censor, Covariance, Curve, FindingVerdict, Fit, Geometry, Making, Material, Observation, Scale,
     Slug, SourceKind, Status,
 };
-
-/// Every material's current revision, sorted by slug.
-pub(super) fn list(conn: &Connection) -> Result<Vec<Summary>> {
-    let sql = "
-        SELECT slug, name, class, number,
-            (SELECT kind FROM source JOIN (
-                SELECT name, source FROM fit WHERE revision_id = revision.id UNION ALL
-                SELECT name, source FROM curve WHERE revision_id = revision.id) AS rendered
-             ON key = rendered.source
-             WHERE revision_id = revision.id AND rendered.name = render) AS render_kind,
-            (SELECT count(*) FROM curve WHERE revision_id = revision.id),
-            (SELECT count(*) FROM observation WHERE revision_id = revision.id),
-            (SELECT count(*) FROM fit WHERE revision_id = revision.id)
-        FROM material JOIN revision ON material_id = material.id AND number = current_revision
-        ORDER BY slug";
-    rows(conn, sql, [], |row| {
-        Ok(Summary {
-            slug: row.get(0)?,
-            name: row.get(1)?,
-            class: row.get(2)?,
-            revision: row.get(3)?,
-            render_kind: row.get(4)?,
-            curves: row.get(5)?,
-            observations: row.get(6)?,
-            fits: row.get(7)?,
-        })
-    })
-}
 
 /// Every revision of a material, oldest first.
 pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSummary>> {
@@ -243,7 +216,7 @@ fn effects(conn: &Connection, revision_id: i64) -> Result<Vec<EffectEntry>> {
     })
 }
 
-fn rows<T>(
+pub(super) fn rows<T>(
     conn: &Connection,
     sql: &str,
     values: impl Params,
@@ -284,12 +257,19 @@ macro_rules! words {
 
 words!(Censor, FindingVerdict, Geometry, Making, Scale, Slug, SourceKind);
 
-/// What SQLite itself finds wrong: damaged pages, and references to nothing.
+/// What is wrong: damaged pages, references to nothing, and lines of lists that are not of their
+/// material.
 pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
     let found = rows(conn, "PRAGMA integrity_check", [], |row| row.get::<_, String>(0))?;
     let dangling = rows(conn, "PRAGMA foreign_key_check", [], |row| {
         let (table, parent): (String, String) = (row.get(0)?, row.get(2)?);
         Ok(format!("a row of `{table}` refers to a row of `{parent}` that is not there"))
     })?;
-    Ok(found.into_iter().filter(|line| line != "ok").chain(dangling).collect())
+    let problems: Vec<String> =
+        found.into_iter().filter(|line| line != "ok").chain(dangling).collect();
+    if !problems.is_empty() {
+        return Ok(problems);
+    }
+    let not_so = |slug| format!("what lists and searches say of `{slug}` is not what is stored");
+    Ok(stale(conn)?.into_iter().map(not_so).collect())
 }
