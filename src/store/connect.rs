@@ -237,9 +237,8 @@ mod tests {
     fn the_views_in_decibels_work_without_another_sqlite() {
         let conn = in_memory().unwrap();
         let sql = "SELECT log10(100), log10(NULL), (SELECT count(sigma0_db) FROM v_curves)";
-        let row: (f64, Option<f64>, u32) = conn
-            .query_row(sql, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
-            .unwrap();
+        let row: (f64, Option<f64>, u32) =
+            conn.query_row(sql, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).unwrap();
         assert_eq!(row, (2.0, None, 0));
     }
 

@@ -70,8 +70,9 @@ impl Store {
     /// When the file cannot be read.
     pub fn search(&self, words: &str, most: u32) -> Result<Vec<Hit>, StoreError> {
         match query(words) {
-            Some(query) => search(&self.conn, &query, most)
-                .map_err(|error| StoreError::new(&self.path, error)),
+            Some(query) => {
+                search(&self.conn, &query, most).map_err(|error| StoreError::new(&self.path, error))
+            }
             None => Ok(Vec::new()),
         }
     }
@@ -101,7 +102,9 @@ fn find(conn: &Connection, filter: &Filter) -> Result<Vec<Summary>> {
 }
 
 fn one(conn: &Connection, slug: &Slug) -> Result<Option<Summary>> {
-    conn.prepare_cached(&format!("{COLUMNS} WHERE slug = ?1"))?.query_row([slug.as_str()], summary).optional()
+    conn.prepare_cached(&format!("{COLUMNS} WHERE slug = ?1"))?
+        .query_row([slug.as_str()], summary)
+        .optional()
 }
 
 fn summary(row: &Row) -> Result<Summary> {

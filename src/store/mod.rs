@@ -26,6 +26,7 @@ use std::path::{Path, PathBuf};
 
 use rusqlite::Connection;
 
+use crate::brdf::Brdf;
 use crate::material::{Activity, Material, Slug, SourceKind};
 use crate::measure::AngleStatistics;
 
@@ -181,15 +182,33 @@ impl Store {
         materials: impl IntoIterator<Item = &'a Material>,
         then: impl FnOnce(&[Added]) -> Result<T, E>,
     ) -> Result<T, E> {
-        let materials: Vec<&Material> = materials.into_iter().collect();
-        for material in &materials {
+        let activity = self.activity.clone();
+        let made = |material| (material, activity.as_ref());
+        self.add_all(&materials.into_iter().map(made).collect::<Vec<_>>(), then)
+    }
+
+    /// Adds materials as [`Store::add`] does, each recorded with which command made it of what.
+    ///
+    /// # Errors
+    /// As [`Store::add`].
+    pub fn add_made(&mut self, made: &[(Material, Activity)]) -> Result<Vec<Added>, StoreError> {
+        let made: Vec<_> = made.iter().map(|(material, by)| (material, Some(by))).collect();
+        self.add_all(&made, |added| Ok(added.to_vec()))
+    }
+
+    fn add_all<T, E: From<StoreError>>(
+        &mut self,
+        made: &[(&Material, Option<&Activity>)],
+        then: impl FnOnce(&[Added]) -> Result<T, E>,
+    ) -> Result<T, E> {
+        for (material, _) in made {
             let slug = || material.slug.to_string();
             material.validate().map_err(|error| StoreError::Material { slug: slug(), error })?;
         }
-        let Store { conn, path, activity } = self;
+        let Store { conn, path, .. } = self;
         let failed = |error| StoreError::new(path, error);
         let tx = conn.transaction().map_err(failed)?;
-        let added = write::add(&tx, &materials, activity.as_ref()).map_err(failed)?;
+        let added = write::add(&tx, made).map_err(failed)?;
         let done = then(&added)?;
         tx.commit().map_err(failed)?;
         Ok(done)
@@ -212,7 +231,7 @@ impl Store {
             let material = material?;
             let slug = || material.slug.to_string();
             material.validate().map_err(|error| StoreError::Material { slug: slug(), error })?;
-            for added in write::add(&tx, &[&material], activity.as_ref()).map_err(failed)? {
+            for added in write::add(&tx, &[(&material, activity.as_ref())]).map_err(failed)? {
                 then(&material, added)?;
             }
         }
@@ -242,6 +261,18 @@ impl Store {
             }
             stored => Ok(stored),
         }
+    }
+
+    /// What scenes render of a material's current revision, and the angles for which that is claimed, rad,
+    /// read without all else and without comparing its hash; `None` when it is not there or no curve can
+    /// be made of it.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn rendered(&self, slug: &Slug) -> Result<Option<(Brdf, [f64; 2])>, StoreError> {
+        let found =
+            read::rendered(&self.conn, slug).map_err(|error| StoreError::new(&self.path, error))?;
+        Ok(found.and_then(|material| Some((material.scattering().ok()?, material.theta_rad))))
     }
 
     /// Statistics by angle of a curve of a revision, or of the current one, as they were computed when

@@ -10,13 +10,9 @@ use crate::formats::EffectEntry;
 use crate::material::{Activity, Covariance, Curve, Fit, Material, Slug};
 use crate::measure::statistics::by_angle;
 
-/// Adds materials or revisions of them.
-pub(super) fn add(
-    tx: &Transaction,
-    materials: &[&Material],
-    activity: Option<&Activity>,
-) -> Result<Vec<Added>> {
-    materials.iter().map(|material| add_one(tx, material, activity)).collect()
+/// Adds materials or revisions of them, each with what made it.
+pub(super) fn add(tx: &Transaction, made: &[(&Material, Option<&Activity>)]) -> Result<Vec<Added>> {
+    made.iter().map(|(material, activity)| add_one(tx, material, *activity)).collect()
 }
 
 fn add_one(tx: &Transaction, material: &Material, activity: Option<&Activity>) -> Result<Added> {
@@ -112,9 +108,10 @@ fn search(tx: &Transaction, slug: &Slug, is_new: bool) -> Result<()> {
          SELECT * FROM search_made WHERE slug = ?1",
     ];
     let forget = if is_new { [].as_slice() } else { FORGET.as_slice() };
-    forget.iter().chain(&MAKE).try_for_each(|sql| {
-        tx.prepare_cached(sql)?.execute([slug.as_str()]).map(|_| ())
-    })
+    forget
+        .iter()
+        .chain(&MAKE)
+        .try_for_each(|sql| tx.prepare_cached(sql)?.execute([slug.as_str()]).map(|_| ()))
 }
 
 /// Writes what hangs on one revision.
