@@ -216,6 +216,9 @@ fn the_database_itself_refuses_what_a_material_may_not_be() {
         "UPDATE finding SET fit_after = 'other'",
         "UPDATE finding SET source = 'other'",
         "UPDATE finding SET confusable_with = '{}'",
+        "UPDATE entry SET material_id = 99",
+        "UPDATE entry SET kind = 1, curves = 'many'",
+        "UPDATE entry_tag SET slug = 'other'",
     ] {
         assert!(conn.execute(sql, []).is_err(), "{sql}");
     }
