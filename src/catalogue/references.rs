@@ -111,7 +111,11 @@ fn gathered(path: &[String]) -> String {
         [list, name, _, parameter @ ..] if list == "fits" => {
             format!("fit {name}, {}", parameter_path(parameter))
         }
-        path => path.join(", "),
+        path => {
+            let is_name = |name: &&String| name.parse::<usize>().is_err();
+            let names: Vec<&str> = path.iter().filter(is_name).map(String::as_str).collect();
+            names.join(", ")
+        }
     }
 }
 
