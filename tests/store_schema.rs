@@ -17,7 +17,7 @@ use rusqlite::Connection;
 use rusqlite::functions::FunctionFlags;
 use support::database::{change, complete, contents, fitted, sample, with_effects};
 
-const NEWEST: &str = "schema-0004.sqlite";
+const NEWEST: &str = "schema-0005.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
@@ -216,6 +216,9 @@ fn the_database_itself_refuses_what_a_material_may_not_be() {
         "UPDATE finding SET fit_after = 'other'",
         "UPDATE finding SET source = 'other'",
         "UPDATE finding SET confusable_with = '{}'",
+        "UPDATE entry SET material_id = 99",
+        "UPDATE entry SET kind = 1, curves = 'many'",
+        "UPDATE entry_tag SET slug = 'other'",
     ] {
         assert!(conn.execute(sql, []).is_err(), "{sql}");
     }

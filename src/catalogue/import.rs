@@ -80,8 +80,12 @@ impl Import {
             };
             return Err(unsound(format!("{first}{others}")));
         }
-        let path = if bundle.is_dir() { bundle.join(DATABASE) } else { bundle.to_owned() };
-        Ok(Import { theirs: database(&path)?, path: bundle.to_owned() })
+        Ok(Import { theirs: database(&database_of(bundle))?, path: bundle.to_owned() })
+    }
+
+    /// The database's file.
+    pub fn database(&self) -> PathBuf {
+        database_of(&self.path)
     }
 
     /// What becomes of every material. Conflicts get the prefix, if there is one, and are looked at
@@ -201,6 +205,10 @@ impl Import {
             }),
         }
     }
+}
+
+fn database_of(bundle: &Path) -> PathBuf {
+    if bundle.is_dir() { bundle.join(DATABASE) } else { bundle.to_owned() }
 }
 
 fn prefixed(prefix: &str, slug: &Slug) -> Result<Slug, CatalogueError> {

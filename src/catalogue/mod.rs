@@ -6,21 +6,28 @@
 
 mod about;
 mod api;
+mod diff;
 mod error;
 mod folder;
 mod import;
+mod leaves;
+mod near;
 mod publish;
 mod records;
+mod references;
 mod refit;
 mod tables;
 mod verify;
 mod site;
 
 pub use about::{About, AboutError};
+pub use diff::{CurveChange, Diff, Field, Levels};
 pub use error::CatalogueError;
 pub use folder::{Folder, Sum};
 pub use import::{Import, Imported, Outcome, Taken};
+pub use near::{Distance, Probe};
 pub use publish::{Published, publish};
+pub use references::{Citable, Reference, references};
 pub use refit::refit;
 pub use tables::HAS_PARQUET;
 pub use verify::{Checked, Problem, Verified, check_store, verify};

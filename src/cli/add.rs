@@ -2,6 +2,7 @@
 
 mod door;
 
+use std::cell::RefCell;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
@@ -9,11 +10,12 @@ use serde_json::json;
 
 use super::console::Console;
 use super::database::Database;
+use super::inputs::input;
 use super::materials::unknown;
 use super::staging::chosen;
 use crate::effects::Level;
 use crate::error::Error;
-use crate::material::{Material, builtin, file};
+use crate::material::{Activity, Input, Material, builtin, file};
 use crate::store::Added;
 
 /// Put materials into the database, built-in ones by name or your own from files
@@ -47,10 +49,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     if args.template {
         return console.result(TEMPLATE, &json!({ "material_toml": TEMPLATE }));
     }
-    let materials = wanted(args, db)?;
+    let made = wanted(args, db)?;
     let mut store = db.write()?;
     let (mut lines, mut records) = (String::new(), Vec::new());
-    for (material, added) in std::iter::zip(&materials, store.add(&materials)?) {
+    for ((material, _), added) in std::iter::zip(&made, store.add_made(&made)?) {
         let slug = &material.slug;
         let (what, revision) = match added {
             Added::New => ("added", 1),
@@ -64,12 +66,12 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 }
 
 /// Reads everything before anything is stored, so that one bad file changes nothing.
-fn wanted(args: &Args, db: &Database) -> Result<Vec<Material>, Error> {
+fn wanted(args: &Args, db: &Database) -> Result<Vec<(Material, Activity)>, Error> {
     let mut materials = Vec::new();
     let all = builtin::names().map(str::to_owned).filter(|_| args.all);
     for name in args.names.iter().cloned().chain(all) {
         match builtin::get(&name) {
-            Some(material) => materials.push(material?),
+            Some(material) => materials.push((material?, made(Vec::new()))),
             None if name.contains('@') => {
                 return Err(Error::Usage {
                     problem: format!("`{name}` names a revision"),
@@ -88,9 +90,9 @@ fn wanted(args: &Args, db: &Database) -> Result<Vec<Material>, Error> {
         }
     }
     let mut seen = HashSet::new();
-    match materials.iter().find(|material| !seen.insert(&material.slug)) {
+    match materials.iter().find(|(material, _)| !seen.insert(&material.slug)) {
         None => Ok(materials),
-        Some(Material { slug, .. }) => Err(Error::Usage {
+        Some((Material { slug, .. }, _)) => Err(Error::Usage {
             problem: format!("`{slug}` is named or found twice"),
             way_out: "name it once, or give one of the files another slug".to_owned(),
         }),
@@ -119,8 +121,13 @@ fn material_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(files)
 }
 
-fn read(path: &Path) -> Result<Material, Error> {
+fn made(inputs: Vec<Input>) -> Activity {
+    Activity { command: "add".to_owned(), inputs }
+}
+
+fn read(path: &Path) -> Result<(Material, Activity), Error> {
     let bytes = std::fs::read(path).map_err(|reason| unreadable(path, reason))?;
+    let inputs = RefCell::new(vec![input(path, &bytes)]);
     let text = String::from_utf8(bytes).map_err(|error| Error::Usage {
         problem: format!(
             "{}: byte {}: not UTF-8",
@@ -130,11 +137,15 @@ fn read(path: &Path) -> Result<Material, Error> {
         way_out: "save the file as UTF-8".to_owned(),
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let read_csv = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
+    let read_csv = |name: &str| {
+        let bytes = std::fs::read(folder.join(name)).map_err(|e| e.to_string())?;
+        inputs.borrow_mut().push(input(Path::new(name), &bytes));
+        Ok(bytes)
+    };
     let material = file::parse(&path.display().to_string(), &text, read_csv)?;
     chosen(&material.effects, Level::Material, format!("{}: [[effect]]", path.display()))?;
     door::check(&material, path)?;
-    Ok(material)
+    Ok((material, made(inputs.into_inner())))
 }
 
 fn unreadable(path: &Path, reason: std::io::Error) -> Error {

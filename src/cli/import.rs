@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::console::Console;
 use super::database::Database;
+use super::inputs::activity;
 use crate::catalogue::{Import, Imported, Outcome, Taken};
 use crate::error::Error;
 
@@ -34,7 +35,9 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     drop(ours);
     let is_new = |taken: &Taken| matches!(taken.outcome, Outcome::Added { .. });
     if !args.dry_run && materials.iter().any(is_new) {
-        import.take(&mut db.write()?, &materials)?;
+        let mut store = db.write()?;
+        store.record(activity("import", &[&import.database()])?);
+        import.take(&mut store, &materials)?;
     }
     let imported = Imported { dry_run: args.dry_run, materials };
     console.result(&text(&imported, db), &imported)

@@ -1,46 +1,110 @@
 //! `matdb list`.
 
+use clap::ValueEnum;
+
 use super::console::Console;
 use super::database::Database;
+use super::materials::not_added;
 use super::summary::table;
 use crate::error::Error;
-use crate::material::builtin;
+use crate::material::SourceKind;
+use crate::store::{Filter, Summary};
 
-/// List the materials in the database
+/// List the materials in the database, all or those that you ask for
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb list
+  matdb list --frequency 300 --kind measured    measured ones that hold at 300 GHz
+  matdb list --class paint --fitted             paints with a model that was fitted
   matdb list --json | jq '.[].slug'")]
-pub(super) struct Args {}
+pub(super) struct Args {
+    #[command(flatten)]
+    filter: Wanted,
+}
 
-pub(super) fn run(db: &Database, console: &Console) -> Result<(), Error> {
-    let materials = match db.read()? {
-        Some(store) => store.list()?,
-        None => Vec::new(),
-    };
-    let missing: Vec<&str> = builtin::names()
-        .filter(|name| !materials.iter().any(|m| m.slug.as_str() == *name))
-        .collect();
-    let mut text = match materials.len() {
-        0 => format!("no material in {} yet\n", db.path().display()),
+/// Which materials are wanted; all that is said must hold.
+#[derive(Debug, clap::Args)]
+pub(super) struct Wanted {
+    /// Only those whose numbers are claimed at this frequency
+    #[arg(long, value_name = "GHZ", value_parser = frequency)]
+    frequency: Option<f64>,
+    /// Only those with this tag
+    #[arg(long, value_name = "TAG")]
+    tag: Option<String>,
+    /// Only those whose rendered numbers came to be like this
+    #[arg(long)]
+    kind: Option<Kind>,
+    /// Only those of this kind of stuff, such as paint or metal
+    #[arg(long, value_name = "CLASS")]
+    class: Option<String>,
+    /// Only those with a model that was fitted to a curve
+    #[arg(long, conflicts_with = "not_fitted")]
+    fitted: bool,
+    /// Only those without one
+    #[arg(long)]
+    not_fitted: bool,
+    /// Only those that may still be used, that are superseded, or that were withdrawn
+    #[arg(long, value_parser = ["active", "superseded", "withdrawn"])]
+    status: Option<String>,
+}
+
+/// How numbers came to be, as flags say it.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Kind {
+    Measured,
+    Literature,
+    Modelled,
+    Synthetic,
+}
+
+impl Wanted {
+    pub fn filter(&self) -> Filter {
+        let kind = |kind| match kind {
+            Kind::Measured => SourceKind::Measured,
+            Kind::Literature => SourceKind::Literature,
+            Kind::Modelled => SourceKind::Modelled,
+            Kind::Synthetic => SourceKind::Synthetic,
+        };
+        Filter {
+            frequency_hz: self.frequency.map(|ghz| ghz * 1e9),
+            tag: self.tag.clone(),
+            kind: self.kind.map(kind),
+            class: self.class.clone(),
+            fitted: (self.fitted || self.not_fitted).then_some(self.fitted),
+            status: self.status.clone(),
+        }
+    }
+}
+
+fn frequency(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(ghz) if ghz.is_finite() && ghz > 0.0 => Ok(ghz),
+        _ => Err("give a frequency in GHz above 0, such as 300".to_owned()),
+    }
+}
+
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    let filter = args.filter.filter();
+    let store = db.read()?;
+    let materials = store.as_ref().map_or(Ok(Vec::new()), |store| store.find(&filter))?;
+    if console.json {
+        return console.result("", &materials);
+    }
+    let missing = not_added(store.as_ref())?.find(&filter)?;
+    let mut text = match (materials.len(), &store) {
+        (0, None) => format!("no material in {} yet\n", db.path().display()),
+        (0, _) if filter == Filter::default() => {
+            format!("no material in {} yet\n", db.path().display())
+        }
+        (0, _) => format!("no such material in {}\n", db.path().display()),
         _ => table(
             &["material", "rev", "kind", "class", "curves", "points", "fits", "name"],
-            materials.iter().map(|m| {
-                [
-                    m.slug.to_string(),
-                    m.revision.to_string(),
-                    m.render_kind.as_str().to_owned(),
-                    m.class.clone(),
-                    m.curves.to_string(),
-                    m.observations.to_string(),
-                    m.fits.to_string(),
-                    m.name.clone(),
-                ]
-            }),
+            materials.iter().map(row),
         ),
     };
     if !missing.is_empty() {
-        text += &wrapped("built in, not added:", &missing);
+        let names: Vec<&str> = missing.iter().map(|summary| summary.slug.as_str()).collect();
+        text += &wrapped("built in, not added:", &names);
     }
     console.result(&text, &materials)
 }
@@ -59,4 +123,17 @@ fn wrapped(title: &str, names: &[&str]) -> String {
         }
     }
     lines.join("\n") + "\n"
+}
+
+fn row(m: &Summary) -> [String; 8] {
+    [
+        m.slug.to_string(),
+        m.revision.to_string(),
+        m.render_kind.as_str().to_owned(),
+        m.class.clone(),
+        m.curves.to_string(),
+        m.observations.to_string(),
+        m.fits.to_string(),
+        m.name.clone(),
+    ]
 }

@@ -42,6 +42,22 @@ fn split<'a>(wanted: &'a str, asked_by: &str) -> Result<(&'a str, Option<u32>), 
     Ok((name, Some(number)))
 }
 
+/// The built-in materials that the database does not have, as a database in memory: listed and searched
+/// as others are.
+pub(super) fn not_added(store: Option<&Store>) -> Result<Store, Error> {
+    let mut missing = Vec::new();
+    for name in builtin::names() {
+        let Some(material) = builtin::get(name) else { continue };
+        let material = material?;
+        if store.map_or(Ok(None), |store| store.summary(&material.slug))?.is_none() {
+            missing.push(material);
+        }
+    }
+    let mut built_in = Store::in_memory()?;
+    built_in.add(&missing)?;
+    Ok(built_in)
+}
+
 /// The error for a name that nobody knows, with the nearest known one.
 pub(super) fn unknown(store: Option<&Store>, wanted: &str, asked_by: &str) -> Result<Error, Error> {
     let mut known: Vec<String> = builtin::names().map(str::to_owned).collect();

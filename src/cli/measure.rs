@@ -8,6 +8,7 @@ use super::cloud::{CloudArgs, start};
 use super::console::Console;
 use super::curves::{Kind, put};
 use super::database::Database;
+use super::inputs::activity;
 use super::materials::find;
 use super::output::write_all;
 use super::summary::grouped;
@@ -162,6 +163,7 @@ fn save(args: &Args, curve: &Curve, db: &Database) -> Result<Option<u32>, Error>
     }
     let mut store = db.write()?;
     let Some(material) = prepared(args, curve, Some(&store))? else { return Ok(None) };
+    store.record(activity("measure", &[&args.cloud.cloud, &args.scene])?);
     let added = store.add([&material])?;
     Ok(added.first().map(|added| added.revision()))
 }

@@ -2,6 +2,7 @@
 
 mod add;
 mod check;
+mod cite;
 mod cloud;
 mod compare;
 mod completions;
@@ -9,18 +10,23 @@ mod database;
 mod console;
 mod curves;
 mod diagnose;
+mod diff;
 mod effects;
 mod fit;
+mod history;
 mod import;
+mod inputs;
 mod list;
 mod materials;
 mod measure;
+mod near;
 mod output;
 mod plot;
 mod publish;
 mod radar;
 mod render;
 mod rm;
+mod search;
 mod show;
 mod staging;
 mod summary;
@@ -76,7 +82,12 @@ enum Command {
     Effects(effects::Args),
     Add(add::Args),
     List(list::Args),
+    Search(search::Args),
+    Near(near::Args),
     Show(show::Args),
+    Diff(diff::Args),
+    History(history::Args),
+    Cite(cite::Args),
     Plot(plot::Args),
     Fit(Box<fit::Args>),
     Check(check::Args),
@@ -103,8 +114,13 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Diagnose(args) => diagnose::run(args, db, &console),
         Command::Effects(args) => effects::run(args, &console),
         Command::Add(args) => add::run(args, db, &console),
-        Command::List(_) => list::run(db, &console),
+        Command::List(args) => list::run(args, db, &console),
+        Command::Search(args) => search::run(args, db, &console),
+        Command::Near(args) => near::run(args, db, &console),
         Command::Show(args) => show::run(args, db, &console),
+        Command::Diff(args) => diff::run(args, db, &console),
+        Command::History(args) => history::run(args, db, &console),
+        Command::Cite(args) => cite::run(args, db, &console),
         Command::Plot(args) => plot::run(args, db, &console),
         Command::Fit(args) => fit::run(args, db, &console),
         Command::Check(_) => check::run(db, &console),

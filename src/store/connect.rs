@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use rusqlite::backup::{Backup, StepResult};
+use rusqlite::functions::FunctionFlags;
 use rusqlite::{Connection, ErrorCode, OpenFlags, TransactionBehavior};
 use rusqlite_migration::{M, Migrations};
 
@@ -15,11 +16,12 @@ use super::StoreError;
 const APPLICATION_ID: i64 = 0x6d61_7464;
 
 /// All schemas there ever were, oldest first. Append only: files in the world have stopped at each.
-const SCHEMAS: [M; 4] = [
+const SCHEMAS: [M; 5] = [
     M::up(include_str!("../../migrations/0001_materials.sql")),
     M::up(include_str!("../../migrations/0002_fits.sql")),
     M::up(include_str!("../../migrations/0003_effects.sql")),
     M::up(include_str!("../../migrations/0004_catalogue.sql")),
+    M::up(include_str!("../../migrations/0005_search.sql")),
 ];
 
 /// What SQLite takes for the whole of a database in one step.
@@ -41,7 +43,9 @@ pub(super) fn readable(path: &Path) -> Result<Option<Connection>, StoreError> {
 /// An empty database of the latest schema that is nowhere on the disk.
 pub(super) fn in_memory() -> Result<Connection, StoreError> {
     let path = Path::new(":memory:");
-    let mut conn = Connection::open_in_memory().map_err(|error| StoreError::new(path, error))?;
+    let fail = |error| StoreError::new(path, error);
+    let mut conn = Connection::open_in_memory().map_err(fail)?;
+    equip(&conn).map_err(fail)?;
     migrate(path, &mut conn)?;
     Ok(conn)
 }
@@ -72,7 +76,6 @@ fn open_writable(path: &Path) -> Result<Connection, StoreError> {
         return Err(StoreError::ReadOnly { file: path.to_owned() });
     }
     conn.pragma_update(None, "journal_mode", "wal").map_err(fail)?;
-    conn.pragma_update(None, "foreign_keys", true).map_err(fail)?;
     // Two writers that each read first would stand in the other's way.
     conn.set_transaction_behavior(TransactionBehavior::Immediate);
     migrate(path, &mut conn)?;
@@ -103,7 +106,7 @@ fn modern_copy(path: &Path, old: &Connection) -> Result<Connection, StoreError> 
     if !whole(&mut copy).map_err(fail)? {
         return Err(StoreError::Busy { file: path.to_owned() });
     }
-    copy.pragma_update(None, "foreign_keys", true).map_err(fail)?;
+    equip(&copy).map_err(fail)?;
     migrate(path, &mut copy)?;
     copy.pragma_update(None, "query_only", true).map_err(fail)?;
     Ok(copy)
@@ -144,7 +147,23 @@ fn quiet(path: &Path) -> Result<Connection, StoreError> {
 fn connect(path: &Path, flags: OpenFlags) -> rusqlite::Result<Connection> {
     let conn = Connection::open_with_flags(path, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
     conn.busy_timeout(PATIENCE)?;
+    equip(&conn)?;
     Ok(conn)
+}
+
+/// What every connection needs.
+fn equip(conn: &Connection) -> rusqlite::Result<()> {
+    conn.pragma_update(None, "foreign_keys", true)?;
+    // Enough for every statement that writes a material; a smaller cache would parse most of them
+    // again for each.
+    conn.set_prepared_statement_cache_capacity(64);
+    // The views in decibels call it, and the SQLite that is built in has none.
+    let flags = FunctionFlags::SQLITE_UTF8
+        | FunctionFlags::SQLITE_DETERMINISTIC
+        | FunctionFlags::SQLITE_INNOCUOUS;
+    conn.create_scalar_function("log10", 1, flags, |context| {
+        context.get::<Option<f64>>(0).map(|x| x.map(f64::log10))
+    })
 }
 
 fn immutable(path: &Path) -> rusqlite::Result<Connection> {
@@ -212,6 +231,15 @@ mod tests {
         assert_eq!(schema_of(Path::new(":memory:"), &conn).unwrap(), 0);
         migrate(Path::new(":memory:"), &mut conn).unwrap();
         assert_eq!(schema_of(Path::new(":memory:"), &conn).unwrap(), SCHEMAS.len());
+    }
+
+    #[test]
+    fn the_views_in_decibels_work_without_another_sqlite() {
+        let conn = in_memory().unwrap();
+        let sql = "SELECT log10(100), log10(NULL), (SELECT count(sigma0_db) FROM v_curves)";
+        let row: (f64, Option<f64>, u32) =
+            conn.query_row(sql, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?))).unwrap();
+        assert_eq!(row, (2.0, None, 0));
     }
 
     #[test]

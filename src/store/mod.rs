@@ -17,6 +17,7 @@
 
 mod connect;
 mod error;
+mod find;
 mod read;
 mod tables;
 mod write;
@@ -25,10 +26,12 @@ use std::path::{Path, PathBuf};
 
 use rusqlite::Connection;
 
+use crate::brdf::Brdf;
 use crate::material::{Activity, Material, Slug, SourceKind};
 use crate::measure::AngleStatistics;
 
 pub use error::StoreError;
+pub use find::{Filter, Hit};
 pub use tables::{Cell, Column, ColumnKind, Reference, Table};
 
 /// An open database.
@@ -101,6 +104,8 @@ pub struct Summary {
     pub revision: u32,
     /// How the numbers that a scene renders came to be.
     pub render_kind: SourceKind,
+    /// `active`, `superseded` or `withdrawn`.
+    pub status: String,
     /// Number of curves.
     pub curves: u32,
     /// Number of points on all curves together.
@@ -141,6 +146,15 @@ impl Store {
         Ok(conn.map(|conn| Store { conn, path, activity: None }))
     }
 
+    /// An empty database in memory, gone when it is dropped.
+    ///
+    /// # Errors
+    /// When there is no memory.
+    pub fn in_memory() -> Result<Store, StoreError> {
+        let conn = connect::in_memory()?;
+        Ok(Store { conn, path: PathBuf::from(":memory:"), activity: None })
+    }
+
     /// Records with every revision that is added from now on which command made it of what.
     pub fn record(&mut self, activity: Activity) {
         self.activity = Some(activity);
@@ -168,15 +182,33 @@ impl Store {
         materials: impl IntoIterator<Item = &'a Material>,
         then: impl FnOnce(&[Added]) -> Result<T, E>,
     ) -> Result<T, E> {
-        let materials: Vec<&Material> = materials.into_iter().collect();
-        for material in &materials {
+        let activity = self.activity.clone();
+        let made = |material| (material, activity.as_ref());
+        self.add_all(&materials.into_iter().map(made).collect::<Vec<_>>(), then)
+    }
+
+    /// Adds materials as [`Store::add`] does, each recorded with which command made it of what.
+    ///
+    /// # Errors
+    /// As [`Store::add`].
+    pub fn add_made(&mut self, made: &[(Material, Activity)]) -> Result<Vec<Added>, StoreError> {
+        let made: Vec<_> = made.iter().map(|(material, by)| (material, Some(by))).collect();
+        self.add_all(&made, |added| Ok(added.to_vec()))
+    }
+
+    fn add_all<T, E: From<StoreError>>(
+        &mut self,
+        made: &[(&Material, Option<&Activity>)],
+        then: impl FnOnce(&[Added]) -> Result<T, E>,
+    ) -> Result<T, E> {
+        for (material, _) in made {
             let slug = || material.slug.to_string();
             material.validate().map_err(|error| StoreError::Material { slug: slug(), error })?;
         }
-        let Store { conn, path, activity } = self;
+        let Store { conn, path, .. } = self;
         let failed = |error| StoreError::new(path, error);
         let tx = conn.transaction().map_err(failed)?;
-        let added = write::add(&tx, &materials, activity.as_ref()).map_err(failed)?;
+        let added = write::add(&tx, made).map_err(failed)?;
         let done = then(&added)?;
         tx.commit().map_err(failed)?;
         Ok(done)
@@ -199,7 +231,7 @@ impl Store {
             let material = material?;
             let slug = || material.slug.to_string();
             material.validate().map_err(|error| StoreError::Material { slug: slug(), error })?;
-            for added in write::add(&tx, &[&material], activity.as_ref()).map_err(failed)? {
+            for added in write::add(&tx, &[(&material, activity.as_ref())]).map_err(failed)? {
                 then(&material, added)?;
             }
         }
@@ -211,7 +243,7 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn list(&self) -> Result<Vec<Summary>, StoreError> {
-        read::list(&self.conn).map_err(|error| StoreError::new(&self.path, error))
+        self.find(&Filter::default())
     }
 
     /// One revision of a material, or the current one; `None` when there is none.
@@ -231,6 +263,18 @@ impl Store {
         }
     }
 
+    /// What scenes render of a material's current revision, and the angles for which that is claimed, rad,
+    /// read without all else and without comparing its hash; `None` when it is not there or no curve can
+    /// be made of it.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn rendered(&self, slug: &Slug) -> Result<Option<(Brdf, [f64; 2])>, StoreError> {
+        let found =
+            read::rendered(&self.conn, slug).map_err(|error| StoreError::new(&self.path, error))?;
+        Ok(found.and_then(|material| Some((material.scattering().ok()?, material.theta_rad))))
+    }
+
     /// Statistics by angle of a curve of a revision, or of the current one, as they were computed when
     /// it was added; none for a curve or revision that is not there, for a curve without backscatter, or
     /// with points above the instrument's range, and for what an older program stored.
@@ -247,8 +291,8 @@ impl Store {
             .map_err(|error| StoreError::new(&self.path, error))
     }
 
-    /// What SQLite itself finds wrong with the file, a sentence each: damaged pages and indexes, and
-    /// references to nothing.
+    /// What is wrong with the file as such, a sentence each: damaged pages and indexes, references to
+    /// nothing, and what lists and searches say without being so.
     ///
     /// # Errors
     /// When the file cannot be read.

@@ -13,41 +13,14 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde::de::value::{Error as WordError, StrDeserializer};
 
-use super::{RevisionSummary, Stored, Summary};
+use super::find::stale;
+use super::{RevisionSummary, Stored};
 use crate::brdf::Brdf;
 use crate::formats::EffectEntry;
 use crate::material::{
     Censor, Covariance, Curve, FindingVerdict, Fit, Geometry, Making, Material, Observation, Scale,
     Slug, SourceKind, Status,
 };
-
-/// Every material's current revision, sorted by slug.
-pub(super) fn list(conn: &Connection) -> Result<Vec<Summary>> {
-    let sql = "
-        SELECT slug, name, class, number,
-            (SELECT kind FROM source JOIN (
-                SELECT name, source FROM fit WHERE revision_id = revision.id UNION ALL
-                SELECT name, source FROM curve WHERE revision_id = revision.id) AS rendered
-             ON key = rendered.source
-             WHERE revision_id = revision.id AND rendered.name = render) AS render_kind,
-            (SELECT count(*) FROM curve WHERE revision_id = revision.id),
-            (SELECT count(*) FROM observation WHERE revision_id = revision.id),
-            (SELECT count(*) FROM fit WHERE revision_id = revision.id)
-        FROM material JOIN revision ON material_id = material.id AND number = current_revision
-        ORDER BY slug";
-    rows(conn, sql, [], |row| {
-        Ok(Summary {
-            slug: row.get(0)?,
-            name: row.get(1)?,
-            class: row.get(2)?,
-            revision: row.get(3)?,
-            render_kind: row.get(4)?,
-            curves: row.get(5)?,
-            observations: row.get(6)?,
-            fits: row.get(7)?,
-        })
-    })
-}
 
 /// Every revision of a material, oldest first.
 pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSummary>> {
@@ -67,26 +40,41 @@ pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSumm
 pub(super) fn get(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result<Option<Stored>> {
     // All rows from one moment, whoever writes meanwhile.
     let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
+    let Some((revision_id, mut stored)) = revision(&tx, slug, number)? else { return Ok(None) };
+    let material = &mut stored.material;
+    material.sources = provenance::sources(&tx, revision_id)?;
+    material.instruments = provenance::instruments(&tx, revision_id)?;
+    material.curves = curves(&tx, revision_id, None)?;
+    material.fits = fits(&tx, revision_id, None)?;
+    material.effects = effects(&tx, revision_id)?;
+    provenance::fill(material, &tx, revision_id)?;
+    stored.activity = provenance::activity(&tx, revision_id)?;
+    Ok(Some(stored))
+}
+
+/// The current revision with what scenes render of it, and nothing else that hangs on it.
+pub(super) fn rendered(conn: &Connection, slug: &Slug) -> Result<Option<Material>> {
+    let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
+    let Some((revision_id, stored)) = revision(&tx, slug, None)? else { return Ok(None) };
+    let mut material = stored.material;
+    material.fits = fits(&tx, revision_id, Some(&material.render))?;
+    if material.fits.is_empty() {
+        material.curves = curves(&tx, revision_id, Some(&material.render))?;
+    }
+    Ok(Some(material))
+}
+
+/// A revision's own row, or that of the current one, and its number in the file.
+fn revision(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result<Option<(i64, Stored)>> {
     let sql = "
         SELECT slug, name, class, description, licence, tags, frequency_min_hz, frequency_max_hz,
             theta_min_rad, theta_max_rad, render, number, content_hash, added_at, program_version,
             revision.id, status, status_reason, superseded_by, finish, unknown
         FROM material JOIN revision ON material_id = material.id
         WHERE slug = ?1 AND number = coalesce(?2, current_revision)";
-    let found = tx
-        .prepare_cached(sql)?
+    conn.prepare_cached(sql)?
         .query_row(params![slug.as_str(), number], |row| Ok((row.get(15)?, stored(row)?)))
-        .optional()?;
-    let Some((revision_id, mut stored)) = found else { return Ok(None) };
-    let material = &mut stored.material;
-    material.sources = provenance::sources(&tx, revision_id)?;
-    material.instruments = provenance::instruments(&tx, revision_id)?;
-    material.curves = curves(&tx, revision_id)?;
-    material.fits = fits(&tx, revision_id)?;
-    material.effects = effects(&tx, revision_id)?;
-    provenance::fill(material, &tx, revision_id)?;
-    stored.activity = provenance::activity(&tx, revision_id)?;
-    Ok(Some(stored))
+        .optional()
 }
 
 /// A revision's own row; what hangs on it is still missing.
@@ -140,13 +128,14 @@ fn status(row: &Row, column: usize) -> Result<Status> {
     }
 }
 
-fn curves(conn: &Connection, revision_id: i64) -> Result<Vec<Curve>> {
+/// Curves of a revision, or the one of this name.
+fn curves(conn: &Connection, revision_id: i64, only: Option<&str>) -> Result<Vec<Curve>> {
     let sql = "
         SELECT name, source, instrument, session FROM curve
         LEFT JOIN curve_session
             ON curve_session.revision_id = curve.revision_id AND curve_session.curve = name
-        WHERE curve.revision_id = ?1 ORDER BY position";
-    rows(conn, sql, [revision_id], |row| {
+        WHERE curve.revision_id = ?1 AND name = coalesce(?2, name) ORDER BY position";
+    rows(conn, sql, params![revision_id, only], |row| {
         let name: String = row.get(0)?;
         let observations = observations(conn, revision_id, &name)?;
         Ok(Curve {
@@ -179,10 +168,11 @@ fn observations(conn: &Connection, revision_id: i64, curve: &str) -> Result<Vec<
     })
 }
 
-fn fits(conn: &Connection, revision_id: i64) -> Result<Vec<Fit>> {
+/// Fits of a revision, or the one of this name.
+fn fits(conn: &Connection, revision_id: i64, only: Option<&str>) -> Result<Vec<Fit>> {
     let sql = "SELECT name, model, estimator, curve, source, report FROM fit
-               WHERE revision_id = ?1 ORDER BY position";
-    rows(conn, sql, [revision_id], |row| {
+               WHERE revision_id = ?1 AND name = coalesce(?2, name) ORDER BY position";
+    rows(conn, sql, params![revision_id, only], |row| {
         let name: String = row.get(0)?;
         let mut model: Brdf = json(row, 1)?;
         let parameter_sources = parameters(conn, revision_id, &name, &mut model)?;
@@ -243,7 +233,7 @@ fn effects(conn: &Connection, revision_id: i64) -> Result<Vec<EffectEntry>> {
     })
 }
 
-fn rows<T>(
+pub(super) fn rows<T>(
     conn: &Connection,
     sql: &str,
     values: impl Params,
@@ -284,12 +274,19 @@ macro_rules! words {
 
 words!(Censor, FindingVerdict, Geometry, Making, Scale, Slug, SourceKind);
 
-/// What SQLite itself finds wrong: damaged pages, and references to nothing.
+/// What is wrong: damaged pages, references to nothing, and lines of lists that are not of their
+/// material.
 pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
     let found = rows(conn, "PRAGMA integrity_check", [], |row| row.get::<_, String>(0))?;
     let dangling = rows(conn, "PRAGMA foreign_key_check", [], |row| {
         let (table, parent): (String, String) = (row.get(0)?, row.get(2)?);
         Ok(format!("a row of `{table}` refers to a row of `{parent}` that is not there"))
     })?;
-    Ok(found.into_iter().filter(|line| line != "ok").chain(dangling).collect())
+    let problems: Vec<String> =
+        found.into_iter().filter(|line| line != "ok").chain(dangling).collect();
+    if !problems.is_empty() {
+        return Ok(problems);
+    }
+    let not_so = |slug| format!("what lists and searches say of `{slug}` is not what is stored");
+    Ok(stale(conn)?.into_iter().map(not_so).collect())
 }

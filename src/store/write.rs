@@ -10,13 +10,9 @@ use crate::formats::EffectEntry;
 use crate::material::{Activity, Covariance, Curve, Fit, Material, Slug};
 use crate::measure::statistics::by_angle;
 
-/// Adds materials or revisions of them.
-pub(super) fn add(
-    tx: &Transaction,
-    materials: &[&Material],
-    activity: Option<&Activity>,
-) -> Result<Vec<Added>> {
-    materials.iter().map(|material| add_one(tx, material, activity)).collect()
+/// Adds materials or revisions of them, each with what made it.
+pub(super) fn add(tx: &Transaction, made: &[(&Material, Option<&Activity>)]) -> Result<Vec<Added>> {
+    made.iter().map(|(material, activity)| add_one(tx, material, *activity)).collect()
 }
 
 fn add_one(tx: &Transaction, material: &Material, activity: Option<&Activity>) -> Result<Added> {
@@ -29,6 +25,7 @@ fn add_one(tx: &Transaction, material: &Material, activity: Option<&Activity>) -
     let revision_id = revision(tx, material, number, &content_hash)?;
     let rows = Rows { tx, revision_id };
     rows.material(material)?;
+    search(tx, &material.slug, added == Added::New)?;
     activity.map_or(Ok(()), |activity| rows.activity(activity))?;
     Ok(added)
 }
@@ -96,6 +93,25 @@ fn revision(tx: &Transaction, material: &Material, number: u32, hash: &str) -> R
         material.finish,
         json(&material.unknown)?,
     ])
+}
+
+/// Makes what a material is found by anew of its current revision.
+fn search(tx: &Transaction, slug: &Slug, is_new: bool) -> Result<()> {
+    const FORGET: [&str; 2] = [
+        "DELETE FROM entry WHERE slug = ?1",
+        "DELETE FROM search WHERE rowid = (SELECT id FROM material WHERE slug = ?1)",
+    ];
+    const MAKE: [&str; 3] = [
+        "INSERT INTO entry SELECT * FROM entry_made WHERE slug = ?1",
+        "INSERT INTO entry_tag SELECT * FROM entry_tag_made WHERE slug = ?1",
+        "INSERT INTO search (rowid, slug, name, class, tags, description, finish, unknown, sources)
+         SELECT * FROM search_made WHERE slug = ?1",
+    ];
+    let forget = if is_new { [].as_slice() } else { FORGET.as_slice() };
+    forget
+        .iter()
+        .chain(&MAKE)
+        .try_for_each(|sql| tx.prepare_cached(sql)?.execute([slug.as_str()]).map(|_| ()))
 }
 
 /// Writes what hangs on one revision.

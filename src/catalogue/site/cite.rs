@@ -131,7 +131,7 @@ fn bibtex(about: &About, key: &str, title: &str, year: &str) -> String {
 }
 
 /// Text that TeX sets as it stands.
-fn tex(text: &str) -> String {
+pub(in crate::catalogue) fn tex(text: &str) -> String {
     let mut set = String::new();
     for letter in text.chars() {
         match letter {

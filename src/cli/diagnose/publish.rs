@@ -8,6 +8,7 @@ use super::takers::{Cast, Taker, pinned};
 use super::{Asked, Context, html, json, plots, residuals, text, typed};
 use crate::cli::console::Console;
 use crate::cli::database::Database;
+use crate::cli::inputs::activity;
 use crate::cli::output::{Written, write_all};
 use crate::diagnose::Report;
 use crate::error::Error;
@@ -82,6 +83,7 @@ impl Publication<'_> {
             last.push(materials.len() - 1);
         }
         let scene = self.asked.scene;
+        store.record(activity("diagnose", &[&self.asked.cloud.cloud, scene])?);
         let written = store.add_if(&materials, |added| {
             let pin = |&at: &usize| Some(pinned(materials.get(at)?, *added.get(at)?));
             context.added = last.iter().filter_map(pin).collect();

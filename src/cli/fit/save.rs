@@ -1,10 +1,13 @@
 //! A fit into a material, as a new revision.
 
+use std::path::PathBuf;
+
 use serde::Serialize;
 
 use super::{Args, Subject};
 use crate::cli::curves;
 use crate::cli::database::Database;
+use crate::cli::inputs::activity;
 use crate::cli::materials::{Found, find};
 use crate::error::Error;
 use crate::fit::{Finding, FitResult};
@@ -147,6 +150,7 @@ pub(super) fn save(
     db: &Database,
 ) -> Result<Saved, Error> {
     let mut store = db.write()?;
+    store.record(activity("fit", &subject.file.iter().map(PathBuf::as_path).collect::<Vec<_>>())?);
     let Some(target) = Target::find(args, subject, name, Some(&store))? else {
         return Err(usage("nothing is to be stored".to_owned(), "add --save"));
     };

@@ -1,6 +1,6 @@
 //! What is fitted: a curve of a file or of a material.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::Args;
 use crate::brdf::Brdf;
@@ -19,6 +19,8 @@ pub(super) struct Subject {
     pub curve: Curve,
     /// The material whose curve it is; `None` for a file.
     pub found: Option<Found>,
+    /// The file, if it is one.
+    pub file: Option<PathBuf>,
 }
 
 impl Subject {
@@ -41,7 +43,7 @@ impl Subject {
         let curve = Curve::read(&bytes).map_err(refused)?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let curve_name = args.curve.clone().unwrap_or(stem);
-        Ok(Subject { label, curve_name, curve, found: None })
+        Ok(Subject { label, curve_name, curve, found: None, file: Some(path.to_owned()) })
     }
 
     fn of_material(args: &Args, found: Found) -> Result<Subject, Error> {
@@ -56,7 +58,7 @@ impl Subject {
         let fail = |error| Error::Observation { curve: label.clone(), error };
         let rows = Curve::from_observations(&curve.observations).map_err(fail)?;
         let curve_name = curve.name.clone();
-        Ok(Subject { label, curve_name, curve: rows, found: Some(found) })
+        Ok(Subject { label, curve_name, curve: rows, found: Some(found), file: None })
     }
 
     /// The model of the material's rendered fit, if it renders one.

@@ -1,0 +1,250 @@
+//! How fast a large database is filled and searched, against SQLite alone.
+//!
+//! `cargo bench --bench store -- 100000` fills a database with that many materials, a curve of 90 rows
+//! each (2000 without a number), and prints one line per measurement. Filling is compared with prepared
+//! statements that insert the very same rows into the same schema, in the same run: the ratio says
+//! something on any machine, the times only on one.
+
+use std::hint::black_box;
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use matdb::material::{Censor, Curve, Material, Observation, SourceKind, builtin};
+use matdb::store::{Filter, Store, StoreError};
+use rusqlite::types::Value;
+use rusqlite::{Connection, params_from_iter};
+
+const ROWS: usize = 90;
+/// Different materials; the others repeat them under other names.
+const KINDS: usize = 50;
+/// Words of names, so that a search finds some and not all.
+const WORDS: [&str; 10] =
+    ["amber", "birch", "copper", "denim", "ebony", "felt", "granite", "hemp", "ivory", "jute"];
+
+fn main() {
+    let number = std::env::args().skip(1).find_map(|argument| argument.parse().ok());
+    let number: usize = number.unwrap_or(2000);
+    let folder = tempfile::tempdir().unwrap();
+    let [ours, raw] = ["ours.sqlite", "raw.sqlite"].map(|name| folder.path().join(name));
+    println!("{number} materials, {ROWS} rows each");
+    let filled = fill(&ours, number);
+    say("bulk import", filled, number);
+    let alone = replay(&ours, &raw, number);
+    say("the same rows, SQLite alone", alone, number);
+    println!("ratio {:.2} (goal: at most 1.5)", filled.as_secs_f64() / alone.as_secs_f64());
+    let store = Store::open_existing(&ours).unwrap().unwrap();
+    look_up(&store, number);
+    filters(&store);
+    processes(&ours);
+}
+
+fn say(what: &str, time: Duration, number: usize) {
+    let each = time.as_secs_f64() * 1e6 / number as f64;
+    println!("{what}: {:.2} s, {each:.0} us each", time.as_secs_f64());
+}
+
+/// The material of this number, alike but for names, classes, tags, frequency and levels.
+fn material(number: usize) -> Material {
+    let mut material = builtin::get("mannequin-paint").unwrap().unwrap();
+    let word = WORDS[number % WORDS.len()];
+    material.slug = format!("material-{number:06}").parse().unwrap();
+    material.name = format!("{word} sample no{number}");
+    material.class = format!("class-{}", number % 1000);
+    material.tags = vec![word.to_owned(), format!("tag-{}", number % 2000)];
+    if number % 500 == 0 {
+        material.frequency_hz = [75e9, 110e9];
+    }
+    let observation = |row: usize| Observation {
+        theta_i_rad: (row as f64).to_radians(),
+        theta_r_rad: (row as f64).to_radians(),
+        delta_phi_rad: 0.0,
+        sigma0: Some(1.0 / (1.0 + (row * (number % KINDS + 1)) as f64)),
+        censor: Censor::None,
+        threshold_sigma0: Some(1e-6),
+        theta_sd_rad: Some(0.01),
+        power_w: Some(1e-10),
+        range_m: Some(8.0),
+        chirp: Some(row as u32),
+    };
+    material.curves = vec![Curve {
+        name: "scan".to_owned(),
+        source: material.sources[0].key.clone(),
+        instrument: None,
+        session: None,
+        observations: (0..ROWS).map(observation).collect(),
+    }];
+    material
+}
+
+fn fill(path: &Path, number: usize) -> Duration {
+    let mut store = Store::open(path).unwrap();
+    // To make a material is no work of the database.
+    let mut made = Duration::ZERO;
+    let start = Instant::now();
+    let materials = (0..number).map(|number| {
+        let start = Instant::now();
+        let material = material(number);
+        made += start.elapsed();
+        Ok::<_, StoreError>(material)
+    });
+    store.add_each(materials, |_, _| Ok::<_, StoreError>(())).unwrap();
+    start.elapsed() - made
+}
+
+/// A table's rows of one material, and where the numbers of material and revision stand in them.
+struct Rows {
+    sql: String,
+    rows: Vec<Vec<Value>>,
+    numbers: Vec<usize>,
+    slug: Option<usize>,
+}
+
+/// Inserts the rows of every material again with prepared statements alone.
+fn replay(from: &Path, to: &Path, number: usize) -> Duration {
+    drop(Store::open(to).unwrap());
+    let from = Connection::open(from).unwrap();
+    let kinds: Vec<Vec<Rows>> =
+        (0..KINDS.min(number)).map(|kind| rows(&from, kind as i64 + 1)).collect();
+    let mut to = Connection::open(to).unwrap();
+    to.set_prepared_statement_cache_capacity(64);
+    let mut prepared = Duration::ZERO;
+    let start = Instant::now();
+    let tx = to.transaction().unwrap();
+    for place in 0..number {
+        let id = Value::Integer(place as i64 + 1);
+        for table in &kinds[place % kinds.len()] {
+            let mut statement = tx.prepare_cached(&table.sql).unwrap();
+            for row in &table.rows {
+                let begin = Instant::now();
+                let mut row = row.clone();
+                table.numbers.iter().for_each(|&column| row[column] = id.clone());
+                if let Some(column) = table.slug {
+                    row[column] = Value::Text(format!("material-{place:06}"));
+                }
+                prepared += begin.elapsed();
+                statement.execute(params_from_iter(row)).unwrap();
+            }
+        }
+    }
+    tx.commit().unwrap();
+    start.elapsed() - prepared
+}
+
+/// The rows of one material in every table that has some.
+fn rows(conn: &Connection, id: i64) -> Vec<Rows> {
+    let tables = [
+        ("material", "id"),
+        ("revision", "material_id"),
+        ("source", "revision_id"),
+        ("instrument", "revision_id"),
+        ("permittivity", "revision_id"),
+        ("layer", "revision_id"),
+        ("roughness", "revision_id"),
+        ("curve", "revision_id"),
+        ("observation", "revision_id"),
+        ("curve_statistic", "revision_id"),
+        ("fit", "revision_id"),
+        ("fit_parameter", "revision_id"),
+        ("fit_covariance", "revision_id"),
+        ("entry", "material_id"),
+        ("search", "rowid"),
+    ];
+    let mut found: Vec<Rows> =
+        tables.iter().map(|(table, key)| table_rows(conn, table, key, id)).collect();
+    found.push(tags(conn, id));
+    found.retain(|table| !table.rows.is_empty());
+    found
+}
+
+fn table_rows(conn: &Connection, table: &str, key: &str, id: i64) -> Rows {
+    let what = if table == "search" { "rowid, *" } else { "*" };
+    read(conn, table, &format!("SELECT {what} FROM {table} WHERE {key} = ?1"), id)
+}
+
+fn tags(conn: &Connection, id: i64) -> Rows {
+    let of = "slug = (SELECT slug FROM material WHERE id = ?1)";
+    read(conn, "entry_tag", &format!("SELECT * FROM entry_tag WHERE {of}"), id)
+}
+
+fn read(conn: &Connection, table: &str, sql: &str, id: i64) -> Rows {
+    let mut statement = conn.prepare(sql).unwrap();
+    let columns: Vec<String> = statement.column_names().iter().map(|&n| n.to_owned()).collect();
+    let count = columns.len();
+    let rows = statement
+        .query_map([id], |row| (0..count).map(|column| row.get(column)).collect())
+        .unwrap()
+        .map(Result::unwrap)
+        .collect();
+    let marks = vec!["?"; count].join(", ");
+    let is_number =
+        |name: &&String| matches!(name.as_str(), "material_id" | "revision_id" | "rowid" | "id");
+    let place = |name: &String| columns.iter().position(|other| other == name);
+    Rows {
+        sql: format!("INSERT INTO {table} ({}) VALUES ({marks})", columns.join(", ")),
+        rows,
+        numbers: columns.iter().filter(is_number).filter_map(place).collect(),
+        slug: columns.iter().position(|name| name == "slug"),
+    }
+}
+
+/// Median time of a call, us.
+fn median_us(times: usize, mut call: impl FnMut(usize)) -> f64 {
+    let mut each: Vec<f64> = (0..times)
+        .map(|turn| {
+            let start = Instant::now();
+            call(turn);
+            start.elapsed().as_secs_f64() * 1e6
+        })
+        .collect();
+    each.sort_by(f64::total_cmp);
+    each[each.len() / 2]
+}
+
+fn look_up(store: &Store, number: usize) {
+    let slug = |turn: usize| format!("material-{:06}", turn * 7919 % number).parse().unwrap();
+    let line = median_us(2000, |turn| drop(black_box(store.summary(&slug(turn)).unwrap())));
+    println!("look-up by name: {line:.1} us (goal: 20)");
+    let rendered = median_us(2000, |turn| drop(black_box(store.rendered(&slug(turn)).unwrap())));
+    println!("what scenes render of a name: {rendered:.1} us");
+    let whole = median_us(500, |turn| drop(black_box(store.get(&slug(turn), None).unwrap())));
+    println!("a whole material with its {ROWS} rows and hash: {whole:.1} us");
+}
+
+fn filters(store: &Store) {
+    let any = Filter::default;
+    for (what, filter) in [
+        ("class", Filter { class: Some("class-7".to_owned()), ..any() }),
+        ("tag", Filter { tag: Some("tag-7".to_owned()), ..any() }),
+        ("frequency", Filter { frequency_hz: Some(100e9), ..any() }),
+        ("kind", Filter { kind: Some(SourceKind::Literature), ..any() }),
+        ("everything", any()),
+    ] {
+        let found = store.find(&filter).unwrap().len();
+        let time = median_us(21, |_| drop(black_box(store.find(&filter).unwrap())));
+        println!("filter by {what}, {found} found: {time:.0} us (goal: 1000)");
+    }
+    for words in ["no77", "amber no1", "amber", "paint"] {
+        let found = store.search(words, u32::MAX).unwrap().len();
+        let time = median_us(21, |_| drop(black_box(store.search(words, 20).unwrap())));
+        println!("full text `{words}`, 20 of {found}: {time:.0} us (goal: 1000)");
+    }
+}
+
+/// Commands as a person runs them.
+fn processes(path: &Path) {
+    for arguments in [
+        vec!["list", "--class", "class-7"],
+        vec!["search", "no77"],
+        vec!["list"],
+        vec!["list", "--json"],
+    ] {
+        let time = median_us(5, |_| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_matdb"));
+            assert!(
+                command.args(&arguments).arg("--db").arg(path).output().unwrap().status.success()
+            );
+        });
+        println!("matdb {}: {:.1} ms (goal: 50)", arguments.join(" "), time / 1e3);
+    }
+}

@@ -1,0 +1,297 @@
+//! Which known material a measured curve is nearest to.
+//!
+//! The curve is gathered by angle and averaged in linear power, as its statistics are. Where all was
+//! detected the mean is one value; what was below the threshold leaves it anywhere between two. The
+//! difference to a material is that of its own mean over the same angles to the nearer end, in dB, and 0
+//! between the ends. Only angles within the material's range count, and a bound that the material
+//! respects counts for nothing, so that silence makes nothing alike.
+
+use serde::Serialize;
+
+use crate::brdf::{Brdf, Scattering};
+use crate::material::{Censor, Observation};
+use crate::measure::statistics::by_angle;
+use crate::units::db_from_ratio;
+
+/// Fewer common angles than this, or than half of the curve's, are no comparison.
+const LEAST_COMMON: usize = 3;
+/// Angles at which a material's mean over a bin is computed.
+const ANGLES_PER_BIN: usize = 8;
+
+/// A curve to be compared with many materials.
+#[derive(Clone, Debug)]
+pub struct Probe {
+    bins: Vec<Bin>,
+    /// Lowest level that the curve speaks of, dB: what a material without an echo is at most.
+    floor_db: f64,
+    noise_db: Option<f64>,
+}
+
+/// What the curve says at one angle, or within one degree.
+#[derive(Clone, Debug)]
+struct Bin {
+    theta_rad: Vec<f64>,
+    /// Least and greatest mean, dB; the least is −∞ where nothing was detected.
+    level_db: [f64; 2],
+}
+
+/// How far a curve is from a material.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Distance {
+    /// Root mean square difference, dB.
+    pub rms_db: f64,
+    /// The same after the best common offset, for a curve whose level is not known, dB.
+    pub rms_shape_db: f64,
+    /// That offset: so much higher than the material the curve is, dB.
+    pub offset_db: f64,
+    /// Angles that count.
+    pub common_angles: usize,
+    /// Angles of the curve beyond the material's range.
+    pub angles_beyond: usize,
+    /// Angles at which the curve has only a bound, and the material lies above it.
+    pub above_bound: usize,
+    /// Angles at which the curve has an echo and the material none: the distance is at least what it says.
+    pub silent: usize,
+}
+
+impl Probe {
+    /// Gathers a curve's backscatter; `None` when nothing was detected, or a point lies above the
+    /// instrument's range.
+    pub fn new(observations: &[Observation]) -> Option<Probe> {
+        let retro: Vec<&Observation> = observations.iter().filter(|o| o.is_retro()).collect();
+        let statistics = by_angle(observations);
+        let within = |[low, high]: [f64; 2]| {
+            let is_one = high - low < 1e-6;
+            let holds = move |theta: f64| theta >= low && (theta < high || is_one && theta <= high);
+            retro.iter().filter(move |o| holds(o.theta_i_rad))
+        };
+        let bin = |row: &crate::measure::AngleStatistics| {
+            let mut theta_rad: Vec<f64> = within(row.theta_rad).map(|o| o.theta_i_rad).collect();
+            theta_rad.sort_by(f64::total_cmp);
+            Bin { theta_rad: thinned(&theta_rad), level_db: row.mean.map(db_from_ratio) }
+        };
+        let bins = statistics.iter().map(bin).filter(|bin| !bin.theta_rad.is_empty());
+        let bins: Vec<Bin> = bins.collect();
+        let levels = bins.iter().flat_map(|bin| bin.level_db).filter(|level| level.is_finite());
+        let floor_db = levels.min_by(f64::total_cmp)?;
+        let detected = |row: &crate::measure::AngleStatistics| -> Vec<f64> {
+            let found = within(row.theta_rad).filter(|o| o.censor == Censor::None);
+            found.filter_map(|o| o.sigma0).collect()
+        };
+        let repeats: Vec<Vec<f64>> = statistics.iter().map(detected).collect();
+        let has_echo = bins.iter().any(|bin| bin.level_db[0].is_finite());
+        has_echo.then(|| Probe { bins, floor_db, noise_db: noise_db(&repeats) })
+    }
+
+    /// Number of angles, or of degrees, at which the curve says something.
+    pub fn angles(&self) -> usize {
+        self.bins.len()
+    }
+
+    /// What chance alone makes of the distance to the true material, dB: from the scatter of repeats;
+    /// none where nothing was repeated.
+    pub fn noise_db(&self) -> Option<f64> {
+        self.noise_db
+    }
+
+    /// The distance to what scenes render of a material whose numbers are claimed for these angles of
+    /// incidence, rad; `None` when too few angles are common.
+    pub fn distance(&self, scattering: &Brdf, [low, high]: [f64; 2]) -> Option<Distance> {
+        const ROUNDING: f64 = 1e-9;
+        let is_within = |theta: &f64| (low - ROUNDING..=high + ROUNDING).contains(theta);
+        let common: Vec<&Bin> =
+            self.bins.iter().filter(|bin| bin.theta_rad.iter().all(is_within)).collect();
+        if common.len() < LEAST_COMMON || common.len() * 2 < self.bins.len() {
+            return None;
+        }
+        let mut silent = 0;
+        let mut level = |bin: &Bin| {
+            let sum: f64 = bin.theta_rad.iter().map(|theta| scattering.sigma0(*theta)).sum();
+            let level_db = db_from_ratio(sum / bin.theta_rad.len().max(1) as f64);
+            if level_db.is_finite() {
+                return level_db;
+            }
+            silent += usize::from(bin.level_db[0].is_finite());
+            self.floor_db
+        };
+        let pairs: Vec<Pair> =
+            common.iter().map(|bin| Pair { ends_db: bin.level_db, level_db: level(bin) }).collect();
+        let (rms_db, counted, above_bound) = rms(&pairs, 0.0);
+        let offset_db = best_offset(&pairs);
+        let (rms_shape_db, ..) = rms(&pairs, offset_db);
+        (counted >= LEAST_COMMON).then_some(Distance {
+            rms_db,
+            rms_shape_db,
+            offset_db,
+            common_angles: counted,
+            angles_beyond: self.bins.len() - common.len(),
+            above_bound,
+            silent,
+        })
+    }
+}
+
+/// What the curve and the material say of one bin.
+struct Pair {
+    ends_db: [f64; 2],
+    level_db: f64,
+}
+
+impl Pair {
+    /// How much the curve lies above the material, dB; none where it has only a bound that holds.
+    fn difference_db(&self, offset_db: f64) -> Option<f64> {
+        let [least, greatest] = self.ends_db;
+        let level = self.level_db + offset_db;
+        match (level < least, level > greatest) {
+            (true, _) => Some(least - level),
+            (_, true) => Some(greatest - level),
+            _ => least.is_finite().then_some(0.0),
+        }
+    }
+
+    fn is_bound(&self) -> bool {
+        !self.ends_db[0].is_finite()
+    }
+}
+
+/// Root mean square, how many count, and how many of these are bounds.
+fn rms(pairs: &[Pair], offset_db: f64) -> (f64, usize, usize) {
+    let counted = || pairs.iter().filter_map(|p| Some((p, p.difference_db(offset_db)?)));
+    let (number, sum) = counted().fold((0, 0.0), |(n, sum), (_, d)| (n + 1, sum + d * d));
+    let bounds = counted().filter(|(pair, _)| pair.is_bound()).count();
+    ((sum / f64::from(number.max(1))).sqrt(), number as usize, bounds)
+}
+
+/// The offset of the least sum of squares, which has one minimum: by bisection of its slope.
+fn best_offset(pairs: &[Pair]) -> f64 {
+    let slope = |offset: f64| -> f64 { pairs.iter().filter_map(|p| p.difference_db(offset)).sum() };
+    let (mut low, mut high) = (-400.0, 400.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if slope(middle) > 0.0 { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// A few of many angles, evenly among them.
+fn thinned(theta_rad: &[f64]) -> Vec<f64> {
+    let n = theta_rad.len();
+    if n <= ANGLES_PER_BIN {
+        return theta_rad.to_vec();
+    }
+    let place = |k: usize| (2 * k + 1) * n / (2 * ANGLES_PER_BIN);
+    (0..ANGLES_PER_BIN).filter_map(|k| theta_rad.get(place(k)).copied()).collect()
+}
+
+/// From the scatter of repeats, relative to their means and pooled over all angles.
+fn noise_db(repeats: &[Vec<f64>]) -> Option<f64> {
+    let db_per_share = 10.0 / std::f64::consts::LN_10;
+    let (mut squares, mut freedom) = (0.0, 0.0);
+    let repeats = || repeats.iter().filter(|values| !values.is_empty());
+    for values in repeats() {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        squares += values.iter().map(|value| (value / mean - 1.0).powi(2)).sum::<f64>();
+        freedom += values.len() as f64 - 1.0;
+    }
+    let share = (freedom > 0.0).then(|| squares / freedom)?;
+    let variances = repeats().map(|values| share / values.len() as f64);
+    Some(db_per_share * (variances.sum::<f64>() / repeats().count() as f64).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::{Material, builtin};
+    use crate::units::ratio_from_db;
+
+    fn curve(points: &[(f64, f64)]) -> Vec<Observation> {
+        points.iter().map(|&(theta_deg, level_db)| at(theta_deg, level_db, Censor::None)).collect()
+    }
+
+    fn at(theta_deg: f64, level_db: f64, censor: Censor) -> Observation {
+        let (theta_rad, level) = (theta_deg.to_radians(), ratio_from_db(level_db));
+        let is_detected = censor == Censor::None;
+        Observation {
+            theta_i_rad: theta_rad,
+            theta_r_rad: theta_rad,
+            delta_phi_rad: 0.0,
+            sigma0: is_detected.then_some(level),
+            censor,
+            threshold_sigma0: (!is_detected).then_some(level),
+            theta_sd_rad: None,
+            power_w: None,
+            range_m: None,
+            chirp: None,
+        }
+    }
+
+    fn flat(observations: &[Observation], level_db: f64) -> Option<Distance> {
+        let level = ratio_from_db(level_db);
+        let points: Vec<(f64, f64)> = [0.0, 0.7, 1.5].map(|theta| (theta, level)).to_vec();
+        let table = crate::brdf::Tabulated::new(&points).unwrap();
+        Probe::new(observations)?.distance(&Brdf::Tabulated(table), [0.0, 1.0])
+    }
+
+    #[test]
+    fn a_material_is_nearest_to_itself_and_an_offset_is_found() {
+        let materials: Vec<Material> =
+            builtin::names().map(|name| builtin::get(name).unwrap().unwrap()).collect();
+        for own in &materials {
+            let scattering = own.scattering().unwrap();
+            let degrees = [1.0, 3.0, 5.0, 8.0, 12.0, 20.0, 30.0, 40.0];
+            let level = |deg: f64| db_from_ratio(scattering.sigma0(deg.to_radians()));
+            let points = degrees.map(|deg| (deg, level(deg))).into_iter();
+            let points: Vec<_> = points.filter(|(_, level)| *level > -100.0).collect();
+            let lifted: Vec<_> = points.iter().map(|(deg, level)| (*deg, level + 7.0)).collect();
+            let probe = Probe::new(&curve(&points)).unwrap();
+            let to = |probe: &Probe, other: &Material| {
+                probe.distance(&other.scattering().unwrap(), other.theta_rad)
+            };
+            let near = |other: &&Material| to(&probe, other).map_or(1e9, |d| d.rms_db);
+            let first = materials.iter().min_by(|a, b| near(a).total_cmp(&near(b))).unwrap();
+            assert_eq!(first.slug, own.slug);
+            assert!(near(&own) < 1e-9);
+            let far = to(&Probe::new(&curve(&lifted)).unwrap(), own).unwrap();
+            assert!((far.rms_db - 7.0).abs() < 1e-6 && (far.offset_db - 7.0).abs() < 1e-6);
+            assert!(far.rms_shape_db < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_bound_counts_only_where_the_material_lies_above_it() {
+        let mut points = curve(&[(5.0, -10.0), (10.0, -10.0), (15.0, -10.0)]);
+        points.push(at(20.0, -20.0, Censor::Left));
+        let below = flat(&points[..3], -10.0).unwrap();
+        assert!(below.rms_db < 1e-9 && below.common_angles == 3);
+        let above = flat(&points, -10.0).unwrap();
+        // Three exact ones, and one 10 dB above its bound.
+        assert!((above.rms_db - 5.0).abs() < 1e-9, "{above:?}");
+        assert_eq!((above.common_angles, above.above_bound), (4, 1));
+        let held = flat(&points, -25.0).unwrap();
+        assert!((held.rms_db - 15.0).abs() < 1e-9 && held.common_angles == 3);
+    }
+
+    #[test]
+    fn angles_beyond_a_materials_range_do_not_count_and_few_are_no_comparison() {
+        let points = curve(&[(5.0, -10.0), (10.0, -10.0), (15.0, -10.0), (80.0, 30.0)]);
+        let found = flat(&points, -10.0).unwrap();
+        assert!(found.rms_db < 1e-9 && found.angles_beyond == 1);
+        assert!(flat(&points[1..], -10.0).is_none());
+    }
+
+    #[test]
+    fn repeats_tell_what_chance_makes_of_it() {
+        assert_eq!(Probe::new(&curve(&[(5.0, 0.0), (9.0, 0.0)])).unwrap().noise_db(), None);
+        // 1 and 3 at each angle: mean 2, deviation 0.707 of it, that of the mean 0.5.
+        let pair = |deg: f64| [(deg, 0.0), (deg, db_from_ratio(3.0))];
+        let points: Vec<_> = [5.0, 9.0, 14.0].into_iter().flat_map(pair).collect();
+        let noise = Probe::new(&curve(&points)).unwrap().noise_db().unwrap();
+        assert!((noise - 0.5 * 10.0 / std::f64::consts::LN_10).abs() < 1e-9, "{noise}");
+    }
+
+    #[test]
+    fn nothing_detected_is_near_nothing() {
+        let silence: Vec<_> = [5.0, 9.0, 14.0].map(|deg| at(deg, -20.0, Censor::Left)).to_vec();
+        assert!(Probe::new(&silence).is_none());
+    }
+}

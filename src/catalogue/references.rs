@@ -1,0 +1,304 @@
+//! Which source every number of a material rests on, and how to cite the material and its sources: as
+//! text, as BibTeX and as CSL-JSON.
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::leaves::{Leaf, leaves};
+use super::site::tex;
+use crate::material::{Citation, Curve, Fit, Material, Source, SourceKind};
+
+/// A source and what rests on it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Reference {
+    /// The source; none for what the entry states of itself, such as the range that it claims.
+    pub source: Option<Source>,
+    /// Paths of numbers: names from the outermost inwards, with a dot between. All points of a curve
+    /// and all numbers of a report are one.
+    pub numbers: Vec<String>,
+}
+
+/// Every source of a material with the numbers that rest on it, in the material's order; at the end what
+/// the entry states itself.
+pub fn references(material: &Material) -> Vec<Reference> {
+    let mut found: Vec<Reference> = material
+        .sources
+        .iter()
+        .map(|source| Reference { source: Some(source.clone()), numbers: Vec::new() })
+        .collect();
+    let mut own = Reference { source: None, numbers: Vec::new() };
+    for leaf in leaves(material).into_iter().filter(|leaf| leaf.value.is_number()) {
+        let key = source_of(material, &leaf);
+        if leaf.path.first().is_some_and(|list| list == "sources") {
+            continue;
+        }
+        let is_of = |reference: &&mut Reference| {
+            reference.source.as_ref().map(|source| source.key.as_str()) == key
+        };
+        let numbers = match found.iter_mut().find(is_of) {
+            Some(reference) => &mut reference.numbers,
+            None => &mut own.numbers,
+        };
+        let place = gathered(&leaf.path);
+        if numbers.last() != Some(&place) {
+            numbers.push(place);
+        }
+    }
+    found.push(own);
+    found
+}
+
+/// The key of the source of a number; `None` where the entry states it itself.
+fn source_of<'a>(material: &'a Material, leaf: &Leaf) -> Option<&'a str> {
+    if leaf.path.first().is_some_and(|list| list == "roughness") {
+        return material.roughness.as_ref().map(|roughness| roughness.source.as_str());
+    }
+    let place = leaf.item?;
+    let curve = |uses: &dyn Fn(&Curve) -> bool| material.curves.iter().find(|curve| uses(curve));
+    let source = match leaf.path.first()?.as_str() {
+        "curves" => &material.curves.get(place)?.source,
+        "fits" => return Some(fit_source(material.fits.get(place)?, &leaf.path)),
+        "permittivities" => &material.permittivities.get(place)?.source,
+        "findings" => &material.findings.get(place)?.source,
+        "layers" => {
+            let key = material.layers.get(place)?.permittivity.as_ref()?;
+            &material.permittivities.iter().find(|entry| entry.key == *key)?.source
+        }
+        // What was measured with it, or then, says so.
+        "instruments" => {
+            let key = &material.instruments.get(place)?.key;
+            &curve(&|curve| curve.instrument.as_ref() == Some(key))?.source
+        }
+        "sessions" => {
+            let key = &material.sessions.get(place)?.key;
+            &curve(&|curve| curve.session.as_ref() == Some(key))?.source
+        }
+        _ => return None,
+    };
+    Some(source)
+}
+
+/// The source of a number of a fit: a parameter may have its own.
+fn fit_source<'a>(fit: &'a Fit, path: &[String]) -> &'a str {
+    let own = |parameter: &[String]| {
+        let parameter = parameter_path(parameter);
+        fit.parameter_sources.iter().find(|(path, _)| *path == parameter)
+    };
+    match path {
+        [_, _, part, parameter @ ..] if part == "model" => {
+            own(parameter).map_or(&fit.source, |(_, source)| source)
+        }
+        _ => &fit.source,
+    }
+}
+
+/// The path of a model's parameter, which does not name the list of a sum's models.
+fn parameter_path(names: &[String]) -> String {
+    let names: Vec<&str> =
+        names.iter().map(String::as_str).filter(|name| *name != "parts").collect();
+    names.join(".")
+}
+
+/// A place for people: a curve's points and what a fit said of itself are one each.
+fn gathered(path: &[String]) -> String {
+    match path {
+        [list, name, what, ..] if list == "curves" && what == "observations" => {
+            format!("curve {name}")
+        }
+        [list, name, what, ..] if list == "fits" && what != "model" => {
+            format!("fit {name}, {what}")
+        }
+        [list, name, _, parameter @ ..] if list == "fits" => {
+            format!("fit {name}, {}", parameter_path(parameter))
+        }
+        path => {
+            let is_name = |name: &&String| name.parse::<usize>().is_err();
+            let names: Vec<&str> = path.iter().filter(is_name).map(String::as_str).collect();
+            names.join(", ")
+        }
+    }
+}
+
+/// How to cite a revision of a material: which one it is, wherever it came from.
+#[derive(Clone, Debug)]
+pub struct Citable<'a> {
+    /// The material.
+    pub material: &'a Material,
+    /// Its revision in a database; none for a built-in one.
+    pub revision: Option<u32>,
+    /// Year in which it was added, four digits; none for a built-in one.
+    pub year: Option<u16>,
+}
+
+impl Citable<'_> {
+    /// A name that no other revision has: name, revision and the beginning of its hash.
+    fn title(&self) -> String {
+        let Material { slug, name, .. } = self.material;
+        let hash = self.material.content_hash();
+        let hash = hash.get(..12).unwrap_or(&hash);
+        let version = concat!("matdb ", env!("CARGO_PKG_VERSION"));
+        match self.revision {
+            Some(revision) => format!("{name} ({slug}, revision {revision}, content {hash})"),
+            None => format!("{name} ({slug}, built into {version}, content {hash})"),
+        }
+    }
+
+    fn key(&self) -> String {
+        let revision = self.revision.map_or(String::new(), |revision| format!("-{revision}"));
+        format!("matdb-{}{revision}", self.material.slug)
+    }
+
+    /// The material and its sources as sentences.
+    pub fn text(&self) -> String {
+        let mut text = format!("{}. {}.\n", self.title(), self.material.licence);
+        for Reference { source, numbers } in references(self.material) {
+            match &source {
+                Some(source) => text += &format!("\n{}", sentence(source)),
+                None if numbers.is_empty() => continue,
+                None => text += "\nstated by this entry itself\n",
+            }
+            numbers.iter().for_each(|place| text += &format!("    {place}\n"));
+            if numbers.is_empty() {
+                text += "    no number of this entry\n";
+            }
+        }
+        text
+    }
+
+    /// The material and its sources as BibTeX.
+    pub fn bibtex(&self) -> String {
+        let own = [
+            ("title", Some(self.title())),
+            ("year", self.year.map(|year| year.to_string())),
+            ("note", Some(format!("Licence {}", self.material.licence))),
+        ];
+        let mut text = entry("misc", &self.key(), own);
+        for source in &self.material.sources {
+            text += &entry(
+                bibtex_type(source),
+                &format!("{}-{}", self.key(), source.key),
+                [
+                    ("author", authors(source, " and ")),
+                    ("title", Some(source.title.clone())),
+                    (container_field(source), source.citation.container.clone()),
+                    ("volume", source.citation.volume.clone()),
+                    ("pages", source.citation.pages.clone()),
+                    ("publisher", source.citation.publisher.clone()),
+                    ("year", source.citation.year.map(|year| year.to_string())),
+                    ("doi", source.doi.clone()),
+                    ("url", source.url.clone()),
+                    ("note", source.note.clone()),
+                ],
+            );
+        }
+        text
+    }
+
+    /// The material and its sources as CSL-JSON.
+    pub fn csl(&self) -> Value {
+        let own = pruned(json!({
+            "id": self.key(),
+            "type": "dataset",
+            "title": self.title(),
+            "issued": self.year.map(issued),
+            "version": self.revision.map(|revision| revision.to_string()),
+            "license": self.material.licence,
+        }));
+        let sources = self.material.sources.iter().map(|source| {
+            let Citation { authors, year, container, volume, pages, publisher } = &source.citation;
+            let names: Vec<Value> = authors.iter().map(|author| person(author)).collect();
+            pruned(json!({
+                "id": format!("{}-{}", self.key(), source.key),
+                "type": csl_type(source),
+                "title": source.title,
+                "author": (!names.is_empty()).then_some(names),
+                "issued": year.map(issued),
+                "container-title": container,
+                "volume": volume,
+                "page": pages,
+                "publisher": publisher,
+                "DOI": source.doi,
+                "URL": source.url,
+                "license": source.licence,
+                "note": source.note,
+            }))
+        });
+        std::iter::once(own).chain(sources).collect()
+    }
+}
+
+fn sentence(source: &Source) -> String {
+    let Citation { year, container, volume, pages, publisher, .. } = &source.citation;
+    let mut text = format!("{} ({}): ", source.key, source.kind.as_str());
+    text += &authors(source, "; ").map_or(String::new(), |authors| format!("{authors}: "));
+    text += &source.title;
+    let place = [container, volume, pages, publisher].into_iter().flatten().cloned();
+    let place: Vec<String> = place.chain(year.map(|year| year.to_string())).collect();
+    if !place.is_empty() {
+        text += &format!(". {}", place.join(", "));
+    }
+    let address = source.doi.as_ref().map(|doi| format!("https://doi.org/{doi}"));
+    text += &address.or(source.url.clone()).map_or(String::new(), |at| format!(". {at}"));
+    text + "\n"
+}
+
+fn authors(source: &Source, between: &str) -> Option<String> {
+    let authors = &source.citation.authors;
+    (!authors.is_empty()).then(|| authors.join(between))
+}
+
+fn is_article(source: &Source) -> bool {
+    source.citation.container.is_some()
+        && (source.citation.volume.is_some() || source.citation.pages.is_some())
+}
+
+fn bibtex_type(source: &Source) -> &'static str {
+    if is_article(source) { "article" } else { "misc" }
+}
+
+fn container_field(source: &Source) -> &'static str {
+    if is_article(source) { "journal" } else { "howpublished" }
+}
+
+fn csl_type(source: &Source) -> &'static str {
+    match (is_article(source), source.kind) {
+        (true, _) => "article-journal",
+        (false, SourceKind::Measured | SourceKind::Synthetic) => "dataset",
+        (false, SourceKind::Literature | SourceKind::Modelled) => "document",
+    }
+}
+
+fn issued(year: u16) -> Value {
+    json!({ "date-parts": [[year]] })
+}
+
+fn person(author: &str) -> Value {
+    match author.split_once(", ") {
+        Some((family, given)) => json!({ "family": family, "given": given }),
+        None => json!({ "literal": author }),
+    }
+}
+
+/// Without what is not known.
+fn pruned(mut record: Value) -> Value {
+    if let Some(fields) = record.as_object_mut() {
+        fields.retain(|_, value| !value.is_null());
+    }
+    record
+}
+
+fn entry<const N: usize>(kind: &str, key: &str, fields: [(&str, Option<String>); N]) -> String {
+    let mut text = format!("@{kind}{{{key}");
+    for (name, value) in fields {
+        if let Some(value) = value {
+            let value = if matches!(name, "doi" | "url") { address(&value) } else { tex(&value) };
+            text += &format!(",\n  {name} = {{{value}}}");
+        }
+    }
+    text + "\n}\n"
+}
+
+/// An address as it is, but for what would end a field.
+fn address(value: &str) -> String {
+    value.replace('{', "%7B").replace('}', "%7D").replace('\\', "%5C")
+}

@@ -1,0 +1,51 @@
+//! `matdb cite`.
+
+use serde_json::json;
+
+use super::console::Console;
+use super::database::Database;
+use super::materials::find;
+use crate::catalogue::{Citable, references};
+use crate::error::Error;
+
+/// Say how to cite a material, and which source each of its numbers rests on
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb cite mannequin-paint
+  matdb cite my-paint@2 --bibtex >> references.bib
+  matdb cite my-paint --csl                  CSL-JSON, for reference managers")]
+pub(super) struct Args {
+    /// NAME or NAME@REVISION
+    name: String,
+    /// As BibTeX: the entry and each of its sources
+    #[arg(long, conflicts_with = "csl")]
+    bibtex: bool,
+    /// As CSL-JSON: the same
+    #[arg(long)]
+    csl: bool,
+}
+
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    let store = db.read()?;
+    let found = find(store.as_ref(), &args.name, "")?;
+    let material = &found.material;
+    let stored = match (&store, found.revision) {
+        (Some(store), Some(_)) => store.get(&material.slug, found.revision)?,
+        _ => None,
+    };
+    let year = stored.and_then(|stored| stored.added_at.get(..4)?.parse().ok());
+    let citable = Citable { material, revision: found.revision, year };
+    let csl = citable.csl();
+    let text = match (args.bibtex, args.csl) {
+        (true, _) => citable.bibtex(),
+        (_, true) => format!("{csl:#}\n"),
+        _ => citable.text(),
+    };
+    let record = json!({
+        "text": citable.text(),
+        "bibtex": citable.bibtex(),
+        "csl": csl,
+        "references": references(material),
+    });
+    console.result(&text, &record)
+}

@@ -1,0 +1,71 @@
+//! `matdb diff`.
+
+use super::console::Console;
+use super::database::Database;
+use super::materials::find;
+use super::summary::table;
+use crate::catalogue::{CurveChange, Diff, Levels};
+use crate::error::Error;
+
+/// Show what differs between two revisions or two materials
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb diff my-paint@1 my-paint@2
+  matdb diff my-paint mannequin-paint
+  matdb diff my-paint@1 my-paint --json | jq '.fields[].path'
+
+Curves are compared at the angles that both have, in dB: the second less the first.")]
+pub(super) struct Args {
+    /// NAME or NAME@REVISION
+    before: String,
+    /// NAME or NAME@REVISION
+    after: String,
+}
+
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    let store = db.read()?;
+    let before = find(store.as_ref(), &args.before, "")?.material;
+    let after = find(store.as_ref(), &args.after, "")?.material;
+    let diff = Diff::new(&before, &after);
+    console.result(&text(&diff, [&args.before, &args.after]), &diff)
+}
+
+fn text(diff: &Diff, names: [&String; 2]) -> String {
+    if diff.is_empty() {
+        return format!("{} and {} say the same\n", names[0], names[1]);
+    }
+    let mut text = String::new();
+    if !diff.fields.is_empty() {
+        let rows = diff.fields.iter().map(|f| [f.path.clone(), cut(&f.before()), cut(&f.after())]);
+        text += &table(&["field", names[0], names[1]], rows);
+    }
+    for CurveChange { curve, points, levels } in &diff.curves {
+        let number =
+            |side: usize| points[side].map_or("none".to_owned(), |n| format!("{n} points"));
+        text += &format!("curve {curve}: {} → {}", number(0), number(1));
+        text += &levels.as_ref().map_or(String::new(), |levels| format!("; {}", words(levels)));
+        text += "\n";
+    }
+    if let Some(levels) = &diff.rendered {
+        text += &format!("what scenes render: {}\n", words(levels));
+    }
+    text
+}
+
+fn words(levels: &Levels) -> String {
+    let Levels { angles, mean_db, rms_db, largest_db } = levels;
+    format!(
+        "{mean_db:+.2} dB in the mean, {rms_db:.2} dB rms, {largest_db:.2} dB at most, \
+         at {angles} common angles"
+    )
+}
+
+/// A text on one line of a table.
+fn cut(text: &str) -> String {
+    const MOST: usize = 48;
+    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    match line.chars().count() {
+        0..=MOST => line,
+        _ => line.chars().take(MOST - 1).chain(['…']).collect(),
+    }
+}
