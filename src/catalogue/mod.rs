@@ -7,6 +7,7 @@
 mod about;
 mod api;
 mod error;
+pub mod exchange;
 mod folder;
 mod import;
 mod publish;

@@ -1,6 +1,7 @@
 //! `matdb add`.
 
 mod door;
+mod foreign;
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -23,7 +24,11 @@ use crate::store::Added;
   matdb add --all                      every built-in material
   matdb add --from my-paint/           the folder's material.toml, or that of each subfolder
   matdb add --from my-paint/material.toml
-  matdb add --template > my-paint/material.toml    a complete entry to change")]
+  matdb add --template > my-paint/material.toml    a complete entry to change
+  matdb add --from water.yml --name water --class liquid    a page of refractiveindex.info
+  matdb add --from scan.csv --name my-paint --class paint --kind measured --source 'Our bench, 2026' \\
+    --licence CC-BY-4.0 --instrument 'Our radar' --frequency 300 --threshold -77    a bare curve
+  matdb add --from paint.brdf --name my-paint --class paint       a universal BRDF file")]
 #[command(group = clap::ArgGroup::new("what").required(true).multiple(true))]
 pub(super) struct Args {
     /// Names of built-in materials
@@ -32,12 +37,15 @@ pub(super) struct Args {
     /// Every built-in material
     #[arg(long, group = "what")]
     all: bool,
-    /// A material.toml, or a folder with one or with subfolders that have one
+    /// A material.toml, or a folder with one or with subfolders that have one; or a curve (.csv), a
+    /// universal BRDF (.brdf, .json) or a page of refractiveindex.info's database (.yml)
     #[arg(long, value_name = "FILE|DIR", group = "what")]
     from: Vec<PathBuf>,
     /// Print a complete material.toml with comments, to be changed
     #[arg(long, group = "what", exclusive = true)]
     template: bool,
+    #[command(flatten)]
+    foreign: foreign::Args,
 }
 
 /// A complete material.toml; docs/materials.md shows the same.
@@ -84,9 +92,13 @@ fn wanted(args: &Args, db: &Database) -> Result<Vec<Material>, Error> {
     }
     for path in &args.from {
         for file in material_files(path)? {
-            materials.push(read(&file)?);
+            materials.push(match foreign::format(&file) {
+                Some(format) => foreign::read(format, &file, &args.foreign)?,
+                None => read(&file)?,
+            });
         }
     }
+    args.foreign.check(&args.from)?;
     let mut seen = HashSet::new();
     match materials.iter().find(|material| !seen.insert(&material.slug)) {
         None => Ok(materials),

@@ -10,6 +10,7 @@ mod console;
 mod curves;
 mod diagnose;
 mod effects;
+mod export;
 mod fit;
 mod import;
 mod list;
@@ -74,7 +75,7 @@ enum Command {
     Compare(compare::Args),
     Diagnose(diagnose::Args),
     Effects(effects::Args),
-    Add(add::Args),
+    Add(Box<add::Args>),
     List(list::Args),
     Show(show::Args),
     Plot(plot::Args),
@@ -84,6 +85,7 @@ enum Command {
     Publish(publish::Args),
     Verify(verify::Args),
     Import(import::Args),
+    Export(export::Args),
     Completions(completions::Args),
 }
 
@@ -112,6 +114,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Publish(args) => publish::run(args, db, &console),
         Command::Verify(args) => verify::run(args, &console),
         Command::Import(args) => import::run(args, db, &console),
+        Command::Export(args) => export::run(args, db, &console),
         Command::Completions(args) => completions::run(args),
     }
 }
