@@ -78,8 +78,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let folder = args.output.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
     write_all(folder, &files)?;
-    let written: Vec<String> =
-        files.iter().map(|(name, _)| args.output.with_file_name(name).display().to_string()).collect();
+    let written: Vec<String> = files
+        .iter()
+        .map(|(name, _)| args.output.with_file_name(name).display().to_string())
+        .collect();
     let text = format!("wrote {}\n{lost}\n", written.join(", "));
     console.result(&text, &json!({ "files": written, "lost": lost }))
 }

@@ -45,7 +45,9 @@ pub enum ExchangeError {
         way_out: String,
     },
     /// The program was built without Parquet.
-    #[error("this matdb was built without Parquet; build it with `--features parquet`, or write CSV")]
+    #[error(
+        "this matdb was built without Parquet; build it with `--features parquet`, or write CSV"
+    )]
     NotBuilt,
     /// A record cannot be encoded.
     #[error("cannot write {format}: {problem}; please report this")]

@@ -17,7 +17,9 @@ use num_complex::Complex;
 
 use super::subject::one_line;
 use super::{ExchangeError, Exported, Subject};
-use crate::brdf::{Brdf, CookTorrance, Distribution, Fresnel, Lambert, Mixture, Scattering, Shadowing};
+use crate::brdf::{
+    Brdf, CookTorrance, Distribution, Fresnel, Lambert, Mixture, Scattering, Shadowing,
+};
 use crate::units::db_from_ratio;
 
 /// Writes the BSDF.
@@ -29,8 +31,7 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
         way_out: "render another fit or curve".to_owned(),
     };
     let model = subject.model().map_err(|error| unfit(error.to_string()))?;
-    let angles: Vec<f64> =
-        subject.angles_rad().into_iter().filter(|angle| model.retro_per_sr(*angle) > 0.0).collect();
+    let angles = subject.echoing_rad(&model);
     if angles.is_empty() {
         return Err(unfit("nothing comes back at any claimed angle".to_owned()));
     }
@@ -58,9 +59,9 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
     Ok(Exported { files: vec![(name.to_owned(), text.into_bytes())], lost })
 }
 
-/// The text as it may stand in a comment of XML.
+/// The text as it may stand in a comment of XML; the second pass is for three in a row.
 fn comment(line: &str) -> String {
-    line.replace('-', "-\u{200b}").replace("-\u{200b}-", "- -").replace('\u{200b}', "")
+    line.replace("--", "- -").replace("--", "- -")
 }
 
 fn bsdf(model: &Brdf, attributes: &str, depth: usize, text: &mut String) {

@@ -63,11 +63,7 @@ pub struct Exported {
 ///
 /// # Errors
 /// When the material has not what the format must have, or the program was built without it.
-pub fn export(
-    subject: &Subject,
-    format: Format,
-    name: &str,
-) -> Result<Exported, ExchangeError> {
+pub fn export(subject: &Subject, format: Format, name: &str) -> Result<Exported, ExchangeError> {
     match format {
         Format::Csv => Ok(plain_csv::write(subject, name)),
         #[cfg(feature = "parquet")]
@@ -108,12 +104,7 @@ impl Foreign {
     ///
     /// # Errors
     /// When the bytes do not follow the format, or neither they nor `given` say what must be known.
-    pub fn read(
-        self,
-        file: &str,
-        bytes: &[u8],
-        given: &Given,
-    ) -> Result<Material, ExchangeError> {
+    pub fn read(self, file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
         match self {
             Foreign::OpticalConstants => optical_constants::read(file, bytes, given),
             Foreign::Csv => plain_csv::read(file, bytes, given),

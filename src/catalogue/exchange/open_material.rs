@@ -9,6 +9,8 @@
 //! Lost: which points are censored (they are left out), uncertainties, parameters of fits other than
 //! as text in `customProperties`, lobes narrower than the grid.
 
+use std::cmp::Ordering;
+
 use serde_json::{Value, json};
 
 use super::subject::{one_line, sigma0_per_f};
@@ -26,6 +28,9 @@ const WAVELENGTHS_M: [f64; 2] = [1e-9, 17.16e-3];
 const ZENITH_STEP_DEG: f64 = 5.0;
 /// Azimuths of the table, from 0 to 180°, degrees.
 const AZIMUTH_STEP_DEG: f64 = 15.0;
+
+/// Below this f, σ⁰ is under −80 dB: nothing comes back, 1/sr.
+const FAINTEST_PER_SR: f64 = 1e-9;
 
 /// Writes the material and its tables.
 pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeError> {
@@ -118,14 +123,14 @@ fn uuid(names: &[&str]) -> String {
 fn custom(subject: &Subject) -> Value {
     let material = subject.material;
     let fit = material.fits.iter().find(|fit| fit.name == material.render);
-    json!({ "matdb": {
-        "about": subject.about(),
-        "kind": subject.kind(),
-        "content_hash": material.content_hash(),
-        "frequency_hz": material.frequency_hz,
-        "theta_rad": material.theta_rad,
-        "model": fit.map(|fit| &fit.model),
-    } })
+    let model = fit.map(|fit| json!(fit.model).to_string());
+    // Version 1.0.0 takes nothing but texts here.
+    json!({
+        "matdb_about": subject.about().join("\n"),
+        "matdb_kind": subject.kind(),
+        "matdb_content_hash": material.content_hash(),
+        "matdb_model": model.unwrap_or_default(),
+    })
 }
 
 fn roughness(subject: &Subject) -> Option<Value> {
@@ -202,7 +207,10 @@ impl Table {
             Some([wavelength_m, i_rad, r_rad, azimuth_rad.min(6.283185), f_per_sr])
         };
         let mut rows: Vec<[f64; 5]> = points.observations.iter().filter_map(row).collect();
-        rows.sort_by(|a, b| a.iter().zip(b).map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne()).unwrap_or(std::cmp::Ordering::Equal));
+        rows.sort_by(|a, b| {
+            let columns = a.iter().zip(b).map(|(x, y)| x.total_cmp(y));
+            columns.fold(Ordering::Equal, Ordering::then)
+        });
         let censored = points.observations.len() - rows.len();
         let is_measured = points.source.is_some_and(|s| s.kind == SourceKind::Measured);
         let what = format!(
@@ -244,8 +252,8 @@ impl Table {
             what: "A model in all directions; exit azimuth 0 is towards the source.".to_owned(),
             lost: format!(
                 "the model is tabulated every {ZENITH_STEP_DEG}° and, between 0 and 180°, every \
-                 {AZIMUTH_STEP_DEG}° of azimuth; interpolated halfway between rows its backscatter is \
-                 up to {worst_db:.1} dB off"
+                 {AZIMUTH_STEP_DEG}° of azimuth; interpolated halfway between rows, its backscatter \
+                 where above -80 dB is up to {worst_db:.1} dB off"
             ),
         }
     }
@@ -256,7 +264,12 @@ fn worst_between_db(model: &Brdf, zeniths: &[f64]) -> f64 {
     let miss = |pair: &[f64]| match pair {
         [a, b] => {
             let between = (model.retro_per_sr(*a) + model.retro_per_sr(*b)) / 2.0;
-            db_from_ratio(between / model.retro_per_sr((a + b) / 2.0)).abs()
+            let true_per_sr = model.retro_per_sr((a + b) / 2.0);
+            if true_per_sr < FAINTEST_PER_SR {
+                0.0
+            } else {
+                db_from_ratio(between / true_per_sr).abs()
+            }
         }
         _ => 0.0,
     };

@@ -43,17 +43,19 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
     let page = parse(text).map_err(refused)?;
     let known = page.is_cc0.then(|| "CC0-1.0".to_owned());
     let licence = given.licence.clone().or(known);
-    let flags =
-        [(given.slug.is_some(), NAME), (given.class.is_some(), CLASS), (licence.is_some(), LICENCE)];
+    let flags = [
+        (given.slug.is_some(), NAME),
+        (given.class.is_some(), CLASS),
+        (licence.is_some(), LICENCE),
+    ];
     let (Some(slug), Some(class), Some(licence)) =
         (given.slug.clone(), given.class.clone(), licence)
     else {
         return Err(missing(file, &flags));
     };
     let wanted_hz = given.frequency_hz.unwrap_or(USUAL_HZ);
-    let (nearest, constants) = constants(&page)
-        .and_then(|constants| around(constants, wanted_hz))
-        .map_err(refused)?;
+    let (nearest, constants) =
+        constants(&page).and_then(|constants| around(constants, wanted_hz)).map_err(refused)?;
     let entry = Entry { slug, class, licence, wanted_hz, nearest, constants };
     let material = material(file, &page, given, entry);
     material
@@ -240,7 +242,8 @@ impl Formula {
             6 => 1.0 + c(1) + pairs(2, &|a, b| a / (b - 1.0 / l2)),
             7 => {
                 let pole = 1.0 / (l2 - 0.028);
-                c(1) + c(2) * pole + c(3) * pole * pole
+                c(1) + c(2) * pole
+                    + c(3) * pole * pole
                     + c(4) * l2
                     + c(5) * l2.powi(2)
                     + c(6) * l2.powi(3)
@@ -303,7 +306,11 @@ fn material(file: &str, page: &Page, given: &Given, entry: Entry) -> Material {
         render: "half-space".to_owned(),
         sources: vec![
             optical_source(file, page, given, licence),
-            source("half-space", SourceKind::Modelled, "Fresnel's reflectance of a smooth half space"),
+            source(
+                "half-space",
+                SourceKind::Modelled,
+                "Fresnel's reflectance of a smooth half space",
+            ),
             source("chosen", SourceKind::Synthetic, "Chosen by matdb; nobody measured it"),
         ],
         instruments: Vec::new(),
@@ -377,7 +384,8 @@ fn source(key: &str, kind: SourceKind, title: &str) -> Source {
 /// The first DOI that a link names.
 fn doi(html: &str) -> Option<String> {
     let (_, rest) = html.split_once("doi.org/")?;
-    let doi: String = rest.chars().take_while(|c| !c.is_whitespace() && !"\"'<>".contains(*c)).collect();
+    let doi: String =
+        rest.chars().take_while(|c| !c.is_whitespace() && !"\"'<>".contains(*c)).collect();
     (doi.starts_with("10.") && doi.contains('/')).then_some(doi)
 }
 

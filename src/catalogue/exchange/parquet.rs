@@ -11,7 +11,8 @@ use crate::store::{Cell, Column, ColumnKind, Table};
 /// Writes the curve, or what the model says at every degree.
 pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeError> {
     let points = subject.points();
-    let real = |name: &str| Column { name: name.to_owned(), kind: ColumnKind::Real, required: false };
+    let real =
+        |name: &str| Column { name: name.to_owned(), kind: ColumnKind::Real, required: false };
     let columns = vec![
         real("theta_i_rad"),
         real("theta_r_rad"),
@@ -23,7 +24,8 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
         real("power_w"),
         real("range_m"),
     ];
-    let table = Table { name: "observation".to_owned(), columns, key: Vec::new(), references: Vec::new() };
+    let table =
+        Table { name: "observation".to_owned(), columns, key: Vec::new(), references: Vec::new() };
     let cell = |value: Option<f64>| value.map_or(Cell::Null, Cell::Real);
     let rows = points.observations.iter().map(|point| {
         vec![

@@ -34,10 +34,8 @@ pub(super) fn write(subject: &Subject, name: &str) -> Exported {
             point.delta_phi_rad.to_degrees(),
         );
     }
-    let lost = format!(
-        "written is {}; everything else of the material is in no column",
-        what(&points)
-    );
+    let lost =
+        format!("written is {}; everything else of the material is in no column", what(&points));
     Exported { files: vec![(name.to_owned(), text.into_bytes())], lost }
 }
 
@@ -45,7 +43,8 @@ pub(super) fn write(subject: &Subject, name: &str) -> Exported {
 pub(super) fn what(points: &Points) -> String {
     match points.curve {
         Some(curve) => format!("the curve `{}`", curve.name),
-        None => "the model's backscatter at every degree, since there is no curve".to_owned(),
+        None => "the model's backscatter at every degree where it is above -80 dB, since there is no curve"
+            .to_owned(),
     }
 }
 
@@ -111,11 +110,7 @@ pub(super) struct Lone {
 }
 
 /// A material that is one curve.
-pub(super) fn of_curve(
-    file: &str,
-    given: &Given,
-    lone: Lone,
-) -> Result<Material, ExchangeError> {
+pub(super) fn of_curve(file: &str, given: &Given, lone: Lone) -> Result<Material, ExchangeError> {
     let Lone { slug, class, licence, title, kind, hz, instrument, observations } = lone;
     let angles = || observations.iter().map(|point| point.theta_i_rad);
     let material = Material {

@@ -3,17 +3,19 @@
 //!
 //! Sionna's diffuse f is S²·Γ²(θ_i)·f_s/cos θ_o, with Γ² the reflected share of the power (here of
 //! unpolarised waves on a half space) and f_s `lambertian`, `directive` or `backscattering` after
-//! Degli-Esposti. S and the pattern are fitted to our backscatter in dB over the claimed angles; the
-//! best of the three is written and its rms error said. σ = ε″·2πf·ε₀.
+//! Degli-Esposti. S and the pattern are fitted in dB over the claimed angles to our backscatter or, of
+//! a mixture, to that of its diffuse part, since Sionna adds the mirror's reflection itself; the best
+//! of the three is written and its rms error said. A smooth surface gets S = 0. σ = ε″·2πf·ε₀.
 //!
-//! Lost: the shape beyond such a pattern. Sionna takes the surface for a slab of a thickness and adds
-//! its mirror reflection, √(1 − S²) of the amplitude, apart; ε′ below 1, of metals, becomes 1.
+//! Lost: the shape beyond such a pattern and the width of the mirror's lobe. Sionna takes the surface
+//! for a slab of a thickness; the mirror's share is √(1 − S²) in amplitude; ε′ below 1 becomes 1.
 
 use std::f64::consts::{PI, TAU};
 
 use super::subject::one_line;
 use super::{ExchangeError, Exported, Subject};
 use crate::brdf::{Brdf, CookTorrance, Directive, Fresnel, Scattering};
+use crate::frames::Direction;
 use crate::units::{db_from_ratio, ratio_from_db};
 
 /// ε₀, F/m (CODATA 2022).
@@ -37,18 +39,28 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
         let problem = "neither a permittivity nor a reflectivity is known".to_owned();
         return Err(unfit(problem, "add a [[permittivity]] to the material"));
     };
-    let angles: Vec<f64> =
-        subject.angles_rad().into_iter().filter(|angle| model.retro_per_sr(*angle) > 0.0).collect();
-    let Some(best) = best_pattern(&model, &substance, &angles) else {
-        let problem = "nothing comes back at any claimed angle".to_owned();
-        return Err(unfit(problem, "render another fit or curve"));
+    let angles = subject.echoing_rad(&model);
+    let scattered = Scattered::of(&model);
+    let best = match scattered {
+        // A mirror scatters nothing apart.
+        Scattered::Nothing => Best { pattern: Pattern::Lambertian, s: 0.0, rms_db: 0.0 },
+        part => best_pattern(&model, part, &substance, &angles).ok_or_else(|| {
+            let problem = "nothing is scattered back at any claimed angle".to_owned();
+            unfit(problem, "render another fit or curve")
+        })?,
     };
-    let lost = format!(
-        "the {} pattern misses the backscatter by {:.1} dB rms over the claimed angles; {}",
-        best.pattern.name(),
-        best.rms_db,
-        substance.origin
-    );
+    let misses = match scattered {
+        Scattered::Nothing => {
+            "a smooth surface: S = 0, and Sionna's mirror reflection is all".to_owned()
+        }
+        part => format!(
+            "the {} pattern misses {} by {:.1} dB rms over the claimed angles",
+            best.pattern.name(),
+            part.what(),
+            best.rms_db
+        ),
+    };
+    let lost = format!("{misses}; {}", substance.origin);
     let text = snippet(subject, &substance, &best, &lost);
     Ok(Exported { files: vec![(name.to_owned(), text.into_bytes())], lost })
 }
@@ -59,14 +71,19 @@ fn snippet(subject: &Subject, substance: &Substance, best: &Best, lost: &str) ->
     let mut text: String = subject.about().iter().map(|line| format!("# {line}\n")).collect();
     text += &format!("# {}\n", one_line(lost));
     let ghz = frequency_hz / 1e9;
-    text += &format!("# conductivity for {ghz} GHz; backscatter fitted as S^2 Gamma^2 f_s / cos theta\n");
+    text += &format!(
+        "# conductivity for {ghz} GHz; backscatter fitted as S^2 Gamma^2 f_s / cos theta\n"
+    );
     text += "from sionna.rt import RadioMaterial\n\nmaterial = RadioMaterial(\n";
     let quoted = serde_json::json!(subject.material.slug).to_string();
     let mut line = |key: &str, value: String| text += &format!("    {key}={value},\n");
     line("name", quoted);
     match substance.thickness_m {
         Some(thickness_m) => line("thickness", python(thickness_m)),
-        None => line("# thickness is that of a wall, 0.1 m, unless you set it: thickness", "0.1".to_owned()),
+        None => line(
+            "# thickness is that of a wall, 0.1 m, unless you set it: thickness",
+            "0.1".to_owned(),
+        ),
     }
     line("relative_permittivity", python(substance.eps_real.max(1.0)));
     line("conductivity", python(conductivity));
@@ -76,6 +93,43 @@ fn snippet(subject: &Subject, substance: &Substance, best: &Best, lost: &str) ->
         line(key, value);
     }
     text + ")\n"
+}
+
+/// Which part of a model Sionna's diffuse scattering stands for; it adds the mirror's itself.
+#[derive(Clone, Copy)]
+enum Scattered {
+    /// A mirror leaves none.
+    Nothing,
+    /// Facets apart from a diffuse part are the mirror.
+    DiffusePart,
+    All,
+}
+
+impl Scattered {
+    fn of(model: &Brdf) -> Scattered {
+        match model {
+            Brdf::Fresnel(_) | Brdf::Layered(_) => Scattered::Nothing,
+            Brdf::Mixture(mixture) if mixture.k > 0.0 => Scattered::DiffusePart,
+            _ => Scattered::All,
+        }
+    }
+
+    fn what(self) -> &'static str {
+        match self {
+            Scattered::DiffusePart => "the diffuse part of the backscatter",
+            _ => "the backscatter",
+        }
+    }
+
+    /// What of the backscatter it is, 1/sr.
+    fn retro_per_sr(self, model: &Brdf, theta_rad: f64) -> f64 {
+        let i = Direction::from_angles(theta_rad, 0.0);
+        match self {
+            Scattered::Nothing => 0.0,
+            Scattered::DiffusePart => model.f_per_sr(i, i) * (1.0 - model.specular_share(i, i)),
+            Scattered::All => model.f_per_sr(i, i),
+        }
+    }
 }
 
 /// A number that Python reads as a float.
@@ -225,7 +279,12 @@ struct Best {
 }
 
 /// The pattern and S nearest to the model's backscatter, in dB.
-fn best_pattern(model: &Brdf, substance: &Substance, angles: &[f64]) -> Option<Best> {
+fn best_pattern(
+    model: &Brdf,
+    part: Scattered,
+    substance: &Substance,
+    angles: &[f64],
+) -> Option<Best> {
     let [eps_real, eps_imag] = [substance.eps_real, substance.eps_imag];
     let mirror = Fresnel { eps_real, eps_imag, lobe_rad: 0.02 };
     let norms = |angle: f64| {
@@ -238,8 +297,9 @@ fn best_pattern(model: &Brdf, substance: &Substance, angles: &[f64]) -> Option<B
     };
     let rows: Vec<_> = angles
         .iter()
+        .filter(|angle| part.retro_per_sr(model, **angle) > 0.0)
         .map(|&angle| {
-            let wanted = model.retro_per_sr(angle) / mirror.reflectance(angle);
+            let wanted = part.retro_per_sr(model, angle) / mirror.reflectance(angle);
             (angle.cos(), norms(angle), db_from_ratio(wanted))
         })
         .collect();

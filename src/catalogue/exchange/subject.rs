@@ -11,6 +11,9 @@ use crate::material::{
 };
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
+/// Below this σ⁰ a model says only that nothing comes back.
+const FAINTEST: f64 = 1e-8;
+
 /// A material and the revision that it is.
 #[derive(Clone, Copy, Debug)]
 pub struct Subject<'a> {
@@ -61,7 +64,7 @@ impl<'a> Subject<'a> {
     }
 
     /// Angles of incidence at every degree of the claimed range, with both of its ends, rad.
-    pub(super) fn angles_rad(&self) -> Vec<f64> {
+    fn angles_rad(&self) -> Vec<f64> {
         let [low, high] = self.material.theta_rad;
         let inner = (0..=90).map(|degree| f64::from(degree).to_radians());
         let mut angles = vec![low];
@@ -85,8 +88,14 @@ impl<'a> Subject<'a> {
             range_m: None,
             chirp: None,
         };
-        let there = |point: &Observation| point.sigma0.is_some_and(|sigma0| sigma0 > 0.0);
-        self.angles_rad().into_iter().map(point).filter(there).collect()
+        self.echoing_rad(model).into_iter().map(point).collect()
+    }
+
+    /// Those of the angles at which a model scatters back more than −80 dB, rad.
+    pub(super) fn echoing_rad(&self, model: &Brdf) -> Vec<f64> {
+        let mut angles = self.angles_rad();
+        angles.retain(|angle| model.sigma0(*angle) > FAINTEST);
+        angles
     }
 
     /// Middle of the claimed range, Hz.

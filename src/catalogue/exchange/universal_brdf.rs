@@ -102,10 +102,7 @@ fn metadata(subject: &Subject, points: &Points) -> Value {
     })
 }
 
-fn session<'a>(
-    subject: &Subject<'a>,
-    points: &Points,
-) -> Option<&'a crate::material::Session> {
+fn session<'a>(subject: &Subject<'a>, points: &Points) -> Option<&'a crate::material::Session> {
     let key = points.curve?.session.as_ref()?;
     subject.material.sessions.iter().find(|session| session.key == *key)
 }

@@ -26,14 +26,14 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
     let wavelength_m = wavelength_m(&json["data"]).map_err(refused)?;
     let (metadata, text) = (&json["metadata"], |value: &Value| value.as_str().map(str::to_owned));
     let ours = &metadata["adhoc_section"][OURS];
-    let hz = given.frequency_hz.or(wavelength_m.map(|wavelength| SPEED_OF_LIGHT_M_PER_S / wavelength));
+    let hz =
+        given.frequency_hz.or(wavelength_m.map(|wavelength| SPEED_OF_LIGHT_M_PER_S / wavelength));
     let kind = given.kind.or_else(|| kind(metadata, ours));
     let name = given.instrument.clone().or_else(|| {
         text(&ours["instrument"]["name"]).or(text(&metadata["instrumentation"]["name"]))
     });
     let licence = given.licence.clone().or(text(&metadata["license"]["type"]));
-    let source =
-        given.source.clone().or(text(&ours["source"])).or(text(&metadata["description"]));
+    let source = given.source.clone().or(text(&ours["source"])).or(text(&metadata["description"]));
     let is_named = name.is_some() || kind != Some(SourceKind::Measured);
     let flags = [
         (given.slug.is_some(), NAME),
@@ -88,12 +88,14 @@ fn observations(data: &Value) -> Result<Vec<Observation>, FormatError> {
     let [theta_i, phi_i] = [angle("theta_i")?, angle("phi_i")?];
     let [theta_r, phi_r] = [angle("theta_r")?, angle("phi_r")?];
     let brdf = numbers(data, "BRDF")?;
-    let columns = [("theta_i", &theta_i), ("phi_i", &phi_i), ("theta_r", &theta_r), ("phi_r", &phi_r)];
+    let columns =
+        [("theta_i", &theta_i), ("phi_i", &phi_i), ("theta_r", &theta_r), ("phi_r", &phi_r)];
     if let Some((key, _)) = columns.iter().find(|(_, column)| column.len() != brdf.len()) {
         return Err(refuse(key, "has not as many values as BRDF", "give one for each"));
     }
     let censors = censors(data, brdf.len())?;
-    let rows = theta_i.iter().zip(&phi_i).zip(theta_r.iter().zip(&phi_r)).zip(brdf.iter().zip(censors));
+    let rows =
+        theta_i.iter().zip(&phi_i).zip(theta_r.iter().zip(&phi_r)).zip(brdf.iter().zip(censors));
     let point = |row: usize, theta_i_rad, theta_r_rad, delta: f64, value: f64, limit: Limit| {
         let per_f = 4.0 * PI * f64::cos(theta_i_rad) * f64::cos(theta_r_rad);
         let sigma0 = per_f * value;
