@@ -10,6 +10,7 @@
 //! as text in `customProperties`, lobes narrower than the grid.
 
 use std::cmp::Ordering;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use serde_json::{Value, json};
 
@@ -24,6 +25,9 @@ const VERSION: &str = "1.0.0";
 const FORMAT: &str = "ASAM OpenMATERIAL 3D";
 /// Wavelengths that the tables may have, m.
 const WAVELENGTHS_M: [f64; 2] = [1e-9, 17.16e-3];
+/// The schema ends its angles at six decimals of π/2 and 2π.
+const LARGEST_ZENITH_RAD: f64 = FRAC_PI_2 - 1e-6;
+const LARGEST_AZIMUTH_RAD: f64 = TAU - 1e-6;
 /// Zenith angles of the table, degrees.
 const ZENITH_STEP_DEG: f64 = 5.0;
 /// Azimuths of the table, from 0 to 180°, degrees.
@@ -201,10 +205,10 @@ impl Table {
         let points = subject.points();
         let wavelength_m = points.wavelength_m();
         let row = |o: &crate::material::Observation| {
-            let azimuth_rad = o.delta_phi_rad.rem_euclid(std::f64::consts::TAU);
+            let azimuth_rad = o.delta_phi_rad.rem_euclid(TAU);
             let f_per_sr = o.sigma0? / sigma0_per_f(o);
-            let [i_rad, r_rad] = [o.theta_i_rad, o.theta_r_rad].map(|rad| rad.min(1.570796));
-            Some([wavelength_m, i_rad, r_rad, azimuth_rad.min(6.283185), f_per_sr])
+            let [i_rad, r_rad] = [o.theta_i_rad, o.theta_r_rad].map(|rad| rad.min(LARGEST_ZENITH_RAD));
+            Some([wavelength_m, i_rad, r_rad, azimuth_rad.min(LARGEST_AZIMUTH_RAD), f_per_sr])
         };
         let mut rows: Vec<[f64; 5]> = points.observations.iter().filter_map(row).collect();
         rows.sort_by(|a, b| {

@@ -60,7 +60,11 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
             best.rms_db
         ),
     };
-    let lost = format!("{misses}; {}", substance.origin);
+    let slab = match substance.thickness_m {
+        Some(_) => "",
+        None => "; Sionna's slab of 0.1 m stands in for a half space",
+    };
+    let lost = format!("{misses}; {}{slab}", substance.origin);
     let text = snippet(subject, &substance, &best, &lost);
     Ok(Exported { files: vec![(name.to_owned(), text.into_bytes())], lost })
 }
@@ -78,12 +82,8 @@ fn snippet(subject: &Subject, substance: &Substance, best: &Best, lost: &str) ->
     let quoted = serde_json::json!(subject.material.slug).to_string();
     let mut line = |key: &str, value: String| text += &format!("    {key}={value},\n");
     line("name", quoted);
-    match substance.thickness_m {
-        Some(thickness_m) => line("thickness", python(thickness_m)),
-        None => line(
-            "# thickness is that of a wall, 0.1 m, unless you set it: thickness",
-            "0.1".to_owned(),
-        ),
+    if let Some(thickness_m) = substance.thickness_m {
+        line("thickness", python(thickness_m));
     }
     line("relative_permittivity", python(substance.eps_real.max(1.0)));
     line("conductivity", python(conductivity));

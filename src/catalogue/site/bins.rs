@@ -87,13 +87,7 @@ mod tests {
 
     fn rows(levels: &[Option<f64>]) -> Vec<Bin> {
         let observations = levels.iter().map(|level| point(55.0, *level)).collect();
-        bins(&Curve {
-            name: "a".into(),
-            source: "s".into(),
-            instrument: None,
-            session: None,
-            observations,
-        })
+        bins(&Curve { name: "a".into(), source: "s".into(), instrument: None, session: None, observations })
     }
 
     #[test]

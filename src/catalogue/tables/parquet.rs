@@ -61,7 +61,7 @@ pub(in crate::catalogue) fn parquet_of<'a>(
     rows: impl Iterator<Item = Vec<Cell<'a>>>,
 ) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
-    let mut write = || -> Result<(), ParquetError> {
+    let write = || -> Result<(), ParquetError> {
         let (schema, properties) = (schema(table)?, properties(table, Some(about)));
         let mut writer =
             SerializedFileWriter::new(&mut bytes, Arc::new(schema), Arc::new(properties))?;
