@@ -45,7 +45,7 @@ pub(super) struct Args {
     #[arg(long, group = "what", exclusive = true)]
     template: bool,
     #[command(flatten)]
-    foreign: foreign::Args,
+    foreign: foreign::Beside,
 }
 
 /// A complete material.toml; docs/materials.md shows the same.

@@ -207,7 +207,8 @@ impl Table {
         let row = |o: &crate::material::Observation| {
             let azimuth_rad = o.delta_phi_rad.rem_euclid(TAU);
             let f_per_sr = o.sigma0? / sigma0_per_f(o);
-            let [i_rad, r_rad] = [o.theta_i_rad, o.theta_r_rad].map(|rad| rad.min(LARGEST_ZENITH_RAD));
+            let [i_rad, r_rad] =
+                [o.theta_i_rad, o.theta_r_rad].map(|rad| rad.min(LARGEST_ZENITH_RAD));
             Some([wavelength_m, i_rad, r_rad, azimuth_rad.min(LARGEST_AZIMUTH_RAD), f_per_sr])
         };
         let mut rows: Vec<[f64; 5]> = points.observations.iter().filter_map(row).collect();

@@ -11,7 +11,7 @@ use crate::units::watts_from_dbm;
 /// What a person says beside a foreign file.
 #[derive(Debug, Default, PartialEq, clap::Args)]
 #[command(next_help_heading = "For a .csv, .brdf or .yml file")]
-pub(super) struct Args {
+pub(super) struct Beside {
     /// Short name that the material gets
     #[arg(long, value_name = "NAME")]
     name: Option<Slug>,
@@ -50,12 +50,12 @@ enum Kind {
     Synthetic,
 }
 
-impl Args {
+impl Beside {
     /// Refuses flags that would be dropped in silence, and one name for several files.
     pub fn check(&self, from: &[PathBuf]) -> Result<(), Error> {
         let foreign = from.iter().filter(|path| !path.is_dir() && format(path).is_some()).count();
         let problem = match foreign {
-            0 if *self != Args::default() => "--name and its like say what a foreign file does not",
+            0 if *self != Beside::default() => "--name and its like say what a foreign file does not",
             2.. => "several foreign files would get one name",
             _ => return Ok(()),
         };
@@ -107,7 +107,7 @@ pub(super) fn format(path: &Path) -> Option<Foreign> {
 }
 
 /// Reads a foreign file as a material.
-pub(super) fn read(format: Foreign, path: &Path, args: &Args) -> Result<Material, Error> {
+pub(super) fn read(format: Foreign, path: &Path, args: &Beside) -> Result<Material, Error> {
     let bytes = std::fs::read(path).map_err(|reason| unreadable(path, reason))?;
     let material = format.read(&path.display().to_string(), &bytes, &args.given()?)?;
     door::check(&material, path)?;
