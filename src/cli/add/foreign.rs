@@ -55,7 +55,9 @@ impl Beside {
     pub fn check(&self, from: &[PathBuf]) -> Result<(), Error> {
         let foreign = from.iter().filter(|path| !path.is_dir() && format(path).is_some()).count();
         let problem = match foreign {
-            0 if *self != Beside::default() => "--name and its like say what a foreign file does not",
+            0 if *self != Beside::default() => {
+                "--name and its like say what a foreign file does not"
+            }
             2.. => "several foreign files would get one name",
             _ => return Ok(()),
         };
