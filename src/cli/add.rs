@@ -55,7 +55,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     if args.template {
         return console.result(TEMPLATE, &json!({ "material_toml": TEMPLATE }));
     }
-    let materials = wanted(args, db)?;
+    let materials = wanted(args, db, console)?;
     let mut store = db.write()?;
     let (mut lines, mut records) = (String::new(), Vec::new());
     for (material, added) in std::iter::zip(&materials, store.add(&materials)?) {
@@ -72,7 +72,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 }
 
 /// Reads everything before anything is stored, so that one bad file changes nothing.
-fn wanted(args: &Args, db: &Database) -> Result<Vec<Material>, Error> {
+fn wanted(args: &Args, db: &Database, console: &Console) -> Result<Vec<Material>, Error> {
     let mut materials = Vec::new();
     let all = builtin::names().map(str::to_owned).filter(|_| args.all);
     for name in args.names.iter().cloned().chain(all) {
@@ -90,15 +90,20 @@ fn wanted(args: &Args, db: &Database) -> Result<Vec<Material>, Error> {
             }
         }
     }
+    args.foreign.check(&args.from)?;
     for path in &args.from {
         for file in material_files(path)? {
             materials.push(match foreign::format(&file) {
-                Some(format) => foreign::read(format, &file, &args.foreign)?,
+                Some(format) => {
+                    let material = foreign::read(format, &file, &args.foreign)?;
+                    let unknown = material.unknown.iter();
+                    unknown.for_each(|what| console.notice(&format!("not known: {what}")));
+                    material
+                }
                 None => read(&file)?,
             });
         }
     }
-    args.foreign.check(&args.from)?;
     let mut seen = HashSet::new();
     match materials.iter().find(|material| !seen.insert(&material.slug)) {
         None => Ok(materials),
