@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::catalogue::exchange::ExchangeError;
 use crate::catalogue::{AboutError, CatalogueError};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::curve::CurveDiagnoseError;
@@ -64,6 +65,9 @@ pub enum Error {
     /// A catalogue could not be published or taken over.
     #[error(transparent)]
     Catalogue(#[from] CatalogueError),
+    /// A material could not be written in somebody else's format, or read from it.
+    #[error(transparent)]
+    Exchange(#[from] ExchangeError),
     /// What a catalogue shall say of itself was refused.
     #[error(transparent)]
     About(#[from] AboutError),

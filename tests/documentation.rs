@@ -169,6 +169,7 @@ fn every_command_has_help_with_an_example() {
         "plot",
         "fit",
         "rm",
+        "export",
         "completions",
     ] {
         let output = matdb(folder.path()).args(["help", command]).output().unwrap();

@@ -8,6 +8,7 @@ mod about;
 mod api;
 mod diff;
 mod error;
+pub mod exchange;
 mod folder;
 mod import;
 mod leaves;

@@ -1,6 +1,7 @@
 //! `matdb add`.
 
 mod door;
+mod foreign;
 
 use std::cell::RefCell;
 use std::collections::HashSet;
@@ -25,7 +26,11 @@ use crate::store::Added;
   matdb add --all                      every built-in material
   matdb add --from my-paint/           the folder's material.toml, or that of each subfolder
   matdb add --from my-paint/material.toml
-  matdb add --template > my-paint/material.toml    a complete entry to change")]
+  matdb add --template > my-paint/material.toml    a complete entry to change
+  matdb add --from water.yml --name water --class liquid    a page of refractiveindex.info
+  matdb add --from scan.csv --name my-paint --class paint --kind measured --source 'Our bench, 2026' \\
+    --licence CC-BY-4.0 --instrument 'Our radar' --frequency 300 --threshold -77    a bare curve
+  matdb add --from paint.brdf --name my-paint --class paint       a universal BRDF file")]
 #[command(group = clap::ArgGroup::new("what").required(true).multiple(true))]
 pub(super) struct Args {
     /// Names of built-in materials
@@ -34,12 +39,15 @@ pub(super) struct Args {
     /// Every built-in material
     #[arg(long, group = "what")]
     all: bool,
-    /// A material.toml, or a folder with one or with subfolders that have one
+    /// A material.toml, or a folder with one or with subfolders that have one; or a curve (.csv), a
+    /// universal BRDF (.brdf, .json) or a page of refractiveindex.info's database (.yml)
     #[arg(long, value_name = "FILE|DIR", group = "what")]
     from: Vec<PathBuf>,
     /// Print a complete material.toml with comments, to be changed
     #[arg(long, group = "what", exclusive = true)]
     template: bool,
+    #[command(flatten)]
+    foreign: foreign::Beside,
 }
 
 /// A complete material.toml; docs/materials.md shows the same.
@@ -49,7 +57,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     if args.template {
         return console.result(TEMPLATE, &json!({ "material_toml": TEMPLATE }));
     }
-    let made = wanted(args, db)?;
+    let made = wanted(args, db, console)?;
     let mut store = db.write()?;
     let (mut lines, mut records) = (String::new(), Vec::new());
     for ((material, _), added) in std::iter::zip(&made, store.add_made(&made)?) {
@@ -66,7 +74,11 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 }
 
 /// Reads everything before anything is stored, so that one bad file changes nothing.
-fn wanted(args: &Args, db: &Database) -> Result<Vec<(Material, Activity)>, Error> {
+fn wanted(
+    args: &Args,
+    db: &Database,
+    console: &Console,
+) -> Result<Vec<(Material, Activity)>, Error> {
     let mut materials = Vec::new();
     let all = builtin::names().map(str::to_owned).filter(|_| args.all);
     for name in args.names.iter().cloned().chain(all) {
@@ -84,9 +96,18 @@ fn wanted(args: &Args, db: &Database) -> Result<Vec<(Material, Activity)>, Error
             }
         }
     }
+    args.foreign.check(&args.from)?;
     for path in &args.from {
         for file in material_files(path)? {
-            materials.push(read(&file)?);
+            materials.push(match foreign::format(&file) {
+                Some(format) => {
+                    let (material, input) = foreign::read(format, &file, &args.foreign)?;
+                    let unknown = material.unknown.iter();
+                    unknown.for_each(|what| console.notice(&format!("not known: {what}")));
+                    (material, made(vec![input]))
+                }
+                None => read(&file)?,
+            });
         }
     }
     let mut seen = HashSet::new();

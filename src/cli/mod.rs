@@ -12,6 +12,7 @@ mod curves;
 mod diagnose;
 mod diff;
 mod effects;
+mod export;
 mod fit;
 mod history;
 mod import;
@@ -80,7 +81,7 @@ enum Command {
     Compare(compare::Args),
     Diagnose(diagnose::Args),
     Effects(effects::Args),
-    Add(add::Args),
+    Add(Box<add::Args>),
     List(list::Args),
     Search(search::Args),
     Near(near::Args),
@@ -95,6 +96,7 @@ enum Command {
     Publish(publish::Args),
     Verify(verify::Args),
     Import(import::Args),
+    Export(export::Args),
     Completions(completions::Args),
 }
 
@@ -128,6 +130,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Publish(args) => publish::run(args, db, &console),
         Command::Verify(args) => verify::run(args, &console),
         Command::Import(args) => import::run(args, db, &console),
+        Command::Export(args) => export::run(args, db, &console),
         Command::Completions(args) => completions::run(args),
     }
 }

@@ -9,6 +9,8 @@ mod units;
 use super::{CatalogueError, Folder};
 use crate::store::{Store, Table};
 
+#[cfg(feature = "parquet")]
+pub(super) use parquet::parquet_of;
 pub(super) use units::unit;
 
 /// Whether this program writes Parquet.

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
+use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -39,7 +40,7 @@ fn rows(store: &Store, table: &Table, place: &Path) -> Result<(), CatalogueError
     let io = |reason| CatalogueError::Io { verb: "write", path: place.to_owned(), reason };
     let file = File::create(place).map_err(io)?;
     let schema = Arc::new(schema(table).map_err(failed)?);
-    let properties = Arc::new(properties(table));
+    let properties = Arc::new(properties(table, None));
     let mut writer = SerializedFileWriter::new(file, schema, properties).map_err(failed)?;
     let mut group = Group::new(table);
     store.rows(table, |cells| {
@@ -51,6 +52,26 @@ fn rows(store: &Store, table: &Table, place: &Path) -> Result<(), CatalogueError
     })?;
     group.flush(&mut writer).map_err(failed)?;
     writer.close().map(|_| ()).map_err(failed)
+}
+
+/// A table of a few rows, in memory; `about` goes into its metadata.
+pub(in crate::catalogue) fn parquet_of<'a>(
+    table: &Table,
+    about: &str,
+    rows: impl Iterator<Item = Vec<Cell<'a>>>,
+) -> Result<Vec<u8>, String> {
+    let mut bytes = Vec::new();
+    let write = || -> Result<(), ParquetError> {
+        let (schema, properties) = (schema(table)?, properties(table, Some(about)));
+        let mut writer =
+            SerializedFileWriter::new(&mut bytes, Arc::new(schema), Arc::new(properties))?;
+        let mut group = Group::new(table);
+        rows.for_each(|cells| group.push(&cells));
+        group.flush(&mut writer)?;
+        writer.close().map(|_| ())
+    };
+    write().map_err(|error| error.to_string())?;
+    Ok(bytes)
 }
 
 fn schema(table: &Table) -> Result<Type, ParquetError> {
@@ -71,13 +92,14 @@ fn schema(table: &Table) -> Result<Type, ParquetError> {
     Type::group_type_builder(&table.name).with_fields(fields).build()
 }
 
-fn properties(table: &Table) -> WriterProperties {
+fn properties(table: &Table, about: Option<&str>) -> WriterProperties {
     let numeric = table.columns.iter().filter(|column| column.kind != ColumnKind::Text);
     let units: BTreeMap<&str, &str> = numeric
         .filter_map(|column| Some((column.name.as_str(), unit(&table.name, &column.name).ok()?)))
         .collect();
-    let entry = KeyValue::new("ucum".to_owned(), serde_json::json!(units).to_string());
-    WriterProperties::builder().set_key_value_metadata(Some(vec![entry])).build()
+    let mut entries = vec![KeyValue::new("ucum".to_owned(), serde_json::json!(units).to_string())];
+    entries.extend(about.map(|about| KeyValue::new("about".to_owned(), about.to_owned())));
+    WriterProperties::builder().set_key_value_metadata(Some(entries)).build()
 }
 
 /// Values of one column: those that there are, and for every row whether there is one.
@@ -134,7 +156,10 @@ impl Group {
         }
     }
 
-    fn flush(&mut self, writer: &mut SerializedFileWriter<File>) -> Result<(), ParquetError> {
+    fn flush<W: Write + Send>(
+        &mut self,
+        writer: &mut SerializedFileWriter<W>,
+    ) -> Result<(), ParquetError> {
         if self.rows == 0 {
             return Ok(());
         }

@@ -1,0 +1,60 @@
+//! What can go wrong between formats, in the words of its user.
+
+use thiserror::Error;
+
+use crate::formats::FormatError;
+use crate::material::MaterialError;
+
+/// Why a material could not be written in a format or read from one.
+#[derive(Debug, Error)]
+pub enum ExchangeError {
+    /// A file does not follow its format.
+    #[error("{file}: {error}")]
+    Format {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        error: FormatError,
+    },
+    /// The file was read, but makes an impossible material.
+    #[error("{file}: {error}")]
+    Material {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        error: MaterialError,
+    },
+    /// Neither the file nor the user says what must be known.
+    #[error("{file} does not say all that an entry needs; add {}", missing.join(", "))]
+    Missing {
+        /// The file.
+        file: String,
+        /// The flags that say it, each with an example.
+        missing: Vec<String>,
+    },
+    /// The material has not what the format must have.
+    #[error("`{slug}` cannot be written as {format}: {problem}; {way_out}")]
+    Unfit {
+        /// The material.
+        slug: String,
+        /// The format.
+        format: &'static str,
+        /// What is missing.
+        problem: String,
+        /// What to do.
+        way_out: String,
+    },
+    /// The program was built without Parquet.
+    #[error(
+        "this matdb was built without Parquet; build it with `--features parquet`, or write CSV"
+    )]
+    NotBuilt,
+    /// A record cannot be encoded.
+    #[error("cannot write {format}: {problem}; please report this")]
+    Encoding {
+        /// The format.
+        format: &'static str,
+        /// What the writer says.
+        problem: String,
+    },
+}

@@ -1,0 +1,44 @@
+//! What a person says of a foreign file that does not say it itself.
+
+use super::ExchangeError;
+use crate::material::{Slug, SourceKind};
+
+/// What a person says beside a foreign file; what is none must stand in the file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Given {
+    /// Short name of the material.
+    pub slug: Option<Slug>,
+    /// Full name; the short one stands in.
+    pub name: Option<String>,
+    /// Kind of stuff.
+    pub class: Option<String>,
+    /// SPDX identifier of the licence of the data.
+    pub licence: Option<String>,
+    /// Citation or, for one's own numbers, how they were made.
+    pub source: Option<String>,
+    /// How the numbers came to be.
+    pub kind: Option<SourceKind>,
+    /// Name of the instrument.
+    pub instrument: Option<String>,
+    /// Frequency of a curve, or at which optical constants are wanted, Hz.
+    pub frequency_hz: Option<f64>,
+    /// Least power that counts as a detection, W.
+    pub threshold_w: Option<f64>,
+}
+
+/// The refusal that names all the flags that are missing.
+pub(super) fn missing(file: &str, flags: &[(bool, &str)]) -> ExchangeError {
+    let missing = flags.iter().filter(|(there, _)| !there);
+    ExchangeError::Missing {
+        file: file.to_owned(),
+        missing: missing.map(|(_, flag)| (*flag).to_owned()).collect(),
+    }
+}
+
+pub(super) const NAME: &str = "--name my-paint";
+pub(super) const CLASS: &str = "--class paint";
+pub(super) const LICENCE: &str = "--licence CC-BY-4.0";
+pub(super) const SOURCE: &str = "--source \"who measured it, where, when\"";
+pub(super) const KIND: &str = "--kind measured";
+pub(super) const INSTRUMENT: &str = "--instrument \"name of the radar\"";
+pub(super) const FREQUENCY: &str = "--frequency 300";

@@ -1,0 +1,114 @@
+//! Other people's formats, one file each: what of a material they can carry, and what gets lost.
+//!
+//! | format | out | in |
+//! |---|---|---|
+//! | the curve as CSV | `plain_csv.rs` | `plain_csv.rs` |
+//! | the curve as Parquet | `parquet.rs` | |
+//! | EMPIR universal BRDF | `universal_brdf.rs` | `universal_brdf.rs` |
+//! | ASAM OpenMATERIAL 3D | `open_material.rs` | |
+//! | Mitsuba 3 BSDF | `mitsuba.rs` | |
+//! | Sionna RT radio material | `sionna.rs` | |
+//! | refractiveindex.info page | | `optical_constants.rs` |
+//!
+//! What goes out is made of the material and its revision alone: the same material gives the same
+//! bytes. What comes in becomes a [`Material`] that says where it is from.
+
+mod error;
+mod given;
+mod mitsuba;
+mod open_material;
+mod optical_constants;
+mod page;
+#[cfg(feature = "parquet")]
+mod parquet;
+mod plain_csv;
+mod sionna;
+mod subject;
+mod universal_brdf;
+mod universal_brdf_in;
+
+use crate::material::Material;
+
+pub use error::ExchangeError;
+pub use given::Given;
+pub use subject::Subject;
+
+/// A format that a material can be written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    #[allow(missing_docs)]
+    Csv,
+    #[allow(missing_docs)]
+    Parquet,
+    #[allow(missing_docs)]
+    UniversalBrdf,
+    #[allow(missing_docs)]
+    OpenMaterial,
+    #[allow(missing_docs)]
+    Mitsuba,
+    #[allow(missing_docs)]
+    Sionna,
+}
+
+/// A material in somebody else's format.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exported {
+    /// Files by name, all for one folder; the first has the name that was asked for.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// What the format could not carry, and what stands in for it, in a sentence.
+    pub lost: String,
+}
+
+/// Writes a material in a format; `name` is that of the file, with its ending.
+///
+/// # Errors
+/// When the material has not what the format must have, or the program was built without it.
+pub fn export(subject: &Subject, format: Format, name: &str) -> Result<Exported, ExchangeError> {
+    match format {
+        Format::Csv => Ok(plain_csv::write(subject, name)),
+        #[cfg(feature = "parquet")]
+        Format::Parquet => parquet::write(subject, name),
+        #[cfg(not(feature = "parquet"))]
+        Format::Parquet => Err(ExchangeError::NotBuilt),
+        Format::UniversalBrdf => universal_brdf::write(subject, name),
+        Format::OpenMaterial => open_material::write(subject, name),
+        Format::Mitsuba => mitsuba::write(subject, name),
+        Format::Sionna => sionna::write(subject, name),
+    }
+}
+
+/// What of a file's ending tells that it holds somebody else's format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Foreign {
+    /// `.yml`, `.yaml`: a page of refractiveindex.info's database.
+    OpticalConstants,
+    /// `.csv`: a curve.
+    Csv,
+    /// `.brdf`, `.json`: universal BRDF.
+    UniversalBrdf,
+}
+
+impl Foreign {
+    /// The format that an ending stands for, in upper or lower case and without the dot.
+    pub fn from_extension(extension: &str) -> Option<Foreign> {
+        match extension.to_ascii_lowercase().as_str() {
+            "yml" | "yaml" => Some(Foreign::OpticalConstants),
+            "csv" => Some(Foreign::Csv),
+            "brdf" | "json" => Some(Foreign::UniversalBrdf),
+            _ => None,
+        }
+    }
+
+    /// Makes a material of a file's bytes and of what a person says beside it. `file` names it in
+    /// errors and sources.
+    ///
+    /// # Errors
+    /// When the bytes do not follow the format, or neither they nor `given` say what must be known.
+    pub fn read(self, file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
+        match self {
+            Foreign::OpticalConstants => optical_constants::read(file, bytes, given),
+            Foreign::Csv => plain_csv::read(file, bytes, given),
+            Foreign::UniversalBrdf => universal_brdf_in::read(file, bytes, given),
+        }
+    }
+}

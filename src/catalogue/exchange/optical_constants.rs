@@ -1,0 +1,412 @@
+//! Optical constants, pages of refractiveindex.info's database (YAML; checked with the database of
+//! 2026-06-14, commit ff11b58).
+//!
+//! A page gives n and k against the wavelength in µm, as tables or n as a dispersion formula. They
+//! become the permittivities ε = (n − jk)² at the tabulated frequencies around the one that is asked
+//! for, and a smooth half space of the nearest. Nothing is read beyond the table: how far the nearest
+//! frequency lies is kept as something that is not known. n is interpolated over the wavelength only
+//! where it is tabulated apart from k. Lost: frequencies further away than a third, the conditions
+//! other than the temperature, HTML.
+
+use super::given::{CLASS, LICENCE, NAME, missing};
+use super::page::{Block, Page, number, parse};
+use super::{ExchangeError, Given};
+use crate::brdf::{Brdf, Fresnel};
+use crate::formats::FormatError;
+use crate::material::{
+    Citation, Fit, Making, Material, Permittivity, Slug, Source, SourceKind, Status,
+};
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
+
+/// Frequency that is wanted when nobody says, Hz.
+const USUAL_HZ: f64 = 300e9;
+/// What is taken reaches this share of the wanted frequency to each side.
+const REACH: f64 = 1.0 / 3.0;
+/// Width of the mirror's lobe: a spot of 16 mm at 1 mm wavelength, rad.
+const LOBE_RAD: f64 = 0.02;
+
+/// n and k at a frequency.
+#[derive(Clone, Copy, Debug)]
+struct Constants {
+    frequency_hz: f64,
+    n: f64,
+    k: f64,
+}
+
+/// Makes a material of a page.
+pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
+    let refused = |error| ExchangeError::Format { file: file.to_owned(), error };
+    let text = std::str::from_utf8(bytes).map_err(|error| {
+        let place = format!("byte {}", error.valid_up_to());
+        refused(FormatError::at(place, "not UTF-8", "save the file as UTF-8"))
+    })?;
+    let page = parse(text).map_err(refused)?;
+    let known = page.is_cc0.then(|| "CC0-1.0".to_owned());
+    let licence = given.licence.clone().or(known);
+    let flags = [
+        (given.slug.is_some(), NAME),
+        (given.class.is_some(), CLASS),
+        (licence.is_some(), LICENCE),
+    ];
+    let (Some(slug), Some(class), Some(licence)) =
+        (given.slug.clone(), given.class.clone(), licence)
+    else {
+        return Err(missing(file, &flags));
+    };
+    let wanted_hz = given.frequency_hz.unwrap_or(USUAL_HZ);
+    let (nearest, constants) =
+        constants(&page).and_then(|constants| around(constants, wanted_hz)).map_err(refused)?;
+    let entry = Entry { slug, class, licence, wanted_hz, nearest, constants };
+    let material = material(file, &page, given, entry);
+    material
+        .validate()
+        .map_err(|error| ExchangeError::Material { file: file.to_owned(), error })?;
+    Ok(material)
+}
+
+/// The constants at every tabulated wavelength where both are known.
+fn constants(page: &Page) -> Result<Vec<Constants>, FormatError> {
+    let (mut indices, mut losses) = (Vec::new(), Vec::new());
+    for block in &page.data {
+        match block.kind {
+            "tabulated nk" => {
+                indices.push(Curve::Table(column(block, 1, 3)?));
+                losses.push(column(block, 2, 3)?);
+            }
+            "tabulated n" => indices.push(Curve::Table(column(block, 1, 2)?)),
+            "tabulated k" => losses.push(column(block, 1, 2)?),
+            kind => indices.push(Curve::Formula(formula(block, kind)?)),
+        }
+    }
+    let (Ok([index]), Ok([loss])) =
+        (<[Curve; 1]>::try_from(indices), <[Vec<[f64; 2]>; 1]>::try_from(losses))
+    else {
+        return Err(FormatError::at(
+            "DATA",
+            "must give n once and k once, since a permittivity needs both",
+            "name a page with both, or write a material.toml with a [[permittivity]]",
+        ));
+    };
+    let both = |[wavelength_um, k]: [f64; 2]| {
+        let n = index.at(wavelength_um)?;
+        Some(Constants { frequency_hz: SPEED_OF_LIGHT_M_PER_S / (wavelength_um * 1e-6), n, k })
+    };
+    Ok(loss.into_iter().filter_map(both).collect())
+}
+
+/// The constants within reach of a frequency, and the nearest of them.
+fn around(
+    mut all: Vec<Constants>,
+    wanted_hz: f64,
+) -> Result<(Constants, Vec<Constants>), FormatError> {
+    all.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+    let away = |c: &Constants| (c.frequency_hz - wanted_hz).abs();
+    let nearest = all.iter().copied().min_by(|a, b| away(a).total_cmp(&away(b)));
+    let Some(nearest) = nearest else {
+        let problem = "n and k are nowhere known together";
+        return Err(FormatError::at("DATA", problem, "name a page with both"));
+    };
+    if away(&nearest) > REACH * wanted_hz {
+        let [near, away, wanted] =
+            [nearest.frequency_hz, away(&nearest), wanted_hz].map(|hz| hz / 1e9);
+        let problem = format!(
+            "the tabulated frequency nearest to {wanted} GHz is {near:.5} GHz, {away:.5} GHz away, \
+             and nothing is extrapolated"
+        );
+        let way_out = format!("ask for it with --frequency {near:.5}, or name another page");
+        return Err(FormatError::at("DATA", problem, way_out));
+    }
+    all.retain(|c| away(c) <= REACH * wanted_hz);
+    Ok((nearest, all))
+}
+
+/// n against the wavelength.
+enum Curve {
+    /// Wavelength in µm, ascending, and value.
+    Table(Vec<[f64; 2]>),
+    Formula(Formula),
+}
+
+impl Curve {
+    /// The value at a wavelength in µm; none outside.
+    fn at(&self, wavelength_um: f64) -> Option<f64> {
+        match self {
+            Curve::Formula(formula) => formula.at(wavelength_um),
+            Curve::Table(rows) => {
+                let right = rows.partition_point(|row| row[0] < wavelength_um);
+                let next = rows.get(right)?;
+                if next[0] == wavelength_um {
+                    return Some(next[1]);
+                }
+                let before = rows.get(right.checked_sub(1)?)?;
+                let share = (wavelength_um - before[0]) / (next[0] - before[0]);
+                Some(before[1] + share * (next[1] - before[1]))
+            }
+        }
+    }
+}
+
+/// A column of a table against the wavelength, sorted by it.
+fn column(block: &Block, column: usize, width: usize) -> Result<Vec<[f64; 2]>, FormatError> {
+    let mut rows = Vec::new();
+    for (line, row) in &block.rows {
+        let place = || format!("line {line}");
+        let (Some(&wavelength_um), Some(&value), true) =
+            (row.first(), row.get(column), row.len() == width)
+        else {
+            let problem = format!("{} numbers in a row of `{}`", row.len(), block.kind);
+            return Err(FormatError::at(place(), problem, format!("give {width}")));
+        };
+        if wavelength_um <= 0.0 || value < 0.0 {
+            let problem = "a wavelength must be above 0, n and k must not be below";
+            return Err(FormatError::at(place(), problem, "mend the row"));
+        }
+        rows.push([wavelength_um, value]);
+    }
+    if rows.is_empty() {
+        let place = format!("line {}", block.line);
+        let problem = format!("`{}` has no rows", block.kind);
+        return Err(FormatError::at(place, problem, "add `data: |` with a row per wavelength"));
+    }
+    rows.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    Ok(rows)
+}
+
+/// A dispersion formula of refractiveindex.info with its coefficients C1, C2 …
+struct Formula {
+    number: u32,
+    coefficients: Vec<f64>,
+    range_um: [f64; 2],
+}
+
+fn formula(block: &Block, kind: &str) -> Result<Formula, FormatError> {
+    let place = format!("line {}", block.line);
+    let number_of = kind.strip_prefix("formula ").and_then(|number| number.trim().parse().ok());
+    let Some(number_of @ 1..=9) = number_of else {
+        let problem = format!("data of the type {kind:?} are not known");
+        let way_out = "known are tabulated nk, tabulated n, tabulated k and formula 1 to 9";
+        return Err(FormatError::at(place, problem, way_out));
+    };
+    let numbers = |keys: [&str; 2]| -> Result<Vec<f64>, FormatError> {
+        let Some((line, text)) = keys.iter().find_map(|key| block.values.get(key)) else {
+            let problem = format!("`{kind}` has no `{}`", keys[0]);
+            return Err(FormatError::at(place.clone(), problem, format!("add `{}: …`", keys[0])));
+        };
+        text.split_whitespace().map(|word| number(word, *line)).collect()
+    };
+    let coefficients = numbers(["coefficients"; 2])?;
+    let range_um = <[f64; 2]>::try_from(numbers(["wavelength_range", "range"])?).map_err(|_| {
+        FormatError::at(place.clone(), "wavelength_range has not two numbers", "give both ends")
+    })?;
+    if coefficients.is_empty() {
+        return Err(FormatError::at(place, "there are no coefficients", "give at least one"));
+    }
+    Ok(Formula { number: number_of, coefficients, range_um })
+}
+
+impl Formula {
+    /// n at a wavelength in µm; none outside the formula's range or where it has no value.
+    ///
+    /// The nine formulas are those of refractiveindex.info's list of dispersion formulas: Sellmeier,
+    /// Sellmeier-2, polynomial, its own general one, Cauchy, gases, Herzberger, retro, exotic.
+    fn at(&self, wavelength_um: f64) -> Option<f64> {
+        let [low, high] = self.range_um;
+        if !(low..=high).contains(&wavelength_um) {
+            return None;
+        }
+        let (l, l2) = (wavelength_um, wavelength_um * wavelength_um);
+        let c = |number: usize| self.coefficients.get(number - 1).copied().unwrap_or(0.0);
+        // Σ over the pairs (C_first, C_first+1), (C_first+2, …) …
+        let pairs = |first: usize, term: &dyn Fn(f64, f64) -> f64| -> f64 {
+            let rest = self.coefficients.get(first - 1..).unwrap_or_default();
+            let pair = |pair: &[f64]| match pair {
+                [a, b] => term(*a, *b),
+                _ => 0.0,
+            };
+            rest.chunks(2).map(pair).sum()
+        };
+        let resonance = |first: usize| {
+            let numerator = c(first) * l.powf(c(first + 1));
+            // Absent terms have no pole either.
+            if numerator == 0.0 { 0.0 } else { numerator / (l2 - c(first + 2).powf(c(first + 3))) }
+        };
+        let n = match self.number {
+            1 => (1.0 + c(1) + pairs(2, &|a, b| a * l2 / (l2 - b * b))).sqrt(),
+            2 => (1.0 + c(1) + pairs(2, &|a, b| a * l2 / (l2 - b))).sqrt(),
+            3 => (c(1) + pairs(2, &|a, b| a * l.powf(b))).sqrt(),
+            4 => {
+                let general = c(1) + resonance(2) + resonance(6);
+                (general + pairs(10, &|a, b| a * l.powf(b))).sqrt()
+            }
+            5 => c(1) + pairs(2, &|a, b| a * l.powf(b)),
+            6 => 1.0 + c(1) + pairs(2, &|a, b| a / (b - 1.0 / l2)),
+            7 => {
+                let pole = 1.0 / (l2 - 0.028);
+                c(1) + c(2) * pole
+                    + c(3) * pole * pole
+                    + c(4) * l2
+                    + c(5) * l2.powi(2)
+                    + c(6) * l2.powi(3)
+            }
+            8 => {
+                let clausius = c(1) + c(2) * l2 / (l2 - c(3)) + c(4) * l2;
+                ((1.0 + 2.0 * clausius) / (1.0 - clausius)).sqrt()
+            }
+            _ => {
+                let off = l - c(5);
+                let pole = if c(2) == 0.0 { 0.0 } else { c(2) / (l2 - c(3)) };
+                let band = if c(4) == 0.0 { 0.0 } else { c(4) * off / (off * off + c(6)) };
+                (c(1) + pole + band).sqrt()
+            }
+        };
+        (n.is_finite() && n >= 0.0).then_some(n)
+    }
+}
+
+struct Entry {
+    slug: Slug,
+    class: String,
+    licence: String,
+    wanted_hz: f64,
+    nearest: Constants,
+    constants: Vec<Constants>,
+}
+
+fn material(file: &str, page: &Page, given: &Given, entry: Entry) -> Material {
+    let Entry { slug, class, licence, wanted_hz, nearest, constants } = entry;
+    let permittivity = |at: &Constants| Permittivity {
+        key: slug.to_string(),
+        frequency_hz: at.frequency_hz,
+        temperature_k: page.temperature_k,
+        real: at.n * at.n - at.k * at.k,
+        imaginary: 2.0 * at.n * at.k,
+        real_sd: None,
+        imaginary_sd: None,
+        source: "optical-constants".to_owned(),
+    };
+    let Permittivity { real: eps_real, imaginary: eps_imag, .. } = permittivity(&nearest);
+    let (wanted_ghz, near_ghz) = (wanted_hz / 1e9, nearest.frequency_hz / 1e9);
+    let distance = format!(
+        "The permittivity at {wanted_ghz} GHz itself: the nearest tabulated frequency is \
+         {near_ghz:.6} GHz, {:.6} GHz away, and is rendered as it is.",
+        (near_ghz - wanted_ghz).abs()
+    );
+    let reference = |path: &str| (path.to_owned(), "optical-constants".to_owned());
+    let comments = plain(&page.comments);
+    Material {
+        name: given.name.clone().unwrap_or_else(|| slug.to_string()),
+        class,
+        description: format!("A smooth half space by its optical constants. {comments}")
+            .trim()
+            .to_owned(),
+        licence: licence.clone(),
+        tags: vec!["optical constants".to_owned()],
+        frequency_hz: [wanted_hz.min(nearest.frequency_hz), wanted_hz.max(nearest.frequency_hz)],
+        theta_rad: [0.0, 80f64.to_radians()],
+        render: "half-space".to_owned(),
+        sources: vec![
+            optical_source(file, page, given, licence),
+            source(
+                "half-space",
+                SourceKind::Modelled,
+                "Fresnel's reflectance of a smooth half space",
+            ),
+            source("chosen", SourceKind::Synthetic, "Chosen by matdb; nobody measured it"),
+        ],
+        instruments: Vec::new(),
+        curves: Vec::new(),
+        fits: vec![Fit {
+            name: "half-space".to_owned(),
+            model: Brdf::Fresnel(Fresnel { eps_real, eps_imag, lobe_rad: LOBE_RAD }),
+            estimator: "stated".to_owned(),
+            curve: None,
+            source: "half-space".to_owned(),
+            parameter_sources: vec![
+                reference("eps_imag"),
+                reference("eps_real"),
+                ("lobe_rad".to_owned(), "chosen".to_owned()),
+            ],
+            covariance: None,
+            report: None,
+        }],
+        effects: Vec::new(),
+        status: Status::Active,
+        finish: None,
+        unknown: vec![
+            distance,
+            "How rough the surface is, and what lies behind it: a smooth half space is meant."
+                .to_owned(),
+        ],
+        roughness: None,
+        layers: Vec::new(),
+        permittivities: constants.iter().map(permittivity).collect(),
+        sessions: Vec::new(),
+        findings: Vec::new(),
+        slug,
+    }
+}
+
+fn optical_source(file: &str, page: &Page, given: &Given, licence: String) -> Source {
+    let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
+    let references = plain(&page.references);
+    let title = match (&given.source, references.is_empty()) {
+        (Some(title), _) => title.clone(),
+        (None, false) => references,
+        (None, true) => format!("refractiveindex.info database, {name}, which names no reference"),
+    };
+    Source {
+        doi: doi(&page.references),
+        licence: Some(licence),
+        note: Some(format!(
+            "n and k of {name} of the refractiveindex.info database, against the wavelength in µm; \
+             here the frequency is c/λ and the permittivity (n - jk)². {}",
+            plain(&page.comments)
+        )),
+        making: Some(Making::Copied),
+        ..source("optical-constants", given.kind.unwrap_or(SourceKind::Literature), &title)
+    }
+}
+
+fn source(key: &str, kind: SourceKind, title: &str) -> Source {
+    Source {
+        key: key.to_owned(),
+        kind,
+        title: title.to_owned(),
+        doi: None,
+        url: None,
+        licence: None,
+        note: None,
+        citation: Citation::default(),
+        making: None,
+    }
+}
+
+/// The first DOI that a link names.
+fn doi(html: &str) -> Option<String> {
+    let (_, rest) = html.split_once("doi.org/")?;
+    let doi: String =
+        rest.chars().take_while(|c| !c.is_whitespace() && !"\"'<>".contains(*c)).collect();
+    (doi.starts_with("10.") && doi.contains('/')).then_some(doi)
+}
+
+/// The text of a bit of HTML.
+fn plain(html: &str) -> String {
+    let mut text = String::new();
+    let mut rest = html;
+    while let Some((before, after)) = rest.split_once('<') {
+        text += before;
+        let is_tag = after.starts_with(|c: char| c.is_ascii_alphabetic() || c == '/');
+        match after.split_once('>').filter(|_| is_tag) {
+            Some((tag, after)) => {
+                text += if tag.starts_with("br") { " " } else { "" };
+                rest = after;
+            }
+            None => {
+                text.push('<');
+                rest = after;
+            }
+        }
+    }
+    text += rest;
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,48 @@
+//! One material's curve as Apache Parquet, in SI units: the columns of the table `observation` that say
+//! what was measured. Units stand in the metadata under `ucum`, what it is and from whom under `about`.
+//!
+//! Lost: everything but the curve.
+
+use super::plain_csv::what;
+use super::{ExchangeError, Exported, Subject};
+use crate::catalogue::tables::parquet_of;
+use crate::store::{Cell, Column, ColumnKind, Table};
+
+/// Writes the curve, or what the model says at every degree.
+pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeError> {
+    let points = subject.points();
+    let real =
+        |name: &str| Column { name: name.to_owned(), kind: ColumnKind::Real, required: false };
+    let columns = vec![
+        real("theta_i_rad"),
+        real("theta_r_rad"),
+        real("delta_phi_rad"),
+        real("sigma0"),
+        Column { name: "censor".to_owned(), kind: ColumnKind::Text, required: true },
+        real("threshold_sigma0"),
+        real("theta_sd_rad"),
+        real("power_w"),
+        real("range_m"),
+    ];
+    let table =
+        Table { name: "observation".to_owned(), columns, key: Vec::new(), references: Vec::new() };
+    let cell = |value: Option<f64>| value.map_or(Cell::Null, Cell::Real);
+    let rows = points.observations.iter().map(|point| {
+        vec![
+            Cell::Real(point.theta_i_rad),
+            Cell::Real(point.theta_r_rad),
+            Cell::Real(point.delta_phi_rad),
+            cell(point.sigma0),
+            Cell::Text(point.censor.as_str()),
+            cell(point.threshold_sigma0),
+            cell(point.theta_sd_rad),
+            cell(point.power_w),
+            cell(point.range_m),
+        ]
+    });
+    let about = format!("{}\n{} GHz", subject.about().join("\n"), points.frequency_hz / 1e9);
+    let bytes = parquet_of(&table, &about, rows)
+        .map_err(|problem| ExchangeError::Encoding { format: "Parquet", problem })?;
+    let lost = format!("written is {}; everything else has no column", what(&points));
+    Ok(Exported { files: vec![(name.to_owned(), bytes)], lost })
+}

@@ -1,0 +1,160 @@
+//! One material's curve as CSV, the columns that a `material.toml` refers to: `theta_deg`, `sigma0_db`,
+//! `censor`, `threshold_db`, `theta_r_deg`, `delta_phi_deg`. Lines that start with `#` say what it is
+//! and from whom; on the way in those at the head are left alone.
+//!
+//! Lost: everything but the curve, and of its points the angle's deviation, power, range and chirp.
+
+use super::given::{CLASS, FREQUENCY, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, missing};
+use super::subject::Points;
+use super::{ExchangeError, Exported, Given, Subject};
+use crate::formats::FormatError;
+use crate::material::{
+    Citation, Curve, Instrument, Material, Observation, Slug, Source, SourceKind, Status, file,
+};
+use crate::units::db_from_ratio;
+
+/// Name of the curve that a plain file becomes.
+const CURVE: &str = "curve";
+
+/// Writes the curve, or what the model says at every degree.
+pub(super) fn write(subject: &Subject, name: &str) -> Exported {
+    let points = subject.points();
+    let mut text: String = subject.about().iter().map(|line| format!("# {line}\n")).collect();
+    text += &format!("# {}, at {} GHz\n", what(&points), points.frequency_hz / 1e9);
+    text += "theta_deg,sigma0_db,censor,threshold_db,theta_r_deg,delta_phi_deg\n";
+    let db = |level: Option<f64>| level.map(|l| db_from_ratio(l).to_string()).unwrap_or_default();
+    for point in points.observations.iter() {
+        text += &format!(
+            "{},{},{},{},{},{}\n",
+            point.theta_i_rad.to_degrees(),
+            db(point.sigma0),
+            point.censor.as_str(),
+            db(point.threshold_sigma0),
+            point.theta_r_rad.to_degrees(),
+            point.delta_phi_rad.to_degrees(),
+        );
+    }
+    let lost =
+        format!("written is {}; everything else of the material is in no column", what(&points));
+    Exported { files: vec![(name.to_owned(), text.into_bytes())], lost }
+}
+
+/// Which numbers these are, in a clause.
+pub(super) fn what(points: &Points) -> String {
+    match points.curve {
+        Some(curve) => format!("the curve `{}`", curve.name),
+        None => "the model's backscatter at every degree where it is above -80 dB, since there is no curve"
+            .to_owned(),
+    }
+}
+
+/// Makes a material of a curve.
+pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
+    let refused = |error: FormatError| ExchangeError::Format { file: file.to_owned(), error };
+    let observations = file::observations(&without_head(bytes)).map_err(refused)?;
+    let Given { slug, class, licence, source, kind, instrument, frequency_hz, .. } = given;
+    let is_measured = *kind == Some(SourceKind::Measured);
+    let flags = [
+        (slug.is_some(), NAME),
+        (class.is_some(), CLASS),
+        (licence.is_some(), LICENCE),
+        (source.is_some(), SOURCE),
+        (kind.is_some(), KIND),
+        (frequency_hz.is_some(), FREQUENCY),
+        (instrument.is_some() || !is_measured, INSTRUMENT),
+    ];
+    let (Some(slug), Some(class), Some(licence), Some(title), Some(kind), Some(hz), true) = (
+        slug.clone(),
+        class.clone(),
+        licence.clone(),
+        source.clone(),
+        *kind,
+        *frequency_hz,
+        instrument.is_some() || !is_measured,
+    ) else {
+        return Err(missing(file, &flags));
+    };
+    let instrument = instrument.as_ref().map(|name| Instrument {
+        key: "instrument".to_owned(),
+        name: name.clone(),
+        centre_frequency_hz: hz,
+        threshold_w: given.threshold_w,
+        ..Instrument::default()
+    });
+    let lone = Lone { slug, class, licence, title, kind, hz, instrument, observations };
+    of_curve(file, given, lone)
+}
+
+/// The bytes with the lines of comment at the head left empty, so that lines keep their numbers.
+fn without_head(bytes: &[u8]) -> Vec<u8> {
+    let mut is_head = true;
+    let line = |line: &[u8]| {
+        is_head &= line.starts_with(b"#") || line.trim_ascii().is_empty();
+        if is_head { b"\n".to_vec() } else { line.to_vec() }
+    };
+    bytes.split_inclusive(|byte| *byte == b'\n').flat_map(line).collect()
+}
+
+/// A curve and all that an entry must say of it.
+pub(super) struct Lone {
+    pub slug: Slug,
+    pub class: String,
+    pub licence: String,
+    /// Of the source.
+    pub title: String,
+    pub kind: SourceKind,
+    /// Frequency, Hz.
+    pub hz: f64,
+    pub instrument: Option<Instrument>,
+    pub observations: Vec<Observation>,
+}
+
+/// A material that is one curve.
+pub(super) fn of_curve(file: &str, given: &Given, lone: Lone) -> Result<Material, ExchangeError> {
+    let Lone { slug, class, licence, title, kind, hz, instrument, observations } = lone;
+    let angles = || observations.iter().map(|point| point.theta_i_rad);
+    let material = Material {
+        name: given.name.clone().unwrap_or_else(|| slug.to_string()),
+        class,
+        description: String::new(),
+        licence: licence.clone(),
+        tags: Vec::new(),
+        frequency_hz: [hz, hz],
+        theta_rad: [angles().fold(f64::INFINITY, f64::min), angles().fold(0.0, f64::max)],
+        render: CURVE.to_owned(),
+        sources: vec![Source {
+            key: "source".to_owned(),
+            kind,
+            title,
+            doi: None,
+            url: None,
+            licence: Some(licence),
+            note: Some(format!("Read from {}.", file.rsplit(['/', '\\']).next().unwrap_or(file))),
+            citation: Citation::default(),
+            making: None,
+        }],
+        curves: vec![Curve {
+            name: CURVE.to_owned(),
+            source: "source".to_owned(),
+            instrument: instrument.as_ref().map(|instrument| instrument.key.clone()),
+            session: None,
+            observations,
+        }],
+        instruments: instrument.into_iter().collect(),
+        fits: Vec::new(),
+        effects: Vec::new(),
+        status: Status::Active,
+        finish: None,
+        unknown: Vec::new(),
+        roughness: None,
+        layers: Vec::new(),
+        permittivities: Vec::new(),
+        sessions: Vec::new(),
+        findings: Vec::new(),
+        slug,
+    };
+    material
+        .validate()
+        .map_err(|error| ExchangeError::Material { file: file.to_owned(), error })?;
+    Ok(material)
+}

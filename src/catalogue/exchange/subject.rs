@@ -1,0 +1,190 @@
+//! A material that is to be written in a foreign format: which of its numbers go out, and what every
+//! file must say of them.
+
+use std::borrow::Cow;
+use std::f64::consts::PI;
+
+use crate::brdf::{Brdf, Scattering};
+use crate::material::{
+    Censor, Curve, Instrument, Layer, Material, MaterialError, Observation, Permittivity, Source,
+    SourceKind,
+};
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
+
+/// Below this σ⁰ a model says only that nothing comes back.
+const FAINTEST: f64 = 1e-8;
+
+/// A material and the revision that it is.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject<'a> {
+    /// The material.
+    pub material: &'a Material,
+    /// Its revision in the database; none for a built-in that is not in it.
+    pub revision: Option<u32>,
+    /// When that was added: UTC, ISO 8601.
+    pub added_at: Option<&'a str>,
+}
+
+/// The curve that goes out: a measured one, or what a model says at every degree.
+pub(super) struct Points<'a> {
+    /// The curve; none for a model.
+    pub curve: Option<&'a Curve>,
+    pub observations: Cow<'a, [Observation]>,
+    pub source: Option<&'a Source>,
+    pub instrument: Option<&'a Instrument>,
+    /// Hz.
+    pub frequency_hz: f64,
+}
+
+impl<'a> Subject<'a> {
+    /// What a scene renders: the curve itself, or the one that was fitted; else the first curve; else
+    /// the model.
+    pub(super) fn points(&self) -> Points<'a> {
+        let material = self.material;
+        let named = |name: &str| material.curves.iter().find(|curve| curve.name == name);
+        let fit = material.fits.iter().find(|fit| fit.name == material.render);
+        let fitted = fit.and_then(|fit| fit.curve.as_deref()).and_then(named);
+        let curve = named(&material.render).or(fitted).or(material.curves.first());
+        let instrument = curve.and_then(|curve| {
+            material.instruments.iter().find(|i| Some(&i.key) == curve.instrument.as_ref())
+        });
+        let key = curve.map(|curve| &curve.source).or(fit.map(|fit| &fit.source));
+        let observations = match (curve, material.scattering()) {
+            (Some(curve), _) => Cow::Borrowed(curve.observations.as_slice()),
+            (None, Ok(model)) => Cow::Owned(self.sampled(&model)),
+            (None, Err(_)) => Cow::default(),
+        };
+        Points {
+            curve,
+            observations,
+            source: material.sources.iter().find(|source| Some(&source.key) == key),
+            instrument,
+            frequency_hz: instrument.map_or(self.frequency_hz(), |i| i.centre_frequency_hz),
+        }
+    }
+
+    /// Angles of incidence at every degree of the claimed range, with both of its ends, rad.
+    fn angles_rad(&self) -> Vec<f64> {
+        let [low, high] = self.material.theta_rad;
+        let inner = (0..=90).map(|degree| f64::from(degree).to_radians());
+        let mut angles = vec![low];
+        angles.extend(inner.filter(|angle| *angle > low && *angle < high));
+        angles.extend((high > low).then_some(high));
+        // At 90° no surface is seen.
+        angles.retain(|angle| *angle < 89.5f64.to_radians());
+        angles
+    }
+
+    fn sampled(&self, model: &Brdf) -> Vec<Observation> {
+        let point = |theta_rad: f64| Observation {
+            theta_i_rad: theta_rad,
+            theta_r_rad: theta_rad,
+            delta_phi_rad: 0.0,
+            sigma0: Some(model.sigma0(theta_rad)),
+            censor: Censor::None,
+            threshold_sigma0: None,
+            theta_sd_rad: None,
+            power_w: None,
+            range_m: None,
+            chirp: None,
+        };
+        self.echoing_rad(model).into_iter().map(point).collect()
+    }
+
+    /// Those of the angles at which a model scatters back more than −80 dB, rad.
+    pub(super) fn echoing_rad(&self, model: &Brdf) -> Vec<f64> {
+        let mut angles = self.angles_rad();
+        angles.retain(|angle| model.sigma0(*angle) > FAINTEST);
+        angles
+    }
+
+    /// Middle of the claimed range, Hz.
+    pub(super) fn frequency_hz(&self) -> f64 {
+        (self.material.frequency_hz[0] + self.material.frequency_hz[1]) / 2.0
+    }
+
+    /// The model that a scene renders.
+    pub(super) fn model(&self) -> Result<Brdf, MaterialError> {
+        self.material.scattering()
+    }
+
+    /// Permittivities of the outermost layer or, without layers, of the only substance.
+    pub(super) fn permittivities(&self) -> Vec<&'a Permittivity> {
+        let entries = &self.material.permittivities;
+        let outermost: Option<&Layer> = self.material.layers.first();
+        let key = match outermost {
+            Some(layer) => layer.permittivity.as_deref(),
+            None => entries.first().map(|entry| entry.key.as_str()),
+        };
+        let is_only = outermost.is_some() || entries.iter().all(|e| Some(e.key.as_str()) == key);
+        let belongs = |entry: &&Permittivity| is_only && Some(entry.key.as_str()) == key;
+        entries.iter().filter(belongs).collect()
+    }
+
+    /// How the rendered numbers came to be, in one word.
+    pub(super) fn kind(&self) -> &'static str {
+        self.material.render_kind().map_or("of unknown origin", SourceKind::as_str)
+    }
+
+    /// `slug@revision`, or that it is built in.
+    pub(super) fn title(&self) -> String {
+        let Material { slug, name, .. } = self.material;
+        match self.revision {
+            Some(revision) => format!("{name} ({slug}@{revision})"),
+            None => format!("{name} ({slug}, built into matdb {})", env!("CARGO_PKG_VERSION")),
+        }
+    }
+
+    /// Every source in a line: how it came to be, what it is, where it is.
+    pub(super) fn sources(&self) -> Vec<String> {
+        self.material.sources.iter().map(cited).collect()
+    }
+
+    /// What every file says of itself, line by line and with nothing that ends a line.
+    pub(super) fn about(&self) -> Vec<String> {
+        let material = self.material;
+        let [low_ghz, high_ghz] = material.frequency_hz.map(|hz| hz / 1e9);
+        let [low_deg, high_deg] = material.theta_rad.map(f64::to_degrees);
+        let mut lines = vec![
+            self.title(),
+            format!("content {}", material.content_hash()),
+            format!("the rendered numbers are {}; licence {}", self.kind(), material.licence),
+            format!("claimed from {low_ghz} to {high_ghz} GHz, {low_deg:.3} to {high_deg:.3} deg"),
+        ];
+        lines.extend(self.sources().iter().map(|source| format!("source, {source}")));
+        lines.extend(material.unknown.iter().map(|sentence| format!("not known: {sentence}")));
+        if let Some(reason) = material.status.reason() {
+            lines.push(format!("{}: {reason}", material.status.as_str()));
+        }
+        lines.iter().map(|line| one_line(line)).collect()
+    }
+}
+
+/// A source in a line.
+pub(super) fn cited(source: &Source) -> String {
+    let doi = source.doi.as_ref().map(|doi| format!(", doi {doi}")).unwrap_or_default();
+    let url = source.url.as_ref().map(|url| format!(", {url}")).unwrap_or_default();
+    format!("{}: {}{doi}{url}", source.kind.as_str(), source.title)
+}
+
+impl Points<'_> {
+    /// Wavelength in free space, m.
+    pub fn wavelength_m(&self) -> f64 {
+        SPEED_OF_LIGHT_M_PER_S / self.frequency_hz
+    }
+}
+
+/// 4π·cos θ_i·cos θ_r, which turns f in 1/sr into σ⁰.
+pub(super) fn sigma0_per_f(observation: &Observation) -> f64 {
+    4.0 * PI * observation.theta_i_rad.cos() * observation.theta_r_rad.cos()
+}
+
+/// The text without what ends a line or turns its direction, so that it cannot leave a comment.
+pub(super) fn one_line(text: &str) -> String {
+    let turns = |c: char| {
+        c.is_control()
+            || matches!(c, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+            || matches!(c, '\u{fffe}' | '\u{ffff}')
+    };
+    text.chars().map(|c| if turns(c) { ' ' } else { c }).collect()
+}

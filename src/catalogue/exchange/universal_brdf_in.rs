@@ -1,0 +1,195 @@
+//! Universal BRDF files (`.brdf`) as a curve: the way back of `universal_brdf.rs`.
+//!
+//! One wavelength and one state of polarisation are read. Lost: uncertainties, instrumentation,
+//! sample and environment of files that matdb did not write; postal addresses of all.
+
+use std::f64::consts::PI;
+
+use serde_json::Value;
+
+use super::given::{CLASS, FREQUENCY, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, missing};
+use super::plain_csv::{Lone, of_curve};
+use super::universal_brdf::{CENSOR, OURS, THRESHOLD};
+use super::{ExchangeError, Given};
+use crate::formats::FormatError;
+use crate::material::{Censor, Instrument, Material, Observation, SourceKind};
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
+
+/// Makes a material of a file.
+pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
+    let refused = |error: FormatError| ExchangeError::Format { file: file.to_owned(), error };
+    let json: Value = serde_json::from_slice(bytes).map_err(|error| {
+        let place = format!("line {}, column {}", error.line(), error.column());
+        refused(FormatError::at(place, "not JSON", "mend the file, or name another"))
+    })?;
+    let observations = observations(&json["data"]).map_err(refused)?;
+    let wavelength_m = wavelength_m(&json["data"]).map_err(refused)?;
+    let (metadata, text) = (&json["metadata"], |value: &Value| value.as_str().map(str::to_owned));
+    let ours = &metadata["adhoc_section"][OURS];
+    let hz =
+        given.frequency_hz.or(wavelength_m.map(|wavelength| SPEED_OF_LIGHT_M_PER_S / wavelength));
+    let kind = given.kind.or_else(|| kind(metadata, ours));
+    let name = given.instrument.clone().or_else(|| {
+        text(&ours["instrument"]["name"]).or(text(&metadata["instrumentation"]["name"]))
+    });
+    let licence = given.licence.clone().or(text(&metadata["license"]["type"]));
+    let source = given.source.clone().or(text(&ours["source"])).or(text(&metadata["description"]));
+    let is_named = name.is_some() || kind != Some(SourceKind::Measured);
+    let flags = [
+        (given.slug.is_some(), NAME),
+        (given.class.is_some(), CLASS),
+        (licence.is_some(), LICENCE),
+        (source.is_some(), SOURCE),
+        (kind.is_some(), KIND),
+        (hz.is_some(), FREQUENCY),
+        (is_named, INSTRUMENT),
+    ];
+    let (Some(slug), Some(class), Some(licence), Some(title), Some(kind), Some(hz), true) =
+        (given.slug.clone(), given.class.clone(), licence, source, kind, hz, is_named)
+    else {
+        return Err(missing(file, &flags));
+    };
+    let number = |key: &str| ours["instrument"][key].as_f64();
+    let instrument = name.map(|name| Instrument {
+        key: "instrument".to_owned(),
+        name,
+        centre_frequency_hz: hz,
+        bandwidth_hz: number("bandwidth_hz"),
+        calibration_sd_factor: number("calibration_sd_factor"),
+        looks: number("looks"),
+        threshold_w: given.threshold_w.or(number("threshold_w")),
+        ..Instrument::default()
+    });
+    of_curve(file, given, Lone { slug, class, licence, title, kind, hz, instrument, observations })
+}
+
+fn kind(metadata: &Value, ours: &Value) -> Option<SourceKind> {
+    let ours = serde_json::from_value(ours["kind"].clone()).ok().flatten();
+    ours.or(match metadata["method"].as_str() {
+        Some("measurement") => Some(SourceKind::Measured),
+        Some("simulation") => Some(SourceKind::Modelled),
+        _ => None,
+    })
+}
+
+fn observations(data: &Value) -> Result<Vec<Observation>, FormatError> {
+    for key in ["polarization_i", "polarization_r"] {
+        one_state(data, key)?;
+    }
+    let angle = |key: &str| {
+        let factor = match data[key]["unit"].as_str() {
+            Some("rad") => 1.0,
+            Some("deg" | "°") => PI / 180.0,
+            _ => return Err(refuse(key, "has no unit rad or deg", "state the unit")),
+        };
+        let radians = |degrees: f64| if factor == 1.0 { degrees } else { degrees.to_radians() };
+        Ok(numbers(data, key)?.into_iter().map(radians).collect::<Vec<f64>>())
+    };
+    let [theta_i, phi_i] = [angle("theta_i")?, angle("phi_i")?];
+    let [theta_r, phi_r] = [angle("theta_r")?, angle("phi_r")?];
+    let brdf = numbers(data, "BRDF")?;
+    let columns =
+        [("theta_i", &theta_i), ("phi_i", &phi_i), ("theta_r", &theta_r), ("phi_r", &phi_r)];
+    if let Some((key, _)) = columns.iter().find(|(_, column)| column.len() != brdf.len()) {
+        return Err(refuse(key, "has not as many values as BRDF", "give one for each"));
+    }
+    let censors = censors(data, brdf.len())?;
+    let rows =
+        theta_i.iter().zip(&phi_i).zip(theta_r.iter().zip(&phi_r)).zip(brdf.iter().zip(censors));
+    let point = |row: usize, theta_i_rad, theta_r_rad, delta: f64, value: f64, limit: Limit| {
+        let per_f = 4.0 * PI * f64::cos(theta_i_rad) * f64::cos(theta_r_rad);
+        let sigma0 = per_f * value;
+        let is_level = sigma0 > 0.0 && sigma0.is_finite();
+        if limit.censor == Censor::None && !is_level {
+            let place = format!("data.BRDF, value {}", row + 1);
+            let problem = format!("{value} is no level in dB");
+            return Err(FormatError::at(place, problem, "leave the point out, or censor it"));
+        }
+        Ok(Observation {
+            theta_i_rad,
+            theta_r_rad,
+            delta_phi_rad: delta,
+            sigma0: (limit.censor == Censor::None).then_some(sigma0),
+            censor: limit.censor,
+            threshold_sigma0: limit.threshold.map(|threshold| per_f * threshold),
+            theta_sd_rad: None,
+            power_w: None,
+            range_m: None,
+            chirp: None,
+        })
+    };
+    rows.enumerate()
+        .map(|(row, (((ti, pi), (tr, pr)), (value, limit)))| {
+            point(row, *ti, *tr, pr - pi, *value, limit)
+        })
+        .collect()
+}
+
+/// What is known of a point apart from its value.
+#[derive(Clone, Copy)]
+struct Limit {
+    censor: Censor,
+    threshold: Option<f64>,
+}
+
+fn censors(data: &Value, len: usize) -> Result<Vec<Limit>, FormatError> {
+    let column = |key: &'static str| match data["adhoc_variables"][key]["values"].as_array() {
+        Some(values) if values.len() == len => Ok(Some(values)),
+        None => Ok(None),
+        Some(_) => Err(refuse(key, "has not as many values as BRDF", "give one for each")),
+    };
+    let (words, thresholds) = (column(CENSOR)?, column(THRESHOLD)?);
+    let limit = |row: usize| {
+        let censor = match words.and_then(|words| words.get(row)).map(Value::as_str) {
+            None | Some(Some("none")) => Censor::None,
+            Some(Some("left")) => Censor::Left,
+            Some(Some("right")) => Censor::Right,
+            Some(_) => return Err(refuse(CENSOR, "has another word", "write none, left or right")),
+        };
+        let threshold = thresholds.and_then(|thresholds| thresholds.get(row)?.as_f64());
+        Ok(Limit { censor, threshold })
+    };
+    (0..len).map(limit).collect()
+}
+
+/// Wavelength, m; none where the file states none.
+fn wavelength_m(data: &Value) -> Result<Option<f64>, FormatError> {
+    const KEY: &str = "wavelength_i";
+    if data[KEY].is_null() {
+        return Ok(None);
+    }
+    let values = numbers(data, KEY)?;
+    let metre = match data[KEY]["unit"].as_str() {
+        Some("nm") => 1e-9,
+        // The Greek letter and the sign for micro.
+        Some("\u{3bc}m" | "\u{b5}m") => 1e-6,
+        _ => return Err(refuse(KEY, "has no unit nm or μm", "state the unit")),
+    };
+    match values.as_slice() {
+        [first, rest @ ..] if *first > 0.0 && rest.iter().all(|value| value == first) => {
+            Ok(Some(first * metre))
+        }
+        _ => Err(refuse(KEY, "is not one wavelength above 0", "make a file for each wavelength")),
+    }
+}
+
+fn one_state(data: &Value, key: &'static str) -> Result<(), FormatError> {
+    let values = data[key]["values"].as_array().map(Vec::as_slice).unwrap_or_default();
+    if values.windows(2).all(|pair| pair.first() == pair.last()) {
+        return Ok(());
+    }
+    Err(refuse(key, "has several states", "make a file for each state of polarisation"))
+}
+
+fn numbers(data: &Value, key: &str) -> Result<Vec<f64>, FormatError> {
+    let Some(values) = data[key]["values"].as_array() else {
+        return Err(refuse(key, "has no `values`", "give a universal BRDF file, schema 1.0"));
+    };
+    let number = |value: &Value| value.as_f64().filter(|number| number.is_finite());
+    let found: Option<Vec<f64>> = values.iter().map(number).collect();
+    found.ok_or_else(|| refuse(key, "holds what is no number", "mend the value"))
+}
+
+fn refuse(key: &str, problem: &str, way_out: &str) -> FormatError {
+    FormatError::at(format!("data.{key}"), problem, way_out)
+}

@@ -1,0 +1,122 @@
+//! Files in other people's formats, and the flags that say what such a file does not.
+
+use std::path::{Path, PathBuf};
+
+use super::{door, unreadable};
+use crate::catalogue::exchange::{Foreign, Given};
+use crate::cli::inputs::input;
+use crate::error::Error;
+use crate::material::{Input, Material, Slug, SourceKind};
+use crate::units::watts_from_dbm;
+
+/// What a person says beside a foreign file.
+#[derive(Debug, Default, PartialEq, clap::Args)]
+#[command(next_help_heading = "For a .csv, .brdf or .yml file")]
+pub(super) struct Beside {
+    /// Short name that the material gets
+    #[arg(long, value_name = "NAME")]
+    name: Option<Slug>,
+    /// Full name [default: the short one]
+    #[arg(long)]
+    title: Option<String>,
+    /// Kind of stuff: metal, polymer, paint, tissue, textile, glass …
+    #[arg(long)]
+    class: Option<String>,
+    /// SPDX identifier of the licence of the data
+    #[arg(long, value_name = "SPDX")]
+    licence: Option<String>,
+    /// Citation or, for your own numbers, how they were made
+    #[arg(long, value_name = "TEXT")]
+    source: Option<String>,
+    /// How the numbers came to be
+    #[arg(long)]
+    kind: Option<Kind>,
+    /// Name of the instrument
+    #[arg(long, value_name = "TEXT")]
+    instrument: Option<String>,
+    /// Frequency of a curve, or at which optical constants are wanted [default there: 300]
+    #[arg(long, value_name = "GHZ")]
+    frequency: Option<f64>,
+    /// Least power that counts as a detection
+    #[arg(long, value_name = "DBM", allow_negative_numbers = true)]
+    threshold: Option<f64>,
+}
+
+/// How numbers came to be, as a flag says it.
+#[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
+enum Kind {
+    Measured,
+    Literature,
+    Modelled,
+    Synthetic,
+}
+
+impl Beside {
+    /// Refuses flags that would be dropped in silence, and one name for several files.
+    pub fn check(&self, from: &[PathBuf]) -> Result<(), Error> {
+        let foreign = from.iter().filter(|path| !path.is_dir() && format(path).is_some()).count();
+        let problem = match foreign {
+            0 if *self != Beside::default() => {
+                "--name and its like say what a foreign file does not"
+            }
+            2.. => "several foreign files would get one name",
+            _ => return Ok(()),
+        };
+        Err(Error::Usage {
+            problem: problem.to_owned(),
+            way_out: "name one .csv, .brdf or .yml file with --from, and no other".to_owned(),
+        })
+    }
+
+    fn given(&self) -> Result<Given, Error> {
+        let frequency_hz = self.frequency.map(|ghz| ghz * 1e9);
+        let is_possible = |hz: f64| hz > 0.0 && hz.is_finite();
+        let threshold_w = self.threshold.map(watts_from_dbm);
+        if !frequency_hz.is_none_or(is_possible) || !threshold_w.is_none_or(is_possible) {
+            return Err(Error::Usage {
+                problem: "--frequency or --threshold cannot be".to_owned(),
+                way_out: "give a frequency in GHz such as 300, a threshold in dBm such as -77"
+                    .to_owned(),
+            });
+        }
+        Ok(Given {
+            slug: self.name.clone(),
+            name: self.title.clone(),
+            class: self.class.clone(),
+            licence: self.licence.clone(),
+            source: self.source.clone(),
+            kind: self.kind.map(SourceKind::from),
+            instrument: self.instrument.clone(),
+            frequency_hz,
+            threshold_w,
+        })
+    }
+}
+
+impl From<Kind> for SourceKind {
+    fn from(kind: Kind) -> SourceKind {
+        match kind {
+            Kind::Measured => SourceKind::Measured,
+            Kind::Literature => SourceKind::Literature,
+            Kind::Modelled => SourceKind::Modelled,
+            Kind::Synthetic => SourceKind::Synthetic,
+        }
+    }
+}
+
+/// The foreign format that a file's ending stands for.
+pub(super) fn format(path: &Path) -> Option<Foreign> {
+    Foreign::from_extension(path.extension()?.to_str()?)
+}
+
+/// Reads a foreign file as a material, and says which file it was.
+pub(super) fn read(
+    format: Foreign,
+    path: &Path,
+    args: &Beside,
+) -> Result<(Material, Input), Error> {
+    let bytes = std::fs::read(path).map_err(|reason| unreadable(path, reason))?;
+    let material = format.read(&path.display().to_string(), &bytes, &args.given()?)?;
+    door::check(&material, path)?;
+    Ok((material, input(path, &bytes)))
+}

@@ -1,0 +1,87 @@
+//! `matdb export`.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::json;
+
+use super::console::Console;
+use super::database::Database;
+use super::materials::{Found, find};
+use super::output::write_all;
+use crate::catalogue::exchange::{self, Exported, Subject};
+use crate::error::Error;
+
+/// Write a material in somebody else's format, and say what it cannot carry
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  matdb export mannequin-paint --as mitsuba -o paint.xml
+  matdb export my-paint@2 --as universal-brdf -o paint.brdf
+  matdb export ptfe --as open-material -o ptfe.xomp     with its tables beside it")]
+pub(super) struct Args {
+    /// NAME or NAME@REVISION
+    material: String,
+    /// The format
+    #[arg(long = "as", value_name = "FORMAT")]
+    format: Format,
+    /// The file to write; tables that belong to it get its name and stand beside it
+    #[arg(long, short, value_name = "FILE")]
+    output: PathBuf,
+}
+
+/// Formats and what they carry.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Format {
+    /// One curve with its detection limits, in degrees and dB; `matdb add --from` reads it back
+    Csv,
+    /// The same in SI units, typed, with units in its metadata
+    Parquet,
+    /// EMPIR universal BRDF (.brdf): one curve, its uncertainty and limits; `matdb add --from` reads it
+    UniversalBrdf,
+    /// ASAM OpenMATERIAL 3D (.xomp): tables of the BRDF and permittivity, roughness
+    OpenMaterial,
+    /// Mitsuba 3 BSDF (.xml): diffuse and rough facets; other models by the nearest of these
+    Mitsuba,
+    /// Sionna RT radio material (.py): permittivity and the nearest scattering pattern
+    Sionna,
+}
+
+impl From<Format> for exchange::Format {
+    fn from(format: Format) -> exchange::Format {
+        match format {
+            Format::Csv => exchange::Format::Csv,
+            Format::Parquet => exchange::Format::Parquet,
+            Format::UniversalBrdf => exchange::Format::UniversalBrdf,
+            Format::OpenMaterial => exchange::Format::OpenMaterial,
+            Format::Mitsuba => exchange::Format::Mitsuba,
+            Format::Sionna => exchange::Format::Sionna,
+        }
+    }
+}
+
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    let store = db.read()?;
+    let Found { material, revision } = find(store.as_ref(), &args.material, "")?;
+    let history = match &store {
+        Some(store) => store.history(&material.slug)?,
+        None => Vec::new(),
+    };
+    let stored = history.iter().find(|line| Some(line.revision) == revision);
+    let added_at = stored.map(|line| line.added_at.as_str());
+    let subject = Subject { material: &material, revision, added_at };
+    let Some(name) = args.output.file_name().and_then(|name| name.to_str()) else {
+        return Err(Error::Usage {
+            problem: format!("{} names no file", args.output.display()),
+            way_out: "name one with -o, such as -o paint.brdf".to_owned(),
+        });
+    };
+    let Exported { files, lost } = exchange::export(&subject, args.format.into(), name)?;
+    let folder = args.output.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let folder = folder.unwrap_or(Path::new("."));
+    write_all(folder, &files)?;
+    let written: Vec<String> = files
+        .iter()
+        .map(|(name, _)| args.output.with_file_name(name).display().to_string())
+        .collect();
+    let text = format!("wrote {}\n{lost}\n", written.join(", "));
+    console.result(&text, &json!({ "files": written, "lost": lost }))
+}
