@@ -165,7 +165,7 @@ fn list_takes_filters() {
     let folder = folder.path();
     matdb(folder).args(["add", "--all"]).assert().success();
     let paint = json(folder, &["list", "--class", "paint", "--frequency", "300"]);
-    assert_eq!(slugs(&paint), ["mannequin-paint"]);
+    assert_eq!(slugs(&paint), ["mannequin-paint", "painted-metal"]);
     assert_eq!(slugs(&json(folder, &["list", "--kind", "measured"])), Vec::<&str>::new());
     assert!(text(folder, &["list", "--fitted", "--kind", "measured"]).contains("no such material"));
     for wrong in [["--frequency", "0"], ["--frequency", "NaN"], ["--kind", "guessed"]] {

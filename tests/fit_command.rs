@@ -103,11 +103,11 @@ fn a_curve_is_fitted_stored_rendered_and_listed() {
     assert_eq!(again["saved"]["render"], "mixture-censored");
     let shown = json(folder, &["show", "human-skin@2"]);
     let fits = shown["material"]["fits"].as_array().unwrap();
-    assert_eq!(fits.len(), 3);
-    let report = &fits[2]["report"];
+    assert_eq!(fits.len(), 4);
+    let report = &fits[3]["report"];
     assert_eq!(report["given"][0]["name"], "diffuse.alpha");
     assert!(report["verdict"].to_string().contains("least squares ignores them"), "{report}");
-    let held = fits[2]["parameter_sources"][0][1].as_str().unwrap();
+    let held = fits[3]["parameter_sources"][0][1].as_str().unwrap();
     let sources = shown["material"]["sources"].as_array().unwrap();
     let held = sources.iter().find(|source| source["key"] == held).unwrap();
     assert_eq!(held["kind"], "synthetic", "a number that somebody chose is not measured");
