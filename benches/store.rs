@@ -52,7 +52,7 @@ fn material(number: usize) -> Material {
     material.name = format!("{word} sample no{number}");
     material.class = format!("class-{}", number % 1000);
     material.tags = vec![word.to_owned(), format!("tag-{}", number % 2000)];
-    if number % 500 == 0 {
+    if number.is_multiple_of(500) {
         material.frequency_hz = [75e9, 110e9];
     }
     let observation = |row: usize| Observation {
