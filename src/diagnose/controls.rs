@@ -97,7 +97,9 @@ fn powers(selection: &Selection, base: &State, effects: &[&dyn Effect]) -> Vec<P
         let recovered = least
             .as_ref()
             .map(|(scale, _, at)| recovered(selection, base, &space, at, INJECTED * scale));
-        let least_db = least.map(|(scale, size_db, _)| scale * size_db);
+        // Nothing smaller than the least size is ever believed.
+        let least_size_db = selection.settings.least_size_db;
+        let least_db = least.map(|(scale, size_db, _)| (scale * size_db).max(least_size_db));
         Power { name: effect.name(), least_db, recovered }
     };
     effects.iter().map(power).collect()
@@ -116,7 +118,7 @@ fn recovered(
 ) -> bool {
     let problem = &selection.problem;
     let [bare, full] = [problem.predict(&base.space, &base.fitted.at), problem.predict(space, at)];
-    let law = Likelihood::new(&bare, problem.declared);
+    let [law, with] = [&bare, &full].map(|p| Likelihood::new(p, problem.declared));
     let looks = bare.receiver.looks;
     let draw = |look: usize| {
         let key = Key {
@@ -127,10 +129,9 @@ fn recovered(
         };
         let mean_w = law.mean_w(look);
         let changed = |p: &crate::effects::Prediction| p.arrived.get(look).copied().flatten();
-        let ln_factor = match (changed(&bare), changed(&full)) {
-            (Some(bare), Some(full)) if bare.power_w > 0.0 && full.power_w > 0.0 => {
-                scale * (full.power_w / bare.power_w).ln()
-            }
+        // Means with thermal noise, so that more of that is put in, too.
+        let ln_factor = match with.mean_w(look) {
+            full_w if mean_w > 0.0 && full_w > 0.0 => scale * (full_w / mean_w).ln(),
             _ => 0.0,
         };
         let mut draws = key.draws();

@@ -1,9 +1,11 @@
 //! Which effect a model lacks: all are tried, and one is believed if it predicts what it has not seen.
 //!
-//! Every effect is fitted together with the base. The best few by ln likelihood predict held-out
-//! patches from fits that never saw them. One is accepted when that gain is more than two standard
-//! errors over patches, its gain in the fit beats that of placebos with as many numbers and a stated
-//! least, and it changes the data by a stated least size.
+//! Every effect is screened on a sample of the looks; those that promise enough are fitted together with
+//! the base, first on the sample, the best few on all looks. These predict held-out patches from fits
+//! without them. One is accepted when that gain is more than two standard errors over patches (or, for
+//! what acts in one small place, far beyond chance and found again where it was not fitted), its gain
+//! in the fit beats that of placebos and a stated least, and it changes the data by a stated least
+//! size.
 
 use nalgebra::DVector;
 use serde::Serialize;

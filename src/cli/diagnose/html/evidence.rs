@@ -163,7 +163,7 @@ fn power(controls: &Controls) -> String {
         .injection_recovery
         .iter()
         .map(|power| {
-            let least = power.least_db.map_or("never".to_owned(), |db| format!("{db:.2}"));
+            let least = power.least_db.map_or("not worked out".to_owned(), |db| format!("{db:.2}"));
             let recovered = match power.recovered {
                 Some(true) => "found again",
                 Some(false) => "not found",
