@@ -137,7 +137,7 @@ fn hook_connections() {
 fn any_step_may_fail() {
     // A write has some 2000 steps, and making a database ten times as many; all of them would take
     // minutes. Primes meet loops unevenly.
-    let every = |write: Write| if let Write::Make = write { 101 } else { 13 };
+    let every = |write: Write| if let Write::Make = write { 61 } else { 7 };
     hook_connections();
     for write in WRITES {
         let folder = tempfile::tempdir().unwrap();

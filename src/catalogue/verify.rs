@@ -15,7 +15,7 @@ use super::CatalogueError;
 use super::api::{self, Entry, Index, Record, SCHEMA_VERSION};
 use super::folder::{INDEX, SUMS, files, hashed};
 use super::publish::DATABASE;
-use super::refit::refit;
+use crate::fit::again::problems;
 use crate::store::{RevisionSummary, Store, StoreError, Stored, Summary};
 
 /// Largest database or table that is read, bytes.
@@ -263,10 +263,10 @@ fn check_material(
 
 fn check_fits(stored: &Stored, report: &mut dyn FnMut(Problem)) -> usize {
     let material = &stored.material;
-    let again = material.fits.iter().filter_map(|fit| Some((fit, refit(material, fit)?)));
+    let again = material.fits.iter().filter_map(|fit| Some((fit, problems(material, fit)?)));
     again
-        .map(|(fit, result)| {
-            if let Err(what) = result {
+        .map(|(fit, wrong)| {
+            for what in wrong {
                 let place = format!("{}@{}, fit `{}`", material.slug, stored.revision, fit.name);
                 report(problem(place, what));
             }

@@ -5,10 +5,8 @@ use serde::Serialize;
 use super::console::Console;
 use super::database::Database;
 use crate::error::Error;
-use crate::fit::again::differences;
-use crate::material::{Curve, Fit, Material};
+use crate::fit::again::problems;
 use crate::measure::AngleStatistics;
-use crate::measure::curve::Curve as Rows;
 use crate::measure::statistics::by_angle;
 use crate::store::{Store, StoreError, Stored, Summary};
 
@@ -107,23 +105,13 @@ fn revision(record: &mut Record, store: &Store, stored: &Stored, place: &str) ->
             record.wrong(&place, "its statistics are not those of its points");
         }
     }
-    material.fits.iter().for_each(|fit| again(record, material, fit, place));
-    Ok(())
-}
-
-/// Fits again what says how it was fitted.
-fn again(record: &mut Record, material: &Material, fit: &Fit, place: &str) {
-    let named = |curve: &&Curve| fit.curve.as_ref() == Some(&curve.name);
-    let Some(curve) = material.curves.iter().find(named).filter(|_| fit.report.is_some()) else {
-        return;
-    };
-    record.fits += 1;
-    let place = format!("{place}, fit {}", fit.name);
-    match Rows::from_observations(&curve.observations).map(|rows| differences(fit, &rows)) {
-        Ok(Ok(found)) => found.iter().for_each(|problem| record.wrong(&place, problem)),
-        Ok(Err(error)) => record.wrong(&place, error),
-        Err(error) => record.wrong(&place, error),
+    for fit in &material.fits {
+        let Some(wrong) = problems(material, fit) else { continue };
+        record.fits += 1;
+        let place = format!("{place}, fit {}", fit.name);
+        wrong.iter().for_each(|problem| record.wrong(&place, problem));
     }
+    Ok(())
 }
 
 fn are_same(kept: &[AngleStatistics], made: &[AngleStatistics]) -> bool {

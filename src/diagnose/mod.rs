@@ -37,6 +37,7 @@ mod screen;
 mod select;
 #[cfg(test)]
 mod tests;
+mod trial;
 
 use serde::Serialize;
 use thiserror::Error;

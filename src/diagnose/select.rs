@@ -18,27 +18,14 @@ use super::refit::{Fitted, Problem, Slope, Space, sum};
 use super::residual::{self, Unexplained, speckle_sd_db};
 use super::score::{DB, Scored, scored};
 use super::screen::{Sample, Screen};
+use super::trial::Trial;
 use super::{Diagnosis, Evidence};
-use crate::effects::{Effect, Knob, Level, Prediction, Receiver};
+use crate::effects::{Effect, Level, Prediction, Receiver};
 use crate::fit::minimise::Minimise;
 
 /// Steps of a fit, and of one on the sample that only shows whether an effect is worth it.
-const SEARCH: Minimise = Minimise { iterations: 20, tolerance: 0.1 };
-const SCOUT: Minimise = Minimise { iterations: 12, tolerance: 0.1 };
-/// Starts of an effect that are followed.
-const STARTS: usize = 2;
-/// How far the shape of a start is moved, in felt steps.
-const SHAPE_STEPS: [f64; 3] = [4.0, 2.0, 1.0];
-/// Strengths of a start that are tried.
-const STRENGTHS: [f64; 6] = [0.3, 1.0, 3.0, 7.0, 12.0, 20.0];
-/// And none that promises less than this share of what the best does.
-const SHARE_OF_START: f64 = 0.7;
-/// Effects that promise less than this share of the best are not fitted at all.
-const SHARE_TO_SCOUT: f64 = 0.1;
-/// Effects of each round that are fitted to all looks and predict held-out patches: at most so many,
-/// and none that gains less than this share of the best.
-const SHORTLIST: usize = 5;
-const SHARE_OF_BEST: f64 = 0.3;
+pub(super) const SEARCH: Minimise = Minimise { iterations: 20, tolerance: 0.1 };
+pub(super) const SCOUT: Minimise = Minimise { iterations: 12, tolerance: 0.1 };
 /// An effect that changes less than this share of what the largest does may be the error of its form.
 const SHARE_OF_LARGEST: f64 = 0.2;
 /// And of the scatter: a form that is off here and there scatters more than it shifts.
@@ -113,20 +100,6 @@ pub(super) struct State<'a> {
 pub(super) struct Added {
     pub class: Vec<&'static str>,
     pub evidence: Evidence,
-}
-
-/// A fit of one more effect.
-struct Trial<'a> {
-    effect: &'a dyn Effect,
-    space: Space<'a>,
-    /// What they promise, and where they are.
-    starts: Vec<(f64, DVector<f64>)>,
-    /// How many starts there were.
-    tried: usize,
-    fitted: Fitted,
-    /// What it changes of the means and of the spread, dB.
-    sizes_db: [f64; 2],
-    candidate: Candidate,
 }
 
 /// All that the selection needs.
@@ -291,187 +264,6 @@ impl Selection<'_> {
         }
     }
 
-    /// Every effect that is not there yet, best first. Those worth it are fitted to all looks, the
-    /// rest to a sample.
-    fn trials<'a>(
-        &self,
-        state: &State<'a>,
-        effects: &[&'a dyn Effect],
-        round: usize,
-    ) -> Vec<Trial<'a>> {
-        let absent = |effect: &&&dyn Effect| {
-            state.space.effects.iter().all(|there| there.name() != effect.name())
-        };
-        (self.hear)(&format!("round {round}: screening {} effects", effects.len()));
-        let sample = self.sample;
-        let screen = Screen::new(sample.problem(&self.problem), &state.space, &state.fitted.at);
-        let mut trials: Vec<Trial> = effects
-            .iter()
-            .filter(absent)
-            .filter_map(|effect| self.promised(state, &screen, sample.weight, *effect, round))
-            .collect();
-        sort(&mut trials);
-        let mut best = 0.25 * self.settings.least_gain_of(1, 1) / SHARE_TO_SCOUT;
-        for trial in &mut trials {
-            if trial.candidate.gain >= SHARE_TO_SCOUT * best {
-                (self.hear)(&format!("round {round}: trying {}", trial.effect.name()));
-                self.scout(state, &screen, sample.weight, trial);
-                best = best.max(trial.candidate.gain);
-            }
-        }
-        sort(&mut trials);
-        let best = trials.first().map_or(0.0, |trial| trial.candidate.gain);
-        let least = (SHARE_OF_BEST * best).max(0.5 * self.settings.least_gain_of(1, 1));
-        for trial in trials.iter_mut().take(SHORTLIST) {
-            if trial.candidate.gain >= least {
-                (self.hear)(&format!("round {round}: refitting with {}", trial.effect.name()));
-                self.refit(state, trial);
-            }
-        }
-        sort(&mut trials);
-        trials
-    }
-
-    /// An effect at the start that promises most.
-    fn promised<'a>(
-        &self,
-        state: &State<'a>,
-        screen: &Screen,
-        weight: f64,
-        effect: &'a dyn Effect,
-        round: usize,
-    ) -> Option<Trial<'a>> {
-        let space = state.space.with(effect);
-        let starts = effect.starts(self.problem.stage, self.problem.looks);
-        let mut starts: Vec<(f64, DVector<f64>)> = starts
-            .iter()
-            .map(|values| {
-                let start = Space::joined(&state.fitted.at, effect, values);
-                (weight * screen.promise(&space, &start), start)
-            })
-            .collect();
-        starts.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let tried = starts.len();
-        starts.truncate(STARTS);
-        let first = state.fitted.at.len();
-        for (promise, start) in &mut starts {
-            self.shape(screen, &space, effect, weight, (promise, start));
-            self.scale(screen, &space, effect, first, start);
-        }
-        // A start at which the effect is absent promises nothing, and is tried all the same.
-        let is_absent = tried == 1 && starts.iter().all(|start| start.0 == 0.0);
-        if round == 1
-            && !is_absent
-            && let Some(declared) = self.declared(screen, &state.space, effect)
-        {
-            starts.push((starts.first().map_or(0.0, |start| start.0), declared));
-        }
-        let (gain, at) = starts.first()?.clone();
-        let gain = if is_absent { f64::INFINITY } else { gain };
-        let candidate = Candidate {
-            round,
-            name: effect.name(),
-            numbers: effect.knobs().len(),
-            gain,
-            sampled: true,
-            placebo_gain: None,
-            held_out: None,
-            size_db: 0.0,
-            converged: false,
-            accepted: false,
-        };
-        let fitted = Fitted { at, ln_likelihood: f64::NEG_INFINITY, converged: false };
-        Some(Trial { effect, space, starts, tried, fitted, sizes_db: [0.0; 2], candidate })
-    }
-
-    /// The best start with the laws as the scene declares them: without an effect that bends the whole
-    /// curve, such as a ceiling, the fitted laws may be far from any that go with it.
-    fn declared(&self, screen: &Screen, base: &Space, effect: &dyn Effect) -> Option<DVector<f64>> {
-        let space = base.with(effect);
-        let starts = effect.starts(self.problem.stage, self.problem.looks);
-        let declared = starts.iter().map(|values| Space::joined(&base.start(), effect, values));
-        let gains = declared.map(|start| (screen.gain(&space, &start), start));
-        gains.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, start)| start)
-    }
-
-    /// Moves what only shapes an effect, such as a place, to where the start promises more.
-    fn shape(
-        &self,
-        screen: &Screen,
-        space: &Space,
-        effect: &dyn Effect,
-        weight: f64,
-        (promise, start): (&mut f64, &mut DVector<f64>),
-    ) {
-        let first = start.len().saturating_sub(effect.knobs().len());
-        let shapes = effect.knobs().iter().enumerate().skip(1);
-        let is_shape = |(_, knob): &(usize, &Knob)| knob.absent != knob.max && *promise > 0.0;
-        for (index, knob) in shapes.filter(is_shape).collect::<Vec<_>>().repeat(SHAPE_STEPS.len()) {
-            for steps in SHAPE_STEPS.iter().flat_map(|s| [*s, -*s]) {
-                let mut moved = start.clone();
-                let place = &mut moved[first + index];
-                *place = (*place + steps).clamp(knob.min / knob.step, knob.max / knob.step);
-                let there = weight * screen.promise(space, &moved);
-                if there > *promise {
-                    (*promise, *start) = (there, moved);
-                }
-            }
-        }
-    }
-
-    /// Makes a start as strong as it gains most: far from the data, outliers would hold it.
-    fn scale(
-        &self,
-        screen: &Screen,
-        space: &Space,
-        effect: &dyn Effect,
-        first: usize,
-        start: &mut DVector<f64>,
-    ) {
-        let Some(knob) = effect.knobs().first() else { return };
-        let scaled = |scale: f64| {
-            let mut scaled = start.clone();
-            let value = knob.absent + scale * (start[first] * knob.step - knob.absent);
-            scaled[first] = value.clamp(knob.min, knob.max) / knob.step;
-            (screen.gain(space, &scaled), scaled)
-        };
-        let best = STRENGTHS.map(scaled).into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((_, scaled)) = best {
-            *start = scaled;
-        }
-    }
-
-    /// Fits a trial to the sample.
-    fn scout(&self, state: &State, screen: &Screen, weight: f64, trial: &mut Trial) {
-        let space = &trial.space;
-        let here = sum(&screen.problem.terms(&state.space, &state.fitted.at));
-        let most = trial.starts.first().map_or(0.0, |start| start.0);
-        let useful = trial.starts.iter().filter(|start| start.0 >= SHARE_OF_START * most);
-        let held = state.space.costly(&state.fitted.at);
-        let scouts = useful.map(|(_, start)| screen.problem.fit(space, start, &held, &SCOUT));
-        let best = scouts
-            .filter(|fit| fit.ln_likelihood.is_finite())
-            .max_by(|a, b| a.ln_likelihood.total_cmp(&b.ln_likelihood));
-        if let Some(best) = best {
-            trial.candidate.gain = weight * (best.ln_likelihood - here);
-            trial.candidate.converged = best.converged;
-            trial.sizes_db = self.sizes_db(state, space, &best.at);
-            trial.fitted = best;
-            trial.candidate.size_db = larger(trial.sizes_db);
-        }
-    }
-
-    /// Fits a trial to all looks.
-    fn refit(&self, state: &State, trial: &mut Trial) {
-        let held = state.space.costly(&state.fitted.at);
-        trial.fitted = self.problem.fit(&trial.space, &trial.fitted.at, &held, &SEARCH);
-        trial.candidate.gain = trial.fitted.ln_likelihood - state.fitted.ln_likelihood;
-        trial.candidate.sampled = false;
-        trial.sizes_db = self.sizes_db(state, &trial.space, &trial.fitted.at);
-        trial.candidate.size_db = larger(trial.sizes_db);
-        trial.candidate.converged = trial.fitted.converged;
-    }
-
     /// The effect to add: its place, its held-out scores, and the names that do as well.
     fn chosen(
         &self,
@@ -595,7 +387,7 @@ impl Selection<'_> {
     }
 
     /// Root mean square change of the means of all detections, and change of the spread, dB.
-    fn sizes_db(&self, state: &State, space: &Space, at: &DVector<f64>) -> [f64; 2] {
+    pub fn sizes_db(&self, state: &State, space: &Space, at: &DVector<f64>) -> [f64; 2] {
         let before = &self.problem.predict(&state.space, &state.fitted.at);
         let after = &self.problem.predict(space, at);
         // Spreads add in squares.
@@ -615,7 +407,7 @@ impl Selection<'_> {
     }
 }
 
-fn larger([a, b]: [f64; 2]) -> f64 {
+pub(super) fn larger([a, b]: [f64; 2]) -> f64 {
     a.max(b)
 }
 
@@ -633,10 +425,6 @@ fn plainness(effect: &dyn Effect) -> (usize, u8) {
 fn smallest(added: &[Added]) -> Option<usize> {
     let sizes = added.iter().map(|a| a.evidence.size_db).enumerate();
     sizes.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)
-}
-
-fn sort(trials: &mut [Trial]) {
-    trials.sort_by(|a, b| b.candidate.gain.total_cmp(&a.candidate.gain));
 }
 
 fn rms(values: &[f64]) -> f64 {

@@ -1,11 +1,13 @@
 //! A stored fit once more: whether its curve and its settings still give it.
 
 use super::{Fit, FitError, FitResult, Method};
-use crate::material::{self, FitReport};
+use crate::material::{self, FitReport, Material};
 use crate::measure::curve::Curve;
 
-/// How far ln likelihoods, or half sums of squares, of two searches for one optimum may differ.
-const SAME_OBJECTIVE: f64 = 0.05;
+/// How far ln likelihoods, or half sums of squares, of two searches for one optimum may differ: where
+/// they stopped, and rounding, relative. One standard deviation of a number is half a unit.
+const SAME_OBJECTIVE: f64 = 0.01;
+const ROUNDING: f64 = 1e-6;
 /// How far numbers may, in their standard deviations.
 const SAME_NUMBER_SD: f64 = 0.1;
 
@@ -40,6 +42,16 @@ pub fn settings(report: &FitReport) -> Option<Fit> {
     })
 }
 
+/// What is wrong with a material's fit, a sentence each: it must follow from its own curve. `None` when
+/// the fit has no report, or no curve here.
+pub fn problems(material: &Material, fit: &material::Fit) -> Option<Vec<String>> {
+    fit.report.as_ref()?;
+    let curve = material.curves.iter().find(|curve| Some(&curve.name) == fit.curve.as_ref())?;
+    let curve = Curve::from_observations(&curve.observations).map_err(|error| error.to_string());
+    let found = curve.and_then(|curve| differences(fit, &curve).map_err(|error| error.to_string()));
+    Some(found.unwrap_or_else(|error| vec![error]))
+}
+
 /// Fits the curve of a stored fit again, from what was found, and says what differs, a sentence each.
 /// Nothing is said of a fit without a report.
 ///
@@ -61,7 +73,7 @@ pub fn differences(stored: &material::Fit, curve: &Curve) -> Result<Vec<String>,
 fn compare(report: &FitReport, found: &FitResult) -> Vec<String> {
     let mut differences = Vec::new();
     let gap = (report.objective - found.objective).abs();
-    if gap.is_nan() || gap > SAME_OBJECTIVE {
+    if gap.is_nan() || gap > SAME_OBJECTIVE + ROUNDING * report.objective.abs() {
         differences.push(format!(
             "its objective is stored as {:.4}, and a new fit reaches {:.4}",
             report.objective, found.objective
@@ -81,8 +93,10 @@ fn compare(report: &FitReport, found: &FitResult) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::model;
     use super::super::twin::{Twin, mixture};
     use super::*;
+    use crate::material::builtin;
 
     #[test]
     fn a_fit_is_found_again_and_a_changed_one_is_not() {
@@ -102,5 +116,57 @@ mod tests {
         told.value += told.sd.unwrap();
         report.objective += 1.0;
         assert_eq!(differences(&stored, &curve).unwrap().len(), 2);
+    }
+
+    /// A material with a curve and the fit of it.
+    fn material_with(fit: &Fit) -> Material {
+        let mut text = "theta_deg,sigma0_db\n".to_owned();
+        for step in 0..60 {
+            let theta_deg = f64::from(step);
+            let ripple = f64::from((step * 7) % 11) / 2.0 - 2.5;
+            text += &format!("{theta_deg},{}\n", ripple - theta_deg / 4.0);
+        }
+        let curve = Curve::read(text.as_bytes()).unwrap();
+        let mut material = builtin::get("ptfe").unwrap().unwrap();
+        let source = material.sources[0].key.clone();
+        let found = fit.run(&model("blinn-phong").unwrap(), &curve).unwrap();
+        material.fits.push(found.stored("again", "scan", &source));
+        material.curves.push(material::Curve {
+            name: "scan".to_owned(),
+            source,
+            instrument: None,
+            session: None,
+            observations: curve.observations(),
+        });
+        material
+    }
+
+    #[test]
+    fn a_fit_follows_from_its_curve_and_nothing_else_does() {
+        let tls = Method::Tls { theta_sd_rad: 0.01, level_sd_db: 3.0 };
+        let held = vec![("alpha".to_owned(), 2.0)];
+        let fits = [
+            Fit::default(),
+            Fit { looks: Some(3.0), ..Fit::default() },
+            Fit { method: tls, fixed: held, ..Fit::default() },
+        ];
+        let said =
+            |material: &Material, fit: &material::Fit| problems(material, fit).unwrap().join("; ");
+        for settings in fits {
+            let material = material_with(&settings);
+            let fit = material.fits.last().unwrap();
+            assert_eq!(problems(&material, fit), Some(Vec::new()), "{settings:?}");
+            assert_eq!(problems(&material, &material.fits[0]), None, "nothing was fitted there");
+            let mut moved = fit.clone();
+            moved.report.as_mut().unwrap().objective += 0.1;
+            assert!(said(&material, &moved).contains("its objective is stored"));
+            let mut moved = fit.clone();
+            let estimate = &mut moved.report.as_mut().unwrap().estimates[0];
+            estimate.value += estimate.sd.unwrap();
+            assert!(said(&material, &moved).contains("a new fit gives"));
+            let mut other = material.clone();
+            other.curves.last_mut().unwrap().observations[3].sigma0 = Some(1e-3);
+            assert!(said(&other, fit).contains("not the one that was fitted"));
+        }
     }
 }

@@ -44,7 +44,7 @@ pub(super) fn residuals(report: &Report, spot_m: f64) -> Result<Picture, FigureE
         .map(|e| format!("rmse {:.2} dB, mean {} dB", e.rmse_db, signed(e.bias_db, 2)));
     let before = (&residual(|row| row.before_dbm) as &dyn Fn(&Row) -> Option<f64>, before);
     let after = (&residual(|row| row.after_dbm) as &dyn Fn(&Row) -> Option<f64>, after);
-    maps(&subject, report, spot_m, [before, after])
+    maps(&subject, report, spot_m, &before_after(report, [before, after]))
 }
 
 /// Mean quantile residual, which chirps that saw nothing have, too.
@@ -69,7 +69,7 @@ pub(super) fn quantiles(report: &Report, spot_m: f64) -> Result<Picture, FigureE
     let (before, after) = (|row: &Row| row.z_before, |row: &Row| row.z_after);
     let panels: [Panel; 2] =
         [(&|row| Some(row.z_before), size(before)), (&|row| Some(row.z_after), size(after))];
-    maps(&subject, report, spot_m, panels)
+    maps(&subject, report, spot_m, &before_after(report, panels))
 }
 
 /// The smooth term that the final model lacks; nothing where there is none.
@@ -88,64 +88,53 @@ pub(super) fn unknown(report: &Report, spot_m: f64) -> Result<Picture, FigureErr
         let caption = String::new();
         return Ok(Picture { file, title, caption, panels: Vec::new(), columns: 1 });
     }
-    let pixel_m = pixel_m(&report.rows, spot_m);
-    let empty = raster(&report.rows, pixel_m);
-    let raster = filled(&empty, &report.rows, &|row| Some(row.unknown_db));
     let squares: f64 = report.rows.iter().map(|row| row.unknown_db.powi(2)).sum();
     let rms_db = (squares / report.rows.len().max(1) as f64).sqrt();
     let note = format!("rms {rms_db:.2} dB over all chirps");
-    let reach = reach(&raster, subject.reach);
-    let panels = vec![figure(&subject, &raster, subject.title, &note, reach).drawing()?];
-    let caption = format!("{} Pixels of {:.0} mm.", subject.caption, 1e3 * pixel_m);
-    let Subject { file, title, .. } = subject;
-    Ok(Picture { file, title, caption, panels, columns: 1 })
+    let title = subject.title;
+    maps(&subject, report, spot_m, &[(title, (&|row: &Row| Some(row.unknown_db), note))])
 }
 
-fn figure<'a>(
-    subject: &Subject,
-    raster: &'a Raster,
-    title: &'a str,
-    note: &'a str,
-    reach: f64,
-) -> Figure<'a> {
-    Figure {
-        raster,
-        channel: CHANNEL,
-        title,
-        subtitle: note,
-        colour_label: subject.quantity,
-        range: Some((-reach, reach)),
-        scale: Scale::Diverging,
-        gaps: subject.gaps,
-        x_label: "x in the target plane, m",
-        y_label: "y in the target plane, m",
-    }
-}
-
-fn maps(
-    subject: &Subject,
-    report: &Report,
-    spot_m: f64,
-    panels: [Panel; 2],
-) -> Result<Picture, FigureError> {
-    let pixel_m = pixel_m(&report.rows, spot_m);
-    let empty = raster(&report.rows, pixel_m);
-    let rasters = panels.each_ref().map(|(pick, _)| filled(&empty, &report.rows, *pick));
-    let reach = reach(&rasters[0], subject.reach);
-    let notes = panels.map(|(_, note)| note);
+/// The panels of the models that a picture shows, with their titles.
+fn before_after<'a>(report: &Report, panels: [Panel<'a>; 2]) -> Vec<(&'static str, Panel<'a>)> {
     let titles = match report.effects.is_empty() {
         true => ["Base model", ""],
         false => ["Before: base model", "After: with the effects"],
     };
-    let drawing = |((raster, title), note): ((&Raster, &str), &String)| {
-        figure(subject, raster, title, note, reach).drawing()
+    titles.into_iter().zip(shown(report, panels)).collect()
+}
+
+/// A map for each panel, all in the colours of the first.
+fn maps(
+    subject: &Subject,
+    report: &Report,
+    spot_m: f64,
+    panels: &[(&'static str, Panel)],
+) -> Result<Picture, FigureError> {
+    let pixel_m = pixel_m(&report.rows, spot_m);
+    let empty = raster(&report.rows, pixel_m);
+    let rasters = panels.iter().map(|(_, (pick, _))| filled(&empty, &report.rows, *pick));
+    let rasters: Vec<Raster> = rasters.collect();
+    let reach = rasters.first().map_or(0.0, |first| reach(first, subject.reach));
+    let drawing = |(raster, (title, (_, note))): (&Raster, &(&'static str, Panel))| {
+        let figure = Figure {
+            raster,
+            channel: CHANNEL,
+            title,
+            subtitle: note,
+            colour_label: subject.quantity,
+            range: Some((-reach, reach)),
+            scale: Scale::Diverging,
+            gaps: subject.gaps,
+            x_label: "x in the target plane, m",
+            y_label: "y in the target plane, m",
+        };
+        figure.drawing()
     };
-    let [before, after] = &rasters;
-    let panels = shown(report, [before, after]).into_iter().zip(titles).zip(&notes);
-    let panels = panels.map(drawing).collect::<Result<_, _>>()?;
+    let drawn = rasters.iter().zip(panels).map(drawing).collect::<Result<_, _>>()?;
     let caption = format!("{} Pixels of {:.0} mm.", subject.caption, 1e3 * pixel_m);
     let Subject { file, title, .. } = *subject;
-    Ok(Picture { file, title, caption, panels, columns: 2 })
+    Ok(Picture { file, title, caption, panels: drawn, columns: panels.len() })
 }
 
 const CHANNEL: &str = "residual";
