@@ -210,7 +210,7 @@ fn an_effect_of_a_material_leaves_the_others_as_they_are() {
     let bench = Bench::new(SCENE);
     let rough = find("subsurface").unwrap();
     let mut effects = SceneEffects::default();
-    effects.add_to_regions(vec![(rough, vec![0.02])], &[false, true]);
+    effects.add_to_regions(vec![(rough, vec![0.02, 0.0])], &[false, true]);
     let with = bench.render(&bench.model(&effects), 1).unwrap();
     let mut changed = 0;
     for (bare, with) in std::iter::zip(bench.bare(), with) {
@@ -322,14 +322,14 @@ fn tilts_that_vary_scatter_the_power_where_the_curve_is_steep() {
     let sd_deg = 0.5;
     let effects = one("angle-error", &[sd_deg]);
     let model = bench.model(&effects);
-    let slopes = bench.with_stage(|stage, looks| model.predict(stage, looks).slope_per_rad);
+    let predicted = bench.with_stage(|stage, looks| model.predict(stage, looks));
     let (bare, with) = (bench.bare(), bench.render(&model, 1).unwrap());
     let shift = |(with, bare): (&Echo, &Echo)| {
         (with.power_dbm - bare.power_dbm) / 10.0 * std::f64::consts::LN_10
     };
     let shifts: Vec<f64> = std::iter::zip(&with, &bare).map(shift).collect();
-    let expected = |slope: &f64| (slope * f64::to_radians(sd_deg)).powi(2);
-    let expected = slopes.iter().map(expected).sum::<f64>() / slopes.len() as f64;
+    let spread = |look: usize| predicted.tilt_spread(look).powi(2);
+    let expected = (0..shifts.len()).map(spread).sum::<f64>() / shifts.len() as f64;
     let [mean, variance] = moments(&shifts);
     // The deviation of a variance over 10 000 draws is 1.4 %, and second order adds about as much.
     assert!((variance / expected - 1.0).abs() < 0.08, "{variance} {expected}");

@@ -5,14 +5,13 @@ use nalgebra::DVector;
 
 use super::covariates::covariates;
 use super::field::Field;
-use super::likelihood::Likelihood;
 use super::looks::Observation;
 use super::placebo::Placebo;
 use super::refit::{Problem, Space};
 use super::screen::Screen;
 use super::select::{Selection, State};
 use super::{Control, Controls, Power};
-use crate::effects::Effect;
+use crate::effects::{Effect, Prediction};
 use crate::radar::random::{Key, Purpose};
 
 /// Strength of an injected effect, in sizes that would just be seen.
@@ -118,7 +117,6 @@ fn recovered(
 ) -> bool {
     let problem = &selection.problem;
     let [bare, full] = [problem.predict(&base.space, &base.fitted.at), problem.predict(space, at)];
-    let [law, with] = [&bare, &full].map(|p| Likelihood::new(p, problem.declared));
     let looks = bare.receiver.looks;
     let draw = |look: usize| {
         let key = Key {
@@ -127,15 +125,16 @@ fn recovered(
             sub_ray: 4,
             purpose: Purpose::Fit,
         };
-        let mean_w = law.mean_w(look);
-        let changed = |p: &crate::effects::Prediction| p.arrived.get(look).copied().flatten();
+        let mean_w = bare.mean_w(look);
+        let changed = |p: &Prediction| p.arrived.get(look).copied().flatten();
         // Means with thermal noise, so that more of that is put in, too.
-        let ln_factor = match with.mean_w(look) {
-            full_w if mean_w > 0.0 && full_w > 0.0 => scale * (full_w / mean_w).ln(),
+        let ln_factor = match [bare.passed_w(look), full.passed_w(look)] {
+            [bare_w, full_w] if bare_w > 0.0 && full_w > 0.0 => scale * (full_w / bare_w).ln(),
             _ => 0.0,
         };
         let mut draws = key.draws();
-        let power_w = mean_w * ln_factor.clamp(-5.0, 5.0).exp() * draws.gamma(looks);
+        let drawn_w = bare.saturating.passed_w(mean_w, mean_w * draws.gamma(looks));
+        let power_w = drawn_w * ln_factor.clamp(-5.0, 5.0).exp();
         let is_detected = power_w >= problem.declared.threshold_w;
         let range_m = changed(&bare).zip(changed(&full)).map(|(bare, full)| {
             let error_m = problem.declared.range_sd_m * draws.gaussian();

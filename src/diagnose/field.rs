@@ -121,7 +121,10 @@ impl Field {
             .filter(|look| problem.observations.get(*look).is_some_and(|o| o.power_w.is_some()))
             .collect();
         let rms_db = |part: &dyn Fn(usize) -> f64| {
-            let sum: f64 = detected.iter().map(|look| part(*look).powi(2)).sum();
+            // As it is seen: what a receiver does not pass counts for nothing.
+            let seen =
+                |look: usize| part(look) * prediction.saturating.passes(prediction.mean_w(look));
+            let sum: f64 = detected.iter().map(|look| seen(*look).powi(2)).sum();
             DB * (sum / detected.len().max(1) as f64).sqrt()
         };
         let mut names = self.names.clone();

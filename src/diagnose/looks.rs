@@ -9,12 +9,13 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::DiagnoseError;
-use crate::effects::{Look, Stage};
+use crate::effects::{Look, Model, Stage};
 use crate::frames::{Direction, Global, Point, Pose};
 use crate::measure::cloud::{Cloud, CloudPoint};
 use crate::measure::nearest::Nearest;
 use crate::radar::{Chirps, Radar};
 use crate::render::{LocalFrame, trace};
+use crate::trace::Hit;
 use crate::units::watts_from_dbm;
 
 /// What one chirp that should hit the target has seen.
@@ -26,16 +27,34 @@ pub struct Observation {
     pub range_m: Option<f64>,
 }
 
+/// A detection that is no look's: its chirp meets no target, or one at another range.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stray {
+    /// The chirp; of no range where it misses, and none where the scan has no such chirp.
+    pub look: Option<Look>,
+    /// Range of the detection, m.
+    pub range_m: f64,
+}
+
+impl Stray {
+    /// Whether it lies on the target where the effects of a model place it.
+    pub(super) fn is_on_target(&self, model: &Model, stage: &Stage) -> bool {
+        let ranges_m = self.look.map_or(Vec::new(), |look| model.ranges_m(stage, &look));
+        ranges_m.iter().any(|range_m| (range_m - self.range_m).abs() <= GATE_M)
+    }
+}
+
 /// A cloud sorted by the looks of its scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matched {
     /// One for each look.
     pub observations: Vec<Observation>,
-    /// Detections of chirps that meet no target.
-    pub beside: usize,
-    /// Detections far in range from where their chirp meets the target.
-    pub false_alarms: usize,
+    /// Detections that are no look's.
+    pub strays: Vec<Stray>,
 }
+
+/// Detections further than this from where their chirp meets the target are not from there, m.
+pub const GATE_M: f64 = 0.1;
 
 /// One look, along the axis of the beam, for every chirp that meets the target.
 ///
@@ -73,18 +92,13 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>,
 }
 
 /// Sorts a cloud by the looks of its scan, by chirp numbers or, without them, by directions. A detection
-/// further than `gate_m` from where its chirp meets the target is a false alarm, and its chirp then
-/// counts as one that saw nothing.
+/// further than [`GATE_M`] from where its chirp meets the target is a stray, and its chirp then counts as
+/// one that saw nothing.
 ///
 /// # Errors
 /// When points have no chirp number and no direction from a common origin, or when hardly any lies on
 /// the target.
-pub fn matched(
-    cloud: &Cloud,
-    chirps: &Chirps,
-    looks: &[Look],
-    gate_m: f64,
-) -> Result<Matched, DiagnoseError> {
+pub fn matched(cloud: &Cloud, chirps: &Chirps, looks: &[Look]) -> Result<Matched, DiagnoseError> {
     let index_of_chirp: HashMap<u32, usize> =
         looks.iter().enumerate().map(|(index, look)| (look.chirp, index)).collect();
     let by_direction = match cloud.points().iter().all(|point| point.chirp.is_some()) {
@@ -92,29 +106,57 @@ pub fn matched(
         false => Some(Directions::new(chirps).ok_or(DiagnoseError::Unnumbered)?),
     };
     let mut observations = vec![Observation::default(); looks.len()];
-    let [mut beside, mut false_alarms, mut on_target] = [0, 0, 0];
+    let index_of_sent: HashMap<u32, usize> = chirps.number.iter().copied().zip(0..).collect();
+    let (mut strays, mut on_target) = (Vec::new(), 0);
     for point in cloud.points() {
         let chirp = point.chirp.or_else(|| by_direction.as_ref()?.chirp(chirps, point.point));
         let index = chirp.and_then(|chirp| index_of_chirp.get(&chirp).copied());
         let seen = index.and_then(|index| Some((looks.get(index)?, observations.get_mut(index)?)));
         match seen {
-            None => beside += 1,
+            None => {
+                let sent = chirp.and_then(|chirp| index_of_sent.get(&chirp).copied());
+                let look = sent.and_then(|index| missed(chirps, index));
+                let range_m = look.map_or(0.0, |look| range_m(point, &look));
+                strays.push(Stray { look, range_m });
+            }
             Some((look, observation))
-                if off_m(point, look) <= gate_m && observation.power_w.is_none() =>
+                if off_m(point, look) <= GATE_M && observation.power_w.is_none() =>
             {
                 on_target += 1;
                 let range_m = Some(range_m(point, look));
                 let power_w = Some(watts_from_dbm(point.power_dbm));
                 *observation = Observation { power_w, range_m };
             }
-            Some(_) => false_alarms += 1,
+            Some((look, _)) => {
+                strays.push(Stray { look: Some(*look), range_m: range_m(point, look) });
+            }
         }
     }
     let (matched, points) = (on_target, cloud.points().len());
     match matched * 2 < points {
         true => Err(DiagnoseError::Elsewhere { matched, points }),
-        false => Ok(Matched { observations, beside, false_alarms }),
+        false => Ok(Matched { observations, strays }),
     }
+}
+
+/// The look of a chirp that meets nothing.
+fn missed(chirps: &Chirps, index: usize) -> Option<Look> {
+    let ray = *chirps.rays.get(index)?;
+    let hit = Hit { facet: u32::MAX, range_m: 0.0, point: ray.origin, cos_theta: 1.0 };
+    Some(Look {
+        chirp: *chirps.number.get(index)?,
+        time_s: chirps.time_s.get(index).copied().unwrap_or(0.0),
+        progress: chirps.progress(index),
+        ray,
+        hit,
+        normal: -ray.direction.xyz(),
+        target: Pose::NONE,
+        azimuth_rad: 0.0,
+        region: 0,
+        xt_m: 0.0,
+        yt_m: 0.0,
+        edge_m: 0.0,
+    })
 }
 
 /// The directions of a scan whose rays start from one point.

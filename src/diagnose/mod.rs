@@ -43,14 +43,14 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Knob, Look, Prediction, Receiver, Stage, Surveys};
+use crate::effects::{Effect, Knob, Look, Prediction, Receiver, Stage, Traced};
 use crate::fit::FitError;
 use crate::render::RenderError;
 use crate::units::dbm_from_watts;
 
 pub use folds::Folds;
 pub use likelihood::Declared;
-pub use looks::{Matched, Observation, looks, matched};
+pub use looks::{Matched, Observation, Stray, looks, matched};
 pub(crate) use refit::LEAST_LOOKS;
 pub use report::{
     Base, BaseValue, BeforeAfter, Control, Controls, Evidence, Found, Parameters, Power, Report,
@@ -135,8 +135,8 @@ pub struct Subject<'a> {
     pub looks: &'a [Look],
     /// What each of them saw.
     pub observations: &'a [Observation],
-    /// Detections that belong to no look, or far from where it meets the target.
-    pub false_alarms: usize,
+    /// Detections that are no look's.
+    pub strays: &'a [Stray],
 }
 
 /// Why nothing can be said.
@@ -226,11 +226,11 @@ impl Diagnosis {
         hear: &(dyn Fn(&str) + Sync),
     ) -> Result<Report, DiagnoseError> {
         let Subject { stage, laws, at_work, receiver, declared, .. } = *subject;
-        let Subject { looks, observations, false_alarms, .. } = *subject;
+        let Subject { looks, observations, strays, .. } = *subject;
         let folds = Folds::new(looks, self.block_m, self.folds, self.seed);
         check(subject, &folds)?;
-        let surveys = &Surveys::default();
-        let problem = Problem { stage, looks, observations, declared, receiver, surveys };
+        let traced = &Traced::default();
+        let problem = Problem { stage, looks, observations, declared, receiver, traced };
         let sample = &Sample::new(&problem);
         let selection = Selection { problem, sample, folds: &folds, settings: self, hear };
         hear("refitting the base laws");
@@ -251,10 +251,14 @@ impl Diagnosis {
         if is_structured {
             unexplained.extend(residual::of_field(&structure));
         }
-        let unknown = if is_structured { structure.ln_factor.as_slice() } else { &[] };
+        let unknown: Vec<f64> = match is_structured {
+            true => prediction.as_passed(&structure.ln_factor),
+            false => Vec::new(),
+        };
         let sd_db = residual::speckle_sd_db(prediction.receiver.looks);
         let neighbours =
             residual::of_neighbours(&z_after, looks, stage.radar.spot_diameter_m, sd_db, &folds);
+        let model = state.space.model(receiver, &state.fitted.at);
         if selection.is_shared(&neighbours, largest_db) {
             unexplained.push(neighbours);
         }
@@ -263,7 +267,7 @@ impl Diagnosis {
             &prediction,
             declared,
             observations,
-            false_alarms,
+            strays.iter().filter(|stray| !stray.is_on_target(&model, stage)).count(),
         ));
         unexplained.extend(residual::steps(observations));
         unexplained.extend(residual::lopsided(&z_after, sd_db));
@@ -286,14 +290,14 @@ impl Diagnosis {
             error,
             controls,
             base,
-            laws: state.space.model(receiver, &state.fitted.at).laws,
+            laws: model.laws,
             rows: rows(
                 subject,
                 &prediction,
                 &folds,
                 [&before, &state.held_out],
                 [&z_before, &z_after],
-                unknown,
+                &unknown,
             ),
         })
     }

@@ -13,7 +13,7 @@ use super::folds::Folds;
 use super::likelihood::{Declared, Likelihood, Term};
 use super::looks::Observation;
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Look, Model, Prediction, Receiver, Stage, Surveys, rank};
+use crate::effects::{Effect, Look, Model, Prediction, Receiver, Stage, Traced, rank};
 use crate::fit::FitError;
 use crate::fit::coordinates::Coordinates;
 use crate::fit::minimise::{Local, Minimise};
@@ -22,6 +22,9 @@ use crate::fit::minimise::{Local, Minimise};
 /// steps.
 const LAW_STEP: f64 = 5e-4;
 const EFFECT_STEP: f64 = 0.25;
+/// The same where facets move under the rays, first and last. ln p then has steps, of which a quotient
+/// sees those within its width, and a search goes about as far at a time.
+const WIDE_TO_NARROW: [f64; 3] = [1.0, 0.25, 0.06];
 /// Times that a step which does not improve is halved.
 const HALVINGS: usize = 5;
 /// Looks that a law must have to be fitted.
@@ -36,7 +39,7 @@ pub(super) struct Problem<'a> {
     pub declared: Declared,
     pub receiver: Receiver,
     /// Of these looks.
-    pub surveys: &'a Surveys,
+    pub traced: &'a Traced,
 }
 
 /// What is turned.
@@ -107,6 +110,17 @@ impl<'a> Space<'a> {
         costly
     }
 
+    /// Unknowns of the effects that move the target.
+    fn moving(&self) -> impl Iterator<Item = usize> {
+        let mut first = self.base_len();
+        self.effects.iter().flat_map(move |effect| {
+            let next = first + effect.knobs().len();
+            let unknowns = if effect.moves() { first..next } else { next..next };
+            first = next;
+            unknowns
+        })
+    }
+
     /// Unknowns of the laws; those of the effects follow.
     pub fn base_len(&self) -> usize {
         self.turned.iter().map(|(_, coordinates)| coordinates.len()).sum()
@@ -117,6 +131,12 @@ impl<'a> Space<'a> {
         let starts =
             self.turned.iter().flat_map(|(_, c)| c.start().iter().copied().collect::<Vec<_>>());
         DVector::from_vec(starts.collect())
+    }
+
+    /// A point with the laws where they begin.
+    pub fn restarted(&self, at: &DVector<f64>) -> DVector<f64> {
+        let effects = at.iter().skip(self.base_len());
+        DVector::from_vec(self.start().iter().chain(effects).copied().collect())
     }
 
     /// A point with the numbers of one more effect.
@@ -178,7 +198,7 @@ impl<'a> Space<'a> {
 impl Problem<'_> {
     /// What a point predicts.
     pub fn predict(&self, space: &Space, at: &DVector<f64>) -> Prediction {
-        space.model(self.receiver, at).predict_with(self.stage, self.looks, self.surveys)
+        space.model(self.receiver, at).predict_with(self.stage, self.looks, self.traced)
     }
 
     /// Every chirp's part of the likelihood at a point.
@@ -203,13 +223,21 @@ impl Problem<'_> {
         }
         let bounds = [&lower, &upper];
         let value = |at: &DVector<f64>| -sum(&self.terms(space, at));
-        let found = search.run_with(start, bounds, value, |at| {
-            let terms = self.terms(space, at);
-            let slopes = self.slopes(space, at, bounds, &terms);
-            local(&terms, &slopes, &|_| true)
-        });
-        let (ln_likelihood, converged) = (-found.local.value, found.converged());
-        Fitted { at: found.at, ln_likelihood, converged }
+        let from = |start: &DVector<f64>, step: f64| {
+            let found = search.run_with(start, bounds, value, |at| {
+                let terms = self.terms(space, at);
+                let slopes = self.slopes_over(step, space, at, bounds, &terms);
+                local(&terms, &slopes, &|_| true)
+            });
+            let (ln_likelihood, converged) = (-found.local.value, found.converged());
+            Fitted { at: found.at, ln_likelihood, converged }
+        };
+        let moves = space.moving().any(|index| lower[index] < upper[index]);
+        let [wide, middle, narrow] = WIDE_TO_NARROW;
+        match moves {
+            true => from(&from(&from(start, wide).at, middle).at, narrow),
+            false => from(start, EFFECT_STEP),
+        }
     }
 
     /// The most likely points of fits without each fold in turn, by a full step from the most likely
@@ -273,11 +301,23 @@ impl Problem<'_> {
         &self,
         space: &Space,
         at: &DVector<f64>,
+        bounds: [&DVector<f64>; 2],
+        here: &[Term],
+    ) -> Vec<Vec<Slope>> {
+        self.slopes_over(EFFECT_STEP, space, at, bounds, here)
+    }
+
+    /// The same by other steps of the effects' numbers.
+    fn slopes_over(
+        &self,
+        effect_step: f64,
+        space: &Space,
+        at: &DVector<f64>,
         [lower, upper]: [&DVector<f64>; 2],
         here: &[Term],
     ) -> Vec<Vec<Slope>> {
         let slope = |index: usize| {
-            let step = if index < space.base_len() { LAW_STEP } else { EFFECT_STEP };
+            let step = if index < space.base_len() { LAW_STEP } else { effect_step };
             let moved = |by: f64| {
                 let mut there = at.clone();
                 there[index] = (at[index] + by).clamp(lower[index], upper[index]);

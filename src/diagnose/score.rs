@@ -113,7 +113,7 @@ pub(super) fn scored(
     let above = Above::new(prediction.receiver.looks);
     let one = |(look, seen): (usize, &Observation)| {
         let below = |level_w: f64| likelihood.below(look, level_w);
-        let [mean, variance] = detected_moments(&likelihood, &above, declared, look);
+        let [mean, variance] = detected_moments(&likelihood, &above, prediction, declared, look);
         let expected_dbm = DB * mean + dbm_from_watts(1.0);
         let missed = below(declared.threshold_w);
         let share = |power_w: f64| (below(power_w) - missed) / (1.0 - missed).max(1e-300);
@@ -134,17 +134,18 @@ pub(super) fn scored(
 fn detected_moments(
     likelihood: &Likelihood,
     above: &Above,
+    prediction: &Prediction,
     declared: Declared,
     look: usize,
 ) -> [f64; 2] {
     let ln_threshold = declared.threshold_w.ln();
-    let (means, passes) = (likelihood.ln_means(look), likelihood.passes(look));
     let mut sums = [0.0; 3];
-    for &(ln_mean, weight) in &means {
-        let [mean, variance] = above.at((ln_threshold - ln_mean) / passes);
-        let variance = passes * passes * variance;
-        let chance = if means.len() == 1 { 1.0 } else { likelihood.chance(ln_mean, passes) };
-        let (mean, weight) = (ln_mean + passes * mean, weight * chance.max(1e-300));
+    for (ln_mean, weight) in likelihood.ln_means(look) {
+        let passed = prediction.saturating.of(ln_mean);
+        let [mean, variance] = above.at((ln_threshold - passed.ln_mean) / passed.slope);
+        let variance = passed.slope * passed.slope * variance;
+        let chance = if weight == 1.0 { 1.0 } else { likelihood.chance(ln_mean) };
+        let (mean, weight) = (passed.ln_mean + passed.slope * mean, weight * chance.max(1e-300));
         for (sum, part) in sums.iter_mut().zip([1.0, mean, variance + mean * mean]) {
             *sum += weight * part;
         }

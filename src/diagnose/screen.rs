@@ -11,7 +11,7 @@ use super::likelihood::Term;
 use super::looks::Observation;
 use super::refit::{Problem, Slope, Space, sum};
 use super::score::DB;
-use crate::effects::{Look, Surveys};
+use crate::effects::{Look, Traced};
 
 /// Looks that a screening needs; more only take time.
 const ENOUGH: usize = 2500;
@@ -23,7 +23,7 @@ const MOST_SCALE: f64 = 5.0;
 pub(super) struct Sample {
     looks: Vec<Look>,
     observations: Vec<Observation>,
-    surveys: Surveys,
+    traced: Traced,
     /// Looks that each of them stands for.
     pub weight: f64,
 }
@@ -35,13 +35,13 @@ impl Sample {
         let looks: Vec<Look> = problem.looks.iter().step_by(every).copied().collect();
         let observations = problem.observations.iter().step_by(every).copied().collect();
         let weight = problem.looks.len() as f64 / looks.len().max(1) as f64;
-        Sample { looks, observations, surveys: Surveys::default(), weight }
+        Sample { looks, observations, traced: Traced::default(), weight }
     }
 
     /// The problem of these looks alone.
     pub fn problem<'a>(&'a self, whole: &Problem<'a>) -> Problem<'a> {
-        let Sample { looks, observations, surveys, .. } = self;
-        Problem { looks, observations, surveys, ..*whole }
+        let Sample { looks, observations, traced, .. } = self;
+        Problem { looks, observations, traced, ..*whole }
     }
 }
 

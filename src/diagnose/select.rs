@@ -46,6 +46,8 @@ const SHARE_KEPT: f64 = 0.6;
 const FAR_BEYOND: f64 = 4.0;
 /// Placebos of each comparison.
 const PLACEBOS: u64 = 3;
+/// Effects of one round of which pairs are tried.
+const MOST_PAIRED: usize = 4;
 /// Difference in ln p of all held-out looks that tells no two effects apart: odds of twenty to one.
 const SAME: f64 = 3.0;
 /// Looks of a first fit of the base, that is not caught far from the data.
@@ -141,8 +143,15 @@ impl Selection<'_> {
                 false => None,
             };
             let Some((index, held_out, class)) = chosen else {
+                let pair = match added.len() + 2 <= self.settings.most_effects {
+                    true => self.pair(&state, &mut trials),
+                    false => None,
+                };
                 ranking.extend(trials.into_iter().map(|trial| trial.candidate));
-                break;
+                let Some((both, next)) = pair else { break };
+                added.extend(both);
+                state = next;
+                continue;
             };
             if let Some(trial) = trials.get_mut(index) {
                 trial.candidate.accepted = true;
@@ -151,6 +160,12 @@ impl Selection<'_> {
                 if !state.space.costly(&state.fitted.at).is_empty() {
                     fitted = self.problem.fit(&space, &fitted.at, &[], &SCOUT);
                     held_out = self.held_out(&space, &fitted.at);
+                }
+                // Laws that were fitted without the effect may be far from any that go with it.
+                let again = self.problem.fit(&space, &space.restarted(&fitted.at), &[], &SEARCH);
+                if again.ln_likelihood > fitted.ln_likelihood + SEARCH.tolerance {
+                    held_out = self.held_out(&space, &again.at);
+                    fitted = again;
                 }
                 state = State { space, fitted, held_out };
                 let Candidate { gain, size_db, .. } = trial.candidate;
@@ -168,9 +183,15 @@ impl Selection<'_> {
             && self.is_structured(&structure, 0.0)
             && added[least].evidence.size_db < structure.size_db
         {
-            state = self.without(&state, least);
+            let without = self.without(&state, least);
+            let left = self.structure(&without);
+            // What predicts more than any field of the means is no error of their form.
+            let [gain, _] = self.difference(&state.held_out, &without.held_out);
+            if gain > left.gain[0] {
+                break;
+            }
+            (state, structure) = (without, left);
             added.remove(least);
-            structure = self.structure(&state);
         }
         Selected { state, ranking, added, structure }
     }
@@ -322,7 +343,7 @@ impl Selection<'_> {
         let behind = |other: &(usize, Vec<Scored>, f64)| self.difference(&first.1, &other.1);
         // Of those that the data do not tell apart the simplest comes first.
         let tied = passed.iter().filter(|other| behind(other)[0] <= SAME);
-        let best = tied.min_by_key(|one| plainness(trials[one.0].effect))?;
+        let best = tied.min_by_key(|one| plainness(&trials[one.0]))?;
         let class = passed.iter().filter(|other| other.0 != best.0).filter(|other| {
             let [worse, se] = behind(other);
             worse <= se.max(SAME)
@@ -336,6 +357,60 @@ impl Selection<'_> {
             trials[best.0].candidate.placebo_gain = Some(placebo);
         }
         Some((best.0, best.1.clone(), names))
+    }
+
+    /// Two effects of which each predicts held-out patches but does worse than placebos, because these
+    /// fit what the other does, too; together they must do better than placebos.
+    fn pair<'a>(
+        &self,
+        state: &State<'a>,
+        trials: &mut [Trial<'a>],
+    ) -> Option<([Added; 2], State<'a>)> {
+        let errors = self.settings.standard_errors;
+        let is_beaten = |trial: &&Trial| {
+            let Candidate { gain, placebo_gain, held_out, .. } = trial.candidate;
+            let predicts = held_out.is_some_and(|[gain, se]| gain > errors * se);
+            predicts && placebo_gain.is_some_and(|placebo| gain <= placebo)
+        };
+        let beaten: Vec<&Trial> = trials.iter().filter(is_beaten).take(MOST_PAIRED).collect();
+        let pairs = beaten
+            .iter()
+            .enumerate()
+            .flat_map(|(i, a)| beaten.iter().skip(i + 1).map(move |b| [*a, *b]));
+        let fits = pairs.map(|[a, b]| {
+            let space = a.space.with(b.effect);
+            let start = a.fitted.at.iter().chain(b.fitted.at.iter().skip(state.fitted.at.len()));
+            let start = DVector::from_vec(start.copied().collect());
+            (self.problem.fit(&space, &start, &[], &SCOUT), space, [a, b])
+        });
+        let (fitted, space, pair) =
+            fits.max_by(|a, b| a.0.ln_likelihood.total_cmp(&b.0.ln_likelihood))?;
+        let gain = fitted.ln_likelihood - state.fitted.ln_likelihood;
+        let screen = Screen::new(self.problem, &state.space, &state.fitted.at);
+        let numbers = pair.iter().map(|trial| trial.candidate.numbers).sum();
+        let placebo_gain = self.placebo_gain(state, &screen, numbers);
+        let held_out = self.held_out(&space, &fitted.at);
+        let beyond = |trial: &Trial| {
+            self.difference(&held_out, &self.held_out(&trial.space, &trial.fitted.at))
+        };
+        let are_needed = pair.iter().all(|trial| {
+            let [gain, se] = beyond(trial);
+            gain > errors * se
+        });
+        if gain <= placebo_gain || !are_needed {
+            return None;
+        }
+        let [held_out_gain, held_out_se] = self.difference(&held_out, &state.held_out);
+        let added = pair.map(|trial| {
+            let size_db = trial.candidate.size_db;
+            let evidence = Evidence { gain, placebo_gain, held_out_gain, held_out_se, size_db };
+            Added { class: Vec::new(), evidence }
+        });
+        let names = pair.map(|trial| trial.candidate.name);
+        for trial in trials.iter_mut().filter(|trial| names.contains(&trial.candidate.name)) {
+            trial.candidate.accepted = true;
+        }
+        Some((added, State { space, fitted, held_out }))
     }
 
     /// What an effect gains where the means are already corrected by a field: scatter that is only
@@ -393,16 +468,16 @@ impl Selection<'_> {
         // Spreads add in squares.
         let wider = |a: f64, b: f64| (a * a - b * b).abs().sqrt();
         let [now, then] = [after, before].map(|p| speckle_sd_db(p.receiver.looks));
-        let mean = |p: &Prediction, look: usize| {
-            let power_w = p.arrived.get(look).copied().flatten().map_or(0.0, |a| a.power_w);
-            (power_w + p.receiver.noise_w).max(f64::MIN_POSITIVE).ln()
-        };
+        let mean = |p: &Prediction, look: usize| p.passed_w(look).max(f64::MIN_POSITIVE).ln();
         let observations = self.problem.observations.iter().enumerate();
         let changes: Vec<f64> = observations
             .filter(|(_, o)| o.power_w.is_some())
             .map(|(look, _)| DB * (mean(after, look) - mean(before, look)))
             .collect();
-        let tilt = |p: &Prediction| DB * p.receiver.tilt_sd_rad * rms(&p.slope_per_rad);
+        let tilt = |p: &Prediction| {
+            let spreads: Vec<f64> = (0..p.tilts.len()).map(|look| p.tilt_spread(look)).collect();
+            DB * rms(&spreads)
+        };
         [rms(&changes), wider(now, then).max(wider(tilt(after), tilt(before)))]
     }
 }
@@ -411,14 +486,17 @@ pub(super) fn larger([a, b]: [f64; 2]) -> f64 {
     a.max(b)
 }
 
-/// Fewer numbers come first, then what is least known beforehand: of an instrument most is.
-fn plainness(effect: &dyn Effect) -> (usize, u8) {
-    let known = match effect.level() {
+/// Fewer numbers that are not where a search begins come first, then what is least known beforehand: of
+/// an instrument most is.
+fn plainness(trial: &Trial) -> (usize, u8) {
+    let known = match trial.effect.level() {
         Level::Material => 0,
         Level::Scene => 1,
         Level::Instrument => 2,
     };
-    (effect.knobs().len(), known)
+    let values = trial.space.effect_values(&trial.fitted.at).pop().unwrap_or_default();
+    let knobs = trial.effect.knobs().iter().zip(values);
+    (knobs.filter(|(knob, value)| (value - knob.absent).abs() > knob.step).count(), known)
 }
 
 /// Which of the effects is the smallest.

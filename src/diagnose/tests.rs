@@ -139,7 +139,6 @@ fn diagnosed(truth: &[(&'static dyn Effect, f64)], seed: u64) -> Report {
     let mut start = law();
     start.set_parameter("specular.m", 0.08);
     let (looks, observations, laws) = (&looks[..], &observations[..], &[start][..]);
-    let false_alarms = 0;
     let subject = Subject {
         stage: &stage,
         laws,
@@ -148,7 +147,7 @@ fn diagnosed(truth: &[(&'static dyn Effect, f64)], seed: u64) -> Report {
         declared,
         looks,
         observations,
-        false_alarms,
+        strays: &[],
     };
     let started = std::time::Instant::now();
     let report = Diagnosis { seed, ..Diagnosis::default() }.run(&subject, &LIBRARY).unwrap();
@@ -247,7 +246,7 @@ fn a_scan_with_too_little_says_so() {
         declared,
         looks: &looks,
         observations: &observations,
-        false_alarms: 0,
+        strays: &[],
     };
     let refused = Diagnosis::default().run(&subject, &LIBRARY).unwrap_err();
     assert!(matches!(refused, DiagnoseError::TooFew { detected: 0 }), "{refused}");
@@ -283,18 +282,21 @@ fn a_cloud_finds_its_looks() {
         point(&looks[9], missed, 0.0),
     ];
     let cloud = Cloud::new(points.clone()).unwrap();
-    let found = matched(&cloud, &chirps(&radar), &looks, 0.05).unwrap();
-    assert_eq!([found.false_alarms, found.beside], [1, 1]);
+    let found = matched(&cloud, &chirps(&radar), &looks).unwrap();
+    let [behind, beside] = &found.strays[..] else { panic!("{:?}", found.strays) };
+    assert_eq!(behind.look, Some(looks[8]));
+    assert!((behind.range_m - looks[8].hit.range_m - 0.5).abs() < 1e-9);
+    assert_eq!(beside.look.map(|look| look.chirp), Some(missed));
     assert_eq!(found.observations.iter().filter(|o| o.power_w.is_some()).count(), 2);
     // Without their numbers, points find their chirps by their directions.
     points.truncate(3);
     points.iter_mut().for_each(|point| point.chirp = None);
     let cloud = Cloud::new(points.clone()).unwrap();
-    let by_direction = matched(&cloud, &chirps(&radar), &looks, 0.05).unwrap();
+    let by_direction = matched(&cloud, &chirps(&radar), &looks).unwrap();
     assert_eq!(by_direction.observations, found.observations);
     // A cloud of something else is refused.
     points.iter_mut().for_each(|p| p.point = Point::from(p.point.xyz + DVec3::new(0.0, 0.0, 3.0)));
-    let elsewhere = matched(&Cloud::new(points).unwrap(), &chirps(&radar), &looks, 0.05);
+    let elsewhere = matched(&Cloud::new(points).unwrap(), &chirps(&radar), &looks);
     assert!(matches!(elsewhere, Err(DiagnoseError::Elsewhere { matched: 0, points: 3 })));
     assert!((found.observations[7].power_w.unwrap() - 1e-9).abs() < 1e-20);
     assert!((found.observations[7].range_m.unwrap() - looks[7].hit.range_m - 1e-3).abs() < 1e-9);

@@ -1,11 +1,10 @@
 //! A receiver that saturates: P becomes P/(1 + (P/P_sat)^p)^(1/p), with the knee p (Rapp, Proc. 2nd
 //! Eur. Conf. Satell. Commun. (1991) 179, for powers).
 //!
-//! One that does so at once holds the speckle down, too: of a small relative fluctuation about the mean
-//! P̄ it passes 1/(1 + (P̄/P_sat)^p). A gain control slower than a chirp passes all of it.
+//! One that does so at once holds the speckle down, too, each look by itself or the mean of all; a gain
+//! control slower than a chirp lets all of it pass.
 
-use super::{Arrived, Effect, Knob, Level, Look, Receiver, Stage, Surveyed};
-use crate::brdf::Brdf;
+use super::{Ceiling, Effect, Knob, Level, Look, Receiver, Stage};
 use crate::units::watts_from_dbm;
 
 /// The effect `compression`.
@@ -24,10 +23,11 @@ impl Effect for Compression {
     }
 
     fn knobs(&self) -> &'static [Knob] {
-        const KNOBS: [Knob; 3] = [
+        const KNOBS: [Knob; 4] = [
             Knob::new("saturation_dbm", "dB[mW]", [-90.0, NONE_DBM], NONE_DBM, 2.0),
             Knob::new("at_once", "1", [0.0, 1.0], 1.0, 0.2),
             Knob::new("knee", "1", [1.0, 4.0], 1.0, 0.2),
+            Knob::new("averaged", "1", [0.0, 1.0], 1.0, 0.2),
         ];
         &KNOBS
     }
@@ -43,29 +43,21 @@ impl Effect for Compression {
     }
 
     fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
-        let levels_dbm = [-25.0, -35.0, -45.0, -55.0];
-        let start =
-            |at_once: f64| levels_dbm.map(|saturation_dbm| vec![saturation_dbm, at_once, 1.0]);
-        [1.0, 0.0].map(start).concat()
+        // Powers that a ceiling leaves no room for are outliers, which show no way to the right one.
+        let levels_dbm = (-27..=-7).map(|level| 3.0 * f64::from(level));
+        let ways = [[1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
+        let start = |saturation_dbm: f64| {
+            ways.map(|[at_once, averaged]| vec![saturation_dbm, at_once, 1.5, averaged])
+        };
+        levels_dbm.flat_map(start).collect()
     }
 
-    fn arrive(&self, values: &[f64], _: &Surveyed, _: &[Brdf], arrived: &mut [Option<Arrived>]) {
-        let &[saturation_dbm, _, knee] = values else { return };
-        if saturation_dbm < NONE_DBM {
-            let saturation_w = watts_from_dbm(saturation_dbm);
-            let soft = |one: &mut Arrived| {
-                one.power_w /= (1.0 + (one.power_w / saturation_w).powf(knee)).powf(1.0 / knee);
-            };
-            arrived.iter_mut().flatten().for_each(soft);
-        }
-    }
-
-    /// 1/(1 + (P̄/P_sat)^p) is 1 less the p-th power of the compressed mean over P_sat.
     fn receive(&self, values: &[f64], receiver: Receiver) -> Receiver {
         match *values {
-            [saturation_dbm, at_once, knee] if saturation_dbm < NONE_DBM => {
-                let ceiling_w = watts_from_dbm(saturation_dbm) * at_once.powf(-1.0 / knee);
-                Receiver { ceiling_w, knee, ..receiver }
+            [saturation_dbm, at_once, knee, averaged] if saturation_dbm < NONE_DBM => {
+                let saturation_w = watts_from_dbm(saturation_dbm);
+                let ceiling = Ceiling { saturation_w, knee, at_once, averaged };
+                Receiver { ceiling, ..receiver }
             }
             _ => receiver,
         }
@@ -75,28 +67,21 @@ impl Effect for Compression {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::testing::{Bench, db};
+    use crate::effects::testing::db;
 
     #[test]
     fn the_ceiling_is_soft() {
-        let bench = Bench::plate();
-        let after_db = |power_w: f64| {
-            let mut arrived = [Some(Arrived { power_w, range_m: 8.0 })];
-            let scan = Surveyed { stage: &bench.stage(), looks: &[], survey: None };
-            Compression.arrive(&[-40.0, 1.0, 1.0], &scan, &[], &mut arrived);
-            db(arrived[0].unwrap().power_w / 1e-3)
-        };
+        let receiver = Compression.receive(&[-40.0, 0.0, 1.0, 1.0], Receiver::LINEAR);
+        let after_db =
+            |power_w: f64| db(receiver.saturating().of(power_w.ln()).ln_mean.exp() / 1e-3);
         assert!((after_db(1e-7) + 40.0 + db(2.0)).abs() < 1e-9);
         assert!((after_db(1.0) + 40.0).abs() < 1e-3);
         assert!((after_db(1e-12) + 90.0).abs() < 1e-3);
     }
 
     #[test]
-    fn only_what_saturates_at_once_holds_the_speckle_down() {
-        let receiver = |at_once: f64| Compression.receive(&[-40.0, at_once, 1.0], Receiver::LINEAR);
-        // A mean that came in at the saturation leaves at half of it.
-        assert!((receiver(1.0).passes(0.5e-7) - 0.5).abs() < 1e-12);
-        assert!((receiver(0.5).passes(0.5e-7) - 0.75).abs() < 1e-12);
-        assert_eq!(receiver(0.0).passes(0.5e-7), 1.0);
+    fn one_that_no_echo_comes_near_is_none() {
+        let receiver = Compression.receive(&[NONE_DBM, 1.0, 1.0, 1.0], Receiver::LINEAR);
+        assert_eq!(receiver, Receiver::LINEAR);
     }
 }

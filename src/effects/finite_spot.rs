@@ -104,6 +104,11 @@ impl Effect for FiniteSpot {
         [0.1, 0.3, 0.75, 1.5].map(|share| vec![(share * nominal_m).clamp(1e-3, 0.1)]).to_vec()
     }
 
+    /// To where the intensity is 12 dB down.
+    fn sees_beside_m(&self, values: &[f64]) -> f64 {
+        values.first().copied().unwrap_or_default()
+    }
+
     fn surveyed(&self, values: &[f64]) -> Option<Vec<f64>> {
         values.first().filter(|diameter_m| **diameter_m > 0.0).map(|_| values.to_vec())
     }

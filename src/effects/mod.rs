@@ -6,19 +6,21 @@
 //!
 //! 1. where and how the chirp meets the target ([`Effect::place`]): pose, motion;
 //! 2. how the surface scatters ([`Effect::scatter`]): subsurface, thin film, anisotropy, shadowing;
-//! 3. how much power arrives ([`Effect::gain`], [`Effect::arrive`]): layers, patches, gains, bounces,
-//!    compression;
-//! 4. what the receiver makes of it ([`Effect::receive`]): speckle, noise, tilts that vary at random.
+//! 3. how much power arrives ([`Effect::gain`], [`Effect::arrive`]): layers, patches, gains, bounces;
+//! 4. what the receiver makes of it ([`Effect::receive`]): compression, speckle, noise, tilts that vary
+//!    at random.
 //!
 //! Parameters at their [`absent`](Knob::absent) values are no effect at all, exactly. [`library`] has
 //! them all; another one is a file and a line of its list.
 
+mod ceiling;
 mod declared;
 mod entry;
 mod lobes;
 mod meeting;
 mod model;
 mod spread;
+mod tilt;
 
 use std::any::Any;
 
@@ -29,10 +31,12 @@ use crate::frames::{Global, Pose, Ray};
 use crate::radar::{Link, Radar};
 use crate::trace::{Bvh, Hit};
 
+pub use ceiling::{Ceiling, Passed, Saturating};
 pub use declared::SceneEffects;
 pub(crate) use entry::rank;
 pub use entry::{Chosen, EffectError, entry, resolve};
-pub use model::{Model, Prediction, Surveys};
+pub use model::{Model, Prediction, Tilts, Traced};
+pub use tilt::tilted_cos_theta;
 
 /// Declares the file of every effect and lists them all, in the order in which they act.
 macro_rules! library {
@@ -138,36 +142,18 @@ pub struct Receiver {
     pub noise_w: f64,
     /// Standard deviation of each of the two tilts of a normal that differ from chirp to chirp, rad.
     pub tilt_sd_rad: f64,
-    /// Mean power that no fluctuation passes, W; infinite for a receiver that is linear.
-    pub ceiling_w: f64,
-    /// How suddenly the ceiling comes: the exponent of mean/ceiling in what does not pass.
-    pub knee: f64,
+    /// What it cannot pass.
+    pub ceiling: Ceiling,
 }
 
 impl Receiver {
     /// No speckle, no noise, no tilt, no ceiling.
-    pub const LINEAR: Receiver = Receiver {
-        looks: f64::INFINITY,
-        noise_w: 0.0,
-        tilt_sd_rad: 0.0,
-        ceiling_w: f64::INFINITY,
-        knee: 1.0,
-    };
+    pub const LINEAR: Receiver =
+        Receiver { looks: f64::INFINITY, noise_w: 0.0, tilt_sd_rad: 0.0, ceiling: Ceiling::NONE };
 
-    /// How much of a small relative fluctuation of the power passes where the mean is `mean_w`: 1 in a
-    /// linear receiver, less below a ceiling.
-    pub fn passes(&self, mean_w: f64) -> f64 {
-        const LEAST: f64 = 0.02;
-        (1.0 - (mean_w / self.ceiling_w).powf(self.knee)).max(LEAST)
-    }
-
-    /// What a linear receiver would measure, W, with its fluctuation about the mean held down.
-    pub fn held_down_w(&self, mean_w: f64, linear_w: f64) -> f64 {
-        let level_w = mean_w + self.noise_w;
-        match self.passes(mean_w) {
-            1.0 => linear_w,
-            passes => level_w * (linear_w / level_w).powf(passes),
-        }
+    /// Its ceiling over its speckle.
+    pub fn saturating(&self) -> Saturating {
+        self.ceiling.over(self.looks)
     }
 }
 
@@ -236,9 +222,19 @@ pub trait Effect: Sync {
     /// miss it, such as places over the target.
     fn starts(&self, stage: &Stage, looks: &[Look]) -> Vec<Vec<f64>>;
 
-    /// Moves the target under the rays. A look whose ray then misses is taken out by `None`.
+    /// Whether it moves the target, which is where rays are traced anew.
+    fn moves(&self) -> bool {
+        false
+    }
+
+    /// Moves the target under the rays, by its values alone. A look whose ray then misses is taken out by `None`.
     fn place(&self, _values: &[f64], _stage: &Stage, look: Look) -> Option<Look> {
         Some(look)
+    }
+
+    /// How far beside its axis a chirp sees the target, m at 8 m.
+    fn sees_beside_m(&self, _values: &[f64]) -> f64 {
+        0.0
     }
 
     /// f in backscatter, 1/sr, of a look whose law without this effect has `f_per_sr`.

@@ -1,12 +1,17 @@
 //! A base law with any number of effects, and what it predicts of a scan.
 
+use std::f64::consts::TAU;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Arrived, Effect, Look, Receiver, Stage, Survey, Surveyed};
+use super::tilt::{NODES, nodes, tilted_cos_theta};
+use super::{Arrived, Effect, Look, Receiver, Saturating, Stage, Survey, Surveyed};
 use crate::brdf::{Brdf, Scattering};
-use crate::frames::Direction;
+use crate::frames::{Direction, Ray};
+use crate::radar::scan::PATTERN_RANGE_M;
+use crate::trace::Hit;
 
 /// The base law and the effects that were added to it, each with its values.
 #[derive(Clone)]
@@ -24,72 +29,157 @@ pub struct Model<'a> {
 pub struct Prediction {
     /// Mean power and range of every look, without thermal noise; `None` where the ray misses.
     pub arrived: Vec<Option<Arrived>>,
-    /// d ln(mean power)/dθ of every look, 1/rad, for tilts that vary at random; 0 where none do.
-    pub slope_per_rad: Vec<f64>,
+    /// Of every look, where tilts vary at random from chirp to chirp; empty where none do.
+    pub tilts: Vec<Tilts>,
     /// The law about the mean.
     pub receiver: Receiver,
+    /// What the receiver passes.
+    pub saturating: Saturating,
 }
 
-/// Surveys that were made for one list of looks, for as long as their values come again.
+/// Factor on the power of a look for every tilt of its normal, and the tilt's probability.
+pub type Tilts = [(f64, f64); NODES];
+
+/// What was traced for one list of looks, for as long as the values that it depends on come again.
 #[derive(Default)]
-pub struct Surveys(Mutex<Vec<(Key, Arc<Survey>)>>);
+pub struct Traced {
+    surveys: Kept<(&'static str, Vec<f64>), Survey>,
+    placed: Kept<Vec<(&'static str, Vec<f64>)>, Vec<Option<Look>>>,
+}
 
-/// Name of an effect and the values that its survey depends on.
-type Key = (&'static str, Vec<f64>);
+/// The latest results of a slow function.
+struct Kept<K, V>(Mutex<Vec<(K, Arc<V>)>>);
 
-/// Surveys that are kept: those of a difference quotient, of its middle, and of the next.
-const KEPT: usize = 6;
+/// Results that are kept: those of a difference quotient over every number of a pose, its middle, and
+/// the next.
+const KEPT: usize = 15;
 
-impl Surveys {
-    fn of(
-        &self,
-        effect: &dyn Effect,
-        values: &[f64],
-        stage: &Stage,
-        looks: &[Look],
-    ) -> Option<Arc<Survey>> {
-        let key = (effect.name(), effect.surveyed(values)?);
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(at) = kept.iter().position(|(other, _)| *other == key) {
-            let found = kept.remove(at);
-            kept.push(found.clone());
-            return Some(found.1);
+impl<K, V> Default for Kept<K, V> {
+    fn default() -> Kept<K, V> {
+        Kept(Mutex::default())
+    }
+}
+
+impl<K: PartialEq, V> Kept<K, V> {
+    /// Makes it without the lock, since other threads may want another key meanwhile.
+    fn of(&self, key: K, make: impl FnOnce() -> V) -> Arc<V> {
+        let kept = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(found) = Self::take(&mut kept(), &key) {
+            return found;
         }
-        let made = Arc::new(effect.survey(values, stage, looks));
-        if kept.len() == KEPT {
+        let made = Arc::new(make());
+        let mut kept = kept();
+        if kept.len() >= KEPT {
             kept.remove(0);
         }
         kept.push((key, made.clone()));
-        Some(made)
+        made
+    }
+
+    /// What is there, as the latest of all.
+    fn take(kept: &mut Vec<(K, Arc<V>)>, key: &K) -> Option<Arc<V>> {
+        let at = kept.iter().position(|(other, _)| other == key)?;
+        let found = kept.remove(at);
+        let value = found.1.clone();
+        kept.push(found);
+        Some(value)
+    }
+}
+
+impl Prediction {
+    /// Mean powers of a look over speckle, without thermal noise, W, with their probabilities: one for
+    /// every tilt of its normal.
+    pub fn powers_w(&self, look: usize) -> impl Iterator<Item = (f64, f64)> + Clone {
+        const AS_IT_IS: &[(f64, f64)] = &[(1.0, 1.0)];
+        let arrived = self.arrived.get(look).copied().flatten();
+        let power_w = arrived.map_or(0.0, |arrived| arrived.power_w).max(0.0);
+        let tilts = self.tilts.get(look).map_or(AS_IT_IS, |tilts| tilts);
+        tilts.iter().map(move |(factor, weight)| (power_w * factor, *weight))
+    }
+
+    /// Mean power of a look with thermal noise before the receiver, W.
+    pub fn mean_w(&self, look: usize) -> f64 {
+        let power_w: f64 = self.powers_w(look).map(|(power_w, weight)| weight * power_w).sum();
+        power_w + self.receiver.noise_w
+    }
+
+    /// The same as the receiver passes it, W.
+    pub fn passed_w(&self, look: usize) -> f64 {
+        let mean_w = self.mean_w(look);
+        if mean_w > 0.0 { self.saturating.of(mean_w.ln()).ln_mean.exp() } else { 0.0 }
+    }
+
+    /// Small relative changes of the looks' mean powers as the receiver passes them.
+    pub fn as_passed(&self, changes: &[f64]) -> Vec<f64> {
+        let passes = |look: usize| self.saturating.passes(self.mean_w(look));
+        changes.iter().enumerate().map(|(look, change)| change * passes(look)).collect()
+    }
+
+    /// Standard deviation of a look's mean power over the tilts of its normal, as a share of the mean.
+    pub fn tilt_spread(&self, look: usize) -> f64 {
+        let moment = |power: i32| -> f64 {
+            self.powers_w(look).map(|(power_w, weight)| weight * power_w.powi(power)).sum()
+        };
+        let [mean_w, square_w2] = [moment(1), moment(2)];
+        let variance = square_w2 - mean_w * mean_w;
+        if variance > 0.0 { variance.sqrt() / mean_w } else { 0.0 }
     }
 }
 
 impl Model<'_> {
     /// What arrives of every look.
     pub fn predict(&self, stage: &Stage, looks: &[Look]) -> Prediction {
-        self.predict_with(stage, looks, &Surveys::default())
+        self.predict_with(stage, looks, &Traced::default())
     }
 
-    /// The same with surveys of these very looks that may have been made before.
-    pub fn predict_with(&self, stage: &Stage, looks: &[Look], surveys: &Surveys) -> Prediction {
-        let placed: Vec<Option<Look>> =
-            looks.par_iter().map(|look| self.placed(stage, *look)).collect();
+    /// The same with what may have been traced for these very looks before.
+    pub fn predict_with(&self, stage: &Stage, looks: &[Look], traced: &Traced) -> Prediction {
+        let moves = self.effects.iter().filter(|(effect, _)| effect.moves());
+        let moves = moves.map(|(effect, values)| (effect.name(), values.clone())).collect();
+        let placed = traced
+            .placed
+            .of(moves, || looks.par_iter().map(|look| self.placed(stage, *look)).collect());
         let mut arrived: Vec<Option<Arrived>> =
             placed.par_iter().map(|look| Some(self.arrived(stage, look.as_ref()?))).collect();
-        self.arrive(stage, looks, surveys, &mut arrived);
+        self.arrive(stage, looks, traced, &mut arrived);
         let receiver = self.received();
-        // Twice the work of the powers themselves, and of use only where tilts vary.
-        let slope = |look: &Option<Look>| match look {
-            Some(look) if receiver.tilt_sd_rad > 0.0 => self.slope_per_rad(stage, look),
-            _ => 0.0,
+        let tilted = |look: &Option<Look>| match look {
+            Some(look) => self.tilts(stage, look, &receiver),
+            None => Tilts::default(),
         };
-        Prediction { slope_per_rad: placed.par_iter().map(slope).collect(), arrived, receiver }
+        let tilts = match receiver.tilt_sd_rad > 0.0 {
+            true => placed.par_iter().map(tilted).collect(),
+            false => Vec::new(),
+        };
+        Prediction { arrived, tilts, saturating: receiver.saturating(), receiver }
     }
 
     /// Where a look meets the target, as the effects place it; `None` where its ray misses.
     pub(crate) fn placed(&self, stage: &Stage, look: Look) -> Option<Look> {
         let mut effects = self.effects.iter();
         effects.try_fold(look, |look, (effect, values)| effect.place(values, stage, look))
+    }
+
+    /// Ranges, m, at which a chirp may see the target, along its axis or beside it.
+    pub(crate) fn ranges_m(&self, stage: &Stage, look: &Look) -> Vec<f64> {
+        const ROUND: usize = 8;
+        let beside = self.effects.iter().map(|(effect, values)| effect.sees_beside_m(values));
+        let tangent = beside.fold(0.0, f64::max) / PATTERN_RANGE_M;
+        let axis = look.ray.direction.xyz();
+        let (u, v) = axis.any_orthonormal_pair();
+        let round = (0..ROUND).map(|k| TAU * k as f64 / ROUND as f64);
+        let ring = round.map(|turn| axis + tangent * (turn.cos() * u + turn.sin() * v));
+        let moves = self.effects.iter().any(|(effect, _)| effect.moves());
+        let range_m = |direction: DVec3| {
+            let ray = Ray { direction: Direction::new(direction)?, ..look.ray };
+            let hit = match moves {
+                true => self.placed(stage, Look { ray, ..*look })?.hit,
+                false => stage.bvh.closest(&ray)?,
+            };
+            Some(hit.range_m)
+        };
+        let rays = std::iter::once(axis).chain(ring.filter(|_| tangent > 0.0));
+        rays.filter_map(range_m).collect()
     }
 
     /// What arrives of one look by itself.
@@ -102,11 +192,14 @@ impl Model<'_> {
         &self,
         stage: &Stage,
         looks: &[Look],
-        surveys: &Surveys,
+        traced: &Traced,
         arrived: &mut [Option<Arrived>],
     ) {
         for (effect, values) in &self.effects {
-            let survey = surveys.of(*effect, values, stage, looks);
+            let survey = effect.surveyed(values).map(|depends| {
+                let make = || effect.survey(values, stage, looks);
+                traced.surveys.of((effect.name(), depends), make)
+            });
             let scan = Surveyed { stage, looks, survey: survey.as_deref() };
             effect.arrive(values, &scan, &self.laws, arrived);
         }
@@ -132,15 +225,16 @@ impl Model<'_> {
         gain * stage.link.power_w(look.hit.range_m, look.hit.cos_theta, f_per_sr)
     }
 
-    fn slope_per_rad(&self, stage: &Stage, look: &Look) -> f64 {
-        const STEP_RAD: f64 = 1e-3;
-        let at = |theta_rad: f64| {
-            let mut look = *look;
-            look.hit.cos_theta = theta_rad.cos();
-            self.power_w(stage, &look).max(f64::MIN_POSITIVE).ln()
-        };
-        let theta_rad =
-            look.hit.theta_rad().clamp(STEP_RAD, std::f64::consts::FRAC_PI_2 - 2.0 * STEP_RAD);
-        (at(theta_rad + STEP_RAD) - at(theta_rad - STEP_RAD)) / (2.0 * STEP_RAD)
+    /// What the tilts of a normal make of the power of a look.
+    fn tilts(&self, stage: &Stage, look: &Look, receiver: &Receiver) -> Tilts {
+        let (theta_rad, power_w) = (look.hit.theta_rad(), self.power_w(stage, look));
+        nodes(receiver.tilt_sd_rad).map(|(tilts, weight)| {
+            let tilted = tilted_cos_theta(theta_rad, tilts).map(|cos_theta| {
+                let hit = Hit { cos_theta, ..look.hit };
+                self.power_w(stage, &Look { hit, ..*look })
+            });
+            let factor = if power_w > 0.0 { tilted.unwrap_or(0.0) / power_w } else { 0.0 };
+            (factor, weight)
+        })
     }
 }

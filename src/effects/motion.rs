@@ -61,6 +61,10 @@ impl Effect for Motion {
         vec![vec![0.0; KNOBS.len()]]
     }
 
+    fn moves(&self) -> bool {
+        true
+    }
+
     fn place(&self, values: &[f64], stage: &Stage, look: Look) -> Option<Look> {
         if values.iter().all(|&value| value == 0.0) {
             return Some(look);

@@ -55,6 +55,10 @@ impl Effect for Pose {
         vec![vec![0.0; KNOBS.len()]]
     }
 
+    fn moves(&self) -> bool {
+        true
+    }
+
     fn place(&self, values: &[f64], stage: &Stage, look: Look) -> Option<Look> {
         let &[x, y, z, roll, pitch, yaw] = values else { return Some(look) };
         let (shift_m, turn_deg) = (DVec3::new(x, y, z), DVec3::new(roll, pitch, yaw));

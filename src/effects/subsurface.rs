@@ -1,4 +1,7 @@
-//! Return from inside the material: σ⁰ + σ_v, that is f + σ_v/(4π·cos²θ).
+//! Return from inside the material: σ⁰ + σ_v·cosᑫθ, that is f + σ_v·cosᑫθ/(4π·cos²θ).
+//!
+//! q = 0 is alike at every angle, q = 2 a Lambert surface; what must cross the surface twice falls
+//! faster.
 
 use std::f64::consts::PI;
 
@@ -21,13 +24,16 @@ impl Effect for Subsurface {
     }
 
     fn knobs(&self) -> &'static [Knob] {
-        const KNOBS: [Knob; 1] = [Knob::new("sigma_v", "1", [0.0, 1.0], 0.0, 5e-4)];
+        const KNOBS: [Knob; 2] = [
+            Knob::new("sigma_v", "1", [0.0, 1.0], 0.0, 5e-4),
+            Knob::new("cosine_power", "1", [0.0, 4.0], 0.0, 0.5),
+        ];
         &KNOBS
     }
 
     fn is(&self) -> &'static str {
         "Part of the wave enters the material, scatters inside and comes back with the same strength \
-         at every angle, added to what the surface returns."
+         at every angle, or falling with a power of its cosine, added to what the surface returns."
     }
 
     fn shows(&self) -> &'static str {
@@ -37,12 +43,13 @@ impl Effect for Subsurface {
     }
 
     fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
-        vec![vec![5e-4], vec![5e-3]]
+        [5e-4, 5e-3].into_iter().flat_map(|sigma_v| [0.0, 2.0].map(|q| vec![sigma_v, q])).collect()
     }
 
     fn scatter(&self, values: &[f64], _: &Stage, _: &Brdf, look: &Look, f_per_sr: f64) -> f64 {
-        let &[sigma_v] = values else { return f_per_sr };
-        f_per_sr + sigma_v / (4.0 * PI * look.hit.cos_theta.max(LEAST_COS_THETA).powi(2))
+        let &[sigma_v, cosine_power] = values else { return f_per_sr };
+        let cos_theta = look.hit.cos_theta.max(LEAST_COS_THETA);
+        f_per_sr + sigma_v * cos_theta.powf(cosine_power - 2.0) / (4.0 * PI)
     }
 }
 
@@ -52,12 +59,15 @@ mod tests {
     use crate::effects::testing::{Bench, db};
 
     #[test]
-    fn it_adds_the_same_sigma0_at_every_angle() {
+    fn it_adds_the_same_sigma0_at_every_angle_or_one_that_falls_with_the_cosine() {
         let bench = Bench::sphere();
-        let (bare, with) = (bench.bare(), bench.with(&Subsurface, &[0.01]));
-        for ((look, bare), with) in bench.looks.iter().zip(&bare).zip(&with) {
-            let one = bench.stage().link.power_w(look.hit.range_m, 1.0, 0.01 / (4.0 * PI));
-            assert!(db((with.power_w - bare.power_w) / one).abs() < 1e-6);
+        for cosine_power in [0.0, 1.5] {
+            let (bare, with) = (bench.bare(), bench.with(&Subsurface, &[0.01, cosine_power]));
+            for ((look, bare), with) in bench.looks.iter().zip(&bare).zip(&with) {
+                let f_per_sr = 0.01 * look.hit.cos_theta.powf(cosine_power) / (4.0 * PI);
+                let one = bench.stage().link.power_w(look.hit.range_m, 1.0, f_per_sr);
+                assert!(db((with.power_w - bare.power_w) / one).abs() < 1e-6);
+            }
         }
     }
 }

@@ -166,11 +166,11 @@ fn is_sound(prediction: &Prediction) -> bool {
         let Arrived { power_w, range_m } = *arrived;
         power_w.is_finite() && power_w >= 0.0 && range_m.is_finite() && range_m > 0.0
     });
-    let Receiver { looks, noise_w, tilt_sd_rad, ceiling_w, knee } = prediction.receiver;
+    let Receiver { looks, noise_w, tilt_sd_rad, ceiling } = prediction.receiver;
     let receiver = [looks, noise_w, tilt_sd_rad].iter().all(|v| v.is_finite())
-        && ceiling_w > 0.0
-        && knee > 0.0;
-    arrived && receiver && prediction.slope_per_rad.iter().all(|slope| slope.is_finite())
+        && ceiling.saturation_w > 0.0
+        && ceiling.knee > 0.0;
+    arrived && receiver && prediction.tilts.iter().flatten().all(|(factor, _)| factor.is_finite())
 }
 
 #[test]

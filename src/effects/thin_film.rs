@@ -86,13 +86,16 @@ impl Effect for ThinFilm {
         let thin_m = [1e-4, 2e-4, 3e-4, 4.5e-4, 6e-4, 8e-4].into_iter();
         let thicknesses_m: Vec<f64> =
             thin_m.chain((4..=28).map(|quarter| 0.25e-3 * f64::from(quarter))).collect();
-        let start = |from_below: f64, substrate_ratio: f64| {
-            let film =
-                |&thickness_m: &f64| vec![0.3, thickness_m, 1.6, from_below, substrate_ratio];
+        let start = |thicknesses_m: &[f64], [coverage, index, from_below, ratio]: [f64; 4]| {
+            let film = |&thickness_m: &f64| vec![coverage, thickness_m, index, from_below, ratio];
             thicknesses_m.iter().map(film).collect::<Vec<_>>()
         };
-        // Without a mirror part of its own the fitted f_λ is lower than the substrate's.
-        [start(1.0, 1.0), start(0.0, 1.6)].concat()
+        let thick_m: Vec<f64> = (2..=12).map(|quarter| 0.25e-3 * f64::from(quarter)).collect();
+        // Without a mirror part of its own the fitted f_λ is lower than the substrate's. A foam hardly
+        // bends the wave, so that its fringes go otherwise with θ.
+        let solid = [[0.3, 1.6, 1.0, 1.0], [0.3, 1.6, 0.0, 1.6]];
+        let solid = solid.into_iter().flat_map(|film| start(&thicknesses_m, film));
+        solid.chain(start(&thick_m, [1.0, 1.1, 0.0, 1.6])).collect()
     }
 
     fn scatter(

@@ -14,7 +14,9 @@ use super::spot::Footprints;
 use super::surface::LocalFrame;
 use super::{Observer, RenderError, Setup};
 use crate::brdf::Scattering;
-use crate::effects::{Arrived, Level, Look, Model, Receiver, Stage, Surveys, middle};
+use crate::effects::{
+    Arrived, Level, Look, Model, Receiver, Stage, Traced, middle, tilted_cos_theta,
+};
 use crate::frames::{Direction, Global, Point, Pose, Ray, Surface};
 use crate::radar::Link;
 use crate::radar::random::{Key, Purpose};
@@ -48,9 +50,6 @@ pub(super) struct Acting<'a> {
 
 /// The facet of a ray that has met nothing yet.
 const NOWHERE: u32 = u32::MAX;
-
-/// Beyond this a tilted facet shows the radar its back.
-const LEAST_COS_THETA: f64 = 1e-6;
 
 impl<'a> Acting<'a> {
     /// `None` for a setup without effects.
@@ -156,7 +155,7 @@ impl<'a> Acting<'a> {
             .collect();
         let looks: Vec<Look> = chirps.iter().map(|(_, look, _)| *look).collect();
         let mut after: Vec<Option<Arrived>> = chirps.iter().map(|(_, _, sum)| Some(*sum)).collect();
-        self.model.arrive(&self.stage(), &looks, &Surveys::default(), &mut after);
+        self.model.arrive(&self.stage(), &looks, &Traced::default(), &mut after);
         let mut changes = vec![None; sums.len()];
         for ((chirp, _, before), after) in chirps.into_iter().zip(after.into_iter().flatten()) {
             changes[chirp] = (before != after).then_some(Change { before, after });
@@ -258,12 +257,8 @@ fn tilted(look: &Look, [along, across]: [f64; 2]) -> Option<Look> {
     if along == 0.0 && across == 0.0 {
         return Some(*look);
     }
-    let theta_rad = look.hit.theta_rad();
-    let length = (1.0 + along * along + across * across).sqrt();
-    let cos_theta = (theta_rad.cos() + along * theta_rad.sin()) / length;
-    let mut look = *look;
-    look.hit.cos_theta = cos_theta;
-    (cos_theta > LEAST_COS_THETA).then_some(look)
+    let cos_theta = tilted_cos_theta(look.hit.theta_rad(), [along, across])?;
+    Some(Look { hit: Hit { cos_theta, ..look.hit }, ..*look })
 }
 
 /// Refuses what would be counted twice, and what an effect cannot say.

@@ -9,7 +9,7 @@ use num_complex::Complex;
 use super::acting::Acting;
 use super::path::Path;
 use super::{Beats, Observer, RenderError, Setup};
-use crate::effects::Receiver;
+use crate::effects::{Receiver, Saturating};
 use crate::radar::noise::measured_w;
 use crate::radar::random::{Draws, Key, Purpose};
 use crate::radar::{Chirp, Detection, RangeProcessor, Return, Speckle};
@@ -21,6 +21,7 @@ pub(super) struct Detector {
     observer: u64,
     kind: Kind,
     threshold_w: f64,
+    saturating: Saturating,
 }
 
 enum Kind {
@@ -63,7 +64,13 @@ impl Detector {
                 }
             }
         };
-        Ok(Detector { seed: setup.seed, observer: observer.number(), kind, threshold_w })
+        Ok(Detector {
+            seed: setup.seed,
+            observer: observer.number(),
+            kind,
+            threshold_w,
+            saturating: law.saturating(),
+        })
     }
 
     /// Least power of a detection, W.
@@ -84,9 +91,12 @@ impl Detector {
     /// What the receiver makes of a chirp, below the threshold, too; `None` for a silent one.
     pub fn observe(&self, chirp: usize, paths: &[Path]) -> Result<Option<Detection>, RenderError> {
         match &self.kind {
-            Kind::Beat(beat) => Ok(beat.processor.peak(&self.mean_profile_w(beat, chirp, paths)?)),
+            Kind::Beat(beat) => {
+                let peak = beat.processor.peak(&self.mean_profile_w(beat, chirp, paths)?);
+                Ok(peak.map(|peak| self.passed(paths, peak)))
+            }
             _ if paths.is_empty() => Ok(None),
-            Kind::Exact => Ok(Some(sum(paths))),
+            Kind::Exact => Ok(Some(self.passed(paths, sum(paths)))),
             Kind::Laws { law, speckle, range_sd_m } => {
                 let Detection { range_m, power_w } = sum(paths);
                 if power_w == 0.0 {
@@ -95,11 +105,19 @@ impl Detector {
                 }
                 let mut draws = self.draws(chirp, Purpose::Speckle);
                 let linear_w = measured_w(power_w, law.noise_w, *speckle, &mut draws);
-                let power_w = law.held_down_w(power_w, linear_w);
+                let power_w = self.saturating.passed_w(power_w + law.noise_w, linear_w);
                 let error_m = range_sd_m * self.draws(chirp, Purpose::Range).gaussian();
                 Ok(Some(Detection { range_m: range_m + error_m, power_w }))
             }
         }
+    }
+
+    /// What a receiver that saturates makes of a power whose mean is that of these paths.
+    fn passed(&self, paths: &[Path], linear: Detection) -> Detection {
+        let mean_w: f64 = paths.iter().map(|path| path.power_w).sum();
+        // Noise alone has no other mean than itself.
+        let mean_w = if mean_w > 0.0 { mean_w } else { linear.power_w };
+        Detection { power_w: self.saturating.passed_w(mean_w, linear.power_w), ..linear }
     }
 
     /// How far a detection may lie from the range of the path that caused it, m; none where a

@@ -240,7 +240,7 @@ fn diagnosed(
     };
     let looks = looks(&stage, radar, &scene.chirps)?;
     stage.middle = middle(&looks);
-    let matched = matched(cloud, &scene.chirps, &looks, GATE_M)?;
+    let matched = matched(cloud, &scene.chirps, &looks)?;
     let (receiver, declared) = receiver(radar);
     let subject = Subject {
         stage: &stage,
@@ -250,10 +250,10 @@ fn diagnosed(
         declared,
         looks: &looks,
         observations: &matched.observations,
-        false_alarms: matched.false_alarms + matched.beside,
+        strays: &matched.strays,
     };
     let report = Diagnosis { seed, ..Diagnosis::default() }.run_with(&subject, effects, hear)?;
-    Ok((report, matched.false_alarms + matched.beside))
+    Ok((report, matched.strays.len()))
 }
 
 fn context(asked: Asked, scene: &Scene, false_alarms: usize, db: &Database) -> Context {
@@ -319,9 +319,6 @@ fn json(value: &impl serde::Serialize) -> Result<Vec<u8>, Error> {
     json.push(b'\n');
     Ok(json)
 }
-
-/// A detection further than this from where its chirp meets the target is a false alarm, m.
-const GATE_M: f64 = 0.1;
 
 /// Looks that stand for a radar without speckle: a likelihood needs some spread.
 const MOST_LOOKS: f64 = 1e4;

@@ -1,0 +1,62 @@
+//! Tilts of a normal that differ at random from chirp to chirp, and means over them.
+//!
+//! Two tilts, along the plane of incidence and across it, each normal about 0. Means over them are
+//! sums over nodes of Gauss and Hermite: five along, and two across, of which only the square counts,
+//! so that they are one. They are exact for polynomials of the ninth degree along and the third across.
+
+/// Nodes of [`nodes`].
+pub const NODES: usize = 5;
+/// Places along the plane of incidence, in standard deviations, and weights.
+const ALONG: [(f64, f64); NODES] = [
+    (-2.856_970_013_872_806, 0.011_257_411_327_721),
+    (-1.355_626_179_974_266, 0.222_075_922_005_613),
+    (0.0, 0.533_333_333_333_333),
+    (1.355_626_179_974_266, 0.222_075_922_005_613),
+    (2.856_970_013_872_806, 0.011_257_411_327_721),
+];
+/// Place across it.
+const ACROSS: f64 = 1.0;
+/// Beyond this a tilted facet shows the radar its back.
+const LEAST_COS_THETA: f64 = 1e-6;
+
+/// Cosine of the angle of incidence θ under tilts of these tangents along the plane of incidence and
+/// across it; `None` where the facet then shows its back.
+pub fn tilted_cos_theta(theta_rad: f64, [along, across]: [f64; 2]) -> Option<f64> {
+    let length = (1.0 + along * along + across * across).sqrt();
+    let cos_theta = (theta_rad.cos() + along * theta_rad.sin()) / length;
+    (cos_theta > LEAST_COS_THETA).then_some(cos_theta)
+}
+
+/// Tangents of the two tilts and their weight at every node, for tilts of a standard deviation, rad.
+pub fn nodes(sd_rad: f64) -> [([f64; 2], f64); NODES] {
+    ALONG.map(|(along, weight)| ([along, ACROSS].map(|t| (sd_rad * t).tan()), weight))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_over_tilts_are_those_of_the_normal_law() {
+        let sd_rad = 0.01;
+        let mean = |f: fn([f64; 2]) -> f64| {
+            let part = |([along, across], weight): ([f64; 2], f64)| {
+                weight * f([along, across].map(|t| t.atan() / 0.01))
+            };
+            nodes(sd_rad).map(part).iter().sum::<f64>()
+        };
+        assert!((mean(|_| 1.0) - 1.0).abs() < 1e-12);
+        assert!((mean(|[a, _]| a * a) - 1.0).abs() < 1e-9);
+        assert!((mean(|[a, b]| a.powi(4) * b * b) - 3.0).abs() < 1e-9);
+        assert!((mean(|[a, _]| a.powi(8)) - 105.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_tilt_in_the_plane_of_incidence_is_a_step_in_theta() {
+        let tilted = tilted_cos_theta(0.5, [0.1f64.tan(), 0.0]).unwrap();
+        assert!((tilted - 0.4f64.cos()).abs() < 1e-12);
+        let across = tilted_cos_theta(0.0, [0.0, 0.2f64.tan()]).unwrap();
+        assert!((across - 0.2f64.cos()).abs() < 1e-12);
+        assert_eq!(tilted_cos_theta(1.5, [-0.2, 0.0]), None);
+    }
+}
