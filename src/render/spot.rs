@@ -95,12 +95,11 @@ impl Rays<'_> {
         hit: impl Fn(&T) -> Option<Hit> + Sync,
     ) -> Result<Vec<T>, NoFan> {
         /// Rays that are traced at once: enough to share the walk over the facets, few enough to hold.
-        const RAYS_PER_TURN: usize = 1 << 20;
+        const RAYS_PER_TURN: usize = 1 << 18;
         let axes = &self.chirps.rays;
         let hits = self.tracer.closest(self.bvh, axes)?;
-        let on_axis = |(number, (axis, hit)): (usize, (&Ray<Global>, Option<Hit>))| {
-            meet(number, axis, hit)
-        };
+        let on_axis =
+            |(number, (axis, hit)): (usize, (&Ray<Global>, Option<Hit>))| meet(number, axis, hit);
         let met: Vec<T> = axes.par_iter().zip(hits).enumerate().map(on_axis).collect();
         if self.rays_per_chirp == 1 {
             done(axes.len());

@@ -30,6 +30,7 @@ pub(super) fn crossing_m(mesh: &Mesh, facet: usize, ray: &Ray<Global>) -> Option
 
 /// Distance along the ray to the plane of a facet, m, for a ray that passes through the facet; `None`
 /// when it lies behind or along the ray.
+#[inline]
 pub(super) fn plane_m(mesh: &Mesh, facet: usize, ray: &Ray<Global>) -> Option<f64> {
     let (origin, direction) = (ray.origin.xyz, ray.direction.xyz());
     let [a, _, _] = mesh.corners(facet);
@@ -39,6 +40,7 @@ pub(super) fn plane_m(mesh: &Mesh, facet: usize, ray: &Ray<Global>) -> Option<f6
 }
 
 /// Completes a hit from the facet and the distance.
+#[inline]
 pub(super) fn measured(mesh: &Mesh, facet: u32, ray: &Ray<Global>, range_m: f64) -> Hit {
     let normal = mesh.area_normal(facet as usize).normalize_or_zero();
     let direction = ray.direction.xyz();

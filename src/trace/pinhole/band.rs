@@ -55,7 +55,11 @@ impl<'a> Band<'a> {
             if start == end {
                 continue;
             }
-            let form = form.get_or_insert_with(|| patch.form(grid.cell, grid.reach));
+            let form = form.get_or_insert_with(|| {
+                let form = patch.form(grid.cell, grid.reach);
+                has_area = patch.has_area(&form).then_some(true);
+                form
+            });
             for place in (start..end).step_by(LANES) {
                 self.block(facet, form, place, end - place, &mut has_area);
             }

@@ -14,8 +14,8 @@ const LEAST_COS: f64 = 0.1;
 /// high cells make full blocks.
 const CELL_HEIGHT: f64 = 3.0;
 
-/// Most cells along one side of the grid.
-const MOST_CELLS: f64 = 1e6;
+/// Least side of a cell over the largest coordinate: four times what rounding moves a box by.
+const LEAST_CELL: f64 = 1e-6;
 
 /// Below this the coordinates are as good as in the middle of the picture.
 const LEAST_REACH: f32 = 0.01;
@@ -58,19 +58,28 @@ pub(super) struct Grid {
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum NoFan {
     /// There is no ray, or more than can be numbered.
-    #[error("cannot fan out {rays} rays; 1 to 2³² − 1 are possible")]
+    #[error(
+        "the tracer `pinhole` takes 1 to 2³² − 2 rays and not {rays}; use `bvh`, or leave the choice to the \
+         program"
+    )]
     Count {
         /// How many there are.
         rays: usize,
     },
     /// They start at several places.
-    #[error("ray {ray} does not start where ray 0 does; trace such a scan with `bvh`")]
+    #[error(
+        "the tracer `pinhole` needs rays of one origin, and ray {ray} starts elsewhere than ray 0; \
+         use `bvh`, or leave the choice to the program"
+    )]
     Origins {
         /// The first that starts elsewhere, from 0.
         ray: usize,
     },
     /// They point all around.
-    #[error("ray {ray} points more than 84° away from the mean of all; trace such a scan with `bvh`")]
+    #[error(
+        "the tracer `pinhole` needs rays within 84° of their mean, and ray {ray} is not; use `bvh`, or \
+         leave the choice to the program"
+    )]
     Wide {
         /// The first such ray, from 0.
         ray: usize,
@@ -146,11 +155,11 @@ impl Grid {
         let count = flat.len() as f64;
         let longest = sides[0].max(sides[1]);
         let spacing = (sides[0] * sides[1] / count).sqrt().max(longest / count);
-        let side = |factor: f64, side: f64| (factor * spacing).max(side / MOST_CELLS).max(1e-9);
-        let cell = [side(1.0, sides[0]), side(CELL_HEIGHT, sides[1])].map(|side| side as f32);
+        let reach = min.into_iter().chain(max).map(f32::abs).fold(LEAST_REACH, f32::max);
+        let least = LEAST_CELL * f64::from(reach);
+        let cell = [1.0, CELL_HEIGHT].map(|factor| (factor * spacing).max(least) as f32);
         let per = cell.map(|side| 1.0 / side);
         let cells = |axis: usize| ((max[axis] - min[axis]) * per[axis]) as usize + 1;
-        let reach = min.into_iter().chain(max).map(f32::abs).fold(LEAST_REACH, f32::max);
         let (columns, rows) = (cells(0), cells(1));
         Grid { min, max, per, cell, columns, rows, reach, starts: vec![0; columns * rows + 1] }
     }

@@ -81,7 +81,7 @@ impl Form {
     ) -> Option<[u32; LANES]> {
         let mut open = [0; LANES];
         let mut any = 0;
-        for lane in 0..LANES {
+        for (lane, open) in open.iter_mut().enumerate() {
             let (low, high) = (seen.w[lane] - self.w_doubt, seen.w[lane] + self.w_doubt);
             let maybe = (seen.least[lane] >= -self.doubt)
                 & (high >= nearest.low[lane])
@@ -90,8 +90,8 @@ impl Form {
             nearest.low[lane] = if surely { low } else { nearest.low[lane] };
             nearest.high[lane] = if surely { high } else { nearest.high[lane] };
             nearest.facet[lane] = if surely { facet } else { nearest.facet[lane] };
-            open[lane] = u32::from(maybe & !surely);
-            any |= open[lane];
+            *open = u32::from(maybe & !surely);
+            any |= *open;
         }
         (any != 0).then_some(open)
     }

@@ -37,8 +37,8 @@ impl<'a> Picture<'a> {
     pub fn new(fan: &'a Fan, mesh: &'a Mesh) -> Picture<'a> {
         let corner = |vertex: &DVec3| {
             let at = fan.frame * (*vertex - fan.origin);
-            let is_ahead = at.z > LEAST_DEPTH_M
-                && at.z * at.z > LEAST_COS * LEAST_COS * at.length_squared();
+            let is_ahead =
+                at.z > LEAST_DEPTH_M && at.z * at.z > LEAST_COS * LEAST_COS * at.length_squared();
             let w = 1.0 / at.z;
             let corner = Vec4::new((at.x * w) as f32, (at.y * w) as f32, w as f32, 0.0);
             if is_ahead { corner } else { Vec4::ZERO }
@@ -103,6 +103,14 @@ impl<'a> Picture<'a> {
 }
 
 impl Patch {
+    /// Whether the facet surely has an area: one that is not seen edge-on and whose corners are not far apart in depth. The
+    /// corners of one without area are collinear to 10⁻¹² of its length, at most 200 depths of the farthest,
+    /// and its picture can only be wide enough if one corner is 300 times as near as another.
+    #[inline(always)]
+    pub fn has_area(&self, form: &Form) -> bool {
+        form.area > 3.0 * form.doubt && self.high.z < 64.0 * self.low.z
+    }
+
     /// The forms of the facet, for rays within its cells.
     ///
     /// Let M be the largest coordinate, L the longest side of the box and two cells more, and η = 2⁻²⁴.
