@@ -336,3 +336,22 @@ fn instruments_that_cannot_work() {
     let arguments = ["render", "--beat", "scene.toml", "-o", "out"];
     check(&refused(matdb(folder.path()).args(arguments)), &["--beat", "[radar.receiver]"]);
 }
+
+#[test]
+fn a_tracer_that_does_not_take_the_rays() {
+    let folder = tempfile::tempdir().unwrap();
+    let scan = "[radar.scan]\npattern = \"rays\"\nfile = \"r.csv\"\n[[mesh]]";
+    fs::write(folder.path().join("scene.toml"), PLATE.replacen("[[mesh]]", scan, 1)).unwrap();
+    let rays = "chirp,time_s,ox_m,oy_m,oz_m,dx,dy,dz\n0,0,0,1.1,8,0,0,-1\n1,1,0.1,1.1,8,0,0,-1\n";
+    fs::write(folder.path().join("r.csv"), rays).unwrap();
+    let render = ["render", "scene.toml", "-o", "out"];
+    let with = |more: &[&str]| {
+        let mut command = matdb(folder.path());
+        command.args(render).args(more);
+        command
+    };
+    check(&refused(&mut with(&["--tracer", "pinhole"])), &["pinhole", "ray 1", "`bvh`"]);
+    assert!(!folder.path().join("out").exists());
+    with(&["--tracer", "bvh"]).assert().success();
+    with(&[]).assert().success();
+}

@@ -30,6 +30,15 @@ fn one_thread_and_two_write_the_same_files() {
 }
 
 #[test]
+fn the_tracer_changes_no_byte() {
+    for name in ["mannequin.toml", "human.toml", "showcase.toml"] {
+        let [bvh, pinhole] =
+            ["bvh", "pinhole"].map(|t| render("2", &["--tracer", t], &scene(name)));
+        assert!(bvh == pinhole && bvh == render("1", &[], &scene(name)), "{name}");
+    }
+}
+
+#[test]
 fn with_everything_switched_on_they_still_do() {
     let text = std::fs::read_to_string(scene("showcase.toml")).unwrap();
     let everything = &text[text.find("[radar.receiver]").unwrap()..text.find("[[mesh]]").unwrap()];

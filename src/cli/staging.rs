@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::formats::EffectEntry;
 use crate::render::{Bounce, Setup, Surface};
 use crate::scene::Scene;
-use crate::trace::Bvh;
+use crate::trace::{Bvh, Tracer};
 use crate::units::ratio_from_db;
 
 /// A material as one scene uses it.
@@ -85,6 +85,7 @@ pub(super) fn setup<'a>(
         radar: scene.radar(),
         chirps: &scene.chirps,
         bvh,
+        tracer: Tracer::Automatic,
         region_of_facet: &scene.target.region_of_facet,
         surfaces,
         bounce: scene.file.bounce.map(|bounce| Bounce {

@@ -182,11 +182,13 @@ impl Mesh {
     }
 
     /// The corners of a facet, m. Panics when `facet` is out of range.
+    #[inline]
     pub fn corners(&self, facet: usize) -> [DVec3; 3] {
         self.facets[facet].map(|v| self.vertices[v as usize])
     }
 
     /// Twice the facet's area times its right-handed unit normal, m²; zero for a degenerate facet.
+    #[inline]
     pub fn area_normal(&self, facet: usize) -> DVec3 {
         let [a, b, c] = self.corners(facet);
         (b - a).cross(c - a)

@@ -74,9 +74,8 @@ impl<'a> Acting<'a> {
         self.receiver
     }
 
-    /// What a ray of a chirp meets.
-    pub fn meet(&self, chirp: usize, ray: &Ray<Global>) -> Meeting {
-        let hit = self.setup.bvh.closest(ray);
+    /// What a ray of a chirp meets, from what it hits where the scene has the target.
+    pub fn meet(&self, chirp: usize, ray: &Ray<Global>, hit: Option<Hit>) -> Meeting {
         // A ray that misses may still meet a target that has moved.
         let look = hit.map_or(self.blank(chirp, *ray), |hit| self.look(chirp, *ray, hit, None));
         match self.model.placed(&self.stage(), look) {

@@ -31,7 +31,7 @@ use crate::effects::Model;
 use crate::frames::{Global, Point, Ray};
 use crate::geometry::Mesh;
 use crate::radar::{Aliased, Chirps, Field, Radar, RadarError, RadarFrames};
-use crate::trace::{Bvh, Hit, winding_number};
+use crate::trace::{Bvh, Hit, NoFan, Tracer, winding_number};
 use crate::units::dbm_from_watts;
 use acting::Acting;
 use detect::Detector;
@@ -57,6 +57,8 @@ pub struct Setup<'a> {
     pub chirps: &'a Chirps,
     /// The target.
     pub bvh: &'a Bvh<'a>,
+    /// How the rays of the scan find it; all others ask `bvh`.
+    pub tracer: Tracer,
     /// Region of every facet, an index into `surfaces`.
     pub region_of_facet: &'a [u16],
     /// What each region is made of.
@@ -79,8 +81,8 @@ impl<'a> Setup<'a> {
         region_of_facet: &'a [u16],
         surfaces: &'a [Surface<'a>],
     ) -> Setup<'a> {
-        let (bounce, effects, seed) = (None, None, 0);
-        Setup { radar, chirps, bvh, region_of_facet, surfaces, bounce, effects, seed }
+        let (tracer, bounce, effects, seed) = (Tracer::Automatic, None, None, 0);
+        Setup { radar, chirps, bvh, tracer, region_of_facet, surfaces, bounce, effects, seed }
     }
 }
 
@@ -157,6 +159,9 @@ pub enum RenderError {
     /// The receiver cannot work.
     #[error(transparent)]
     Radar(#[from] RadarError),
+    /// The tracer that was asked for does not take the rays of the scan.
+    #[error(transparent)]
+    Tracer(#[from] NoFan),
 }
 
 impl Scan {
@@ -178,26 +183,31 @@ pub fn trace(
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Footprints, RenderError> {
-    seen(spot::trace(radar, chirps, bvh, rays_per_chirp.max(1), done), radar, chirps, bvh)
+    let rays = rays_per_chirp.max(1);
+    seen(spot::trace(radar, chirps, bvh, Tracer::Automatic, rays, done)?, radar, chirps, bvh)
 }
 
 /// As [`trace`], of the target where the setup's effects place it.
 ///
 /// # Errors
-/// When no ray meets the mesh, or an effect would count what the setup renders already.
+/// When no ray meets the mesh, an effect would count what the setup renders already, or the setup's
+/// tracer does not take the rays.
 pub fn trace_placed(
     setup: &Setup,
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Footprints, RenderError> {
-    let Setup { radar, chirps, bvh, .. } = *setup;
+    let Setup { radar, chirps, bvh, tracer, .. } = *setup;
     let rays = rays_per_chirp.max(1);
     acting::check(setup, rays, Observer::Radar)?;
-    let Some(acting) = Acting::new(setup) else {
-        return trace(radar, chirps, bvh, rays, done);
+    let footprints = match Acting::new(setup) {
+        None => spot::trace(radar, chirps, bvh, tracer, rays, done),
+        Some(acting) => {
+            let meet = |chirp, ray: &Ray<Global>, hit| acting.meet(chirp, ray, hit);
+            spot::trace_moved(radar, chirps, bvh, tracer, rays, done, meet)
+        }
     };
-    let meet = |chirp, ray: &Ray<Global>| acting.meet(chirp, ray);
-    seen(spot::trace_moved(radar, chirps, rays, done, meet), radar, chirps, bvh)
+    seen(footprints?, radar, chirps, bvh)
 }
 
 /// Footprints that are not all empty.

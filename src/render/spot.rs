@@ -15,7 +15,7 @@ use super::edges;
 use crate::frames::{Direction, Global, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Beam, Chirps, Radar};
-use crate::trace::{Bvh, Hit};
+use crate::trace::{Bvh, Hit, NoFan, Tracer};
 
 /// 1/φ: successive multiples of it are spread evenly over 0 to 1.
 pub(super) const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -46,66 +46,104 @@ pub(super) fn trace(
     radar: &Radar,
     chirps: &Chirps,
     bvh: &Bvh,
+    tracer: Tracer,
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
-) -> Footprints {
-    let meet = |_, ray: &Ray<Global>| bvh.closest(ray);
-    let hits = meetings(radar, chirps, rays_per_chirp, done, meet, |hit| *hit);
+) -> Result<Footprints, NoFan> {
+    let scan = Rays { radar, chirps, bvh, tracer, rays_per_chirp };
+    let hits = scan.meetings(done, |_, _, hit| hit, |hit| *hit)?;
     let edge_m = edge_distances_m(radar, chirps, &hits, rays_per_chirp);
-    Footprints { rays_per_chirp, hits, edge_m, facings: Vec::new() }
+    Ok(Footprints { rays_per_chirp, hits, edge_m, facings: Vec::new() })
 }
 
-/// The same, had the rays of every chirp, by its number, met what `meet` says.
+/// The same, had the rays of every chirp, by its number, met what `meet` makes of their hits.
 pub(super) fn trace_moved(
     radar: &Radar,
     chirps: &Chirps,
+    bvh: &Bvh,
+    tracer: Tracer,
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
-    meet: impl Fn(usize, &Ray<Global>) -> Meeting + Sync,
-) -> Footprints {
-    let met = meetings(radar, chirps, rays_per_chirp, done, meet, |met| met.0);
+    meet: impl Fn(usize, &Ray<Global>, Option<Hit>) -> Meeting + Sync,
+) -> Result<Footprints, NoFan> {
+    let scan = Rays { radar, chirps, bvh, tracer, rays_per_chirp };
+    let met = scan.meetings(done, meet, |met| met.0)?;
     let (hits, mut facings): (Vec<_>, Vec<_>) = met.into_iter().unzip();
     if facings.iter().all(Option::is_none) {
         facings = Vec::new();
     }
     let edge_m = edge_distances_m(radar, chirps, &hits, rays_per_chirp);
-    Footprints { rays_per_chirp, hits, edge_m, facings }
+    Ok(Footprints { rays_per_chirp, hits, edge_m, facings })
 }
 
-/// What the rays of every chirp meet, by `meet`; `hit` is where.
-fn meetings<T: Default + Send>(
-    radar: &Radar,
-    chirps: &Chirps,
+/// The rays of a scan and what they may meet.
+#[derive(Clone, Copy)]
+struct Rays<'a> {
+    radar: &'a Radar,
+    chirps: &'a Chirps,
+    bvh: &'a Bvh<'a>,
+    tracer: Tracer,
     rays_per_chirp: usize,
-    done: &(dyn Fn(usize) + Sync),
-    meet: impl Fn(usize, &Ray<Global>) -> T + Sync,
-    hit: impl Fn(&T) -> Option<Hit> + Sync,
-) -> Vec<T> {
-    const CHIRPS_PER_TASK: usize = 256;
-    let beam = Beam::new(radar);
-    let chirp = |(number, axis): (usize, &Ray<Global>)| {
-        let met = meet(number, axis);
-        if rays_per_chirp == 1 {
-            return vec![met];
+}
+
+impl Rays<'_> {
+    /// What `meet` makes of what the rays of every chirp hit; `hit` is where that is.
+    fn meetings<T: Default + Send + Sync>(
+        &self,
+        done: &(dyn Fn(usize) + Sync),
+        meet: impl Fn(usize, &Ray<Global>, Option<Hit>) -> T + Sync,
+        hit: impl Fn(&T) -> Option<Hit> + Sync,
+    ) -> Result<Vec<T>, NoFan> {
+        /// Rays that are traced at once: enough to share the walk over the facets, few enough to hold.
+        const RAYS_PER_TURN: usize = 1 << 18;
+        let axes = &self.chirps.rays;
+        let hits = self.tracer.closest(self.bvh, axes)?;
+        let on_axis =
+            |(number, (axis, hit)): (usize, (&Ray<Global>, Option<Hit>))| meet(number, axis, hit);
+        let met: Vec<T> = axes.par_iter().zip(hits).enumerate().map(on_axis).collect();
+        if self.rays_per_chirp == 1 {
+            done(axes.len());
+            return Ok(met);
         }
-        // The spot is as wide as the beam where its axis meets the target, or at 8 m.
-        let range_m = hit(&met).map_or(PATTERN_RANGE_M, |hit| hit.range_m);
-        let tangent = beam.diameter_along_m(axis, range_m) / range_m;
-        let sub_ray = |ray: Option<Ray<Global>>| ray.map_or(T::default(), |ray| meet(number, &ray));
-        sub_rays(axis, tangent, number, rays_per_chirp).map(sub_ray).collect()
-    };
-    chirps
-        .rays
-        .par_chunks(CHIRPS_PER_TASK)
-        .enumerate()
-        .flat_map_iter(|(task, rays)| {
-            let first = task * CHIRPS_PER_TASK;
-            let met: Vec<T> =
-                rays.iter().enumerate().flat_map(|(i, ray)| chirp((first + i, ray))).collect();
-            done(rays.len());
-            met
-        })
-        .collect()
+        let turn = (RAYS_PER_TURN / self.rays_per_chirp).max(1);
+        let mut all = Vec::with_capacity(axes.len() * self.rays_per_chirp);
+        for (number, met) in met.chunks(turn).enumerate() {
+            let first = number * turn;
+            let ranges_m: Vec<Option<f64>> =
+                met.iter().map(|met| hit(met).map(|hit| hit.range_m)).collect();
+            all.extend(self.spots(first, &ranges_m, &meet)?);
+            done(met.len());
+        }
+        Ok(all)
+    }
+
+    /// What all rays of some chirps meet, from the ranges on their axes.
+    fn spots<T: Default + Send>(
+        &self,
+        first: usize,
+        ranges_m: &[Option<f64>],
+        meet: impl Fn(usize, &Ray<Global>, Option<Hit>) -> T + Sync,
+    ) -> Result<Vec<T>, NoFan> {
+        let beam = Beam::new(self.radar);
+        let count = self.rays_per_chirp;
+        let spot = |(offset, range_m): (usize, &Option<f64>)| {
+            let axis = &self.chirps.rays[first + offset];
+            // The spot is as wide as the beam where its axis meets the target, or at 8 m.
+            let range_m = range_m.unwrap_or(PATTERN_RANGE_M);
+            let tangent = beam.diameter_along_m(axis, range_m) / range_m;
+            sub_rays(axis, tangent, first + offset, count)
+        };
+        let rays: Vec<Option<Ray<Global>>> =
+            ranges_m.par_iter().enumerate().flat_map_iter(spot).collect();
+        let given: Vec<Ray<Global>> = rays.iter().flatten().copied().collect();
+        let mut hits = self.tracer.closest(self.bvh, &given)?.into_iter();
+        let hits: Vec<Option<Hit>> =
+            rays.iter().map(|ray| ray.and_then(|_| hits.next().flatten())).collect();
+        let meet = |(number, (ray, hit)): (usize, (Option<Ray<Global>>, Option<Hit>))| {
+            ray.map_or(T::default(), |ray| meet(first + number / count, &ray, hit))
+        };
+        Ok(rays.into_par_iter().zip(hits).enumerate().map(meet).collect())
+    }
 }
 
 /// By the first ray of each chirp, which is the nearest to its axis.

@@ -2,6 +2,7 @@
 //!
 //! The library's own triangle tests lose rays on shared edges; ours is in `facet.rs`.
 
+use std::sync::OnceLock;
 use std::time::Duration;
 
 use glam::{DVec3, Vec3A};
@@ -19,10 +20,16 @@ use crate::geometry::Mesh;
 /// Boxes are grown by this share of the mesh's radius, some eighty times the rounding of f32.
 const PADDING: f64 = 1e-5;
 
-/// A hierarchy over one mesh.
+/// A hierarchy over one mesh, built when the first ray asks for it.
 pub struct Bvh<'a> {
     mesh: &'a Mesh,
-    boxes: Bvh2,
+    /// The facets that it holds; none for all that have an area.
+    only: Option<Vec<u32>>,
+    boxes: OnceLock<Boxes>,
+}
+
+struct Boxes {
+    tree: Bvh2,
     /// Facet of each leaf entry.
     facets: Vec<u32>,
     centre: DVec3,
@@ -30,13 +37,42 @@ pub struct Bvh<'a> {
 }
 
 impl<'a> Bvh<'a> {
-    /// Builds the hierarchy over all facets that have an area.
+    /// A hierarchy over all facets that have an area.
     pub fn new(mesh: &'a Mesh) -> Bvh<'a> {
-        let live: Vec<u32> =
-            (0..mesh.facets.len()).filter(|&f| !mesh.is_degenerate(f)).map(|f| f as u32).collect();
-        let (centre, radius_m) = bounding_sphere(mesh, &live);
+        Bvh { mesh, only: None, boxes: OnceLock::new() }
+    }
+
+    /// The same over some facets, which must have an area.
+    pub(super) fn over(mesh: &'a Mesh, facets: Vec<u32>) -> Bvh<'a> {
+        Bvh { only: Some(facets), ..Bvh::new(mesh) }
+    }
+
+    /// The mesh that it is over.
+    pub fn mesh(&self) -> &'a Mesh {
+        self.mesh
+    }
+
+    /// Whether a ray has asked for it yet.
+    pub fn is_built(&self) -> bool {
+        self.boxes.get().is_some()
+    }
+
+    /// The closest hit of one ray; of equally near facets the one with the smallest number.
+    pub fn closest(&self, ray: &Ray<Global>) -> Option<Hit> {
+        let boxes = self.boxes.get_or_init(|| {
+            let live = |&facet: &u32| !self.mesh.is_degenerate(facet as usize);
+            let all = || (0..self.mesh.facets.len() as u32).filter(live).collect();
+            Boxes::new(self.mesh, self.only.clone().unwrap_or_else(all))
+        });
+        boxes.closest(self.mesh, ray)
+    }
+}
+
+impl Boxes {
+    fn new(mesh: &Mesh, facets: Vec<u32>) -> Boxes {
+        let (centre, radius_m) = bounding_sphere(mesh, &facets);
         let padding = Vec3A::splat((PADDING * radius_m) as f32);
-        let boxes: Vec<Aabb> = live
+        let boxes: Vec<Aabb> = facets
             .iter()
             .map(|&facet| {
                 let corners = mesh.corners(facet as usize).map(|c| (c - centre).as_vec3a());
@@ -44,25 +80,19 @@ impl<'a> Bvh<'a> {
                 Aabb::new(tight.min - padding, tight.max + padding)
             })
             .collect();
-        let boxes = build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Duration::default());
-        let facets = boxes.primitive_indices.iter().map(|&entry| live[entry as usize]).collect();
-        Bvh { mesh, boxes, facets, centre, radius_m }
+        let tree = build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Duration::default());
+        let facets = tree.primitive_indices.iter().map(|&entry| facets[entry as usize]).collect();
+        Boxes { tree, facets, centre, radius_m }
     }
 
-    /// The mesh that it was built over.
-    pub fn mesh(&self) -> &'a Mesh {
-        self.mesh
-    }
-
-    /// The closest hit of one ray; of equally near facets the one with the smallest number.
-    pub fn closest(&self, ray: &Ray<Global>) -> Option<Hit> {
+    fn closest(&self, mesh: &Mesh, ray: &Ray<Global>) -> Option<Hit> {
         let start_m = self.entry_m(ray)?;
         let origin = ray.origin.xyz + start_m * ray.direction.xyz() - self.centre;
         let box_ray = BoxRay::new_inf(origin.as_vec3a(), ray.direction.xyz().as_vec3a());
         let mut best: Option<(f64, u32)> = None;
-        self.boxes.ray_traverse(box_ray, &mut RayHit::none(), |_, entry| {
+        self.tree.ray_traverse(box_ray, &mut RayHit::none(), |_, entry| {
             let facet = self.facets[entry];
-            if let Some(range_m) = crossing_m(self.mesh, facet as usize, ray)
+            if let Some(range_m) = crossing_m(mesh, facet as usize, ray)
                 && best.is_none_or(|nearest| (range_m, facet) < nearest)
             {
                 best = Some((range_m, facet));
@@ -72,10 +102,10 @@ impl<'a> Bvh<'a> {
                 (range_m - start_m + 2.0 * PADDING * self.radius_m) as f32
             })
         });
-        best.map(|(range_m, facet)| measured(self.mesh, facet, ray, range_m))
+        best.map(|(range_m, facet)| measured(mesh, facet, ray, range_m))
     }
 
-    /// Distance at which the ray reaches the sphere around the mesh, m; f32 is precise from there.
+    /// Distance at which the ray reaches the sphere around the facets, m; f32 is precise from there.
     fn entry_m(&self, ray: &Ray<Global>) -> Option<f64> {
         let to_centre = self.centre - ray.origin.xyz;
         let along_m = to_centre.dot(ray.direction.xyz());
@@ -147,6 +177,15 @@ mod tests {
         assert!(bvh.closest(&ray(DVec3::Z, DVec3::new(9.0, 0.0, 0.0))).is_none());
         // Along the plate: parallel to both facets.
         assert!(bvh.closest(&ray(DVec3::new(-3.0, 0.0, 0.0), DVec3::ZERO)).is_none());
+    }
+
+    #[test]
+    fn nothing_is_built_before_the_first_ray() {
+        let mesh = plate();
+        let bvh = Bvh::new(&mesh);
+        assert!(bvh.mesh().facets.len() == 2 && !bvh.is_built());
+        bvh.closest(&ray(DVec3::Z, DVec3::ZERO));
+        assert!(bvh.is_built());
     }
 
     #[test]

@@ -1,18 +1,24 @@
 //! Closest hits of rays on a mesh.
 //!
-//! [`Bvh`] finds facets with boxes in f32 and decides and measures in f64; [`brute`] is the naive
-//! loop that judges it. Both take any mesh that passes [`Mesh::validate`](crate::geometry::Mesh::validate) and lies within 100 km, where
+//! [`Fan`] finds what rays of one origin meet, as the rays of a scan are, and builds nothing for it. [`Bvh`]
+//! takes any ray and finds facets with boxes. Both look in f32 and decide and measure in f64; [`brute`]
+//! is the naive loop that judges them, and [`Tracer`] chooses. All take any mesh that passes
+//! [`Mesh::validate`](crate::geometry::Mesh::validate) and lies within 100 km, where
 //! f32 does its work; facets without area are never hit.
 
 pub mod brute;
 mod bvh;
 mod facet;
 mod inside;
+mod pinhole;
+mod tracer;
 
 use crate::frames::{Global, Point};
 
 pub use bvh::Bvh;
 pub use inside::winding_number;
+pub use pinhole::{Fan, NoFan};
+pub use tracer::Tracer;
 
 /// Where a ray meets a facet, in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]

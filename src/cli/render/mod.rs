@@ -15,9 +15,9 @@ use super::output::write_all;
 use super::staging::{effects, materials, model, setup, surfaces};
 use crate::error::Error;
 use crate::geometry::Raster;
-use crate::render::{RenderError, trace_placed};
+use crate::render::{RenderError, Setup, trace_placed};
 use crate::scene::Scene;
-use crate::trace::Bvh;
+use crate::trace::{Bvh, Tracer};
 use record::Record;
 use stages::Stages;
 
@@ -39,6 +39,31 @@ pub(super) struct Args {
     /// Write the sampled beat signals, too: beat.npy, chirps x samples; needs [radar.receiver]
     #[arg(long)]
     beat: bool,
+    /// How the rays of the scan are traced; all give the same [default: pinhole where they share their
+    /// origin, else bvh]
+    #[arg(long, value_name = "NAME")]
+    tracer: Option<Rays>,
+}
+
+/// Ways to trace the rays of a scan.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Rays {
+    /// Rays of one origin as points of a picture; nothing is built
+    Pinhole,
+    /// A hierarchy of boxes, for any rays
+    Bvh,
+    /// Every facet for every ray
+    Brute,
+}
+
+impl Rays {
+    fn tracer(self) -> Tracer {
+        match self {
+            Rays::Pinhole => Tracer::Pinhole,
+            Rays::Bvh => Tracer::Bvh,
+            Rays::Brute => Tracer::Brute,
+        }
+    }
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
@@ -57,7 +82,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     stages.end("load", console);
 
     let bvh = Bvh::new(&scene.target.mesh);
-    let setup = setup(&scene, &bvh, &surfaces, model.as_ref());
+    let tracer = args.tracer.map_or(Tracer::Automatic, Rays::tracer);
+    let setup = Setup { tracer, ..setup(&scene, &bvh, &surfaces, model.as_ref()) };
     let bar = console.progress("tracing", scene.chirps.rays.len());
     let rays = scene.file.spot.rays;
     let footprints = trace_placed(&setup, rays, &|chirps| bar.inc(chirps as u64));

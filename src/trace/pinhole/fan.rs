@@ -1,0 +1,205 @@
+//! Rays of one origin as points of a plane, sorted into cells.
+
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+use thiserror::Error;
+
+use super::lanes::LANES;
+use crate::frames::{Global, Ray};
+
+/// Least cosine between a ray and the axis of its fan: 84°.
+const LEAST_COS: f64 = 0.1;
+
+/// Height of a cell over its width. A facet reads its cells row by row, a block of lanes at a time:
+/// high cells make full blocks.
+const CELL_HEIGHT: f64 = 3.0;
+
+/// Least side of a cell over the largest coordinate: four times what rounding moves a box by.
+const LEAST_CELL: f64 = 1e-6;
+
+/// Below this the coordinates are as good as in the middle of the picture.
+const LEAST_REACH: f32 = 0.01;
+
+/// Rays that share an origin, sorted for [`Fan::closest`].
+///
+/// In a frame whose z axis is the mean direction, a ray is the point (u, v) = (d_x/d_z, d_y/d_z).
+/// A fan belongs to its rays alone: it serves every mesh and every pose of it.
+pub struct Fan<'a> {
+    pub(super) rays: &'a [Ray<Global>],
+    pub(super) origin: DVec3,
+    /// Turns a direction into the frame of the fan.
+    pub(super) frame: DMat3,
+    pub(super) grid: Grid,
+    /// Coordinates of the rays, cell after cell, and [`LANES`] more that are read and not used.
+    pub(super) u: Vec<f32>,
+    pub(super) v: Vec<f32>,
+    /// The ray at each place of these lists, and the place of each ray.
+    pub(super) ray_at: Vec<u32>,
+    pub(super) place_of: Vec<u32>,
+}
+
+/// Cells over (u, v), and which places belong to each, row by row.
+pub(super) struct Grid {
+    pub min: [f32; 2],
+    pub max: [f32; 2],
+    /// Cells per unit of u and v.
+    pub per: [f32; 2],
+    /// Sides of a cell.
+    pub cell: [f32; 2],
+    pub columns: usize,
+    pub rows: usize,
+    /// The largest coordinate, which is what they are rounded to.
+    pub reach: f32,
+    /// First place of each cell, and the end.
+    starts: Vec<u32>,
+}
+
+/// Why rays are no fan.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum NoFan {
+    /// There is no ray, or more than can be numbered.
+    #[error(
+        "the tracer `pinhole` takes 1 to 2³² − 2 rays and not {rays}; use `bvh`, or leave the choice to the \
+         program"
+    )]
+    Count {
+        /// How many there are.
+        rays: usize,
+    },
+    /// They start at several places.
+    #[error(
+        "the tracer `pinhole` needs rays of one origin, and ray {ray} starts elsewhere than ray 0; \
+         use `bvh`, or leave the choice to the program"
+    )]
+    Origins {
+        /// The first that starts elsewhere, from 0.
+        ray: usize,
+    },
+    /// They point all around.
+    #[error(
+        "the tracer `pinhole` needs rays within 84° of their mean, and ray {ray} is not; use `bvh`, or \
+         leave the choice to the program"
+    )]
+    Wide {
+        /// The first such ray, from 0.
+        ray: usize,
+    },
+}
+
+impl<'a> Fan<'a> {
+    /// Sorts the rays.
+    ///
+    /// # Errors
+    /// When they do not share an origin, or point more than 84° away from their mean direction.
+    pub fn new(rays: &'a [Ray<Global>]) -> Result<Fan<'a>, NoFan> {
+        let origin = match rays.first() {
+            Some(ray) if rays.len() < u32::MAX as usize => ray.origin.xyz,
+            _ => return Err(NoFan::Count { rays: rays.len() }),
+        };
+        if let Some(ray) = rays.par_iter().position_first(|ray| ray.origin.xyz != origin) {
+            return Err(NoFan::Origins { ray });
+        }
+        let frame = frame(rays);
+        let flat: Vec<Option<[f32; 2]>> =
+            rays.par_iter().with_min_len(4096).map(|ray| flattened(frame, ray)).collect();
+        if let Some(ray) = flat.par_iter().position_first(Option::is_none) {
+            return Err(NoFan::Wide { ray });
+        }
+        let flat: Vec<[f32; 2]> = flat.into_iter().flatten().collect();
+        let mut grid = Grid::over(&flat);
+        let place_of = grid.sort(&flat);
+        let mut fan = Fan {
+            rays,
+            origin,
+            frame,
+            grid,
+            u: vec![0.0; rays.len() + LANES],
+            v: vec![0.0; rays.len() + LANES],
+            ray_at: vec![0; rays.len()],
+            place_of,
+        };
+        for ((&place, [u, v]), ray) in fan.place_of.iter().zip(flat).zip(0..) {
+            let place = place as usize;
+            (fan.u[place], fan.v[place], fan.ray_at[place]) = (u, v, ray);
+        }
+        Ok(fan)
+    }
+}
+
+/// Rows: two axes across the mean direction, and it.
+fn frame(rays: &[Ray<Global>]) -> DMat3 {
+    // Fixed chunks, so that the sum does not depend on the threads.
+    let sum = |rays: &[Ray<Global>]| rays.iter().map(|ray| ray.direction.xyz()).sum::<DVec3>();
+    let sums: Vec<DVec3> = rays.par_chunks(4096).map(sum).collect();
+    let axis = sums.into_iter().sum::<DVec3>().normalize_or(rays[0].direction.xyz());
+    let (right, up) = axis.any_orthonormal_pair();
+    DMat3::from_cols(right, up, axis).transpose()
+}
+
+fn flattened(frame: DMat3, ray: &Ray<Global>) -> Option<[f32; 2]> {
+    let DVec3 { x, y, z } = frame * ray.direction.xyz();
+    (z > LEAST_COS).then(|| [(x / z) as f32, (y / z) as f32])
+}
+
+impl Grid {
+    /// Cells as wide as the rays' mean spacing; along a line, their spacing on it.
+    fn over(flat: &[[f32; 2]]) -> Grid {
+        let (mut min, mut max) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+        for point in flat {
+            for axis in [0, 1] {
+                min[axis] = min[axis].min(point[axis]);
+                max[axis] = max[axis].max(point[axis]);
+            }
+        }
+        let sides = [0, 1].map(|axis| f64::from(max[axis]) - f64::from(min[axis]));
+        let count = flat.len() as f64;
+        let longest = sides[0].max(sides[1]);
+        let spacing = (sides[0] * sides[1] / count).sqrt().max(longest / count);
+        let reach = min.into_iter().chain(max).map(f32::abs).fold(LEAST_REACH, f32::max);
+        let least = LEAST_CELL * f64::from(reach);
+        let cell = [1.0, CELL_HEIGHT].map(|factor| (factor * spacing).max(least) as f32);
+        let per = cell.map(|side| 1.0 / side);
+        let cells = |axis: usize| ((max[axis] - min[axis]) * per[axis]) as usize + 1;
+        let (columns, rows) = (cells(0), cells(1));
+        Grid { min, max, per, cell, columns, rows, reach, starts: vec![0; columns * rows + 1] }
+    }
+
+    /// Column or row of a coordinate; outside the grid the nearest. It never falls as `at` grows.
+    #[inline(always)]
+    pub fn step(&self, axis: usize, at: f32) -> usize {
+        let most = if axis == 0 { self.columns } else { self.rows } - 1;
+        // A negative number becomes 0.
+        (((at - self.min[axis]) * self.per[axis]) as i32).clamp(0, most as i32) as usize
+    }
+
+    /// The places of some columns, from first to last, of a row.
+    #[inline(always)]
+    pub fn places(&self, row: usize, first: usize, last: usize) -> [usize; 2] {
+        let cell = row * self.columns;
+        [cell + first, cell + last + 1].map(|cell| self.starts[cell] as usize)
+    }
+
+    /// The first place of a row; of the row after the last, the end.
+    pub fn row_start(&self, row: usize) -> usize {
+        self.starts[row * self.columns] as usize
+    }
+
+    /// The place of every ray, cell after cell and in a cell by number.
+    fn sort(&mut self, flat: &[[f32; 2]]) -> Vec<u32> {
+        let cell = |&[u, v]: &[f32; 2]| (self.step(1, v) * self.columns + self.step(0, u)) as u32;
+        let mut place_of: Vec<u32> = flat.par_iter().with_min_len(4096).map(cell).collect();
+        let mut next = vec![0; self.starts.len()];
+        place_of.iter().for_each(|&cell| next[cell as usize] += 1);
+        let mut before = 0;
+        for count in &mut next {
+            before += std::mem::replace(count, before);
+        }
+        self.starts.copy_from_slice(&next);
+        for place in &mut place_of {
+            let next = &mut next[*place as usize];
+            *place = *next;
+            *next += 1;
+        }
+        place_of
+    }
+}

@@ -1,0 +1,129 @@
+//! One facet against a block of rays, in f32 and side by side.
+//!
+//! Plain loops over arrays of fixed length, which become vector instructions; [`widest`] picks the
+//! widest that the processor has. No product is fused with a sum, so that all give the same bits.
+
+use super::band::Band;
+
+/// Rays of a block.
+pub(super) const LANES: usize = 16;
+
+pub(super) type Lanes = [f32; LANES];
+
+/// A facet as linear forms over (u, v).
+///
+/// Twice the areas that a point spans with the edges are b, c and `area` − b − c, all positive
+/// inside; the inverse depth, 1/m, is `w` + `w_b`·b + `w_c`·c.
+#[derive(Clone, Copy)]
+pub(super) struct Form {
+    /// The first corner.
+    pub at: [f32; 2],
+    /// The edges from the first corner to the second and from the third to it; both turned around
+    /// when the facet runs clockwise.
+    pub ab: [f32; 2],
+    pub ca: [f32; 2],
+    pub area: f32,
+    /// An area nearer to zero than this may have either sign.
+    pub doubt: f32,
+    pub w: f32,
+    pub w_b: f32,
+    pub w_c: f32,
+    /// The inverse depth is good to this, 1/m.
+    pub w_doubt: f32,
+}
+
+/// What a block of rays sees of a facet.
+pub(super) struct Seen {
+    /// The least of the three areas.
+    pub least: Lanes,
+    /// Inverse depth, 1/m.
+    pub w: Lanes,
+}
+
+/// The nearest so far of a block of rays.
+pub(super) struct Nearest<'a> {
+    /// Bounds of the inverse depth, 1/m.
+    pub low: &'a mut Lanes,
+    pub high: &'a mut Lanes,
+    pub facet: &'a mut [u32; LANES],
+}
+
+impl Form {
+    /// The first `count` rays of a block; none when all surely pass beside the facet or meet a nearer one.
+    #[inline(always)]
+    pub fn see(&self, u: &Lanes, v: &Lanes, low: &Lanes, count: f32) -> Option<Seen> {
+        let mut seen = Seen { least: [0.0; LANES], w: [0.0; LANES] };
+        let mut any = 0;
+        for lane in 0..LANES {
+            let (x, y) = (u[lane] - self.at[0], v[lane] - self.at[1]);
+            let c = self.ab[0] * y - self.ab[1] * x;
+            let b = self.ca[0] * y - self.ca[1] * x;
+            let a = self.area - b - c;
+            let least = if b < c { b } else { c };
+            let least = if a < least { a } else { least };
+            let w = self.w + b * self.w_b + c * self.w_c;
+            seen.least[lane] = least;
+            seen.w[lane] = w;
+            let maybe = (least >= -self.doubt) & (w + self.w_doubt >= low[lane]);
+            any |= u32::from(maybe & ((lane as f32) < count));
+        }
+        (any != 0).then_some(seen)
+    }
+
+    /// Notes where the facet is surely the nearest; lanes where f32 cannot tell are left 1 in the answer.
+    #[inline(always)]
+    pub fn note(
+        &self,
+        facet: u32,
+        seen: &Seen,
+        nearest: Nearest,
+        count: f32,
+    ) -> Option<[u32; LANES]> {
+        let mut open = [0; LANES];
+        let mut any = 0;
+        for (lane, open) in open.iter_mut().enumerate() {
+            let (low, high) = (seen.w[lane] - self.w_doubt, seen.w[lane] + self.w_doubt);
+            let maybe = (seen.least[lane] >= -self.doubt)
+                & (high >= nearest.low[lane])
+                & ((lane as f32) < count);
+            let surely = maybe & (seen.least[lane] > self.doubt) & (low > nearest.high[lane]);
+            nearest.low[lane] = if surely { low } else { nearest.low[lane] };
+            nearest.high[lane] = if surely { high } else { nearest.high[lane] };
+            nearest.facet[lane] = if surely { facet } else { nearest.facet[lane] };
+            *open = u32::from(maybe & !surely);
+            any |= *open;
+        }
+        (any != 0).then_some(open)
+    }
+}
+
+/// Walks facets over a band with the widest instructions that the processor has.
+pub(super) fn widest(band: &mut Band, facets: impl Iterator<Item = u32>) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if is_x86_feature_detected!("avx512f") {
+            // SAFETY: the processor has just been asked for the only feature that it needs.
+            return unsafe { x86::lanes_of_16(band, facets) };
+        }
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: as above.
+            return unsafe { x86::lanes_of_8(band, facets) };
+        }
+    }
+    band.walk(facets);
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use super::Band;
+
+    #[target_feature(enable = "avx512f")]
+    pub fn lanes_of_16(band: &mut Band, facets: impl Iterator<Item = u32>) {
+        band.walk(facets);
+    }
+
+    #[target_feature(enable = "avx2")]
+    pub fn lanes_of_8(band: &mut Band, facets: impl Iterator<Item = u32>) {
+        band.walk(facets);
+    }
+}

@@ -1,0 +1,81 @@
+//! Which way the closest hits of many rays are found.
+
+use rayon::prelude::*;
+
+use super::{Bvh, Fan, Hit, NoFan, brute};
+use crate::frames::{Global, Ray};
+
+/// How the closest hits of many rays are found. All ways agree; they differ in time and in what they take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tracer {
+    /// The pinhole where all rays share an origin, else the hierarchy.
+    #[default]
+    Automatic,
+    /// [`Fan`]: rays of one origin only, nothing is built.
+    Pinhole,
+    /// [`Bvh`]: any rays.
+    Bvh,
+    /// [`brute`]: any rays, and slow.
+    Brute,
+}
+
+impl Tracer {
+    /// The closest hit of every ray on the hierarchy's mesh. The hierarchy itself is built only if it
+    /// is asked.
+    ///
+    /// # Errors
+    /// When the pinhole is told to take rays that it cannot.
+    pub fn closest(self, bvh: &Bvh, rays: &[Ray<Global>]) -> Result<Vec<Option<Hit>>, NoFan> {
+        let each = |closest: &(dyn Fn(&Ray<Global>) -> Option<Hit> + Sync)| {
+            rays.par_iter().with_min_len(64).map(closest).collect()
+        };
+        Ok(match self {
+            Tracer::Pinhole => Fan::new(rays)?.closest(bvh.mesh()),
+            Tracer::Bvh => each(&|ray| bvh.closest(ray)),
+            Tracer::Brute => each(&|ray| brute::closest(bvh.mesh(), ray)),
+            Tracer::Automatic => match Fan::new(rays) {
+                Ok(fan) => fan.closest(bvh.mesh()),
+                Err(_) => each(&|ray| bvh.closest(ray)),
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::Point;
+    use crate::scene::solids;
+
+    fn ray(from: [f64; 3], to: [f64; 3]) -> Ray<Global> {
+        let [origin, to] = [from, to].map(|[x, y, z]| Point::new(x, y, z));
+        Ray { origin, direction: origin.towards(to).unwrap() }
+    }
+
+    #[test]
+    fn one_origin_needs_no_hierarchy_and_two_need_one() {
+        let mesh = solids::plate(2.0, 2.0);
+        let mut rays =
+            vec![ray([0.0, 0.0, 8.0], [0.1, 0.2, 0.0]), ray([0.0, 0.0, 8.0], [0.3, 0.0, 0.0])];
+        let bvh = Bvh::new(&mesh);
+        let one = Tracer::Automatic.closest(&bvh, &rays).unwrap();
+        assert!(one.iter().all(Option::is_some) && !bvh.is_built());
+        rays.push(ray([1.0, 0.0, 8.0], [0.3, 0.0, 0.0]));
+        assert_eq!(Tracer::Pinhole.closest(&bvh, &rays), Err(NoFan::Origins { ray: 2 }));
+        assert!(!bvh.is_built());
+        let two = Tracer::Automatic.closest(&bvh, &rays).unwrap();
+        assert!(bvh.is_built() && two[..2] == one && two[2].is_some());
+        assert_eq!(Tracer::Bvh.closest(&bvh, &rays).unwrap(), two);
+        for (slow, fast) in Tracer::Brute.closest(&bvh, &rays).unwrap().iter().zip(&two) {
+            assert!((slow.unwrap().range_m - fast.unwrap().range_m).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn no_rays_meet_nothing() {
+        let mesh = solids::plate(2.0, 2.0);
+        assert_eq!(Tracer::Automatic.closest(&Bvh::new(&mesh), &[]).unwrap(), []);
+        let refused = Tracer::Pinhole.closest(&Bvh::new(&mesh), &[]);
+        assert_eq!(refused, Err(NoFan::Count { rays: 0 }));
+    }
+}
