@@ -273,9 +273,7 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn rendered(&self, slug: &Slug) -> Result<Option<(Brdf, [f64; 2])>, StoreError> {
-        let found =
-            read::rendered(&self.conn, slug).map_err(|error| StoreError::new(&self.path, error))?;
-        Ok(found.and_then(|material| Some((material.scattering().ok()?, material.theta_rad))))
+        read::rendered(&self.conn, slug).map_err(|error| StoreError::new(&self.path, error))
     }
 
     /// Statistics by angle of a curve of a revision, or of the current one, as they were computed when
