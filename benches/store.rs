@@ -3,11 +3,14 @@
 //! `cargo bench --bench store -- 100000` fills a database with that many materials, a curve of 90 rows
 //! each (2000 without a number), and prints one line per measurement. Filling is compared with prepared
 //! statements that insert the very same rows into the same schema, in the same run: the ratio says
-//! something on any machine, the times only on one.
+//! something on any machine, the times only on one. A second argument `publish` publishes it, too, twice:
+//! that takes long and much room on the disk.
 
+use std::fs;
 use std::hint::black_box;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use matdb::material::{Censor, Curve, Material, Observation, SourceKind, builtin};
@@ -33,10 +36,17 @@ fn main() {
     let alone = replay(&ours, &raw, number);
     say("the same rows, SQLite alone", alone, number);
     println!("ratio {:.2} (goal: at most 1.5)", filled.as_secs_f64() / alone.as_secs_f64());
+    println!("size: {:.0} MB", fs::metadata(&ours).unwrap().len() as f64 / 1e6);
+    opening(folder.path(), &ours);
     let store = Store::open_existing(&ours).unwrap().unwrap();
     look_up(&store, number);
     filters(&store);
     processes(&ours);
+    if std::env::args().any(|argument| argument == "publish") {
+        let site = folder.path().join("site");
+        publishing(&ours, &site, "publish");
+        publishing(&ours, &site, "publish again");
+    }
 }
 
 fn say(what: &str, time: Duration, number: usize) {
@@ -90,6 +100,17 @@ fn fill(path: &Path, number: usize) -> Duration {
     });
     store.add_each(materials, |_, _| Ok::<_, StoreError>(())).unwrap();
     start.elapsed() - made
+}
+
+/// What it takes before the first question: no file yet, and one that is there.
+fn opening(folder: &Path, ours: &Path) {
+    let new = |turn: usize| folder.join(format!("new-{turn}.sqlite"));
+    let made = median_us(21, |turn| drop(Store::open(new(turn)).unwrap()));
+    println!("open a new database and migrate: {:.2} ms (goal: 5)", made / 1e3);
+    let opened = median_us(21, |_| drop(Store::open(ours).unwrap()));
+    println!("open to write: {:.2} ms (goal: 5)", opened / 1e3);
+    let opened = median_us(21, |_| drop(Store::open_existing(ours).unwrap()));
+    println!("open to read: {:.2} ms (goal: 5)", opened / 1e3);
 }
 
 /// A table's rows of one material, and where the numbers of material and revision stand in them.
@@ -238,6 +259,13 @@ fn processes(path: &Path) {
         vec!["search", "no77"],
         vec!["list"],
         vec!["list", "--json"],
+        vec!["list", "--frequency", "100"],
+        vec!["list", "--kind", "literature"],
+        vec!["search", "paint"],
+        vec!["search", "amber", "no1"],
+        vec!["search", "mate"],
+        vec!["near", "--material", "material-000007"],
+        vec!["near", "--material", "material-000007", "--class", "class-7"],
     ] {
         let time = median_us(5, |_| {
             let mut command = Command::new(env!("CARGO_BIN_EXE_matdb"));
@@ -247,4 +275,46 @@ fn processes(path: &Path) {
         });
         println!("matdb {}: {:.1} ms (goal: 50)", arguments.join(" "), time / 1e3);
     }
+}
+
+/// Publishes as a person does, and watches the memory.
+fn publishing(path: &Path, site: &Path, what: &str) {
+    let start = Instant::now();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_matdb"));
+    let command = command.arg("publish").arg(site).arg("--db").arg(path);
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let status = format!("/proc/{}/status", child.id());
+    let mut peak_mib = None;
+    let ended = loop {
+        peak_mib = fs::read_to_string(&status).ok().and_then(|text| high_mib(&text)).or(peak_mib);
+        match child.try_wait().unwrap() {
+            Some(ended) => break ended,
+            None => thread::sleep(Duration::from_millis(20)),
+        }
+    };
+    assert!(ended.success());
+    let memory = peak_mib.map_or("unknown".to_owned(), |mib| format!("{mib:.0} MiB"));
+    let (files, bytes) = size(site);
+    println!(
+        "{what}: {:.1} s, memory {memory} (goal: 500 MiB), {files} files, {:.0} MB",
+        start.elapsed().as_secs_f64(),
+        bytes as f64 / 1e6
+    );
+}
+
+/// The most memory that a process ever had, as Linux tells it.
+fn high_mib(status: &str) -> Option<f64> {
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.split_whitespace().next()?.parse().ok().map(|kib: f64| kib / 1024.0)
+}
+
+/// Number of files below a folder, and their bytes.
+fn size(folder: &Path) -> (usize, u64) {
+    fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| match entry.unwrap() {
+            entry if entry.file_type().unwrap().is_dir() => size(&entry.path()),
+            entry => (1, entry.metadata().unwrap().len()),
+        })
+        .fold((0, 0), |(files, bytes), (more, longer)| (files + more, bytes + longer))
 }

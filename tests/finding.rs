@@ -84,6 +84,105 @@ fn a_filter_lets_through_exactly_what_it_says() {
     }
 }
 
+/// A built-in material under other names, classes, tags and frequencies.
+fn many(number: usize) -> Vec<Material> {
+    let first = builtin::get("ptfe").unwrap().unwrap();
+    let of = |number: usize| Material {
+        slug: format!("sheet-{number:04}").parse().unwrap(),
+        name: format!("Sheet no{number}"),
+        class: format!("class-{}", number % 7),
+        tags: vec![format!("tag-{}", number % 2), format!("rare-{}", number % 400)],
+        frequency_hz: if number.is_multiple_of(300) { [1e9, 2e9] } else { [3e9, 400e9] },
+        ..first.clone()
+    };
+    (0..number).map(of).collect()
+}
+
+#[test]
+fn among_many_a_page_is_the_beginning_of_the_list_and_lines_are_those_of_the_materials() {
+    let mut store = Store::in_memory().unwrap();
+    let mut all = many(1200);
+    store.add(&all).unwrap();
+    // Twice in one go, and once more: only the last counts.
+    let renamed = |name: &str| Material { name: name.to_owned(), ..all[3].clone() };
+    let (second, third) = (renamed("Second"), renamed("Third"));
+    store.add([&second, &third]).unwrap();
+    all[3] = third;
+    assert!(store.damage().unwrap().is_empty());
+    assert_eq!(store.summary(&all[3].slug).unwrap().unwrap().revision, 3);
+    let any = Filter::default;
+    let tag = |tag: &str| Filter { tag: Some(tag.to_owned()), ..any() };
+    let class = Some("class-3".to_owned());
+    let hz = |hz: f64| Filter { frequency_hz: Some(hz), ..any() };
+    let kind = all[0].render_kind();
+    let cases = [
+        any(),
+        tag("tag-1"),
+        tag("rare-7"),
+        Filter { class: class.clone(), ..any() },
+        Filter { class: class.clone(), ..tag("tag-1") },
+        Filter { class, kind, ..tag("rare-7") },
+        hz(1.5e9),
+        hz(300e9),
+        Filter { kind, status: Some("active".to_owned()), ..hz(300e9) },
+        Filter { kind, ..tag("tag-0") },
+        Filter { fitted: Some(false), ..any() },
+        Filter { fitted: Some(true), ..any() },
+    ];
+    for filter in cases {
+        let Filter { frequency_hz, tag, class, fitted, .. } = &filter;
+        let holds = |m: &&Material| {
+            frequency_hz.is_none_or(|hz| m.frequency_hz[0] <= hz && hz <= m.frequency_hz[1])
+                && tag.as_ref().is_none_or(|tag| m.tags.contains(tag))
+                && class.as_ref().is_none_or(|class| m.class == *class)
+                && fitted.is_none_or(|fitted| fitted == m.fits.iter().any(|f| f.curve.is_some()))
+        };
+        let expected: Vec<_> = all.iter().filter(holds).map(|m| m.slug.clone()).collect();
+        let found = store.find(&filter).unwrap();
+        let slugs: Vec<_> = found.iter().map(|summary| summary.slug.clone()).collect();
+        assert_eq!(slugs, expected, "{filter:?}");
+        assert_eq!(store.count(&filter).unwrap(), found.len(), "{filter:?}");
+        let page = store.page(&filter, 9).unwrap();
+        assert_eq!(page, found[..found.len().min(9)], "{filter:?}");
+    }
+}
+
+#[test]
+fn a_word_that_is_everywhere_fills_a_page_and_hides_no_rare_one() {
+    let mut store = Store::in_memory().unwrap();
+    store.add(&many(1200)).unwrap();
+    let found = |words: &str, most: u32| -> Vec<String> {
+        let hits = store.search(words, most).unwrap();
+        hits.iter().map(|hit| hit.slug.to_string()).collect()
+    };
+    for words in ["sheet", "shee", "sh", "tag sheet"] {
+        let some = found(words, 9);
+        let different: std::collections::BTreeSet<_> = some.iter().collect();
+        assert_eq!((some.len(), different.len()), (9, 9), "{words}");
+        assert_eq!(found(words, u32::MAX).len(), 1200, "{words}");
+    }
+    assert_eq!(found("sheet no77", 1), ["sheet-0077"]);
+    assert_eq!(found("sheet 07", 2), ["sheet-0700", "sheet-0701"]);
+    assert_eq!(found("sheet no777", 9), ["sheet-0777"]);
+    assert_eq!(found("no777", 9), ["sheet-0777"]);
+    assert!(found("sheet zirconia", 9).is_empty());
+}
+
+#[test]
+fn a_long_list_says_what_it_leaves_out_and_json_leaves_nothing_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Store::open(folder.path().join("matdb.sqlite")).unwrap();
+    store.add(&many(1200)).unwrap();
+    drop(store);
+    let list = text(folder.path(), &["list"]);
+    assert!(list.contains("sheet-0199") && !list.contains("sheet-0200"), "{list}");
+    assert!(list.contains("… and 1 000 more; narrow with --class"), "{list}");
+    assert!(text(folder.path(), &["list", "--limit", "3"]).contains("… and 1 197 more"));
+    assert!(!text(folder.path(), &["list", "--tag", "rare-7"]).contains("more;"));
+    assert_eq!(slugs(&json(folder.path(), &["list"])).len(), 1200);
+    assert_eq!(slugs(&json(folder.path(), &["list", "--limit", "5"])).len(), 5);
+}
+
 #[test]
 fn what_is_found_is_the_current_revision_and_goes_with_its_material() {
     let mut store = Store::in_memory().unwrap();

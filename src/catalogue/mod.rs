@@ -6,6 +6,7 @@
 
 mod about;
 mod api;
+mod bibtex;
 mod diff;
 mod error;
 pub mod exchange;

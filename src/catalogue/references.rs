@@ -4,8 +4,8 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::bibtex::entry;
 use super::leaves::{Leaf, leaves};
-use super::site::tex;
 use crate::material::{Citation, Curve, Fit, Material, Source, SourceKind};
 
 /// A source and what rests on it.
@@ -285,20 +285,4 @@ fn pruned(mut record: Value) -> Value {
         fields.retain(|_, value| !value.is_null());
     }
     record
-}
-
-fn entry<const N: usize>(kind: &str, key: &str, fields: [(&str, Option<String>); N]) -> String {
-    let mut text = format!("@{kind}{{{key}");
-    for (name, value) in fields {
-        if let Some(value) = value {
-            let value = if matches!(name, "doi" | "url") { address(&value) } else { tex(&value) };
-            text += &format!(",\n  {name} = {{{value}}}");
-        }
-    }
-    text + "\n}\n"
-}
-
-/// An address as it is, but for what would end a field.
-fn address(value: &str) -> String {
-    value.replace('{', "%7B").replace('}', "%7D").replace('\\', "%5C")
 }

@@ -1,6 +1,6 @@
 //! What a command says, and to whom: results to standard output, the rest to standard error.
 
-use std::io::{ErrorKind, Write};
+use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::PathBuf;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -19,9 +19,11 @@ impl Console {
     /// The result of a command: `text` for a person, `value` for a script.
     pub fn result(&self, text: &str, value: &impl Serialize) -> Result<(), Error> {
         if self.json {
-            // Our own records always serialise; a failure would be a defect worth seeing.
-            let json = serde_json::to_string_pretty(value).unwrap_or_else(|e| e.to_string());
-            return write_out(&format!("{json}\n"));
+            // Piece by piece: the text of a large list is several times the list.
+            return written(|out| {
+                serde_json::to_writer_pretty(&mut *out, value)?;
+                out.write_all(b"\n")
+            });
         }
         if self.quiet { Ok(()) } else { write_out(&harmless(text)) }
     }
@@ -71,8 +73,12 @@ pub fn harmless(text: &str) -> String {
 
 /// Writes to standard output; a reader that has left, as `head` does, is no error.
 pub(super) fn write_out(text: &str) -> Result<(), Error> {
-    let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    written(|out| out.write_all(text.as_bytes()))
+}
+
+fn written(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Error> {
+    let mut out = BufWriter::new(io::stdout().lock());
+    match write(&mut out).and_then(|()| out.flush()) {
         Err(reason) if reason.kind() != ErrorKind::BrokenPipe => Err(Error::Io {
             verb: "write",
             path: PathBuf::from("standard output"),

@@ -5,10 +5,10 @@ use clap::ValueEnum;
 use super::console::Console;
 use super::database::Database;
 use super::materials::not_added;
-use super::summary::table;
+use super::summary::{grouped, table};
 use crate::error::Error;
 use crate::material::SourceKind;
-use crate::store::{Filter, Summary};
+use crate::store::{Filter, Store, Summary};
 
 /// List the materials in the database, all or those that you ask for
 #[derive(Debug, clap::Args)]
@@ -20,7 +20,13 @@ use crate::store::{Filter, Summary};
 pub(super) struct Args {
     #[command(flatten)]
     filter: Wanted,
+    /// How many to show at most [default: 200, with --json all]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    limit: Option<u32>,
 }
+
+/// What a person still looks through.
+const SHOWN: u32 = 200;
 
 /// Which materials are wanted; all that is said must hold.
 #[derive(Debug, clap::Args)]
@@ -86,7 +92,12 @@ fn frequency(text: &str) -> Result<f64, String> {
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let filter = args.filter.filter();
     let store = db.read()?;
-    let materials = store.as_ref().map_or(Ok(Vec::new()), |store| store.find(&filter))?;
+    let limit = args.limit.or((!console.json).then_some(SHOWN));
+    let found = |store: &Store| match limit {
+        Some(most) => store.page(&filter, most),
+        None => store.find(&filter),
+    };
+    let materials = store.as_ref().map_or(Ok(Vec::new()), found)?;
     if console.json {
         return console.result("", &materials);
     }
@@ -102,6 +113,14 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             materials.iter().map(row),
         ),
     };
+    let all = store.as_ref().map_or(Ok(0), |store| store.count(&filter))?;
+    if all > materials.len() {
+        text += &format!(
+            "… and {} more; narrow with --class, --tag, --kind or --frequency, or see more with \
+             --limit\n",
+            grouped(all - materials.len())
+        );
+    }
     if !missing.is_empty() {
         let names: Vec<&str> = missing.iter().map(|summary| summary.slug.as_str()).collect();
         text += &wrapped("built in, not added:", &names);

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::console::Console;
@@ -9,11 +10,12 @@ use super::database::Database;
 use super::list::Wanted;
 use super::materials::{find, not_added};
 use super::summary::table;
+use crate::brdf::Brdf;
 use crate::catalogue::{Distance, Probe};
 use crate::error::Error;
 use crate::material::{Observation, Slug};
 use crate::measure::Curve;
-use crate::store::Store;
+use crate::store::{Store, Summary};
 
 /// Find the known materials that a measured curve is nearest to
 #[derive(Debug, clap::Args)]
@@ -43,6 +45,9 @@ pub(super) struct Args {
     #[command(flatten)]
     filter: Wanted,
 }
+
+/// Materials that are compared at once.
+const AT_ONCE: usize = 1000;
 
 /// A material and how far it is.
 #[derive(Serialize)]
@@ -86,39 +91,52 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     };
     for (store, is_stored) in [(store.as_ref(), true), (Some(&missing), false)] {
         let Some(store) = store else { continue };
-        for summary in store.find(&args.filter.filter())? {
-            let rendered = store.rendered(&summary.slug)?;
-            let Some(distance) =
-                rendered.and_then(|(model, angles)| probe.distance(&model, angles))
-            else {
-                record.left_out += 1;
-                continue;
-            };
-            record.materials.push(Near {
-                slug: summary.slug,
-                name: summary.name,
-                revision: is_stored.then_some(summary.revision),
-                kind: summary.render_kind.as_str(),
-                status: summary.status,
-                distance,
-            });
-            keep_best(&mut record.materials, args, 2 * args.limit);
+        for some in store.find(&args.filter.filter())?.chunks(AT_ONCE) {
+            for (summary, distance) in some.iter().zip(distances(store, &probe, some)?) {
+                match distance {
+                    Some(distance) => record.materials.push(near(summary, is_stored, distance)),
+                    None => record.left_out += 1,
+                }
+            }
+            keep_best(&mut record.materials, args);
         }
     }
-    keep_best(&mut record.materials, args, 0);
     console.result(&text(&record, args), &record)
 }
 
-/// Sorts and cuts the list when it has grown beyond `most`.
-fn keep_best(list: &mut Vec<Near>, args: &Args, most: usize) {
+/// The distance to each of these, `None` for too little in common.
+fn distances(
+    store: &Store,
+    probe: &Probe,
+    some: &[Summary],
+) -> Result<Vec<Option<Distance>>, Error> {
+    let models: Result<Vec<_>, _> = some.iter().map(|s| store.rendered(&s.slug)).collect();
+    let distance = |model: &Option<(Brdf, [f64; 2])>| {
+        let (model, theta_rad) = model.as_ref()?;
+        probe.distance(model, *theta_rad)
+    };
+    Ok(models?.par_iter().map(distance).collect())
+}
+
+fn near(summary: &Summary, is_stored: bool, distance: Distance) -> Near {
+    Near {
+        slug: summary.slug.clone(),
+        name: summary.name.clone(),
+        revision: is_stored.then_some(summary.revision),
+        kind: summary.render_kind.as_str(),
+        status: summary.status.clone(),
+        distance,
+    }
+}
+
+/// Sorts and cuts the list.
+fn keep_best(list: &mut Vec<Near>, args: &Args) {
     let far = |near: &Near| match args.shape {
         true => near.distance.rms_shape_db,
         false => near.distance.rms_db,
     };
-    if list.len() > most {
-        list.sort_by(|a, b| far(a).total_cmp(&far(b)).then_with(|| a.slug.cmp(&b.slug)));
-        list.truncate(args.limit);
-    }
+    list.sort_by(|a, b| far(a).total_cmp(&far(b)).then_with(|| a.slug.cmp(&b.slug)));
+    list.truncate(args.limit);
 }
 
 fn observations(args: &Args, store: Option<&Store>) -> Result<Vec<Observation>, Error> {

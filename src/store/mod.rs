@@ -208,7 +208,10 @@ impl Store {
         let Store { conn, path, .. } = self;
         let failed = |error| StoreError::new(path, error);
         let tx = conn.transaction().map_err(failed)?;
-        let added = write::add(&tx, made).map_err(failed)?;
+        let mut adding = write::Adding::new(&tx);
+        let added: Result<Vec<Added>, _> =
+            made.iter().map(|(material, activity)| adding.add(material, *activity)).collect();
+        let added = added.and_then(|added| adding.finish().map(|()| added)).map_err(failed)?;
         let done = then(&added)?;
         tx.commit().map_err(failed)?;
         Ok(done)
@@ -227,14 +230,14 @@ impl Store {
         let Store { conn, path, activity } = self;
         let failed = |error| StoreError::new(path, error);
         let tx = conn.transaction().map_err(failed)?;
+        let mut adding = write::Adding::new(&tx);
         for material in materials {
             let material = material?;
             let slug = || material.slug.to_string();
             material.validate().map_err(|error| StoreError::Material { slug: slug(), error })?;
-            for added in write::add(&tx, &[(&material, activity.as_ref())]).map_err(failed)? {
-                then(&material, added)?;
-            }
+            then(&material, adding.add(&material, activity.as_ref()).map_err(failed)?)?;
         }
+        adding.finish().map_err(failed)?;
         Ok(tx.commit().map_err(failed)?)
     }
 
@@ -270,9 +273,7 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn rendered(&self, slug: &Slug) -> Result<Option<(Brdf, [f64; 2])>, StoreError> {
-        let found =
-            read::rendered(&self.conn, slug).map_err(|error| StoreError::new(&self.path, error))?;
-        Ok(found.and_then(|material| Some((material.scattering().ok()?, material.theta_rad))))
+        read::rendered(&self.conn, slug).map_err(|error| StoreError::new(&self.path, error))
     }
 
     /// Statistics by angle of a curve of a revision, or of the current one, as they were computed when

@@ -45,23 +45,41 @@ pub(super) fn get(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result
     material.sources = provenance::sources(&tx, revision_id)?;
     material.instruments = provenance::instruments(&tx, revision_id)?;
     material.curves = curves(&tx, revision_id, None)?;
-    material.fits = fits(&tx, revision_id, None)?;
+    material.fits = fits(&tx, revision_id)?;
     material.effects = effects(&tx, revision_id)?;
     provenance::fill(material, &tx, revision_id)?;
     stored.activity = provenance::activity(&tx, revision_id)?;
     Ok(Some(stored))
 }
 
-/// The current revision with what scenes render of it, and nothing else that hangs on it.
-pub(super) fn rendered(conn: &Connection, slug: &Slug) -> Result<Option<Material>> {
+/// What scenes render of the current revision, as far as that can be, and the angles for which it is
+/// claimed, rad.
+pub(super) fn rendered(conn: &Connection, slug: &Slug) -> Result<Option<(Brdf, [f64; 2])>> {
     let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
-    let Some((revision_id, stored)) = revision(&tx, slug, None)? else { return Ok(None) };
-    let mut material = stored.material;
-    material.fits = fits(&tx, revision_id, Some(&material.render))?;
-    if material.fits.is_empty() {
-        material.curves = curves(&tx, revision_id, Some(&material.render))?;
-    }
-    Ok(Some(material))
+    let sql = "
+        SELECT revision.id, render, theta_min_rad, theta_max_rad, model
+        FROM material JOIN revision ON material_id = material.id AND number = current_revision
+        LEFT JOIN fit ON revision_id = revision.id AND fit.name = render
+        WHERE slug = ?1";
+    let found = tx
+        .prepare_cached(sql)?
+        .query_row([slug.as_str()], |row| {
+            let (revision_id, render): (i64, String) = (row.get(0)?, row.get(1)?);
+            Ok((revision_id, render, [row.get(2)?, row.get(3)?], optional_json(row, 4)?))
+        })
+        .optional()?;
+    let Some((revision_id, render, theta_rad, model)) = found else { return Ok(None) };
+    let model = match model {
+        Some(mut model) => {
+            parameters(&tx, revision_id, &render, &mut model)?;
+            Some(model)
+        }
+        None => {
+            let curve = curves(&tx, revision_id, Some(&render))?.pop();
+            curve.and_then(|curve| curve.tabulated().ok()).map(Brdf::Tabulated)
+        }
+    };
+    Ok(model.map(|model| (model, theta_rad)))
 }
 
 /// A revision's own row, or that of the current one, and its number in the file.
@@ -168,11 +186,10 @@ fn observations(conn: &Connection, revision_id: i64, curve: &str) -> Result<Vec<
     })
 }
 
-/// Fits of a revision, or the one of this name.
-fn fits(conn: &Connection, revision_id: i64, only: Option<&str>) -> Result<Vec<Fit>> {
+fn fits(conn: &Connection, revision_id: i64) -> Result<Vec<Fit>> {
     let sql = "SELECT name, model, estimator, curve, source, report FROM fit
-               WHERE revision_id = ?1 AND name = coalesce(?2, name) ORDER BY position";
-    rows(conn, sql, params![revision_id, only], |row| {
+               WHERE revision_id = ?1 ORDER BY position";
+    rows(conn, sql, [revision_id], |row| {
         let name: String = row.get(0)?;
         let mut model: Brdf = json(row, 1)?;
         let parameter_sources = parameters(conn, revision_id, &name, &mut model)?;

@@ -10,24 +10,76 @@ use crate::formats::EffectEntry;
 use crate::material::{Activity, Covariance, Curve, Fit, Material, Slug};
 use crate::measure::statistics::by_angle;
 
-/// Adds materials or revisions of them, each with what made it.
-pub(super) fn add(tx: &Transaction, made: &[(&Material, Option<&Activity>)]) -> Result<Vec<Added>> {
-    made.iter().map(|(material, activity)| add_one(tx, material, *activity)).collect()
+/// Materials of which lines are made at once.
+const AT_ONCE: usize = 500;
+
+/// Materials on their way into the file, within one transaction.
+///
+/// What they are found by is made of many at once: SQLite writes the full-text index out at the end of
+/// every statement, which for one material takes longer than all its other rows.
+pub(super) struct Adding<'a> {
+    tx: &'a Transaction<'a>,
+    /// Numbers of materials whose lines are still to be made.
+    waiting: Vec<i64>,
 }
 
-fn add_one(tx: &Transaction, material: &Material, activity: Option<&Activity>) -> Result<Added> {
-    let content_hash = material.content_hash();
-    let (added, number) = match current(tx, &material.slug)? {
-        Some((number, stored)) if stored == content_hash => return Ok(Added::Unchanged(number)),
-        Some((number, _)) => (Added::Revision(number + 1), number + 1),
-        None => (Added::New, 1),
-    };
-    let revision_id = revision(tx, material, number, &content_hash)?;
-    let rows = Rows { tx, revision_id };
-    rows.material(material)?;
-    search(tx, &material.slug, added == Added::New)?;
-    activity.map_or(Ok(()), |activity| rows.activity(activity))?;
-    Ok(added)
+impl<'a> Adding<'a> {
+    pub fn new(tx: &'a Transaction<'a>) -> Adding<'a> {
+        Adding { tx, waiting: Vec::new() }
+    }
+
+    /// Adds a material, or a revision to it, with what made it.
+    pub fn add(&mut self, material: &Material, activity: Option<&Activity>) -> Result<Added> {
+        let tx = self.tx;
+        let content_hash = material.content_hash();
+        let (added, number) = match current(tx, &material.slug)? {
+            Some((number, stored)) if stored == content_hash => {
+                return Ok(Added::Unchanged(number));
+            }
+            Some((number, _)) => (Added::Revision(number + 1), number + 1),
+            None => (Added::New, 1),
+        };
+        let (material_id, revision_id) = revision(tx, material, number, &content_hash)?;
+        let rows = Rows { tx, revision_id };
+        rows.material(material)?;
+        activity.map_or(Ok(()), |activity| rows.activity(activity))?;
+        self.waiting.push(material_id);
+        if self.waiting.len() >= AT_ONCE {
+            self.lines()?;
+        }
+        Ok(added)
+    }
+
+    /// Makes what is still missing.
+    pub fn finish(mut self) -> Result<()> {
+        self.lines()
+    }
+
+    /// Makes what materials are found by anew of their current revisions.
+    fn lines(&mut self) -> Result<()> {
+        const STEPS: [&str; 5] = [
+            "DELETE FROM entry WHERE material_id IN (SELECT value FROM json_each(?1))",
+            "DELETE FROM search WHERE rowid IN (SELECT value FROM json_each(?1))",
+            "INSERT INTO entry SELECT * FROM entry_made
+             WHERE material_id IN (SELECT value FROM json_each(?1))",
+            // Through its view SQLite would look at all materials.
+            "INSERT OR IGNORE INTO entry_tag
+             SELECT slug, value FROM material
+             JOIN revision ON material_id = material.id AND number = current_revision
+             JOIN json_each(tags)
+             WHERE material.id IN (SELECT value FROM json_each(?1))",
+            "INSERT INTO search
+             (rowid, slug, name, class, tags, description, finish, unknown, sources)
+             SELECT * FROM search_made WHERE id IN (SELECT value FROM json_each(?1))",
+        ];
+        if self.waiting.is_empty() {
+            return Ok(());
+        }
+        let waiting = json(&std::mem::take(&mut self.waiting))?;
+        STEPS
+            .iter()
+            .try_for_each(|sql| self.tx.prepare_cached(sql)?.execute([&waiting]).map(|_| ()))
+    }
 }
 
 /// Removes materials and all that hangs on them, all or none.
@@ -56,8 +108,8 @@ fn current(tx: &Transaction, slug: &Slug) -> Result<Option<(u32, String)>> {
         .optional()
 }
 
-/// Writes a revision's own row and makes it the current one.
-fn revision(tx: &Transaction, material: &Material, number: u32, hash: &str) -> Result<i64> {
+/// Writes a revision's own row and makes it the current one; gives the numbers of material and revision.
+fn revision(tx: &Transaction, material: &Material, number: u32, hash: &str) -> Result<(i64, i64)> {
     let upsert = "INSERT INTO material (slug, current_revision) VALUES (?1, ?2)
                   ON CONFLICT (slug) DO UPDATE SET current_revision = excluded.current_revision
                   RETURNING id";
@@ -72,7 +124,7 @@ fn revision(tx: &Transaction, material: &Material, number: u32, hash: &str) -> R
          added_at, program_version, status, status_reason, superseded_by, finish, unknown)
         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13,
          strftime('%Y-%m-%dT%H:%M:%SZ', 'now'), ?14, ?15, ?16, ?17, ?18, ?19)";
-    tx.prepare_cached(insert)?.insert(params![
+    let revision_id = tx.prepare_cached(insert)?.insert(params![
         material_id,
         number,
         hash,
@@ -92,26 +144,8 @@ fn revision(tx: &Transaction, material: &Material, number: u32, hash: &str) -> R
         material.status.superseded_by().map(Slug::as_str),
         material.finish,
         json(&material.unknown)?,
-    ])
-}
-
-/// Makes what a material is found by anew of its current revision.
-fn search(tx: &Transaction, slug: &Slug, is_new: bool) -> Result<()> {
-    const FORGET: [&str; 2] = [
-        "DELETE FROM entry WHERE slug = ?1",
-        "DELETE FROM search WHERE rowid = (SELECT id FROM material WHERE slug = ?1)",
-    ];
-    const MAKE: [&str; 3] = [
-        "INSERT INTO entry SELECT * FROM entry_made WHERE slug = ?1",
-        "INSERT INTO entry_tag SELECT * FROM entry_tag_made WHERE slug = ?1",
-        "INSERT INTO search (rowid, slug, name, class, tags, description, finish, unknown, sources)
-         SELECT * FROM search_made WHERE slug = ?1",
-    ];
-    let forget = if is_new { [].as_slice() } else { FORGET.as_slice() };
-    forget
-        .iter()
-        .chain(&MAKE)
-        .try_for_each(|sql| tx.prepare_cached(sql)?.execute([slug.as_str()]).map(|_| ()))
+    ])?;
+    Ok((material_id, revision_id))
 }
 
 /// Writes what hangs on one revision.
@@ -177,7 +211,7 @@ impl Rows<'_> {
             ];
             insert.execute(values).map(|_| ())
         })?;
-        numbered(&by_angle(observations), |position, row| self.statistic(name, position, row))
+        self.statistics(name, &by_angle(observations))
     }
 
     fn fit(&self, position: u32, fit: &Fit) -> Result<()> {

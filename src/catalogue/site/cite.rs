@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use super::link::doi_href;
 use super::words::cut;
 use crate::catalogue::About;
+use crate::catalogue::bibtex::entry;
 use crate::store::Stored;
 
 /// How to cite a material.
@@ -112,7 +113,7 @@ fn place(about: &About) -> Option<String> {
 fn bibtex(about: &About, key: &str, title: &str, year: &str) -> String {
     let names: Vec<String> =
         about.people.iter().map(|person| format!("{}, {}", person.family, person.given)).collect();
-    let optional = [
+    let fields = [
         ("author", (!names.is_empty()).then(|| names.join(" and "))),
         ("title", Some(title.to_owned())),
         ("howpublished", Some(about.title.clone())),
@@ -121,38 +122,13 @@ fn bibtex(about: &About, key: &str, title: &str, year: &str) -> String {
         ("doi", about.doi.clone()),
         ("url", about.url.clone()),
     ];
-    let mut text = format!("@misc{{matdb-{key}");
-    for (name, value) in optional {
-        if let Some(value) = value {
-            text += &format!(",\n  {name} = {{{}}}", tex(&cut(&value, 400)));
-        }
-    }
-    text + "\n}"
-}
-
-/// Text that TeX sets as it stands.
-pub(in crate::catalogue) fn tex(text: &str) -> String {
-    let mut set = String::new();
-    for letter in text.chars() {
-        match letter {
-            '\\' => set += "\\textbackslash{}",
-            '~' => set += "\\textasciitilde{}",
-            '^' => set += "\\textasciicircum{}",
-            '{' | '}' | '&' | '%' | '$' | '#' | '_' => set.extend(['\\', letter]),
-            other => set.push(other),
-        }
-    }
-    set
+    let short = fields.map(|(name, value)| (name, value.map(|value| cut(&value, 400))));
+    entry("misc", &format!("matdb-{key}"), short).trim_end().to_owned()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn what_tex_would_read_is_spelled_out() {
-        assert_eq!(tex("50 % of {a_b} \\x"), "50 \\% of \\{a\\_b\\} \\textbackslash{}x");
-    }
 
     #[test]
     fn a_catalogue_without_people_is_cited_by_its_title() {

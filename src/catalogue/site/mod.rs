@@ -27,7 +27,6 @@ use super::{About, CatalogueError, Folder};
 use crate::store::{RevisionSummary, Stored};
 
 use cite::Citation;
-pub(in crate::catalogue) use cite::tex;
 use entry::Entry;
 use templates::Templates;
 use words::cut;

@@ -168,22 +168,19 @@ impl Rows<'_> {
         )
     }
 
-    pub(super) fn statistic(
-        &self,
-        curve: &str,
-        position: u32,
-        row: &AngleStatistics,
-    ) -> Result<()> {
-        let ([theta_min_rad, theta_max_rad], [mean_least, mean_greatest]) =
-            (row.theta_rad, row.mean);
-        let [quantile_05, quantile_50, quantile_95] = row.quantiles;
-        self.insert(
+    pub(super) fn statistics(&self, curve: &str, rows: &[AngleStatistics]) -> Result<()> {
+        let mut insert = self.tx.prepare_cached(
             "INSERT INTO curve_statistic
              (revision_id, curve, position, theta_min_rad, theta_max_rad, points, censored_points,
               threshold_sigma0, mean_least, mean_greatest, quantile_05, quantile_50, quantile_95,
               interval_low, interval_high)
              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15)",
-            params![
+        )?;
+        numbered(rows, |position, row| {
+            let ([theta_min_rad, theta_max_rad], [mean_least, mean_greatest]) =
+                (row.theta_rad, row.mean);
+            let [quantile_05, quantile_50, quantile_95] = row.quantiles;
+            let values = params![
                 self.revision_id,
                 curve,
                 position,
@@ -199,8 +196,9 @@ impl Rows<'_> {
                 quantile_95,
                 row.interval_95.map(|[low, _]| low),
                 row.interval_95.map(|[_, high]| high),
-            ],
-        )
+            ];
+            insert.execute(values).map(|_| ())
+        })
     }
 
     pub(super) fn activity(&self, activity: &Activity) -> Result<()> {

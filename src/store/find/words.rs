@@ -1,0 +1,129 @@
+//! Words: the full-text index, and what is done where a word is nearly everywhere.
+
+use std::collections::BTreeSet;
+
+use rusqlite::{Connection, Result, Row, params};
+
+use super::{Hit, rows};
+use crate::material::Slug;
+
+/// Words beyond these are not looked for: nobody types more.
+const MOST_WORDS: usize = 32;
+
+/// A word in more materials than this is frequent.
+const RARE: u32 = 500;
+
+/// The `most` materials that all these words are found in.
+pub(super) fn search(conn: &Connection, words: &str, most: u32) -> Result<Vec<Hit>> {
+    let phrases = phrases(words);
+    if phrases.is_empty() {
+        return Ok(Vec::new());
+    }
+    match are_rare(conn, &phrases)? {
+        true => ranked(conn, &beginning(&phrases), most),
+        false => unranked(conn, words, &phrases, most),
+    }
+}
+
+/// Words as the index takes them: each a phrase in quotes.
+fn phrases(words: &str) -> Vec<String> {
+    let apart = |letter: char| letter.is_whitespace() || letter.is_control() || letter == '"';
+    let says_something = |word: &&str| word.chars().any(char::is_alphanumeric);
+    let found = words.split(apart).filter(says_something).take(MOST_WORDS);
+    found.map(|word| format!("\"{word}\"")).collect()
+}
+
+/// All words, the last also as the beginning of one.
+fn beginning(phrases: &[String]) -> String {
+    phrases.join(" ") + "*"
+}
+
+/// Whether every word alone is in few materials, so that to weigh them takes little.
+fn are_rare(conn: &Connection, phrases: &[String]) -> Result<bool> {
+    let last = phrases.last().map(|last| format!("{last}*"));
+    for phrase in phrases.iter().chain(&last) {
+        let sql = "SELECT count(*) FROM (SELECT 1 FROM search WHERE search MATCH ?1 LIMIT ?2)";
+        let found: u32 =
+            conn.prepare_cached(sql)?.query_row(params![phrase, RARE + 1], |row| row.get(0))?;
+        if found > RARE {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// The best first.
+fn ranked(conn: &Connection, query: &str, most: u32) -> Result<Vec<Hit>> {
+    let sql = "
+        SELECT search.slug, search.name, current_revision,
+            snippet(search, -1, '[', ']', '…', 12), rank
+        FROM search JOIN material ON material.id = search.rowid
+        WHERE search MATCH ?1 AND rank MATCH 'bm25(10, 10, 5, 5, 1, 2, 1, 1)'
+        ORDER BY rank LIMIT ?2";
+    rows(conn, sql, params![query, most], hit)
+}
+
+/// Those whose short name begins with the words, then those with the whole words, then all.
+fn unranked(conn: &Connection, words: &str, phrases: &[String], most: u32) -> Result<Vec<Hit>> {
+    let sql = "
+        SELECT search.slug, search.name, current_revision,
+            snippet(search, -1, '[', ']', '…', 12), 0.0
+        FROM search JOIN material ON material.id = search.rowid
+        WHERE search MATCH ?1 ORDER BY search.rowid LIMIT ?2";
+    let mut found = called(conn, words, most)?;
+    let wanted = usize::try_from(most).unwrap_or(usize::MAX);
+    for query in [&phrases.join(" "), &beginning(phrases)] {
+        if found.len() < wanted {
+            // Some of these may be there already.
+            let known: BTreeSet<Slug> = found.iter().map(|hit| hit.slug.clone()).collect();
+            let more = rows(conn, sql, params![query, most], hit)?;
+            found.extend(more.into_iter().filter(|hit| !known.contains(&hit.slug)));
+        }
+    }
+    found.truncate(wanted);
+    Ok(found)
+}
+
+/// Those whose short name begins with the words.
+fn called(conn: &Connection, words: &str, most: u32) -> Result<Vec<Hit>> {
+    let begin = words.split_whitespace().collect::<Vec<_>>().join("-").to_lowercase();
+    // In ASCII the signs of short names all come before it.
+    let end = format!("{begin}~");
+    let sql = "SELECT slug, name, revision FROM entry
+               WHERE slug >= ?1 AND slug < ?2 ORDER BY slug LIMIT ?3";
+    rows(conn, sql, params![begin, end, most], |row| {
+        let slug: Slug = row.get(0)?;
+        let rest = slug.as_str().strip_prefix(&begin).unwrap_or_default();
+        let snippet = format!("[{begin}]{rest}");
+        Ok(Hit { slug, name: row.get(1)?, revision: row.get(2)?, snippet, rank: 0.0 })
+    })
+}
+
+fn hit(row: &Row) -> Result<Hit> {
+    Ok(Hit {
+        slug: row.get(0)?,
+        name: row.get(1)?,
+        revision: row.get(2)?,
+        snippet: row.get(3)?,
+        rank: row.get(4)?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{beginning, phrases};
+
+    fn query(words: &str) -> Option<String> {
+        let phrases = phrases(words);
+        (!phrases.is_empty()).then(|| beginning(&phrases))
+    }
+
+    #[test]
+    fn words_are_only_words() {
+        assert_eq!(query("matt paint").as_deref(), Some("\"matt\" \"paint\"*"));
+        assert_eq!(query("a\" OR b").as_deref(), Some("\"a\" \"OR\" \"b\"*"));
+        assert_eq!(query("name:x NEAR(").as_deref(), Some("\"name:x\" \"NEAR(\"*"));
+        assert_eq!(query(" \" - * ( \u{0} "), None);
+        assert_eq!(query("a\u{0}b").as_deref(), Some("\"a\" \"b\"*"));
+    }
+}
