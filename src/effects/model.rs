@@ -43,9 +43,12 @@ pub type Tilts = [(f64, f64); NODES];
 /// What was traced for one list of looks, for as long as the values that it depends on come again.
 #[derive(Default)]
 pub struct Traced {
-    surveys: Kept<(&'static str, Vec<f64>), Survey>,
-    placed: Kept<Vec<(&'static str, Vec<f64>)>, Vec<Option<Look>>>,
+    surveys: Kept<Key, Survey>,
+    placed: Kept<Vec<Key>, Vec<Option<Look>>>,
 }
+
+/// Name of an effect and the values that matter.
+type Key = (&'static str, Vec<f64>);
 
 /// The latest results of a slow function.
 struct Kept<K, V>(Mutex<Vec<(K, Arc<V>)>>);
