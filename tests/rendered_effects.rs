@@ -141,14 +141,14 @@ fn agrees(bench: &Bench, effects: &SceneEffects, case: &str) -> usize {
     bench.with_stage(|stage, looks| {
         let predicted = model.predict(stage, looks);
         let mut missed = 0;
-        for (look, arrived) in looks.iter().zip(&predicted.arrived) {
+        for ((number, look), arrived) in looks.iter().enumerate().zip(&predicted.arrived) {
             let echo = echoes.iter().find(|echo| echo.chirp == look.chirp);
             let (Some(arrived), Some(echo)) = (arrived, echo) else {
                 assert!(arrived.is_none() && echo.is_none(), "{case}, chirp {}", look.chirp);
                 missed += 1;
                 continue;
             };
-            let power_dbm = dbm_from_watts(arrived.power_w);
+            let power_dbm = dbm_from_watts(predicted.passed_w(number));
             let off_db = (echo.power_dbm - power_dbm).abs();
             assert!(off_db < POWER_DB || echo.power_dbm == power_dbm, "{case}: {off_db} dB");
             assert!((echo.range_m - arrived.range_m).abs() < RANGE_M, "{case}: {echo:?}");
