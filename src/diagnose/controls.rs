@@ -78,6 +78,7 @@ fn powers(selection: &Selection, base: &State, effects: &[&dyn Effect]) -> Vec<P
         let least_gain = selection.settings.least_gain_of(effect.knobs().len(), 1);
         let space = base.space.with(*effect);
         let starts = effect.starts(problem.stage, problem.looks);
+        let every = starts.len().div_ceil(MOST_STARTS).max(1);
         let present = |values: &Vec<f64>| {
             let knobs = effect.knobs().iter().zip(values);
             // Where an effect starts from nothing, a felt change of all its numbers stands for it.
@@ -86,7 +87,7 @@ fn powers(selection: &Selection, base: &State, effects: &[&dyn Effect]) -> Vec<P
                 knobs.map(|(k, v)| if all_absent { v + k.step } else { *v }).collect::<Vec<_>>();
             Space::joined(&base.fitted.at, *effect, &moved)
         };
-        let found = starts.iter().take(MOST_STARTS).map(present).filter_map(|at| {
+        let found = starts.iter().step_by(every).map(present).filter_map(|at| {
             let [information, size_db] = screen.felt(&space, &at);
             let gain_of_unit = 0.5 * sample.weight * information;
             let useful = gain_of_unit > 0.0 && size_db > 0.0;

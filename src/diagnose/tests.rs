@@ -183,6 +183,7 @@ fn nothing_is_found_where_nothing_is_missing() {
         assert!((ratio - 1.0).abs() < 0.06, "{ratio}");
         assert!((report.error.before.coverage_90 - 0.9).abs() < 0.02);
         assert_eq!(report.error.before, report.error.after);
+        assert!(report.rows.iter().all(|row| row.unknown_db == 0.0));
         assert_row_errors(&report);
     }
     // Two or more of 12 have a chance of 2 % at the declared family error.
@@ -202,6 +203,11 @@ fn a_missing_effect_is_named_and_its_number_found() {
         let error = &report.error;
         assert!((error.after.rmse_db / error.after.noise_floor_db - 1.0).abs() < 0.045);
         assert!(error.after.log_score > error.before.log_score);
+        // 2400 looks of 2 dB would tell a twentieth of the effect that is there.
+        let powers = &report.controls.injection_recovery;
+        let power = powers.iter().find(|power| power.name == effect.name).unwrap();
+        assert!(power.least_db.is_some_and(|db| (0.1..0.5).contains(&db)), "{power:?}");
+        assert_eq!(power.recovered, Some(true));
     }
 }
 
@@ -218,6 +224,10 @@ fn what_no_effect_explains_is_called_unexplained() {
     let report = diagnosed(&[(&STRIPES, 1.2)], 31);
     assert_eq!(report.verdict, Verdict::Unexplained, "{report:#?}");
     assert!(report.unexplained.iter().any(|u| u.covariate == "x_t"), "{report:#?}");
+    // The map of what is unknown has the stripes, of 1.2 dB and drawn to nothing by the field's prior.
+    let stripe = |row: &Row| row.unknown_db * (9.0 * row.xt_m).sin().signum();
+    let mean_db = report.rows.iter().map(stripe).sum::<f64>() / report.rows.len() as f64;
+    assert!((0.4..1.3).contains(&mean_db), "{mean_db}");
 }
 
 #[test]
