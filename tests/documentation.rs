@@ -168,7 +168,7 @@ fn the_way_to_a_catalogue_runs() {
     let text = read("docs/publishing.md");
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("about.toml"), blocks(&text, "toml")[0]).unwrap();
-    for command in blocks(&text, "sh")[0].lines() {
+    for command in blocks(&text, "sh")[1].lines() {
         let arguments = command.split(" #").next().unwrap_or("").trim();
         let arguments = arguments.strip_prefix("matdb ").unwrap();
         matdb(folder.path()).args(arguments.split_whitespace()).assert().success();

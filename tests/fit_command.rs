@@ -224,13 +224,16 @@ fn a_measured_curve_is_stored_with_its_circumstances() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     fs::write(folder.join("scan.csv"), curve(0.0, 60.0, 400)).unwrap();
-    let mut command = matdb(folder);
-    command.args("fit scan.csv --save cotton --kind measured --starts 1 --source bench".split(' '));
-    command.args("--licence CC0-1.0 --instrument Radar --frequency 300 --threshold -77".split(' '));
-    command.assert().success();
+    for _ in ["once", "again"] {
+        let mut command = matdb(folder);
+        let said = "fit scan.csv --save cotton --kind measured --starts 1 --source bench \
+                    --licence CC0-1.0 --instrument Radar --frequency 300 --threshold -77";
+        command.args(said.split_whitespace()).assert().success();
+    }
     let store = matdb::store::Store::open_existing(folder.join("matdb.sqlite")).unwrap().unwrap();
     let material = store.get(&"cotton".parse().unwrap(), None).unwrap().unwrap().material;
     let curve = material.curves.iter().find(|curve| curve.name == "scan").unwrap();
+    assert_eq!(material.instruments.iter().filter(|known| known.name == "Radar").count(), 1);
     let named = |i: &&matdb::material::Instrument| Some(&i.key) == curve.instrument.as_ref();
     let instrument = material.instruments.iter().find(named).unwrap();
     assert_eq!((instrument.name.as_str(), instrument.centre_frequency_hz), ("Radar", 300e9));

@@ -150,12 +150,12 @@ fn what_cannot_be_trusted_changes_nothing() {
         (
             |site| {
                 let path = site.join("api/v1/materials/huge.json");
-                fs::File::create(path).unwrap().set_len((32 << 20) + 1).unwrap();
+                fs::File::create(path).unwrap().set_len((256 << 20) + 1).unwrap();
                 let mut list = fs::read_to_string(site.join("SHA256SUMS")).unwrap();
                 list += &format!("{:064}  api/v1/materials/huge.json\n", 0);
                 fs::write(site.join("SHA256SUMS"), list).unwrap();
             },
-            "is larger than 32 MiB",
+            "is larger than 256 MiB",
         ),
         (|site| fs::remove_file(site.join("SHA256SUMS")).unwrap(), "it has no SHA256SUMS"),
         (

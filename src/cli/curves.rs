@@ -64,23 +64,41 @@ impl Circumstances {
             let way_out = "give a frequency in GHz such as 300, a threshold in dBm such as -77";
             return usage("--frequency or --threshold cannot be", way_out.to_owned());
         }
-        let is_known = self.known(material).is_some();
-        if is_known && (self.frequency.is_some() || self.threshold.is_some()) {
-            let way_out = "leave --frequency and --threshold out".to_owned();
-            return usage("the material says of its instrument what these flags say", way_out);
+        let known = self.known(material);
+        let is_other = |known: &Instrument| {
+            self.frequency.is_some_and(|ghz| ghz * 1e9 != known.centre_frequency_hz)
+                || self.threshold.is_some_and(|dbm| known.threshold_w != Some(watts_from_dbm(dbm)))
+        };
+        if known.is_some_and(is_other) {
+            let way_out = "leave --frequency and --threshold out, or name another --instrument";
+            let problem =
+                "the material's instrument of that name has another frequency or threshold";
+            return usage(problem, way_out.to_owned());
         }
+        let is_measured = kind == SourceKind::Measured;
+        let is_said =
+            self.instrument.is_some() || self.frequency.is_some() || self.threshold.is_some();
+        let has = |is_there: bool, is_needed: bool| is_there || known.is_some() || !is_needed;
         let wanted = [
-            (self.licence.is_some(), "--licence CC-BY-4.0"),
-            (self.instrument.is_some(), "--instrument \"name of the radar\""),
-            (is_known || self.frequency.is_some(), "--frequency 300"),
-            (is_known || self.threshold.is_some(), "--threshold -77"),
+            (self.licence.is_some() || !is_measured, "--licence CC-BY-4.0"),
+            (
+                has(self.instrument.is_some(), is_measured || is_said),
+                "--instrument \"name of the radar\"",
+            ),
+            (has(self.frequency.is_some(), is_measured || is_said), "--frequency 300"),
+            (has(self.threshold.is_some(), is_measured), "--threshold -77"),
         ];
         let missing: Vec<&str> =
             wanted.into_iter().filter(|(is_there, _)| !is_there).map(|(_, flag)| flag).collect();
-        if kind != SourceKind::Measured || missing.is_empty() {
-            return Ok(());
+        match (missing.is_empty(), is_measured) {
+            (true, _) => Ok(()),
+            (_, true) => {
+                usage("a measured curve needs more", format!("add {}", missing.join(", ")))
+            }
+            (_, false) => {
+                usage("the instrument of a curve needs more", format!("add {}", missing.join(", ")))
+            }
         }
-        usage("a measured curve needs more", format!("add {}", missing.join(", ")))
     }
 
     /// The instrument of the material that is meant.
