@@ -416,11 +416,13 @@ fn the_commands_go_there_and_back() {
     add.assert().success();
     let message =
         refused(matdb(folder.path()).args(["add", "--from", "scan.csv", "--name", "scan"]));
-    for flag in
-        ["--class", "--licence", "--source", "--kind", "--frequency", "--instrument", "--threshold"]
-    {
+    // Every row says its threshold.
+    for flag in ["--class", "--licence", "--source", "--kind", "--frequency", "--instrument"] {
         assert!(message.contains(flag) && !message.contains("--name"), "{message}");
     }
+    fs::write(file("bare.csv"), "theta_deg,sigma0_db\n0,-5\n10,-12\n").unwrap();
+    let message = refused(matdb(folder.path()).args(["add", "--from", "bare.csv"]));
+    assert!(message.contains("--kind") && message.contains("--threshold"), "{message}");
     let known =
         ["--class", "paint", "--licence", "CC0-1.0", "--source", "bench", "--frequency", "300"];
     let measured = ["--kind", "measured", "--instrument", "radar", "--threshold", "-77"];

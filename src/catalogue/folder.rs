@@ -78,17 +78,20 @@ impl Folder {
         Ok(Folder { target: resolved, place: Place::Staged(stage), sums: BTreeMap::new() })
     }
 
-    /// What would be written over `published`, as hashes only.
+    /// What would be written over `published`, as hashes only; those of `sums` are known.
     ///
     /// # Errors
     /// When there is no room for temporary files.
-    pub(super) fn hashed(published: &Path) -> Result<Folder, CatalogueError> {
+    pub(super) fn hashed(
+        published: &Path,
+        sums: BTreeMap<String, Sum>,
+    ) -> Result<Folder, CatalogueError> {
         let failed = |reason| {
             let path = std::env::temp_dir();
             CatalogueError::Io { verb: "write", path, reason }
         };
         let place = Place::Hashed(tempfile::tempdir().map_err(failed)?);
-        Ok(Folder { target: published.to_owned(), place, sums: BTreeMap::new() })
+        Ok(Folder { target: published.to_owned(), place, sums })
     }
 
     /// What stood at the target before, if anything did.

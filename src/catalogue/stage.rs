@@ -121,7 +121,8 @@ fn sweep(beside: &Path, prefix: &str, target: &Path) -> io::Result<()> {
         }
         carry(&stale, target)?;
         if KEPT.iter().all(|name| stale.join(name).symlink_metadata().is_err()) {
-            fs::remove_dir_all(&stale)?;
+            // Whoever has just put a publication in place may be removing it, too.
+            let _ = fs::remove_dir_all(&stale);
         }
     }
     Ok(())

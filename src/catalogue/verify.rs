@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use super::CatalogueError;
 use super::api::{self, Entry, Index, LARGEST_MATERIAL_BYTES, Record, SCHEMA_VERSION};
-use super::folder::{INDEX, SUMS, files, hashed};
+use super::folder::{INDEX, SUMS, Sum, files, hashed};
 use super::publish::{ABOUT, DATABASE, rebuilt};
 use super::{About, HAS_PARQUET};
 use crate::fit::again::problems;
@@ -381,9 +381,10 @@ fn check_rebuilt(
     sums: &BTreeMap<String, String>,
     problems: &mut Vec<Problem>,
 ) -> Vec<String> {
-    let made = read::<About>(bundle, ABOUT)
-        .map_err(|what| problem(ABOUT, what))
-        .and_then(|about| rebuilt(store, &about, bundle).map_err(|error| problem(DATABASE, error)));
+    let made = database_sum(bundle, sums).and_then(|database| {
+        let about = read::<About>(bundle, ABOUT).map_err(|what| problem(ABOUT, what))?;
+        rebuilt(store, &about, bundle, database).map_err(|error| problem(DATABASE, error))
+    });
     let made = match made {
         Ok(made) => made,
         Err(what) => {
@@ -407,6 +408,13 @@ fn check_rebuilt(
         problems.push(problem(".", format!("{more} more files are not what its database gives")));
     }
     notes
+}
+
+/// The database as its hash was found to be.
+fn database_sum(bundle: &Path, sums: &BTreeMap<String, String>) -> Result<Sum, Problem> {
+    let found = fs::metadata(bundle.join(DATABASE)).map_err(|reason| problem(DATABASE, reason))?;
+    let sha256 = sums.get(DATABASE).cloned().unwrap_or_default();
+    Ok(Sum { sha256, bytes: found.len() })
 }
 
 /// Files that are named one by one.
