@@ -309,3 +309,28 @@ fn crowded_process() {
     assert!(sentence(&error, &path).contains("no room left"), "{error}");
     assert_eq!(contents(&path), before);
 }
+
+#[test]
+fn a_write_that_was_cut_short_is_taken_back_by_who_writes_and_left_alone_by_who_reads() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, cut] = ["a.sqlite", "cut.sqlite"].map(|name| folder.path().join(name));
+    Store::open(&path).unwrap().add([&sample("paint")]).unwrap();
+    let conn = rusqlite::Connection::open(&path).unwrap();
+    conn.execute_batch("PRAGMA journal_mode = delete; BEGIN; UPDATE revision SET name = 'half'")
+        .unwrap();
+    let journal = |path: &Path| path.with_extension("sqlite-journal");
+    fs::copy(&path, &cut).unwrap();
+    fs::copy(journal(&path), journal(&cut)).unwrap();
+    drop(conn);
+    let before = [fs::read(&cut).unwrap(), fs::read(journal(&cut)).unwrap()];
+    let error = Store::open_existing(&cut).unwrap_err();
+    assert!(matches!(error, StoreError::Interrupted { .. }), "{error}");
+    assert_eq!(before, [fs::read(&cut).unwrap(), fs::read(journal(&cut)).unwrap()]);
+    drop(Store::open(&cut).unwrap());
+    assert!(!journal(&cut).exists());
+    let read = Store::open_existing(&cut).unwrap().unwrap();
+    assert_eq!(
+        read.get(&"paint".parse().unwrap(), None).unwrap().unwrap().material,
+        sample("paint")
+    );
+}

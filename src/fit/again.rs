@@ -99,6 +99,8 @@ mod tests {
         assert_eq!(differences(&stored, &curve).unwrap().len(), 2);
     }
 
+    type Forge = fn(&mut material::Fit);
+
     /// A material with a curve and the fit of it.
     fn material_with(fit: &Fit) -> Material {
         let mut text = "theta_deg,sigma0_db\n".to_owned();
@@ -145,7 +147,7 @@ mod tests {
             let estimate = &mut moved.report.as_mut().unwrap().estimates[0];
             estimate.value += estimate.sd.unwrap();
             assert!(said(&material, &moved).contains("a new fit gives"));
-            let forgeries: [(&str, fn(&mut material::Fit)); 5] = [
+            let forgeries: [(&str, Forge); 5] = [
                 ("in its model r_s", |fit| {
                     let r_s = fit.model.parameters().into_iter().find(|p| p.path == "r_s").unwrap();
                     fit.model.set_parameter("r_s", (r_s.value * 0.5).max(r_s.min));
