@@ -51,6 +51,11 @@ fn a_sound_database_passes_and_nothing_is_missed_in_a_changed_one() {
             "cotton@1, curve backscatter",
             "statistics",
         ),
+        ("DELETE FROM curve_statistic", "cotton@1, curve backscatter", "statistics"),
+        ("UPDATE unit SET ucum = 'furlong' WHERE ucum = 'm'", "matdb.sqlite", "units of columns"),
+        ("UPDATE fit_parameter SET sd = 7", "cotton@2", "`fit_parameter`"),
+        ("UPDATE fit_parameter SET unit = 'furlong'", "cotton@2", "`fit_parameter`"),
+        ("UPDATE entry SET kind = 'measured'", "matdb.sqlite", "what lists and searches say"),
         ("DELETE FROM source WHERE revision_id = 1", "matdb.sqlite", "refers to a row"),
     ] {
         let path = folder.path().join("matdb.sqlite");

@@ -25,6 +25,19 @@ fn variant(folder: &Path, slug: &str, from: &str, to: &str) {
 }
 
 #[test]
+fn a_template_is_printed_whatever_else_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    for more in [&[][..], &["--json"], &["--verbose"]] {
+        let mut command = matdb(folder.path());
+        command.env("MATDB", "mine.sqlite").args(["add", "--template"]).args(more);
+        let said = command.output().unwrap();
+        assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stderr));
+        assert!(String::from_utf8_lossy(&said.stdout).contains("my-paint"));
+    }
+    matdb(folder.path()).args(["add", "--template", "-q"]).assert().success();
+}
+
+#[test]
 fn adding_twice_changes_nothing_and_a_change_is_a_new_revision() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
@@ -122,6 +135,30 @@ fn the_template_is_accepted_and_shown() {
         .chain(["not known: The thickness of each coat.", "sprayed", "thin-film", "not found"])
     {
         assert!(text.contains(said), "{said}: {text}");
+    }
+}
+
+#[test]
+fn values_that_only_a_slip_can_give_are_refused() {
+    for (from, to, expected) in [
+        ("licence = \"CC-BY-4.0\"", "licence = \"all rights reserved\"", "no SPDX expression"),
+        ("10.1234/example", "https://doi.org/10.1234/example", "is none"),
+        ("doi = \"10.1234/example\"", "url = \"javascript:alert(1)\"", "begins with http://"),
+        ("bandwidth_ghz = 27", "bandwidth_ghz = 27e9", "begins below 0 Hz"),
+        ("thickness_mm = 0.12", "thickness_mm = 120000", "120 m thick"),
+    ] {
+        let folder = from_template(|text: String| text.replacen(from, to, 1), BARE);
+        let message = refused(matdb(folder.path()).args(["add", "--from", "."]));
+        assert!(message.contains(expected), "{expected}: {message}");
+        assert!(!folder.path().join("matdb.sqlite").exists());
+    }
+    for (key, expected) in [
+        ("licence = 'all mine'", "SPDX"),
+        ("url = 'javascript:alert(1)'", "http://"),
+        ("doi = 'doi:10.1/x'", "resolver"),
+    ] {
+        let error = matdb::catalogue::About::parse("about.toml", key).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
     }
 }
 

@@ -72,6 +72,31 @@ fn every_command_of_the_readme_runs() {
 }
 
 #[test]
+fn a_curve_gets_from_csv_to_a_folder_for_a_web_server_as_the_docs_say() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("scan.csv"), "theta_deg,sigma0_db\n0,-3\n20,-12\n50,-25\n")
+        .unwrap();
+    let page = read("docs/publishing.md");
+    let (_, own) = page.split_once("## Your own curve").unwrap();
+    let script: String = blocks(own, "sh")[0]
+        .lines()
+        .filter(|line| !line.starts_with("rsync "))
+        .collect::<Vec<_>>()
+        .join("\n");
+    let program = assert_cmd::cargo::cargo_bin("matdb");
+    let path = format!("{}:/usr/bin:/bin", program.parent().unwrap().display());
+    assert_cmd::Command::new("sh")
+        .args(["-euc", &script])
+        .current_dir(folder.path())
+        .env("PATH", path)
+        .env_remove("MATDB")
+        .assert()
+        .success();
+    let listed = fs::read_dir(folder.path().join("site/material")).unwrap().count();
+    assert_eq!(listed, 2, "its page and its table, and no other material");
+}
+
+#[test]
 fn the_readme_names_the_test_command_and_files_that_exist() {
     let readme = read("README.md");
     assert!(blocks(&readme, "sh").iter().any(|block| block.lines().any(|l| l == "cargo test")));
@@ -143,7 +168,7 @@ fn the_way_to_a_catalogue_runs() {
     let text = read("docs/publishing.md");
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("about.toml"), blocks(&text, "toml")[0]).unwrap();
-    for command in blocks(&text, "sh")[0].lines() {
+    for command in blocks(&text, "sh")[1].lines() {
         let arguments = command.split(" #").next().unwrap_or("").trim();
         let arguments = arguments.strip_prefix("matdb ").unwrap();
         matdb(folder.path()).args(arguments.split_whitespace()).assert().success();

@@ -72,6 +72,11 @@ fn a_page_of_optical_constants_becomes_a_half_space() {
     let [entry] = material.permittivities.as_slice() else { panic!("{material:?}") };
     assert!((entry.frequency_hz - 299.792_458e9).abs() < 1.0);
     assert_eq!(entry.temperature_k, Some(292.65));
+    assert_eq!(
+        material.frequency_hz, [entry.frequency_hz; 2],
+        "nothing is claimed where nothing was"
+    );
+    assert_eq!(material.theta_rad, [0.0, 5f64.to_radians()], "a mirror, near its normal");
     assert!((entry.real - (2.43f64.powi(2) - 0.915f64.powi(2))).abs() < 1e-12);
     assert!((entry.imaginary - 2.0 * 2.43 * 0.915).abs() < 1e-12);
     let n = num_complex::Complex::new(2.43, -0.915);
@@ -411,9 +416,13 @@ fn the_commands_go_there_and_back() {
     add.assert().success();
     let message =
         refused(matdb(folder.path()).args(["add", "--from", "scan.csv", "--name", "scan"]));
-    for flag in ["--class", "--licence", "--source", "--kind", "--frequency"] {
+    // Every row says its threshold.
+    for flag in ["--class", "--licence", "--source", "--kind", "--frequency", "--instrument"] {
         assert!(message.contains(flag) && !message.contains("--name"), "{message}");
     }
+    fs::write(file("bare.csv"), "theta_deg,sigma0_db\n0,-5\n10,-12\n").unwrap();
+    let message = refused(matdb(folder.path()).args(["add", "--from", "bare.csv"]));
+    assert!(message.contains("--kind") && message.contains("--threshold"), "{message}");
     let known =
         ["--class", "paint", "--licence", "CC0-1.0", "--source", "bench", "--frequency", "300"];
     let measured = ["--kind", "measured", "--instrument", "radar", "--threshold", "-77"];
@@ -429,6 +438,13 @@ fn the_commands_go_there_and_back() {
         let mut command = matdb(folder.path());
         command.args(["export", "scan", "--as", format, "-o", name]).assert().success();
         assert!(file(name).exists());
+    }
+    for command in [&["near", "--curve", "a.csv"][..], &["near", "--curve", "scan.csv"]] {
+        matdb(folder.path()).args(command).assert().success();
+    }
+    for curve in ["a.csv", "scan.csv"] {
+        let arguments = ["fit", curve, "--model", "lambert", "--looks", "1"];
+        matdb(folder.path()).args(arguments).assert().success();
     }
     for name in ["a.csv", "a.brdf"] {
         let slug = name.replace('.', "-");

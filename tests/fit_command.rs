@@ -200,6 +200,14 @@ fn bad_input_is_refused_with_a_sentence_and_nothing_is_stored() {
         ("scan.csv --save ptfe", "nobody has said where scan.csv comes from"),
         ("scan.csv --save ptfe --kind measured", "nobody has said where"),
         ("scan.csv --save ptf --kind measured --source x", "did you mean `ptfe`?"),
+        (
+            "scan.csv --save ptfe --kind measured --source x --licence CC0-1.0",
+            "add --instrument \"name of the radar\", --frequency 300, --threshold -77",
+        ),
+        (
+            "scan.csv --save ptfe --kind measured --source x --licence free/for/all",
+            "--licence is no SPDX expression",
+        ),
         ("scan.csv --save ptfe@1 --kind measured --source x", "a revision never changes"),
         ("scan.csv -o fit.pdf", "does not end in .svg or .png"),
         ("cotton --model mixture --save ptfe", "belongs to `cotton`"),
@@ -209,4 +217,27 @@ fn bad_input_is_refused_with_a_sentence_and_nothing_is_stored() {
         assert!(sentence.contains(expected), "{arguments:?}: {sentence}");
         assert_eq!(entries(folder), before, "{arguments:?}");
     }
+}
+
+#[test]
+fn a_measured_curve_is_stored_with_its_circumstances() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("scan.csv"), curve(0.0, 60.0, 400)).unwrap();
+    for _ in ["once", "again"] {
+        let mut command = matdb(folder);
+        let said = "fit scan.csv --save cotton --kind measured --starts 1 --source bench \
+                    --licence CC0-1.0 --instrument Radar --frequency 300 --threshold -77";
+        command.args(said.split_whitespace()).assert().success();
+    }
+    let store = matdb::store::Store::open_existing(folder.join("matdb.sqlite")).unwrap().unwrap();
+    let material = store.get(&"cotton".parse().unwrap(), None).unwrap().unwrap().material;
+    let curve = material.curves.iter().find(|curve| curve.name == "scan").unwrap();
+    assert_eq!(material.instruments.iter().filter(|known| known.name == "Radar").count(), 1);
+    let named = |i: &&matdb::material::Instrument| Some(&i.key) == curve.instrument.as_ref();
+    let instrument = material.instruments.iter().find(named).unwrap();
+    assert_eq!((instrument.name.as_str(), instrument.centre_frequency_hz), ("Radar", 300e9));
+    assert!((instrument.threshold_w.unwrap() / 1.995e-11 - 1.0).abs() < 1e-3, "-77 dBm");
+    let source = material.sources.iter().find(|source| source.key == curve.source).unwrap();
+    assert_eq!(source.licence.as_deref(), Some("CC0-1.0"));
 }

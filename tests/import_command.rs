@@ -150,12 +150,12 @@ fn what_cannot_be_trusted_changes_nothing() {
         (
             |site| {
                 let path = site.join("api/v1/materials/huge.json");
-                fs::File::create(path).unwrap().set_len((32 << 20) + 1).unwrap();
+                fs::File::create(path).unwrap().set_len((256 << 20) + 1).unwrap();
                 let mut list = fs::read_to_string(site.join("SHA256SUMS")).unwrap();
                 list += &format!("{:064}  api/v1/materials/huge.json\n", 0);
                 fs::write(site.join("SHA256SUMS"), list).unwrap();
             },
-            "is larger than 32 MiB",
+            "is larger than 256 MiB",
         ),
         (|site| fs::remove_file(site.join("SHA256SUMS")).unwrap(), "it has no SHA256SUMS"),
         (
@@ -202,4 +202,52 @@ fn an_effect_that_nobody_knows_takes_everything_back() {
     let said = refused(matdb(ours.path()).arg("import").arg(theirs.path().join("site")));
     assert!(said.contains("zinc") && said.contains("telepathy"), "{said}");
     assert_eq!(contents(&database), before, "primer came first and is not there");
+}
+
+/// Puts a journal beside a database that tells SQLite to remove `victim` (sqlite.org/fileformat.html,
+/// "The Rollback Journal").
+fn plant(database: &Path, victim: &Path) {
+    let bytes = fs::read(database).unwrap();
+    let page = u32::from(u16::from_be_bytes([bytes[16], bytes[17]]));
+    let magic = [0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7];
+    let pages = (bytes.len() as u32) / page;
+    let mut journal = magic.to_vec();
+    [0, 0, pages, 512, page].iter().for_each(|n: &u32| journal.extend(n.to_be_bytes()));
+    journal.resize(512, 0);
+    let name = victim.to_str().unwrap().as_bytes();
+    let sum: u32 = name.iter().map(|byte| u32::from(*byte)).sum();
+    journal.extend((0x4000_0000 / page + 1).to_be_bytes());
+    journal.extend(name);
+    journal.extend((name.len() as u32).to_be_bytes());
+    journal.extend(sum.to_be_bytes());
+    journal.extend(magic);
+    let mut place = database.as_os_str().to_owned();
+    place.push("-journal");
+    fs::write(place, journal).unwrap();
+}
+
+#[test]
+fn a_planted_journal_removes_nothing() {
+    let (theirs, ours) = laboratories();
+    let site = theirs.path().join("site");
+    let database = site.join("catalogue.sqlite");
+    let victim = ours.path().join("thesis.txt");
+    fs::write(&victim, "").unwrap();
+    plant(&database, &victim);
+    for is_listed in [false, true] {
+        if is_listed {
+            list_hashes(&site);
+        }
+        for bundle in [&site, &database] {
+            let output = matdb(ours.path()).arg("verify").arg(bundle).output().unwrap();
+            assert_eq!(output.status.code(), Some(1));
+            refused(matdb(ours.path()).arg("import").arg(bundle).arg("--dry-run"));
+            refused(matdb(ours.path()).arg("import").arg(bundle));
+            for command in [&["list"][..], &["add", "ptfe"]] {
+                let said = refused(matdb(ours.path()).arg("--db").arg(&database).args(command));
+                assert!(said.contains("remove the journal"), "{said}");
+            }
+            assert!(victim.exists() && site.join("catalogue.sqlite-journal").exists());
+        }
+    }
 }

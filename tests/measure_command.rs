@@ -182,6 +182,10 @@ fn clouds_that_cannot_be_used() {
         (&["--pose", "1,2"], &["`1,2` is no pose"]),
         (&["--edge-margin", "7"], &["--edge-margin 7"]),
         (&["--save", "no-such", "--kind", "measured", "--source", "x"], &["no-such"]),
+        (
+            &["--save", "ptfe", "--kind", "measured", "--source", "x"],
+            &["--licence CC-BY-4.0", "--instrument", "--frequency 300", "--threshold -77"],
+        ),
         (&["--save", "ptfe@1", "--kind", "measured", "--source", "x"], &["`ptfe@1`", "bare name"]),
     ] {
         let run = ["measure", "good.csv", "--scene", "scene.toml", "-o", "measured"];

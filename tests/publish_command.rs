@@ -17,7 +17,7 @@ use matdb::store::Store;
 use serde_json::Value;
 use support::database::{bytes, contents, sample, sound, with_effects};
 use support::json_schema::problems;
-use support::{matdb, refused};
+use support::{entries, matdb, refused};
 
 const ABOUT: &str = "title = 'Paints <of> \"ours\"'\nversion = '1.0'\ndoi = '10.5281/zenodo.123'\n\
     [[person]]\nfamily = 'Roe'\ngiven = 'Ann'\norcid = '0000-0002-1825-0097'\n";
@@ -241,6 +241,29 @@ fn a_killed_publication_leaves_a_whole_one() {
         }
     }
     assert!(killed > 0);
+    publish(at);
+    let left: Vec<_> = entries(at).into_iter().filter(|name| name.starts_with(".matdb")).collect();
+    assert_eq!(left, [""; 0], "what the killed ones had begun");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_stays_a_link_and_version_control_stays_in_the_folder() {
+    let folder = laboratory();
+    let at = folder.path();
+    let real = at.join("real");
+    fs::create_dir_all(real.join(".git")).unwrap();
+    fs::write(real.join(".git/HEAD"), "ref: x").unwrap();
+    fs::write(real.join("CNAME"), "example.org").unwrap();
+    std::os::unix::fs::symlink("real", at.join("site")).unwrap();
+    publish(at);
+    publish(at);
+    assert!(at.join("site").symlink_metadata().unwrap().is_symlink());
+    assert_eq!(fs::read(real.join(".git/HEAD")).unwrap(), b"ref: x");
+    assert!(real.join("CNAME").exists() && real.join("index.html").exists());
+    matdb(at).args(["verify", "site", "-q"]).assert().success();
+    let said = refused(matdb(&real).args(["publish", ".", "--db", "../matdb.sqlite"]));
+    assert!(said.contains("you are in it"), "{said}");
 }
 
 type Spoil = fn(&Path);
@@ -251,7 +274,18 @@ fn whatever_is_changed_afterwards_is_seen() {
     let at = folder.path();
     publish(at);
     let site = at.join("site");
-    let spoils: [(Spoil, &str); 7] = [
+    let forged = "is not what its database gives";
+    let spoils: [(Spoil, &str); 17] = [
+        (|site| relist(site, "CITATION.cff", b"x"), forged),
+        (|site| relist(site, ".zenodo.json", b"{}"), forged),
+        (|site| relist(site, "tables/curve.csv", b"x"), forged),
+        (|site| relist(site, "material/paint.html", b"x"), forged),
+        (|site| relist(site, "data/paint.js", b"x"), forged),
+        (|site| relist(site, "datapackage.json", b"{}"), forged),
+        (|site| relist(site, "evil.html", b"x"), "evil.html: is of no publication"),
+        (|site| relist(site, "catalogue.sqlite-journal", b"x"), "taken for a part of the database"),
+        (|site| resql(site, "UPDATE unit SET ucum = 'furlong'"), "units of columns"),
+        (|site| resql(site, "UPDATE fit_parameter SET sd = 7"), "`fit_parameter`"),
         (|site| flip(&site.join("api/v1/materials/paint.json")), "paint.json: is not what"),
         (|site| flip(&site.join("catalogue.sqlite")), "catalogue.sqlite: is not what"),
         (|site| fs::remove_file(site.join("CITATION.cff")).unwrap(), "CITATION.cff: is missing"),
@@ -287,6 +321,14 @@ fn flip(path: &Path) {
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
     fs::write(path, bytes).unwrap();
+}
+
+/// Changes the database and the list of hashes with it.
+fn resql(site: &Path, sql: &str) {
+    let conn = rusqlite::Connection::open(site.join("catalogue.sqlite")).unwrap();
+    conn.execute_batch(sql).unwrap();
+    drop(conn);
+    support::list_hashes(site);
 }
 
 /// Changes a file and the list of hashes with it.

@@ -309,3 +309,32 @@ fn crowded_process() {
     assert!(sentence(&error, &path).contains("no room left"), "{error}");
     assert_eq!(contents(&path), before);
 }
+
+#[test]
+fn a_write_that_was_cut_short_is_taken_back_by_who_writes_and_left_alone_by_who_reads() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, cut] = ["a.sqlite", "cut.sqlite"].map(|name| folder.path().join(name));
+    Store::open(&path).unwrap().add([&sample("paint")]).unwrap();
+    Store::open_existing(&path).unwrap().unwrap().copy_to(&cut).unwrap();
+    let journal = |path: &Path| path.with_extension("sqlite-journal");
+    // Its head alone: cut short before the first page was changed.
+    let whole = fs::read(&cut).unwrap();
+    let page = u32::from(u16::from_be_bytes([whole[16], whole[17]]));
+    let mut head = vec![0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7];
+    for number in [0, 0, whole.len() as u32 / page, 512, page] {
+        head.extend(number.to_be_bytes());
+    }
+    head.resize(512, 0);
+    fs::write(journal(&cut), head).unwrap();
+    let before = [fs::read(&cut).unwrap(), fs::read(journal(&cut)).unwrap()];
+    let error = Store::open_existing(&cut).unwrap_err();
+    assert!(matches!(error, StoreError::Interrupted { .. }), "{error}");
+    assert_eq!(before, [fs::read(&cut).unwrap(), fs::read(journal(&cut)).unwrap()]);
+    drop(Store::open(&cut).unwrap());
+    assert!(!journal(&cut).exists());
+    let read = Store::open_existing(&cut).unwrap().unwrap();
+    assert_eq!(
+        read.get(&"paint".parse().unwrap(), None).unwrap().unwrap().material,
+        sample("paint")
+    );
+}

@@ -4,6 +4,8 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::material::form::{is_address, is_doi, is_licence};
+
 /// What a catalogue says of itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -81,6 +83,23 @@ impl About {
         let about: About = toml::from_str(text).map_err(|error| refused(error.to_string()))?;
         if about.title.trim().is_empty() {
             return Err(refused("`title` is empty; give the catalogue a title".to_owned()));
+        }
+        if !is_licence(&about.licence) {
+            let licence = &about.licence;
+            return Err(refused(format!(
+                "`licence` is `{licence}`; write an SPDX expression such as CC-BY-4.0 or \
+                 LicenseRef-proprietary"
+            )));
+        }
+        if let Some(url) = about.url.as_ref().filter(|url| !is_address(url)) {
+            return Err(refused(format!(
+                "`url` is `{url}`; write an address that begins with http:// or https://"
+            )));
+        }
+        if let Some(doi) = about.doi.as_ref().filter(|doi| !is_doi(doi)) {
+            return Err(refused(format!(
+                "`doi` is `{doi}`; write it as 10.1234/name, without a resolver in front"
+            )));
         }
         Ok(about)
     }

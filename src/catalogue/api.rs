@@ -16,6 +16,9 @@ use crate::store::{Stored, Summary};
 /// The version of the shape of every JSON file here.
 pub(super) const SCHEMA_VERSION: u32 = 1;
 
+/// Largest file of a single material, bytes: about 800 000 points. Nobody writes or reads a larger one.
+pub(super) const LARGEST_MATERIAL_BYTES: u64 = 256 << 20;
+
 /// Where a material's file stands.
 pub(super) fn path(slug: &str) -> String {
     format!("{FOLDER}{slug}.json")
@@ -101,6 +104,9 @@ pub(super) struct Index {
     pub version: Option<String>,
     /// When the newest entry was added: UTC, ISO 8601; none in an empty catalogue.
     pub date: Option<String>,
+    /// Of the program that published; none of one that did not say so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub program_version: Option<String>,
     pub materials: Vec<Entry>,
 }
 
@@ -112,6 +118,7 @@ impl Index {
             licence: about.licence.clone(),
             version: about.version.clone(),
             date: materials.iter().map(|entry| &entry.added_at).max().cloned(),
+            program_version: Some(env!("CARGO_PKG_VERSION").to_owned()),
             materials,
         }
     }
@@ -123,7 +130,18 @@ impl Index {
 
 /// Writes a material's own file.
 pub(super) fn write(folder: &mut Folder, stored: &Stored) -> Result<(), CatalogueError> {
-    json(folder, &path(stored.material.slug.as_str()), &Record::new(stored))
+    let slug = stored.material.slug.as_str();
+    json(folder, &path(slug), &Record::new(stored))?;
+    folder.sums().get(&path(slug)).map_or(Ok(()), |sum| check_size(slug, sum.bytes))
+}
+
+/// Refuses a material that nobody who verifies would read.
+fn check_size(slug: &str, bytes: u64) -> Result<(), CatalogueError> {
+    let limit = LARGEST_MATERIAL_BYTES;
+    match bytes > limit {
+        true => Err(CatalogueError::TooLarge { slug: slug.to_owned(), bytes, limit }),
+        false => Ok(()),
+    }
 }
 
 /// Writes a value as one line of JSON.
@@ -136,4 +154,34 @@ pub(super) fn json(
         serde_json::to_writer(&mut *out, value).map_err(io::Error::from)?;
         out.write_all(b"\n")
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::{Censor, Observation};
+
+    #[test]
+    fn a_curve_of_300_000_points_fits_and_what_does_not_is_refused_with_its_size() {
+        let long = Some(std::f64::consts::PI * 1e-17);
+        let point = Observation {
+            theta_i_rad: 0.123_456_789_012_345_6,
+            theta_r_rad: 0.123_456_789_012_345_6,
+            delta_phi_rad: 0.123_456_789_012_345_6,
+            sigma0: long,
+            censor: Censor::Right,
+            threshold_sigma0: long,
+            theta_sd_rad: long,
+            power_w: long,
+            range_m: long,
+            chirp: Some(u32::MAX),
+        };
+        let bytes = serde_json::to_vec(&point).unwrap().len() as u64 + 1;
+        assert!(check_size("paint", 300_000 * bytes).is_ok(), "{bytes}");
+        let said = check_size("paint", LARGEST_MATERIAL_BYTES + 1).unwrap_err().to_string();
+        assert!(
+            said.starts_with("`paint` takes 257 MiB as JSON and a publication takes 256"),
+            "{said}"
+        );
+    }
 }

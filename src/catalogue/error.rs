@@ -25,6 +25,29 @@ pub enum CatalogueError {
         /// A file in it, by its path from there.
         stranger: String,
     },
+    /// The folder cannot give way to a new one.
+    #[error("cannot replace {}: {problem}; name a folder in it or beside it", folder.display())]
+    Fixed {
+        /// The folder.
+        folder: PathBuf,
+        /// Why.
+        problem: &'static str,
+    },
+    /// A material is larger than anybody who verifies a publication would read.
+    #[error(
+        "`{slug}` takes {} MiB as JSON and a publication takes {} at most; nothing was published, thin its \
+         curves out or split it",
+        bytes.div_ceil(1 << 20),
+        limit >> 20
+    )]
+    TooLarge {
+        /// The material.
+        slug: String,
+        /// Its size.
+        bytes: u64,
+        /// What is allowed.
+        limit: u64,
+    },
     /// What stands there was published, but its record of changes cannot be continued.
     #[error(
         "cannot continue the change log of the earlier publication: {}: {problem}; publish into a new \

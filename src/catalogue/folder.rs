@@ -7,9 +7,10 @@ use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
-use tempfile::{Builder, TempDir};
+use tempfile::TempDir;
 
 use super::CatalogueError;
+use super::stage::{KEPT, Stage, hindrance, parent};
 
 /// The list of hashes, which tells a publication from somebody's own folder.
 pub(super) const SUMS: &str = "SHA256SUMS";
@@ -30,8 +31,26 @@ pub struct Sum {
 #[derive(Debug)]
 pub struct Folder {
     target: PathBuf,
-    staged: TempDir,
+    place: Place,
     sums: BTreeMap<String, Sum>,
+}
+
+/// Where files go before they are in their place.
+#[derive(Debug)]
+enum Place {
+    /// Beside the target.
+    Staged(Stage),
+    /// Nowhere, only their hashes are wanted; what must be written by its path is removed again.
+    Hashed(TempDir),
+}
+
+impl Place {
+    fn path(&self) -> &Path {
+        match self {
+            Place::Staged(stage) => stage.path(),
+            Place::Hashed(folder) => folder.path(),
+        }
+    }
 }
 
 impl Folder {
@@ -44,23 +63,35 @@ impl Folder {
             let path = path.to_owned();
             move |reason| CatalogueError::Io { verb, path, reason }
         };
-        if let Some(stranger) = stranger(target).map_err(io("read", target))? {
+        // A link stays, and what it leads to is replaced.
+        let resolved = match target.symlink_metadata() {
+            Ok(_) => fs::canonicalize(target).map_err(io("read", target))?,
+            Err(_) => target.to_owned(),
+        };
+        if let Some(stranger) = stranger(&resolved).map_err(io("read", target))? {
             return Err(CatalogueError::Occupied { folder: target.to_owned(), stranger });
         }
-        let beside = match target.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        fs::create_dir_all(beside).map_err(io("create", beside))?;
-        let mut builder = Builder::new();
-        builder.prefix(".matdb-");
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(fs::Permissions::from_mode(0o777));
+        if let Some(problem) = hindrance(&resolved) {
+            return Err(CatalogueError::Fixed { folder: target.to_owned(), problem });
         }
-        let staged = builder.tempdir_in(beside).map_err(io("create", beside))?;
-        Ok(Folder { target: target.to_owned(), staged, sums: BTreeMap::new() })
+        let stage = Stage::new(&resolved).map_err(io("create", parent(&resolved)))?;
+        Ok(Folder { target: resolved, place: Place::Staged(stage), sums: BTreeMap::new() })
+    }
+
+    /// What would be written over `published`, as hashes only; those of `sums` are known.
+    ///
+    /// # Errors
+    /// When there is no room for temporary files.
+    pub(super) fn hashed(
+        published: &Path,
+        sums: BTreeMap<String, Sum>,
+    ) -> Result<Folder, CatalogueError> {
+        let failed = |reason| {
+            let path = std::env::temp_dir();
+            CatalogueError::Io { verb: "write", path, reason }
+        };
+        let place = Place::Hashed(tempfile::tempdir().map_err(failed)?);
+        Ok(Folder { target: published.to_owned(), place, sums })
     }
 
     /// What stood at the target before, if anything did.
@@ -85,8 +116,11 @@ impl Folder {
         path: &str,
         write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), CatalogueError> {
-        let place = self.staged.path().join(path);
-        let sum = write_hashed(&place, write).map_err(|reason| self.unwritable(path, reason))?;
+        let sum = match &self.place {
+            Place::Staged(stage) => write_hashed(&stage.path().join(path), write),
+            Place::Hashed(_) => hash(BufWriter::new(io::sink()), write),
+        };
+        let sum = sum.map_err(|reason| self.unwritable(path, reason))?;
         self.sums.insert(path.to_owned(), sum);
         Ok(())
     }
@@ -101,12 +135,15 @@ impl Folder {
         path: &str,
         make: impl FnOnce(&Path) -> Result<(), E>,
     ) -> Result<PathBuf, E> {
-        let place = self.staged.path().join(path);
+        let place = self.place.path().join(path);
         if let Some(folder) = place.parent() {
             fs::create_dir_all(folder).map_err(|reason| self.unwritable(path, reason))?;
         }
         make(&place)?;
-        let sum = File::open(&place).and_then(hashed);
+        let mut sum = File::open(&place).and_then(hashed);
+        if matches!(self.place, Place::Hashed(_)) {
+            sum = sum.and_then(|sum| fs::remove_file(&place).map(|()| sum));
+        }
         self.sums.insert(path.to_owned(), sum.map_err(|reason| self.unwritable(path, reason))?);
         Ok(place)
     }
@@ -128,24 +165,15 @@ impl Folder {
         let list: String =
             self.sums.iter().map(|(path, sum)| format!("{}  {path}\n", sum.sha256)).collect();
         self.write(SUMS, list.as_bytes())?;
-        let Folder { target, staged, .. } = self;
-        let failed = |reason| CatalogueError::Io { verb: "write", path: target.clone(), reason };
-        let aside = staged.path().with_extension("before");
-        let had_one = target.exists();
-        if had_one {
-            fs::rename(&target, &aside).map_err(failed)?;
+        let Folder { target, place, .. } = self;
+        match place {
+            Place::Staged(stage) => stage.keep().map_err(|reason| CatalogueError::Io {
+                verb: "write",
+                path: target,
+                reason,
+            }),
+            Place::Hashed(_) => Ok(()),
         }
-        if let Err(reason) = fs::rename(staged.path(), &target) {
-            if had_one {
-                // The first error is the one to report.
-                let _ = fs::rename(&aside, &target);
-            }
-            return Err(failed(reason));
-        }
-        if had_one {
-            fs::remove_dir_all(&aside).map_err(failed)?;
-        }
-        Ok(())
     }
 }
 
@@ -160,15 +188,20 @@ fn stranger(target: &Path) -> io::Result<Option<String>> {
     };
     let listed: BTreeSet<&str> = sums.lines().filter_map(|line| line.get(66..)).collect();
     if !listed.contains(INDEX) {
-        let first = fs::read_dir(target)?.next().transpose()?;
-        return Ok(first.map(|entry| entry.file_name().to_string_lossy().into_owned()));
+        for entry in fs::read_dir(target)? {
+            let name = entry?.file_name().to_string_lossy().into_owned();
+            if !KEPT.contains(&name.as_str()) {
+                return Ok(Some(name));
+            }
+        }
+        return Ok(None);
     }
     let is_ours = |path: &str| path == SUMS || listed.contains(path);
     Ok(files(target)?.into_iter().map(|(path, _)| path).find(|path| !is_ours(path)))
 }
 
-/// Every file below a folder, sorted: its path relative to it, the parts joined by `/`, and whether it
-/// is a plain file. Links are not followed.
+/// Every file below a folder but what may stand there [besides](KEPT), sorted: its path relative to it,
+/// the parts joined by `/`, and whether it is a plain file. Links are not followed.
 pub(super) fn files(root: &Path) -> io::Result<Vec<(String, bool)>> {
     let mut found = Vec::new();
     let mut folders = vec![(root.to_owned(), String::new())];
@@ -176,6 +209,9 @@ pub(super) fn files(root: &Path) -> io::Result<Vec<(String, bool)>> {
         for entry in fs::read_dir(folder)? {
             let entry = entry?;
             let path = format!("{prefix}{}", entry.file_name().to_string_lossy());
+            if KEPT.contains(&path.as_str()) {
+                continue;
+            }
             let kind = entry.file_type()?;
             match kind.is_dir() {
                 true => folders.push((entry.path(), format!("{path}/"))),
@@ -201,7 +237,10 @@ fn write_hashed(
     if let Some(folder) = place.parent() {
         fs::create_dir_all(folder)?;
     }
-    let out = BufWriter::new(File::create(place)?);
+    hash(BufWriter::new(File::create(place)?), write)
+}
+
+fn hash(out: impl Write, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<Sum> {
     let mut out = Hashed { out, hash: Sha256::new(), bytes: 0 };
     write(&mut out)?;
     out.flush()?;

@@ -12,16 +12,15 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use super::CatalogueError;
-use super::api::{self, Entry, Index, Record, SCHEMA_VERSION};
-use super::folder::{INDEX, SUMS, files, hashed};
-use super::publish::DATABASE;
+use super::api::{self, Entry, Index, LARGEST_MATERIAL_BYTES, Record, SCHEMA_VERSION};
+use super::folder::{INDEX, SUMS, Sum, files, hashed};
+use super::publish::{ABOUT, DATABASE, rebuilt};
+use super::{About, HAS_PARQUET};
 use crate::fit::again::problems;
-use crate::store::{RevisionSummary, Store, StoreError, Stored, Summary};
+use crate::store::{Again, RevisionSummary, Store, StoreError, Stored, Summary};
 
 /// Largest database or table that is read, bytes.
 pub const LARGEST_TABLE_BYTES: u64 = 64 << 30;
-/// Largest file of a single material, bytes.
-pub const LARGEST_MATERIAL_BYTES: u64 = 32 << 20;
 /// Largest file of any other kind, bytes.
 pub const LARGEST_FILE_BYTES: u64 = 1 << 30;
 
@@ -63,6 +62,9 @@ pub struct Verified {
     /// What of its database was checked.
     #[serde(flatten)]
     pub checked: Checked,
+    /// What could not be checked, a sentence each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     /// Everything that is wrong, in the order of the checks; none: the publication is sound.
     pub problems: Vec<Problem>,
 }
@@ -75,6 +77,7 @@ pub fn verify(bundle: &Path) -> Result<Verified, CatalogueError> {
     let mut verified = Verified::default();
     let problems = &mut verified.problems;
     if bundle.is_file() {
+        alone(bundle)?;
         let store = database(bundle)?;
         verified.checked = check_store(&store, &mut |found| problems.push(found));
         return Ok(verified);
@@ -90,14 +93,20 @@ pub fn verify(bundle: &Path) -> Result<Verified, CatalogueError> {
         return Ok(verified);
     }
     match database(&bundle.join(DATABASE)) {
-        Ok(store) => verified.checked = check_content(bundle, &store, &sums, problems),
+        Ok(store) => {
+            verified.checked = check_content(bundle, &store, &sums, problems);
+            // What is wrong already would be found wrong again in every file made of it.
+            if problems.is_empty() {
+                verified.notes = check_rebuilt(bundle, &store, &sums, problems);
+            }
+        }
         Err(error) => problems.push(problem(DATABASE, error)),
     }
     Ok(verified)
 }
 
-/// Checks a database: every revision has the content that its hash says, and every fit of a current
-/// revision follows from its curve. `report` hears of everything that is wrong.
+/// Checks a database: its pages and indexes are sound, every revision has the content that its hash
+/// says, what else is stored follows from that, and every fit of a current revision from its curve. `report` hears of everything that is wrong.
 pub fn check_store(store: &Store, report: &mut dyn FnMut(Problem)) -> Checked {
     check_each(store, report, |_, _, _| ())
 }
@@ -112,11 +121,34 @@ pub(super) fn database(path: &Path) -> Result<Store, CatalogueError> {
     if size > LARGEST_TABLE_BYTES {
         return Err(no_bundle("it is larger than any catalogue may be"));
     }
-    let store = Store::open_existing(path)?.ok_or_else(|| no_bundle("it is empty"))?;
+    let store = Store::open_frozen(path)?.ok_or_else(|| no_bundle("it is empty"))?;
     match store.has_own_schema()? {
         true => Ok(store),
         false => Err(no_bundle("its tables, indexes or views are not those that matdb makes")),
     }
+}
+
+/// Whether SQLite would read, roll back or remove the file together with the database.
+fn is_beside_database(path: &str) -> bool {
+    path.strip_prefix(DATABASE).is_some_and(|ending| ending.starts_with('-'))
+}
+
+/// Refuses a database with something beside it that says more, or something else.
+fn alone(path: &Path) -> Result<(), CatalogueError> {
+    for ending in ["-journal", "-wal"] {
+        let mut name = path.as_os_str().to_owned();
+        name.push(ending);
+        // An empty log says nothing, and readers leave such behind.
+        if fs::symlink_metadata(&name).is_ok_and(|found| found.len() > 0) {
+            let problem = format!(
+                "{} lies beside it, so that the file by itself is not all of it (`matdb publish` makes a \
+                 copy that is)",
+                Path::new(&name).display()
+            );
+            return Err(CatalogueError::NoBundle { path: path.to_owned(), problem });
+        }
+    }
+    Ok(())
 }
 
 fn unreadable(path: &Path, reason: io::Error) -> CatalogueError {
@@ -174,6 +206,10 @@ fn check_files(
     let found = files(bundle).map_err(|reason| unreadable(bundle, reason))?;
     for (path, is_plain) in &found {
         match sums.get(path) {
+            _ if is_beside_database(path) => {
+                problems
+                    .push(problem(path, "would be taken for a part of the database; remove it"));
+            }
             _ if !is_plain => problems.push(problem(path, "is a link or no plain file")),
             None if path == SUMS => {}
             None => problems.push(problem(path, "is not listed in SHA256SUMS")),
@@ -213,8 +249,9 @@ fn check_each(
     mut each: impl FnMut(&Summary, &Stored, &mut dyn FnMut(Problem)),
 ) -> Checked {
     let mut checked = Checked::default();
-    let summaries = match store.list() {
-        Ok(summaries) => summaries,
+    let opened = check_file_itself(store, report).and_then(|()| Ok((store.list()?, Again::new()?)));
+    let (summaries, mut again) = match opened {
+        Ok(opened) => opened,
         Err(error) => {
             report(problem("materials", error));
             return checked;
@@ -222,15 +259,54 @@ fn check_each(
     };
     for summary in &summaries {
         checked.materials += 1;
-        if let Err(error) = check_material(store, summary, report, &mut checked, &mut each) {
+        let done = check_material(store, &mut again, summary, report, &mut checked, &mut each);
+        if let Err(error) = done {
             report(problem(summary.slug.as_str(), error));
         }
     }
     checked
 }
 
+fn check_file_itself(store: &Store, report: &mut dyn FnMut(Problem)) -> Result<(), StoreError> {
+    store.damage()?.into_iter().for_each(|what| report(problem(DATABASE, what)));
+    if !Again::new()?.has_own_units(store)? {
+        report(problem(DATABASE, OTHER_UNITS));
+    }
+    Ok(())
+}
+
+/// What is wrong with a database whose table of units was changed.
+pub const OTHER_UNITS: &str = "its units of columns are not those that matdb writes";
+
+/// What of a stored revision does not follow from its content: statistics of curves, numbers beside
+/// parameters, and whatever else the program writes twice.
+///
+/// # Errors
+/// When the database cannot be read.
+pub fn derived(
+    again: &mut Again,
+    store: &Store,
+    stored: &Stored,
+) -> Result<Vec<Problem>, StoreError> {
+    let place = format!("{}@{}", stored.material.slug, stored.revision);
+    let differences = again.differences(store, stored)?.into_iter();
+    Ok(differences
+        .map(|found| match found.curve {
+            Some(curve) => problem(
+                format!("{place}, curve {curve}"),
+                "its statistics are not those of its points",
+            ),
+            None => problem(
+                place.clone(),
+                format!("its rows of `{}` are not those that its content gives", found.table),
+            ),
+        })
+        .collect())
+}
+
 fn check_material(
     store: &Store,
+    again: &mut Again,
     summary: &Summary,
     report: &mut dyn FnMut(Problem),
     checked: &mut Checked,
@@ -253,6 +329,7 @@ fn check_material(
             report(problem(place(), error));
             continue;
         }
+        derived(again, store, &stored)?.into_iter().for_each(&mut *report);
         if revision == summary.revision {
             checked.fits += check_fits(&stored, report);
             each(summary, &stored, report);
@@ -295,6 +372,99 @@ fn check_content(
     let strangers = strangers.filter(|path| !known.contains(path.as_str()));
     problems.extend(strangers.map(|path| problem(path, "is of no material of the database")));
     checked
+}
+
+/// Publishes once more, without writing, and compares file by file; what was left out, a sentence each.
+fn check_rebuilt(
+    bundle: &Path,
+    store: &Store,
+    sums: &BTreeMap<String, String>,
+    problems: &mut Vec<Problem>,
+) -> Vec<String> {
+    let made = database_sum(bundle, sums).and_then(|database| {
+        let about = read::<About>(bundle, ABOUT).map_err(|what| problem(ABOUT, what))?;
+        rebuilt(store, &about, bundle, database).map_err(|error| problem(DATABASE, error))
+    });
+    let made = match made {
+        Ok(made) => made,
+        Err(what) => {
+            problems.push(what);
+            return Vec::new();
+        }
+    };
+    let (scope, notes) = Scope::new(bundle, sums);
+    let paths: BTreeSet<&String> = sums.keys().chain(made.keys()).collect();
+    let mut wrong = paths.into_iter().filter(|path| scope.has(path)).filter_map(|path| {
+        match (sums.get(path), made.get(path)) {
+            (Some(sum), Some(made)) if *sum == made.sha256 => None,
+            (Some(_), Some(_)) => Some(problem(path, "is not what its database gives")),
+            (Some(_), None) => Some(problem(path, "is of no publication of its database")),
+            (None, _) => Some(problem(path, "is missing: its database gives it")),
+        }
+    });
+    problems.extend(wrong.by_ref().take(MOST_NAMED));
+    let more = wrong.count();
+    if more > 0 {
+        problems.push(problem(".", format!("{more} more files are not what its database gives")));
+    }
+    notes
+}
+
+/// The database as its hash was found to be.
+fn database_sum(bundle: &Path, sums: &BTreeMap<String, String>) -> Result<Sum, Problem> {
+    let found = fs::metadata(bundle.join(DATABASE)).map_err(|reason| problem(DATABASE, reason))?;
+    let sha256 = sums.get(DATABASE).cloned().unwrap_or_default();
+    Ok(Sum { sha256, bytes: found.len() })
+}
+
+/// Files that are named one by one.
+const MOST_NAMED: usize = 10;
+
+/// Which files of a publication this program would write just so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Scope {
+    same_version: bool,
+    same_parquet: bool,
+}
+
+impl Scope {
+    /// The scope, and what is outside.
+    fn new(bundle: &Path, sums: &BTreeMap<String, String>) -> (Scope, Vec<String>) {
+        let version = read::<Index>(bundle, INDEX).ok().and_then(|index| index.program_version);
+        let has_parquet = sums.keys().any(|path| is_parquet(path));
+        let scope = Scope {
+            same_version: version.as_deref() == Some(env!("CARGO_PKG_VERSION")),
+            same_parquet: has_parquet == HAS_PARQUET,
+        };
+        let by = version.map_or("an older matdb".to_owned(), |version| format!("matdb {version}"));
+        let other_version = format!(
+            "{by} has published this, so that of the files beside the database only tables/*.csv were \
+             made again and compared"
+        );
+        let other_tables = "this matdb was built with other formats of tables, so that Parquet and the \
+                            records that list it were not made again";
+        let notes = match scope {
+            Scope { same_version: false, .. } => vec![other_version],
+            Scope { same_parquet: false, .. } => vec![other_tables.to_owned()],
+            _ => Vec::new(),
+        };
+        (scope, notes)
+    }
+
+    fn has(self, path: &str) -> bool {
+        const LISTS: [&str; 3] = ["datapackage.json", "dataset.jsonld", "ro-crate-metadata.json"];
+        match self {
+            Scope { same_version: false, .. } => {
+                path.starts_with("tables/") && path.ends_with(".csv")
+            }
+            Scope { same_parquet: false, .. } => !is_parquet(path) && !LISTS.contains(&path),
+            _ => true,
+        }
+    }
+}
+
+fn is_parquet(path: &str) -> bool {
+    path.starts_with("tables/") && path.ends_with(".parquet")
 }
 
 fn check_record(bundle: &Path, stored: &Stored) -> Option<Problem> {

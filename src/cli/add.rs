@@ -1,6 +1,5 @@
 //! `matdb add`.
 
-mod door;
 mod foreign;
 
 use std::cell::RefCell;
@@ -11,6 +10,7 @@ use serde_json::json;
 
 use super::console::Console;
 use super::database::Database;
+use super::door;
 use super::inputs::input;
 use super::materials::unknown;
 use super::staging::chosen;
@@ -44,7 +44,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE|DIR", group = "what")]
     from: Vec<PathBuf>,
     /// Print a complete material.toml with comments, to be changed
-    #[arg(long, group = "what", exclusive = true)]
+    #[arg(long, group = "what", conflicts_with_all = ["names", "all", "from"])]
     template: bool,
     #[command(flatten)]
     foreign: foreign::Beside,

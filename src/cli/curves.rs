@@ -2,9 +2,12 @@
 
 use clap::ValueEnum;
 
+use super::door;
 use crate::error::Error;
-use crate::material::{Citation, Curve, Material, Source, SourceKind};
+use crate::material::form::is_licence;
+use crate::material::{Citation, Curve, Instrument, Material, Source, SourceKind};
 use crate::measure;
+use crate::units::watts_from_dbm;
 
 /// How a curve came to be, as flags say it.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -22,28 +25,135 @@ impl From<Kind> for SourceKind {
     }
 }
 
+/// The way out for whoever has not said where a curve comes from.
+pub(super) const UNSAID: &str = "add --kind measured or --kind synthetic, and --source with who, when and \
+    how; a measured curve needs --licence, --instrument, --frequency and --threshold, too";
+
+/// What a person says of a curve that is to be stored.
+#[derive(Debug, Default, PartialEq, clap::Args)]
+#[command(next_help_heading = "For a measured curve that is stored")]
+pub(super) struct Circumstances {
+    /// SPDX identifier of the licence of its data
+    #[arg(long, value_name = "SPDX", requires = "save")]
+    licence: Option<String>,
+    /// Name of the instrument, one of the material's or a new one
+    #[arg(long, value_name = "TEXT", requires = "save")]
+    instrument: Option<String>,
+    /// Centre frequency of a new instrument
+    #[arg(long, value_name = "GHZ", requires = "save")]
+    frequency: Option<f64>,
+    /// Least power that counts as a detection with a new instrument
+    #[arg(long, value_name = "DBM", requires = "save", allow_negative_numbers = true)]
+    threshold: Option<f64>,
+}
+
+impl Circumstances {
+    /// Refuses a measured curve of which not enough is said, before anything is computed for it.
+    pub fn check(&self, material: &Material, kind: SourceKind) -> Result<(), Error> {
+        let usage = |problem: &str, way_out: String| {
+            Err(Error::Usage { problem: problem.to_owned(), way_out })
+        };
+        if self.licence.as_ref().is_some_and(|licence| !is_licence(licence)) {
+            let way_out = "write an SPDX identifier such as CC-BY-4.0, or LicenseRef-proprietary";
+            return usage("--licence is no SPDX expression", way_out.to_owned());
+        }
+        let is_possible = |number: f64| number > 0.0 && number.is_finite();
+        if !self.frequency.is_none_or(is_possible)
+            || !self.threshold.is_none_or(|dbm| is_possible(watts_from_dbm(dbm)))
+        {
+            let way_out = "give a frequency in GHz such as 300, a threshold in dBm such as -77";
+            return usage("--frequency or --threshold cannot be", way_out.to_owned());
+        }
+        let known = self.known(material);
+        let is_other = |known: &Instrument| {
+            self.frequency.is_some_and(|ghz| ghz * 1e9 != known.centre_frequency_hz)
+                || self.threshold.is_some_and(|dbm| known.threshold_w != Some(watts_from_dbm(dbm)))
+        };
+        if known.is_some_and(is_other) {
+            let way_out = "leave --frequency and --threshold out, or name another --instrument";
+            let problem =
+                "the material's instrument of that name has another frequency or threshold";
+            return usage(problem, way_out.to_owned());
+        }
+        let is_measured = kind == SourceKind::Measured;
+        let is_said =
+            self.instrument.is_some() || self.frequency.is_some() || self.threshold.is_some();
+        let has = |is_there: bool, is_needed: bool| is_there || known.is_some() || !is_needed;
+        let wanted = [
+            (self.licence.is_some() || !is_measured, "--licence CC-BY-4.0"),
+            (
+                has(self.instrument.is_some(), is_measured || is_said),
+                "--instrument \"name of the radar\"",
+            ),
+            (has(self.frequency.is_some(), is_measured || is_said), "--frequency 300"),
+            (has(self.threshold.is_some(), is_measured), "--threshold -77"),
+        ];
+        let missing: Vec<&str> =
+            wanted.into_iter().filter(|(is_there, _)| !is_there).map(|(_, flag)| flag).collect();
+        match (missing.is_empty(), is_measured) {
+            (true, _) => Ok(()),
+            (_, true) => {
+                usage("a measured curve needs more", format!("add {}", missing.join(", ")))
+            }
+            (_, false) => {
+                usage("the instrument of a curve needs more", format!("add {}", missing.join(", ")))
+            }
+        }
+    }
+
+    /// The instrument of the material that is meant.
+    fn known<'a>(&self, material: &'a Material) -> Option<&'a Instrument> {
+        let name = self.instrument.as_ref()?;
+        material.instruments.iter().find(|known| known.key == *name || known.name == *name)
+    }
+
+    /// The key of the instrument, which is added when it is a new one.
+    fn instrument(&self, material: &mut Material) -> Option<String> {
+        if let Some(known) = self.known(material) {
+            return Some(known.key.clone());
+        }
+        let name = self.instrument.clone()?;
+        let centre_frequency_hz = self.frequency? * 1e9;
+        let key = free("instrument", |key| material.instruments.iter().all(|i| i.key != *key));
+        material.instruments.push(Instrument {
+            key: key.clone(),
+            name,
+            centre_frequency_hz,
+            threshold_w: self.threshold.map(watts_from_dbm),
+            ..Instrument::default()
+        });
+        Some(key)
+    }
+}
+
 /// Puts a curve into a material, unless the very same is there; the key of its source.
 pub(super) fn put(
     material: &mut Material,
     name: &str,
     curve: &measure::Curve,
-    kind: SourceKind,
-    title: &str,
+    (kind, title): (SourceKind, &str),
+    circumstances: &Circumstances,
 ) -> Result<String, Error> {
+    circumstances.check(material, kind)?;
     let observations = curve.observations();
-    let source = source(material, kind, title, name);
+    let source = source(material, kind, title, name, circumstances.licence.as_deref());
     let taken = material.curves.iter().find(|known| known.name == name);
     match taken.map(|known| known.observations == observations && known.source == source) {
         Some(true) => Ok(source),
         None if !material.fits.iter().any(|fit| fit.name == name) => {
-            let (name, source_key) = (name.to_owned(), source.clone());
-            material.curves.push(Curve {
-                name,
-                source: source_key,
-                instrument: None,
-                session: None,
-                observations,
-            });
+            let instrument = circumstances.instrument(material);
+            let (name, session) = (name.to_owned(), None);
+            let curve = Curve { name, source: source.clone(), instrument, session, observations };
+            match door::missing(material, &curve).as_slice() {
+                [] => material.curves.push(curve),
+                missing => {
+                    return Err(Error::Usage {
+                        problem: format!("a measured curve needs more: {}", missing.join("; ")),
+                        way_out: "name another --instrument, with --frequency and --threshold"
+                            .to_owned(),
+                    });
+                }
+            }
             Ok(source)
         }
         _ => Err(Error::Usage {
@@ -54,25 +164,37 @@ pub(super) fn put(
 }
 
 /// The key of a source of this kind and title, added under a free key when it is not there.
-pub(super) fn source(material: &mut Material, kind: SourceKind, title: &str, key: &str) -> String {
-    let same = |source: &&Source| source.kind == kind && source.title == title;
+pub(super) fn source(
+    material: &mut Material,
+    kind: SourceKind,
+    title: &str,
+    key: &str,
+    licence: Option<&str>,
+) -> String {
+    let same = |source: &&Source| {
+        let is_licence = licence.is_none() || source.licence.as_deref() == licence;
+        source.kind == kind && source.title == title && is_licence
+    };
     if let Some(known) = material.sources.iter().find(same) {
         return known.key.clone();
     }
-    let is_free = |key: &String| material.sources.iter().all(|source| source.key != *key);
-    let numbered = (2u32..).map(|number| format!("{key}-{number}"));
-    let key = std::iter::once(key.to_owned()).chain(numbered).find(is_free);
-    let key = key.unwrap_or_default();
+    let key = free(key, |key| material.sources.iter().all(|source| source.key != *key));
     material.sources.push(Source {
         key: key.clone(),
         kind,
         title: title.to_owned(),
         doi: None,
         url: None,
-        licence: None,
+        licence: licence.map(str::to_owned),
         note: None,
         citation: Citation::default(),
         making: None,
     });
     key
+}
+
+/// The key, or the first with a number behind it that is free.
+fn free(key: &str, is_free: impl Fn(&String) -> bool) -> String {
+    let numbered = (2u32..).map(|number| format!("{key}-{number}"));
+    std::iter::once(key.to_owned()).chain(numbered).find(is_free).unwrap_or_default()
 }

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::cloud::{CloudArgs, start};
 use super::console::Console;
-use super::curves::{Kind, put};
+use super::curves::{Circumstances, Kind, UNSAID, put};
 use super::database::Database;
 use super::inputs::activity;
 use super::materials::find;
@@ -26,7 +26,8 @@ use crate::units::db_from_ratio;
   matdb measure out/cloud.ply --scene scenes/mannequin.toml -o measured
   matdb measure cloud.csv --scene scene.toml --pose 0.03,0,-0.01,0,5,0 --region body -o measured
   matdb measure cloud.xyz --unit mm --scene scene.toml --pose auto -o measured
-  matdb measure cloud.ply --scene scene.toml --save my-paint --kind measured --source 'Our bench, 2026' -o measured
+  matdb measure cloud.ply --scene scene.toml --save my-paint --kind measured --source 'Our bench, 2026' \\
+    --licence CC-BY-4.0 --instrument 'Our radar' --frequency 300 --threshold -77 -o measured
 
 Then: matdb fit measured/curve.csv, or matdb fit my-paint --save")]
 pub(super) struct Args {
@@ -66,6 +67,8 @@ pub(super) struct Args {
     /// Who measured or made the cloud, when and how
     #[arg(long, value_name = "TITLE")]
     source: Option<String>,
+    #[command(flatten)]
+    circumstances: Circumstances,
     /// Folder to write into; created when it is not there
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
@@ -141,18 +144,19 @@ fn target(args: &Args, store: Option<&Store>) -> Result<Option<Material>, Error>
     if args.kind.is_none() || args.source.is_none() {
         return Err(Error::Usage {
             problem: format!("nobody has said where {} comes from", args.cloud.cloud.display()),
-            way_out: "add --kind measured or --kind synthetic, and --source with who, when and how"
-                .to_owned(),
+            way_out: UNSAID.to_owned(),
         });
     }
-    Ok(Some(find(store, name, "--save: ")?.material))
+    let material = find(store, name, "--save: ")?.material;
+    args.kind.map_or(Ok(()), |kind| args.circumstances.check(&material, kind.into()))?;
+    Ok(Some(material))
 }
 
 /// The material with the curve in it.
 fn prepared(args: &Args, curve: &Curve, store: Option<&Store>) -> Result<Option<Material>, Error> {
     let (Some(kind), Some(title)) = (args.kind, &args.source) else { return Ok(None) };
     let Some(mut material) = target(args, store)? else { return Ok(None) };
-    put(&mut material, &args.curve, curve, kind.into(), title)?;
+    put(&mut material, &args.curve, curve, (kind.into(), title), &args.circumstances)?;
     Ok(Some(material))
 }
 

@@ -11,6 +11,7 @@ mod console;
 mod curves;
 mod diagnose;
 mod diff;
+mod door;
 mod effects;
 mod export;
 mod fit;

@@ -40,12 +40,15 @@ impl Written {
             written.created.splice(0..0, create_folder(folder)?);
             staged.push((*folder, stage(folder, files)?));
         }
-        for (folder, files) in staged {
-            for (name, file) in files {
-                let placed =
-                    place(folder, name, file).map_err(|reason| failed(folder, name, reason))?;
-                written.placed.push(placed);
-            }
+        // What a device or another program has taken does not come back, so it gets it last.
+        let mut staged: Vec<_> = staged
+            .into_iter()
+            .flat_map(|(folder, files)| files.into_iter().map(move |file| (folder, file)))
+            .collect();
+        staged.sort_by_key(|(_, (_, file))| matches!(file, Staged::Through(..)));
+        for (folder, (name, file)) in staged {
+            let placed = place(file).map_err(|reason| failed(folder, name, reason))?;
+            written.placed.extend(placed);
         }
         Ok(written)
     }
@@ -84,11 +87,33 @@ fn create_folder(folder: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(missing)
 }
 
+/// A file that waits for its place.
+enum Staged<'a> {
+    /// A whole file beside its place.
+    Whole(NamedTempFile, PathBuf),
+    /// Bytes for a device or a pipe, which stays what it is.
+    Through(&'a [u8], PathBuf),
+}
+
+/// Where a file goes: a link stays, and what it leads to is replaced.
+fn target(path: PathBuf) -> std::io::Result<PathBuf> {
+    match path.symlink_metadata() {
+        Ok(found) if found.is_symlink() => path.canonicalize(),
+        _ => Ok(path),
+    }
+}
+
 fn stage<'a, Name: AsRef<str>>(
     folder: &Path,
     files: &'a [(Name, Vec<u8>)],
-) -> Result<Vec<(&'a str, NamedTempFile)>, Error> {
+) -> Result<Vec<(&'a str, Staged<'a>)>, Error> {
     let write = |(name, bytes): &'a (Name, Vec<u8>)| {
+        let path = folder.join(name.as_ref());
+        if path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+            return Ok((name.as_ref(), Staged::Through(bytes, path)));
+        }
+        let path = target(path)?;
+        let beside = path.parent().unwrap_or(folder);
         let mut builder = Builder::new();
         builder.prefix(".matdb-");
         #[cfg(unix)]
@@ -96,10 +121,10 @@ fn stage<'a, Name: AsRef<str>>(
             use std::os::unix::fs::PermissionsExt;
             builder.permissions(std::fs::Permissions::from_mode(0o666));
         }
-        let mut file = builder.tempfile_in(folder)?;
+        let mut file = builder.tempfile_in(beside)?;
         file.write_all(bytes)?;
         file.as_file().sync_data()?;
-        Ok((name.as_ref(), file))
+        Ok((name.as_ref(), Staged::Whole(file, path)))
     };
     files
         .iter()
@@ -114,8 +139,15 @@ struct Placed {
 }
 
 /// Puts a file in its place; what was there is kept under a temporary name.
-fn place(folder: &Path, name: &str, file: NamedTempFile) -> std::io::Result<Placed> {
-    let path = folder.join(name);
+fn place(file: Staged) -> std::io::Result<Option<Placed>> {
+    let (file, path) = match file {
+        Staged::Whole(file, path) => (file, path),
+        Staged::Through(bytes, path) => {
+            std::fs::File::options().write(true).open(path)?.write_all(bytes)?;
+            return Ok(None);
+        }
+    };
+    let folder = path.parent().unwrap_or(Path::new("."));
     let before = match path.symlink_metadata() {
         Ok(found) if found.is_dir() => return Err(std::io::ErrorKind::IsADirectory.into()),
         Ok(_) => {
@@ -126,7 +158,7 @@ fn place(folder: &Path, name: &str, file: NamedTempFile) -> std::io::Result<Plac
         Err(_) => None,
     };
     match file.persist(&path) {
-        Ok(_) => Ok(Placed { path, before }),
+        Ok(_) => Ok(Some(Placed { path, before })),
         Err(error) => {
             take_back(Placed { path, before });
             Err(error.error)
@@ -199,6 +231,27 @@ mod tests {
         Written::new(&[(&new, &files), (&old, &files)]).unwrap().keep();
         assert_eq!(std::fs::read(new.join("one")).unwrap(), b"new");
         assert_eq!(entries(&old), ["one"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_devices_stay_what_they_are() {
+        let root = tempfile::tempdir().unwrap();
+        let at = |name: &str| root.path().join(name);
+        std::fs::create_dir(at("far")).unwrap();
+        std::fs::write(at("far/real"), "old").unwrap();
+        std::os::unix::fs::symlink("far/real", at("link")).unwrap();
+        std::os::unix::fs::symlink("nowhere", at("dangling")).unwrap();
+        std::os::unix::fs::symlink("/dev/null", at("null")).unwrap();
+        write_all(root.path(), &[("link", b"new".to_vec()), ("null", b"x".to_vec())]).unwrap();
+        assert_eq!(std::fs::read(at("far/real")).unwrap(), b"new");
+        for link in ["link", "null", "dangling"] {
+            assert!(at(link).symlink_metadata().unwrap().is_symlink(), "{link}");
+        }
+        assert!(write_all(root.path(), &[("dangling", b"x".to_vec())]).is_err());
+        assert_eq!(entries(root.path()), ["dangling", "far", "link", "null"]);
+        drop(Written::new(&[(root.path(), &[("link", b"more".to_vec())])]).unwrap());
+        assert_eq!(std::fs::read(at("far/real")).unwrap(), b"new");
     }
 
     #[test]

@@ -20,7 +20,8 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let verified = verify(&args.bundle)?;
-    let Verified { files, checked, problems } = &verified;
+    let Verified { files, checked, notes, problems } = &verified;
+    notes.iter().for_each(|note| console.notice(note));
     let mut text: String = problems.iter().map(|problem| format!("{problem}\n")).collect();
     if problems.is_empty() {
         text += &format!(

@@ -1,6 +1,8 @@
 //! A stored fit once more: whether its curve and its settings still give it.
 
-use super::{Fit, FitError, FitResult, Method};
+mod compare;
+
+use super::{Fit, FitError, Method};
 use crate::material::{self, FitReport, Material};
 use crate::measure::curve::Curve;
 
@@ -8,7 +10,7 @@ use crate::measure::curve::Curve;
 /// they stopped, and rounding, relative. One standard deviation of a number is half a unit.
 const SAME_OBJECTIVE: f64 = 0.01;
 const ROUNDING: f64 = 1e-6;
-/// How far numbers may, in their standard deviations.
+/// How far numbers may, in the standard deviations of the new fit.
 const SAME_NUMBER_SD: f64 = 0.1;
 
 /// The settings that a fit was made with; `None` where its report does not say them.
@@ -67,28 +69,7 @@ pub fn differences(stored: &material::Fit, curve: &Curve) -> Result<Vec<String>,
     if found.data_hash != report.data_hash {
         return Ok(vec!["the curve is not the one that was fitted".to_owned()]);
     }
-    Ok(compare(report, &found))
-}
-
-fn compare(report: &FitReport, found: &FitResult) -> Vec<String> {
-    let mut differences = Vec::new();
-    let gap = (report.objective - found.objective).abs();
-    if gap.is_nan() || gap > SAME_OBJECTIVE + ROUNDING * report.objective.abs() {
-        differences.push(format!(
-            "its objective is stored as {:.4}, and a new fit reaches {:.4}",
-            report.objective, found.objective
-        ));
-    }
-    for stored in &report.estimates {
-        let Some(sd) = stored.sd else { continue };
-        let new = found.estimate(&stored.name).map(|new| new.value);
-        if !new.is_some_and(|new| (new - stored.value).abs() <= SAME_NUMBER_SD * sd) {
-            let new = new.map_or("none".to_owned(), |new| format!("{new:.4e}"));
-            let (name, value) = (&stored.name, stored.value);
-            differences.push(format!("{name} is stored as {value:.4e}, and a new fit gives {new}"));
-        }
-    }
-    differences
+    Ok(compare::compare(stored, &found, curve))
 }
 
 #[cfg(test)]
@@ -117,6 +98,8 @@ mod tests {
         report.objective += 1.0;
         assert_eq!(differences(&stored, &curve).unwrap().len(), 2);
     }
+
+    type Forge = fn(&mut material::Fit);
 
     /// A material with a curve and the fit of it.
     fn material_with(fit: &Fit) -> Material {
@@ -164,6 +147,34 @@ mod tests {
             let estimate = &mut moved.report.as_mut().unwrap().estimates[0];
             estimate.value += estimate.sd.unwrap();
             assert!(said(&material, &moved).contains("a new fit gives"));
+            let forgeries: [(&str, Forge); 5] = [
+                ("in its model r_s", |fit| {
+                    let r_s = fit.model.parameters().into_iter().find(|p| p.path == "r_s").unwrap();
+                    fit.model.set_parameter("r_s", (r_s.value * 0.5).max(r_s.min));
+                }),
+                ("the deviation of r_s", |fit| {
+                    let report = fit.report.as_mut().unwrap();
+                    report.estimates.iter_mut().for_each(|e| e.sd = e.sd.map(|sd| sd / 5.0));
+                }),
+                ("the interval of r_s", |fit| {
+                    for e in &mut fit.report.as_mut().unwrap().estimates {
+                        e.interval_95 = e.interval_95.map(|_| [0.999 * e.value, 1.001 * e.value]);
+                    }
+                }),
+                ("its rms_db", |fit| fit.report.as_mut().unwrap().goodness.rms_db = 0.01),
+                ("its verdict says", |fit| {
+                    fit.report.as_mut().unwrap().verdict.push("every number is certain".to_owned());
+                }),
+            ];
+            for (what, forge) in forgeries {
+                let mut forged = fit.clone();
+                forge(&mut forged);
+                assert!(
+                    said(&material, &forged).contains(what),
+                    "{what}: {}",
+                    said(&material, &forged)
+                );
+            }
             let mut other = material.clone();
             other.curves.last_mut().unwrap().observations[3].sigma0 = Some(1e-3);
             assert!(said(&other, fit).contains("not the one that was fitted"));

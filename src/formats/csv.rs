@@ -145,6 +145,16 @@ fn malformed(error: csv::Error) -> FormatError {
     FormatError::at(format!("line {line}"), problem, "mend the line")
 }
 
+/// The bytes with the lines of comment at the head left empty, so that lines keep their numbers.
+pub fn without_head(bytes: &[u8]) -> Vec<u8> {
+    let mut is_head = true;
+    let line = |line: &[u8]| {
+        is_head &= line.starts_with(b"#") || line.trim_ascii().is_empty();
+        if is_head { b"\n".to_vec() } else { line.to_vec() }
+    };
+    bytes.split_inclusive(|byte| *byte == b'\n').flat_map(line).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

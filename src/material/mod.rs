@@ -8,6 +8,7 @@ mod check;
 mod composition;
 pub mod file;
 mod finding;
+pub mod form;
 mod instrument;
 mod provenance;
 mod report;

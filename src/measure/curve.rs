@@ -8,7 +8,7 @@
 use thiserror::Error;
 
 use crate::formats::FormatError;
-use crate::formats::csv::Table;
+use crate::formats::csv::{Table, without_head};
 use crate::material::{Censor, Observation};
 use crate::units::{db_from_ratio, dbm_from_watts, ratio_from_db, watts_from_dbm};
 
@@ -91,11 +91,16 @@ impl Curve {
     /// Reads a curve file. `theta_deg` and `sigma0_db` must be there. Without the others a row is
     /// uncensored, its angle exact, its range 0, its power σ⁰ in watts, its chirp its number from 0.
     ///
+    /// The columns of a material's curve do as well: `censor` (`none`, `left`), `threshold_db`, and, for
+    /// backscatter, `theta_r_deg` and `delta_phi_deg`. Lines of `#` at the head are left alone.
+    ///
     /// # Errors
     /// The first cell that cannot be used, with its line and column.
     pub fn read(bytes: &[u8]) -> Result<Curve, FormatError> {
         let optional = ["theta_sd_deg", "power_dbm", "range_m", "chirp", "censored"];
-        let table = Table::read(bytes, &["theta_deg", "sigma0_db"], &optional)?;
+        let of_materials = ["censor", "threshold_db", "theta_r_deg", "delta_phi_deg"];
+        let optional = [optional.as_slice(), &of_materials].concat();
+        let table = Table::read(&without_head(bytes), &["theta_deg", "sigma0_db"], &optional)?;
         let rows = (0..table.len()).map(|row| read_row(&table, row)).collect::<Result<_, _>>()?;
         Ok(Curve { rows })
     }
@@ -174,8 +179,11 @@ fn read_row(table: &Table, row: usize) -> Result<Row, FormatError> {
     };
     let theta_deg = table.required_number(row, "theta_deg")?;
     bounded("theta_deg", (0.0, 90.0))?;
-    let sigma0_db = table.required_number(row, "sigma0_db")?;
-    bounded("sigma0_db", (-300.0, 300.0))?;
+    retro(table, row, theta_deg)?;
+    let is_left = is_left(table, row)?;
+    let level = if is_left { "threshold_db" } else { "sigma0_db" };
+    bounded(level, (-300.0, 300.0))?;
+    let sigma0_db = table.required_number(row, level)?;
     let censored = bounded("censored", (0.0, 1.0))?.unwrap_or(0.0);
     if let (true, Some(cell)) = (censored.fract() != 0.0, table.cell(row, "censored")) {
         return Err(cell.refuse("give 1 for a chirp without a detection, else 0"));
@@ -192,8 +200,35 @@ fn read_row(table: &Table, row: usize) -> Result<Row, FormatError> {
         sigma0,
         range_m: bounded("range_m", (0.0, 1e6))?.unwrap_or(0.0),
         chirp,
-        censored: censored == 1.0,
+        censored: is_left || censored == 1.0,
     })
+}
+
+/// Whether a row says, as a material's curve does, that nothing was detected.
+fn is_left(table: &Table, row: usize) -> Result<bool, FormatError> {
+    match table.cell(row, "censor") {
+        None => Ok(false),
+        Some(cell) => match cell.text {
+            "none" => Ok(false),
+            "left" => Ok(true),
+            "right" => Err(cell.refuse("leave points above the instrument's range out")),
+            _ => Err(cell.refuse("write none or left")),
+        },
+    }
+}
+
+/// Refuses a row whose receiver was not where the source was.
+fn retro(table: &Table, row: usize, theta_deg: f64) -> Result<(), FormatError> {
+    for (column, wanted) in [("theta_r_deg", theta_deg), ("delta_phi_deg", 0.0)] {
+        let is_same = |value: f64| (value - wanted).abs() < 1e-9;
+        match (table.number(row, column)?, table.cell(row, column)) {
+            (Some(value), Some(cell)) if !is_same(value) => {
+                return Err(cell.refuse("only backscatter is taken here; leave other points out"));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -209,6 +244,23 @@ mod tests {
         assert_eq!(curve.detected().count(), 1);
         assert!((curve.rows[0].theta_rad - 12.5f64.to_radians()).abs() < 1e-15);
         assert_eq!(String::from_utf8(curve.write()).unwrap(), text);
+    }
+
+    #[test]
+    fn the_columns_of_a_materials_curve_are_taken_too() {
+        let text =
+            b"# my-paint\ntheta_deg,sigma0_db,censor,threshold_db,theta_r_deg,delta_phi_deg\n\
+                     10,-3,none,-30,10,0\n60,,left,-30,60,0\n";
+        let curve = Curve::read(text).unwrap();
+        assert_eq!(curve.rows.iter().map(|row| row.censored).collect::<Vec<_>>(), [false, true]);
+        assert!((curve.rows[1].sigma0 - 1e-3).abs() < 1e-15);
+        for (row, column) in [("10,-3,,,11,0", "theta_r_deg"), ("10,-3,right,,,", "censor")] {
+            let text = format!(
+                "theta_deg,sigma0_db,censor,threshold_db,theta_r_deg,delta_phi_deg\n{row}\n"
+            );
+            let error = Curve::read(text.as_bytes()).unwrap_err().to_string();
+            assert!(error.contains(column) && error.contains("line 2"), "{error}");
+        }
     }
 
     #[test]

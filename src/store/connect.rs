@@ -1,7 +1,7 @@
 //! Opening a file: telling ours from others' without touching it, and bringing it up to date.
 
 use std::fs;
-use std::io;
+use std::io::{self, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -40,6 +40,18 @@ pub(super) fn readable(path: &Path) -> Result<Option<Connection>, StoreError> {
     patiently(|| open_readable(path))
 }
 
+/// Opens a file that nobody writes, somebody else's copy above all: logs and journals beside it are
+/// not looked at, so that nothing is written, made or removed on their word.
+pub(super) fn frozen(path: &Path) -> Result<Option<Connection>, StoreError> {
+    if size_bytes(path)? == 0 {
+        return Ok(None);
+    }
+    let fail = |error| StoreError::new(path, error);
+    let conn = immutable(path).map_err(fail)?;
+    conn.pragma_update(None, "query_only", true).map_err(fail)?;
+    modern(path, conn)
+}
+
 /// An empty database of the latest schema that is nowhere on the disk.
 pub(super) fn in_memory() -> Result<Connection, StoreError> {
     let path = Path::new(":memory:");
@@ -66,10 +78,16 @@ fn patiently<T>(open: impl Fn() -> Result<T, StoreError>) -> Result<T, StoreErro
 
 fn open_writable(path: &Path) -> Result<Connection, StoreError> {
     // A stranger's file is never opened for writing.
-    if size_bytes(path)? > 0 {
-        schema_of(path, &quiet(path)?)?;
-    }
     let fail = |error| StoreError::new(path, error);
+    if size_bytes(path)? > 0 {
+        match quiet(path) {
+            // A write of ours that was cut short, which SQLite takes back when it opens the file.
+            Err(StoreError::Interrupted { .. }) if !names_another_file(path) => {
+                schema_of(path, &immutable(path).map_err(fail)?)?
+            }
+            conn => schema_of(path, &conn?)?,
+        };
+    }
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
     let mut conn = connect(path, flags).map_err(fail)?;
     if conn.is_readonly("main").map_err(fail)? {
@@ -86,7 +104,11 @@ fn open_readable(path: &Path) -> Result<Option<Connection>, StoreError> {
     if size_bytes(path)? == 0 {
         return Ok(None);
     }
-    let conn = quiet(path)?;
+    modern(path, quiet(path)?)
+}
+
+/// The connection, or one to a copy in memory that has the latest schema.
+fn modern(path: &Path, conn: Connection) -> Result<Option<Connection>, StoreError> {
     match schema_of(path, &conn)? {
         0 => Ok(None),
         schema if schema < SCHEMAS.len() => modern_copy(path, &conn).map(Some),
@@ -127,10 +149,12 @@ fn size_bytes(path: &Path) -> Result<u64, StoreError> {
 /// Opens an existing file, whosever it is, so that nothing in it can change.
 fn quiet(path: &Path) -> Result<Connection, StoreError> {
     let fail = |error| StoreError::new(path, error);
-    let log_exists = beside(path, "-wal").exists();
+    let is_there = |ending| beside(path, ending).symlink_metadata().is_ok();
+    let (log_exists, journal_exists) = (is_there("-wal"), is_there("-journal"));
     // A read-only connection leaves an empty log behind. A writable one clears that away, but would
-    // also write a log that it finds into the database.
-    let flags = if log_exists {
+    // also write a log that it finds into the database, and do what a journal says: that may be to
+    // remove any file.
+    let flags = if log_exists || journal_exists {
         OpenFlags::SQLITE_OPEN_READ_ONLY
     } else {
         OpenFlags::SQLITE_OPEN_READ_WRITE
@@ -139,7 +163,12 @@ fn quiet(path: &Path) -> Result<Connection, StoreError> {
     conn.pragma_update(None, "query_only", true).map_err(fail)?;
     match conn.query_row("SELECT count(*) FROM sqlite_schema", [], |_| Ok(())) {
         // Where no log can be made nobody writes, so the file may be read as if it never changed.
-        Err(error) if !log_exists && wants_a_log(&error) => immutable(path).map_err(fail),
+        Err(error) if is_interrupted(&error) => {
+            Err(StoreError::Interrupted { file: path.to_owned() })
+        }
+        Err(error) if !log_exists && !journal_exists && wants_a_log(&error) => {
+            immutable(path).map_err(fail)
+        }
         result => result.map(|()| conn).map_err(fail),
     }
 }
@@ -183,6 +212,26 @@ fn escape(byte: &u8) -> String {
 
 fn wants_a_log(error: &rusqlite::Error) -> bool {
     matches!(error.sqlite_error_code(), Some(ErrorCode::CannotOpen | ErrorCode::ReadOnly))
+}
+
+/// Whether a journal beside the file waits to be rolled back.
+fn is_interrupted(error: &rusqlite::Error) -> bool {
+    let code = error.sqlite_error().map(|failure| failure.extended_code);
+    code == Some(rusqlite::ffi::SQLITE_READONLY_ROLLBACK)
+}
+
+/// Whether the journal beside a database ends with the name of another one, which SQLite would remove:
+/// ours never do (sqlite.org/fileformat.html, "The Rollback Journal"). One that cannot be read counts.
+fn names_another_file(path: &Path) -> bool {
+    const MAGIC: [u8; 8] = [0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7];
+    let end = || -> io::Result<[u8; 8]> {
+        let mut journal = fs::File::open(beside(path, "-journal"))?;
+        let mut end = [0; 8];
+        journal.seek(io::SeekFrom::End(-8))?;
+        journal.read_exact(&mut end)?;
+        Ok(end)
+    };
+    end().map_or(true, |end| end == MAGIC)
 }
 
 fn beside(path: &Path, ending: &str) -> PathBuf {

@@ -37,6 +37,16 @@ pub enum StoreError {
         /// The file.
         file: PathBuf,
     },
+    /// A write to it was cut short, and only a writer may take that back.
+    #[error(
+        "beside {} lies a journal of a write that was cut short; if the file is yours, `matdb add` of any \
+         material takes that back, else remove the journal",
+        file.display()
+    )]
+    Interrupted {
+        /// The file.
+        file: PathBuf,
+    },
     /// It can be read, but not written.
     #[error("{} cannot be written; make it and its directory writable", file.display())]
     ReadOnly {

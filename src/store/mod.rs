@@ -15,6 +15,7 @@
 //! assert_eq!(store.get(&paint.slug, None).unwrap().unwrap().material, paint);
 //! ```
 
+mod again;
 mod connect;
 mod error;
 mod find;
@@ -30,6 +31,7 @@ use crate::brdf::Brdf;
 use crate::material::{Activity, Material, Slug, SourceKind};
 use crate::measure::AngleStatistics;
 
+pub use again::{Again, Difference};
 pub use error::StoreError;
 pub use find::{Filter, Hit};
 pub use tables::{Cell, Column, ColumnKind, Reference, Table};
@@ -143,6 +145,17 @@ impl Store {
     pub fn open_existing(path: impl AsRef<Path>) -> Result<Option<Store>, StoreError> {
         let path = path.as_ref().to_owned();
         let conn = connect::readable(&path)?;
+        Ok(conn.map(|conn| Store { conn, path, activity: None }))
+    }
+
+    /// Opens a file that nobody writes, such as somebody else's copy: what lies beside it is neither
+    /// read nor changed. `None` when there is no file or nothing in it.
+    ///
+    /// # Errors
+    /// As [`Store::open`].
+    pub fn open_frozen(path: impl AsRef<Path>) -> Result<Option<Store>, StoreError> {
+        let path = path.as_ref().to_owned();
+        let conn = connect::frozen(&path)?;
         Ok(conn.map(|conn| Store { conn, path, activity: None }))
     }
 

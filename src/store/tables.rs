@@ -141,7 +141,7 @@ fn schema(conn: &Connection) -> Result<Vec<[Option<String>; 4]>> {
         .collect()
 }
 
-fn tables(conn: &Connection) -> Result<Vec<Table>> {
+pub(super) fn tables(conn: &Connection) -> Result<Vec<Table>> {
     let sql = "SELECT name FROM pragma_table_list
                WHERE schema = 'main' AND type = 'table' AND name NOT LIKE 'sqlite\\_%' ESCAPE '\\'
                ORDER BY name";

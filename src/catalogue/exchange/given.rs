@@ -41,4 +41,5 @@ pub(super) const LICENCE: &str = "--licence CC-BY-4.0";
 pub(super) const SOURCE: &str = "--source \"who measured it, where, when\"";
 pub(super) const KIND: &str = "--kind measured";
 pub(super) const INSTRUMENT: &str = "--instrument \"name of the radar\"";
+pub(super) const THRESHOLD: &str = "--threshold -77";
 pub(super) const FREQUENCY: &str = "--frequency 300";

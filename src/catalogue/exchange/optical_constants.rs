@@ -301,8 +301,9 @@ fn material(file: &str, page: &Page, given: &Given, entry: Entry) -> Material {
             .to_owned(),
         licence: licence.clone(),
         tags: vec!["optical constants".to_owned()],
-        frequency_hz: [wanted_hz.min(nearest.frequency_hz), wanted_hz.max(nearest.frequency_hz)],
-        theta_rad: [0.0, 80f64.to_radians()],
+        frequency_hz: [nearest.frequency_hz; 2],
+        // A mirror answers a radar at normal incidence; the lobe that stands for it claims no more.
+        theta_rad: [0.0, 5f64.to_radians()],
         render: "half-space".to_owned(),
         sources: vec![
             optical_source(file, page, given, licence),

@@ -4,10 +4,11 @@
 //!
 //! Lost: everything but the curve, and of its points the angle's deviation, power, range and chirp.
 
-use super::given::{CLASS, FREQUENCY, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, missing};
+use super::given::{CLASS, FREQUENCY, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD, missing};
 use super::subject::Points;
 use super::{ExchangeError, Exported, Given, Subject};
 use crate::formats::FormatError;
+use crate::formats::csv::without_head;
 use crate::material::{
     Citation, Curve, Instrument, Material, Observation, Slug, Source, SourceKind, Status, file,
 };
@@ -53,7 +54,10 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
     let refused = |error: FormatError| ExchangeError::Format { file: file.to_owned(), error };
     let observations = file::observations(&without_head(bytes)).map_err(refused)?;
     let Given { slug, class, licence, source, kind, instrument, frequency_hz, .. } = given;
-    let is_measured = *kind == Some(SourceKind::Measured);
+    // Who has not said how the curve came to be may have measured it.
+    let is_measured = kind.is_none_or(|kind| kind == SourceKind::Measured);
+    let in_rows = observations.iter().all(|row| row.threshold_sigma0.is_some());
+    let has_threshold = !is_measured || in_rows || given.threshold_w.is_some();
     let flags = [
         (slug.is_some(), NAME),
         (class.is_some(), CLASS),
@@ -62,6 +66,7 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
         (kind.is_some(), KIND),
         (frequency_hz.is_some(), FREQUENCY),
         (instrument.is_some() || !is_measured, INSTRUMENT),
+        (has_threshold, THRESHOLD),
     ];
     let (Some(slug), Some(class), Some(licence), Some(title), Some(kind), Some(hz), true) = (
         slug.clone(),
@@ -70,7 +75,7 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
         source.clone(),
         *kind,
         *frequency_hz,
-        instrument.is_some() || !is_measured,
+        has_threshold && (instrument.is_some() || !is_measured),
     ) else {
         return Err(missing(file, &flags));
     };
@@ -83,16 +88,6 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
     });
     let lone = Lone { slug, class, licence, title, kind, hz, instrument, observations };
     of_curve(file, given, lone)
-}
-
-/// The bytes with the lines of comment at the head left empty, so that lines keep their numbers.
-fn without_head(bytes: &[u8]) -> Vec<u8> {
-    let mut is_head = true;
-    let line = |line: &[u8]| {
-        is_head &= line.starts_with(b"#") || line.trim_ascii().is_empty();
-        if is_head { b"\n".to_vec() } else { line.to_vec() }
-    };
-    bytes.split_inclusive(|byte| *byte == b'\n').flat_map(line).collect()
 }
 
 /// A curve and all that an entry must say of it.

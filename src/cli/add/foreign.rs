@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{door, unreadable};
+use super::unreadable;
 use crate::catalogue::exchange::{Foreign, Given};
+use crate::cli::door;
 use crate::cli::inputs::input;
 use crate::error::Error;
 use crate::material::{Input, Material, Slug, SourceKind};

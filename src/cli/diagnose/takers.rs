@@ -154,7 +154,7 @@ fn with_found(
     report: &Report,
     title: &str,
 ) -> Result<Material, Error> {
-    let key = source(&mut material, SourceKind::Modelled, title, FIT);
+    let key = source(&mut material, SourceKind::Modelled, title, FIT, None);
     let is_before = |fit: &&Fit| fit.name == material.render && fit.name != FIT;
     let before = material.fits.iter().find(is_before).map(|fit| fit.name.clone());
     let fit = Fit {

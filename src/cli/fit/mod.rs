@@ -10,7 +10,7 @@ use clap::ValueEnum;
 use serde::Serialize;
 
 use super::console::Console;
-use super::curves::Kind;
+use super::curves::{Circumstances, Kind};
 use super::database::Database;
 use super::materials::find;
 use super::plot::{ending, layers, one_file, plot, points};
@@ -31,7 +31,8 @@ use subject::Subject;
   matdb fit curve.csv --model mixture-ggx -o fit.svg
   matdb fit curve.csv --method tls-tail --alpha 3
   matdb fit cotton --fix diffuse.alpha=4 --save
-  matdb fit curve.csv --save my-paint --kind measured --source 'Our bench, 2026'
+  matdb fit curve.csv --save my-paint --kind measured --source 'Our bench, 2026' \\
+    --licence CC-BY-4.0 --instrument 'Our radar' --frequency 300 --threshold -77
 
 Methods: censored (speckle and missing chirps by their laws), tls (orthogonal distance in dB),
 tls-tail (the same with alpha given), mse (least squares in two pieces).
@@ -92,6 +93,8 @@ pub(super) struct Args {
     /// Who measured or made a file's curve, when and how
     #[arg(long, value_name = "TITLE", requires = "save")]
     source: Option<String>,
+    #[command(flatten)]
+    circumstances: Circumstances,
     /// Draw points, fit and 95 % band: a .svg or .png file
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,

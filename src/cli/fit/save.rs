@@ -75,10 +75,11 @@ fn of_material(
             "leave the name after --save out",
         ));
     }
-    if args.kind.is_some() || args.source.is_some() {
+    let is_silent = args.circumstances == curves::Circumstances::default();
+    if args.kind.is_some() || args.source.is_some() || !is_silent {
         return Err(usage(
             format!("the curve of `{slug}` has a source already"),
-            "leave --kind and --source out",
+            "leave --kind, --source and what goes with them out",
         ));
     }
     // As it is now: it may have been revised while the fit ran.
@@ -118,12 +119,13 @@ fn of_file(
     let (Some(kind), Some(title)) = (args.kind, &args.source) else {
         return Err(usage(
             format!("nobody has said where {} comes from", subject.label),
-            "add --kind measured or --kind synthetic, and --source with who, when and how",
+            curves::UNSAID,
         ));
     };
     let mut material = find(store, name, "--save: ")?.material;
     let (curve, name) = (&subject.curve, &subject.curve_name);
-    let source = curves::put(&mut material, name, curve, kind.into(), title)?;
+    let said = (kind.into(), title.as_str());
+    let source = curves::put(&mut material, name, curve, said, &args.circumstances)?;
     Ok(Target { material, curve: name.clone(), source })
 }
 
@@ -137,7 +139,7 @@ fn chosen(material: &mut Material, found: &FitResult) -> Vec<(String, String)> {
     if paths.is_empty() {
         return Vec::new();
     }
-    let key = curves::source(material, SourceKind::Synthetic, CHOSEN, "chosen");
+    let key = curves::source(material, SourceKind::Synthetic, CHOSEN, "chosen", None);
     paths.into_iter().map(|path| (path, key.clone())).collect()
 }
 

@@ -1,0 +1,236 @@
+//! The folder beside a target in which a publication grows, how it takes the target's place, and what
+//! becomes of those that a killed program has left.
+
+use std::ffi::OsStr;
+use std::fs::{self, File, Permissions};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use tempfile::{Builder, TempDir};
+
+use super::folder::SUMS;
+
+/// What may stand in a published folder besides: it belongs to version control and to web hosts.
+pub(super) const KEPT: [&str; 3] = [".git", ".nojekyll", "CNAME"];
+
+/// Ends the name of what stood at the target while something else takes its place.
+const BEFORE: &str = "before";
+
+/// A folder that is being written. It is locked while it lives, so that nobody takes it for left over.
+#[derive(Debug)]
+pub(super) struct Stage {
+    folder: TempDir,
+    target: PathBuf,
+    _claim: Option<File>,
+}
+
+impl Stage {
+    /// Makes a folder beside the target and removes those that no program writes any more.
+    pub fn new(target: &Path) -> io::Result<Stage> {
+        let beside = parent(target);
+        fs::create_dir_all(beside)?;
+        // Others neither look at a stage between its making and its locking, nor at two names that
+        // are just being exchanged.
+        let _turn = locked(beside);
+        let prefix = prefix(target);
+        sweep(beside, &prefix, target)?;
+        let mut builder = Builder::new();
+        builder.prefix(&prefix);
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(Permissions::from_mode(0o777));
+        }
+        let folder = builder.tempdir_in(beside)?;
+        let claim = File::open(folder.path()).ok().filter(|claim| claim.try_lock().is_ok());
+        Ok(Stage { folder, target: target.to_owned(), _claim: claim })
+    }
+
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Puts the folder in the target's place, and removes what stood there but for what is [`KEPT`].
+    pub fn keep(self) -> io::Result<()> {
+        let Stage { folder, target, _claim } = &self;
+        let _turn = locked(parent(target));
+        written(folder.path())?;
+        if !target.exists() {
+            fs::rename(folder.path(), target)?;
+        } else if exchange(folder.path(), target).is_ok() {
+            if let Err(reason) = carry(folder.path(), target) {
+                // The first error is the one to report.
+                let _ = carry(target, folder.path());
+                let _ = exchange(folder.path(), target);
+                return Err(reason);
+            }
+        } else {
+            let aside = folder.path().with_extension(BEFORE);
+            fs::rename(target, &aside)?;
+            let placed = fs::rename(folder.path(), target).and_then(|()| carry(&aside, target));
+            if let Err(reason) = placed {
+                let _ = carry(target, &aside);
+                let _ = fs::rename(target, folder.path());
+                let _ = fs::rename(&aside, target);
+                return Err(reason);
+            }
+            fs::remove_dir_all(&aside)?;
+        }
+        // The names are there whether or not the disk knows them already.
+        let _ = File::open(parent(target)).and_then(|folder| folder.sync_all());
+        Ok(())
+    }
+}
+
+pub(super) fn parent(target: &Path) -> &Path {
+    target.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Begins the name of every stage of a target, and of no other target in the same folder.
+fn prefix(target: &Path) -> String {
+    let name = target.file_name().unwrap_or_default();
+    let hash = blake3::hash(name.as_encoded_bytes()).to_hex();
+    format!(".matdb-{}-", hash.get(..16).unwrap_or_default())
+}
+
+/// Holds a folder until it is dropped, where the system can lock folders.
+fn locked(folder: &Path) -> Option<File> {
+    let folder = File::open(folder).ok()?;
+    folder.lock().ok()?;
+    Some(folder)
+}
+
+/// Removes what programs that were killed have left, and puts back what they had moved away.
+fn sweep(beside: &Path, prefix: &str, target: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(beside)? {
+        let entry = entry?;
+        let is_ours = entry.file_name().to_string_lossy().starts_with(prefix);
+        if !is_ours || !entry.file_type()?.is_dir() {
+            continue;
+        }
+        let stale = entry.path();
+        // Whoever still writes it holds the lock; where there are no locks nobody can tell.
+        let is_left = File::open(&stale).is_ok_and(|folder| folder.try_lock().is_ok());
+        if !is_left {
+            continue;
+        }
+        let stood_there = stale.extension() == Some(OsStr::new(BEFORE));
+        if stood_there && !target.exists() && stale.join(SUMS).exists() {
+            fs::rename(&stale, target)?;
+            continue;
+        }
+        carry(&stale, target)?;
+        if KEPT.iter().all(|name| stale.join(name).symlink_metadata().is_err()) {
+            // Whoever has just put a publication in place may be removing it, too.
+            let _ = fs::remove_dir_all(&stale);
+        }
+    }
+    Ok(())
+}
+
+/// Moves what is kept from one folder to another, unless that has its own.
+fn carry(from: &Path, to: &Path) -> io::Result<()> {
+    for name in KEPT {
+        let [old, new] = [from, to].map(|folder| folder.join(name));
+        let is_wanted = old.symlink_metadata().is_ok() && new.symlink_metadata().is_err();
+        if is_wanted && to.is_dir() {
+            fs::rename(old, new)?;
+        }
+    }
+    Ok(())
+}
+
+/// Exchanges two folders in one step, so that at every moment there is one of each name.
+#[cfg(target_os = "linux")]
+fn exchange(a: &Path, b: &Path) -> io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    Ok(renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE)?)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn exchange(_: &Path, _: &Path) -> io::Result<()> {
+    Err(io::ErrorKind::Unsupported.into())
+}
+
+/// Waits until the disk has all of a folder.
+#[cfg(target_os = "linux")]
+fn written(folder: &Path) -> io::Result<()> {
+    Ok(rustix::fs::syncfs(File::open(folder)?)?)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn written(folder: &Path) -> io::Result<()> {
+    let files = super::folder::files(folder)?;
+    files
+        .iter()
+        .try_for_each(|(path, _)| File::options().write(true).open(folder.join(path))?.sync_all())
+}
+
+/// Why a folder cannot give way to another, if that can be told without trying.
+pub(super) fn hindrance(target: &Path) -> Option<&'static str> {
+    if target.file_name().is_none() {
+        return Some("that is no name that a folder could get");
+    }
+    if !target.exists() {
+        return None;
+    }
+    if std::env::current_dir().is_ok_and(|here| here.starts_with(target)) {
+        return Some("you are in it");
+    }
+    is_mount(target).then_some("another disk is mounted there")
+}
+
+#[cfg(unix)]
+fn is_mount(target: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let device = |path: &Path| fs::metadata(path).map(|found| found.dev()).ok();
+    device(target) != device(parent(target))
+}
+
+#[cfg(not(unix))]
+fn is_mount(_: &Path) -> bool {
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let names = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name());
+        let mut names: Vec<String> = names.map(|n| n.to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn what_a_killed_program_left_goes_and_what_a_running_one_writes_stays() {
+        let root = tempfile::tempdir().unwrap();
+        let [site, other] = ["site", "other"].map(|name| root.path().join(name));
+        let prefix = prefix(&site);
+        fs::create_dir_all(root.path().join(format!("{prefix}dead/x"))).unwrap();
+        let running = Stage::new(&site).unwrap();
+        let of_other = Stage::new(&other).unwrap();
+        drop(Stage::new(&site).unwrap());
+        let mut left = names(root.path());
+        left.retain(|name| *name != running.path().file_name().unwrap().to_string_lossy());
+        assert_eq!(left, [of_other.path().file_name().unwrap().to_string_lossy()]);
+    }
+
+    #[test]
+    fn a_program_killed_between_two_names_loses_nothing() {
+        let root = tempfile::tempdir().unwrap();
+        let site = root.path().join("site");
+        let prefix = prefix(&site);
+        let before = root.path().join(format!("{prefix}dead.{BEFORE}"));
+        fs::create_dir(&before).unwrap();
+        fs::write(before.join(SUMS), "").unwrap();
+        let stage = root.path().join(format!("{prefix}dead"));
+        fs::create_dir(&stage).unwrap();
+        fs::write(stage.join("CNAME"), "example.org").unwrap();
+        drop(Stage::new(&site).unwrap());
+        drop(Stage::new(&site).unwrap());
+        assert_eq!(names(root.path()), ["site"]);
+        assert_eq!(names(&site), ["CNAME", SUMS]);
+    }
+}

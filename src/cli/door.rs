@@ -1,0 +1,103 @@
+//! What a material must say before it is let in: numbers without their circumstances cannot be used by
+//! anybody else, and who measured them knows them best on the day.
+
+use std::path::Path;
+
+use crate::error::Error;
+use crate::material::form::{is_address, is_doi, is_licence};
+use crate::material::{Curve, Instrument, Material, SourceKind};
+
+/// Thickest layer of a sample that anybody puts before a radar, m.
+const THICKEST_M: f64 = 10.0;
+
+/// Refuses a material with measured curves that lack licence, instrument or threshold, and one with
+/// values that only a slip can give.
+pub(super) fn check(material: &Material, file: &Path) -> Result<(), Error> {
+    let missing: Vec<String> =
+        material.curves.iter().flat_map(|curve| missing(material, curve)).collect();
+    if !missing.is_empty() {
+        return Err(Error::Usage {
+            problem: format!(
+                "{}: a measured curve needs more: {}",
+                file.display(),
+                missing.join("; ")
+            ),
+            way_out: "`matdb add --template` prints a complete entry".to_owned(),
+        });
+    }
+    match slips(material).first() {
+        None => Ok(()),
+        Some((problem, way_out)) => Err(Error::Usage {
+            problem: format!("{}: {problem}", file.display()),
+            way_out: (*way_out).to_owned(),
+        }),
+    }
+}
+
+/// What a curve lacks, a clause each. That there is a source at all was checked before.
+pub(super) fn missing(material: &Material, curve: &Curve) -> Vec<String> {
+    let source = material.sources.iter().find(|source| source.key == curve.source);
+    let Some(source) = source.filter(|source| source.kind == SourceKind::Measured) else {
+        return Vec::new();
+    };
+    let mut missing = Vec::new();
+    if source.licence.as_ref().is_none_or(|licence| licence.trim().is_empty()) {
+        missing.push(format!("source `{}` has no licence", source.key));
+    }
+    let key = curve.instrument.as_ref();
+    let instrument = key.and_then(|key| material.instruments.iter().find(|i| i.key == *key));
+    if instrument.is_none() {
+        missing.push(format!("curve `{}` names no instrument", curve.name));
+    }
+    let in_rows = curve.observations.iter().all(|row| row.threshold_sigma0.is_some());
+    if !in_rows && instrument.is_none_or(|instrument| instrument.threshold_w.is_none()) {
+        missing.push(match instrument {
+            Some(instrument) => format!(
+                "instrument `{}` has no threshold_dbm and not every row of curve `{}` a threshold_db",
+                instrument.key, curve.name
+            ),
+            None => format!("not every row of curve `{}` has a threshold_db", curve.name),
+        });
+    }
+    missing
+}
+
+/// Values that cannot be meant, each with the way out.
+fn slips(material: &Material) -> Vec<(String, &'static str)> {
+    const LICENCE: &str =
+        "write an SPDX identifier such as CC-BY-4.0, or LicenseRef-proprietary for your own terms";
+    const DOI: &str = "write it as 10.1234/name, without a resolver in front";
+    const URL: &str = "write an address that begins with http:// or https://";
+    let mut slips = Vec::new();
+    let own = ("the material".to_owned(), Some(&material.licence));
+    let of_sources =
+        material.sources.iter().map(|s| (format!("source `{}`", s.key), s.licence.as_ref()));
+    for (place, licence) in std::iter::once(own).chain(of_sources) {
+        if let Some(text) = licence.filter(|text| !is_licence(text)) {
+            slips.push((
+                format!("the licence of {place}, `{text}`, is no SPDX expression"),
+                LICENCE,
+            ));
+        }
+    }
+    for source in &material.sources {
+        if let Some(doi) = source.doi.as_ref().filter(|doi| !is_doi(doi)) {
+            slips.push((format!("the doi of source `{}`, `{doi}`, is none", source.key), DOI));
+        }
+        if let Some(url) = source.url.as_ref().filter(|url| !is_address(url)) {
+            slips.push((format!("the url of source `{}`, `{url}`, is none", source.key), URL));
+        }
+    }
+    let is_wide =
+        |i: &&Instrument| i.bandwidth_hz.is_some_and(|b| b >= 2.0 * i.centre_frequency_hz);
+    slips.extend(material.instruments.iter().filter(is_wide).map(|instrument| {
+        let problem = format!("instrument `{}` has a band that begins below 0 Hz", instrument.key);
+        (problem, "give bandwidth_ghz and centre_frequency_ghz in GHz")
+    }));
+    slips.extend(material.layers.iter().filter_map(|layer| {
+        let thickness_m = layer.thickness_m.filter(|thickness_m| *thickness_m > THICKEST_M)?;
+        let problem = format!("layer `{}` is {thickness_m} m thick", layer.name);
+        Some((problem, "give thickness_mm in mm, 10000 at most"))
+    }));
+    slips
+}

@@ -1,0 +1,278 @@
+//! What a stored fit says against what a new one finds: the model that is rendered, the numbers and how
+//! well they are known, and the sentences. How far apart they may be follows from the new fit alone.
+
+use super::{ROUNDING, SAME_NUMBER_SD, SAME_OBJECTIVE};
+use crate::brdf::{Brdf, Scattering};
+use crate::fit::coordinates::{DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
+use crate::fit::interval::DEVIATE_95;
+use crate::fit::{Estimate, Finding, FitResult};
+use crate::material::{self, FitReport, Goodness};
+use crate::measure::curve::Curve;
+
+/// How far standard deviations of two searches for one optimum may differ, relative.
+const SAME_SD: f64 = 0.05;
+/// How far sums over the rows may, relative and in dB.
+const SAME_SUM: f64 = 0.02;
+const SAME_LEVEL_DB: f64 = 0.005;
+/// How far numbers in sentences may, relative and absolute.
+const SAME_WORDS: [f64; 2] = [0.02, 0.01];
+/// How near to its limit a finding may be there or not.
+const BORDERLINE: f64 = 0.05;
+/// Angles at which two models are compared.
+const ANGLES: u32 = 32;
+
+/// What differs, a sentence each.
+pub(super) fn compare(stored: &material::Fit, found: &FitResult, curve: &Curve) -> Vec<String> {
+    let Some(report) = &stored.report else { return Vec::new() };
+    let new =
+        found.stored(&stored.name, stored.curve.as_deref().unwrap_or_default(), &stored.source);
+    let Some(new_report) = &new.report else { return Vec::new() };
+    let mut differences = Vec::new();
+    let gap = (report.objective - found.objective).abs();
+    if gap.is_nan() || gap > SAME_OBJECTIVE + ROUNDING * report.objective.abs() {
+        differences.push(format!(
+            "its objective is stored as {:.4}, and a new fit reaches {:.4}",
+            report.objective, found.objective
+        ));
+    }
+    differences.extend(estimates(report, found));
+    differences.extend(model(stored, found, curve));
+    differences.extend(covariances(stored, &new, found));
+    differences.extend(settings(stored, report, new_report, &new.estimator));
+    differences.extend(goodness(&report.goodness, &new_report.goodness));
+    differences.extend(verdict(&report.verdict, &found.verdict));
+    differences
+}
+
+/// The numbers of the report, their deviations and intervals.
+fn estimates(report: &FitReport, found: &FitResult) -> Vec<String> {
+    let names = |name: &String| found.estimate(name).is_some();
+    if report.estimates.len() != found.estimates.len()
+        || !report.estimates.iter().all(|stored| names(&stored.name))
+    {
+        return vec!["its report lists other numbers than a new fit finds".to_owned()];
+    }
+    let pairs = report.estimates.iter().filter_map(|e| Some((e, found.estimate(&e.name)?)));
+    pairs.flat_map(|(stored, new)| estimate(stored, new)).collect()
+}
+
+fn estimate(stored: &material::Estimate, new: &Estimate) -> Vec<String> {
+    let mut differences = Vec::new();
+    let name = &stored.name;
+    let (Some(old_sd), Some(sd)) = (stored.sd, new.sd) else {
+        if stored.sd.is_some() != new.sd.is_some() {
+            differences.push(format!(
+                "whether the data tell {name} by itself is stored otherwise than a new fit finds"
+            ));
+        }
+        return differences;
+    };
+    differences.extend(number(name, stored.value, new.value, sd));
+    if !is_near(old_sd, sd, SAME_SD * sd) {
+        differences.push(format!(
+            "the deviation of {name} is stored as {old_sd:.4e}, and a new fit gives {sd:.4e}"
+        ));
+    }
+    let width = |[low, high]: [f64; 2]| (high - low) / (2.0 * DEVIATE_95);
+    let same = match (stored.interval_95, new.interval_95) {
+        (Some(old), Some(new)) => {
+            let step = SAME_NUMBER_SD * sd.max(width(new));
+            std::iter::zip(old, new).all(|(old, new)| is_near(old, new, step))
+        }
+        (old, new) => old.is_none() && new.is_none(),
+    };
+    if !same {
+        differences.push(format!("the interval of {name} is not the one that a new fit gives"));
+    }
+    differences
+}
+
+fn number(name: &str, stored: f64, new: f64, sd: f64) -> Option<String> {
+    (!is_near(stored, new, SAME_NUMBER_SD * sd))
+        .then(|| format!("{name} is stored as {stored:.4e}, and a new fit gives {new:.4e}"))
+}
+
+/// What is rendered: the numbers of the model, and its level at the angles of the detections.
+fn model(stored: &material::Fit, found: &FitResult, curve: &Curve) -> Vec<String> {
+    let mut differences = Vec::new();
+    for new in found.estimates.iter().filter(|new| new.name != LOOKS) {
+        let Some(value) = value(&stored.model, &new.name) else {
+            differences.push(format!("its model has no {}", new.name));
+            continue;
+        };
+        let wrong = new.sd.and_then(|sd| number(&new.name, value, new.value, sd));
+        differences.extend(wrong.map(|wrong| format!("in its model {wrong}")));
+    }
+    for (path, held) in &found.fit.fixed {
+        if value(&stored.model, path) != Some(*held) {
+            differences.push(format!("its model has not the {path} that was held"));
+        }
+    }
+    if differences.is_empty() {
+        differences.extend(level(stored, found, curve));
+    }
+    differences
+}
+
+fn value(model: &Brdf, name: &str) -> Option<f64> {
+    match (name, model.identified_products()) {
+        (SPECULAR_LEVEL, Some([s, _])) => Some(s),
+        (DIFFUSE_LEVEL, Some([_, r])) => Some(r),
+        _ => model.parameters().into_iter().find(|p| p.path == name).map(|p| p.value),
+    }
+}
+
+/// The curve of the model where the data are: numbers that they do not tell one by one must still give it.
+fn level(stored: &material::Fit, found: &FitResult, curve: &Curve) -> Option<String> {
+    let angles = || curve.detected().map(|row| row.theta_rad);
+    let [low, high] = [angles().fold(f64::INFINITY, f64::min), angles().fold(0.0, f64::max)];
+    // As many directions as numbers, each as far off as a number may be.
+    let directions = (found.estimates.len() as f64).sqrt();
+    let differs = |&theta_rad: &f64| {
+        let band = found.band(theta_rad);
+        let sd = (band.high / band.mid).ln() / DEVIATE_95;
+        let step =
+            SAME_NUMBER_SD * directions * sd + SAME_LEVEL_DB * std::f64::consts::LN_10 / 10.0;
+        !is_near(stored.model.sigma0(theta_rad).ln(), band.mid.ln(), step)
+    };
+    let grid = (0..=ANGLES).map(|step| low + (high - low) * f64::from(step) / f64::from(ANGLES));
+    let theta_deg = grid.into_iter().find(differs)?.to_degrees();
+    Some(format!("its model has another level at {theta_deg:.1}° than that of a new fit"))
+}
+
+/// Both covariances: of all numbers found, and of the parameters.
+fn covariances(stored: &material::Fit, new: &material::Fit, found: &FitResult) -> Option<String> {
+    let sds: Vec<f64> = found.estimates.iter().map(|e| e.sd.unwrap_or(0.0)).collect();
+    let whole = |fit: &material::Fit| fit.report.as_ref().map(|r| r.covariance.clone());
+    let sd_of = |path: &String| found.estimate(path).and_then(|e| e.sd).unwrap_or(0.0);
+    let parameters = match (&stored.covariance, &new.covariance) {
+        (Some(old), Some(new)) => {
+            let sds: Vec<f64> = new.parameters.iter().map(sd_of).collect();
+            old.parameters == new.parameters && is_same_matrix(&old.matrix, &new.matrix, &sds)
+        }
+        (old, new) => old.is_none() && new.is_none(),
+    };
+    let report = std::iter::zip(whole(stored), whole(new))
+        .all(|(old, new)| is_same_matrix(&old, &new, &sds));
+    (!parameters || !report)
+        .then(|| "its covariance is not the one that a new fit gives".to_owned())
+}
+
+fn is_same_matrix(old: &[Vec<f64>], new: &[Vec<f64>], sds: &[f64]) -> bool {
+    let size = sds.len();
+    let is_square = |m: &[Vec<f64>]| m.len() == size && m.iter().all(|row| row.len() == size);
+    is_square(old)
+        && is_square(new)
+        && std::iter::zip(old, new).zip(sds).all(|((old, new), row_sd)| {
+            let mut cells = std::iter::zip(old, new).zip(sds);
+            cells.all(|((old, new), sd)| is_near(*old, *new, 2.0 * SAME_SD * row_sd * sd))
+        })
+}
+
+/// What was set, and whether the search came to an end.
+fn settings(
+    stored: &material::Fit,
+    old: &FitReport,
+    new: &FitReport,
+    estimator: &str,
+) -> Vec<String> {
+    let scale = new.singular_values.first().copied().unwrap_or(1.0);
+    let values = || std::iter::zip(&old.singular_values, &new.singular_values);
+    let same_values = old.singular_values.len() == new.singular_values.len()
+        && values().all(|(old, new)| is_near(*old, *new, SAME_SD * scale));
+    let looks_sd = new.estimate(LOOKS).and_then(|e| e.sd);
+    let same_looks = match (old.looks, new.looks) {
+        (Some(old), Some(new)) => {
+            is_near(old, new, SAME_NUMBER_SD * looks_sd.unwrap_or(0.0) + SAME_SUM * new)
+        }
+        (old, new) => old.is_none() && new.is_none(),
+    };
+    let checks = [
+        ("estimator", stored.estimator == estimator && old.method == new.method),
+        ("settings", old.given == new.given && old.noise_w == new.noise_w),
+        ("choice of k", old.gauge == new.gauge),
+        ("looks", same_looks),
+        ("singular values", same_values),
+        ("end of the search", old.converged == new.converged),
+    ];
+    let wrong = checks.into_iter().filter(|(_, same)| !same);
+    wrong.map(|(what, _)| format!("its {what}: the report and a new fit differ")).collect()
+}
+
+fn goodness(old: &Goodness, new: &Goodness) -> Vec<String> {
+    let step_db = |size_db: f64| SAME_SUM * size_db.abs() + SAME_LEVEL_DB;
+    // Residuals of a curve without noise are steps of the search, and follow no law.
+    let step = SAME_SUM + SAME_LEVEL_DB / new.rms_db.max(f64::MIN_POSITIVE);
+    let speckle = match (old.speckle_db, new.speckle_db) {
+        (Some(old), Some(new)) => is_near(old, new, step_db(new)),
+        (old, new) => old.is_none() && new.is_none(),
+    };
+    let checks = [
+        ("rms_db", is_near(old.rms_db, new.rms_db, step_db(new.rms_db))),
+        ("mean_db", is_near(old.mean_db, new.mean_db, step_db(new.rms_db))),
+        ("speckle_db", speckle),
+        ("z_mean", is_near(old.z_mean, new.z_mean, step)),
+        ("z_variance", is_near(old.z_variance, new.z_variance, step * new.z_variance.max(1.0))),
+        ("ks_distance", is_near(old.ks_distance, new.ks_distance, step)),
+        ("rows", old.rows == new.rows),
+    ];
+    let wrong = checks.into_iter().filter(|(_, same)| !same);
+    wrong.map(|(what, _)| format!("its {what} is not the one that a new fit gives")).collect()
+}
+
+/// The sentences. How many starts agree depends on where the search began, and is not compared.
+fn verdict(stored: &[String], found: &[Finding]) -> Vec<String> {
+    let is_of_starts = |sentence: &String| sentence.contains("starts reached the best fit");
+    let is_borderline = |finding: &Finding| match finding {
+        Finding::StartsDisagree { .. } => true,
+        Finding::PoorFit { ks_distance, limit } => *ks_distance < (1.0 + BORDERLINE) * limit,
+        Finding::HardToTellApart { correlation, .. } => correlation.abs() < 0.96,
+        _ => false,
+    };
+    let has =
+        |finding: &Finding, sentence: &String| is_same_sentence(sentence, &finding.to_string());
+    let extra = stored
+        .iter()
+        .filter(|sentence| !is_of_starts(sentence))
+        .filter(|sentence| !found.iter().any(|finding| has(finding, sentence)));
+    let lost = found
+        .iter()
+        .filter(|finding| !is_borderline(finding))
+        .filter(|finding| !stored.iter().any(|sentence| has(finding, sentence)));
+    let extra =
+        extra.map(|sentence| format!("its verdict says what a new fit does not: {sentence}"));
+    extra.chain(lost.map(|finding| format!("its verdict does not say: {finding}"))).collect()
+}
+
+/// Whether two sentences are the same but for the last digits of their numbers.
+fn is_same_sentence(old: &str, new: &str) -> bool {
+    let (old, new) = (parts(old), parts(new));
+    let [relative, absolute] = SAME_WORDS;
+    old.len() == new.len()
+        && std::iter::zip(&old, &new).all(|(old, new)| match (old.parse(), new.parse()) {
+            (Ok(old), Ok(new)) => is_near(old, new, relative * f64::abs(new) + absolute),
+            _ => old == new,
+        })
+}
+
+/// A sentence cut where numbers begin and end.
+fn parts(sentence: &str) -> Vec<String> {
+    let mut parts: Vec<String> = Vec::new();
+    let mut was_number = None;
+    for letter in sentence.chars() {
+        let is_number = letter.is_ascii_digit() || letter == '.';
+        if was_number != Some(is_number) {
+            parts.push(String::new());
+            was_number = Some(is_number);
+        }
+        if let Some(part) = parts.last_mut() {
+            part.push(letter);
+        }
+    }
+    parts
+}
+
+/// False for what is no number, too.
+fn is_near(a: f64, b: f64, step: f64) -> bool {
+    (a - b).abs() <= step + ROUNDING * b.abs()
+}

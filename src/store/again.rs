@@ -1,0 +1,160 @@
+//! A revision written once more, beside what is stored: what follows from its content must follow from
+//! it still. The content itself has its hash.
+
+use rusqlite::types::{Value, ValueRef};
+use rusqlite::{Connection, Result, Statement, params};
+
+use super::tables::{Table, tables};
+use super::{Store, StoreError, Stored, connect, write};
+
+/// Tables that say who made a revision, which follows from nothing.
+const MAKING: [&str; 2] = ["activity", "activity_input"];
+/// The table of which an older program wrote nothing.
+const STATISTICS: &str = "curve_statistic";
+/// What a sum may differ by on another machine, relative.
+const ROUNDING: f64 = 1e-9;
+
+/// Writes revisions again, into a database of its own.
+#[derive(Debug)]
+pub struct Again {
+    scratch: Connection,
+    tables: Vec<Table>,
+}
+
+/// Rows of a revision that are not what its content gives.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// The table.
+    pub table: String,
+    /// The curve, where the table has statistics of curves.
+    pub curve: Option<String>,
+}
+
+impl Again {
+    /// An empty database to write into.
+    ///
+    /// # Errors
+    /// When there is no memory.
+    pub fn new() -> std::result::Result<Again, StoreError> {
+        let scratch = connect::in_memory()?;
+        let tables =
+            tables(&scratch).map_err(|error| StoreError::new(":memory:".as_ref(), error))?;
+        Ok(Again { scratch, tables })
+    }
+
+    /// Rows of a revision of `store` that differ from what its content gives, the first of each table.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn differences(
+        &mut self,
+        store: &Store,
+        stored: &Stored,
+    ) -> std::result::Result<Vec<Difference>, StoreError> {
+        self.compare(&store.conn, stored).map_err(|error| StoreError::new(&store.path, error))
+    }
+
+    /// Whether the file has the units that the program would write.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn has_own_units(&self, store: &Store) -> std::result::Result<bool, StoreError> {
+        let units = |conn: &Connection| -> Result<Vec<[Option<String>; 3]>> {
+            let sql = "SELECT column_name, ucum, meaning FROM unit ORDER BY column_name";
+            conn.prepare(sql)?
+                .query_map([], |row| Ok([row.get(0)?, row.get(1)?, row.get(2)?]))?
+                .collect()
+        };
+        let failed = |error| StoreError::new(&store.path, error);
+        Ok(units(&store.conn).map_err(failed)? == units(&self.scratch).map_err(failed)?)
+    }
+
+    fn compare(&mut self, conn: &Connection, stored: &Stored) -> Result<Vec<Difference>> {
+        let tx = self.scratch.transaction()?;
+        // What it would be found by is compared elsewhere, and is not made.
+        write::Adding::new(&tx).add(&stored.material, None)?;
+        let new: i64 = tx.query_row("SELECT max(id) FROM revision", [], |row| row.get(0))?;
+        let sql = "SELECT revision.id FROM revision JOIN material ON material.id = material_id
+                   WHERE slug = ?1 AND number = ?2";
+        let of = params![stored.material.slug.as_str(), stored.revision];
+        let old: i64 = conn.query_row(sql, of, |row| row.get(0))?;
+        let mut differences = Vec::new();
+        for table in self.tables.iter().filter(|table| hangs_on_a_revision(table)) {
+            if table.name == STATISTICS && !has_statistics(conn, old)? {
+                continue;
+            }
+            let sql = select(table);
+            let (mut old_rows, mut new_rows) = (conn.prepare(&sql)?, tx.prepare(&sql)?);
+            if let Some(row) = first_difference((&mut old_rows, old), (&mut new_rows, new))? {
+                let curve = row.into_iter().next().filter(|_| table.name == STATISTICS);
+                differences.push(Difference { table: table.name.clone(), curve });
+            }
+        }
+        Ok(differences)
+    }
+}
+
+fn hangs_on_a_revision(table: &Table) -> bool {
+    table.columns.iter().any(|column| column.name == "revision_id")
+        && !MAKING.contains(&table.name.as_str())
+}
+
+/// Whether the revision must have statistics: a program that writes them has written it.
+fn has_statistics(conn: &Connection, revision_id: i64) -> Result<bool> {
+    let sql = "SELECT EXISTS (SELECT 1 FROM activity WHERE revision_id = ?1)
+               OR EXISTS (SELECT 1 FROM curve_statistic WHERE revision_id <= ?1)";
+    conn.query_row(sql, [revision_id], |row| row.get(0))
+}
+
+/// Everything but the number of the revision, that of a curve first.
+fn select(table: &Table) -> String {
+    let quoted = |name: &String| format!("\"{name}\"");
+    let names = table.columns.iter().map(|column| &column.name);
+    let mut names: Vec<&String> = names.filter(|name| *name != "revision_id").collect();
+    names.sort_by_key(|name| *name != "curve");
+    let columns: Vec<String> = names.into_iter().map(quoted).collect();
+    let order: Vec<String> = table.key.iter().map(quoted).collect();
+    format!(
+        "SELECT {} FROM \"{}\" WHERE revision_id = ?1 ORDER BY {}",
+        columns.join(", "),
+        table.name,
+        order.join(", ")
+    )
+}
+
+/// The texts of the first row that one has otherwise than the other.
+fn first_difference(
+    (old, old_id): (&mut Statement, i64),
+    (new, new_id): (&mut Statement, i64),
+) -> Result<Option<Vec<String>>> {
+    let columns = new.column_count();
+    let (mut old, mut new) = (old.query([old_id])?, new.query([new_id])?);
+    loop {
+        let (old, new) = (old.next()?, new.next()?);
+        let same = match (old, new) {
+            (None, None) => return Ok(None),
+            (Some(old), Some(new)) => (0..columns).try_fold(true, |same, column| {
+                Ok::<_, rusqlite::Error>(
+                    same && is_same(old.get_ref(column)?, new.get_ref(column)?),
+                )
+            })?,
+            _ => false,
+        };
+        if let (false, Some(row)) = (same, old.or(new)) {
+            let text = |column| match row.get::<_, Value>(column) {
+                Ok(Value::Text(text)) => Some(text),
+                _ => None,
+            };
+            return Ok(Some((0..columns).filter_map(text).collect()));
+        }
+    }
+}
+
+fn is_same(old: ValueRef, new: ValueRef) -> bool {
+    match (old, new) {
+        (ValueRef::Real(old), ValueRef::Real(new)) => {
+            (old - new).abs() <= ROUNDING * old.abs().max(new.abs())
+        }
+        (old, new) => old == new,
+    }
+}
