@@ -54,7 +54,7 @@ pub struct Matched {
 }
 
 /// Detections further than this from where their chirp meets the target are not from there, m.
-pub const GATE_M: f64 = 0.1;
+const GATE_M: f64 = 0.1;
 
 /// One look, along the axis of the beam, for every chirp that meets the target.
 ///
@@ -92,7 +92,7 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>,
 }
 
 /// Sorts a cloud by the looks of its scan, by chirp numbers or, without them, by directions. A detection
-/// further than [`GATE_M`] from where its chirp meets the target is a stray, and its chirp then counts as
+/// further than 0.1 m from where its chirp meets the target is a stray, and its chirp then counts as
 /// one that saw nothing.
 ///
 /// # Errors
