@@ -74,18 +74,14 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>,
         let [x, y, _] = towards.xyz().to_array();
         let place = places.get(index)?;
         Some(Look {
-            chirp: *chirps.number.get(index)?,
-            time_s: chirps.time_s.get(index).copied().unwrap_or(0.0),
-            progress: chirps.progress(index),
-            ray,
             hit,
             normal: frame.normal,
-            target: Pose::NONE,
             azimuth_rad: y.atan2(x),
             region,
             xt_m: place.x,
             yt_m: place.y,
             edge_m: footprints.edge_m.get(index).copied().unwrap_or(0.0),
+            ..missed(chirps, index)?
         })
     };
     Ok((0..chirps.rays.len()).into_par_iter().filter_map(look).collect())

@@ -401,6 +401,7 @@ impl Selection<'_> {
         if gain <= placebo_gain || !are_needed {
             return None;
         }
+        // Each has the evidence of both: alone it has none.
         let [held_out_gain, held_out_se] = self.difference(&held_out, &state.held_out);
         let added = pair.map(|trial| {
             let size_db = trial.candidate.size_db;

@@ -35,7 +35,7 @@ pub struct Saturating {
     knots: Vec<[f64; 2]>,
 }
 
-/// Range of ln(P̄/P_sat) beyond which nothing changes, and the step, which costs 0.001 dB.
+/// Range of ln(P̄/P_sat) beyond which nothing changes, and the step, which costs 0.002 dB.
 const FIRST: f64 = -14.0;
 const LAST: f64 = 12.0;
 const STEP: f64 = 0.05;
@@ -169,6 +169,18 @@ mod tests {
         // Far below a ceiling, neither does one that has it.
         let high = Ceiling { saturation_w: 1.0, ..Ceiling::NONE }.over(LOOKS);
         assert!((high.passed_w(1e-9, 3e-9) / 3e-9 - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn between_the_knots_the_curve_is_kept() {
+        let ceiling = Ceiling { saturation_w: 1.0, knee: 4.0, ..Ceiling::NONE };
+        let (table, speckle) = (ceiling.over(LOOKS), Speckle::new(LOOKS));
+        for k in 0..400 {
+            let ln_mean = -10.0 + STEP * (f64::from(k) + 0.5);
+            let [ln_held, _] = ceiling.knot(&speckle, ln_mean);
+            let off_db = 10.0 / std::f64::consts::LN_10 * (table.of(ln_mean).ln_mean - ln_held);
+            assert!(off_db.abs() < 2e-3, "{ln_mean}: {off_db} dB");
+        }
     }
 
     #[test]
