@@ -64,6 +64,11 @@ impl Case {
         }
     }
 
+    /// Whether the error after is larger than before.
+    pub fn is_worse(&self) -> bool {
+        self.run.error().is_some_and(|error| error.after.rmse_db > error.before.rmse_db)
+    }
+
     /// Error after over noise floor.
     pub fn after_to_floor(&self) -> Option<f64> {
         self.run.error().map(|error| error.after.rmse_db / error.noise_floor_db)

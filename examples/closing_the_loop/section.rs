@@ -225,7 +225,7 @@ fn errors(cases: &[Case]) -> String {
             Sorted::new(errors.iter().filter_map(|error| of(error))).median()
         };
         let after = Sorted::new(cases.iter().filter_map(|case| case.after_to_floor()));
-        let worse = errors.iter().filter(|error| error.after.rmse_db > error.before.rmse_db);
+        let worse = cases.iter().filter(|case| case.is_worse());
         let percent = |share: Option<f64>| match share {
             Some(share) => format!("{:.1} %", 100.0 * share),
             None => "–".into(),

@@ -52,6 +52,7 @@ pub fn targets(cases: &[Case]) -> Vec<Target> {
     let unexplained = share(&unknown, |case| case.run.verdict() == "unexplained");
     let both = share(&pairs(cases), Case::all_found);
     let [middle, most] = [after.median(), after.quantile(0.9)];
+    let worse = named.iter().filter(|case| case.is_worse()).count();
     vec![
         Target::at_least(
             "strong effect: right name first",
@@ -95,6 +96,13 @@ pub fn targets(cases: &[Case]) -> Vec<Target> {
             most,
             1.10,
             digits(most, 3),
+        ),
+        Target::at_most(
+            "known effects: cases whose error is worse than before",
+            "0",
+            (!named.is_empty()).then_some(worse as f64),
+            0.0,
+            format!("{worse} of {}", named.len()),
         ),
     ]
 }

@@ -52,7 +52,7 @@ fn spline(selection: &Selection, base: &State, numbers: usize) -> Option<Control
     let problem = &selection.problem;
     let prediction = problem.predict(&base.space, &base.fitted.at);
     let mut all = covariates(problem.looks, &prediction, problem.observations);
-    let laws = selection.mean_slopes(base);
+    let laws = selection.problem.mean_slopes(&base.space, &base.fitted.at);
     let mut best: Option<Control> = None;
     for covariate in &mut all {
         covariate.cells = numbers.max(2);

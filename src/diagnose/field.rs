@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use super::covariates::{Covariate, quantiles};
 use super::folds::Folds;
 use super::likelihood::{Likelihood, Term};
-use super::refit::{Problem, Slope};
+use super::refit::Problem;
 use super::score::DB;
 use crate::effects::{Look, Prediction};
 
@@ -95,7 +95,7 @@ impl Field {
         &self,
         problem: &Problem,
         prediction: &Prediction,
-        laws: &[Vec<Slope>],
+        laws: &[Vec<f64>],
         folds: &Folds,
     ) -> Structure {
         let here = terms(problem, prediction, &vec![0.0; self.entries.len()]);
@@ -145,12 +145,16 @@ impl Field {
         &self,
         problem: &Problem,
         prediction: &Prediction,
-        laws: &[Vec<Slope>],
+        laws: &[Vec<f64>],
         size: f64,
         used: &dyn Fn(usize) -> bool,
     ) -> DVector<f64> {
         let count = self.names.len() + laws.len();
         let mut numbers = DVector::zeros(count);
+        // A receiver that saturates passes less of a change.
+        let passes: Vec<f64> = (0..self.entries.len())
+            .map(|look| prediction.saturating.passes(prediction.mean_w(look)))
+            .collect();
         for _ in 0..STEPS {
             let factors: Vec<f64> =
                 (0..self.entries.len()).map(|look| self.ln_factor(&numbers, laws, look)).collect();
@@ -158,7 +162,8 @@ impl Field {
             let mut curvature = DMatrix::zeros(count, count);
             let mut downhill = DVector::zeros(count);
             for (look, term) in terms.iter().enumerate().filter(|(look, _)| used(*look)) {
-                let row = self.row(laws, look);
+                let mut row = self.row(laws, look);
+                row.iter_mut().for_each(|(_, a)| *a *= passes[look]);
                 for &(i, a) in &row {
                     downhill[i] += a * term.slope;
                     for &(j, b) in row.iter().filter(|(j, _)| *j <= i) {
@@ -181,18 +186,18 @@ impl Field {
         numbers
     }
 
-    fn row(&self, laws: &[Vec<Slope>], look: usize) -> Entry {
+    fn row(&self, laws: &[Vec<f64>], look: usize) -> Entry {
         let mut row = self.entries.get(look).cloned().unwrap_or_default();
         let first = self.names.len();
         let of_laws = laws
             .iter()
             .enumerate()
-            .filter_map(|(k, slopes)| slopes.get(look).map(|slope| (first + k, slope.ln_mean)));
+            .filter_map(|(k, slopes)| slopes.get(look).map(|slope| (first + k, *slope)));
         row.extend(of_laws.filter(|(_, slope)| *slope != 0.0));
         row
     }
 
-    fn ln_factor(&self, numbers: &DVector<f64>, laws: &[Vec<Slope>], look: usize) -> f64 {
+    fn ln_factor(&self, numbers: &DVector<f64>, laws: &[Vec<f64>], look: usize) -> f64 {
         // Beyond this the mean is no longer a small change of the model's.
         self.row(laws, look).iter().map(|(i, a)| a * numbers[*i]).sum::<f64>().clamp(-3.0, 3.0)
     }

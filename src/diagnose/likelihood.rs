@@ -6,7 +6,7 @@
 //! ones. A share of one in ten thousand of all chirps may be anything, so that a
 //! silhouette that the mesh misses costs a bounded amount.
 
-use crate::effects::Prediction;
+use crate::effects::{Arrived, Prediction};
 use crate::fit::gamma_law::{GammaLaw, LnProbability};
 
 use super::looks::Observation;
@@ -17,7 +17,7 @@ const OUTLIERS: f64 = 1e-4;
 const OUTLIER_DENSITY: f64 = 1.0 / 13.8;
 /// Standard deviations of the score of a look that count at most where a start is sought.
 const MOST_PULL: f64 = 4.0;
-/// Share of ranges that no model explains, and how much wider than the rest these are.
+/// Share of ranges that no model explains, and how much wider than the rest these are at least.
 const STRAY_RANGES: f64 = 0.01;
 const STRAY_WIDTH: f64 = 10.0;
 /// A mean so far below the threshold that nothing is ever detected, for rays that miss.
@@ -30,6 +30,14 @@ pub struct Declared {
     pub threshold_w: f64,
     /// Standard deviation of a range, m; 0 where ranges are not to be used.
     pub range_sd_m: f64,
+}
+
+impl Declared {
+    /// Measured less expected range, m; `None` where there is none of use.
+    pub(super) fn range_off_m(&self, arrived: &Arrived, seen: &Observation) -> Option<f64> {
+        let range_m = seen.range_m.filter(|_| self.range_sd_m > 0.0 && arrived.range_m > 0.0)?;
+        Some(range_m - arrived.range_m)
+    }
 }
 
 /// A law made ready for one prediction.
@@ -79,11 +87,12 @@ impl<'a> Likelihood<'a> {
 
     /// One chirp's part of the likelihood.
     pub fn term(&self, look: usize, seen: &Observation) -> Term {
+        let ln_seen = seen.power_w.unwrap_or(self.declared.threshold_w).ln();
         let (mut p, mut slope, mut bend, mut pull) = (0.0, 0.0, 0.0, 0.0);
         for (ln_mean, weight) in self.ln_means(look) {
             let law = match seen.power_w {
-                Some(power_w) => self.detected(power_w.ln(), ln_mean),
-                None => self.limited(self.declared.threshold_w.ln(), ln_mean),
+                Some(_) => self.detected(ln_seen, ln_mean),
+                None => self.limited(ln_seen, ln_mean),
             };
             let part = (1.0 - OUTLIERS) * weight * law.value.exp();
             p += part;
@@ -96,11 +105,11 @@ impl<'a> Likelihood<'a> {
         let pull = pull.clamp(-most, most);
         p += OUTLIERS * anything;
         let ln_mean = self.ln_mean(look);
-        let ln_seen = seen.power_w.unwrap_or(self.declared.threshold_w).ln();
         let lost = self.entered(ln_mean, ln_seen).0 - ln_seen;
         let arrived = self.prediction.arrived.get(look).copied().flatten();
         let range_m = arrived.map_or(0.0, |arrived| arrived.range_m);
-        let [ln_range, range_slope, range_bend] = self.range(range_m, seen);
+        let ranged = arrived.and_then(|arrived| self.range(&arrived, seen));
+        let [ln_range, range_slope, range_bend] = ranged.unwrap_or_default();
         Term {
             ln_p: p.ln() + ln_range,
             ln_mean: ln_mean - lost,
@@ -145,18 +154,17 @@ impl<'a> Likelihood<'a> {
         (ln_mean + (ln_seen - passed.ln_mean) / passed.slope, passed.slope)
     }
 
-    /// ln p of a range, its slope and its curvature by the predicted range.
-    fn range(&self, predicted_m: f64, seen: &Observation) -> [f64; 3] {
+    /// ln p of a range, its slope and its curvature by the predicted range; `None` where there is no
+    /// range, or one that is not to be used.
+    fn range(&self, arrived: &Arrived, seen: &Observation) -> Option<[f64; 3]> {
         let sd_m = self.declared.range_sd_m;
-        let Some(range_m) = seen.range_m.filter(|_| sd_m > 0.0 && predicted_m > 0.0) else {
-            return [0.0; 3];
-        };
-        let x = (range_m - predicted_m) / sd_m;
+        let x = self.declared.range_off_m(arrived, seen)? / sd_m;
+        let width = STRAY_WIDTH.max(arrived.spread_m / sd_m);
         let bell = |x: f64| (-0.5 * x * x).exp();
         let near = (1.0 - STRAY_RANGES) * bell(x);
-        let stray = STRAY_RANGES / STRAY_WIDTH * bell(x / STRAY_WIDTH);
+        let stray = STRAY_RANGES / width * bell(x / width);
         let p = (near + stray).max(f64::MIN_POSITIVE);
-        let weight = (near + stray / STRAY_WIDTH.powi(2)) / p;
-        [p.ln(), weight * x / sd_m, weight / (sd_m * sd_m)]
+        let weight = (near + stray / width.powi(2)) / p;
+        Some([p.ln(), weight * x / sd_m, weight / (sd_m * sd_m)])
     }
 }

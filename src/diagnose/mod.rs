@@ -273,7 +273,11 @@ impl Diagnosis {
         unexplained.extend(residual::lopsided(&z_after, sd_db));
         unexplained.sort_by(|a, b| b.strength_db.total_cmp(&a.strength_db));
         let (parameters, effects) = values(&problem, &state, added);
-        let error = before_after(score::errors(&before), score::errors(&state.held_out), &folds);
+        let error = before_after(
+            score::errors(&before, &folds),
+            score::errors(&state.held_out, &folds),
+            &folds,
+        );
         let base = Base {
             parameters,
             looks: receiver.looks,

@@ -139,6 +139,29 @@ impl<'a> Space<'a> {
         DVector::from_vec(self.start().iter().chain(effects).copied().collect())
     }
 
+    /// Points beside another by one unknown, and how far they are apart: on one side by a law's, which
+    /// are smooth, on both by an effect's.
+    fn beside(
+        &self,
+        at: &DVector<f64>,
+        [lower, upper]: [&DVector<f64>; 2],
+        index: usize,
+        effect_step: f64,
+    ) -> ([DVector<f64>; 2], f64) {
+        let is_law = index < self.base_len();
+        let step = if is_law { LAW_STEP } else { effect_step };
+        let moved = |by: f64| {
+            let mut there = at.clone();
+            there[index] = (at[index] + by).clamp(lower[index], upper[index]);
+            there
+        };
+        let more = moved(step);
+        let is_one_sided = is_law && more[index] > at[index];
+        let less = if is_one_sided { at.clone() } else { moved(-step) };
+        let width = more[index] - less[index];
+        ([more, less], width)
+    }
+
     /// A point with the numbers of one more effect.
     pub fn joined(at: &DVector<f64>, effect: &dyn Effect, values: &[f64]) -> DVector<f64> {
         let knobs = effect.knobs().iter().zip(values);
@@ -313,24 +336,19 @@ impl Problem<'_> {
         effect_step: f64,
         space: &Space,
         at: &DVector<f64>,
-        [lower, upper]: [&DVector<f64>; 2],
+        bounds: [&DVector<f64>; 2],
         here: &[Term],
     ) -> Vec<Vec<Slope>> {
         let slope = |index: usize| {
-            let step = if index < space.base_len() { LAW_STEP } else { effect_step };
-            let moved = |by: f64| {
-                let mut there = at.clone();
-                there[index] = (at[index] + by).clamp(lower[index], upper[index]);
-                let moved = there[index] - at[index];
-                (moved, if moved == 0.0 { here.to_vec() } else { self.terms(space, &there) })
-            };
-            let (more, up) = moved(step);
-            let is_one_sided = index < space.base_len() && more > 0.0;
-            let (less, down) = if is_one_sided { (0.0, here.to_vec()) } else { moved(-step) };
-            let width = more - less;
+            let ([more, less], width) = space.beside(at, bounds, index, effect_step);
             if width <= 0.0 {
                 return vec![Slope::default(); self.looks.len()];
             }
+            let terms = |there: &DVector<f64>| match there == at {
+                true => here.to_vec(),
+                false => self.terms(space, there),
+            };
+            let (up, down) = (terms(&more), terms(&less));
             let slope = |(a, b): (Term, Term)| Slope {
                 ln_p: (a.ln_p - b.ln_p) / width,
                 ln_mean: (a.ln_mean - b.ln_mean) / width,
@@ -339,6 +357,23 @@ impl Problem<'_> {
             up.into_iter().zip(down).map(slope).collect()
         };
         (0..at.len()).map(slope).collect()
+    }
+
+    /// Slopes of ln mean before the receiver by every unknown that changes it: unlike [`Term::ln_mean`]
+    /// that depends on nothing that was seen.
+    pub fn mean_slopes(&self, space: &Space, at: &DVector<f64>) -> Vec<Vec<f64>> {
+        let [lower, upper] = space.bounds();
+        let ln_means = |at: &DVector<f64>| -> Vec<f64> {
+            let prediction = self.predict(space, at);
+            let ln_mean = |look| prediction.mean_w(look).max(f64::MIN_POSITIVE).ln();
+            (0..self.looks.len()).map(ln_mean).collect()
+        };
+        let slopes = (0..at.len()).map(|index| {
+            let (ends, width) = space.beside(at, [&lower, &upper], index, EFFECT_STEP);
+            let [more, less] = ends.map(|end| ln_means(&end));
+            more.iter().zip(less).map(|(a, b)| (a - b) / width.max(f64::MIN_POSITIVE)).collect()
+        });
+        slopes.filter(|slopes: &Vec<f64>| slopes.iter().any(|slope| *slope != 0.0)).collect()
     }
 }
 

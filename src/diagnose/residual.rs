@@ -224,13 +224,11 @@ pub(super) fn outliers(
     let count = z.len().max(1) as f64;
     let wild = z.iter().filter(|z| z.abs() > OUTLYING).count();
     let off = |(seen, arrived): (&Observation, &Option<Arrived>)| {
-        let off_m = seen.range_m? - arrived.as_ref()?.range_m;
-        (off_m.abs() > OUTLYING * declared.range_sd_m).then_some(())
+        let arrived = arrived.as_ref()?;
+        let sd_m = declared.range_sd_m.hypot(arrived.spread_m);
+        (declared.range_off_m(arrived, seen)?.abs() > OUTLYING * sd_m).then_some(())
     };
-    let strays = match declared.range_sd_m > 0.0 {
-        true => observations.iter().zip(&prediction.arrived).filter_map(off).count(),
-        false => 0,
-    };
+    let strays = observations.iter().zip(&prediction.arrived).filter_map(off).count();
     let found = [
         (wild, "outlying powers"),
         (strays, "outlying ranges"),

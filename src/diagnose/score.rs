@@ -7,6 +7,7 @@
 use serde::Serialize;
 use statrs::function::gamma::ln_gamma;
 
+use super::folds::Folds;
 use super::likelihood::{Declared, Likelihood};
 use super::looks::Observation;
 use crate::effects::Prediction;
@@ -37,8 +38,12 @@ pub(super) struct Scored {
 pub struct Errors {
     /// Root mean square over detections about E[dB | detected], dB.
     pub rmse_db: f64,
+    /// Its standard error, by how small patches of the target differ, dB.
+    pub rmse_se_db: f64,
     /// Mean of the same, dB.
     pub bias_db: f64,
+    /// Its standard error, likewise, dB.
+    pub bias_se_db: f64,
     /// Mean ln p of all looks, the censored ones included.
     pub log_score: f64,
     /// Share of detections within the central half of their law.
@@ -155,7 +160,7 @@ fn detected_moments(
 }
 
 /// Sums up looks.
-pub(super) fn errors(scored: &[Scored]) -> Errors {
+pub(super) fn errors(scored: &[Scored], folds: &Folds) -> Errors {
     let mean = |values: &mut dyn Iterator<Item = f64>| {
         let (sum, count) = values.fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
         sum / f64::max(count, 1.0)
@@ -166,9 +171,19 @@ pub(super) fn errors(scored: &[Scored]) -> Errors {
         mean(&mut scored.iter().filter_map(|s| s.share).map(|s| f64::from(u8::from(within(s)))))
     };
     let brier = |s: &Scored| (s.chance - f64::from(u8::from(s.residual_db.is_some()))).powi(2);
+    let bias_db = mean(&mut detected().map(|(_, r)| r));
+    let square_db2 = mean(&mut detected().map(|(_, r)| r * r));
+    let count = detected().count().max(1) as f64;
+    let standard_error = |off: &dyn Fn(f64) -> f64| {
+        let off: Vec<f64> = scored.iter().map(|s| s.residual_db.map_or(0.0, off)).collect();
+        folds.sum(&off)[1] / count
+    };
+    let square_se_db2 = standard_error(&|r| r * r - square_db2);
     Errors {
-        rmse_db: mean(&mut detected().map(|(_, r)| r * r)).sqrt(),
-        bias_db: mean(&mut detected().map(|(_, r)| r)),
+        rmse_db: square_db2.sqrt(),
+        rmse_se_db: square_se_db2 / (2.0 * square_db2.sqrt().max(f64::MIN_POSITIVE)),
+        bias_db,
+        bias_se_db: standard_error(&|r| r - bias_db),
         log_score: mean(&mut scored.iter().map(|s| s.ln_p)),
         coverage_50: inside(0.5),
         coverage_90: inside(0.9),

@@ -15,7 +15,7 @@ use super::covariates::covariates;
 use super::field::{Field, Structure, terms};
 use super::folds::Folds;
 use super::placebo::Placebo;
-use super::refit::{Fitted, Problem, Slope, Space, sum};
+use super::refit::{Fitted, Problem, Space, sum};
 use super::residual::{self, Unexplained, speckle_sd_db};
 use super::score::{DB, Scored, scored};
 use super::screen::{Sample, Screen};
@@ -226,7 +226,7 @@ impl Selection<'_> {
         let problem = &self.problem;
         let prediction = problem.predict(&state.space, &state.fitted.at);
         let covariates = covariates(problem.looks, &prediction, problem.observations);
-        let laws = self.mean_slopes(state);
+        let laws = problem.mean_slopes(&state.space, &state.fitted.at);
         Field::new(problem.looks, &covariates).structure(problem, &prediction, &laws, self.folds)
     }
 
@@ -235,16 +235,6 @@ impl Selection<'_> {
         let fitted = self.problem.fit(space, start, &[], &SCOUT);
         let held_out = self.held_out(space, &fitted.at);
         (fitted, self.difference(&held_out, &base.held_out))
-    }
-
-    /// Slopes of the means by every number of a model.
-    pub fn mean_slopes(&self, state: &State) -> Vec<Vec<Slope>> {
-        let [lower, upper] = state.space.bounds();
-        let at = &state.fitted.at;
-        let here = self.problem.terms(&state.space, at);
-        let mut slopes = self.problem.slopes(&state.space, at, [&lower, &upper], &here);
-        slopes.retain(|slopes| slopes.iter().any(|slope| slope.ln_mean != 0.0));
-        slopes
     }
 
     /// The model without one of its effects.
@@ -312,6 +302,8 @@ impl Selection<'_> {
             // chance and be found again where it was not fitted.
             let is_kept = gain >= SHARE_KEPT * trial.candidate.gain && gain > se;
             let is_local = is_kept && trial.candidate.gain >= FAR_BEYOND * least;
+            // A fit without a patch may be far off where the patch was all that held it.
+            let gain = gain.min(trial.candidate.gain);
             if gain <= standard_errors * se && !is_local {
                 continue;
             }
@@ -342,13 +334,14 @@ impl Selection<'_> {
         }
         let first = passed.first()?;
         let behind = |other: &(usize, Vec<Scored>, f64)| self.difference(&first.1, &other.1);
-        // Of those that the data do not tell apart the simplest comes first.
-        let tied = passed.iter().filter(|other| behind(other)[0] <= SAME);
-        let best = tied.min_by_key(|one| plainness(&trials[one.0]))?;
-        let class = passed.iter().filter(|other| other.0 != best.0).filter(|other| {
+        // Of those that the data do not tell apart the simplest comes first: the rule of one standard error.
+        let is_tied = |other: &&(usize, Vec<Scored>, f64)| {
             let [worse, se] = behind(other);
             worse <= se.max(SAME)
-        });
+        };
+        let tied = || passed.iter().filter(is_tied);
+        let best = tied().min_by_key(|one| plainness(&trials[one.0]))?;
+        let class = tied().filter(|other| other.0 != best.0);
         let names = class.map(|one| trials[one.0].candidate.name).collect();
         if trials[best.0].candidate.placebo_gain.is_none()
             && let Some(screen) = &screen

@@ -21,6 +21,8 @@ const SHARE_TO_SCOUT: f64 = 0.1;
 /// Effects of each round that are fitted to all looks and predict held-out patches: at most so many,
 /// and none that gains less than this share of the best.
 const SHORTLIST: usize = 5;
+/// A refit that keeps less of its promise does not count among them.
+const SHARE_KEPT: f64 = 0.3;
 const SHARE_OF_BEST: f64 = 0.3;
 
 /// A fit of one more effect.
@@ -67,13 +69,17 @@ impl Selection<'_> {
             }
         }
         sort(&mut trials);
-        let best = trials.first().map_or(0.0, |trial| trial.candidate.gain);
-        let least = (SHARE_OF_BEST * best).max(0.5 * self.settings.least_gain_of(1, 1));
-        for trial in trials.iter_mut().take(SHORTLIST) {
-            if trial.candidate.gain >= least {
-                (self.hear)(&format!("round {round}: refitting with {}", trial.effect.name()));
-                self.refit(state, trial);
+        // Measured by what the refits keep: a sample may promise what all looks do not.
+        let (mut best, mut kept) = (0.5 * self.settings.least_gain_of(1, 1) / SHARE_OF_BEST, 0);
+        for trial in &mut trials {
+            let promised = trial.candidate.gain;
+            if kept == SHORTLIST || promised < SHARE_OF_BEST * best {
+                break;
             }
+            (self.hear)(&format!("round {round}: refitting with {}", trial.effect.name()));
+            self.refit(state, trial);
+            best = best.max(trial.candidate.gain);
+            kept += usize::from(trial.candidate.gain >= SHARE_KEPT * promised);
         }
         sort(&mut trials);
         trials
@@ -99,6 +105,14 @@ impl Selection<'_> {
             .collect();
         starts.sort_by(|a, b| b.0.total_cmp(&a.0));
         let tried = starts.len();
+        // Starts that differ by their strength alone lead to the same place.
+        let mut shapes: Vec<Vec<f64>> = Vec::new();
+        starts.retain(|(_, start)| {
+            let shape: Vec<f64> = start.iter().skip(state.fitted.at.len() + 1).copied().collect();
+            let is_new = !shapes.contains(&shape);
+            shapes.push(shape);
+            is_new
+        });
         starts.truncate(STARTS);
         let first = state.fitted.at.len();
         for (promise, start) in &mut starts {
@@ -202,7 +216,13 @@ impl Selection<'_> {
     /// Fits a trial to all looks.
     fn refit(&self, state: &State, trial: &mut Trial) {
         let held = state.space.costly(&state.fitted.at);
-        trial.fitted = self.problem.fit(&trial.space, &trial.fitted.at, &held, &SEARCH);
+        let ln_p = |at: &DVector<f64>| sum(&self.problem.terms(&trial.space, at));
+        // What suits the sample may suit the whole worse than no effect at all.
+        let absent: Vec<f64> = trial.effect.knobs().iter().map(|knob| knob.absent).collect();
+        let without = Space::joined(&state.fitted.at, trial.effect, &absent);
+        let is_worse = ln_p(&trial.fitted.at) < ln_p(&without);
+        let start = if is_worse { without } else { trial.fitted.at.clone() };
+        trial.fitted = self.problem.fit(&trial.space, &start, &held, &SEARCH);
         trial.candidate.gain = trial.fitted.ln_likelihood - state.fitted.ln_likelihood;
         trial.candidate.sampled = false;
         trial.sizes_db = self.sizes_db(state, &trial.space, &trial.fitted.at);

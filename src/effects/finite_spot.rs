@@ -3,11 +3,12 @@
 
 use rayon::prelude::*;
 
-use super::meeting::met;
+use super::meeting::at;
 use super::spread::sunflower;
-use super::{Arrived, Effect, Knob, Level, Look, Stage, Survey, Surveyed};
+use super::{Arrived, Effect, Knob, Level, Look, Stage, Survey};
 use crate::brdf::{Brdf, Scattering};
-use crate::frames::{Direction, Ray};
+use crate::frames::{Direction, Global, Ray, Surface};
+use crate::trace::{Hit, closest};
 
 /// The effect `finite-spot`.
 pub(super) struct FiniteSpot;
@@ -20,58 +21,79 @@ const RAYS: usize = 24;
 struct Beside {
     range_m: f64,
     cos_theta: f64,
-    azimuth_rad: f64,
+    to_radar: Direction<Surface>,
     region: u16,
 }
 
 impl Beside {
     fn of(look: &Look) -> Beside {
-        let Look { hit, azimuth_rad, region, .. } = *look;
-        Beside { range_m: hit.range_m, cos_theta: hit.cos_theta, azimuth_rad, region }
+        let Look { hit: Hit { range_m, cos_theta, .. }, azimuth_rad, region, .. } = *look;
+        let to_radar = Direction::from_angles(look.hit.theta_rad(), azimuth_rad);
+        Beside { range_m, cos_theta, to_radar, region }
     }
 
     /// Equation (11) of the base law, W; nothing where the region has no law.
     fn power_w(&self, stage: &Stage, laws: &[Brdf]) -> f64 {
-        let retro =
-            Direction::from_angles(self.cos_theta.clamp(-1.0, 1.0).acos(), self.azimuth_rad);
-        laws.get(usize::from(self.region)).map_or(0.0, |law| {
-            stage.link.power_w(self.range_m, self.cos_theta, law.f_per_sr(retro, retro))
-        })
+        let f_per_sr = |law: &Brdf| law.f_per_sr(self.to_radar, self.to_radar);
+        let f_per_sr = laws.get(usize::from(self.region)).map_or(0.0, f_per_sr);
+        stage.link.power_w(self.range_m, self.cos_theta, f_per_sr)
     }
 }
 
 /// The ray of a look and those of its spot, as far as they meet the target as the scene has it.
 type Spot = (Beside, Vec<Beside>);
 
-fn spot(stage: &Stage, look: &Look, diameter_m: f64) -> Option<Spot> {
-    let centre = met(stage, look, look.ray)?;
+fn spots(stage: &Stage, looks: &[Look], diameter_m: f64) -> Vec<Option<Spot>> {
+    let axes: Vec<Ray<Global>> = looks.iter().map(|look| look.ray).collect();
+    let centres = closest(stage.bvh, &axes);
+    let round = |(look, centre): (&Look, &Option<Hit>)| {
+        round(&look.ray, centre.map_or(0.0, |hit| diameter_m / hit.range_m))
+    };
+    let rays: Vec<Ray<Global>> = looks.par_iter().zip(&centres).flat_map_iter(round).collect();
+    let hits = closest(stage.bvh, &rays);
+    let spot = |(look, (centre, (rays, hits))): (&Look, (&Option<Hit>, (&[Ray<_>], &[_])))| {
+        let met = |ray, hit: Option<Hit>| Some(Beside::of(&at(stage, look, ray, hit?)));
+        let beside = rays.iter().zip(hits).filter_map(|(ray, hit)| met(*ray, *hit));
+        Some((met(look.ray, *centre)?, beside.collect()))
+    };
+    let rounds = rays.par_chunks(RAYS).zip(hits.par_chunks(RAYS));
+    looks.par_iter().zip(centres.par_iter().zip(rounds)).map(spot).collect()
+}
+
+/// The rays of a spot whose diameter is seen at an angle, rad.
+fn round(axis: &Ray<Global>, diameter_rad: f64) -> [Ray<Global>; RAYS] {
     // The intensity exp(−4 ln 2·r²/D²) has this standard deviation along each direction.
-    let sd_rad = diameter_m / centre.hit.range_m / (8.0 * std::f64::consts::LN_2).sqrt();
-    let forward = look.ray.direction.xyz();
+    let sd_rad = diameter_rad / (8.0 * std::f64::consts::LN_2).sqrt();
+    let forward = axis.direction.xyz();
     let (u, v) = forward.any_orthonormal_pair();
     let beside = |(share, angle_rad): (f64, f64)| {
         let off = sd_rad * (-2.0 * (1.0 - share).ln()).sqrt();
         let aside = off * (angle_rad.cos() * u + angle_rad.sin() * v);
-        let direction = Direction::new(forward + aside)?;
-        met(stage, look, Ray { origin: look.ray.origin, direction })
+        Ray { direction: Direction::new(forward + aside).unwrap_or(axis.direction), ..*axis }
     };
-    let met = sunflower(RAYS).filter_map(beside).map(|look| Beside::of(&look));
-    Some((Beside::of(&centre), met.collect()))
+    let mut places = sunflower(RAYS);
+    [(); RAYS].map(|()| places.next().map_or(*axis, beside))
 }
 
-/// What a spot changes: the factor on the power and what adds to the range, m.
-///
-/// Both are of the base law on the target as the scene has it, so that other effects stay as they are.
-fn averaged(stage: &Stage, laws: &[Brdf], (centre, beside): &Spot) -> Option<(f64, f64)> {
+/// What a spot changes.
+struct Change {
+    /// Factor on the power.
+    factor: f64,
+    /// What adds to the range, and its spread, m.
+    longer_m: f64,
+    spread_m: f64,
+}
+
+/// What a spot changes: of the base law on the target as the scene has it, so that other effects stay as they are.
+fn averaged(stage: &Stage, laws: &[Brdf], (centre, beside): &Spot) -> Option<Change> {
     let centre_w = centre.power_w(stage, laws);
-    let (mut power_w, mut moment) = (0.0, 0.0);
-    for ray in beside {
-        let one_w = ray.power_w(stage, laws) / RAYS as f64;
-        power_w += one_w;
-        moment += one_w * ray.range_m;
-    }
-    let useful = centre_w > 0.0 && power_w > 0.0;
-    useful.then(|| (power_w / centre_w, moment / power_w - centre.range_m))
+    let rays = beside.iter();
+    let rays = rays.map(|ray| Arrived::at_once(ray.power_w(stage, laws), ray.range_m));
+    let all = rays.reduce(Arrived::with)?;
+    let factor = all.power_w / RAYS as f64 / centre_w;
+    let longer_m = all.range_m - centre.range_m;
+    let change = Change { factor, longer_m, spread_m: all.spread_m };
+    (centre_w > 0.0 && factor > 0.0).then_some(change)
 }
 
 impl Effect for FiniteSpot {
@@ -115,22 +137,24 @@ impl Effect for FiniteSpot {
 
     fn survey(&self, values: &[f64], stage: &Stage, looks: &[Look]) -> Survey {
         let diameter_m = values.first().copied().unwrap_or(0.0);
-        let spots: Vec<Option<Spot>> =
-            looks.par_iter().map(|look| spot(stage, look, diameter_m)).collect();
-        Box::new(spots)
+        Box::new(spots(stage, looks, diameter_m))
     }
 
-    fn arrive(&self, _: &[f64], scan: &Surveyed, laws: &[Brdf], arrived: &mut [Option<Arrived>]) {
-        let Some(spots) = scan.survey.and_then(|s| s.downcast_ref::<Vec<Option<Spot>>>()) else {
-            return;
-        };
-        spots.par_iter().zip(arrived).for_each(|(spot, one)| {
-            let changed = spot.as_ref().and_then(|spot| averaged(scan.stage, laws, spot));
-            if let (Some(one), Some((factor, longer_m))) = (one, changed) {
-                one.power_w *= factor;
-                one.range_m += longer_m;
+    fn shade(&self, survey: &Survey, stage: &Stage, laws: &[Brdf]) -> Survey {
+        let spots = survey.downcast_ref::<Vec<Option<Spot>>>().map_or(&[][..], Vec::as_slice);
+        let change = |spot: &Option<Spot>| averaged(stage, laws, spot.as_ref()?);
+        Box::new(spots.par_iter().map(change).collect::<Vec<Option<Change>>>())
+    }
+
+    fn arrive(&self, _: &[f64], shaded: &Survey, arrived: &mut [Option<Arrived>]) {
+        let changes = shaded.downcast_ref::<Vec<Option<Change>>>().into_iter().flatten();
+        for (change, one) in changes.zip(arrived) {
+            if let (Some(one), Some(change)) = (one, change) {
+                one.power_w *= change.factor;
+                one.range_m += change.longer_m;
+                one.spread_m = one.spread_m.hypot(change.spread_m);
             }
-        });
+        }
     }
 }
 

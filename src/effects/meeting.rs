@@ -43,32 +43,40 @@ fn grain(stage: &Stage, region: u16) -> DVec3 {
 
 /// The look, had its chirp taken another ray.
 pub(super) fn met(stage: &Stage, look: &Look, ray: Ray<Global>) -> Option<Look> {
-    let hit = stage.bvh.closest(&ray)?;
+    stage.bvh.closest(&ray).map(|hit| at(stage, look, ray, hit))
+}
+
+/// The same for the closest hit of that ray.
+pub(super) fn at(stage: &Stage, look: &Look, ray: Ray<Global>, hit: Hit) -> Look {
     let back = -ray.direction.xyz();
     let outward = stage.bvh.mesh().area_normal(hit.facet as usize).normalize_or(back);
     let normal = if outward.dot(back) < 0.0 { -outward } else { outward };
     let region = stage.region_of_facet.get(hit.facet as usize).copied().unwrap_or(0);
     let to_radar = Axes::new(normal, grain(stage, region)).local(back).xyz();
     let azimuth_rad = to_radar.y.atan2(to_radar.x);
-    Some(Look { ray, hit, normal, azimuth_rad, region, ..*look })
+    Look { ray, hit, normal, azimuth_rad, region, ..*look }
 }
 
-/// The look at a target turned about `pivot` and then shifted, on top of what has moved it before;
-/// `None` where the ray misses it then.
+/// A motion of the target: a turn about `pivot`, and then a shift.
+pub(super) fn motion(rotation: DMat3, pivot: DVec3, shift_m: DVec3) -> Pose<Global, Global> {
+    Pose::new(rotation, pivot + shift_m - rotation * pivot)
+}
+
+/// The ray as a target sees it that stands still where the scene has it.
+pub(super) fn seen_from(target: &Pose<Global, Global>, ray: &Ray<Global>) -> Ray<Global> {
+    let back = target.inverse();
+    Ray { origin: back * ray.origin, direction: back * ray.direction }
+}
+
+/// The look at a target that has moved, for the closest hit of its ray as seen from there.
 pub(super) fn moved(
     stage: &Stage,
     look: &Look,
-    rotation: DMat3,
-    pivot: DVec3,
-    shift_m: DVec3,
-) -> Option<Look> {
-    let motion = Pose::<Global, Global>::new(rotation, pivot + shift_m - rotation * pivot);
-    let target = motion * look.target;
-    // The target stands still in its own frame, and the ray moves the other way.
-    let back = target.inverse();
-    let ray = Ray { origin: back * look.ray.origin, direction: back * look.ray.direction };
-    let there = met(stage, look, ray)?;
+    target: Pose<Global, Global>,
+    (ray, hit): (Ray<Global>, Hit),
+) -> Look {
+    let there = at(stage, look, ray, hit);
     let hit = Hit { point: target * there.hit.point, ..there.hit };
     let normal = target.rotation() * there.normal;
-    Some(Look { ray: look.ray, hit, normal, target, ..there })
+    Look { ray: look.ray, hit, normal, target, ..there }
 }

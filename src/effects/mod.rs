@@ -4,7 +4,7 @@
 //! A prediction starts from what the scene knows of every chirp, a [`Look`], and asks every effect in
 //! turn for each of four things; an effect answers those that it changes:
 //!
-//! 1. where and how the chirp meets the target ([`Effect::place`]): pose, motion;
+//! 1. where and how the chirp meets the target ([`Effect::motion`]): pose, motion;
 //! 2. how the surface scatters ([`Effect::scatter`]): subsurface, thin film, anisotropy, shadowing;
 //! 3. how much power arrives ([`Effect::gain`], [`Effect::arrive`]): layers, patches, gains, bounces;
 //! 4. what the receiver makes of it ([`Effect::receive`]): compression, speckle, noise, tilts that vary
@@ -227,9 +227,14 @@ pub trait Effect: Sync {
         false
     }
 
-    /// Moves the target under the rays, by its values alone. A look whose ray then misses is taken out by `None`.
-    fn place(&self, _values: &[f64], _stage: &Stage, look: Look) -> Option<Look> {
-        Some(look)
+    /// How it moves the target under the ray of a look, by its values alone; `None` where it rests.
+    fn motion(
+        &self,
+        _values: &[f64],
+        _stage: &Stage,
+        _look: &Look,
+    ) -> Option<Pose<Global, Global>> {
+        None
     }
 
     /// How far beside its axis a chirp sees the target, m at 8 m.
@@ -264,16 +269,13 @@ pub trait Effect: Sync {
         Box::new(())
     }
 
-    /// Changes the mean powers, W, and ranges, m, of all looks together, after all gains. `laws` are
-    /// those of the regions.
-    fn arrive(
-        &self,
-        _values: &[f64],
-        _scan: &Surveyed,
-        _laws: &[Brdf],
-        _arrived: &mut [Option<Arrived>],
-    ) {
+    /// What the laws of the regions make of a survey, for whatever else changes.
+    fn shade(&self, _survey: &Survey, _stage: &Stage, _laws: &[Brdf]) -> Survey {
+        Box::new(())
     }
+
+    /// Changes the mean powers, W, and ranges, m, of all looks together by a shaded survey, after all gains.
+    fn arrive(&self, _values: &[f64], _shaded: &Survey, _arrived: &mut [Option<Arrived>]) {}
 
     /// Changes the receiver's law.
     fn receive(&self, _values: &[f64], receiver: Receiver) -> Receiver {
@@ -281,26 +283,40 @@ pub trait Effect: Sync {
     }
 }
 
-/// What an effect has traced: a list of its own with an entry for each look.
+/// What an effect has traced, or made of it: a list of its own with an entry for each look.
 pub type Survey = Box<dyn Any + Send + Sync>;
-
-/// A scan as its effects meet it together.
-pub struct Surveyed<'a> {
-    /// Instrument and target.
-    pub stage: &'a Stage<'a>,
-    /// Every look, on the target as the scene has it.
-    pub looks: &'a [Look],
-    /// What the effect has traced; nothing for one without a survey.
-    pub survey: Option<&'a Survey>,
-}
 
 /// What arrives of one look in the mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arrived {
     /// Mean power, W.
     pub power_w: f64,
-    /// Range, m.
+    /// Range, the mean by power, m.
     pub range_m: f64,
+    /// Standard deviation by power of the ranges of what arrives together, m: speckle weighs it anew from
+    /// chirp to chirp, so that the range may lie so far from the mean.
+    pub spread_m: f64,
+}
+
+impl Arrived {
+    /// What arrives from one place.
+    pub fn at_once(power_w: f64, range_m: f64) -> Arrived {
+        Arrived { power_w, range_m, spread_m: 0.0 }
+    }
+
+    /// With something else; nothing changes where neither brings any power.
+    pub fn with(self, other: Arrived) -> Arrived {
+        let power_w = self.power_w + other.power_w;
+        if power_w <= 0.0 {
+            return self;
+        }
+        let share = other.power_w / power_w;
+        let apart_m = other.range_m - self.range_m;
+        let within_m2 = (1.0 - share) * self.spread_m.powi(2) + share * other.spread_m.powi(2);
+        let between_m2 = share * (1.0 - share) * apart_m * apart_m;
+        let range_m = self.range_m + share * apart_m;
+        Arrived { power_w, range_m, spread_m: (within_m2 + between_m2).sqrt() }
+    }
 }
 
 #[cfg(test)]

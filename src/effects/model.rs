@@ -6,12 +6,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::meeting::{moved, seen_from};
 use super::tilt::{NODES, nodes, tilted_cos_theta};
-use super::{Arrived, Effect, Look, Receiver, Saturating, Stage, Survey, Surveyed};
+use super::{Arrived, Effect, Look, Receiver, Saturating, Stage, Survey};
 use crate::brdf::{Brdf, Scattering};
-use crate::frames::{Direction, Ray};
+use crate::frames::{Direction, Global, Pose, Ray, Surface};
 use crate::radar::scan::PATTERN_RANGE_M;
-use crate::trace::Hit;
+use crate::trace::{Hit, closest};
 
 /// The base law and the effects that were added to it, each with its values.
 #[derive(Clone)]
@@ -40,12 +41,21 @@ pub struct Prediction {
 /// Factor on the power of a look for every tilt of its normal, and the tilt's probability.
 pub type Tilts = [(f64, f64); NODES];
 
-/// What was traced for one list of looks, for as long as the values that it depends on come again.
+/// What was traced and worked out for one list of looks, for as long as what it depends on comes again:
+/// a search turns one number at a time, and few numbers move a ray or change a law.
 #[derive(Default)]
 pub struct Traced {
     surveys: Kept<Key, Survey>,
-    placed: Kept<Vec<Key>, Vec<Option<Look>>>,
+    shaded: Kept<(Key, Vec<Brdf>), Survey>,
+    placed: Kept<Vec<Key>, Vec<Option<Placed>>>,
+    /// f of the laws by themselves, 1/sr, by the laws and what moves the looks.
+    scattered: Kept<(Vec<Brdf>, Vec<Key>), Vec<f64>>,
+    /// What all gains make of a power.
+    gains: Kept<Vec<Key>, Vec<f64>>,
 }
+
+/// A look where the effects place it, and the direction of the radar from its surface.
+type Placed = (Look, Direction<Surface>);
 
 /// Name of an effect and the values that matter.
 type Key = (&'static str, Vec<f64>);
@@ -137,30 +147,76 @@ impl Model<'_> {
 
     /// The same with what may have been traced for these very looks before.
     pub fn predict_with(&self, stage: &Stage, looks: &[Look], traced: &Traced) -> Prediction {
-        let moves = self.effects.iter().filter(|(effect, _)| effect.moves());
-        let moves = moves.map(|(effect, values)| (effect.name(), values.clone())).collect();
-        let placed = traced
-            .placed
-            .of(moves, || looks.par_iter().map(|look| self.placed(stage, *look)).collect());
-        let mut arrived: Vec<Option<Arrived>> =
-            placed.par_iter().map(|look| Some(self.arrived(stage, look.as_ref()?))).collect();
-        self.arrive(stage, looks, traced, &mut arrived);
-        let receiver = self.received();
-        let tilted = |look: &Option<Look>| match look {
-            Some(look) => self.tilts(stage, look, &receiver),
-            None => Tilts::default(),
+        let keys = |matters: fn(&dyn Effect) -> bool| -> Vec<Key> {
+            let matters = self.effects.iter().filter(|(effect, _)| matters(*effect));
+            matters.map(|(effect, values)| (effect.name(), values.clone())).collect()
         };
+        let (moves, all) = (keys(|effect| effect.moves()), keys(|_| true));
+        let placed = traced.placed.of(moves.clone(), || self.all_placed(stage, looks));
+        let of_placed = |of: &(dyn Fn(&Placed) -> f64 + Sync)| -> Vec<f64> {
+            placed.par_iter().map(|placed| placed.as_ref().map_or(0.0, of)).collect()
+        };
+        let law = |(look, to_radar): &Placed| self.law_per_sr(look, *to_radar);
+        let f_per_sr = traced.scattered.of((self.laws.clone(), moves), || of_placed(&law));
+        let gains = traced.gains.of(all, || of_placed(&|(look, _)| self.gain(stage, look)));
+        let arrive = |((placed, f_per_sr), gain): ((&Option<Placed>, &f64), &f64)| {
+            let (look, _) = placed.as_ref()?;
+            let power_w = gain * self.scattered_w(stage, look, *f_per_sr);
+            Some(Arrived::at_once(power_w, look.hit.range_m))
+        };
+        let looked = placed.par_iter().zip(&*f_per_sr).zip(&*gains);
+        let mut arrived: Vec<Option<Arrived>> = looked.map(arrive).collect();
+        let receiver = self.received();
+        let tilted =
+            |(placed, arrived): (&Option<Placed>, &Option<Arrived>)| match (placed, arrived) {
+                (Some((look, _)), Some(arrived)) => {
+                    self.tilts(stage, look, arrived.power_w, &receiver)
+                }
+                _ => Tilts::default(),
+            };
         let tilts = match receiver.tilt_sd_rad > 0.0 {
-            true => placed.par_iter().map(tilted).collect(),
+            true => placed.par_iter().zip(&arrived).map(tilted).collect(),
             false => Vec::new(),
         };
+        self.arrive(stage, looks, traced, &mut arrived);
         Prediction { arrived, tilts, saturating: receiver.saturating(), receiver }
     }
 
     /// Where a look meets the target, as the effects place it; `None` where its ray misses.
     pub(crate) fn placed(&self, stage: &Stage, look: Look) -> Option<Look> {
-        let mut effects = self.effects.iter();
-        effects.try_fold(look, |look, (effect, values)| effect.place(values, stage, look))
+        let Some(target) = self.target(stage, &look) else { return Some(look) };
+        let ray = seen_from(&target, &look.ray);
+        stage.bvh.closest(&ray).map(|hit| moved(stage, &look, target, (ray, hit)))
+    }
+
+    /// All looks at once, so that rays of one origin share their walk over the facets.
+    fn all_placed(&self, stage: &Stage, looks: &[Look]) -> Vec<Option<Placed>> {
+        let facing = |look: Look| (look, to_radar(&look));
+        let targets = looks.par_iter().map(|look| self.target(stage, look));
+        let targets: Vec<Option<Pose<Global, Global>>> = targets.collect();
+        if targets.iter().all(Option::is_none) {
+            return looks.par_iter().map(|look| Some(facing(*look))).collect();
+        }
+        let seen = |(look, target): (&Look, &Option<Pose<Global, Global>>)| {
+            target.map_or(look.ray, |target| seen_from(&target, &look.ray))
+        };
+        let rays: Vec<Ray<Global>> = looks.par_iter().zip(&targets).map(seen).collect();
+        let hits = closest(stage.bvh, &rays);
+        let placed =
+            |(((look, target), ray), hit): (((&Look, &Option<_>), &Ray<_>), &Option<_>)| {
+                Some(facing(match *target {
+                    None => *look,
+                    Some(target) => moved(stage, look, target, (*ray, (*hit)?)),
+                }))
+            };
+        looks.par_iter().zip(&targets).zip(&rays).zip(&hits).map(placed).collect()
+    }
+
+    /// Where the effects have the target under a look; `None` where the scene has it.
+    fn target(&self, stage: &Stage, look: &Look) -> Option<Pose<Global, Global>> {
+        let motions = self.effects.iter().filter(|(effect, _)| effect.moves());
+        let motions = motions.filter_map(|(effect, values)| effect.motion(values, stage, look));
+        motions.reduce(|target, motion| motion * target)
     }
 
     /// Ranges, m, at which a chirp may see the target, along its axis or beside it.
@@ -187,7 +243,7 @@ impl Model<'_> {
 
     /// What arrives of one look by itself.
     pub(crate) fn arrived(&self, stage: &Stage, look: &Look) -> Arrived {
-        Arrived { power_w: self.power_w(stage, look), range_m: look.hit.range_m }
+        Arrived::at_once(self.power_w(stage, look), look.hit.range_m)
     }
 
     /// What the effects make of all that arrives together.
@@ -199,12 +255,12 @@ impl Model<'_> {
         arrived: &mut [Option<Arrived>],
     ) {
         for (effect, values) in &self.effects {
-            let survey = effect.surveyed(values).map(|depends| {
-                let make = || effect.survey(values, stage, looks);
-                traced.surveys.of((effect.name(), depends), make)
-            });
-            let scan = Surveyed { stage, looks, survey: survey.as_deref() };
-            effect.arrive(values, &scan, &self.laws, arrived);
+            let Some(depends) = effect.surveyed(values) else { continue };
+            let key: Key = (effect.name(), depends);
+            let survey = || traced.surveys.of(key.clone(), || effect.survey(values, stage, looks));
+            let shade = || effect.shade(&survey(), stage, &self.laws);
+            let shaded = traced.shaded.of((key.clone(), self.laws.clone()), shade);
+            effect.arrive(values, &shaded, arrived);
         }
     }
 
@@ -217,20 +273,34 @@ impl Model<'_> {
 
     /// Equation (11) with every effect on the surface and the gain.
     fn power_w(&self, stage: &Stage, look: &Look) -> f64 {
-        let Some(law) = self.laws.get(usize::from(look.region)) else { return 0.0 };
-        let retro = Direction::from_angles(look.hit.theta_rad(), look.azimuth_rad);
-        let f_per_sr =
-            self.effects.iter().fold(law.f_per_sr(retro, retro), |f, (effect, values)| {
-                effect.scatter(values, stage, law, look, f)
-            });
-        let gain: f64 =
-            self.effects.iter().map(|(effect, values)| effect.gain(values, stage, look)).product();
-        gain * stage.link.power_w(look.hit.range_m, look.hit.cos_theta, f_per_sr)
+        let f_per_sr = self.law_per_sr(look, to_radar(look));
+        self.gain(stage, look) * self.scattered_w(stage, look, f_per_sr)
     }
 
-    /// What the tilts of a normal make of the power of a look.
-    fn tilts(&self, stage: &Stage, look: &Look, receiver: &Receiver) -> Tilts {
-        let (theta_rad, power_w) = (look.hit.theta_rad(), self.power_w(stage, look));
+    /// f of the law of a look by itself, 1/sr.
+    fn law_per_sr(&self, look: &Look, to_radar: Direction<Surface>) -> f64 {
+        let law = self.laws.get(usize::from(look.region));
+        law.map_or(0.0, |law| law.f_per_sr(to_radar, to_radar))
+    }
+
+    /// Equation (11) with every effect on the surface, W.
+    fn scattered_w(&self, stage: &Stage, look: &Look, law_per_sr: f64) -> f64 {
+        let Some(law) = self.laws.get(usize::from(look.region)) else { return 0.0 };
+        let f_per_sr = self
+            .effects
+            .iter()
+            .fold(law_per_sr, |f, (effect, values)| effect.scatter(values, stage, law, look, f));
+        stage.link.power_w(look.hit.range_m, look.hit.cos_theta, f_per_sr)
+    }
+
+    /// What all gains make of the power of a look.
+    fn gain(&self, stage: &Stage, look: &Look) -> f64 {
+        self.effects.iter().map(|(effect, values)| effect.gain(values, stage, look)).product()
+    }
+
+    /// What the tilts of a normal make of the power, W, of a look.
+    fn tilts(&self, stage: &Stage, look: &Look, power_w: f64, receiver: &Receiver) -> Tilts {
+        let theta_rad = look.hit.theta_rad();
         nodes(receiver.tilt_sd_rad).map(|(tilts, weight)| {
             let tilted = tilted_cos_theta(theta_rad, tilts).map(|cos_theta| {
                 let hit = Hit { cos_theta, ..look.hit };
@@ -240,4 +310,9 @@ impl Model<'_> {
             (factor, weight)
         })
     }
+}
+
+/// The direction of the radar from the surface of a look.
+fn to_radar(look: &Look) -> Direction<Surface> {
+    Direction::from_angles(look.hit.theta_rad(), look.azimuth_rad)
 }

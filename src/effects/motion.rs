@@ -5,8 +5,9 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
 
-use super::meeting::moved;
+use super::meeting::motion;
 use super::{Effect, Knob, Level, Look, Stage};
+use crate::frames::{Global, Pose};
 
 /// The effect `motion`.
 pub(super) struct Motion;
@@ -65,12 +66,10 @@ impl Effect for Motion {
         true
     }
 
-    fn place(&self, values: &[f64], stage: &Stage, look: Look) -> Option<Look> {
-        if values.iter().all(|&value| value == 0.0) {
-            return Some(look);
-        }
+    fn motion(&self, values: &[f64], _: &Stage, look: &Look) -> Option<Pose<Global, Global>> {
+        let moves = values.iter().any(|&value| value != 0.0);
         let shift_m = shift_m(values, look.progress);
-        moved(stage, &look, DMat3::IDENTITY, DVec3::ZERO, shift_m)
+        moves.then(|| motion(DMat3::IDENTITY, DVec3::ZERO, shift_m))
     }
 }
 
@@ -86,7 +85,7 @@ mod tests {
         values[5] = 4e-3;
         for (progress, expected_m) in [(0.0, 4e-3), (0.25, 0.0), (0.5, -4e-3), (1.0, 4e-3)] {
             let look = Look { progress, ..bench.looks[7] };
-            let found = Motion.place(&values, &bench.stage(), look).unwrap();
+            let found = bench.moved(&Motion, &values, &look).unwrap();
             let nearer_m = (look.hit.range_m - found.hit.range_m) * look.hit.cos_theta;
             assert!((nearer_m - expected_m).abs() < 1e-9, "{progress}: {nearer_m}");
         }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::meeting::{Axes, met};
 use super::spread::sunflower;
-use super::{Arrived, Effect, Knob, Level, Look, Stage, Survey, Surveyed};
+use super::{Arrived, Effect, Knob, Level, Look, Stage, Survey};
 use crate::brdf::{Brdf, Distribution, Scattering};
 use crate::frames::{Direction, Point, Ray, Surface};
 use crate::units::ratio_from_db;
@@ -118,13 +118,8 @@ fn detours(stage: &Stage, look: &Look) -> Vec<Detour> {
 
 /// Power, W, and range, m, of all that a chirp returns by way of a second surface.
 fn returned(laws: &[Brdf], detours: &[Detour]) -> Option<Arrived> {
-    let (mut power_w, mut moment) = (0.0, 0.0);
-    for detour in detours {
-        let one_w = detour.power_w(laws);
-        power_w += one_w;
-        moment += one_w * detour.range_m;
-    }
-    (power_w > 0.0).then(|| Arrived { power_w, range_m: moment / power_w })
+    let detours = detours.iter();
+    detours.map(|one| Arrived::at_once(one.power_w(laws), one.range_m)).reduce(Arrived::with)
 }
 
 impl Effect for MultiBounce {
@@ -165,25 +160,20 @@ impl Effect for MultiBounce {
         Box::new(all)
     }
 
-    fn arrive(
-        &self,
-        values: &[f64],
-        scan: &Surveyed,
-        laws: &[Brdf],
-        arrived: &mut [Option<Arrived>],
-    ) {
-        let Some(all) = scan.survey.and_then(|s| s.downcast_ref::<Vec<Vec<Detour>>>()) else {
-            return;
-        };
+    fn shade(&self, survey: &Survey, _: &Stage, laws: &[Brdf]) -> Survey {
+        let all = survey.downcast_ref::<Vec<Vec<Detour>>>().map_or(&[][..], Vec::as_slice);
+        let one = |detours: &Vec<Detour>| returned(laws, detours);
+        Box::new(all.par_iter().map(one).collect::<Vec<Option<Arrived>>>())
+    }
+
+    fn arrive(&self, values: &[f64], shaded: &Survey, arrived: &mut [Option<Arrived>]) {
         let coupling = ratio_from_db(values.first().copied().unwrap_or(NONE_DB));
-        all.par_iter().zip(arrived).for_each(|(detours, one)| {
-            if let (Some(one), Some(detour)) = (one, returned(laws, detours)) {
-                let (direct_w, detour_w) = (one.power_w, coupling * detour.power_w);
-                one.power_w = direct_w + detour_w;
-                let share = detour_w / one.power_w;
-                one.range_m += share * (detour.range_m - one.range_m);
+        let returned = shaded.downcast_ref::<Vec<Option<Arrived>>>().into_iter().flatten();
+        for (detour, one) in returned.zip(arrived) {
+            if let (Some(one), Some(detour)) = (one, detour) {
+                *one = one.with(Arrived { power_w: coupling * detour.power_w, ..*detour });
             }
-        });
+        }
     }
 }
 

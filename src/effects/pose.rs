@@ -3,9 +3,12 @@
 
 use glam::{DMat3, DVec3};
 
-use super::meeting::moved;
+use super::meeting::motion;
 use super::{Effect, Knob, Level, Look, Stage};
-use crate::frames;
+use crate::frames::{Global, Pose as FramePose};
+
+/// From where the scene has the target to where it stands.
+type Motion = FramePose<Global, Global>;
 
 /// The effect `pose`.
 pub(super) struct Pose;
@@ -23,7 +26,7 @@ const KNOBS: [Knob; 6] = [
 
 fn rotation(turn_deg: DVec3) -> DMat3 {
     let turn_rad = turn_deg.map(f64::to_radians);
-    frames::Pose::<frames::Global, frames::Global>::from_euler_xyz(turn_rad, DVec3::ZERO).rotation()
+    Motion::from_euler_xyz(turn_rad, DVec3::ZERO).rotation()
 }
 
 impl Effect for Pose {
@@ -59,13 +62,11 @@ impl Effect for Pose {
         true
     }
 
-    fn place(&self, values: &[f64], stage: &Stage, look: Look) -> Option<Look> {
-        let &[x, y, z, roll, pitch, yaw] = values else { return Some(look) };
+    fn motion(&self, values: &[f64], stage: &Stage, _: &Look) -> Option<Motion> {
+        let &[x, y, z, roll, pitch, yaw] = values else { return None };
         let (shift_m, turn_deg) = (DVec3::new(x, y, z), DVec3::new(roll, pitch, yaw));
-        if shift_m == DVec3::ZERO && turn_deg == DVec3::ZERO {
-            return Some(look);
-        }
-        moved(stage, &look, rotation(turn_deg), stage.middle, shift_m)
+        let rests = shift_m == DVec3::ZERO && turn_deg == DVec3::ZERO;
+        (!rests).then(|| motion(rotation(turn_deg), stage.middle, shift_m))
     }
 }
 
@@ -78,8 +79,7 @@ mod tests {
     fn a_shift_towards_the_radar_shortens_the_range() {
         let bench = Bench::plate();
         for look in &bench.looks {
-            let found =
-                Pose.place(&[0.0, 0.0, 0.01, 0.0, 0.0, 0.0], &bench.stage(), *look).unwrap();
+            let found = bench.moved(&Pose, &[0.0, 0.0, 0.01, 0.0, 0.0, 0.0], look).unwrap();
             let shorter_m = look.hit.range_m - found.hit.range_m;
             assert!((shorter_m * look.hit.cos_theta - 0.01).abs() < 1e-9);
             assert!((found.hit.point.xyz.z - 0.01).abs() < 1e-9);
@@ -91,7 +91,7 @@ mod tests {
         let bench = Bench::plate();
         let look =
             bench.looks.iter().min_by(|a, b| a.hit.range_m.total_cmp(&b.hit.range_m)).unwrap();
-        let found = Pose.place(&[0.0, 0.0, 0.0, 5.0, 0.0, 0.0], &bench.stage(), *look).unwrap();
+        let found = bench.moved(&Pose, &[0.0, 0.0, 0.0, 5.0, 0.0, 0.0], look).unwrap();
         // The plate turns about its middle, half a row of rays away at most.
         assert!((found.hit.range_m - look.hit.range_m).abs() < 2e-3);
         let tilt_deg = found.normal.dot(look.normal).acos().to_degrees();
@@ -103,6 +103,6 @@ mod tests {
     fn what_has_moved_out_of_the_way_is_missed() {
         let bench = Bench::plate();
         let edge = bench.looks.iter().max_by(|a, b| a.xt_m.total_cmp(&b.xt_m)).unwrap();
-        assert!(Pose.place(&[-0.2, 0.0, 0.0, 0.0, 0.0, 0.0], &bench.stage(), *edge).is_none());
+        assert!(bench.moved(&Pose, &[-0.2, 0.0, 0.0, 0.0, 0.0, 0.0], edge).is_none());
     }
 }

@@ -88,6 +88,13 @@ impl Bench {
             .predict(&self.stage(), &self.looks)
     }
 
+    /// A look where an effect places it.
+    pub(super) fn moved(&self, effect: &dyn Effect, values: &[f64], look: &Look) -> Option<Look> {
+        let effects = vec![(effect, values.to_vec())];
+        let receiver = Receiver::LINEAR;
+        Model { laws: Vec::new(), receiver, effects }.placed(&self.stage(), *look)
+    }
+
     /// What arrives without any effect.
     pub(super) fn bare(&self) -> Vec<Arrived> {
         self.predict(Vec::new()).arrived.into_iter().flatten().collect()
@@ -163,7 +170,7 @@ fn at_absent_values_no_effect_changes_anything() {
 
 fn is_sound(prediction: &Prediction) -> bool {
     let arrived = prediction.arrived.iter().flatten().all(|arrived| {
-        let Arrived { power_w, range_m } = *arrived;
+        let Arrived { power_w, range_m, .. } = *arrived;
         power_w.is_finite() && power_w >= 0.0 && range_m.is_finite() && range_m > 0.0
     });
     let Receiver { looks, noise_w, tilt_sd_rad, ceiling } = prediction.receiver;

@@ -101,7 +101,7 @@ impl<'a> Paths<'a> {
         let arrived = |(chirp, hits): (usize, &[Option<Hit>])| {
             let paths = self.of_chirp(chirp, hits);
             let Detection { power_w, range_m } = sum(&paths);
-            (!paths.is_empty()).then_some(Arrived { power_w, range_m })
+            (!paths.is_empty()).then_some(Arrived::at_once(power_w, range_m))
         };
         acting.arrive(self.footprints, self.footprints.chirps().enumerate().map(arrived).collect())
     }

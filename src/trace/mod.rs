@@ -18,7 +18,7 @@ use crate::frames::{Global, Point};
 pub use bvh::Bvh;
 pub use inside::winding_number;
 pub use pinhole::{Fan, NoFan};
-pub use tracer::Tracer;
+pub use tracer::{Tracer, closest};
 
 /// Where a ray meets a facet, in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -26,19 +26,28 @@ impl Tracer {
     /// # Errors
     /// When the pinhole is told to take rays that it cannot.
     pub fn closest(self, bvh: &Bvh, rays: &[Ray<Global>]) -> Result<Vec<Option<Hit>>, NoFan> {
-        let each = |closest: &(dyn Fn(&Ray<Global>) -> Option<Hit> + Sync)| {
-            rays.par_iter().with_min_len(64).map(closest).collect()
-        };
         Ok(match self {
             Tracer::Pinhole => Fan::new(rays)?.closest(bvh.mesh()),
-            Tracer::Bvh => each(&|ray| bvh.closest(ray)),
-            Tracer::Brute => each(&|ray| brute::closest(bvh.mesh(), ray)),
-            Tracer::Automatic => match Fan::new(rays) {
-                Ok(fan) => fan.closest(bvh.mesh()),
-                Err(_) => each(&|ray| bvh.closest(ray)),
-            },
+            Tracer::Bvh => each(rays, &|ray| bvh.closest(ray)),
+            Tracer::Brute => each(rays, &|ray| brute::closest(bvh.mesh(), ray)),
+            Tracer::Automatic => closest(bvh, rays),
         })
     }
+}
+
+/// The closest hit of every ray by what is fastest for them: [`Tracer::Automatic`], which takes any rays.
+pub fn closest(bvh: &Bvh, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
+    match Fan::new(rays) {
+        Ok(fan) => fan.closest(bvh.mesh()),
+        Err(_) => each(rays, &|ray| bvh.closest(ray)),
+    }
+}
+
+fn each(
+    rays: &[Ray<Global>],
+    closest: &(dyn Fn(&Ray<Global>) -> Option<Hit> + Sync),
+) -> Vec<Option<Hit>> {
+    rays.par_iter().with_min_len(64).map(closest).collect()
 }
 
 #[cfg(test)]

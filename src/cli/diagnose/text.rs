@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::words::{covariate, listed, plus_minus, sentence, value, verdict};
 use crate::cli::effects::level;
-use crate::diagnose::{Found, Report};
+use crate::diagnose::{Errors, Found, Report};
 
 /// Lines of what remains that are shown; the page has all.
 const MOST_UNEXPLAINED: usize = 3;
@@ -62,13 +62,18 @@ fn error(report: &Report) -> String {
         None => String::new(),
     };
     let change = match report.effects.is_empty() {
-        true => format!("{:.2} dB", error.before.rmse_db),
-        false => format!("{:.2} → {:.2} dB", error.before.rmse_db, error.after.rmse_db),
+        true => rms(&error.before),
+        false => format!("{} → {}", rms(&error.before), rms(&error.after)),
     };
     format!(
-        "error on held-out patches: {change} rms (noise floor {:.2} dB){share}\n",
+        "error on held-out patches: {change} dB rms (noise floor {:.2} dB){share}\n",
         error.noise_floor_db
     )
+}
+
+/// With its standard error.
+fn rms(errors: &Errors) -> String {
+    format!("{:.2} ± {:.2}", errors.rmse_db, errors.rmse_se_db)
 }
 
 fn remains(report: &Report) -> String {

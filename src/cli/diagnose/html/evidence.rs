@@ -19,13 +19,22 @@ pub(super) fn errors(report: &Report) -> String {
     let rows = [
         row(
             "rms error, dB",
-            [fixed(before.rmse_db, 2), fixed(after.rmse_db, 2), fixed(*noise_floor_db, 2)],
-            "Root mean square of observed − predicted power over the detections. The last column is \
-             the noise floor: what speckle and noise leave to a model that is right.",
+            [
+                format!("{:.2} ± {:.2}", before.rmse_db, before.rmse_se_db),
+                format!("{:.2} ± {:.2}", after.rmse_db, after.rmse_se_db),
+                fixed(*noise_floor_db, 2),
+            ],
+            "Root mean square of observed − predicted power over the detections, with its standard \
+             error. The last column is the noise floor: what speckle and noise leave to a model that is \
+             right.",
         ),
         row(
             "mean error, dB",
-            [signed(before.bias_db, 2), signed(after.bias_db, 2), "0".to_owned()],
+            [
+                format!("{} ± {:.2}", signed(before.bias_db, 2), before.bias_se_db),
+                format!("{} ± {:.2}", signed(after.bias_db, 2), after.bias_se_db),
+                "0".to_owned(),
+            ],
             "Observed − predicted, in the mean.",
         ),
         row(

@@ -1,0 +1,92 @@
+//! How long the paper's scan takes to be predicted again when a material or an effect changes and the
+//! geometry does not, against tracing it anew:
+//!
+//!     cargo bench --bench reshade
+//!
+//! Ways are taken in turns, and medians are printed.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use glam::DVec3;
+use matdb::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
+use matdb::diagnose;
+use matdb::effects::{self, Effect, Model, Receiver, Stage, Traced};
+use matdb::radar::{Chirps, Link, Radar};
+use matdb::scene::mannequin;
+use matdb::trace::{Bvh, Tracer};
+
+const TURNS: usize = 101;
+
+fn main() {
+    let radar = Radar::default();
+    let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).expect("the paper's scan");
+    let mesh = mannequin::mannequin();
+    let bvh = Bvh::new(&mesh);
+    let regions = vec![0; mesh.facets.len()];
+    let link = Link::new(&radar);
+    let mut stage = Stage {
+        radar: &radar,
+        link,
+        bvh: &bvh,
+        region_of_facet: &regions,
+        grain_of_region: &[DVec3::Y],
+        middle: DVec3::ZERO,
+    };
+    let looks = diagnose::looks(&stage, &radar, &chirps).expect("chirps that meet the target");
+    stage.middle = effects::middle(&looks);
+    let drift = effects::find("drift").expect("the effect");
+    println!("{} chirps, {} of them on the target", chirps.rays.len(), looks.len());
+    for threads in [1, 2] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let [trace, same, law, effect] = pool.install(|| {
+            let kept = Traced::default();
+            let mut times = [(); 4].map(|()| Vec::new());
+            for turn in 0..TURNS {
+                let change = turn as f64 / TURNS as f64;
+                let predict = |m: f64, drift_db: f64| {
+                    model(m, drift, drift_db).predict_with(&stage, &looks, &kept)
+                };
+                let ways: [&dyn Fn(); 4] = [
+                    &|| drop(black_box(Tracer::Pinhole.closest(&bvh, &chirps.rays))),
+                    &|| drop(black_box(predict(0.2, 1.0))),
+                    &|| drop(black_box(predict(0.2 + 0.1 * change, 1.0))),
+                    &|| drop(black_box(predict(0.2, 1.0 + change))),
+                ];
+                for (times, way) in times.iter_mut().zip(ways) {
+                    let start = Instant::now();
+                    way();
+                    times.push(start.elapsed().as_secs_f64() * 1e3);
+                }
+            }
+            times.map(median)
+        });
+        println!(
+            "{threads} threads: traced anew {trace:.3} ms; predicted again {same:.3} ms, with another \
+             law {law:.3} ms, with another effect {effect:.3} ms"
+        );
+    }
+}
+
+/// Paint of a roughness, and a gain that drifts.
+fn model(m: f64, drift: &dyn Effect, drift_db: f64) -> Model<'_> {
+    let (distribution, shadowing) = (Distribution::Beckmann, Shadowing::Separable);
+    let lobe = CookTorrance { f_lambda: 0.2, m, m_across: None, distribution, shadowing };
+    let paint = Brdf::Mixture(Mixture {
+        k: 0.3,
+        diffuse: Box::new(Brdf::BlinnPhong(BlinnPhong { r_s: 0.02, alpha: 4.0 })),
+        specular: Box::new(Brdf::CookTorrance(lobe)),
+    });
+    let values = drift.knobs().iter().map(|knob| knob.absent);
+    let values = values.enumerate().map(|(k, absent)| if k == 0 { drift_db } else { absent });
+    Model {
+        laws: vec![paint],
+        receiver: Receiver::LINEAR,
+        effects: vec![(drift, values.collect())],
+    }
+}
+
+fn median(mut times_ms: Vec<f64>) -> f64 {
+    times_ms.sort_by(f64::total_cmp);
+    times_ms[times_ms.len() / 2]
+}
