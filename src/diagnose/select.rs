@@ -163,10 +163,14 @@ impl Selection<'_> {
                     held_out = self.held_out(&space, &fitted.at);
                 }
                 // Laws that were fitted without the effect may be far from any that go with it.
-                let again = self.problem.fit(&space, &space.restarted(&fitted.at), &[], &SEARCH);
+                let (start, held) = (space.restarted(&fitted.at), space.costly(&fitted.at));
+                let again = self.problem.fit(&space, &start, &held, &SEARCH);
                 if again.ln_likelihood > fitted.ln_likelihood + SEARCH.tolerance {
-                    held_out = self.held_out(&space, &again.at);
-                    fitted = again;
+                    fitted = match held.is_empty() {
+                        true => again,
+                        false => self.problem.fit(&space, &again.at, &[], &SCOUT),
+                    };
+                    held_out = self.held_out(&space, &fitted.at);
                 }
                 state = State { space, fitted, held_out };
                 let Candidate { gain, size_db, .. } = trial.candidate;
