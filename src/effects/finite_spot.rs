@@ -13,30 +13,34 @@ use crate::trace::{Hit, closest};
 /// The effect `finite-spot`.
 pub(super) struct FiniteSpot;
 
-/// Rays that stand for a spot.
-const RAYS: usize = 24;
+/// Rays that stand for a spot. On a ball a highlight may be a tenth of it.
+const RAYS: usize = 64;
+/// What other effects make of a look's power at most, and one over that at least: beyond it they have
+/// moved the look to another surface, and the spot sees what it saw.
+const MOST_GAIN: f64 = 100.0;
 
 /// Where one ray of a spot meets the target.
 #[derive(Clone, Copy)]
 struct Beside {
     range_m: f64,
-    cos_theta: f64,
     to_radar: Direction<Surface>,
+    /// Power, W, where f is 1/sr.
+    watts_per_f: f64,
     region: u16,
 }
 
 impl Beside {
-    fn of(look: &Look) -> Beside {
+    fn of(stage: &Stage, look: &Look) -> Beside {
         let Look { hit: Hit { range_m, cos_theta, .. }, azimuth_rad, region, .. } = *look;
         let to_radar = Direction::from_angles(look.hit.theta_rad(), azimuth_rad);
-        Beside { range_m, cos_theta, to_radar, region }
+        let watts_per_f = stage.link.power_w(range_m, cos_theta, 1.0);
+        Beside { range_m, to_radar, watts_per_f, region }
     }
 
     /// Equation (11) of the base law, W; nothing where the region has no law.
-    fn power_w(&self, stage: &Stage, laws: &[Brdf]) -> f64 {
-        let f_per_sr = |law: &Brdf| law.f_per_sr(self.to_radar, self.to_radar);
-        let f_per_sr = laws.get(usize::from(self.region)).map_or(0.0, f_per_sr);
-        stage.link.power_w(self.range_m, self.cos_theta, f_per_sr)
+    fn power_w(&self, laws: &[Brdf]) -> f64 {
+        let law = laws.get(usize::from(self.region));
+        law.map_or(0.0, |law| self.watts_per_f * law.f_per_sr(self.to_radar, self.to_radar))
     }
 }
 
@@ -52,7 +56,7 @@ fn spots(stage: &Stage, looks: &[Look], diameter_m: f64) -> Vec<Option<Spot>> {
     let rays: Vec<Ray<Global>> = looks.par_iter().zip(&centres).flat_map_iter(round).collect();
     let hits = closest(stage.bvh, &rays);
     let spot = |(look, (centre, (rays, hits))): (&Look, (&Option<Hit>, (&[Ray<_>], &[_])))| {
-        let met = |ray, hit: Option<Hit>| Some(Beside::of(&at(stage, look, ray, hit?)));
+        let met = |ray, hit: Option<Hit>| Some(Beside::of(stage, &at(stage, look, ray, hit?)));
         let beside = rays.iter().zip(hits).filter_map(|(ray, hit)| met(*ray, *hit));
         Some((met(look.ray, *centre)?, beside.collect()))
     };
@@ -75,25 +79,30 @@ fn round(axis: &Ray<Global>, diameter_rad: f64) -> [Ray<Global>; RAYS] {
     [(); RAYS].map(|()| places.next().map_or(*axis, beside))
 }
 
-/// What a spot changes.
-struct Change {
-    /// Factor on the power.
-    factor: f64,
+/// What the base law makes of a spot on the target as the scene has it, so that other effects stay as
+/// they are.
+struct Averaged {
+    /// Power of the ray along the axis and the mean over the spot, W.
+    centre_w: f64,
+    mean_w: f64,
     /// What adds to the range, and its spread, m.
     longer_m: f64,
     spread_m: f64,
 }
 
-/// What a spot changes: of the base law on the target as the scene has it, so that other effects stay as they are.
-fn averaged(stage: &Stage, laws: &[Brdf], (centre, beside): &Spot) -> Option<Change> {
-    let centre_w = centre.power_w(stage, laws);
-    let rays = beside.iter();
-    let rays = rays.map(|ray| Arrived::at_once(ray.power_w(stage, laws), ray.range_m));
-    let all = rays.reduce(Arrived::with)?;
-    let factor = all.power_w / RAYS as f64 / centre_w;
-    let longer_m = all.range_m - centre.range_m;
-    let change = Change { factor, longer_m, spread_m: all.spread_m };
-    (centre_w > 0.0 && factor > 0.0).then_some(change)
+fn averaged(laws: &[Brdf], (centre, beside): &Spot) -> Option<Averaged> {
+    let sums = beside.iter().fold([0.0; 3], |[power_w, first, second], ray| {
+        let (one_w, longer_m) = (ray.power_w(laws), ray.range_m - centre.range_m);
+        [power_w + one_w, first + one_w * longer_m, second + one_w * longer_m * longer_m]
+    });
+    let centre_w = centre.power_w(laws);
+    let [power_w, first, second] = sums;
+    if centre_w <= 0.0 || power_w <= 0.0 {
+        return None;
+    }
+    let (mean_w, longer_m) = (power_w / RAYS as f64, first / power_w);
+    let spread_m = (second / power_w - longer_m * longer_m).max(0.0).sqrt();
+    Some(Averaged { centre_w, mean_w, longer_m, spread_m })
 }
 
 impl Effect for FiniteSpot {
@@ -126,9 +135,9 @@ impl Effect for FiniteSpot {
         [0.1, 0.3, 0.75, 1.5].map(|share| vec![(share * nominal_m).clamp(1e-3, 0.1)]).to_vec()
     }
 
-    /// To where the intensity is 12 dB down.
+    /// To where the intensity is 19 dB down.
     fn sees_beside_m(&self, values: &[f64]) -> f64 {
-        values.first().copied().unwrap_or_default()
+        1.25 * values.first().copied().unwrap_or_default()
     }
 
     fn surveyed(&self, values: &[f64]) -> Option<Vec<f64>> {
@@ -140,19 +149,20 @@ impl Effect for FiniteSpot {
         Box::new(spots(stage, looks, diameter_m))
     }
 
-    fn shade(&self, survey: &Survey, stage: &Stage, laws: &[Brdf]) -> Survey {
+    fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
         let spots = survey.downcast_ref::<Vec<Option<Spot>>>().map_or(&[][..], Vec::as_slice);
-        let change = |spot: &Option<Spot>| averaged(stage, laws, spot.as_ref()?);
-        Box::new(spots.par_iter().map(change).collect::<Vec<Option<Change>>>())
+        let averaged = |spot: &Option<Spot>| averaged(laws, spot.as_ref()?);
+        Box::new(spots.par_iter().map(averaged).collect::<Vec<Option<Averaged>>>())
     }
 
     fn arrive(&self, _: &[f64], shaded: &Survey, arrived: &mut [Option<Arrived>]) {
-        let changes = shaded.downcast_ref::<Vec<Option<Change>>>().into_iter().flatten();
-        for (change, one) in changes.zip(arrived) {
-            if let (Some(one), Some(change)) = (one, change) {
-                one.power_w *= change.factor;
-                one.range_m += change.longer_m;
-                one.spread_m = one.spread_m.hypot(change.spread_m);
+        let all = shaded.downcast_ref::<Vec<Option<Averaged>>>().into_iter().flatten();
+        for (averaged, one) in all.zip(arrived) {
+            if let (Some(one), Some(averaged)) = (one, averaged) {
+                let gain = one.power_w / averaged.centre_w;
+                one.power_w = averaged.mean_w * gain.clamp(1.0 / MOST_GAIN, MOST_GAIN);
+                one.range_m += averaged.longer_m;
+                one.spread_m = one.spread_m.hypot(averaged.spread_m);
             }
         }
     }

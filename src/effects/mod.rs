@@ -270,7 +270,7 @@ pub trait Effect: Sync {
     }
 
     /// What the laws of the regions make of a survey, for whatever else changes.
-    fn shade(&self, _survey: &Survey, _stage: &Stage, _laws: &[Brdf]) -> Survey {
+    fn shade(&self, _survey: &Survey, _laws: &[Brdf]) -> Survey {
         Box::new(())
     }
 

@@ -45,7 +45,8 @@ pub type Tilts = [(f64, f64); NODES];
 /// a search turns one number at a time, and few numbers move a ray or change a law.
 #[derive(Default)]
 pub struct Traced {
-    surveys: Kept<Key, Survey>,
+    /// Large, and on one number each.
+    surveys: Kept<Key, Survey, 4>,
     shaded: Kept<(Key, Vec<Brdf>), Survey>,
     placed: Kept<Vec<Key>, Vec<Option<Placed>>>,
     /// f of the laws by themselves, 1/sr, by the laws and what moves the looks.
@@ -60,20 +61,17 @@ type Placed = (Look, Direction<Surface>);
 /// Name of an effect and the values that matter.
 type Key = (&'static str, Vec<f64>);
 
-/// The latest results of a slow function.
-struct Kept<K, V>(Mutex<Vec<(K, Arc<V>)>>);
+/// The latest results of a slow function: those of a difference quotient over every number of a pose, its
+/// middle, and the next, or as many as that.
+struct Kept<K, V, const MOST: usize = 15>(Mutex<Vec<(K, Arc<V>)>>);
 
-/// Results that are kept: those of a difference quotient over every number of a pose, its middle, and
-/// the next.
-const KEPT: usize = 15;
-
-impl<K, V> Default for Kept<K, V> {
-    fn default() -> Kept<K, V> {
+impl<K, V, const MOST: usize> Default for Kept<K, V, MOST> {
+    fn default() -> Self {
         Kept(Mutex::default())
     }
 }
 
-impl<K: PartialEq, V> Kept<K, V> {
+impl<K: PartialEq, V, const MOST: usize> Kept<K, V, MOST> {
     /// Makes it without the lock, since other threads may want another key meanwhile.
     fn of(&self, key: K, make: impl FnOnce() -> V) -> Arc<V> {
         let kept = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -82,7 +80,7 @@ impl<K: PartialEq, V> Kept<K, V> {
         }
         let made = Arc::new(make());
         let mut kept = kept();
-        if kept.len() >= KEPT {
+        if kept.len() >= MOST {
             kept.remove(0);
         }
         kept.push((key, made.clone()));
@@ -222,12 +220,15 @@ impl Model<'_> {
     /// Ranges, m, at which a chirp may see the target, along its axis or beside it.
     pub(crate) fn ranges_m(&self, stage: &Stage, look: &Look) -> Vec<f64> {
         const ROUND: usize = 8;
+        const RINGS: [f64; 3] = [1.0 / 3.0, 2.0 / 3.0, 1.0];
         let beside = self.effects.iter().map(|(effect, values)| effect.sees_beside_m(values));
         let tangent = beside.fold(0.0, f64::max) / PATTERN_RANGE_M;
         let axis = look.ray.direction.xyz();
         let (u, v) = axis.any_orthonormal_pair();
-        let round = (0..ROUND).map(|k| TAU * k as f64 / ROUND as f64);
-        let ring = round.map(|turn| axis + tangent * (turn.cos() * u + turn.sin() * v));
+        let ring = |share: f64| {
+            let round = (0..ROUND).map(|k| TAU * k as f64 / ROUND as f64);
+            round.map(move |turn| axis + share * tangent * (turn.cos() * u + turn.sin() * v))
+        };
         let moves = self.effects.iter().any(|(effect, _)| effect.moves());
         let range_m = |direction: DVec3| {
             let ray = Ray { direction: Direction::new(direction)?, ..look.ray };
@@ -237,7 +238,8 @@ impl Model<'_> {
             };
             Some(hit.range_m)
         };
-        let rays = std::iter::once(axis).chain(ring.filter(|_| tangent > 0.0));
+        let rays =
+            std::iter::once(axis).chain(RINGS.into_iter().flat_map(ring).filter(|_| tangent > 0.0));
         rays.filter_map(range_m).collect()
     }
 
@@ -258,7 +260,7 @@ impl Model<'_> {
             let Some(depends) = effect.surveyed(values) else { continue };
             let key: Key = (effect.name(), depends);
             let survey = || traced.surveys.of(key.clone(), || effect.survey(values, stage, looks));
-            let shade = || effect.shade(&survey(), stage, &self.laws);
+            let shade = || effect.shade(&survey(), &self.laws);
             let shaded = traced.shaded.of((key.clone(), self.laws.clone()), shade);
             effect.arrive(values, &shaded, arrived);
         }

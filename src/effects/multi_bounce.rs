@@ -160,7 +160,7 @@ impl Effect for MultiBounce {
         Box::new(all)
     }
 
-    fn shade(&self, survey: &Survey, _: &Stage, laws: &[Brdf]) -> Survey {
+    fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
         let all = survey.downcast_ref::<Vec<Vec<Detour>>>().map_or(&[][..], Vec::as_slice);
         let one = |detours: &Vec<Detour>| returned(laws, detours);
         Box::new(all.par_iter().map(one).collect::<Vec<Option<Arrived>>>())
