@@ -54,7 +54,7 @@ def rows(answers, missing):
 
 
 def main():
-    build("--example", "fit_speed")
+    build("fit_speed")
     with tempfile.TemporaryDirectory() as folder:
         for row in measure(folder, quick=False)[0]:
             print(row)

@@ -70,7 +70,7 @@ def error(transformation, folder):
 
 
 def main():
-    build("--example", "icp_speed")
+    build("icp_speed")
     with tempfile.TemporaryDirectory() as folder:
         for found in measure(folder, quick=False)[0]:
             print(found)

@@ -1,9 +1,10 @@
 """docs/performance.md from the stored results; needs nothing but Python."""
 
+import math
 from pathlib import Path
 
 from goals import LOW, MEDIUM, all_goals
-from rows import HIERARCHY, PINHOLE, best, median, of_workload, ours
+from rows import HIERARCHY, PINHOLE, best, median, named, of_workload, ours
 from words import bound, grouped, number, share, spread, table, times
 
 LIMITS = Path(__file__).resolve().parent / "limits.md"
@@ -58,9 +59,10 @@ def goals(results):
 
 
 def losses(results):
-    lines = [line for part in (lost_traces, lost_others) for line in part(results)]
-    text = "".join(f"- {line}\n" for line in lines) or "Nowhere in this run.\n"
-    return f"## Where we lose\n\nEvery other program that was faster than ours in a row below.\n\n{text}"
+    head = ["work", "threads", "program", "ratio", "ratio once built"]
+    rows = [row for part in (lost_traces, lost_others) for row in part(results)]
+    text = table(head, rows, right=[head[1], *head[3:]]) if rows else "Nowhere in this run.\n"
+    return f"## Where we lose\n\nEvery program that was faster than ours, by the fastest of its ways.\n\n{text}"
 
 
 def workloads(results):
@@ -76,29 +78,20 @@ def lost_traces(results):
         mine = ours(rows)
         if mine is None:
             continue
-        where = f"{grouped(mine['facets'])} facets, {grouped(mine['rays'])} rays, {threads_of(threads)}"
-        where += "" if mine["coherent"] else ", second bounce"
-        for row in rows:
-            if row["tracer"].startswith("matdb") or "total" not in row:
-                continue
-            whole = median(row["total"]) / median(mine["total"])
-            alone = median(row["trace"]) / median(mine["trace"])
-            if whole < 1:
-                yield f"{where}: {name_of(row)}, build and trace {times(whole)}"
-            elif alone < 1:
-                yield f"{where}: {name_of(row)}, once built, {times(alone)}"
+        work = f"{grouped(mine['facets'])} facets, {grouped(mine['rays'])} rays" + ", second bounce" * (not mine["coherent"])
+        for tracer in dict.fromkeys(row["tracer"] for row in rows if not row["tracer"].startswith("matdb")):
+            ways = named(rows, tracer)
+            ratio = lambda part: min((median(row[part]) for row in ways), default=math.inf) / median(mine[part])
+            if min(ratio("total"), ratio("trace")) < 1:
+                yield [work, threads, tracer, times(ratio("total")), times(ratio("trace"))]
 
 
 def lost_others(results):
-    groups = [
-        (results.get("registration", []), "registration, {threaded}", "threads"),
-        (results.get("fits", []), "{fit}", "fit"),
-        (results.get("formats", []), "{work}", "work"),
-    ]
-    for rows, title, key in groups:
-        for row, ratio in beside(rows, key):
+    for part, key in [("registration", "threads"), ("fits", "fit"), ("formats", "work")]:
+        for row, ratio in beside(results.get(part, []), key):
             if ratio is not None and ratio < 1:
-                yield f"{title.format(**row, threaded=threads_of(row.get('threads')))}: {row['program']}, {times(ratio)}"
+                work = part if key == "threads" else row[key]
+                yield [work, row.get("threads", ""), row["program"], times(ratio), ""]
 
 
 def beside(rows, key):
@@ -224,7 +217,8 @@ def rendering(results):
         ["writing them, left to the system", spread(found["write_unsynced"]), times(median(found["write_unsynced"]) / write)],
         ["a process that only tells its version", spread(found["start"]), times(median(found["start"]) / write)],
     ]
-    stages = ", ".join(f"{stage} {number(ms)}" for stage, ms in found["stages_ms"].items())
+    slowest = sorted(found["stages_ms"].items(), key=lambda stage: -stage[1])
+    stages = ", ".join(f"{stage} {number(ms)}" for stage, ms in slowest)
     return f"""## The whole program
 
 The paper's scene, {grouped(found["bytes"])} bytes of files, which a script wrote again in the same turns; here the ratio is to that

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import machine
 from page import page
-from programs import ROOT, build
+from programs import ROOT, build, cargo
 
 HERE = Path(__file__).resolve().parent
 PARTS = ["trace", "power", "registration", "fits", "render", "formats", "store"]
@@ -41,8 +41,8 @@ def arguments():
 
 def measure(options):
     say("build")
-    build("--bin", "matdb", "--example", "trace_speed", "--example", "file_speed")
-    build("--example", "fit_speed", "--example", "icp_speed")
+    build("trace_speed", "file_speed", "fit_speed", "icp_speed")
+    cargo("bench", "--no-run", "--bench", "store")
     found = {"schema": 1, "quick": options.quick, "machine": machine.describe(), "versions": {}, "failed": {}}
     if options.only and options.results.exists():
         stored = json.loads(options.results.read_text(encoding="utf-8"))

@@ -2,6 +2,7 @@
 
 import json
 import os
+import random
 import subprocess
 import tempfile
 import time
@@ -10,8 +11,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release"
 
-# Between two turns, so that one program's threads are asleep when the next is timed.
-REST_S = 0.01
+# Between two turns: threads of some programs wait for work awake for a while.
+REST_S = 0.05
 LEAST_TURNS = 3
 
 
@@ -19,20 +20,20 @@ class Missing(Exception):
     """A program that is not there or does not run; its text says why."""
 
 
-def build(*what):
-    """Builds parts of the crate with optimisation."""
-    command = ["cargo", "build", "--release", "--quiet", *what]
-    subprocess.run(command, cwd=ROOT, check=True)
+def cargo(*words):
+    """What cargo prints when it succeeds."""
+    command = ["cargo", words[0], "--quiet", *words[1:]]
+    return subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def build(*examples):
+    """Builds the program and some examples with optimisation."""
+    cargo("build", "--release", "--bin", "matdb", *(word for name in examples for word in ("--example", name)))
 
 
 def example(name, *arguments):
     """The command that runs an example that has been built."""
     return [str(TARGET / "examples" / name), *map(str, arguments)]
-
-
-def output(command):
-    """What a command prints that must succeed."""
-    return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
 
 
 class Program:
@@ -117,12 +118,15 @@ def start(commands, threads):
 
 
 def alternate(running, missing, turns, seconds):
-    """The answers of all turns; a first turn of each program is not counted. After so many seconds no
-    further round begins, if there have been enough. A program that fails becomes a missing one."""
+    """The answers of all turns; a first turn of each program is not counted, and every round has another
+    order. After so many seconds no further round begins, if there have been enough. A program that fails
+    becomes a missing one."""
     answers = {name: [] for name in running}
     began = time.monotonic()
     for number in range(turns + 1):
-        for name in list(running):
+        names = list(running)
+        random.Random(number).shuffle(names)
+        for name in names:
             time.sleep(REST_S)
             try:
                 take = running[name].watched_turn if number == 1 else running[name].turn

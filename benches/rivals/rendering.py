@@ -46,7 +46,7 @@ def measure(folder, quick):
 def said(command, folder):
     """What a command prints that must succeed, where there is no database."""
     environment = {name: value for name, value in os.environ.items() if name != "MATDB"}
-    return subprocess.run(command, check=True, cwd=folder, env=environment, stdout=subprocess.PIPE).stdout
+    return subprocess.run(command, check=True, cwd=folder, env=environment, capture_output=True).stdout
 
 
 def note(times_ms, call):

@@ -35,16 +35,16 @@ class Workload:
 
 FULL = [
     Workload("paper", "body", "paper", 41, 15, robust=True),
-    Workload("body", "body", 10**6, 11, 20, robust=True),
-    Workload("second bounce", "body", "second", 7, 20),
-    Workload("facets 3", 10**3, 10**6, 7, 12),
-    Workload("facets 4", 10**4, 10**6, 7, 12),
-    Workload("facets 5", 10**5, 10**6, 7, 12),
-    Workload("facets 6", 10**6, 10**6, 9, 30, robust=True),
-    Workload("facets 7", 10**7, 10**5, 3, 30, threads=[2]),
-    Workload("rays 4", 10**6, 10**4, 7, 12),
-    Workload("rays 5", 10**6, 10**5, 7, 12),
-    Workload("rays 7", 10**6, 10**7, 5, 40),
+    Workload("body", "body", 10**6, 11, 15, robust=True),
+    Workload("second bounce", "body", "second", 7, 15),
+    Workload("facets 3", 10**3, 10**6, 7, 8),
+    Workload("facets 4", 10**4, 10**6, 7, 8),
+    Workload("facets 5", 10**5, 10**6, 7, 8),
+    Workload("facets 6", 10**6, 10**6, 9, 20, robust=True),
+    Workload("facets 7", 10**7, 10**5, 3, 20, threads=[2]),
+    Workload("rays 4", 10**6, 10**4, 7, 10),
+    Workload("rays 5", 10**6, 10**5, 7, 10),
+    Workload("rays 7", 10**6, 10**7, 5, 30),
 ]
 
 QUICK = [
