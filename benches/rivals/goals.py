@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from rows import best, median, named, of_workload, ours, total
 from words import bound, number, times
 
+# Not the filter that lets all pass.
+QUESTIONS = ("filter by class", "filter by tag", "filter by frequency", "filter by kind", "full text")
 LOW, MEDIUM = "Embree, low build", "Embree, medium build"
 
 
@@ -106,7 +108,7 @@ def store(results):
     of = f"database of {number(count)} materials: " if count else "database: "
     yield at_most(of + "insert over SQLite alone", 1.5, "", value("bulk import over"))
     yield at_most(of + "look-up by name", 20, "µs", value("look-up"))
-    yield at_most(of + "the slowest filter or full text", 1000, "µs", value("filter", "full text"))
+    yield at_most(of + "the slowest filter or full text", 1000, "µs", value(*QUESTIONS))
     yield at_most(of + "the slowest opening", 5, "ms", value("open"))
 
 

@@ -285,9 +285,10 @@ Four parameters, 5 000 points, one start.
 def store(results):
     rows = []
     for row in results.get("store", []):
-        unit = row["unit"].replace("us", "µs")
-        goal = "" if row["goal"] is None else f"≤ {bound(row['goal'])}: {'met' if row['value'] <= row['goal'] else 'missed'}"
-        rows.append([row["what"], f"{number(row['value'])} {unit}".strip(), goal])
+        unit, value = row["unit"].replace("us", "µs"), row["value"]
+        shown = grouped(int(value)) if not unit and value == int(value) else number(value)
+        goal = "" if row["goal"] is None else f"≤ {bound(row['goal'])}: {'met' if value <= row['goal'] else 'missed'}"
+        rows.append([row["what"], f"{shown} {unit}".strip(), goal])
     if not rows:
         return ""
     return f"""## Database
