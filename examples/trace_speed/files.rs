@@ -49,9 +49,11 @@ pub fn write_hits(path: &Path, hits: &[Option<Hit>]) -> Result<()> {
 pub fn read_mesh(path: &Path) -> Result<Mesh> {
     let mut file = BufReader::new(File::open(path)?);
     let (vertices, facets) = (read_count(&mut file)?, read_count(&mut file)?);
-    let mut mesh = Mesh::default();
-    mesh.vertices = (0..vertices).map(|_| read_vector(&mut file)).collect::<Result<_>>()?;
-    mesh.facets = (0..facets).map(|_| read_facet(&mut file)).collect::<Result<_>>()?;
+    let mesh = Mesh {
+        vertices: (0..vertices).map(|_| read_vector(&mut file)).collect::<Result<_>>()?,
+        facets: (0..facets).map(|_| read_facet(&mut file)).collect::<Result<_>>()?,
+        labels: Vec::new(),
+    };
     mesh.validate().map_err(Error::other)?;
     Ok(mesh)
 }
