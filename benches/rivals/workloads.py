@@ -41,7 +41,7 @@ FULL = [
     Workload("facets 4", 10**4, 10**6, 7, 8),
     Workload("facets 5", 10**5, 10**6, 7, 8),
     Workload("facets 6", 10**6, 10**6, 9, 20, robust=True),
-    Workload("facets 7", 10**7, 10**5, 3, 20, threads=[2]),
+    Workload("facets 7", 10**7, 10**5, 2, 20, threads=[2]),
     Workload("rays 4", 10**6, 10**4, 7, 10),
     Workload("rays 5", 10**6, 10**5, 7, 10),
     Workload("rays 7", 10**6, 10**7, 5, 30),
