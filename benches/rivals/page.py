@@ -38,6 +38,8 @@ def head(results):
     machine, versions = results["machine"], results["versions"]
     quick = "**A trial run of few turns and small sizes: its numbers mean nothing.**\n\n" if results["quick"] else ""
     told = ", ".join(f"{name} {version}" for name, version in sorted(versions.items()))
+    commit = machine["commit"]
+    older = "".join(f"\n- {part}: measured at `{at}`" for part, at in results["commits"].items() if at != commit)
     failed = "".join(f"\n- {part} could not be measured: {why}" for part, why in results["failed"].items())
     return f"""# Performance
 
@@ -48,8 +50,8 @@ brackets. Times are ms and belong to one machine. Ratios say more: **× 3 means 
 `matdb`**.
 
 - {machine["cpu"]} (family and model {machine["family"]}), {machine["cores"]} cores of {machine["architecture"]} with {", ".join(machine["features"])}; {machine["memory_gb"]} GB; {machine["system"]}
-- {machine["date"]}, commit `{machine["commit"]}`, {machine["rustc"]}; {results["minutes"]:.0f} minutes, load before them {machine["load_before"]}
-- {told or "no rival"}{failed}
+- {machine["date"]}, commit `{commit}`, {machine["rustc"]}; {results["minutes"]:.0f} minutes, load before them {machine["load_before"]}
+- {told or "no rival"}{older}{failed}
 """
 
 

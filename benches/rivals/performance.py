@@ -43,13 +43,13 @@ def measure(options):
     say("build")
     build("trace_speed", "file_speed", "fit_speed", "icp_speed")
     cargo("bench", "--no-run", "--bench", "store")
-    found = {"schema": 1, "quick": options.quick, "machine": machine.describe(), "versions": {}, "failed": {}}
-    if options.only and options.results.exists():
-        stored = json.loads(options.results.read_text(encoding="utf-8"))
-        found |= {key: stored[key] for key in ["versions", *PARTS] if key in stored}
+    found = {"schema": 1, "quick": options.quick, "machine": machine.describe()}
+    found |= {"versions": {}, "failed": {}, "commits": {}} | kept(options)
     began = time.monotonic()
     for part in options.only or PARTS:
         say(part)
+        found["commits"][part] = found["machine"]["commit"]
+        found["failed"].pop(part, None)
         with tempfile.TemporaryDirectory(prefix="rivals-") as folder:
             try:
                 found[part], versions = measured(part, folder, options.quick)
@@ -59,6 +59,15 @@ def measure(options):
                 found.pop(part, None)
                 found["failed"][part] = said(reason)
     return found | {"minutes": round((time.monotonic() - began) / 60, 1)}
+
+
+def kept(options):
+    """What stays of the stored results."""
+    if not options.only or not options.results.exists():
+        return {}
+    stored = json.loads(options.results.read_text(encoding="utf-8"))
+    kept = {key: stored[key] for key in ["versions", "failed", "commits", *PARTS] if key in stored}
+    return kept | {"quick": options.quick or stored["quick"]}
 
 
 def measured(part, folder, quick):

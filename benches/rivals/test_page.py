@@ -9,7 +9,7 @@ MACHINE = {
     "cpu": "Abacus", "family": "1", "architecture": "wood", "cores": 2, "features": ["beads"], "memory_gb": 1,
     "system": "Table 1", "date": "2000-01-01", "commit": "0123456789ab", "rustc": "rustc 1", "load_before": 0.0,
 }
-EMPTY = {"schema": 1, "quick": False, "machine": MACHINE, "versions": {}, "failed": {}, "minutes": 1}
+EMPTY = {"schema": 1, "quick": False, "machine": MACHINE, "versions": {}, "failed": {}, "commits": {}, "minutes": 1}
 
 
 def trace(workload, tracer, build, trace, threads=2, way="", **more):
@@ -84,11 +84,14 @@ class Page(unittest.TestCase):
                  "coherent": True, "tracer": "Open3D", "missing": "No module named 'open3d'"},
             ],
             "failed": {"store": "no cargo"},
+            "commits": {"trace": MACHINE["commit"], "fits": "ba9876543210"},
         }
         row, = self.lines(results, "| Open3D |")
         self.assertIn("No module named 'open3d'", row)
         self.assertEqual(self.lines(results, "Nowhere"), ["Nowhere in this run."])
         self.assertEqual(self.lines(results, "- store"), ["- store could not be measured: no cargo"])
+        self.assertEqual(self.lines(results, "- fits"), ["- fits: measured at `ba9876543210`"])
+        self.assertEqual(self.lines(results, "- trace"), [])
 
     def test_registration_must_be_faster_than_the_fastest_and_as_exact(self):
         results = {"registration": [
