@@ -3,8 +3,8 @@
 //! `cargo bench --bench store -- 100000` fills a database with that many materials, a curve of 90 rows
 //! each (2000 without a number), and prints one line per measurement. Filling is compared with prepared
 //! statements that insert the very same rows into the same schema, in the same run: the ratio says
-//! something on any machine, the times only on one. A second argument `publish` publishes it, too, twice:
-//! that takes long and much room on the disk.
+//! something on any machine, the times only on one. A further argument `publish` publishes it, too, twice:
+//! that takes long and much room on the disk; with `json` every line is JSON.
 
 use std::fs;
 use std::hint::black_box;
@@ -30,13 +30,16 @@ fn main() {
     let number: usize = number.unwrap_or(2000);
     let folder = tempfile::tempdir().unwrap();
     let [ours, raw] = ["ours.sqlite", "raw.sqlite"].map(|name| folder.path().join(name));
-    println!("{number} materials, {ROWS} rows each");
-    let filled = fill(&ours, number);
-    say("bulk import", filled, number);
-    let alone = replay(&ours, &raw, number);
-    say("the same rows, SQLite alone", alone, number);
-    println!("ratio {:.2} (goal: at most 1.5)", filled.as_secs_f64() / alone.as_secs_f64());
-    println!("size: {:.0} MB", fs::metadata(&ours).unwrap().len() as f64 / 1e6);
+    tell("materials", number as f64, "", None);
+    tell("rows each", ROWS as f64, "", None);
+    let filled = fill(&ours, number).as_secs_f64();
+    tell("bulk import", filled, "s", None);
+    tell("bulk import, each", filled * 1e6 / number as f64, "us", None);
+    let alone = replay(&ours, &raw, number).as_secs_f64();
+    tell("the same rows, SQLite alone", alone, "s", None);
+    tell("the same rows, SQLite alone, each", alone * 1e6 / number as f64, "us", None);
+    tell("bulk import over SQLite alone", filled / alone, "", Some(1.5));
+    tell("size", fs::metadata(&ours).unwrap().len() as f64 / 1e6, "MB", None);
     opening(folder.path(), &ours);
     let store = Store::open_existing(&ours).unwrap().unwrap();
     look_up(&store, number);
@@ -49,9 +52,16 @@ fn main() {
     }
 }
 
-fn say(what: &str, time: Duration, number: usize) {
-    let each = time.as_secs_f64() * 1e6 / number as f64;
-    println!("{what}: {:.2} s, {each:.0} us each", time.as_secs_f64());
+/// One measurement, with what it should stay below.
+fn tell(what: &str, value: f64, unit: &str, goal: Option<f64>) {
+    if std::env::args().any(|argument| argument == "json") {
+        let line = serde_json::json!({ "what": what, "value": value, "unit": unit, "goal": goal });
+        println!("{line}");
+        return;
+    }
+    let digits = if value < 10.0 { 2 } else { 0 };
+    let goal = goal.map_or(String::new(), |goal| format!(" (goal: {goal})"));
+    println!("{what}: {value:.digits$} {unit}{goal}");
 }
 
 /// The material of this number, alike but for names, classes, tags, frequency and levels.
@@ -106,11 +116,11 @@ fn fill(path: &Path, number: usize) -> Duration {
 fn opening(folder: &Path, ours: &Path) {
     let new = |turn: usize| folder.join(format!("new-{turn}.sqlite"));
     let made = median_us(21, |turn| drop(Store::open(new(turn)).unwrap()));
-    println!("open a new database and migrate: {:.2} ms (goal: 5)", made / 1e3);
+    tell("open a new database and migrate", made / 1e3, "ms", Some(5.0));
     let opened = median_us(21, |_| drop(Store::open(ours).unwrap()));
-    println!("open to write: {:.2} ms (goal: 5)", opened / 1e3);
+    tell("open to write", opened / 1e3, "ms", Some(5.0));
     let opened = median_us(21, |_| drop(Store::open_existing(ours).unwrap()));
-    println!("open to read: {:.2} ms (goal: 5)", opened / 1e3);
+    tell("open to read", opened / 1e3, "ms", Some(5.0));
 }
 
 /// A table's rows of one material, and where the numbers of material and revision stand in them.
@@ -225,11 +235,11 @@ fn median_us(times: usize, mut call: impl FnMut(usize)) -> f64 {
 fn look_up(store: &Store, number: usize) {
     let slug = |turn: usize| format!("material-{:06}", turn * 7919 % number).parse().unwrap();
     let line = median_us(2000, |turn| drop(black_box(store.summary(&slug(turn)).unwrap())));
-    println!("look-up by name: {line:.1} us (goal: 20)");
+    tell("look-up by name", line, "us", Some(20.0));
     let rendered = median_us(2000, |turn| drop(black_box(store.rendered(&slug(turn)).unwrap())));
-    println!("what scenes render of a name: {rendered:.1} us");
+    tell("what scenes render of a name", rendered, "us", None);
     let whole = median_us(500, |turn| drop(black_box(store.get(&slug(turn), None).unwrap())));
-    println!("a whole material with its {ROWS} rows and hash: {whole:.1} us");
+    tell("a whole material with its rows and hash", whole, "us", None);
 }
 
 fn filters(store: &Store) {
@@ -243,12 +253,12 @@ fn filters(store: &Store) {
     ] {
         let found = store.find(&filter).unwrap().len();
         let time = median_us(21, |_| drop(black_box(store.find(&filter).unwrap())));
-        println!("filter by {what}, {found} found: {time:.0} us (goal: 1000)");
+        tell(&format!("filter by {what}, {found} found"), time, "us", Some(1000.0));
     }
     for words in ["no77", "amber no1", "amber", "paint"] {
         let found = store.search(words, u32::MAX).unwrap().len();
         let time = median_us(21, |_| drop(black_box(store.search(words, 20).unwrap())));
-        println!("full text `{words}`, 20 of {found}: {time:.0} us (goal: 1000)");
+        tell(&format!("full text `{words}`, 20 of {found}"), time, "us", Some(1000.0));
     }
 }
 
@@ -273,7 +283,7 @@ fn processes(path: &Path) {
                 command.args(&arguments).arg("--db").arg(path).output().unwrap().status.success()
             );
         });
-        println!("matdb {}: {:.1} ms (goal: 50)", arguments.join(" "), time / 1e3);
+        tell(&format!("matdb {}", arguments.join(" ")), time / 1e3, "ms", Some(50.0));
     }
 }
 
@@ -293,13 +303,13 @@ fn publishing(path: &Path, site: &Path, what: &str) {
         }
     };
     assert!(ended.success());
-    let memory = peak_mib.map_or("unknown".to_owned(), |mib| format!("{mib:.0} MiB"));
     let (files, bytes) = size(site);
-    println!(
-        "{what}: {:.1} s, memory {memory} (goal: 500 MiB), {files} files, {:.0} MB",
-        start.elapsed().as_secs_f64(),
-        bytes as f64 / 1e6
-    );
+    tell(what, start.elapsed().as_secs_f64(), "s", None);
+    if let Some(peak_mib) = peak_mib {
+        tell(&format!("{what}, memory"), peak_mib, "MiB", Some(500.0));
+    }
+    tell(&format!("{what}, files"), files as f64, "", None);
+    tell(&format!("{what}, size"), bytes as f64 / 1e6, "MB", None);
 }
 
 /// The most memory that a process ever had, as Linux tells it.

@@ -1,14 +1,16 @@
-//! Milliseconds per fit of a curve from a file, as JSON: the half that `benches/rivals/fits.py` starts.
+//! Milliseconds per fit of a curve from a file, one JSON line for every line on stdin: the half that
+//! `benches/rivals/fits.py` starts.
 //!
 //!     cargo run --release --example fit_speed -- curve.csv
 
-use std::time::Instant;
+#[path = "support/turns.rs"]
+mod turns;
 
 use matdb::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
 use matdb::fit::{Fit, Method};
 use matdb::measure::curve::Curve;
+use turns::{Answer, serve, timed};
 
-const REPEATS: usize = 21;
 const LEVEL_SD_DB: f64 = 2.0;
 const THETA_SD_DEG: f64 = 1.0;
 
@@ -26,7 +28,7 @@ fn start() -> Brdf {
     Brdf::Mixture(Mixture { k: 0.3, diffuse, specular })
 }
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> Answer<()> {
     let path = std::env::args().nth(1).ok_or("give a curve: theta_deg,sigma0_db")?;
     let curve = Curve::read(&std::fs::read(path)?)?;
     let squares = |theta_sd_rad| {
@@ -39,26 +41,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         ("orthogonal distance", squares(THETA_SD_DEG.to_radians())),
         ("censored, with profiles", censored),
     ];
-    let mut found = serde_json::Map::new();
-    for (name, fit) in fits {
-        let mut times_ms = Vec::new();
-        let mut result = fit.run(&start(), &curve)?;
-        for _ in 0..REPEATS {
-            let began = Instant::now();
-            result = fit.run(&start(), &curve)?;
-            times_ms.push(1e3 * began.elapsed().as_secs_f64());
+    serve(|| {
+        let mut found = serde_json::Map::new();
+        for (name, fit) in &fits {
+            let (ms, result) = timed(|| fit.run(&start(), &curve));
+            let result = result?;
+            let value = |name: &str| result.estimate(name).map(|e| e.value);
+            let values = ["specular.m", "diffuse.alpha", "S", "R"].map(value);
+            let (converged, iterations) = (result.converged, result.iterations);
+            let entry = serde_json::json!({
+                "ms": ms, "values": values, "converged": converged, "iterations": iterations,
+            });
+            found.insert((*name).to_owned(), entry);
         }
-        times_ms.sort_by(f64::total_cmp);
-        let value = |name: &str| result.estimate(name).map(|e| e.value);
-        let values = ["specular.m", "diffuse.alpha", "S", "R"].map(value);
-        let entry = serde_json::json!({
-            "ms": times_ms[REPEATS / 2],
-            "values": values,
-            "converged": result.converged,
-            "iterations": result.iterations,
-        });
-        found.insert(name.to_owned(), entry);
-    }
-    println!("{}", serde_json::Value::Object(found));
-    Ok(())
+        Ok(serde_json::Value::Object(found))
+    })
 }

@@ -1,11 +1,13 @@
-//! Milliseconds and errors of a registration of some 20 000 points, as JSON: the half that
-//! `benches/rivals/icp.py` starts. The clouds and the push go into the folder that is given.
+//! Milliseconds and errors of a registration of some 20 000 points, one JSON line for every line on stdin:
+//! the half that `benches/rivals/icp.py` starts. The clouds and the push go into the folder that is given.
 //!
 //!     cargo run --release --example icp_speed -- DIR
 
+#[path = "support/turns.rs"]
+mod turns;
+
 use std::fmt::Write;
 use std::path::Path;
-use std::time::Instant;
 
 use glam::DVec3;
 use matdb::frames::{Global, Point, Pose};
@@ -14,15 +16,15 @@ use matdb::measure::placed::Traced;
 use matdb::measure::{Cloud, CloudPoint, Registration, Start};
 use matdb::radar::random::{Key, Purpose};
 use matdb::scene::{Scene, SceneFile};
+use turns::{Answer, serve, timed};
 
-const REPEATS: usize = 11;
 const RANGE_SD_M: f64 = 2e-3;
 const PUSH_M: f64 = 0.032;
 const PUSH_DEG: f64 = 5.0;
 /// Some 20 000 of these meet the target.
 const CHIRPS: usize = 31_000;
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> Answer<()> {
     let folder = std::env::args().nth(1).ok_or("give a folder for the clouds")?;
     let scene = scene()?;
     let cloud = measured(&scene)?;
@@ -38,28 +40,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let settings = Registration { start: Start::Given(rough), ..Registration::default() };
     let run = || settings.run(&scene.target.mesh, scene.radar(), &scene.chirps, &cloud);
-    let mut found = run()?;
-    let mut times_ms = Vec::new();
-    for _ in 0..REPEATS {
-        let began = Instant::now();
-        found = run()?;
-        times_ms.push(1e3 * began.elapsed().as_secs_f64());
-    }
-    times_ms.sort_by(f64::total_cmp);
-    let error = Motion::of(&found.pose, middle);
-    let record = serde_json::json!({
-        "points": cloud.points().len(),
-        "ms": times_ms[REPEATS / 2],
-        "shift_mm": 1e3 * error.shift_m.length(),
-        "turn_deg": error.turn_rad.length().to_degrees(),
-        "threads": rayon::current_num_threads(),
-    });
-    println!("{record}");
-    Ok(())
+    serve(|| {
+        let (ms, found) = timed(run);
+        let error = Motion::of(&found?.pose, middle);
+        Ok(serde_json::json!({
+            "points": cloud.points().len(),
+            "ms": ms,
+            "shift_mm": 1e3 * error.shift_m.length(),
+            "turn_deg": error.turn_rad.length().to_degrees(),
+        }))
+    })
 }
 
 /// The human scene with more chirps than the paper's.
-fn scene() -> Result<Scene, Box<dyn std::error::Error>> {
+fn scene() -> Answer<Scene> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/human.toml");
     let text = std::fs::read_to_string(&path)?;
     let scan = format!("[radar.scan]\npattern = \"elliptical\"\nchirps = {CHIRPS}\n\n[[mesh]]");
@@ -67,7 +61,7 @@ fn scene() -> Result<Scene, Box<dyn std::error::Error>> {
 }
 
 /// Every hit with noise in range; its power plays no part.
-fn measured(scene: &Scene) -> Result<Cloud, Box<dyn std::error::Error>> {
+fn measured(scene: &Scene) -> Answer<Cloud> {
     let here = Pose::<Global, Global>::from_euler_xyz(DVec3::ZERO, DVec3::ZERO);
     let seen = Traced::new(&scene.target.mesh).scan(&here, &scene.chirps.rays);
     let mut draws = Key { seed: 5, chirp: 0, sub_ray: 0, purpose: Purpose::Range }.draws();

@@ -92,17 +92,23 @@ impl<'a> Fan<'a> {
     /// # Errors
     /// When they do not share an origin, or point more than 84° away from their mean direction.
     pub fn new(rays: &'a [Ray<Global>]) -> Result<Fan<'a>, NoFan> {
+        // Within the pool: from outside, every step would wake it anew.
+        rayon::scope(|_| Fan::sorted(rays))
+    }
+
+    fn sorted(rays: &'a [Ray<Global>]) -> Result<Fan<'a>, NoFan> {
         let origin = match rays.first() {
             Some(ray) if rays.len() < u32::MAX as usize => ray.origin.xyz,
             _ => return Err(NoFan::Count { rays: rays.len() }),
         };
-        if let Some(ray) = rays.par_iter().position_first(|ray| ray.origin.xyz != origin) {
+        let elsewhere = |ray: &Ray<Global>| ray.origin.xyz != origin;
+        if let Some(ray) = rays.par_iter().with_min_len(4096).position_first(elsewhere) {
             return Err(NoFan::Origins { ray });
         }
         let frame = frame(rays);
         let flat: Vec<Option<[f32; 2]>> =
             rays.par_iter().with_min_len(4096).map(|ray| flattened(frame, ray)).collect();
-        if let Some(ray) = flat.par_iter().position_first(Option::is_none) {
+        if let Some(ray) = flat.par_iter().with_min_len(4096).position_first(Option::is_none) {
             return Err(NoFan::Wide { ray });
         }
         let flat: Vec<[f32; 2]> = flat.into_iter().flatten().collect();

@@ -51,6 +51,11 @@ impl Fan<'_> {
     /// The closest hits of all rays on a mesh, in their order; of equally near facets the one with the
     /// smallest number.
     pub fn closest(&self, mesh: &Mesh) -> Vec<Option<Hit>> {
+        // Within the pool: from outside, every step would wake it anew.
+        rayon::scope(|_| self.nearest_hits(mesh))
+    }
+
+    fn nearest_hits(&self, mesh: &Mesh) -> Vec<Option<Hit>> {
         let picture = Picture::new(self, mesh);
         let nearest = nearest(&picture);
         let left_out = picture.left_out();

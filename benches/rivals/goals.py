@@ -1,0 +1,124 @@
+"""The goals, and what of them was reached."""
+
+from dataclasses import dataclass
+
+from rows import best, median, named, of_workload, ours, total
+from words import bound, number, times
+
+# Not the filter that lets all pass.
+QUESTIONS = ("filter by class", "filter by tag", "filter by frequency", "filter by kind", "full text")
+LOW, MEDIUM = "Embree, low build", "Embree, medium build"
+
+
+@dataclass
+class Goal:
+    """`reached` is None where nothing was measured."""
+
+    work: str
+    goal: str
+    measured: str
+    reached: bool | None
+
+    def verdict(self):
+        return {True: "met", False: "**missed**", None: "not measured"}[self.reached]
+
+
+def at_least(work, factor, theirs, mine, rival):
+    if theirs is None or mine is None:
+        return Goal(work, f"≥ {bound(factor)} × {rival}", "", None)
+    ratio = theirs / mine
+    return Goal(work, f"≥ {bound(factor)} × {rival}", times(ratio), ratio >= factor)
+
+
+def at_most(work, most, unit, value):
+    goal = f"≤ {bound(most)} {unit}".strip()
+    if value is None:
+        return Goal(work, goal, "", None)
+    return Goal(work, goal, f"{number(value)} {unit}".strip(), value <= most)
+
+
+def all_goals(results):
+    return [
+        *tracing(results), *rendering(results), gpu(), *fits(results), *registration(results),
+        *store(results), *formats(results), memory(results),
+    ]
+
+
+def tracing(results):
+    rows = results.get("trace", [])
+    paper = of_workload(rows, "paper", 2)
+    shaded = [row["power"] for row in results.get("power", []) if row["threads"] == 2 and "power" in row]
+    mine = total(ours(paper))
+    whole = mine + median(shaded[0]) if mine is not None and shaded else None
+    work = "paper's scan, facets → hits → power, 2 threads"
+    for tracer, factor, name in [(MEDIUM, 8, "Embree medium"), (LOW, 4, "Embree low")]:
+        yield at_least(work, factor, total(best(paper, tracer)), whole, f"{name}, build + trace")
+    yield at_most("paper's scan, facets → hits, 1 thread", 0.6, "ms", total(ours(of_workload(rows, "paper", 1))))
+    for key, name, factor in [("facets 6", "1 M × 1 M", 5), ("rays 7", "1 M × 10 M", 1.2)]:
+        found = of_workload(rows, key, 2)
+        work = f"{name}, facets → hits, 2 threads"
+        yield at_least(work, factor, total(best(found, MEDIUM)), total(ours(found)), "Embree medium, build + trace")
+    for threads in [1, 2]:
+        found = of_workload(rows, "second bounce", threads)
+        packets = [median(row["trace"]) for row in named(found, MEDIUM) if "packets" in row["way"]]
+        mine = ours(found)
+        work = f"general rays, trace alone, {threads} thread{'s' * (threads > 1)}"
+        yield at_least(work, 0.8, min(packets, default=None), mine and median(mine["trace"]), "Embree packets")
+
+
+def rendering(results):
+    found = results.get("render")
+    ratio = median(found["render"]) / median(found["write"]) if found else None
+    yield at_most("whole `render` of the paper's scene over writing its files", 3, "", ratio)
+
+
+def gpu():
+    return Goal("GPU", "within 2 × of the best published rate", "no GPU was at hand", None)
+
+
+def fits(results):
+    rows = [row for row in results.get("fits", []) if "ms" in row]
+    ms = {(row["fit"], row["program"]): median(row["ms"]) for row in rows}
+    for fit, program, name, factor in [
+        ("least squares", "scipy least_squares", "scipy", 7.4),
+        ("orthogonal distance", "odrpack", "odrpack", 9.5),
+    ]:
+        yield at_least(f"{fit}, 4 parameters, 5 000 points", factor, ms.get((fit, program)), ms.get((fit, "matdb")), name)
+    yield Goal("1 000 bootstrap refits", "≤ 1 s", "there is no bootstrap", None)
+
+
+def registration(results):
+    rows = [row for row in results.get("registration", []) if "ms" in row]
+    for threads in [1, 2]:
+        here = [row for row in rows if row["threads"] == threads]
+        mine = next((row for row in here if row["program"].startswith("matdb")), None)
+        for rival in ["small_gicp", "Open3D"]:
+            fastest = min((median(row["ms"]) for row in here if row["program"].startswith(rival)), default=None)
+            work = f"registration, {threads} thread{'s' * (threads > 1)}"
+            yield at_least(work, 1, fastest, mine and median(mine["ms"]), f"the fastest of {rival}")
+    error = (mine["shift_mm"], mine["turn_deg"]) if rows and mine else (None, None)
+    yield at_most("registration, error of the shift", 0.1, "mm", error[0])
+    yield at_most("registration, error of the turn", 0.02, "°", error[1])
+
+
+def store(results):
+    rows = {row["what"]: row for row in results.get("store", [])}
+    value = lambda *starts: max((r["value"] for what, r in rows.items() if what.startswith(starts)), default=None)
+    count = value("materials")
+    of = f"database of {number(count)} materials: " if count else "database: "
+    yield at_most(of + "insert over SQLite alone", 1.5, "", value("bulk import over"))
+    yield at_most(of + "look-up by name", 20, "µs", value("look-up"))
+    yield at_most(of + "the slowest filter or full text", 1000, "µs", value(*QUESTIONS))
+    yield at_most(of + "the slowest opening", 5, "ms", value("open"))
+
+
+def formats(results):
+    ms = {(row["work"], row["program"]): median(row["ms"]) for row in results.get("formats", []) if "ms" in row}
+    yield at_most("read and check a binary PLY of 1 M triangles", 10, "ms", ms.get(("read PLY", "matdb")))
+    yield at_most("write EXR, 1024², 7 channels, ZIP16", 100, "ms", ms.get(("write EXR", "matdb")))
+
+
+def memory(results):
+    mine = ours(of_workload(results.get("trace", []), "facets 7", 2))
+    over = (mine["mesh_mb"] + mine["memory_mb"]) / mine["mesh_mb"] if mine else None
+    return at_most("memory, 10 M facets, mesh included", 1.5, "× the mesh", over)

@@ -1,0 +1,124 @@
+"""The page of a small hand-made result: ratios, goals, losses and what is missing."""
+
+import unittest
+
+from goals import all_goals
+from page import page
+
+MACHINE = {
+    "cpu": "Abacus", "family": "1", "architecture": "wood", "cores": 2, "features": ["beads"], "memory_gb": 1,
+    "system": "Table 1", "date": "2000-01-01", "commit": "0123456789ab", "rustc": "rustc 1", "load_before": 0.0,
+}
+EMPTY = {"schema": 1, "quick": False, "machine": MACHINE, "versions": {}, "failed": {}, "commits": {}, "minutes": 1}
+
+
+def trace(workload, tracer, build, trace, threads=2, way="", **more):
+    row = {
+        "workload": workload, "facets": 1000, "rays": 2000, "threads": threads, "mesh_mb": 10.0, "coherent": True,
+        "tracer": tracer, "agree": 1.0, "memory_mb": 4.0, "way": way, "turns": 3,
+    }
+    parts = {"build": build, "trace": trace, "total": build + trace}
+    return row | {name: [0.9 * ms, ms, 1.1 * ms] for name, ms in parts.items()} | more
+
+
+def ms(value, **more):
+    return {"ms": [value, value, value]} | more
+
+
+class Page(unittest.TestCase):
+    def goal(self, results, work, rival=""):
+        found = [g for g in all_goals(EMPTY | results) if g.work.startswith(work) and rival in g.goal]
+        self.assertEqual(len(found), 1, found)
+        return found[0]
+
+    def lines(self, results, start):
+        text = page(EMPTY | results)
+        self.assertNotIn("None", text)
+        return [line for line in text.splitlines() if line.startswith(start)]
+
+    def test_power_is_part_of_the_papers_goal_and_the_fastest_way_counts(self):
+        results = {
+            "trace": [
+                trace("paper", "matdb pinhole", 0.0, 1.0),
+                trace("paper", "Embree, medium build", 9.0, 4.0, way="single"),
+                trace("paper", "Embree, medium build", 9.0, 1.0, way="packets of 16"),
+            ],
+            "power": [{"threads": 2, "power": [0.2, 0.25, 0.3]}],
+        }
+        goal = self.goal(results, "paper's scan, facets → hits → power", "medium")
+        self.assertEqual((goal.measured, goal.reached), ("× 8.00", True))
+        results["power"][0]["power"][1] = 0.26
+        self.assertFalse(self.goal(results, "paper's scan, facets → hits → power", "medium").reached)
+        row, = self.lines(results, "| Embree, medium build, packets of 16 |")
+        self.assertIn("| × 10.0 | ≥ 8: met |", row)
+
+    def test_the_default_tracer_is_the_measure_and_not_the_faster_one(self):
+        results = {
+            "trace": [trace("paper", "matdb pinhole", 0.0, 2.0), trace("paper", "matdb hierarchy", 0.5, 0.5)]
+        }
+        row, = self.lines(results, "| matdb hierarchy |")
+        self.assertIn("| × 0.500 |", row)
+
+    def test_a_loss_once_built_is_one_too(self):
+        results = {
+            "trace": [
+                trace("body", "matdb pinhole", 0.0, 2.0),
+                trace("body", "Embree, low build", 0.5, 0.5),
+                trace("body", "Embree, medium build", 5.0, 1.0),
+                trace("body", "Open3D", 5.0, 3.0),
+            ],
+            "fits": [ms(2.0, fit="f", program="matdb"), ms(1.0, fit="f", program="odrpack", gap=1e-7)],
+        }
+        lost = self.lines(results, "| 1 000 facets, ") + self.lines(results, "| f |  |")
+        self.assertEqual(lost, [
+            "| 1 000 facets, 2 000 rays | 2 | Embree, low build | × 0.500 | × 0.250 |",
+            "| 1 000 facets, 2 000 rays | 2 | Embree, medium build | × 3.00 | × 0.500 |",
+            "| f |  | odrpack | × 0.500 |  |",
+        ])
+
+    def test_what_is_missing_is_said_and_is_no_loss(self):
+        results = {
+            "trace": [
+                trace("body", "matdb pinhole", 0.0, 2.0),
+                {"workload": "body", "facets": 1000, "rays": 2000, "threads": 2, "mesh_mb": 10.0,
+                 "coherent": True, "tracer": "Open3D", "missing": "No module named 'open3d'"},
+            ],
+            "failed": {"store": "no cargo"},
+            "commits": {"trace": MACHINE["commit"], "fits": "ba9876543210"},
+        }
+        row, = self.lines(results, "| Open3D |")
+        self.assertIn("No module named 'open3d'", row)
+        self.assertEqual(self.lines(results, "Nowhere"), ["Nowhere in this run."])
+        self.assertEqual(self.lines(results, "- store"), ["- store could not be measured: no cargo"])
+        self.assertEqual(self.lines(results, "- fits"), ["- fits: measured at `ba9876543210`"])
+        self.assertEqual(self.lines(results, "- trace"), [])
+
+    def test_registration_must_be_faster_than_the_fastest_and_as_exact(self):
+        results = {"registration": [
+            ms(50.0, threads=2, program="matdb, whole", shift_mm=0.05, turn_deg=0.03, points=9),
+            ms(60.0, threads=2, program="small_gicp ICP", shift_mm=4.0, turn_deg=0.6),
+            ms(40.0, threads=2, program="small_gicp GICP", shift_mm=0.1, turn_deg=0.1),
+        ]}
+        self.assertEqual(self.goal(results, "registration, 2 threads", "small_gicp").measured, "× 0.800")
+        self.assertIsNone(self.goal(results, "registration, 1 thread", "Open3D").reached)
+        self.assertTrue(self.goal(results, "registration, error of the shift").reached)
+        self.assertFalse(self.goal(results, "registration, error of the turn").reached)
+
+    def test_the_slowest_question_to_the_database_counts(self):
+        rows = [("filter by tag", 20.0), ("filter by kind", 1200.0), ("full text `no77`", 300.0)]
+        results = {"store": [{"what": what, "value": us, "unit": "us", "goal": 1000.0} for what, us in rows]}
+        goal = self.goal(results, "database: the slowest filter")
+        self.assertEqual((goal.measured, goal.reached), ("1 200 µs", False))
+
+    def test_memory_counts_the_mesh_itself(self):
+        results = {"trace": [trace("facets 7", "matdb pinhole", 0.0, 1.0)]}
+        self.assertEqual(self.goal(results, "memory").measured, "1.40 × the mesh")
+
+    def test_a_page_without_results_names_every_goal_as_not_measured(self):
+        for goal in all_goals(EMPTY):
+            self.assertIsNone(goal.reached, goal)
+        self.assertIn("No GPU was at hand", page(EMPTY))
+
+
+if __name__ == "__main__":
+    unittest.main()

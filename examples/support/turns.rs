@@ -1,0 +1,25 @@
+//! A program that is timed in turns with others: it reads its input, says `ready`, and answers every line
+//! on stdin with one of JSON. `benches/rivals/programs.py` is the other side.
+
+use std::error::Error;
+use std::time::Instant;
+
+use serde_json::Value;
+
+pub type Answer<T> = Result<T, Box<dyn Error>>;
+
+pub fn serve(mut turn: impl FnMut() -> Answer<Value>) -> Answer<()> {
+    println!("ready");
+    for line in std::io::stdin().lines() {
+        line?;
+        println!("{}", turn()?);
+    }
+    Ok(())
+}
+
+/// Milliseconds of a call, and what it returned.
+pub fn timed<T>(call: impl FnOnce() -> T) -> (f64, T) {
+    let began = Instant::now();
+    let answer = call();
+    (1e3 * began.elapsed().as_secs_f64(), answer)
+}
