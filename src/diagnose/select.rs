@@ -258,11 +258,13 @@ impl Selection<'_> {
                     let loss = state.fitted.ln_likelihood - without.fitted.ln_likelihood;
                     let [gain, se] = self.difference(&state.held_out, &without.held_out);
                     let largest_db = added.iter().map(|a| a.evidence.size_db).fold(0.0, f64::max);
-                    let size_db = larger(self.sizes_db(&without, &state.space, &state.fitted.at));
+                    let sizes_db = self.sizes_db(&without, &state.space, &state.fitted.at);
+                    let (size_db, is_spread) = (larger(sizes_db), sizes_db[1] > sizes_db[0]);
                     let least_db = self.settings.least_size_db.max(SHARE_OF_LARGEST * largest_db);
                     let numbers = state.space.effects[index].knobs().len();
                     let least = self.settings.least_gain_of(numbers, 1);
-                    let is_local = loss > FAR_BEYOND * least && gain > SHARE_KEPT * loss;
+                    let is_local =
+                        !is_spread && loss > FAR_BEYOND * least && gain > SHARE_KEPT * loss;
                     let is_needed = (gain > self.settings.standard_errors * se || is_local)
                         && loss > least
                         && size_db >= least_db;
@@ -302,10 +304,10 @@ impl Selection<'_> {
             let held_out = self.held_out(&trial.space, &trial.fitted.at);
             let [gain, se] = self.difference(&held_out, &state.held_out);
             trial.candidate.held_out = Some([gain, se]);
-            // What acts in one small place has no standard error over places; it must be far beyond
-            // chance and be found again where it was not fitted.
+            // What acts in one small place, as no scatter does, has no standard error over places; it
+            // must be far beyond chance and be found again where it was not fitted.
             let is_kept = gain >= SHARE_KEPT * trial.candidate.gain && gain > se;
-            let is_local = is_kept && trial.candidate.gain >= FAR_BEYOND * least;
+            let is_local = is_kept && !is_spread && trial.candidate.gain >= FAR_BEYOND * least;
             // A fit without a patch may be far off where the patch was all that held it.
             let gain = gain.min(trial.candidate.gain);
             if gain <= standard_errors * se && !is_local {
