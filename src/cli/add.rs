@@ -143,7 +143,7 @@ fn material_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
 }
 
 fn made(inputs: Vec<Input>) -> Activity {
-    Activity { command: "add".to_owned(), inputs }
+    Activity { command: "add".to_owned(), inputs, origin: None }
 }
 
 fn read(path: &Path) -> Result<(Material, Activity), Error> {

@@ -28,7 +28,9 @@ pub use check::MaterialError;
 pub use composition::{Layer, Permittivity, Roughness};
 pub use finding::{Finding, FindingVerdict};
 pub use instrument::{Geometry, Instrument, Scale};
-pub use provenance::{Activity, Citation, Input, Making, Session, SessionPose, Source, SourceKind};
+pub use provenance::{
+    Activity, Citation, Input, Making, Origin, Session, SessionPose, Source, SourceKind,
+};
 pub use report::{Estimate, FitReport, Given, Goodness};
 pub use slug::Slug;
 pub use status::Status;
