@@ -496,6 +496,11 @@ fn read<T: DeserializeOwned>(bundle: &Path, path: &str) -> Result<T, String> {
     serde_json::from_slice(&bytes).map_err(|error| error.to_string())
 }
 
+/// What a publication says of itself.
+pub(super) fn about(bundle: &Path) -> Result<About, String> {
+    read(bundle, ABOUT).map_err(|what| format!("{ABOUT}: {what}"))
+}
+
 /// Whether a newer program has published this: its files may say what this one would not understand.
 pub(super) fn is_newer(bundle: &Path) -> bool {
     #[derive(serde::Deserialize)]
