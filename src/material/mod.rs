@@ -14,6 +14,7 @@ mod provenance;
 mod report;
 mod slug;
 mod status;
+mod texts;
 
 use std::io;
 
@@ -34,6 +35,7 @@ pub use provenance::{
 pub use report::{Estimate, FitReport, Given, Goodness};
 pub use slug::Slug;
 pub use status::Status;
+pub use texts::{LONGEST_TEXT_BYTES, is_turning, turns_the_line};
 
 /// One revision of a material.
 #[derive(Clone, Debug, PartialEq, Serialize)]
