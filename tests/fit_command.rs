@@ -85,6 +85,11 @@ fn a_curve_is_fitted_stored_rendered_and_listed() {
     assert_eq!((&listed["curves"], &listed["observations"]), (&1.into(), &400.into()));
     let shown = text(folder, &["show", "human-skin"]);
     assert!(shown.contains("method censored: converged") && shown.contains("verdict:"), "{shown}");
+    let fitted = shown.split("fit mixture-censored").nth(1).unwrap();
+    for path in ["k ", "specular.f_lambda", "diffuse.r_s"] {
+        let line = fitted.lines().find(|line| line.starts_with(path)).unwrap();
+        assert!(line.ends_with("a convention, not measured"), "{line}");
+    }
     text(folder, &["plot", "human-skin", "-o", "plot.svg"]);
     let plot = fs::read_to_string(folder.join("plot.svg")).unwrap();
     assert!(plot.contains("scan, below the threshold here") && plot.contains("mixture-censored"));
