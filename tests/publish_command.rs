@@ -364,4 +364,44 @@ fn a_fit_that_does_not_follow_from_its_curve_is_seen() {
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(!output.status.success() && said.contains("ptfe@3, fit `lambert-censored`"), "{said}");
     assert_eq!(bytes(at).len(), 2, "verifying leaves nothing behind");
+    ptfe.fits.last_mut().unwrap().report = None;
+    Store::open(&path).unwrap().add([&ptfe]).unwrap();
+    for command in [&["verify", "matdb.sqlite"][..], &["check"]] {
+        let output = matdb(at).args(command).output().unwrap();
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert!(
+            !output.status.success() && said.contains("the report of that is not there"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn of_another_versions_publication_it_is_said_what_was_compared_and_what_not() {
+    let folder = laboratory();
+    publish(folder.path());
+    let site = folder.path().join("site");
+    let index = fs::read_to_string(site.join("api/v1/index.json")).unwrap();
+    let own = format!("\"program_version\":\"{}\"", env!("CARGO_PKG_VERSION"));
+    let old = index.replacen(&own, "\"program_version\":\"0.0.1\"", 1);
+    assert_ne!(old, index);
+    fs::write(site.join("api/v1/index.json"), old).unwrap();
+    // It knew fewer tables, and other pages.
+    fs::remove_file(site.join("tables/origin.csv")).unwrap();
+    relist(&site, "index.html", b"another page");
+    let output = matdb(folder.path()).args(["verify", "site"]).output().unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    let said = String::from_utf8(said).unwrap();
+    assert!(output.status.success(), "{said}");
+    for part in [
+        "matdb 0.0.1 has published this",
+        "compared were the hashes",
+        "not compared were the pages",
+    ] {
+        assert!(said.contains(part), "`{part}` is not in: {said}");
+    }
+    relist(&site, "tables/curve.csv", b"x");
+    let output = matdb(folder.path()).args(["verify", "site"]).output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(!output.status.success() && said.contains("tables/curve.csv: is not what"), "{said}");
 }

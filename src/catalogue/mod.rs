@@ -33,4 +33,6 @@ pub use nearest::Nearest;
 pub use publish::{Published, publish};
 pub use references::{Citable, Reference, references};
 pub use tables::HAS_PARQUET;
-pub use verify::{Checked, OTHER_UNITS, Problem, Verified, check_store, derived, verify};
+pub use verify::{
+    Checked, OTHER_UNITS, Problem, Verified, check_store, derived, verify, without_report,
+};
