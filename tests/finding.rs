@@ -267,9 +267,18 @@ fn list_takes_filters() {
     assert_eq!(slugs(&paint), ["mannequin-paint", "painted-metal"]);
     assert_eq!(slugs(&json(folder, &["list", "--kind", "measured"])), Vec::<&str>::new());
     assert!(text(folder, &["list", "--fitted", "--kind", "measured"]).contains("no such material"));
-    for wrong in [["--frequency", "0"], ["--frequency", "NaN"], ["--kind", "guessed"]] {
+    for wrong in [
+        ["--frequency", "0"],
+        ["--frequency", "-1"],
+        ["--frequency", "inf"],
+        ["--frequency", "NaN"],
+        ["--kind", "guessed"],
+    ] {
         let output = matdb(folder).arg("list").args(wrong).output().unwrap();
         assert_eq!(output.status.code(), Some(2));
+        let said = String::from_utf8(output.stderr).unwrap();
+        let way_out = ["give a frequency in GHz above 0", "possible values"];
+        assert!(way_out.iter().any(|way_out| said.contains(way_out)), "{said}");
     }
 }
 

@@ -204,6 +204,10 @@ fn bad_input_is_refused_with_a_sentence_and_nothing_is_stored() {
         ("scan.csv --save", "belongs to no material yet"),
         ("scan.csv --save ptfe", "nobody has said where scan.csv comes from"),
         ("scan.csv --save ptfe --kind measured", "nobody has said where"),
+        (
+            "scan.csv --save my-paint --kind measured --source x",
+            "`matdb add --from scan.csv --name my-paint --class CLASS …` makes one of the curve",
+        ),
         ("scan.csv --save ptf --kind measured --source x", "did you mean `ptfe`?"),
         (
             "scan.csv --save ptfe --kind measured --source x --licence CC0-1.0",

@@ -122,7 +122,21 @@ fn of_file(
             curves::UNSAID,
         ));
     };
-    let mut material = find(store, name, "--save: ")?.material;
+    let mut material = match find(store, name, "--save: ") {
+        Err(Error::UnknownMaterial { asked_by, name, way_out }) => {
+            let meant = match way_out.starts_with("did you mean") {
+                true => format!("{way_out} Else "),
+                false => String::new(),
+            };
+            let way_out = format!(
+                "{meant}`matdb add --from {} --name {name} --class CLASS …` makes one of the curve, and then \
+                 `matdb fit {name} --save` stores the fit",
+                args.what
+            );
+            return Err(Error::UnknownMaterial { asked_by, name, way_out });
+        }
+        found => found?.material,
+    };
     let (curve, name) = (&subject.curve, &subject.curve_name);
     let said = (kind.into(), title.as_str());
     let source = curves::put(&mut material, name, curve, said, &args.circumstances)?;
