@@ -66,7 +66,8 @@ pub(super) struct Args {
     /// Try only these effects [default: all]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     effects: Vec<String>,
-    /// Store what is found: new revisions of the materials, and the scene as SCENE-after.toml beside it
+    /// Store what is found, and what was tried and not found, as new revisions of the materials; with
+    /// something found the scene, too, as SCENE-after.toml beside it
     #[arg(long)]
     add: bool,
     /// The material that takes refitted law and effects in [default: all of the scene with enough looks]
