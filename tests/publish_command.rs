@@ -130,6 +130,15 @@ fn a_table_has_every_row_bit_for_bit_and_a_unit_for_every_number() {
     assert!(of_paint.iter().all(|o| points.contains(&(o.theta_i_rad, o.sigma0))));
     let units = fs::read_to_string(site.join("tables/units.csv")).unwrap();
     assert!(units.contains("observation,theta_i_rad,rad,\n"), "{units}");
+    let conn = rusqlite::Connection::open(site.join("catalogue.sqlite")).unwrap();
+    for line in units.lines().skip(1) {
+        let [table, column, code, _] = line.split(',').collect::<Vec<_>>()[..] else {
+            panic!("{line}")
+        };
+        let sql = "SELECT coalesce(ucum, '') FROM unit WHERE column_name = ?1";
+        let own: String = conn.query_row(sql, [column], |row| row.get(0)).unwrap();
+        assert_eq!(own, code, "{table}.{column}: the table `unit` of the database says otherwise");
+    }
     let package = json(&site.join("datapackage.json"));
     let resources = package["resources"].as_array().unwrap();
     for resource in resources {
