@@ -4,17 +4,6 @@
 --
 -- The program fills the outlines of what was stored before; where that came from nobody knows: no row.
 
--- Made of the current revision in the transaction that makes a revision current, as `entry` is. What its
--- bytes say is in src/brdf/outline.rs; they stand for nothing that is not stored elsewhere, and exports
--- leave them out.
-CREATE TABLE outline (
-    slug          TEXT PRIMARY KEY REFERENCES entry (slug) ON DELETE CASCADE,
-    theta_min_rad REAL NOT NULL,
-    theta_max_rad REAL NOT NULL,
-    model_hash    BLOB CHECK (length(model_hash) = 16),             -- NULL: nothing can be rendered
-    levels        BLOB CHECK (length(levels) = 180)                 -- NULL: not known
-) STRICT, WITHOUT ROWID;
-
 -- Somebody else's catalogue that a revision was taken from.
 CREATE TABLE origin (
     revision_id     INTEGER PRIMARY KEY REFERENCES activity (revision_id) ON DELETE CASCADE,
@@ -27,3 +16,14 @@ CREATE TABLE origin (
     program_version TEXT    NOT NULL,
     command         TEXT                                            -- what made it there
 ) STRICT;
+
+-- Made of the current revision in the transaction that makes a revision current, as `entry` is. What its
+-- bytes say is in src/brdf/outline.rs; they stand for nothing that is not stored elsewhere, and exports
+-- leave them out.
+CREATE TABLE outline (
+    slug          TEXT PRIMARY KEY REFERENCES entry (slug) ON DELETE CASCADE,
+    theta_min_rad REAL NOT NULL,
+    theta_max_rad REAL NOT NULL,
+    model_hash    BLOB CHECK (length(model_hash) = 16),             -- NULL: nothing can be rendered
+    levels        BLOB CHECK (length(levels) = 180)                 -- NULL: not known
+) STRICT, WITHOUT ROWID;

@@ -178,7 +178,29 @@ fn quiet(path: &Path) -> Result<Connection, StoreError> {
         Err(error) if !log_exists && !journal_exists && wants_a_log(&error) => {
             immutable(path).map_err(fail)
         }
-        result => result.map(|()| conn).map_err(fail),
+        result => {
+            result.map_err(fail)?;
+            check_length(path, &conn)?;
+            Ok(conn)
+        }
+    }
+}
+
+/// Refuses a file that was cut off: SQLite notices only when it reads what is not there, and takes half a
+/// page for one that is filled with zeros.
+fn check_length(path: &Path, conn: &Connection) -> Result<(), StoreError> {
+    let sql = "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size";
+    let said: i64 =
+        conn.query_row(sql, [], |row| row.get(0)).map_err(|error| StoreError::new(path, error))?;
+    // What a writer has added may still be in the log alone; in this order the file has it if there is none.
+    let has_log = beside(path, "-wal").symlink_metadata().is_ok_and(|found| found.len() > 0);
+    let bytes = size_bytes(path)?;
+    match has_log || u64::try_from(said).is_ok_and(|said| said <= bytes) {
+        true => Ok(()),
+        false => Err(StoreError::Corrupt {
+            file: path.to_owned(),
+            problem: format!("it has {bytes} bytes and says that it has {said}, so it was cut off"),
+        }),
     }
 }
 
