@@ -13,6 +13,7 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use matdb::catalogue::{Probe, Rank};
 use matdb::material::{Censor, Curve, Material, Observation, SourceKind, builtin};
 use matdb::store::{Filter, Store, StoreError};
 use rusqlite::types::Value;
@@ -75,6 +76,7 @@ fn material(number: usize) -> Material {
     if number.is_multiple_of(500) {
         material.frequency_hz = [75e9, 110e9];
     }
+    vary(&mut material, number);
     let observation = |row: usize| Observation {
         theta_i_rad: (row as f64).to_radians(),
         theta_r_rad: (row as f64).to_radians(),
@@ -95,6 +97,21 @@ fn material(number: usize) -> Material {
         observations: (0..ROWS).map(observation).collect(),
     }];
     material
+}
+
+/// Another lobe and another tail for each, so that no two scatter alike.
+fn vary(material: &mut Material, number: usize) {
+    let share = |period: usize| (number % period) as f64 / period as f64;
+    for fit in &mut material.fits {
+        fit.covariance = None;
+        for (path, value) in [
+            ("specular.m", 0.02 + 0.4 * share(97)),
+            ("diffuse.r_s", 0.01 + 0.9 * share(89)),
+            ("diffuse.alpha", 0.5 + 5.0 * share(83)),
+        ] {
+            fit.model.set_parameter(path, value);
+        }
+    }
 }
 
 fn fill(path: &Path, number: usize) -> Duration {
@@ -183,7 +200,7 @@ fn rows(conn: &Connection, id: i64) -> Vec<Rows> {
     ];
     let mut found: Vec<Rows> =
         tables.iter().map(|(table, key)| table_rows(conn, table, key, id)).collect();
-    found.push(tags(conn, id));
+    found.extend(["entry_tag", "outline"].map(|table| by_slug(conn, table, id)));
     found.retain(|table| !table.rows.is_empty());
     found
 }
@@ -193,9 +210,9 @@ fn table_rows(conn: &Connection, table: &str, key: &str, id: i64) -> Rows {
     read(conn, table, &format!("SELECT {what} FROM {table} WHERE {key} = ?1"), id)
 }
 
-fn tags(conn: &Connection, id: i64) -> Rows {
+fn by_slug(conn: &Connection, table: &str, id: i64) -> Rows {
     let of = "slug = (SELECT slug FROM material WHERE id = ?1)";
-    read(conn, "entry_tag", &format!("SELECT * FROM entry_tag WHERE {of}"), id)
+    read(conn, table, &format!("SELECT * FROM {table} WHERE {of}"), id)
 }
 
 fn read(conn: &Connection, table: &str, sql: &str, id: i64) -> Rows {
@@ -255,6 +272,13 @@ fn filters(store: &Store) {
         let time = median_us(21, |_| drop(black_box(store.find(&filter).unwrap())));
         tell(&format!("filter by {what}, {found} found"), time, "us", Some(1000.0));
     }
+    let own = store.get(&"material-000007".parse().unwrap(), None).unwrap().unwrap();
+    let probe = Probe::new(&own.material.curves[0].observations).unwrap();
+    for rank in [Rank::Level, Rank::Shape] {
+        let time =
+            median_us(5, |_| drop(black_box(probe.nearest(store, &any(), rank, 10).unwrap())));
+        println!("nearest of all by {rank:?}: {:.1} ms", time / 1e3);
+    }
     for words in ["no77", "amber no1", "amber", "paint"] {
         let found = store.search(words, u32::MAX).unwrap().len();
         let time = median_us(21, |_| drop(black_box(store.search(words, 20).unwrap())));
@@ -275,6 +299,8 @@ fn processes(path: &Path) {
         vec!["search", "amber", "no1"],
         vec!["search", "mate"],
         vec!["near", "--material", "material-000007"],
+        vec!["near", "--material", "material-000007", "--shape"],
+        vec!["near", "--material", "material-000007", "--frequency", "300"],
         vec!["near", "--material", "material-000007", "--class", "class-7"],
     ] {
         let time = median_us(5, |_| {

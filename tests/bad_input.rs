@@ -44,6 +44,33 @@ fn check(message: &str, parts: &[&str]) {
     }
 }
 
+/// Adds a folder with a changed built-in material; the error, after checking that nothing was stored.
+fn add(from: &str, to: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let text = fs::read_to_string(root().join("materials/glass/material.toml")).unwrap();
+    assert!(text.contains(from));
+    fs::write(folder.path().join("material.toml"), text.replacen(from, to, 1)).unwrap();
+    let message = refused(matdb(folder.path()).args(["add", "--from", "material.toml"]));
+    assert_eq!(entries(folder.path()), ["material.toml"], "{message}");
+    message
+}
+
+#[test]
+fn texts_that_nobody_reads_and_names_that_turn_a_line_round_stay_outside() {
+    let long = format!("unknown = [\"{}\",", "x".repeat((64 << 10) + 1));
+    check(
+        &add("unknown = [", &long),
+        &["unknown: the text has 65 KiB and 64 KiB are the most", "shorten"],
+    );
+    let turned = "name = \"\u{202e}ssalg\"";
+    check(&add("name = \"Window glass\"", turned), &["name: it holds a character that turns"]);
+    let folder = tempfile::tempdir().unwrap();
+    let file = fs::File::create(folder.path().join("material.toml")).unwrap();
+    file.set_len((64 << 20) + 1).unwrap();
+    let message = refused(matdb(folder.path()).args(["add", "--from", "material.toml"]));
+    check(&message, &["material.toml is larger than 64 MiB", "CSV"]);
+}
+
 #[test]
 fn a_good_scene_renders_so_that_the_errors_below_mean_something() {
     let folder = tempfile::tempdir().unwrap();

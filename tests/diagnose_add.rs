@@ -169,11 +169,19 @@ fn an_effect_of_a_material_becomes_a_revision_or_a_file() {
 }
 
 #[test]
-fn nothing_is_stored_when_nothing_is_missing_or_something_hinders_it() {
+fn what_was_tried_and_not_found_is_stored_and_nothing_when_something_hinders_it() {
     let folder = measured("", None);
     let at = folder.path();
-    run(at, &diagnose("scene.toml", "fov-gain", &["--add"]), "so nothing was stored");
-    assert!(!at.join("matdb.sqlite").exists() && !at.join("scene-after.toml").exists());
+    let add = diagnose("scene.toml", "fov-gain", &["--add"]);
+    run(at, &add, "stored in mannequin-paint@2 of matdb.sqlite what was tried and not found");
+    assert!(!at.join("scene-after.toml").exists());
+    let [builtin, tried] = &contents(&at.join("matdb.sqlite"))[..] else { panic!() };
+    let [finding] = &tried.findings[..] else { panic!("{:?}", tried.findings) };
+    assert_eq!((finding.effect.as_str(), finding.verdict), ("fov-gain", FindingVerdict::NotFound));
+    assert_eq!((finding.fit_before.as_deref(), &finding.fit_after), (Some("stated"), &None));
+    assert_eq!((&tried.render, &tried.fits), (&builtin.render, &builtin.fits));
+    // The same once more is no revision.
+    run(at, &add, "stored in mannequin-paint@2 of");
     run(at, &["render", "report/after.toml", "-o", "again"], "");
 
     let stranger = ["--add", "--material", "mannequin-pant"];

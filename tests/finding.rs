@@ -267,10 +267,45 @@ fn list_takes_filters() {
     assert_eq!(slugs(&paint), ["mannequin-paint", "painted-metal"]);
     assert_eq!(slugs(&json(folder, &["list", "--kind", "measured"])), Vec::<&str>::new());
     assert!(text(folder, &["list", "--fitted", "--kind", "measured"]).contains("no such material"));
-    for wrong in [["--frequency", "0"], ["--frequency", "NaN"], ["--kind", "guessed"]] {
+    for wrong in [
+        ["--frequency", "0"],
+        ["--frequency", "-1"],
+        ["--frequency", "inf"],
+        ["--frequency", "NaN"],
+        ["--kind", "guessed"],
+    ] {
         let output = matdb(folder).arg("list").args(wrong).output().unwrap();
         assert_eq!(output.status.code(), Some(2));
+        let said = String::from_utf8(output.stderr).unwrap();
+        let way_out = ["give a frequency in GHz above 0", "possible values"];
+        assert!(way_out.iter().any(|way_out| said.contains(way_out)), "{said}");
     }
+}
+
+#[test]
+fn a_withdrawn_material_stays_with_its_reason_and_is_found_by_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let withdraw = |more: &[&str]| {
+        let mut command = matdb(folder);
+        command.args(["withdraw", "ptfe", "--reason", "The trihedral was dented."]).args(more);
+        command
+    };
+    assert!(refused(&mut withdraw(&[])).contains("`ptfe` is not in"));
+    assert!(support::entries(folder).is_empty());
+    matdb(folder).args(["add", "ptfe", "hdpe"]).assert().success();
+    assert!(refused(&mut withdraw(&["--superseded-by", "hdp"])).contains("did you mean `hdpe`?"));
+    withdraw(&[]).assert().success();
+    assert_eq!(slugs(&json(folder, &["list", "--status", "withdrawn"])), ["ptfe"]);
+    let said = text(folder, &["show", "ptfe"]);
+    assert!(said.contains("withdrawn: The trihedral was dented."), "{said}");
+    withdraw(&["--superseded-by", "hdpe"]).assert().success();
+    let said = text(folder, &["show", "ptfe"]);
+    assert!(said.contains("superseded: The trihedral was dented.; use hdpe"), "{said}");
+    let history = json(folder, &["history", "ptfe"]);
+    assert_eq!(history[2]["activity"]["command"], "withdraw");
+    let said = refused(matdb(folder).args(["withdraw", "hdpe", "--reason", " "]));
+    assert!(said.contains("gives no reason"), "{said}");
 }
 
 /// A curve of a built-in material, so many dB higher, as a file.

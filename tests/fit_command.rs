@@ -85,6 +85,11 @@ fn a_curve_is_fitted_stored_rendered_and_listed() {
     assert_eq!((&listed["curves"], &listed["observations"]), (&1.into(), &400.into()));
     let shown = text(folder, &["show", "human-skin"]);
     assert!(shown.contains("method censored: converged") && shown.contains("verdict:"), "{shown}");
+    let fitted = shown.split("fit mixture-censored").nth(1).unwrap();
+    for path in ["k ", "specular.f_lambda", "diffuse.r_s"] {
+        let line = fitted.lines().find(|line| line.starts_with(path)).unwrap();
+        assert!(line.ends_with("a convention, not measured"), "{line}");
+    }
     text(folder, &["plot", "human-skin", "-o", "plot.svg"]);
     let plot = fs::read_to_string(folder.join("plot.svg")).unwrap();
     assert!(plot.contains("scan, below the threshold here") && plot.contains("mixture-censored"));
@@ -199,6 +204,10 @@ fn bad_input_is_refused_with_a_sentence_and_nothing_is_stored() {
         ("scan.csv --save", "belongs to no material yet"),
         ("scan.csv --save ptfe", "nobody has said where scan.csv comes from"),
         ("scan.csv --save ptfe --kind measured", "nobody has said where"),
+        (
+            "scan.csv --save my-paint --kind measured --source x",
+            "`matdb add --from scan.csv --name my-paint --class CLASS …` makes one of the curve",
+        ),
         ("scan.csv --save ptf --kind measured --source x", "did you mean `ptfe`?"),
         (
             "scan.csv --save ptfe --kind measured --source x --licence CC0-1.0",

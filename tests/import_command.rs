@@ -7,6 +7,7 @@ mod support;
 use std::fs;
 use std::path::Path;
 
+use matdb::material::Material;
 use matdb::store::Store;
 use serde_json::Value;
 use support::database::{changed, contents, sample, sound};
@@ -76,6 +77,80 @@ fn a_prefix_puts_what_differs_beside_ones_own() {
     assert_eq!(results(&again)[0], ("roe-paint", "unchanged"));
     let said = refused(matdb(ours.path()).arg("import").arg(&site).args(["--as-prefix", "Roe/"]));
     assert!(said.contains("`Roe/paint` is not a material name"), "{said}");
+}
+
+fn history(folder: &Path, name: &str) -> Value {
+    let output = matdb(folder).args(["history", name, "--json"]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn what_was_taken_says_from_which_catalogue_and_when_it_was_made_there() {
+    let (theirs, ours) = laboratories();
+    let about = "title = 'Paints of Roe'\nversion = '2.1'\ndoi = '10.1234/paints'\n\
+                 [[person]]\nfamily = 'Roe'\ngiven = 'Ann'\n";
+    fs::write(theirs.path().join("about.toml"), about).unwrap();
+    let publish = ["publish", "site", "-q", "--about", "about.toml"];
+    matdb(theirs.path()).args(publish).assert().success();
+    import(ours.path(), &theirs.path().join("site"), &[]);
+    let [here, there] = [&ours, &theirs].map(|folder| history(folder.path(), "primer"));
+    for (number, there) in (1..).zip(there.as_array().unwrap()) {
+        let activity = &here[number - 1]["activity"];
+        assert_eq!(activity["command"], "import");
+        let origin = &activity["origin"];
+        assert_eq!(
+            (&origin["title"], &origin["version"]),
+            (&"Paints of Roe".into(), &"2.1".into())
+        );
+        assert_eq!(
+            (&origin["doi"], &origin["revision"]),
+            (&"10.1234/paints".into(), &number.into())
+        );
+        assert_eq!(origin["added_at"], there["added_at"]);
+    }
+    let said = matdb(ours.path()).args(["history", "primer"]).output().unwrap().stdout;
+    let said = String::from_utf8(said).unwrap();
+    assert!(said.contains("Paints of Roe 2.1, doi:10.1234/paints: its revision 2 of"), "{said}");
+}
+
+#[test]
+fn what_they_made_since_comes_as_revisions_unless_it_was_changed_here() {
+    let (theirs, ours) = laboratories();
+    let site = theirs.path().join("site");
+    let revised =
+        |name: &str, finish: &str| Material { finish: Some(finish.to_owned()), ..changed(name) };
+    import(ours.path(), &site, &["--as-prefix", "roe-"]);
+    let mut store = Store::open(theirs.path().join("matdb.sqlite")).unwrap();
+    for name in ["paint", "primer"] {
+        store.add([&revised(name, "sanded")]).unwrap();
+        store.add([&revised(name, "washed")]).unwrap();
+    }
+    drop(store);
+    matdb(theirs.path()).args(["publish", "site", "-q"]).assert().success();
+    let said = import(ours.path(), &site, &["--as-prefix", "roe-"]);
+    let expected = [("roe-paint", "continued"), ("primer", "continued"), ("same", "unchanged")];
+    assert_eq!(results(&said), expected);
+    assert_eq!(
+        (&said["materials"][1]["revisions"], &said["materials"][1]["after"]),
+        (&2.into(), &2.into())
+    );
+    let revisions = history(ours.path(), "primer");
+    assert_eq!(revisions.as_array().unwrap().len(), 4);
+    assert_eq!(revisions[3]["content_hash"], revised("primer", "washed").content_hash());
+    assert_eq!(revisions[3]["activity"]["origin"]["revision"], 4);
+    let again = import(ours.path(), &site, &["--as-prefix", "roe-"]);
+    assert!(results(&again).iter().all(|(_, result)| *result == "unchanged"), "{again}");
+    let mut store = Store::open(ours.path().join("matdb.sqlite")).unwrap();
+    store.add([&revised("primer", "our own")]).unwrap();
+    drop(store);
+    let mut store = Store::open(theirs.path().join("matdb.sqlite")).unwrap();
+    store.add([&revised("primer", "polished")]).unwrap();
+    drop(store);
+    matdb(theirs.path()).args(["publish", "site", "-q"]).assert().success();
+    let said = import(ours.path(), &site, &[]);
+    assert!(results(&said).contains(&("primer", "conflict")), "{said}");
+    assert_eq!(history(ours.path(), "primer").as_array().unwrap().len(), 5);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Promise: what is asked of a material outside the range that it claims is answered with the distance
-//! stated, never silently: in frequency and in angle, by `render`, `show` and `plot`.
+//! stated, never silently: in frequency and in angle, by `render`, `show`, `plot`, `compare`, `diagnose`
+//! and `near`.
 
 mod support;
 
@@ -101,6 +102,49 @@ fn show_and_plot_tell_what_is_claimed_from_what_is_not() {
     fs::write(folder.path().join("material.toml"), wide).unwrap();
     matdb(folder.path()).args(["add", "-q", "--from", "material.toml"]).assert().success();
     assert!(claimed_to_80 > lines(), "what is not claimed is drawn in dashes");
+}
+
+#[test]
+fn comparing_and_diagnosing_tell_how_far_a_material_is_from_the_radars_frequency() {
+    const AWAY: &str =
+        "`ptfe` is described for 90–270 GHz, the radar works at 300 GHz, 30 GHz away";
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("scene.toml"), PLATE).unwrap();
+    matdb(folder.path()).args(["render", "scene.toml", "-o", "out"]).assert().success();
+    for command in ["compare", "diagnose"] {
+        let arguments = [command, "out/cloud.ply", "--scene", "scene.toml", "-o", command];
+        let output = matdb(folder.path()).args(arguments).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(said.contains(AWAY), "{command}: {said}");
+    }
+    let record = fs::read(folder.path().join("compare/error.json")).unwrap();
+    let record: Value = serde_json::from_slice(&record).unwrap();
+    assert!(record["notices"].to_string().contains("30 GHz away"), "{record}");
+}
+
+#[test]
+fn the_nearest_materials_say_how_far_they_are_from_the_curves_frequency() {
+    let folder = tempfile::tempdir().unwrap();
+    let curve = "theta_deg,sigma0_db\n2,-1\n6,-9\n10,-18\n14,-20\n";
+    fs::write(folder.path().join("curve.csv"), curve).unwrap();
+    let near = |more: &[&str]| {
+        let mut command = matdb(folder.path());
+        let command = command.args(["near", "--curve", "curve.csv", "--limit", "40"]).args(more);
+        String::from_utf8(command.output().unwrap().stdout).unwrap()
+    };
+    let said = near(&[]);
+    assert!(
+        said.contains("nobody says at which frequency") && !said.contains("GHz outside"),
+        "{said}"
+    );
+    let said = near(&["--measured-at", "300"]);
+    let ptfe = said.lines().find(|line| line.starts_with("ptfe ")).unwrap();
+    assert!(ptfe.contains("90–270") && ptfe.contains("30 GHz outside its range"), "{ptfe}");
+    let record: Value = serde_json::from_str(&near(&["--measured-at", "300", "--json"])).unwrap();
+    let materials = record["materials"].as_array().unwrap();
+    let ptfe = materials.iter().find(|near| near["slug"] == "ptfe").unwrap();
+    assert_eq!(ptfe["frequency_outside_ghz"], 30.0);
+    assert_eq!(record["measured_at_ghz"], 300.0);
 }
 
 #[test]

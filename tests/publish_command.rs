@@ -130,6 +130,15 @@ fn a_table_has_every_row_bit_for_bit_and_a_unit_for_every_number() {
     assert!(of_paint.iter().all(|o| points.contains(&(o.theta_i_rad, o.sigma0))));
     let units = fs::read_to_string(site.join("tables/units.csv")).unwrap();
     assert!(units.contains("observation,theta_i_rad,rad,\n"), "{units}");
+    let conn = rusqlite::Connection::open(site.join("catalogue.sqlite")).unwrap();
+    for line in units.lines().skip(1) {
+        let [table, column, code, _] = line.split(',').collect::<Vec<_>>()[..] else {
+            panic!("{line}")
+        };
+        let sql = "SELECT coalesce(ucum, '') FROM unit WHERE column_name = ?1";
+        let own: String = conn.query_row(sql, [column], |row| row.get(0)).unwrap();
+        assert_eq!(own, code, "{table}.{column}: the table `unit` of the database says otherwise");
+    }
     let package = json(&site.join("datapackage.json"));
     let resources = package["resources"].as_array().unwrap();
     for resource in resources {
@@ -364,4 +373,44 @@ fn a_fit_that_does_not_follow_from_its_curve_is_seen() {
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(!output.status.success() && said.contains("ptfe@3, fit `lambert-censored`"), "{said}");
     assert_eq!(bytes(at).len(), 2, "verifying leaves nothing behind");
+    ptfe.fits.last_mut().unwrap().report = None;
+    Store::open(&path).unwrap().add([&ptfe]).unwrap();
+    for command in [&["verify", "matdb.sqlite"][..], &["check"]] {
+        let output = matdb(at).args(command).output().unwrap();
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert!(
+            !output.status.success() && said.contains("the report of that is not there"),
+            "{said}"
+        );
+    }
+}
+
+#[test]
+fn of_another_versions_publication_it_is_said_what_was_compared_and_what_not() {
+    let folder = laboratory();
+    publish(folder.path());
+    let site = folder.path().join("site");
+    let index = fs::read_to_string(site.join("api/v1/index.json")).unwrap();
+    let own = format!("\"program_version\":\"{}\"", env!("CARGO_PKG_VERSION"));
+    let old = index.replacen(&own, "\"program_version\":\"0.0.1\"", 1);
+    assert_ne!(old, index);
+    fs::write(site.join("api/v1/index.json"), old).unwrap();
+    // It knew fewer tables, and other pages.
+    fs::remove_file(site.join("tables/origin.csv")).unwrap();
+    relist(&site, "index.html", b"another page");
+    let output = matdb(folder.path()).args(["verify", "site"]).output().unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    let said = String::from_utf8(said).unwrap();
+    assert!(output.status.success(), "{said}");
+    for part in [
+        "matdb 0.0.1 has published this",
+        "compared were the hashes",
+        "not compared were the pages",
+    ] {
+        assert!(said.contains(part), "`{part}` is not in: {said}");
+    }
+    relist(&site, "tables/curve.csv", b"x");
+    let output = matdb(folder.path()).args(["verify", "site"]).output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(!output.status.success() && said.contains("tables/curve.csv: is not what"), "{said}");
 }

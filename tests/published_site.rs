@@ -296,6 +296,14 @@ fn a_page_says_what_is_known_and_how_it_came_to_be() {
         assert!(page.contains(words), "{words}");
     }
     assert!(page.contains("class=\"band") && page.contains("id=\"residuals-0-title\""));
+    for path in ["k", "specular.f_lambda", "diffuse.r_s"] {
+        let row = page.split(&format!("<code>{path}</code>")).nth(1).unwrap();
+        let row = row.split("</tr>").next().unwrap();
+        assert!(
+            row.contains("is-convention\">convention<") && !row.contains("is-measured"),
+            "{row}"
+        );
+    }
     let kinds = ["measured", "literature", "modelled", "synthetic"];
     for material in materials() {
         let html = &site.files[&format!("material/{}.html", material.slug)];

@@ -8,7 +8,7 @@ use matdb::formats::EffectEntry;
 use matdb::material::{
     Activity, Censor, Citation, Covariance, Curve, Estimate, Finding, FindingVerdict, Fit,
     FitReport, Geometry, Given, Goodness, Input, Instrument, Layer, Making, Material, Observation,
-    Permittivity, Roughness, Scale, Session, SessionPose, Slug, Source, SourceKind, Status,
+    Origin, Permittivity, Roughness, Scale, Session, SessionPose, Slug, Source, SourceKind, Status,
     builtin,
 };
 use matdb::measure::statistics::by_angle;
@@ -465,8 +465,16 @@ fn a_revision_knows_which_command_made_it_of_what() {
     let first = builtin::get("cotton").unwrap().unwrap();
     store.add([&first]).unwrap();
     let input = |name: &str| Input { name: name.to_owned(), hash: "0e".repeat(32) };
-    let activity =
-        Activity { command: "fit".to_owned(), inputs: vec![input("b.csv"), input("a.csv")] };
+    let origin = Origin {
+        title: Some("Cloths of another laboratory".to_owned()),
+        doi: Some("10.1234/cloths".to_owned()),
+        revision: 7,
+        added_at: "2025-01-31T12:00:00Z".to_owned(),
+        program_version: "0.0.1".to_owned(),
+        ..Origin::default()
+    };
+    let inputs = vec![input("b.csv"), input("a.csv")];
+    let activity = Activity { command: "import".to_owned(), inputs, origin: Some(origin) };
     store.record(activity.clone());
     let second = Material { finish: Some("washed".to_owned()), ..first.clone() };
     assert_eq!(store.add([&second]).unwrap(), [Added::Revision(2)]);

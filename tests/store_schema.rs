@@ -17,7 +17,7 @@ use rusqlite::Connection;
 use rusqlite::functions::FunctionFlags;
 use support::database::{change, complete, contents, fitted, sample, with_effects};
 
-const NEWEST: &str = "schema-0005.sqlite";
+const NEWEST: &str = "schema-0006.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")

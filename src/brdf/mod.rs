@@ -33,6 +33,7 @@ mod kirchhoff_go;
 mod lambert;
 mod layered;
 mod mixture;
+mod outline;
 mod parameter;
 mod permittivity;
 mod sum;
@@ -51,6 +52,7 @@ pub use kirchhoff_go::KirchhoffGo;
 pub use lambert::Lambert;
 pub use layered::{Layer, Layered};
 pub use mixture::Mixture;
+pub use outline::{DEGREES, Outline};
 pub use parameter::{Parameter, ParameterError};
 pub use sum::Sum;
 pub use tabulated::{Tabulated, TabulatedError};
@@ -266,7 +268,7 @@ mod tests {
         models
     }
 
-    fn every_model() -> Vec<Brdf> {
+    pub(super) fn every_model() -> Vec<Brdf> {
         let mut models = every_isotropic_model();
         models.extend(anisotropic_models());
         models

@@ -103,6 +103,12 @@ impl Tabulated {
         (self.theta_rad[0], self.theta_rad[self.theta_rad.len() - 1])
     }
 
+    /// The points: angles, rad, and σ⁰, dB.
+    pub fn points(&self) -> impl Iterator<Item = (f64, f64)> {
+        std::iter::zip(&self.theta_rad, &self.columns.sigma0_db)
+            .map(|(theta, level)| (*theta, *level))
+    }
+
     /// σ⁰ at an angle, dB; the end values are held outside [`Tabulated::range_rad`], and it is −∞
     /// where the curve is silent.
     pub fn sigma0_db(&self, theta_rad: f64) -> f64 {

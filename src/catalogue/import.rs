@@ -1,17 +1,17 @@
-//! Another laboratory's catalogue into one's own: what is not there is added with all its revisions,
-//! and nothing that is there changes.
+//! Another laboratory's catalogue into one's own: what is not there is added with all its revisions, and
+//! what they have made since of what was taken before; nothing that is there changes.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use super::publish::DATABASE;
-use super::verify::{database, is_newer};
-use super::{CatalogueError, verify};
+use super::verify::{about, database, is_newer};
+use super::{About, CatalogueError, verify};
 use crate::effects::{Level, resolve};
-use crate::material::{Material, Slug};
-use crate::store::{Added, Store, Stored};
+use crate::material::{Activity, Material, Origin, Slug};
+use crate::store::{Added, RevisionSummary, Store, Stored};
 
 /// Somebody's catalogue that was [verified](super::verify) and may be taken over.
 #[derive(Debug)]
@@ -40,6 +40,13 @@ pub enum Outcome {
     Added {
         /// How many.
         revisions: usize,
+    },
+    /// What is here was theirs once, and what they have made of it since is added as revisions.
+    Continued {
+        /// How many.
+        revisions: usize,
+        /// The revision here that they follow.
+        after: u32,
     },
     /// What they have is what is, or once was, here.
     Unchanged,
@@ -149,7 +156,24 @@ impl Import {
                 return Ok(Outcome::Unchanged);
             }
         }
-        Ok(Outcome::Conflict { ours: known.content_hash, theirs })
+        Ok(match self.since(slug, name, &known.content_hash)?.len() {
+            0 => Outcome::Conflict { ours: known.content_hash, theirs },
+            revisions => Outcome::Continued { revisions, after: known.revision },
+        })
+    }
+
+    /// Numbers of their revisions after the one with this content; none where they never had it.
+    fn since(&self, slug: &Slug, name: &Slug, content: &str) -> Result<Vec<u32>, CatalogueError> {
+        let mut since = None;
+        for RevisionSummary { revision, .. } in self.theirs.history(slug)? {
+            let Some(material) = self.revision(slug, Some(revision), name)? else { continue };
+            match &mut since {
+                _ if material.content_hash() == content => since = Some(Vec::new()),
+                Some(numbers) => numbers.push(revision),
+                None => {}
+            }
+        }
+        Ok(since.unwrap_or_default())
     }
 
     /// A revision of theirs under the name that it gets here.
@@ -166,15 +190,31 @@ impl Import {
     /// Adds what the plan adds, in one transaction: all of it or nothing.
     ///
     /// # Errors
-    /// When an effect is not known here, the database cannot be written, or somebody else has added a
+    /// When an effect is not known here, the database cannot be written, or somebody else has changed a
     /// material of the same name since the plan was made.
-    pub fn take(&self, ours: &mut Store, plan: &[Taken]) -> Result<(), CatalogueError> {
-        let wanted = plan.iter().filter(|taken| matches!(taken.outcome, Outcome::Added { .. }));
-        let materials = wanted.flat_map(|taken| self.materials(taken));
+    pub fn take(
+        &self,
+        ours: &mut Store,
+        plan: &[Taken],
+        by: &Activity,
+    ) -> Result<(), CatalogueError> {
+        let about = self.about()?;
+        let mut wanted = Vec::new();
+        for taken in plan {
+            wanted.extend(self.wanted(ours, taken)?.into_iter().map(|number| (taken, number)));
+        }
+        let made = wanted.iter().map(|(taken, number)| {
+            let stored = self.stored(&taken.slug, *number)?;
+            let by = Activity { origin: Some(origin(&about, &stored)), ..by.clone() };
+            let material = Material { slug: taken.name.clone(), ..stored.material };
+            Ok((self.known(material)?, Some(by)))
+        });
+        let expected: BTreeMap<&Slug, Added> =
+            plan.iter().filter_map(|taken| Some((&taken.name, taken.outcome.first()?))).collect();
         let mut last: Option<Slug> = None;
-        ours.add_each(materials, |material, added| {
+        ours.add_each_made(made, |material, added| {
             let is_first = last.as_ref() != Some(&material.slug);
-            if is_first && added != Added::New {
+            if is_first && expected.get(&material.slug) != Some(&added) {
                 return Err(CatalogueError::Overtaken { slug: material.slug.to_string() });
             }
             last = Some(material.slug.clone());
@@ -182,17 +222,36 @@ impl Import {
         })
     }
 
-    /// Every revision of a material, oldest first.
-    fn materials(&self, taken: &Taken) -> Vec<Result<Material, CatalogueError>> {
-        let history = match self.theirs.history(&taken.slug) {
-            Ok(history) => history,
-            Err(error) => return vec![Err(error.into())],
-        };
-        let read = |number: u32| -> Option<Result<Material, CatalogueError>> {
-            let material = self.revision(&taken.slug, Some(number), &taken.name).transpose()?;
-            Some(material.and_then(|material| self.known(material)))
-        };
-        history.into_iter().filter_map(|revision| read(revision.revision)).collect()
+    /// Numbers of their revisions that are added, oldest first.
+    fn wanted(&self, ours: &Store, taken: &Taken) -> Result<Vec<u32>, CatalogueError> {
+        let Taken { slug, name, outcome } = taken;
+        match outcome {
+            Outcome::Added { .. } => {
+                Ok(self.theirs.history(slug)?.into_iter().map(|line| line.revision).collect())
+            }
+            Outcome::Continued { .. } => match ours.get(name, None)? {
+                Some(known) => self.since(slug, name, &known.content_hash),
+                None => Err(CatalogueError::Overtaken { slug: name.to_string() }),
+            },
+            Outcome::Unchanged | Outcome::Conflict { .. } => Ok(Vec::new()),
+        }
+    }
+
+    fn stored(&self, slug: &Slug, number: u32) -> Result<Stored, CatalogueError> {
+        self.theirs.get(slug, Some(number))?.ok_or_else(|| CatalogueError::Unsound {
+            bundle: self.path.clone(),
+            problem: format!("{slug}@{number} is not there any more"),
+        })
+    }
+
+    /// What their catalogue says of itself; none of a database alone.
+    fn about(&self) -> Result<Option<About>, CatalogueError> {
+        match self.path.is_dir() {
+            true => about(&self.path)
+                .map(Some)
+                .map_err(|problem| CatalogueError::Unsound { bundle: self.path.clone(), problem }),
+            false => Ok(None),
+        }
     }
 
     /// The material, if this program knows its effects.
@@ -204,6 +263,34 @@ impl Import {
                 problem: format!("{}: {error}", material.slug),
             }),
         }
+    }
+}
+
+impl Outcome {
+    /// What adding the first of the revisions does, if any is added.
+    fn first(&self) -> Option<Added> {
+        match self {
+            Outcome::Added { .. } => Some(Added::New),
+            Outcome::Continued { after, .. } => Some(Added::Revision(after + 1)),
+            Outcome::Unchanged | Outcome::Conflict { .. } => None,
+        }
+    }
+}
+
+/// Where a revision of theirs comes from.
+fn origin(about: &Option<About>, stored: &Stored) -> Origin {
+    let about = about.clone();
+    let (version, doi, url) =
+        about.clone().map_or((None, None, None), |about| (about.version, about.doi, about.url));
+    Origin {
+        title: about.map(|about| about.title),
+        version,
+        doi,
+        url,
+        revision: stored.revision,
+        added_at: stored.added_at.clone(),
+        program_version: stored.program_version.clone(),
+        command: stored.activity.as_ref().map(|activity| activity.command.clone()),
     }
 }
 

@@ -14,6 +14,7 @@ mod folder;
 mod import;
 mod leaves;
 mod near;
+mod nearest;
 mod publish;
 mod records;
 mod references;
@@ -27,8 +28,11 @@ pub use diff::{CurveChange, Diff, Field, Levels};
 pub use error::CatalogueError;
 pub use folder::{Folder, Sum};
 pub use import::{Import, Imported, Outcome, Taken};
-pub use near::{Distance, Probe};
+pub use near::{Distance, Probe, Rank};
+pub use nearest::Nearest;
 pub use publish::{Published, publish};
 pub use references::{Citable, Reference, references};
 pub use tables::HAS_PARQUET;
-pub use verify::{Checked, OTHER_UNITS, Problem, Verified, check_store, derived, verify};
+pub use verify::{
+    Checked, OTHER_UNITS, Problem, Verified, check_store, derived, verify, without_report,
+};

@@ -8,7 +8,7 @@
 
 use serde::Serialize;
 
-use crate::brdf::{Brdf, Scattering};
+use crate::brdf::{Brdf, DEGREES, Outline, Scattering};
 use crate::material::{Censor, Observation};
 use crate::measure::statistics::by_angle;
 use crate::units::db_from_ratio;
@@ -31,8 +31,20 @@ pub struct Probe {
 #[derive(Clone, Debug)]
 struct Bin {
     theta_rad: Vec<f64>,
+    /// The degrees of incidence that these lie in.
+    first_degree: usize,
+    last_degree: usize,
     /// Least and greatest mean, dB; the least is −∞ where nothing was detected.
     level_db: [f64; 2],
+}
+
+/// What a search ranks materials by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rank {
+    /// [`Distance::rms_db`].
+    Level,
+    /// [`Distance::rms_shape_db`].
+    Shape,
 }
 
 /// How far a curve is from a material.
@@ -54,6 +66,16 @@ pub struct Distance {
     pub silent: usize,
 }
 
+impl Distance {
+    /// What a search ranks by, dB.
+    pub fn rank_db(&self, rank: Rank) -> f64 {
+        match rank {
+            Rank::Level => self.rms_db,
+            Rank::Shape => self.rms_shape_db,
+        }
+    }
+}
+
 impl Probe {
     /// Gathers a curve's backscatter; `None` when nothing was detected, or a point lies above the
     /// instrument's range.
@@ -68,7 +90,12 @@ impl Probe {
         let bin = |row: &crate::measure::AngleStatistics| {
             let mut theta_rad: Vec<f64> = within(row.theta_rad).map(|o| o.theta_i_rad).collect();
             theta_rad.sort_by(f64::total_cmp);
-            Bin { theta_rad: thinned(&theta_rad), level_db: row.mean.map(db_from_ratio) }
+            let theta_rad = thinned(&theta_rad);
+            let degree = |theta: Option<&f64>| {
+                theta.map_or(0, |theta| (theta.to_degrees() as usize).min(DEGREES - 1))
+            };
+            let (first_degree, last_degree) = (degree(theta_rad.first()), degree(theta_rad.last()));
+            Bin { theta_rad, first_degree, last_degree, level_db: row.mean.map(db_from_ratio) }
         };
         let bins = statistics.iter().map(bin).filter(|bin| !bin.theta_rad.is_empty());
         let bins: Vec<Bin> = bins.collect();
@@ -97,13 +124,7 @@ impl Probe {
     /// The distance to what scenes render of a material whose numbers are claimed for these angles of
     /// incidence, rad; `None` when too few angles are common.
     pub fn distance(&self, scattering: &Brdf, [low, high]: [f64; 2]) -> Option<Distance> {
-        const ROUNDING: f64 = 1e-9;
-        let is_within = |theta: &f64| (low - ROUNDING..=high + ROUNDING).contains(theta);
-        let common: Vec<&Bin> =
-            self.bins.iter().filter(|bin| bin.theta_rad.iter().all(is_within)).collect();
-        if common.len() < LEAST_COMMON || common.len() * 2 < self.bins.len() {
-            return None;
-        }
+        let common = self.common([low, high])?;
         let mut silent = 0;
         let mut level = |bin: &Bin| {
             let sum: f64 = bin.theta_rad.iter().map(|theta| scattering.sigma0(*theta)).sum();
@@ -128,6 +149,90 @@ impl Probe {
             above_bound,
             silent,
         })
+    }
+
+    /// A distance, dB, that [`Probe::distance`] of a model with this outline is not below; −∞ where that
+    /// may be none at all, and `None` where it certainly is.
+    pub(super) fn at_least(
+        &self,
+        outline: &Outline,
+        theta_rad: [f64; 2],
+        rank: Rank,
+    ) -> Option<f64> {
+        // More than what the sums of many squares lose.
+        const ROUNDING_DB: f64 = 1e-6;
+        let common = self.common(theta_rad)?;
+        if common.iter().filter(|bin| bin.level_db[0].is_finite()).count() < LEAST_COMMON {
+            return Some(f64::NEG_INFINITY);
+        }
+        let mut sums = Gaps::default();
+        for bin in &common {
+            sums.add(bin.level_db, self.ends_db(outline, bin));
+        }
+        Some(sums.least_db(rank, common.len()) - ROUNDING_DB)
+    }
+
+    /// Least and greatest level that stands for a material at an angle, dB.
+    fn ends_db(&self, outline: &Outline, bin: &Bin) -> [f64; 2] {
+        let [low, high] = match outline.ends_db(bin.first_degree..=bin.last_degree) {
+            Some(ends) => ends,
+            None => return [self.floor_db; 2],
+        };
+        // Where it may be silent, the floor may stand for it.
+        if low.is_finite() { [low, high] } else { [low, high.max(self.floor_db)] }
+    }
+
+    /// The bins within these angles, rad; `None` when they are too few.
+    fn common(&self, [low, high]: [f64; 2]) -> Option<Vec<&Bin>> {
+        const ROUNDING: f64 = 1e-9;
+        let is_within = |theta: &f64| (low - ROUNDING..=high + ROUNDING).contains(theta);
+        let common: Vec<&Bin> =
+            self.bins.iter().filter(|bin| bin.theta_rad.iter().all(is_within)).collect();
+        let enough = common.len() >= LEAST_COMMON && common.len() * 2 >= self.bins.len();
+        enough.then_some(common)
+    }
+}
+
+/// Sums over bins at which a curve and a material each lie within some range.
+#[derive(Default)]
+struct Gaps {
+    /// Squares of the gaps between the ranges, dB².
+    gaps: f64,
+    /// Of bins of which all ends are known: how many,
+    number: f64,
+    /// the differences between the middles and their squares, dB and dB²,
+    middles: f64,
+    middles_squared: f64,
+    /// and the squares of half the widths together, dB².
+    widths_squared: f64,
+}
+
+impl Gaps {
+    fn add(&mut self, curve: [f64; 2], material: [f64; 2]) {
+        let gap = (curve[0] - material[1]).max(material[0] - curve[1]).max(0.0);
+        self.gaps += gap * gap;
+        if curve[0].is_finite() && material.iter().all(|end| end.is_finite()) {
+            let middle = 0.5 * (curve[0] + curve[1] - material[0] - material[1]);
+            let width = 0.5 * (curve[1] - curve[0] + material[1] - material[0]);
+            self.number += 1.0;
+            self.middles += middle;
+            self.middles_squared += middle * middle;
+            self.widths_squared += width * width;
+        }
+    }
+
+    /// What the root mean square over so many bins is not below, dB. Whatever the offset, the
+    /// differences are those of the middles but for half the widths: by the triangle inequality.
+    fn least_db(&self, rank: Rank, bins: usize) -> f64 {
+        let squares = match rank {
+            Rank::Level => self.gaps,
+            Rank::Shape => {
+                let spread =
+                    self.middles_squared - self.middles * self.middles / self.number.max(1.0);
+                (spread.max(0.0).sqrt() - self.widths_squared.sqrt()).max(0.0).powi(2)
+            }
+        };
+        (squares / bins.max(1) as f64).sqrt()
     }
 }
 

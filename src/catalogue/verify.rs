@@ -16,7 +16,8 @@ use super::api::{self, Entry, Index, LARGEST_MATERIAL_BYTES, Record, SCHEMA_VERS
 use super::folder::{INDEX, SUMS, Sum, files, hashed};
 use super::publish::{ABOUT, DATABASE, rebuilt};
 use super::{About, HAS_PARQUET};
-use crate::fit::again::problems;
+use crate::fit::again::{lacks_report, problems};
+use crate::material::Fit;
 use crate::store::{Again, RevisionSummary, Store, StoreError, Stored, Summary};
 
 /// Largest database or table that is read, bytes.
@@ -340,6 +341,10 @@ fn check_material(
 
 fn check_fits(stored: &Stored, report: &mut dyn FnMut(Problem)) -> usize {
     let material = &stored.material;
+    for fit in material.fits.iter().filter(|fit| lacks_report(fit)) {
+        let place = format!("{}@{}, fit `{}`", material.slug, stored.revision, fit.name);
+        report(problem(place, without_report(fit)));
+    }
     let again = material.fits.iter().filter_map(|fit| Some((fit, problems(material, fit)?)));
     again
         .map(|(fit, wrong)| {
@@ -349,6 +354,11 @@ fn check_fits(stored: &Stored, report: &mut dyn FnMut(Problem)) -> usize {
             }
         })
         .count()
+}
+
+/// What is wrong with a fit whose report was taken away.
+pub fn without_report(fit: &Fit) -> String {
+    format!("was found by `{}`, but the report of that is not there", fit.estimator)
 }
 
 /// Checks that files and database say the same.
@@ -399,6 +409,8 @@ fn check_rebuilt(
             (Some(sum), Some(made)) if *sum == made.sha256 => None,
             (Some(_), Some(_)) => Some(problem(path, "is not what its database gives")),
             (Some(_), None) => Some(problem(path, "is of no publication of its database")),
+            // An older version had fewer tables.
+            (None, _) if !scope.same_version => None,
             (None, _) => Some(problem(path, "is missing: its database gives it")),
         }
     });
@@ -438,8 +450,11 @@ impl Scope {
         };
         let by = version.map_or("an older matdb".to_owned(), |version| format!("matdb {version}"));
         let other_version = format!(
-            "{by} has published this, so that of the files beside the database only tables/*.csv were \
-             made again and compared"
+            "{by} has published this and this is matdb {}: compared were the hashes of all files, the \
+             database in itself, its fits with their curves, api/v1/ with the database, and those of \
+             tables/*.csv that are there; not compared were the pages, Parquet, the records \
+             (datapackage.json, CITATION.cff and others), tables/units.csv, and whether a table is missing",
+            env!("CARGO_PKG_VERSION")
         );
         let other_tables = "this matdb was built with other formats of tables, so that Parquet and the \
                             records that list it were not made again";
@@ -455,7 +470,8 @@ impl Scope {
         const LISTS: [&str; 3] = ["datapackage.json", "dataset.jsonld", "ro-crate-metadata.json"];
         match self {
             Scope { same_version: false, .. } => {
-                path.starts_with("tables/") && path.ends_with(".csv")
+                // The list of units has a line for every table that the program knows.
+                path.starts_with("tables/") && path.ends_with(".csv") && path != "tables/units.csv"
             }
             Scope { same_parquet: false, .. } => !is_parquet(path) && !LISTS.contains(&path),
             _ => true,
@@ -494,6 +510,11 @@ fn read<T: DeserializeOwned>(bundle: &Path, path: &str) -> Result<T, String> {
     }
     let bytes = fs::read(place).map_err(|reason| reason.to_string())?;
     serde_json::from_slice(&bytes).map_err(|error| error.to_string())
+}
+
+/// What a publication says of itself.
+pub(super) fn about(bundle: &Path) -> Result<About, String> {
+    read(bundle, ABOUT).map_err(|what| format!("{ABOUT}: {what}"))
 }
 
 /// Whether a newer program has published this: its files may say what this one would not understand.

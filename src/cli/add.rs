@@ -4,6 +4,8 @@ mod foreign;
 
 use std::cell::RefCell;
 use std::collections::HashSet;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
@@ -143,11 +145,11 @@ fn material_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
 }
 
 fn made(inputs: Vec<Input>) -> Activity {
-    Activity { command: "add".to_owned(), inputs }
+    Activity { command: "add".to_owned(), inputs, origin: None }
 }
 
 fn read(path: &Path) -> Result<(Material, Activity), Error> {
-    let bytes = std::fs::read(path).map_err(|reason| unreadable(path, reason))?;
+    let bytes = read_whole(path)?;
     let inputs = RefCell::new(vec![input(path, &bytes)]);
     let text = String::from_utf8(bytes).map_err(|error| Error::Usage {
         problem: format!(
@@ -167,6 +169,26 @@ fn read(path: &Path) -> Result<(Material, Activity), Error> {
     chosen(&material.effects, Level::Material, format!("{}: [[effect]]", path.display()))?;
     door::check(&material, path)?;
     Ok((material, made(inputs.into_inner())))
+}
+
+/// Largest material.toml, bytes: points stand in tables of their own.
+const LARGEST_FILE_BYTES: u64 = 64 << 20;
+
+fn read_whole(path: &Path) -> Result<Vec<u8>, Error> {
+    let read = || -> std::io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        File::open(path)?.take(LARGEST_FILE_BYTES + 1).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    };
+    let bytes = read().map_err(|reason| unreadable(path, reason))?;
+    match bytes.len() as u64 > LARGEST_FILE_BYTES {
+        false => Ok(bytes),
+        true => Err(Error::Usage {
+            problem: format!("{} is larger than {} MiB", path.display(), LARGEST_FILE_BYTES >> 20),
+            way_out: "put points into a CSV file that a [[curve]] names, and shorten texts"
+                .to_owned(),
+        }),
+    }
 }
 
 fn unreadable(path: &Path, reason: std::io::Error) -> Error {

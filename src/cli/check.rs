@@ -4,9 +4,9 @@ use serde::Serialize;
 
 use super::console::Console;
 use super::database::Database;
-use crate::catalogue::{OTHER_UNITS, derived};
+use crate::catalogue::{OTHER_UNITS, derived, without_report};
 use crate::error::Error;
-use crate::fit::again::problems;
+use crate::fit::again::{lacks_report, problems};
 use crate::store::{Again, Store, StoreError, Stored, Summary};
 
 /// Verify the whole database: pages, hashes, values, statistics of curves, and fits by fitting again
@@ -113,6 +113,9 @@ fn revision(
         Err(error) => record.wrong(place, error),
     }
     for fit in &material.fits {
+        if lacks_report(fit) {
+            record.wrong(&format!("{place}, fit {}", fit.name), without_report(fit));
+        }
         let Some(wrong) = problems(material, fit) else { continue };
         record.fits += 1;
         let place = format!("{place}, fit {}", fit.name);

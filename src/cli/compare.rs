@@ -8,7 +8,7 @@ use super::cloud::{CloudArgs, pose};
 use super::console::Console;
 use super::database::Database;
 use super::output::write_all;
-use super::staging::{Used, effects, materials, model, setup, surfaces};
+use super::staging::{Used, beyond_frequency, effects, materials, model, setup, surfaces};
 use super::summary::grouped;
 use crate::error::Error;
 use crate::formats::figure::{Figure, Plot, Scale, Series, Style, beside};
@@ -55,7 +55,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let vertices = scene.target.mesh.vertices.iter_mut();
     vertices.for_each(|vertex| *vertex = (moved * Point::from(*vertex)).xyz);
     let cloud = args.cloud.read(scene.radar())?;
-    let (simulated, material_of_region) = simulate(args, &scene, db)?;
+    let Simulated { scan: simulated, material_of_region, notices } = simulate(args, &scene, db)?;
+    let notices = [cloud.notices.clone(), notices].concat();
     let measured = measured_scan(scene.radar(), &scene.chirps, &cloud);
 
     let field = scene.chirps.field(&scene.radar().frames());
@@ -71,7 +72,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             way_out: "check the frame of the cloud, or register it with `matdb measure`".to_owned(),
         });
     }
-    let record = record(args, &agreement, &cloud.notices);
+    let record = record(args, &agreement, &notices);
     let mut json = serde_json::to_vec_pretty(&record)?;
     json.push(b'\n');
     let line_scan = line_scan(&scene.file.name, line, &measured, &simulated);
@@ -82,7 +83,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         ("error.json", json),
     ];
     write_all(&args.output, &files)?;
-    cloud.notices.iter().for_each(|notice| console.notice(notice));
+    notices.iter().for_each(|notice| console.notice(notice));
     console.result(&text(args, &agreement), &record)
 }
 
@@ -107,7 +108,15 @@ fn line(text: &str) -> Result<Line, Error> {
     }
 }
 
-fn simulate(args: &Args, scene: &Scene, db: &Database) -> Result<(Scan, Vec<u16>), Error> {
+/// The scene as it is rendered.
+struct Simulated {
+    scan: Scan,
+    material_of_region: Vec<u16>,
+    /// Sentences on materials that are extrapolated.
+    notices: Vec<String>,
+}
+
+fn simulate(args: &Args, scene: &Scene, db: &Database) -> Result<Simulated, Error> {
     let at = |error| Error::Render {
         scene: args.scene.clone(),
         antenna: String::new(),
@@ -124,7 +133,8 @@ fn simulate(args: &Args, scene: &Scene, db: &Database) -> Result<(Scan, Vec<u16>
     let setup = setup(scene, &bvh, &surfaces, model.as_ref());
     let footprints = trace_placed(&setup, scene.file.spot.rays, &|_| {}).map_err(at)?;
     let scan = shade(&setup, &footprints, Observer::Radar, &|_| {}).map_err(at)?;
-    Ok((scan, material_of_region))
+    let notices = beyond_frequency(&used, scene.radar());
+    Ok(Simulated { scan, material_of_region, notices })
 }
 
 /// Takes the fit of this name in every material that has one; at least one must.

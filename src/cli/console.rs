@@ -7,6 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
 use crate::error::Error;
+use crate::material::is_turning;
 
 /// How much a command says.
 pub(super) struct Console {
@@ -66,9 +67,10 @@ impl Console {
     }
 }
 
-/// The text without control characters, which a file could use to write over the terminal.
+/// The text without control characters, which a file could use to write over the terminal, and without
+/// those that turn the direction of a line.
 pub fn harmless(text: &str) -> String {
-    text.chars().filter(|c| !c.is_control() || *c == '\n').collect()
+    text.chars().filter(|c| (!c.is_control() || *c == '\n') && !is_turning(*c)).collect()
 }
 
 /// Writes to standard output; a reader that has left, as `head` does, is no error.

@@ -8,7 +8,7 @@ use super::materials::{find, unknown};
 use super::summary::table;
 use crate::catalogue::Diff;
 use crate::error::Error;
-use crate::material::{Activity, Material};
+use crate::material::{Activity, Material, Origin};
 
 /// List the revisions of a material: when, by which command of which files, and what changed
 #[derive(Debug, clap::Args)]
@@ -81,14 +81,28 @@ fn none(args: &Args, db: &Database, has_store: bool) -> Result<Error, Error> {
     }
 }
 
+/// The catalogue that a revision was taken from.
+fn origin(origin: &Origin) -> String {
+    let Origin { title, version, doi, url, revision, added_at, .. } = origin;
+    let version = version.as_ref().map_or(String::new(), |version| format!(" {version}"));
+    let place = match (doi, url) {
+        (Some(doi), _) => format!(", doi:{doi}"),
+        (None, Some(url)) => format!(", {url}"),
+        (None, None) => String::new(),
+    };
+    let title = title.as_deref().unwrap_or("a catalogue without a title");
+    format!(" ({title}{version}{place}: its revision {revision} of {added_at})")
+}
+
 fn row(record: &Record) -> [String; 5] {
     let made = record.activity.as_ref().map_or("not recorded".to_owned(), |activity| {
         let inputs: Vec<&str> = activity.inputs.iter().map(|input| input.name.as_str()).collect();
-        match inputs.len() {
+        let made = match inputs.len() {
             0 => activity.command.clone(),
             1..=3 => format!("{} of {}", activity.command, inputs.join(", ")),
             more => format!("{} of {more} files", activity.command),
-        }
+        };
+        made + &activity.origin.as_ref().map_or(String::new(), origin)
     });
     let hash = record.content_hash.get(..12).unwrap_or(&record.content_hash);
     [

@@ -15,7 +15,9 @@ use crate::error::Error;
   matdb import site                            add what is not there, report conflicts
   matdb import site --as-prefix roe-           add conflicting materials as roe-NAME
 
-The catalogue is verified first. All of it is added, or nothing.")]
+The catalogue is verified first. All of it is added, or nothing. What was taken over before and is as it
+was then gets their newer revisions; what was changed here since is a conflict. `matdb history` tells
+from which catalogue a revision was taken.")]
 pub(super) struct Args {
     /// A published folder, or its catalogue.sqlite
     bundle: PathBuf,
@@ -33,11 +35,11 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let ours = if db.path().exists() { db.read()? } else { None };
     let materials = import.plan(ours.as_ref(), args.as_prefix.as_deref())?;
     drop(ours);
-    let is_new = |taken: &Taken| matches!(taken.outcome, Outcome::Added { .. });
+    let is_new =
+        |taken: &Taken| matches!(taken.outcome, Outcome::Added { .. } | Outcome::Continued { .. });
     if !args.dry_run && materials.iter().any(is_new) {
         let mut store = db.write()?;
-        store.record(activity("import", &[&import.database()])?);
-        import.take(&mut store, &materials)?;
+        import.take(&mut store, &materials, &activity("import", &[&import.database()])?)?;
     }
     let imported = Imported { dry_run: args.dry_run, materials };
     console.result(&text(&imported, db), &imported)
@@ -46,7 +48,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 fn text(imported: &Imported, db: &Database) -> String {
     let mut text = String::new();
     let add = if imported.dry_run { "would add" } else { "added" };
-    let mut counts = [0; 3];
+    let mut counts = [0; 4];
     for Taken { slug, name, outcome } in &imported.materials {
         let of = if slug == name { String::new() } else { format!(", their {slug}") };
         match outcome {
@@ -54,9 +56,13 @@ fn text(imported: &Imported, db: &Database) -> String {
                 counts[0] += 1;
                 text += &format!("{add} {name}{of}, {revisions} revision(s)\n");
             }
-            Outcome::Unchanged => counts[1] += 1,
+            Outcome::Continued { revisions, after } => {
+                counts[1] += 1;
+                text += &format!("{add} to {name}@{after}{of}, {revisions} newer revision(s)\n");
+            }
+            Outcome::Unchanged => counts[2] += 1,
             Outcome::Conflict { ours, theirs } => {
-                counts[2] += 1;
+                counts[3] += 1;
                 text += &format!(
                     "conflict {name}{of}: yours has hash {ours}, theirs {theirs}; yours stays, \
                      --as-prefix adds theirs beside it\n"
@@ -64,9 +70,10 @@ fn text(imported: &Imported, db: &Database) -> String {
             }
         }
     }
-    let [new, same, conflicts] = counts;
+    let [new, continued, same, conflicts] = counts;
     text + &format!(
-        "{add} {new} materials to {}; {same} were there, {conflicts} are in conflict\n",
+        "{add} {new} materials to {}, and newer revisions to {continued}; {same} were there, {conflicts} are \
+         in conflict\n",
         db.path().display()
     )
 }

@@ -23,5 +23,5 @@ pub(super) fn activity(command: &str, paths: &[&Path]) -> Result<Activity, Error
         Ok(input(path, &bytes))
     };
     let inputs = paths.iter().map(read).collect::<Result<_, Error>>()?;
-    Ok(Activity { command: command.to_owned(), inputs })
+    Ok(Activity { command: command.to_owned(), inputs, origin: None })
 }

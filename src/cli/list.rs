@@ -32,7 +32,7 @@ const SHOWN: u32 = 200;
 #[derive(Debug, clap::Args)]
 pub(super) struct Wanted {
     /// Only those whose numbers are claimed at this frequency
-    #[arg(long, value_name = "GHZ", value_parser = frequency)]
+    #[arg(long, value_name = "GHZ", value_parser = frequency, allow_negative_numbers = true)]
     frequency: Option<f64>,
     /// Only those with this tag
     #[arg(long, value_name = "TAG")]
@@ -82,7 +82,7 @@ impl Wanted {
     }
 }
 
-fn frequency(text: &str) -> Result<f64, String> {
+pub(super) fn frequency(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(ghz) if ghz.is_finite() && ghz > 0.0 => Ok(ghz),
         _ => Err("give a frequency in GHz above 0, such as 300".to_owned()),

@@ -55,7 +55,7 @@ pub(super) struct Args {
     /// The target is the facets of the mesh, as in a rendered cloud: their normals have no error
     #[arg(long)]
     exact_mesh: bool,
-    /// Store the curve in this material as a new revision, too
+    /// Store the curve in this material, which must be there, as a new revision, too
     #[arg(long, value_name = "MATERIAL")]
     save: Option<String>,
     /// Name of the stored curve

@@ -33,6 +33,7 @@ mod show;
 mod staging;
 mod summary;
 mod verify;
+mod withdraw;
 
 use std::path::PathBuf;
 
@@ -94,6 +95,7 @@ enum Command {
     Fit(Box<fit::Args>),
     Check(check::Args),
     Rm(rm::Args),
+    Withdraw(withdraw::Args),
     Publish(publish::Args),
     Verify(verify::Args),
     Import(import::Args),
@@ -128,6 +130,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Fit(args) => fit::run(args, db, &console),
         Command::Check(_) => check::run(db, &console),
         Command::Rm(args) => rm::run(args, db, &console),
+        Command::Withdraw(args) => withdraw::run(args, db, &console),
         Command::Publish(args) => publish::run(args, db, &console),
         Command::Verify(args) => verify::run(args, &console),
         Command::Import(args) => import::run(args, db, &console),

@@ -2,32 +2,33 @@
 
 use std::path::PathBuf;
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::console::Console;
 use super::database::Database;
-use super::list::Wanted;
+use super::list::{Wanted, frequency};
 use super::materials::{find, not_added};
 use super::summary::table;
-use crate::brdf::Brdf;
-use crate::catalogue::{Distance, Probe};
+use crate::catalogue::{Distance, Nearest, Probe, Rank};
 use crate::error::Error;
 use crate::material::{Observation, Slug};
 use crate::measure::Curve;
-use crate::store::{Store, Summary};
+use crate::store::Store;
+use crate::units::{range, rounded, shown};
 
 /// Find the known materials that a measured curve is nearest to
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb near --curve measured/curve.csv
   matdb near --curve curve.csv --shape             the level of the curve is not known
+  matdb near --curve curve.csv --measured-at 300   say how far from 300 GHz materials are described
   matdb near --material my-paint --frequency 300   among what holds at 300 GHz
 
 The distance is the root mean square difference in dB between the curve's mean at each angle and what
 scenes render of a material, at angles within that material's range. Below the threshold only a
 material that lies above it differs. Materials with fewer than 3 angles, or half of the curve's, in
-common are left out.")]
+common are left out. Of a material that is not described at the frequency of the curve the notes say
+how far away that is; the distance does not count it.")]
 #[command(group = clap::ArgGroup::new("what").required(true))]
 pub(super) struct Args {
     /// A curve, as `matdb measure` writes it: theta_deg and sigma0_db, others if there are
@@ -36,6 +37,9 @@ pub(super) struct Args {
     /// The longest curve of this material, NAME or NAME@REVISION
     #[arg(long, value_name = "NAME", group = "what")]
     material: Option<String>,
+    /// Frequency at which the curve was measured [default: that of the material's instrument]
+    #[arg(long, value_name = "GHZ", value_parser = frequency, allow_negative_numbers = true)]
+    measured_at: Option<f64>,
     /// Rank by shape: the level of the curve is not known
     #[arg(long)]
     shape: bool,
@@ -46,9 +50,6 @@ pub(super) struct Args {
     filter: Wanted,
 }
 
-/// Materials that are compared at once.
-const AT_ONCE: usize = 1000;
-
 /// A material and how far it is.
 #[derive(Serialize)]
 struct Near {
@@ -58,12 +59,18 @@ struct Near {
     revision: Option<u32>,
     kind: &'static str,
     status: String,
+    /// For which its numbers are claimed.
+    frequency_ghz: [f64; 2],
+    /// How far the curve's frequency lies outside of these, 0 within; none where nobody says it.
+    frequency_outside_ghz: Option<f64>,
     #[serde(flatten)]
     distance: Distance,
 }
 
 #[derive(Serialize)]
 struct Record {
+    /// At which the curve was measured; none where nobody says.
+    measured_at_ghz: Option<f64>,
     angles: usize,
     /// What chance alone makes of the distance to the true material, dB.
     noise_db: Option<f64>,
@@ -72,9 +79,16 @@ struct Record {
     materials: Vec<Near>,
 }
 
+/// The curve that is asked about.
+struct Asked {
+    observations: Vec<Observation>,
+    frequency_hz: Option<f64>,
+}
+
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let store = db.read()?;
-    let Some(probe) = Probe::new(&observations(args, store.as_ref())?) else {
+    let asked = asked(args, store.as_ref())?;
+    let Some(probe) = Probe::new(&asked.observations) else {
         return Err(Error::Usage {
             problem: "the curve has no backscatter that was detected, or a point above the \
                       instrument's range"
@@ -84,62 +98,54 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     };
     let missing = not_added(store.as_ref())?;
     let mut record = Record {
+        measured_at_ghz: asked.frequency_hz.map(|hz| rounded(hz / 1e9)),
         angles: probe.angles(),
         noise_db: probe.noise_db(),
         left_out: 0,
         materials: Vec::new(),
     };
+    let rank = if args.shape { Rank::Shape } else { Rank::Level };
     for (store, is_stored) in [(store.as_ref(), true), (Some(&missing), false)] {
         let Some(store) = store else { continue };
-        for some in store.find(&args.filter.filter())?.chunks(AT_ONCE) {
-            for (summary, distance) in some.iter().zip(distances(store, &probe, some)?) {
-                match distance {
-                    Some(distance) => record.materials.push(near(summary, is_stored, distance)),
-                    None => record.left_out += 1,
-                }
-            }
-            keep_best(&mut record.materials, args);
+        let Nearest { found, left_out } =
+            probe.nearest(store, &args.filter.filter(), rank, args.limit)?;
+        record.left_out += left_out;
+        for (slug, distance) in found {
+            record.materials.extend(near(store, &slug, &asked, is_stored, distance)?);
         }
     }
+    let far = |near: &Near| near.distance.rank_db(rank);
+    record.materials.sort_by(|a, b| far(a).total_cmp(&far(b)).then_with(|| a.slug.cmp(&b.slug)));
+    record.materials.truncate(args.limit);
     console.result(&text(&record, args), &record)
 }
 
-/// The distance to each of these, `None` for too little in common.
-fn distances(
+fn near(
     store: &Store,
-    probe: &Probe,
-    some: &[Summary],
-) -> Result<Vec<Option<Distance>>, Error> {
-    let models: Result<Vec<_>, _> = some.iter().map(|s| store.rendered(&s.slug)).collect();
-    let distance = |model: &Option<(Brdf, [f64; 2])>| {
-        let (model, theta_rad) = model.as_ref()?;
-        probe.distance(model, *theta_rad)
+    slug: &Slug,
+    asked: &Asked,
+    is_stored: bool,
+    distance: Distance,
+) -> Result<Option<Near>, Error> {
+    let (Some(summary), Some(stored)) = (store.summary(slug)?, store.get(slug, None)?) else {
+        return Ok(None);
     };
-    Ok(models?.par_iter().map(distance).collect())
-}
-
-fn near(summary: &Summary, is_stored: bool, distance: Distance) -> Near {
-    Near {
-        slug: summary.slug.clone(),
-        name: summary.name.clone(),
+    let material = stored.material;
+    let outside_ghz = |hz| rounded(material.frequency_outside_hz(hz) / 1e9);
+    Ok(Some(Near {
+        slug: summary.slug,
+        name: summary.name,
         revision: is_stored.then_some(summary.revision),
         kind: summary.render_kind.as_str(),
-        status: summary.status.clone(),
+        status: summary.status,
+        frequency_ghz: material.frequency_hz.map(|hz| rounded(hz / 1e9)),
+        frequency_outside_ghz: asked.frequency_hz.map(outside_ghz),
         distance,
-    }
+    }))
 }
 
-/// Sorts and cuts the list.
-fn keep_best(list: &mut Vec<Near>, args: &Args) {
-    let far = |near: &Near| match args.shape {
-        true => near.distance.rms_shape_db,
-        false => near.distance.rms_db,
-    };
-    list.sort_by(|a, b| far(a).total_cmp(&far(b)).then_with(|| a.slug.cmp(&b.slug)));
-    list.truncate(args.limit);
-}
-
-fn observations(args: &Args, store: Option<&Store>) -> Result<Vec<Observation>, Error> {
+fn asked(args: &Args, store: Option<&Store>) -> Result<Asked, Error> {
+    let stated_hz = args.measured_at.map(|ghz| ghz * 1e9);
     if let Some(path) = &args.curve {
         let bytes = std::fs::read(path).map_err(|reason| Error::Io {
             verb: "read",
@@ -148,29 +154,49 @@ fn observations(args: &Args, store: Option<&Store>) -> Result<Vec<Observation>, 
             way_out: "check the path",
         })?;
         let refused = |error| Error::CurveFile { file: path.clone(), error };
-        return Ok(Curve::read(&bytes).map_err(refused)?.observations());
+        let observations = Curve::read(&bytes).map_err(refused)?.observations();
+        return Ok(Asked { observations, frequency_hz: stated_hz });
     }
     let name = args.material.as_deref().unwrap_or_default();
-    let curves = find(store, name, "")?.material.curves;
-    match curves.into_iter().rev().max_by_key(|curve| curve.observations.len()) {
-        Some(curve) => Ok(curve.observations),
-        None => Err(Error::Usage {
+    let material = find(store, name, "")?.material;
+    let longest = material.curves.into_iter().rev().max_by_key(|curve| curve.observations.len());
+    let Some(curve) = longest else {
+        return Err(Error::Usage {
             problem: format!("`{name}` has no curve"),
             way_out: "give one with --curve FILE".to_owned(),
-        }),
-    }
+        });
+    };
+    let its_own = |key: &String| material.instruments.iter().find(|own| own.key == *key);
+    let instrument = curve.instrument.as_ref().and_then(its_own);
+    let frequency_hz = stated_hz.or(instrument.map(|own| own.centre_frequency_hz));
+    Ok(Asked { observations: curve.observations, frequency_hz })
 }
 
 fn text(record: &Record, args: &Args) -> String {
     let mut text = match record.materials.as_slice() {
         [] => "no material has enough angles in common with the curve\n".to_owned(),
         found => table(
-            &["material", "rev", "kind", "rms dB", "shape dB", "offset dB", "angles", "notes"],
+            &[
+                "material",
+                "rev",
+                "kind",
+                "GHz",
+                "rms dB",
+                "shape dB",
+                "offset dB",
+                "angles",
+                "notes",
+            ],
             found.iter().map(|near| row(near, record.angles)),
         ),
     };
     let by = if args.shape { "shape, its level left open" } else { "level and shape" };
     text += &format!("ranked by {by}, at {} angles of the curve\n", record.angles);
+    text += &match record.measured_at_ghz {
+        Some(ghz) => format!("the curve is of {} GHz\n", shown(ghz)),
+        None => "nobody says at which frequency the curve was measured: --measured-at GHZ does\n"
+            .to_owned(),
+    };
     text += &match record.noise_db {
         Some(noise) => format!("its repeats scatter: chance alone makes {noise:.1} dB\n"),
         None => "without repeats at an angle nobody knows what chance makes of it\n".to_owned(),
@@ -181,10 +207,13 @@ fn text(record: &Record, args: &Args) -> String {
     text
 }
 
-fn row(near: &Near, angles: usize) -> [String; 8] {
+fn row(near: &Near, angles: usize) -> [String; 9] {
     let Distance { rms_db, rms_shape_db, offset_db, common_angles, above_bound, silent, .. } =
         near.distance;
     let mut notes = Vec::new();
+    if let Some(outside_ghz) = near.frequency_outside_ghz.filter(|ghz| *ghz > 0.0) {
+        notes.push(format!("{} GHz outside its range", shown(outside_ghz)));
+    }
     if above_bound > 0 {
         notes.push(format!("above the threshold at {above_bound}"));
     }
@@ -198,6 +227,7 @@ fn row(near: &Near, angles: usize) -> [String; 8] {
         near.slug.to_string(),
         near.revision.map_or("built in".to_owned(), |revision| revision.to_string()),
         near.kind.to_owned(),
+        range(near.frequency_ghz),
         format!("{rms_db:.1}"),
         format!("{rms_shape_db:.1}"),
         format!("{offset_db:+.1}"),

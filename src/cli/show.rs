@@ -78,7 +78,7 @@ fn describe(material: &Material, origin: &str) -> Result<String, Error> {
         if let Some([specular, diffuse]) = fit.model.identified_products() {
             text += &format!(
                 "a monostatic measurement tells only (1 − k)·f_lambda = {specular:.3e} and \
-                 k·r_s = {diffuse:.3e}; k itself is a convention\n"
+                 k·r_s = {diffuse:.3e}; k, f_lambda and r_s by themselves are a convention\n"
             );
         }
         text += &fit.report.as_ref().map_or(String::new(), report);
@@ -144,6 +144,9 @@ fn effects(material: &Material) -> String {
 
 fn parameters(fit: &Fit) -> String {
     let source = |path: &str| {
+        if fit.report.as_ref().is_some_and(|report| report.is_by_convention(path)) {
+            return "a convention, not measured".to_owned();
+        }
         let own = fit.parameter_sources.iter().find(|(p, _)| p == path);
         own.map_or(fit.source.clone(), |(_, source)| source.clone())
     };

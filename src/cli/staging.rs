@@ -8,10 +8,11 @@ use crate::brdf::Brdf;
 use crate::effects::{Chosen, Level, Model, Receiver, SceneEffects, resolve};
 use crate::error::Error;
 use crate::formats::EffectEntry;
+use crate::radar::Radar;
 use crate::render::{Bounce, Setup, Surface};
 use crate::scene::Scene;
 use crate::trace::{Bvh, Tracer};
-use crate::units::ratio_from_db;
+use crate::units::{range, ratio_from_db, rounded, shown};
 
 /// A material as one scene uses it.
 pub(super) struct Used {
@@ -19,6 +20,35 @@ pub(super) struct Used {
     pub scattering: Brdf,
     /// Its own effects.
     pub effects: Chosen,
+}
+
+/// Sentences on materials that make no claim at the radar's frequency.
+pub(super) fn beyond_frequency(used: &[Used], radar: &Radar) -> Vec<String> {
+    let frequency_ghz = radar.centre_frequency_ghz;
+    used.iter()
+        .filter_map(|Used { found, .. }| {
+            let material = &found.material;
+            let outside_ghz = material.frequency_outside_hz(frequency_ghz * 1e9) / 1e9;
+            let range_ghz = material.frequency_hz.map(|hz| hz / 1e9);
+            let name = material.slug.as_str();
+            (outside_ghz > 0.0).then(|| extrapolated(name, range_ghz, frequency_ghz, outside_ghz))
+        })
+        .collect()
+}
+
+/// That a material makes no claim at the radar's frequency.
+pub(super) fn extrapolated(
+    name: &str,
+    range_ghz: [f64; 2],
+    frequency_ghz: f64,
+    outside_ghz: f64,
+) -> String {
+    format!(
+        "`{name}` is described for {} GHz, the radar works at {frequency_ghz} GHz, {} GHz away: what it \
+         returns is extrapolated",
+        range(range_ghz),
+        shown(rounded(outside_ghz))
+    )
 }
 
 /// The surface of each region of a scene.

@@ -14,6 +14,9 @@ const ROUNDING: f64 = 1e-6;
 /// How far numbers may, in the standard deviations of the new fit.
 const SAME_NUMBER_SD: f64 = 0.1;
 
+/// What a fit that this program found has as its estimator.
+const METHODS: [&str; 4] = ["censored", "mse", "tls", "tls-tail"];
+
 /// The settings that a fit was made with; `None` where its report does not say them.
 pub fn settings(report: &FitReport) -> Option<Fit> {
     let given = |name: &str| report.given.iter().find(|g| g.name == name).map(|g| g.value);
@@ -43,6 +46,11 @@ pub fn settings(report: &FitReport) -> Option<Fit> {
         starts: report.starts as usize,
         seed: report.seed,
     })
+}
+
+/// Whether a fit says that this program found it, and the report of that is not there any more.
+pub fn lacks_report(fit: &material::Fit) -> bool {
+    fit.curve.is_some() && fit.report.is_none() && METHODS.contains(&fit.estimator.as_str())
 }
 
 /// What is wrong with a material's fit, a sentence each: it must follow from its own curve. `None` when

@@ -62,6 +62,7 @@ pub enum MaterialError {
 impl Material {
     /// Checks names, references, ranges and values.
     pub fn validate(&self) -> Result<(), MaterialError> {
+        self.check_lengths()?;
         self.check_text()?;
         self.check_limits()?;
         unique("source", self.sources.iter().map(|s| s.key.as_str()))?;

@@ -14,6 +14,7 @@ mod provenance;
 mod report;
 mod slug;
 mod status;
+mod texts;
 
 use std::io;
 
@@ -28,10 +29,13 @@ pub use check::MaterialError;
 pub use composition::{Layer, Permittivity, Roughness};
 pub use finding::{Finding, FindingVerdict};
 pub use instrument::{Geometry, Instrument, Scale};
-pub use provenance::{Activity, Citation, Input, Making, Session, SessionPose, Source, SourceKind};
+pub use provenance::{
+    Activity, Citation, Input, Making, Origin, Session, SessionPose, Source, SourceKind,
+};
 pub use report::{Estimate, FitReport, Given, Goodness};
 pub use slug::Slug;
 pub use status::Status;
+pub use texts::{LONGEST_TEXT_BYTES, is_turning, turns_the_line};
 
 /// One revision of a material.
 #[derive(Clone, Debug, PartialEq, Serialize)]

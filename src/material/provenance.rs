@@ -148,6 +148,30 @@ pub struct Activity {
     pub command: String,
     /// The files that it read.
     pub inputs: Vec<Input>,
+    /// Somebody else's catalogue that the revision was taken from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub origin: Option<Origin>,
+}
+
+/// Somebody else's catalogue that a revision was taken from, and what it was there.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Origin {
+    /// Title of the catalogue; none of a database by itself.
+    pub title: Option<String>,
+    /// Its version, as people who cite it read it.
+    pub version: Option<String>,
+    /// Its DOI, without a resolver in front.
+    pub doi: Option<String>,
+    /// Its address.
+    pub url: Option<String>,
+    /// Number of the revision there, from 1.
+    pub revision: u32,
+    /// When it was added there: UTC, ISO 8601, to the second.
+    pub added_at: String,
+    /// Version of the program that added it there.
+    pub program_version: String,
+    /// Which command made it there; none where that was not recorded.
+    pub command: Option<String>,
 }
 
 /// A file that a command read.

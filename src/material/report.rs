@@ -96,6 +96,17 @@ pub struct Goodness {
 }
 
 impl FitReport {
+    /// Parameters that backscatter sees only inside S = (1 − k)·f_λ and R = k·r_s: where
+    /// [`gauge`](FitReport::gauge) says that there was a choice, their values are a convention.
+    pub const BY_CONVENTION: [&str; 3] = ["diffuse.r_s", "k", "specular.f_lambda"];
+
+    /// Whether the value of a parameter is a convention, and nothing that the data tell.
+    pub fn is_by_convention(&self, path: &str) -> bool {
+        self.gauge.is_some()
+            && Self::BY_CONVENTION.contains(&path)
+            && self.given.iter().all(|given| given.name != path)
+    }
+
     /// A found number by its name.
     pub fn estimate(&self, name: &str) -> Option<&Estimate> {
         self.estimates.iter().find(|estimate| estimate.name == name)

@@ -57,6 +57,31 @@ pub fn by_angle(observations: &[Observation]) -> Vec<AngleStatistics> {
     }
 }
 
+/// Median σ⁰ of backscatter taken together whatever its angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Median {
+    /// It is this.
+    At(f64),
+    /// It is below this.
+    Below(f64),
+    /// There is no point, or one above the instrument's range.
+    NotTold,
+}
+
+/// The median of points taken together, as [`by_angle`] gives it for each angle.
+pub fn median<'a>(observations: impl Iterator<Item = &'a Observation> + Clone) -> Median {
+    if observations.clone().any(|o| o.is_retro() && o.censor == Censor::Right) {
+        return Median::NotTold;
+    }
+    let points: Vec<Point> = observations.zip(0..).filter_map(Point::new).collect();
+    let spread = Sample::new(&points).spread(&vec![1; points.len()]);
+    match (spread.quantile(0.5), spread.threshold()) {
+        (Some(sigma0), _) => Median::At(sigma0),
+        (None, Some(threshold)) => Median::Below(threshold),
+        (None, None) => Median::NotTold,
+    }
+}
+
 /// A point of a bin.
 #[derive(Clone, Copy)]
 struct Point {

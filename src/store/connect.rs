@@ -7,22 +7,31 @@ use std::time::{Duration, Instant};
 
 use rusqlite::backup::{Backup, StepResult};
 use rusqlite::functions::FunctionFlags;
-use rusqlite::{Connection, ErrorCode, OpenFlags, TransactionBehavior};
+use rusqlite::{Connection, ErrorCode, OpenFlags, Transaction, TransactionBehavior};
 use rusqlite_migration::{M, Migrations};
 
 use super::StoreError;
+use super::find::outline;
 
 /// "matd" in the file's header.
 const APPLICATION_ID: i64 = 0x6d61_7464;
 
+/// The latest schema.
+const LATEST: usize = 6;
+
 /// All schemas there ever were, oldest first. Append only: files in the world have stopped at each.
-const SCHEMAS: [M; 5] = [
-    M::up(include_str!("../../migrations/0001_materials.sql")),
-    M::up(include_str!("../../migrations/0002_fits.sql")),
-    M::up(include_str!("../../migrations/0003_effects.sql")),
-    M::up(include_str!("../../migrations/0004_catalogue.sql")),
-    M::up(include_str!("../../migrations/0005_search.sql")),
-];
+fn schemas() -> [M<'static>; LATEST] {
+    [
+        M::up(include_str!("../../migrations/0001_materials.sql")),
+        M::up(include_str!("../../migrations/0002_fits.sql")),
+        M::up(include_str!("../../migrations/0003_effects.sql")),
+        M::up(include_str!("../../migrations/0004_catalogue.sql")),
+        M::up(include_str!("../../migrations/0005_search.sql")),
+        M::up_with_hook(include_str!("../../migrations/0006_outline.sql"), |tx: &Transaction| {
+            Ok(outline::fill(tx)?)
+        }),
+    ]
+}
 
 /// What SQLite takes for the whole of a database in one step.
 const ALL_PAGES: i32 = -1;
@@ -111,7 +120,7 @@ fn open_readable(path: &Path) -> Result<Option<Connection>, StoreError> {
 fn modern(path: &Path, conn: Connection) -> Result<Option<Connection>, StoreError> {
     match schema_of(path, &conn)? {
         0 => Ok(None),
-        schema if schema < SCHEMAS.len() => modern_copy(path, &conn).map(Some),
+        schema if schema < LATEST => modern_copy(path, &conn).map(Some),
         _ => Ok(Some(conn)),
     }
 }
@@ -169,7 +178,29 @@ fn quiet(path: &Path) -> Result<Connection, StoreError> {
         Err(error) if !log_exists && !journal_exists && wants_a_log(&error) => {
             immutable(path).map_err(fail)
         }
-        result => result.map(|()| conn).map_err(fail),
+        result => {
+            result.map_err(fail)?;
+            check_length(path, &conn)?;
+            Ok(conn)
+        }
+    }
+}
+
+/// Refuses a file that was cut off: SQLite notices only when it reads what is not there, and takes half a
+/// page for one that is filled with zeros.
+fn check_length(path: &Path, conn: &Connection) -> Result<(), StoreError> {
+    let sql = "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size";
+    let said: i64 =
+        conn.query_row(sql, [], |row| row.get(0)).map_err(|error| StoreError::new(path, error))?;
+    // What a writer has added may still be in the log alone; in this order the file has it if there is none.
+    let has_log = beside(path, "-wal").symlink_metadata().is_ok_and(|found| found.len() > 0);
+    let bytes = size_bytes(path)?;
+    match has_log || u64::try_from(said).is_ok_and(|said| said <= bytes) {
+        true => Ok(()),
+        false => Err(StoreError::Corrupt {
+            file: path.to_owned(),
+            problem: format!("it has {bytes} bytes and says that it has {said}, so it was cut off"),
+        }),
     }
 }
 
@@ -247,7 +278,7 @@ fn schema_of(path: &Path, conn: &Connection) -> Result<usize, StoreError> {
     let (application_id, schema, tables): (i64, i64, i64) = conn
         .query_row(header, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
         .map_err(|error| StoreError::new(path, error))?;
-    let (file, known) = (path.to_owned(), SCHEMAS.len());
+    let (file, known) = (path.to_owned(), LATEST);
     match (application_id, usize::try_from(schema), tables) {
         (0, Ok(0), 0) => Ok(0),
         (APPLICATION_ID, Ok(schema), _) if schema > known => {
@@ -259,9 +290,9 @@ fn schema_of(path: &Path, conn: &Connection) -> Result<usize, StoreError> {
 }
 
 fn migrate(path: &Path, conn: &mut Connection) -> Result<(), StoreError> {
-    let outcome = Migrations::from_slice(&SCHEMAS).to_latest(conn);
+    let outcome = Migrations::new(schemas().into()).to_latest(conn);
     // Another program may have done it while this one waited for its turn.
-    if schema_of(path, conn)? == SCHEMAS.len() {
+    if schema_of(path, conn)? == LATEST {
         return Ok(());
     }
     outcome.map_err(|error| match error {
@@ -279,7 +310,7 @@ mod tests {
         let mut conn = Connection::open_in_memory().unwrap();
         assert_eq!(schema_of(Path::new(":memory:"), &conn).unwrap(), 0);
         migrate(Path::new(":memory:"), &mut conn).unwrap();
-        assert_eq!(schema_of(Path::new(":memory:"), &conn).unwrap(), SCHEMAS.len());
+        assert_eq!(schema_of(Path::new(":memory:"), &conn).unwrap(), LATEST);
     }
 
     #[test]
@@ -296,7 +327,7 @@ mod tests {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/migrations");
         let mut names: Vec<_> = fs::read_dir(folder).unwrap().map(|f| f.unwrap().path()).collect();
         names.sort();
-        assert_eq!(names.len(), SCHEMAS.len());
+        assert_eq!(names.len(), LATEST);
         for (number, name) in (1..).zip(names) {
             let stem = name.file_stem().unwrap().to_str().unwrap();
             assert!(stem.starts_with(&format!("{number:04}_")), "{stem}");
@@ -309,6 +340,6 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("50 % of #1?mode=memory&ü.sqlite");
         drop(writable(&path).unwrap());
-        assert_eq!(schema_of(&path, &immutable(&path).unwrap()).unwrap(), SCHEMAS.len());
+        assert_eq!(schema_of(&path, &immutable(&path).unwrap()).unwrap(), LATEST);
     }
 }

@@ -1,6 +1,7 @@
 //! One material among many: filters, words, and the line that lists show.
 
 mod filter;
+pub(super) mod outline;
 mod words;
 
 use rusqlite::{Connection, OptionalExtension, Result, Row};
@@ -108,7 +109,7 @@ fn summary(row: &Row) -> Result<Summary> {
     })
 }
 
-/// Materials whose line or words are not those of their current revision.
+/// Materials whose line, words or outline are not those of their current revision.
 pub(super) fn stale(conn: &Connection) -> Result<Vec<String>> {
     let sql = "
         SELECT slug FROM (
@@ -120,5 +121,9 @@ pub(super) fn stale(conn: &Connection) -> Result<Vec<String>> {
         UNION SELECT slug FROM (SELECT * FROM entry_tag EXCEPT SELECT * FROM entry_tag_made)
         UNION SELECT slug FROM (SELECT * FROM search_made EXCEPT SELECT rowid, * FROM search)
         UNION SELECT slug FROM search WHERE rowid NOT IN (SELECT id FROM material)";
-    rows(conn, sql, [], |row| row.get(0))
+    let mut stale: Vec<String> = rows(conn, sql, [], |row| row.get(0))?;
+    stale.extend(outline::stale(conn)?);
+    stale.sort();
+    stale.dedup();
+    Ok(stale)
 }

@@ -33,6 +33,7 @@ use crate::measure::AngleStatistics;
 
 pub use again::{Again, Difference};
 pub use error::StoreError;
+pub use find::outline::Outlined;
 pub use find::{Filter, Hit};
 pub use tables::{Cell, Column, ColumnKind, Reference, Table};
 
@@ -238,14 +239,28 @@ impl Store {
     pub fn add_each<E: From<StoreError>>(
         &mut self,
         materials: impl IntoIterator<Item = Result<Material, E>>,
+        then: impl FnMut(&Material, Added) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let activity = self.activity.clone();
+        let made = |material: Result<Material, E>| Ok((material?, activity.clone()));
+        self.add_each_made(materials.into_iter().map(made), then)
+    }
+
+    /// Adds materials as [`Store::add_each`] does, each recorded with which command made it of what.
+    ///
+    /// # Errors
+    /// As [`Store::add_each`].
+    pub fn add_each_made<E: From<StoreError>>(
+        &mut self,
+        made: impl IntoIterator<Item = Result<(Material, Option<Activity>), E>>,
         mut then: impl FnMut(&Material, Added) -> Result<(), E>,
     ) -> Result<(), E> {
-        let Store { conn, path, activity } = self;
+        let Store { conn, path, .. } = self;
         let failed = |error| StoreError::new(path, error);
         let tx = conn.transaction().map_err(failed)?;
         let mut adding = write::Adding::new(&tx);
-        for material in materials {
-            let material = material?;
+        for made in made {
+            let (material, activity) = made?;
             let slug = || material.slug.to_string();
             material.validate().map_err(|error| StoreError::Material { slug: slug(), error })?;
             then(&material, adding.add(&material, activity.as_ref()).map_err(failed)?)?;

@@ -52,16 +52,24 @@ pub(super) fn get(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result
     Ok(Some(stored))
 }
 
-/// What scenes render of the current revision, as far as that can be, and the angles for which it is
-/// claimed, rad.
+/// What scenes render of the current revision, and the angles for which it is claimed, rad.
 pub(super) fn rendered(conn: &Connection, slug: &Slug) -> Result<Option<(Brdf, [f64; 2])>> {
     let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
+    let found = rendered_in(&tx, slug)?;
+    Ok(found.and_then(|(model, theta_rad)| Some((model?, theta_rad))))
+}
+
+/// The same within a transaction; no model where no curve can be made of it.
+pub(super) fn rendered_in(
+    conn: &Connection,
+    slug: &Slug,
+) -> Result<Option<(Option<Brdf>, [f64; 2])>> {
     let sql = "
         SELECT revision.id, render, theta_min_rad, theta_max_rad, model
         FROM material JOIN revision ON material_id = material.id AND number = current_revision
         LEFT JOIN fit ON revision_id = revision.id AND fit.name = render
         WHERE slug = ?1";
-    let found = tx
+    let found = conn
         .prepare_cached(sql)?
         .query_row([slug.as_str()], |row| {
             let (revision_id, render): (i64, String) = (row.get(0)?, row.get(1)?);
@@ -71,15 +79,15 @@ pub(super) fn rendered(conn: &Connection, slug: &Slug) -> Result<Option<(Brdf, [
     let Some((revision_id, render, theta_rad, model)) = found else { return Ok(None) };
     let model = match model {
         Some(mut model) => {
-            parameters(&tx, revision_id, &render, &mut model)?;
+            parameters(conn, revision_id, &render, &mut model)?;
             Some(model)
         }
         None => {
-            let curve = curves(&tx, revision_id, Some(&render))?.pop();
+            let curve = curves(conn, revision_id, Some(&render))?.pop();
             curve.and_then(|curve| curve.tabulated().ok()).map(Brdf::Tabulated)
         }
     };
-    Ok(model.map(|model| (model, theta_rad)))
+    Ok(Some((model, theta_rad)))
 }
 
 /// A revision's own row, or that of the current one, and its number in the file.

@@ -67,8 +67,8 @@ pub enum Cell<'a> {
 }
 
 impl Store {
-    /// Every table that holds materials, sorted by name; those that SQLite keeps for itself, as search
-    /// indexes do, are left out.
+    /// Every table that holds materials, sorted by name; those of indexes, whether SQLite keeps them for
+    /// itself or the program as [`Store::outlines`], are left out.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -144,7 +144,7 @@ fn schema(conn: &Connection) -> Result<Vec<[Option<String>; 4]>> {
 pub(super) fn tables(conn: &Connection) -> Result<Vec<Table>> {
     let sql = "SELECT name FROM pragma_table_list
                WHERE schema = 'main' AND type = 'table' AND name NOT LIKE 'sqlite\\_%' ESCAPE '\\'
-               ORDER BY name";
+               AND name <> 'outline' ORDER BY name";
     let names: Vec<String> =
         conn.prepare(sql)?.query_map([], |row| row.get(0))?.collect::<Result<_>>()?;
     names.into_iter().map(|name| table(conn, name)).collect()

@@ -5,7 +5,8 @@ mod provenance;
 use rusqlite::{Connection, Error, OptionalExtension, Params, Result, Transaction, params};
 use serde::Serialize;
 
-use super::{Added, Removed};
+use super::find::outline;
+use super::{Added, Outlined, Removed};
 use crate::formats::EffectEntry;
 use crate::material::{Activity, Covariance, Curve, Fit, Material, Slug};
 use crate::measure::statistics::by_angle;
@@ -21,11 +22,13 @@ pub(super) struct Adding<'a> {
     tx: &'a Transaction<'a>,
     /// Numbers of materials whose lines are still to be made.
     waiting: Vec<i64>,
+    /// What they render.
+    outlines: Vec<Outlined>,
 }
 
 impl<'a> Adding<'a> {
     pub fn new(tx: &'a Transaction<'a>) -> Adding<'a> {
-        Adding { tx, waiting: Vec::new() }
+        Adding { tx, waiting: Vec::new(), outlines: Vec::new() }
     }
 
     /// Adds a material, or a revision to it, with what made it.
@@ -44,6 +47,8 @@ impl<'a> Adding<'a> {
         rows.material(material)?;
         activity.map_or(Ok(()), |activity| rows.activity(activity))?;
         self.waiting.push(material_id);
+        let model = material.scattering().ok();
+        self.outlines.push(outline::line(&material.slug, model.as_ref(), material.theta_rad));
         if self.waiting.len() >= AT_ONCE {
             self.lines()?;
         }
@@ -78,7 +83,8 @@ impl<'a> Adding<'a> {
         let waiting = json(&std::mem::take(&mut self.waiting))?;
         STEPS
             .iter()
-            .try_for_each(|sql| self.tx.prepare_cached(sql)?.execute([&waiting]).map(|_| ()))
+            .try_for_each(|sql| self.tx.prepare_cached(sql)?.execute([&waiting]).map(|_| ()))?;
+        self.outlines.drain(..).try_for_each(|line| outline::write(self.tx, &line))
     }
 }
 

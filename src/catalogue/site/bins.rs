@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::words::{decibels, grouped, percent};
 use crate::material::{Censor, Curve, Observation};
+use crate::measure::statistics::{self, Median};
 use crate::units::db_from_ratio;
 
 /// Width of a step, °.
@@ -42,27 +43,12 @@ fn bin(points: &[&Observation]) -> Option<Bin> {
     })
 }
 
-/// The middle one, in words when only a bound of it is known. Bounds that lie on the wrong side of
-/// everything else leave it open.
+/// The median in words, as the table of statistics has it.
 fn median(points: &[&Observation]) -> String {
-    let ends = |o: &&Observation| match (o.sigma0, o.threshold_sigma0, o.censor) {
-        (Some(sigma0), ..) => [sigma0, sigma0],
-        (None, Some(bound), Censor::Left) => [0.0, bound],
-        (None, Some(bound), _) => [bound, f64::INFINITY],
-        (None, None, _) => [0.0, f64::INFINITY],
-    };
-    let middle = |end: usize| {
-        let mut levels: Vec<f64> = points.iter().map(|o| ends(o)[end]).collect();
-        levels.sort_by(f64::total_cmp);
-        levels.get((levels.len().max(1) - 1) / 2).copied().unwrap_or(f64::NAN)
-    };
-    let [low_db, high_db] = [middle(0), middle(1)].map(db_from_ratio);
-    match (low_db.is_finite(), high_db.is_finite()) {
-        (true, true) if high_db - low_db < 0.05 => decibels(low_db),
-        (true, true) => format!("{} to {}", decibels(low_db), decibels(high_db)),
-        (false, true) => format!("< {}", decibels(high_db)),
-        (true, false) => format!("> {}", decibels(low_db)),
-        (false, false) => "not told".to_owned(),
+    match statistics::median(points.iter().copied()) {
+        Median::At(sigma0) => decibels(db_from_ratio(sigma0)),
+        Median::Below(sigma0) => format!("< {}", decibels(db_from_ratio(sigma0))),
+        Median::NotTold => "not told".to_owned(),
     }
 }
 
@@ -102,8 +88,8 @@ mod tests {
         assert_eq!(of(&[Some(0.1), Some(1.0), Some(1.0)]), "0.0");
         assert_eq!(of(&[None, Some(0.1), Some(1.0)]), "−10.0");
         assert_eq!(of(&[None, None, Some(1.0)]), "< −20.0");
-        // A detection under another point's threshold may or may not be the middle one.
-        assert_eq!(of(&[None, Some(0.001), Some(0.005)]), "−30.0 to −23.0");
+        // What may lie above or below the detections shares its weight among what lies lower.
+        assert_eq!(of(&[None, Some(0.001), Some(0.005)]), "−30.0");
     }
 
     #[test]

@@ -14,6 +14,9 @@ use crate::units::dbm_from_watts;
 const PRODUCTS: [(&str, &str); 3] =
     [("specular.f_lambda", "S"), ("diffuse.r_s", "R"), ("k", "S and R")];
 
+/// What stands in the place of a kind where a value is neither measured nor stated.
+const CONVENTION: &str = "convention";
+
 /// A fit as its page shows it.
 #[derive(Debug, Serialize)]
 pub(super) struct FitView {
@@ -116,7 +119,10 @@ fn parameter(material: &Material, fit: &Fit, parameter: &Parameter) -> Parameter
         range: interval([parameter.min, parameter.max]),
         source: source.clone(),
         source_place: place_of(material, source),
-        kind: word(material, source),
+        kind: match fit.report.as_ref().is_some_and(|report| report.is_by_convention(path)) {
+            true => CONVENTION,
+            false => word(material, source),
+        },
         told,
         is_told,
     }

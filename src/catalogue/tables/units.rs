@@ -1,4 +1,5 @@
-//! The unit of every numeric column, as UCUM code, from the ending of its name.
+//! The unit of every numeric column, as UCUM code, from the ending of its name. The table `unit` of the
+//! database says the same (`tests/publish_command.rs` compares).
 
 /// Endings of names and their units.
 const ENDINGS: [(&str, &str); 8] = [
@@ -11,6 +12,9 @@ const ENDINGS: [(&str, &str); 8] = [
     ("_deg", "deg"),
     ("_s", "s"),
 ];
+
+/// Names that have a unit and no ending.
+const WHOLE: [(&str, &str); 1] = [("year", "a")];
 
 /// Columns whose unit another column of the same row tells.
 const TOLD: [(&str, &str, &str); 4] = [
@@ -25,6 +29,9 @@ const TOLD: [(&str, &str, &str); 4] = [
 pub(in crate::catalogue) fn unit(table: &str, column: &str) -> Result<&'static str, &'static str> {
     if let Some((.., place)) = TOLD.iter().find(|told| (told.0, told.1) == (table, column)) {
         return Err(place);
+    }
+    if let Some((_, unit)) = WHOLE.iter().find(|(name, _)| *name == column) {
+        return Ok(unit);
     }
     let ending = ENDINGS.iter().find(|(ending, _)| column.ends_with(ending));
     Ok(ending.map_or("1", |(_, unit)| unit))

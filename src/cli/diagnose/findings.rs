@@ -7,14 +7,14 @@ use crate::material::{Finding, FindingVerdict};
 pub(super) fn findings(
     report: &Report,
     fit_before: Option<&str>,
-    fit_after: &str,
+    fit_after: Option<&str>,
     source: &str,
 ) -> Vec<Finding> {
     let bare = |effect: &str, verdict: FindingVerdict| Finding {
         effect: effect.to_owned(),
         verdict,
         fit_before: fit_before.map(str::to_owned),
-        fit_after: Some(fit_after.to_owned()),
+        fit_after: fit_after.map(str::to_owned),
         gain: None,
         placebo_gain: None,
         p: None,

@@ -21,7 +21,7 @@ use super::console::Console;
 use super::database::{Database, USUAL};
 use super::effects::chosen;
 use super::output::write_all;
-use super::staging::{materials, model};
+use super::staging::{beyond_frequency, materials, model};
 use crate::brdf::Brdf;
 use crate::diagnose::{Declared, DiagnoseError, Diagnosis, Report, Subject, looks, matched};
 use crate::effects::{Effect, Receiver, Stage, middle};
@@ -66,7 +66,8 @@ pub(super) struct Args {
     /// Try only these effects [default: all]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     effects: Vec<String>,
-    /// Store what is found: new revisions of the materials, and the scene as SCENE-after.toml beside it
+    /// Store what is found, and what was tried and not found, as new revisions of the materials; with
+    /// something found the scene, too, as SCENE-after.toml beside it
     #[arg(long)]
     add: bool,
     /// The material that takes refitted law and effects in [default: all of the scene with enough looks]
@@ -90,6 +91,8 @@ struct Context {
     regions: Vec<(String, String)>,
     /// Detections that were set aside.
     false_alarms: usize,
+    /// Sentences on materials that are extrapolated to the radar's frequency.
+    beyond: Vec<String>,
     seed: u64,
     /// This command, as a person would type it again.
     command: String,
@@ -156,14 +159,15 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     };
     let laws: Vec<Brdf> =
         material_of_region.iter().map(|&m| used[usize::from(m)].scattering.clone()).collect();
-    cloud.notices.iter().for_each(|notice| console.notice(notice));
+    let beyond = beyond_frequency(&used, scene.radar());
+    cloud.notices.iter().chain(&beyond).for_each(|notice| console.notice(notice));
     let bar = console.spinner("diagnosing");
     let hear = |what: &str| bar.set_message(format!("diagnosing: {what}"));
     let answer = diagnosed(&scene, &cloud, &laws, at_work, args.seed, &effects, &hear);
     bar.finish_and_clear();
     match answer {
         Ok((report, false_alarms)) => {
-            let context = context(asked, &scene, false_alarms, db);
+            let context = Context { beyond, ..context(asked, &scene, false_alarms, db) };
             let (given, report) = (given.as_str(), &report);
             Publication { asked, scene: &scene, given, cast, wanted, report }
                 .publish(context, db, console)
@@ -265,6 +269,7 @@ fn context(asked: Asked, scene: &Scene, false_alarms: usize, db: &Database) -> C
         cloud_path: cloud.cloud.display().to_string(),
         regions: regions.iter().map(|r| (r.name.clone(), r.material.clone())).collect(),
         false_alarms,
+        beyond: Vec::new(),
         seed: args.seed,
         program: program(db),
         command: command(std::env::args_os().skip(1)),

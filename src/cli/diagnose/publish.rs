@@ -57,7 +57,10 @@ impl Publication<'_> {
             files.extend(more);
             files.push((AFTER.to_owned(), self.after(&names, &head(&context))?));
             files.push(("report.html".to_owned(), page(&context)?));
-            write_all(&self.asked.args.output, &files)?;
+            match self.asked.args.add {
+                true => self.add_tried(&files, &mut context, db)?,
+                false => write_all(&self.asked.args.output, &files)?,
+            }
         }
         notices.iter().for_each(|notice| console.notice(notice));
         self.left_out(&takers).iter().for_each(|notice| console.notice(notice));
@@ -93,6 +96,20 @@ impl Publication<'_> {
             let file = after::with_found(self.scene, &self.report.effects, &names);
             let beside = [(after::name_beside(scene), self.text(MARK, &file)?)];
             Written::new(&[(&self.asked.args.output, files), (after::folder_of(scene), &beside)])
+        })?;
+        written.keep();
+        Ok(())
+    }
+
+    /// Stores what was tried and not found, and writes the files.
+    fn add_tried(&self, files: &Files, context: &mut Context, db: &Database) -> Result<(), Error> {
+        let mut store = db.write()?;
+        let (materials, last) = self.cast.tried(self.report, self.wanted, &self.title(), &store)?;
+        store.record(activity("diagnose", &[&self.asked.cloud.cloud, self.asked.scene])?);
+        let written = store.add_if(&materials, |added| {
+            let pin = |&at: &usize| Some(pinned(materials.get(at)?, *added.get(at)?));
+            context.added = last.iter().filter_map(pin).collect();
+            Written::new(&[(&self.asked.args.output, files)])
         })?;
         written.keep();
         Ok(())
@@ -158,7 +175,15 @@ impl Publication<'_> {
     fn stored(&self, context: &Context, db: &Database) -> String {
         match (self.asked.args.add, self.report.effects.is_empty()) {
             (false, _) => String::new(),
-            (true, true) => "nothing was found, so nothing was stored\n".to_owned(),
+            (true, true) => match context.added.join(", ") {
+                none if none.is_empty() => {
+                    "nothing was found, on too few looks to be stored\n".to_owned()
+                }
+                names => format!(
+                    "stored in {names} of {} what was tried and not found; they scatter as before\n",
+                    db.path().display()
+                ),
+            },
             (true, false) => {
                 let scene = &context.beside;
                 let file = db.path().display();

@@ -69,13 +69,49 @@ impl<'a> Cast<'a> {
 
     /// Each region has a law of its own; the one that most looks went into stands for the material.
     fn taker(&self, report: &Report, number: usize) -> Option<Taker> {
+        let law = report.laws.get(self.region(report, number)?)?.clone();
+        Some(Taker { number, law })
+    }
+
+    /// The region of a material that most looks went into, if those are enough.
+    fn region(&self, report: &Report, number: usize) -> Option<usize> {
         let looks =
             |region: usize| report.rows.iter().filter(|r| usize::from(r.region) == region).count();
         let regions = self.of_region.iter().enumerate();
         let regions = regions.filter(|(_, of)| usize::from(**of) == number);
         let (looks, region) = regions.map(|(region, _)| (looks(region), region)).max()?;
-        let law = report.laws.get(region).filter(|_| looks >= LEAST_LOOKS)?.clone();
-        Some(Taker { number, law })
+        (looks >= LEAST_LOOKS).then_some(region)
+    }
+
+    /// The current revisions of all materials that were looked at with what was tried on them and not
+    /// found, each after a built-in one that is not in the database yet, and the places of the former.
+    pub fn tried(
+        &self,
+        report: &Report,
+        wanted: Option<usize>,
+        title: &str,
+        store: &Store,
+    ) -> Result<(Vec<Material>, Vec<usize>), Error> {
+        let (mut materials, mut last) = (Vec::new(), Vec::new());
+        for (number, used) in self.used.iter().enumerate() {
+            let is_wanted = wanted.is_none_or(|wanted| wanted == number);
+            if !is_wanted || self.region(report, number).is_none() {
+                continue;
+            }
+            let Found { mut material, revision } =
+                find(Some(store), used.found.material.slug.as_str(), "--add: ")?;
+            materials.extend(revision.is_none().then(|| material.clone()));
+            let key = source(&mut material, SourceKind::Modelled, title, FIT, None);
+            let is_fit = |fit: &&Fit| fit.name == material.render;
+            let rendered = material.fits.iter().find(is_fit).map(|fit| fit.name.clone());
+            // The same diagnosis once more says the same once.
+            material.findings.retain(|known| known.source != key || known.fit_after.is_some());
+            material.findings.extend(findings(report, rendered.as_deref(), None, &key));
+            material.validate()?;
+            last.push(materials.len());
+            materials.push(material);
+        }
+        Ok((materials, last))
     }
 
     /// The current revision of a taker's material with what was found, before it a built-in one that
@@ -174,7 +210,7 @@ fn with_found(
     material.render = FIT.to_owned();
     // The fit that earlier findings speak of has given way.
     material.findings.retain(|known| known.fit_after.as_deref() != Some(FIT));
-    material.findings.extend(findings(report, before.as_deref(), FIT, &key));
+    material.findings.extend(findings(report, before.as_deref(), Some(FIT), &key));
     let declared = used.found.material.effects.iter().cloned();
     material.effects = declared.chain(entries(&report.effects, Level::Material)).collect();
     material.validate()?;

@@ -31,8 +31,11 @@ use subject::Subject;
   matdb fit curve.csv --model mixture-ggx -o fit.svg
   matdb fit curve.csv --method tls-tail --alpha 3
   matdb fit cotton --fix diffuse.alpha=4 --save
+  matdb fit my-paint --save                     a fit of its longest curve, into my-paint
   matdb fit curve.csv --save my-paint --kind measured --source 'Our bench, 2026' \\
     --licence CC-BY-4.0 --instrument 'Our radar' --frequency 300 --threshold -77
+                                                curve and fit into my-paint, which is there already;
+                                                `matdb add --from curve.csv …` makes a new material
 
 Methods: censored (speckle and missing chirps by their laws), tls (orthogonal distance in dB),
 tls-tail (the same with alpha given), mse (least squares in two pieces).
@@ -78,7 +81,8 @@ pub(super) struct Args {
     /// Seed of the starts and of the residuals of missing chirps
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Store the fit in the material; a file's curve goes with it, into the material NAME
+    /// Store the fit in the material; a file's curve goes with it, into the material NAME,
+    /// which must be there
     #[arg(long, value_name = "NAME", num_args = 0..=1)]
     save: Option<Option<String>>,
     /// Name of the stored fit [default: MODEL-METHOD]

@@ -11,7 +11,7 @@ use crate::cli::inputs::activity;
 use crate::cli::materials::{Found, find};
 use crate::error::Error;
 use crate::fit::{Finding, FitResult};
-use crate::material::{Curve, Material, SourceKind};
+use crate::material::{Curve, FitReport, Material, SourceKind};
 use crate::store::{Added, Store};
 
 /// Where a fit was stored.
@@ -122,7 +122,21 @@ fn of_file(
             curves::UNSAID,
         ));
     };
-    let mut material = find(store, name, "--save: ")?.material;
+    let mut material = match find(store, name, "--save: ") {
+        Err(Error::UnknownMaterial { asked_by, name, way_out }) => {
+            let meant = match way_out.starts_with("did you mean") {
+                true => format!("{way_out} Else "),
+                false => String::new(),
+            };
+            let way_out = format!(
+                "{meant}`matdb add --from {} --name {name} --class CLASS …` makes one of the curve, and then \
+                 `matdb fit {name} --save` stores the fit",
+                args.what
+            );
+            return Err(Error::UnknownMaterial { asked_by, name, way_out });
+        }
+        found => found?.material,
+    };
     let (curve, name) = (&subject.curve, &subject.curve_name);
     let said = (kind.into(), title.as_str());
     let source = curves::put(&mut material, name, curve, said, &args.circumstances)?;
@@ -132,15 +146,23 @@ fn of_file(
 /// The source of every parameter that somebody chose and no data gave, by path.
 fn chosen(material: &mut Material, found: &FitResult) -> Vec<(String, String)> {
     const CHOSEN: &str = "Chosen, while the other parameters were fitted";
-    let held = found.fit.fixed.iter().map(|(path, _)| path.clone());
-    let mut paths: Vec<String> = held.chain(found.gauge_k.map(|_| "k".to_owned())).collect();
-    paths.sort();
-    paths.dedup();
-    if paths.is_empty() {
-        return Vec::new();
+    const CONVENTION: &str = "Convention: k is chosen, and f_lambda and r_s follow from it; the curve tells \
+                              S = (1 − k)·f_lambda and R = k·r_s";
+    let held: Vec<String> = found.fit.fixed.iter().map(|(path, _)| path.clone()).collect();
+    let is_free = |path: &&str| found.gauge_k.is_some() && held.iter().all(|known| known != path);
+    let by_convention: Vec<String> =
+        FitReport::BY_CONVENTION.into_iter().filter(is_free).map(str::to_owned).collect();
+    let mut sources = Vec::new();
+    for (paths, title, key) in [(held, CHOSEN, "chosen"), (by_convention, CONVENTION, "convention")]
+    {
+        if !paths.is_empty() {
+            let key = curves::source(material, SourceKind::Synthetic, title, key, None);
+            sources.extend(paths.into_iter().map(|path| (path, key.clone())));
+        }
     }
-    let key = curves::source(material, SourceKind::Synthetic, CHOSEN, "chosen", None);
-    paths.into_iter().map(|path| (path, key.clone())).collect()
+    sources.sort();
+    sources.dedup_by(|a, b| a.0 == b.0);
+    sources
 }
 
 /// Stores a fit; a fit of the same name gives way to it, and stays in the revisions before.

@@ -5,14 +5,14 @@ use serde_json::{Value, json};
 
 use super::views::View;
 use crate::cli::materials::Found;
-use crate::cli::staging::Used;
+use crate::cli::staging::{Used, extrapolated};
 use crate::effects::{Level, Model, entry};
 use crate::formats::EffectEntry;
 use crate::geometry::Raster;
 use crate::radar::Radar;
 use crate::render::{Scan, Truth};
 use crate::scene::{MeshReport, Scene};
-use crate::units::{range, rounded, shown};
+use crate::units::range;
 
 /// Version of the layout of `scan.json`; it grows with every change that a reader could trip over.
 const SCHEMA: u32 = 2;
@@ -242,13 +242,9 @@ impl<'a> Record<'a> {
         }
         let frequency_ghz = self.radar.centre_frequency_ghz;
         for material in self.materials.iter().filter(|m| m.frequency_outside_ghz > 0.0) {
-            notices.push(format!(
-                "`{}` is described for {} GHz, the radar works at {frequency_ghz} GHz, {} GHz away: what it \
-                 returns is extrapolated",
-                material.name,
-                range(material.frequency_ghz),
-                shown(rounded(material.frequency_outside_ghz))
-            ));
+            let MaterialRecord { name, frequency_ghz: range_ghz, .. } = *material;
+            let outside_ghz = material.frequency_outside_ghz;
+            notices.push(extrapolated(name, range_ghz, frequency_ghz, outside_ghz));
         }
         notices
     }

@@ -51,13 +51,18 @@ pub(super) fn page(conn: &Connection, filter: &Filter, most: u32) -> Result<Vec<
 
 /// How many a filter lets through.
 pub(super) fn count(conn: &Connection, filter: &Filter) -> Result<usize> {
-    let conditions = conditions(conn, filter)?;
-    let index = rare(conn, &conditions)?.or((!conditions.is_empty()).then_some(0));
-    let (from, values) = from(&conditions, index);
+    let (from, values) = from_rarest(conn, filter)?;
     let found: u32 = conn
         .prepare_cached(&format!("SELECT count(*) {from}"))?
         .query_row(params_from_iter(values), |row| row.get(0))?;
     Ok(usize::try_from(found).unwrap_or(usize::MAX))
+}
+
+/// All conditions, by the index of the one that lets the fewest through.
+pub(super) fn from_rarest(conn: &Connection, filter: &Filter) -> Result<(String, Vec<Value>)> {
+    let conditions = conditions(conn, filter)?;
+    let index = rare(conn, &conditions)?.or((!conditions.is_empty()).then_some(0));
+    Ok(from(&conditions, index))
 }
 
 fn sorted(

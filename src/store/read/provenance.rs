@@ -4,8 +4,8 @@ use rusqlite::{Connection, OptionalExtension, Result, params};
 
 use super::{json, optional_json, rows};
 use crate::material::{
-    Activity, Citation, Finding, Input, Instrument, Layer, Material, Permittivity, Roughness,
-    Session, Slug, Source,
+    Activity, Citation, Finding, Input, Instrument, Layer, Material, Origin, Permittivity,
+    Roughness, Session, Slug, Source,
 };
 use crate::measure::AngleStatistics;
 
@@ -173,7 +173,25 @@ pub(super) fn activity(conn: &Connection, revision_id: i64) -> Result<Option<Act
     let sql = "SELECT name, hash FROM activity_input WHERE revision_id = ?1 ORDER BY position";
     let inputs =
         rows(conn, sql, [revision_id], |row| Ok(Input { name: row.get(0)?, hash: row.get(1)? }))?;
-    Ok(Some(Activity { command, inputs }))
+    Ok(Some(Activity { command, inputs, origin: origin(conn, revision_id)? }))
+}
+
+fn origin(conn: &Connection, revision_id: i64) -> Result<Option<Origin>> {
+    let sql = "SELECT title, version, doi, url, revision, added_at, program_version, command
+               FROM origin WHERE revision_id = ?1";
+    let found = rows(conn, sql, [revision_id], |row| {
+        Ok(Origin {
+            title: row.get(0)?,
+            version: row.get(1)?,
+            doi: row.get(2)?,
+            url: row.get(3)?,
+            revision: row.get(4)?,
+            added_at: row.get(5)?,
+            program_version: row.get(6)?,
+            command: row.get(7)?,
+        })
+    });
+    Ok(found?.pop())
 }
 
 /// Statistics of a curve of a revision, or of the current one.

@@ -4,8 +4,8 @@ use rusqlite::{Result, params};
 
 use super::{Rows, json, numbered};
 use crate::material::{
-    Activity, Citation, Finding, Geometry, Instrument, Layer, Making, Permittivity, Roughness,
-    Scale, Session, Source,
+    Activity, Citation, Finding, Geometry, Instrument, Layer, Making, Origin, Permittivity,
+    Roughness, Scale, Session, Source,
 };
 use crate::measure::AngleStatistics;
 
@@ -212,6 +212,28 @@ impl Rows<'_> {
                  VALUES (?1, ?2, ?3, ?4)",
                 params![self.revision_id, position, input.name, input.hash],
             )
-        })
+        })?;
+        activity.origin.as_ref().map_or(Ok(()), |origin| self.origin(origin))
+    }
+
+    fn origin(&self, origin: &Origin) -> Result<()> {
+        let Origin { title, version, doi, url, revision, added_at, program_version, command } =
+            origin;
+        self.insert(
+            "INSERT INTO origin
+             (revision_id, title, version, doi, url, revision, added_at, program_version, command)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+            params![
+                self.revision_id,
+                title,
+                version,
+                doi,
+                url,
+                revision,
+                added_at,
+                program_version,
+                command
+            ],
+        )
     }
 }

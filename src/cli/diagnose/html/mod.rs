@@ -79,6 +79,7 @@ fn heading(report: &Report, context: &Context) -> String {
         escaped(&context.scene_path),
         escaped(&sentence(report))
     ) + &quiet(&facts)
+        + &context.beyond.iter().map(|sentence| paragraph(sentence)).collect::<String>()
 }
 
 fn found(report: &Report) -> String {

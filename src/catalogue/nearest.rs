@@ -1,0 +1,118 @@
+//! The nearest of many materials: in outline all of them, in full only those that may be among the best.
+//!
+//! The outline of a material says how near it is at most. Materials are looked at in that order, until
+//! the outline of the next one says that it is farther than the best that are wanted; equal models are
+//! looked at once. The answer is that of looking at every one.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::near::{Distance, Probe, Rank};
+use crate::material::Slug;
+use crate::store::{Filter, Outlined, Store, StoreError};
+
+/// The materials that a curve is nearest to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Nearest {
+    /// The nearest first; of equally near ones the first by name.
+    pub found: Vec<(Slug, Distance)>,
+    /// How many have too little in common with the curve.
+    pub left_out: usize,
+}
+
+impl Probe {
+    /// The `most` nearest materials among those that a filter lets through.
+    ///
+    /// # Errors
+    /// When the database cannot be read.
+    pub fn nearest(
+        &self,
+        store: &Store,
+        filter: &Filter,
+        rank: Rank,
+        most: usize,
+    ) -> Result<Nearest, StoreError> {
+        let lines = store.outlines(filter)?;
+        let at_least = |(place, line): (usize, &Outlined)| {
+            let least_db = match (&line.model_hash, &line.outline) {
+                (None, _) => None,
+                (_, None) => Some(f64::NEG_INFINITY),
+                (_, Some(outline)) => self.at_least(outline, line.theta_rad, rank),
+            };
+            Some((least_db?, place))
+        };
+        let mut candidates: Vec<(f64, usize)> =
+            lines.par_iter().enumerate().filter_map(at_least).collect();
+        let mut left_out = lines.len() - candidates.len();
+        candidates.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut best = Best { rank, most, found: Vec::new() };
+        let mut known = HashMap::new();
+        for (least_db, place) in candidates {
+            if least_db > best.worst_db() {
+                break;
+            }
+            let Some(line) = lines.get(place) else { continue };
+            match self.in_full(store, line, &mut known)? {
+                Some(distance) => best.take(place, distance),
+                None => left_out += 1,
+            }
+        }
+        let name = |(place, distance): (usize, Distance)| {
+            Some((lines.get(place)?.slug.parse::<Slug>().ok()?, distance))
+        };
+        Ok(Nearest { found: best.found.into_iter().filter_map(name).collect(), left_out })
+    }
+
+    /// The distance to a material; to one that scatters like one before it, the same.
+    fn in_full(
+        &self,
+        store: &Store,
+        line: &Outlined,
+        known: &mut HashMap<Likeness, Option<Distance>>,
+    ) -> Result<Option<Distance>, StoreError> {
+        let likeness = (line.model_hash, line.theta_rad.map(f64::to_bits));
+        if let Some(distance) = known.get(&likeness) {
+            return Ok(*distance);
+        }
+        let Ok(slug) = line.slug.parse() else { return Ok(None) };
+        let rendered = store.rendered(&slug)?;
+        let distance = rendered.and_then(|(model, theta_rad)| self.distance(&model, theta_rad));
+        known.insert(likeness, distance);
+        Ok(distance)
+    }
+}
+
+/// Equal exactly for materials of equal model and range.
+type Likeness = (Option<[u8; 16]>, [u64; 2]);
+
+/// The nearest so far, with their places in the order of names.
+struct Best {
+    rank: Rank,
+    most: usize,
+    found: Vec<(usize, Distance)>,
+}
+
+impl Best {
+    /// What is farther than this is not among the best, dB.
+    fn worst_db(&self) -> f64 {
+        match self.found.last() {
+            _ if self.found.len() < self.most => f64::INFINITY,
+            Some((_, distance)) => distance.rank_db(self.rank),
+            None => f64::NEG_INFINITY,
+        }
+    }
+
+    fn take(&mut self, place: usize, distance: Distance) {
+        let far = |(place, distance): &(usize, Distance)| (distance.rank_db(self.rank), *place);
+        let new = far(&(place, distance));
+        let at = self.found.partition_point(|other| {
+            let other = far(other);
+            other.0.total_cmp(&new.0).then(other.1.cmp(&new.1)).is_lt()
+        });
+        if at < self.most {
+            self.found.insert(at, (place, distance));
+            self.found.truncate(self.most);
+        }
+    }
+}

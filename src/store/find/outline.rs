@@ -1,0 +1,129 @@
+//! What scenes render of every material in outline: what a search for the nearest one goes through.
+
+use std::collections::BTreeMap;
+
+use rusqlite::{Connection, Error, Result, Row, params, params_from_iter};
+
+use super::{Filter, filter, rows};
+use crate::brdf::{Brdf, Outline};
+use crate::material::Slug;
+use crate::store::read::rendered_in;
+use crate::store::{Store, StoreError};
+
+/// What scenes render of a material's current revision, in outline.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outlined {
+    /// Short name.
+    pub slug: String,
+    /// Angles of incidence for which it is claimed, rad.
+    pub theta_rad: [f64; 2],
+    /// Equal exactly for equal models; none where nothing can be rendered.
+    pub model_hash: Option<[u8; 16]>,
+    /// Its levels; none where they are not known in outline.
+    pub outline: Option<Outline>,
+}
+
+const COLUMNS: &str = "slug, theta_min_rad, theta_max_rad, model_hash, levels";
+
+impl Store {
+    /// In outline what scenes render of the materials that a filter lets through, sorted by name.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn outlines(&self, filter: &Filter) -> std::result::Result<Vec<Outlined>, StoreError> {
+        all(&self.conn, filter).map_err(|error| StoreError::new(&self.path, error))
+    }
+}
+
+fn all(conn: &Connection, filter: &Filter) -> Result<Vec<Outlined>> {
+    if *filter == Filter::default() {
+        return rows(conn, &format!("SELECT {COLUMNS} FROM outline ORDER BY slug"), [], outlined);
+    }
+    let (from, values) = filter::from_rarest(conn, filter)?;
+    let columns = COLUMNS.replace("slug", "outline.slug");
+    let sql = format!(
+        "SELECT {columns} FROM (SELECT slug {from}) AS wanted
+         CROSS JOIN outline ON outline.slug = wanted.slug"
+    );
+    let mut found = rows(conn, &sql, params_from_iter(values), outlined)?;
+    found.sort_by(|a, b| a.slug.cmp(&b.slug));
+    Ok(found)
+}
+
+fn outlined(row: &Row) -> Result<Outlined> {
+    let levels = row.get_ref(4)?.as_blob_or_null()?;
+    Ok(Outlined {
+        slug: row.get(0)?,
+        theta_rad: [row.get(1)?, row.get(2)?],
+        model_hash: row.get(3)?,
+        outline: levels.and_then(Outline::from_bytes),
+    })
+}
+
+/// Writes the line of a material, which is in the lists already, anew.
+pub(in crate::store) fn write(conn: &Connection, line: &Outlined) -> Result<()> {
+    let sql = "INSERT OR REPLACE INTO outline
+               (slug, theta_min_rad, theta_max_rad, model_hash, levels) VALUES (?1, ?2, ?3, ?4, ?5)";
+    let [theta_min_rad, theta_max_rad] = line.theta_rad;
+    let levels = line.outline.as_ref().map(Outline::to_bytes);
+    let values = params![line.slug, theta_min_rad, theta_max_rad, line.model_hash, levels];
+    conn.prepare_cached(sql)?.execute(values).map(|_| ())
+}
+
+/// The line of a material that renders this, if anything.
+pub(in crate::store) fn line(slug: &Slug, model: Option<&Brdf>, theta_rad: [f64; 2]) -> Outlined {
+    let hash = |model: &Brdf| -> Option<[u8; 16]> {
+        let hash = blake3::hash(&serde_json::to_vec(model).ok()?);
+        hash.as_bytes().first_chunk().copied()
+    };
+    Outlined {
+        slug: slug.to_string(),
+        theta_rad,
+        model_hash: model.and_then(hash),
+        outline: model.and_then(Outline::new),
+    }
+}
+
+/// Writes the lines of everything that an older program stored.
+pub(in crate::store) fn fill(conn: &Connection) -> Result<()> {
+    each(conn, |line| write(conn, &line))
+}
+
+/// Materials whose line is not that of what they render.
+pub(super) fn stale(conn: &Connection) -> Result<Vec<String>> {
+    let mut kept: BTreeMap<String, Outlined> =
+        all(conn, &Filter::default())?.into_iter().map(|line| (line.slug.clone(), line)).collect();
+    let mut stale = Vec::new();
+    each(conn, |line| {
+        if !kept.remove(&line.slug).is_some_and(|kept| is_same(&kept, &line)) {
+            stale.push(line.slug);
+        }
+        Ok(())
+    })?;
+    stale.extend(kept.into_keys());
+    Ok(stale)
+}
+
+fn is_same(kept: &Outlined, made: &Outlined) -> bool {
+    let levels = match (&kept.outline, &made.outline) {
+        (Some(kept), Some(made)) => kept.is_like(made),
+        (kept, made) => kept == made,
+    };
+    levels && (kept.theta_rad, kept.model_hash) == (made.theta_rad, made.model_hash)
+}
+
+/// The line that each material should have.
+fn each(conn: &Connection, mut take: impl FnMut(Outlined) -> Result<()>) -> Result<()> {
+    let slugs: Vec<Slug> = rows(conn, "SELECT slug FROM material", [], |row| row.get(0))?;
+    for slug in slugs {
+        let found = match rendered_in(conn, &slug) {
+            // What cannot be read has no line, and must not keep the rest of the file from being read.
+            Err(Error::FromSqlConversionFailure(..)) => None,
+            found => found?,
+        };
+        if let Some((model, theta_rad)) = found {
+            take(line(&slug, model.as_ref(), theta_rad))?;
+        }
+    }
+    Ok(())
+}
