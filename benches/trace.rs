@@ -13,7 +13,7 @@ use matdb::frames::{Global, Point, Ray};
 use matdb::geometry::Mesh;
 use matdb::radar::{Chirps, Radar};
 use matdb::scene::{mannequin, solids};
-use matdb::trace::{Bvh, Fan, Gpu, GpuError, Tracer};
+use matdb::trace::{Answer, Bvh, Fan, Gpu, GpuError, Tracer};
 
 const ORIGIN: DVec3 = DVec3::new(0.0, 1.1, 8.0);
 
@@ -85,7 +85,7 @@ fn square(side: usize) -> Vec<Ray<Global>> {
 
 /// All ways in turns.
 fn compare(mesh: &Mesh, rays: &[Ray<Global>], turns: usize, gpu: Option<&Gpu>) {
-    let (mut hold, mut find, mut decide) = (vec![], vec![], vec![]);
+    let (mut hold, mut find, mut decide, mut unsure) = (vec![], vec![], vec![], 0);
     let (mut grid, mut pinhole, mut build, mut trace) = (vec![], vec![], vec![], vec![]);
     for _ in 0..turns {
         grid.push(timed(|| Fan::new(rays)));
@@ -99,6 +99,8 @@ fn compare(mesh: &Mesh, rays: &[Ray<Global>], turns: usize, gpu: Option<&Gpu>) {
             let held = gpu.hold(&bvh).expect("room for the mesh");
             find.push(timed(|| held.answers(rays)));
             decide.push(timed(|| held.closest(rays)));
+            let answers = held.answers(rays).expect("a device that works");
+            unsure = answers.iter().filter(|&&answer| answer == Answer::Unsure).count();
         }
     }
     let [grid, pinhole, build, trace] = [grid, pinhole, build, trace].map(median);
@@ -112,7 +114,7 @@ fn compare(mesh: &Mesh, rays: &[Ray<Global>], turns: usize, gpu: Option<&Gpu>) {
         let [hold, find, decide] = [hold, find, decide].map(median);
         println!(
             "  graphics processor: takes the hierarchy over in {hold:.2} ms, answers in {find:.2} ms, {:.2} million \
-             rays a second; hits in {decide:.2} ms, {:.2} of the hierarchy's time",
+             rays a second, and leaves {unsure} open; hits in {decide:.2} ms, {:.2} of the hierarchy's time",
             rays.len() as f64 / find / 1e3,
             decide / trace
         );
