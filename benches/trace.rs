@@ -1,4 +1,5 @@
-//! How long the closest hits of a scan take, by the pinhole, the hierarchy and the naive loop.
+//! How long the closest hits of a scan take, by the pinhole, the hierarchy and the naive loop, and on a
+//! graphics processor where there is one and the program is built with `--features gpu`.
 //!
 //! `cargo bench --bench trace` runs the paper's scan on the mannequin and how times grow with facets and
 //! rays, on one thread and on two; `-- paper` runs the first alone. Ways are taken in turns, and the
@@ -12,25 +13,32 @@ use matdb::frames::{Global, Point, Ray};
 use matdb::geometry::Mesh;
 use matdb::radar::{Chirps, Radar};
 use matdb::scene::{mannequin, solids};
-use matdb::trace::{Bvh, Fan, Tracer};
+use matdb::trace::{Answer, Bvh, Fan, Gpu, GpuError, Tracer};
 
 const ORIGIN: DVec3 = DVec3::new(0.0, 1.1, 8.0);
 
 fn main() {
     let only_paper = std::env::args().any(|argument| argument == "paper");
+    let gpu = Gpu::new();
+    match &gpu {
+        Ok(gpu) => println!("graphics processor: {}", gpu.adapter()),
+        Err(GpuError::NotBuilt) => {}
+        Err(error) => println!("{error}"),
+    }
+    let gpu = gpu.ok();
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
-            paper(threads);
+            paper(threads, gpu.as_ref());
             if !only_paper {
-                growth(threads);
+                growth(threads, gpu.as_ref());
             }
         });
     }
 }
 
 /// The elliptical scan on the mannequin.
-fn paper(threads: usize) {
+fn paper(threads: usize, gpu: Option<&Gpu>) {
     let radar = Radar::default();
     let scan = Chirps::draw(&radar, |_| Err("no file".to_owned())).expect("the paper's scan");
     let mesh = mannequin::mannequin();
@@ -39,7 +47,7 @@ fn paper(threads: usize) {
         scan.rays.len(),
         mesh.facets.len()
     );
-    compare(&mesh, &scan.rays, 41);
+    compare(&mesh, &scan.rays, 41, gpu);
     let slow_ms = timed(|| Tracer::Brute.closest(&Bvh::new(&mesh), &scan.rays[..200]));
     println!(
         "  naive loop, from 200 of the rays: {:.0} ms",
@@ -48,7 +56,7 @@ fn paper(threads: usize) {
 }
 
 /// Balls of ever more facets under ever more rays.
-fn growth(threads: usize) {
+fn growth(threads: usize, gpu: Option<&Gpu>) {
     for subdivisions in [3, 5, 6, 8] {
         let mut ball = solids::icosphere(0.5, subdivisions);
         ball.vertices.iter_mut().for_each(|vertex| *vertex += 1.1 * DVec3::Y);
@@ -58,7 +66,7 @@ fn growth(threads: usize) {
                 side * side,
                 ball.facets.len()
             );
-            compare(&ball, &square(side), 5);
+            compare(&ball, &square(side), 5, gpu);
         }
     }
 }
@@ -75,8 +83,9 @@ fn square(side: usize) -> Vec<Ray<Global>> {
     (0..side * side).map(ray).collect()
 }
 
-/// Both ways in turns.
-fn compare(mesh: &Mesh, rays: &[Ray<Global>], turns: usize) {
+/// All ways in turns.
+fn compare(mesh: &Mesh, rays: &[Ray<Global>], turns: usize, gpu: Option<&Gpu>) {
+    let (mut hold, mut find, mut decide, mut unsure) = (vec![], vec![], vec![], 0);
     let (mut grid, mut pinhole, mut build, mut trace) = (vec![], vec![], vec![], vec![]);
     for _ in 0..turns {
         grid.push(timed(|| Fan::new(rays)));
@@ -85,6 +94,14 @@ fn compare(mesh: &Mesh, rays: &[Ray<Global>], turns: usize) {
         let bvh = Bvh::new(mesh);
         build.push(timed(|| bvh.closest(&rays[0])));
         trace.push(timed(|| Tracer::Bvh.closest(&bvh, rays)));
+        if let Some(gpu) = gpu {
+            hold.push(timed(|| gpu.hold(&bvh).map(drop)));
+            let held = gpu.hold(&bvh).expect("room for the mesh");
+            find.push(timed(|| held.answers(rays)));
+            decide.push(timed(|| held.closest(rays)));
+            let answers = held.answers(rays).expect("a device that works");
+            unsure = answers.iter().filter(|&&answer| answer == Answer::Unsure).count();
+        }
     }
     let [grid, pinhole, build, trace] = [grid, pinhole, build, trace].map(median);
     println!(
@@ -93,6 +110,15 @@ fn compare(mesh: &Mesh, rays: &[Ray<Global>], turns: usize) {
         (build + trace) / pinhole,
         (build + trace) / (grid + pinhole)
     );
+    if gpu.is_some() {
+        let [hold, find, decide] = [hold, find, decide].map(median);
+        println!(
+            "  graphics processor: takes the hierarchy over in {hold:.2} ms, answers in {find:.2} ms, {:.2} million \
+             rays a second, and leaves {unsure} open; hits in {decide:.2} ms, {:.2} of the hierarchy's time",
+            rays.len() as f64 / find / 1e3,
+            decide / trace
+        );
+    }
 }
 
 /// Time of a call, ms.

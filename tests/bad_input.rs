@@ -378,6 +378,11 @@ fn a_tracer_that_does_not_take_the_rays() {
         command
     };
     check(&refused(&mut with(&["--tracer", "pinhole"])), &["pinhole", "ray 1", "`bvh`"]);
+    #[cfg(not(feature = "gpu"))]
+    check(
+        &refused(&mut with(&["--tracer", "gpu"])),
+        &["without the tracer `gpu`", "--features gpu"],
+    );
     assert!(!folder.path().join("out").exists());
     with(&["--tracer", "bvh"]).assert().success();
     with(&[]).assert().success();

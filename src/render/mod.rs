@@ -31,7 +31,7 @@ use crate::effects::Model;
 use crate::frames::{Global, Point, Ray};
 use crate::geometry::Mesh;
 use crate::radar::{Aliased, Chirps, Field, Radar, RadarError, RadarFrames};
-use crate::trace::{Bvh, Hit, NoFan, Tracer, winding_number};
+use crate::trace::{Bvh, Hit, TraceError, Tracer, winding_number};
 use crate::units::dbm_from_watts;
 use acting::Acting;
 use detect::Detector;
@@ -58,7 +58,7 @@ pub struct Setup<'a> {
     /// The target.
     pub bvh: &'a Bvh<'a>,
     /// How the rays of the scan find it; all others ask `bvh`.
-    pub tracer: Tracer,
+    pub tracer: Tracer<'a>,
     /// Region of every facet, an index into `surfaces`.
     pub region_of_facet: &'a [u16],
     /// What each region is made of.
@@ -159,9 +159,9 @@ pub enum RenderError {
     /// The receiver cannot work.
     #[error(transparent)]
     Radar(#[from] RadarError),
-    /// The tracer that was asked for does not take the rays of the scan.
+    /// The tracer that was asked for does not take the rays of the scan, or stopped working.
     #[error(transparent)]
-    Tracer(#[from] NoFan),
+    Tracer(#[from] TraceError),
 }
 
 impl Scan {
@@ -191,7 +191,7 @@ pub fn trace(
 ///
 /// # Errors
 /// When no ray meets the mesh, an effect would count what the setup renders already, or the setup's
-/// tracer does not take the rays.
+/// tracer does not take the rays or stops working.
 pub fn trace_placed(
     setup: &Setup,
     rays_per_chirp: usize,

@@ -15,7 +15,7 @@ use super::edges;
 use crate::frames::{Direction, Global, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Beam, Chirps, Radar};
-use crate::trace::{Bvh, Hit, NoFan, Tracer};
+use crate::trace::{Bvh, Hit, TraceError, Tracer};
 
 /// 1/φ: successive multiples of it are spread evenly over 0 to 1.
 pub(super) const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -49,7 +49,7 @@ pub(super) fn trace(
     tracer: Tracer,
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
-) -> Result<Footprints, NoFan> {
+) -> Result<Footprints, TraceError> {
     let scan = Rays { radar, chirps, bvh, tracer, rays_per_chirp };
     let hits = scan.meetings(done, |_, _, hit| hit, |hit| *hit)?;
     let edge_m = edge_distances_m(radar, chirps, &hits, rays_per_chirp);
@@ -65,7 +65,7 @@ pub(super) fn trace_moved(
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
     meet: impl Fn(usize, &Ray<Global>, Option<Hit>) -> Meeting + Sync,
-) -> Result<Footprints, NoFan> {
+) -> Result<Footprints, TraceError> {
     let scan = Rays { radar, chirps, bvh, tracer, rays_per_chirp };
     let met = scan.meetings(done, meet, |met| met.0)?;
     let (hits, mut facings): (Vec<_>, Vec<_>) = met.into_iter().unzip();
@@ -82,7 +82,7 @@ struct Rays<'a> {
     radar: &'a Radar,
     chirps: &'a Chirps,
     bvh: &'a Bvh<'a>,
-    tracer: Tracer,
+    tracer: Tracer<'a>,
     rays_per_chirp: usize,
 }
 
@@ -93,7 +93,7 @@ impl Rays<'_> {
         done: &(dyn Fn(usize) + Sync),
         meet: impl Fn(usize, &Ray<Global>, Option<Hit>) -> T + Sync,
         hit: impl Fn(&T) -> Option<Hit> + Sync,
-    ) -> Result<Vec<T>, NoFan> {
+    ) -> Result<Vec<T>, TraceError> {
         /// Rays that are traced at once: enough to share the walk over the facets, few enough to hold.
         const RAYS_PER_TURN: usize = 1 << 18;
         let axes = &self.chirps.rays;
@@ -123,7 +123,7 @@ impl Rays<'_> {
         first: usize,
         ranges_m: &[Option<f64>],
         meet: impl Fn(usize, &Ray<Global>, Option<Hit>) -> T + Sync,
-    ) -> Result<Vec<T>, NoFan> {
+    ) -> Result<Vec<T>, TraceError> {
         let beam = Beam::new(self.radar);
         let count = self.rays_per_chirp;
         let spot = |(offset, range_m): (usize, &Option<f64>)| {

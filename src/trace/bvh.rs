@@ -28,12 +28,13 @@ pub struct Bvh<'a> {
     boxes: OnceLock<Boxes>,
 }
 
-struct Boxes {
-    tree: Bvh2,
+/// The boxes, in f32 and from the centre of a sphere around the facets.
+pub(super) struct Boxes {
+    pub(super) tree: Bvh2,
     /// Facet of each leaf entry.
-    facets: Vec<u32>,
-    centre: DVec3,
-    radius_m: f64,
+    pub(super) facets: Vec<u32>,
+    pub(super) centre: DVec3,
+    pub(super) radius_m: f64,
 }
 
 impl<'a> Bvh<'a> {
@@ -59,12 +60,16 @@ impl<'a> Bvh<'a> {
 
     /// The closest hit of one ray; of equally near facets the one with the smallest number.
     pub fn closest(&self, ray: &Ray<Global>) -> Option<Hit> {
-        let boxes = self.boxes.get_or_init(|| {
+        self.boxes().closest(self.mesh, ray)
+    }
+
+    /// The hierarchy itself, which is built if it is not yet.
+    pub(super) fn boxes(&self) -> &Boxes {
+        self.boxes.get_or_init(|| {
             let live = |&facet: &u32| !self.mesh.is_degenerate(facet as usize);
             let all = || (0..self.mesh.facets.len() as u32).filter(live).collect();
             Boxes::new(self.mesh, self.only.clone().unwrap_or_else(all))
-        });
-        boxes.closest(self.mesh, ray)
+        })
     }
 }
 
@@ -106,7 +111,7 @@ impl Boxes {
     }
 
     /// Distance at which the ray reaches the sphere around the facets, m; f32 is precise from there.
-    fn entry_m(&self, ray: &Ray<Global>) -> Option<f64> {
+    pub(super) fn entry_m(&self, ray: &Ray<Global>) -> Option<f64> {
         let to_centre = self.centre - ray.origin.xyz;
         let along_m = to_centre.dot(ray.direction.xyz());
         let beside2 = (to_centre - along_m * ray.direction.xyz()).length_squared();

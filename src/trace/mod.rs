@@ -1,14 +1,15 @@
 //! Closest hits of rays on a mesh.
 //!
 //! [`Fan`] finds what rays of one origin meet, as the rays of a scan are, and builds nothing for it. [`Bvh`]
-//! takes any ray and finds facets with boxes. Both look in f32 and decide and measure in f64; [`brute`]
-//! is the naive loop that judges them, and [`Tracer`] chooses. All take any mesh that passes
-//! [`Mesh::validate`](crate::geometry::Mesh::validate) and lies within 100 km, where
-//! f32 does its work; facets without area are never hit.
+//! takes any ray and finds facets with boxes; a [`Gpu`] does the same with many rays at once. All look in
+//! f32 and decide and measure in f64; [`brute`] is the naive loop that judges them, and [`Tracer`] chooses.
+//! All take any mesh that passes [`Mesh::validate`](crate::geometry::Mesh::validate) and lies within
+//! 100 km, where f32 does its work; facets without area are never hit.
 
 pub mod brute;
 mod bvh;
 mod facet;
+mod gpu;
 mod inside;
 mod pinhole;
 mod tracer;
@@ -16,9 +17,10 @@ mod tracer;
 use crate::frames::{Global, Point};
 
 pub use bvh::Bvh;
+pub use gpu::{Answer, Gpu, GpuError, Held};
 pub use inside::winding_number;
 pub use pinhole::{Fan, NoFan};
-pub use tracer::{Tracer, closest};
+pub use tracer::{TraceError, Tracer, closest};
 
 /// Where a ray meets a facet, in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,12 +2,14 @@
 
 use rayon::prelude::*;
 
-use super::{Bvh, Fan, Hit, NoFan, brute};
+use thiserror::Error;
+
+use super::{Bvh, Fan, GpuError, Held, Hit, NoFan, brute};
 use crate::frames::{Global, Ray};
 
 /// How the closest hits of many rays are found. All ways agree; they differ in time and in what they take.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Tracer {
+#[derive(Clone, Copy, Default)]
+pub enum Tracer<'a> {
     /// The pinhole where all rays share an origin, else the hierarchy.
     #[default]
     Automatic,
@@ -17,19 +19,35 @@ pub enum Tracer {
     Bvh,
     /// [`brute`]: any rays, and slow.
     Brute,
+    /// A graphics processor that holds the hierarchy: any rays.
+    Gpu(&'a Held<'a>),
 }
 
-impl Tracer {
+/// Why a tracer does not trace.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum TraceError {
+    /// The pinhole is told to take rays that it cannot.
+    #[error(transparent)]
+    NoFan(#[from] NoFan),
+    /// The graphics processor does not work.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+}
+
+impl Tracer<'_> {
     /// The closest hit of every ray on the hierarchy's mesh. The hierarchy itself is built only if it
     /// is asked.
     ///
     /// # Errors
-    /// When the pinhole is told to take rays that it cannot.
-    pub fn closest(self, bvh: &Bvh, rays: &[Ray<Global>]) -> Result<Vec<Option<Hit>>, NoFan> {
+    /// When the pinhole is told to take rays that it cannot, or the graphics processor stops working or
+    /// holds another hierarchy.
+    pub fn closest(self, bvh: &Bvh, rays: &[Ray<Global>]) -> Result<Vec<Option<Hit>>, TraceError> {
         Ok(match self {
             Tracer::Pinhole => Fan::new(rays)?.closest(bvh.mesh()),
             Tracer::Bvh => each(rays, &|ray| bvh.closest(ray)),
             Tracer::Brute => each(rays, &|ray| brute::closest(bvh.mesh(), ray)),
+            Tracer::Gpu(held) if std::ptr::eq(held.bvh(), bvh) => held.closest(rays)?,
+            Tracer::Gpu(_) => return Err(GpuError::OtherMesh.into()),
             Tracer::Automatic => closest(bvh, rays),
         })
     }
@@ -70,7 +88,7 @@ mod tests {
         let one = Tracer::Automatic.closest(&bvh, &rays).unwrap();
         assert!(one.iter().all(Option::is_some) && !bvh.is_built());
         rays.push(ray([1.0, 0.0, 8.0], [0.3, 0.0, 0.0]));
-        assert_eq!(Tracer::Pinhole.closest(&bvh, &rays), Err(NoFan::Origins { ray: 2 }));
+        assert_eq!(Tracer::Pinhole.closest(&bvh, &rays), Err(NoFan::Origins { ray: 2 }.into()));
         assert!(!bvh.is_built());
         let two = Tracer::Automatic.closest(&bvh, &rays).unwrap();
         assert!(bvh.is_built() && two[..2] == one && two[2].is_some());
@@ -85,6 +103,6 @@ mod tests {
         let mesh = solids::plate(2.0, 2.0);
         assert_eq!(Tracer::Automatic.closest(&Bvh::new(&mesh), &[]).unwrap(), []);
         let refused = Tracer::Pinhole.closest(&Bvh::new(&mesh), &[]);
-        assert_eq!(refused, Err(NoFan::Count { rays: 0 }));
+        assert_eq!(refused, Err(NoFan::Count { rays: 0 }.into()));
     }
 }

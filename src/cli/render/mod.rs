@@ -5,6 +5,7 @@ mod files;
 mod record;
 mod report;
 mod stages;
+mod tracer;
 mod views;
 
 use std::path::PathBuf;
@@ -17,9 +18,10 @@ use crate::error::Error;
 use crate::geometry::Raster;
 use crate::render::{RenderError, Setup, trace_placed};
 use crate::scene::Scene;
-use crate::trace::{Bvh, Tracer};
+use crate::trace::{Bvh, GpuError};
 use record::Record;
 use stages::Stages;
+use tracer::{Rays, gpu, tracer};
 
 /// Render a scene: power.exr, power.png, cloud.ply and scan.json
 #[derive(Debug, clap::Args)]
@@ -45,27 +47,6 @@ pub(super) struct Args {
     tracer: Option<Rays>,
 }
 
-/// Ways to trace the rays of a scan.
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum Rays {
-    /// Rays of one origin as points of a picture; nothing is built
-    Pinhole,
-    /// A hierarchy of boxes, for any rays
-    Bvh,
-    /// Every facet for every ray
-    Brute,
-}
-
-impl Rays {
-    fn tracer(self) -> Tracer {
-        match self {
-            Rays::Pinhole => Tracer::Pinhole,
-            Rays::Bvh => Tracer::Bvh,
-            Rays::Brute => Tracer::Brute,
-        }
-    }
-}
-
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let mut stages = Stages::start();
     let scene = Scene::load(&args.scene)?;
@@ -82,7 +63,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     stages.end("load", console);
 
     let bvh = Bvh::new(&scene.target.mesh);
-    let tracer = args.tracer.map_or(Tracer::Automatic, Rays::tracer);
+    let failed = |error: GpuError| at((String::new(), RenderError::Tracer(error.into())));
+    let gpu = gpu(args.tracer, console).map_err(failed)?;
+    let held = gpu.as_ref().map(|gpu| gpu.hold(&bvh)).transpose().map_err(failed)?;
+    let tracer = tracer(args.tracer, held.as_ref());
     let setup = Setup { tracer, ..setup(&scene, &bvh, &surfaces, model.as_ref()) };
     let bar = console.progress("tracing", scene.chirps.rays.len());
     let rays = scene.file.spot.rays;

@@ -1,0 +1,258 @@
+//! All that knows `wgpu`: an adapter, buffers in its memory, and the one shader that it runs.
+
+use std::fmt::Display;
+use std::future::Future;
+use std::pin::pin;
+use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, OnceLock};
+use std::task::{Context, Poll, Waker};
+
+use wgpu::BufferUsages as Usage;
+
+use super::GpuError;
+use super::packed::{Aim, Corners, Node};
+
+/// Invocations of a workgroup, as in the shader.
+const WORKGROUP: u64 = 64;
+
+/// An adapter, ready to trace.
+pub(super) struct Device {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    pipeline: wgpu::ComputePipeline,
+    adapter: String,
+    /// Bytes of the largest buffer.
+    most: u64,
+    /// The first thing that went wrong where nobody waited for it.
+    trouble: Arc<OnceLock<String>>,
+}
+
+/// A hierarchy in the device's memory.
+pub(super) struct Tree {
+    nodes: wgpu::Buffer,
+    corners: wgpu::Buffer,
+}
+
+/// Rays that the device is at work on.
+pub(super) struct Flight {
+    submission: wgpu::SubmissionIndex,
+    answers: wgpu::Buffer,
+    mapped: Receiver<Result<(), wgpu::BufferAsyncError>>,
+}
+
+impl Device {
+    /// The fastest kind of adapter, with buffers of at most `most` bytes.
+    pub fn open(most: u64) -> Result<Device, GpuError> {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+            backends: wgpu::Backends::VULKAN,
+            flags: wgpu::InstanceFlags::empty(),
+            ..wgpu::InstanceDescriptor::new_without_display_handle()
+        });
+        let no_adapter = |reason: &dyn Display| GpuError::NoAdapter { reason: line(reason) };
+        let adapter = at_once(instance.request_adapter(&wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::HighPerformance,
+            ..Default::default()
+        }))
+        .map_err(|reason| no_adapter(&reason))?;
+        let limits = adapter.limits();
+        let most = most.min(limits.max_buffer_size).min(limits.max_storage_buffer_binding_size);
+        let (device, queue) = at_once(adapter.request_device(&wgpu::DeviceDescriptor {
+            required_limits: limits,
+            ..Default::default()
+        }))
+        .map_err(|reason| no_adapter(&reason))?;
+        let trouble = Arc::new(OnceLock::new());
+        let note = |trouble: &Arc<OnceLock<String>>| {
+            let trouble = trouble.clone();
+            // What follows from the first trouble says less.
+            move |reason: &dyn Display| drop(trouble.set(line(reason)))
+        };
+        let (failed, lost) = (note(&trouble), note(&trouble));
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| failed(&error)));
+        device.set_device_lost_callback(move |_, reason| lost(&reason));
+        let module = device.create_shader_module(wgpu::include_wgsl!("closest.wgsl"));
+        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: None,
+            layout: None,
+            module: &module,
+            entry_point: None,
+            compilation_options: Default::default(),
+            cache: None,
+        });
+        let adapter = adapter.get_info().name;
+        let device = Device { device, queue, pipeline, adapter, most, trouble };
+        device.untroubled().map(|()| device)
+    }
+
+    pub fn adapter(&self) -> &str {
+        &self.adapter
+    }
+
+    /// Rays of one call, at most `most`.
+    pub fn rays_at_once(&self, most: u64) -> usize {
+        let groups = u64::from(self.device.limits().max_compute_workgroups_per_dimension);
+        let fit = (self.most / size_of::<Aim>() as u64).min(WORKGROUP * groups);
+        most.min(fit).max(1) as usize
+    }
+
+    pub fn hold(&self, nodes: &[Node], corners: &[Corners]) -> Result<Tree, GpuError> {
+        let [nodes, corners]: [&[u8]; 2] =
+            [bytemuck::cast_slice(nodes), bytemuck::cast_slice(corners)];
+        let needed = nodes.len().max(corners.len()) as u64;
+        if needed > self.most {
+            let (adapter, most) = (self.adapter.clone(), self.most);
+            return Err(GpuError::TooLarge { adapter, needed, most });
+        }
+        let tree = Tree { nodes: self.filled(nodes)?, corners: self.filled(corners)? };
+        self.untroubled().map(|()| tree)
+    }
+
+    /// Sets the device to work.
+    pub fn launch(&self, tree: &Tree, aims: &[Aim]) -> Result<Flight, GpuError> {
+        let bytes = (aims.len() * size_of::<u32>()) as u64;
+        let rays = self.filled(bytemuck::cast_slice(aims))?;
+        let found = self.buffer(bytes, Usage::STORAGE | Usage::COPY_SRC)?;
+        let answers = self.buffer(bytes, Usage::MAP_READ | Usage::COPY_DST)?;
+        let buffers = [&tree.nodes, &tree.corners, &rays, &found];
+        let entries: Vec<_> = std::iter::zip(0.., buffers)
+            .map(|(binding, buffer)| wgpu::BindGroupEntry {
+                binding,
+                resource: buffer.as_entire_binding(),
+            })
+            .collect();
+        let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &self.pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups((aims.len() as u64).div_ceil(WORKGROUP) as u32, 1, 1);
+        drop(pass);
+        encoder.copy_buffer_to_buffer(&found, 0, &answers, 0, bytes);
+        let submission = self.queue.submit([encoder.finish()]);
+        let (tell, mapped) = channel();
+        // Nobody listens any more when a later call has failed.
+        answers.map_async(wgpu::MapMode::Read, .., move |result| drop(tell.send(result)));
+        self.untroubled()?;
+        Ok(Flight { submission, answers, mapped })
+    }
+
+    /// Waits for the answers.
+    pub fn land(&self, flight: Flight) -> Result<Vec<u32>, GpuError> {
+        let Flight { submission, answers, mapped } = flight;
+        let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
+        let polled = self.device.poll(wait);
+        self.untroubled()?;
+        polled.map_err(|reason| self.lost(&reason))?;
+        match mapped.try_recv() {
+            Ok(Ok(())) => {}
+            Ok(Err(reason)) => return Err(self.lost(&reason)),
+            Err(reason) => return Err(self.lost(&reason)),
+        }
+        let view = answers.get_mapped_range(..).map_err(|reason| self.lost(&reason))?;
+        Ok(bytemuck::pod_collect_to_vec(&view[..]))
+    }
+
+    /// A buffer with this in it.
+    fn filled(&self, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
+        let buffer = self.buffer(bytes.len() as u64, Usage::STORAGE | Usage::COPY_DST)?;
+        self.queue.write_buffer(&buffer, 0, bytes);
+        Ok(buffer)
+    }
+
+    fn buffer(&self, bytes: u64, usage: Usage) -> Result<wgpu::Buffer, GpuError> {
+        let scope = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: bytes,
+            usage,
+            mapped_at_creation: false,
+        });
+        match at_once(scope.pop()) {
+            None => Ok(buffer),
+            Some(_) => Err(GpuError::Full { adapter: self.adapter.clone(), needed: bytes }),
+        }
+    }
+
+    fn untroubled(&self) -> Result<(), GpuError> {
+        self.trouble.get().map_or(Ok(()), |reason| Err(self.lost(reason)))
+    }
+
+    fn lost(&self, reason: &dyn Display) -> GpuError {
+        GpuError::Lost { adapter: self.adapter.clone(), reason: line(reason) }
+    }
+}
+
+/// What a future gives that is ready, as those of native drivers are.
+fn at_once<F: Future>(future: F) -> F::Output {
+    let (mut future, mut context) = (pin!(future), Context::from_waker(Waker::noop()));
+    loop {
+        if let Poll::Ready(output) = future.as_mut().poll(&mut context) {
+            return output;
+        }
+        std::thread::yield_now();
+    }
+}
+
+/// What somebody else says, in one line.
+fn line(reason: &dyn Display) -> String {
+    let text = reason.to_string();
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An adapter; `None`, with a word about it, where there is none.
+    fn device() -> Option<Device> {
+        match Device::open(u64::MAX) {
+            Ok(device) => Some(device),
+            Err(error) => {
+                assert!(
+                    std::env::var_os("MATDB_NEED_GPU").is_none(),
+                    "MATDB_NEED_GPU is set: {error}"
+                );
+                eprintln!("skipped: {error}");
+                None
+            }
+        }
+    }
+
+    /// A box without anything in it.
+    const EMPTY: Node = [0, 0, 0, 1, 0, 0, 0, 0];
+    const POINT: Corners = [[0.0; 4]; 3];
+
+    #[test]
+    fn a_device_that_is_lost_is_an_error_and_no_panic() {
+        let Some(device) = device() else { return };
+        let tree = device.hold(&[EMPTY], &[POINT]).unwrap();
+        let answers = device.land(device.launch(&tree, &[[7; 8], [9; 8]]).unwrap()).unwrap();
+        assert_eq!(answers, [7, 9], "what is known is not asked");
+        let flight = device.launch(&tree, &[[7; 8]]).unwrap();
+        device.device.destroy();
+        let lost = |error: GpuError| {
+            let text = error.to_string();
+            assert!(matches!(error, GpuError::Lost { .. }) && text.lines().count() == 1, "{text}");
+            assert!(text.ends_with("try again, or use the tracer `bvh`"), "{text}");
+        };
+        // What was under way may still arrive.
+        device.land(flight).map_or_else(lost, |answers| assert_eq!(answers, [7]));
+        lost(device.launch(&tree, &[[7; 8]]).err().unwrap());
+        lost(device.hold(&[EMPTY], &[POINT]).err().unwrap());
+    }
+
+    #[test]
+    fn memory_that_is_not_there_is_an_error_and_no_panic() {
+        let Some(device) = device() else { return };
+        let most = device.device.limits().max_buffer_size;
+        match device.buffer(most, Usage::STORAGE) {
+            Err(GpuError::Full { needed, .. }) => assert_eq!(needed, most),
+            Err(other) => panic!("{other}"),
+            Ok(_) => {}
+        }
+    }
+}
