@@ -44,6 +44,9 @@ impl Beside {
     }
 }
 
+/// The rays of a spot and what they hit.
+type Round<'a> = (&'a [Ray<Global>], &'a [Option<Hit>]);
+
 /// The ray of a look and those of its spot, as far as they meet the target as the scene has it.
 type Spot = (Beside, Vec<Beside>);
 
@@ -55,7 +58,7 @@ fn spots(stage: &Stage, looks: &[Look], diameter_m: f64) -> Vec<Option<Spot>> {
     };
     let rays: Vec<Ray<Global>> = looks.par_iter().zip(&centres).flat_map_iter(round).collect();
     let hits = closest(stage.bvh, &rays);
-    let spot = |(look, (centre, (rays, hits))): (&Look, (&Option<Hit>, (&[Ray<_>], &[_])))| {
+    let spot = |(look, (centre, (rays, hits))): (&Look, (&Option<Hit>, Round))| {
         let met = |ray, hit: Option<Hit>| Some(Beside::of(stage, &at(stage, look, ray, hit?)));
         let beside = rays.iter().zip(hits).filter_map(|(ray, hit)| met(*ray, *hit));
         Some((met(look.ray, *centre)?, beside.collect()))
