@@ -6,7 +6,7 @@
 //!
 //! - **The device finds**, in f32 with bounds of its rounding. It names a facet when the ray surely passes
 //!   through it, and surely nearer than through any other; it says that there is none when there surely is none.
-//! - **The processor decides** in f64 the rays of which the device is not sure, some in a thousand: those that pass near
+//! - **The processor decides** in f64 the rays of which the device is not sure: those that pass near
 //!   an edge, and those that meet two facets at almost the same range. For all it measures range and angle.
 //!
 //! So the hits are those of the hierarchy, bit for bit, on any device. Power and sub-rays are
