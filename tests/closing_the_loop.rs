@@ -226,14 +226,14 @@ fn the_page_begins_with_targets_and_what_was_reached() {
     let mut by_hand = by_hand();
     let met: Vec<Option<bool>> = targets(&by_hand.cases).iter().map(|target| target.met).collect();
     let no = Some(false);
-    // Extra names: 1 of 9 cases. The 90th percentile is 1.10, which is allowed.
-    assert_eq!(met, [no, no, no, no, no, no, no, Some(true), Some(true)]);
+    // Extra names: 1 of 9 cases. The 90th percentile is 1.10, which is allowed. One error has grown.
+    assert_eq!(met, [no, no, no, no, no, no, no, Some(true), Some(true), no]);
     let text = page(&[by_hand], Some("the seeds 90 to 99"));
     assert!(
         text.contains("| strong effect: right name first | ≥ 97 % | **66.7 % (2 of 3): missed** |")
     );
     assert!(
-        text.contains("5 of 15 cases came out as they should, and 2 of the 9 targets"),
+        text.contains("5 of 15 cases came out as they should, and 2 of the 10 targets"),
         "{text}"
     );
     assert!(text.contains("tuned on: the seeds 90 to 99."));
