@@ -2,8 +2,8 @@
 //!
 //! Every effect is screened on a sample of the looks; those that promise enough are fitted together with
 //! the base, first on the sample, the best few on all looks. These predict held-out patches from fits
-//! without them. One is accepted when that gain is more than two standard errors over patches (or, for
-//! what acts in one small place, far beyond chance and found again where it was not fitted), its gain
+//! without them. One is accepted when that gain, or the one in the fit if it is less, is more than two
+//! standard errors over patches (or, for what shifts means in one small place, far beyond chance and found again where it was not fitted), its gain
 //! in the fit beats that of placebos and a stated least, and it changes the data by a stated least
 //! size. Where placebos beat all, two that predict held-out patches are tried together: each alone is a
 //! worse picture of both than a wave.

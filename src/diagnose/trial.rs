@@ -22,7 +22,7 @@ const SHARE_TO_SCOUT: f64 = 0.1;
 /// and none that gains less than this share of the best.
 const SHORTLIST: usize = 5;
 /// A refit that keeps less of its promise does not count among them.
-const SHARE_KEPT: f64 = 0.3;
+const SHARE_OF_PROMISE: f64 = 0.3;
 const SHARE_OF_BEST: f64 = 0.3;
 
 /// A fit of one more effect.
@@ -79,7 +79,7 @@ impl Selection<'_> {
             (self.hear)(&format!("round {round}: refitting with {}", trial.effect.name()));
             self.refit(state, trial);
             best = best.max(trial.candidate.gain);
-            kept += usize::from(trial.candidate.gain >= SHARE_KEPT * promised);
+            kept += usize::from(trial.candidate.gain >= SHARE_OF_PROMISE * promised);
         }
         sort(&mut trials);
         trials
