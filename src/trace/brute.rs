@@ -2,7 +2,6 @@
 //! own method. Slow, obvious, and the judge of every faster tracer.
 
 use super::Hit;
-use super::facet::measured;
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 
@@ -14,7 +13,14 @@ pub fn closest(mesh: &Mesh, ray: &Ray<Global>) -> Option<Hit> {
             && best.is_none_or(|hit| range_m < hit.range_m)
             && !mesh.is_degenerate(facet)
         {
-            best = Some(measured(mesh, facet as u32, ray, range_m));
+            let (along, normal) =
+                (ray.direction.xyz(), mesh.area_normal(facet).normalize_or_zero());
+            best = Some(Hit {
+                facet: facet as u32,
+                range_m,
+                point: (ray.origin.xyz + range_m * along).into(),
+                cos_theta: along.dot(normal).abs(),
+            });
         }
     }
     best

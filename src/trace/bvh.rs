@@ -13,7 +13,7 @@ use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ray::{Ray as BoxRay, RayHit};
 
 use super::Hit;
-use super::facet::{crossing_m, measured};
+use super::facet::{Line, met};
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 
@@ -94,10 +94,11 @@ impl Boxes {
         let start_m = self.entry_m(ray)?;
         let origin = ray.origin.xyz + start_m * ray.direction.xyz() - self.centre;
         let box_ray = BoxRay::new_inf(origin.as_vec3a(), ray.direction.xyz().as_vec3a());
+        let line = Line::new(ray);
         let mut best: Option<(f64, u32)> = None;
         self.tree.ray_traverse(box_ray, &mut RayHit::none(), |_, entry| {
             let facet = self.facets[entry];
-            if let Some(range_m) = crossing_m(mesh, facet as usize, ray)
+            if let Some(range_m) = line.crossing_m(mesh, facet as usize)
                 && best.is_none_or(|nearest| (range_m, facet) < nearest)
             {
                 best = Some((range_m, facet));
@@ -107,7 +108,9 @@ impl Boxes {
                 (range_m - start_m + 2.0 * PADDING * self.radius_m) as f32
             })
         });
-        best.map(|(range_m, facet)| measured(mesh, facet, ray, range_m))
+        let (_, facet) = best?;
+        let [hit] = met(mesh, [facet], [ray]);
+        hit
     }
 
     /// Distance at which the ray reaches the sphere around the facets, m; f32 is precise from there.

@@ -1,53 +1,103 @@
-//! One ray, one facet, in f64.
+//! Rays and facets in f64.
+
+use glam::DVec3;
 
 use super::Hit;
-use crate::frames::{Global, Ray};
+use crate::frames::{Global, Point, Ray};
 use crate::geometry::Mesh;
 
-/// Distance along the ray to a facet, m; `None` when it passes beside or behind.
+/// A ray made ready to be tested against many facets.
 ///
 /// By Woop, Benthin and Wald (JCGT 2 (2013) 65): the corners are sheared so that the ray becomes an axis,
 /// which depends on the corner and the ray alone, and an edge is the difference of two products. Rounding
 /// cannot turn its sign, only make it zero, which counts as inside: no ray slips between
 /// neighbours, nor through the corner where many meet.
-pub(super) fn crossing_m(mesh: &Mesh, facet: usize, ray: &Ray<Global>) -> Option<f64> {
-    let direction = ray.direction.xyz();
-    let along = direction.abs().max_position();
-    let [across, up] = [(along + 1) % 3, (along + 2) % 3];
-    let shear = [direction[across], direction[up]].map(|part| part / direction[along]);
-    let [a, b, c] = mesh.corners(facet).map(|corner| {
-        let at = corner - ray.origin.xyz;
-        [at[across] - shear[0] * at[along], at[up] - shear[1] * at[along]]
-    });
-    let edge = |from: [f64; 2], to: [f64; 2]| from[0] * to[1] - from[1] * to[0];
-    let [ab, bc, ca] = [edge(a, b), edge(b, c), edge(c, a)];
-    let all = |inside: fn(f64) -> bool| inside(ab) && inside(bc) && inside(ca);
-    if !all(|v| v >= 0.0) && !all(|v| v <= 0.0) {
-        return None;
+pub(super) struct Line<'a> {
+    ray: &'a Ray<Global>,
+    /// The axis that the ray runs along most, and the other two.
+    along: usize,
+    beside: [usize; 2],
+    shear: [f64; 2],
+}
+
+impl<'a> Line<'a> {
+    #[inline]
+    pub fn new(ray: &'a Ray<Global>) -> Line<'a> {
+        let direction = ray.direction.xyz();
+        let along = direction.abs().max_position();
+        let beside = [(along + 1) % 3, (along + 2) % 3];
+        Line { ray, along, beside, shear: beside.map(|axis| direction[axis] / direction[along]) }
     }
-    plane_m(mesh, facet, ray)
+
+    /// Distance to a facet, m; `None` when the ray passes beside it or away from it.
+    #[inline]
+    pub fn crossing_m(&self, mesh: &Mesh, facet: usize) -> Option<f64> {
+        let Line { ray, along, beside: [across, up], shear } = *self;
+        let [a, b, c] = mesh.corners(facet).map(|corner| {
+            let at = corner - ray.origin.xyz;
+            [at[across] - shear[0] * at[along], at[up] - shear[1] * at[along]]
+        });
+        let edge = |from: [f64; 2], to: [f64; 2]| from[0] * to[1] - from[1] * to[0];
+        let [ab, bc, ca] = [edge(a, b), edge(b, c), edge(c, a)];
+        let all = |inside: fn(f64) -> bool| inside(ab) && inside(bc) && inside(ca);
+        if !all(|v| v >= 0.0) && !all(|v| v <= 0.0) {
+            return None;
+        }
+        plane_m(mesh, facet, ray)
+    }
 }
 
 /// Distance along the ray to the plane of a facet, m, for a ray that passes through the facet; `None`
 /// when it lies behind or along the ray.
 #[inline]
 pub(super) fn plane_m(mesh: &Mesh, facet: usize, ray: &Ray<Global>) -> Option<f64> {
-    let (origin, direction) = (ray.origin.xyz, ray.direction.xyz());
-    let [a, _, _] = mesh.corners(facet);
-    let normal = mesh.area_normal(facet);
-    let range_m = (a - origin).dot(normal) / direction.dot(normal);
-    (range_m > 0.0 && range_m.is_finite()).then_some(range_m)
+    let [hit] = met(mesh, [facet as u32], [ray]);
+    hit.map(|hit| hit.range_m)
 }
 
-/// Completes a hit from the facet and the distance.
-#[inline]
-pub(super) fn measured(mesh: &Mesh, facet: u32, ray: &Ray<Global>, range_m: f64) -> Hit {
-    let normal = mesh.area_normal(facet as usize).normalize_or_zero();
-    let direction = ray.direction.xyz();
-    Hit {
-        facet,
-        range_m,
-        point: (ray.origin.xyz + range_m * direction).into(),
-        cos_theta: direction.dot(normal).abs(),
+/// Where rays meet the planes of their facets, side by side; `None` where the plane lies behind or along the
+/// ray, and for a number that is no facet's.
+#[inline(always)]
+pub(super) fn met<const N: usize>(
+    mesh: &Mesh,
+    facets: [u32; N],
+    rays: [&Ray<Global>; N],
+) -> [Option<Hit>; N] {
+    let [mut origin, mut along, mut a, mut b, mut c] = [[[0.0; N]; 3]; 5];
+    for lane in 0..N {
+        let set = |list: &mut [[f64; N]; 3], at: DVec3| {
+            list.iter_mut().zip(at.to_array()).for_each(|(list, at)| list[lane] = at);
+        };
+        set(&mut origin, rays[lane].origin.xyz);
+        set(&mut along, rays[lane].direction.xyz());
+        if let Some(corners) = mesh.facets.get(facets[lane] as usize) {
+            let corners = corners.map(|vertex| mesh.vertices[vertex as usize]);
+            [&mut a, &mut b, &mut c].into_iter().zip(corners).for_each(|(list, at)| set(list, at));
+        }
     }
+    let mut point = [[0.0; N]; 3];
+    let [mut range_m, mut cos_theta] = [[0.0; N]; 2];
+    for lane in 0..N {
+        let [origin, along, a, b, c] =
+            [&origin, &along, &a, &b, &c].map(|list| [list[0][lane], list[1][lane], list[2][lane]]);
+        let [origin, along, a, b, c] = [origin, along, a, b, c].map(DVec3::from_array);
+        let normal = (b - a).cross(c - a);
+        range_m[lane] = (a - origin).dot(normal) / along.dot(normal);
+        let per_length = 1.0 / normal.dot(normal).sqrt();
+        let unit = if per_length.is_finite() { normal * per_length } else { DVec3::ZERO };
+        cos_theta[lane] = along.dot(unit).abs();
+        let at = origin + range_m[lane] * along;
+        for (list, at) in point.iter_mut().zip(at.to_array()) {
+            list[lane] = at;
+        }
+    }
+    std::array::from_fn(|lane| {
+        let range_m = range_m[lane];
+        (range_m > 0.0 && range_m.is_finite()).then(|| Hit {
+            facet: facets[lane],
+            range_m,
+            point: Point::new(point[0][lane], point[1][lane], point[2][lane]),
+            cos_theta: cos_theta[lane],
+        })
+    })
 }

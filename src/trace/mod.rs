@@ -13,6 +13,7 @@ mod gpu;
 mod inside;
 mod pinhole;
 mod tracer;
+mod wide;
 
 use crate::frames::{Global, Point};
 

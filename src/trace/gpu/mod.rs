@@ -21,7 +21,7 @@ mod packed;
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::facet::{measured, plane_m};
+use super::facet::met;
 use super::{Bvh, Hit};
 use crate::frames::{Global, Ray};
 use packed::NOTHING;
@@ -155,10 +155,10 @@ impl<'a> Held<'a> {
         self.each(rays, |ray, answer| match answer {
             Answer::Nothing => None,
             Answer::Unsure => self.bvh.closest(ray),
-            Answer::Facet(facet) => match plane_m(self.bvh.mesh(), facet as usize, ray) {
-                Some(range_m) => Some(measured(self.bvh.mesh(), facet, ray, range_m)),
-                None => self.bvh.closest(ray),
-            },
+            Answer::Facet(facet) => {
+                let [hit] = met(self.bvh.mesh(), [facet], [ray]);
+                hit.or_else(|| self.bvh.closest(ray))
+            }
         })
     }
 

@@ -3,9 +3,11 @@
 use std::ops::Range;
 
 use super::lanes::{Form, LANES, Nearest};
-use super::picture::{Patch, Picture};
+use super::patches::{Cells, Forms, Patches, blocks};
+use super::picture::Picture;
 use super::{NONE, ROUNDING};
-use crate::trace::facet::{crossing_m, plane_m};
+use crate::trace::facet::{Line, plane_m};
+use crate::trace::wide::{Wide, widest};
 
 /// The nearest facets of the rays of some rows.
 ///
@@ -29,80 +31,79 @@ impl<'a> Band<'a> {
         Band { picture, rows, first, low, high, facet: vec![NONE; count] }
     }
 
-    /// Facets in ascending order; may be called again with higher ones.
-    #[inline(always)]
-    pub fn walk(&mut self, facets: impl Iterator<Item = u32>) {
-        for facet in facets {
-            if let Some(patch) = self.picture.patch(facet) {
-                self.meet(facet, &patch);
-            }
-        }
-    }
-
-    /// The nearest facet of every ray, in the order of the fan's lists.
-    pub fn facets(mut self) -> Vec<u32> {
+    /// The nearest facets when these have been met too.
+    pub fn walked(mut self, facets: impl Iterator<Item = u32>) -> Vec<u32> {
+        widest(Walk { band: &mut self, facets });
         self.facet.truncate(self.facet.len() - LANES);
         self.facet
     }
 
+    /// Facets in ascending order.
     #[inline(always)]
-    fn meet(&mut self, facet: u32, patch: &Patch) {
+    fn walk(&mut self, facets: impl Iterator<Item = u32>) {
         let grid = &self.picture.fan.grid;
-        let ([first, last], [left, right]) = (patch.rows, patch.columns);
-        let (mut form, mut has_area) = (None, None);
-        for row in first.max(self.rows.start)..(last + 1).min(self.rows.end) {
-            let [start, end] = grid.places(row, left, right);
-            if start == end {
-                continue;
-            }
-            let form = form.get_or_insert_with(|| {
-                let form = patch.form(grid.cell, grid.reach);
-                has_area = patch.has_area(&form).then_some(true);
-                form
-            });
-            for place in (start..end).step_by(LANES) {
-                self.block(facet, form, place, end - place, &mut has_area);
+        for block in blocks(facets) {
+            let patches = self.picture.patches(&block);
+            let forms = patches.forms(grid);
+            for lane in patches.seen() {
+                self.meet(block[lane], &patches, &forms, lane);
             }
         }
     }
 
-    /// Up to [`LANES`] rays from a place on.
     #[inline(always)]
-    fn block(
-        &mut self,
-        facet: u32,
-        form: &Form,
-        place: usize,
-        count: usize,
-        has_area: &mut Option<bool>,
-    ) {
+    fn meet(&mut self, facet: u32, patches: &Patches, forms: &Forms, lane: usize) {
+        if !forms.has_area(lane) && self.picture.mesh.is_degenerate(facet as usize) {
+            return;
+        }
+        let (cells, form) = (patches.cells(lane), forms.of(lane));
+        let mut is_open = false;
+        for (place, count) in self.blocks(cells) {
+            is_open |= self.note(facet, &form, place, count);
+        }
+        // Once all is noted: with a call in the loop nothing would stay in its register.
+        if is_open {
+            self.settle(facet, &form, cells);
+        }
+    }
+
+    /// Notes where a facet is the nearest, for the first `count` rays from a place on; true when f32 cannot tell of some.
+    #[inline(always)]
+    fn note(&mut self, facet: u32, form: &Form, place: usize, count: usize) -> bool {
         let (fan, own, count) = (self.picture.fan, place - self.first, count as f32);
-        let (Some(u), Some(v)) = (lanes(&fan.u, place), lanes(&fan.v, place)) else { return };
+        let (Some(u), Some(v)) = (lanes(&fan.u, place), lanes(&fan.v, place)) else { return false };
         let (Some(low), Some(high), Some(best)) = (
             lanes_mut(&mut self.low, own),
             lanes_mut(&mut self.high, own),
             lanes_mut(&mut self.facet, own),
         ) else {
-            return;
+            return false;
         };
-        let Some(seen) = form.see(u, v, low, count) else { return };
-        let mesh = self.picture.mesh;
-        if !*has_area.get_or_insert_with(|| !mesh.is_degenerate(facet as usize)) {
-            return;
-        }
-        let nearest = Nearest { low, high, facet: best };
-        if let Some(open) = form.note(facet, &seen, nearest, count) {
-            let open = std::iter::zip(place.., open).filter(|&(_, open)| open == 1);
-            open.for_each(|(place, _)| self.settle(facet, place));
+        match form.see(u, v, low, count) {
+            Some(seen) => form.note(facet, &seen, Nearest { low, high, facet: best }, count),
+            None => false,
         }
     }
 
-    /// Decides in f64 what f32 cannot tell.
+    /// Decides in f64 what f32 could not tell of a facet.
     #[cold]
-    fn settle(&mut self, facet: u32, place: usize) {
+    #[inline(never)]
+    fn settle(&mut self, facet: u32, form: &Form, cells: Cells) {
+        let fan = self.picture.fan;
+        for (start, count) in self.blocks(cells) {
+            for place in start..start + count.min(LANES) {
+                let (at, own) = ([fan.u[place], fan.v[place]], place - self.first);
+                if self.facet[own] != facet && form.may_meet(at, self.low[own]) {
+                    self.decide(facet, place);
+                }
+            }
+        }
+    }
+
+    fn decide(&mut self, facet: u32, place: usize) {
         let Picture { fan, mesh, .. } = *self.picture;
         let ray = &fan.rays[fan.ray_at[place] as usize];
-        let Some(range_m) = crossing_m(mesh, facet as usize, ray) else { return };
+        let Some(range_m) = Line::new(ray).crossing_m(mesh, facet as usize) else { return };
         let own = place - self.first;
         let so_far = self.facet[own];
         let nearest_m = match so_far {
@@ -114,6 +115,32 @@ impl<'a> Band<'a> {
             let bound = |sign: f64| (per_m * (1.0 + sign * 4.0 * f64::from(ROUNDING))) as f32;
             (self.low[own], self.high[own], self.facet[own]) = (bound(-1.0), bound(1.0), facet);
         }
+    }
+
+    /// Where the rays of some cells begin, [`LANES`] and fewer at a time, and how many are left in their row.
+    #[inline(always)]
+    fn blocks(&self, cells: Cells) -> impl Iterator<Item = (usize, usize)> + use<'a> {
+        let grid = &self.picture.fan.grid;
+        let Cells { columns: [left, right], rows: [first, last] } = cells;
+        (first.max(self.rows.start)..(last + 1).min(self.rows.end)).flat_map(move |row| {
+            let [start, end] = grid.places(row, left, right);
+            (start..end).step_by(LANES).map(move |place| (place, end - place))
+        })
+    }
+}
+
+/// Facets that a band has yet to meet.
+struct Walk<'a, 'b, I> {
+    band: &'a mut Band<'b>,
+    facets: I,
+}
+
+impl<I: Iterator<Item = u32>> Wide for Walk<'_, '_, I> {
+    type Answer = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.band.walk(self.facets);
     }
 }
 

@@ -4,8 +4,9 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::lanes::LANES;
+use super::lanes::{LANES, least, most};
 use crate::frames::{Global, Ray};
+use crate::trace::wide::{Wide, widest};
 
 /// Least cosine between a ray and the axis of its fan: 84°.
 const LEAST_COS: f64 = 0.1;
@@ -16,6 +17,9 @@ const CELL_HEIGHT: f64 = 3.0;
 
 /// Least side of a cell over the largest coordinate: four times what rounding moves a box by.
 const LEAST_CELL: f64 = 1e-6;
+
+/// Rays of one task.
+const CHUNK: usize = 4096;
 
 /// Below this the coordinates are as good as in the middle of the picture.
 const LEAST_REACH: f32 = 0.01;
@@ -101,19 +105,26 @@ impl<'a> Fan<'a> {
             Some(ray) if rays.len() < u32::MAX as usize => ray.origin.xyz,
             _ => return Err(NoFan::Count { rays: rays.len() }),
         };
-        let elsewhere = |ray: &Ray<Global>| ray.origin.xyz != origin;
-        if let Some(ray) = rays.par_iter().with_min_len(4096).position_first(elsewhere) {
-            return Err(NoFan::Origins { ray });
+        let elsewhere = |rays: &[Ray<Global>]| rays.iter().position(|ray| ray.origin.xyz != origin);
+        let sum = |rays: &[Ray<Global>]| rays.iter().map(|ray| ray.direction.xyz()).sum::<DVec3>();
+        // Fixed chunks, so that the sum does not depend on the threads.
+        let chunks: Vec<_> =
+            rays.par_chunks(CHUNK).map(|rays| (elsewhere(rays), sum(rays))).collect();
+        for (chunk, (elsewhere, _)) in chunks.iter().enumerate() {
+            if let Some(ray) = elsewhere {
+                return Err(NoFan::Origins { ray: chunk * CHUNK + ray });
+            }
         }
-        let frame = frame(rays);
-        let flat: Vec<Option<[f32; 2]>> =
-            rays.par_iter().with_min_len(4096).map(|ray| flattened(frame, ray)).collect();
-        if let Some(ray) = flat.par_iter().with_min_len(4096).position_first(Option::is_none) {
+        let sum = chunks.iter().map(|(_, sum)| sum).sum::<DVec3>();
+        let frame = frame(sum.normalize_or(rays[0].direction.xyz()));
+        let blocks = rays.par_chunks(LANES).with_min_len(256);
+        let flat: Vec<_> = blocks.map(|rays| widest(Flattening { frame, rays })).collect();
+        let flat = &flat.as_flattened()[..rays.len()];
+        if let Some(ray) = flat.iter().position(|at| at[0].is_nan()) {
             return Err(NoFan::Wide { ray });
         }
-        let flat: Vec<[f32; 2]> = flat.into_iter().flatten().collect();
-        let mut grid = Grid::over(&flat);
-        let place_of = grid.sort(&flat);
+        let mut grid = Grid::over(flat);
+        let place_of = grid.sort(flat);
         let mut fan = Fan {
             rays,
             origin,
@@ -124,7 +135,7 @@ impl<'a> Fan<'a> {
             ray_at: vec![0; rays.len()],
             place_of,
         };
-        for ((&place, [u, v]), ray) in fan.place_of.iter().zip(flat).zip(0..) {
+        for ((&place, &[u, v]), ray) in fan.place_of.iter().zip(flat).zip(0..) {
             let place = place as usize;
             (fan.u[place], fan.v[place], fan.ray_at[place]) = (u, v, ray);
         }
@@ -132,19 +143,37 @@ impl<'a> Fan<'a> {
     }
 }
 
-/// Rows: two axes across the mean direction, and it.
-fn frame(rays: &[Ray<Global>]) -> DMat3 {
-    // Fixed chunks, so that the sum does not depend on the threads.
-    let sum = |rays: &[Ray<Global>]| rays.iter().map(|ray| ray.direction.xyz()).sum::<DVec3>();
-    let sums: Vec<DVec3> = rays.par_chunks(4096).map(sum).collect();
-    let axis = sums.into_iter().sum::<DVec3>().normalize_or(rays[0].direction.xyz());
+/// Rows: two axes across a direction, and it.
+fn frame(axis: DVec3) -> DMat3 {
     let (right, up) = axis.any_orthonormal_pair();
     DMat3::from_cols(right, up, axis).transpose()
 }
 
-fn flattened(frame: DMat3, ray: &Ray<Global>) -> Option<[f32; 2]> {
-    let DVec3 { x, y, z } = frame * ray.direction.xyz();
-    (z > LEAST_COS).then(|| [(x / z) as f32, (y / z) as f32])
+/// (u, v) of up to [`LANES`] rays; not a number for one that is too far from the axis.
+struct Flattening<'a> {
+    frame: DMat3,
+    rays: &'a [Ray<Global>],
+}
+
+impl Wide for Flattening<'_> {
+    type Answer = [[f32; 2]; LANES];
+
+    #[inline(always)]
+    fn run(self) -> [[f32; 2]; LANES] {
+        let mut along = [[0.0; LANES]; 3];
+        for (lane, ray) in self.rays.iter().enumerate() {
+            let at = ray.direction.xyz().to_array();
+            along.iter_mut().zip(at).for_each(|(list, at)| list[lane] = at);
+        }
+        let mut flat = [[0.0; 2]; LANES];
+        for lane in 0..LANES {
+            let along = DVec3::new(along[0][lane], along[1][lane], along[2][lane]);
+            let DVec3 { x, y, z } = self.frame * along;
+            let per_depth = if z > LEAST_COS { 1.0 / z } else { f64::NAN };
+            flat[lane] = [(x * per_depth) as f32, (y * per_depth) as f32];
+        }
+        flat
+    }
 }
 
 impl Grid {
@@ -153,8 +182,8 @@ impl Grid {
         let (mut min, mut max) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
         for point in flat {
             for axis in [0, 1] {
-                min[axis] = min[axis].min(point[axis]);
-                max[axis] = max[axis].max(point[axis]);
+                min[axis] = least(min[axis], point[axis]);
+                max[axis] = most(max[axis], point[axis]);
             }
         }
         let sides = [0, 1].map(|axis| f64::from(max[axis]) - f64::from(min[axis]));
@@ -165,17 +194,19 @@ impl Grid {
         let least = LEAST_CELL * f64::from(reach);
         let cell = [1.0, CELL_HEIGHT].map(|factor| (factor * spacing).max(least) as f32);
         let per = cell.map(|side| 1.0 / side);
-        let cells = |axis: usize| ((max[axis] - min[axis]) * per[axis]) as usize + 1;
+        let cells = |axis: usize| ((max[axis] - min[axis]) * per[axis]).round() as usize + 1;
         let (columns, rows) = (cells(0), cells(1));
         Grid { min, max, per, cell, columns, rows, reach, starts: vec![0; columns * rows + 1] }
     }
 
     /// Column or row of a coordinate; outside the grid the nearest. It never falls as `at` grows.
     #[inline(always)]
-    pub fn step(&self, axis: usize, at: f32) -> usize {
-        let most = if axis == 0 { self.columns } else { self.rows } - 1;
-        // A negative number becomes 0.
-        (((at - self.min[axis]) * self.per[axis]) as i32).clamp(0, most as i32) as usize
+    pub fn step(&self, axis: usize, at: f32) -> u32 {
+        let last = if axis == 0 { self.columns } else { self.rows } - 1;
+        let step = least(most((at - self.min[axis]) * self.per[axis], 0.0), last as f32);
+        // A sum of 2²³ and less than that is rounded to a whole number, which its last 23 bits are.
+        const WHOLE: f32 = (1 << 23) as f32;
+        (step + WHOLE).to_bits() - WHOLE.to_bits()
     }
 
     /// The places of some columns, from first to last, of a row.
@@ -192,8 +223,9 @@ impl Grid {
 
     /// The place of every ray, cell after cell and in a cell by number.
     fn sort(&mut self, flat: &[[f32; 2]]) -> Vec<u32> {
-        let cell = |&[u, v]: &[f32; 2]| (self.step(1, v) * self.columns + self.step(0, u)) as u32;
-        let mut place_of: Vec<u32> = flat.par_iter().with_min_len(4096).map(cell).collect();
+        let columns = self.columns as u32;
+        let cell = |&[u, v]: &[f32; 2]| self.step(1, v) * columns + self.step(0, u);
+        let mut place_of: Vec<u32> = flat.par_iter().with_min_len(CHUNK).map(cell).collect();
         let mut next = vec![0; self.starts.len()];
         place_of.iter().for_each(|&cell| next[cell as usize] += 1);
         let mut before = 0;

@@ -1,9 +1,6 @@
 //! One facet against a block of rays, in f32 and side by side.
 //!
-//! Plain loops over arrays of fixed length, which become vector instructions; [`widest`] picks the
-//! widest that the processor has. No product is fused with a sum, so that all give the same bits.
-
-use super::band::Band;
+//! Plain loops over arrays of fixed length, which become vector instructions ([`Wide`](crate::trace::wide::Wide)).
 
 /// Rays of a block.
 pub(super) const LANES: usize = 16;
@@ -49,19 +46,30 @@ pub(super) struct Nearest<'a> {
 }
 
 impl Form {
+    /// The least of the three areas that a point spans with the edges, and the inverse depth, 1/m.
+    #[inline(always)]
+    fn at(&self, [u, v]: [f32; 2]) -> (f32, f32) {
+        let (x, y) = (u - self.at[0], v - self.at[1]);
+        let c = self.ab[0] * y - self.ab[1] * x;
+        let b = self.ca[0] * y - self.ca[1] * x;
+        let a = self.area - b - c;
+        (least(a, least(b, c)), self.w + b * self.w_b + c * self.w_c)
+    }
+
+    /// Whether a ray may meet the facet, and no nearer one: not with certainty the one or the other.
+    #[inline(always)]
+    pub fn may_meet(&self, at: [f32; 2], low: f32) -> bool {
+        let (least, w) = self.at(at);
+        (least >= -self.doubt) & (w + self.w_doubt >= low)
+    }
+
     /// The first `count` rays of a block; none when all surely pass beside the facet or meet a nearer one.
     #[inline(always)]
     pub fn see(&self, u: &Lanes, v: &Lanes, low: &Lanes, count: f32) -> Option<Seen> {
         let mut seen = Seen { least: [0.0; LANES], w: [0.0; LANES] };
         let mut any = 0;
         for lane in 0..LANES {
-            let (x, y) = (u[lane] - self.at[0], v[lane] - self.at[1]);
-            let c = self.ab[0] * y - self.ab[1] * x;
-            let b = self.ca[0] * y - self.ca[1] * x;
-            let a = self.area - b - c;
-            let least = if b < c { b } else { c };
-            let least = if a < least { a } else { least };
-            let w = self.w + b * self.w_b + c * self.w_c;
+            let (least, w) = self.at([u[lane], v[lane]]);
             seen.least[lane] = least;
             seen.w[lane] = w;
             let maybe = (least >= -self.doubt) & (w + self.w_doubt >= low[lane]);
@@ -70,18 +78,11 @@ impl Form {
         (any != 0).then_some(seen)
     }
 
-    /// Notes where the facet is surely the nearest; lanes where f32 cannot tell are left 1 in the answer.
+    /// Notes where the facet is surely the nearest; true when f32 cannot tell of some rays.
     #[inline(always)]
-    pub fn note(
-        &self,
-        facet: u32,
-        seen: &Seen,
-        nearest: Nearest,
-        count: f32,
-    ) -> Option<[u32; LANES]> {
-        let mut open = [0; LANES];
+    pub fn note(&self, facet: u32, seen: &Seen, nearest: Nearest, count: f32) -> bool {
         let mut any = 0;
-        for (lane, open) in open.iter_mut().enumerate() {
+        for lane in 0..LANES {
             let (low, high) = (seen.w[lane] - self.w_doubt, seen.w[lane] + self.w_doubt);
             let maybe = (seen.least[lane] >= -self.doubt)
                 & (high >= nearest.low[lane])
@@ -90,40 +91,19 @@ impl Form {
             nearest.low[lane] = if surely { low } else { nearest.low[lane] };
             nearest.high[lane] = if surely { high } else { nearest.high[lane] };
             nearest.facet[lane] = if surely { facet } else { nearest.facet[lane] };
-            *open = u32::from(maybe & !surely);
-            any |= *open;
+            any |= u32::from(maybe & !surely);
         }
-        (any != 0).then_some(open)
+        any != 0
     }
 }
 
-/// Walks facets over a band with the widest instructions that the processor has.
-pub(super) fn widest(band: &mut Band, facets: impl Iterator<Item = u32>) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        if is_x86_feature_detected!("avx512f") {
-            // SAFETY: the processor has just been asked for the only feature that it needs.
-            return unsafe { x86::lanes_of_16(band, facets) };
-        }
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: as above.
-            return unsafe { x86::lanes_of_8(band, facets) };
-        }
-    }
-    band.walk(facets);
+// Other than the standard library's these need not mind NaN, and are one instruction.
+#[inline(always)]
+pub(super) fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
-#[cfg(target_arch = "x86_64")]
-mod x86 {
-    use super::Band;
-
-    #[target_feature(enable = "avx512f")]
-    pub fn lanes_of_16(band: &mut Band, facets: impl Iterator<Item = u32>) {
-        band.walk(facets);
-    }
-
-    #[target_feature(enable = "avx2")]
-    pub fn lanes_of_8(band: &mut Band, facets: impl Iterator<Item = u32>) {
-        band.walk(facets);
-    }
+#[inline(always)]
+pub(super) fn most(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }

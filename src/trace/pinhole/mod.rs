@@ -5,7 +5,7 @@
 //! a grid ([`Fan`]); then the facets are walked, each over the cells that its box touches.
 //!
 //! - **f32 finds.** Differences from the facet's first corner come before products, and every form has a bound
-//!   of its rounding (`picture.rs`): for a facet of 1 cm at 8 m some micrometres beside an edge. A ray farther than
+//!   of its rounding (`patches.rs`): for a facet of 1 cm at 8 m some micrometres beside an edge. A ray farther than
 //!   that inside, and nearer by more than the bound on inverse depth than what it has met so far, is decided.
 //! - **f64 decides** the rest, one ray in some hundreds, by the rule of the hierarchy: edge volumes that are exact negatives for
 //!   neighbours, so that nothing slips between, and of equally near facets the one with the smallest number.
@@ -19,18 +19,23 @@
 mod band;
 mod fan;
 mod lanes;
+mod patches;
 mod picture;
 #[cfg(test)]
 mod tests;
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
-use super::facet::{measured, plane_m};
+use super::facet::met;
+use super::wide::{Wide, widest};
 use super::{Bvh, Hit};
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 use band::Band;
-use lanes::widest;
+use lanes::LANES;
+use patches::blocks;
 use picture::Picture;
 
 pub use fan::{Fan, NoFan};
@@ -60,15 +65,41 @@ impl Fan<'_> {
         let nearest = nearest(&picture);
         let left_out = picture.left_out();
         let bvh = (!left_out.is_empty()).then(|| Bvh::over(mesh, left_out));
-        let hit = |(ray, &place): (&Ray<Global>, &u32)| {
-            let in_picture = match nearest[place as usize] {
-                NONE => None,
-                facet => plane_m(mesh, facet as usize, ray)
-                    .map(|range_m| measured(mesh, facet, ray, range_m)),
-            };
-            nearer(in_picture, bvh.as_ref().and_then(|bvh| bvh.closest(ray)))
+        let hits = |(rays, places): (&[Ray<Global>], &[u32])| {
+            let mut hits = widest(Meeting { mesh, rays, places, nearest: &nearest });
+            if let Some(bvh) = &bvh {
+                let behind = rays.iter().map(|ray| bvh.closest(ray));
+                hits.iter_mut().zip(behind).for_each(|(hit, other)| *hit = nearer(*hit, other));
+            }
+            hits
         };
-        self.rays.par_iter().zip(&self.place_of).with_min_len(1024).map(hit).collect()
+        let (rays, places) = (self.rays.par_chunks(LANES), self.place_of.par_chunks(LANES));
+        let hits: Vec<_> = rays.zip(places).with_min_len(64).map(hits).collect();
+        let mut hits = hits.into_flattened();
+        hits.truncate(self.rays.len());
+        hits
+    }
+}
+
+/// Up to [`LANES`] rays that meet the facets at their places.
+struct Meeting<'a> {
+    mesh: &'a Mesh,
+    rays: &'a [Ray<Global>],
+    places: &'a [u32],
+    nearest: &'a [u32],
+}
+
+impl Wide for Meeting<'_> {
+    type Answer = [Option<Hit>; LANES];
+
+    #[inline(always)]
+    fn run(self) -> [Option<Hit>; LANES] {
+        let mut facets = [NONE; LANES];
+        for (facet, &place) in facets.iter_mut().zip(self.places) {
+            *facet = self.nearest[place as usize];
+        }
+        let rays = std::array::from_fn(|lane| self.rays.get(lane).unwrap_or(&self.rays[0]));
+        met(self.mesh, facets, rays)
     }
 }
 
@@ -86,22 +117,20 @@ fn nearest(picture: &Picture) -> Vec<u32> {
     let rows = picture.fan.grid.rows;
     let threads = rayon::current_num_threads();
     if threads == 1 {
-        let mut band = Band::new(picture, 0..rows);
-        widest(&mut band, 0..facets as u32);
-        return band.facets();
+        return Band::new(picture, 0..rows).walked(0..facets as u32);
     }
     let cuts = cuts(picture.fan, BANDS_PER_THREAD * threads);
     let tasks: Vec<Vec<Vec<u32>>> = (0..facets.div_ceil(FACETS_PER_TASK))
         .into_par_iter()
         .map(|task| {
-            let first = task * FACETS_PER_TASK;
-            shared_out(picture, &cuts, first..facets.min(first + FACETS_PER_TASK))
+            let [first, end] =
+                [task, task + 1].map(|task| (task * FACETS_PER_TASK).min(facets) as u32);
+            widest(Sharing { picture, cuts: &cuts, facets: first..end })
         })
         .collect();
     let band = |number: usize| {
-        let mut band = Band::new(picture, cuts[number]..cuts[number + 1]);
-        widest(&mut band, tasks.iter().flat_map(|bands| bands[number].iter().copied()));
-        band.facets()
+        let facets = tasks.iter().flat_map(|bands| bands[number].iter().copied());
+        Band::new(picture, cuts[number]..cuts[number + 1]).walked(facets)
     };
     (0..cuts.len() - 1).into_par_iter().flat_map_iter(band).collect()
 }
@@ -120,14 +149,26 @@ fn cuts(fan: &Fan, bands: usize) -> Vec<usize> {
 }
 
 /// For every band the facets that reach into it, in ascending order.
-fn shared_out(picture: &Picture, cuts: &[usize], facets: std::ops::Range<usize>) -> Vec<Vec<u32>> {
-    let mut bands = vec![Vec::new(); cuts.len() - 1];
-    let band_of = |row: usize| cuts.partition_point(|&cut| cut <= row) - 1;
-    for facet in facets.start as u32..facets.end as u32 {
-        if let Some(patch) = picture.patch(facet) {
-            let [first, last] = patch.rows.map(band_of);
-            bands[first..=last].iter_mut().for_each(|band| band.push(facet));
+struct Sharing<'a> {
+    picture: &'a Picture<'a>,
+    cuts: &'a [usize],
+    facets: Range<u32>,
+}
+
+impl Wide for Sharing<'_> {
+    type Answer = Vec<Vec<u32>>;
+
+    #[inline(always)]
+    fn run(self) -> Vec<Vec<u32>> {
+        let mut bands = vec![Vec::new(); self.cuts.len() - 1];
+        let band_of = |row: usize| self.cuts.partition_point(|&cut| cut <= row) - 1;
+        for block in blocks(self.facets) {
+            let patches = self.picture.patches(&block);
+            for lane in patches.seen() {
+                let [first, last] = patches.cells(lane).rows.map(band_of);
+                bands[first..=last].iter_mut().for_each(|band| band.push(block[lane]));
+            }
         }
+        bands
     }
-    bands
 }

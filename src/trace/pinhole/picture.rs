@@ -3,10 +3,11 @@
 use glam::{DVec3, Vec4};
 use rayon::prelude::*;
 
-use super::ROUNDING;
 use super::fan::Fan;
-use super::lanes::Form;
+use super::lanes::LANES;
+use super::patches::Patches;
 use crate::geometry::Mesh;
+use crate::trace::wide::{Wide, widest};
 
 /// Corners farther than this from the axis have no place in the picture: cosine of 89.4°.
 const LEAST_COS: f64 = 0.01;
@@ -20,54 +21,29 @@ pub(super) struct Picture<'a> {
     pub mesh: &'a Mesh,
     /// (u, v, 1/z, 0) of every vertex; all 0 for one that has no place in the picture.
     corners: Vec<Vec4>,
-    /// Where the rays are; without bounds in the other two components.
-    field: [Vec4; 2],
-}
-
-/// A facet in the picture, and the cells that its box touches.
-pub(super) struct Patch {
-    corners: [Vec4; 3],
-    low: Vec4,
-    high: Vec4,
-    pub columns: [usize; 2],
-    pub rows: [usize; 2],
 }
 
 impl<'a> Picture<'a> {
     pub fn new(fan: &'a Fan, mesh: &'a Mesh) -> Picture<'a> {
-        let corner = |vertex: &DVec3| {
-            let at = fan.frame * (*vertex - fan.origin);
-            let is_ahead =
-                at.z > LEAST_DEPTH_M && at.z * at.z > LEAST_COS * LEAST_COS * at.length_squared();
-            let w = 1.0 / at.z;
-            let corner = Vec4::new((at.x * w) as f32, (at.y * w) as f32, w as f32, 0.0);
-            if is_ahead { corner } else { Vec4::ZERO }
-        };
-        let corners = mesh.vertices.par_iter().with_min_len(4096).map(corner).collect();
-        let ([u_min, v_min], [u_max, v_max]) = (fan.grid.min, fan.grid.max);
-        let field = [
-            Vec4::new(u_min, v_min, f32::NEG_INFINITY, f32::NEG_INFINITY),
-            Vec4::new(u_max, v_max, f32::INFINITY, f32::INFINITY),
-        ];
-        Picture { fan, mesh, corners, field }
+        let blocks = mesh.vertices.par_chunks(LANES).with_min_len(256);
+        let corners: Vec<_> = blocks.map(|vertices| widest(Projection { fan, vertices })).collect();
+        let mut corners = corners.into_flattened();
+        corners.truncate(mesh.vertices.len());
+        Picture { fan, mesh, corners }
     }
 
-    /// A facet; `None` when no ray passes near it or it has no place in the picture.
+    /// A block of facets; [`NONE`] is not seen.
     #[inline(always)]
-    pub fn patch(&self, facet: u32) -> Option<Patch> {
-        let corners = self.mesh.facets[facet as usize].map(|vertex| self.corners[vertex as usize]);
-        let [a, b, c] = corners;
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        let grid = &self.fan.grid;
-        // Both the corners and the rays are rounded.
-        let slack = 4.0 * ROUNDING * low.abs().max(high.abs()).max(Vec4::splat(grid.reach));
-        let (near, far) = (low - slack, high + slack);
-        if (far.cmplt(self.field[0]) | near.cmpgt(self.field[1])).any() || low.z <= 0.0 {
-            return None;
+    pub fn patches(&self, facets: &[u32; LANES]) -> Patches {
+        let mut corners = [[[0.0; LANES]; 3]; 3];
+        for (lane, &facet) in facets.iter().enumerate() {
+            let Some(vertices) = self.mesh.facets.get(facet as usize) else { continue };
+            for (corner, &vertex) in corners.iter_mut().zip(vertices) {
+                let at = self.corners[vertex as usize].to_array();
+                corner.iter_mut().zip(at).for_each(|(part, at)| part[lane] = at);
+            }
         }
-        let columns = [grid.step(0, near.x), grid.step(0, far.x)];
-        let rows = [grid.step(1, near.y), grid.step(1, far.y)];
-        Some(Patch { corners, low, high, columns, rows })
+        Patches::new(corners, &self.fan.grid)
     }
 
     /// Facets that rays may meet and that have no place in the picture.
@@ -102,43 +78,36 @@ impl<'a> Picture<'a> {
     }
 }
 
-impl Patch {
-    /// Whether the facet surely has an area: one that is not seen edge-on and whose corners are not far apart in depth. The
-    /// corners of one without area are collinear to 10⁻¹² of its length, at most 200 depths of the farthest,
-    /// and its picture can only be wide enough if one corner is 300 times as near as another.
-    #[inline(always)]
-    pub fn has_area(&self, form: &Form) -> bool {
-        form.area > 3.0 * form.doubt && self.high.z < 64.0 * self.low.z
-    }
+/// (u, v, 1/z, 0) of up to [`LANES`] vertices.
+struct Projection<'a> {
+    fan: &'a Fan<'a>,
+    vertices: &'a [DVec3],
+}
 
-    /// The forms of the facet, for rays within its cells.
-    ///
-    /// Let M be the largest coordinate, L the longest side of the box and two cells more, and η = 2⁻²⁴.
-    /// Coordinates err by 1.1·ηM, their differences by 2.2·ηM + ηL, an area by 8.8·ηLM + 8·ηL², and the
-    /// third area, which is what the other two leave, by 27·ηLM + 34·ηL²: all by less than
-    /// e = 36·ηL(M + L). Where rounding turned the sign of the whole area, a point inside may
-    /// show −2e, hence a doubt of 2e. The shares of two corners err by 2e/area each and the
-    /// inverse depths by a few η.
+impl Wide for Projection<'_> {
+    type Answer = [Vec4; LANES];
+
     #[inline(always)]
-    pub fn form(&self, cell: [f32; 2], reach: f32) -> Form {
-        let [a, b, c] = self.corners;
-        let sides = self.high - self.low;
-        let length = (sides.x + 2.0 * cell[0]).max(sides.y + 2.0 * cell[1]);
-        let most = self.low.abs().max(self.high.abs());
-        let doubt = 72.0 * ROUNDING * length * (most.x.max(most.y).max(reach) + length);
-        let (ab, ca) = (b - a, a - c);
-        let area = ab.y * ca.x - ab.x * ca.y;
-        let (ab, ca, area) = if area < 0.0 { (-ab, -ca, -area) } else { (ab, ca, area) };
-        let rounding = 8.0 * ROUNDING * self.high.z;
-        let [w, w_b, w_c, w_doubt] = if area > 3.0 * doubt {
-            let per_area = 1.0 / area;
-            let spread = 3.0 * doubt * per_area * sides.z;
-            [a.z, (b.z - a.z) * per_area, (c.z - a.z) * per_area, spread + rounding]
-        } else {
-            // Seen edge-on: nothing is sure but that it is no nearer than its nearest corner.
-            [self.high.z, 0.0, 0.0, rounding]
-        };
-        let [at, ab, ca] = [a, ab, ca].map(|corner| [corner.x, corner.y]);
-        Form { at, ab, ca, area, doubt, w, w_b, w_c, w_doubt }
+    fn run(self) -> [Vec4; LANES] {
+        let mut places = [[0.0; LANES]; 3];
+        for (lane, vertex) in self.vertices.iter().enumerate() {
+            let at = vertex.to_array();
+            places.iter_mut().zip(at).for_each(|(list, at)| list[lane] = at);
+        }
+        let mut corners = [[0.0; LANES]; 3];
+        for lane in 0..LANES {
+            let place = DVec3::new(places[0][lane], places[1][lane], places[2][lane]);
+            let at = self.fan.frame * (place - self.fan.origin);
+            let is_ahead = (at.z > LEAST_DEPTH_M)
+                & (at.z * at.z > LEAST_COS * LEAST_COS * at.length_squared());
+            let w = 1.0 / at.z;
+            let corner = [(at.x * w) as f32, (at.y * w) as f32, w as f32];
+            for (list, part) in corners.iter_mut().zip(corner) {
+                list[lane] = if is_ahead { part } else { 0.0 };
+            }
+        }
+        std::array::from_fn(|lane| {
+            Vec4::new(corners[0][lane], corners[1][lane], corners[2][lane], 0.0)
+        })
     }
 }
