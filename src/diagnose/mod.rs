@@ -401,7 +401,7 @@ fn values(
             (knob.name, Value { value, sd: finite(sd * knob.step), unit: knob.unit })
         };
         let parameters = Parameters::new(knobs.map(value).collect(), problem.looks);
-        let select::Added { class, evidence } = added;
+        let select::Added { class, evidence, .. } = added;
         Found { name: effect.name(), level: effect.level(), class, parameters, evidence }
     });
     let found = found.collect();

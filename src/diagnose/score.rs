@@ -64,6 +64,8 @@ pub(super) struct Above {
 const FIRST: f64 = -8.0;
 const LAST: f64 = 6.0;
 const CELLS: usize = 560;
+/// A mean so many e-folds below the threshold is as good as none.
+const FARTHEST: f64 = 100.0;
 
 impl Above {
     /// For L looks.
@@ -146,7 +148,8 @@ fn detected_moments(
     let ln_threshold = declared.threshold_w.ln();
     let mut sums = [0.0; 3];
     for (ln_mean, weight) in likelihood.ln_means(look) {
-        let passed = prediction.saturating.of(ln_mean);
+        // What is detected where nothing is expected lies at the threshold.
+        let passed = prediction.saturating.of(ln_mean.max(ln_threshold - FARTHEST));
         let [mean, variance] = above.at((ln_threshold - passed.ln_mean) / passed.slope);
         let variance = passed.slope * passed.slope * variance;
         let chance = if weight == 1.0 { 1.0 } else { likelihood.chance(ln_mean) };

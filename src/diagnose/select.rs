@@ -21,7 +21,7 @@ use super::score::{DB, Scored, scored};
 use super::screen::{Sample, Screen};
 use super::trial::Trial;
 use super::{Diagnosis, Evidence};
-use crate::effects::{Effect, Level, Prediction, Receiver};
+use crate::effects::{Effect, Prediction, Receiver};
 use crate::fit::minimise::Minimise;
 
 /// Steps of a fit, and of one on the sample that only shows whether an effect is worth it.
@@ -51,6 +51,10 @@ const PLACEBOS: u64 = 3;
 const MOST_PAIRED: usize = 4;
 /// Difference in ln p of all held-out looks that tells no two effects apart: odds of twenty to one.
 const SAME: f64 = 3.0;
+/// Share of the best held-out gain that others reach which may yet prove better.
+const SHARE_OF_RIVAL: f64 = 0.9;
+/// Others of each effect that are tried again.
+const MOST_RIVALS: usize = 2;
 /// Looks of a first fit of the base, that is not caught far from the data.
 const WIDE_LOOKS: f64 = 4.0;
 
@@ -85,7 +89,7 @@ pub(super) struct Selected<'a> {
     /// Every effect of every round.
     pub ranking: Vec<Candidate>,
     /// What was added and stayed, in the order of the model's effects.
-    pub added: Vec<Added>,
+    pub added: Vec<Added<'a>>,
     /// What a field finds beside it.
     pub structure: Structure,
 }
@@ -100,9 +104,20 @@ pub(super) struct State<'a> {
 }
 
 /// An effect that was added.
-pub(super) struct Added {
+pub(super) struct Added<'a> {
     pub class: Vec<&'static str>,
     pub evidence: Evidence,
+    /// Others that did nearly as well.
+    rivals: Vec<&'a dyn Effect>,
+}
+
+/// The effect of a round that is to be added.
+struct Chosen<'a> {
+    trial: usize,
+    held_out: Vec<Scored>,
+    /// Names that predict as well.
+    class: Vec<&'static str>,
+    rivals: Vec<&'a dyn Effect>,
 }
 
 /// All that the selection needs.
@@ -143,7 +158,7 @@ impl Selection<'_> {
                 true => self.chosen(&state, &mut trials, largest_db),
                 false => None,
             };
-            let Some((index, held_out, class)) = chosen else {
+            let Some(Chosen { trial: index, held_out, class, rivals }) = chosen else {
                 let pair = match added.len() + 2 <= self.settings.most_effects {
                     true => self.pair(&state, &mut trials),
                     false => None,
@@ -177,11 +192,12 @@ impl Selection<'_> {
                 let [held_out_gain, held_out_se] = trial.candidate.held_out.unwrap_or_default();
                 let placebo_gain = trial.candidate.placebo_gain.unwrap_or_default();
                 let evidence = Evidence { gain, placebo_gain, held_out_gain, held_out_se, size_db };
-                added.push(Added { class, evidence });
+                added.push(Added { class, evidence, rivals });
             }
             ranking.extend(trials.into_iter().map(|trial| trial.candidate));
         }
         (self.hear)("asking what each effect is needed for");
+        self.exchange(&mut state, &mut added);
         self.prune(&mut state, &mut added);
         let mut structure = self.structure(&state);
         while let Some(least) = smallest(&added)
@@ -198,6 +214,8 @@ impl Selection<'_> {
             (state, structure) = (without, left);
             added.remove(least);
         }
+        let there: Vec<&str> = state.space.effects.iter().map(|effect| effect.name()).collect();
+        added.iter_mut().for_each(|one| one.class.retain(|name| !there.contains(name)));
         Selected { state, ranking, added, structure }
     }
 
@@ -249,6 +267,67 @@ impl Selection<'_> {
         State { space, fitted, held_out }
     }
 
+    /// Exchanges effects for ones that did nearly as well when they were chosen: those that were added
+    /// later may have told them apart.
+    fn exchange<'a>(&self, state: &mut State<'a>, added: &mut Vec<Added<'a>>) {
+        // The first is looked at as often as there are effects: each goes to the end.
+        for _ in 0..if added.len() > 1 { added.len() } else { 0 } {
+            let mut one = added.remove(0);
+            let rivals = std::mem::take(&mut one.rivals);
+            let is_new = |rival: &&dyn Effect| {
+                state.space.effects.iter().all(|effect| effect.name() != rival.name())
+            };
+            let rivals: Vec<_> = rivals.into_iter().filter(is_new).collect();
+            let mut effect = state.space.effects[0];
+            let values = state.space.effect_values(&state.fitted.at).remove(0);
+            let (space, at) = state.space.without(&state.fitted.at, 0);
+            let mut best = State {
+                fitted: Fitted { at: Space::joined(&at, effect, &values), ..state.fitted.clone() },
+                space: space.with(effect),
+                held_out: state.held_out.clone(),
+            };
+            if !rivals.is_empty() {
+                let without = self.without(state, 0);
+                for rival in rivals {
+                    let Some(trial) = self.tried(&without, rival) else { continue };
+                    let held_out = self.held_out(&trial.space, &trial.fitted.at);
+                    let [better, se] = self.difference(&held_out, &best.held_out);
+                    let is_tied = better.abs() <= se.max(SAME);
+                    let numbers = [
+                        numbers(rival, &trial.space, &trial.fitted.at),
+                        numbers(effect, &best.space, &best.fitted.at),
+                    ];
+                    let is_simpler = numbers[0] < numbers[1];
+                    let is_as_simple = numbers[0] == numbers[1];
+                    let replaces = if is_tied {
+                        is_simpler || is_as_simple && better > 0.0
+                    } else {
+                        better > 0.0
+                    };
+                    one.class.retain(|name| *name != rival.name());
+                    if replaces {
+                        if is_tied {
+                            one.class.push(effect.name());
+                        } else {
+                            one.class.clear();
+                        }
+                        let Candidate { gain, size_db, .. } = trial.candidate;
+                        let [held_out_gain, held_out_se] =
+                            self.difference(&held_out, &without.held_out);
+                        one.evidence =
+                            Evidence { gain, size_db, held_out_gain, held_out_se, ..one.evidence };
+                        effect = rival;
+                        best = State { space: trial.space, fitted: trial.fitted, held_out };
+                    } else if is_tied {
+                        one.class.push(rival.name());
+                    }
+                }
+            }
+            *state = best;
+            added.push(one);
+        }
+    }
+
     /// Takes away effects that the later ones made superfluous.
     fn prune(&self, state: &mut State, added: &mut Vec<Added>) {
         while added.len() > 1 {
@@ -282,13 +361,13 @@ impl Selection<'_> {
         }
     }
 
-    /// The effect to add: its place, its held-out scores, and the names that do as well.
-    fn chosen(
+    /// The effect to add.
+    fn chosen<'a>(
         &self,
-        state: &State,
-        trials: &mut [Trial],
+        state: &State<'a>,
+        trials: &mut [Trial<'a>],
         largest_db: f64,
-    ) -> Option<(usize, Vec<Scored>, Vec<&'static str>)> {
+    ) -> Option<Chosen<'a>> {
         let mut passed: Vec<(usize, Vec<Scored>, f64)> = Vec::new();
         let (mut structure, mut shared_db) = (None, None);
         let Diagnosis { least_size_db, standard_errors, .. } = *self.settings;
@@ -340,15 +419,23 @@ impl Selection<'_> {
         }
         let first = passed.first()?;
         let behind = |other: &(usize, Vec<Scored>, f64)| self.difference(&first.1, &other.1);
-        // Of those that the data do not tell apart the simplest comes first: the rule of one standard error.
+        // Of those that the data do not tell apart the simplest comes first, by the rule of one standard error,
+        // and of equally simple ones the likelier.
         let is_tied = |other: &&(usize, Vec<Scored>, f64)| {
             let [worse, se] = behind(other);
             worse <= se.max(SAME)
         };
         let tied = || passed.iter().filter(is_tied);
-        let best = tied().min_by_key(|one| plainness(&trials[one.0]))?;
+        let count = |one: &(usize, Vec<Scored>, f64)| {
+            let Trial { effect, space, fitted, .. } = &trials[one.0];
+            numbers(*effect, space, &fitted.at)
+        };
+        let best = tied().min_by_key(|one| count(one))?;
         let class = tied().filter(|other| other.0 != best.0);
-        let names = class.map(|one| trials[one.0].candidate.name).collect();
+        let class = class.map(|one| trials[one.0].candidate.name).collect();
+        let rivals =
+            passed.iter().filter(|one| one.0 != best.0 && one.2 >= SHARE_OF_RIVAL * first.2);
+        let rivals = rivals.take(MOST_RIVALS).map(|one| trials[one.0].effect).collect();
         if trials[best.0].candidate.placebo_gain.is_none()
             && let Some(screen) = &screen
         {
@@ -356,7 +443,7 @@ impl Selection<'_> {
             let placebo = self.placebo_gain(state, screen, numbers);
             trials[best.0].candidate.placebo_gain = Some(placebo);
         }
-        Some((best.0, best.1.clone(), names))
+        Some(Chosen { trial: best.0, held_out: best.1.clone(), class, rivals })
     }
 
     /// Two effects of which each predicts held-out patches but does worse than placebos, because these
@@ -365,7 +452,7 @@ impl Selection<'_> {
         &self,
         state: &State<'a>,
         trials: &mut [Trial<'a>],
-    ) -> Option<([Added; 2], State<'a>)> {
+    ) -> Option<([Added<'a>; 2], State<'a>)> {
         let errors = self.settings.standard_errors;
         let is_beaten = |trial: &&Trial| {
             let Candidate { gain, placebo_gain, held_out, .. } = trial.candidate;
@@ -405,7 +492,7 @@ impl Selection<'_> {
         let added = pair.map(|trial| {
             let size_db = trial.candidate.size_db;
             let evidence = Evidence { gain, placebo_gain, held_out_gain, held_out_se, size_db };
-            Added { class: Vec::new(), evidence }
+            Added { class: Vec::new(), evidence, rivals: Vec::new() }
         });
         let names = pair.map(|trial| trial.candidate.name);
         for trial in trials.iter_mut().filter(|trial| names.contains(&trial.candidate.name)) {
@@ -487,17 +574,11 @@ pub(super) fn larger([a, b]: [f64; 2]) -> f64 {
     a.max(b)
 }
 
-/// Fewer numbers that are not where a search begins come first, then what is least known beforehand: of
-/// an instrument most is.
-fn plainness(trial: &Trial) -> (usize, u8) {
-    let known = match trial.effect.level() {
-        Level::Material => 0,
-        Level::Scene => 1,
-        Level::Instrument => 2,
-    };
-    let values = trial.space.effect_values(&trial.fitted.at).pop().unwrap_or_default();
-    let knobs = trial.effect.knobs().iter().zip(values);
-    (knobs.filter(|(knob, value)| (value - knob.absent).abs() > knob.step).count(), known)
+/// How many of an effect's numbers, the last of a space, are not where it is absent.
+fn numbers(effect: &dyn Effect, space: &Space, at: &DVector<f64>) -> usize {
+    let values = space.effect_values(at).pop().unwrap_or_default();
+    let knobs = effect.knobs().iter().zip(values);
+    knobs.filter(|(knob, value)| (value - knob.absent).abs() > knob.step).count()
 }
 
 /// Which of the effects is the smallest.

@@ -10,6 +10,8 @@ use crate::effects::{Effect, Knob};
 
 /// Starts of an effect that are followed.
 const STARTS: usize = 2;
+/// How often a fit to the sample is continued that has not settled.
+const LONGER: usize = 3;
 /// How far the shape of a start is moved, in felt steps.
 const SHAPE_STEPS: [f64; 3] = [4.0, 2.0, 1.0];
 /// Strengths of a start that are tried.
@@ -85,6 +87,16 @@ impl Selection<'_> {
         trials
     }
 
+    /// One effect, fitted to all looks whatever it promises.
+    pub fn tried<'a>(&self, state: &State<'a>, effect: &'a dyn Effect) -> Option<Trial<'a>> {
+        let problem = self.sample.problem(&self.problem);
+        let screen = Screen::new(problem, &state.space, &state.fitted.at);
+        let mut trial = self.promised(state, &screen, self.sample.weight, effect, 0)?;
+        self.scout(state, &screen, self.sample.weight, &mut trial);
+        self.refit(state, &mut trial);
+        Some(trial)
+    }
+
     /// An effect at the start that promises most.
     fn promised<'a>(
         &self,
@@ -121,7 +133,7 @@ impl Selection<'_> {
         }
         // A start at which the effect is absent promises nothing, and is tried all the same.
         let is_absent = tried == 1 && starts.iter().all(|start| start.0 == 0.0);
-        if round == 1
+        if state.space.effects.is_empty()
             && !is_absent
             && let Some(start) = from_declared_laws(screen, &state.space, &space, effect, &values)
         {
@@ -204,7 +216,14 @@ impl Selection<'_> {
         let best = scouts
             .filter(|fit| fit.ln_likelihood.is_finite())
             .max_by(|a, b| a.ln_likelihood.total_cmp(&b.ln_likelihood));
-        if let Some(best) = best {
+        if let Some(mut best) = best {
+            // One that must carry the laws far away with it comes slowly.
+            for _ in 0..LONGER {
+                if best.converged {
+                    break;
+                }
+                best = screen.problem.fit(space, &best.at, &held, &SCOUT);
+            }
             trial.candidate.gain = weight * (best.ln_likelihood - here);
             trial.candidate.converged = best.converged;
             trial.sizes_db = self.sizes_db(state, space, &best.at);
