@@ -95,6 +95,21 @@ impl<'a> Space<'a> {
         (space, at.clone().remove_rows(first, gone))
     }
 
+    /// With the first effect as the last, and a point likewise.
+    pub fn rotated(&self, at: &DVector<f64>) -> (Space<'a>, DVector<f64>) {
+        let values = self.effect_values(at).into_iter().next();
+        let Some((&first, values)) = self.effects.first().zip(values) else {
+            return (self.clone(), at.clone());
+        };
+        let (space, at) = self.without(at, 0);
+        (space.with(first), Space::joined(&at, first, &values))
+    }
+
+    /// Whether an effect of this name is among its.
+    pub fn has(&self, name: &str) -> bool {
+        self.effects.iter().any(|effect| effect.name() == name)
+    }
+
     /// Unknowns of the effects for which rays would have to be traced anew: few, and hardly moved by
     /// another effect.
     pub fn costly(&self, at: &DVector<f64>) -> Vec<usize> {

@@ -214,8 +214,7 @@ impl Selection<'_> {
             (state, structure) = (without, left);
             added.remove(least);
         }
-        let there: Vec<&str> = state.space.effects.iter().map(|effect| effect.name()).collect();
-        added.iter_mut().for_each(|one| one.class.retain(|name| !there.contains(name)));
+        added.iter_mut().for_each(|one| one.class.retain(|name| !state.space.has(name)));
         Selected { state, ranking, added, structure }
     }
 
@@ -267,64 +266,56 @@ impl Selection<'_> {
         State { space, fitted, held_out }
     }
 
-    /// Exchanges effects for ones that did nearly as well when they were chosen: those that were added
-    /// later may have told them apart.
+    /// Holds each of several effects against those that did nearly as well when it was chosen: what was
+    /// added later may have told them apart.
     fn exchange<'a>(&self, state: &mut State<'a>, added: &mut Vec<Added<'a>>) {
-        // The first is looked at as often as there are effects: each goes to the end.
-        for _ in 0..if added.len() > 1 { added.len() } else { 0 } {
+        if added.len() < 2 {
+            return;
+        }
+        for _ in 0..added.len() {
+            // Its turn makes it the last, as a new one is.
             let mut one = added.remove(0);
+            (state.space, state.fitted.at) = state.space.rotated(&state.fitted.at);
             let rivals = std::mem::take(&mut one.rivals);
-            let is_new = |rival: &&dyn Effect| {
-                state.space.effects.iter().all(|effect| effect.name() != rival.name())
-            };
-            let rivals: Vec<_> = rivals.into_iter().filter(is_new).collect();
-            let mut effect = state.space.effects[0];
-            let values = state.space.effect_values(&state.fitted.at).remove(0);
-            let (space, at) = state.space.without(&state.fitted.at, 0);
-            let mut best = State {
-                fitted: Fitted { at: Space::joined(&at, effect, &values), ..state.fitted.clone() },
-                space: space.with(effect),
-                held_out: state.held_out.clone(),
-            };
+            let is_new = |rival: &&dyn Effect| !state.space.has(rival.name());
+            let rivals: Vec<&dyn Effect> = rivals.into_iter().filter(is_new).collect();
             if !rivals.is_empty() {
-                let without = self.without(state, 0);
-                for rival in rivals {
-                    let Some(trial) = self.tried(&without, rival) else { continue };
-                    let held_out = self.held_out(&trial.space, &trial.fitted.at);
-                    let [better, se] = self.difference(&held_out, &best.held_out);
-                    let is_tied = better.abs() <= se.max(SAME);
-                    let numbers = [
-                        numbers(rival, &trial.space, &trial.fitted.at),
-                        numbers(effect, &best.space, &best.fitted.at),
-                    ];
-                    let is_simpler = numbers[0] < numbers[1];
-                    let is_as_simple = numbers[0] == numbers[1];
-                    let replaces = if is_tied {
-                        is_simpler || is_as_simple && better > 0.0
-                    } else {
-                        better > 0.0
-                    };
-                    one.class.retain(|name| *name != rival.name());
-                    if replaces {
-                        if is_tied {
-                            one.class.push(effect.name());
-                        } else {
-                            one.class.clear();
-                        }
-                        let Candidate { gain, size_db, .. } = trial.candidate;
-                        let [held_out_gain, held_out_se] =
-                            self.difference(&held_out, &without.held_out);
-                        one.evidence =
-                            Evidence { gain, size_db, held_out_gain, held_out_se, ..one.evidence };
-                        effect = rival;
-                        best = State { space: trial.space, fitted: trial.fitted, held_out };
-                    } else if is_tied {
-                        one.class.push(rival.name());
-                    }
-                }
+                let without = self.without(state, added.len());
+                rivals.into_iter().for_each(|rival| self.hold(&without, state, &mut one, rival));
             }
-            *state = best;
             added.push(one);
+        }
+    }
+
+    /// Holds the last effect of a model against another, which takes its place if it is the better one.
+    fn hold<'a>(
+        &self,
+        without: &State<'a>,
+        state: &mut State<'a>,
+        last: &mut Added<'a>,
+        rival: &'a dyn Effect,
+    ) {
+        let Some(Trial { space, fitted, candidate, .. }) = self.tried(without, rival) else {
+            return;
+        };
+        let held_out = self.held_out(&space, &fitted.at);
+        let [better, se] = self.difference(&held_out, &state.held_out);
+        let is_tied = better.abs() <= se.max(SAME);
+        let [own, other] = [numbers(&state.space, &state.fitted.at), numbers(&space, &fitted.at)];
+        let is_better = if is_tied && own != other { other < own } else { better > 0.0 };
+        last.class.retain(|name| *name != rival.name());
+        let mut loser = rival.name();
+        if is_better {
+            loser = state.space.effects.last().map_or(loser, |effect| effect.name());
+            let [held_out_gain, held_out_se] = self.difference(&held_out, &without.held_out);
+            let Candidate { gain, size_db, .. } = candidate;
+            last.evidence = Evidence { gain, size_db, held_out_gain, held_out_se, ..last.evidence };
+            *state = State { space, fitted, held_out };
+        }
+        match is_tied {
+            true => last.class.push(loser),
+            false if is_better => last.class.clear(),
+            false => {}
         }
     }
 
@@ -427,8 +418,8 @@ impl Selection<'_> {
         };
         let tied = || passed.iter().filter(is_tied);
         let count = |one: &(usize, Vec<Scored>, f64)| {
-            let Trial { effect, space, fitted, .. } = &trials[one.0];
-            numbers(*effect, space, &fitted.at)
+            let Trial { space, fitted, .. } = &trials[one.0];
+            numbers(space, &fitted.at)
         };
         let best = tied().min_by_key(|one| count(one))?;
         let class = tied().filter(|other| other.0 != best.0);
@@ -574,9 +565,11 @@ pub(super) fn larger([a, b]: [f64; 2]) -> f64 {
     a.max(b)
 }
 
-/// How many of an effect's numbers, the last of a space, are not where it is absent.
-fn numbers(effect: &dyn Effect, space: &Space, at: &DVector<f64>) -> usize {
-    let values = space.effect_values(at).pop().unwrap_or_default();
+/// How many numbers of the last effect of a model are not where it is absent.
+fn numbers(space: &Space, at: &DVector<f64>) -> usize {
+    let Some((effect, values)) = space.effects.last().zip(space.effect_values(at).pop()) else {
+        return 0;
+    };
     let knobs = effect.knobs().iter().zip(values);
     knobs.filter(|(knob, value)| (value - knob.absent).abs() > knob.step).count()
 }

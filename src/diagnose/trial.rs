@@ -50,9 +50,7 @@ impl Selection<'_> {
         effects: &[&'a dyn Effect],
         round: usize,
     ) -> Vec<Trial<'a>> {
-        let absent = |effect: &&&dyn Effect| {
-            state.space.effects.iter().all(|there| there.name() != effect.name())
-        };
+        let absent = |effect: &&&dyn Effect| !state.space.has(effect.name());
         (self.hear)(&format!("round {round}: screening {} effects", effects.len()));
         let sample = self.sample;
         let screen = Screen::new(sample.problem(&self.problem), &state.space, &state.fitted.at);
