@@ -3,6 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
 use tempfile::{Builder, NamedTempFile, TempPath};
 
 use crate::error::Error;
@@ -11,7 +12,7 @@ use crate::error::Error;
 ///
 /// Every file is written under a temporary name first; when all are complete they take the places
 /// of what was there. On an error everything is as it was before.
-pub(super) fn write_all<Name: AsRef<str>>(
+pub(super) fn write_all<Name: AsRef<str> + Sync>(
     folder: &Path,
     files: &[(Name, Vec<u8>)],
 ) -> Result<(), Error> {
@@ -33,7 +34,7 @@ pub(super) struct Written {
 
 impl Written {
     /// Writes files into several folders as [`write_all`] does into one: all of them or none.
-    pub fn new<Name: AsRef<str>>(folders: &[Folder<Name>]) -> Result<Written, Error> {
+    pub fn new<Name: AsRef<str> + Sync>(folders: &[Folder<Name>]) -> Result<Written, Error> {
         let mut written = Written::default();
         let mut staged = Vec::new();
         for (folder, files) in folders {
@@ -103,7 +104,7 @@ fn target(path: PathBuf) -> std::io::Result<PathBuf> {
     }
 }
 
-fn stage<'a, Name: AsRef<str>>(
+fn stage<'a, Name: AsRef<str> + Sync>(
     folder: &Path,
     files: &'a [(Name, Vec<u8>)],
 ) -> Result<Vec<(&'a str, Staged<'a>)>, Error> {
@@ -126,10 +127,12 @@ fn stage<'a, Name: AsRef<str>>(
         file.as_file().sync_data()?;
         Ok((name.as_ref(), Staged::Whole(file, path)))
     };
-    files
-        .iter()
-        .map(|file| write(file).map_err(|reason| failed(folder, file.0.as_ref(), reason)))
-        .collect()
+    // A disk takes several at once; of several errors the first file's is told.
+    let staged: Vec<_> = files.par_iter().map(write).collect();
+    let at = |(result, (name, _)): (std::io::Result<_>, &(Name, _))| {
+        result.map_err(|reason| failed(folder, name.as_ref(), reason))
+    };
+    staged.into_iter().zip(files).map(at).collect()
 }
 
 /// A file that has taken its place, and what was there before.

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use glam::DVec3;
+use rayon::prelude::*;
 use thiserror::Error;
 
 /// A triangle mesh: shared vertices, facets as vertex triples, and any number of per-facet labels.
@@ -49,6 +50,15 @@ impl FacetLabels {
 }
 
 impl FacetLabels {
+    /// So many facets with the empty name.
+    fn unnamed(property: &str, facets: usize) -> FacetLabels {
+        let mut builder = LabelBuilder::new(property);
+        if facets > 0 {
+            builder.push("", facets);
+        }
+        builder.finish()
+    }
+
     /// Appends the names of further facets.
     fn append(&mut self, other: &FacetLabels) {
         let mut number_of_name: HashMap<String, u32> =
@@ -168,17 +178,19 @@ impl Mesh {
         if self.facets.is_empty() {
             return Err(MeshError::NoFacets);
         }
-        if let Some(vertex) = self.vertices.iter().position(|v| !v.is_finite()) {
-            let DVec3 { x, y, z } = self.vertices[vertex];
+        if let Some((vertex, &DVec3 { x, y, z })) = first(&self.vertices, |v| !v.is_finite()) {
             return Err(MeshError::NotFinite { vertex, x, y, z });
         }
         let vertices = self.vertices.len();
-        for (facet, indices) in self.facets.iter().enumerate() {
-            if let Some(&index) = indices.iter().find(|&&i| i as usize >= vertices) {
-                return Err(MeshError::IndexOutOfRange { facet, index: index.into(), vertices });
+        let is_stray = |&&index: &&u32| index as usize >= vertices;
+        let stray = |facet: &[u32; 3]| facet.iter().find(is_stray).copied();
+        match first(&self.facets, |facet| facet.iter().fold(false, |bad, i| bad | is_stray(&i))) {
+            Some((facet, indices)) => {
+                let index = stray(indices).unwrap_or_default().into();
+                Err(MeshError::IndexOutOfRange { facet, index, vertices })
             }
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// The corners of a facet, m. Panics when `facet` is out of range.
@@ -227,17 +239,13 @@ impl Mesh {
         }
         for theirs in &other.labels {
             if !self.labels.iter().any(|l| l.property == theirs.property) {
-                let unnamed = std::iter::repeat_n("", self.facets.len());
-                self.labels.push(FacetLabels::from_names(&theirs.property, unnamed));
+                self.labels.push(FacetLabels::unnamed(&theirs.property, self.facets.len()));
             }
         }
         for ours in &mut self.labels {
             match other.labels.iter().find(|l| l.property == ours.property) {
                 Some(theirs) => ours.append(theirs),
-                None => {
-                    let unnamed = std::iter::repeat_n("", other.facets.len());
-                    ours.append(&FacetLabels::from_names("", unnamed));
-                }
+                None => ours.append(&FacetLabels::unnamed("", other.facets.len())),
             }
         }
         let vertex_offset = self.vertices.len() as u32;
@@ -247,9 +255,41 @@ impl Mesh {
     }
 }
 
+/// The first item that is wrong, with its number.
+fn first<T: Sync>(items: &[T], is_wrong: impl Fn(&T) -> bool + Sync) -> Option<(usize, &T)> {
+    /// Items whose tests are joined without a branch.
+    const TOGETHER: usize = 1 << 13;
+    let any = |chunk: &[T]| chunk.iter().fold(false, |any, item| any | is_wrong(item));
+    let chunk = items.par_chunks(TOGETHER).position_first(any)?;
+    items.iter().enumerate().skip(chunk * TOGETHER).find(|(_, item)| is_wrong(item))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_first_fault_is_told_however_many_there_are() {
+        let count = 100_000;
+        let good = Mesh {
+            vertices: vec![DVec3::ONE; count],
+            facets: vec![[0, 1, 2]; count],
+            labels: vec![],
+        };
+        assert_eq!(good.validate(), Ok(()));
+        let mut stray = good.clone();
+        for facet in [99_999, 70_001, 90_000] {
+            stray.facets[facet] = [0, 100_000 + facet as u32, u32::MAX];
+        }
+        let vertices = count;
+        let expected = MeshError::IndexOutOfRange { facet: 70_001, index: 170_001, vertices };
+        assert_eq!(stray.validate(), Err(expected));
+        for vertex in [80_000, 30_000, 99_999] {
+            stray.vertices[vertex].y = f64::INFINITY;
+        }
+        let expected = MeshError::NotFinite { vertex: 30_000, x: 1.0, y: f64::INFINITY, z: 1.0 };
+        assert_eq!(stray.validate(), Err(expected));
+    }
 
     #[test]
     fn labels_are_joined_by_name() {

@@ -9,8 +9,10 @@ use rayon::prelude::*;
 
 use super::Mesh;
 
-/// Corners per side of a block that is skipped as a whole when the surface is far away.
+/// Corners per side of the largest block that is skipped as a whole when the surface is far away.
 const BLOCK: usize = 4;
+/// How far from its start a vertex may be put onto the surface, in cells.
+const REACH_CELLS: f64 = 0.5;
 /// How often the vertices are evened out before they are put onto the surface.
 const EVENING_ROUNDS: usize = 6;
 /// Newton steps towards the surface; a smooth distance needs two or three.
@@ -20,36 +22,82 @@ const ON_SURFACE_M: f64 = 1e-10;
 /// Marks a cell that the surface does not pass through.
 const NO_VERTEX: u32 = u32::MAX;
 
-/// Meshes the surface `sdf(p) = 0` inside a box, normals towards positive distances.
+/// A signed distance to a surface.
+pub trait Field: Clone + Send + Sync {
+    /// Distance of a point, m: negative inside, and never larger in magnitude than the true one.
+    fn distance_m(&self, point_m: DVec3) -> f64;
+
+    /// A field with the same values in a ball, which may be quicker to evaluate.
+    #[must_use]
+    fn within(&self, _centre_m: DVec3, _radius_m: f64) -> Self {
+        self.clone()
+    }
+}
+
+impl<F: Fn(DVec3) -> f64 + Clone + Send + Sync> Field for F {
+    fn distance_m(&self, point_m: DVec3) -> f64 {
+        self(point_m)
+    }
+}
+
+/// Meshes the surface on which a field is zero inside a box, normals towards positive distances.
 ///
-/// `sdf` is in metres, negative inside, and never larger in magnitude than the true distance: empty
-/// space is skipped on its word. The surface must lie inside the bounds (it is left open where it
-/// leaves them), and anything thinner than two cells may be lost or pinched. Facets have sides of
-/// about `cell_m`. The result is the same for any number of threads.
+/// Empty space is skipped on the field's word. The surface must lie inside the bounds (it is left
+/// open where it leaves them), and anything thinner than two cells may be lost or pinched. Facets
+/// have sides of about `cell_m`. The result is the same for any number of threads.
 ///
 /// ```
 /// use glam::DVec3;
 /// let ball = matdb::geometry::surface_nets(
-///     |p| p.length() - 1.0, DVec3::splat(-1.5), DVec3::splat(1.5), 0.1,
+///     |p: DVec3| p.length() - 1.0, DVec3::splat(-1.5), DVec3::splat(1.5), 0.1,
 /// );
 /// assert!(ball.vertices.iter().all(|v| (v.length() - 1.0).abs() < 1e-9));
 /// ```
 pub fn surface_nets(
-    sdf: impl Fn(DVec3) -> f64 + Sync,
+    field: impl Field,
     bounds_min_m: DVec3,
     bounds_max_m: DVec3,
     cell_m: f64,
 ) -> Mesh {
     let lattice = Lattice::covering(bounds_min_m, bounds_max_m, cell_m);
-    let distances_m = lattice.sample(&sdf);
-    let (mut vertices, vertex_of_cell) = lattice.vertices(&distances_m);
-    let quads = lattice.quads(&distances_m, &vertex_of_cell);
+    let distances_m = lattice.sample(&field);
+    let crossed = lattice.crossed(&distances_m);
+    let quads = lattice.quads(&distances_m, &crossed);
+    let mut vertices = lattice.vertices(&distances_m, &crossed);
     for _ in 0..EVENING_ROUNDS {
         even_out(&mut vertices, &quads);
     }
-    vertices.par_iter_mut().for_each(|v| *v = onto_surface(&sdf, *v, 1e-5 * cell_m));
+    let reach_m = REACH_CELLS * cell_m;
+    let vertices = by_blocks(&vertices, BLOCK as f64 * cell_m, |centre_m, radius_m| {
+        let field = field.within(centre_m, radius_m + reach_m);
+        move |start_m| onto_surface(&field.within(start_m, reach_m), start_m, 1e-5 * cell_m)
+    });
     let facets = quads.iter().flat_map(|quad| halves(quad, &vertices)).collect();
     Mesh { vertices, facets, labels: Vec::new() }
+}
+
+/// A value for every point, found block by block of space: `in_ball` is given the centre (m) and
+/// the radius (m) of a ball around each block's points, and returns what finds their values.
+pub fn by_blocks<T: Copy + Default + Send, F: Fn(DVec3) -> T>(
+    points_m: &[DVec3],
+    side_m: f64,
+    in_ball: impl Fn(DVec3, f64) -> F + Sync,
+) -> Vec<T> {
+    let block = |point_m: &DVec3| (point_m / side_m).floor().to_array().map(|x| x as i64);
+    let mut sorted: Vec<([i64; 3], u32)> = points_m.iter().map(block).zip(0..).collect();
+    sorted.par_sort_unstable();
+    let blocks: Vec<&[([i64; 3], u32)]> = sorted.chunk_by(|a, b| a.0 == b.0).collect();
+    let values = |points: &&[([i64; 3], u32)]| {
+        let centre_m = (DVec3::from(points[0].0.map(|x| x as f64)) + 0.5) * side_m;
+        let value = in_ball(centre_m, 0.5 * 3f64.sqrt() * side_m);
+        points.iter().map(|&(_, point)| value(points_m[point as usize])).collect::<Vec<T>>()
+    };
+    let values: Vec<Vec<T>> = blocks.par_iter().map(values).collect();
+    let mut in_order = vec![T::default(); points_m.len()];
+    for (&(_, point), value) in sorted.iter().zip(values.into_iter().flatten()) {
+        in_order[point as usize] = value;
+    }
+    in_order
 }
 
 /// The corners of a grid of cubic cells; a cell is numbered by its corner nearest the origin.
@@ -59,6 +107,9 @@ struct Lattice {
     /// Corners along x, y and z.
     size: [usize; 3],
 }
+
+/// A cell that the surface passes through: its place along x, y and z, and its number.
+type Crossed = ([usize; 3], usize);
 
 impl Lattice {
     /// Centred on the bounds, so that a symmetric body gets a symmetric net.
@@ -77,70 +128,103 @@ impl Lattice {
         self.origin_m + self.cell_m * DVec3::new(x as f64, y as f64, z as f64)
     }
 
-    /// All corners that have a successor along each axis, with their index.
-    fn cells(&self) -> impl Iterator<Item = ([usize; 3], usize)> + use<> {
-        let ([nx, ny, nz], [_, sy, sz]) = (self.size, self.strides());
-        (0..nz - 1).flat_map(move |z| {
-            (0..ny - 1)
-                .flat_map(move |y| (0..nx - 1).map(move |x| ([x, y, z], x + y * sy + z * sz)))
-        })
-    }
-
     /// Distance at every corner, m; far from the surface only its sign is right.
-    fn sample(&self, sdf: &(impl Fn(DVec3) -> f64 + Sync)) -> Vec<f64> {
+    fn sample(&self, field: &impl Field) -> Vec<f64> {
         let [nx, ny, nz] = self.size;
         let mut distances_m = vec![0.0; nx * ny * nz];
         distances_m.par_chunks_mut(nx * ny * BLOCK).enumerate().for_each(|(slab, values)| {
             for y in (0..ny).step_by(BLOCK) {
                 for x in (0..nx).step_by(BLOCK) {
-                    self.sample_block(sdf, [x, y, slab * BLOCK], values);
+                    self.sample_block(field, [x, y, 0], BLOCK, slab * BLOCK, values);
                 }
             }
         });
         distances_m
     }
 
-    /// Fills one block of a slab of `BLOCK` layers.
-    fn sample_block(&self, sdf: &impl Fn(DVec3) -> f64, first: [usize; 3], slab: &mut [f64]) {
-        let half_side_m = 0.5 * (BLOCK - 1) as f64 * self.cell_m;
-        let at_centre_m = sdf(self.position_m(first) + half_side_m);
+    /// Fills a block of a slab of layers that begins with layer `z_first`, half a side at a time
+    /// where the surface is near.
+    fn sample_block(
+        &self,
+        field: &impl Field,
+        first @ [x, y, z]: [usize; 3],
+        side: usize,
+        z_first: usize,
+        slab: &mut [f64],
+    ) {
+        let half_side_m = 0.5 * (side - 1) as f64 * self.cell_m;
+        let centre_m = self.position_m([x, y, z_first + z]) + half_side_m;
+        let at_centre_m = field.distance_m(centre_m);
         // One cell more than the block: no lattice edge that leaves it crosses the surface either.
         let is_far = at_centre_m.abs() > 3f64.sqrt() * (half_side_m + self.cell_m);
-        let [[x0, x1], [y0, y1], [z0, z1]] =
-            [0, 1, 2].map(|axis| [first[axis], (first[axis] + BLOCK).min(self.size[axis])]);
-        for z in z0..z1 {
-            for y in y0..y1 {
-                for x in x0..x1 {
-                    slab[x + self.size[0] * (y + self.size[1] * (z - z0))] =
-                        if is_far { at_centre_m } else { sdf(self.position_m([x, y, z])) };
+        let [nx, ny, _] = self.size;
+        let end = [nx, ny, slab.len() / (nx * ny)];
+        let spans = |step| [0, 1, 2].map(|i| (first[i]..end[i].min(first[i] + side)).step_by(step));
+        if is_far || side == 1 {
+            let [xs, ys, zs] = spans(1);
+            for (z, y) in zs.flat_map(|z| ys.clone().map(move |y| (z, y))) {
+                xs.clone().for_each(|x| slab[x + nx * (y + ny * z)] = at_centre_m);
+            }
+            return;
+        }
+        let near = field.within(centre_m, 3f64.sqrt() * half_side_m);
+        let [xs, ys, zs] = spans(side / 2);
+        for z in zs {
+            for y in ys.clone() {
+                for x in xs.clone() {
+                    self.sample_block(&near, [x, y, z], side / 2, z_first, slab);
                 }
             }
         }
     }
 
-    /// One vertex per crossed cell, the mean of its edges' crossings; and each cell's vertex.
-    fn vertices(&self, distances_m: &[f64]) -> (Vec<DVec3>, Vec<u32>) {
-        let mut vertices = Vec::new();
-        let mut vertex_of_cell = vec![NO_VERTEX; distances_m.len()];
+    /// The cells that the surface passes through, by their numbers.
+    fn crossed(&self, distances_m: &[f64]) -> Vec<Crossed> {
+        let ([nx, ny, nz], [_, sy, sz]) = (self.size, self.strides());
+        let is_inside = |corner: usize| distances_m[corner] < 0.0;
+        let in_layer = |z: usize| {
+            let mut crossed = Vec::new();
+            for y in 0..ny - 1 {
+                let row = y * sy + z * sz;
+                // Corners inside among the four of a cell that have its x.
+                let inside = |x: usize| {
+                    [0, sy, sz, sy + sz].iter().filter(|&&to| is_inside(row + x + to)).count()
+                };
+                let mut before = inside(0);
+                for x in 0..nx - 1 {
+                    let after = inside(x + 1);
+                    if before + after != 0 && before + after != 8 {
+                        crossed.push(([x, y, z], row + x));
+                    }
+                    before = after;
+                }
+            }
+            crossed
+        };
+        (0..nz - 1).into_par_iter().flat_map_iter(in_layer).collect()
+    }
+
+    /// One vertex per crossed cell, the mean of its edges' crossings.
+    fn vertices(&self, distances_m: &[f64], crossed: &[Crossed]) -> Vec<DVec3> {
         let [sx, sy, sz] = self.strides();
         let offsets = [0, 1, 2, 3, 4, 5, 6, 7usize]
             .map(|corner| (corner & 1) * sx + (corner >> 1 & 1) * sy + (corner >> 2) * sz);
-        for (cell, index) in self.cells() {
+        let vertex = |&(cell, index): &Crossed| {
             let corners_m = offsets.map(|offset| distances_m[index + offset]);
-            let inside = corners_m.iter().filter(|&&d| d < 0.0).count();
-            if inside != 0 && inside != 8 {
-                vertex_of_cell[index] = vertices.len() as u32;
-                vertices.push(self.position_m(cell) + self.cell_m * mean_crossing(&corners_m));
-            }
-        }
-        (vertices, vertex_of_cell)
+            self.position_m(cell) + self.cell_m * mean_crossing(&corners_m)
+        };
+        crossed.par_iter().map(vertex).collect()
     }
 
     /// A quad around every crossed lattice edge, right-handed about the outward direction.
-    fn quads(&self, distances_m: &[f64], vertex_of_cell: &[u32]) -> Vec<[u32; 4]> {
+    fn quads(&self, distances_m: &[f64], crossed: &[Crossed]) -> Vec<[u32; 4]> {
         let strides = self.strides();
-        let mut quads = Vec::new();
-        for (corner, index) in self.cells() {
+        let mut vertex_of_cell = vec![NO_VERTEX; distances_m.len()];
+        for (vertex, &(_, index)) in (0..).zip(crossed) {
+            vertex_of_cell[index] = vertex;
+        }
+        let mut quads = Vec::with_capacity(crossed.len());
+        for &(corner, index) in crossed {
             for axis in 0..3 {
                 let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
                 let is_inside = distances_m[index] < 0.0;
@@ -194,24 +278,25 @@ fn even_out(vertices: &mut [DVec3], quads: &[[u32; 4]]) {
 }
 
 /// Newton's method along the gradient.
-fn onto_surface(sdf: &impl Fn(DVec3) -> f64, start_m: DVec3, step_m: f64) -> DVec3 {
+fn onto_surface(field: &impl Field, start_m: DVec3, step_m: f64) -> DVec3 {
     let mut point_m = start_m;
     for _ in 0..NEWTON_STEPS {
-        let distance_m = sdf(point_m);
+        let distance_m = field.distance_m(point_m);
         if distance_m.abs() < ON_SURFACE_M {
             break;
         }
-        let gradient = gradient(sdf, point_m, step_m);
+        let gradient = gradient(field, point_m, step_m);
         point_m -= gradient * (distance_m / gradient.length_squared().max(f64::MIN_POSITIVE));
     }
     point_m
 }
 
 /// Gradient from four samples at the corners of a tetrahedron.
-fn gradient(sdf: &impl Fn(DVec3) -> f64, point_m: DVec3, step_m: f64) -> DVec3 {
+fn gradient(field: &impl Field, point_m: DVec3, step_m: f64) -> DVec3 {
     const CORNERS: [[f64; 3]; 4] =
         [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
-    let weighted = CORNERS.map(DVec3::from_array).map(|c| c * sdf(point_m + step_m * c));
+    let weighted =
+        CORNERS.map(DVec3::from_array).map(|c| c * field.distance_m(point_m + step_m * c));
     weighted.into_iter().sum::<DVec3>() / (4.0 * step_m)
 }
 
@@ -228,8 +313,8 @@ mod tests {
     use super::super::checks::{area_m2, euler_characteristic, is_closed, volume_m3};
     use super::*;
 
-    fn meshed(sdf: impl Fn(DVec3) -> f64 + Sync, cell_m: f64) -> Mesh {
-        surface_nets(sdf, DVec3::splat(-1.5), DVec3::splat(1.5), cell_m)
+    fn meshed(field: impl Fn(DVec3) -> f64 + Clone + Send + Sync, cell_m: f64) -> Mesh {
+        surface_nets(field, DVec3::splat(-1.5), DVec3::splat(1.5), cell_m)
     }
 
     #[test]

@@ -170,12 +170,14 @@ impl F5 {
         let gamma = angles.gamma_rad / self.gamma_scale_rad;
         let (sin, cos) = angles.phi_rad.sin_cos();
         let range = (range_m - self.range_centre_m) / self.range_scale_m;
-        let power = |base: f64, exponent: usize| base.powi(exponent as i32);
+        let bases = [gamma, cos, sin, range];
+        let powers = bases.map(|base| [0, 1, 2, 3, 4, 5].map(|exponent| base.powi(exponent)));
+        let power = |base: usize, exponent: usize| match powers[base].get(exponent) {
+            Some(&power) => power,
+            None => bases[base].powi(exponent as i32),
+        };
         let value = |t: &Term| {
-            power(gamma, t.gamma)
-                * power(cos, t.cos_phi)
-                * power(sin, t.sin_phi)
-                * power(range, t.range)
+            power(0, t.gamma) * power(1, t.cos_phi) * power(2, t.sin_phi) * power(3, t.range)
         };
         self.terms.iter().map(value).collect()
     }

@@ -4,8 +4,6 @@
 //! when their ranges differ by more than a spot and a slope of 60° explain. The edge is taken halfway
 //! between them, so that a distance is good to about one spacing of the scan.
 
-use std::collections::{HashMap, HashSet};
-
 use glam::DVec2;
 use rayon::prelude::*;
 
@@ -25,35 +23,37 @@ pub(super) fn distances_m(looks: &[(DVec2, Option<f64>)], spot_m: f64, reach_m: 
     let all_places: Vec<DVec2> = looks.iter().map(|look| look.0).collect();
     let looks = apart(looks, spacing_m / 4.0);
     let places: Vec<DVec2> = looks.iter().map(|look| look.0).collect();
-    let all = Cells::new(&places, near_m);
-    let nearest_across = |look: &(DVec2, Option<f64>)| {
-        let across =
-            all.within(look.0, near_m).filter(|&other| is_across(*look, looks[other], spot_m));
-        let distance_m2 = |other: usize| places[other].distance_squared(look.0);
-        across.min_by(|&a, &b| distance_m2(a).total_cmp(&distance_m2(b)))
+    let cells = Cells::new(&places, near_m);
+    let nearest_across = |number: usize, near: &[u32]| {
+        let distance_m2 = |other: &usize| places[*other].distance_squared(places[number]);
+        let is_edge = |other: &usize| {
+            distance_m2(other) <= near_m * near_m && is_across(looks[number], looks[*other], spot_m)
+        };
+        let others = near.iter().map(|&other| other as usize).filter(is_edge);
+        others.min_by(|a, b| distance_m2(a).total_cmp(&distance_m2(b)))
     };
-    let across: Vec<Option<usize>> = looks.par_iter().map(nearest_across).collect();
+    let across: Vec<Option<usize>> = cells.map_near(&cells, nearest_across);
     // Only pairs that are nearest to each other; others see past a look on their own side.
     let edge = |(look, other): (usize, &Option<usize>)| {
         let other = (*other)?;
         (across[other] == Some(look)).then(|| 0.5 * (places[look] + places[other]))
     };
     let edges: Vec<DVec2> = across.iter().enumerate().filter_map(edge).collect();
-    let cells = Cells::new(&edges, reach_m);
-    let distance_m = |place: &DVec2| {
-        let nearest = cells.within(*place, reach_m).map(|edge| edges[edge].distance(*place));
-        nearest.fold(reach_m, f64::min)
+    let distance_m = |number: usize, near: &[u32]| {
+        let distance_m2 = |&edge: &u32| edges[edge as usize].distance_squared(all_places[number]);
+        let within = near.iter().map(distance_m2).filter(|&m2| m2 <= reach_m * reach_m);
+        within.fold(f64::INFINITY, f64::min).sqrt().min(reach_m)
     };
-    all_places.par_iter().map(distance_m).collect()
+    Cells::new(&all_places, reach_m).map_near(&Cells::new(&edges, reach_m), distance_m)
 }
 
 /// One look of each small cell, the first, so that looks on top of each other cost no more than one.
 fn apart(looks: &[(DVec2, Option<f64>)], cell_m: f64) -> Vec<(DVec2, Option<f64>)> {
-    let mut taken = HashSet::new();
-    let is_first = |look: &&(DVec2, Option<f64>)| {
-        taken.insert((look.0 / cell_m).floor().to_array().map(|x| x as i64))
-    };
-    looks.iter().filter(is_first).copied().collect()
+    let places: Vec<DVec2> = looks.iter().map(|look| look.0).collect();
+    let cells = Cells::new(&places, cell_m);
+    let mut first: Vec<u32> = cells.occupied().map(|points| points[0].1).collect();
+    first.sort_unstable();
+    first.into_iter().map(|number| looks[number as usize]).collect()
 }
 
 fn is_across(a: (DVec2, Option<f64>), b: (DVec2, Option<f64>), spot_m: f64) -> bool {
@@ -75,33 +75,54 @@ fn spacing_m(looks: &[(DVec2, Option<f64>)]) -> f64 {
 }
 
 /// Points sorted into square cells, for look-ups within one cell's side.
-struct Cells<'a> {
-    points: &'a [DVec2],
-    side_m: f64,
-    of_cell: HashMap<[i64; 2], Vec<u32>>,
+struct Cells {
+    /// The cell and the number of each point, in this order.
+    sorted: Vec<([i64; 2], u32)>,
 }
 
-impl<'a> Cells<'a> {
-    fn new(points: &'a [DVec2], side_m: f64) -> Cells<'a> {
-        let mut cells = Cells { points, side_m, of_cell: HashMap::new() };
-        for (number, point) in points.iter().enumerate() {
-            cells.of_cell.entry(cells.cell(*point)).or_default().push(number as u32);
+impl Cells {
+    fn new(points: &[DVec2], side_m: f64) -> Cells {
+        let cell = |point: &DVec2| (point / side_m).floor().to_array().map(|x| x as i64);
+        let mut sorted: Vec<_> = points.iter().map(cell).zip(0..).collect();
+        sorted.par_sort_unstable();
+        Cells { sorted }
+    }
+
+    /// The points of each cell that has any.
+    fn occupied(&self) -> impl Iterator<Item = &[([i64; 2], u32)]> {
+        self.sorted.chunk_by(|a, b| a.0 == b.0)
+    }
+
+    /// Points in a cell and in the eight around it.
+    fn around(&self, [column, row]: [i64; 2]) -> Vec<u32> {
+        let in_column = |aside: i64| {
+            let [first, last] =
+                [-1, 1].map(|up| [column.saturating_add(aside), row.saturating_add(up)]);
+            let start = self.sorted.partition_point(|point| point.0 < first);
+            let end = self.sorted.partition_point(|point| point.0 <= last);
+            self.sorted[start..end].iter().map(|point| point.1)
+        };
+        [-1, 0, 1].into_iter().flat_map(in_column).collect()
+    }
+
+    /// A value for every point, by its number and those of `others`, in cells of the same size, that
+    /// may be within one side of it.
+    fn map_near<T: Clone + Default + Send>(
+        &self,
+        others: &Cells,
+        value: impl Fn(usize, &[u32]) -> T + Sync,
+    ) -> Vec<T> {
+        let cells: Vec<&[([i64; 2], u32)]> = self.occupied().collect();
+        let in_cell = |points: &&[([i64; 2], u32)]| {
+            let near = others.around(points[0].0);
+            points.iter().map(|&(_, number)| value(number as usize, &near)).collect()
+        };
+        let values: Vec<Vec<T>> = cells.par_iter().map(in_cell).collect();
+        let mut by_number = vec![T::default(); self.sorted.len()];
+        for (&(_, number), value) in self.sorted.iter().zip(values.into_iter().flatten()) {
+            by_number[number as usize] = value;
         }
-        cells
-    }
-
-    fn cell(&self, point: DVec2) -> [i64; 2] {
-        (point / self.side_m).floor().to_array().map(|x| x as i64)
-    }
-
-    /// Points within `radius_m`, at most a cell's side, of a place.
-    fn within(&self, place: DVec2, radius_m: f64) -> impl Iterator<Item = usize> + '_ {
-        let [column, row] = self.cell(place);
-        let around = (-1..=1).flat_map(move |x| (-1..=1).map(move |y| [column + x, row + y]));
-        let near = around.filter_map(|cell| self.of_cell.get(&cell)).flatten();
-        near.map(|&number| number as usize).filter(move |&number| {
-            self.points[number].distance_squared(place) <= radius_m * radius_m
-        })
+        by_number
     }
 }
 

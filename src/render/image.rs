@@ -1,5 +1,9 @@
 //! Detections on a regular grid of the target plane.
 
+use std::ops::Range;
+
+use rayon::prelude::*;
+
 use super::{Echo, Scan};
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
@@ -8,6 +12,18 @@ use crate::units::{dbm_from_watts, watts_from_dbm};
 
 /// Names of the channels of a power image, in order.
 pub const CHANNELS: [&str; 5] = ["power_dbm", "range_m", "incidence_deg", "material", "count"];
+
+/// Parts of an image that are filled at the same time.
+const BANDS: usize = 16;
+
+/// A detection with what every pixel of its spot takes from it.
+struct Shown<'a> {
+    echo: &'a Echo,
+    power_w: f64,
+    /// None for a false alarm.
+    incidence_rad: Option<f64>,
+    material: Option<u16>,
+}
 
 /// Sums over the detections whose spot covers one pixel.
 #[derive(Clone, Copy, Default)]
@@ -38,13 +54,21 @@ pub fn power_image(
 ) -> Raster {
     let mut raster = grid(field, spot_m, pixel_m);
     let mut pixels = vec![Pixel::default(); raster.width * raster.height];
-    for echo in scan.detections() {
-        let material = echo.truth.map(|truth| material_of_region[usize::from(truth.region)]);
-        for (index, distance_m) in covered(&raster, echo, spot_m) {
-            let weight = (-4.0 * std::f64::consts::LN_2 * (distance_m / spot_m).powi(2)).exp();
-            pixels[index].add(echo, material, weight);
+    let shown: Vec<Shown> =
+        scan.detections().map(|echo| Shown::new(echo, material_of_region)).collect();
+    // A band of rows has all that falls on it in the order of the scan, however many threads there are.
+    let band_rows = raster.height.div_ceil(BANDS);
+    let bands = pixels.par_chunks_mut(raster.width * band_rows).enumerate();
+    bands.for_each(|(band, pixels)| {
+        let first = band * band_rows;
+        let rows = first..(first + band_rows).min(raster.height);
+        for shown in &shown {
+            for (index, distance_m) in covered(&raster, shown.echo, spot_m, rows.clone()) {
+                let weight = (-4.0 * std::f64::consts::LN_2 * (distance_m / spot_m).powi(2)).exp();
+                pixels[index - first * raster.width].add(shown, weight);
+            }
         }
-    }
+    });
     raster.channels = channels(&pixels);
     raster
 }
@@ -60,11 +84,13 @@ fn grid(field: Field, spot_m: f64, pixel_m: f64) -> Raster {
     Raster { width, height, x_min_m, y_min_m, pixel_m, channels: Vec::new() }
 }
 
-/// Pixels whose centre lies within the spot of an echo, with their distance from its centre, m.
+/// Pixels in some rows whose centre lies within the spot of an echo, with their distance from its
+/// centre, m.
 fn covered<'a>(
     raster: &'a Raster,
     echo: &'a Echo,
     spot_m: f64,
+    rows: Range<usize>,
 ) -> impl Iterator<Item = (usize, f64)> + 'a {
     let radius_m = spot_m / 2.0;
     let span = |centre_m: f64, min_m: f64, count: usize| {
@@ -74,8 +100,10 @@ fn covered<'a>(
         (first as usize).min(count)..(end as usize).min(count)
     };
     let columns = span(echo.xt_m, raster.x_min_m, raster.width);
-    let rows_from_below = span(echo.yt_m, raster.y_min_m, raster.height);
-    rows_from_below.flat_map(move |up| {
+    let from_below = span(echo.yt_m, raster.y_min_m, raster.height);
+    let first = from_below.start.max(raster.height - rows.end);
+    let end = from_below.end.min(raster.height - rows.start);
+    (first..end).flat_map(move |up| {
         let row = raster.height - 1 - up;
         columns.clone().filter_map(move |column| {
             let (dx, dy) = (raster.x_m(column) - echo.xt_m, raster.y_m(row) - echo.yt_m);
@@ -85,19 +113,30 @@ fn covered<'a>(
     })
 }
 
+impl<'a> Shown<'a> {
+    fn new(echo: &'a Echo, material_of_region: &[u16]) -> Shown<'a> {
+        Shown {
+            echo,
+            power_w: watts_from_dbm(echo.power_dbm),
+            incidence_rad: echo.truth.map(|truth| truth.hit.theta_rad()),
+            material: echo.truth.map(|truth| material_of_region[usize::from(truth.region)]),
+        }
+    }
+}
+
 impl Pixel {
-    fn add(&mut self, echo: &Echo, material: Option<u16>, weight: f64) {
+    fn add(&mut self, shown: &Shown, weight: f64) {
         self.weight += weight;
-        self.power_w += weight * watts_from_dbm(echo.power_dbm);
-        self.range_m += weight * echo.range_m;
+        self.power_w += weight * shown.power_w;
+        self.range_m += weight * shown.echo.range_m;
         self.count += 1;
-        if let Some(truth) = echo.truth {
+        if let Some(incidence_rad) = shown.incidence_rad {
             self.known_weight += weight;
-            self.incidence_rad += weight * truth.hit.theta_rad();
+            self.incidence_rad += weight * incidence_rad;
         }
         if weight > self.nearest_weight {
             self.nearest_weight = weight;
-            self.material = material;
+            self.material = shown.material;
         }
     }
 }

@@ -6,8 +6,8 @@
 //! be read off the tables: bust 0.86 m, waist 0.63 m, hips 0.89 m around.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
+use crate::geometry::surface_nets::{Field, by_blocks};
 use crate::geometry::{FacetLabels, Mesh, surface_nets};
 
 /// Side of the polygoniser's cells, m; chosen for about 28 000 facets.
@@ -18,6 +18,9 @@ const BOUNDS_M: [DVec3; 2] = [DVec3::new(-0.32, 0.42, -0.22), DVec3::new(0.32, 1
 const MIDLINE_M: f64 = 0.015;
 /// Keeps the blended distance below the true one, so that empty space may be skipped on its word.
 const CAUTION: f64 = 0.8;
+/// The most that a shape's own distance changes over a metre, with room to spare: a shape is left
+/// out of a ball on its word.
+const STEEPEST: f64 = 1.5;
 
 /// The mannequin as a closed mesh: about 28 000 facets of 1 cm, in metres.
 ///
@@ -30,9 +33,12 @@ const CAUTION: f64 = 0.8;
 /// ```
 pub fn mannequin() -> Mesh {
     let body = Body::new();
-    let mut mesh = surface_nets(|p| body.distance_m(p), BOUNDS_M[0], BOUNDS_M[1], CELL_M);
-    let facets = (0..mesh.facets.len()).into_par_iter();
-    let parts: Vec<_> = facets.map(|facet| body.part_at(mesh.centroid(facet))).collect();
+    let mut mesh = surface_nets(body.everywhere(), BOUNDS_M[0], BOUNDS_M[1], CELL_M);
+    let centroids_m: Vec<_> = (0..mesh.facets.len()).map(|facet| mesh.centroid(facet)).collect();
+    let parts = by_blocks(&centroids_m, 4.0 * CELL_M, |centre_m, radius_m| {
+        let nearest = body.nearest_within(centre_m, radius_m);
+        move |point_m| nearest.part_at(point_m)
+    });
     mesh.labels.push(FacetLabels::from_names("part", parts));
     mesh
 }
@@ -149,10 +155,65 @@ impl Body {
         Body { shapes: shapes.collect() }
     }
 
-    /// Signed distance to the figure, m, negative inside.
+    /// The body with all its shapes.
+    fn everywhere(&self) -> Near<'_> {
+        Near { shapes: &self.shapes, chosen: (1 << self.shapes.len()) - 1 }
+    }
+
+    /// The shapes of which one comes nearest to any point of a ball.
+    fn nearest_within(&self, centre_m: DVec3, radius_m: f64) -> Near<'_> {
+        let slack_m = STEEPEST * radius_m;
+        let solids =
+            || self.everywhere().numbered().filter(|(_, shape)| shape.role != Role::Hollow);
+        let all_m: Vec<_> = solids().map(|(n, s)| (n, s.distance_m(centre_m))).collect();
+        let nearest_m =
+            all_m.iter().map(|&(_, distance_m)| distance_m).fold(f64::INFINITY, f64::min);
+        let near =
+            all_m.iter().filter(|(_, distance_m)| distance_m - slack_m <= nearest_m + slack_m);
+        Near { shapes: &self.shapes, chosen: near.map(|(number, _)| 1 << number).sum() }
+    }
+}
+
+/// Some of a body's shapes: enough of them for a part of space.
+#[derive(Clone, Copy)]
+struct Near<'a> {
+    shapes: &'a [Shape],
+    /// Bit `i` stands for shape `i`.
+    chosen: u32,
+}
+
+impl<'a> Near<'a> {
+    /// The shapes with their numbers, in the order in which they are joined.
+    fn numbered(self) -> impl Iterator<Item = (usize, &'a Shape)> {
+        let mut left = self.chosen;
+        std::iter::from_fn(move || {
+            let number = left.trailing_zeros() as usize;
+            left &= left.wrapping_sub(1);
+            self.shapes.get(number).map(|shape| (number, shape))
+        })
+    }
+
+    /// Name of the part whose own shapes come nearest.
+    fn part_at(&self, point_m: DVec3) -> &'static str {
+        let nearest = self
+            .numbered()
+            .map(|(_, shape)| (shape.distance_m(point_m), shape.role))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        match (nearest.map(|(_, role)| role), point_m.x > 0.0) {
+            (Some(Role::Head), _) => "head",
+            (Some(Role::Arm), true) => "left-arm",
+            (Some(Role::Arm), false) => "right-arm",
+            (Some(Role::Leg), true) => "left-leg",
+            (Some(Role::Leg), false) => "right-leg",
+            _ => "torso",
+        }
+    }
+}
+
+impl Field for Near<'_> {
     fn distance_m(&self, point_m: DVec3) -> f64 {
         let mut distance_m = f64::INFINITY;
-        for shape in &self.shapes {
+        for (_, shape) in self.numbered() {
             let other_m = shape.distance_m(point_m);
             distance_m = match shape.role {
                 Role::Hollow => -smooth_min(-distance_m, other_m, shape.blend_m),
@@ -162,20 +223,34 @@ impl Body {
         CAUTION * distance_m
     }
 
-    /// Name of the part whose own shapes come nearest.
-    fn part_at(&self, point_m: DVec3) -> &'static str {
-        let solid = self.shapes.iter().filter(|shape| shape.role != Role::Hollow);
-        let nearest = solid
-            .min_by(|a, b| a.distance_m(point_m).total_cmp(&b.distance_m(point_m)))
-            .map(|shape| shape.role);
-        match (nearest, point_m.x > 0.0) {
-            (Some(Role::Head), _) => "head",
-            (Some(Role::Arm), true) => "left-arm",
-            (Some(Role::Arm), false) => "right-arm",
-            (Some(Role::Leg), true) => "left-leg",
-            (Some(Role::Leg), false) => "right-leg",
-            _ => "torso",
+    /// Without the shapes that leave no trace in the ball: those beyond the blend with what came
+    /// before them, and those before one that hides them all.
+    fn within(&self, centre_m: DVec3, radius_m: f64) -> Self {
+        let slack_m = STEEPEST * radius_m;
+        let mut chosen = 0;
+        // Bounds of the distance to the shapes so far.
+        let (mut low_m, mut high_m) = (f64::INFINITY, f64::INFINITY);
+        for (number, &Shape { role, blend_m, .. }) in self.numbered() {
+            let other_m = self.shapes[number].distance_m(centre_m);
+            let (other_low_m, other_high_m) = (other_m - slack_m, other_m + slack_m);
+            // The most by which a blend falls below both.
+            let fillet_m = blend_m / 6.0;
+            if role == Role::Hollow {
+                if other_low_m < blend_m - low_m {
+                    chosen |= 1 << number;
+                    low_m = low_m.max(-other_high_m);
+                    high_m = high_m.max(-other_low_m) + fillet_m;
+                }
+            } else if other_low_m < high_m + blend_m {
+                if low_m >= other_high_m + blend_m {
+                    chosen = 0;
+                }
+                chosen |= 1 << number;
+                low_m = low_m.min(other_low_m) - fillet_m;
+                high_m = high_m.min(other_high_m);
+            }
         }
+        Near { chosen, ..*self }
     }
 }
 
@@ -194,8 +269,11 @@ impl Shape {
 /// Twice continuously differentiable, so that reflections run smoothly over the seam.
 fn smooth_min(a_m: f64, b_m: f64, blend_m: f64) -> f64 {
     let overlap_m = blend_m - (a_m - b_m).abs();
-    let fillet_m =
-        if overlap_m > 0.0 { overlap_m.powi(3) / (6.0 * blend_m * blend_m) } else { 0.0 };
+    let fillet_m = if overlap_m > 0.0 {
+        overlap_m * (overlap_m * overlap_m) / (6.0 * blend_m * blend_m)
+    } else {
+        0.0
+    };
     a_m.min(b_m) - fillet_m
 }
 
@@ -211,6 +289,8 @@ struct Knot {
     y_m: f64,
     measures_m: [f64; 5],
     slopes: [f64; 5],
+    /// Mean slopes up to the next section.
+    chords: [f64; 5],
 }
 
 impl Loft {
@@ -223,7 +303,8 @@ impl Loft {
             let slopes = std::array::from_fn(|m| {
                 if is_end { 0.0 } else { (above[m + 1] - below[m + 1]) / (above[0] - below[0]) }
             });
-            Knot { y_m, measures_m: *measures_m, slopes }
+            let chords = std::array::from_fn(|m| (above[m + 1] - measures_m[m]) / (above[0] - y_m));
+            Knot { y_m, measures_m: *measures_m, slopes, chords }
         });
         Loft { caps_m, knots: knots.collect() }
     }
@@ -247,7 +328,8 @@ impl Loft {
 
     /// Centre x, centre z, half-width, front and back at a height between the ends, m; their slopes.
     fn section(&self, y_m: f64) -> ([f64; 5], [f64; 5]) {
-        let above = self.knots.partition_point(|knot| knot.y_m < y_m).max(1);
+        // There are few: to count them all is quicker than to guess at branches.
+        let above = self.knots.iter().filter(|knot| knot.y_m < y_m).count().max(1);
         let (Some(low), Some(high)) = (self.knots.get(above - 1), self.knots.get(above)) else {
             return (self.knots[0].measures_m, [0.0; 5]);
         };
@@ -260,8 +342,7 @@ impl Loft {
             start * s * s + end * t * t
         };
         let slope = |m: usize| {
-            let chord = (high.measures_m[m] - low.measures_m[m]) / height_m;
-            6.0 * s * t * chord
+            6.0 * s * t * low.chords[m]
                 + low.slopes[m] * s * (s - 2.0 * t)
                 + high.slopes[m] * t * (t - 2.0 * s)
         };
@@ -281,7 +362,8 @@ mod tests {
     fn gradient(body: &Body, point_m: DVec3) -> DVec3 {
         const STEP_M: f64 = 1e-6;
         DVec3::from_array([DVec3::X, DVec3::Y, DVec3::Z].map(|axis| {
-            let [ahead, behind] = [STEP_M, -STEP_M].map(|s| body.distance_m(point_m + s * axis));
+            let [ahead, behind] =
+                [STEP_M, -STEP_M].map(|s| body.everywhere().distance_m(point_m + s * axis));
             (ahead - behind) / (2.0 * STEP_M)
         }))
     }
@@ -397,7 +479,8 @@ mod tests {
     fn vertices_lie_on_the_surface() {
         const ON_SURFACE_M: f64 = 1e-6;
         let body = Body::new();
-        assert!(MANNEQUIN.vertices.iter().all(|&v| body.distance_m(v).abs() < 0.5 * ON_SURFACE_M));
+        let all = body.everywhere();
+        assert!(MANNEQUIN.vertices.iter().all(|&v| all.distance_m(v).abs() < 0.5 * ON_SURFACE_M));
     }
 
     #[test]
@@ -425,11 +508,25 @@ mod tests {
     fn skipping_empty_space_loses_nothing() {
         let body = Body::new();
         // A distance too small for any block to be skipped.
-        let thorough =
-            surface_nets(|p| 0.05 * body.distance_m(p), BOUNDS_M[0], BOUNDS_M[1], CELL_M);
+        let all = body.everywhere();
+        let thorough = surface_nets(|p| 0.05 * all.distance_m(p), BOUNDS_M[0], BOUNDS_M[1], CELL_M);
         assert_eq!(thorough.vertices.len(), MANNEQUIN.vertices.len());
         let mut pairs = thorough.vertices.iter().zip(&MANNEQUIN.vertices);
         assert!(pairs.all(|(a, b)| a.distance(*b) < 1e-6));
+    }
+
+    #[test]
+    fn leaving_shapes_out_changes_no_bit() {
+        let body = Body::new();
+        let all = body.everywhere();
+        let whole = surface_nets(|p| all.distance_m(p), BOUNDS_M[0], BOUNDS_M[1], CELL_M);
+        let bits = |mesh: &Mesh| -> Vec<[u64; 3]> {
+            mesh.vertices.iter().map(|v| v.to_array().map(f64::to_bits)).collect()
+        };
+        assert_eq!(bits(&whole), bits(&MANNEQUIN));
+        assert_eq!(whole.facets, MANNEQUIN.facets);
+        let solids = body.nearest_within(DVec3::ZERO, f64::INFINITY);
+        assert!((0..whole.facets.len()).all(|f| solids.part_at(whole.centroid(f)) == part_of(f)));
     }
 
     #[test]

@@ -243,16 +243,16 @@ fn report(
 }
 
 fn hash(mesh: &Mesh) -> String {
+    /// Vertices or facets that are handed over at once.
+    const TOGETHER: usize = 1024;
     let mut hasher = blake3::Hasher::new();
-    for vertex in &mesh.vertices {
-        for coordinate in vertex.to_array() {
-            hasher.update(&coordinate.to_le_bytes());
-        }
+    for vertices in mesh.vertices.chunks(TOGETHER) {
+        let coordinates = vertices.iter().flat_map(DVec3::to_array);
+        hasher.update(&coordinates.flat_map(f64::to_le_bytes).collect::<Vec<u8>>());
     }
-    for facet in &mesh.facets {
-        for index in facet {
-            hasher.update(&index.to_le_bytes());
-        }
+    for facets in mesh.facets.chunks(TOGETHER) {
+        let indices = facets.as_flattened().iter();
+        hasher.update(&indices.flat_map(|index| index.to_le_bytes()).collect::<Vec<u8>>());
     }
     hasher.finalize().to_hex().to_string()
 }

@@ -26,17 +26,22 @@ pub(super) fn encode(
     let regions: Vec<&str> = scene.target.regions.iter().map(|r| r.name.as_str()).collect();
     let materials = record.material_names();
     let materials: Vec<&str> = materials.iter().map(String::as_str).collect();
-    let mut files = Vec::new();
-    for (view, image) in std::iter::zip(views, images) {
+    let exr = |image| exr::write(image, &exr_attributes(image, &materials));
+    let cloud = |view: &View| {
         let echoes: Vec<&Echo> = match all {
             true => view.scan.echoes.iter().collect(),
             false => view.scan.detections().collect(),
         };
-        let cloud = cloud_table(&echoes, material_of_region, &regions, &materials);
-        let exr = exr::write(image, &exr_attributes(image, &materials))?;
-        files.push((view.file("power", "exr"), exr));
-        files.push((view.file("power", "png"), power_figure(scene, view, image)?));
-        files.push((view.file("cloud", "ply"), ply::write_table(&cloud)?));
+        let table = cloud_table(&echoes, material_of_region, &regions, &materials);
+        ply::write_table(&table)
+    };
+    let mut files = Vec::new();
+    for (view, image) in std::iter::zip(views, images) {
+        let (figure, (exr, cloud)) =
+            rayon::join(|| power_figure(scene, view, image), || (exr(image), cloud(view)));
+        files.push((view.file("power", "exr"), exr?));
+        files.push((view.file("power", "png"), figure?));
+        files.push((view.file("cloud", "ply"), cloud?));
     }
     let mut json = serde_json::to_vec_pretty(record)?;
     json.push(b'\n');

@@ -47,6 +47,17 @@ impl<'a> Body<'a> {
         self.for_each_row(element, None, |_, _| Ok(()))
     }
 
+    /// The bytes of all entries of `element` if each has `row_bytes` of them, least significant first.
+    pub fn rows(&self, element: &Element, row_bytes: usize) -> Option<&'a [u8]> {
+        let is_little = self.encoding == Encoding::BinaryLittleEndian;
+        is_little.then(|| self.rest.get(..element.count.checked_mul(row_bytes)?)).flatten()
+    }
+
+    /// Goes on after `bytes` that were read by themselves.
+    pub fn advance(&mut self, bytes: usize) {
+        self.rest = self.rest.get(bytes..).unwrap_or_default();
+    }
+
     fn read_row(&mut self, element: &Element, list: Option<usize>, row: &mut Row) -> Option<()> {
         let is_text = self.encoding == Encoding::Ascii;
         if is_text {

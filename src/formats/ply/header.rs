@@ -63,7 +63,7 @@ impl Scalar {
         }
     }
 
-    fn size_bytes(self) -> usize {
+    pub(super) fn size_bytes(self) -> usize {
         match self {
             Scalar::Char | Scalar::UChar => 1,
             Scalar::Short | Scalar::UShort => 2,

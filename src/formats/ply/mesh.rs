@@ -5,6 +5,7 @@ use std::fmt::Write;
 use glam::DVec3;
 
 use super::body::{Body, Row};
+use super::common;
 use super::header::{Element, Header, Scalar, Shape};
 use crate::formats::FormatError;
 use crate::geometry::Mesh;
@@ -29,8 +30,13 @@ pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
         match element.name.as_str() {
             "vertex" => mesh.vertices = read_vertices(&mut body, element)?,
             "face" => {
+                let list = corner_list(element)?;
+                if let Some(facets) = common::triangles(&mut body, element, vertices) {
+                    mesh.facets = facets;
+                    continue;
+                }
                 let mut faces = Faces::new(element, vertices, bytes.len());
-                body.for_each_row(element, corner_list(element)?, |n, row| faces.push(n, row))?;
+                body.for_each_row(element, list, |n, row| faces.push(n, row))?;
                 mesh.facets = faces.facets;
                 mesh.labels = faces.labels.into_iter().map(|(_, l)| l.finish()).collect();
             }
@@ -42,6 +48,9 @@ pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
 
 fn read_vertices(body: &mut Body, element: &Element) -> Result<Vec<DVec3>, FormatError> {
     let (x, y, z) = (element.scalar("x")?, element.scalar("y")?, element.scalar("z")?);
+    if let Some(vertices) = common::vertices(body, element, [x, y, z]) {
+        return Ok(vertices);
+    }
     let mut vertices = Vec::with_capacity(element.count);
     body.for_each_row(element, None, |_, Row { scalars, .. }| {
         vertices.push(DVec3::new(scalars[x], scalars[y], scalars[z]));
@@ -213,6 +222,64 @@ mod tests {
         assert_eq!(mesh.vertices[0], DVec3::new(0.0, 0.5, -1.0));
         assert_eq!(read_mesh(&binary("big", properties, &big)).unwrap(), mesh);
         assert_eq!(read_mesh(text.as_bytes()).unwrap(), mesh);
+    }
+
+    /// A grid of squares, each of two triangles, with a further number for each vertex.
+    fn grid(encoding: &str, item: &str, side: u32) -> Vec<u8> {
+        let is_little = encoding == "little";
+        let float = |x: f32| if is_little { x.to_le_bytes() } else { x.to_be_bytes() };
+        let index = |i: u32| if is_little { i.to_le_bytes() } else { i.to_be_bytes() };
+        let mut body = Vec::new();
+        for at in 0..side * side {
+            let (x, y) = ((at % side) as f32, (at / side) as f32);
+            body.push(at as u8);
+            body.extend([x * 0.1, y * 0.1, (x * y).sin()].map(float).as_flattened());
+        }
+        for at in (0..side * (side - 1)).filter(|at| at % side < side - 1) {
+            for corners in [[at, at + 1, at + side], [at + 1, at + side + 1, at + side]] {
+                body.push(3);
+                body.extend(corners.map(index).as_flattened());
+            }
+        }
+        let properties = format!(
+            "element vertex {}\nproperty uchar flag\nproperty float x\nproperty float y\n\
+             property float z\nelement face {}\nproperty list uchar {item} vertex_indices\n",
+            side * side,
+            2 * (side - 1) * (side - 1)
+        );
+        binary(encoding, &properties, &body)
+    }
+
+    #[test]
+    fn the_common_layout_gives_what_the_general_reader_does() {
+        // More rows than one thread takes at a time; only little-endian files take the short way.
+        let general = read_mesh(&grid("big", "int", 160)).unwrap();
+        assert_eq!(general.facets.len(), 2 * 159 * 159);
+        for item in ["int", "uint"] {
+            assert_eq!(read_mesh(&grid("little", item, 160)).unwrap(), general);
+        }
+    }
+
+    #[test]
+    fn faults_in_the_common_layout_have_the_place_that_the_general_reader_finds() {
+        let good = grid("little", "int", 4);
+        let face = |number: usize| good.len() - 13 * (18 - number);
+        let altered = |at: usize, byte: u8| {
+            let mut bytes = good.clone();
+            bytes[at] = byte;
+            read_mesh(&bytes)
+        };
+        let problem = |at, byte| altered(at, byte).unwrap_err().to_string();
+        assert!(problem(face(7) + 1, 16).starts_with("face 7: refers to vertex 16, but the file"));
+        assert!(problem(face(9) + 12, 255).starts_with("face 9: refers to vertex -16"));
+        assert!(problem(face(3), 2).starts_with("face 3: has 2 corners"));
+        assert!(problem(face(17), 4).starts_with(&format!("byte {}: the file ends", good.len())));
+        assert!(read_mesh(&good[..good.len() - 1]).is_err());
+        // Four corners on the way, and the file is as long as it must be.
+        let mut quad = good.clone();
+        quad[face(0)] = 4;
+        quad.splice(face(1)..face(1), 0u32.to_le_bytes());
+        assert_eq!(read_mesh(&quad).unwrap().facets.len(), 19);
     }
 
     #[test]

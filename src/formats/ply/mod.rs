@@ -10,6 +10,7 @@
 //! that are declared once, and on elements that have properties.
 
 mod body;
+mod common;
 mod header;
 mod mesh;
 mod table;

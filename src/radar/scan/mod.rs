@@ -4,6 +4,7 @@ mod explicit;
 mod pattern;
 
 use glam::DVec2;
+use rayon::prelude::*;
 
 use super::f5::{Domain, F5};
 use super::mirror::{Mirror, MirrorAngles};
@@ -177,7 +178,7 @@ fn through_points(
 fn through_mirror(radar: &Radar, angles: &[MirrorAngles]) -> Result<Vec<Ray<Global>>, RadarError> {
     let f5 = radar.f5(radar.f5_domain(angles))?;
     let points: Vec<[f64; 2]> =
-        angles.iter().map(|&angles| f5.target_point_m(angles, PATTERN_RANGE_M)).collect();
+        angles.par_iter().map(|&angles| f5.target_point_m(angles, PATTERN_RANGE_M)).collect();
     through_points(&radar.frames(), &points)
 }
 
