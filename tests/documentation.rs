@@ -74,10 +74,9 @@ fn every_command_of_the_readme_runs() {
 #[test]
 fn a_curve_gets_from_csv_to_a_folder_for_a_web_server_as_the_docs_say() {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("scan.csv"), "theta_deg,sigma0_db\n0,-3\n20,-12\n50,-25\n")
-        .unwrap();
     let page = read("docs/publishing.md");
     let (_, own) = page.split_once("## Your own curve").unwrap();
+    fs::write(folder.path().join("scan.csv"), blocks(own, "csv")[0]).unwrap();
     let script: String = blocks(own, "sh")[0]
         .lines()
         .filter(|line| !line.starts_with("rsync "))

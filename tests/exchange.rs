@@ -50,7 +50,7 @@ fn text(subject: &Subject, format: Format) -> String {
 }
 
 fn bare(material: &Material) -> Subject<'_> {
-    Subject { material, revision: Some(3), added_at: Some("2026-03-14T10:00:00Z") }
+    Subject { material, revision: Some(3), added_at: Some("2026-03-14T10:00:00Z"), curve: None }
 }
 
 fn given() -> Given {
@@ -468,6 +468,58 @@ fn the_commands_go_there_and_back() {
             refused(command.args(["export", "scan", "--as", "parquet", "-o", "x.parquet"]));
         assert!(message.contains("--features parquet"), "{message}");
     }
+}
+
+#[test]
+fn a_bare_curve_is_named_by_its_file_and_says_what_it_is_found_and_cited_by() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| {
+        let output = matdb(folder.path()).args(arguments).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap())
+    };
+    fs::write(folder.path().join("spring.csv"), CURVE).unwrap();
+    let add = "add --from spring.csv --name paint --class paint --tag matt --year 2026 --kind measured \
+               --licence CC-BY --instrument Bench --frequency 3e11 --threshold 77 --source bench";
+    let mut add: Vec<&str> = add.split_whitespace().collect();
+    add.extend(["--author", "Doe, Jane", "--description", "Grey. Not known: its age"]);
+    let [_, notes] = run(&add);
+    for note in ["3e11 GHz; is that in GHz?", "below 77 dBm", "did you mean `CC-BY-4.0`?"] {
+        assert!(notes.contains(note), "{note}: {notes}");
+    }
+    assert!(run(&["list", "--tag", "matt"])[0].contains("paint"));
+    let [cited, _] = run(&["cite", "paint"]);
+    for said in
+        ["spring (measured): Doe, Jane: bench. 2026", "curve spring", "instrument radar, thr"]
+    {
+        assert!(cited.contains(said), "{said}: {cited}");
+    }
+    let [shown, _] = run(&["show", "paint"]);
+    assert!(shown.contains("instrument radar: Bench, 3e11 GHz, threshold 77 dBm"), "{shown}");
+    assert!(shown.contains("curve spring: 3 points, 1 of them below the threshold, from spring"));
+    assert!(shown.contains("45°") && shown.contains("below the threshold  15° outside"), "{shown}");
+
+    let second = "theta_deg,sigma0_db\n0,-4\n10,-13\n20,-20\n25,-24\n";
+    fs::write(folder.path().join("second.csv"), second).unwrap();
+    run(&[
+        "fit",
+        "second.csv",
+        "--model",
+        "lambert",
+        "--save",
+        "paint",
+        "--kind",
+        "synthetic",
+        "--source",
+        "chosen",
+        "--keep-render",
+    ]);
+    let [said, _] = run(&["export", "paint", "--as", "csv", "--curve", "second", "-o", "out.csv"]);
+    assert!(said.contains("the curve `second` and not spring"), "{said}");
+    assert!(fs::read_to_string(folder.path().join("out.csv")).unwrap().contains("\n25,-24"));
+    let wrong = ["export", "paint", "--as", "csv", "--curve", "third", "-o", "out.csv"];
+    let said = refused(matdb(folder.path()).args(wrong));
+    assert!(said.contains("no curve `third`; there are: spring, second"), "{said}");
 }
 
 proptest! {

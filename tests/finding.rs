@@ -283,6 +283,26 @@ fn list_takes_filters() {
 }
 
 #[test]
+fn a_class_that_nobody_has_is_answered_with_those_there_are() {
+    let folder = tempfile::tempdir().unwrap();
+    matdb(folder.path()).args(["add", "ptfe"]).assert().success();
+    let said = text(folder.path(), &["list", "--class", "nix"]);
+    assert!(
+        said.contains("no class is called `nix`, there are: ") && said.contains("textile"),
+        "{said}"
+    );
+    let said = refused(matdb(folder.path()).args([
+        "withdraw",
+        "ptfe",
+        "--reason",
+        "dented",
+        "--superseded-by",
+        "ptfe-2",
+    ]));
+    assert!(said.contains("`ptfe-2`") && said.contains("add that one first"), "{said}");
+}
+
+#[test]
 fn a_withdrawn_material_stays_with_its_reason_and_is_found_by_it() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
@@ -375,6 +395,20 @@ fn a_difference_names_the_field_with_its_unit_and_a_history_who_made_it() {
 }
 
 #[test]
+fn a_fit_that_is_new_is_told_by_its_parameters() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    matdb(folder).args(["add", "cotton"]).assert().success();
+    let fit = ["fit", "cotton", "--model", "lambert", "--save", "--looks", "4"];
+    matdb(folder).args(fit).assert().success();
+    let told = text(folder, &["diff", "cotton@1", "cotton@2"]);
+    assert!(told.contains("fits.lambert-censored.model.albedo"), "{told}");
+    assert!(!told.contains("report") && told.lines().count() < 15, "{told}");
+    let all = text(folder, &["diff", "cotton@1", "cotton@2", "--all"]);
+    assert!(all.contains("report") && all.contains("covariance") && !all.contains("inf"), "{all}");
+}
+
+#[test]
 fn curves_differ_by_their_levels_at_common_angles() {
     let before = builtin::get("cotton").unwrap().unwrap();
     let mut after = before.clone();
@@ -433,6 +467,8 @@ fn every_built_in_number_has_a_source_that_cite_prints() {
                 "sources" => continue,
                 "curves" => "curve ",
                 "fits" => "fit ",
+                "permittivities" => "permittivity ",
+                "layers" => "layer ",
                 other => other,
             };
             let is_there = all.iter().any(|place| place.starts_with(word));

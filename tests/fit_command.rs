@@ -229,6 +229,54 @@ fn bad_input_is_refused_with_a_sentence_and_nothing_is_stored() {
 }
 
 #[test]
+fn what_no_numbers_in_range_explain_is_said_once_and_not_stored() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let rows: String = (0..12).map(|i| format!("{i},12\n")).collect();
+    fs::write(folder.join("bright.csv"), format!("theta_deg,sigma0_db\n{rows}")).unwrap();
+    let fit = ["fit", "bright.csv", "--fix", "specular.m=0.5", "--looks", "4", "--starts", "1"];
+    let said = text(folder, &fit);
+    let sentence = "no parameters in their ranges give this level";
+    assert_eq!(said.matches(sentence).count(), 1, "{said}");
+    assert!(said.contains("let go of specular.m, or check the calibration"), "{said}");
+    for wrong in ["was chosen", "S stopped", "R stopped"] {
+        assert!(!said.contains(wrong), "{said}");
+    }
+    let output = matdb(folder).args(fit).args(SAVE).output().unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.contains("nothing is stored, since the fit is out of range"), "{error}");
+    assert_eq!(entries(folder), ["bright.csv"]);
+}
+
+#[test]
+fn points_that_are_there_already_are_not_stored_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    fs::write(folder.join("scan.csv"), "theta_deg,sigma0_db\n0,-3\n20,-4\n50,-6\n60,-8\n").unwrap();
+    let said = "--kind measured --source bench --licence CC0-1.0 --instrument Radar --frequency 300 \
+                --threshold -77";
+    let said: Vec<&str> = said.split_whitespace().collect();
+    let add = ["add", "--from", "scan.csv", "--name", "my-paint", "--class", "paint"];
+    matdb(folder).args(add).args(&said).assert().success();
+    let fit = ["fit", "scan.csv", "--model", "lambert", "--save", "my-paint"];
+    let other_name = ["--curve", "second"];
+    matdb(folder).args(fit).args(&said).args(other_name).assert().success();
+    let curves = &json(folder, &["show", "my-paint"])["material"]["curves"];
+    assert_eq!((curves.as_array().unwrap().len(), &curves[0]["name"]), (1, &"scan".into()));
+
+    let others: Vec<&str> =
+        said.iter().map(|s| if *s == "bench" { "elsewhere" } else { s }).collect();
+    let refusal = refused(matdb(folder).args(fit).args(&others));
+    assert!(
+        refusal.contains("has these points already, as the curve `scan` from bench"),
+        "{refusal}"
+    );
+    fs::write(folder.join("scan.csv"), "theta_deg,sigma0_db\n0,-3\n20,-4\n50,-6\n61,-8\n").unwrap();
+    let refusal = refused(matdb(folder).args(fit).args(&said));
+    assert!(refusal.contains("has another curve `scan`, from bench; give this curve"), "{refusal}");
+}
+
+#[test]
 fn a_measured_curve_is_stored_with_its_circumstances() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();

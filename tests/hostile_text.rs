@@ -7,7 +7,7 @@ use std::path::Path;
 
 use matdb::brdf::{Brdf, Lambert, Scattering};
 use matdb::effects::{Level, Receiver, SceneEffects, resolve};
-use matdb::material::file::{observations, parse};
+use matdb::material::file::{parse, points};
 use matdb::radar::Pattern;
 use matdb::render::{Bounce, Observer, Setup, Surface, power_image, shade, trace, trace_placed};
 use matdb::scene::{Scene, SceneFile};
@@ -236,6 +236,6 @@ proptest! {
 
     #[test]
     fn curves(text in damaged(CURVE)) {
-        let _ = observations(text.as_bytes());
+        let _ = points(text.as_bytes());
     }
 }

@@ -111,7 +111,41 @@ fn what_was_taken_says_from_which_catalogue_and_when_it_was_made_there() {
     }
     let said = matdb(ours.path()).args(["history", "primer"]).output().unwrap().stdout;
     let said = String::from_utf8(said).unwrap();
-    assert!(said.contains("Paints of Roe 2.1, doi:10.1234/paints: its revision 2 of"), "{said}");
+    assert!(said.contains("import, their revision 2 of "), "{said}");
+    let from = "Paints of Roe, version 2.1, https://doi.org/10.1234/paints";
+    assert!(said.ends_with(&format!("imported from {from}\n")), "{said}");
+
+    // It is theirs wherever it is cited, also when it is taken on from a third catalogue.
+    let third = tempfile::tempdir().unwrap();
+    let mine = about.replace("Paints of Roe", "Mine").replace("family = 'Roe'", "family = 'Doe'");
+    fs::write(ours.path().join("about.toml"), mine.replace("10.1234/paints", "10.1234/mine"))
+        .unwrap();
+    matdb(ours.path()).args(["add", "ptfe"]).assert().success();
+    matdb(ours.path()).args(publish).assert().success();
+    import(third.path(), &ours.path().join("site"), &[]);
+    for folder in [ours.path(), third.path()] {
+        let cited = matdb(folder).args(["cite", "primer"]).output().unwrap().stdout;
+        assert!(
+            String::from_utf8(cited).unwrap().contains(&format!("From {from}, revision 2 of "))
+        );
+    }
+    let page = |name: &str| {
+        fs::read_to_string(ours.path().join(format!("site/material/{name}.html"))).unwrap()
+    };
+    let cited = |page: &str| page.split("id=\"cite\"").nth(1).unwrap().to_owned();
+    let primer = cited(&page("primer"));
+    let [text, bibtex] = ["</p>", "BibTeX</button>"].map(|end| primer.split(end).next().unwrap());
+    assert!(text.contains("In: Paints of Roe, version 2.1, https:"), "{text}");
+    assert!(text.contains("Republished in: Mine") && !text.contains("Doe, Ann"), "{text}");
+    assert!(
+        bibtex.contains("doi = {10.1234&#x2f;paints}") && !bibtex.contains("author"),
+        "{bibtex}"
+    );
+    assert!(primer.contains("imported from <bdi>Paints of Roe</bdi>"), "{primer}");
+    let ptfe = cited(&page("ptfe"));
+    assert!(ptfe.contains("Built into matdb") && !ptfe.contains("Doe, Ann"), "{ptfe}");
+    let paint = cited(&page("paint"));
+    assert!(paint.contains("Doe, Ann") && !paint.contains("Republished"), "{paint}");
 }
 
 #[test]

@@ -178,6 +178,31 @@ fn changes_are_told_from_one_publication_to_the_next() {
 }
 
 #[test]
+fn what_the_publication_there_says_of_itself_stays_and_is_said() {
+    let folder = laboratory();
+    publish(folder.path());
+    let run = |arguments: &[&str]| {
+        let output = matdb(folder.path()).args(arguments).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let before = json(&folder.path().join("site/about.json"));
+    let notes = run(&["publish", "site"]);
+    assert_eq!(json(&folder.path().join("site/about.json")), before);
+    assert!(notes.contains("those of the publication there, `Paints <of> \"ours\"`"), "{notes}");
+    assert!(!notes.contains("other data"), "{notes}");
+    let mut store = Store::open(folder.path().join("matdb.sqlite")).unwrap();
+    store.add([&sample("new")]).unwrap();
+    drop(store);
+    let notes = run(&["publish", "site", "--about", "about.toml"]);
+    assert!(notes.contains("version 1.0 stood there with other data"), "{notes}");
+    assert!(!notes.contains("those of the publication there"), "{notes}");
+    fs::write(folder.path().join("about.toml"), ABOUT.replace("0097", "0098")).unwrap();
+    let said = refused(matdb(folder.path()).args(["publish", "site", "--about", "about.toml"]));
+    assert!(said.contains("`orcid` is `0000-0002-1825-0098`, whose digits do not check"), "{said}");
+}
+
+#[test]
 fn nothing_of_somebody_elses_folder_is_touched() {
     let folder = laboratory();
     let at = folder.path();

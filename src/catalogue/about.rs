@@ -1,10 +1,15 @@
 //! What a catalogue says of itself: title, people, licence. A small TOML file that a laboratory writes
 //! once.
 
+use std::fs;
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::material::form::{is_address, is_doi, is_licence};
+use super::folder::SUMS;
+use super::publish::ABOUT;
+use crate::material::form::{is_address, is_doi, is_licence, is_orcid};
 
 /// What a catalogue says of itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -81,6 +86,21 @@ impl About {
     pub fn parse(file: &str, text: &str) -> Result<About, AboutError> {
         let refused = |problem: String| AboutError { file: file.to_owned(), problem };
         let about: About = toml::from_str(text).map_err(|error| refused(error.to_string()))?;
+        about.check(file)?;
+        Ok(about)
+    }
+
+    /// What the publication in a folder says of itself; none where there is none, or none that can be read.
+    pub fn of_publication(folder: &Path) -> Option<About> {
+        let text = fs::read_to_string(folder.join(ABOUT)).ok()?;
+        let about: About = serde_json::from_str(&text).ok()?;
+        let is_publication = folder.join(SUMS).is_file() && about.check(ABOUT).is_ok();
+        is_publication.then_some(about)
+    }
+
+    fn check(&self, file: &str) -> Result<(), AboutError> {
+        let about = self;
+        let refused = |problem: String| AboutError { file: file.to_owned(), problem };
         if about.title.trim().is_empty() {
             return Err(refused("`title` is empty; give the catalogue a title".to_owned()));
         }
@@ -101,6 +121,13 @@ impl About {
                 "`doi` is `{doi}`; write it as 10.1234/name, without a resolver in front"
             )));
         }
-        Ok(about)
+        let orcids = about.people.iter().flat_map(|person| &person.orcid);
+        if let Some(orcid) = orcids.into_iter().find(|orcid| !is_orcid(orcid)) {
+            return Err(refused(format!(
+                "`orcid` is `{orcid}`, whose digits do not check; copy it from orcid.org, as in \
+                 0000-0002-1825-0097"
+            )));
+        }
+        Ok(())
     }
 }

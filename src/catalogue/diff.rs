@@ -125,14 +125,27 @@ impl Field {
                 (Some(rad), "rad") => format!("{}°", shown(rounded(rad.to_degrees()))),
                 (Some(hz), "Hz") => format!("{} GHz", shown(rounded(hz / 1e9))),
                 (Some(m), "m") => format!("{} mm", shown(rounded(m * 1e3))),
+                (Some(0.0), "W") => "none".to_owned(),
                 (Some(w), "W") => format!("{} dBm", shown(rounded(dbm_from_watts(w)))),
                 (Some(k), "K") => format!("{} °C", shown(rounded(k - 273.15))),
-                (Some(number), "" | "1") => shown(number),
-                (Some(number), unit) => format!("{} {unit}", shown(number)),
+                (Some(number), "" | "1") => self.digits(number),
+                (Some(number), unit) => format!("{} {unit}", self.digits(number)),
                 (None, _) => value.to_string(),
             },
         }
     }
+
+    /// Six significant digits, or all where those are the same before and after.
+    fn digits(&self, number: f64) -> String {
+        let [before, after] =
+            [&self.before, &self.after].map(|value| value.as_ref()?.as_f64().map(short));
+        shown(if before == after { number } else { short(number) })
+    }
+}
+
+/// Six significant digits.
+fn short(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
 }
 
 /// Without what a change of unit leaves in the last digits.

@@ -277,8 +277,12 @@ impl Outcome {
     }
 }
 
-/// Where a revision of theirs comes from.
+/// Where a revision of theirs comes from: of what they have imported themselves the catalogue that published it
+/// first, whom it is to be credited to.
 fn origin(about: &Option<About>, stored: &Stored) -> Origin {
+    if let Some(first) = stored.activity.as_ref().and_then(|activity| activity.origin.clone()) {
+        return first;
+    }
     let about = about.clone();
     let (version, doi, url) =
         about.clone().map_or((None, None, None), |about| (about.version, about.doi, about.url));

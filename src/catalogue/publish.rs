@@ -22,6 +22,8 @@ pub struct Published {
     pub materials: usize,
     /// Number of files.
     pub files: usize,
+    /// Whether other data had the same version in this folder before.
+    pub is_version_reused: bool,
 }
 
 /// Writes every material of a database as a catalogue into a folder, all of it or nothing.
@@ -40,8 +42,9 @@ pub fn publish(
     // Everything else is read from the copy: one moment, whoever writes meanwhile.
     let copy = folder.place(DATABASE, |place| Ok::<(), CatalogueError>(store.copy_to(place)?))?;
     let copy = Store::open_existing(copy)?;
-    let materials = fill(&mut folder, copy.as_ref().unwrap_or(store), about, progress)?;
-    let published = Published { materials, files: folder.sums().len() + 1 };
+    let (materials, is_version_reused) =
+        fill(&mut folder, copy.as_ref().unwrap_or(store), about, progress)?;
+    let published = Published { materials, files: folder.sums().len() + 1, is_version_reused };
     folder.keep()?;
     Ok(published)
 }
@@ -59,13 +62,14 @@ pub(super) fn rebuilt(
     Ok(folder.sums().clone())
 }
 
-/// Writes everything but the database and the list of hashes; the number of materials.
+/// Writes everything but the database and the list of hashes; the number of materials, and whether other data had
+/// the same version there.
 fn fill(
     folder: &mut Folder,
     store: &Store,
     about: &About,
     mut progress: impl FnMut(usize),
-) -> Result<usize, CatalogueError> {
+) -> Result<(usize, bool), CatalogueError> {
     folder.write(ABOUT, format!("{}\n", serde_json::json!(about)).as_bytes())?;
     let (mut entries, mut site) = (Vec::new(), Site::new(about)?);
     for (number, summary) in store.list()?.iter().enumerate() {
@@ -79,6 +83,6 @@ fn fill(
     let index = Index::new(about, entries);
     index.write(folder)?;
     let tables = tables::write(folder, store)?;
-    records::write(folder, about, &index, &tables)?;
-    Ok(index.materials.len())
+    let is_version_reused = records::write(folder, about, &index, &tables)?;
+    Ok((index.materials.len(), is_version_reused))
 }

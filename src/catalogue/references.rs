@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::bibtex::entry;
 use super::leaves::{Leaf, leaves};
-use crate::material::{Citation, Curve, Fit, Material, Source, SourceKind};
+use crate::material::{Citation, Curve, Fit, Material, Origin, Source, SourceKind};
 
 /// A source and what rests on it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -113,9 +113,22 @@ fn gathered(path: &[String]) -> String {
         }
         path => {
             let is_name = |name: &&String| name.parse::<usize>().is_err();
-            let names: Vec<&str> = path.iter().filter(is_name).map(String::as_str).collect();
-            names.join(", ")
+            let names = path.iter().filter(is_name).map(String::as_str);
+            match names.collect::<Vec<_>>().as_slice() {
+                [list, key, numbers @ ..] if !numbers.is_empty() => {
+                    format!("{} {key}, {}", one_of(list), numbers.join(", "))
+                }
+                names => names.join(", "),
+            }
         }
+    }
+}
+
+/// One thing of a list that a material has.
+fn one_of(list: &str) -> &str {
+    match list {
+        "permittivities" => "permittivity",
+        list => list.strip_suffix('s').unwrap_or(list),
     }
 }
 
@@ -128,6 +141,8 @@ pub struct Citable<'a> {
     pub revision: Option<u32>,
     /// Year in which it was added, four digits; none for a built-in one.
     pub year: Option<u16>,
+    /// Somebody else's catalogue that it was taken from.
+    pub origin: Option<&'a Origin>,
 }
 
 impl Citable<'_> {
@@ -151,6 +166,7 @@ impl Citable<'_> {
     /// The material and its sources as sentences.
     pub fn text(&self) -> String {
         let mut text = format!("{}. {}.\n", self.title(), self.material.licence);
+        text += &self.taken_from().map_or(String::new(), |from| format!("{from}.\n"));
         for Reference { source, numbers } in references(self.material) {
             match &source {
                 Some(source) => text += &format!("\n{}", sentence(source)),
@@ -165,11 +181,21 @@ impl Citable<'_> {
         text
     }
 
+    /// Which entry of which catalogue it was.
+    fn taken_from(&self) -> Option<String> {
+        let origin = self.origin?;
+        let day = origin.added_at.get(..10).unwrap_or_default();
+        Some(format!("From {}, revision {} of {day} there", origin.catalogue(), origin.revision))
+    }
+
     /// The material and its sources as BibTeX.
     pub fn bibtex(&self) -> String {
         let own = [
             ("title", Some(self.title())),
+            ("howpublished", self.taken_from()),
             ("year", self.year.map(|year| year.to_string())),
+            ("doi", self.origin.and_then(|origin| origin.doi.clone())),
+            ("url", self.origin.and_then(|origin| origin.url.clone())),
             ("note", Some(format!("Licence {}", self.material.licence))),
         ];
         let mut text = entry("misc", &self.key(), own);
@@ -202,6 +228,10 @@ impl Citable<'_> {
             "title": self.title(),
             "issued": self.year.map(issued),
             "version": self.revision.map(|revision| revision.to_string()),
+            "container-title": self.origin.map(Origin::title),
+            "DOI": self.origin.and_then(|origin| origin.doi.clone()),
+            "URL": self.origin.and_then(|origin| origin.url.clone()),
+            "note": self.taken_from(),
             "license": self.material.licence,
         }));
         let sources = self.material.sources.iter().map(|source| {

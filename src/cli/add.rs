@@ -30,9 +30,13 @@ use crate::store::Added;
   matdb add --from my-paint/material.toml
   matdb add --template > my-paint/material.toml    a complete entry to change
   matdb add --from water.yml --name water --class liquid    a page of refractiveindex.info
-  matdb add --from scan.csv --name my-paint --class paint --kind measured --source 'Our bench, 2026' \\
-    --licence CC-BY-4.0 --instrument 'Our radar' --frequency 300 --threshold -77    a bare curve
-  matdb add --from paint.brdf --name my-paint --class paint       a universal BRDF file")]
+  matdb add --from paint.brdf --name my-paint --class paint       a universal BRDF file
+  matdb add --from scan.csv --name my-paint --class paint \\
+    --kind measured --source 'Our bench, 2026' --licence CC-BY-4.0 \\
+    --instrument 'Our radar' --frequency 300 --threshold -77      a bare curve
+
+A bare curve has the columns theta_deg and sigma0_db; where nothing was detected sigma0_db is empty,
+censor is left and threshold_db the limit in dB. docs/materials.md has the other columns.")]
 #[command(group = clap::ArgGroup::new("what").required(true).multiple(true))]
 pub(super) struct Args {
     /// Names of built-in materials
@@ -60,6 +64,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         return console.result(TEMPLATE, &json!({ "material_toml": TEMPLATE }));
     }
     let made = wanted(args, db, console)?;
+    let notes = made.iter().flat_map(|(material, _)| door::doubts(material));
+    notes.for_each(|doubt| console.notice(&doubt));
     let mut store = db.write()?;
     let (mut lines, mut records) = (String::new(), Vec::new());
     for ((material, _), added) in std::iter::zip(&made, store.add_made(&made)?) {

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::console::Console;
 use super::database::Database;
+use super::summary::counted;
 use crate::catalogue::{OTHER_UNITS, derived, without_report};
 use crate::error::Error;
 use crate::fit::again::{lacks_report, problems};
@@ -77,7 +78,7 @@ pub(super) fn run(db: &Database, console: &Console) -> Result<(), Error> {
     match record.findings.len() {
         0 => Ok(()),
         count => Err(Error::Usage {
-            problem: format!("{count} thing(s) wrong in {file}"),
+            problem: format!("{} wrong in {file}", counted(count, "thing")),
             way_out: "restore it from a copy, or add the materials again".to_owned(),
         }),
     }
@@ -88,7 +89,10 @@ fn text(record: &Record, file: &str) -> String {
     let mut text: String =
         findings.iter().map(|wrong| format!("{}: {}\n", wrong.place, wrong.problem)).collect();
     text += &format!(
-        "looked at {revisions} revision(s), {curves} curve(s) and fitted {fits} again in {file}: {}\n",
+        "looked at {} and {} and made {} again in {file}: {}\n",
+        counted(*revisions, "revision"),
+        counted(*curves, "curve"),
+        counted(*fits, "fit"),
         if findings.is_empty() { "all is well" } else { "see above" }
     );
     text

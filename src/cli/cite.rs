@@ -33,8 +33,12 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         (Some(store), Some(_)) => store.get(&material.slug, found.revision)?,
         _ => None,
     };
-    let year = stored.and_then(|stored| stored.added_at.get(..4)?.parse().ok());
-    let citable = Citable { material, revision: found.revision, year };
+    let activity = stored.as_ref().and_then(|stored| stored.activity.as_ref());
+    let origin = activity.and_then(|activity| activity.origin.as_ref());
+    // What was imported is of the year in which the others made it.
+    let added_at = origin.map(|o| &o.added_at).or(stored.as_ref().map(|s| &s.added_at));
+    let year = added_at.and_then(|added_at| added_at.get(..4)?.parse().ok());
+    let citable = Citable { material, revision: found.revision, year, origin };
     let csl = citable.csl();
     let text = match (args.bibtex, args.csl) {
         (true, _) => citable.bibtex(),

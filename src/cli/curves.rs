@@ -114,7 +114,7 @@ impl Circumstances {
         }
         let name = self.instrument.clone()?;
         let centre_frequency_hz = self.frequency? * 1e9;
-        let key = free("instrument", |key| material.instruments.iter().all(|i| i.key != *key));
+        let key = free("radar", |key| material.instruments.iter().all(|i| i.key != *key));
         material.instruments.push(Instrument {
             key: key.clone(),
             name,
@@ -126,41 +126,79 @@ impl Circumstances {
     }
 }
 
-/// Puts a curve into a material, unless the very same is there; the key of its source.
+/// A curve of a material.
+pub(super) struct Put {
+    /// Its name.
+    pub curve: String,
+    /// Key of its source.
+    pub source: String,
+}
+
+/// Puts a curve into a material, unless the very same is there, maybe under another name.
 pub(super) fn put(
     material: &mut Material,
     name: &str,
     curve: &measure::Curve,
     (kind, title): (SourceKind, &str),
     circumstances: &Circumstances,
-) -> Result<String, Error> {
+) -> Result<Put, Error> {
     circumstances.check(material, kind)?;
-    let observations = curve.observations();
     let source = source(material, kind, title, name, circumstances.licence.as_deref());
-    let taken = material.curves.iter().find(|known| known.name == name);
-    match taken.map(|known| known.observations == observations && known.source == source) {
-        Some(true) => Ok(source),
-        None if !material.fits.iter().any(|fit| fit.name == name) => {
-            let instrument = circumstances.instrument(material);
-            let (name, session) = (name.to_owned(), None);
-            let curve = Curve { name, source: source.clone(), instrument, session, observations };
-            match door::missing(material, &curve).as_slice() {
-                [] => material.curves.push(curve),
-                missing => {
-                    return Err(Error::Usage {
-                        problem: format!("a measured curve needs more: {}", missing.join("; ")),
-                        way_out: "name another --instrument, with --frequency and --threshold"
-                            .to_owned(),
-                    });
-                }
-            }
-            Ok(source)
-        }
-        _ => Err(Error::Usage {
-            problem: format!("`{}` has something else of the name `{name}`", material.slug),
-            way_out: "give the curve another name with --curve".to_owned(),
-        }),
+    let slug = material.slug.clone();
+    let is_same = |known: &&Curve| {
+        measure::Curve::from_observations(&known.observations).is_ok_and(|known| known == *curve)
+    };
+    if let Some(Curve { name: known, source: its, .. }) = material.curves.iter().find(is_same) {
+        return match *its == source {
+            true => Ok(Put { curve: known.clone(), source }),
+            false => Err(Error::Usage {
+                problem: format!(
+                    "`{slug}` has these points already, as the curve `{known}` from {}",
+                    title_of(material, its)
+                ),
+                way_out: format!("`matdb fit {slug} --curve {known} --save` fits that"),
+            }),
+        };
     }
+    let taken = material.curves.iter().find(|known| known.name == name);
+    let what = match taken {
+        Some(known) => {
+            Some(format!("another curve `{name}`, from {}", title_of(material, &known.source)))
+        }
+        None => {
+            let fit = material.fits.iter().find(|fit| fit.name == name);
+            fit.map(|_| format!("a fit of the name `{name}`"))
+        }
+    };
+    if let Some(what) = what {
+        return Err(Error::Usage {
+            problem: format!("`{slug}` has {what}"),
+            way_out: "give this curve another name with --curve".to_owned(),
+        });
+    }
+    let curve = Curve {
+        name: name.to_owned(),
+        source: source.clone(),
+        instrument: circumstances.instrument(material),
+        session: None,
+        observations: curve.observations(),
+    };
+    match door::missing(material, &curve).as_slice() {
+        [] => material.curves.push(curve),
+        missing => {
+            return Err(Error::Usage {
+                problem: format!("a measured curve needs more: {}", missing.join("; ")),
+                way_out: "name another --instrument, with --frequency and --threshold".to_owned(),
+            });
+        }
+    }
+    Ok(Put { curve: name.to_owned(), source })
+}
+
+/// What a source says of itself.
+fn title_of<'a>(material: &'a Material, key: &str) -> &'a str {
+    let source = material.sources.iter().find(|source| source.key == key);
+    source.map_or("nowhere", |source| &source.title)
 }
 
 /// The key of a source of this kind and title, added under a free key when it is not there.

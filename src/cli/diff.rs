@@ -3,8 +3,8 @@
 use super::console::Console;
 use super::database::Database;
 use super::materials::find;
-use super::summary::table;
-use crate::catalogue::{CurveChange, Diff, Levels};
+use super::summary::{counted, table};
+use crate::catalogue::{CurveChange, Diff, Field, Levels};
 use crate::error::Error;
 
 /// Show what differs between two revisions or two materials
@@ -12,6 +12,7 @@ use crate::error::Error;
 #[command(after_help = "Examples:
   matdb diff my-paint@1 my-paint@2
   matdb diff my-paint mannequin-paint
+  matdb diff my-paint@1 my-paint --all          every number of every fit, too
   matdb diff my-paint@1 my-paint --json | jq '.fields[].path'
 
 Curves are compared at the angles that both have, in dB: the second less the first.")]
@@ -20,6 +21,9 @@ pub(super) struct Args {
     before: String,
     /// NAME or NAME@REVISION
     after: String,
+    /// Every field of fits that are new, gone or made again, and not only their parameters
+    #[arg(long)]
+    all: bool,
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
@@ -27,16 +31,39 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let before = find(store.as_ref(), &args.before, "")?.material;
     let after = find(store.as_ref(), &args.after, "")?.material;
     let diff = Diff::new(&before, &after);
-    console.result(&text(&diff, [&args.before, &args.after]), &diff)
+    let names = [&args.before, &args.after];
+    let text = match args.all {
+        true => text(&diff, diff.fields.iter(), names),
+        false => {
+            let told = diff.fields.iter().filter(|field| !is_of_report(&field.path));
+            text(&diff, told, names) + &left_out(&diff)
+        }
+    };
+    console.result(&text, &diff)
 }
 
-fn text(diff: &Diff, names: [&String; 2]) -> String {
+/// Whether a field says how a fit was made, and not what it found: its report, its covariance, whence each
+/// parameter is.
+fn is_of_report(path: &str) -> bool {
+    let parts: Vec<&str> = path.split('.').collect();
+    parts.first() == Some(&"fits")
+        && ["report", "covariance", "parameter_sources"].iter().any(|part| parts.contains(part))
+}
+
+fn left_out(diff: &Diff) -> String {
+    match diff.fields.iter().filter(|field| is_of_report(&field.path)).count() {
+        0 => String::new(),
+        more => format!("and {} of how fits were made: --all shows them\n", counted(more, "field")),
+    }
+}
+
+fn text<'a>(diff: &Diff, fields: impl Iterator<Item = &'a Field>, names: [&String; 2]) -> String {
     if diff.is_empty() {
         return format!("{} and {} say the same\n", names[0], names[1]);
     }
     let mut text = String::new();
-    if !diff.fields.is_empty() {
-        let rows = diff.fields.iter().map(|f| [f.path.clone(), cut(&f.before()), cut(&f.after())]);
+    let mut rows = fields.map(|f| [f.path.clone(), cut(&f.before()), cut(&f.after())]).peekable();
+    if rows.peek().is_some() {
         text += &table(&["field", names[0], names[1]], rows);
     }
     for CurveChange { curve, points, levels } in &diff.curves {

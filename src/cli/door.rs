@@ -4,11 +4,15 @@
 use std::path::Path;
 
 use crate::error::Error;
-use crate::material::form::{is_address, is_doi, is_licence};
+use crate::material::form::{is_address, is_doi, is_licence, licence_doubt};
 use crate::material::{Curve, Instrument, Material, SourceKind, turns_the_line};
+use crate::units::{dbm_from_watts, rounded, shown};
 
 /// Thickest layer of a sample that anybody puts before a radar, m.
 const THICKEST_M: f64 = 10.0;
+
+/// Highest frequency of anything that is called a radar, Hz.
+const HIGHEST_HZ: f64 = 1e13;
 
 /// Refuses a material with measured curves that lack licence, instrument or threshold, and one with
 /// values that only a slip can give.
@@ -32,6 +36,34 @@ pub(super) fn check(material: &Material, file: &Path) -> Result<(), Error> {
             way_out: (*way_out).to_owned(),
         }),
     }
+}
+
+/// What may be a slip and may be meant, a sentence each.
+pub(super) fn doubts(material: &Material) -> Vec<String> {
+    let slug = &material.slug;
+    let mut doubts = Vec::new();
+    for Instrument { key, centre_frequency_hz, threshold_w, .. } in &material.instruments {
+        let ghz = shown(rounded(centre_frequency_hz / 1e9));
+        if *centre_frequency_hz > HIGHEST_HZ {
+            doubts.push(format!("{slug}: instrument `{key}` is at {ghz} GHz; is that in GHz?"));
+        }
+        if let Some(dbm) = threshold_w.map(|w| rounded(dbm_from_watts(w))).filter(|dbm| *dbm > 0.0)
+        {
+            doubts.push(format!(
+                "{slug}: instrument `{key}` detects nothing below {} dBm, which is more than a radar \
+                 receives; is a minus missing?",
+                shown(dbm)
+            ));
+        }
+    }
+    let mut licences: Vec<&String> = material.sources.iter().flat_map(|s| &s.licence).collect();
+    licences.push(&material.licence);
+    licences.sort();
+    licences.dedup();
+    for licence in licences {
+        doubts.extend(licence_doubt(licence).map(|doubt| format!("{slug}: {doubt}")));
+    }
+    doubts
 }
 
 /// What a curve lacks, a clause each. That there is a source at all was checked before.

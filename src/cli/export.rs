@@ -16,6 +16,7 @@ use crate::error::Error;
 #[command(after_help = "Examples:
   matdb export mannequin-paint --as mitsuba -o paint.xml
   matdb export my-paint@2 --as universal-brdf -o paint.brdf
+  matdb export my-paint --as csv --curve spring -o spring.csv
   matdb export ptfe --as open-material -o ptfe.xomp     with its tables beside it")]
 pub(super) struct Args {
     /// NAME or NAME@REVISION
@@ -23,6 +24,9 @@ pub(super) struct Args {
     /// The format
     #[arg(long = "as", value_name = "FORMAT")]
     format: Format,
+    /// Which curve [default: what scenes render, else the one that was fitted]
+    #[arg(long, value_name = "NAME")]
+    curve: Option<String>,
     /// The file to write; tables that belong to it get its name and stand beside it
     #[arg(long, short, value_name = "FILE")]
     output: PathBuf,
@@ -67,7 +71,18 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     };
     let stored = history.iter().find(|line| Some(line.revision) == revision);
     let added_at = stored.map(|line| line.added_at.as_str());
-    let subject = Subject { material: &material, revision, added_at };
+    let curve = args.curve.as_deref();
+    if let Some(name) = curve.filter(|name| material.curves.iter().all(|c| c.name != *name)) {
+        let names: Vec<&str> = material.curves.iter().map(|curve| curve.name.as_str()).collect();
+        return Err(Error::Usage {
+            problem: format!("`{}` has no curve `{name}`", args.material),
+            way_out: match names.is_empty() {
+                true => "leave --curve out: its model is written".to_owned(),
+                false => format!("there are: {}", names.join(", ")),
+            },
+        });
+    }
+    let subject = Subject { material: &material, revision, added_at, curve };
     let Some(name) = args.output.file_name().and_then(|name| name.to_str()) else {
         return Err(Error::Usage {
             problem: format!("{} names no file", args.output.display()),

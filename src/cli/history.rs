@@ -61,7 +61,15 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         return Err(none(args, db, true)?);
     }
     let header = ["rev", "added", "content", "made by", "changed"];
-    console.result(&table(&header, records.iter().map(row)), &records)
+    let mut text = table(&header, records.iter().map(row));
+    let mut catalogues: Vec<String> = origins(&records).map(Origin::catalogue).collect();
+    catalogues.dedup();
+    catalogues.iter().for_each(|from| text += &format!("imported from {from}\n"));
+    console.result(&text, &records)
+}
+
+fn origins(records: &[Record]) -> impl Iterator<Item = &Origin> {
+    records.iter().filter_map(|record| record.activity.as_ref()?.origin.as_ref())
 }
 
 /// Why there is nothing to tell.
@@ -81,28 +89,18 @@ fn none(args: &Args, db: &Database, has_store: bool) -> Result<Error, Error> {
     }
 }
 
-/// The catalogue that a revision was taken from.
-fn origin(origin: &Origin) -> String {
-    let Origin { title, version, doi, url, revision, added_at, .. } = origin;
-    let version = version.as_ref().map_or(String::new(), |version| format!(" {version}"));
-    let place = match (doi, url) {
-        (Some(doi), _) => format!(", doi:{doi}"),
-        (None, Some(url)) => format!(", {url}"),
-        (None, None) => String::new(),
-    };
-    let title = title.as_deref().unwrap_or("a catalogue without a title");
-    format!(" ({title}{version}{place}: its revision {revision} of {added_at})")
-}
-
 fn row(record: &Record) -> [String; 5] {
     let made = record.activity.as_ref().map_or("not recorded".to_owned(), |activity| {
+        if let Some(Origin { revision, added_at, .. }) = &activity.origin {
+            let day = added_at.get(..10).unwrap_or(added_at);
+            return format!("{}, their revision {revision} of {day}", activity.command);
+        }
         let inputs: Vec<&str> = activity.inputs.iter().map(|input| input.name.as_str()).collect();
-        let made = match inputs.len() {
+        match inputs.len() {
             0 => activity.command.clone(),
             1..=3 => format!("{} of {}", activity.command, inputs.join(", ")),
             more => format!("{} of {more} files", activity.command),
-        };
-        made + &activity.origin.as_ref().map_or(String::new(), origin)
+        }
     });
     let hash = record.content_hash.get(..12).unwrap_or(&record.content_hash);
     [

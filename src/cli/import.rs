@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::console::Console;
 use super::database::Database;
 use super::inputs::activity;
+use super::summary::counted;
 use crate::catalogue::{Import, Imported, Outcome, Taken};
 use crate::error::Error;
 
@@ -54,17 +55,19 @@ fn text(imported: &Imported, db: &Database) -> String {
         match outcome {
             Outcome::Added { revisions } => {
                 counts[0] += 1;
-                text += &format!("{add} {name}{of}, {revisions} revision(s)\n");
+                text += &format!("{add} {name}{of}, {}\n", counted(*revisions, "revision"));
             }
             Outcome::Continued { revisions, after } => {
                 counts[1] += 1;
-                text += &format!("{add} to {name}@{after}{of}, {revisions} newer revision(s)\n");
+                let newer = counted(*revisions, "newer revision");
+                text += &format!("{add} to {name}@{after}{of}, {newer}\n");
             }
             Outcome::Unchanged => counts[2] += 1,
             Outcome::Conflict { ours, theirs } => {
                 counts[3] += 1;
+                let [ours, theirs] = [ours, theirs].map(|hash| hash.get(..12).unwrap_or(hash));
                 text += &format!(
-                    "conflict {name}{of}: yours has hash {ours}, theirs {theirs}; yours stays, \
+                    "conflict {name}{of}: yours has content {ours}, theirs {theirs}; yours stays, \
                      --as-prefix adds theirs beside it\n"
                 );
             }
@@ -72,8 +75,9 @@ fn text(imported: &Imported, db: &Database) -> String {
     }
     let [new, continued, same, conflicts] = counts;
     text + &format!(
-        "{add} {new} materials to {}, and newer revisions to {continued}; {same} were there, {conflicts} are \
-         in conflict\n",
+        "{add} {} to {}, and newer revisions to {continued}; there already: {same}, in conflict: \
+         {conflicts}\n",
+        counted(new, "material"),
         db.path().display()
     )
 }

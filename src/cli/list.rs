@@ -1,5 +1,7 @@
 //! `matdb list`.
 
+use std::collections::BTreeSet;
+
 use clap::ValueEnum;
 
 use super::console::Console;
@@ -107,7 +109,9 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         (0, _) if filter == Filter::default() => {
             format!("no material in {} yet\n", db.path().display())
         }
-        (0, _) => format!("no such material in {}\n", db.path().display()),
+        (0, Some(store)) => {
+            format!("no such material in {}{}\n", db.path().display(), classes(&filter, store)?)
+        }
         _ => table(
             &["material", "rev", "kind", "class", "curves", "points", "fits", "name"],
             materials.iter().map(row),
@@ -126,6 +130,21 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         text += &wrapped("built in, not added:", &names);
     }
     console.result(&text, &materials)
+}
+
+/// Which classes there are, where one is asked for that no material has.
+fn classes(filter: &Filter, store: &Store) -> Result<String, Error> {
+    let Some(class) = &filter.class else { return Ok(String::new()) };
+    let built_in = not_added(Some(store))?.list()?;
+    let all = store.list()?.into_iter().chain(built_in).map(|summary| summary.class);
+    let classes: BTreeSet<String> = all.collect();
+    Ok(match classes.contains(class) {
+        true => String::new(),
+        false => {
+            let there = classes.into_iter().collect::<Vec<_>>().join(", ");
+            format!("; no class is called `{class}`, there are: {there}")
+        }
+    })
 }
 
 /// Names after a title, on lines that a narrow terminal holds.

@@ -6,8 +6,9 @@ use serde_json::{Value, json};
 
 use super::cloud::{CloudArgs, start};
 use super::console::Console;
-use super::curves::{Circumstances, Kind, UNSAID, put};
+use super::curves::{Circumstances, Kind, Put, UNSAID, put};
 use super::database::Database;
+use super::door;
 use super::inputs::activity;
 use super::materials::find;
 use super::output::write_all;
@@ -26,8 +27,9 @@ use crate::units::db_from_ratio;
   matdb measure out/cloud.ply --scene scenes/mannequin.toml -o measured
   matdb measure cloud.csv --scene scene.toml --pose 0.03,0,-0.01,0,5,0 --region body -o measured
   matdb measure cloud.xyz --unit mm --scene scene.toml --pose auto -o measured
-  matdb measure cloud.ply --scene scene.toml --save my-paint --kind measured --source 'Our bench, 2026' \\
-    --licence CC-BY-4.0 --instrument 'Our radar' --frequency 300 --threshold -77 -o measured
+  matdb measure cloud.ply --scene scene.toml -o measured --save my-paint --kind measured \\
+    --source 'Our bench, 2026' --licence CC-BY-4.0 \\
+    --instrument 'Our radar' --frequency 300 --threshold -77
 
 Then: matdb fit measured/curve.csv, or matdb fit my-paint --save")]
 pub(super) struct Args {
@@ -98,20 +100,22 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 
     let record = record(args, &registered, &reduced);
     // Refused before anything is written, stored after it.
-    prepared(args, &reduced.curve, db.read()?.as_ref())?;
+    let doubts =
+        prepared(args, &reduced.curve, db.read()?.as_ref())?.map(|(m, _)| door::doubts(&m));
+    doubts.iter().flatten().for_each(|doubt| console.notice(doubt));
     let mut pose = serde_json::to_vec_pretty(&record)?;
     pose.push(b'\n');
     let svg = plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
     let files = [("pose.json", pose), ("curve.csv", reduced.curve.write()), ("curve.svg", svg)];
     write_all(&args.output, &files)?;
-    let revision = save(args, &reduced.curve, db)?;
+    let stored = save(args, &reduced.curve, db)?;
     let mixed = mixed(args, &scene);
     let notices =
         mixed.iter().chain(&cloud.notices).chain(&registered.verdicts).chain(&reduced.notices);
     notices.for_each(|notice| console.notice(notice));
-    let saved = match (&args.save, revision) {
-        (Some(name), Some(revision)) => {
-            format!("stored the curve as `{}` in {name}@{revision}\n", args.curve)
+    let saved = match (&args.save, stored) {
+        (Some(name), Some((curve, revision))) => {
+            format!("stored the curve as `{curve}` in {name}@{revision}\n")
         }
         _ => String::new(),
     };
@@ -153,23 +157,27 @@ fn target(args: &Args, store: Option<&Store>) -> Result<Option<Material>, Error>
 }
 
 /// The material with the curve in it.
-fn prepared(args: &Args, curve: &Curve, store: Option<&Store>) -> Result<Option<Material>, Error> {
+fn prepared(
+    args: &Args,
+    curve: &Curve,
+    store: Option<&Store>,
+) -> Result<Option<(Material, Put)>, Error> {
     let (Some(kind), Some(title)) = (args.kind, &args.source) else { return Ok(None) };
     let Some(mut material) = target(args, store)? else { return Ok(None) };
-    put(&mut material, &args.curve, curve, (kind.into(), title), &args.circumstances)?;
-    Ok(Some(material))
+    let put = put(&mut material, &args.curve, curve, (kind.into(), title), &args.circumstances)?;
+    Ok(Some((material, put)))
 }
 
-/// Stores the curve when it is asked for; the revision that holds it.
-fn save(args: &Args, curve: &Curve, db: &Database) -> Result<Option<u32>, Error> {
+/// Stores the curve when it is asked for; its name and the revision that holds it.
+fn save(args: &Args, curve: &Curve, db: &Database) -> Result<Option<(String, u32)>, Error> {
     if args.save.is_none() {
         return Ok(None);
     }
     let mut store = db.write()?;
-    let Some(material) = prepared(args, curve, Some(&store))? else { return Ok(None) };
+    let Some((material, put)) = prepared(args, curve, Some(&store))? else { return Ok(None) };
     store.record(activity("measure", &[&args.cloud.cloud, &args.scene])?);
     let added = store.add([&material])?;
-    Ok(added.first().map(|added| added.revision()))
+    Ok(added.first().map(|added| (put.curve, added.revision())))
 }
 
 fn registration(args: &Args) -> Result<Registration, Error> {

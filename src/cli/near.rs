@@ -19,9 +19,8 @@ use crate::units::{range, rounded, shown};
 /// Find the known materials that a measured curve is nearest to
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  matdb near --curve measured/curve.csv
+  matdb near --curve curve.csv --measured-at 300   and how far from 300 GHz materials are described
   matdb near --curve curve.csv --shape             the level of the curve is not known
-  matdb near --curve curve.csv --measured-at 300   say how far from 300 GHz materials are described
   matdb near --material my-paint --frequency 300   among what holds at 300 GHz
 
 The distance is the root mean square difference in dB between the curve's mean at each angle and what

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::console::Console;
 use super::database::Database;
+use super::summary::counted;
 use crate::catalogue::{About, HAS_PARQUET, publish};
 use crate::error::Error;
 
@@ -15,13 +16,17 @@ use crate::error::Error;
 pub(super) struct Args {
     /// Folder to write; an earlier publication there is replaced
     folder: PathBuf,
-    /// TOML file with title, description, licence, url and [[person]]s of the catalogue
+    /// TOML file with title, description, licence, url and [[person]]s of the catalogue [default: as the
+    /// publication there has them]
     #[arg(long, value_name = "FILE")]
     about: Option<PathBuf>,
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
-    let about = args.about.as_deref().map_or_else(|| Ok(About::default()), about)?;
+    let about = match &args.about {
+        Some(path) => about(path)?,
+        None => About::of_publication(&args.folder).unwrap_or_default(),
+    };
     let Some(store) = db.read()? else {
         return Err(Error::Usage {
             problem: format!("there is no database {}", db.path().display()),
@@ -29,18 +34,30 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         });
     };
     let published = publish(&store, &about, &args.folder, |_| ())?;
+    if args.about.is_none() && about != About::default() {
+        console.notice(&format!(
+            "title, people, licence and the like are those of the publication there, `{}`; --about FILE \
+             gives others",
+            about.title
+        ));
+    }
     if !HAS_PARQUET {
         console.notice(
             "without Parquet tables; `cargo install --path . --features parquet` writes them, too",
         );
     }
+    if let (true, Some(version)) = (published.is_version_reused, &about.version) {
+        console.notice(&format!(
+            "version {version} stood there with other data; give this one another `version` in --about FILE"
+        ));
+    }
     if about.people.is_empty() {
         console.notice("nobody is named as author; name yourselves as [[person]] in --about FILE");
     }
     let text = format!(
-        "published {} materials in {} files: {}\n",
-        published.materials,
-        published.files,
+        "published {} in {}: {}\n",
+        counted(published.materials, "material"),
+        counted(published.files, "file"),
         args.folder.display()
     );
     console.result(&text, &published)

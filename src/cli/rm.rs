@@ -4,6 +4,7 @@ use serde_json::json;
 
 use super::console::Console;
 use super::database::Database;
+use super::summary::counted;
 use crate::error::Error;
 use crate::formats::text::nearest;
 use crate::store::{Removed, Store};
@@ -38,8 +39,11 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let (mut lines, mut records) = (String::new(), Vec::new());
     for (name, removed) in std::iter::zip(&args.names, removed) {
         let revisions = removed.map_or(0, |Removed { revisions }| revisions);
-        lines +=
-            &format!("removed {name}, {revisions} revision(s), from {}\n", db.path().display());
+        lines += &format!(
+            "removed {name}, {}, from {}\n",
+            counted(revisions as usize, "revision"),
+            db.path().display()
+        );
         records.push(json!({ "slug": name, "revisions": revisions }));
     }
     console.result(&lines, &records)

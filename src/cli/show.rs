@@ -8,7 +8,7 @@ use super::console::Console;
 use super::database::Database;
 use super::fit::words::report;
 use super::materials::{Found, find};
-use super::summary::table;
+use super::summary::{counted, table};
 use crate::brdf::Scattering;
 use crate::error::Error;
 use crate::formats::EffectEntry;
@@ -41,8 +41,9 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     if !history.is_empty() {
         text += "\nrevisions:\n";
     }
-    for RevisionSummary { revision, added_at, program_version } in &history {
-        text += &format!("{revision}  {added_at}  by matdb {program_version}\n");
+    for RevisionSummary { revision, added_at, program_version, origin } in &history {
+        let origin = origin.as_ref().map_or(String::new(), |title| format!(", from {title}"));
+        text += &format!("{revision}  {added_at}  by matdb {program_version}{origin}\n");
     }
     console
         .result(&text, &json!({ "revision": revision, "material": material, "history": history }))
@@ -64,13 +65,15 @@ fn describe(material: &Material, origin: &str) -> Result<String, Error> {
     text += &sources(material);
     text += &about::composition(material);
     text += &about::sessions(material);
+    text += &about::instruments(material);
     for curve in &material.curves {
         let censored = curve.observations.iter().filter(|o| o.sigma0.is_none()).count();
         text += &format!(
-            "\ncurve {}: {} points, {censored} of them censored, from {}\n",
+            "\ncurve {}: {}, {censored} of them below the threshold, from {}{}\n",
             curve.name,
-            curve.observations.len(),
-            curve.source
+            counted(curve.observations.len(), "point"),
+            curve.source,
+            curve.instrument.as_ref().map_or(String::new(), |key| format!(", by {key}")),
         );
     }
     for fit in &material.fits {
@@ -172,7 +175,7 @@ fn curve_table(material: &Material) -> Result<String, Error> {
         let sigma0_db = db_from_ratio(scattering.sigma0(theta_deg.to_radians()));
         let level = match sigma0_db.is_finite() {
             true => format!("{sigma0_db:.1}"),
-            false => "nothing".to_owned(),
+            false => material.silence().to_owned(),
         };
         let outside_deg = rounded(material.theta_outside_rad(theta_deg.to_radians()).to_degrees());
         let said = match outside_deg > 0.0 {

@@ -40,9 +40,20 @@ pub(super) fn grouped(number: usize) -> String {
     text
 }
 
+/// A number of things that end in `s`: `1 revision`, `18 529 revisions`.
+pub(super) fn counted(number: usize, thing: &str) -> String {
+    format!("{} {thing}{}", grouped(number), if number == 1 { "" } else { "s" })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_thing_is_no_things() {
+        let said = [0, 1, 2000].map(|number| counted(number, "fit"));
+        assert_eq!(said, ["0 fits", "1 fit", "2 000 fits"]);
+    }
 
     #[test]
     fn numbers_are_grouped_and_aligned() {

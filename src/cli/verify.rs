@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::console::Console;
+use super::summary::counted;
 use crate::catalogue::{Verified, verify};
 use crate::error::Error;
 
@@ -25,18 +26,19 @@ pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let mut text: String = problems.iter().map(|problem| format!("{problem}\n")).collect();
     if problems.is_empty() {
         text += &format!(
-            "{} is sound: {files} files, {} materials in {} revisions, {} fits made again\n",
+            "{} is sound: {}, {} in {}, {} made again\n",
             args.bundle.display(),
-            checked.materials,
-            checked.revisions,
-            checked.fits
+            counted(*files, "file"),
+            counted(checked.materials, "material"),
+            counted(checked.revisions, "revision"),
+            counted(checked.fits, "fit")
         );
     }
     console.result(&text, &verified)?;
     match problems.len() {
         0 => Ok(()),
         number => Err(Error::Usage {
-            problem: format!("{} has {number} problem(s)", args.bundle.display()),
+            problem: format!("{} has {}", args.bundle.display(), counted(number, "problem")),
             way_out: "get a sound copy, or publish it again".to_owned(),
         }),
     }

@@ -8,6 +8,7 @@ use super::inputs::activity;
 use super::materials::{find, unknown};
 use crate::error::Error;
 use crate::material::{Material, Slug, Status};
+use crate::store::Store;
 
 /// Say that a material must not be used any more, and why; it and its revisions stay
 #[derive(Debug, clap::Args)]
@@ -45,13 +46,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let reason = args.reason.clone();
     let status = match &args.superseded_by {
         None => Status::Withdrawn { reason },
-        Some(by) => {
-            let found = find(known.as_ref(), by, "--superseded-by: ")?;
-            if found.material.slug.as_str() != by {
-                return Err(unknown(known.as_ref(), by, "--superseded-by: ")?);
-            }
-            Status::Superseded { by: found.material.slug, reason }
-        }
+        Some(by) => Status::Superseded { by: successor(known.as_ref(), &args.name, by)?, reason },
     };
     drop(known);
     let material = Material { status, ..stored.material };
@@ -62,4 +57,24 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let (slug, status) = (&material.slug, material.status.as_str());
     let text = format!("{slug} is {status}, revision {revision}, in {}\n", db.path().display());
     console.result(&text, &json!({ "slug": slug, "status": material.status, "revision": revision }))
+}
+
+/// The name of the better one, which must be there.
+fn successor(store: Option<&Store>, name: &str, by: &str) -> Result<Slug, Error> {
+    const ASKED_BY: &str = "--superseded-by: ";
+    let error = match find(store, by, ASKED_BY) {
+        Ok(found) if found.material.slug.as_str() == by => return Ok(found.material.slug),
+        Ok(_) => unknown(store, by, ASKED_BY)?,
+        Err(error) => error,
+    };
+    match error {
+        // The nearest name is often that of the one which is withdrawn.
+        Error::UnknownMaterial { asked_by, name: wanted, way_out }
+            if way_out.contains(&format!("`{name}`")) =>
+        {
+            let way_out = "add that one first, with `matdb add --from FILE`".to_owned();
+            Err(Error::UnknownMaterial { asked_by, name: wanted, way_out })
+        }
+        error => Err(error),
+    }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use super::coordinates::Coordinates;
+use super::coordinates::{Coordinates, DIFFUSE_LEVEL, SPECULAR_LEVEL};
 use super::goodness::{Goodness, normal_share, shares};
 use super::interval::{DEVIATE_95, End};
 use super::likelihood::Likelihood;
@@ -12,10 +12,10 @@ use super::sensitivity::derivatives;
 use super::table::{Place, Table};
 use super::verdict::Finding;
 use super::{Fit, Method, Stop};
-use crate::brdf::{Brdf, Scattering};
+use crate::brdf::{Brdf, ParameterError, Scattering};
 use crate::measure::curve::{Curve, Row};
 use crate::radar::speckle::standard_deviation_db;
-use crate::units::db_from_ratio;
+use crate::units::{db_from_ratio, shown};
 
 /// One fitted number.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -149,8 +149,10 @@ impl FitResult {
     }
 
     fn judge(&self, found: &Found, rows: &[Row]) -> Vec<Finding> {
-        let mut findings: Vec<Finding> =
-            self.gauge_k.map(|k| Finding::Gauge { k }).into_iter().collect();
+        let range = self.model.validate();
+        // Out of range k is what the levels make of it, and nobody chose it.
+        let gauge = self.gauge_k.filter(|_| range.is_ok());
+        let mut findings: Vec<Finding> = gauge.map(|k| Finding::Gauge { k }).into_iter().collect();
         if !self.converged {
             findings.push(Finding::NotConverged { stop: self.stop });
         }
@@ -160,8 +162,15 @@ impl FitResult {
         }
         findings.extend(self.judge_rows(rows));
         findings.extend(self.judge_numbers(found));
-        if let Err(error) = self.model.validate() {
-            findings.push(Finding::OutOfRange { problem: error.to_string() });
+        if let Err(ParameterError { path, value, .. }) = range {
+            let problem = format!(
+                "{path} would be {}",
+                shown(format!("{value:.3e}").parse().unwrap_or(value))
+            );
+            let held = self.fit.fixed.iter().map(|(path, _)| path.clone()).collect();
+            let of_levels = |f: &Finding| matches!(f, Finding::AtBound { name, .. } if [SPECULAR_LEVEL, DIFFUSE_LEVEL].contains(&name.as_str()));
+            findings.retain(|finding| !of_levels(finding));
+            findings.push(Finding::OutOfRange { problem, held });
         }
         let limit = KOLMOGOROV_1_PERCENT / (self.goodness.rows.max(1) as f64).sqrt();
         let ks_distance = self.goodness.ks_distance;

@@ -80,6 +80,8 @@ pub enum Finding {
     OutOfRange {
         /// What is wrong.
         problem: String,
+        /// The parameters that were held.
+        held: Vec<String>,
     },
     /// The law of the fit does not explain the rows.
     PoorFit {
@@ -152,8 +154,14 @@ impl fmt::Display for Finding {
             Finding::OpenInterval { name, value } => {
                 write!(f, "the data do not limit {name} before its bound {}", rounded(*value))
             }
-            Finding::OutOfRange { problem } => {
-                write!(f, "{problem}: the level asks for a calibration of the radar")
+            Finding::OutOfRange { problem, held } => {
+                write!(f, "no parameters in their ranges give this level: {problem}; ")?;
+                match held.is_empty() {
+                    true => write!(f, "check the calibration of the radar"),
+                    false => {
+                        write!(f, "let go of {}, or check the calibration of the radar", list(held))
+                    }
+                }
             }
             Finding::PoorFit { ks_distance, limit } => write!(
                 f,

@@ -76,6 +76,22 @@ impl Table {
         })
     }
 
+    /// A number from the least to the greatest; `None` where the cell is absent or empty.
+    pub fn number_within(
+        &self,
+        row: usize,
+        column: &str,
+        (least, greatest): (f64, f64),
+    ) -> Result<Option<f64>, FormatError> {
+        let value = self.number(row, column)?;
+        match (value.is_none_or(|v| (least..=greatest).contains(&v)), self.cell(row, column)) {
+            (false, Some(cell)) => {
+                Err(cell.refuse(&format!("give a value from {least} to {greatest}")))
+            }
+            _ => Ok(value),
+        }
+    }
+
     /// A whole number of 32 bits that must be there.
     pub fn whole_number(&self, row: usize, column: &str) -> Result<u32, FormatError> {
         let value = self.required_number(row, column)?;
@@ -88,9 +104,14 @@ impl Table {
         }
     }
 
+    /// The line of a row in the file, from 1.
+    pub fn line(&self, row: usize) -> usize {
+        self.rows.get(row).map_or(0, |row| row.line as usize)
+    }
+
     /// Where a row stands in the file: `line L`.
     pub fn place(&self, row: usize) -> String {
-        format!("line {}", self.rows.get(row).map_or(0, |r| r.line))
+        format!("line {}", self.line(row))
     }
 }
 
@@ -120,6 +141,16 @@ fn check_header(
     let refuse = |problem: String| {
         Err(FormatError::at("line 1", problem, format!("the columns are {}", known.join(", "))))
     };
+    for (mark, name) in [(';', "semicolons"), ('\t', "tabs")] {
+        if required.len() > 1 && matches!(columns, [only] if only.contains(mark)) {
+            let problem = format!("the cells are parted by {name}");
+            return Err(FormatError::at(
+                "line 1",
+                problem,
+                "part them by commas, and write numbers with a point, as in -3.5",
+            ));
+        }
+    }
     if let Some(missing) = required.iter().find(|r| !columns.iter().any(|c| c == *r)) {
         return refuse(format!("there is no column `{missing}`"));
     }
@@ -176,6 +207,9 @@ mod tests {
     fn errors_name_line_and_column() {
         let message = |text: &str| read(text).unwrap_err().to_string();
         assert!(message("sigma0_db\n1").contains("no column `theta_deg`"));
+        let table = Table::read(b"theta_deg;sigma0_db\n1;-3,5\n", &["theta_deg", "sigma0_db"], &[]);
+        let refused = table.unwrap_err().to_string();
+        assert!(refused.starts_with("line 1: the cells are parted by semicolons;"), "{refused}");
         assert!(message("theta_deg,x\n1,2").contains("unknown column `x`"));
         assert!(message("theta_deg,theta_deg\n1,2").contains("twice"));
         assert!(message("theta_deg\n1\n2,3\n").starts_with("line 3: 2 cells"));

@@ -1,4 +1,86 @@
-//! The forms of licences, DOIs and addresses, as others will look them up.
+//! The forms of licences, DOIs, ORCIDs and addresses, as others will look them up.
+
+use crate::formats::text::nearest;
+
+/// Identifiers of SPDX's list that data and programs are most often under (spdx.org/licenses).
+const LICENCES: [&str; 32] = [
+    "0BSD",
+    "AGPL-3.0-only",
+    "AGPL-3.0-or-later",
+    "Apache-2.0",
+    "BSD-2-Clause",
+    "BSD-3-Clause",
+    "BSL-1.0",
+    "CC-BY-3.0",
+    "CC-BY-4.0",
+    "CC-BY-NC-3.0",
+    "CC-BY-NC-4.0",
+    "CC-BY-NC-ND-4.0",
+    "CC-BY-NC-SA-4.0",
+    "CC-BY-ND-4.0",
+    "CC-BY-SA-3.0",
+    "CC-BY-SA-4.0",
+    "CC-PDDC",
+    "CC0-1.0",
+    "CDLA-Permissive-1.0",
+    "CDLA-Permissive-2.0",
+    "CDLA-Sharing-1.0",
+    "GPL-2.0-only",
+    "GPL-2.0-or-later",
+    "GPL-3.0-only",
+    "GPL-3.0-or-later",
+    "LGPL-3.0-or-later",
+    "MIT",
+    "MPL-2.0",
+    "ODC-By-1.0",
+    "ODbL-1.0",
+    "PDDL-1.0",
+    "etalab-2.0",
+];
+
+/// A sentence on the first identifier of a licence expression that is none of the usual ones of SPDX's list and no
+/// `LicenseRef-…`; none where all are. The list has others.
+///
+/// ```
+/// use matdb::material::form::licence_doubt;
+/// assert!(licence_doubt("MIT OR CC-BY-4.0").is_none() && licence_doubt("LicenseRef-ours").is_none());
+/// assert!(licence_doubt("CC-BY").unwrap().contains("did you mean `CC-BY-4.0`?"));
+/// ```
+pub fn licence_doubt(text: &str) -> Option<String> {
+    let words = text.split(|c: char| c.is_whitespace() || "()".contains(c));
+    let mut names = words.filter(|word| !["", "AND", "OR", "WITH"].contains(word));
+    let is_known = |name: &str| name.contains("LicenseRef-") || LICENCES.contains(&name);
+    let stranger = names.find(|name| !is_known(name))?;
+    // A name without its version is nearest to its latest.
+    let begun = LICENCES.iter().rev().find(|known| {
+        known.strip_prefix(stranger).is_some_and(|rest| {
+            rest.strip_prefix('-').is_some_and(|version| version.starts_with(char::is_numeric))
+        })
+    });
+    let meant = begun.copied().or_else(|| nearest(stranger, LICENCES));
+    let meant = meant.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
+    Some(format!(
+        "the licence `{stranger}` is none of SPDX's usual identifiers (spdx.org/licenses){meant}"
+    ))
+}
+
+/// Whether a text is an ORCID: sixteen digits in groups of four, of which the last, which may be `X`, checks the
+/// others (ISO 7064, mod 11-2).
+///
+/// ```
+/// use matdb::material::form::is_orcid;
+/// assert!(is_orcid("0000-0002-1825-0097") && is_orcid("0000-0002-9079-593X"));
+/// assert!(!is_orcid("0000-0002-1825-0098") && !is_orcid("0000000218250097"));
+/// ```
+pub fn is_orcid(text: &str) -> bool {
+    let groups: Vec<&str> = text.split('-').collect();
+    let is_grouped = groups.len() == 4 && groups.iter().all(|group| group.len() == 4);
+    let sum = text.chars().filter(|c| *c != '-').enumerate().try_fold(0, |sum, (place, c)| {
+        let digit = if place == 15 && c == 'X' { 10 } else { c.to_digit(10)? };
+        Some(if place == 15 { sum + digit } else { (sum + digit) * 2 % 11 })
+    });
+    is_grouped && sum.is_some_and(|sum| sum % 11 == 1)
+}
 
 /// Whether a text has the form of an SPDX licence expression: identifiers such as `CC-BY-4.0` or
 /// `LicenseRef-proprietary`, joined by `AND`, `OR` and `WITH` (spdx.github.io/spdx-spec, annex

@@ -222,6 +222,15 @@ impl Material {
         self.sources.iter().find(|s| s.key == *key).map(|s| s.kind)
     }
 
+    /// What it means that [`scattering`](Material::scattering) gives no level at an angle: of a curve that its
+    /// detections end before, of a model that nothing comes back.
+    pub fn silence(&self) -> &'static str {
+        match self.curves.iter().any(|curve| curve.name == self.render) {
+            true => "below the threshold",
+            false => "nothing",
+        }
+    }
+
     /// How far a frequency, Hz, lies outside [`frequency_hz`](Material::frequency_hz), Hz; 0 within.
     pub fn frequency_outside_hz(&self, frequency_hz: f64) -> f64 {
         outside(self.frequency_hz, frequency_hz)

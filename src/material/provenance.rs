@@ -183,6 +183,21 @@ pub struct Input {
     pub hash: String,
 }
 
+impl Origin {
+    /// The catalogue as people cite it: title, version and where it is.
+    pub fn catalogue(&self) -> String {
+        let version = self.version.as_ref().map(|version| format!("version {version}"));
+        let doi = self.doi.as_ref().map(|doi| format!("https://doi.org/{doi}"));
+        let parts = [Some(self.title().to_owned()), version, doi.or(self.url.clone())];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+
+    /// Its title, or that it has none.
+    pub fn title(&self) -> &str {
+        self.title.as_deref().unwrap_or("a catalogue without a title")
+    }
+}
+
 impl Citation {
     /// Whether nothing is known.
     pub fn is_empty(&self) -> bool {

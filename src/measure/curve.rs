@@ -8,9 +8,9 @@
 use thiserror::Error;
 
 use crate::formats::FormatError;
-use crate::formats::csv::{Table, without_head};
+use crate::material::file::points;
 use crate::material::{Censor, Observation};
-use crate::units::{db_from_ratio, dbm_from_watts, ratio_from_db, watts_from_dbm};
+use crate::units::{db_from_ratio, dbm_from_watts};
 
 /// Columns of a curve file, in order.
 pub const COLUMNS: [&str; 7] =
@@ -88,20 +88,25 @@ impl Curve {
         self.rows.iter().all(|row| row.power_w == row.sigma0)
     }
 
-    /// Reads a curve file. `theta_deg` and `sigma0_db` must be there. Without the others a row is
-    /// uncensored, its angle exact, its range 0, its power σ⁰ in watts, its chirp its number from 0.
-    ///
-    /// The columns of a material's curve do as well: `censor` (`none`, `left`), `threshold_db`, and, for
-    /// backscatter, `theta_r_deg` and `delta_phi_deg`. Lines of `#` at the head are left alone.
+    /// Reads a curve file ([`points`]). Without a column a row is uncensored, its angle exact, its range 0, its
+    /// power σ⁰ in watts, its chirp its number from 0.
     ///
     /// # Errors
-    /// The first cell that cannot be used, with its line and column.
+    /// The first cell that cannot be used, with its line and column, and rows that are no backscatter.
     pub fn read(bytes: &[u8]) -> Result<Curve, FormatError> {
-        let optional = ["theta_sd_deg", "power_dbm", "range_m", "chirp", "censored"];
-        let of_materials = ["censor", "threshold_db", "theta_r_deg", "delta_phi_deg"];
-        let optional = [optional.as_slice(), &of_materials].concat();
-        let table = Table::read(&without_head(bytes), &["theta_deg", "sigma0_db"], &optional)?;
-        let rows = (0..table.len()).map(|row| read_row(&table, row)).collect::<Result<_, _>>()?;
+        let row = |(index, (line, point)): (usize, (usize, Observation))| {
+            from_observation(index, &point).map_err(|error| {
+                let problem = match error {
+                    ObservationError::Bistatic { .. } => "the row is bistatic",
+                    ObservationError::AboveRange { .. } => {
+                        "the row is above the instrument's range"
+                    }
+                    ObservationError::Empty { .. } => "the row has no value and no threshold",
+                };
+                FormatError::at(format!("line {line}"), problem, "leave it out here")
+            })
+        };
+        let rows = points(bytes)?.into_iter().enumerate().map(row).collect::<Result<_, _>>()?;
         Ok(Curve { rows })
     }
 
@@ -169,68 +174,6 @@ fn from_observation(index: usize, o: &Observation) -> Result<Row, ObservationErr
     })
 }
 
-fn read_row(table: &Table, row: usize) -> Result<Row, FormatError> {
-    let bounded = |column: &'static str, (min, max): (f64, f64)| {
-        let value = table.number(row, column)?;
-        match (value.is_none_or(|value| (min..=max).contains(&value)), table.cell(row, column)) {
-            (false, Some(cell)) => Err(cell.refuse(&format!("give a value from {min} to {max}"))),
-            _ => Ok(value),
-        }
-    };
-    let theta_deg = table.required_number(row, "theta_deg")?;
-    bounded("theta_deg", (0.0, 90.0))?;
-    retro(table, row, theta_deg)?;
-    let is_left = is_left(table, row)?;
-    let level = if is_left { "threshold_db" } else { "sigma0_db" };
-    bounded(level, (-300.0, 300.0))?;
-    let sigma0_db = table.required_number(row, level)?;
-    let censored = bounded("censored", (0.0, 1.0))?.unwrap_or(0.0);
-    if let (true, Some(cell)) = (censored.fract() != 0.0, table.cell(row, "censored")) {
-        return Err(cell.refuse("give 1 for a chirp without a detection, else 0"));
-    }
-    let sigma0 = ratio_from_db(sigma0_db);
-    let chirp = match table.cell(row, "chirp") {
-        Some(_) => table.whole_number(row, "chirp")?,
-        None => row as u32,
-    };
-    Ok(Row {
-        theta_rad: theta_deg.to_radians(),
-        theta_sd_rad: bounded("theta_sd_deg", (0.0, 90.0))?.unwrap_or(0.0).to_radians(),
-        power_w: bounded("power_dbm", (-400.0, 400.0))?.map_or(sigma0, watts_from_dbm),
-        sigma0,
-        range_m: bounded("range_m", (0.0, 1e6))?.unwrap_or(0.0),
-        chirp,
-        censored: is_left || censored == 1.0,
-    })
-}
-
-/// Whether a row says, as a material's curve does, that nothing was detected.
-fn is_left(table: &Table, row: usize) -> Result<bool, FormatError> {
-    match table.cell(row, "censor") {
-        None => Ok(false),
-        Some(cell) => match cell.text {
-            "none" => Ok(false),
-            "left" => Ok(true),
-            "right" => Err(cell.refuse("leave points above the instrument's range out")),
-            _ => Err(cell.refuse("write none or left")),
-        },
-    }
-}
-
-/// Refuses a row whose receiver was not where the source was.
-fn retro(table: &Table, row: usize, theta_deg: f64) -> Result<(), FormatError> {
-    for (column, wanted) in [("theta_r_deg", theta_deg), ("delta_phi_deg", 0.0)] {
-        let is_same = |value: f64| (value - wanted).abs() < 1e-9;
-        match (table.number(row, column)?, table.cell(row, column)) {
-            (Some(value), Some(cell)) if !is_same(value) => {
-                return Err(cell.refuse("only backscatter is taken here; leave other points out"));
-            }
-            _ => {}
-        }
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -254,12 +197,14 @@ mod tests {
         let curve = Curve::read(text).unwrap();
         assert_eq!(curve.rows.iter().map(|row| row.censored).collect::<Vec<_>>(), [false, true]);
         assert!((curve.rows[1].sigma0 - 1e-3).abs() < 1e-15);
-        for (row, column) in [("10,-3,,,11,0", "theta_r_deg"), ("10,-3,right,,,", "censor")] {
+        for (row, said) in
+            [("10,-3,,,11,0", "bistatic"), ("10,,right,-3,,", "above the instrument")]
+        {
             let text = format!(
                 "theta_deg,sigma0_db,censor,threshold_db,theta_r_deg,delta_phi_deg\n{row}\n"
             );
             let error = Curve::read(text.as_bytes()).unwrap_err().to_string();
-            assert!(error.contains(column) && error.contains("line 2"), "{error}");
+            assert!(error.contains(said) && error.contains("line 2"), "{error}");
         }
     }
 

@@ -92,6 +92,9 @@ pub struct RevisionSummary {
     pub added_at: String,
     /// Version of the program that added it.
     pub program_version: String,
+    /// Title of somebody else's catalogue that it was taken from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub origin: Option<String>,
 }
 
 /// A line of [`Store::list`].

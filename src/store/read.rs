@@ -18,17 +18,21 @@ use super::{RevisionSummary, Stored};
 use crate::brdf::Brdf;
 use crate::formats::EffectEntry;
 use crate::material::{
-    Censor, Covariance, Curve, FindingVerdict, Fit, Geometry, Making, Material, Observation, Scale,
-    Slug, SourceKind, Status,
+    Censor, Covariance, Curve, FindingVerdict, Fit, Geometry, Making, Material, Observation,
+    Origin, Scale, Slug, SourceKind, Status,
 };
 
 /// Every revision of a material, oldest first.
 pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSummary>> {
-    let sql = "SELECT number, added_at, program_version
+    let sql = "SELECT number, revision.added_at, revision.program_version, origin.revision_id, origin.title
                FROM material JOIN revision ON material_id = material.id
+               LEFT JOIN origin ON origin.revision_id = revision.id
                WHERE slug = ?1 ORDER BY number";
     rows(conn, sql, [slug.as_str()], |row| {
+        let (of, title): (Option<i64>, Option<String>) = (row.get(3)?, row.get(4)?);
+        let origin = of.map(|_| Origin { title, ..Origin::default() }.title().to_owned());
         Ok(RevisionSummary {
+            origin,
             revision: row.get(0)?,
             added_at: row.get(1)?,
             program_version: row.get(2)?,

@@ -1,7 +1,7 @@
 //! What a person says of a foreign file that does not say it itself.
 
 use super::ExchangeError;
-use crate::material::{Slug, SourceKind};
+use crate::material::{Material, Slug, SourceKind};
 
 /// What a person says beside a foreign file; what is none must stand in the file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -12,10 +12,20 @@ pub struct Given {
     pub name: Option<String>,
     /// Kind of stuff.
     pub class: Option<String>,
+    /// What it is, and what is not known of it; takes the place of what the file says.
+    pub description: Option<String>,
+    /// Words that it is found by, besides those of the file.
+    pub tags: Vec<String>,
     /// SPDX identifier of the licence of the data.
     pub licence: Option<String>,
     /// Citation or, for one's own numbers, how they were made.
     pub source: Option<String>,
+    /// Who measured or wrote that, `Family, Given`.
+    pub authors: Vec<String>,
+    /// Year of it, four digits.
+    pub year: Option<u16>,
+    /// Name of the curve; that of the file stands in.
+    pub curve: Option<String>,
     /// How the numbers came to be.
     pub kind: Option<SourceKind>,
     /// Name of the instrument.
@@ -24,6 +34,24 @@ pub struct Given {
     pub frequency_hz: Option<f64>,
     /// Least power that counts as a detection, W.
     pub threshold_w: Option<f64>,
+}
+
+impl Given {
+    /// Adds what any material may say and no foreign file does.
+    pub(super) fn complete(&self, material: &mut Material) {
+        material.description = self.description.clone().unwrap_or(material.description.clone());
+        let new = self.tags.iter().filter(|tag| !material.tags.contains(tag)).cloned();
+        material.tags.extend(new.collect::<Vec<_>>());
+        if let Some(source) = material.sources.first_mut() {
+            source.citation.authors.extend(self.authors.iter().cloned());
+            source.citation.year = self.year.or(source.citation.year);
+        }
+    }
+}
+
+/// The name of a file, without its folder.
+pub(super) fn file_name(file: &str) -> &str {
+    file.rsplit(['/', '\\']).next().unwrap_or(file)
 }
 
 /// The refusal that names all the flags that are missing.

@@ -35,21 +35,26 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
     if angles.is_empty() {
         return Err(unfit("nothing comes back at any claimed angle".to_owned()));
     }
-    let (near, mut lost) = (counterpart(&model, &angles), "effects have no counterpart".to_owned());
+    let near = counterpart(&model, &angles);
+    let mut lost = vec!["the file holds what scenes render, as backscatter".to_owned()];
+    if !subject.material.effects.is_empty() {
+        lost.push("effects have no counterpart".to_owned());
+    }
     let Miss { rms_db, worst_db, .. } = miss(&model, &near, &angles);
     if worst_db >= 0.05 {
-        lost += &format!(
-            "; parts of the model have none either: their stand-ins miss its backscatter by {rms_db:.1} \
+        lost.push(format!(
+            "parts of the model have no counterpart: their stand-ins miss its backscatter by {rms_db:.1} \
              dB rms, {worst_db:.1} dB at most, over the claimed angles"
-        );
+        ));
     }
     let schlick_db = schlick_miss_db(&near);
     if schlick_db >= 0.05 {
-        lost += &format!(
-            "; Fresnel stands in for Schlick, the same in backscatter, up to {schlick_db:.1} dB off at \
+        lost.push(format!(
+            "Fresnel stands in for Schlick, the same in backscatter, up to {schlick_db:.1} dB off at \
              a facet's angle of up to 60°"
-        );
+        ));
     }
+    let lost = lost.join("; ");
     let mut text = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n".to_owned();
     for line in subject.about().iter().chain([&one_line(&lost)]) {
         text += &format!("<!-- {} -->\n", comment(line));

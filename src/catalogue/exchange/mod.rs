@@ -105,10 +105,14 @@ impl Foreign {
     /// # Errors
     /// When the bytes do not follow the format, or neither they nor `given` say what must be known.
     pub fn read(self, file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
-        match self {
+        let mut material = match self {
             Foreign::OpticalConstants => optical_constants::read(file, bytes, given),
             Foreign::Csv => plain_csv::read(file, bytes, given),
             Foreign::UniversalBrdf => universal_brdf_in::read(file, bytes, given),
-        }
+        }?;
+        given.complete(&mut material);
+        let refused = |error| ExchangeError::Material { file: file.to_owned(), error };
+        material.validate().map_err(refused)?;
+        Ok(material)
     }
 }

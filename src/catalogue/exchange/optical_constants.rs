@@ -8,7 +8,7 @@
 //! where it is tabulated apart from k. Lost: frequencies further away than a third, the conditions
 //! other than the temperature, HTML.
 
-use super::given::{CLASS, LICENCE, NAME, missing};
+use super::given::{CLASS, LICENCE, NAME, file_name, missing};
 use super::page::{Block, Page, number, parse};
 use super::{ExchangeError, Given};
 use crate::brdf::{Brdf, Fresnel};
@@ -57,11 +57,7 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
     let (nearest, constants) =
         constants(&page).and_then(|constants| around(constants, wanted_hz)).map_err(refused)?;
     let entry = Entry { slug, class, licence, wanted_hz, nearest, constants };
-    let material = material(file, &page, given, entry);
-    material
-        .validate()
-        .map_err(|error| ExchangeError::Material { file: file.to_owned(), error })?;
-    Ok(material)
+    Ok(material(file, &page, given, entry))
 }
 
 /// The constants at every tabulated wavelength where both are known.
@@ -348,7 +344,7 @@ fn material(file: &str, page: &Page, given: &Given, entry: Entry) -> Material {
 }
 
 fn optical_source(file: &str, page: &Page, given: &Given, licence: String) -> Source {
-    let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
+    let name = file_name(file);
     let references = plain(&page.references);
     let title = match (&given.source, references.is_empty()) {
         (Some(title), _) => title.clone(),

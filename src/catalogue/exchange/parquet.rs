@@ -43,6 +43,9 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
     let about = format!("{}\n{} GHz", subject.about().join("\n"), points.frequency_hz / 1e9);
     let bytes = parquet_of(&table, &about, rows)
         .map_err(|problem| ExchangeError::Encoding { format: "Parquet", problem })?;
-    let lost = format!("written is {}; everything else has no column", what(&points));
+    let lost = format!(
+        "the file holds {}; nothing else of the material has a column there",
+        what(&points)
+    );
     Ok(Exported { files: vec![(name.to_owned(), bytes)], lost })
 }

@@ -4,18 +4,21 @@
 //!
 //! Lost: everything but the curve, and of its points the angle's deviation, power, range and chirp.
 
-use super::given::{CLASS, FREQUENCY, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD, missing};
+use std::path::Path;
+
+use super::given::{
+    CLASS, FREQUENCY, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD, file_name, missing,
+};
 use super::subject::Points;
 use super::{ExchangeError, Exported, Given, Subject};
 use crate::formats::FormatError;
-use crate::formats::csv::without_head;
 use crate::material::{
     Citation, Curve, Instrument, Material, Observation, Slug, Source, SourceKind, Status, file,
 };
 use crate::units::db_from_ratio;
 
-/// Name of the curve that a plain file becomes.
-const CURVE: &str = "curve";
+/// Key of the instrument that a curve was measured with.
+pub(super) const RADAR: &str = "radar";
 
 /// Writes the curve, or what the model says at every degree.
 pub(super) fn write(subject: &Subject, name: &str) -> Exported {
@@ -35,15 +38,18 @@ pub(super) fn write(subject: &Subject, name: &str) -> Exported {
             point.delta_phi_rad.to_degrees(),
         );
     }
-    let lost =
-        format!("written is {}; everything else of the material is in no column", what(&points));
+    let lost = format!(
+        "the file holds {}; nothing else of the material has a column there",
+        what(&points)
+    );
     Exported { files: vec![(name.to_owned(), text.into_bytes())], lost }
 }
 
 /// Which numbers these are, in a clause.
 pub(super) fn what(points: &Points) -> String {
     match points.curve {
-        Some(curve) => format!("the curve `{}`", curve.name),
+        Some(curve) if points.others.is_empty() => format!("the curve `{}`", curve.name),
+        Some(curve) => format!("the curve `{}` and not {}", curve.name, points.others.join(", ")),
         None => "the model's backscatter at every degree where it is above -80 dB, since there is no curve"
             .to_owned(),
     }
@@ -52,7 +58,13 @@ pub(super) fn what(points: &Points) -> String {
 /// Makes a material of a curve.
 pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
     let refused = |error: FormatError| ExchangeError::Format { file: file.to_owned(), error };
-    let observations = file::observations(&without_head(bytes)).map_err(refused)?;
+    let points = file::points(bytes).map_err(refused)?;
+    let observations: Vec<Observation> = points.into_iter().map(|(_, point)| point).collect();
+    if observations.is_empty() {
+        let empty =
+            FormatError::at("line 1", "no row follows the header", "add the curve's points");
+        return Err(refused(empty));
+    }
     let Given { slug, class, licence, source, kind, instrument, frequency_hz, .. } = given;
     // Who has not said how the curve came to be may have measured it.
     let is_measured = kind.is_none_or(|kind| kind == SourceKind::Measured);
@@ -80,14 +92,14 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
         return Err(missing(file, &flags));
     };
     let instrument = instrument.as_ref().map(|name| Instrument {
-        key: "instrument".to_owned(),
+        key: RADAR.to_owned(),
         name: name.clone(),
         centre_frequency_hz: hz,
         threshold_w: given.threshold_w,
         ..Instrument::default()
     });
     let lone = Lone { slug, class, licence, title, kind, hz, instrument, observations };
-    of_curve(file, given, lone)
+    Ok(of_curve(file, given, lone))
 }
 
 /// A curve and all that an entry must say of it.
@@ -105,10 +117,12 @@ pub(super) struct Lone {
 }
 
 /// A material that is one curve.
-pub(super) fn of_curve(file: &str, given: &Given, lone: Lone) -> Result<Material, ExchangeError> {
+pub(super) fn of_curve(file: &str, given: &Given, lone: Lone) -> Material {
     let Lone { slug, class, licence, title, kind, hz, instrument, observations } = lone;
+    let stem = Path::new(file_name(file)).file_stem().unwrap_or_default().to_string_lossy();
+    let name = given.curve.clone().unwrap_or(stem.into_owned());
     let angles = || observations.iter().map(|point| point.theta_i_rad);
-    let material = Material {
+    Material {
         name: given.name.clone().unwrap_or_else(|| slug.to_string()),
         class,
         description: String::new(),
@@ -116,21 +130,21 @@ pub(super) fn of_curve(file: &str, given: &Given, lone: Lone) -> Result<Material
         tags: Vec::new(),
         frequency_hz: [hz, hz],
         theta_rad: [angles().fold(f64::INFINITY, f64::min), angles().fold(0.0, f64::max)],
-        render: CURVE.to_owned(),
+        render: name.clone(),
         sources: vec![Source {
-            key: "source".to_owned(),
+            key: name.clone(),
             kind,
             title,
             doi: None,
             url: None,
             licence: Some(licence),
-            note: Some(format!("Read from {}.", file.rsplit(['/', '\\']).next().unwrap_or(file))),
+            note: Some(format!("Read from {}.", file_name(file))),
             citation: Citation::default(),
             making: None,
         }],
         curves: vec![Curve {
-            name: CURVE.to_owned(),
-            source: "source".to_owned(),
+            name: name.clone(),
+            source: name,
             instrument: instrument.as_ref().map(|instrument| instrument.key.clone()),
             session: None,
             observations,
@@ -147,9 +161,5 @@ pub(super) fn of_curve(file: &str, given: &Given, lone: Lone) -> Result<Material
         sessions: Vec::new(),
         findings: Vec::new(),
         slug,
-    };
-    material
-        .validate()
-        .map_err(|error| ExchangeError::Material { file: file.to_owned(), error })?;
-    Ok(material)
+    }
 }

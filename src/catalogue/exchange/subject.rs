@@ -23,12 +23,16 @@ pub struct Subject<'a> {
     pub revision: Option<u32>,
     /// When that was added: UTC, ISO 8601.
     pub added_at: Option<&'a str>,
+    /// Name of the curve that goes out; none: what a scene renders, or was fitted.
+    pub curve: Option<&'a str>,
 }
 
 /// The curve that goes out: a measured one, or what a model says at every degree.
 pub(super) struct Points<'a> {
     /// The curve; none for a model.
     pub curve: Option<&'a Curve>,
+    /// Names of the curves that stay behind.
+    pub others: Vec<&'a str>,
     pub observations: Cow<'a, [Observation]>,
     pub source: Option<&'a Source>,
     pub instrument: Option<&'a Instrument>,
@@ -37,14 +41,16 @@ pub(super) struct Points<'a> {
 }
 
 impl<'a> Subject<'a> {
-    /// What a scene renders: the curve itself, or the one that was fitted; else the first curve; else
-    /// the model.
+    /// The curve that is asked for; else what a scene renders: the curve itself, or the one that was fitted;
+    /// else the first curve; else the model.
     pub(super) fn points(&self) -> Points<'a> {
         let material = self.material;
         let named = |name: &str| material.curves.iter().find(|curve| curve.name == name);
         let fit = material.fits.iter().find(|fit| fit.name == material.render);
         let fitted = fit.and_then(|fit| fit.curve.as_deref()).and_then(named);
-        let curve = named(&material.render).or(fitted).or(material.curves.first());
+        let asked = self.curve.and_then(named);
+        let curve = asked.or(named(&material.render)).or(fitted).or(material.curves.first());
+        let names = material.curves.iter().map(|curve| curve.name.as_str());
         let instrument = curve.and_then(|curve| {
             material.instruments.iter().find(|i| Some(&i.key) == curve.instrument.as_ref())
         });
@@ -56,6 +62,7 @@ impl<'a> Subject<'a> {
         };
         Points {
             curve,
+            others: names.filter(|name| curve.is_some_and(|c| c.name != *name)).collect(),
             observations,
             source: material.sources.iter().find(|source| Some(&source.key) == key),
             instrument,

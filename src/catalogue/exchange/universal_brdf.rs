@@ -36,7 +36,7 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
     };
     let text = serde_json::to_string_pretty(&file).map_err(failed)? + "\n";
     let lost = format!(
-        "written is {}; fits, effects, permittivities and layers have no place in the format, and \
+        "the file holds {}; fits, effects, permittivities and layers have no place in the format, and \
          a detection limit only in adhoc_variables",
         what(&points)
     );

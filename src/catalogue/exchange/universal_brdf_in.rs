@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use serde_json::Value;
 
 use super::given::{CLASS, FREQUENCY, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, missing};
-use super::plain_csv::{Lone, of_curve};
+use super::plain_csv::{Lone, RADAR, of_curve};
 use super::universal_brdf::{CENSOR, OURS, THRESHOLD};
 use super::{ExchangeError, Given};
 use crate::formats::FormatError;
@@ -51,7 +51,7 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
     };
     let number = |key: &str| ours["instrument"][key].as_f64();
     let instrument = name.map(|name| Instrument {
-        key: "instrument".to_owned(),
+        key: RADAR.to_owned(),
         name,
         centre_frequency_hz: hz,
         bandwidth_hz: number("bandwidth_hz"),
@@ -60,7 +60,8 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
         threshold_w: given.threshold_w.or(number("threshold_w")),
         ..Instrument::default()
     });
-    of_curve(file, given, Lone { slug, class, licence, title, kind, hz, instrument, observations })
+    let lone = Lone { slug, class, licence, title, kind, hz, instrument, observations };
+    Ok(of_curve(file, given, lone))
 }
 
 fn kind(metadata: &Value, ours: &Value) -> Option<SourceKind> {

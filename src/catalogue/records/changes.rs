@@ -55,23 +55,28 @@ struct Version {
 }
 
 /// Continues the log of what stood in the folder before. Publishing the same again adds nothing to it.
-pub(super) fn write(folder: &mut Folder, index: &Index) -> Result<(), CatalogueError> {
+/// Whether other data had the same version there.
+pub(super) fn write(folder: &mut Folder, index: &Index) -> Result<bool, CatalogueError> {
+    let mut is_reused = false;
     let (before, mut publications) = match folder.before() {
         Some(earlier) => {
             let before: Index = read(earlier, INDEX)?;
             let changes: Changes = read(earlier, CHANGES)?;
+            is_reused = index.version.is_some() && index.version == before.version;
             (states(&before), changes.publications)
         }
         None => (BTreeMap::new(), Vec::new()),
     };
     let new = publication(index, &before);
     let is_first = publications.is_empty();
-    if is_first || !(new.added.is_empty() && new.changed.is_empty() && new.withdrawn.is_empty()) {
+    let is_other = !(new.added.is_empty() && new.changed.is_empty() && new.withdrawn.is_empty());
+    if is_first || is_other {
         publications.insert(0, new);
     }
     let changes = Changes { schema_version: SCHEMA_VERSION, publications };
     api::json(folder, CHANGES, &changes)?;
-    folder.write("CHANGES.md", text(&changes).as_bytes())
+    folder.write("CHANGES.md", text(&changes).as_bytes())?;
+    Ok(is_reused && is_other)
 }
 
 fn read<T: DeserializeOwned>(folder: &Path, name: &str) -> Result<T, CatalogueError> {

@@ -24,17 +24,18 @@ impl<'a> Context<'a> {
     }
 }
 
-/// Writes all records; everything else but the list of hashes stands in the folder already.
+/// Writes all records; everything else but the list of hashes stands in the folder already. Whether other data
+/// had the same version there.
 pub(super) fn write(
     folder: &mut Folder,
     about: &About,
     index: &Index,
     tables: &[Written],
-) -> Result<(), CatalogueError> {
+) -> Result<bool, CatalogueError> {
     for (path, schema) in api::SCHEMAS {
         folder.write(path, schema.as_bytes())?;
     }
-    changes::write(folder, index)?;
+    let is_reused = changes::write(folder, index)?;
     let context = Context { about, date: index.date.as_deref(), materials: index.materials.len() };
     folder.write("CITATION.cff", citation::cff(&context).as_bytes())?;
     pretty(folder, ".zenodo.json", &citation::zenodo(&context))?;
@@ -44,7 +45,8 @@ pub(super) fn write(
         "datapackage.json",
         &data_package::package(&context, index, tables, folder.sums()),
     )?;
-    pretty(folder, "ro-crate-metadata.json", &linked::crate_metadata(&context, folder.sums()))
+    pretty(folder, "ro-crate-metadata.json", &linked::crate_metadata(&context, folder.sums()))?;
+    Ok(is_reused)
 }
 
 fn pretty(

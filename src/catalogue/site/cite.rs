@@ -7,7 +7,35 @@ use super::link::doi_href;
 use super::words::cut;
 use crate::catalogue::About;
 use crate::catalogue::bibtex::entry;
+use crate::material::{Origin, builtin};
 use crate::store::Stored;
+
+/// What is said of an entry that comes with the program.
+const BUILT_IN: &str = "Built into matdb, not by the publisher of this catalogue";
+
+/// Whom an entry is to be credited to.
+enum Credit<'a> {
+    /// Those who publish the catalogue.
+    Publisher,
+    /// Those of the catalogue that it was imported from.
+    Others(&'a Origin),
+    /// Those who make matdb.
+    BuiltIn,
+}
+
+impl Credit<'_> {
+    fn of(stored: &Stored) -> Credit<'_> {
+        let built_in = builtin::get(stored.material.slug.as_str()).and_then(Result::ok);
+        let origin = stored.activity.as_ref().and_then(|activity| activity.origin.as_ref());
+        match origin {
+            _ if built_in.is_some_and(|own| own.content_hash() == stored.content_hash) => {
+                Credit::BuiltIn
+            }
+            Some(origin) => Credit::Others(origin),
+            None => Credit::Publisher,
+        }
+    }
+}
 
 /// How to cite a material.
 #[derive(Debug, Serialize)]
@@ -16,6 +44,8 @@ pub(super) struct Citation {
     text: String,
     /// For a bibliography.
     bibtex: String,
+    /// What it is that somebody else is to be credited with, and to whom.
+    origin: Option<(&'static str, String)>,
     /// For machines.
     #[serde(skip)]
     pub(super) record: Value,
@@ -29,9 +59,28 @@ impl Citation {
         let hash = stored.content_hash.get(..12).unwrap_or(&stored.content_hash);
         let what =
             format!("{name} ({}, revision {}, content {hash})", material.slug, stored.revision);
-        let year = stored.added_at.get(..4).unwrap_or_default();
-        let text = format!("{}{what}. In: {}", authors(about), catalogue_words(about));
-        let bibtex = bibtex(about, &format!("{}-{}", material.slug, stored.revision), &what, year);
+        let credit = Credit::of(stored);
+        let text = match &credit {
+            Credit::Publisher => {
+                format!("{}{what}. In: {}", authors(about), catalogue_words(about))
+            }
+            Credit::BuiltIn => format!("{what}. {BUILT_IN}. In: {}", catalogue_words(about)),
+            Credit::Others(origin) => {
+                let there = origin.catalogue();
+                format!("{what}. In: {there}. Republished in: {}", catalogue_words(about))
+            }
+        };
+        let key = format!("{}-{}", material.slug, stored.revision);
+        let bibtex = bibtex(about, &credit, &key, &what, &stored.added_at);
+        let creator = match credit {
+            Credit::Publisher => creators(about),
+            Credit::BuiltIn | Credit::Others(_) => Vec::new(),
+        };
+        let origin = match &credit {
+            Credit::Publisher => None,
+            Credit::BuiltIn => Some(("Made by", "matdb, which it is built into".to_owned())),
+            Credit::Others(origin) => Some(("Imported from", origin.catalogue())),
+        };
         let record = json!({
             "@context": "https://schema.org/",
             "@type": "Dataset",
@@ -41,14 +90,14 @@ impl Citation {
             "license": spdx(&material.licence),
             "keywords": material.tags,
             "version": stored.revision.to_string(),
-            "creator": creators(about),
+            "creator": creator,
             "isPartOf": { "@type": "DataCatalog", "name": about.title },
             "distribution": [
                 distribution(&format!("../api/v1/materials/{}.json", material.slug), "application/json"),
                 distribution(&format!("{}.csv", material.slug), "text/csv"),
             ],
         });
-        Citation { text, bibtex, record }
+        Citation { text, bibtex, origin, record }
     }
 }
 
@@ -110,17 +159,29 @@ fn place(about: &About) -> Option<String> {
     doi.or_else(|| about.url.clone())
 }
 
-fn bibtex(about: &About, key: &str, title: &str, year: &str) -> String {
+fn bibtex(about: &About, credit: &Credit, key: &str, title: &str, added_at: &str) -> String {
     let names: Vec<String> =
         about.people.iter().map(|person| format!("{}, {}", person.family, person.given)).collect();
+    let authors = (!names.is_empty()).then(|| names.join(" and "));
+    let here = (Some(about.title.clone()), &about.version, &about.doi, &about.url);
+    let (author, (place, version, doi, url), note) = match credit {
+        Credit::Publisher => (authors, here, None),
+        Credit::BuiltIn => (None, here, Some(BUILT_IN.to_owned())),
+        Credit::Others(o) => {
+            let there = (Some(o.title().to_owned()), &o.version, &o.doi, &o.url);
+            (None, there, Some(format!("Republished in {}", catalogue_words(about))))
+        }
+    };
+    let added_at = if let Credit::Others(origin) = credit { &origin.added_at } else { added_at };
     let fields = [
-        ("author", (!names.is_empty()).then(|| names.join(" and "))),
+        ("author", author),
         ("title", Some(title.to_owned())),
-        ("howpublished", Some(about.title.clone())),
-        ("year", Some(year.to_owned())),
-        ("version", about.version.clone()),
-        ("doi", about.doi.clone()),
-        ("url", about.url.clone()),
+        ("howpublished", place),
+        ("year", added_at.get(..4).map(str::to_owned)),
+        ("version", version.clone()),
+        ("doi", doi.clone()),
+        ("url", url.clone()),
+        ("note", note),
     ];
     let short = fields.map(|(name, value)| (name, value.map(|value| cut(&value, 400))));
     entry("misc", &format!("matdb-{key}"), short).trim_end().to_owned()

@@ -31,6 +31,7 @@ pub(super) fn data(material: &Material) -> Value {
         "render": material.render,
         "ghz": material.frequency_hz.map(|hz| hz / 1e9),
         "deg": range_deg(material),
+        "silence": material.silence(),
         "lines": lines,
         "curves": material.curves.iter().map(|c| curve(material, c)).collect::<Vec<_>>(),
         "table": { "deg": TABLE_DEG, "level": TABLE_DEG.iter().map(level).collect::<Vec<_>>() },

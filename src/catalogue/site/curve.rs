@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::bins::{Bin, bins};
 use super::entry::{kind_of, place_of};
+use super::fit::kind_words;
 use super::levels::{self, FAINTEST_DB, range_deg};
 use super::plot::{Plot, Series, Shape};
 use super::words::{digits, grouped, percent};
@@ -19,6 +20,8 @@ const INKS: usize = 6;
 pub(super) struct Sample {
     name: String,
     kind: &'static str,
+    /// Those of the badge, where they are not the kind itself.
+    kind_words: Option<String>,
     /// `line`, `dots`, `below` or `above`.
     shape: &'static str,
     class: String,
@@ -75,6 +78,7 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
         samples.push(Sample {
             name: fit.name.clone(),
             kind: word(kind),
+            kind_words: kind_words(material, fit),
             shape: "line",
             class,
             note,
@@ -92,7 +96,7 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
         }));
         let name = "between the points".to_owned();
         let kind = word(material.render_kind());
-        samples.push(Sample { name, kind, shape: "line", class, note: "" });
+        samples.push(Sample { name, kind, kind_words: None, shape: "line", class, note: "" });
     }
     let plot = Plot {
         id: "curve".to_owned(),
@@ -161,7 +165,8 @@ fn points(curve: &Curve, kind: Option<SourceKind>, ink: &str) -> (Vec<Series>, V
             Shape::Above => ("above", "beyond the instrument: the value lies above"),
             _ => ("dots", "detections"),
         };
-        Sample { name: curve.name.clone(), kind: word(kind), shape, class: class.clone(), note }
+        let name = curve.name.clone();
+        Sample { name, kind: word(kind), kind_words: None, shape, class: class.clone(), note }
     };
     let samples = drawn.iter().map(sample).collect();
     (drawn, samples)

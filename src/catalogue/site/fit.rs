@@ -22,8 +22,9 @@ const CONVENTION: &str = "convention";
 pub(super) struct FitView {
     name: String,
     kind: &'static str,
+    kind_words: Option<String>,
     model: String,
-    estimator: String,
+    method: String,
     curve: Option<String>,
     is_rendered: bool,
     parameters: Vec<ParameterView>,
@@ -74,8 +75,9 @@ pub(super) fn view(material: &Material, number: usize, fit: &Fit) -> FitView {
     FitView {
         name: fit.name.clone(),
         kind: word(material, &fit.source),
+        kind_words: kind_words(material, fit),
         model: model_name(fit),
-        estimator: fit.estimator.clone(),
+        method: method(&fit.estimator),
         curve: fit.curve.clone(),
         is_rendered: fit.name == material.render,
         has_values: !parameters.is_empty(),
@@ -84,6 +86,25 @@ pub(super) fn view(material: &Material, number: usize, fit: &Fit) -> FitView {
         report: fit.report.as_ref().map(report),
         residuals: residuals::picture(material, number, fit),
     }
+}
+
+/// What a badge says of a fit to a curve: nobody measured the model itself.
+pub(super) fn kind_words(material: &Material, fit: &Fit) -> Option<String> {
+    fit.curve.as_ref()?;
+    Some(format!("fitted to {} data", word(material, &fit.source)))
+}
+
+/// An estimator in words; what somebody else calls theirs stays.
+fn method(estimator: &str) -> String {
+    match estimator {
+        "stated" => "the numbers are stated",
+        "censored" => "the likelihood of detections and of what stayed below the threshold",
+        "tls" => "orthogonal distance in degrees and dB",
+        "tls-tail" => "orthogonal distance in degrees and dB with a given tail",
+        "mse" => "least squares in dB in two pieces",
+        other => other,
+    }
+    .to_owned()
 }
 
 fn word(material: &Material, source: &str) -> &'static str {

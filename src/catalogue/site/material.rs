@@ -24,6 +24,8 @@ pub(super) struct Page<'a> {
     title: String,
     material: Head<'a>,
     kind: &'static str,
+    /// Those of the badge, where they are not the kind itself.
+    kind_words: Option<String>,
     kind_means: &'static str,
     revision: u32,
     content_hash: &'a str,
@@ -83,13 +85,19 @@ pub(super) fn page<'a>(
     let (picture, samples) = curve::picture(material);
     let kind = material.render_kind();
     let fits = material.fits.iter().enumerate();
+    let rendered = material.fits.iter().find(|fit| fit.name == material.render);
+    let rendered = rendered.and_then(|fit| fit::kind_words(material, fit));
     Page {
         about,
         root: "../",
         title: cut(&material.name, 80),
         material: head(material),
         kind: kind.map_or("unknown", SourceKind::as_str),
-        kind_means: kind.map_or("of unknown origin", meaning),
+        kind_means: match (&rendered, kind) {
+            (Some(_), _) => "a model that was fitted to a curve",
+            (None, kind) => kind.map_or("of unknown origin", meaning),
+        },
+        kind_words: rendered,
         revision: stored.revision,
         content_hash: &stored.content_hash,
         added_at: &stored.added_at,
@@ -128,7 +136,7 @@ fn levels(material: &Material) -> Vec<(String, String)> {
         let [least, most] = range_deg(material);
         let text = match claimed_db(material, &model, theta_deg) {
             Some(level_db) => decibels(level_db),
-            None if (least..=most).contains(&theta_deg) => "nothing".to_owned(),
+            None if (least..=most).contains(&theta_deg) => material.silence().to_owned(),
             None => "not claimed".to_owned(),
         };
         (format!("{theta_deg:.0}°"), text)

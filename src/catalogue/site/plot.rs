@@ -11,7 +11,7 @@ const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 420.0;
 const LEFT: f64 = 84.0;
 const RIGHT: f64 = 18.0;
-const TOP: f64 = 14.0;
+const TOP: f64 = 44.0;
 const BOTTOM: f64 = 64.0;
 
 /// Points of one series from which on they are drawn small.
@@ -138,11 +138,9 @@ impl Frame {
             ));
         }
         let (middle, low) = ((LEFT + WIDTH - RIGHT) / 2.0, HEIGHT - 10.0);
-        let halfway = (top + bottom) / 2.0;
         put(format_args!(
             "<text class=\"label\" x=\"{middle}\" y=\"{low}\" text-anchor=\"middle\">angle of incidence, \
-             °</text><text class=\"label\" transform=\"translate(22 {halfway}) rotate(-90)\" \
-             text-anchor=\"middle\">{y_label}</text>"
+             °</text><text class=\"label\" x=\"9\" y=\"26\">{y_label}</text>"
         ));
         svg
     }

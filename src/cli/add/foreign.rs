@@ -23,12 +23,27 @@ pub(super) struct Beside {
     /// Kind of stuff: metal, polymer, paint, tissue, textile, glass …
     #[arg(long)]
     class: Option<String>,
+    /// What it is; `Not known: …` says what is not
+    #[arg(long, value_name = "TEXT")]
+    description: Option<String>,
+    /// A word to find it by; may be repeated
+    #[arg(long = "tag", value_name = "WORD")]
+    tags: Vec<String>,
+    /// Name of the curve [default: that of the file]
+    #[arg(long, value_name = "NAME")]
+    curve: Option<String>,
     /// SPDX identifier of the licence of the data
     #[arg(long, value_name = "SPDX")]
     licence: Option<String>,
     /// Citation or, for your own numbers, how they were made
     #[arg(long, value_name = "TEXT")]
     source: Option<String>,
+    /// Who measured or wrote that, as in 'Doe, Jane'; may be repeated
+    #[arg(long = "author", value_name = "NAME")]
+    authors: Vec<String>,
+    /// Year of it
+    #[arg(long, value_name = "YYYY")]
+    year: Option<u16>,
     /// How the numbers came to be
     #[arg(long)]
     kind: Option<Kind>,
@@ -84,6 +99,11 @@ impl Beside {
             slug: self.name.clone(),
             name: self.title.clone(),
             class: self.class.clone(),
+            description: self.description.clone(),
+            tags: self.tags.clone(),
+            curve: self.curve.clone(),
+            authors: self.authors.clone(),
+            year: self.year,
             licence: self.licence.clone(),
             source: self.source.clone(),
             kind: self.kind.map(SourceKind::from),

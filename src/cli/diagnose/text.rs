@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::words::{covariate, listed, plus_minus, sentence, value, verdict};
+use super::words::{covariate, gone, listed, plus_minus, sentence, value, verdict};
 use crate::cli::effects::level;
 use crate::diagnose::{Errors, Found, Report};
 
@@ -58,7 +58,7 @@ fn effect(found: &Found) -> String {
 fn error(report: &Report) -> String {
     let error = &report.error;
     let share = match error.explained_share.filter(|_| !report.effects.is_empty()) {
-        Some(share) => format!("; {:.0} % of what lies above the floor is gone", 100.0 * share),
+        Some(share) => format!("; {} of what lies above the floor is gone", gone(share)),
         None => String::new(),
     };
     let change = match report.effects.is_empty() {

@@ -4,6 +4,12 @@ use crate::cli::effects::unit;
 use crate::diagnose::{Report, Value, Verdict};
 use crate::effects::Level;
 
+/// How much of the error above the noise floor is gone. The floor is an estimate: what ends below it has nothing left
+/// to explain.
+pub(super) fn gone(share: f64) -> String {
+    if share < 1.0 { format!("{:.0} %", 100.0 * share) } else { "all".to_owned() }
+}
+
 /// The verdict in a word or two.
 pub(super) fn verdict(report: &Report) -> &'static str {
     match report.verdict {

@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::console::Console;
 use super::curves::{Circumstances, Kind};
 use super::database::Database;
+use super::door;
 use super::materials::find;
 use super::plot::{ending, layers, one_file, plot, points};
 use crate::brdf::Brdf;
@@ -32,10 +33,11 @@ use subject::Subject;
   matdb fit curve.csv --method tls-tail --alpha 3
   matdb fit cotton --fix diffuse.alpha=4 --save
   matdb fit my-paint --save                     a fit of its longest curve, into my-paint
-  matdb fit curve.csv --save my-paint --kind measured --source 'Our bench, 2026' \\
-    --licence CC-BY-4.0 --instrument 'Our radar' --frequency 300 --threshold -77
+  matdb fit spring.csv --save my-paint --curve spring --kind measured \\
+    --source 'Our bench, 2026' --licence CC-BY-4.0 \\
+    --instrument 'Our radar' --frequency 300 --threshold -77
                                                 curve and fit into my-paint, which is there already;
-                                                `matdb add --from curve.csv …` makes a new material
+                                                `matdb add --from spring.csv …` makes a new material
 
 Methods: censored (speckle and missing chirps by their laws), tls (orthogonal distance in dB),
 tls-tail (the same with alpha given), mse (least squares in two pieces).
@@ -45,7 +47,8 @@ pub(super) struct Args {
     /// A curve's CSV file, or NAME or NAME@REVISION of a material with a curve
     #[arg(value_name = "MATERIAL|CURVE.csv")]
     what: String,
-    /// Which curve of the material [default: the longest]; for a file, the name to store it under
+    /// Which curve of the material [default: the longest]; for a file, the name to store it
+    /// under [default: that of the file]
     #[arg(long, value_name = "NAME")]
     curve: Option<String>,
     /// What to fit, and where to start [default: what the material renders, else mixture]
@@ -130,11 +133,14 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     // A fit takes a while: what hinders its storing or drawing is said before.
     args.output.as_deref().map(ending).transpose()?;
     let name = fit_name(args, &start);
-    Target::find(args, &subject, &name, store.as_ref())?;
+    let target = Target::find(args, &subject, &name, store.as_ref())?;
+    let doubts = target.filter(|_| subject.file.is_some()).map(|t| door::doubts(&t.material));
+    doubts.iter().flatten().for_each(|doubt| console.notice(doubt));
     drop(store);
     let fail = |error| Error::Fit { curve: subject.label.clone(), error };
     let found = fit.run(&start, &subject.curve).map_err(fail)?;
-    let saved = match (&args.save, found.converged) {
+    let is_possible = found.model.validate().is_ok();
+    let saved = match (&args.save, found.converged && is_possible) {
         (Some(_), true) => Some(save::save(args, &subject, &name, &found, db)),
         _ => None,
     };
@@ -149,7 +155,11 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     console.result(&text, &Record { result: &found, sentences, saved: done, files })?;
     saved.transpose()?;
     match found.converged {
-        true => Ok(()),
+        true if is_possible || args.save.is_none() => Ok(()),
+        true => Err(Error::Usage {
+            problem: format!("{}: nothing is stored, since the fit is out of range", subject.label),
+            way_out: "the verdict says what to let go of".to_owned(),
+        }),
         false => Err(Error::NotConverged { curve: subject.label, stop: found.stop.as_str() }),
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::{Args, Subject};
-use crate::cli::curves;
+use crate::cli::curves::{self, Put};
 use crate::cli::database::Database;
 use crate::cli::inputs::activity;
 use crate::cli::materials::{Found, find};
@@ -30,7 +30,7 @@ pub(super) struct Saved {
 
 /// The material that takes the fit in, with its curve and the source of it.
 pub(super) struct Target {
-    material: Material,
+    pub material: Material,
     curve: String,
     source: String,
 }
@@ -50,10 +50,11 @@ impl Target {
         };
         let stated = target.material.fits.iter().any(|f| f.name == fit_name && f.report.is_none());
         let curve = target.material.curves.iter().any(|c| c.name == fit_name);
+        let what = if curve { "a curve" } else { "a fit that nobody fitted here" };
         if stated || curve {
             let slug = &target.material.slug;
             return Err(usage(
-                format!("`{slug}` has something else of the name `{fit_name}`"),
+                format!("`{slug}` has {what} of the name `{fit_name}`"),
                 "give the fit another name with --fit-name",
             ));
         }
@@ -139,8 +140,8 @@ fn of_file(
     };
     let (curve, name) = (&subject.curve, &subject.curve_name);
     let said = (kind.into(), title.as_str());
-    let source = curves::put(&mut material, name, curve, said, &args.circumstances)?;
-    Ok(Target { material, curve: name.clone(), source })
+    let Put { curve, source } = curves::put(&mut material, name, curve, said, &args.circumstances)?;
+    Ok(Target { material, curve, source })
 }
 
 /// The source of every parameter that somebody chose and no data gave, by path.

@@ -1,8 +1,10 @@
 //! What `matdb show` says of composition, sessions and findings.
 
 use crate::cli::summary::table;
-use crate::material::{Finding, FindingVerdict, Layer, Material, Permittivity, Session};
-use crate::units::{rounded, shown};
+use crate::material::{
+    Finding, FindingVerdict, Instrument, Layer, Material, Permittivity, Session,
+};
+use crate::units::{db_from_ratio, dbm_from_watts, rounded, shown};
 
 /// Layers, permittivities, roughness and finish.
 pub(super) fn composition(material: &Material) -> String {
@@ -54,6 +56,38 @@ fn permittivity(entry: &Permittivity) -> [String; 6] {
 
 fn micro(length_m: f64) -> f64 {
     rounded(length_m * 1e6)
+}
+
+/// What curves were measured with, a line each.
+pub(super) fn instruments(material: &Material) -> String {
+    material.instruments.iter().map(instrument).collect()
+}
+
+fn instrument(instrument: &Instrument) -> String {
+    let number = |value: Option<f64>, what: &str, unit: &str| {
+        value.map(|value| format!("{what}{} {unit}", shown(rounded(value))))
+    };
+    let dbm = |power_w: Option<f64>| power_w.map(dbm_from_watts);
+    let word =
+        |text: &Option<String>, what: &str| text.as_ref().map(|text| format!("{what}{text}"));
+    let parts = [
+        Some(instrument.name.clone()),
+        number(Some(instrument.centre_frequency_hz / 1e9), "", "GHz"),
+        number(instrument.bandwidth_hz.map(|hz| hz / 1e9), "bandwidth ", "GHz"),
+        word(&instrument.polarisation, "polarisation "),
+        word(&instrument.transmit_polarisation, "sends "),
+        word(&instrument.receive_polarisation, "receives "),
+        number(dbm(instrument.threshold_w), "threshold ", "dBm"),
+        number(dbm(instrument.noise_floor_w), "noise ", "dBm"),
+        number(instrument.stand_off_m, "from ", "m"),
+        number(instrument.spot_diameter_m.map(|m| m * 1e3), "spot ", "mm"),
+        word(&instrument.calibration_target, "calibrated by "),
+        number(instrument.calibration_sd_factor.map(db_from_ratio), "to ", "dB"),
+        number(instrument.looks, "", if instrument.looks == Some(1.0) { "look" } else { "looks" }),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    let note = instrument.note.as_ref().map_or(String::new(), |note| format!("    {note}\n"));
+    format!("\ninstrument {}: {}\n{note}", instrument.key, parts.join(", "))
 }
 
 /// Sittings of measurement.

@@ -1,9 +1,10 @@
 //! `material.toml`: a material as people write and review it, in degrees, gigahertz and dB.
 //!
 //! Curves stand beside it as CSV with the columns `theta_deg,sigma0_db,censor,threshold_db`; the
-//! last two may be left out, and `theta_r_deg,delta_phi_deg` may be added for bistatic points.
+//! last two may be left out, and others may be added ([`points`]).
 
 mod composition;
+mod points;
 mod provenance;
 
 use std::collections::BTreeMap;
@@ -13,14 +14,14 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{
-    Censor, Covariance, Curve, Finding, Fit, Instrument, Layer, Material, MaterialError,
-    Observation, Permittivity, Roughness, Session, Slug, Source, Status,
+    Covariance, Curve, Finding, Fit, Instrument, Layer, Material, MaterialError, Permittivity,
+    Roughness, Session, Slug, Source, Status,
 };
 use crate::brdf::Brdf;
-use crate::formats::csv::Table;
 use crate::formats::text::{from_toml, to_toml};
 use crate::formats::{EffectEntry, FormatError};
-use crate::units::ratio_from_db;
+pub use points::points;
+
 use composition::{LayerFile, PermittivityFile, RoughnessFile};
 use provenance::{InstrumentFile, SessionFile, SourceFile};
 
@@ -162,8 +163,11 @@ pub fn parse(
             reason,
         })?;
         let beside = Path::new(file).with_file_name(&entry.file);
-        let observations = observations(&bytes)
-            .map_err(|error| FileError::Format { file: beside.display().to_string(), error })?;
+        let observations = points(&bytes)
+            .map_err(|error| FileError::Format { file: beside.display().to_string(), error })?
+            .into_iter()
+            .map(|(_, point)| point)
+            .collect();
         let CurveFile { name, source, instrument, session, .. } = entry;
         Ok(Curve { name, source, instrument, session, observations })
     };
@@ -262,45 +266,11 @@ impl From<FitFile> for Fit {
     }
 }
 
-/// Reads a curve's CSV.
-pub fn observations(bytes: &[u8]) -> Result<Vec<Observation>, FormatError> {
-    let optional = ["censor", "threshold_db", "theta_r_deg", "delta_phi_deg"];
-    let table = Table::read(bytes, &["theta_deg", "sigma0_db"], &optional)?;
-    (0..table.len()).map(|row| observation(&table, row)).collect()
-}
-
-fn observation(table: &Table, row: usize) -> Result<Observation, FormatError> {
-    let theta_i_deg = table.required_number(row, "theta_deg")?;
-    let theta_r_deg = table.number(row, "theta_r_deg")?.unwrap_or(theta_i_deg);
-    let delta_phi_deg = table.number(row, "delta_phi_deg")?.unwrap_or(0.0);
-    let censor = match table.cell(row, "censor") {
-        None => Censor::None,
-        Some(cell) => match cell.text {
-            "none" => Censor::None,
-            "left" => Censor::Left,
-            "right" => Censor::Right,
-            _ => return Err(cell.refuse("write none, left or right")),
-        },
-    };
-    Ok(Observation {
-        theta_i_rad: theta_i_deg.to_radians(),
-        theta_r_rad: theta_r_deg.to_radians(),
-        delta_phi_rad: delta_phi_deg.to_radians(),
-        sigma0: table.number(row, "sigma0_db")?.map(ratio_from_db),
-        censor,
-        threshold_sigma0: table.number(row, "threshold_db")?.map(ratio_from_db),
-        theta_sd_rad: None,
-        power_w: None,
-        range_m: None,
-        chirp: None,
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::brdf::Scattering;
-    use crate::material::SourceKind;
+    use crate::material::{Censor, Observation, SourceKind};
 
     const CURVE: &str =
         "theta_deg,sigma0_db,censor,threshold_db\n0,5,none,-30\n20,-10,,-30\n60,,left,-30\n";

@@ -3,7 +3,7 @@
 (() => {
   const MOST = 6, OFFERED = 12;
   const SVG = 'http://www.w3.org/2000/svg';
-  const WIDTH = 720, HEIGHT = 420, LEFT = 84, RIGHT = 18, TOP = 14, BOTTOM = 64;
+  const WIDTH = 720, HEIGHT = 420, LEFT = 84, RIGHT = 18, TOP = 44, BOTTOM = 64;
   const SLUG = /^[a-z0-9][a-z0-9-]{0,63}$/;
 
   const byId = (id) => document.getElementById(id);
@@ -143,7 +143,7 @@
         draw('text', { class: 'tick', x: x(deg), y: HEIGHT - BOTTOM + 26, 'text-anchor': 'middle' }, String(deg)));
     }
     svg.append(draw('text', { class: 'label', x: (LEFT + WIDTH - RIGHT) / 2, y: HEIGHT - 10, 'text-anchor': 'middle' }, 'angle of incidence, °'),
-      draw('text', { class: 'label', transform: `translate(22 ${(TOP + HEIGHT - BOTTOM) / 2}) rotate(-90)`, 'text-anchor': 'middle' }, 'σ⁰, dB'));
+      draw('text', { class: 'label', x: 9, y: 26 }, 'σ⁰, dB'));
     const each = (points, mark) => points.map(([deg, level]) => `M${x(deg)} ${y(level)}${mark}`).join('');
     const put = (name, points, path) => { if (points.length) svg.append(draw('path', { class: `${name}${points.length > 150 ? ' many' : ''}`, d: path })); };
     for (const { ink, material } of there) {
@@ -169,7 +169,7 @@
     const cell = (material, row) => {
       const level = material.table.level[row], deg = material.table.deg[row];
       if (level !== null) return signed(level);
-      return deg < material.deg[0] || deg > material.deg[1] ? 'not claimed' : 'nothing';
+      return deg < material.deg[0] || deg > material.deg[1] ? 'not claimed' : material.silence;
     };
     const head = make('tr', {}, make('th', { scope: 'col' }, 'incidence'),
       ...there.map(({ material }) => make('th', { scope: 'col' }, make('bdi', {}, material.name), ' ', badge(material.kind))));

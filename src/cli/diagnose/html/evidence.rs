@@ -3,7 +3,7 @@
 use super::page::{list, numbers, paragraph, quiet, table, words};
 use crate::cli::diagnose::Context;
 use crate::cli::diagnose::words::{
-    covariate, fixed, plus_minus, probability, signed, value as with_unit,
+    covariate, fixed, gone, plus_minus, probability, signed, value as with_unit,
 };
 use crate::diagnose::{Base, BeforeAfter, Candidate, Control, Controls, Report, Unexplained};
 
@@ -90,7 +90,7 @@ fn explained(error: &BeforeAfter) -> String {
     };
     let share = match error.explained_share {
         Some(share) => {
-            format!("Of the squared error above the noise floor, {:.0} % is gone.", 100.0 * share)
+            format!("Of the squared error above the noise floor, {} is gone.", gone(share))
                 .replace('-', "−")
         }
         None => {

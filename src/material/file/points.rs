@@ -1,0 +1,158 @@
+//! The CSV of a curve, as every command reads it: a point per line, in degrees and dB.
+
+use crate::formats::FormatError;
+use crate::formats::csv::{Table, without_head};
+use crate::material::{Censor, Observation};
+use crate::units::{ratio_from_db, watts_from_dbm};
+
+const REQUIRED: [&str; 2] = ["theta_deg", "sigma0_db"];
+const OPTIONAL: [&str; 9] = [
+    "censor",
+    "threshold_db",
+    "theta_r_deg",
+    "delta_phi_deg",
+    "theta_sd_deg",
+    "power_dbm",
+    "range_m",
+    "chirp",
+    "censored",
+];
+
+/// Angles that a surface can be seen under, degrees.
+const QUARTER_TURN_DEG: (f64, f64) = (0.0, 90.0);
+/// Levels that are no slip, dB.
+const LEVELS_DB: (f64, f64) = (-300.0, 300.0);
+/// Powers that are no slip, dBm.
+const POWERS_DBM: (f64, f64) = (-400.0, 400.0);
+/// Ranges that are no slip, m.
+const RANGES_M: (f64, f64) = (0.0, 1e6);
+
+/// Reads a curve's CSV: each point behind the number of its line. Lines of `#` at the head are left alone.
+///
+/// Where nothing was detected, `censor` is `left` and `threshold_db` the σ⁰ that it stayed below; `censored`
+/// = 1, as `matdb measure` writes, says the same of the level in `sigma0_db`.
+///
+/// # Errors
+/// The first cell that cannot be used, with its line and column.
+pub fn points(bytes: &[u8]) -> Result<Vec<(usize, Observation)>, FormatError> {
+    let table = Table::read(&without_head(bytes), &REQUIRED, &OPTIONAL)?;
+    (0..table.len()).map(|row| Ok((table.line(row), point(&table, row)?))).collect()
+}
+
+fn point(table: &Table, row: usize) -> Result<Observation, FormatError> {
+    let number = |column: &'static str, range| table.number_within(row, column, range);
+    table.required_number(row, "theta_deg")?;
+    let theta_i_deg = number("theta_deg", QUARTER_TURN_DEG)?.unwrap_or_default();
+    let censor = censor(table, row)?;
+    let level_db = number("sigma0_db", LEVELS_DB)?;
+    let limit_db = number("threshold_db", LEVELS_DB)?;
+    let is_flagged = censor == Censor::Left && table.cell(row, "censored").is_some();
+    let (level_db, limit_db) = match (censor, level_db, limit_db) {
+        (Censor::Left, level, limit) if is_flagged => (None, limit.or(level)),
+        (_, level, limit) => (level, limit),
+    };
+    stated(table, row, censor, [level_db, limit_db])?;
+    let chirp = table.cell(row, "chirp").map(|_| table.whole_number(row, "chirp")).transpose()?;
+    Ok(Observation {
+        theta_i_rad: theta_i_deg.to_radians(),
+        theta_r_rad: number("theta_r_deg", QUARTER_TURN_DEG)?.unwrap_or(theta_i_deg).to_radians(),
+        delta_phi_rad: table.number(row, "delta_phi_deg")?.unwrap_or(0.0).to_radians(),
+        sigma0: level_db.map(ratio_from_db),
+        censor,
+        threshold_sigma0: limit_db.map(ratio_from_db),
+        theta_sd_rad: number("theta_sd_deg", QUARTER_TURN_DEG)?.map(f64::to_radians),
+        power_w: number("power_dbm", POWERS_DBM)?.map(watts_from_dbm),
+        range_m: number("range_m", RANGES_M)?,
+        chirp,
+    })
+}
+
+fn censor(table: &Table, row: usize) -> Result<Censor, FormatError> {
+    let stated = match table.cell(row, "censor") {
+        None => None,
+        Some(cell) => Some(match cell.text {
+            "none" => Censor::None,
+            "left" => Censor::Left,
+            "right" => Censor::Right,
+            _ => return Err(cell.refuse("write none, left or right")),
+        }),
+    };
+    match (table.cell(row, "censored"), stated) {
+        (None, stated) => Ok(stated.unwrap_or(Censor::None)),
+        (Some(cell), Some(_)) => Err(cell.refuse("leave it empty, since `censor` says it")),
+        (Some(cell), None) => match cell.text.parse::<f64>() {
+            Ok(0.0) => Ok(Censor::None),
+            Ok(1.0) => Ok(Censor::Left),
+            _ => Err(cell.refuse("give 1 for a chirp without a detection, else 0")),
+        },
+    }
+}
+
+/// Refuses a row that has neither level nor limit, or the wrong one of them.
+fn stated(
+    table: &Table,
+    row: usize,
+    censor: Censor,
+    [level, limit]: [Option<f64>; 2],
+) -> Result<(), FormatError> {
+    const LIMIT: &str = "the limit, in σ⁰ dB, in `threshold_db` (the radar's threshold is in dBm and \
+                         stands elsewhere)";
+    let refuse = |column, problem, way_out: String| {
+        Err(FormatError::at(format!("line {}, column {column}", table.line(row)), problem, way_out))
+    };
+    match (censor, level, limit) {
+        (Censor::None, None, _) => refuse(
+            "sigma0_db",
+            "the cell is empty",
+            format!("where nothing was detected write `left` in `censor` and {LIMIT}"),
+        ),
+        (Censor::Left | Censor::Right, Some(_), _) => {
+            let way_out = "leave sigma0_db empty there, or `censor`";
+            refuse("sigma0_db", "the row has a level and is censored", way_out.to_owned())
+        }
+        (Censor::Left | Censor::Right, None, None) => {
+            refuse("threshold_db", "the cell is empty", format!("give {LIMIT}"))
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HEADER: &str = "theta_deg,sigma0_db,censor,threshold_db,censored\n";
+
+    fn read(row: &str) -> Result<Vec<(usize, Observation)>, String> {
+        points(format!("# head\n{HEADER}{row}\n").as_bytes()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn both_ways_of_saying_that_nothing_was_detected_say_the_same() {
+        let codes = read("60,,left,-30,").unwrap();
+        assert_eq!(codes, read("60,-30,,,1").unwrap());
+        let (line, point) = codes[0];
+        assert_eq!((line, point.censor, point.sigma0), (3, Censor::Left, None));
+        assert!((point.threshold_sigma0.unwrap() - 1e-3).abs() < 1e-15);
+        assert_eq!(read("60,-30,,,0").unwrap(), read("60,-30,none,,").unwrap());
+    }
+
+    #[test]
+    fn a_row_that_says_too_little_or_too_much_is_named_by_its_line() {
+        for (row, said) in [
+            ("60,,,,", "line 3, column sigma0_db: the cell is empty; where nothing was detected"),
+            ("60,,left,,", "line 3, column threshold_db: the cell is empty; give the limit, in σ⁰"),
+            ("60,-3,left,-30,", "line 3, column sigma0_db: the row has a level and is censored"),
+            ("60,-3,none,,1", "line 3, column censored: `1` is not accepted here"),
+            (
+                "95,-3,,,",
+                "line 3, column theta_deg: `95` is not accepted here; give a value from 0",
+            ),
+            ("60,-3,low,,", "line 3, column censor: `low`"),
+            (",-3,,,", "line 3, column theta_deg: the cell is empty"),
+        ] {
+            let error = read(row).unwrap_err();
+            assert!(error.starts_with(said), "{error}");
+        }
+    }
+}
