@@ -151,6 +151,8 @@ impl Citable<'_> {
     /// The material and its sources as sentences.
     pub fn text(&self) -> String {
         let mut text = format!("{}. {}.\n", self.title(), self.material.licence);
+        let status = self.material.status.sentence();
+        text += &status.map_or(String::new(), |said| format!("This entry is {said}\n"));
         for Reference { source, numbers } in references(self.material) {
             match &source {
                 Some(source) => text += &format!("\n{}", sentence(source)),
@@ -167,10 +169,12 @@ impl Citable<'_> {
 
     /// The material and its sources as BibTeX.
     pub fn bibtex(&self) -> String {
+        let licence = format!("Licence {}", self.material.licence);
+        let status = self.material.status.sentence();
         let own = [
             ("title", Some(self.title())),
             ("year", self.year.map(|year| year.to_string())),
-            ("note", Some(format!("Licence {}", self.material.licence))),
+            ("note", Some(status.map_or(licence.clone(), |said| format!("{licence}; {said}")))),
         ];
         let mut text = entry("misc", &self.key(), own);
         for source in &self.material.sources {
@@ -203,6 +207,7 @@ impl Citable<'_> {
             "issued": self.year.map(issued),
             "version": self.revision.map(|revision| revision.to_string()),
             "license": self.material.licence,
+            "note": self.material.status.sentence(),
         }));
         let sources = self.material.sources.iter().map(|source| {
             let Citation { authors, year, container, volume, pages, publisher } = &source.citation;
@@ -280,7 +285,7 @@ fn person(author: &str) -> Value {
 }
 
 /// Without what is not known.
-fn pruned(mut record: Value) -> Value {
+pub(super) fn pruned(mut record: Value) -> Value {
     if let Some(fields) = record.as_object_mut() {
         fields.retain(|_, value| !value.is_null());
     }

@@ -7,6 +7,7 @@ use super::link::doi_href;
 use super::words::cut;
 use crate::catalogue::About;
 use crate::catalogue::bibtex::entry;
+use crate::catalogue::references::pruned;
 use crate::store::Stored;
 
 /// How to cite a material.
@@ -30,9 +31,12 @@ impl Citation {
         let what =
             format!("{name} ({}, revision {}, content {hash})", material.slug, stored.revision);
         let year = stored.added_at.get(..4).unwrap_or_default();
-        let text = format!("{}{what}. In: {}", authors(about), catalogue_words(about));
-        let bibtex = bibtex(about, &format!("{}-{}", material.slug, stored.revision), &what, year);
-        let record = json!({
+        let status = material.status.sentence();
+        let said = status.as_ref().map_or(String::new(), |said| format!(" This entry is {said}"));
+        let text = format!("{}{what}. In: {}{said}", authors(about), catalogue_words(about));
+        let key = format!("{}-{}", material.slug, stored.revision);
+        let bibtex = bibtex(about, &key, &what, year, status.clone());
+        let record = pruned(json!({
             "@context": "https://schema.org/",
             "@type": "Dataset",
             "name": name,
@@ -47,7 +51,8 @@ impl Citation {
                 distribution(&format!("../api/v1/materials/{}.json", material.slug), "application/json"),
                 distribution(&format!("{}.csv", material.slug), "text/csv"),
             ],
-        });
+            "creativeWorkStatus": status,
+        }));
         Citation { text, bibtex, record }
     }
 }
@@ -59,7 +64,7 @@ pub(super) fn catalogue(about: &About) -> String {
 
 /// The catalogue for machines.
 pub(super) fn catalogue_record(about: &About) -> Value {
-    json!({
+    pruned(json!({
         "@context": "https://schema.org/",
         "@type": "DataCatalog",
         "name": about.title,
@@ -68,7 +73,7 @@ pub(super) fn catalogue_record(about: &About) -> Value {
         "version": about.version,
         "url": about.url,
         "creator": creators(about),
-    })
+    }))
 }
 
 fn distribution(path: &str, media_type: &str) -> Value {
@@ -81,13 +86,13 @@ fn spdx(licence: &str) -> String {
 
 fn creators(about: &About) -> Vec<Value> {
     let person = |person: &crate::catalogue::about::Person| {
-        json!({
+        pruned(json!({
             "@type": "Person",
             "familyName": person.family,
             "givenName": person.given,
             "affiliation": person.affiliation,
             "identifier": person.orcid.as_ref().map(|orcid| format!("https://orcid.org/{orcid}")),
-        })
+        }))
     };
     about.people.iter().map(person).collect()
 }
@@ -110,7 +115,7 @@ fn place(about: &About) -> Option<String> {
     doi.or_else(|| about.url.clone())
 }
 
-fn bibtex(about: &About, key: &str, title: &str, year: &str) -> String {
+fn bibtex(about: &About, key: &str, title: &str, year: &str, note: Option<String>) -> String {
     let names: Vec<String> =
         about.people.iter().map(|person| format!("{}, {}", person.family, person.given)).collect();
     let fields = [
@@ -121,6 +126,7 @@ fn bibtex(about: &About, key: &str, title: &str, year: &str) -> String {
         ("version", about.version.clone()),
         ("doi", about.doi.clone()),
         ("url", about.url.clone()),
+        ("note", note),
     ];
     let short = fields.map(|(name, value)| (name, value.map(|value| cut(&value, 400))));
     entry("misc", &format!("matdb-{key}"), short).trim_end().to_owned()
