@@ -317,8 +317,19 @@ fn a_withdrawn_material_stays_with_its_reason_and_is_found_by_it() {
     assert!(refused(&mut withdraw(&["--superseded-by", "hdp"])).contains("did you mean `hdpe`?"));
     withdraw(&[]).assert().success();
     assert_eq!(slugs(&json(folder, &["list", "--status", "withdrawn"])), ["ptfe"]);
-    let said = text(folder, &["show", "ptfe"]);
-    assert!(said.contains("withdrawn: The trihedral was dented."), "{said}");
+    for command in [&["show", "ptfe"][..], &["cite", "ptfe"], &["cite", "ptfe", "--bibtex"]] {
+        let said = text(folder, command);
+        assert!(said.contains("withdrawn: The trihedral was dented."), "{command:?}: {said}");
+    }
+    assert!(text(folder, &["list"]).contains("synthetic, withdrawn"));
+    assert!(text(folder, &["search", "ptfe"]).contains("revision 2, withdrawn"));
+    assert_eq!(json(folder, &["search", "ptfe"])[0]["status"], "withdrawn");
+    let csl = json(folder, &["cite", "ptfe"])["csl"][0]["note"].clone();
+    assert_eq!(csl, "withdrawn: The trihedral was dented.");
+    let export = ["export", "ptfe", "--as", "csv", "-o", "ptfe.csv"];
+    let output = matdb(folder).args(export).output().unwrap();
+    assert!(String::from_utf8_lossy(&output.stderr).contains("`ptfe` is withdrawn: The trihedral"));
+    assert!(!text(folder, &["list"]).contains("active"));
     withdraw(&["--superseded-by", "hdpe"]).assert().success();
     let said = text(folder, &["show", "ptfe"]);
     assert!(said.contains("superseded: The trihedral was dented.; use hdpe"), "{said}");

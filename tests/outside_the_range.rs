@@ -159,3 +159,24 @@ fn the_scenes_that_come_with_the_program_still_run() {
         said.contains("`human-skin` is described for 100 GHz") && said.contains("200 GHz away")
     );
 }
+
+#[test]
+fn a_withdrawn_material_is_rendered_with_its_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("scene.toml"), PLATE.replace("ptfe", "glass")).unwrap();
+    let rendered = || {
+        let arguments = ["render", "scene.toml", "-o", "out"];
+        let output = matdb(folder.path()).args(arguments).output().unwrap();
+        let record = fs::read(folder.path().join("out/scan.json")).unwrap();
+        let record: Value = serde_json::from_slice(&record).unwrap();
+        let status = record["materials"][0]["status"].clone();
+        (String::from_utf8(output.stderr).unwrap(), status)
+    };
+    let (said, status) = rendered();
+    assert!(!said.contains("withdrawn") && status.is_null(), "{said}");
+    matdb(folder.path()).args(["add", "-q", "glass"]).assert().success();
+    matdb(folder.path()).args(["withdraw", "glass", "--reason", "Dented."]).assert().success();
+    let (said, status) = rendered();
+    assert!(said.contains("`glass` is withdrawn: Dented."), "{said}");
+    assert_eq!((&status["is"], &status["reason"]), (&"withdrawn".into(), &"Dented.".into()));
+}

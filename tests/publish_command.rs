@@ -203,6 +203,58 @@ fn what_the_publication_there_says_of_itself_stays_and_is_said() {
 }
 
 #[test]
+fn a_withdrawn_material_says_so_in_every_file_that_names_it() {
+    let folder = laboratory();
+    publish(folder.path());
+    let site = folder.path().join("site");
+    let read = |path: &str| fs::read_to_string(site.join(path)).unwrap();
+    assert!(
+        !read("api/v1/index.json").contains("status") && !read("index/1.js").contains("status")
+    );
+    let withdraw = ["withdraw", "primer", "--reason", "Levels are <3> dB low."];
+    matdb(folder.path()).args(withdraw).assert().success();
+    publish(folder.path());
+    let index = json(&site.join("api/v1/index.json"));
+    let primer = index["materials"].as_array().unwrap().iter().find(|m| m["slug"] == "primer");
+    let reason = "Levels are <3> dB low.";
+    assert_eq!(
+        primer.unwrap()["status"],
+        serde_json::json!({ "is": "withdrawn", "reason": reason })
+    );
+    let changes = json(&site.join("changes.json"));
+    let now = &changes["publications"][0];
+    assert_eq!(now["withdrawn"][0]["slug"], "primer");
+    assert_eq!(now["withdrawn"][0]["now"]["revision"], 2);
+    assert_eq!(
+        (now["added"].clone(), now["changed"].clone()),
+        (Value::from([0; 0]), Value::from([0; 0]))
+    );
+    for (schema, value) in [("index.json", &index), ("changes.json", &changes)] {
+        assert_eq!(problems(&json(&site.join("schema").join(schema)), value), [""; 0]);
+    }
+    let said = read("CHANGES.md");
+    assert!(said.contains("Withdrawn:\n\n- primer, revision 1 to 2, withdrawn: Levels"), "{said}");
+    assert!(read("index/1.js").contains("\"status\":\"withdrawn\""));
+    assert!(read("data/primer.js").contains("\"status\":\"withdrawn\""));
+    assert!(read("data/paint.js").contains("\"status\":null"));
+    assert_eq!(read("list/1.html").matches("is-withdrawn").count(), 1);
+    let page = read("material/primer.html");
+    let title = page.find("</h1>").unwrap();
+    let said = page.find("This entry is withdrawn.").unwrap();
+    assert!(
+        said > title && !page[title..said].contains("class=\"facts\""),
+        "directly below the title"
+    );
+    assert!(page.contains("\"creativeWorkStatus\":\"withdrawn: Levels are \\u003c3"));
+    assert!(page.contains("This entry is withdrawn: Levels are &lt;3&gt; dB low."));
+    assert!(!page.contains("\":null"), "linked data say only what is known");
+    assert!(!read("index.html").contains("\":null"));
+    // Nothing turns withdrawn twice.
+    publish(folder.path());
+    assert_eq!(json(&site.join("changes.json")), changes);
+}
+
+#[test]
 fn nothing_of_somebody_elses_folder_is_touched() {
     let folder = laboratory();
     let at = folder.path();

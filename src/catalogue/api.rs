@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::folder::INDEX;
 use super::{About, CatalogueError, Folder};
-use crate::material::{Material, Slug};
+use crate::material::{Material, Slug, Status};
 use crate::store::{Stored, Summary};
 
 /// The version of the shape of every JSON file here.
@@ -74,6 +74,9 @@ pub(super) struct Entry {
     pub fits: u32,
     /// From the folder of the publication.
     pub path: String,
+    /// Whether it may still be used.
+    #[serde(default, skip_serializing_if = "Status::is_active")]
+    pub status: Status,
 }
 
 impl Entry {
@@ -91,6 +94,7 @@ impl Entry {
             observations: summary.observations,
             fits: summary.fits,
             path: path(summary.slug.as_str()),
+            status: stored.material.status.clone(),
         }
     }
 }

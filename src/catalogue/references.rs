@@ -167,6 +167,8 @@ impl Citable<'_> {
     pub fn text(&self) -> String {
         let mut text = format!("{}. {}.\n", self.title(), self.material.licence);
         text += &self.taken_from().map_or(String::new(), |from| format!("{from}.\n"));
+        let status = self.material.status.sentence();
+        text += &status.map_or(String::new(), |said| format!("This entry is {said}\n"));
         for Reference { source, numbers } in references(self.material) {
             match &source {
                 Some(source) => text += &format!("\n{}", sentence(source)),
@@ -190,13 +192,15 @@ impl Citable<'_> {
 
     /// The material and its sources as BibTeX.
     pub fn bibtex(&self) -> String {
+        let licence = format!("Licence {}", self.material.licence);
+        let status = self.material.status.sentence();
         let own = [
             ("title", Some(self.title())),
             ("howpublished", self.taken_from()),
             ("year", self.year.map(|year| year.to_string())),
             ("doi", self.origin.and_then(|origin| origin.doi.clone())),
             ("url", self.origin.and_then(|origin| origin.url.clone())),
-            ("note", Some(format!("Licence {}", self.material.licence))),
+            ("note", Some(status.map_or(licence.clone(), |said| format!("{licence}; {said}")))),
         ];
         let mut text = entry("misc", &self.key(), own);
         for source in &self.material.sources {
@@ -222,6 +226,9 @@ impl Citable<'_> {
 
     /// The material and its sources as CSL-JSON.
     pub fn csl(&self) -> Value {
+        let notes: Vec<String> =
+            self.taken_from().into_iter().chain(self.material.status.sentence()).collect();
+        let note = (!notes.is_empty()).then(|| notes.join("; "));
         let own = pruned(json!({
             "id": self.key(),
             "type": "dataset",
@@ -231,8 +238,8 @@ impl Citable<'_> {
             "container-title": self.origin.map(Origin::title),
             "DOI": self.origin.and_then(|origin| origin.doi.clone()),
             "URL": self.origin.and_then(|origin| origin.url.clone()),
-            "note": self.taken_from(),
             "license": self.material.licence,
+            "note": note,
         }));
         let sources = self.material.sources.iter().map(|source| {
             let Citation { authors, year, container, volume, pages, publisher } = &source.citation;
@@ -310,7 +317,7 @@ fn person(author: &str) -> Value {
 }
 
 /// Without what is not known.
-fn pruned(mut record: Value) -> Value {
+pub(super) fn pruned(mut record: Value) -> Value {
     if let Some(fields) = record.as_object_mut() {
         fields.retain(|_, value| !value.is_null());
     }

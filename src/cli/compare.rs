@@ -8,7 +8,7 @@ use super::cloud::{CloudArgs, pose};
 use super::console::Console;
 use super::database::Database;
 use super::output::write_all;
-use super::staging::{Used, beyond_frequency, effects, materials, model, setup, surfaces};
+use super::staging::{Used, effects, materials, model, notices, setup, surfaces};
 use super::summary::grouped;
 use crate::error::Error;
 use crate::formats::figure::{Figure, Plot, Scale, Series, Style, beside};
@@ -133,7 +133,7 @@ fn simulate(args: &Args, scene: &Scene, db: &Database) -> Result<Simulated, Erro
     let setup = setup(scene, &bvh, &surfaces, model.as_ref());
     let footprints = trace_placed(&setup, scene.file.spot.rays, &|_| {}).map_err(at)?;
     let scan = shade(&setup, &footprints, Observer::Radar, &|_| {}).map_err(at)?;
-    let notices = beyond_frequency(&used, scene.radar());
+    let notices = notices(&used, scene.radar());
     Ok(Simulated { scan, material_of_region, notices })
 }
 

@@ -6,7 +6,7 @@ use clap::ValueEnum;
 
 use super::console::Console;
 use super::database::Database;
-use super::materials::not_added;
+use super::materials::{not_added, with_status};
 use super::summary::{grouped, table};
 use crate::error::Error;
 use crate::material::SourceKind;
@@ -167,7 +167,7 @@ fn row(m: &Summary) -> [String; 8] {
     [
         m.slug.to_string(),
         m.revision.to_string(),
-        m.render_kind.as_str().to_owned(),
+        with_status(m.render_kind.as_str(), &m.status),
         m.class.clone(),
         m.curves.to_string(),
         m.observations.to_string(),

@@ -58,6 +58,19 @@ pub(super) fn not_added(store: Option<&Store>) -> Result<Store, Error> {
     Ok(built_in)
 }
 
+/// A cell of a table with the status of its material, which goes without saying while it is active.
+pub(super) fn with_status(cell: &str, status: &str) -> String {
+    match status {
+        "active" => cell.to_owned(),
+        status => format!("{cell}, {status}"),
+    }
+}
+
+/// That a material should not be used any more.
+pub(super) fn not_to_be_used(material: &Material) -> Option<String> {
+    Some(format!("`{}` is {}", material.slug, material.status.sentence()?))
+}
+
 /// The error for a name that nobody knows, with the nearest known one.
 pub(super) fn unknown(store: Option<&Store>, wanted: &str, asked_by: &str) -> Result<Error, Error> {
     let mut known: Vec<String> = builtin::names().map(str::to_owned).collect();

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::console::Console;
 use super::database::Database;
-use super::materials::not_added;
+use super::materials::{not_added, with_status};
 use super::summary::table;
 use crate::error::Error;
 use crate::store::{Hit, Store};
@@ -61,7 +61,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 fn row(Record { hit, origin }: &Record) -> [String; 4] {
     let place = match *origin {
         "built-in" => "built in, not added".to_owned(),
-        _ => format!("revision {}", hit.revision),
+        _ => with_status(&format!("revision {}", hit.revision), &hit.status),
     };
     let snippet = hit.snippet.split_whitespace().collect::<Vec<_>>().join(" ");
     [hit.slug.to_string(), place, hit.name.clone(), snippet]

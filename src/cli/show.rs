@@ -95,11 +95,8 @@ fn describe(material: &Material, origin: &str) -> Result<String, Error> {
 /// Whether it may still be used, and what is not known of it.
 fn status(material: &Material) -> String {
     let mut text = String::new();
-    if let Some(reason) = material.status.reason() {
-        text += &format!("{}: {reason}", material.status.as_str());
-        let by = material.status.superseded_by();
-        text += &by.map_or(String::new(), |by| format!("; use {by}"));
-        text += "\n\n";
+    if let Some(sentence) = material.status.sentence() {
+        text += &format!("{sentence}\n\n");
     }
     for sentence in &material.unknown {
         text += &format!("not known: {sentence}\n");

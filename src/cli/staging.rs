@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use super::database::Database;
-use super::materials::{Found, find};
+use super::materials::{Found, find, not_to_be_used};
 use crate::brdf::Brdf;
 use crate::effects::{Chosen, Level, Model, Receiver, SceneEffects, resolve};
 use crate::error::Error;
 use crate::formats::EffectEntry;
+use crate::material::Material;
 use crate::radar::Radar;
 use crate::render::{Bounce, Setup, Surface};
 use crate::scene::Scene;
@@ -22,33 +23,26 @@ pub(super) struct Used {
     pub effects: Chosen,
 }
 
-/// Sentences on materials that make no claim at the radar's frequency.
-pub(super) fn beyond_frequency(used: &[Used], radar: &Radar) -> Vec<String> {
-    let frequency_ghz = radar.centre_frequency_ghz;
-    used.iter()
-        .filter_map(|Used { found, .. }| {
-            let material = &found.material;
-            let outside_ghz = material.frequency_outside_hz(frequency_ghz * 1e9) / 1e9;
-            let range_ghz = material.frequency_hz.map(|hz| hz / 1e9);
-            let name = material.slug.as_str();
-            (outside_ghz > 0.0).then(|| extrapolated(name, range_ghz, frequency_ghz, outside_ghz))
-        })
-        .collect()
+/// Sentences on materials that are not to be used, or make no claim at the radar's frequency.
+pub(super) fn notices(used: &[Used], radar: &Radar) -> Vec<String> {
+    let materials = || used.iter().map(|used| &used.found.material);
+    let extrapolated = materials().filter_map(|material| extrapolated(material, radar));
+    materials().filter_map(not_to_be_used).chain(extrapolated).collect()
 }
 
 /// That a material makes no claim at the radar's frequency.
-pub(super) fn extrapolated(
-    name: &str,
-    range_ghz: [f64; 2],
-    frequency_ghz: f64,
-    outside_ghz: f64,
-) -> String {
-    format!(
-        "`{name}` is described for {} GHz, the radar works at {frequency_ghz} GHz, {} GHz away: what it \
-         returns is extrapolated",
-        range(range_ghz),
-        shown(rounded(outside_ghz))
-    )
+fn extrapolated(material: &Material, radar: &Radar) -> Option<String> {
+    let frequency_ghz = radar.centre_frequency_ghz;
+    let outside_ghz = material.frequency_outside_hz(frequency_ghz * 1e9) / 1e9;
+    (outside_ghz > 0.0).then(|| {
+        format!(
+            "`{}` is described for {} GHz, the radar works at {frequency_ghz} GHz, {} GHz away: what it \
+             returns is extrapolated",
+            material.slug,
+            range(material.frequency_hz.map(|hz| hz / 1e9)),
+            shown(rounded(outside_ghz))
+        )
+    })
 }
 
 /// The surface of each region of a scene.

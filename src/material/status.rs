@@ -52,8 +52,14 @@ impl Status {
         }
     }
 
+    /// What to say of an entry that is not to be used: `withdrawn: the reason`; none while it is active.
+    pub fn sentence(&self) -> Option<String> {
+        let by = self.superseded_by().map_or(String::new(), |by| format!("; use {by}"));
+        Some(format!("{}: {}{by}", self.as_str(), self.reason()?))
+    }
+
     /// Whether nothing is to be said.
-    pub(super) fn is_active(&self) -> bool {
+    pub fn is_active(&self) -> bool {
         *self == Status::Active
     }
 

@@ -38,6 +38,8 @@ pub struct Hit {
     pub revision: u32,
     /// Some words around those that were found, which stand in brackets.
     pub snippet: String,
+    /// `active`, `superseded` or `withdrawn`.
+    pub status: String,
     /// How well it fits (BM25), less is better; comparable only within one search, 0 where not ranked.
     pub rank: f64,
 }

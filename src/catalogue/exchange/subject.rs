@@ -160,9 +160,7 @@ impl<'a> Subject<'a> {
         ];
         lines.extend(self.sources().iter().map(|source| format!("source, {source}")));
         lines.extend(material.unknown.iter().map(|sentence| format!("not known: {sentence}")));
-        if let Some(reason) = material.status.reason() {
-            lines.push(format!("{}: {reason}", material.status.as_str()));
-        }
+        lines.extend(material.status.sentence());
         lines.iter().map(|line| one_line(line)).collect()
     }
 }

@@ -8,9 +8,10 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::catalogue::api::{Index, SCHEMA_VERSION};
+use crate::catalogue::api::{Entry, Index, SCHEMA_VERSION};
 use crate::catalogue::folder::INDEX;
 use crate::catalogue::{CatalogueError, Folder, api};
+use crate::material::{Slug, Status};
 
 const CHANGES: &str = "changes.json";
 
@@ -27,22 +28,25 @@ struct Publication {
     date: Option<String>,
     added: Vec<Change>,
     changed: Vec<Change>,
-    /// What is no longer in the catalogue.
+    /// What must not be used any more, or is no longer in the catalogue.
     withdrawn: Vec<Change>,
 }
 
 #[derive(Serialize, Deserialize)]
 struct Change {
-    slug: String,
+    slug: Slug,
     /// As it is now.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     now: Option<State>,
     /// As it was before.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     before: Option<State>,
+    /// Whether it may still be used.
+    #[serde(default, skip_serializing_if = "Status::is_active")]
+    status: Status,
 }
 
-#[derive(Clone, PartialEq, Serialize, Deserialize)]
+#[derive(PartialEq, Serialize, Deserialize)]
 struct State {
     revision: u32,
     content_hash: String,
@@ -63,9 +67,9 @@ pub(super) fn write(folder: &mut Folder, index: &Index) -> Result<bool, Catalogu
             let before: Index = read(earlier, INDEX)?;
             let changes: Changes = read(earlier, CHANGES)?;
             is_reused = index.version.is_some() && index.version == before.version;
-            (states(&before), changes.publications)
+            (before.materials, changes.publications)
         }
-        None => (BTreeMap::new(), Vec::new()),
+        None => (Vec::new(), Vec::new()),
     };
     let new = publication(index, &before);
     let is_first = publications.is_empty();
@@ -91,30 +95,34 @@ fn read<T: DeserializeOwned>(folder: &Path, name: &str) -> Result<T, CatalogueEr
     serde_json::from_slice(&bytes).map_err(|error| earlier(error.to_string()))
 }
 
-fn states(index: &Index) -> BTreeMap<String, State> {
-    let state = |entry: &api::Entry| State {
-        revision: entry.revision,
-        content_hash: entry.content_hash.clone(),
-    };
-    index.materials.iter().map(|entry| (entry.slug.to_string(), state(entry))).collect()
+impl State {
+    fn of(entry: &Entry) -> State {
+        State { revision: entry.revision, content_hash: entry.content_hash.clone() }
+    }
 }
 
-fn publication(index: &Index, before: &BTreeMap<String, State>) -> Publication {
-    let (mut added, mut changed) = (Vec::new(), Vec::new());
-    let now = states(index);
-    for (slug, state) in &now {
-        let was = before.get(slug).cloned();
-        let list = match &was {
+fn publication(index: &Index, before: &[Entry]) -> Publication {
+    let (mut added, mut changed, mut withdrawn) = (Vec::new(), Vec::new(), Vec::new());
+    let mut gone: BTreeMap<&Slug, &Entry> = before.iter().map(|was| (&was.slug, was)).collect();
+    let is_withdrawn = |entry: &Entry| matches!(entry.status, Status::Withdrawn { .. });
+    for entry in &index.materials {
+        let (was, now) = (gone.remove(&entry.slug), State::of(entry));
+        let before = was.map(State::of);
+        let list = match was {
             None => &mut added,
-            Some(was) if was == state => continue,
+            Some(_) if before.as_ref() == Some(&now) => continue,
+            Some(was) if is_withdrawn(entry) && !is_withdrawn(was) => &mut withdrawn,
             Some(_) => &mut changed,
         };
-        list.push(Change { slug: slug.clone(), now: Some(state.clone()), before: was });
+        let (slug, status) = (entry.slug.clone(), entry.status.clone());
+        list.push(Change { slug, now: Some(now), before, status });
     }
-    let gone = before.iter().filter(|(slug, _)| !now.contains_key(*slug));
-    let withdrawn = gone
-        .map(|(slug, was)| Change { slug: slug.clone(), now: None, before: Some(was.clone()) })
-        .collect();
+    withdrawn.extend(gone.into_values().map(|was| Change {
+        slug: was.slug.clone(),
+        now: None,
+        before: Some(State::of(was)),
+        status: Status::Active,
+    }));
     let (version, date) = (index.version.clone(), index.date.clone());
     Publication { version, date, added, changed, withdrawn }
 }
@@ -124,8 +132,7 @@ fn text(changes: &Changes) -> String {
         "# Changes\n\nFrom one publication of this catalogue to the next, the newest first.\n"
             .to_owned();
     for publication in &changes.publications {
-        let harmless = |text: &String| text.chars().filter(|c| !c.is_control()).collect();
-        let version: String = publication.version.as_ref().map(harmless).unwrap_or_default();
+        let version = publication.version.as_deref().map(harmless).unwrap_or_default();
         let date = publication.date.as_deref().and_then(|date| date.get(..10)).unwrap_or("empty");
         let words: Vec<&str> =
             [version.as_str(), date].into_iter().filter(|w| !w.is_empty()).collect();
@@ -149,5 +156,11 @@ fn line(change: &Change) -> String {
         (Some(state), None) | (None, Some(state)) => format!("revision {}", state.revision),
         (None, None) => String::new(),
     };
-    format!("- {}, {revision}\n", change.slug)
+    let status = change.status.sentence().map_or(String::new(), |said| format!(", {said}"));
+    format!("- {}, {revision}{}\n", change.slug, harmless(&status))
+}
+
+/// Text that stays on its line.
+fn harmless(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control()).collect()
 }

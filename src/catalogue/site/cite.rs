@@ -7,6 +7,7 @@ use super::link::doi_href;
 use super::words::cut;
 use crate::catalogue::About;
 use crate::catalogue::bibtex::entry;
+use crate::catalogue::references::pruned;
 use crate::material::{Origin, builtin};
 use crate::store::Stored;
 
@@ -60,7 +61,7 @@ impl Citation {
         let what =
             format!("{name} ({}, revision {}, content {hash})", material.slug, stored.revision);
         let credit = Credit::of(stored);
-        let text = match &credit {
+        let mut text = match &credit {
             Credit::Publisher => {
                 format!("{}{what}. In: {}", authors(about), catalogue_words(about))
             }
@@ -70,8 +71,10 @@ impl Citation {
                 format!("{what}. In: {there}. Republished in: {}", catalogue_words(about))
             }
         };
+        let status = material.status.sentence();
+        text += &status.as_ref().map_or(String::new(), |said| format!(" This entry is {said}"));
         let key = format!("{}-{}", material.slug, stored.revision);
-        let bibtex = bibtex(about, &credit, &key, &what, &stored.added_at);
+        let bibtex = bibtex(about, &credit, &key, &what, &stored.added_at, status.clone());
         let creator = match credit {
             Credit::Publisher => creators(about),
             Credit::BuiltIn | Credit::Others(_) => Vec::new(),
@@ -81,7 +84,7 @@ impl Citation {
             Credit::BuiltIn => Some(("Made by", "matdb, which it is built into".to_owned())),
             Credit::Others(origin) => Some(("Imported from", origin.catalogue())),
         };
-        let record = json!({
+        let record = pruned(json!({
             "@context": "https://schema.org/",
             "@type": "Dataset",
             "name": name,
@@ -96,7 +99,8 @@ impl Citation {
                 distribution(&format!("../api/v1/materials/{}.json", material.slug), "application/json"),
                 distribution(&format!("{}.csv", material.slug), "text/csv"),
             ],
-        });
+            "creativeWorkStatus": status,
+        }));
         Citation { text, bibtex, origin, record }
     }
 }
@@ -108,7 +112,7 @@ pub(super) fn catalogue(about: &About) -> String {
 
 /// The catalogue for machines.
 pub(super) fn catalogue_record(about: &About) -> Value {
-    json!({
+    pruned(json!({
         "@context": "https://schema.org/",
         "@type": "DataCatalog",
         "name": about.title,
@@ -117,7 +121,7 @@ pub(super) fn catalogue_record(about: &About) -> Value {
         "version": about.version,
         "url": about.url,
         "creator": creators(about),
-    })
+    }))
 }
 
 fn distribution(path: &str, media_type: &str) -> Value {
@@ -130,13 +134,13 @@ fn spdx(licence: &str) -> String {
 
 fn creators(about: &About) -> Vec<Value> {
     let person = |person: &crate::catalogue::about::Person| {
-        json!({
+        pruned(json!({
             "@type": "Person",
             "familyName": person.family,
             "givenName": person.given,
             "affiliation": person.affiliation,
             "identifier": person.orcid.as_ref().map(|orcid| format!("https://orcid.org/{orcid}")),
-        })
+        }))
     };
     about.people.iter().map(person).collect()
 }
@@ -159,7 +163,14 @@ fn place(about: &About) -> Option<String> {
     doi.or_else(|| about.url.clone())
 }
 
-fn bibtex(about: &About, credit: &Credit, key: &str, title: &str, added_at: &str) -> String {
+fn bibtex(
+    about: &About,
+    credit: &Credit,
+    key: &str,
+    title: &str,
+    added_at: &str,
+    status: Option<String>,
+) -> String {
     let names: Vec<String> =
         about.people.iter().map(|person| format!("{}, {}", person.family, person.given)).collect();
     let authors = (!names.is_empty()).then(|| names.join(" and "));
@@ -172,6 +183,8 @@ fn bibtex(about: &About, credit: &Credit, key: &str, title: &str, added_at: &str
             (None, there, Some(format!("Republished in {}", catalogue_words(about))))
         }
     };
+    let notes: Vec<String> = note.into_iter().chain(status).collect();
+    let note = (!notes.is_empty()).then(|| notes.join("; "));
     let added_at = if let Credit::Others(origin) = credit { &origin.added_at } else { added_at };
     let fields = [
         ("author", author),

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use serde_json::{Value, json};
 
 use super::curve::marks;
-use super::entry::kind_of;
+use super::entry::{kind_of, status_of};
 use super::levels::{self, TABLE_DEG, claimed_db, range_deg, tenth};
 use super::words::cut;
 use crate::brdf::Scattering;
@@ -28,6 +28,7 @@ pub(super) fn data(material: &Material) -> Value {
         "slug": material.slug,
         "name": cut(&material.name, 200),
         "kind": material.render_kind().map_or("unknown", SourceKind::as_str),
+        "status": status_of(material),
         "render": material.render,
         "ghz": material.frequency_hz.map(|hz| hz / 1e9),
         "deg": range_deg(material),

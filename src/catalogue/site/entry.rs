@@ -19,6 +19,9 @@ pub(super) struct Entry {
     tags: Vec<String>,
     text: String,
     kind: &'static str,
+    /// `superseded` or `withdrawn`; none of what may still be used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    status: Option<&'static str>,
     /// Lowest and highest frequency, GHz.
     ghz: [f64; 2],
     /// Smallest and largest angle, °.
@@ -47,6 +50,7 @@ impl Entry {
             tags: material.tags.iter().map(|tag| cut(tag, NAME)).collect(),
             text: clean(&cut(&material.description, DESCRIPTION)),
             kind: material.render_kind().map_or("unknown", SourceKind::as_str),
+            status: status_of(material),
             ghz: material.frequency_hz.map(|hz| hz / 1e9),
             deg: range_deg(material),
             fitted: material.fits.iter().any(|fit| fit.curve.is_some()),
@@ -56,6 +60,11 @@ impl Entry {
             level: SMALL_DEG.iter().map(level).collect(),
         }
     }
+}
+
+/// `superseded` or `withdrawn`; none of what may still be used.
+pub(super) fn status_of(material: &Material) -> Option<&'static str> {
+    (!material.status.is_active()).then(|| material.status.as_str())
 }
 
 /// Whether somebody measured one of the curves.

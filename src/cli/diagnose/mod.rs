@@ -21,7 +21,7 @@ use super::console::Console;
 use super::database::{Database, USUAL};
 use super::effects::chosen;
 use super::output::write_all;
-use super::staging::{beyond_frequency, materials, model};
+use super::staging::{materials, model, notices};
 use crate::brdf::Brdf;
 use crate::diagnose::{Declared, DiagnoseError, Diagnosis, Report, Subject, looks, matched};
 use crate::effects::{Effect, Receiver, Stage, middle};
@@ -91,7 +91,7 @@ struct Context {
     regions: Vec<(String, String)>,
     /// Detections that were set aside.
     false_alarms: usize,
-    /// Sentences on materials that are extrapolated to the radar's frequency.
+    /// Sentences on materials that are not to be used, or are extrapolated to the radar's frequency.
     beyond: Vec<String>,
     seed: u64,
     /// This command, as a person would type it again.
@@ -159,7 +159,7 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     };
     let laws: Vec<Brdf> =
         material_of_region.iter().map(|&m| used[usize::from(m)].scattering.clone()).collect();
-    let beyond = beyond_frequency(&used, scene.radar());
+    let beyond = notices(&used, scene.radar());
     cloud.notices.iter().chain(&beyond).for_each(|notice| console.notice(notice));
     let bar = console.spinner("diagnosing");
     let hear = |what: &str| bar.set_message(format!("diagnosing: {what}"));

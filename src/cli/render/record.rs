@@ -5,10 +5,11 @@ use serde_json::{Value, json};
 
 use super::views::View;
 use crate::cli::materials::Found;
-use crate::cli::staging::{Used, extrapolated};
+use crate::cli::staging::{self, Used};
 use crate::effects::{Level, Model, entry};
 use crate::formats::EffectEntry;
 use crate::geometry::Raster;
+use crate::material::Status;
 use crate::radar::Radar;
 use crate::render::{Scan, Truth};
 use crate::scene::{MeshReport, Scene};
@@ -50,6 +51,8 @@ pub(super) struct Record<'a> {
     receivers: Vec<ReceiverRecord<'a>>,
     #[serde(skip)]
     scan_notices: &'a [String],
+    #[serde(skip)]
+    used: &'a [Used],
 }
 
 #[derive(Serialize)]
@@ -81,6 +84,9 @@ struct MaterialRecord<'a> {
     revision: Option<u32>,
     origin: &'static str,
     kind: Option<&'static str>,
+    /// Whether it may still be used.
+    #[serde(skip_serializing_if = "Status::is_active")]
+    status: &'a Status,
     content_blake3: String,
     frequency_ghz: [f64; 2],
     /// How far the radar's centre frequency lies outside of these, 0 within.
@@ -184,6 +190,7 @@ impl<'a> Record<'a> {
                 .filter_map(|(view, image)| ReceiverRecord::new(scene, view, image))
                 .collect(),
             scan_notices: &scene.chirps.notices,
+            used,
         }
     }
 
@@ -240,12 +247,7 @@ impl<'a> Record<'a> {
                  target is too near or too bright for the power balance to hold"
             ));
         }
-        let frequency_ghz = self.radar.centre_frequency_ghz;
-        for material in self.materials.iter().filter(|m| m.frequency_outside_ghz > 0.0) {
-            let MaterialRecord { name, frequency_ghz: range_ghz, .. } = *material;
-            let outside_ghz = material.frequency_outside_ghz;
-            notices.push(extrapolated(name, range_ghz, frequency_ghz, outside_ghz));
-        }
+        notices.extend(staging::notices(self.used, self.radar));
         notices
     }
 
@@ -310,6 +312,7 @@ impl<'a> MaterialRecord<'a> {
             revision: *revision,
             origin: if revision.is_some() { "database" } else { "built-in" },
             kind: material.render_kind().map(|kind| kind.as_str()),
+            status: &material.status,
             content_blake3: material.content_hash(),
             frequency_ghz: material.frequency_hz.map(|f| f / 1e9),
             frequency_outside_ghz: outside_hz / 1e9,

@@ -55,9 +55,9 @@ fn are_rare(conn: &Connection, phrases: &[String]) -> Result<bool> {
 /// The best first.
 fn ranked(conn: &Connection, query: &str, most: u32) -> Result<Vec<Hit>> {
     let sql = "
-        SELECT search.slug, search.name, current_revision,
+        SELECT search.slug, search.name, revision, status,
             snippet(search, -1, '[', ']', '…', 12), rank
-        FROM search JOIN material ON material.id = search.rowid
+        FROM search JOIN entry ON material_id = search.rowid
         WHERE search MATCH ?1 AND rank MATCH 'bm25(10, 10, 5, 5, 1, 2, 1, 1)'
         ORDER BY rank LIMIT ?2";
     rows(conn, sql, params![query, most], hit)
@@ -66,9 +66,9 @@ fn ranked(conn: &Connection, query: &str, most: u32) -> Result<Vec<Hit>> {
 /// Those whose short name begins with the words, then those with the whole words, then all.
 fn unranked(conn: &Connection, words: &str, phrases: &[String], most: u32) -> Result<Vec<Hit>> {
     let sql = "
-        SELECT search.slug, search.name, current_revision,
+        SELECT search.slug, search.name, revision, status,
             snippet(search, -1, '[', ']', '…', 12), 0.0
-        FROM search JOIN material ON material.id = search.rowid
+        FROM search JOIN entry ON material_id = search.rowid
         WHERE search MATCH ?1 ORDER BY search.rowid LIMIT ?2";
     let mut found = called(conn, words, most)?;
     let wanted = usize::try_from(most).unwrap_or(usize::MAX);
@@ -89,13 +89,14 @@ fn called(conn: &Connection, words: &str, most: u32) -> Result<Vec<Hit>> {
     let begin = words.split_whitespace().collect::<Vec<_>>().join("-").to_lowercase();
     // In ASCII the signs of short names all come before it.
     let end = format!("{begin}~");
-    let sql = "SELECT slug, name, revision FROM entry
+    let sql = "SELECT slug, name, revision, status FROM entry
                WHERE slug >= ?1 AND slug < ?2 ORDER BY slug LIMIT ?3";
     rows(conn, sql, params![begin, end, most], |row| {
         let slug: Slug = row.get(0)?;
         let rest = slug.as_str().strip_prefix(&begin).unwrap_or_default();
         let snippet = format!("[{begin}]{rest}");
-        Ok(Hit { slug, name: row.get(1)?, revision: row.get(2)?, snippet, rank: 0.0 })
+        let (name, revision, status) = (row.get(1)?, row.get(2)?, row.get(3)?);
+        Ok(Hit { slug, name, revision, status, snippet, rank: 0.0 })
     })
 }
 
@@ -104,8 +105,9 @@ fn hit(row: &Row) -> Result<Hit> {
         slug: row.get(0)?,
         name: row.get(1)?,
         revision: row.get(2)?,
-        snippet: row.get(3)?,
-        rank: row.get(4)?,
+        status: row.get(3)?,
+        snippet: row.get(4)?,
+        rank: row.get(5)?,
     })
 }
 

@@ -22,7 +22,8 @@
   const make = (name, attributes, ...inside) => fill(document.createElement(name), attributes, inside);
   const draw = (name, attributes, ...inside) => fill(document.createElementNS(SVG, name), attributes, inside);
   const signed = (value) => value.toFixed(1).replace('-', '−');
-  const badge = (kind) => make('span', { class: `badge is-${kind}` }, kind);
+  const badge = (word) => make('span', { class: `badge is-${word}` }, word);
+  const badges = ({ kind, status }) => [kind, status].filter(Boolean).flatMap((word) => [badge(word), ' ']);
 
   // Loading: a page opened from a folder may load scripts and nothing else.
   const load = (path) => new Promise((resolve, reject) => {
@@ -113,7 +114,7 @@
       button.addEventListener('click', () => remove(slug));
       if (!material) return make('li', {}, wrong.includes(slug) ? `There is no material ${slug}.` : slug, button);
       const link = make('a', { href: `material/${slug}.html` }, make('bdi', {}, name));
-      return make('li', {}, sample(ink, material.kind), link, badge(material.kind), button);
+      return make('li', {}, sample(ink, material.kind), link, ...badges(material), button);
     }));
   };
   const step = (span, wanted) => {
@@ -172,7 +173,7 @@
       return deg < material.deg[0] || deg > material.deg[1] ? 'not claimed' : material.silence;
     };
     const head = make('tr', {}, make('th', { scope: 'col' }, 'incidence'),
-      ...there.map(({ material }) => make('th', { scope: 'col' }, make('bdi', {}, material.name), ' ', badge(material.kind))));
+      ...there.map(({ material }) => make('th', { scope: 'col' }, make('bdi', {}, material.name), ' ', ...badges(material))));
     const rows = there[0].material.table.deg.map((deg, row) => make('tr', {}, make('th', { scope: 'row' }, `${deg}°`),
       ...there.map(({ material }) => make('td', {}, cell(material, row)))));
     return make('table', { class: 'numbers compared' }, make('caption', {}, 'σ⁰, dB, of what scenes render'), make('thead', {}, head), make('tbody', {}, ...rows));

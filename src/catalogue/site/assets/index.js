@@ -31,12 +31,13 @@
     for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
     return element;
   };
+  const badge = (word) => make('span', { class: `badge is-${word}` }, word);
   const number = (value) => value.toLocaleString('en').replaceAll(',', '\u202f');
   const range = ([low, high], unit) => (low === high ? `${low}` : `${low}–${high}`) + unit;
 
   window.matdbIndex = ({ entries }) => {
     for (const entry of entries) {
-      entry.words = plain([entry.slug, entry.name, entry.class, ...entry.tags, entry.text].join(' '));
+      entry.words = plain([entry.slug, entry.name, entry.class, entry.status ?? '', ...entry.tags, entry.text].join(' '));
       all.push(entry);
       classes.add(entry.class);
     }
@@ -129,7 +130,7 @@
     const choose = make('input', { type: 'checkbox', value: entry.slug, 'aria-label': `Compare ${entry.name}` });
     choose.checked = compared.has(entry.slug);
     return make('li', { class: 'card' }, curve(entry), make('h2', {}, link),
-      make('p', {}, make('span', { class: `badge is-${entry.kind}` }, entry.kind), ' ', make('bdi', {}, entry.class)),
+      make('p', {}, ...[entry.kind, entry.status].filter(Boolean).flatMap((word) => [badge(word), ' ']), make('bdi', {}, entry.class)),
       make('p', { class: 'quiet' }, `${range(entry.ghz, '\u00a0GHz')}, ${range(entry.deg, '°')}. ${holds(entry)}`),
       make('label', {}, choose, 'Compare'));
   };
