@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use matdb::brdf::{Brdf, Fresnel, Parameter, Scattering};
+use matdb::catalogue::references;
 use matdb::material::{Fit, Material, Permittivity, Source, SourceKind, builtin};
 use support::{matdb, root};
 
@@ -139,6 +140,38 @@ fn each_number_has_a_source_that_can_be_found_and_that_show_prints() {
 }
 
 #[test]
+fn cite_names_no_source_that_does_not_state_the_number() {
+    for material in all() {
+        for reference in references(&material) {
+            let note =
+                reference.source.as_ref().and_then(|s| s.note.as_deref()).unwrap_or_default();
+            let is_frequency = |place: &String| place.ends_with(", frequency_hz");
+            let states_none = note.contains("frequency not stated");
+            assert!(
+                !(states_none && reference.numbers.iter().any(is_frequency)),
+                "{}: {note}",
+                material.slug
+            );
+            let key = reference.source.as_ref().map(|s| s.key.as_str());
+            let layers = reference.numbers.iter().filter(|place| place.starts_with("layers, "));
+            for place in layers {
+                let mut layers = material.layers.iter();
+                let layer = layers.find(|layer| place.contains(&layer.name)).unwrap();
+                assert_eq!(layer.source.as_deref(), key, "{}: {place}", material.slug);
+            }
+        }
+    }
+    for slug in ["alumina", "macor"] {
+        let material = builtin::get(slug).unwrap().unwrap();
+        let chosen = references(&material)
+            .into_iter()
+            .find(|r| r.source.as_ref().is_some_and(|s| s.kind == SourceKind::Synthetic));
+        let frequency = format!("permittivities, {slug} at 300 GHz, frequency_hz");
+        assert!(chosen.unwrap().numbers.contains(&frequency));
+    }
+}
+
+#[test]
 fn what_is_rendered_reflects_as_the_stated_permittivity_does() {
     let mut judged = 0;
     for material in all() {
@@ -153,6 +186,8 @@ fn what_is_rendered_reflects_as_the_stated_permittivity_does() {
             let distance = |e: &&Permittivity| (e.frequency_hz - RADAR_HZ).abs();
             let nearest = entries.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
             let rendered = nearest.filter(|_| fit.name == material.render);
+            let beyond_hz = rendered.map_or(0.0, |e| material.frequency_outside_hz(e.frequency_hz));
+            assert!(beyond_hz < 1e9, "{} renders what it does not claim", material.slug);
             let allowed: Vec<&Permittivity> =
                 rendered.map_or(entries.iter().collect(), |entry| vec![entry]);
             if let Some(f_lambda) = value("f_lambda") {

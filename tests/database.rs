@@ -83,8 +83,8 @@ fn a_scene_renders_what_the_database_holds() {
     let built_in = render("one");
     assert_eq!((&built_in["origin"], &built_in["revision"]), (&"built-in".into(), &Value::Null));
     assert_eq!(entries(folder), ["one"], "rendering creates no database");
-    variant(folder, "human-skin", "m = 0.08", "m = 0.12");
-    json(folder, &["add", "--from", "human-skin"]);
+    variant(folder, "human-skin-300-ghz", "m = 0.08", "m = 0.12");
+    json(folder, &["add", "--from", "human-skin-300-ghz"]);
     let stored = render("two");
     assert_eq!((&stored["origin"], &stored["revision"]), (&"database".into(), &1.into()));
     assert_eq!(stored["scattering"]["specular"]["m"], 0.12);
@@ -146,6 +146,12 @@ fn values_that_only_a_slip_can_give_are_refused() {
         ("doi = \"10.1234/example\"", "url = \"javascript:alert(1)\"", "begins with http://"),
         ("bandwidth_ghz = 27", "bandwidth_ghz = 27e9", "begins below 0 Hz"),
         ("thickness_mm = 0.12", "thickness_mm = 120000", "120 m thick"),
+        (
+            "centre_frequency_ghz = 300",
+            "centre_frequency_ghz = 94",
+            "measured at 94 GHz and the entry claims 290–310 GHz",
+        ),
+        ("curve = \"scan\"\n", "", "fit `two-lobes` has the measured source `bench`"),
     ] {
         let folder = from_template(|text: String| text.replacen(from, to, 1), BARE);
         let message = refused(matdb(folder.path()).args(["add", "--from", "."]));

@@ -368,6 +368,32 @@ fn a_lambertian_surface_is_sionnas_lambertian_pattern() {
 }
 
 #[test]
+fn a_substance_of_two_sources_is_written_with_the_one_that_is_rendered() {
+    let glass = builtin::get("glass").unwrap().unwrap();
+    let sionna = text(&bare(&glass), Format::Sionna);
+    let conductivity = sionna.split("conductivity=").nth(1).unwrap().split(',').next().unwrap();
+    // 17.98 sigma/f = eps'', f in GHz.
+    let expected = 0.30676 * 300.0 / 17.98;
+    assert!((conductivity.parse::<f64>().unwrap() / expected - 1.0).abs() < 1e-2, "{sionna}");
+    assert!(sionna.contains("relative_permittivity=5.79,"), "{sionna}");
+    for slug in ["ceiling-board", "marble", "plasterboard", "plywood", "pmma", "wood"] {
+        let material = builtin::get(slug).unwrap().unwrap();
+        let lost = export(&bare(&material), Format::OpenMaterial, "a.xomp").unwrap().lost;
+        assert!(!lost.contains("permittivity"), "{slug}: {lost}");
+    }
+    let nobody_says = Material { layers: Vec::new(), ..glass.clone() };
+    let nothing = Material { permittivities: Vec::new(), ..nobody_says.clone() };
+    for (material, expected) in
+        [(nobody_says, "several permittivities"), (nothing, "no permittivity")]
+    {
+        for format in [Format::Sionna, Format::OpenMaterial] {
+            let lost = export(&bare(&material), format, "a").unwrap().lost;
+            assert!(lost.contains(expected), "{lost}");
+        }
+    }
+}
+
+#[test]
 fn hostile_names_stay_in_their_place() {
     let mut material = sample("paint");
     let hostile = "--></bsdf>\"\"\"\r\nimport os # <script>&'\u{202e}\u{2028}\u{0}\\";

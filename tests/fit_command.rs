@@ -55,7 +55,8 @@ fn text(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-const SAVE: [&str; 6] = ["--save", "human-skin", "--kind", "synthetic", "--source", "A test"];
+const SAVE: [&str; 6] =
+    ["--save", "human-skin-300-ghz", "--kind", "synthetic", "--source", "A test"];
 
 #[test]
 fn a_curve_is_fitted_stored_rendered_and_listed() {
@@ -80,17 +81,17 @@ fn a_curve_is_fitted_stored_rendered_and_listed() {
     let listed = &json(folder, &["list"])[0];
     assert_eq!(
         (&listed["slug"], &listed["render_kind"]),
-        (&"human-skin".into(), &"synthetic".into())
+        (&"human-skin-300-ghz".into(), &"synthetic".into())
     );
     assert_eq!((&listed["curves"], &listed["observations"]), (&1.into(), &400.into()));
-    let shown = text(folder, &["show", "human-skin"]);
+    let shown = text(folder, &["show", "human-skin-300-ghz"]);
     assert!(shown.contains("method censored: converged") && shown.contains("verdict:"), "{shown}");
     let fitted = shown.split("fit mixture-censored").nth(1).unwrap();
     for path in ["k ", "specular.f_lambda", "diffuse.r_s"] {
         let line = fitted.lines().find(|line| line.starts_with(path)).unwrap();
         assert!(line.ends_with("a convention, not measured"), "{line}");
     }
-    text(folder, &["plot", "human-skin", "-o", "plot.svg"]);
+    text(folder, &["plot", "human-skin-300-ghz", "-o", "plot.svg"]);
     let plot = fs::read_to_string(folder.join("plot.svg")).unwrap();
     assert!(plot.contains("scan, below the threshold here") && plot.contains("mixture-censored"));
 
@@ -101,18 +102,18 @@ fn a_curve_is_fitted_stored_rendered_and_listed() {
     assert_eq!(record["materials"][0]["origin"], "database");
 
     // The stored curve gives what the file gave, and a second fit leaves the first in its revision.
-    let again = ["fit", "human-skin", "--method", "tls-tail", "--alpha", "4", "--save"];
+    let again = ["fit", "human-skin-300-ghz", "--method", "tls-tail", "--alpha", "4", "--save"];
     let again = json(folder, &[&again[..], &["--keep-render", "--starts", "1"]].concat());
     assert_eq!(again["data_hash"], found["data_hash"]);
     assert_eq!(again["saved"]["fit"], "mixture-tls-tail");
     assert_eq!(again["saved"]["render"], "mixture-censored");
-    let shown = json(folder, &["show", "human-skin@2"]);
+    let shown = json(folder, &["show", "human-skin-300-ghz@2"]);
     let fits = shown["material"]["fits"].as_array().unwrap();
-    assert_eq!(fits.len(), 4);
-    let report = &fits[3]["report"];
+    assert_eq!(fits.len(), 3);
+    let report = &fits[2]["report"];
     assert_eq!(report["given"][0]["name"], "diffuse.alpha");
     assert!(report["verdict"].to_string().contains("least squares ignores them"), "{report}");
-    let held = fits[3]["parameter_sources"][0][1].as_str().unwrap();
+    let held = fits[2]["parameter_sources"][0][1].as_str().unwrap();
     let sources = shown["material"]["sources"].as_array().unwrap();
     let held = sources.iter().find(|source| source["key"] == held).unwrap();
     assert_eq!(held["kind"], "synthetic", "a number that somebody chose is not measured");

@@ -155,6 +155,8 @@ fn the_scenes_that_come_with_the_program_still_run() {
     let output = matdb(folder.path()).args(arguments).output().unwrap();
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success(), "{said}");
+    assert!(!said.contains("GHz away"), "{said}");
+    let (said, _) = rendered(&PLATE.replace("ptfe", "human-skin"));
     assert!(
         said.contains("`human-skin` is described for 100 GHz") && said.contains("200 GHz away")
     );
@@ -179,4 +181,59 @@ fn a_withdrawn_material_is_rendered_with_its_reason() {
     let (said, status) = rendered();
     assert!(said.contains("`glass` is withdrawn: Dented."), "{said}");
     assert_eq!((&status["is"], &status["reason"]), (&"withdrawn".into(), &"Dented.".into()));
+}
+
+#[test]
+fn a_rendered_curve_answers_no_farther_than_its_points_and_says_its_thresholds() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = matdb(folder.path()).args(["add", "--template"]).output().unwrap();
+    fs::write(folder.path().join("material.toml"), output.stdout).unwrap();
+    let csv = "theta_deg,sigma0_db,censor,threshold_db\n5,5.0,none,-32.9\n20,-19.5,none,-32.9\n\
+               60,,left,-32.9\n";
+    fs::write(folder.path().join("scan.csv"), csv).unwrap();
+    matdb(folder.path()).args(["add", "-q", "--from", "."]).assert().success();
+    let output = matdb(folder.path()).args(["show", "my-paint"]).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let line = |angle: &str| {
+        let mut lines = text.lines().map(str::trim_start);
+        lines.rfind(|line| line.starts_with(angle)).unwrap().to_owned()
+    };
+    for (angle, level, outside) in [
+        ("0°", "5.0", "5° outside"),
+        ("10°", "", ""),
+        ("45°", "-19.5", "15° outside"),
+        ("60°", "< -32.9", ""),
+        ("75°", "nothing", "15° outside"),
+    ] {
+        let line = line(angle);
+        assert!(line.contains(level) && line.contains(outside), "{line}");
+        assert_eq!(line.contains("outside"), !outside.is_empty(), "{line}");
+    }
+    matdb(folder.path()).args(["publish", "site", "-q"]).assert().success();
+    let page = fs::read_to_string(folder.path().join("site/material/my-paint.html")).unwrap();
+    let levels = page.split("Levels of ").nth(1).unwrap().split("</table>").next().unwrap();
+    let row = levels.split("<tbody>").nth(1).unwrap();
+    let cells: Vec<&str> =
+        row.split("<td>").skip(1).map(|c| c.split('<').next().unwrap()).collect();
+    assert_eq!(
+        (cells.len(), cells[0], cells[6], cells[8]),
+        (9, "not claimed", "not claimed", "not claimed")
+    );
+    assert_eq!(cells[7], "&lt; −32.9");
+    let compared = fs::read_to_string(folder.path().join("site/data/my-paint.js")).unwrap();
+    assert!(
+        compared.contains("\"\\u003c −32.9\"") && compared.contains("\"not claimed\""),
+        "{compared}"
+    );
+    let near = |angles: [u32; 4]| {
+        let rows: String = angles.iter().map(|angle| format!("{angle},-12\n")).collect();
+        fs::write(folder.path().join("curve.csv"), format!("theta_deg,sigma0_db\n{rows}")).unwrap();
+        let near = ["near", "--curve", "curve.csv", "--limit", "99"];
+        let output = matdb(folder.path()).args(near).output().unwrap();
+        String::from_utf8(output.stdout).unwrap().contains("my-paint")
+    };
+    assert!(
+        near([8, 10, 12, 14]) && !near([62, 64, 66, 68]),
+        "within the claim, beyond the points"
+    );
 }

@@ -342,6 +342,26 @@ fn a_page_says_what_a_material_is_made_of_and_what_was_tried_on_it() {
 }
 
 #[test]
+fn what_was_stated_beside_a_curve_is_not_called_a_fit() {
+    let mut material = fitted("stated");
+    material.fits[0].report = None;
+    material.fits[0].estimator = "stated".to_owned();
+    let path = material.fits[0].covariance.as_ref().unwrap().parameters[0].clone();
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Store::open(folder.path().join("a.sqlite")).unwrap();
+    store.add([&material]).unwrap();
+    publish(&store, &about(), &folder.path().join("site"), |_| ()).unwrap();
+    let page = fs::read_to_string(folder.path().join("site/material/stated.html")).unwrap();
+    assert!(page.contains("stated beside the curve <bdi>scan</bdi>, not fitted to it"));
+    assert!(!page.contains("fitted to the curve"));
+    assert_eq!(path, "k");
+    let row = page.split("<code>k</code>").nth(1).unwrap().split("</tr>").next().unwrap();
+    assert!(row.contains("only inside S and R; this value is a convention"), "{row}");
+    let index = fs::read_to_string(folder.path().join("site/index/1.js")).unwrap();
+    assert!(index.contains("\"fitted\":false"));
+}
+
+#[test]
 fn points_are_in_the_table_for_other_programs() {
     let site = site();
     let mut reader = csv::Reader::from_reader(site.files["material/fitted.csv"].as_bytes());

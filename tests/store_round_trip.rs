@@ -108,6 +108,7 @@ prop_compose! {
         let (key, source) = (String::new(), String::new());
         Permittivity {
             key, frequency_hz: 1.0, temperature_k, real, imaginary, real_sd, imaginary_sd, source,
+            frequency_source: None,
         }
     }
 }
@@ -160,7 +161,7 @@ prop_compose! {
             rms_height_m, correlation_length_m, method, source: String::new(),
         });
         let layer = |(name, thickness_m)| Layer {
-            name, thickness_m: Some(thickness_m), permittivity: None,
+            name, thickness_m: Some(thickness_m), permittivity: None, source: None,
         };
         let layers = thicknesses.into_iter().map(layer).collect();
         Rest { status, finish, unknown, roughness, layers, permittivities, sessions, findings }
@@ -286,7 +287,7 @@ fn curve() -> impl Strategy<Value = Curve> {
 
 prop_compose! {
     fn effect()(numbers in btree_map(word(), number(), 0..4)) -> EffectEntry {
-        EffectEntry { name: String::new(), parameters: numbers }
+        EffectEntry { name: String::new(), source: None, parameters: numbers }
     }
 }
 
@@ -347,8 +348,10 @@ fn connect(material: &mut Material, key: &str, mut pick: usize) {
         entry.key = name("permittivity", index.max(1));
         entry.frequency_hz = 1e9 * (index + 1) as f64;
         entry.source = choose("source", counts[0]).unwrap();
+        entry.frequency_source = choose("source", index.min(1) * counts[0]);
     }
     for layer in &mut material.layers {
+        layer.source = choose("source", counts[0]);
         layer.permittivity = material.permittivities.first().map(|entry| entry.key.clone());
     }
     if let Some(last) = material.layers.last_mut() {
@@ -371,6 +374,7 @@ fn connect(material: &mut Material, key: &str, mut pick: usize) {
     }
     for (index, effect) in material.effects.iter_mut().enumerate() {
         effect.name = name("effect", index);
+        effect.source = choose("source", index.min(1) * counts[0]);
     }
     material.render = choose("fit", material.fits.len()).unwrap();
 }

@@ -15,9 +15,9 @@ use matdb::material::Material;
 use matdb::store::{Added, Store};
 use rusqlite::Connection;
 use rusqlite::functions::FunctionFlags;
-use support::database::{change, complete, contents, fitted, sample, with_effects};
+use support::database::{attributed, change, complete, contents, fitted, sample, with_effects};
 
-const NEWEST: &str = "schema-0006.sqlite";
+const NEWEST: &str = "schema-0007.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
@@ -41,7 +41,8 @@ fn held(file: &str) -> [Material; 3] {
         "schema-0001.sqlite" => sample,
         "schema-0002.sqlite" => fitted,
         "schema-0003.sqlite" => with_effects,
-        _ => complete,
+        "schema-0004.sqlite" | "schema-0005.sqlite" | "schema-0006.sqlite" => complete,
+        _ => attributed,
     };
     [make("paint"), change(make("paint")), make("primer")]
 }
@@ -194,7 +195,16 @@ fn the_database_itself_refuses_what_a_material_may_not_be() {
         "UPDATE permittivity SET frequency_hz = 3e11",
         "UPDATE permittivity SET temperature_k = 0",
         "UPDATE permittivity SET source = 'other'",
+        "UPDATE permittivity SET frequency_source = 'other'",
         "UPDATE layer SET thickness_m = 0",
+        "UPDATE layer SET source = 'other'",
+        "UPDATE effect SET source = 'other'",
+        "UPDATE fit_estimate SET fit = 'other'",
+        "UPDATE fit_estimate SET sd = -1",
+        "UPDATE fit_estimate SET high_95 = low_95 - 1",
+        "UPDATE fit_estimate SET identified = 2",
+        "UPDATE fit_estimate SET at_bound = 2",
+        "UPDATE fit_estimate SET chosen_by = 'chance'",
         "UPDATE roughness SET rms_height_m = -1",
         "UPDATE roughness SET correlation_length_m = 0",
         "UPDATE roughness SET source = 'other'",
@@ -310,5 +320,63 @@ fn views_show_people_decibels_and_degrees() {
     assert_eq!(count("SELECT count(*) FROM v_materials WHERE status = 'superseded'"), 2);
     assert_eq!(count("SELECT count(*) FROM v_materials WHERE frequency_min_ghz = 290"), 2);
     let parameters = sample("paint").fits[0].model.parameters().len() as i64;
-    assert_eq!(count("SELECT count(*) FROM v_fits WHERE is_rendered"), 2 * parameters);
+    let told = attributed("paint").fits[0].told().len() as i64;
+    assert!(told > parameters, "S and R stand beside the parameters");
+    assert_eq!(count("SELECT count(*) FROM v_fits WHERE is_rendered"), 2 * told);
+}
+
+#[test]
+fn a_fit_says_of_each_number_whether_the_data_tell_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (fresh, old) = (folder.path().join("a.sqlite"), folder.path().join("old.sqlite"));
+    fill(&fresh);
+    fs::write(&old, fs::read(fixtures().join("schema-0002.sqlite")).unwrap()).unwrap();
+    drop(Store::open(&old).unwrap());
+    for path in [&fresh, &old] {
+        let conn = Connection::open(path).unwrap();
+        let sql = "SELECT path, chosen_by, identified, at_bound FROM v_fits
+                   WHERE slug = 'paint' AND chosen_by IS NOT NULL ORDER BY path";
+        let mut statement = conn.prepare(sql).unwrap();
+        type Row = (String, String, bool, bool);
+        let rows: Vec<Row> = statement
+            .query_map([], |r| Ok((r.get(0)?, r.get(1)?, r.get(2)?, r.get(3)?)))
+            .unwrap()
+            .map(Result::unwrap)
+            .collect();
+        let of = |name: &str| {
+            let row = rows.iter().find(|row| row.0 == name).unwrap();
+            (row.1.as_str(), row.2, row.3)
+        };
+        assert_eq!(of("S"), ("data", true, false));
+        assert_eq!(of("R"), ("data", false, false));
+        assert_eq!(of("diffuse.alpha"), ("hand", false, false));
+        for name in ["k", "specular.f_lambda", "diffuse.r_s"] {
+            assert_eq!(of(name), ("convention", false, false), "{name}");
+        }
+    }
+    let conn = Connection::open(&fresh).unwrap();
+    let sql = "SELECT low_95, high_95 FROM fit_estimate WHERE name = 'S'";
+    let interval: (f64, f64) = conn.query_row(sql, [], |r| Ok((r.get(0)?, r.get(1)?))).unwrap();
+    assert_eq!(interval, (0.25 - 0.02, 0.25 + 0.02));
+}
+
+#[test]
+fn what_was_stated_beside_a_curve_is_no_fit_to_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.sqlite");
+    let mut store = Store::open(&path).unwrap();
+    let mut stated = fitted("stated");
+    stated.fits[0].report = None;
+    stated.fits[0].estimator = "stated".to_owned();
+    let mut made = stated.clone();
+    made.slug = "made".parse().unwrap();
+    made.fits[0].estimator = "censored".to_owned();
+    store.add([&stated, &made]).unwrap();
+    let conn = Connection::open(&path).unwrap();
+    let fitted = |slug: &str| {
+        conn.query_row("SELECT fitted FROM entry WHERE slug = ?1", [slug], |row| {
+            row.get::<_, i64>(0)
+        })
+    };
+    assert_eq!((fitted("stated").unwrap(), fitted("made").unwrap()), (0, 1));
 }

@@ -1,12 +1,14 @@
 //! BibTeX.
 
-/// An entry with the fields that have a value.
+/// An entry with the fields that have a value. Of its key TeX reads letters, digits, `:` and `-` safely;
+/// whatever else is in it becomes `-`.
 pub(super) fn entry<const N: usize>(
     kind: &str,
     key: &str,
     fields: [(&str, Option<String>); N],
 ) -> String {
-    let mut text = format!("@{kind}{{{key}");
+    let plain = |c: char| if c.is_ascii_alphanumeric() || ":-".contains(c) { c } else { '-' };
+    let mut text = format!("@{kind}{{{}", key.chars().map(plain).collect::<String>());
     for (name, value) in fields {
         if let Some(value) = value {
             let value = if matches!(name, "doi" | "url") { address(&value) } else { tex(&value) };
@@ -48,7 +50,7 @@ mod tests {
     #[test]
     fn an_address_stays_one_and_ends_no_field() {
         let url = Some("https://a.example/x_y?z={1}".to_owned());
-        let text = entry("misc", "key", [("url", url), ("note", None)]);
-        assert_eq!(text, "@misc{key,\n  url = {https://a.example/x_y?z=%7B1%7D}\n}\n");
+        let text = entry("misc", "a key}, é", [("url", url), ("note", None)]);
+        assert_eq!(text, "@misc{a-key----,\n  url = {https://a.example/x_y?z=%7B1%7D}\n}\n");
     }
 }

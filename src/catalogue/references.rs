@@ -58,12 +58,14 @@ fn source_of<'a>(material: &'a Material, leaf: &Leaf) -> Option<&'a str> {
     let source = match leaf.path.first()?.as_str() {
         "curves" => &material.curves.get(place)?.source,
         "fits" => return Some(fit_source(material.fits.get(place)?, &leaf.path)),
-        "permittivities" => &material.permittivities.get(place)?.source,
-        "findings" => &material.findings.get(place)?.source,
-        "layers" => {
-            let key = material.layers.get(place)?.permittivity.as_ref()?;
-            &material.permittivities.iter().find(|entry| entry.key == *key)?.source
+        "permittivities" => {
+            let entry = material.permittivities.get(place)?;
+            let is_frequency = leaf.path.last().is_some_and(|field| field == "frequency_hz");
+            entry.frequency_source.as_ref().filter(|_| is_frequency).unwrap_or(&entry.source)
         }
+        "findings" => &material.findings.get(place)?.source,
+        "layers" => material.layers.get(place)?.source.as_ref()?,
+        "effects" => material.effects.get(place)?.source.as_ref()?,
         // What was measured with it, or then, says so.
         "instruments" => {
             let key = &material.instruments.get(place)?.key;

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use crate::error::Error;
 use crate::material::form::{is_address, is_doi, is_licence, licence_doubt};
-use crate::material::{Curve, Instrument, Material, SourceKind, turns_the_line};
-use crate::units::{dbm_from_watts, rounded, shown};
+use crate::material::{Curve, Fit, Instrument, Material, SourceKind, turns_the_line};
+use crate::units::{dbm_from_watts, range, rounded, shown};
 
 /// Thickest layer of a sample that anybody puts before a radar, m.
 const THICKEST_M: f64 = 10.0;
@@ -14,15 +14,15 @@ const THICKEST_M: f64 = 10.0;
 /// Highest frequency of anything that is called a radar, Hz.
 const HIGHEST_HZ: f64 = 1e13;
 
-/// Refuses a material with measured curves that lack licence, instrument or threshold, and one with
-/// values that only a slip can give.
+/// Refuses a material with measured numbers that lack curve, licence, instrument or threshold, and one
+/// with values that only a slip can give.
 pub(super) fn check(material: &Material, file: &Path) -> Result<(), Error> {
-    let missing: Vec<String> =
-        material.curves.iter().flat_map(|curve| missing(material, curve)).collect();
+    let of_curves = material.curves.iter().flat_map(|curve| missing(material, curve));
+    let missing: Vec<String> = of_curves.chain(measured_alone(material)).collect();
     if !missing.is_empty() {
         return Err(Error::Usage {
             problem: format!(
-                "{}: a measured curve needs more: {}",
+                "{}: what was measured needs more: {}",
                 file.display(),
                 missing.join("; ")
             ),
@@ -64,6 +64,24 @@ pub(super) fn doubts(material: &Material) -> Vec<String> {
         doubts.extend(licence_doubt(licence).map(|doubt| format!("{slug}: {doubt}")));
     }
     doubts
+}
+
+/// Fits that claim to be measured without a curve that anybody measured, a clause each.
+fn measured_alone(material: &Material) -> impl Iterator<Item = String> {
+    let is_alone = |fit: &&Fit| {
+        fit.curve.is_none() && kind(material, &fit.source) == Some(SourceKind::Measured)
+    };
+    material.fits.iter().filter(is_alone).map(|fit| {
+        format!(
+            "fit `{}` has the measured source `{}` and names no curve; numbers that others fitted are \
+             literature",
+            fit.name, fit.source
+        )
+    })
+}
+
+fn kind(material: &Material, key: &str) -> Option<SourceKind> {
+    material.sources.iter().find(|source| source.key == key).map(|source| source.kind)
 }
 
 /// What a curve lacks, a clause each. That there is a source at all was checked before.
@@ -133,10 +151,28 @@ fn slips(material: &Material) -> Vec<(String, &'static str)> {
         let problem = format!("instrument `{}` has a band that begins below 0 Hz", instrument.key);
         (problem, "give bandwidth_ghz and centre_frequency_ghz in GHz")
     }));
+    slips.extend(material.curves.iter().filter_map(|curve| strange_frequency(material, curve)));
     slips.extend(material.layers.iter().filter_map(|layer| {
         let thickness_m = layer.thickness_m.filter(|thickness_m| *thickness_m > THICKEST_M)?;
         let problem = format!("layer `{}` is {thickness_m} m thick", layer.name);
         Some((problem, "give thickness_mm in mm, 10000 at most"))
     }));
     slips
+}
+
+/// That a measured curve is of another frequency than the entry claims.
+fn strange_frequency(material: &Material, curve: &Curve) -> Option<(String, &'static str)> {
+    let instrument =
+        material.instruments.iter().find(|i| Some(&i.key) == curve.instrument.as_ref())?;
+    let is_measured = kind(material, &curve.source) == Some(SourceKind::Measured);
+    let is_outside = material.frequency_outside_hz(instrument.centre_frequency_hz) > 0.0;
+    (is_measured && is_outside).then(|| {
+        let problem = format!(
+            "curve `{}` was measured at {} GHz and the entry claims {} GHz",
+            curve.name,
+            shown(instrument.centre_frequency_hz / 1e9),
+            range(material.frequency_hz.map(|hz| hz / 1e9))
+        );
+        (problem, "claim in frequency_ghz what was measured, or name the curve's own instrument")
+    })
 }

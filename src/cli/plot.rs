@@ -12,8 +12,8 @@ use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Scatter
 use crate::error::Error;
 use crate::fit::stored_band;
 use crate::formats::figure::{Plot, Series, Style};
-use crate::material::{Censor, Fit, Material, Observation};
-use crate::units::{db_from_ratio, rounded};
+use crate::material::{Censor, Fit, Material, Observation, Reach};
+use crate::units::db_from_ratio;
 
 /// Below this a level says only that nothing comes back.
 const FAINTEST_DB: f64 = -80.0;
@@ -110,20 +110,31 @@ fn claimed(material: &Material, series: Series) -> Vec<Series> {
     if series.style != Style::Curve {
         return vec![series];
     }
-    let [least_deg, most_deg] = material.theta_rad.map(|rad| rounded(rad.to_degrees()));
-    let part = |style: Style, wanted: &dyn Fn(f64) -> bool| {
-        let kept = |&(theta_deg, level_db): &(f64, f64)| {
-            (theta_deg, if wanted(theta_deg) { level_db } else { f64::NAN })
+    // Without fits it is the rendered curve that is drawn, between its points.
+    let reach = match material.fits.is_empty() {
+        true => material.reach(),
+        false => Reach::new(material.theta_rad, None),
+    };
+    let angles = || series.points.iter().map(|(theta_deg, _)| theta_deg.to_radians());
+    let is_within: Vec<bool> =
+        angles().map(|theta_rad| reach.outside_rad(theta_rad) < ROUNDING_RAD).collect();
+    let part = |style: Style, wanted: &dyn Fn(usize) -> bool| {
+        let kept = |(place, &(theta_deg, level_db)): (usize, &(f64, f64))| {
+            (theta_deg, if wanted(place) { level_db } else { f64::NAN })
         };
-        let points = series.points.iter().map(kept).collect();
+        let points = series.points.iter().enumerate().map(kept).collect();
         Series { name: series.name.clone(), style, points }
     };
+    let is_beyond = |place: usize| is_within.get(place).is_some_and(|within| !within);
     // The ends belong to both, or a gap would show.
-    vec![
-        part(Style::Beyond, &|deg| deg <= least_deg || deg >= most_deg),
-        part(Style::Curve, &|deg| (least_deg..=most_deg).contains(&deg)),
-    ]
+    let touches_beyond = |place: usize| {
+        is_beyond(place) || is_beyond(place + 1) || place > 0 && is_beyond(place - 1)
+    };
+    vec![part(Style::Beyond, &touches_beyond), part(Style::Curve, &|place| !is_beyond(place))]
 }
+
+/// What an angle may lose on its way through degrees, rad.
+const ROUNDING_RAD: f64 = 1e-9;
 
 /// Bands below points below fits, so that each can be seen.
 pub(super) fn layers(fits: &[Fit], points: Vec<Series>) -> Vec<Series> {

@@ -124,8 +124,9 @@ fn sources(material: &Material) -> String {
 /// As they are stored: a later program may know more of them than this one.
 fn effects(material: &Material) -> String {
     let mut text = String::new();
-    for EffectEntry { name, parameters } in &material.effects {
-        text += &format!("\neffect {name}\n");
+    for EffectEntry { name, source, parameters } in &material.effects {
+        let from = source.as_ref().map_or(String::new(), |source| format!(", from {source}"));
+        text += &format!("\neffect {name}{from}\n");
         if let Some(effect) = crate::effects::find(name) {
             text += &format!("    {}\n", effect.is());
         }
@@ -168,13 +169,16 @@ fn parameters(fit: &Fit) -> String {
 
 fn curve_table(material: &Material) -> Result<String, Error> {
     let scattering = material.scattering()?;
+    let reach = material.reach();
     let levels = [0.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0].map(|theta_deg: f64| {
-        let sigma0_db = db_from_ratio(scattering.sigma0(theta_deg.to_radians()));
-        let level = match sigma0_db.is_finite() {
-            true => format!("{sigma0_db:.1}"),
-            false => material.silence().to_owned(),
+        let theta_rad = theta_deg.to_radians();
+        let sigma0_db = db_from_ratio(scattering.sigma0(theta_rad));
+        let level = match reach.below_sigma0(theta_rad) {
+            Some(threshold) => format!("< {:.1}", db_from_ratio(threshold)),
+            None if sigma0_db.is_finite() => format!("{sigma0_db:.1}"),
+            None => "nothing".to_owned(),
         };
-        let outside_deg = rounded(material.theta_outside_rad(theta_deg.to_radians()).to_degrees());
+        let outside_deg = rounded(reach.outside_rad(theta_rad).to_degrees());
         let said = match outside_deg > 0.0 {
             true => format!("{}° outside the range", shown(outside_deg)),
             false => String::new(),

@@ -86,7 +86,7 @@ impl Level {
 /// use matdb::effects::{Level, resolve};
 /// use matdb::formats::EffectEntry;
 /// let parameters = [("slope_db".to_owned(), 2.0)].into();
-/// let drift = EffectEntry { name: "drift".to_owned(), parameters };
+/// let drift = EffectEntry { name: "drift".to_owned(), source: None, parameters };
 /// let found = resolve(&[drift.clone()], Level::Instrument).unwrap();
 /// assert_eq!(found[0].1, [2.0, 0.0, 0.0, 1.0]);
 /// assert!(resolve(&[drift], Level::Scene).is_err());
@@ -119,7 +119,7 @@ pub fn resolve(entries: &[EffectEntry], level: Level) -> Result<Chosen, EffectEr
 pub fn entry(effect: &dyn Effect, values: &[f64]) -> EffectEntry {
     let number = |(knob, value): (&Knob, &f64)| (knob.name.to_owned(), *value);
     let parameters = std::iter::zip(effect.knobs(), values).map(number).collect();
-    EffectEntry { name: effect.name().to_owned(), parameters }
+    EffectEntry { name: effect.name().to_owned(), source: None, parameters }
 }
 
 /// Place of an effect in the order in which effects act.
@@ -164,7 +164,11 @@ mod tests {
 
     fn written(name: &str, parameters: &[(&str, f64)]) -> EffectEntry {
         let number = |(name, value): &(&str, f64)| ((*name).to_owned(), *value);
-        EffectEntry { name: name.to_owned(), parameters: parameters.iter().map(number).collect() }
+        EffectEntry {
+            name: name.to_owned(),
+            source: None,
+            parameters: parameters.iter().map(number).collect(),
+        }
     }
 
     #[test]

@@ -10,6 +10,9 @@ use serde::{Deserialize, Serialize};
 pub struct EffectEntry {
     /// Its name.
     pub name: String,
+    /// Key of the source of its numbers, in a material; none where whoever wrote it states them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
     /// Its numbers, each in the unit that ends its name; those left out are as if it were absent.
     #[serde(flatten)]
     pub parameters: BTreeMap<String, f64>,

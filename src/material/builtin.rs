@@ -20,7 +20,7 @@ macro_rules! entries {
     };
 }
 
-static ENTRIES: [Entry; 37] = entries![
+static ENTRIES: [Entry; 38] = entries![
     "acrylate-resist",
     "alumina",
     "alumina-film",
@@ -36,6 +36,7 @@ static ENTRIES: [Entry; 37] = entries![
     "glass",
     "hdpe",
     "human-skin",
+    "human-skin-300-ghz",
     "ice",
     "kapton",
     "macor",

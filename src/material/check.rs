@@ -156,7 +156,8 @@ impl Material {
     /// What can be said of effects without knowing any.
     fn check_effects(&self) -> Result<(), MaterialError> {
         unique("effect", self.effects.iter().map(|effect| effect.name.as_str()))?;
-        for EffectEntry { name, parameters } in &self.effects {
+        for EffectEntry { name, source, parameters } in &self.effects {
+            self.check_own_source(&format!("effect `{name}`"), source.as_ref())?;
             if let Some((key, number)) = parameters.iter().find(|(_, v)| !v.is_finite()) {
                 let place = format!("effect `{name}`");
                 let problem = format!("{key} = {number} is not a finite number");
@@ -174,6 +175,7 @@ impl Material {
             }
             entry.validate(&place)?;
             self.check_source(&place, &entry.source)?;
+            self.check_own_source(&place, entry.frequency_source.as_ref())?;
             let before = self.permittivities.iter().take(index);
             if before.into_iter().any(|other| entry.is_same_place(other)) {
                 let problem = "is given twice at one frequency and temperature";
@@ -185,6 +187,7 @@ impl Material {
             layer.validate(&place, index + 1 == self.layers.len())?;
             let known = self.permittivities.iter().map(|entry| &entry.key);
             refers(&place, "a permittivity", layer.permittivity.as_ref(), known)?;
+            self.check_own_source(&place, layer.source.as_ref())?;
         }
         let Some(roughness) = &self.roughness else { return Ok(()) };
         roughness.validate()?;
@@ -204,7 +207,12 @@ impl Material {
     }
 
     fn check_source(&self, place: &str, key: &String) -> Result<(), MaterialError> {
-        refers(place, "a source", Some(key), self.sources.iter().map(|s| &s.key))
+        self.check_own_source(place, Some(key))
+    }
+
+    /// The same where a source may be left out.
+    fn check_own_source(&self, place: &str, key: Option<&String>) -> Result<(), MaterialError> {
+        refers(place, "a source", key, self.sources.iter().map(|s| &s.key))
     }
 }
 

@@ -16,6 +16,9 @@ pub struct Layer {
     pub thickness_m: Option<f64>,
     /// Key of its permittivity; none where nobody knows it.
     pub permittivity: Option<String>,
+    /// Key of the source of its thickness; none where the entry itself states it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
 }
 
 /// The permittivity of a substance at one frequency and temperature.
@@ -39,6 +42,9 @@ pub struct Permittivity {
     pub imaginary_sd: Option<f64>,
     /// Key of the source.
     pub source: String,
+    /// Key of the source of the frequency, where it is another: a table may state none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frequency_source: Option<String>,
 }
 
 /// How rough the outer surface is.

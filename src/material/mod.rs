@@ -11,6 +11,7 @@ mod finding;
 pub mod form;
 mod instrument;
 mod provenance;
+mod reach;
 mod report;
 mod slug;
 mod status;
@@ -32,7 +33,8 @@ pub use instrument::{Geometry, Instrument, Scale};
 pub use provenance::{
     Activity, Citation, Input, Making, Origin, Session, SessionPose, Source, SourceKind,
 };
-pub use report::{Estimate, FitReport, Given, Goodness};
+pub use reach::Reach;
+pub use report::{ChosenBy, Estimate, FitReport, Given, Goodness, Told};
 pub use slug::Slug;
 pub use status::Status;
 pub use texts::{LONGEST_TEXT_BYTES, is_turning, turns_the_line};
@@ -222,23 +224,9 @@ impl Material {
         self.sources.iter().find(|s| s.key == *key).map(|s| s.kind)
     }
 
-    /// What it means that [`scattering`](Material::scattering) gives no level at an angle: of a curve that its
-    /// detections end before, of a model that nothing comes back.
-    pub fn silence(&self) -> &'static str {
-        match self.curves.iter().any(|curve| curve.name == self.render) {
-            true => "below the threshold",
-            false => "nothing",
-        }
-    }
-
     /// How far a frequency, Hz, lies outside [`frequency_hz`](Material::frequency_hz), Hz; 0 within.
     pub fn frequency_outside_hz(&self, frequency_hz: f64) -> f64 {
-        outside(self.frequency_hz, frequency_hz)
-    }
-
-    /// How far an incidence, rad, lies outside [`theta_rad`](Material::theta_rad), rad; 0 within.
-    pub fn theta_outside_rad(&self, theta_rad: f64) -> f64 {
-        outside(self.theta_rad, theta_rad)
+        reach::outside(self.frequency_hz, frequency_hz)
     }
 
     /// Hash of everything in the material: equal exactly when nothing differs.
@@ -256,11 +244,6 @@ impl Material {
         let fits = self.fits.iter().map(|f| f.name.clone());
         fits.chain(self.curves.iter().map(|c| c.name.clone())).collect()
     }
-}
-
-/// Distance of a number from a range, 0 within.
-fn outside([low, high]: [f64; 2], x: f64) -> f64 {
-    (low - x).max(x - high).max(0.0)
 }
 
 /// Angles nearer than this, rad, differ by rounding only.
@@ -314,6 +297,16 @@ impl Observation {
     /// Whether source and receiver were in the same direction.
     pub fn is_retro(&self) -> bool {
         self.theta_i_rad == self.theta_r_rad && self.delta_phi_rad == 0.0
+    }
+}
+
+impl Fit {
+    /// The [`estimator`](Fit::estimator) of values that nobody fitted.
+    pub const STATED: &str = "stated";
+
+    /// Whether its values come of its curve.
+    pub fn is_fitted(&self) -> bool {
+        self.curve.is_some() && self.estimator != Fit::STATED
     }
 }
 

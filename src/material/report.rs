@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::MaterialError;
 use super::check::value;
 use super::provenance::is_hash;
+use super::{Fit, MaterialError};
+use crate::brdf::Parameter;
 
 /// The record of one fit to one curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,6 +76,75 @@ pub struct Estimate {
     pub interval_95: Option<[f64; 2]>,
 }
 
+/// What a fit says of one of its numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Told {
+    /// As [`Estimate::name`].
+    pub name: String,
+    /// Its value, in `unit`.
+    pub value: f64,
+    /// UCUM code.
+    pub unit: &'static str,
+    /// As [`Estimate::sd`].
+    pub sd: Option<f64>,
+    /// As [`Estimate::interval_95`].
+    pub interval_95: Option<[f64; 2]>,
+    /// What the value comes of.
+    pub chosen_by: ChosenBy,
+    /// Whether the search stopped at an end of its range.
+    pub is_at_bound: bool,
+}
+
+/// What a number of a fit comes of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChosenBy {
+    /// It was searched for in the data.
+    Data,
+    /// It was set beforehand.
+    Hand,
+    /// Another would do as well: the data tell it only inside a product.
+    Convention,
+}
+
+impl ChosenBy {
+    /// The word that the database uses.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            ChosenBy::Data => "data",
+            ChosenBy::Hand => "hand",
+            ChosenBy::Convention => "convention",
+        }
+    }
+}
+
+impl Told {
+    /// Whether the data tell the number by itself.
+    pub fn is_identified(&self) -> bool {
+        self.sd.is_some() && !self.is_at_bound
+    }
+}
+
+impl Fit {
+    /// What its report says of each number: every parameter of the model, then what was found beside them;
+    /// nothing without a report.
+    pub fn told(&self) -> Vec<Told> {
+        let Some(report) = &self.report else { return Vec::new() };
+        let parameters = self.model.parameters();
+        let is_parameter = |name: &str| parameters.iter().any(|p| p.path == name);
+        let others = report.estimates.iter().filter(|estimate| !is_parameter(&estimate.name));
+        let others = others.map(|estimate| Told {
+            name: estimate.name.clone(),
+            value: estimate.value,
+            unit: "1",
+            sd: estimate.sd,
+            interval_95: estimate.interval_95,
+            chosen_by: ChosenBy::Data,
+            is_at_bound: false,
+        });
+        parameters.iter().map(|parameter| report.told(parameter)).chain(others).collect()
+    }
+}
+
 /// How well a fit explains its curve.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -110,6 +180,30 @@ impl FitReport {
     /// A found number by its name.
     pub fn estimate(&self, name: &str) -> Option<&Estimate> {
         self.estimates.iter().find(|estimate| estimate.name == name)
+    }
+
+    fn told(&self, parameter: &Parameter) -> Told {
+        let Parameter { path, value, min, max, .. } = parameter;
+        let estimate = self.estimate(path);
+        // Ranges may have been narrowed by hand.
+        let narrowed = |end: &str| {
+            let name = format!("{path}.{end}");
+            self.given.iter().any(|given| given.name == name && given.value == *value)
+        };
+        Told {
+            name: path.clone(),
+            value: *value,
+            unit: parameter.unit,
+            sd: estimate.and_then(|estimate| estimate.sd),
+            interval_95: estimate.and_then(|estimate| estimate.interval_95),
+            chosen_by: match estimate {
+                Some(_) => ChosenBy::Data,
+                None if self.is_by_convention(path) => ChosenBy::Convention,
+                None => ChosenBy::Hand,
+            },
+            is_at_bound: estimate.is_some()
+                && ([min, max].contains(&value) || narrowed("min") || narrowed("max")),
+        }
     }
 
     pub(super) fn validate(&self, place: &str) -> Result<(), MaterialError> {

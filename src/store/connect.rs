@@ -10,14 +10,14 @@ use rusqlite::functions::FunctionFlags;
 use rusqlite::{Connection, ErrorCode, OpenFlags, Transaction, TransactionBehavior};
 use rusqlite_migration::{M, Migrations};
 
-use super::StoreError;
 use super::find::outline;
+use super::{StoreError, write};
 
 /// "matd" in the file's header.
 const APPLICATION_ID: i64 = 0x6d61_7464;
 
 /// The latest schema.
-const LATEST: usize = 6;
+const LATEST: usize = 7;
 
 /// All schemas there ever were, oldest first. Append only: files in the world have stopped at each.
 fn schemas() -> [M<'static>; LATEST] {
@@ -30,6 +30,13 @@ fn schemas() -> [M<'static>; LATEST] {
         M::up_with_hook(include_str!("../../migrations/0006_outline.sql"), |tx: &Transaction| {
             Ok(outline::fill(tx)?)
         }),
+        M::up_with_hook(
+            include_str!("../../migrations/0007_attribution.sql"),
+            |tx: &Transaction| {
+                write::fill_estimates(tx)?;
+                Ok(outline::fill(tx)?)
+            },
+        ),
     ]
 }
 

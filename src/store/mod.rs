@@ -297,8 +297,7 @@ impl Store {
         }
     }
 
-    /// What scenes render of a material's current revision, and the angles for which that is claimed, rad,
-    /// read without all else and without comparing its hash; `None` when it is not there or no curve can
+    /// What scenes render of a material's current revision, and the angles at which that answers, rad, read without all else and without comparing its hash; `None` when it is not there or no curve can
     /// be made of it.
     ///
     /// # Errors

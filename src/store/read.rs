@@ -19,7 +19,7 @@ use crate::brdf::Brdf;
 use crate::formats::EffectEntry;
 use crate::material::{
     Censor, Covariance, Curve, FindingVerdict, Fit, Geometry, Making, Material, Observation,
-    Origin, Scale, Slug, SourceKind, Status,
+    Origin, Reach, Scale, Slug, SourceKind, Status,
 };
 
 /// Every revision of a material, oldest first.
@@ -56,7 +56,7 @@ pub(super) fn get(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result
     Ok(Some(stored))
 }
 
-/// What scenes render of the current revision, and the angles for which it is claimed, rad.
+/// What scenes render of the current revision, and the angles at which it answers, rad.
 pub(super) fn rendered(conn: &Connection, slug: &Slug) -> Result<Option<(Brdf, [f64; 2])>> {
     let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
     let found = rendered_in(&tx, slug)?;
@@ -81,17 +81,13 @@ pub(super) fn rendered_in(
         })
         .optional()?;
     let Some((revision_id, render, theta_rad, model)) = found else { return Ok(None) };
-    let model = match model {
-        Some(mut model) => {
-            parameters(conn, revision_id, &render, &mut model)?;
-            Some(model)
-        }
-        None => {
-            let curve = curves(conn, revision_id, Some(&render))?.pop();
-            curve.and_then(|curve| curve.tabulated().ok()).map(Brdf::Tabulated)
-        }
-    };
-    Ok(Some((model, theta_rad)))
+    if let Some(mut model) = model {
+        parameters(conn, revision_id, &render, &mut model)?;
+        return Ok(Some((Some(model), theta_rad)));
+    }
+    let curve = curves(conn, revision_id, Some(&render))?.pop();
+    let model = curve.as_ref().and_then(|curve| curve.tabulated().ok()).map(Brdf::Tabulated);
+    Ok(Some((model, Reach::new(theta_rad, curve.as_ref()).span_rad())))
 }
 
 /// A revision's own row, or that of the current one, and its number in the file.
@@ -198,7 +194,7 @@ fn observations(conn: &Connection, revision_id: i64, curve: &str) -> Result<Vec<
     })
 }
 
-fn fits(conn: &Connection, revision_id: i64) -> Result<Vec<Fit>> {
+pub(super) fn fits(conn: &Connection, revision_id: i64) -> Result<Vec<Fit>> {
     let sql = "SELECT name, model, estimator, curve, source, report FROM fit
                WHERE revision_id = ?1 ORDER BY position";
     rows(conn, sql, [revision_id], |row| {
@@ -252,13 +248,13 @@ fn covariance(conn: &Connection, revision_id: i64, fit: &str) -> Result<Option<C
 }
 
 fn effects(conn: &Connection, revision_id: i64) -> Result<Vec<EffectEntry>> {
-    let sql = "SELECT name FROM effect WHERE revision_id = ?1 ORDER BY position";
+    let sql = "SELECT name, source FROM effect WHERE revision_id = ?1 ORDER BY position";
     rows(conn, sql, [revision_id], |row| {
-        let name: String = row.get(0)?;
+        let (name, source): (String, _) = (row.get(0)?, row.get(1)?);
         let sql = "SELECT name, value FROM effect_parameter WHERE revision_id = ?1 AND effect = ?2";
         let number = |row: &Row| Ok((row.get(0)?, row.get(1)?));
         let parameters = rows(conn, sql, params![revision_id, name], number)?.into_iter().collect();
-        Ok(EffectEntry { name, parameters })
+        Ok(EffectEntry { name, source, parameters })
     })
 }
 

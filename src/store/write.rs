@@ -6,7 +6,7 @@ use rusqlite::{Connection, Error, OptionalExtension, Params, Result, Transaction
 use serde::Serialize;
 
 use super::find::outline;
-use super::{Added, Outlined, Removed};
+use super::{Added, Outlined, Removed, read};
 use crate::formats::EffectEntry;
 use crate::material::{Activity, Covariance, Curve, Fit, Material, Slug};
 use crate::measure::statistics::by_angle;
@@ -48,7 +48,11 @@ impl<'a> Adding<'a> {
         activity.map_or(Ok(()), |activity| rows.activity(activity))?;
         self.waiting.push(material_id);
         let model = material.scattering().ok();
-        self.outlines.push(outline::line(&material.slug, model.as_ref(), material.theta_rad));
+        self.outlines.push(outline::line(
+            &material.slug,
+            model.as_ref(),
+            material.reach().span_rad(),
+        ));
         if self.waiting.len() >= AT_ONCE {
             self.lines()?;
         }
@@ -86,6 +90,17 @@ impl<'a> Adding<'a> {
             .try_for_each(|sql| self.tx.prepare_cached(sql)?.execute([&waiting]).map(|_| ()))?;
         self.outlines.drain(..).try_for_each(|line| outline::write(self.tx, &line))
     }
+}
+
+/// Writes what the fits that an older program stored say of their numbers.
+pub(super) fn fill_estimates(tx: &Transaction) -> Result<()> {
+    let sql = "SELECT DISTINCT revision_id FROM fit WHERE report IS NOT NULL";
+    let revisions: Vec<i64> = read::rows(tx, sql, [], |row| row.get(0))?;
+    revisions.into_iter().try_for_each(|revision_id| match read::fits(tx, revision_id) {
+        // What cannot be read must not keep the rest of the file from being read.
+        Err(Error::FromSqlConversionFailure(..)) => Ok(()),
+        fits => fits?.iter().try_for_each(|fit| Rows { tx, revision_id }.estimates(fit)),
+    })
 }
 
 /// Removes materials and all that hangs on them, all or none.
@@ -229,6 +244,7 @@ impl Rows<'_> {
             params![self.revision_id, position, name, model, estimator, curve, source, report],
         )?;
         self.parameters(fit)?;
+        self.estimates(fit)?;
         fit.covariance.as_ref().map_or(Ok(()), |covariance| self.covariance(name, covariance))
     }
 
@@ -256,11 +272,37 @@ impl Rows<'_> {
         })
     }
 
+    /// What the fit says of each number.
+    fn estimates(&self, fit: &Fit) -> Result<()> {
+        numbered(&fit.told(), |position, told| {
+            self.insert(
+                "INSERT INTO fit_estimate
+                 (revision_id, fit, position, name, value, unit, sd, low_95, high_95, chosen_by, at_bound,
+                  identified)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
+                params![
+                    self.revision_id,
+                    fit.name,
+                    position,
+                    told.name,
+                    told.value,
+                    told.unit,
+                    told.sd,
+                    told.interval_95.map(|[low, _]| low),
+                    told.interval_95.map(|[_, high]| high),
+                    told.chosen_by.as_str(),
+                    told.is_at_bound,
+                    told.is_identified(),
+                ],
+            )
+        })
+    }
+
     fn effect(&self, position: u32, effect: &EffectEntry) -> Result<()> {
-        let EffectEntry { name, parameters } = effect;
+        let EffectEntry { name, source, parameters } = effect;
         self.insert(
-            "INSERT INTO effect (revision_id, position, name) VALUES (?1, ?2, ?3)",
-            params![self.revision_id, position, name],
+            "INSERT INTO effect (revision_id, position, name, source) VALUES (?1, ?2, ?3, ?4)",
+            params![self.revision_id, position, name, source],
         )?;
         parameters.iter().try_for_each(|(parameter, value)| {
             self.insert(

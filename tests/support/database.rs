@@ -64,6 +64,7 @@ pub fn fitted(slug: &str) -> Material {
 pub fn with_effects(slug: &str) -> Material {
     let effect = |name: &str, parameters: &[(&str, f64)]| EffectEntry {
         name: name.to_owned(),
+        source: None,
         parameters: parameters.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect(),
     };
     let film = effect("thin-film", &[("coverage", 0.3), ("thickness_m", 4.5e-4)]);
@@ -127,6 +128,7 @@ pub fn complete(slug: &str) -> Material {
         real_sd: Some(0.02),
         imaginary_sd: None,
         source: source.clone(),
+        frequency_source: None,
     };
     material.permittivities =
         vec![permittivity(300e9, Some(295.15)), permittivity(310e9, Some(295.15))];
@@ -134,6 +136,7 @@ pub fn complete(slug: &str) -> Material {
         name: name.to_owned(),
         thickness_m,
         permittivity: key.map(str::to_owned),
+        source: None,
     };
     material.layers =
         vec![layer("paint", Some(1e-4), Some("acrylate")), layer("glass fibre", None, None)];
@@ -183,6 +186,16 @@ pub fn complete(slug: &str) -> Material {
         source: found.source.clone(),
     };
     material.findings = vec![found, absent];
+    material
+}
+
+/// The same with a source for each number that may name its own.
+pub fn attributed(slug: &str) -> Material {
+    let mut material = complete(slug);
+    let source = Some(material.sources[0].key.clone());
+    material.layers[0].source.clone_from(&source);
+    material.effects[0].source.clone_from(&source);
+    material.permittivities[0].frequency_source = source;
     material
 }
 

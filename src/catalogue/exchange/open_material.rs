@@ -43,7 +43,7 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
     let table = Table::new(subject)?;
     let permittivities = permittivities(subject);
     let mut properties = json!({ "brdfUris": [brdf_name], "customProperties": custom(subject) });
-    if !permittivities.is_empty() {
+    if permittivities.is_ok() {
         properties["electromagneticPropertiesUri"] = json!(emp_name);
     }
     if let Some(roughness) = roughness(subject) {
@@ -61,15 +61,16 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
     });
     let mut files = vec![(name.to_owned(), encoded(&material)?), (brdf_name, encoded(&brdf)?)];
     let mut lost = table.lost;
-    if permittivities.is_empty() {
-        lost += "; no permittivity of the surface is known, so that there is no table of it";
-    } else {
-        let emp = json!({
-            "$schema": schema("material_emp"),
-            "metadata": metadata(subject, "emp", Some("Permittivity; a permeability of 1 is assumed.")),
-            "electromagneticProperties": permittivities,
-        });
-        files.push((emp_name, encoded(&emp)?));
+    match permittivities {
+        Err(why) => lost += &format!("; {why}, so that there is no table of it"),
+        Ok(permittivities) => {
+            let emp = json!({
+                "$schema": schema("material_emp"),
+                "metadata": metadata(subject, "emp", Some("Permittivity; a permeability of 1 is assumed.")),
+                "electromagneticProperties": permittivities,
+            });
+            files.push((emp_name, encoded(&emp)?));
+        }
     }
     Ok(Exported { files, lost })
 }
@@ -147,10 +148,11 @@ fn roughness(subject: &Subject) -> Option<Value> {
     }))
 }
 
-/// Rows of wavelength, temperature, humidity, permeability and permittivity, sorted.
-fn permittivities(subject: &Subject) -> Vec<Value> {
+/// Rows of wavelength, temperature, humidity, permeability and permittivity, sorted; else why there are
+/// none.
+fn permittivities(subject: &Subject) -> Result<Vec<Value>, &'static str> {
     let mut entries: Vec<_> = subject
-        .permittivities()
+        .permittivities()?
         .into_iter()
         .map(|entry| (SPEED_OF_LIGHT_M_PER_S / entry.frequency_hz, entry))
         .filter(|(wavelength_m, _)| is_wavelength(*wavelength_m))
@@ -163,7 +165,10 @@ fn permittivities(subject: &Subject) -> Vec<Value> {
     let row = |(wavelength_m, entry): &(f64, &crate::material::Permittivity)| {
         json!([wavelength_m, entry.temperature_k, null, 1.0, 0.0, entry.real, entry.imaginary])
     };
-    entries.iter().map(row).collect()
+    match entries.is_empty() {
+        true => Err("no permittivity of the surface is at a wavelength that the format has"),
+        false => Ok(entries.iter().map(row).collect()),
+    }
 }
 
 fn is_wavelength(wavelength_m: f64) -> bool {

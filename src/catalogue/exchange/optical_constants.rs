@@ -271,6 +271,7 @@ struct Entry {
 fn material(file: &str, page: &Page, given: &Given, entry: Entry) -> Material {
     let Entry { slug, class, licence, wanted_hz, nearest, constants } = entry;
     let permittivity = |at: &Constants| Permittivity {
+        frequency_source: None,
         key: slug.to_string(),
         frequency_hz: at.frequency_hz,
         temperature_k: page.temperature_k,

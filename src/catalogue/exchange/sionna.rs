@@ -152,8 +152,10 @@ impl Substance {
         let middle_hz = subject.frequency_hz();
         let away = |hz: f64| (hz - middle_hz).abs();
         let known = subject.permittivities();
-        let nearest =
-            known.iter().min_by(|a, b| away(a.frequency_hz).total_cmp(&away(b.frequency_hz)));
+        let nearest = known
+            .iter()
+            .flatten()
+            .min_by(|a, b| away(a.frequency_hz).total_cmp(&away(b.frequency_hz)));
         let thickness_m = subject.material.layers.first().and_then(|layer| layer.thickness_m);
         let substance = |[eps_real, eps_imag]: [f64; 2], frequency_hz, origin: String| Substance {
             eps_real,
@@ -178,8 +180,9 @@ impl Substance {
         let reflectivity = reflectivity(model).filter(|share| *share < 1.0 - 1e-9)?;
         let root = reflectivity.sqrt();
         let index = (1.0 + root) / (1.0 - root);
+        let why = known.err().unwrap_or("no permittivity of the surface is known");
         let origin = format!(
-            "no permittivity is known: a real one of {:.3} with the same normal reflectance, \
+            "{why}: a real one of {:.3} with the same normal reflectance, \
              {reflectivity:.4}, stands in",
             index * index
         );

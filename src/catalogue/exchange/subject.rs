@@ -115,17 +115,22 @@ impl<'a> Subject<'a> {
         self.material.scattering()
     }
 
-    /// Permittivities of the outermost layer or, without layers, of the only substance.
-    pub(super) fn permittivities(&self) -> Vec<&'a Permittivity> {
+    /// Permittivities of the outermost layer or, without layers, of the only substance; else why there are
+    /// none.
+    pub(super) fn permittivities(&self) -> Result<Vec<&'a Permittivity>, &'static str> {
         let entries = &self.material.permittivities;
         let outermost: Option<&Layer> = self.material.layers.first();
-        let key = match outermost {
-            Some(layer) => layer.permittivity.as_deref(),
-            None => entries.first().map(|entry| entry.key.as_str()),
+        let key = match (outermost, entries.first()) {
+            (Some(layer), _) => layer.permittivity.as_deref(),
+            (None, Some(first)) if entries.iter().any(|entry| entry.key != first.key) => {
+                return Err(
+                    "several permittivities are known and no layer says which is the surface's",
+                );
+            }
+            (None, first) => first.map(|entry| entry.key.as_str()),
         };
-        let is_only = outermost.is_some() || entries.iter().all(|e| Some(e.key.as_str()) == key);
-        let belongs = |entry: &&Permittivity| is_only && Some(entry.key.as_str()) == key;
-        entries.iter().filter(belongs).collect()
+        let key = key.ok_or("no permittivity of the surface is known")?;
+        Ok(entries.iter().filter(|entry| entry.key == key).collect())
     }
 
     /// How the rendered numbers came to be, in one word.

@@ -6,23 +6,23 @@ use serde_json::{Value, json};
 
 use super::curve::marks;
 use super::entry::{kind_of, status_of};
-use super::levels::{self, TABLE_DEG, claimed_db, range_deg, tenth};
+use super::levels::{Levels, TABLE_DEG, range_deg, tenth};
 use super::words::cut;
-use crate::brdf::Scattering;
 use crate::material::{Curve, Material, SourceKind};
 
 /// Lines, points and a few levels, in ° and dB.
 pub(super) fn data(material: &Material) -> Value {
     let rendered = material.scattering().ok();
-    let level = |&deg: &f64| rendered.as_ref().and_then(|model| claimed_db(material, model, deg));
+    let levels = rendered.as_ref().map(|model| Levels::rendered(material, model));
+    let level = |&deg: &f64| levels.as_ref().map_or(String::new(), |levels| levels.text(deg));
     let mut lines: Vec<Value> = Vec::new();
     for fit in &material.fits {
-        lines.push(line(material, &fit.name, &fit.source, &fit.model));
+        lines.push(line(material, &fit.name, &fit.source, &Levels::stated(material, &fit.model)));
     }
-    if let (true, Some(model)) = (lines.is_empty(), &rendered) {
+    if let (true, Some(levels)) = (lines.is_empty(), &levels) {
         let curve = material.curves.iter().find(|curve| curve.name == material.render);
         let source = curve.map_or("", |curve| curve.source.as_str());
-        lines.push(line(material, &material.render, source, model));
+        lines.push(line(material, &material.render, source, levels));
     }
     json!({
         "slug": material.slug,
@@ -32,18 +32,17 @@ pub(super) fn data(material: &Material) -> Value {
         "render": material.render,
         "ghz": material.frequency_hz.map(|hz| hz / 1e9),
         "deg": range_deg(material),
-        "silence": material.silence(),
         "lines": lines,
         "curves": material.curves.iter().map(|c| curve(material, c)).collect::<Vec<_>>(),
         "table": { "deg": TABLE_DEG, "level": TABLE_DEG.iter().map(level).collect::<Vec<_>>() },
     })
 }
 
-fn line(material: &Material, name: &str, source: &str, model: &dyn Scattering) -> Value {
+fn line(material: &Material, name: &str, source: &str, levels: &Levels) -> Value {
     json!({
         "name": cut(name, 200),
         "kind": kind_of(material, source).map_or("unknown", SourceKind::as_str),
-        "pieces": levels::line(material, model),
+        "pieces": levels.line(),
     })
 }
 

@@ -13,7 +13,7 @@ pub(super) struct Composition {
     finish: Option<String>,
     /// In a sentence, and the place of its source.
     roughness: Option<(String, usize)>,
-    layers: Vec<[String; 3]>,
+    layers: Vec<LayerView>,
     permittivities: Vec<PermittivityView>,
     sessions: Vec<SessionView>,
     findings: Vec<FindingView>,
@@ -25,6 +25,13 @@ struct StatusView {
     word: &'static str,
     reason: String,
     by: Option<String>,
+}
+
+#[derive(Serialize)]
+struct LayerView {
+    cells: [String; 3],
+    /// Key of its source and its place.
+    source: Option<(String, usize)>,
 }
 
 #[derive(Serialize)]
@@ -57,7 +64,7 @@ pub(super) fn view(material: &Material) -> Composition {
         status: status(&material.status),
         finish: material.finish.clone(),
         roughness: roughness(material),
-        layers: material.layers.iter().map(layer).collect(),
+        layers: material.layers.iter().map(|l| layer(material, l)).collect(),
         permittivities: material.permittivities.iter().map(|p| permittivity(material, p)).collect(),
         sessions: material.sessions.iter().map(session).collect(),
         findings: material.findings.iter().map(|f| finding(material, f)).collect(),
@@ -80,24 +87,28 @@ fn roughness(material: &Material) -> Option<(String, usize)> {
     Some((text, place_of(material, &roughness.source)))
 }
 
-fn layer(layer: &Layer) -> [String; 3] {
+fn layer(material: &Material, layer: &Layer) -> LayerView {
     let thickness = layer.thickness_m.map(|m| digits(m * 1e3));
-    [
-        layer.name.clone(),
-        thickness.unwrap_or("half space".to_owned()),
-        layer.permittivity.clone().unwrap_or("not known".to_owned()),
-    ]
+    LayerView {
+        cells: [
+            layer.name.clone(),
+            thickness.unwrap_or("half space".to_owned()),
+            layer.permittivity.clone().unwrap_or("not known".to_owned()),
+        ],
+        source: layer.source.as_ref().map(|key| (key.clone(), place_of(material, key))),
+    }
 }
 
 fn permittivity(material: &Material, entry: &Permittivity) -> PermittivityView {
     let with = |value: f64, sd: Option<f64>| {
         digits(value) + &sd.map_or(String::new(), |sd| format!(" ± {}", digits(sd)))
     };
+    let from = entry.frequency_source.as_ref().map_or(String::new(), |key| format!(", {key}"));
     let celsius = entry.temperature_k.map(|k| digits(k - 273.15));
     PermittivityView {
         cells: [
             entry.key.clone(),
-            digits(entry.frequency_hz / 1e9),
+            digits(entry.frequency_hz / 1e9) + &from,
             celsius.unwrap_or("not stated".to_owned()),
             with(entry.real, entry.real_sd),
             with(entry.imaginary, entry.imaginary_sd),

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::bins::{Bin, bins};
 use super::entry::{kind_of, place_of};
 use super::fit::kind_words;
-use super::levels::{self, FAINTEST_DB, range_deg};
+use super::levels::{FAINTEST_DB, Levels, TABLE_DEG, angles_deg, range_deg};
 use super::plot::{Plot, Series, Shape};
 use super::words::{digits, grouped, percent};
 use crate::fit::stored_band;
@@ -68,7 +68,7 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
     for (number, fit) in material.fits.iter().enumerate() {
         let kind = kind_of(material, &fit.source);
         let class = format!("{} {}", ink(curves + number), class_of(kind));
-        let pieces = levels::line(material, &fit.model).into_iter();
+        let pieces = Levels::stated(material, &fit.model).line().into_iter();
         series.extend(pieces.map(|points| Series {
             shape: Shape::Line,
             class: class.clone(),
@@ -88,7 +88,7 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
         && let Ok(model) = material.scattering()
     {
         let class = format!("ink0 {}", class_of(material.render_kind()));
-        let pieces = levels::line(material, &model).into_iter();
+        let pieces = Levels::rendered(material, &model).line().into_iter();
         series.extend(pieces.map(|points| Series {
             shape: Shape::Line,
             class: class.clone(),
@@ -113,8 +113,9 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
 fn description(material: &Material) -> String {
     let mut text = "σ⁰ in dB over the angle of incidence. ".to_owned();
     if let Ok(model) = material.scattering() {
-        let named = levels::TABLE_DEG.iter().filter_map(|&deg| {
-            let level_db = levels::claimed_db(material, &model, deg)?;
+        let levels = Levels::rendered(material, &model);
+        let named = TABLE_DEG.iter().filter_map(|&deg| {
+            let level_db = levels.db(deg)?;
             Some(format!("{level_db:.1} dB at {deg:.0}°"))
         });
         text += &named.collect::<Vec<_>>().join(", ").replace('-', "−");
@@ -179,7 +180,7 @@ fn band(material: &Material, fit: &Fit, ink: &str) -> Option<Series> {
         let [low_db, high_db] = [band.low, band.high].map(db_from_ratio);
         (high_db >= FAINTEST_DB).then_some((theta_deg, low_db.max(FAINTEST_DB), high_db))
     };
-    let ends: Vec<(f64, f64, f64)> = levels::angles_deg(material).filter_map(ends).collect();
+    let ends: Vec<(f64, f64, f64)> = angles_deg(range_deg(material)).filter_map(ends).collect();
     let low = ends.iter().map(|(theta_deg, low_db, _)| (*theta_deg, *low_db));
     let high = ends.iter().rev().map(|(theta_deg, _, high_db)| (*theta_deg, *high_db));
     let points: Vec<(f64, f64)> = low.chain(high).collect();

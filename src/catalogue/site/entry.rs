@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::levels::{SMALL_DEG, claimed_db, range_deg};
+use super::levels::{Levels, SMALL_DEG, range_deg};
 use super::words::{clean, cut};
 use crate::material::{Material, SourceKind};
 
@@ -42,7 +42,8 @@ impl Entry {
     pub(super) fn new(material: &Material) -> Entry {
         let observations = || material.curves.iter().flat_map(|c| &c.observations);
         let model = material.scattering().ok();
-        let level = |&deg: &f64| claimed_db(material, model.as_ref()?, deg);
+        let levels = model.as_ref().map(|model| Levels::rendered(material, model));
+        let level = |&deg: &f64| levels.as_ref()?.db(deg);
         Entry {
             slug: material.slug.to_string(),
             name: cut(&material.name, NAME),
@@ -53,7 +54,7 @@ impl Entry {
             status: status_of(material),
             ghz: material.frequency_hz.map(|hz| hz / 1e9),
             deg: range_deg(material),
-            fitted: material.fits.iter().any(|fit| fit.curve.is_some()),
+            fitted: material.fits.iter().any(|fit| fit.is_fitted()),
             measured: has_measured_curve(material),
             points: observations().count(),
             censored: observations().filter(|o| o.sigma0.is_none()).count(),

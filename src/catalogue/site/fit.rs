@@ -7,7 +7,7 @@ use super::entry::{kind_of, place_of};
 use super::residuals;
 use super::words::{digits, grouped};
 use crate::brdf::Parameter;
-use crate::material::{Estimate, Fit, FitReport, Material, SourceKind};
+use crate::material::{ChosenBy, Fit, FitReport, Material, SourceKind, Told};
 use crate::units::dbm_from_watts;
 
 /// Parameters that backscatter sees only inside a product, and the product's name.
@@ -26,6 +26,7 @@ pub(super) struct FitView {
     model: String,
     method: String,
     curve: Option<String>,
+    is_fitted: bool,
     is_rendered: bool,
     parameters: Vec<ParameterView>,
     products: Vec<ProductView>,
@@ -70,8 +71,9 @@ struct ReportView {
 
 /// A fit as its page shows it; `number` is its place.
 pub(super) fn view(material: &Material, number: usize, fit: &Fit) -> FitView {
+    let told = fit.told();
     let parameters: Vec<ParameterView> =
-        fit.model.parameters().iter().map(|p| parameter(material, fit, p)).collect();
+        fit.model.parameters().iter().map(|p| parameter(material, fit, &told, p)).collect();
     FitView {
         name: fit.name.clone(),
         kind: word(material, &fit.source),
@@ -79,6 +81,7 @@ pub(super) fn view(material: &Material, number: usize, fit: &Fit) -> FitView {
         model: model_name(fit),
         method: method(&fit.estimator),
         curve: fit.curve.clone(),
+        is_fitted: fit.is_fitted(),
         is_rendered: fit.name == material.render,
         has_values: !parameters.is_empty(),
         parameters,
@@ -124,23 +127,28 @@ fn model_name(fit: &Fit) -> String {
     }
 }
 
-fn parameter(material: &Material, fit: &Fit, parameter: &Parameter) -> ParameterView {
+fn parameter(
+    material: &Material,
+    fit: &Fit,
+    told: &[Told],
+    parameter: &Parameter,
+) -> ParameterView {
     let path = &parameter.path;
     let own = fit.parameter_sources.iter().find(|(known, _)| known == path);
     let source = own.map_or(&fit.source, |(_, source)| source);
-    let estimate = fit.report.as_ref().and_then(|report| report.estimate(path));
+    let own_told = told.iter().find(|told| told.name == *path);
     let stored_sd = fit.covariance.as_ref().and_then(|c| c.standard_deviation(path));
-    let (told, is_told) = told(fit, parameter, estimate, stored_sd);
+    let (told, is_told) = in_words(fit, path, own_told, stored_sd);
     ParameterView {
         path: path.clone(),
         value: digits(parameter.value),
         unit: parameter.unit,
-        sd: estimate.and_then(|e| e.sd).or(stored_sd).map(digits),
-        interval: estimate.and_then(|e| e.interval_95).map(interval),
+        sd: own_told.and_then(|told| told.sd).or(stored_sd).map(digits),
+        interval: own_told.and_then(|told| told.interval_95).map(interval),
         range: interval([parameter.min, parameter.max]),
         source: source.clone(),
         source_place: place_of(material, source),
-        kind: match fit.report.as_ref().is_some_and(|report| report.is_by_convention(path)) {
+        kind: match own_told.is_some_and(|told| told.chosen_by == ChosenBy::Convention) {
             true => CONVENTION,
             false => word(material, source),
         },
@@ -154,28 +162,24 @@ fn interval([low, high]: [f64; 2]) -> String {
 }
 
 /// Whether the data tell a parameter.
-fn told(
-    fit: &Fit,
-    parameter: &Parameter,
-    estimate: Option<&Estimate>,
-    stored_sd: Option<f64>,
-) -> (String, bool) {
-    let path = parameter.path.as_str();
+fn in_words(fit: &Fit, path: &str, told: Option<&Told>, stored_sd: Option<f64>) -> (String, bool) {
     let product = PRODUCTS.iter().find(|(known, _)| *known == path);
-    let is_gauge = fit.report.as_ref().is_some_and(|r| r.gauge.is_some());
-    let is_held = fit.report.as_ref().is_some_and(|r| r.given.iter().any(|g| g.name == path));
-    let is_at_end = [parameter.min, parameter.max].contains(&parameter.value);
-    match (estimate, product) {
-        (Some(Estimate { sd: Some(_), .. }), _) if is_at_end => {
+    let product = product.filter(|_| fit.model.identified_products().is_some());
+    let convention = |name: &str| format!("only inside {name}; this value is a convention");
+    match (told, product) {
+        (Some(told), _) if told.is_identified() => ("yes".to_owned(), true),
+        (Some(Told { chosen_by: ChosenBy::Data, sd: Some(_), .. }), _) => {
             ("told, but it ended at the end of its range".to_owned(), false)
         }
-        (Some(Estimate { sd: Some(_), .. }), _) => ("yes".to_owned(), true),
-        (Some(_), _) => ("no: the data leave it open".to_owned(), false),
-        _ if is_held => ("no: held at this value".to_owned(), false),
-        (None, Some((_, name))) if is_gauge => {
-            (format!("only inside {name}; this value is a convention"), false)
+        (Some(Told { chosen_by: ChosenBy::Data, .. }), _) => {
+            ("no: the data leave it open".to_owned(), false)
         }
-        _ if fit.curve.is_none() => ("no fit: stated".to_owned(), false),
+        (Some(Told { chosen_by: ChosenBy::Hand, .. }), _) => {
+            ("no: held at this value".to_owned(), false)
+        }
+        (None, _) if fit.curve.is_none() => ("no fit: stated".to_owned(), false),
+        (_, Some((_, name))) => (convention(name), false),
+        (Some(_), None) => (convention("a product"), false),
         _ if stored_sd.is_some() => ("yes, as the source states".to_owned(), true),
         _ => ("not said".to_owned(), false),
     }

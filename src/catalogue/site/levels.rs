@@ -1,7 +1,8 @@
 //! Levels of a model over the angle, in the range for which a material's numbers are claimed.
 
+use super::words::decibels;
 use crate::brdf::Scattering;
-use crate::material::Material;
+use crate::material::{Material, Reach};
 use crate::units::db_from_ratio;
 
 /// Below this a level says only that nothing comes back, dB.
@@ -16,36 +17,71 @@ pub(super) const SMALL_DEG: [f64; 27] = [
 /// Angles of tables, °.
 pub(super) const TABLE_DEG: [f64; 9] = [0.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0];
 
-/// σ⁰ in dB to a tenth at an angle; none beyond the range that is claimed, or where nothing comes back.
-pub(super) fn claimed_db(
-    material: &Material,
-    model: &dyn Scattering,
-    theta_deg: f64,
-) -> Option<f64> {
-    let [least, most] = range_deg(material);
-    let level_db = db_from_ratio(model.sigma0(theta_deg.to_radians()));
-    let is_claimed = (least..=most).contains(&theta_deg) && level_db >= FAINTEST_DB;
-    is_claimed.then(|| tenth(level_db))
+/// A model within the angles at which a material answers for it.
+pub(super) struct Levels<'a> {
+    model: &'a dyn Scattering,
+    reach: Reach,
+    range_deg: [f64; 2],
 }
 
-/// A curve fine enough for the lobe of a smooth surface: (°, dB), one list per unbroken piece.
-pub(super) fn line(material: &Material, model: &dyn Scattering) -> Vec<Vec<(f64, f64)>> {
-    let level = |theta_deg: f64| Some((theta_deg, claimed_db(material, model, theta_deg)?));
-    let mut pieces: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
-    for point in angles_deg(material).map(level) {
-        match (point, pieces.last_mut()) {
-            (Some(point), Some(piece)) => piece.push(point),
-            (None, Some(piece)) if !piece.is_empty() => pieces.push(Vec::new()),
-            _ => {}
+impl<'a> Levels<'a> {
+    /// Of what scenes render.
+    pub fn rendered(material: &Material, model: &'a dyn Scattering) -> Levels<'a> {
+        Levels { reach: material.reach(), ..Levels::stated(material, model) }
+    }
+
+    /// Of a model that answers wherever the material claims to.
+    pub fn stated(material: &Material, model: &'a dyn Scattering) -> Levels<'a> {
+        let reach = Reach::new(material.theta_rad, None);
+        Levels { model, reach, range_deg: range_deg(material) }
+    }
+
+    /// σ⁰ in dB to a tenth at an angle; none where it is not claimed, or nothing comes back.
+    pub fn db(&self, theta_deg: f64) -> Option<f64> {
+        let level_db = db_from_ratio(self.model.sigma0(theta_deg.to_radians()));
+        (self.is_claimed(theta_deg) && level_db >= FAINTEST_DB).then(|| tenth(level_db))
+    }
+
+    /// The same in words; a level of which only a threshold is known as a bound.
+    pub fn text(&self, theta_deg: f64) -> String {
+        match (self.below_db(theta_deg), self.db(theta_deg)) {
+            (Some(threshold_db), _) => format!("< {}", decibels(threshold_db)),
+            (None, Some(level_db)) => decibels(level_db),
+            (None, None) if self.is_claimed(theta_deg) => "nothing".to_owned(),
+            (None, None) => "not claimed".to_owned(),
         }
     }
-    pieces.retain(|piece| piece.len() > 1);
-    pieces
+
+    fn below_db(&self, theta_deg: f64) -> Option<f64> {
+        let threshold = self.reach.below_sigma0(theta_deg.to_radians())?;
+        self.is_claimed(theta_deg).then(|| db_from_ratio(threshold))
+    }
+
+    fn is_claimed(&self, theta_deg: f64) -> bool {
+        self.reach.outside_rad(theta_deg.to_radians()) < ROUNDING_RAD
+    }
+
+    /// A curve fine enough for the lobe of a smooth surface: (°, dB), one list per unbroken piece.
+    pub fn line(&self) -> Vec<Vec<(f64, f64)>> {
+        let level = |theta_deg: f64| Some((theta_deg, self.db(theta_deg)?));
+        let mut pieces: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
+        for point in angles_deg(self.range_deg).map(level) {
+            match (point, pieces.last_mut()) {
+                (Some(point), Some(piece)) => piece.push(point),
+                (None, Some(piece)) if !piece.is_empty() => pieces.push(Vec::new()),
+                _ => {}
+            }
+        }
+        pieces.retain(|piece| piece.len() > 1);
+        pieces
+    }
 }
 
+/// What an angle may lose on its way through degrees, rad.
+const ROUNDING_RAD: f64 = 1e-7;
+
 /// Angles from end to end of the claimed range, °: every tenth up to 12°, then every half.
-pub(super) fn angles_deg(material: &Material) -> impl Iterator<Item = f64> {
-    let [least, most] = range_deg(material);
+pub(super) fn angles_deg([least, most]: [f64; 2]) -> impl Iterator<Item = f64> {
     let fine = (0..120).map(|step: u32| f64::from(step) / 10.0);
     let coarse = (24..180).map(|step: u32| f64::from(step) / 2.0);
     let inner = fine.chain(coarse).filter(move |a| *a > least && *a < most);

@@ -5,12 +5,12 @@ use serde::Serialize;
 use super::cite::Citation;
 use super::composition::{self, Composition};
 use super::curve::{self, CurveView, Sample};
-use super::entry::has_measured_curve;
+use super::entry::{has_measured_curve, place_of};
 use super::fit::{self, FitView};
-use super::levels::{TABLE_DEG, claimed_db, range_deg};
+use super::levels::{Levels, TABLE_DEG, range_deg};
 use super::link::{self, Link};
 use super::script::inert;
-use super::words::{cut, decibels, digits, gaps, meaning};
+use super::words::{cut, digits, gaps, meaning};
 use crate::catalogue::About;
 use crate::effects;
 use crate::material::{FindingVerdict, Material, Source, SourceKind};
@@ -70,6 +70,8 @@ struct SourceView<'a> {
 #[derive(Serialize)]
 struct EffectView {
     name: String,
+    /// Key of its source and its place.
+    source: Option<(String, usize)>,
     is: Option<&'static str>,
     parameters: Vec<[String; 3]>,
 }
@@ -132,15 +134,8 @@ fn head(material: &Material) -> Head<'_> {
 /// Levels of what scenes render.
 fn levels(material: &Material) -> Vec<(String, String)> {
     let Ok(model) = material.scattering() else { return Vec::new() };
-    let level = |theta_deg: f64| {
-        let [least, most] = range_deg(material);
-        let text = match claimed_db(material, &model, theta_deg) {
-            Some(level_db) => decibels(level_db),
-            None if (least..=most).contains(&theta_deg) => material.silence().to_owned(),
-            None => "not claimed".to_owned(),
-        };
-        (format!("{theta_deg:.0}°"), text)
-    };
+    let levels = Levels::rendered(material, &model);
+    let level = |theta_deg: f64| (format!("{theta_deg:.0}°"), levels.text(theta_deg));
     TABLE_DEG.into_iter().map(level).collect()
 }
 
@@ -165,6 +160,7 @@ fn effects(material: &Material) -> Vec<EffectView> {
         };
         EffectView {
             name: entry.name.clone(),
+            source: entry.source.as_ref().map(|key| (key.clone(), place_of(material, key))),
             is: effect.map(|effect| effect.is()),
             parameters: entry.parameters.iter().map(row).collect(),
         }

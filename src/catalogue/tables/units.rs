@@ -17,9 +17,13 @@ const ENDINGS: [(&str, &str); 8] = [
 const WHOLE: [(&str, &str); 1] = [("year", "a")];
 
 /// Columns whose unit another column of the same row tells.
-const TOLD: [(&str, &str, &str); 4] = [
+const TOLD: [(&str, &str, &str); 8] = [
     ("fit_parameter", "value", "the column `unit`"),
     ("fit_parameter", "sd", "the column `unit`"),
+    ("fit_estimate", "value", "the column `unit`"),
+    ("fit_estimate", "sd", "the column `unit`"),
+    ("fit_estimate", "low_95", "the column `unit`"),
+    ("fit_estimate", "high_95", "the column `unit`"),
     ("fit_covariance", "covariance", "the product of the units of `row_path` and `column_path`"),
     ("effect_parameter", "value", "the ending of the column `name`"),
 ];

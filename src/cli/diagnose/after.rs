@@ -30,6 +30,7 @@ pub(super) fn with_found(scene: &Scene, found: &[Found], materials: &[String]) -
 pub(super) fn entries(found: &[Found], level: Level) -> impl Iterator<Item = EffectEntry> + '_ {
     found.iter().filter(move |one| one.level == level).map(|one| EffectEntry {
         name: one.name.to_owned(),
+        source: None,
         parameters: one.parameters.iter().map(|(k, v)| ((*k).to_owned(), v.value)).collect(),
     })
 }

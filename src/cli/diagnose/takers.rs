@@ -9,6 +9,7 @@ use crate::cli::staging::Used;
 use crate::diagnose::{LEAST_LOOKS, Report};
 use crate::effects::Level;
 use crate::error::Error;
+use crate::formats::EffectEntry;
 use crate::material::{Fit, Material, Slug, SourceKind};
 use crate::store::{Added, Store};
 
@@ -211,8 +212,17 @@ fn with_found(
     // The fit that earlier findings speak of has given way.
     material.findings.retain(|known| known.fit_after.as_deref() != Some(FIT));
     material.findings.extend(findings(report, before.as_deref(), Some(FIT), &key));
+    // A material of its own has left its sources behind.
+    let is_known = |key: &String| material.sources.iter().any(|source| source.key == *key);
     let declared = used.found.material.effects.iter().cloned();
-    material.effects = declared.chain(entries(&report.effects, Level::Material)).collect();
+    let declared = declared.map(|entry| {
+        let source = entry.source.clone().filter(is_known);
+        EffectEntry { source, ..entry }
+    });
+    let found = entries(&report.effects, Level::Material)
+        .map(|entry| EffectEntry { source: Some(key.clone()), ..entry });
+    let effects = declared.chain(found).collect();
+    material.effects = effects;
     material.validate()?;
     Ok(material)
 }

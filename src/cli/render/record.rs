@@ -13,7 +13,7 @@ use crate::material::Status;
 use crate::radar::Radar;
 use crate::render::{Scan, Truth};
 use crate::scene::{MeshReport, Scene};
-use crate::units::range;
+use crate::units::{range, rounded};
 
 /// Version of the layout of `scan.json`; it grows with every change that a reader could trip over.
 const SCHEMA: u32 = 2;
@@ -149,9 +149,8 @@ impl<'a> Record<'a> {
             let of_material = |truth: &&Truth| {
                 usize::from(material_of_region[usize::from(truth.region)]) == material
             };
-            let beyond_rad = |truth: &Truth| {
-                used[material].found.material.theta_outside_rad(truth.hit.theta_rad())
-            };
+            let reach = used[material].found.material.reach();
+            let beyond_rad = |truth: &Truth| reach.outside_rad(truth.hit.theta_rad());
             let known = scan.detections().filter_map(|echo| echo.truth.as_ref());
             let strange = known.filter(of_material).map(beyond_rad).filter(|rad| *rad > 0.0);
             strange.fold((0, 0.0), |(count, most), rad| (count + 1, rad.max(most)))
@@ -201,12 +200,14 @@ impl<'a> Record<'a> {
     /// Sentences about what a person should not overlook.
     pub fn notices(&self) -> Vec<String> {
         let mut notices = self.scan_notices.to_vec();
-        for material in self.materials.iter().filter(|m| m.detections_outside_theta > 0) {
-            let MaterialRecord { name, theta_deg, theta_outside_deg, .. } = material;
+        let strange = |(material, _): &(&MaterialRecord, _)| material.detections_outside_theta > 0;
+        for (material, used) in std::iter::zip(&self.materials, self.used).filter(strange) {
+            let MaterialRecord { name, theta_outside_deg, .. } = material;
+            let span_rad = used.found.material.reach().span_rad();
             notices.push(format!(
                 "{} detections on `{name}` lie outside the {}° for which it is described, by up to {theta_outside_deg:.1}°",
                 material.detections_outside_theta,
-                range(*theta_deg)
+                range(span_rad.map(|rad| rounded(rad.to_degrees())))
             ));
         }
         for mesh in self.meshes.iter().filter(|mesh| mesh.degenerate_facets > 0) {

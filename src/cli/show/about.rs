@@ -11,8 +11,8 @@ pub(super) fn composition(material: &Material) -> String {
     let mut text = String::new();
     if !material.layers.is_empty() {
         text += "\nlayers, outermost first\n";
-        text +=
-            &table(&["layer", "thickness mm", "permittivity"], material.layers.iter().map(layer));
+        let header = ["layer", "thickness mm", "permittivity", "source"];
+        text += &table(&header, material.layers.iter().map(layer));
     }
     if !material.permittivities.is_empty() {
         text += "\npermittivity eps' - j eps''\n";
@@ -31,12 +31,13 @@ pub(super) fn composition(material: &Material) -> String {
     text
 }
 
-fn layer(layer: &Layer) -> [String; 3] {
+fn layer(layer: &Layer) -> [String; 4] {
     let thickness = layer.thickness_m.map(|m| shown(rounded(m * 1e3)));
     [
         layer.name.clone(),
         thickness.unwrap_or("half space".to_owned()),
         layer.permittivity.clone().unwrap_or("not known".to_owned()),
+        layer.source.clone().unwrap_or_default(),
     ]
 }
 
@@ -44,9 +45,10 @@ fn permittivity(entry: &Permittivity) -> [String; 6] {
     let with = |value: f64, sd: Option<f64>| {
         shown(value) + &sd.map_or(String::new(), |sd| format!(" ± {}", shown(sd)))
     };
+    let from = entry.frequency_source.as_ref().map_or(String::new(), |key| format!(", {key}"));
     [
         entry.key.clone(),
-        shown(rounded(entry.frequency_hz / 1e9)),
+        shown(rounded(entry.frequency_hz / 1e9)) + &from,
         entry.temperature_k.map_or("not stated".to_owned(), |k| shown(rounded(k - 273.15))),
         with(entry.real, entry.real_sd),
         with(entry.imaginary, entry.imaginary_sd),

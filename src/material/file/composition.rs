@@ -11,6 +11,7 @@ pub(super) struct LayerFile {
     name: String,
     thickness_mm: Option<f64>,
     permittivity: Option<String>,
+    source: Option<String>,
 }
 
 #[derive(Deserialize, Serialize)]
@@ -24,6 +25,7 @@ pub(super) struct PermittivityFile {
     real_sd: Option<f64>,
     imaginary_sd: Option<f64>,
     source: String,
+    frequency_source: Option<String>,
 }
 
 #[derive(Deserialize, Serialize)]
@@ -37,15 +39,15 @@ pub(super) struct RoughnessFile {
 
 impl From<LayerFile> for Layer {
     fn from(entry: LayerFile) -> Layer {
-        let LayerFile { name, thickness_mm, permittivity } = entry;
-        Layer { name, thickness_m: thickness_mm.map(|mm| mm / 1e3), permittivity }
+        let LayerFile { name, thickness_mm, permittivity, source } = entry;
+        Layer { name, thickness_m: thickness_mm.map(|mm| mm / 1e3), permittivity, source }
     }
 }
 
 impl From<Layer> for LayerFile {
     fn from(layer: Layer) -> LayerFile {
-        let Layer { name, thickness_m, permittivity } = layer;
-        LayerFile { name, thickness_mm: thickness_m.map(|m| m * 1e3), permittivity }
+        let Layer { name, thickness_m, permittivity, source } = layer;
+        LayerFile { name, thickness_mm: thickness_m.map(|m| m * 1e3), permittivity, source }
     }
 }
 
@@ -61,6 +63,7 @@ impl From<PermittivityFile> for Permittivity {
             real_sd,
             imaginary_sd,
             source,
+            frequency_source: entry.frequency_source,
         }
     }
 }
@@ -77,6 +80,7 @@ impl From<Permittivity> for PermittivityFile {
             real_sd,
             imaginary_sd,
             source,
+            frequency_source: entry.frequency_source,
         }
     }
 }

@@ -142,7 +142,7 @@ fn celsius(temperature_k: f64) -> f64 {
 }
 
 fn stated() -> String {
-    "stated".to_owned()
+    Fit::STATED.to_owned()
 }
 
 /// Reads a material file; `read_csv` fetches a curve's file by the name the material gives it.
@@ -336,7 +336,7 @@ covariance = {{ parameters = ["albedo"], matrix = [[0.01]] }}
         material.curves.clear();
         material.tags = vec!["a \"word\"".to_owned()];
         let parameters = [("slope".to_owned(), 0.1 + 0.2)].into();
-        material.effects = vec![EffectEntry { name: "any".to_owned(), parameters }];
+        material.effects = vec![EffectEntry { name: "any".to_owned(), source: None, parameters }];
         assert_eq!(read(&write(&material).unwrap()).unwrap(), material);
     }
 

@@ -15,7 +15,7 @@ use crate::store::{Store, StoreError};
 pub struct Outlined {
     /// Short name.
     pub slug: String,
-    /// Angles of incidence for which it is claimed, rad.
+    /// Angles of incidence at which it answers, rad: [`Reach::span_rad`](crate::material::Reach::span_rad).
     pub theta_rad: [f64; 2],
     /// Equal exactly for equal models; none where nothing can be rendered.
     pub model_hash: Option<[u8; 16]>,

@@ -101,7 +101,8 @@ fn sessions(conn: &Connection, revision_id: i64) -> Result<Vec<Session>> {
 
 fn permittivities(conn: &Connection, revision_id: i64) -> Result<Vec<Permittivity>> {
     let sql =
-        "SELECT key, frequency_hz, temperature_k, real, imaginary, real_sd, imaginary_sd, source
+        "SELECT key, frequency_hz, temperature_k, real, imaginary, real_sd, imaginary_sd, source,
+                   frequency_source
                FROM permittivity WHERE revision_id = ?1 ORDER BY position";
     rows(conn, sql, [revision_id], |row| {
         Ok(Permittivity {
@@ -113,15 +114,21 @@ fn permittivities(conn: &Connection, revision_id: i64) -> Result<Vec<Permittivit
             real_sd: row.get(5)?,
             imaginary_sd: row.get(6)?,
             source: row.get(7)?,
+            frequency_source: row.get(8)?,
         })
     })
 }
 
 fn layers(conn: &Connection, revision_id: i64) -> Result<Vec<Layer>> {
-    let sql = "SELECT name, thickness_m, permittivity FROM layer
+    let sql = "SELECT name, thickness_m, permittivity, source FROM layer
                WHERE revision_id = ?1 ORDER BY position";
     rows(conn, sql, [revision_id], |row| {
-        Ok(Layer { name: row.get(0)?, thickness_m: row.get(1)?, permittivity: row.get(2)? })
+        Ok(Layer {
+            name: row.get(0)?,
+            thickness_m: row.get(1)?,
+            permittivity: row.get(2)?,
+            source: row.get(3)?,
+        })
     })
 }
 

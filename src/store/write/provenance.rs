@@ -104,8 +104,8 @@ impl Rows<'_> {
         self.insert(
             "INSERT INTO permittivity
              (revision_id, position, key, frequency_hz, temperature_k, real, imaginary, real_sd,
-              imaginary_sd, source)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
+              imaginary_sd, source, frequency_source)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
             params![
                 self.revision_id,
                 position,
@@ -117,16 +117,17 @@ impl Rows<'_> {
                 entry.real_sd,
                 entry.imaginary_sd,
                 entry.source,
+                entry.frequency_source,
             ],
         )
     }
 
     pub(super) fn layer(&self, position: u32, layer: &Layer) -> Result<()> {
-        let Layer { name, thickness_m, permittivity } = layer;
+        let Layer { name, thickness_m, permittivity, source } = layer;
         self.insert(
-            "INSERT INTO layer (revision_id, position, name, thickness_m, permittivity)
-             VALUES (?1, ?2, ?3, ?4, ?5)",
-            params![self.revision_id, position, name, thickness_m, permittivity],
+            "INSERT INTO layer (revision_id, position, name, thickness_m, permittivity, source)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+            params![self.revision_id, position, name, thickness_m, permittivity, source],
         )
     }
 

@@ -167,15 +167,10 @@
     return svg;
   };
   const table = (there) => {
-    const cell = (material, row) => {
-      const level = material.table.level[row], deg = material.table.deg[row];
-      if (level !== null) return signed(level);
-      return deg < material.deg[0] || deg > material.deg[1] ? 'not claimed' : material.silence;
-    };
     const head = make('tr', {}, make('th', { scope: 'col' }, 'incidence'),
       ...there.map(({ material }) => make('th', { scope: 'col' }, make('bdi', {}, material.name), ' ', ...badges(material))));
     const rows = there[0].material.table.deg.map((deg, row) => make('tr', {}, make('th', { scope: 'row' }, `${deg}°`),
-      ...there.map(({ material }) => make('td', {}, cell(material, row)))));
+      ...there.map(({ material }) => make('td', {}, material.table.level[row]))));
     return make('table', { class: 'numbers compared' }, make('caption', {}, 'σ⁰, dB, of what scenes render'), make('thead', {}, head), make('tbody', {}, ...rows));
   };
 
