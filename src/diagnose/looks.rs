@@ -88,7 +88,7 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>,
 }
 
 /// Sorts a cloud by the looks of its scan, by chirp numbers or, without them, by directions. A detection
-/// further than 0.1 m from where its chirp meets the target is a stray, and its chirp then counts as
+/// further than 0.1 m from where its chirp meets the target, or beside its ray, is a stray, and its chirp then counts as
 /// one that saw nothing.
 ///
 /// # Errors
@@ -181,6 +181,10 @@ fn range_m(point: &CloudPoint, look: &Look) -> f64 {
     point.range_m.unwrap_or_else(|| look.ray.origin.distance_m(point.point))
 }
 
+/// How far a point lies from where its chirp meets the target: along the ray and beside it, m.
 fn off_m(point: &CloudPoint, look: &Look) -> f64 {
-    (range_m(point, look) - look.hit.range_m).abs()
+    let along = look.ray.direction.xyz();
+    let from_origin = point.point.xyz - look.ray.origin.xyz;
+    let beside_m = (from_origin - from_origin.dot(along) * along).length();
+    (range_m(point, look) - look.hit.range_m).abs() + beside_m
 }

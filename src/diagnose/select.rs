@@ -17,7 +17,7 @@ use super::folds::Folds;
 use super::placebo::Placebo;
 use super::refit::{Fitted, Problem, Space, sum};
 use super::residual::{self, Unexplained, speckle_sd_db};
-use super::score::{DB, Scored, scored};
+use super::score::{DB, Scored, errors, scored};
 use super::screen::{Sample, Screen};
 use super::trial::Trial;
 use super::{Diagnosis, Evidence};
@@ -281,42 +281,60 @@ impl Selection<'_> {
             let rivals: Vec<&dyn Effect> = rivals.into_iter().filter(is_new).collect();
             if !rivals.is_empty() {
                 let without = self.without(state, added.len());
-                rivals.into_iter().for_each(|rival| self.hold(&without, state, &mut one, rival));
+                rivals.into_iter().for_each(|rival| self.contest(&without, state, &mut one, rival));
             }
             added.push(one);
         }
     }
 
-    /// Holds the last effect of a model against another, which takes its place if it is the better one.
-    fn hold<'a>(
+    /// Holds the last effect of a model against another, which takes its place if it is the better one and
+    /// supported by itself.
+    fn contest<'a>(
         &self,
         without: &State<'a>,
         state: &mut State<'a>,
         last: &mut Added<'a>,
         rival: &'a dyn Effect,
     ) {
-        let Some(Trial { space, fitted, candidate, .. }) = self.tried(without, rival) else {
+        last.class.retain(|name| *name != rival.name());
+        let Some(Trial { space, fitted, candidate, tried, .. }) = self.tried(without, rival) else {
             return;
         };
         let held_out = self.held_out(&space, &fitted.at);
+        let [held_out_gain, held_out_se] = self.difference(&held_out, &without.held_out);
+        let Candidate { gain, size_db, numbers: count, .. } = candidate;
+        let is_supported = held_out_gain.min(gain) > self.settings.standard_errors * held_out_se
+            && gain >= self.settings.least_gain_of(count, tried)
+            && !self.is_farther_off(&held_out, &without.held_out);
         let [better, se] = self.difference(&held_out, &state.held_out);
         let is_tied = better.abs() <= se.max(SAME);
         let [own, other] = [numbers(&state.space, &state.fitted.at), numbers(&space, &fitted.at)];
         let is_better = if is_tied && own != other { other < own } else { better > 0.0 };
-        last.class.retain(|name| *name != rival.name());
+        if !is_supported {
+            return;
+        }
         let mut loser = rival.name();
         if is_better {
+            let screen = Screen::new(self.problem, &without.space, &without.fitted.at);
+            let placebo_gain = self.placebo_gain(without, &screen, count);
+            if gain <= placebo_gain {
+                return;
+            }
             loser = state.space.effects.last().map_or(loser, |effect| effect.name());
-            let [held_out_gain, held_out_se] = self.difference(&held_out, &without.held_out);
-            let Candidate { gain, size_db, .. } = candidate;
-            last.evidence = Evidence { gain, size_db, held_out_gain, held_out_se, ..last.evidence };
+            last.evidence = Evidence { gain, placebo_gain, held_out_gain, held_out_se, size_db };
             *state = State { space, fitted, held_out };
         }
-        match is_tied {
-            true => last.class.push(loser),
-            false if is_better => last.class.clear(),
-            false => {}
+        if is_tied {
+            last.class.push(loser);
+        } else if is_better {
+            last.class.clear();
         }
+    }
+
+    /// Whether held-out errors grow by more than their standard error.
+    fn is_farther_off(&self, now: &[Scored], before: &[Scored]) -> bool {
+        let [now, before] = [now, before].map(|scored| errors(scored, self.folds));
+        now.rmse_db > before.rmse_db + now.rmse_se_db
     }
 
     /// Takes away effects that the later ones made superfluous.
@@ -380,7 +398,9 @@ impl Selection<'_> {
             let is_local = is_kept && !is_spread && trial.candidate.gain >= FAR_BEYOND * least;
             // A fit without a patch may be far off where the patch was all that held it.
             let gain = gain.min(trial.candidate.gain);
-            if gain <= standard_errors * se && !is_local {
+            if gain <= standard_errors * se && !is_local
+                || self.is_farther_off(&held_out, &state.held_out)
+            {
                 continue;
             }
             if is_spread {
