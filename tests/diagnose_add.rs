@@ -158,6 +158,12 @@ fn an_effect_of_a_material_becomes_a_revision_or_a_file() {
     run(at, &diagnose("scene.toml", "anisotropy,fov-gain", &add), "stored mannequin-paint@2");
     let diagnosed = contents(&at.join("matdb.sqlite")).pop().unwrap();
     assert_eq!(diagnosed.effects[0].name, "anisotropy");
+    let from = &diagnosed.findings[0].source;
+    assert_eq!(
+        diagnosed.effects[0].source.as_ref(),
+        Some(from),
+        "the diagnosis states its numbers"
+    );
     let verdict = |name: &str| {
         let found = diagnosed.findings.iter().find(|finding| finding.effect == name);
         found.map(|finding| (finding.verdict, finding.fit_after.as_deref()))
