@@ -72,7 +72,7 @@ impl Patches {
     #[inline(always)]
     pub fn seen(&self) -> impl Iterator<Item = usize> {
         let bits = (0..LANES).fold(0, |bits, lane| bits | self.is_seen[lane] << lane);
-        std::iter::successors(Some(bits), |bits| Some(bits & (bits - 1)))
+        std::iter::successors(Some(bits), |bits| Some(bits & bits.wrapping_sub(1)))
             .take_while(|&bits: &u32| bits != 0)
             .map(|bits| bits.trailing_zeros() as usize)
     }
