@@ -153,7 +153,7 @@ fn cite_names_no_source_that_does_not_state_the_number() {
                 material.slug
             );
             let key = reference.source.as_ref().map(|s| s.key.as_str());
-            let layers = reference.numbers.iter().filter(|place| place.starts_with("layers, "));
+            let layers = reference.numbers.iter().filter(|place| place.starts_with("layer "));
             for place in layers {
                 let mut layers = material.layers.iter();
                 let layer = layers.find(|layer| place.contains(&layer.name)).unwrap();
@@ -166,7 +166,7 @@ fn cite_names_no_source_that_does_not_state_the_number() {
         let chosen = references(&material)
             .into_iter()
             .find(|r| r.source.as_ref().is_some_and(|s| s.kind == SourceKind::Synthetic));
-        let frequency = format!("permittivities, {slug} at 300 GHz, frequency_hz");
+        let frequency = format!("permittivity {slug} at 300 GHz, frequency_hz");
         assert!(chosen.unwrap().numbers.contains(&frequency));
     }
 }
