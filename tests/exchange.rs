@@ -523,7 +523,8 @@ fn a_bare_curve_is_named_by_its_file_and_says_what_it_is_found_and_cited_by() {
     let [shown, _] = run(&["show", "paint"]);
     assert!(shown.contains("instrument radar: Bench, 3e11 GHz, threshold 77 dBm"), "{shown}");
     assert!(shown.contains("curve spring: 3 points, 1 of them below the threshold, from spring"));
-    assert!(shown.contains("45°") && shown.contains("below the threshold  15° outside"), "{shown}");
+    assert!(shown.contains("30°  < -33.0"), "{shown}");
+    assert!(shown.contains("45°  nothing    15° outside"), "{shown}");
 
     let second = "theta_deg,sigma0_db\n0,-4\n10,-13\n20,-20\n25,-24\n";
     fs::write(folder.path().join("second.csv"), second).unwrap();

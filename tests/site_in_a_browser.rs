@@ -105,7 +105,7 @@ fn search_and_filter(browser: &Browser, root: &str) {
     choose(browser, "measured", "yes");
     browser.wait("return document.getElementById('count').textContent === '1 of 8 materials'");
     assert_eq!(browser.text(NAMES), "Plate on the bench");
-    choose(browser, "fitted", "no");
+    choose(browser, "fitted", "yes");
     browser.wait("return /^0 of 8/.test(document.getElementById('count').textContent)");
     browser.click("button[type=reset]");
     browser.wait("return document.getElementById('count').textContent === '8 materials'");
