@@ -15,7 +15,7 @@
 //! | probability of what was seen | `likelihood.rs` |
 //! | base and effects together | `refit.rs` |
 //! | what an effect promises | `screen.rs` |
-//! | held-out patches, selection | `folds.rs`, `select.rs` |
+//! | held-out patches, selection, rivals held against each other | `folds.rs`, `select.rs`, `exchange.rs` |
 //! | what remains | `covariates.rs`, `field.rs`, `residual.rs` |
 //! | what is said in the end | `report.rs` |
 //! | how large the error is, and what the answer is to be held against | `score.rs`, `controls.rs`, `placebo.rs` |
@@ -24,6 +24,7 @@
 mod controls;
 mod covariates;
 pub mod curve;
+mod exchange;
 mod field;
 mod folds;
 mod likelihood;

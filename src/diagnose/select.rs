@@ -3,9 +3,9 @@
 //! Every effect is screened on a sample of the looks; those that promise enough are fitted together with
 //! the base, first on the sample, the best few on all looks. These predict held-out patches from fits
 //! without them. One is accepted when that gain, or the one in the fit if it is less, is more than two
-//! standard errors over patches (or, for what shifts means in one small place, far beyond chance and found again where it was not fitted), its gain
-//! in the fit beats that of placebos and a stated least, and it changes the data by a stated least
-//! size. Where placebos beat all, two that predict held-out patches are tried together: each alone is a
+//! standard errors over patches (or, for what shifts means in one small place, far beyond chance and
+//! found again where it was not fitted), held-out errors do not grow, its gain in the fit beats that of
+//! placebos and a stated least, and it changes the data by a stated least size. Where placebos beat all, two that predict held-out patches are tried together: each alone is a
 //! worse picture of both than a wave.
 
 use nalgebra::DVector;
@@ -50,7 +50,7 @@ const PLACEBOS: u64 = 3;
 /// Effects of one round of which pairs are tried.
 const MOST_PAIRED: usize = 4;
 /// Difference in ln p of all held-out looks that tells no two effects apart: odds of twenty to one.
-const SAME: f64 = 3.0;
+pub(super) const SAME: f64 = 3.0;
 /// Share of the best held-out gain that others reach which may yet prove better.
 const SHARE_OF_RIVAL: f64 = 0.9;
 /// Others of each effect that are tried again.
@@ -108,7 +108,7 @@ pub(super) struct Added<'a> {
     pub class: Vec<&'static str>,
     pub evidence: Evidence,
     /// Others that did nearly as well.
-    rivals: Vec<&'a dyn Effect>,
+    pub rivals: Vec<&'a dyn Effect>,
 }
 
 /// The effect of a round that is to be added.
@@ -259,80 +259,15 @@ impl Selection<'_> {
     }
 
     /// The model without one of its effects.
-    fn without<'a>(&self, state: &State<'a>, index: usize) -> State<'a> {
+    pub(super) fn without<'a>(&self, state: &State<'a>, index: usize) -> State<'a> {
         let (space, start) = state.space.without(&state.fitted.at, index);
         let fitted = self.problem.fit(&space, &start, &[], &SEARCH);
         let held_out = self.held_out(&space, &fitted.at);
         State { space, fitted, held_out }
     }
 
-    /// Holds each of several effects against those that did nearly as well when it was chosen: what was
-    /// added later may have told them apart.
-    fn exchange<'a>(&self, state: &mut State<'a>, added: &mut Vec<Added<'a>>) {
-        if added.len() < 2 {
-            return;
-        }
-        for _ in 0..added.len() {
-            // Its turn makes it the last, as a new one is.
-            let mut one = added.remove(0);
-            (state.space, state.fitted.at) = state.space.rotated(&state.fitted.at);
-            let rivals = std::mem::take(&mut one.rivals);
-            let is_new = |rival: &&dyn Effect| !state.space.has(rival.name());
-            let rivals: Vec<&dyn Effect> = rivals.into_iter().filter(is_new).collect();
-            if !rivals.is_empty() {
-                let without = self.without(state, added.len());
-                rivals.into_iter().for_each(|rival| self.contest(&without, state, &mut one, rival));
-            }
-            added.push(one);
-        }
-    }
-
-    /// Holds the last effect of a model against another, which takes its place if it is the better one and
-    /// supported by itself.
-    fn contest<'a>(
-        &self,
-        without: &State<'a>,
-        state: &mut State<'a>,
-        last: &mut Added<'a>,
-        rival: &'a dyn Effect,
-    ) {
-        last.class.retain(|name| *name != rival.name());
-        let Some(Trial { space, fitted, candidate, tried, .. }) = self.tried(without, rival) else {
-            return;
-        };
-        let held_out = self.held_out(&space, &fitted.at);
-        let [held_out_gain, held_out_se] = self.difference(&held_out, &without.held_out);
-        let Candidate { gain, size_db, numbers: count, .. } = candidate;
-        let is_supported = held_out_gain.min(gain) > self.settings.standard_errors * held_out_se
-            && gain >= self.settings.least_gain_of(count, tried)
-            && !self.is_farther_off(&held_out, &without.held_out);
-        let [better, se] = self.difference(&held_out, &state.held_out);
-        let is_tied = better.abs() <= se.max(SAME);
-        let [own, other] = [numbers(&state.space, &state.fitted.at), numbers(&space, &fitted.at)];
-        let is_better = if is_tied && own != other { other < own } else { better > 0.0 };
-        if !is_supported {
-            return;
-        }
-        let mut loser = rival.name();
-        if is_better {
-            let screen = Screen::new(self.problem, &without.space, &without.fitted.at);
-            let placebo_gain = self.placebo_gain(without, &screen, count);
-            if gain <= placebo_gain {
-                return;
-            }
-            loser = state.space.effects.last().map_or(loser, |effect| effect.name());
-            last.evidence = Evidence { gain, placebo_gain, held_out_gain, held_out_se, size_db };
-            *state = State { space, fitted, held_out };
-        }
-        if is_tied {
-            last.class.push(loser);
-        } else if is_better {
-            last.class.clear();
-        }
-    }
-
     /// Whether held-out errors grow by more than their standard error.
-    fn is_farther_off(&self, now: &[Scored], before: &[Scored]) -> bool {
+    pub(super) fn is_farther_off(&self, now: &[Scored], before: &[Scored]) -> bool {
         let [now, before] = [now, before].map(|scored| errors(scored, self.folds));
         now.rmse_db > before.rmse_db + now.rmse_se_db
     }
@@ -523,12 +458,12 @@ impl Selection<'_> {
     }
 
     /// Sum over all looks of a difference in ln p, and its standard error over patches.
-    fn difference(&self, a: &[Scored], b: &[Scored]) -> [f64; 2] {
+    pub(super) fn difference(&self, a: &[Scored], b: &[Scored]) -> [f64; 2] {
         let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a.ln_p - b.ln_p).collect();
         self.folds.sum(&differences)
     }
 
-    fn placebo_gain(&self, state: &State, screen: &Screen, numbers: usize) -> f64 {
+    pub(super) fn placebo_gain(&self, state: &State, screen: &Screen, numbers: usize) -> f64 {
         let gain = |draw: u64| {
             let placebo = Placebo::new(numbers, self.settings.seed, draw);
             let mut space = state.space.clone();
@@ -548,7 +483,7 @@ impl Selection<'_> {
     }
 
     /// Every look, predicted by a fit without its fold.
-    fn held_out(&self, space: &Space, at: &DVector<f64>) -> Vec<Scored> {
+    pub(super) fn held_out(&self, space: &Space, at: &DVector<f64>) -> Vec<Scored> {
         let Problem { declared, observations, .. } = self.problem;
         let mut all: Vec<(usize, Scored)> = Vec::new();
         for (fold, at) in self.problem.fit_without(space, at, self.folds).iter().enumerate() {
@@ -586,7 +521,7 @@ pub(super) fn larger([a, b]: [f64; 2]) -> f64 {
 }
 
 /// How many numbers of the last effect of a model are not where it is absent.
-fn numbers(space: &Space, at: &DVector<f64>) -> usize {
+pub(super) fn numbers(space: &Space, at: &DVector<f64>) -> usize {
     let Some((effect, values)) = space.effects.last().zip(space.effect_values(at).pop()) else {
         return 0;
     };
