@@ -59,7 +59,7 @@ fn hostile() -> Material {
 
 fn about() -> About {
     let text = format!(
-        "title = 'Catalogue of {0}'\ndescription = '{0}'\nversion = '1'\n\
+        "title = 'Catalogue of {0}'\ndescription = '{0}'\nversion = '1'\nlicence = 'CC0-1.0'\n\
          [[person]]\nfamily = '<b>Roe</b>'\ngiven = 'Ann'\n",
         "<script>alert(0)</script>"
     );

@@ -21,8 +21,9 @@ pub struct About {
     pub description: String,
     /// Version of this publication, as the people who cite it will read it; none: not numbered.
     pub version: Option<String>,
-    /// SPDX identifier of the licence of the catalogue as a whole; materials may say their own.
-    pub licence: String,
+    /// SPDX expression of the licence of the catalogue as a whole; materials say their own. None: nobody has
+    /// declared one, so that it is what they share.
+    pub licence: Option<String>,
     /// Address at which the catalogue will stand, if it is known.
     pub url: Option<String>,
     /// DOI of the publication, without a resolver in front.
@@ -53,7 +54,7 @@ impl Default for About {
             description: "How materials scatter, measured or fitted, each number with its source."
                 .to_owned(),
             version: None,
-            licence: "CC-BY-4.0".to_owned(),
+            licence: None,
             url: None,
             doi: None,
             people: Vec::new(),
@@ -104,8 +105,7 @@ impl About {
         if about.title.trim().is_empty() {
             return Err(refused("`title` is empty; give the catalogue a title".to_owned()));
         }
-        if !is_licence(&about.licence) {
-            let licence = &about.licence;
+        if let Some(licence) = about.licence.as_ref().filter(|licence| !is_licence(licence)) {
             return Err(refused(format!(
                 "`licence` is `{licence}`; write an SPDX expression such as CC-BY-4.0 or \
                  LicenseRef-proprietary"

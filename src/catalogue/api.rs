@@ -104,7 +104,9 @@ impl Entry {
 pub(super) struct Index {
     pub schema_version: u32,
     pub title: String,
-    pub licence: String,
+    /// None of an empty catalogue that declares none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub licence: Option<String>,
     pub version: Option<String>,
     /// When the newest entry was added: UTC, ISO 8601; none in an empty catalogue.
     pub date: Option<String>,

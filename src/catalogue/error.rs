@@ -48,6 +48,17 @@ pub enum CatalogueError {
         /// What is allowed.
         limit: u64,
     },
+    /// The materials share no licence, and none was declared for the catalogue.
+    #[error(
+        "the materials are under {found}, which is no one licence for the catalogue; nothing was published, \
+         declare one in a file for --about, such as licence = \"{example}\""
+    )]
+    NoLicence {
+        /// Their licences.
+        found: String,
+        /// What could be declared.
+        example: String,
+    },
     /// What stands there was published, but its record of changes cannot be continued.
     #[error(
         "cannot continue the change log of the earlier publication: {}: {problem}; publish into a new \

@@ -7,6 +7,7 @@ use super::api::{Entry, Index};
 use super::folder::Sum;
 use super::site::Site;
 use super::{About, CatalogueError, Folder, api, records, tables};
+use crate::material::form::is_licence;
 use crate::store::Store;
 
 /// The database of a publication.
@@ -31,7 +32,8 @@ pub struct Published {
 /// An earlier publication there is replaced. `progress` hears of every material done.
 ///
 /// # Errors
-/// When the database cannot be read, the folder holds anything else, or something cannot be written.
+/// When the database cannot be read, its materials share no licence and `about` declares none, the folder holds
+/// anything else, or something cannot be written.
 pub fn publish(
     store: &Store,
     about: &About,
@@ -71,6 +73,8 @@ fn fill(
     mut progress: impl FnMut(usize),
 ) -> Result<(usize, bool), CatalogueError> {
     folder.write(ABOUT, format!("{}\n", serde_json::json!(about)).as_bytes())?;
+    // What nobody declared is not written as if they had: the next publication asks its own materials.
+    let about = &About { licence: licence(store, about)?, ..about.clone() };
     let (mut entries, mut site) = (Vec::new(), Site::new(about)?);
     for (number, summary) in store.list()?.iter().enumerate() {
         let Some(stored) = store.get(&summary.slug, None)? else { continue };
@@ -85,4 +89,39 @@ fn fill(
     let tables = tables::write(folder, store)?;
     let is_version_reused = records::write(folder, about, &index, &tables)?;
     Ok((index.materials.len(), is_version_reused))
+}
+
+/// The licence of the catalogue as a whole: the declared one, or else that of all its materials; none where there
+/// are none.
+fn licence(store: &Store, about: &About) -> Result<Option<String>, CatalogueError> {
+    if about.licence.is_some() {
+        return Ok(about.licence.clone());
+    }
+    match store.licences()?.as_slice() {
+        [] => Ok(None),
+        [only] if is_licence(only) => Ok(Some(only.clone())),
+        several => Err(no_licence(several)),
+    }
+}
+
+/// That these licences give none for the whole, and what could be declared.
+fn no_licence(licences: &[String]) -> CatalogueError {
+    /// Licences that are named one by one.
+    const MOST_NAMED: usize = 5;
+    /// Letters of a licence that is none.
+    const MOST_LETTERS: usize = 40;
+    let named = licences.iter().take(MOST_NAMED);
+    let named: Vec<String> = named.map(|l| l.chars().take(MOST_LETTERS).collect()).collect();
+    let mut found = named.join(", ");
+    if licences.len() > MOST_NAMED {
+        found += &format!(" and {} more", licences.len() - MOST_NAMED);
+    }
+    let part = |licence: &String| match licence.contains(' ') {
+        true => format!("({licence})"),
+        false => licence.clone(),
+    };
+    let all_of_them = licences.iter().map(part).collect::<Vec<_>>().join(" AND ");
+    let is_example = licences.len() <= MOST_NAMED && is_licence(&all_of_them);
+    let example = if is_example { all_of_them } else { "CC-BY-4.0".to_owned() };
+    CatalogueError::NoLicence { found, example }
 }

@@ -7,6 +7,7 @@ use super::database::Database;
 use super::summary::counted;
 use crate::catalogue::{About, HAS_PARQUET, publish};
 use crate::error::Error;
+use crate::material::form::licence_doubt;
 
 /// Publish the database as a catalogue: a static site and the data in open formats
 #[derive(Debug, clap::Args)]
@@ -17,7 +18,7 @@ pub(super) struct Args {
     /// Folder to write; an earlier publication there is replaced
     folder: PathBuf,
     /// TOML file with title, description, licence, url and [[person]]s of the catalogue [default: as the
-    /// publication there has them]
+    /// publication there has them, and the licence that all materials share]
     #[arg(long, value_name = "FILE")]
     about: Option<PathBuf>,
 }
@@ -40,6 +41,9 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
              gives others",
             about.title
         ));
+    }
+    if let Some(doubt) = about.licence.as_deref().and_then(licence_doubt) {
+        console.notice(&doubt);
     }
     if !HAS_PARQUET {
         console.notice(

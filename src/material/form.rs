@@ -47,10 +47,8 @@ const LICENCES: [&str; 32] = [
 /// assert!(licence_doubt("CC-BY").unwrap().contains("did you mean `CC-BY-4.0`?"));
 /// ```
 pub fn licence_doubt(text: &str) -> Option<String> {
-    let words = text.split(|c: char| c.is_whitespace() || "()".contains(c));
-    let mut names = words.filter(|word| !["", "AND", "OR", "WITH"].contains(word));
     let is_known = |name: &str| name.contains("LicenseRef-") || LICENCES.contains(&name);
-    let stranger = names.find(|name| !is_known(name))?;
+    let stranger = licence_names(text).find(|name| !is_known(name))?;
     // A name without its version is nearest to its latest.
     let begun = LICENCES.iter().rev().find(|known| {
         known.strip_prefix(stranger).is_some_and(|rest| {
@@ -62,6 +60,27 @@ pub fn licence_doubt(text: &str) -> Option<String> {
     Some(format!(
         "the licence `{stranger}` is none of SPDX's usual identifiers (spdx.org/licenses){meant}"
     ))
+}
+
+/// The identifiers in a licence expression, in its order.
+pub fn licence_names(text: &str) -> impl Iterator<Item = &str> {
+    let words = text.split(|c: char| c.is_whitespace() || "()".contains(c));
+    words.filter(|word| !["", "AND", "OR", "WITH"].contains(word))
+}
+
+/// The licences of which a reader may choose one, by their identifiers on SPDX's list; none of an expression that
+/// says more, or names a licence that is not on the list.
+///
+/// ```
+/// use matdb::material::form::alternative_licences;
+/// assert_eq!(alternative_licences("MIT OR CC0-1.0").unwrap(), ["MIT", "CC0-1.0"]);
+/// assert_eq!(alternative_licences("CC-BY-4.0 AND CC0-1.0"), None);
+/// assert_eq!(alternative_licences("LicenseRef-ours"), None);
+/// ```
+pub fn alternative_licences(text: &str) -> Option<Vec<&str>> {
+    let is_listed = |name: &str| is_identifier(name) && !name.contains("LicenseRef-");
+    let names = text.split(" OR ").map(str::trim);
+    names.map(|name| is_listed(name).then_some(name)).collect()
 }
 
 /// Whether a text is an ORCID: sixteen digits in groups of four, of which the last, which may be `X`, checks the

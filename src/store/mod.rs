@@ -280,6 +280,14 @@ impl Store {
         self.find(&Filter::default())
     }
 
+    /// The licences of the current revisions, each once, sorted.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn licences(&self) -> Result<Vec<String>, StoreError> {
+        read::licences(&self.conn).map_err(|error| StoreError::new(&self.path, error))
+    }
+
     /// One revision of a material, or the current one; `None` when there is none.
     ///
     /// # Errors

@@ -40,6 +40,14 @@ pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSumm
     })
 }
 
+/// The licences of the current revisions, each once, sorted.
+pub(super) fn licences(conn: &Connection) -> Result<Vec<String>> {
+    let sql = "SELECT DISTINCT licence FROM material
+               JOIN revision ON material_id = material.id AND number = current_revision
+               ORDER BY licence";
+    rows(conn, sql, [], |row| row.get(0))
+}
+
 /// One revision of a material, or the current one.
 pub(super) fn get(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result<Option<Stored>> {
     // All rows from one moment, whoever writes meanwhile.

@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 
 use super::Context;
 use crate::catalogue::about::Person;
+use crate::material::form::alternative_licences;
 
 /// The DOI's own address.
 pub(super) fn doi_url(doi: &str) -> String {
@@ -19,10 +20,15 @@ pub(super) fn nobody(context: &Context) -> String {
 /// `CITATION.cff`.
 pub(super) fn cff(context: &Context) -> String {
     let about = context.about;
-    let mut text = "cff-version: 1.2.0\n\
-        message: \"If you use these data, please cite them as below, and the source of each number.\"\n\
-        type: dataset\n"
-        .to_owned();
+    let licence = about.licence.as_deref();
+    // Of several the format knows only those of which one may be chosen, and only those of SPDX's list.
+    let alternatives = licence.and_then(alternative_licences).unwrap_or_default();
+    let unsaid = licence.filter(|_| alternatives.is_empty());
+    let message = format!(
+        "If you use these data, please cite them as below, and the source of each number.{}",
+        unsaid.map_or(String::new(), |licence| format!(" Licence: {licence}."))
+    );
+    let mut text = format!("cff-version: 1.2.0\nmessage: {}\ntype: dataset\n", quoted(&message));
     let mut line = |key: &str, value: Option<&str>| {
         if let Some(value) = value {
             text += &format!("{key}: {}\n", quoted(value));
@@ -32,9 +38,15 @@ pub(super) fn cff(context: &Context) -> String {
     line("abstract", Some(&about.description));
     line("version", about.version.as_deref());
     line("date-released", context.day());
-    line("license", Some(&about.licence));
+    if let [only] = alternatives.as_slice() {
+        line("license", Some(only));
+    }
     line("doi", about.doi.as_deref());
     line("url", about.url.as_deref());
+    if alternatives.len() > 1 {
+        text += "license:\n";
+        alternatives.iter().for_each(|licence| text += &format!("  - {}\n", quoted(licence)));
+    }
     text += "authors:\n";
     if about.people.is_empty() {
         text += &format!("  - name: {}\n", quoted(&nobody(context)));
@@ -76,8 +88,16 @@ pub(super) fn zenodo(context: &Context) -> Value {
         "description": escaped(&about.description),
         "creators": creators,
         "access_right": "open",
-        "license": about.licence.to_lowercase(),
     });
+    let alternatives = about.licence.as_deref().and_then(alternative_licences);
+    match (alternatives.as_deref(), about.licence.as_deref()) {
+        // Zenodo knows one licence, by SPDX's identifier in small letters.
+        (Some([only]), _) => insert(&mut record, "license", Some(&only.to_lowercase())),
+        (_, Some(licence)) => {
+            insert(&mut record, "notes", Some(&escaped(&format!("Licence: {licence}."))));
+        }
+        (_, None) => {}
+    }
     insert(&mut record, "version", about.version.as_deref());
     insert(&mut record, "publication_date", context.day());
     insert(&mut record, "doi", about.doi.as_deref());
@@ -116,6 +136,7 @@ mod tests {
     fn both_say_the_same() {
         let text =
             "title = 'A \"b\": c'\ndescription = 'x < y'\nversion = '1.2'\ndoi = '10.5281/zenodo.1'
+            licence = 'CC-BY-4.0'
             [[person]]\nfamily = 'Roe'\ngiven = 'Ann'\norcid = '0000-0002-1825-0097'";
         let about = About::parse("about.toml", text).unwrap();
         let context = Context { about: &about, date: Some("2026-01-02T03:04:05Z"), materials: 1 };
@@ -138,6 +159,28 @@ mod tests {
         assert_eq!(creator["name"], format!("{}, {}", value("family-names"), value("given-names")));
         assert_eq!(orcid_url(creator["orcid"].as_str().unwrap()), value("orcid"));
         assert_eq!(value("date-released"), "2026-01-02");
+    }
+
+    #[test]
+    fn a_licence_is_said_where_the_format_can_and_in_words_where_it_cannot() {
+        let of = |licence: &str| {
+            let about = About { licence: Some(licence.to_owned()), ..About::default() };
+            let context = Context { about: &about, date: None, materials: 1 };
+            (cff(&context), zenodo(&context))
+        };
+        let (cff, zenodo) = of("CC0-1.0");
+        assert!(cff.contains("\nlicense: \"CC0-1.0\"\n") && !cff.contains("Licence:"), "{cff}");
+        assert_eq!((&zenodo["license"], &zenodo["notes"]), (&"cc0-1.0".into(), &Value::Null));
+        let (cff, zenodo) = of("MIT OR CC0-1.0");
+        assert!(cff.contains("\nlicense:\n  - \"MIT\"\n  - \"CC0-1.0\"\n"), "{cff}");
+        assert_eq!(zenodo["notes"], "Licence: MIT OR CC0-1.0.");
+        for several in ["CC-BY-4.0 AND CC0-1.0", "LicenseRef-ours"] {
+            let (cff, zenodo) = of(several);
+            assert!(!cff.contains("\nlicense:"), "{cff}");
+            assert!(cff.contains(&format!("of each number. Licence: {several}.\"\n")), "{cff}");
+            assert_eq!((&zenodo["license"], zenodo["notes"].as_str()),
+                (&Value::Null, Some(format!("Licence: {several}.").as_str())));
+        }
     }
 
     #[test]

@@ -10,6 +10,7 @@ use super::{Context, listed};
 use crate::catalogue::api::Index;
 use crate::catalogue::folder::Sum;
 use crate::catalogue::tables::{Written, csv_path, unit};
+use crate::material::form::{is_licence, licence_names};
 use crate::store::{Column, ColumnKind, Reference, Table};
 
 pub(super) fn package(
@@ -30,12 +31,16 @@ pub(super) fn package(
         "name": name(&about.title),
         "title": about.title,
         "description": about.description,
-        "licenses": licences(context, index),
         "contributors": contributors(context),
         "sources": [{ "title": "The tables source and fit_parameter name the source of every number",
             "path": "tables/source.csv" }],
         "resources": sums.iter().filter_map(resource).collect::<Vec<_>>(),
     });
+    let licences = licences(context, index);
+    if !licences.is_empty() {
+        // A list must hold something.
+        package["licenses"] = licences.into();
+    }
     insert(&mut package, "version", about.version.as_deref());
     insert(&mut package, "created", context.date);
     insert(&mut package, "homepage", about.url.as_deref());
@@ -51,12 +56,18 @@ fn name(title: &str) -> String {
     if words.is_empty() { "catalogue".to_owned() } else { words.join("-") }
 }
 
-/// The catalogue's licence first, then those that materials say of themselves.
+/// The catalogue's licence first, then those that materials say of themselves: one name each, of an expression
+/// those in it.
 fn licences(context: &Context, index: &Index) -> Vec<Value> {
     let own: BTreeSet<&str> = index.materials.iter().map(|entry| entry.licence.as_str()).collect();
-    let first = context.about.licence.as_str();
-    let others = own.into_iter().filter(|licence| *licence != first);
-    std::iter::once(first).chain(others).map(|licence| json!({ "name": licence })).collect()
+    let all = context.about.licence.as_deref().into_iter().chain(own);
+    let mut names: Vec<&str> = Vec::new();
+    for name in all.filter(|licence| is_licence(licence)).flat_map(licence_names) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    names.into_iter().map(|name| json!({ "name": name })).collect()
 }
 
 fn contributors(context: &Context) -> Vec<Value> {

@@ -10,9 +10,22 @@ use super::{Context, listed};
 use crate::catalogue::about::Person;
 use crate::catalogue::api;
 use crate::catalogue::folder::Sum;
+use crate::material::form::alternative_licences;
 
-fn licence_url(licence: &str) -> String {
-    format!("https://spdx.org/licenses/{licence}")
+/// Where SPDX has the text of a licence; none of an expression of several, or of a licence that is not on its list.
+fn licence_url(licence: &str) -> Option<String> {
+    match alternative_licences(licence)?.as_slice() {
+        [only] => Some(format!("https://spdx.org/licenses/{only}")),
+        _ => None,
+    }
+}
+
+/// A licence as schema.org has it: by its address, or else by its name.
+pub(in crate::catalogue) fn licence_record(licence: &str) -> Value {
+    match licence_url(licence) {
+        Some(url) => url.into(),
+        None => json!({ "@type": "CreativeWork", "name": licence }),
+    }
 }
 
 /// People as schema.org has them, each with an identifier in this file.
@@ -53,7 +66,9 @@ fn common(context: &Context) -> Value {
 pub(super) fn dataset(context: &Context, sums: &BTreeMap<String, Sum>) -> Value {
     let mut record = common(context);
     record["@context"] = "https://schema.org/".into();
-    record["license"] = licence_url(&context.about.licence).into();
+    if let Some(licence) = &context.about.licence {
+        record["license"] = licence_record(licence);
+    }
     record["creator"] = people(context).into();
     record["isAccessibleForFree"] = true.into();
     record["keywords"] =
@@ -91,7 +106,6 @@ pub(super) fn crate_metadata(context: &Context, sums: &BTreeMap<String, Sum>) ->
     };
     let files: Vec<Value> = sums.iter().filter_map(file).collect();
     let people = people(context);
-    let licence = licence_url(&context.about.licence);
     let ids = |entries: &[Value]| -> Vec<Value> {
         entries.iter().map(|entry| json!({ "@id": entry["@id"] })).collect()
     };
@@ -114,14 +128,17 @@ pub(super) fn crate_metadata(context: &Context, sums: &BTreeMap<String, Sum>) ->
     }
     let mut root = common(context);
     root["@id"] = "./".into();
-    root["license"] = json!({ "@id": licence });
     let mut authors = ids(&people);
     // A list of one should stand without its brackets.
     root["author"] = if authors.len() == 1 { authors.remove(0) } else { authors.into() };
     root["hasPart"] = parts.into();
+    if let Some(licence) = &context.about.licence {
+        let id = licence_url(licence).unwrap_or("#licence".to_owned());
+        root["license"] = json!({ "@id": id });
+        single.push(json!({ "@id": id, "@type": "CreativeWork", "name": licence,
+            "identifier": licence }));
+    }
     graph.push(root);
-    graph.push(json!({ "@id": licence, "@type": "CreativeWork", "name": context.about.licence,
-        "identifier": context.about.licence }));
     graph.extend(people.into_iter().chain(single).chain(files));
     json!({ "@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph })
 }

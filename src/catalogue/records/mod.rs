@@ -5,6 +5,8 @@ mod citation;
 mod data_package;
 mod linked;
 
+pub(super) use linked::licence_record;
+
 use super::api::Index;
 use super::tables::Written;
 use super::{About, CatalogueError, Folder, api};

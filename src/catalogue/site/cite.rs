@@ -7,6 +7,7 @@ use super::link::doi_href;
 use super::words::cut;
 use crate::catalogue::About;
 use crate::catalogue::bibtex::entry;
+use crate::catalogue::records::licence_record;
 use crate::catalogue::references::pruned;
 use crate::material::{Origin, builtin};
 use crate::store::Stored;
@@ -90,7 +91,7 @@ impl Citation {
             "name": name,
             "identifier": format!("{}@{}", material.slug, stored.revision),
             "description": cut(&format!("{}. {}", name, material.description), 4000),
-            "license": spdx(&material.licence),
+            "license": licence_record(&material.licence),
             "keywords": material.tags,
             "version": stored.revision.to_string(),
             "creator": creator,
@@ -117,7 +118,7 @@ pub(super) fn catalogue_record(about: &About) -> Value {
         "@type": "DataCatalog",
         "name": about.title,
         "description": about.description,
-        "license": spdx(&about.licence),
+        "license": about.licence.as_deref().map(licence_record),
         "version": about.version,
         "url": about.url,
         "creator": creators(about),
@@ -126,10 +127,6 @@ pub(super) fn catalogue_record(about: &About) -> Value {
 
 fn distribution(path: &str, media_type: &str) -> Value {
     json!({ "@type": "DataDownload", "contentUrl": path, "encodingFormat": media_type })
-}
-
-fn spdx(licence: &str) -> String {
-    format!("https://spdx.org/licenses/{licence}")
 }
 
 fn creators(about: &About) -> Vec<Value> {
