@@ -2,10 +2,8 @@
 //! the format can carry comes back the same; `matdb add --from` takes curves and optical constants in
 //! and names every thing that is missing; nothing in a name or a damaged file gets out of its place.
 //!
-//! Checked by hand with the peers' own: universal BRDF by the JSON Schemas of BiRD-project/BiRD_view,
-//! commit a1ed342 (jsonschema 4.26.0; its schema of sample holders is no valid JSON and not used), open
-//! materials by those of asam-ev/OpenMATERIAL-3D, tag v1.0.0 and commit d8f359a, BSDFs with Mitsuba
-//! 3.9.1, patterns with Sionna RT 2.2.0. Their files are not kept here.
+//! What the peers themselves say of every built-in material's exports, `tests/peers/check_exports.py` asks them;
+//! docs/exchange.md has the answers. Their files are not kept here.
 
 mod support;
 

@@ -113,7 +113,8 @@ fn what_was_taken_says_from_which_catalogue_and_when_it_was_made_there() {
     let said = String::from_utf8(said).unwrap();
     assert!(said.contains("import, their revision 2 of "), "{said}");
     let from = "Paints of Roe, version 2.1, https://doi.org/10.1234/paints";
-    assert!(said.ends_with(&format!("imported from {from}\n")), "{said}");
+    let credited = format!("Roe, Ann: {from}");
+    assert!(said.ends_with(&format!("imported from {credited}\n")), "{said}");
 
     // It is theirs wherever it is cited, also when it is taken on from a third catalogue.
     let third = tempfile::tempdir().unwrap();
@@ -124,10 +125,13 @@ fn what_was_taken_says_from_which_catalogue_and_when_it_was_made_there() {
     matdb(ours.path()).args(publish).assert().success();
     import(third.path(), &ours.path().join("site"), &[]);
     for folder in [ours.path(), third.path()] {
-        let cited = matdb(folder).args(["cite", "primer"]).output().unwrap().stdout;
-        assert!(
-            String::from_utf8(cited).unwrap().contains(&format!("From {from}, revision 2 of "))
-        );
+        let cited = matdb(folder).args(["cite", "primer", "--json"]).output().unwrap().stdout;
+        let cited: Value = serde_json::from_slice(&cited).unwrap();
+        let text = cited["text"].as_str().unwrap();
+        assert!(text.contains(&format!("From {credited}, revision 2 of ")), "{text}");
+        let bibtex = cited["bibtex"].as_str().unwrap();
+        assert!(bibtex.contains("author = {Roe, Ann}") && !bibtex.contains("Doe"), "{bibtex}");
+        assert_eq!(cited["csl"][0]["author"][0]["family"], "Roe");
     }
     let page = |name: &str| {
         fs::read_to_string(ours.path().join(format!("site/material/{name}.html"))).unwrap()
@@ -135,13 +139,18 @@ fn what_was_taken_says_from_which_catalogue_and_when_it_was_made_there() {
     let cited = |page: &str| page.split("id=\"cite\"").nth(1).unwrap().to_owned();
     let primer = cited(&page("primer"));
     let [text, bibtex] = ["</p>", "BibTeX</button>"].map(|end| primer.split(end).next().unwrap());
-    assert!(text.contains("In: Paints of Roe, version 2.1, https:"), "{text}");
+    assert!(
+        text.contains("Roe, Ann. ") && text.contains("In: Paints of Roe, version 2.1, https:"),
+        "{text}"
+    );
     assert!(text.contains("Republished in: Mine") && !text.contains("Doe, Ann"), "{text}");
     assert!(
-        bibtex.contains("doi = {10.1234&#x2f;paints}") && !bibtex.contains("author"),
+        bibtex.contains("doi = {10.1234&#x2f;paints}") && bibtex.contains("author = {Roe, Ann}"),
         "{bibtex}"
     );
     assert!(primer.contains("imported from <bdi>Paints of Roe</bdi>"), "{primer}");
+    let record = page("primer");
+    assert!(record.contains("\"familyName\":\"Roe\",\"givenName\":\"Ann\""), "{record}");
     let ptfe = cited(&page("ptfe"));
     assert!(ptfe.contains("Built into matdb") && !ptfe.contains("Doe, Ann"), "{ptfe}");
     let paint = cited(&page("paint"));
@@ -311,6 +320,28 @@ fn an_effect_that_nobody_knows_takes_everything_back() {
     let said = refused(matdb(ours.path()).arg("import").arg(theirs.path().join("site")));
     assert!(said.contains("zinc") && said.contains("telepathy"), "{said}");
     assert_eq!(contents(&database), before, "primer came first and is not there");
+}
+
+#[test]
+fn a_name_that_add_refuses_does_not_come_in_by_import() {
+    let (theirs, ours) = laboratories();
+    let tricky = Material { name: "Paint \u{202e}gnp.exe".to_owned(), ..sound("zinc") };
+    Store::open(theirs.path().join("matdb.sqlite")).unwrap().add([&tricky]).unwrap();
+    matdb(theirs.path()).args(["publish", "site", "-q"]).assert().success();
+    let database = ours.path().join("matdb.sqlite");
+    let before = contents(&database);
+    for more in [&["--dry-run"][..], &[]] {
+        let import = ["import".as_ref(), theirs.path().join("site").into_os_string()];
+        let said = refused(matdb(ours.path()).args(import).args(more));
+        assert!(said.contains("zinc@1: name: it holds a character that turns"), "{said}");
+        assert_eq!(contents(&database), before);
+    }
+    // What stays away is no reason to refuse the others.
+    let mut store = Store::open(&database).unwrap();
+    store.add([&sound("zinc")]).unwrap();
+    drop(store);
+    let said = import(ours.path(), &theirs.path().join("site"), &[]);
+    assert!(results(&said).contains(&("zinc", "conflict")), "{said}");
 }
 
 /// Puts a journal beside a database that tells SQLite to remove `victim` (sqlite.org/fileformat.html,

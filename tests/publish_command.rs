@@ -203,6 +203,73 @@ fn what_the_publication_there_says_of_itself_stays_and_is_said() {
 }
 
 #[test]
+fn a_catalogue_is_under_the_licence_of_its_materials_and_under_none_where_they_differ() {
+    let folder = laboratory();
+    let at = folder.path();
+    let site = at.join("site");
+    matdb(at).args(["publish", "site", "-q"]).assert().success();
+    assert_eq!(json(&site.join("api/v1/index.json"))["licence"], "CC0-1.0");
+    assert_eq!(
+        json(&site.join("datapackage.json"))["licenses"],
+        serde_json::json!([{ "name": "CC0-1.0" }])
+    );
+    assert_eq!(json(&site.join("about.json"))["licence"], Value::Null, "nobody declared it");
+    let mut store = Store::open(at.join("matdb.sqlite")).unwrap();
+    let other = |name: &str, licence: &str| {
+        let licence = licence.to_owned();
+        matdb::material::Material { licence, ..sample(name) }
+    };
+    store.add([&other("ours", "CC-BY-4.0"), &other("choice", "MIT OR CC0-1.0")]).unwrap();
+    let before = tree(&site);
+    let said = refused(matdb(at).args(["publish", "site"]));
+    let whole = "CC-BY-4.0 AND CC0-1.0 AND (MIT OR CC0-1.0)";
+    for part in
+        ["under CC-BY-4.0, CC0-1.0, MIT OR CC0-1.0,", "--about", &format!("licence = \"{whole}\"")]
+    {
+        assert!(said.contains(part), "`{part}` is not in: {said}");
+    }
+    assert_eq!(tree(&site), before);
+    fs::write(at.join("about.toml"), format!("licence = '{whole}'\n")).unwrap();
+    publish(at);
+    matdb(at).args(["verify", "site"]).assert().success();
+    assert_eq!(json(&site.join("api/v1/index.json"))["licence"], whole);
+    let names = json(&site.join("datapackage.json"))["licenses"].clone();
+    assert_eq!(
+        names,
+        serde_json::json!([{ "name": "CC-BY-4.0" }, { "name": "CC0-1.0" }, { "name": "MIT" }])
+    );
+    let work = serde_json::json!({ "@type": "CreativeWork", "name": whole });
+    assert_eq!(json(&site.join("dataset.jsonld"))["license"], work);
+    let linked = json(&site.join("ro-crate-metadata.json"));
+    let graph = linked["@graph"].as_array().unwrap();
+    let of = |id: &str| graph.iter().find(|entity| entity["@id"] == id).unwrap();
+    assert_eq!(
+        (&of("./")["license"]["@id"], &of("#licence")["name"]),
+        (&"#licence".into(), &whole.into())
+    );
+    // What was declared stays so until somebody declares otherwise.
+    matdb(at).args(["publish", "site", "-q"]).assert().success();
+    assert_eq!(json(&site.join("api/v1/index.json"))["licence"], whole);
+    // A licence in words is none that a catalogue could state, and an empty catalogue has none.
+    let empty = at.join("empty");
+    let words =
+        Store::open(at.join("words.sqlite")).unwrap().add([&other("a", "all rights <reserved>")]);
+    assert!(words.is_ok());
+    let said = refused(matdb(at).args(["--db", "words.sqlite", "publish", "empty"]));
+    assert!(
+        said.contains("all rights <reserved>") && said.contains("such as licence = \"CC-BY-4.0\""),
+        "{said}"
+    );
+    let mut store = Store::open(at.join("words.sqlite")).unwrap();
+    store.remove([&"a".parse().unwrap()]).unwrap();
+    matdb(at).args(["--db", "words.sqlite", "publish", "empty", "-q"]).assert().success();
+    matdb(at).args(["verify", "empty"]).assert().success();
+    let index = json(&empty.join("api/v1/index.json"));
+    assert_eq!(index.get("licence"), None);
+    assert_eq!(problems(&json(&empty.join("schema/index.json")), &index), [""; 0]);
+}
+
+#[test]
 fn a_withdrawn_material_says_so_in_every_file_that_names_it() {
     let folder = laboratory();
     publish(folder.path());

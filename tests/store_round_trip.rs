@@ -470,6 +470,7 @@ fn a_revision_knows_which_command_made_it_of_what() {
     store.add([&first]).unwrap();
     let input = |name: &str| Input { name: name.to_owned(), hash: "0e".repeat(32) };
     let origin = Origin {
+        authors: vec!["Roe, Ann".to_owned(), "Doe, Jane".to_owned()],
         title: Some("Cloths of another laboratory".to_owned()),
         doi: Some("10.1234/cloths".to_owned()),
         revision: 7,

@@ -11,13 +11,13 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use matdb::material::Material;
+use matdb::material::{Activity, Input, Material, Origin};
 use matdb::store::{Added, Store};
 use rusqlite::Connection;
 use rusqlite::functions::FunctionFlags;
 use support::database::{attributed, change, complete, contents, fitted, sample, with_effects};
 
-const NEWEST: &str = "schema-0007.sqlite";
+const NEWEST: &str = "schema-0008.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
@@ -37,14 +37,19 @@ fn schema(path: &Path) -> (Vec<[Option<String>; 4]>, [i64; 2]) {
 
 /// What the file of a schema holds: all that the schema can say.
 fn held(file: &str) -> [Material; 3] {
-    let make = match file {
+    let make: fn(&str) -> Material = match file {
         "schema-0001.sqlite" => sample,
         "schema-0002.sqlite" => fitted,
         "schema-0003.sqlite" => with_effects,
         "schema-0004.sqlite" | "schema-0005.sqlite" | "schema-0006.sqlite" => complete,
         _ => attributed,
     };
-    [make("paint"), change(make("paint")), make("primer")]
+    let mut held = [make("paint"), change(make("paint")), make("primer")];
+    if file < "schema-0008.sqlite" {
+        // They were written when the fit did not say yet by which method it was found.
+        held.iter_mut().for_each(|material| material.fits[0].estimator = "stated".to_owned());
+    }
+    held
 }
 
 /// The files of all schemas, by name.
@@ -56,9 +61,27 @@ fn files() -> Vec<String> {
     files
 }
 
+/// Which command made what the newest schema's file holds.
+fn imported() -> Activity {
+    let input = Input { name: "catalogue.sqlite".to_owned(), hash: "0e".repeat(32) };
+    let origin = Origin {
+        authors: vec!["Roe, Ann".to_owned(), "Doe, Jane".to_owned()],
+        title: Some("Paints of Roe".to_owned()),
+        version: Some("2.1".to_owned()),
+        doi: Some("10.1234/paints".to_owned()),
+        url: Some("https://paints.example.org".to_owned()),
+        revision: 1,
+        added_at: "2026-03-14T09:26:53Z".to_owned(),
+        program_version: "0.1.0".to_owned(),
+        command: Some("add".to_owned()),
+    };
+    Activity { command: "import".to_owned(), inputs: vec![input], origin: Some(origin) }
+}
+
 /// Fills a new file as the newest schema's file is.
 fn fill(path: &Path) {
     let mut store = Store::open(path).unwrap();
+    store.record(imported());
     for material in held(NEWEST) {
         store.add([&material]).unwrap();
     }
@@ -110,6 +133,9 @@ fn the_newest_schema_has_its_file() {
     fs::write(&kept, fs::read(fixtures().join(NEWEST)).unwrap()).unwrap();
     assert_eq!(contents(&kept), contents(&fresh));
     assert_eq!(schema(&kept), schema(&fresh));
+    let store = Store::open_existing(&kept).unwrap().unwrap();
+    let stored = store.get(&"paint".parse().unwrap(), Some(1)).unwrap().unwrap();
+    assert_eq!(stored.activity, Some(imported()));
 }
 
 #[test]
@@ -226,6 +252,9 @@ fn the_database_itself_refuses_what_a_material_may_not_be() {
         "UPDATE finding SET fit_after = 'other'",
         "UPDATE finding SET source = 'other'",
         "UPDATE finding SET confusable_with = '{}'",
+        "UPDATE origin SET revision = 0",
+        "UPDATE origin_author SET author = ''",
+        "UPDATE origin_author SET revision_id = 99",
         "UPDATE entry SET material_id = 99",
         "UPDATE entry SET kind = 1, curves = 'many'",
         "UPDATE entry_tag SET slug = 'other'",

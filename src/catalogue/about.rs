@@ -99,6 +99,14 @@ impl About {
         is_publication.then_some(about)
     }
 
+    /// Who answers for it, each as `Family, Given`.
+    pub(super) fn authors(&self) -> Vec<String> {
+        self.people
+            .iter()
+            .map(|Person { family, given, .. }| format!("{family}, {given}"))
+            .collect()
+    }
+
     fn check(&self, file: &str) -> Result<(), AboutError> {
         let about = self;
         let refused = |problem: String| AboutError { file: file.to_owned(), problem };

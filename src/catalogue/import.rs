@@ -99,7 +99,8 @@ impl Import {
     /// again under that name.
     ///
     /// # Errors
-    /// When a database cannot be read, or the prefix makes no name.
+    /// When a database cannot be read, the prefix makes no name, or what would be added has effects that are not known
+    /// here, or names that do not read as they stand.
     pub fn plan(
         &self,
         ours: Option<&Store>,
@@ -119,6 +120,7 @@ impl Import {
                 let prefix = prefix.unwrap_or_default().to_owned();
                 return Err(CatalogueError::Prefix { prefix, problem });
             }
+            self.check(ours, &taken)?;
             plan.push(taken);
         }
         Ok(plan)
@@ -190,8 +192,8 @@ impl Import {
     /// Adds what the plan adds, in one transaction: all of it or nothing.
     ///
     /// # Errors
-    /// When an effect is not known here, the database cannot be written, or somebody else has changed a
-    /// material of the same name since the plan was made.
+    /// When the database cannot be written, or somebody else has changed a material of the same name since the
+    /// plan was made.
     pub fn take(
         &self,
         ours: &mut Store,
@@ -201,13 +203,14 @@ impl Import {
         let about = self.about()?;
         let mut wanted = Vec::new();
         for taken in plan {
-            wanted.extend(self.wanted(ours, taken)?.into_iter().map(|number| (taken, number)));
+            wanted
+                .extend(self.wanted(Some(ours), taken)?.into_iter().map(|number| (taken, number)));
         }
         let made = wanted.iter().map(|(taken, number)| {
             let stored = self.stored(&taken.slug, *number)?;
             let by = Activity { origin: Some(origin(&about, &stored)), ..by.clone() };
             let material = Material { slug: taken.name.clone(), ..stored.material };
-            Ok((self.known(material)?, Some(by)))
+            Ok((material, Some(by)))
         });
         let expected: BTreeMap<&Slug, Added> =
             plan.iter().filter_map(|taken| Some((&taken.name, taken.outcome.first()?))).collect();
@@ -223,16 +226,18 @@ impl Import {
     }
 
     /// Numbers of their revisions that are added, oldest first.
-    fn wanted(&self, ours: &Store, taken: &Taken) -> Result<Vec<u32>, CatalogueError> {
+    fn wanted(&self, ours: Option<&Store>, taken: &Taken) -> Result<Vec<u32>, CatalogueError> {
         let Taken { slug, name, outcome } = taken;
         match outcome {
             Outcome::Added { .. } => {
                 Ok(self.theirs.history(slug)?.into_iter().map(|line| line.revision).collect())
             }
-            Outcome::Continued { .. } => match ours.get(name, None)? {
-                Some(known) => self.since(slug, name, &known.content_hash),
-                None => Err(CatalogueError::Overtaken { slug: name.to_string() }),
-            },
+            Outcome::Continued { .. } => {
+                match ours.map_or(Ok(None), |ours| ours.get(name, None))? {
+                    Some(known) => self.since(slug, name, &known.content_hash),
+                    None => Err(CatalogueError::Overtaken { slug: name.to_string() }),
+                }
+            }
             Outcome::Unchanged | Outcome::Conflict { .. } => Ok(Vec::new()),
         }
     }
@@ -254,15 +259,20 @@ impl Import {
         }
     }
 
-    /// The material, if this program knows its effects.
-    fn known(&self, material: Material) -> Result<Material, CatalogueError> {
-        match resolve(&material.effects, Level::Material) {
-            Ok(_) => Ok(material),
-            Err(error) => Err(CatalogueError::Unsound {
-                bundle: self.path.clone(),
-                problem: format!("{}: {error}", material.slug),
-            }),
+    /// Refuses what nobody could add here by themselves.
+    fn check(&self, ours: Option<&Store>, taken: &Taken) -> Result<(), CatalogueError> {
+        for number in self.wanted(ours, taken)? {
+            let material = self.stored(&taken.slug, number)?.material;
+            let effects = resolve(&material.effects, Level::Material);
+            let problem = effects.err().map(|error| error.to_string());
+            if let Some(problem) = problem.or(material.misleading_name()) {
+                return Err(CatalogueError::Unsound {
+                    bundle: self.path.clone(),
+                    problem: format!("{}@{number}: {problem}", taken.slug),
+                });
+            }
         }
+        Ok(())
     }
 }
 
@@ -287,6 +297,7 @@ fn origin(about: &Option<About>, stored: &Stored) -> Origin {
     let (version, doi, url) =
         about.clone().map_or((None, None, None), |about| (about.version, about.doi, about.url));
     Origin {
+        authors: about.as_ref().map_or(Vec::new(), About::authors),
         title: about.map(|about| about.title),
         version,
         doi,

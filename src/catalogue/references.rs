@@ -189,14 +189,21 @@ impl Citable<'_> {
     fn taken_from(&self) -> Option<String> {
         let origin = self.origin?;
         let day = origin.added_at.get(..10).unwrap_or_default();
-        Some(format!("From {}, revision {} of {day} there", origin.catalogue(), origin.revision))
+        Some(format!("From {}, revision {} of {day} there", origin.credit(), origin.revision))
+    }
+
+    /// Who published the catalogue that it was taken from.
+    fn authors_there(&self) -> &[String] {
+        self.origin.map_or(&[], |origin| &origin.authors)
     }
 
     /// The material and its sources as BibTeX.
     pub fn bibtex(&self) -> String {
         let licence = format!("Licence {}", self.material.licence);
         let status = self.material.status.sentence();
+        let authors_there = self.authors_there().join(" and ");
         let own = [
+            ("author", Some(authors_there).filter(|authors| !authors.is_empty())),
             ("title", Some(self.title())),
             ("howpublished", self.taken_from()),
             ("year", self.year.map(|year| year.to_string())),
@@ -231,10 +238,13 @@ impl Citable<'_> {
         let notes: Vec<String> =
             self.taken_from().into_iter().chain(self.material.status.sentence()).collect();
         let note = (!notes.is_empty()).then(|| notes.join("; "));
+        let authors_there: Vec<Value> =
+            self.authors_there().iter().map(|author| person(author)).collect();
         let own = pruned(json!({
             "id": self.key(),
             "type": "dataset",
             "title": self.title(),
+            "author": (!authors_there.is_empty()).then_some(authors_there),
             "issued": self.year.map(issued),
             "version": self.revision.map(|revision| revision.to_string()),
             "container-title": self.origin.map(Origin::title),

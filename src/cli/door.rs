@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::error::Error;
 use crate::material::form::{is_address, is_doi, is_licence, licence_doubt};
-use crate::material::{Curve, Fit, Instrument, Material, SourceKind, turns_the_line};
+use crate::material::{Curve, Fit, Instrument, Material, SourceKind};
 use crate::units::{dbm_from_watts, range, rounded, shown};
 
 /// Thickest layer of a sample that anybody puts before a radar, m.
@@ -120,12 +120,8 @@ fn slips(material: &Material) -> Vec<(String, &'static str)> {
         "leave U+202A to U+202E and U+2066 to U+2069 out; letters of any script are welcome";
     const DOI: &str = "write it as 10.1234/name, without a resolver in front";
     const URL: &str = "write an address that begins with http:// or https://";
-    let mut slips = Vec::new();
-    material.names(&mut |place, name| {
-        if turns_the_line(name) {
-            slips.push((format!("{place}: it holds a character that turns the line round"), TURN));
-        }
-    });
+    let mut slips: Vec<_> =
+        material.misleading_name().map(|name| (name, TURN)).into_iter().collect();
     let own = ("the material".to_owned(), Some(&material.licence));
     let of_sources =
         material.sources.iter().map(|s| (format!("source `{}`", s.key), s.licence.as_ref()));

@@ -62,7 +62,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     }
     let header = ["rev", "added", "content", "made by", "changed"];
     let mut text = table(&header, records.iter().map(row));
-    let mut catalogues: Vec<String> = origins(&records).map(Origin::catalogue).collect();
+    let mut catalogues: Vec<String> = origins(&records).map(Origin::credit).collect();
     catalogues.dedup();
     catalogues.iter().for_each(|from| text += &format!("imported from {from}\n"));
     console.result(&text, &records)

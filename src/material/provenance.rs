@@ -156,6 +156,10 @@ pub struct Activity {
 /// Somebody else's catalogue that a revision was taken from, and what it was there.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Origin {
+    /// Who answers for the catalogue, as `Family, Given`; none where it names nobody, and of what was imported
+    /// before they were noted.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub authors: Vec<String>,
     /// Title of the catalogue; none of a database by itself.
     pub title: Option<String>,
     /// Its version, as people who cite it read it.
@@ -184,6 +188,14 @@ pub struct Input {
 }
 
 impl Origin {
+    /// The catalogue with those who answer for it.
+    pub fn credit(&self) -> String {
+        match self.authors.as_slice() {
+            [] => self.catalogue(),
+            authors => format!("{}: {}", authors.join("; "), self.catalogue()),
+        }
+    }
+
     /// The catalogue as people cite it: title, version and where it is.
     pub fn catalogue(&self) -> String {
         let version = self.version.as_ref().map(|version| format!("version {version}"));

@@ -46,6 +46,17 @@ impl Material {
         self.findings.iter().for_each(|finding| take("effect of a finding", &finding.effect));
     }
 
+    /// A sentence on the first name that does not read as it stands.
+    pub fn misleading_name(&self) -> Option<String> {
+        let mut found = None;
+        self.names(&mut |place, name| {
+            if turns_the_line(name) && found.is_none() {
+                found = Some(format!("{place}: it holds a character that turns the line round"));
+            }
+        });
+        found
+    }
+
     fn texts(&self, take: &mut dyn FnMut(&str, &str)) {
         self.names(take);
         take("description", &self.description);

@@ -8,7 +8,7 @@ use super::tables::{Table, tables};
 use super::{Store, StoreError, Stored, connect, write};
 
 /// Tables that say who made a revision, which follows from nothing.
-const MAKING: [&str; 3] = ["activity", "activity_input", "origin"];
+const MAKING: [&str; 4] = ["activity", "activity_input", "origin", "origin_author"];
 /// The table of which an older program wrote nothing.
 const STATISTICS: &str = "curve_statistic";
 /// What a sum may differ by on another machine, relative.

@@ -17,7 +17,7 @@ use super::{StoreError, write};
 const APPLICATION_ID: i64 = 0x6d61_7464;
 
 /// The latest schema.
-const LATEST: usize = 7;
+const LATEST: usize = 8;
 
 /// All schemas there ever were, oldest first. Append only: files in the world have stopped at each.
 fn schemas() -> [M<'static>; LATEST] {
@@ -37,6 +37,7 @@ fn schemas() -> [M<'static>; LATEST] {
                 Ok(outline::fill(tx)?)
             },
         ),
+        M::up(include_str!("../../migrations/0008_origin_author.sql")),
     ]
 }
 

@@ -57,6 +57,7 @@ pub fn fitted(slug: &str) -> Material {
     }
     material.fits[0].curve = Some("scan".to_owned());
     material.fits[0].report = Some(report());
+    material.fits[0].estimator = report().method;
     material
 }
 
@@ -199,10 +200,11 @@ pub fn attributed(slug: &str) -> Material {
     material
 }
 
-/// The same without the report of a fit that nobody made, so that everything in it holds.
+/// The same with its model stated beside the curve, as nobody made that fit, so that everything in it holds.
 pub fn sound(slug: &str) -> Material {
     let mut material = with_effects(slug);
     material.fits[0].report = None;
+    material.fits[0].estimator = "stated".to_owned();
     material
 }
 

@@ -178,8 +178,10 @@ mod tests {
             let (cff, zenodo) = of(several);
             assert!(!cff.contains("\nlicense:"), "{cff}");
             assert!(cff.contains(&format!("of each number. Licence: {several}.\"\n")), "{cff}");
-            assert_eq!((&zenodo["license"], zenodo["notes"].as_str()),
-                (&Value::Null, Some(format!("Licence: {several}.").as_str())));
+            assert_eq!(
+                (&zenodo["license"], zenodo["notes"].as_str()),
+                (&Value::Null, Some(format!("Licence: {several}.").as_str()))
+            );
         }
     }
 

@@ -64,12 +64,13 @@ impl Citation {
         let credit = Credit::of(stored);
         let mut text = match &credit {
             Credit::Publisher => {
-                format!("{}{what}. In: {}", authors(about), catalogue_words(about))
+                format!("{}{what}. In: {}", listed(&about.authors()), catalogue_words(about))
             }
             Credit::BuiltIn => format!("{what}. {BUILT_IN}. In: {}", catalogue_words(about)),
             Credit::Others(origin) => {
                 let there = origin.catalogue();
-                format!("{what}. In: {there}. Republished in: {}", catalogue_words(about))
+                let authors = listed(&origin.authors);
+                format!("{authors}{what}. In: {there}. Republished in: {}", catalogue_words(about))
             }
         };
         let status = material.status.sentence();
@@ -78,12 +79,13 @@ impl Citation {
         let bibtex = bibtex(about, &credit, &key, &what, &stored.added_at, status.clone());
         let creator = match credit {
             Credit::Publisher => creators(about),
-            Credit::BuiltIn | Credit::Others(_) => Vec::new(),
+            Credit::BuiltIn => Vec::new(),
+            Credit::Others(origin) => origin.authors.iter().map(|author| person(author)).collect(),
         };
         let origin = match &credit {
             Credit::Publisher => None,
             Credit::BuiltIn => Some(("Made by", "matdb, which it is built into".to_owned())),
-            Credit::Others(origin) => Some(("Imported from", origin.catalogue())),
+            Credit::Others(origin) => Some(("Imported from", origin.credit())),
         };
         let record = pruned(json!({
             "@context": "https://schema.org/",
@@ -108,7 +110,7 @@ impl Citation {
 
 /// How to cite the catalogue as a whole.
 pub(super) fn catalogue(about: &About) -> String {
-    format!("{}{}", authors(about), catalogue_words(about))
+    format!("{}{}", listed(&about.authors()), catalogue_words(about))
 }
 
 /// The catalogue for machines.
@@ -142,10 +144,15 @@ fn creators(about: &About) -> Vec<Value> {
     about.people.iter().map(person).collect()
 }
 
-fn authors(about: &About) -> String {
-    let names: Vec<String> =
-        about.people.iter().map(|person| format!("{}, {}", person.family, person.given)).collect();
-    if names.is_empty() { String::new() } else { names.join("; ") + ". " }
+/// Somebody of whom only `Family, Given` is known.
+fn person(author: &str) -> Value {
+    let (family, given) = author.split_once(", ").unwrap_or((author, ""));
+    json!({ "@type": "Person", "familyName": family, "givenName": given })
+}
+
+/// Names before a title.
+fn listed(authors: &[String]) -> String {
+    if authors.is_empty() { String::new() } else { authors.join("; ") + ". " }
 }
 
 fn catalogue_words(about: &About) -> String {
@@ -168,16 +175,14 @@ fn bibtex(
     added_at: &str,
     status: Option<String>,
 ) -> String {
-    let names: Vec<String> =
-        about.people.iter().map(|person| format!("{}, {}", person.family, person.given)).collect();
-    let authors = (!names.is_empty()).then(|| names.join(" and "));
+    let named = |authors: &[String]| (!authors.is_empty()).then(|| authors.join(" and "));
     let here = (Some(about.title.clone()), &about.version, &about.doi, &about.url);
     let (author, (place, version, doi, url), note) = match credit {
-        Credit::Publisher => (authors, here, None),
+        Credit::Publisher => (named(&about.authors()), here, None),
         Credit::BuiltIn => (None, here, Some(BUILT_IN.to_owned())),
         Credit::Others(o) => {
             let there = (Some(o.title().to_owned()), &o.version, &o.doi, &o.url);
-            (None, there, Some(format!("Republished in {}", catalogue_words(about))))
+            (named(&o.authors), there, Some(format!("Republished in {}", catalogue_words(about))))
         }
     };
     let notes: Vec<String> = note.into_iter().chain(status).collect();

@@ -188,6 +188,7 @@ fn origin(conn: &Connection, revision_id: i64) -> Result<Option<Origin>> {
                FROM origin WHERE revision_id = ?1";
     let found = rows(conn, sql, [revision_id], |row| {
         Ok(Origin {
+            authors: origin_authors(conn, revision_id)?,
             title: row.get(0)?,
             version: row.get(1)?,
             doi: row.get(2)?,
@@ -199,6 +200,11 @@ fn origin(conn: &Connection, revision_id: i64) -> Result<Option<Origin>> {
         })
     });
     Ok(found?.pop())
+}
+
+fn origin_authors(conn: &Connection, revision_id: i64) -> Result<Vec<String>> {
+    let sql = "SELECT author FROM origin_author WHERE revision_id = ?1 ORDER BY position";
+    rows(conn, sql, [revision_id], |row| row.get(0))
 }
 
 /// Statistics of a curve of a revision, or of the current one.

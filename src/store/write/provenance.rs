@@ -218,8 +218,9 @@ impl Rows<'_> {
     }
 
     fn origin(&self, origin: &Origin) -> Result<()> {
-        let Origin { title, version, doi, url, revision, added_at, program_version, command } =
-            origin;
+        let Origin {
+            title, version, doi, url, revision, added_at, program_version, command, ..
+        } = origin;
         self.insert(
             "INSERT INTO origin
              (revision_id, title, version, doi, url, revision, added_at, program_version, command)
@@ -235,6 +236,12 @@ impl Rows<'_> {
                 program_version,
                 command
             ],
-        )
+        )?;
+        numbered(&origin.authors, |position, author| {
+            self.insert(
+                "INSERT INTO origin_author (revision_id, position, author) VALUES (?1, ?2, ?3)",
+                params![self.revision_id, position, author],
+            )
+        })
     }
 }
