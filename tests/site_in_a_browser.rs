@@ -105,7 +105,12 @@ fn search_and_filter(browser: &Browser, root: &str) {
     choose(browser, "measured", "yes");
     browser.wait("return document.getElementById('count').textContent === '1 of 8 materials'");
     assert_eq!(browser.text(NAMES), "Plate on the bench");
+    let badge = "return document.querySelector('#results .badge').textContent";
+    assert_eq!(browser.text(badge), "fitted to measured data");
     choose(browser, "fitted", "yes");
+    browser.wait("return document.getElementById('count').textContent === '1 of 8 materials'");
+    assert_eq!(browser.text(NAMES), "Plate on the bench");
+    choose(browser, "fitted", "no");
     browser.wait("return /^0 of 8/.test(document.getElementById('count').textContent)");
     browser.click("button[type=reset]");
     browser.wait("return document.getElementById('count').textContent === '8 materials'");
@@ -135,6 +140,11 @@ fn compare(browser: &Browser, root: &str) {
     assert_eq!(count("#plot svg[role=img] > title"), json!(1));
     assert_eq!((count("#plot path.mark"), count("#plot path.dots")), (json!(1), json!(1)));
     assert!(count("#plot path.line").as_u64() >= Some(2));
+    for place in ["#chosen li", "#values thead th"] {
+        let badge =
+            format!("return document.querySelector('{place}:last-child .badge').textContent");
+        assert_eq!(browser.text(&badge), "fitted to measured data", "{place}");
+    }
     type_into(browser, "#add", "glass");
     browser.wait("return !!document.querySelector('#matches [data-slug=glass]')");
     browser.click("#matches [data-slug=glass]");

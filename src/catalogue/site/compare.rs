@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 
 use super::curve::marks;
 use super::entry::{kind_of, status_of};
+use super::fit::rendered_words;
 use super::levels::{Levels, TABLE_DEG, range_deg, tenth};
 use super::words::cut;
 use crate::material::{Curve, Material, SourceKind};
@@ -28,6 +29,7 @@ pub(super) fn data(material: &Material) -> Value {
         "slug": material.slug,
         "name": cut(&material.name, 200),
         "kind": material.render_kind().map_or("unknown", SourceKind::as_str),
+        "kind_words": rendered_words(material),
         "status": status_of(material),
         "render": material.render,
         "ghz": material.frequency_hz.map(|hz| hz / 1e9),

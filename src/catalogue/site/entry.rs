@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::fit::rendered_words;
 use super::levels::{Levels, SMALL_DEG, range_deg};
 use super::words::{clean, cut};
 use crate::material::{Material, SourceKind};
@@ -19,6 +20,9 @@ pub(super) struct Entry {
     tags: Vec<String>,
     text: String,
     kind: &'static str,
+    /// What a badge says in the kind's place of a model that goes with a curve.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    kind_words: Option<String>,
     /// `superseded` or `withdrawn`; none of what may still be used.
     #[serde(skip_serializing_if = "Option::is_none")]
     status: Option<&'static str>,
@@ -51,6 +55,7 @@ impl Entry {
             tags: material.tags.iter().map(|tag| cut(tag, NAME)).collect(),
             text: clean(&cut(&material.description, DESCRIPTION)),
             kind: material.render_kind().map_or("unknown", SourceKind::as_str),
+            kind_words: rendered_words(material),
             status: status_of(material),
             ghz: material.frequency_hz.map(|hz| hz / 1e9),
             deg: range_deg(material),

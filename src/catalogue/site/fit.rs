@@ -91,10 +91,17 @@ pub(super) fn view(material: &Material, number: usize, fit: &Fit) -> FitView {
     }
 }
 
-/// What a badge says of a fit to a curve: nobody measured the model itself.
+/// What a badge says of a model that goes with a curve: nobody measured the model itself.
 pub(super) fn kind_words(material: &Material, fit: &Fit) -> Option<String> {
-    fit.curve.as_ref()?;
-    Some(format!("fitted to {} data", word(material, &fit.source)))
+    let curve = material.curves.iter().find(|curve| Some(&curve.name) == fit.curve.as_ref())?;
+    let how = if fit.is_fitted() { "fitted to" } else { "stated beside" };
+    Some(format!("{how} {} data", word(material, &curve.source)))
+}
+
+/// The same of what scenes render; none of a curve, and of a model without one.
+pub(super) fn rendered_words(material: &Material) -> Option<String> {
+    let rendered = material.fits.iter().find(|fit| fit.name == material.render)?;
+    kind_words(material, rendered)
 }
 
 /// An estimator in words; what somebody else calls theirs stays.

@@ -87,8 +87,7 @@ pub(super) fn page<'a>(
     let (picture, samples) = curve::picture(material);
     let kind = material.render_kind();
     let fits = material.fits.iter().enumerate();
-    let rendered = material.fits.iter().find(|fit| fit.name == material.render);
-    let rendered = rendered.and_then(|fit| fit::kind_words(material, fit));
+    let rendered = fit::rendered_words(material);
     Page {
         about,
         root: "../",
@@ -96,7 +95,7 @@ pub(super) fn page<'a>(
         material: head(material),
         kind: kind.map_or("unknown", SourceKind::as_str),
         kind_means: match (&rendered, kind) {
-            (Some(_), _) => "a model that was fitted to a curve",
+            (Some(_), _) => "a model beside a curve, which nobody measured itself",
             (None, kind) => kind.map_or("of unknown origin", meaning),
         },
         kind_words: rendered,

@@ -22,8 +22,8 @@
   const make = (name, attributes, ...inside) => fill(document.createElement(name), attributes, inside);
   const draw = (name, attributes, ...inside) => fill(document.createElementNS(SVG, name), attributes, inside);
   const signed = (value) => value.toFixed(1).replace('-', '−');
-  const badge = (word) => make('span', { class: `badge is-${word}` }, word);
-  const badges = ({ kind, status }) => [kind, status].filter(Boolean).flatMap((word) => [badge(word), ' ']);
+  const badge = (kind, words = kind) => make('span', { class: `badge is-${kind}${words === kind ? '' : ' is-fitted'}` }, words);
+  const badges = ({ kind, kind_words: words, status }) => [badge(kind, words ?? kind), ' ', ...(status ? [badge(status), ' '] : [])];
 
   // Loading: a page opened from a folder may load scripts and nothing else.
   const load = (path) => new Promise((resolve, reject) => {

@@ -31,7 +31,8 @@
     for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
     return element;
   };
-  const badge = (word) => make('span', { class: `badge is-${word}` }, word);
+  const badge = (kind, words = kind) => make('span', { class: `badge is-${kind}${words === kind ? '' : ' is-fitted'}` }, words);
+  const badges = ({ kind, kind_words: words, status }) => [badge(kind, words ?? kind), ' ', ...(status ? [badge(status), ' '] : [])];
   const number = (value) => value.toLocaleString('en').replaceAll(',', '\u202f');
   const range = ([low, high], unit) => (low === high ? `${low}` : `${low}–${high}`) + unit;
 
@@ -130,7 +131,7 @@
     const choose = make('input', { type: 'checkbox', value: entry.slug, 'aria-label': `Compare ${entry.name}` });
     choose.checked = compared.has(entry.slug);
     return make('li', { class: 'card' }, curve(entry), make('h2', {}, link),
-      make('p', {}, ...[entry.kind, entry.status].filter(Boolean).flatMap((word) => [badge(word), ' ']), make('bdi', {}, entry.class)),
+      make('p', {}, ...badges(entry), make('bdi', {}, entry.class)),
       make('p', { class: 'quiet' }, `${range(entry.ghz, '\u00a0GHz')}, ${range(entry.deg, '°')}. ${holds(entry)}`),
       make('label', {}, choose, 'Compare'));
   };
