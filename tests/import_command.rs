@@ -292,6 +292,8 @@ fn what_cannot_be_trusted_changes_nothing() {
         spoil(&site);
         let said = refused(matdb(ours.path()).arg("import").arg(&site));
         assert!(said.contains(expected), "`{expected}` is not in: {said}");
+        let would_help = expected != "newer matdb";
+        assert!(would_help || !said.contains("a sound copy"), "{said}");
         assert!(fs::read(&database).unwrap() == before, "{expected}");
         fs::remove_dir_all(&site).unwrap();
         matdb(theirs.path()).args(["publish", "site", "-q"]).assert().success();
@@ -331,8 +333,8 @@ fn a_name_that_add_refuses_does_not_come_in_by_import() {
     let database = ours.path().join("matdb.sqlite");
     let before = contents(&database);
     for more in [&["--dry-run"][..], &[]] {
-        let import = ["import".as_ref(), theirs.path().join("site").into_os_string()];
-        let said = refused(matdb(ours.path()).args(import).args(more));
+        let site = theirs.path().join("site");
+        let said = refused(matdb(ours.path()).arg("import").arg(site).args(more));
         assert!(said.contains("zinc@1: name: it holds a character that turns"), "{said}");
         assert_eq!(contents(&database), before);
     }

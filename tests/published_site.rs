@@ -361,8 +361,8 @@ fn what_was_stated_beside_a_curve_is_not_called_a_fit() {
     assert!(index.contains("\"fitted\":false"));
     let list = fs::read_to_string(folder.path().join("site/list/1.html")).unwrap();
     for text in [&page, &index, &list] {
-        assert!(text.contains("stated beside literature data"), "{text}");
-        assert!(!text.contains("fitted to literature data"), "{text}");
+        assert!(text.contains("stated beside modelled data"), "{text}");
+        assert!(!text.contains("fitted to modelled data"), "{text}");
     }
 }
 
@@ -370,7 +370,7 @@ fn what_was_stated_beside_a_curve_is_not_called_a_fit() {
 fn a_fit_is_called_one_wherever_its_kind_stands() {
     let site = site();
     for path in ["material/fitted.html", "index/1.js", "list/1.html", "data/fitted.js"] {
-        assert!(site.files[path].contains("fitted to literature data"), "{path}");
+        assert!(site.files[path].contains("fitted to modelled data"), "{path}");
     }
     for path in ["material/ptfe.html", "data/ptfe.js"] {
         assert!(!site.files[path].contains("fitted to "), "{path}");

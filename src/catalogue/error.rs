@@ -79,6 +79,12 @@ pub enum CatalogueError {
         /// The first thing that is wrong.
         problem: String,
     },
+    /// A bundle in forms that this program does not know.
+    #[error("a newer matdb has published {}; nothing was imported, install that", bundle.display())]
+    Newer {
+        /// The folder.
+        bundle: PathBuf,
+    },
     /// What was named is no catalogue.
     #[error("{} is no catalogue: {problem}; name a published folder or its catalogue.sqlite", path.display())]
     NoBundle {

@@ -11,7 +11,7 @@ use super::verify::{about, database, is_newer};
 use super::{About, CatalogueError, verify};
 use crate::effects::{Level, resolve};
 use crate::material::{Activity, Material, Origin, Slug};
-use crate::store::{Added, RevisionSummary, Store, Stored};
+use crate::store::{Added, RevisionSummary, Store, StoreError, Stored};
 
 /// Somebody's catalogue that was [verified](super::verify) and may be taken over.
 #[derive(Debug)]
@@ -77,7 +77,13 @@ impl Import {
         let unsound =
             |problem: String| CatalogueError::Unsound { bundle: bundle.to_owned(), problem };
         if bundle.is_dir() && is_newer(bundle) {
-            return Err(unsound("a newer matdb has published it, install that".to_owned()));
+            return Err(CatalogueError::Newer { bundle: bundle.to_owned() });
+        }
+        // No other copy of it could be read, either.
+        if let Err(CatalogueError::Store(newer @ StoreError::Newer { .. })) =
+            database(&database_of(bundle))
+        {
+            return Err(newer.into());
         }
         let problems = verify(bundle)?.problems;
         if let Some(first) = problems.first() {
