@@ -4,6 +4,7 @@
 mod support;
 
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 use std::path::Path;
 
 use matdb::brdf::{Brdf, Fresnel, Parameter, Scattering};
@@ -137,6 +138,34 @@ fn each_number_has_a_source_that_can_be_found_and_that_show_prints() {
             assert!(used(&material).contains(&key), "{} {key}", material.slug);
         }
     }
+}
+
+/// The number before a unit in a sentence.
+fn number_before(text: &str, unit: &str) -> f64 {
+    let before = text.split(unit).next().unwrap().trim_end();
+    before.rsplit(' ').next().unwrap().parse().unwrap()
+}
+
+#[test]
+fn a_stated_depth_is_that_of_the_permittivity_at_its_frequency() {
+    let mut judged = 0;
+    for material in all() {
+        for sentence in material.unknown.iter().filter(|s| s.contains("falls to 1/e in")) {
+            let said = sentence.split("falls to 1/e in").nth(1).unwrap();
+            let depth_mm = number_before(said, " mm at");
+            let frequency_hz = 1e9 * number_before(said, " GHz");
+            let entry = &material.permittivities[0];
+            assert!(near(frequency_hz, entry.frequency_hz, 1e-9), "{}", material.slug);
+            let (real, imaginary) = (entry.real, entry.imaginary);
+            // Of n + iκ = √(ε′ + iε″) the power falls with 2·κ·ω/c.
+            let kappa = (0.5 * (real.hypot(imaginary) - real)).sqrt();
+            let expected_mm = 1e3 * 299_792_458.0 / (4.0 * PI * frequency_hz * kappa);
+            // Two digits are stated.
+            assert!(near(depth_mm, expected_mm, 0.05), "{}: {expected_mm}", material.slug);
+            judged += 1;
+        }
+    }
+    assert!(judged >= 20);
 }
 
 #[test]
