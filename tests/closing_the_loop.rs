@@ -44,7 +44,7 @@ fn report(verdict: &str, names: &[(&str, &[&str])], after_db: f64) -> Value {
     };
     let errors = |rmse_db: f64| json!({ "rmse_db": rmse_db, "coverage_90": 0.9 });
     json!({
-        "schema": 1, "verdict": verdict, "effects": effects,
+        "schema": 2, "verdict": verdict, "effects": effects,
         "ranking": [
             candidate("drift", 100.0, false, json!([90.0, 9.0])),
             candidate("pose", 95.0, false, json!([85.0, 9.0])),

@@ -107,7 +107,7 @@ fn a_report_is_complete_and_its_table_gives_its_errors() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(entries(&at.join("report")), FILES);
     let report = json(&at.join("report/report.json"));
-    assert_eq!(report["schema"], 1);
+    assert_eq!(report["schema"], 2);
     // The speckle is of one look, and the scene says four.
     assert_eq!(report["verdict"], "explained", "{report}");
     assert_eq!(report["effects"][0]["name"], "speckle");
@@ -195,7 +195,7 @@ fn too_few_detections_are_said_in_files_and_one_sentence() {
     assert!(message.contains("80 detections") && message.contains("300"), "{message}");
     assert_eq!(entries(&at.join("report")), ["report.html", "report.json"]);
     let report = json(&at.join("report/report.json"));
-    assert_eq!(report["schema"], 1);
+    assert_eq!(report["schema"], 2);
     assert_eq!(report["verdict"], "cannot-tell");
     assert_eq!(report["effects"].as_array().unwrap().len(), 0);
     for key in ["reason", "would_help"] {

@@ -60,7 +60,7 @@ fn a_report_is_complete_and_its_table_gives_its_errors() {
     assert_eq!(entries(&at.join("out")), FILES);
     let report = json(&at.join("out/report.json"));
     assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap(), report);
-    assert_eq!((&report["schema"], &report["verdict"]), (&1.into(), &"explained".into()));
+    assert_eq!((&report["schema"], &report["verdict"]), (&2.into(), &"explained".into()));
     assert_eq!(report["effects"][0]["name"], "stray-light", "{report}");
     let csv = fs::read_to_string(at.join("out/residuals.csv")).unwrap();
     for (column, model) in [(4, "before"), (5, "after")] {

@@ -78,7 +78,14 @@ pub(super) fn chosen(names: &[String]) -> Result<Vec<&'static dyn Effect>, Error
     if names.is_empty() {
         return Ok(library().to_vec());
     }
-    names.iter().map(|name| known(name)).collect()
+    let mut chosen: Vec<&'static dyn Effect> = Vec::new();
+    for name in names {
+        let effect = known(name)?;
+        if chosen.iter().all(|other| other.name() != effect.name()) {
+            chosen.push(effect);
+        }
+    }
+    Ok(chosen)
 }
 
 fn known(name: &str) -> Result<&'static dyn Effect, Error> {

@@ -1,21 +1,22 @@
 //! What an answer is to be held against: terms that mean nothing and gain something all the same, and the
-//! size from which each effect would have been seen.
+//! size from which each effect is found again in drawn data.
+//!
+//! These are a sample of the looks, so that the size has the scatter of one drawn scan.
 
 use nalgebra::DVector;
 
 use super::covariates::covariates;
 use super::field::Field;
+use super::folds::Folds;
+use super::likelihood::Declared;
 use super::looks::Observation;
 use super::placebo::Placebo;
 use super::refit::{Problem, Space};
-use super::screen::Screen;
-use super::select::{Selection, State};
-use super::{Control, Controls, Power};
+use super::screen::{Sample, Screen};
+use super::select::{SCOUT, Selection, State, larger, sizes_db};
+use super::{Control, Controls, Diagnosis, Power};
 use crate::effects::{Effect, Prediction};
 use crate::radar::random::{Key, Purpose};
-
-/// Strength of an injected effect, in sizes that would just be seen.
-const INJECTED: f64 = 2.0;
 
 /// All controls, beside the base model.
 pub(super) fn controls(
@@ -69,85 +70,171 @@ fn spline(selection: &Selection, base: &State, numbers: usize) -> Option<Control
     best
 }
 
-/// The size from which each effect would be seen beside the base model.
+/// From which size on each effect is found in data that the base model draws with it.
 fn powers(selection: &Selection, base: &State, effects: &[&dyn Effect]) -> Vec<Power> {
     let sample = selection.sample;
     let problem = sample.problem(&selection.problem);
-    let screen = Screen::new(problem, &base.space, &base.fitted.at);
-    let power = |effect: &&dyn Effect| {
-        let least_gain = selection.settings.least_gain_of(effect.knobs().len(), 1);
-        let space = base.space.with(*effect);
-        let starts = effect.starts(problem.stage, problem.looks);
-        let every = starts.len().div_ceil(MOST_STARTS).max(1);
-        let present = |values: &Vec<f64>| {
-            let knobs = effect.knobs().iter().zip(values);
-            // Where an effect starts from nothing, a felt change of all its numbers stands for it.
-            let all_absent = knobs.clone().all(|(knob, value)| knob.absent == *value);
-            let moved =
-                knobs.map(|(k, v)| if all_absent { v + k.step } else { *v }).collect::<Vec<_>>();
-            Space::joined(&base.fitted.at, *effect, &moved)
-        };
-        let found = starts.iter().step_by(every).map(present).filter_map(|at| {
-            let [information, size_db] = screen.felt(&space, &at);
-            let gain_of_unit = 0.5 * sample.weight * information;
-            let useful = gain_of_unit > 0.0 && size_db > 0.0;
-            useful.then(|| ((least_gain / gain_of_unit).sqrt(), size_db, at))
-        });
-        let least = found.min_by(|a, b| (a.0 * a.1).total_cmp(&(b.0 * b.1)));
-        let recovered = least
-            .as_ref()
-            .map(|(scale, _, at)| recovered(selection, base, &space, at, INJECTED * scale));
-        // Nothing smaller than the least size is ever believed.
-        let least_size_db = selection.settings.least_size_db;
-        let least_db = least.map(|(scale, size_db, _)| (scale * size_db).max(least_size_db));
-        Power { name: effect.name(), least_db, recovered }
-    };
-    effects.iter().map(power).collect()
+    let Diagnosis { block_m, folds, seed, .. } = *selection.settings;
+    let folds = Folds::new(problem.looks, block_m, folds, seed);
+    let bench =
+        Bench { problem, folds: &folds, settings: selection.settings, base, weight: sample.weight };
+    effects.iter().map(|effect| bench.power(*effect)).collect()
 }
 
-/// Starts of an effect that the power is taken over.
-const MOST_STARTS: usize = 12;
+/// Where effects are put in and looked for: a sample of the looks, each of which stands for several.
+struct Bench<'a> {
+    problem: Problem<'a>,
+    folds: &'a Folds,
+    settings: &'a Diagnosis,
+    base: &'a State<'a>,
+    weight: f64,
+}
 
-/// Whether the effect, so many times as strong as at a point, is seen again in drawn data.
-fn recovered(
-    selection: &Selection,
-    base: &State,
-    space: &Space,
-    at: &DVector<f64>,
-    scale: f64,
-) -> bool {
-    let problem = &selection.problem;
-    let [bare, full] = [problem.predict(&base.space, &base.fitted.at), problem.predict(space, at)];
-    let looks = bare.receiver.looks;
-    let draw = |look: usize| {
-        let key = Key {
-            seed: selection.settings.seed,
-            chirp: look as u64,
-            sub_ray: 4,
-            purpose: Purpose::Fit,
+/// An effect of one strength: its size, dB, and the point.
+type Rung = (f64, DVector<f64>);
+
+impl Bench<'_> {
+    fn power(&self, effect: &dyn Effect) -> Power {
+        let rungs = self.rungs(effect);
+        // What is found is found when stronger, too.
+        let (mut missed, mut found) = (None, None);
+        let mut open: &[Rung] = &rungs;
+        while let Some((size_db, at)) = open.get(open.len() / 2) {
+            let (weaker, stronger) = open.split_at(open.len() / 2);
+            if self.is_found(effect, *size_db, at) {
+                (found, open) = (Some(*size_db), weaker);
+            } else {
+                (missed, open) = (Some(*size_db), stronger.get(1..).unwrap_or_default());
+            }
+        }
+        Power { name: effect.name(), least_db: found, missed_db: missed }
+    }
+
+    /// The effect in strengths about where a score test would just see it, weakest first.
+    fn rungs(&self, effect: &dyn Effect) -> Vec<Rung> {
+        let Bench { problem, base, .. } = self;
+        let space = base.space.with(effect);
+        let screen = Screen::new(*problem, &base.space, &base.fitted.at);
+        let starts = effect.starts(problem.stage, problem.looks);
+        let every = starts.len().div_ceil(MOST_STARTS).max(1);
+        let starts: Vec<Vec<f64>> = starts.into_iter().step_by(every).collect();
+        let joined = |values: &Vec<f64>| Space::joined(&base.fitted.at, effect, values);
+        let scaled = |values: &Vec<f64>, scale: f64| joined(&scaled(effect, values, scale));
+        let points: Vec<DVector<f64>> = if starts.iter().any(|start| is_far(effect, start)) {
+            starts.iter().map(joined).collect()
+        } else {
+            let promised = starts.iter().filter_map(|start| {
+                let [information, size_db] = screen.felt(&space, &scaled(start, 1.0));
+                let gain_of_unit = 0.5 * self.weight * information;
+                let scale = (self.least_gain(effect) / gain_of_unit).sqrt();
+                (scale.is_finite() && size_db > 0.0).then_some((scale * size_db, scale, start))
+            });
+            let best = promised.min_by(|a, b| a.0.total_cmp(&b.0));
+            let about = |(_, scale, start): (f64, f64, &Vec<f64>)| {
+                SCALES.map(|times| scaled(start, times * scale)).to_vec()
+            };
+            best.map(about).unwrap_or_default()
         };
-        let mean_w = bare.mean_w(look);
-        let changed = |p: &Prediction| p.arrived.get(look).copied().flatten();
-        // Means with thermal noise, so that more of that is put in, too.
-        let ln_factor = match [bare.passed_w(look), full.passed_w(look)] {
-            [bare_w, full_w] if bare_w > 0.0 && full_w > 0.0 => scale * (full_w / bare_w).ln(),
-            _ => 0.0,
-        };
-        let mut draws = key.draws();
-        let drawn_w = bare.saturating.passed_w(mean_w, mean_w * draws.gamma(looks));
-        let power_w = drawn_w * ln_factor.clamp(-5.0, 5.0).exp();
-        let is_detected = power_w >= problem.declared.threshold_w;
-        let range_m = changed(&bare).zip(changed(&full)).map(|(bare, full)| {
-            let error_m = problem.declared.range_sd_m * draws.gaussian();
-            bare.range_m + scale * (full.range_m - bare.range_m) + error_m
+        let bare = problem.predict(&base.space, &base.fitted.at);
+        let sized = points.into_iter().map(|at| {
+            let sizes_db = sizes_db(problem, &bare, &problem.predict(&space, &at));
+            (larger(sizes_db), at)
         });
-        let (power_w, range_m) = (Some(power_w), range_m);
-        if is_detected { Observation { power_w, range_m } } else { Observation::default() }
-    };
-    let drawn: Vec<Observation> = (0..problem.looks.len()).map(draw).collect();
-    let problem = Problem { observations: &drawn, ..*problem };
-    let screen = Screen::new(problem, &base.space, &base.fitted.at);
-    let least =
-        selection.settings.least_gain_of(space.effects.last().map_or(1, |e| e.knobs().len()), 1);
-    screen.promise(space, at) >= least
+        // Where the base has nothing for an effect to act on, none of its strengths changes anything.
+        let is_felt = |(size_db, _): &Rung| *size_db > LEAST_RUNG_DB;
+        let mut rungs: Vec<Rung> = sized.filter(is_felt).collect();
+        rungs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        rungs
+    }
+
+    fn least_gain(&self, effect: &dyn Effect) -> f64 {
+        self.settings.least_gain_of(effect.knobs().len(), 1)
+    }
+
+    /// Whether an effect is found again, about as large, in data drawn with it.
+    fn is_found(&self, effect: &dyn Effect, size_db: f64, at: &DVector<f64>) -> bool {
+        let drawn = self.drawn(&self.problem.predict(&self.base.space.with(effect), at));
+        let problem = Problem { observations: &drawn, ..self.problem };
+        let sample = &Sample::new(&problem);
+        let selection = Selection {
+            problem,
+            sample,
+            folds: self.folds,
+            settings: self.settings,
+            hear: &|_| (),
+        };
+        let State { space, fitted, .. } = self.base;
+        let fitted = problem.fit(space, &fitted.at, &[], &SCOUT);
+        let held_out = selection.held_out(space, &fitted.at);
+        let bare = State { space: space.clone(), fitted, held_out };
+        let Some(trial) = selection.tried(&bare, effect) else { return false };
+        let held_out = selection.held_out(&trial.space, &trial.fitted.at);
+        let [gain, se] = selection.difference(&held_out, &bare.held_out);
+        // So many looks as the scan has, of which each of these stands for several.
+        let (gain, se) = (self.weight * gain, self.weight.sqrt() * se);
+        let fitted_gain = self.weight * trial.candidate.gain;
+        fitted_gain >= self.settings.least_gain_of(trial.candidate.numbers, trial.tried)
+            && gain.min(fitted_gain) > self.settings.standard_errors * se
+            && trial.candidate.size_db >= self.settings.least_size_db
+            && (size_db / ABOUT..=size_db * ABOUT).contains(&trial.candidate.size_db)
+    }
+
+    /// Data as a prediction draws them.
+    fn drawn(&self, prediction: &Prediction) -> Vec<Observation> {
+        let Declared { threshold_w, range_sd_m } = self.problem.declared;
+        let draw = |look: usize| {
+            let seed = self.settings.seed;
+            let chirp = look as u64;
+            let mut draws = Key { seed, chirp, sub_ray: 4, purpose: Purpose::Fit }.draws();
+            let mut left = draws.uniform();
+            let mut tilted_w = 0.0;
+            for (power_w, weight) in prediction.powers_w(look) {
+                if left >= 0.0 {
+                    tilted_w = power_w;
+                }
+                left -= weight;
+            }
+            let mean_w = tilted_w + prediction.receiver.noise_w;
+            let drawn_w = mean_w * draws.gamma(prediction.receiver.looks);
+            let power_w = prediction.saturating.passed_w(mean_w, drawn_w);
+            let arrived = prediction.arrived.get(look).copied().flatten();
+            let range_m = arrived
+                .map(|a| a.range_m + range_sd_m.hypot(a.spread_m) * draws.gaussian())
+                .filter(|_| range_sd_m > 0.0);
+            match power_w >= threshold_w {
+                true => Observation { power_w: Some(power_w), range_m },
+                false => Observation::default(),
+            }
+        };
+        (0..self.problem.looks.len()).map(draw).collect()
+    }
+}
+
+/// Starts of an effect that are looked at.
+const MOST_STARTS: usize = 12;
+/// Sizes that are tried, dB, and the factor within which one is found again.
+const LEAST_RUNG_DB: f64 = 0.01;
+const ABOUT: f64 = 2.0;
+/// Strengths, in those that a score test would just see.
+const SCALES: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];
+/// Steps from where an effect is absent beyond which no line leads there: a level or a number of looks
+/// whose end stands for none.
+const FAR_STEPS: f64 = 30.0;
+
+fn is_far(effect: &dyn Effect, values: &[f64]) -> bool {
+    let first = effect.knobs().iter().zip(values).next();
+    first.is_some_and(|(knob, value)| (value - knob.absent).abs() > FAR_STEPS * knob.step)
+}
+
+/// So many times as strong. The first number is the strength and the others a shape, or, where a start is
+/// nothing at all, a felt change of every number stands for it.
+fn scaled(effect: &dyn Effect, values: &[f64], scale: f64) -> Vec<f64> {
+    let is_nothing = effect.knobs().iter().zip(values).all(|(knob, value)| knob.absent == *value);
+    let knobs = effect.knobs().iter().zip(values).enumerate();
+    let scaled = knobs.map(|(index, (knob, value))| match (is_nothing, index) {
+        (true, _) => knob.absent + scale * knob.step,
+        (false, 0) => knob.absent + scale * (value - knob.absent),
+        (false, _) => *value,
+    });
+    scaled.collect()
 }

@@ -3,7 +3,7 @@
 
 use super::Evidence;
 use super::screen::Screen;
-use super::select::{Added, Candidate, SAME, Selection, State, numbers};
+use super::select::{Added, Candidate, Left, SAME, Selection, State, numbers};
 use super::trial::Trial;
 use crate::effects::Effect;
 
@@ -22,7 +22,10 @@ impl Selection<'_> {
             let rivals: Vec<&dyn Effect> = rivals.into_iter().filter(is_new).collect();
             if !rivals.is_empty() {
                 let without = self.without(state, added.len());
-                rivals.into_iter().for_each(|rival| self.contest(&without, state, &mut one, rival));
+                let largest_db = added.iter().map(|a| a.evidence.size_db).fold(0.0, f64::max);
+                for rival in rivals {
+                    self.contest(&without, state, &mut one, rival, largest_db);
+                }
             }
             added.push(one);
         }
@@ -36,24 +39,22 @@ impl Selection<'_> {
         state: &mut State<'a>,
         last: &mut Added<'a>,
         rival: &'a dyn Effect,
+        largest_db: f64,
     ) {
         last.class.retain(|name| *name != rival.name());
-        let Some(Trial { space, fitted, candidate, tried, .. }) = self.tried(without, rival) else {
+        let Some(mut trial) = self.tried(without, rival) else { return };
+        let Some((held_out, _)) = self.support(without, &mut trial, largest_db, &Left::default())
+        else {
             return;
         };
-        let held_out = self.held_out(&space, &fitted.at);
+        let Trial { space, fitted, candidate, .. } = trial;
+        let (fitted, held_out) = self.settled(without, &space, &fitted, held_out);
         let [held_out_gain, held_out_se] = self.difference(&held_out, &without.held_out);
         let Candidate { gain, size_db, numbers: count, .. } = candidate;
-        let is_supported = held_out_gain.min(gain) > self.settings.standard_errors * held_out_se
-            && gain >= self.settings.least_gain_of(count, tried)
-            && !self.is_farther_off(&held_out, &without.held_out);
         let [better, se] = self.difference(&held_out, &state.held_out);
         let is_tied = better.abs() <= se.max(SAME);
         let [own, other] = [numbers(&state.space, &state.fitted.at), numbers(&space, &fitted.at)];
         let is_better = if is_tied && own != other { other < own } else { better > 0.0 };
-        if !is_supported {
-            return;
-        }
         let mut loser = rival.name();
         if is_better {
             let screen = Screen::new(self.problem, &without.space, &without.fitted.at);

@@ -53,6 +53,8 @@ pub struct Matched {
     pub strays: Vec<Stray>,
 }
 
+/// Share of a cloud beside the target, from which it is not of this target.
+const MOST_STRAYS: f64 = 0.25;
 /// Detections further than this from where their chirp meets the target are not from there, m.
 const GATE_M: f64 = 0.1;
 
@@ -92,14 +94,21 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>,
 /// one that saw nothing.
 ///
 /// # Errors
-/// When points have no chirp number and no direction from a common origin, or when hardly any lies on
-/// the target.
+/// When points have no chirp number and no direction from a common origin, when they lie on the rays of
+/// other chirps than their numbers say, or when more than a quarter is not on the target.
 pub fn matched(cloud: &Cloud, chirps: &Chirps, looks: &[Look]) -> Result<Matched, DiagnoseError> {
     let index_of_chirp: HashMap<u32, usize> =
         looks.iter().enumerate().map(|(index, look)| (look.chirp, index)).collect();
-    let by_direction = match cloud.points().iter().all(|point| point.chirp.is_some()) {
-        true => None,
-        false => Some(Directions::new(chirps).ok_or(DiagnoseError::Unnumbered)?),
+    let is_numbered = cloud.points().iter().all(|point| point.chirp.is_some());
+    let directions = Directions::new(chirps);
+    let by_direction = match (is_numbered, directions) {
+        (false, None) => return Err(DiagnoseError::Unnumbered),
+        (false, directions) => directions,
+        (true, directions) => {
+            let off = directions.and_then(|directions| directions.number_off(chirps, cloud));
+            off.map_or(Ok(()), |off| Err(DiagnoseError::Misnumbered { off }))?;
+            None
+        }
     };
     let mut observations = vec![Observation::default(); looks.len()];
     let index_of_sent: HashMap<u32, usize> = chirps.number.iter().copied().zip(0..).collect();
@@ -129,7 +138,7 @@ pub fn matched(cloud: &Cloud, chirps: &Chirps, looks: &[Look]) -> Result<Matched
         }
     }
     let (matched, points) = (on_target, cloud.points().len());
-    match matched * 2 < points {
+    match (points - matched) as f64 > MOST_STRAYS * points as f64 {
         true => Err(DiagnoseError::Elsewhere { matched, points }),
         false => Ok(Matched { observations, strays }),
     }
@@ -174,6 +183,21 @@ impl Directions {
     fn chirp(&self, chirps: &Chirps, point: Point<Global>) -> Option<u32> {
         let direction = self.origin.towards(point)?;
         chirps.number.get(self.tree.find(direction.xyz()).0).copied()
+    }
+
+    /// By how much most chirp numbers are too high; `None` where they are not, all alike. A cloud that is
+    /// out of place lies on rays to either side, as the scan goes to and fro.
+    fn number_off(&self, chirps: &Chirps, cloud: &Cloud) -> Option<i64> {
+        let off = |point: &CloudPoint| {
+            let nearest = self.chirp(chirps, point.point)?;
+            Some(i64::from(point.chirp?) - i64::from(nearest))
+        };
+        let mut counts: HashMap<i64, usize> = HashMap::new();
+        for off in cloud.points().par_iter().filter_map(off).collect::<Vec<_>>() {
+            *counts.entry(off).or_default() += 1;
+        }
+        let (off, count) = counts.into_iter().max_by_key(|(off, count)| (*count, *off))?;
+        (off != 0 && 2 * count > cloud.points().len()).then_some(off)
     }
 }
 

@@ -68,10 +68,16 @@ use screen::Sample;
 use select::{Selected, Selection};
 
 /// Version of [`Report`] as JSON.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
 
 /// Detections without which nothing is said.
 const LEAST_DETECTIONS: usize = 300;
+/// Share of detections below the threshold that may be the rounding of a file.
+const MOST_BELOW: f64 = 0.01;
+/// By how much these are below it, ratio of powers.
+const BELOW: f64 = 0.999;
+/// Share of chirps far off the refitted model, from which no effect explains them.
+const MOST_WILD: f64 = 0.25;
 /// Patches without which held-out scores have no standard error worth the name.
 const LEAST_BLOCKS: usize = 15;
 
@@ -155,6 +161,17 @@ pub enum DiagnoseError {
          the cloud with a column `chirp`"
     )]
     Unnumbered,
+    /// Points on the rays of other chirps.
+    #[error(
+        "most points of the cloud lie on the rays of the chirps numbered {} {} than they say; number \
+         them as the scene's scan does, from its first chirp on, or leave the column `chirp` out",
+        .off.unsigned_abs(),
+        if *.off > 0 { "lower" } else { "higher" }
+    )]
+    Misnumbered {
+        /// How much too high their numbers are.
+        off: i64,
+    },
     /// A cloud of something else.
     #[error(
         "{matched} of the cloud's {points} points lie where the scan meets the mesh; check the scene, \
@@ -165,6 +182,30 @@ pub enum DiagnoseError {
         matched: usize,
         /// Points.
         points: usize,
+    },
+    /// Detections that the declared threshold forbids.
+    #[error(
+        "{below} of {detected} detections are weaker than the threshold of {threshold_dbm:.2} dBm that the \
+         scene declares; correct `threshold_dbm` under [radar], or the powers of the cloud"
+    )]
+    Threshold {
+        /// Detections below the threshold.
+        below: usize,
+        /// Detections.
+        detected: usize,
+        /// As declared, dBm.
+        threshold_dbm: f64,
+    },
+    /// A law that fits nowhere.
+    #[error(
+        "the refitted model is far off at {wild} of {looks} chirps, as for another target or power \
+         balance; check mesh, pose and radar of the scene, or register the cloud with `matdb measure`"
+    )]
+    Unlike {
+        /// Chirps beyond 4.5 standard deviations.
+        wild: usize,
+        /// Chirps that meet the target.
+        looks: usize,
     },
     /// Too little was detected.
     #[error(
@@ -237,6 +278,10 @@ impl Diagnosis {
         hear("refitting the base laws");
         let base = selection.base(Space::new(&problem, laws, at_work)?);
         let (before, z_before) = (base.held_out.clone(), self.z(&problem, &base));
+        let (wild, all) = (residual::wild(&z_before), looks.len());
+        if wild as f64 > MOST_WILD * all as f64 {
+            return Err(DiagnoseError::Unlike { wild, looks: all });
+        }
         let Selected { state, ranking, added, structure } = selection.run(base.clone(), effects);
         let numbers = ranking.first().map_or(1, |candidate| candidate.numbers);
         hear("controls");
@@ -293,6 +338,7 @@ impl Diagnosis {
             ranking,
             unexplained,
             error,
+            set_aside: strays.len(),
             controls,
             base,
             laws: model.laws,
@@ -373,6 +419,13 @@ fn check(subject: &Subject, folds: &Folds) -> Result<(), DiagnoseError> {
     let detected = subject.observations.iter().filter(|o| o.power_w.is_some()).count();
     if detected < LEAST_DETECTIONS {
         return Err(DiagnoseError::TooFew { detected });
+    }
+    let threshold_w = subject.declared.threshold_w;
+    let is_below = |o: &&Observation| o.power_w.is_some_and(|w| w < BELOW * threshold_w);
+    let below = subject.observations.iter().filter(is_below).count();
+    if below as f64 > MOST_BELOW * detected as f64 {
+        let threshold_dbm = dbm_from_watts(threshold_w);
+        return Err(DiagnoseError::Threshold { below, detected, threshold_dbm });
     }
     match folds.blocks < LEAST_BLOCKS {
         true => Err(DiagnoseError::TooSmall { blocks: folds.blocks }),

@@ -161,15 +161,15 @@ pub struct Base {
     pub converged: bool,
 }
 
-/// The smallest effect that these data would reveal.
+/// From which size on an effect was found that was put into data drawn by the base model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Power {
     /// Effect.
     pub name: &'static str,
-    /// Size, dB, from which it would be seen; none where these data never show it.
+    /// The smallest size, dB, that was found; none where none was.
     pub least_db: Option<f64>,
-    /// Whether an effect of twice that size, put into drawn data, was found again.
-    pub recovered: Option<bool>,
+    /// The largest size below it, dB, that was not found; none where all were.
+    pub missed_db: Option<f64>,
 }
 
 /// What the answer is to be held against.
@@ -180,7 +180,7 @@ pub struct Controls {
     pub placebo: Option<Control>,
     /// The same of a spline over the best covariate.
     pub equal_df_spline: Option<Control>,
-    /// For every effect, the size that would be seen.
+    /// For every effect, the size from which it was found again.
     pub injection_recovery: Vec<Power>,
 }
 
@@ -254,6 +254,9 @@ pub struct Report {
     pub unexplained: Vec<Unexplained>,
     /// Errors on held-out patches.
     pub error: BeforeAfter,
+    /// Detections that lie elsewhere than their chirps meet the target: set aside, and their chirps count as
+    /// silent.
+    pub set_aside: usize,
     /// What the answer is to be held against.
     pub controls: Controls,
     /// What the effects are added to.

@@ -212,6 +212,11 @@ pub(super) fn of_neighbours(
     Unexplained { covariate: "neighbourhood".to_owned(), strength_db, p_value }
 }
 
+/// How many looks lie beyond [`OUTLYING`] standard deviations in power.
+pub(super) fn wild(z: &[f64]) -> usize {
+    z.iter().filter(|z| z.abs() > OUTLYING).count()
+}
+
 /// Looks that no spread explains: beyond [`OUTLYING`] standard deviations in power or in range, or with
 /// a detection far off the target.
 pub(super) fn outliers(
@@ -222,7 +227,7 @@ pub(super) fn outliers(
     false_alarms: usize,
 ) -> Option<Unexplained> {
     let count = z.len().max(1) as f64;
-    let wild = z.iter().filter(|z| z.abs() > OUTLYING).count();
+    let wild = wild(z);
     let off = |(seen, arrived): (&Observation, &Option<Arrived>)| {
         let arrived = arrived.as_ref()?;
         let sd_m = declared.range_sd_m.hypot(arrived.spread_m);

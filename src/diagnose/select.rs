@@ -8,6 +8,8 @@
 //! placebos and a stated least, and it changes the data by a stated least size. Where placebos beat all, two that predict held-out patches are tried together: each alone is a
 //! worse picture of both than a wave.
 
+use std::cell::OnceCell;
+
 use nalgebra::DVector;
 use serde::Serialize;
 
@@ -79,7 +81,7 @@ pub struct Candidate {
     pub size_db: f64,
     /// Whether the fit converged.
     pub converged: bool,
-    /// Whether it was added.
+    /// Whether it was added in this round and stayed.
     pub accepted: bool,
 }
 
@@ -118,6 +120,33 @@ struct Chosen<'a> {
     /// Names that predict as well.
     class: Vec<&'static str>,
     rivals: Vec<&'a dyn Effect>,
+}
+
+/// What an effect has to say for itself.
+struct Claim {
+    /// Gain in ln likelihood, and the least that counts.
+    gain: f64,
+    least: f64,
+    /// Gain in ln p of held-out patches and its standard error.
+    held_out: [f64; 2],
+    /// What it changes of the means and of the spread, dB, and the least that counts beside what others
+    /// change.
+    sizes_db: [f64; 2],
+    least_db: f64,
+}
+
+impl Claim {
+    /// The smaller gain: a fit without a patch may be far off where the patch was all that held it.
+    fn counts(&self) -> f64 {
+        self.held_out[0].min(self.gain)
+    }
+}
+
+/// What a model leaves, once it is asked for: by a field, and what neighbours have in common, dB.
+#[derive(Default)]
+pub(super) struct Left {
+    structure: OnceCell<Structure>,
+    shared_db: OnceCell<f64>,
 }
 
 /// All that the selection needs.
@@ -171,22 +200,8 @@ impl Selection<'_> {
             };
             if let Some(trial) = trials.get_mut(index) {
                 trial.candidate.accepted = true;
-                let (space, mut fitted) = (trial.space.clone(), trial.fitted.clone());
-                let mut held_out = held_out;
-                if !state.space.costly(&state.fitted.at).is_empty() {
-                    fitted = self.problem.fit(&space, &fitted.at, &[], &SCOUT);
-                    held_out = self.held_out(&space, &fitted.at);
-                }
-                // Laws that were fitted without the effect may be far from any that go with it.
-                let (start, held) = (space.restarted(&fitted.at), space.costly(&fitted.at));
-                let again = self.problem.fit(&space, &start, &held, &SEARCH);
-                if again.ln_likelihood > fitted.ln_likelihood + SEARCH.tolerance {
-                    fitted = match held.is_empty() {
-                        true => again,
-                        false => self.problem.fit(&space, &again.at, &[], &SCOUT),
-                    };
-                    held_out = self.held_out(&space, &fitted.at);
-                }
+                let space = trial.space.clone();
+                let (fitted, held_out) = self.settled(&state, &space, &trial.fitted, held_out);
                 state = State { space, fitted, held_out };
                 let Candidate { gain, size_db, .. } = trial.candidate;
                 let [held_out_gain, held_out_se] = trial.candidate.held_out.unwrap_or_default();
@@ -215,7 +230,35 @@ impl Selection<'_> {
             added.remove(least);
         }
         added.iter_mut().for_each(|one| one.class.retain(|name| !state.space.has(name)));
+        ranking.iter_mut().for_each(|one| one.accepted &= state.space.has(one.name));
         Selected { state, ranking, added, structure }
+    }
+
+    /// The fit of an effect that is taken in, with everything free that its trial held, and its held-out
+    /// looks.
+    pub(super) fn settled(
+        &self,
+        before: &State,
+        space: &Space,
+        trial: &Fitted,
+        mut held_out: Vec<Scored>,
+    ) -> (Fitted, Vec<Scored>) {
+        let mut fitted = trial.clone();
+        if !before.space.costly(&before.fitted.at).is_empty() {
+            fitted = self.problem.fit(space, &fitted.at, &[], &SCOUT);
+            held_out = self.held_out(space, &fitted.at);
+        }
+        // Laws that were fitted without the effect may be far from any that go with it.
+        let (start, held) = (space.restarted(&fitted.at), space.costly(&fitted.at));
+        let again = self.problem.fit(space, &start, &held, &SEARCH);
+        if again.ln_likelihood > fitted.ln_likelihood + SEARCH.tolerance {
+            fitted = match held.is_empty() {
+                true => again,
+                false => self.problem.fit(space, &again.at, &[], &SCOUT),
+            };
+            held_out = self.held_out(space, &fitted.at);
+        }
+        (fitted, held_out)
     }
 
     /// Whether what a field finds is more than chance and more than a law's form may be off.
@@ -282,15 +325,14 @@ impl Selection<'_> {
                     let [gain, se] = self.difference(&state.held_out, &without.held_out);
                     let largest_db = added.iter().map(|a| a.evidence.size_db).fold(0.0, f64::max);
                     let sizes_db = self.sizes_db(&without, &state.space, &state.fitted.at);
-                    let (size_db, is_spread) = (larger(sizes_db), sizes_db[1] > sizes_db[0]);
-                    let least_db = self.settings.least_size_db.max(SHARE_OF_LARGEST * largest_db);
                     let numbers = state.space.effects[index].knobs().len();
-                    let least = self.settings.least_gain_of(numbers, 1);
-                    let is_local =
-                        !is_spread && loss > FAR_BEYOND * least && gain > SHARE_KEPT * loss;
-                    let is_needed = (gain > self.settings.standard_errors * se || is_local)
-                        && loss > least
-                        && size_db >= least_db;
+                    let is_needed = self.is_supported(&Claim {
+                        gain: loss,
+                        least: self.settings.least_gain_of(numbers, 1),
+                        held_out: [gain, se],
+                        sizes_db,
+                        least_db: SHARE_OF_LARGEST * largest_db,
+                    });
                     (index, without, loss, is_needed)
                 })
                 .collect();
@@ -305,6 +347,63 @@ impl Selection<'_> {
         }
     }
 
+    /// What held-out looks are under a trial and the gain that speaks for it; `None` where it is not
+    /// supported.
+    pub(super) fn support<'a>(
+        &self,
+        state: &State<'a>,
+        trial: &mut Trial<'a>,
+        largest_db: f64,
+        left: &Left,
+    ) -> Option<(Vec<Scored>, f64)> {
+        let Candidate { gain, numbers, size_db, .. } = trial.candidate;
+        let [mean_db, spread_db] = trial.sizes_db;
+        let is_spread = spread_db > mean_db;
+        let share = if is_spread { SHARE_OF_SPREAD } else { SHARE_OF_LARGEST };
+        let mut claim = Claim {
+            gain,
+            least: self.settings.least_gain_of(numbers, trial.tried),
+            held_out: [f64::INFINITY, 0.0],
+            sizes_db: trial.sizes_db,
+            least_db: share * largest_db,
+        };
+        // Held-out patches are dear: nobody asks them of what fails without.
+        if !self.is_supported(&claim) {
+            return None;
+        }
+        let held_out = self.held_out(&trial.space, &trial.fitted.at);
+        claim.held_out = self.difference(&held_out, &state.held_out);
+        trial.candidate.held_out = Some(claim.held_out);
+        if !self.is_supported(&claim) || self.is_farther_off(&held_out, &state.held_out) {
+            return None;
+        }
+        if is_spread {
+            let structure = left.structure.get_or_init(|| self.structure(state));
+            let shared_db = *left.shared_db.get_or_init(|| self.shared_db(state));
+            let beside = self.gain_beside(state, trial, structure);
+            if beside < SHARE_BESIDE_FIELD * gain || shared_db > MOST_SHARED * size_db {
+                return None;
+            }
+        }
+        Some((held_out, claim.counts()))
+    }
+
+    /// Whether fit, held-out patches and size speak for an effect.
+    fn is_supported(&self, claim: &Claim) -> bool {
+        let Diagnosis { least_size_db, standard_errors, .. } = *self.settings;
+        let Claim { gain, least, held_out: [held_out, se], sizes_db: [mean_db, spread_db], .. } =
+            *claim;
+        // What acts in one small place, as no scatter does, has no standard error over places; it
+        // must be far beyond chance and be found again where it was not fitted.
+        let is_local = spread_db <= mean_db
+            && gain >= FAR_BEYOND * least
+            && held_out >= SHARE_KEPT * gain
+            && held_out > se;
+        gain >= least
+            && mean_db.max(spread_db) >= least_size_db.max(claim.least_db)
+            && (claim.counts() > standard_errors * se || is_local)
+    }
+
     /// The effect to add.
     fn chosen<'a>(
         &self,
@@ -313,42 +412,11 @@ impl Selection<'_> {
         largest_db: f64,
     ) -> Option<Chosen<'a>> {
         let mut passed: Vec<(usize, Vec<Scored>, f64)> = Vec::new();
-        let (mut structure, mut shared_db) = (None, None);
-        let Diagnosis { least_size_db, standard_errors, .. } = *self.settings;
+        let left = Left::default();
         for (index, trial) in trials.iter_mut().enumerate().filter(|t| !t.1.candidate.sampled) {
-            let least = self.settings.least_gain_of(trial.candidate.numbers, trial.tried);
-            let [mean_db, spread_db] = trial.sizes_db;
-            let is_spread = spread_db > mean_db;
-            let share = if is_spread { SHARE_OF_SPREAD } else { SHARE_OF_LARGEST };
-            let least_db = least_size_db.max(share * largest_db);
-            if trial.candidate.gain < least || trial.candidate.size_db < least_db {
-                continue;
+            if let Some((held_out, gain)) = self.support(state, trial, largest_db, &left) {
+                passed.push((index, held_out, gain));
             }
-            let held_out = self.held_out(&trial.space, &trial.fitted.at);
-            let [gain, se] = self.difference(&held_out, &state.held_out);
-            trial.candidate.held_out = Some([gain, se]);
-            // What acts in one small place, as no scatter does, has no standard error over places; it
-            // must be far beyond chance and be found again where it was not fitted.
-            let is_kept = gain >= SHARE_KEPT * trial.candidate.gain && gain > se;
-            let is_local = is_kept && !is_spread && trial.candidate.gain >= FAR_BEYOND * least;
-            // A fit without a patch may be far off where the patch was all that held it.
-            let gain = gain.min(trial.candidate.gain);
-            if gain <= standard_errors * se && !is_local
-                || self.is_farther_off(&held_out, &state.held_out)
-            {
-                continue;
-            }
-            if is_spread {
-                let structure = structure.get_or_insert_with(|| self.structure(state));
-                let left = self.gain_beside(state, trial, structure);
-                let shared_db = *shared_db.get_or_insert_with(|| self.shared_db(state));
-                if left < SHARE_BESIDE_FIELD * trial.candidate.gain
-                    || shared_db > MOST_SHARED * trial.candidate.size_db
-                {
-                    continue;
-                }
-            }
-            passed.push((index, held_out, gain));
         }
         passed.sort_by(|a, b| b.2.total_cmp(&a.2));
         let mut screen = None;
@@ -495,25 +563,29 @@ impl Selection<'_> {
         all.into_iter().map(|(_, scored)| scored).collect()
     }
 
-    /// Root mean square change of the means of all detections, and change of the spread, dB.
+    /// What a model with more effects changes, dB.
     pub fn sizes_db(&self, state: &State, space: &Space, at: &DVector<f64>) -> [f64; 2] {
-        let before = &self.problem.predict(&state.space, &state.fitted.at);
-        let after = &self.problem.predict(space, at);
-        // Spreads add in squares.
-        let wider = |a: f64, b: f64| (a * a - b * b).abs().sqrt();
-        let [now, then] = [after, before].map(|p| speckle_sd_db(p.receiver.looks));
-        let mean = |p: &Prediction, look: usize| p.passed_w(look).max(f64::MIN_POSITIVE).ln();
-        let observations = self.problem.observations.iter().enumerate();
-        let changes: Vec<f64> = observations
-            .filter(|(_, o)| o.power_w.is_some())
-            .map(|(look, _)| DB * (mean(after, look) - mean(before, look)))
-            .collect();
-        let tilt = |p: &Prediction| {
-            let spreads: Vec<f64> = (0..p.tilts.len()).map(|look| p.tilt_spread(look)).collect();
-            DB * rms(&spreads)
-        };
-        [rms(&changes), wider(now, then).max(wider(tilt(after), tilt(before)))]
+        let before = self.problem.predict(&state.space, &state.fitted.at);
+        sizes_db(&self.problem, &before, &self.problem.predict(space, at))
     }
+}
+
+/// Root mean square change of the means of all detections, and change of the spread, dB.
+pub(super) fn sizes_db(problem: &Problem, before: &Prediction, after: &Prediction) -> [f64; 2] {
+    // Spreads add in squares.
+    let wider = |a: f64, b: f64| (a * a - b * b).abs().sqrt();
+    let [now, then] = [after, before].map(|p| speckle_sd_db(p.receiver.looks));
+    let mean = |p: &Prediction, look: usize| p.passed_w(look).max(f64::MIN_POSITIVE).ln();
+    let observations = problem.observations.iter().enumerate();
+    let changes: Vec<f64> = observations
+        .filter(|(_, o)| o.power_w.is_some())
+        .map(|(look, _)| DB * (mean(after, look) - mean(before, look)))
+        .collect();
+    let tilt = |p: &Prediction| {
+        let spreads: Vec<f64> = (0..p.tilts.len()).map(|look| p.tilt_spread(look)).collect();
+        DB * rms(&spreads)
+    };
+    [rms(&changes), wider(now, then).max(wider(tilt(after), tilt(before)))]
 }
 
 pub(super) fn larger([a, b]: [f64; 2]) -> f64 {

@@ -19,7 +19,7 @@ const STRENGTHS: [f64; 6] = [0.3, 1.0, 3.0, 7.0, 12.0, 20.0];
 /// And of those none that promises less than this share of what the best does.
 const SHARE_OF_START: f64 = 0.7;
 /// Effects that promise less than this share of the best are not fitted at all.
-const SHARE_TO_SCOUT: f64 = 0.1;
+const SHARE_TO_SCOUT: f64 = 0.05;
 /// Effects of each round that are fitted to all looks and predict held-out patches: at most so many,
 /// and none that gains less than this share of the best.
 const SHORTLIST: usize = 5;

@@ -53,7 +53,15 @@ fn would_help(error: &DiagnoseError) -> &'static str {
         DiagnoseError::Render(_) => {
             "A scene whose target the scan meets: check its place, its unit of length and the scan."
         }
-        DiagnoseError::Elsewhere { .. } => {
+        DiagnoseError::Misnumbered { .. } => {
+            "Chirp numbers as the scan of the scene has them; without the column `chirp` the points are \
+             given to their chirps by direction."
+        }
+        DiagnoseError::Threshold { .. } => {
+            "The power below which the radar reports nothing, as `threshold_dbm` under [radar] in the \
+             scene, and powers in dBm at the receiver."
+        }
+        DiagnoseError::Elsewhere { .. } | DiagnoseError::Unlike { .. } => {
             "The scene that was measured, with the target where it stood: `matdb measure` finds the pose."
         }
         // What later reasons say of themselves stands in `reason`.
@@ -70,7 +78,7 @@ mod tests {
         let answer = CannotTell::new(&DiagnoseError::TooFew { detected: 12 });
         let json = serde_json::to_value(&answer).unwrap();
         assert_eq!(json["verdict"], "cannot-tell");
-        assert_eq!(json["schema"], 1);
+        assert_eq!(json["schema"], 2);
         assert_eq!(json["effects"], serde_json::json!([]));
         assert!(json["reason"].as_str().unwrap().contains("12 detections"));
         assert!(json["would_help"].as_str().unwrap().contains("threshold"));

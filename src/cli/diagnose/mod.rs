@@ -89,8 +89,6 @@ struct Context {
     cloud_path: String,
     /// Name and material of every region.
     regions: Vec<(String, String)>,
-    /// Detections that were set aside.
-    false_alarms: usize,
     /// Sentences on materials that are not to be used, or are extrapolated to the radar's frequency.
     beyond: Vec<String>,
     seed: u64,
@@ -166,8 +164,8 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     let answer = diagnosed(&scene, &cloud, &laws, at_work, args.seed, &effects, &hear);
     bar.finish_and_clear();
     match answer {
-        Ok((report, false_alarms)) => {
-            let context = Context { beyond, ..context(asked, &scene, false_alarms, db) };
+        Ok(report) => {
+            let context = Context { beyond, ..context(asked, &scene, db) };
             let (given, report) = (given.as_str(), &report);
             Publication { asked, scene: &scene, given, cast, wanted, report }
                 .publish(context, db, console)
@@ -221,7 +219,6 @@ fn undeclared(
     Ok(tried)
 }
 
-/// The diagnosis, and how many detections were set aside.
 fn diagnosed(
     scene: &Scene,
     cloud: &Cloud,
@@ -230,7 +227,7 @@ fn diagnosed(
     seed: u64,
     effects: &[&dyn Effect],
     hear: &(dyn Fn(&str) + Sync),
-) -> Result<(Report, usize), DiagnoseError> {
+) -> Result<Report, DiagnoseError> {
     let bvh = Bvh::new(&scene.target.mesh);
     let grain_of_region: Vec<_> = scene.target.regions.iter().map(|region| region.grain).collect();
     let radar = scene.radar();
@@ -256,11 +253,10 @@ fn diagnosed(
         observations: &matched.observations,
         strays: &matched.strays,
     };
-    let report = Diagnosis { seed, ..Diagnosis::default() }.run_with(&subject, effects, hear)?;
-    Ok((report, matched.strays.len()))
+    Diagnosis { seed, ..Diagnosis::default() }.run_with(&subject, effects, hear)
 }
 
-fn context(asked: Asked, scene: &Scene, false_alarms: usize, db: &Database) -> Context {
+fn context(asked: Asked, scene: &Scene, db: &Database) -> Context {
     let Asked { cloud, scene: path, args } = asked;
     let regions = &scene.target.regions;
     Context {
@@ -268,7 +264,6 @@ fn context(asked: Asked, scene: &Scene, false_alarms: usize, db: &Database) -> C
         scene_path: path.display().to_string(),
         cloud_path: cloud.cloud.display().to_string(),
         regions: regions.iter().map(|r| (r.name.clone(), r.material.clone())).collect(),
-        false_alarms,
         beyond: Vec::new(),
         seed: args.seed,
         program: program(db),

@@ -15,6 +15,9 @@ pub(super) fn text(report: &Report, files: &[String], folder: &Path) -> String {
     text += &report.effects.iter().map(effect).collect::<String>();
     text += &error(report);
     text += &remains(report);
+    if report.set_aside > 0 {
+        text += &format!("set aside: {} detections that lie elsewhere\n", report.set_aside);
+    }
     let accepted = |name: &str| {
         report.effects.iter().any(|found| found.name == name || found.class.contains(&name))
     };

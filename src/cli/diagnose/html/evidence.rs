@@ -172,29 +172,21 @@ fn power(controls: &Controls) -> String {
         .injection_recovery
         .iter()
         .map(|power| {
-            let least = power.least_db.map_or("not worked out".to_owned(), |db| format!("{db:.2}"));
-            let recovered = match power.recovered {
-                Some(true) => "found again",
-                Some(false) => "not found",
-                None => "not tried",
-            };
-            [power.name.to_owned(), least, recovered.to_owned()]
+            let size = |db: Option<f64>| db.map_or("–".to_owned(), |db| format!("{db:.2}"));
+            [power.name.to_owned(), size(power.least_db), size(power.missed_db)]
         })
         .collect();
-    let columns = [
-        words("effect"),
-        numbers("would be seen from, dB"),
-        words("twice that, put into drawn data"),
-    ];
+    let columns = [words("effect"), numbers("found from, dB"), numbers("missed up to, dB")];
     paragraph(
-        "What this scan can reveal: from the stated size on (root mean square over the chirps) an \
-         effect would have been seen. Below it, its absence means nothing.",
+        "What this scan can reveal: each effect was put into data drawn by the base model, in several \
+         sizes (root mean square over the chirps), and looked for. Below what was found its absence \
+         means nothing.",
     ) + &table("What these data would have shown", columns, &rows)
 }
 
 /// What was tried and not added, best first.
 pub(super) fn tried(report: &Report) -> String {
-    let accepted = |name: &str| report.ranking.iter().any(|c| c.accepted && c.name == name);
+    let accepted = |name: &str| report.effects.iter().any(|found| found.name == name);
     let last = report.ranking.iter().map(|candidate| candidate.round).max().unwrap_or(0);
     let mut candidates: Vec<&Candidate> = report
         .ranking

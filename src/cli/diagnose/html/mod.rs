@@ -59,7 +59,7 @@ fn heading(report: &Report, context: &Context) -> String {
          set aside. Everything random follows seed {}.",
         grouped(report.rows.len()),
         grouped(detected),
-        grouped(context.false_alarms),
+        grouped(report.set_aside),
         context.seed
     );
     let heading = match report.verdict {

@@ -9,14 +9,16 @@ use crate::formats::figure::{Bar, Bars, FigureError};
 pub(super) fn ranking(report: &Report) -> Result<Picture, FigureError> {
     let mut first: Vec<&Candidate> = report.ranking.iter().filter(|c| c.round == 1).collect();
     first.sort_by(|a, b| b.gain.total_cmp(&a.gain));
-    let added = |name: &str| report.ranking.iter().find(|c| c.accepted && c.name == name);
+    let round_of = |name: &str| {
+        report.ranking.iter().find(|c| c.accepted && c.name == name).map(|accepted| accepted.round)
+    };
     let bar = |candidate: &&Candidate| {
-        let round = added(candidate.name).map(|accepted| accepted.round);
+        let round = round_of(candidate.name);
         Bar {
             name: candidate.name,
             value: if candidate.gain.is_finite() { candidate.gain } else { 0.0 },
             note: note(candidate, round),
-            strong: round.is_some(),
+            strong: report.effects.iter().any(|found| found.name == candidate.name),
         }
     };
     let placebos = first.iter().filter_map(|c| c.placebo_gain).filter(|gain| gain.is_finite());
