@@ -548,7 +548,7 @@ fn of_another_versions_publication_it_is_said_what_was_compared_and_what_not() {
     let own = format!("\"program_version\":\"{}\"", env!("CARGO_PKG_VERSION"));
     let old = index.replacen(&own, "\"program_version\":\"0.0.1\"", 1);
     assert_ne!(old, index);
-    let without_words = old.replace("\"render_words\":\"fitted to modelled data\",", "");
+    let without_words = old.replace("\"render_words\":\"stated beside modelled data\",", "");
     assert_ne!(without_words, old);
     let old = without_words;
     fs::write(site.join("api/v1/index.json"), old).unwrap();

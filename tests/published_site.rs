@@ -381,8 +381,7 @@ fn a_fit_is_called_one_wherever_its_kind_stands() {
 #[test]
 fn a_fit_is_called_one_outside_the_site_too() {
     let mut material = fitted("fitted");
-    let source = material.sources.iter_mut().find(|s| s.key == material.fits[0].source).unwrap();
-    source.kind = SourceKind::Measured;
+    material.sources.iter_mut().for_each(|source| source.kind = SourceKind::Measured);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.sqlite");
     let mut store = Store::open(&path).unwrap();
