@@ -10,8 +10,8 @@ use rusqlite::functions::FunctionFlags;
 use rusqlite::{Connection, ErrorCode, OpenFlags, Transaction, TransactionBehavior};
 use rusqlite_migration::{M, Migrations};
 
-use super::find::outline;
 use super::error::directory_of;
+use super::find::outline;
 use super::{StoreError, write};
 
 /// "matd" in the file's header.
