@@ -519,6 +519,14 @@ fn a_bare_curve_is_named_by_its_file_and_says_what_it_is_found_and_cited_by() {
         assert!(cited.contains(said), "{said}: {cited}");
     }
     let [shown, _] = run(&["show", "paint"]);
+    assert!(shown.contains("source spring (measured): Doe, Jane (2026): bench"), "{shown}");
+    run(&["export", "paint", "--as", "csv", "-o", "own.csv"]);
+    run(&["export", "paint", "--as", "mitsuba", "-o", "own.xml"]);
+    run(&["publish", "site"]);
+    for file in ["own.csv", "own.xml", "site/material/paint.html"] {
+        let text = fs::read_to_string(folder.path().join(file)).unwrap();
+        assert!(text.contains("Doe, Jane (2026): bench"), "{file}: {text}");
+    }
     assert!(shown.contains("instrument radar: Bench, 3e11 GHz, threshold 77 dBm"), "{shown}");
     assert!(shown.contains("curve spring: 3 points, 1 of them below the threshold, from spring"));
     assert!(shown.contains("30°  < -33.0"), "{shown}");

@@ -7,6 +7,7 @@ mod support;
 use std::fs;
 use std::path::Path;
 
+use matdb::catalogue::{About, publish};
 use matdb::material::Material;
 use matdb::store::Store;
 use serde_json::Value;
@@ -133,6 +134,12 @@ fn what_was_taken_says_from_which_catalogue_and_when_it_was_made_there() {
         assert!(bibtex.contains("author = {Roe, Ann}") && !bibtex.contains("Doe"), "{bibtex}");
         assert_eq!(cited["csl"][0]["author"][0]["family"], "Roe");
     }
+    // What comes with the program is not theirs, though it came with their catalogue.
+    let cited = matdb(third.path()).args(["cite", "ptfe", "--json"]).output().unwrap().stdout;
+    let said = String::from_utf8(cited).unwrap();
+    assert!(said.contains("Built into matdb") && !said.contains("10.1234/mine"), "{said}");
+    let cited: Value = serde_json::from_str(&said).unwrap();
+    assert!(!said.contains("Doe") && cited["csl"][0].get("author").is_none(), "{said}");
     let page = |name: &str| {
         fs::read_to_string(ours.path().join(format!("site/material/{name}.html"))).unwrap()
     };
@@ -338,6 +345,22 @@ fn a_name_that_add_refuses_does_not_come_in_by_import() {
         assert!(said.contains("zinc@1: name: it holds a character that turns"), "{said}");
         assert_eq!(contents(&database), before);
     }
+    // Neither do they whom a material would be credited to.
+    let turned = "title = 'Paints \u{202e}of Roe'\n";
+    fs::write(theirs.path().join("about.toml"), turned).unwrap();
+    let own = ["publish", "other", "--about", "about.toml"];
+    let said = refused(matdb(theirs.path()).args(own));
+    assert!(said.contains("`title` holds a character that turns the line"), "{said}");
+    let about = About { title: "Paints \u{202e}of Roe".to_owned(), ..About::default() };
+    let mut store = Store::in_memory().unwrap();
+    store.add([&sound("lead")]).unwrap();
+    let other = theirs.path().join("other");
+    publish(&store, &about, &other, |_| ()).unwrap();
+    let said = refused(matdb(ours.path()).arg("import").arg(&other));
+    assert!(
+        said.contains("lead@1: its catalogue or an author") && said.contains("turns"),
+        "{said}"
+    );
     // What stays away is no reason to refuse the others.
     let mut store = Store::open(&database).unwrap();
     store.add([&sound("zinc")]).unwrap();

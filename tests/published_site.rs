@@ -11,6 +11,7 @@ use matdb::catalogue::{About, publish};
 use matdb::material::{Material, SourceKind, builtin};
 use matdb::store::Store;
 use support::database::{complete, fitted, sample, with_effects};
+use support::matdb;
 
 const HOSTILE: &str = "</script><script>alert(1)</script><img src=x onerror=alert(2)>\"'&{{7*7}}{% x %}\u{0}\u{1b}[2J\u{202e}abc\u{2028}";
 
@@ -375,6 +376,81 @@ fn a_fit_is_called_one_wherever_its_kind_stands() {
     for path in ["material/ptfe.html", "data/ptfe.js"] {
         assert!(!site.files[path].contains("fitted to "), "{path}");
     }
+}
+
+#[test]
+fn a_fit_is_called_one_outside_the_site_too() {
+    let mut material = fitted("fitted");
+    material.sources.iter_mut().for_each(|source| source.kind = SourceKind::Measured);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.sqlite");
+    let mut store = Store::open(&path).unwrap();
+    store.add([&material, &builtin::get("ptfe").unwrap().unwrap()]).unwrap();
+    let words = Some("fitted to measured data".to_owned());
+    assert_eq!(
+        (store.rendered_words(&material.slug).unwrap(), material.rendered_words()),
+        (words.clone(), words)
+    );
+    assert_eq!(store.rendered_words(&"ptfe".parse().unwrap()).unwrap(), None);
+    publish(&store, &about(), &folder.path().join("site"), |_| ()).unwrap();
+    let index = fs::read_to_string(folder.path().join("site/api/v1/index.json")).unwrap();
+    let index: serde_json::Value = serde_json::from_str(&index).unwrap();
+    let [fit, stated] = [&index["materials"][0], &index["materials"][1]];
+    assert_eq!(
+        (&fit["render_kind"], &fit["render_words"]),
+        (&"measured".into(), &"fitted to measured data".into())
+    );
+    assert!(stated.get("render_words").is_none(), "{stated}");
+    let said = |arguments: &[&str]| {
+        let output =
+            matdb(folder.path()).args(["--db", "a.sqlite"]).args(arguments).output().unwrap();
+        String::from_utf8(output.stdout).unwrap()
+    };
+    for arguments in [&["list"][..], &["near", "--material", "fitted", "--limit", "100"]] {
+        let said = said(arguments);
+        let line = said.lines().find(|line| line.starts_with("fitted ")).unwrap_or(&said);
+        assert!(line.contains("fitted to measured data"), "{said}");
+    }
+    for (format, file) in [("csv", "out.csv"), ("mitsuba", "out.xml")] {
+        said(&["export", "fitted", "--as", format, "-o", file]);
+        let text = fs::read_to_string(folder.path().join(file)).unwrap();
+        let words = "the rendered numbers are fitted to measured data;";
+        assert!(text.contains(words), "{file}: {text}");
+    }
+}
+
+#[test]
+fn a_comparison_draws_what_scenes_render_and_a_stated_model_as_one() {
+    let mut material = fitted("stated");
+    material.fits[0].report = None;
+    material.fits[0].estimator = "stated".to_owned();
+    material.sources.iter_mut().for_each(|source| source.kind = SourceKind::Measured);
+    let by_points =
+        Material { slug: "points".parse().unwrap(), render: "scan".to_owned(), ..material.clone() };
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Store::open(folder.path().join("a.sqlite")).unwrap();
+    store.add([&material, &by_points]).unwrap();
+    publish(&store, &about(), &folder.path().join("site"), |_| ()).unwrap();
+    let fit = &material.fits[0].name;
+    for (slug, rendered) in [("stated", fit.as_str()), ("points", "scan")] {
+        let data = fs::read_to_string(folder.path().join(format!("site/data/{slug}.js"))).unwrap();
+        let json = data.split_once('(').unwrap().1.rsplit_once(')').unwrap().0;
+        let data: serde_json::Value = serde_json::from_str(json).unwrap();
+        assert_eq!(data["render"], rendered);
+        let line = |name: &str| {
+            data["lines"].as_array().unwrap().iter().find(|line| line["name"] == name).cloned()
+        };
+        let stated = line(fit).unwrap();
+        assert_eq!(
+            (&stated["kind"], &stated["kind_words"]),
+            (&"stated".into(), &"stated beside measured data".into())
+        );
+        assert!(!line(rendered).unwrap()["pieces"].as_array().unwrap().is_empty(), "{slug}");
+        let page = fs::read_to_string(folder.path().join(format!("site/material/{slug}.html")));
+        assert_eq!(page.unwrap().contains("between the points"), slug == "points");
+    }
+    let style = fs::read_to_string(folder.path().join("site/assets/style.css")).unwrap();
+    assert!(style.contains(".line.is-stated { stroke-dasharray"));
 }
 
 #[test]

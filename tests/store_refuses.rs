@@ -216,7 +216,51 @@ fn what_may_not_be_written_is_still_read() {
         Err(error) => eprintln!("skipped: no process without rights can be started: {error}"),
     }
     assert_eq!(bytes(folder.path()), before);
-    allow(folder.path(), 0o755);
+    // Nor is anything left where something could be: the owner could not write it.
+    allow(folder.path(), 0o777);
+    for mode in [0o444, 0o644] {
+        allow(&path, mode);
+        match powerless("reader_beside_a_file_of_others", &path).output() {
+            Ok(output) => {
+                assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
+            }
+            Err(error) => eprintln!("skipped: no process without rights can be started: {error}"),
+        }
+        assert_eq!(bytes(folder.path()), before, "{mode:o}");
+    }
+    allow(&path, 0o644);
+    Store::open(&path).unwrap().add([&changed("subject")]).unwrap();
+    // While somebody writes, what is read is of the last moment that was finished.
+    let writer = Store::open(&path).unwrap();
+    match powerless("reader_beside_a_writer", &path).output() {
+        Ok(output) => {
+            assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
+        }
+        Err(error) => eprintln!("skipped: no process without rights can be started: {error}"),
+    }
+    drop(writer);
+}
+
+/// Not a test by itself: a process that `what_may_not_be_written_is_still_read` starts.
+#[test]
+fn reader_beside_a_file_of_others() {
+    let Some(path) = given() else { return };
+    assert_eq!(contents(&path), [sample("subject")]);
+    let error = Store::open(&path).unwrap_err();
+    assert!(matches!(error, StoreError::ReadOnly { .. }), "{error}");
+}
+
+/// Not a test by itself: a process that `what_may_not_be_written_is_still_read` starts.
+#[test]
+fn reader_beside_a_writer() {
+    let Some(path) = given() else { return };
+    assert_eq!(contents(&path), [sample("subject"), changed("subject")]);
+    // What lies beside it is not ours, and is named.
+    let said = Store::open(&path).unwrap_err().to_string();
+    assert!(
+        said.contains("materials.sqlite-wal and ") && said.contains("materials.sqlite-shm"),
+        "{said}"
+    );
 }
 
 /// Not a test by itself: the process that `what_may_not_be_written_is_still_read` starts.

@@ -10,6 +10,7 @@ use thiserror::Error;
 use super::folder::SUMS;
 use super::publish::ABOUT;
 use crate::material::form::{is_address, is_doi, is_licence, is_orcid};
+use crate::material::turns_the_line;
 
 /// What a catalogue says of itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -112,6 +113,17 @@ impl About {
         let refused = |problem: String| AboutError { file: file.to_owned(), problem };
         if about.title.trim().is_empty() {
             return Err(refused("`title` is empty; give the catalogue a title".to_owned()));
+        }
+        let mut names = vec![("title", about.title.as_str())];
+        names.extend(about.version.iter().map(|version| ("version", version.as_str())));
+        for Person { family, given, affiliation, .. } in &about.people {
+            names.extend([("family", family.as_str()), ("given", given.as_str())]);
+            names.extend(affiliation.iter().map(|place| ("affiliation", place.as_str())));
+        }
+        if let Some((key, _)) = names.into_iter().find(|(_, name)| turns_the_line(name)) {
+            return Err(refused(format!(
+                "`{key}` holds a character that turns the line round; write it without"
+            )));
         }
         if let Some(licence) = about.licence.as_ref().filter(|licence| !is_licence(licence)) {
             return Err(refused(format!(

@@ -68,7 +68,11 @@ pub(super) struct Entry {
     pub revision: u32,
     pub content_hash: String,
     pub added_at: String,
+    /// Of the data: of a model that was fitted to a curve, that of the curve's.
     pub render_kind: String,
+    /// What is said of a model that goes with a curve, which nobody measured itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub render_words: Option<String>,
     pub curves: u32,
     pub observations: u32,
     pub fits: u32,
@@ -90,12 +94,19 @@ impl Entry {
             content_hash: stored.content_hash.clone(),
             added_at: stored.added_at.clone(),
             render_kind: summary.render_kind.as_str().to_owned(),
+            render_words: stored.material.rendered_words(),
             curves: summary.curves,
             observations: summary.observations,
             fits: summary.fits,
             path: path(summary.slug.as_str()),
             status: stored.material.status.clone(),
         }
+    }
+
+    /// Whether it says the same as that of the database; an older program knew nothing of the words.
+    pub fn is_of(&self, database: &Entry) -> bool {
+        let words = database.render_words.clone().filter(|_| self.render_words.is_some());
+        *self == Entry { render_words: words, ..database.clone() }
     }
 }
 

@@ -267,11 +267,14 @@ impl Import {
 
     /// Refuses what nobody could add here by themselves.
     fn check(&self, ours: Option<&Store>, taken: &Taken) -> Result<(), CatalogueError> {
+        let about = self.about()?;
         for number in self.wanted(ours, taken)? {
-            let material = self.stored(&taken.slug, number)?.material;
-            let effects = resolve(&material.effects, Level::Material);
+            let stored = self.stored(&taken.slug, number)?;
+            let effects = resolve(&stored.material.effects, Level::Material);
             let problem = effects.err().map(|error| error.to_string());
-            if let Some(problem) = problem.or(material.misleading_name()) {
+            let misleading =
+                || stored.material.misleading_name().or(origin(&about, &stored).misleading_name());
+            if let Some(problem) = problem.or_else(misleading) {
                 return Err(CatalogueError::Unsound {
                     bundle: self.path.clone(),
                     problem: format!("{}@{number}: {problem}", taken.slug),

@@ -30,8 +30,8 @@ pub use folder::{Folder, Sum};
 pub use import::{Import, Imported, Outcome, Taken};
 pub use near::{Distance, Probe, Rank};
 pub use nearest::Nearest;
-pub use publish::{Published, publish};
-pub use references::{Citable, Reference, references};
+pub use publish::{Published, named_licences, publish};
+pub use references::{Citable, Credit, Reference, references};
 pub use tables::HAS_PARQUET;
 pub use verify::{
     Checked, OTHER_UNITS, Problem, Verified, check_store, derived, verify, without_report,

@@ -3,8 +3,9 @@
 //! The curve is gathered by angle and averaged in linear power, as its statistics are. Where all was
 //! detected the mean is one value; what was below the threshold leaves it anywhere between two. The
 //! difference to a material is that of its own mean over the same angles to the nearer end, in dB, and 0
-//! between the ends. Only angles within the material's range count, and a bound that the material
-//! respects counts for nothing, so that silence makes nothing alike.
+//! between the ends. Every angle within the material's range counts, also one with a bound that the
+//! material respects, where the difference is 0; there must be some at which something was detected, so
+//! that silence makes nothing alike.
 
 use serde::Serialize;
 
@@ -13,7 +14,7 @@ use crate::material::{Censor, Observation};
 use crate::measure::statistics::by_angle;
 use crate::units::db_from_ratio;
 
-/// Fewer common angles than this, or than half of the curve's, are no comparison.
+/// Fewer common angles with an echo than this, or than half of the curve's angles, are no comparison.
 const LEAST_COMMON: usize = 3;
 /// Angles at which a material's mean over a bin is computed.
 const ANGLES_PER_BIN: usize = 8;
@@ -56,7 +57,7 @@ pub struct Distance {
     pub rms_shape_db: f64,
     /// That offset: so much higher than the material the curve is, dB.
     pub offset_db: f64,
-    /// Angles that count.
+    /// Angles that are compared: those of the curve within the material's range.
     pub common_angles: usize,
     /// Angles of the curve beyond the material's range.
     pub angles_beyond: usize,
@@ -137,22 +138,21 @@ impl Probe {
         };
         let pairs: Vec<Pair> =
             common.iter().map(|bin| Pair { ends_db: bin.level_db, level_db: level(bin) }).collect();
-        let (rms_db, counted, above_bound) = rms(&pairs, 0.0);
         let offset_db = best_offset(&pairs);
-        let (rms_shape_db, ..) = rms(&pairs, offset_db);
-        (counted >= LEAST_COMMON).then_some(Distance {
-            rms_db,
-            rms_shape_db,
+        let is_above = |pair: &&Pair| pair.is_bound() && pair.difference_db(0.0) != 0.0;
+        Some(Distance {
+            rms_db: rms_db(&pairs, 0.0),
+            rms_shape_db: rms_db(&pairs, offset_db),
             offset_db,
-            common_angles: counted,
+            common_angles: common.len(),
             angles_beyond: self.bins.len() - common.len(),
-            above_bound,
+            above_bound: pairs.iter().filter(is_above).count(),
             silent,
         })
     }
 
-    /// A distance, dB, that [`Probe::distance`] of a model with this outline is not below; −∞ where that
-    /// may be none at all, and `None` where it certainly is.
+    /// A distance, dB, that [`Probe::distance`] of a model with this outline is not below; `None` where
+    /// there is none.
     pub(super) fn at_least(
         &self,
         outline: &Outline,
@@ -162,9 +162,6 @@ impl Probe {
         // More than what the sums of many squares lose.
         const ROUNDING_DB: f64 = 1e-6;
         let common = self.common(theta_rad)?;
-        if common.iter().filter(|bin| bin.level_db[0].is_finite()).count() < LEAST_COMMON {
-            return Some(f64::NEG_INFINITY);
-        }
         let mut sums = Gaps::default();
         for bin in &common {
             sums.add(bin.level_db, self.ends_db(outline, bin));
@@ -188,7 +185,8 @@ impl Probe {
         let is_within = |theta: &f64| (low - ROUNDING..=high + ROUNDING).contains(theta);
         let common: Vec<&Bin> =
             self.bins.iter().filter(|bin| bin.theta_rad.iter().all(is_within)).collect();
-        let enough = common.len() >= LEAST_COMMON && common.len() * 2 >= self.bins.len();
+        let echoes = common.iter().filter(|bin| bin.level_db[0].is_finite()).count();
+        let enough = echoes >= LEAST_COMMON && common.len() * 2 >= self.bins.len();
         enough.then_some(common)
     }
 }
@@ -243,15 +241,11 @@ struct Pair {
 }
 
 impl Pair {
-    /// How much the curve lies above the material, dB; none where it has only a bound that holds.
-    fn difference_db(&self, offset_db: f64) -> Option<f64> {
+    /// How much the curve lies above the material, dB; 0 where the material lies between its ends.
+    fn difference_db(&self, offset_db: f64) -> f64 {
         let [least, greatest] = self.ends_db;
         let level = self.level_db + offset_db;
-        match (level < least, level > greatest) {
-            (true, _) => Some(least - level),
-            (_, true) => Some(greatest - level),
-            _ => least.is_finite().then_some(0.0),
-        }
+        (least - level).max(0.0) + (greatest - level).min(0.0)
     }
 
     fn is_bound(&self) -> bool {
@@ -259,17 +253,15 @@ impl Pair {
     }
 }
 
-/// Root mean square, how many count, and how many of these are bounds.
-fn rms(pairs: &[Pair], offset_db: f64) -> (f64, usize, usize) {
-    let counted = || pairs.iter().filter_map(|p| Some((p, p.difference_db(offset_db)?)));
-    let (number, sum) = counted().fold((0, 0.0), |(n, sum), (_, d)| (n + 1, sum + d * d));
-    let bounds = counted().filter(|(pair, _)| pair.is_bound()).count();
-    ((sum / f64::from(number.max(1))).sqrt(), number as usize, bounds)
+/// Root mean square over all of them, dB.
+fn rms_db(pairs: &[Pair], offset_db: f64) -> f64 {
+    let squares: f64 = pairs.iter().map(|pair| pair.difference_db(offset_db).powi(2)).sum();
+    (squares / pairs.len().max(1) as f64).sqrt()
 }
 
 /// The offset of the least sum of squares, which has one minimum: by bisection of its slope.
 fn best_offset(pairs: &[Pair]) -> f64 {
-    let slope = |offset: f64| -> f64 { pairs.iter().filter_map(|p| p.difference_db(offset)).sum() };
+    let slope = |offset: f64| -> f64 { pairs.iter().map(|p| p.difference_db(offset)).sum() };
     let (mut low, mut high) = (-400.0, 400.0);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
@@ -373,7 +365,23 @@ mod tests {
         assert!((above.rms_db - 5.0).abs() < 1e-9, "{above:?}");
         assert_eq!((above.common_angles, above.above_bound), (4, 1));
         let held = flat(&points, -25.0).unwrap();
-        assert!((held.rms_db - 15.0).abs() < 1e-9 && held.common_angles == 3);
+        assert!((held.rms_db - 15.0 * 0.75f64.sqrt()).abs() < 1e-9, "{held:?}");
+        assert_eq!((held.common_angles, held.above_bound), (4, 0));
+    }
+
+    #[test]
+    fn who_contradicts_a_bound_is_not_nearer_for_it_and_a_shape_is_never_farther() {
+        let mut points = curve(&[(5.0, -10.0), (10.0, -10.0), (15.0, -10.0)]);
+        points.extend((20..40).map(|deg| at(f64::from(deg), -12.0, Censor::Left)));
+        // Both are 4 dB off where something was seen; the brighter one also where nothing was.
+        let [agrees, contradicts] = [-14.0, -6.0].map(|level| flat(&points, level).unwrap());
+        assert!(agrees.rms_db < contradicts.rms_db, "{agrees:?} {contradicts:?}");
+        for level_db in [-30.0, -14.0, -11.0, -6.0, 20.0] {
+            let found = flat(&points, level_db).unwrap();
+            assert!(found.rms_shape_db <= found.rms_db + 1e-9, "{found:?}");
+            assert_eq!(found.common_angles, 23);
+        }
+        assert!(flat(&points[1..], -10.0).is_none(), "two echoes are too few, whatever else");
     }
 
     #[test]

@@ -5,9 +5,10 @@ use std::path::Path;
 
 use super::api::{Entry, Index};
 use super::folder::Sum;
+use super::records::ZENODO;
 use super::site::Site;
 use super::{About, CatalogueError, Folder, api, records, tables};
-use crate::material::form::is_licence;
+use crate::material::form::{alternative_licences, is_licence, licence_names};
 use crate::store::Store;
 
 /// The database of a publication.
@@ -16,8 +17,11 @@ pub(super) const DATABASE: &str = "catalogue.sqlite";
 /// What the catalogue says of itself.
 pub(super) const ABOUT: &str = "about.json";
 
+/// Licences that a sentence names one by one.
+const MOST_NAMED: usize = 5;
+
 /// What was published.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Published {
     /// Number of materials.
     pub materials: usize,
@@ -25,6 +29,10 @@ pub struct Published {
     pub files: usize,
     /// Whether other data had the same version in this folder before.
     pub is_version_reused: bool,
+    /// Whether there is no `.zenodo.json`, as Zenodo could not be told the licence.
+    pub is_without_zenodo: bool,
+    /// Licences of materials that the declared one does not name; none where none is declared.
+    pub undeclared_licences: Vec<String>,
 }
 
 /// Writes every material of a database as a catalogue into a folder, all of it or nothing.
@@ -44,9 +52,15 @@ pub fn publish(
     // Everything else is read from the copy: one moment, whoever writes meanwhile.
     let copy = folder.place(DATABASE, |place| Ok::<(), CatalogueError>(store.copy_to(place)?))?;
     let copy = Store::open_existing(copy)?;
-    let (materials, is_version_reused) =
-        fill(&mut folder, copy.as_ref().unwrap_or(store), about, progress)?;
-    let published = Published { materials, files: folder.sums().len() + 1, is_version_reused };
+    let store = copy.as_ref().unwrap_or(store);
+    let (materials, is_version_reused) = fill(&mut folder, store, about, progress)?;
+    let published = Published {
+        materials,
+        files: folder.sums().len() + 1,
+        is_version_reused,
+        is_without_zenodo: !folder.sums().contains_key(ZENODO),
+        undeclared_licences: undeclared(&store.licences()?, about),
+    };
     folder.keep()?;
     Ok(published)
 }
@@ -104,18 +118,32 @@ fn licence(store: &Store, about: &About) -> Result<Option<String>, CatalogueErro
     }
 }
 
-/// That these licences give none for the whole, and what could be declared.
-fn no_licence(licences: &[String]) -> CatalogueError {
-    /// Licences that are named one by one.
-    const MOST_NAMED: usize = 5;
+/// Those of the materials' licences that the declared one does not name.
+fn undeclared(licences: &[String], about: &About) -> Vec<String> {
+    let Some(declared) = &about.licence else { return Vec::new() };
+    let is_named = |name: &str| licence_names(declared).any(|declared| declared == name);
+    let is_said = |licence: &&String| match alternative_licences(licence) {
+        Some(alternatives) => alternatives.into_iter().any(is_named),
+        None => licence_names(licence).all(is_named),
+    };
+    licences.iter().filter(|licence| !is_said(licence)).cloned().collect()
+}
+
+/// Some licences for a sentence.
+pub fn named_licences(licences: &[String]) -> String {
     /// Letters of a licence that is none.
     const MOST_LETTERS: usize = 40;
     let named = licences.iter().take(MOST_NAMED);
     let named: Vec<String> = named.map(|l| l.chars().take(MOST_LETTERS).collect()).collect();
-    let mut found = named.join(", ");
-    if licences.len() > MOST_NAMED {
-        found += &format!(" and {} more", licences.len() - MOST_NAMED);
+    match licences.len().saturating_sub(MOST_NAMED) {
+        0 => named.join(", "),
+        more => format!("{} and {more} more", named.join(", ")),
     }
+}
+
+/// That these licences give none for the whole, and what could be declared.
+fn no_licence(licences: &[String]) -> CatalogueError {
+    let found = named_licences(licences);
     let part = |licence: &String| match licence.contains(' ') {
         true => format!("({licence})"),
         false => licence.clone(),

@@ -6,7 +6,8 @@ use serde_json::{Value, json};
 
 use super::bibtex::entry;
 use super::leaves::{Leaf, leaves};
-use crate::material::{Citation, Curve, Fit, Material, Origin, Source, SourceKind};
+use crate::material::{Citation, Curve, Fit, Material, Origin, Source, SourceKind, builtin};
+use crate::store::Stored;
 
 /// A source and what rests on it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -134,6 +135,32 @@ fn one_of(list: &str) -> &str {
     }
 }
 
+/// Whom a stored revision is to be credited to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Credit<'a> {
+    /// Those to whom the database belongs.
+    Own,
+    /// Those of the catalogue that it was imported from.
+    Others(&'a Origin),
+    /// Those who make matdb, whatever it went through since.
+    BuiltIn,
+}
+
+impl Credit<'_> {
+    /// Of a stored revision.
+    pub fn of(stored: &Stored) -> Credit<'_> {
+        let built_in = builtin::get(stored.material.slug.as_str()).and_then(Result::ok);
+        let origin = stored.activity.as_ref().and_then(|activity| activity.origin.as_ref());
+        match origin {
+            _ if built_in.is_some_and(|own| own.content_hash() == stored.content_hash) => {
+                Credit::BuiltIn
+            }
+            Some(origin) => Credit::Others(origin),
+            None => Credit::Own,
+        }
+    }
+}
+
 /// How to cite a revision of a material: which one it is, wherever it came from.
 #[derive(Clone, Debug)]
 pub struct Citable<'a> {
@@ -143,8 +170,8 @@ pub struct Citable<'a> {
     pub revision: Option<u32>,
     /// Year in which it was added, four digits; none for a built-in one.
     pub year: Option<u16>,
-    /// Somebody else's catalogue that it was taken from.
-    pub origin: Option<&'a Origin>,
+    /// Who has it made.
+    pub credit: Credit<'a>,
 }
 
 impl Citable<'_> {
@@ -185,16 +212,27 @@ impl Citable<'_> {
         text
     }
 
-    /// Which entry of which catalogue it was.
+    /// Which entry of which catalogue it was, or that it comes with the program.
     fn taken_from(&self) -> Option<String> {
-        let origin = self.origin?;
+        let origin = match self.credit {
+            Credit::Own => return None,
+            Credit::BuiltIn => return Some("Built into matdb".to_owned()),
+            Credit::Others(origin) => origin,
+        };
         let day = origin.added_at.get(..10).unwrap_or_default();
         Some(format!("From {}, revision {} of {day} there", origin.credit(), origin.revision))
     }
 
+    fn origin(&self) -> Option<&Origin> {
+        match self.credit {
+            Credit::Others(origin) => Some(origin),
+            Credit::Own | Credit::BuiltIn => None,
+        }
+    }
+
     /// Who published the catalogue that it was taken from.
     fn authors_there(&self) -> &[String] {
-        self.origin.map_or(&[], |origin| &origin.authors)
+        self.origin().map_or(&[], |origin| &origin.authors)
     }
 
     /// The material and its sources as BibTeX.
@@ -207,8 +245,8 @@ impl Citable<'_> {
             ("title", Some(self.title())),
             ("howpublished", self.taken_from()),
             ("year", self.year.map(|year| year.to_string())),
-            ("doi", self.origin.and_then(|origin| origin.doi.clone())),
-            ("url", self.origin.and_then(|origin| origin.url.clone())),
+            ("doi", self.origin().and_then(|origin| origin.doi.clone())),
+            ("url", self.origin().and_then(|origin| origin.url.clone())),
             ("note", Some(status.map_or(licence.clone(), |said| format!("{licence}; {said}")))),
         ];
         let mut text = entry("misc", &self.key(), own);
@@ -247,9 +285,9 @@ impl Citable<'_> {
             "author": (!authors_there.is_empty()).then_some(authors_there),
             "issued": self.year.map(issued),
             "version": self.revision.map(|revision| revision.to_string()),
-            "container-title": self.origin.map(Origin::title),
-            "DOI": self.origin.and_then(|origin| origin.doi.clone()),
-            "URL": self.origin.and_then(|origin| origin.url.clone()),
+            "container-title": self.origin().map(Origin::title),
+            "DOI": self.origin().and_then(|origin| origin.doi.clone()),
+            "URL": self.origin().and_then(|origin| origin.url.clone()),
             "license": self.material.licence,
             "note": note,
         }));

@@ -5,7 +5,7 @@ use serde_json::json;
 use super::console::Console;
 use super::database::Database;
 use super::materials::find;
-use crate::catalogue::{Citable, references};
+use crate::catalogue::{Citable, Credit, references};
 use crate::error::Error;
 
 /// Say how to cite a material, and which source each of its numbers rests on
@@ -33,12 +33,14 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         (Some(store), Some(_)) => store.get(&material.slug, found.revision)?,
         _ => None,
     };
-    let activity = stored.as_ref().and_then(|stored| stored.activity.as_ref());
-    let origin = activity.and_then(|activity| activity.origin.as_ref());
+    let credit = stored.as_ref().map_or(Credit::BuiltIn, Credit::of);
     // What was imported is of the year in which the others made it.
-    let added_at = origin.map(|o| &o.added_at).or(stored.as_ref().map(|s| &s.added_at));
+    let added_at = match credit {
+        Credit::Others(origin) => Some(&origin.added_at),
+        Credit::Own | Credit::BuiltIn => stored.as_ref().map(|stored| &stored.added_at),
+    };
     let year = added_at.and_then(|added_at| added_at.get(..4)?.parse().ok());
-    let citable = Citable { material, revision: found.revision, year, origin };
+    let citable = Citable { material, revision: found.revision, year, credit };
     let csl = citable.csl();
     let text = match (args.bibtex, args.csl) {
         (true, _) => citable.bibtex(),

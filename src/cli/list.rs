@@ -114,7 +114,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         }
         _ => table(
             &["material", "rev", "kind", "class", "curves", "points", "fits", "name"],
-            materials.iter().map(row),
+            materials.iter().zip(kinds(store.as_ref(), &materials)?).map(row),
         ),
     };
     let all = store.as_ref().map_or(Ok(0), |store| store.count(&filter))?;
@@ -163,11 +163,20 @@ fn wrapped(title: &str, names: &[&str]) -> String {
     lines.join("\n") + "\n"
 }
 
-fn row(m: &Summary) -> [String; 8] {
+/// How what scenes render of each material came to be.
+fn kinds(store: Option<&Store>, materials: &[Summary]) -> Result<Vec<String>, Error> {
+    let kind = |m: &Summary| {
+        let words = store.map_or(Ok(None), |store| store.rendered_words(&m.slug))?;
+        Ok(words.unwrap_or_else(|| m.render_kind.as_str().to_owned()))
+    };
+    materials.iter().map(kind).collect()
+}
+
+fn row((m, kind): (&Summary, String)) -> [String; 8] {
     [
         m.slug.to_string(),
         m.revision.to_string(),
-        with_status(m.render_kind.as_str(), &m.status),
+        with_status(&kind, &m.status),
         m.class.clone(),
         m.curves.to_string(),
         m.observations.to_string(),

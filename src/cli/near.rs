@@ -25,9 +25,9 @@ use crate::units::{range, rounded, shown};
 
 The distance is the root mean square difference in dB between the curve's mean at each angle and what
 scenes render of a material, at angles within that material's range. Below the threshold only a
-material that lies above it differs. Materials with fewer than 3 angles, or half of the curve's, in
-common are left out. Of a material that is not described at the frequency of the curve the notes say
-how far away that is; the distance does not count it.")]
+material that lies above it differs. Materials with fewer than 3 angles with an echo, or half of the
+curve's angles, in common are left out. Of a material that is not described at the frequency of the
+curve the notes say how far away that is; the distance does not count it.")]
 #[command(group = clap::ArgGroup::new("what").required(true))]
 pub(super) struct Args {
     /// A curve, as `matdb measure` writes it: theta_deg and sigma0_db, others if there are
@@ -56,7 +56,11 @@ struct Near {
     name: String,
     /// None for a built-in one that is not in the database.
     revision: Option<u32>,
+    /// Of the data behind what scenes render.
     kind: &'static str,
+    /// Of a model that goes with a curve, which nobody measured itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    kind_words: Option<String>,
     status: String,
     /// For which its numbers are claimed.
     frequency_ghz: [f64; 2],
@@ -136,6 +140,7 @@ fn near(
         name: summary.name,
         revision: is_stored.then_some(summary.revision),
         kind: summary.render_kind.as_str(),
+        kind_words: material.rendered_words(),
         status: summary.status,
         frequency_ghz: material.frequency_hz.map(|hz| rounded(hz / 1e9)),
         frequency_outside_ghz: asked.frequency_hz.map(outside_ghz),
@@ -225,7 +230,7 @@ fn row(near: &Near, angles: usize) -> [String; 9] {
     [
         near.slug.to_string(),
         near.revision.map_or("built in".to_owned(), |revision| revision.to_string()),
-        near.kind.to_owned(),
+        near.kind_words.clone().unwrap_or_else(|| near.kind.to_owned()),
         range(near.frequency_ghz),
         format!("{rms_db:.1}"),
         format!("{rms_shape_db:.1}"),

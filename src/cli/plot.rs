@@ -51,7 +51,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
                 Some(sweep) => swept(&material, sweep)?,
             };
             let kind = material.render_kind().map_or("of unknown origin", |kind| kind.as_str());
-            one_file(&args.output, &plot(&material.name, kind, series))?
+            let kind = material.rendered_words().unwrap_or_else(|| kind.to_owned());
+            one_file(&args.output, &plot(&material.name, &kind, series))?
         }
     };
     let text = format!("wrote {}\n", written.join(", "));

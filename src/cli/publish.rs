@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::console::Console;
 use super::database::Database;
 use super::summary::counted;
-use crate::catalogue::{About, HAS_PARQUET, publish};
+use crate::catalogue::{About, HAS_PARQUET, named_licences, publish};
 use crate::error::Error;
 use crate::material::form::licence_doubt;
 
@@ -48,6 +48,19 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     if !HAS_PARQUET {
         console.notice(
             "without Parquet tables; `cargo install --path . --features parquet` writes them, too",
+        );
+    }
+    if let ([_, ..], Some(declared)) = (published.undeclared_licences.as_slice(), &about.licence) {
+        console.notice(&format!(
+            "the catalogue is declared to be under {declared}, but materials in it are under {}; name these, too, \
+             in `licence` of --about FILE",
+            named_licences(&published.undeclared_licences)
+        ));
+    }
+    if published.is_without_zenodo {
+        console.notice(
+            "without .zenodo.json: Zenodo takes one licence of SPDX's list, and CC0 for what names none; \
+             choose the licence there by hand",
         );
     }
     if let (true, Some(version)) = (published.is_version_reused, &about.version) {

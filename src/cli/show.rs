@@ -107,7 +107,7 @@ fn status(material: &Material) -> String {
 fn sources(material: &Material) -> String {
     let mut text = String::new();
     for source in &material.sources {
-        text += &format!("source {} ({}): {}", source.key, source.kind.as_str(), source.title);
+        text += &format!("source {} ({}): {}", source.key, source.kind.as_str(), source.titled());
         if let Some(doi) = &source.doi {
             text += &format!(", doi:{doi}");
         } else if let Some(url) = &source.url {

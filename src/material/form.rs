@@ -68,19 +68,19 @@ pub fn licence_names(text: &str) -> impl Iterator<Item = &str> {
     words.filter(|word| !["", "AND", "OR", "WITH"].contains(word))
 }
 
-/// The licences of which a reader may choose one, by their identifiers on SPDX's list; none of an expression that
-/// says more, or names a licence that is not on the list.
+/// The licences of which a reader may choose one, by SPDX's usual identifiers; none of an expression that says more,
+/// or names a licence that is none of these.
 ///
 /// ```
 /// use matdb::material::form::alternative_licences;
 /// assert_eq!(alternative_licences("MIT OR CC0-1.0").unwrap(), ["MIT", "CC0-1.0"]);
 /// assert_eq!(alternative_licences("CC-BY-4.0 AND CC0-1.0"), None);
 /// assert_eq!(alternative_licences("LicenseRef-ours"), None);
+/// assert_eq!(alternative_licences("CC-BY"), None, "without its version it is on no list");
 /// ```
 pub fn alternative_licences(text: &str) -> Option<Vec<&str>> {
-    let is_listed = |name: &str| is_identifier(name) && !name.contains("LicenseRef-");
     let names = text.split(" OR ").map(str::trim);
-    names.map(|name| is_listed(name).then_some(name)).collect()
+    names.map(|name| LICENCES.contains(&name).then_some(name)).collect()
 }
 
 /// Whether a text is an ORCID: sixteen digits in groups of four, of which the last, which may be `X`, checks the

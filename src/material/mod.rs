@@ -224,6 +224,19 @@ impl Material {
         self.sources.iter().find(|s| s.key == *key).map(|s| s.kind)
     }
 
+    /// What is said of a model that goes with a curve in place of its source's kind: nobody measured the
+    /// model itself; none without a curve.
+    pub fn kind_words(&self, fit: &Fit) -> Option<String> {
+        let curve = self.curves.iter().find(|curve| Some(&curve.name) == fit.curve.as_ref())?;
+        let source = self.sources.iter().find(|source| source.key == curve.source)?;
+        Some(source.kind.words_beside(fit.is_fitted()))
+    }
+
+    /// The same of what scenes render; none of a curve, and of a model without one.
+    pub fn rendered_words(&self) -> Option<String> {
+        self.kind_words(self.fits.iter().find(|fit| fit.name == self.render)?)
+    }
+
     /// How far a frequency, Hz, lies outside [`frequency_hz`](Material::frequency_hz), Hz; 0 within.
     pub fn frequency_outside_hz(&self, frequency_hz: f64) -> f64 {
         reach::outside(self.frequency_hz, frequency_hz)

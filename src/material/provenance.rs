@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::check::{Check, MaterialError, value};
+use super::texts::turns_the_line;
 
 /// Where numbers come from.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -75,6 +76,12 @@ impl SourceKind {
             SourceKind::Modelled => "modelled",
             SourceKind::Synthetic => "synthetic",
         }
+    }
+
+    /// What is said of a model beside a curve of this kind, to which it was fitted or not.
+    pub fn words_beside(self, is_fitted: bool) -> String {
+        let how = if is_fitted { "fitted to" } else { "stated beside" };
+        format!("{how} {} data", self.as_str())
     }
 }
 
@@ -204,6 +211,14 @@ impl Origin {
         parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
+    /// A sentence on the first of its names that does not read as it stands.
+    pub fn misleading_name(&self) -> Option<String> {
+        let names = self.authors.iter().chain(&self.title).chain(&self.version);
+        names.into_iter().any(|name| turns_the_line(name)).then(|| {
+            "its catalogue or an author of that: the name holds a character that turns the line round".to_owned()
+        })
+    }
+
     /// Its title, or that it has none.
     pub fn title(&self) -> &str {
         self.title.as_deref().unwrap_or("a catalogue without a title")
@@ -218,6 +233,17 @@ impl Citation {
 }
 
 impl Source {
+    /// The title behind who wrote it and when, as far as that is known: `Doe, Jane; Roe, Ann (2026): Title`.
+    pub fn titled(&self) -> String {
+        let Citation { authors, year, .. } = &self.citation;
+        let year = year.map(|year| format!("({year})"));
+        let by: Vec<String> = [(!authors.is_empty()).then(|| authors.join("; ")), year]
+            .into_iter()
+            .flatten()
+            .collect();
+        if by.is_empty() { self.title.clone() } else { format!("{}: {}", by.join(" "), self.title) }
+    }
+
     pub(super) fn validate(&self) -> Result<(), MaterialError> {
         let place = format!("source `{}`", self.key);
         if self.title.trim().is_empty() {

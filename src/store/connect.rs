@@ -10,6 +10,7 @@ use rusqlite::functions::FunctionFlags;
 use rusqlite::{Connection, ErrorCode, OpenFlags, Transaction, TransactionBehavior};
 use rusqlite_migration::{M, Migrations};
 
+use super::error::directory_of;
 use super::find::outline;
 use super::{StoreError, write};
 
@@ -108,7 +109,7 @@ fn open_writable(path: &Path) -> Result<Connection, StoreError> {
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
     let mut conn = connect(path, flags).map_err(fail)?;
     if conn.is_readonly("main").map_err(fail)? {
-        return Err(StoreError::ReadOnly { file: path.to_owned() });
+        return Err(StoreError::read_only(path));
     }
     conn.pragma_update(None, "journal_mode", "wal").map_err(fail)?;
     // Two writers that each read first would stand in the other's way.
@@ -137,8 +138,17 @@ fn modern(path: &Path, conn: Connection) -> Result<Option<Connection>, StoreErro
 /// and may not even be allowed to.
 fn modern_copy(path: &Path, old: &Connection) -> Result<Connection, StoreError> {
     let fail = |error| StoreError::new(path, error);
+    let mut copy = in_memory_copy(path, old)?;
+    migrate(path, &mut copy)?;
+    copy.pragma_update(None, "query_only", true).map_err(fail)?;
+    Ok(copy)
+}
+
+/// A copy of a database in memory.
+fn in_memory_copy(path: &Path, original: &Connection) -> Result<Connection, StoreError> {
+    let fail = |error| StoreError::new(path, error);
     let mut copy = Connection::open_in_memory().map_err(fail)?;
-    let whole = |copy: &mut Connection| match Backup::new(old, copy)?.step(ALL_PAGES)? {
+    let whole = |copy: &mut Connection| match Backup::new(original, copy)?.step(ALL_PAGES)? {
         StepResult::Done => Ok(true),
         _ => Ok::<_, rusqlite::Error>(false),
     };
@@ -146,8 +156,6 @@ fn modern_copy(path: &Path, old: &Connection) -> Result<Connection, StoreError> 
         return Err(StoreError::Busy { file: path.to_owned() });
     }
     equip(&copy).map_err(fail)?;
-    migrate(path, &mut copy)?;
-    copy.pragma_update(None, "query_only", true).map_err(fail)?;
     Ok(copy)
 }
 
@@ -177,6 +185,9 @@ fn quiet(path: &Path) -> Result<Connection, StoreError> {
         OpenFlags::SQLITE_OPEN_READ_WRITE
     };
     let conn = connect(path, flags).map_err(fail)?;
+    if !log_exists && !journal_exists && conn.is_readonly("main").map_err(fail)? {
+        return unwritable(path);
+    }
     conn.pragma_update(None, "query_only", true).map_err(fail)?;
     match conn.query_row("SELECT count(*) FROM sqlite_schema", [], |_| Ok(())) {
         // Where no log can be made nobody writes, so the file may be read as if it never changed.
@@ -192,6 +203,45 @@ fn quiet(path: &Path) -> Result<Connection, StoreError> {
             Ok(conn)
         }
     }
+}
+
+/// Opens a file that we may not write and beside which lies no log. One that is made for reading would
+/// stay there with the rights of the file, or as ours, and keep from writing whoever may.
+fn unwritable(path: &Path) -> Result<Connection, StoreError> {
+    let fail = |error| StoreError::new(path, error);
+    let now = || {
+        let reason = |reason| StoreError::Open { file: path.to_owned(), reason };
+        let found = fs::metadata(path).map_err(reason)?;
+        Ok((found.len(), found.modified().ok(), beside(path, "-wal").symlink_metadata().is_ok()))
+    };
+    let nobody_writes = fs::metadata(path).is_ok_and(|found| found.permissions().readonly());
+    let before = now()?;
+    let conn = immutable(path).map_err(fail)?;
+    conn.pragma_update(None, "query_only", true).map_err(fail)?;
+    // As where no log can be made.
+    if nobody_writes || !may_add_to(directory_of(path)) {
+        check_length(path, &conn)?;
+        return Ok(conn);
+    }
+    // Somebody else may write it meanwhile: what is read is a copy of one moment.
+    let copy = check_length(path, &conn).and_then(|()| in_memory_copy(path, &conn));
+    if before != now()? {
+        return Err(StoreError::Busy { file: path.to_owned() });
+    }
+    let copy = copy?;
+    copy.pragma_update(None, "query_only", true).map_err(fail)?;
+    Ok(copy)
+}
+
+/// Whether we may make files in a folder; where nobody can say, perhaps.
+#[cfg(target_os = "linux")]
+fn may_add_to(folder: &Path) -> bool {
+    rustix::fs::access(folder, rustix::fs::Access::WRITE_OK).is_ok()
+}
+
+#[cfg(not(target_os = "linux"))]
+fn may_add_to(_: &Path) -> bool {
+    true
 }
 
 /// Refuses a file that was cut off: SQLite notices only when it reads what is not there, and takes half a

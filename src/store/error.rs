@@ -48,10 +48,12 @@ pub enum StoreError {
         file: PathBuf,
     },
     /// It can be read, but not written.
-    #[error("{} cannot be written; make it and its directory writable", file.display())]
+    #[error("{} cannot be written; {way_out}", file.display())]
     ReadOnly {
         /// The file.
         file: PathBuf,
+        /// What must be writable.
+        way_out: String,
     },
     /// The file contradicts itself.
     #[error("{} is damaged: {problem}; restore it from a copy", file.display())]
@@ -110,6 +112,11 @@ pub enum StoreError {
 }
 
 impl StoreError {
+    /// That a file can be read, but not written.
+    pub(super) fn read_only(path: &Path) -> StoreError {
+        StoreError::ReadOnly { file: path.to_owned(), way_out: way_to_write(path) }
+    }
+
     /// Sorts SQLite's errors by what the user can do about them.
     pub(super) fn new(path: &Path, error: rusqlite::Error) -> StoreError {
         use rusqlite::Error::*;
@@ -137,7 +144,7 @@ impl StoreError {
             | ErrorCode::ConstraintViolation => corrupt(error.to_string()),
             ErrorCode::NotADatabase => StoreError::Foreign { file },
             ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked => StoreError::Busy { file },
-            ErrorCode::ReadOnly => StoreError::ReadOnly { file },
+            ErrorCode::ReadOnly => StoreError::read_only(path),
             ErrorCode::DiskFull => StoreError::Full { file },
             ErrorCode::CannotOpen => StoreError::Open { file, reason: reason(path) },
             ErrorCode::SystemIoFailure => StoreError::Disk { file, error },
@@ -146,11 +153,33 @@ impl StoreError {
     }
 }
 
+/// What must be writable for a database to be: SQLite does not say which of its files is not.
+fn way_to_write(path: &Path) -> String {
+    let beside = ["-wal", "-shm"].map(|ending| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(ending);
+        PathBuf::from(name)
+    });
+    let there = beside.iter().filter(|file| file.symlink_metadata().is_ok());
+    let there: Vec<String> = there.map(|file| file.display().to_string()).collect();
+    match there.join(" and ") {
+        none if none.is_empty() => "make it and its directory writable".to_owned(),
+        files => format!(
+            "make it, its directory, and {files} writable, or, if the -wal is empty and no program uses \
+             the database, remove what lies beside it"
+        ),
+    }
+}
+
+/// The folder that a file stands in.
+pub(super) fn directory_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 /// Why a file cannot be opened. SQLite does not say, and to try it ourselves would drop the locks
 /// that other connections of this process hold, so this only looks.
 fn reason(path: &Path) -> io::Error {
-    let directory = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    match (fs::metadata(path), fs::metadata(directory)) {
+    match (fs::metadata(path), fs::metadata(directory_of(path))) {
         (_, Err(reason)) => reason,
         (Err(reason), _) if reason.kind() != io::ErrorKind::NotFound => reason,
         (_, Ok(found)) if !found.is_dir() => io::ErrorKind::NotADirectory.into(),

@@ -8,7 +8,7 @@ use rusqlite::{Connection, OptionalExtension, Result, Row};
 
 use super::read::rows;
 use super::{Store, StoreError, Summary};
-use crate::material::{Slug, SourceKind};
+use crate::material::{Fit, Slug, SourceKind};
 
 /// Which materials are wanted: those of which all holds that is said here.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -77,6 +77,15 @@ impl Store {
         one(&self.conn, slug).map_err(|error| StoreError::new(&self.path, error))
     }
 
+    /// What is said of the model that scenes render of a material where it goes with a curve
+    /// ([`Material::rendered_words`](crate::material::Material::rendered_words)), read without all else.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn rendered_words(&self, slug: &Slug) -> Result<Option<String>, StoreError> {
+        words_of(&self.conn, slug).map_err(|error| StoreError::new(&self.path, error))
+    }
+
     /// The `most` materials that all these words are found in, the best first; the last word may be the
     /// beginning of one. Names count most, then tags and class, then all else. Words are only words,
     /// whatever signs are in them; without a letter or digit nothing is found.
@@ -95,6 +104,21 @@ fn one(conn: &Connection, slug: &Slug) -> Result<Option<Summary>> {
     let sql = "SELECT slug, name, class, revision, kind, status, curves, observations, fits
                FROM entry WHERE slug = ?1";
     conn.prepare_cached(sql)?.query_row([slug.as_str()], summary).optional()
+}
+
+fn words_of(conn: &Connection, slug: &Slug) -> Result<Option<String>> {
+    let sql = "SELECT fit.estimator, source.kind
+               FROM material
+               JOIN revision ON material_id = material.id AND number = current_revision
+               JOIN fit ON fit.revision_id = revision.id AND fit.name = render
+               JOIN curve ON curve.revision_id = revision.id AND curve.name = fit.curve
+               JOIN source ON source.revision_id = revision.id AND source.key = curve.source
+               WHERE slug = ?1";
+    let words = |row: &Row| {
+        let (estimator, kind): (String, SourceKind) = (row.get(0)?, row.get(1)?);
+        Ok(kind.words_beside(estimator != Fit::STATED))
+    };
+    conn.prepare_cached(sql)?.query_row([slug.as_str()], words).optional()
 }
 
 fn summary(row: &Row) -> Result<Summary> {

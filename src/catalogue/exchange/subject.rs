@@ -133,9 +133,10 @@ impl<'a> Subject<'a> {
         Ok(entries.iter().filter(|entry| entry.key == key).collect())
     }
 
-    /// How the rendered numbers came to be, in one word.
-    pub(super) fn kind(&self) -> &'static str {
-        self.material.render_kind().map_or("of unknown origin", SourceKind::as_str)
+    /// How the rendered numbers came to be.
+    pub(super) fn kind(&self) -> String {
+        let kind = || self.material.render_kind().map_or("of unknown origin", SourceKind::as_str);
+        self.material.rendered_words().unwrap_or_else(|| kind().to_owned())
     }
 
     /// `slug@revision`, or that it is built in.
@@ -174,7 +175,7 @@ impl<'a> Subject<'a> {
 pub(super) fn cited(source: &Source) -> String {
     let doi = source.doi.as_ref().map(|doi| format!(", doi {doi}")).unwrap_or_default();
     let url = source.url.as_ref().map(|url| format!(", {url}")).unwrap_or_default();
-    format!("{}: {}{doi}{url}", source.kind.as_str(), source.title)
+    format!("{}: {}{doi}{url}", source.kind.as_str(), source.titled())
 }
 
 impl Points<'_> {

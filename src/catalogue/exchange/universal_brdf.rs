@@ -95,7 +95,7 @@ fn metadata(subject: &Subject, points: &Points) -> Value {
             "slug": material.slug,
             "revision": subject.revision,
             "kind": kind,
-            "source": points.source.map(|source| one_line(&source.title)),
+            "source": points.source.map(|source| one_line(&source.titled())),
             "licence_of_source": points.source.and_then(|source| source.licence.clone()),
             "instrument": points.instrument,
         } },

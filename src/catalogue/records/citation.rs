@@ -1,5 +1,5 @@
-//! How to cite a publication: `CITATION.cff` (Citation File Format 1.2.0) and `.zenodo.json`, which
-//! Zenodo reads in its place without saying so. Both come from the same record.
+//! How to cite a publication: `CITATION.cff` (Citation File Format 1.2.0) and, where Zenodo can be told the
+//! licence, `.zenodo.json`, which it reads in its place without saying so. Both come from the same record.
 
 use serde_json::{Value, json};
 
@@ -68,9 +68,12 @@ pub(super) fn orcid_url(orcid: &str) -> String {
     format!("https://orcid.org/{orcid}")
 }
 
-/// `.zenodo.json`.
-pub(super) fn zenodo(context: &Context) -> Value {
+/// `.zenodo.json`; none where the licence is not one of SPDX's list: Zenodo knows one, by its identifier in small
+/// letters, and puts data that name none under CC0.
+pub(super) fn zenodo(context: &Context) -> Option<Value> {
     let about = context.about;
+    let alternatives = alternative_licences(about.licence.as_deref()?)?;
+    let [licence] = alternatives.as_slice() else { return None };
     let person = |person: &Person| {
         let mut creator = json!({ "name": format!("{}, {}", person.family, person.given) });
         insert(&mut creator, "orcid", person.orcid.as_deref());
@@ -88,20 +91,12 @@ pub(super) fn zenodo(context: &Context) -> Value {
         "description": escaped(&about.description),
         "creators": creators,
         "access_right": "open",
+        "license": licence.to_lowercase(),
     });
-    let alternatives = about.licence.as_deref().and_then(alternative_licences);
-    match (alternatives.as_deref(), about.licence.as_deref()) {
-        // Zenodo knows one licence, by SPDX's identifier in small letters.
-        (Some([only]), _) => insert(&mut record, "license", Some(&only.to_lowercase())),
-        (_, Some(licence)) => {
-            insert(&mut record, "notes", Some(&escaped(&format!("Licence: {licence}."))));
-        }
-        (_, None) => {}
-    }
     insert(&mut record, "version", about.version.as_deref());
     insert(&mut record, "publication_date", context.day());
     insert(&mut record, "doi", about.doi.as_deref());
-    record
+    Some(record)
 }
 
 /// Sets a key that says something.
@@ -140,7 +135,7 @@ mod tests {
             [[person]]\nfamily = 'Roe'\ngiven = 'Ann'\norcid = '0000-0002-1825-0097'";
         let about = About::parse("about.toml", text).unwrap();
         let context = Context { about: &about, date: Some("2026-01-02T03:04:05Z"), materials: 1 };
-        let (cff, zenodo) = (cff(&context), zenodo(&context));
+        let (cff, zenodo) = (cff(&context), zenodo(&context).unwrap());
         let value = |key: &str| -> String {
             let line = cff.lines().find_map(|l| l.trim_start_matches([' ', '-']).strip_prefix(key));
             serde_json::from_str(line.unwrap().strip_prefix(": ").unwrap()).unwrap()
@@ -162,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_licence_is_said_where_the_format_can_and_in_words_where_it_cannot() {
+    fn a_licence_is_said_where_the_format_can_and_zenodo_is_told_nothing_where_it_would_take_cc0() {
         let of = |licence: &str| {
             let about = About { licence: Some(licence.to_owned()), ..About::default() };
             let context = Context { about: &about, date: None, materials: 1 };
@@ -170,19 +165,18 @@ mod tests {
         };
         let (cff, zenodo) = of("CC0-1.0");
         assert!(cff.contains("\nlicense: \"CC0-1.0\"\n") && !cff.contains("Licence:"), "{cff}");
-        assert_eq!((&zenodo["license"], &zenodo["notes"]), (&"cc0-1.0".into(), &Value::Null));
+        assert_eq!(zenodo.unwrap()["license"], "cc0-1.0");
         let (cff, zenodo) = of("MIT OR CC0-1.0");
         assert!(cff.contains("\nlicense:\n  - \"MIT\"\n  - \"CC0-1.0\"\n"), "{cff}");
-        assert_eq!(zenodo["notes"], "Licence: MIT OR CC0-1.0.");
+        assert_eq!(zenodo, None);
         for several in ["CC-BY-4.0 AND CC0-1.0", "LicenseRef-ours"] {
             let (cff, zenodo) = of(several);
             assert!(!cff.contains("\nlicense:"), "{cff}");
             assert!(cff.contains(&format!("of each number. Licence: {several}.\"\n")), "{cff}");
-            assert_eq!(
-                (&zenodo["license"], zenodo["notes"].as_str()),
-                (&Value::Null, Some(format!("Licence: {several}.").as_str()))
-            );
+            assert_eq!(zenodo, None, "{several}");
         }
+        let nothing = About { licence: None, ..About::default() };
+        assert_eq!(self::zenodo(&Context { about: &nothing, date: None, materials: 0 }), None);
     }
 
     #[test]

@@ -11,6 +11,9 @@ use super::api::Index;
 use super::tables::Written;
 use super::{About, CatalogueError, Folder, api};
 
+/// What Zenodo reads.
+pub(super) const ZENODO: &str = ".zenodo.json";
+
 /// What every record is made from.
 pub(super) struct Context<'a> {
     pub about: &'a About,
@@ -40,7 +43,9 @@ pub(super) fn write(
     let is_reused = changes::write(folder, index)?;
     let context = Context { about, date: index.date.as_deref(), materials: index.materials.len() };
     folder.write("CITATION.cff", citation::cff(&context).as_bytes())?;
-    pretty(folder, ".zenodo.json", &citation::zenodo(&context))?;
+    if let Some(record) = citation::zenodo(&context) {
+        pretty(folder, ZENODO, &record)?;
+    }
     pretty(folder, "dataset.jsonld", &linked::dataset(&context, folder.sums()))?;
     pretty(
         folder,

@@ -8,36 +8,11 @@ use super::words::cut;
 use crate::catalogue::About;
 use crate::catalogue::bibtex::entry;
 use crate::catalogue::records::licence_record;
-use crate::catalogue::references::pruned;
-use crate::material::{Origin, builtin};
+use crate::catalogue::references::{Credit, pruned};
 use crate::store::Stored;
 
 /// What is said of an entry that comes with the program.
 const BUILT_IN: &str = "Built into matdb, not by the publisher of this catalogue";
-
-/// Whom an entry is to be credited to.
-enum Credit<'a> {
-    /// Those who publish the catalogue.
-    Publisher,
-    /// Those of the catalogue that it was imported from.
-    Others(&'a Origin),
-    /// Those who make matdb.
-    BuiltIn,
-}
-
-impl Credit<'_> {
-    fn of(stored: &Stored) -> Credit<'_> {
-        let built_in = builtin::get(stored.material.slug.as_str()).and_then(Result::ok);
-        let origin = stored.activity.as_ref().and_then(|activity| activity.origin.as_ref());
-        match origin {
-            _ if built_in.is_some_and(|own| own.content_hash() == stored.content_hash) => {
-                Credit::BuiltIn
-            }
-            Some(origin) => Credit::Others(origin),
-            None => Credit::Publisher,
-        }
-    }
-}
 
 /// How to cite a material.
 #[derive(Debug, Serialize)]
@@ -63,7 +38,7 @@ impl Citation {
             format!("{name} ({}, revision {}, content {hash})", material.slug, stored.revision);
         let credit = Credit::of(stored);
         let mut text = match &credit {
-            Credit::Publisher => {
+            Credit::Own => {
                 format!("{}{what}. In: {}", listed(&about.authors()), catalogue_words(about))
             }
             Credit::BuiltIn => format!("{what}. {BUILT_IN}. In: {}", catalogue_words(about)),
@@ -78,12 +53,12 @@ impl Citation {
         let key = format!("{}-{}", material.slug, stored.revision);
         let bibtex = bibtex(about, &credit, &key, &what, &stored.added_at, status.clone());
         let creator = match credit {
-            Credit::Publisher => creators(about),
+            Credit::Own => creators(about),
             Credit::BuiltIn => Vec::new(),
             Credit::Others(origin) => origin.authors.iter().map(|author| person(author)).collect(),
         };
         let origin = match &credit {
-            Credit::Publisher => None,
+            Credit::Own => None,
             Credit::BuiltIn => Some(("Made by", "matdb, which it is built into".to_owned())),
             Credit::Others(origin) => Some(("Imported from", origin.credit())),
         };
@@ -178,7 +153,7 @@ fn bibtex(
     let named = |authors: &[String]| (!authors.is_empty()).then(|| authors.join(" and "));
     let here = (Some(about.title.clone()), &about.version, &about.doi, &about.url);
     let (author, (place, version, doi, url), note) = match credit {
-        Credit::Publisher => (named(&about.authors()), here, None),
+        Credit::Own => (named(&about.authors()), here, None),
         Credit::BuiltIn => (None, here, Some(BUILT_IN.to_owned())),
         Credit::Others(o) => {
             let there = (Some(o.title().to_owned()), &o.version, &o.doi, &o.url);

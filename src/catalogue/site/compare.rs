@@ -4,34 +4,33 @@ use std::collections::BTreeSet;
 
 use serde_json::{Value, json};
 
-use super::curve::marks;
+use super::curve::{line_word, marks, word};
 use super::entry::{kind_of, status_of};
-use super::fit::rendered_words;
 use super::levels::{Levels, TABLE_DEG, range_deg, tenth};
 use super::words::cut;
-use crate::material::{Curve, Material, SourceKind};
+use crate::material::{Curve, Fit, Material, SourceKind};
 
 /// Lines, points and a few levels, in ° and dB.
 pub(super) fn data(material: &Material) -> Value {
     let rendered = material.scattering().ok();
     let levels = rendered.as_ref().map(|model| Levels::rendered(material, model));
     let level = |&deg: &f64| levels.as_ref().map_or(String::new(), |levels| levels.text(deg));
-    let mut lines: Vec<Value> = Vec::new();
-    for fit in &material.fits {
-        lines.push(line(material, &fit.name, &fit.source, &Levels::stated(material, &fit.model)));
-    }
-    if let (true, Some(levels)) = (lines.is_empty(), &levels) {
-        let curve = material.curves.iter().find(|curve| curve.name == material.render);
-        let source = curve.map_or("", |curve| curve.source.as_str());
-        lines.push(line(material, &material.render, source, levels));
+    let of_fit = |fit: &Fit| {
+        let levels = Levels::stated(material, &fit.model);
+        line(&fit.name, line_word(material, fit), material.kind_words(fit), &levels)
+    };
+    let mut lines: Vec<Value> = material.fits.iter().map(of_fit).collect();
+    let drawn = material.curves.iter().find(|curve| curve.name == material.render);
+    if let (Some(drawn), Some(levels)) = (drawn, &levels) {
+        lines.push(line(&drawn.name, word(kind_of(material, &drawn.source)), None, levels));
     }
     json!({
         "slug": material.slug,
         "name": cut(&material.name, 200),
         "kind": material.render_kind().map_or("unknown", SourceKind::as_str),
-        "kind_words": rendered_words(material),
+        "kind_words": material.rendered_words(),
         "status": status_of(material),
-        "render": material.render,
+        "render": cut(&material.render, 200),
         "ghz": material.frequency_hz.map(|hz| hz / 1e9),
         "deg": range_deg(material),
         "lines": lines,
@@ -40,10 +39,12 @@ pub(super) fn data(material: &Material) -> Value {
     })
 }
 
-fn line(material: &Material, name: &str, source: &str, levels: &Levels) -> Value {
+/// A line; `kind` is that of its style.
+fn line(name: &str, kind: &str, kind_words: Option<String>, levels: &Levels) -> Value {
     json!({
         "name": cut(name, 200),
-        "kind": kind_of(material, source).map_or("unknown", SourceKind::as_str),
+        "kind": kind,
+        "kind_words": kind_words,
         "pieces": levels.line(),
     })
 }

@@ -4,7 +4,6 @@ use serde::Serialize;
 
 use super::bins::{Bin, bins};
 use super::entry::{kind_of, place_of};
-use super::fit::kind_words;
 use super::levels::{FAINTEST_DB, Levels, TABLE_DEG, angles_deg, range_deg};
 use super::plot::{Plot, Series, Shape};
 use super::words::{digits, grouped, percent};
@@ -67,7 +66,7 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
     }
     for (number, fit) in material.fits.iter().enumerate() {
         let kind = kind_of(material, &fit.source);
-        let class = format!("{} {}", ink(curves + number), class_of(kind));
+        let class = format!("{} is-{}", ink(curves + number), line_word(material, fit));
         let pieces = Levels::stated(material, &fit.model).line().into_iter();
         series.extend(pieces.map(|points| Series {
             shape: Shape::Line,
@@ -78,16 +77,16 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
         samples.push(Sample {
             name: fit.name.clone(),
             kind: word(kind),
-            kind_words: kind_words(material, fit),
+            kind_words: material.kind_words(fit),
             shape: "line",
             class,
             note,
         });
     }
-    if material.fits.is_empty()
+    if let Some(number) = material.curves.iter().position(|curve| curve.name == material.render)
         && let Ok(model) = material.scattering()
     {
-        let class = format!("ink0 {}", class_of(material.render_kind()));
+        let class = format!("{} {}", ink(number), class_of(material.render_kind()));
         let pieces = Levels::rendered(material, &model).line().into_iter();
         series.extend(pieces.map(|points| Series {
             shape: Shape::Line,
@@ -135,8 +134,15 @@ pub(super) fn class_of(kind: Option<SourceKind>) -> String {
     format!("is-{}", word(kind))
 }
 
-fn word(kind: Option<SourceKind>) -> &'static str {
+pub(super) fn word(kind: Option<SourceKind>) -> &'static str {
     kind.map_or("unknown", SourceKind::as_str)
+}
+
+/// The word for the style of a fit's line: what was stated beside measured points is not drawn as if it were they.
+pub(super) fn line_word(material: &Material, fit: &Fit) -> &'static str {
+    let kind = kind_of(material, &fit.source);
+    let is_stated = fit.curve.is_some() && !fit.is_fitted();
+    if is_stated && kind == Some(SourceKind::Measured) { "stated" } else { word(kind) }
 }
 
 /// Detections and bounds of a curve, (°, dB), as three kinds of marks.

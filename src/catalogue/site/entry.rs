@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use super::fit::rendered_words;
 use super::levels::{Levels, SMALL_DEG, range_deg};
 use super::words::{clean, cut};
 use crate::material::{Material, SourceKind};
@@ -55,7 +54,7 @@ impl Entry {
             tags: material.tags.iter().map(|tag| cut(tag, NAME)).collect(),
             text: clean(&cut(&material.description, DESCRIPTION)),
             kind: material.render_kind().map_or("unknown", SourceKind::as_str),
-            kind_words: rendered_words(material),
+            kind_words: material.rendered_words(),
             status: status_of(material),
             ghz: material.frequency_hz.map(|hz| hz / 1e9),
             deg: range_deg(material),

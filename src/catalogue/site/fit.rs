@@ -77,7 +77,7 @@ pub(super) fn view(material: &Material, number: usize, fit: &Fit) -> FitView {
     FitView {
         name: fit.name.clone(),
         kind: word(material, &fit.source),
-        kind_words: kind_words(material, fit),
+        kind_words: material.kind_words(fit),
         model: model_name(fit),
         method: method(&fit.estimator),
         curve: fit.curve.clone(),
@@ -89,19 +89,6 @@ pub(super) fn view(material: &Material, number: usize, fit: &Fit) -> FitView {
         report: fit.report.as_ref().map(report),
         residuals: residuals::picture(material, number, fit),
     }
-}
-
-/// What a badge says of a model that goes with a curve: nobody measured the model itself.
-pub(super) fn kind_words(material: &Material, fit: &Fit) -> Option<String> {
-    let curve = material.curves.iter().find(|curve| Some(&curve.name) == fit.curve.as_ref())?;
-    let how = if fit.is_fitted() { "fitted to" } else { "stated beside" };
-    Some(format!("{how} {} data", word(material, &curve.source)))
-}
-
-/// The same of what scenes render; none of a curve, and of a model without one.
-pub(super) fn rendered_words(material: &Material) -> Option<String> {
-    let rendered = material.fits.iter().find(|fit| fit.name == material.render)?;
-    kind_words(material, rendered)
 }
 
 /// An estimator in words; what somebody else calls theirs stays.

@@ -61,7 +61,8 @@ struct Head<'a> {
 struct SourceView<'a> {
     key: &'a str,
     kind: &'static str,
-    title: &'a str,
+    /// With authors and year.
+    title: String,
     link: Option<Link>,
     licence: Option<&'a str>,
     note: Option<&'a str>,
@@ -87,7 +88,7 @@ pub(super) fn page<'a>(
     let (picture, samples) = curve::picture(material);
     let kind = material.render_kind();
     let fits = material.fits.iter().enumerate();
-    let rendered = fit::rendered_words(material);
+    let rendered = material.rendered_words();
     Page {
         about,
         root: "../",
@@ -142,7 +143,7 @@ fn source(source: &Source) -> SourceView<'_> {
     SourceView {
         key: &source.key,
         kind: source.kind.as_str(),
-        title: &source.title,
+        title: source.titled(),
         link: link::of(source),
         licence: source.licence.as_deref(),
         note: source.note.as_deref(),

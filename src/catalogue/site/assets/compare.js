@@ -101,11 +101,15 @@
   };
 
   // What is shown.
-  const sample = (ink, kind) => {
+  const styled = (ink, { render }, line) => `line ink${ink} is-${line.kind}${line.name === render ? '' : ' faint'}`;
+  const sample = (ink, material, line) => {
     const svg = draw('svg', { class: 'sample', viewBox: '0 0 34 14', 'aria-hidden': 'true' });
-    svg.append(draw('path', { class: `line ink${ink} is-${kind}`, d: 'M1 7h32' }));
+    svg.append(draw('path', { class: styled(ink, material, line), d: 'M1 7h32' }));
     return svg;
   };
+  // What else is drawn of a material, beside what scenes render.
+  const others = (ink, material) => material.lines.filter((line) => line.name !== material.render).map((line) => make('span', { class: 'quiet' },
+    sample(ink, material, line), ' not rendered: ', make('bdi', {}, line.name), ' ', line.kind_words ?? line.kind));
   const list = (wrong) => {
     byId('chosen').replaceChildren(...chosen.map((slug, ink) => {
       const material = known.get(slug);
@@ -114,7 +118,8 @@
       button.addEventListener('click', () => remove(slug));
       if (!material) return make('li', {}, wrong.includes(slug) ? `There is no material ${slug}.` : slug, button);
       const link = make('a', { href: `material/${slug}.html` }, make('bdi', {}, name));
-      return make('li', {}, sample(ink, material.kind), link, ...badges(material), button);
+      const rendered = material.lines.filter((line) => line.name === material.render);
+      return make('li', {}, ...rendered.map((line) => sample(ink, material, line)), link, ...badges(material), ...others(ink, material), button);
     }));
   };
   const step = (span, wanted) => {
@@ -157,10 +162,9 @@
     }
     for (const { ink, material } of there) {
       for (const line of material.lines) {
-        const faint = line.name === material.render ? '' : ' faint';
         for (const piece of line.pieces) {
           const path = piece.map(([deg, level], i) => `${i ? 'L' : 'M'}${x(deg)} ${y(level)}`).join('');
-          svg.append(draw('path', { class: `line ink${ink} is-${line.kind}${faint}`, d: path }));
+          svg.append(draw('path', { class: styled(ink, material, line), d: path }));
         }
       }
     }
