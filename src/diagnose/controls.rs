@@ -101,7 +101,7 @@ impl Bench<'_> {
         let mut open: &[Rung] = &rungs;
         while let Some((size_db, at)) = open.get(open.len() / 2) {
             let (weaker, stronger) = open.split_at(open.len() / 2);
-            if self.is_found(effect, *size_db, at) {
+            if self.is_found(effect, at) {
                 (found, open) = (Some(*size_db), weaker);
             } else {
                 (missed, open) = (Some(*size_db), stronger.get(1..).unwrap_or_default());
@@ -151,8 +151,8 @@ impl Bench<'_> {
         self.settings.least_gain_of(effect.knobs().len(), 1)
     }
 
-    /// Whether an effect is found again, about as large, in data drawn with it.
-    fn is_found(&self, effect: &dyn Effect, size_db: f64, at: &DVector<f64>) -> bool {
+    /// Whether an effect is found again in data drawn with it.
+    fn is_found(&self, effect: &dyn Effect, at: &DVector<f64>) -> bool {
         let drawn = self.drawn(&self.problem.predict(&self.base.space.with(effect), at));
         let problem = Problem { observations: &drawn, ..self.problem };
         let sample = &Sample::new(&problem);
@@ -176,7 +176,6 @@ impl Bench<'_> {
         fitted_gain >= self.settings.least_gain_of(trial.candidate.numbers, trial.tried)
             && gain.min(fitted_gain) > self.settings.standard_errors * se
             && trial.candidate.size_db >= self.settings.least_size_db
-            && (size_db / ABOUT..=size_db * ABOUT).contains(&trial.candidate.size_db)
     }
 
     /// Data as a prediction draws them.
@@ -212,9 +211,8 @@ impl Bench<'_> {
 
 /// Starts of an effect that are looked at.
 const MOST_STARTS: usize = 12;
-/// Sizes that are tried, dB, and the factor within which one is found again.
-const LEAST_RUNG_DB: f64 = 0.01;
-const ABOUT: f64 = 2.0;
+/// Smallest size that is tried, dB.
+const LEAST_RUNG_DB: f64 = 0.05;
 /// Strengths, in those that a score test would just see.
 const SCALES: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];
 /// Steps from where an effect is absent beyond which no line leads there: a level or a number of looks

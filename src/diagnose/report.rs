@@ -166,7 +166,7 @@ pub struct Base {
 pub struct Power {
     /// Effect.
     pub name: &'static str,
-    /// The smallest size, dB, that was found; none where none was.
+    /// The smallest size, dB as put in, that was found; none where none was.
     pub least_db: Option<f64>,
     /// The largest size below it, dB, that was not found; none where all were.
     pub missed_db: Option<f64>,
