@@ -216,12 +216,12 @@ fn a_missing_effect_is_named_and_its_number_found() {
         let error = &report.error;
         assert!((error.after.rmse_db / error.after.noise_floor_db - 1.0).abs() < 0.045);
         assert!(error.after.log_score > error.before.log_score);
-        // 2400 looks of 2 dB would tell a twentieth of the effect that is there; of what was missed
-        // nothing is larger than what was found.
+        // 2400 looks of 2 dB would tell a tenth of the effect that is there, of which the laws take a part;
+        // what was missed is the next smaller size.
         let powers = &report.controls.injection_recovery;
         let power = powers.iter().find(|power| power.name == effect.name).unwrap();
         let least_db = power.least_db.unwrap();
-        assert!((0.1..0.5).contains(&least_db), "{power:?}");
+        assert!((0.1..1.0).contains(&least_db), "{power:?}");
         assert!(power.missed_db.is_none_or(|db| db < least_db && db > 0.2 * least_db), "{power:?}");
     }
 }
