@@ -109,7 +109,12 @@ fn each_number_has_a_source_that_can_be_found_and_that_show_prints() {
         let output = matdb(folder.path()).args(["show", material.slug.as_str()]).output().unwrap();
         let text = String::from_utf8(output.stdout).unwrap();
         for s in &material.sources {
-            assert!(text.contains(&format!("source {} ({}): {}", s.key, s.kind.as_str(), s.title)));
+            assert!(text.contains(&format!(
+                "source {} ({}): {}",
+                s.key,
+                s.kind.as_str(),
+                s.titled()
+            )));
             let found = s.doi.is_some() || s.url.is_some() || s.citation.publisher.is_some();
             assert!(found || s.kind != SourceKind::Literature, "{} {}", material.slug, s.key);
             assert!(
