@@ -406,7 +406,10 @@ fn a_fit_is_called_one_outside_the_site_too() {
             matdb(folder.path()).args(["--db", "a.sqlite"]).args(arguments).output().unwrap();
         String::from_utf8(output.stdout).unwrap()
     };
-    for arguments in [&["list"][..], &["near", "--material", "fitted", "--limit", "100"]] {
+    // As many angles as a distance needs.
+    let curve = "theta_deg,sigma0_db\n0,-3\n5,-5\n10,-8\n15,-11\n20,-13\n25,-15\n30,-17\n";
+    fs::write(folder.path().join("probe.csv"), curve).unwrap();
+    for arguments in [&["list"][..], &["near", "--curve", "probe.csv", "--limit", "100"]] {
         let said = said(arguments);
         let line = said.lines().find(|line| line.starts_with("fitted ")).unwrap_or(&said);
         assert!(line.contains("fitted to measured data"), "{said}");
