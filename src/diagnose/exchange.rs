@@ -3,7 +3,8 @@
 
 use super::Evidence;
 use super::screen::Screen;
-use super::select::{Added, Candidate, Left, SAME, Selection, State, numbers};
+use super::select::{Added, Candidate, SAME, Selection, State, numbers};
+use super::support::Left;
 use super::trial::Trial;
 use crate::effects::Effect;
 

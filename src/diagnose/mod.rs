@@ -15,7 +15,7 @@
 //! | probability of what was seen | `likelihood.rs` |
 //! | base and effects together | `refit.rs` |
 //! | what an effect promises | `screen.rs` |
-//! | held-out patches, selection, rivals held against each other | `folds.rs`, `select.rs`, `exchange.rs` |
+//! | held-out patches, selection, what counts as support, rivals held against each other | `folds.rs`, `select.rs`, `support.rs`, `exchange.rs` |
 //! | what remains | `covariates.rs`, `field.rs`, `residual.rs` |
 //! | what is said in the end | `report.rs` |
 //! | how large the error is, and what the answer is to be held against | `score.rs`, `controls.rs`, `placebo.rs` |
@@ -36,6 +36,7 @@ mod residual;
 mod score;
 mod screen;
 mod select;
+mod support;
 #[cfg(test)]
 mod tests;
 mod trial;

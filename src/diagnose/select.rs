@@ -8,8 +8,6 @@
 //! placebos and a stated least, and it changes the data by a stated least size. Where placebos beat all, two that predict held-out patches are tried together: each alone is a
 //! worse picture of both than a wave.
 
-use std::cell::OnceCell;
-
 use nalgebra::DVector;
 use serde::Serialize;
 
@@ -19,8 +17,9 @@ use super::folds::Folds;
 use super::placebo::Placebo;
 use super::refit::{Fitted, Problem, Space, sum};
 use super::residual::{self, Unexplained, speckle_sd_db};
-use super::score::{DB, Scored, errors, scored};
+use super::score::{DB, Scored, scored};
 use super::screen::{Sample, Screen};
+use super::support::{Claim, Left};
 use super::trial::Trial;
 use super::{Diagnosis, Evidence};
 use crate::effects::{Effect, Prediction, Receiver};
@@ -30,23 +29,13 @@ use crate::fit::minimise::Minimise;
 pub(super) const SEARCH: Minimise = Minimise { iterations: 20, tolerance: 0.1 };
 pub(super) const SCOUT: Minimise = Minimise { iterations: 12, tolerance: 0.1 };
 /// An effect that changes less than this share of what the largest does may be the error of its form.
-const SHARE_OF_LARGEST: f64 = 0.2;
-/// And of the scatter: a form that is off here and there scatters more than it shifts.
-const SHARE_OF_SPREAD: f64 = 0.4;
+pub(super) const SHARE_OF_LARGEST: f64 = 0.2;
 /// Structure that is left, likewise.
 pub(super) const SHARE_OF_FORM: f64 = 0.25;
 /// Standard errors by which a field's held-out gain must exceed nothing.
 const FIELD_ERRORS: f64 = 3.0;
-/// Share of its gain that an effect of the scatter must keep where a field has corrected the means.
-const SHARE_BESIDE_FIELD: f64 = 0.5;
-/// Share of the size of such an effect that neighbours may have in common: scatter is each look's own.
-const MOST_SHARED: f64 = 0.6;
 /// Probability by chance of what neighbours have in common.
 const CHANCE: f64 = 1e-3;
-/// Share of its gain that an effect of one small place keeps where it is held out, and how many least
-/// gains it is worth.
-const SHARE_KEPT: f64 = 0.6;
-const FAR_BEYOND: f64 = 4.0;
 /// Placebos of each comparison.
 const PLACEBOS: u64 = 3;
 /// Effects of one round of which pairs are tried.
@@ -120,33 +109,6 @@ struct Chosen<'a> {
     /// Names that predict as well.
     class: Vec<&'static str>,
     rivals: Vec<&'a dyn Effect>,
-}
-
-/// What an effect has to say for itself.
-struct Claim {
-    /// Gain in ln likelihood, and the least that counts.
-    gain: f64,
-    least: f64,
-    /// Gain in ln p of held-out patches and its standard error.
-    held_out: [f64; 2],
-    /// What it changes of the means and of the spread, dB, and the least that counts beside what others
-    /// change.
-    sizes_db: [f64; 2],
-    least_db: f64,
-}
-
-impl Claim {
-    /// The smaller gain: a fit without a patch may be far off where the patch was all that held it.
-    fn counts(&self) -> f64 {
-        self.held_out[0].min(self.gain)
-    }
-}
-
-/// What a model leaves, once it is asked for: by a field, and what neighbours have in common, dB.
-#[derive(Default)]
-pub(super) struct Left {
-    structure: OnceCell<Structure>,
-    shared_db: OnceCell<f64>,
 }
 
 /// All that the selection needs.
@@ -275,7 +237,7 @@ impl Selection<'_> {
     }
 
     /// What neighbours have in common beyond a model, dB.
-    fn shared_db(&self, state: &State) -> f64 {
+    pub(super) fn shared_db(&self, state: &State) -> f64 {
         let problem = &self.problem;
         let prediction = problem.predict(&state.space, &state.fitted.at);
         let z =
@@ -286,7 +248,7 @@ impl Selection<'_> {
     }
 
     /// The field beside a model.
-    fn structure(&self, state: &State) -> Structure {
+    pub(super) fn structure(&self, state: &State) -> Structure {
         let problem = &self.problem;
         let prediction = problem.predict(&state.space, &state.fitted.at);
         let covariates = covariates(problem.looks, &prediction, problem.observations);
@@ -307,12 +269,6 @@ impl Selection<'_> {
         let fitted = self.problem.fit(&space, &start, &[], &SEARCH);
         let held_out = self.held_out(&space, &fitted.at);
         State { space, fitted, held_out }
-    }
-
-    /// Whether held-out errors grow by more than their standard error.
-    pub(super) fn is_farther_off(&self, now: &[Scored], before: &[Scored]) -> bool {
-        let [now, before] = [now, before].map(|scored| errors(scored, self.folds));
-        now.rmse_db > before.rmse_db + now.rmse_se_db
     }
 
     /// Takes away effects that the later ones made superfluous.
@@ -345,63 +301,6 @@ impl Selection<'_> {
                 None => return,
             }
         }
-    }
-
-    /// What held-out looks are under a trial and the gain that speaks for it; `None` where it is not
-    /// supported.
-    pub(super) fn support<'a>(
-        &self,
-        state: &State<'a>,
-        trial: &mut Trial<'a>,
-        largest_db: f64,
-        left: &Left,
-    ) -> Option<(Vec<Scored>, f64)> {
-        let Candidate { gain, numbers, size_db, .. } = trial.candidate;
-        let [mean_db, spread_db] = trial.sizes_db;
-        let is_spread = spread_db > mean_db;
-        let share = if is_spread { SHARE_OF_SPREAD } else { SHARE_OF_LARGEST };
-        let mut claim = Claim {
-            gain,
-            least: self.settings.least_gain_of(numbers, trial.tried),
-            held_out: [f64::INFINITY, 0.0],
-            sizes_db: trial.sizes_db,
-            least_db: share * largest_db,
-        };
-        // Held-out patches are dear: nobody asks them of what fails without.
-        if !self.is_supported(&claim) {
-            return None;
-        }
-        let held_out = self.held_out(&trial.space, &trial.fitted.at);
-        claim.held_out = self.difference(&held_out, &state.held_out);
-        trial.candidate.held_out = Some(claim.held_out);
-        if !self.is_supported(&claim) || self.is_farther_off(&held_out, &state.held_out) {
-            return None;
-        }
-        if is_spread {
-            let structure = left.structure.get_or_init(|| self.structure(state));
-            let shared_db = *left.shared_db.get_or_init(|| self.shared_db(state));
-            let beside = self.gain_beside(state, trial, structure);
-            if beside < SHARE_BESIDE_FIELD * gain || shared_db > MOST_SHARED * size_db {
-                return None;
-            }
-        }
-        Some((held_out, claim.counts()))
-    }
-
-    /// Whether fit, held-out patches and size speak for an effect.
-    fn is_supported(&self, claim: &Claim) -> bool {
-        let Diagnosis { least_size_db, standard_errors, .. } = *self.settings;
-        let Claim { gain, least, held_out: [held_out, se], sizes_db: [mean_db, spread_db], .. } =
-            *claim;
-        // What acts in one small place, as no scatter does, has no standard error over places; it
-        // must be far beyond chance and be found again where it was not fitted.
-        let is_local = spread_db <= mean_db
-            && gain >= FAR_BEYOND * least
-            && held_out >= SHARE_KEPT * gain
-            && held_out > se;
-        gain >= least
-            && mean_db.max(spread_db) >= least_size_db.max(claim.least_db)
-            && (claim.counts() > standard_errors * se || is_local)
     }
 
     /// The effect to add.
@@ -517,7 +416,7 @@ impl Selection<'_> {
 
     /// What an effect gains where the means are already corrected by a field: scatter that is only
     /// structure of the means gains nothing there.
-    fn gain_beside(&self, state: &State, trial: &Trial, structure: &Structure) -> f64 {
+    pub(super) fn gain_beside(&self, state: &State, trial: &Trial, structure: &Structure) -> f64 {
         let ln_p = |space: &Space, fitted: &Fitted| {
             let prediction = self.problem.predict(space, &fitted.at);
             sum(&terms(&self.problem, &prediction, &structure.ln_factor))
