@@ -277,7 +277,7 @@ fn filters(store: &Store) {
     for rank in [Rank::Level, Rank::Shape] {
         let time =
             median_us(5, |_| drop(black_box(probe.nearest(store, &any(), rank, 10).unwrap())));
-        println!("nearest of all by {rank:?}: {:.1} ms", time / 1e3);
+        tell(&format!("nearest of all by {rank:?}"), time / 1e3, "ms", None);
     }
     for words in ["no77", "amber no1", "amber", "paint"] {
         let found = store.search(words, u32::MAX).unwrap().len();

@@ -110,6 +110,8 @@ def store(results):
     yield at_most(of + "look-up by name", 20, "µs", value("look-up"))
     yield at_most(of + "the slowest filter or full text", 1000, "µs", value(*QUESTIONS))
     yield at_most(of + "the slowest opening", 5, "ms", value("open"))
+    yield at_most(of + "the slowest listing command", 50, "ms", value("matdb"))
+    yield at_most(of + "memory of `matdb publish`", 500, "MiB", value("publish, memory", "publish again, memory"))
 
 
 def formats(results):
