@@ -286,7 +286,8 @@ fn filters(store: &Store) {
     }
 }
 
-/// Commands as a person runs them.
+/// Commands as a person runs them. The goal is that of listings: all materials as JSON take as long as they
+/// are, and `near` reads every curve.
 fn processes(path: &Path) {
     for arguments in [
         vec!["list", "--class", "class-7"],
@@ -309,7 +310,9 @@ fn processes(path: &Path) {
                 command.args(&arguments).arg("--db").arg(path).output().unwrap().status.success()
             );
         });
-        tell(&format!("matdb {}", arguments.join(" ")), time / 1e3, "ms", Some(50.0));
+        let is_listing = arguments[0] != "near" && arguments != ["list", "--json"];
+        let goal = is_listing.then_some(50.0);
+        tell(&format!("matdb {}", arguments.join(" ")), time / 1e3, "ms", goal);
     }
 }
 
