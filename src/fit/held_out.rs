@@ -170,15 +170,13 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_only_learn_their_rows_by_heart_are_found_out() {
-        // Seven numbers for twelve rows of pure speckle.
+    fn without_places_whole_runs_of_chirps_are_held_out() {
         let curve = Twin { rows: 24, ..Twin::default() }.curve(7);
-        let found = Fit { starts: 1, looks: Some(1.0), ..Fit::default() }
-            .run(&mixture(0.1, 3.0, 0.02, 0.004), &curve)
-            .unwrap();
+        let fit = Fit { starts: 1, looks: Some(1.0), ..Fit::default() };
+        let found = fit.run(&model("lambert").unwrap(), &curve).unwrap();
         let held = found.hold_out(&curve).unwrap();
-        assert!(held.score.unwrap() < found.objective / 24.0 - 0.02, "{held:?} {found:?}");
         assert_eq!((held.blocks, held.block_m), (20, None));
+        assert!(held.score.unwrap() < found.objective / 24.0, "{held:?} {found:?}");
     }
 
     #[test]
