@@ -88,6 +88,7 @@ fn material(number: usize) -> Material {
         power_w: Some(1e-10),
         range_m: Some(8.0),
         chirp: Some(row as u32),
+        target_m: None,
     };
     material.curves = vec![Curve {
         name: "scan".to_owned(),

@@ -48,7 +48,8 @@ fn text(subject: &Subject, format: Format) -> String {
 }
 
 fn bare(material: &Material) -> Subject<'_> {
-    Subject { material, revision: Some(3), added_at: Some("2026-03-14T10:00:00Z"), curve: None }
+    let added_at = Some("2026-03-14T10:00:00Z");
+    Subject { material, revision: Some(3), added_at, origin: None, curve: None }
 }
 
 fn given() -> Given {

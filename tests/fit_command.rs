@@ -86,6 +86,12 @@ fn a_curve_is_fitted_stored_rendered_and_listed() {
     assert_eq!((&listed["curves"], &listed["observations"]), (&1.into(), &400.into()));
     let shown = text(folder, &["show", "human-skin-300-ghz"]);
     assert!(shown.contains("method censored: converged") && shown.contains("verdict:"), "{shown}");
+    let score = found["held_out"]["score"].as_f64().unwrap();
+    let held = format!(
+        "held out in 5 turns (20 runs of chirps): {:.2} dB rms, ln p {score:.4} ± ",
+        found["held_out"]["rms_db"].as_f64().unwrap()
+    );
+    assert!(shown.contains(&held), "{held}: {shown}");
     let fitted = shown.split("fit mixture-censored").nth(1).unwrap();
     for path in ["k ", "specular.f_lambda", "diffuse.r_s"] {
         let line = fitted.lines().find(|line| line.starts_with(path)).unwrap();

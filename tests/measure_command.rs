@@ -4,6 +4,7 @@
 
 mod support;
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
@@ -76,6 +77,20 @@ fn a_cloud_becomes_a_material_that_renders_like_it() {
         ],
     );
     assert_eq!(entries(&at.join("measured")), ["curve.csv", "curve.svg", "pose.json"]);
+    let curve = fs::read_to_string(at.join("measured/curve.csv")).unwrap();
+    let cloud = read_cloud(&at.join("out/cloud.ply"));
+    let places: BTreeMap<u32, [f64; 2]> = (0..cloud["chirp"].len())
+        .map(|i| (cloud["chirp"][i] as u32, ["xt_m", "yt_m"].map(|axis| cloud[axis][i])))
+        .collect();
+    let mut compared = 0;
+    for line in curve.lines().skip(1) {
+        let cells: Vec<&str> = line.split(',').collect();
+        let Some([xt_m, yt_m]) = places.get(&cells[5].parse().unwrap()) else { continue };
+        let said = [cells[7], cells[8]].map(|cell| cell.parse::<f64>().unwrap());
+        assert!((said[0] - xt_m).abs() < 1e-4 && (said[1] - yt_m).abs() < 1e-4, "{line}");
+        compared += 1;
+    }
+    assert!(compared > 1000, "{compared}");
     // The mesh stood where the scene has it: at the points the pose moves nothing.
     let about = &pose["covariance"]["about_m"];
     for row in 0..3 {
@@ -91,6 +106,15 @@ fn a_cloud_becomes_a_material_that_renders_like_it() {
 
     let fit = json(at, &["fit", "mannequin-paint", "--noise-dbm", "-100", "--save"]);
     assert_eq!(fit["converged"], true);
+    // A right law does as well on squares of the target that it has not seen.
+    let held = &fit["held_out"];
+    assert_eq!(held["folds"], 5);
+    assert!(number(&held["block_m"]) > 0.01 && number(&held["blocks"]) > 20.0, "{held}");
+    let (seen, unseen) = (number(&fit["goodness"]["rms_db"]), number(&held["rms_db"]));
+    assert!((unseen / seen - 1.0).abs() < 0.02, "{seen} {unseen}");
+    let rows = number(&fit["goodness"]["rows"]);
+    let off = number(&held["score"]) - number(&fit["objective"]) / rows;
+    assert!(off < 0.0 && -off < number(&held["score_sd"]), "{held} {off}");
     let truth = json(at, &["show", "mannequin-paint@1"]);
     let model = &truth["material"]["fits"][0]["model"];
     let k = number(&model["k"]);

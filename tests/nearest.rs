@@ -3,7 +3,7 @@
 
 use matdb::brdf::{Brdf, Tabulated};
 use matdb::catalogue::{Distance, Nearest, Probe, Rank};
-use matdb::material::{Censor, Curve, Material, Observation, Slug, builtin};
+use matdb::material::{Curve, Material, Observation, Slug, builtin};
 use matdb::radar::random::{Draws, Key, Purpose};
 use matdb::store::{Filter, Store};
 use matdb::units::ratio_from_db;
@@ -20,18 +20,8 @@ fn within(draws: &mut Draws, low: f64, high: f64) -> f64 {
 
 fn at(theta_deg: f64, level_db: f64, is_detected: bool) -> Observation {
     let (theta_rad, level) = (theta_deg.to_radians(), ratio_from_db(level_db));
-    Observation {
-        theta_i_rad: theta_rad,
-        theta_r_rad: theta_rad,
-        delta_phi_rad: 0.0,
-        sigma0: is_detected.then_some(level),
-        censor: if is_detected { Censor::None } else { Censor::Left },
-        threshold_sigma0: (!is_detected).then_some(level),
-        theta_sd_rad: None,
-        power_w: None,
-        range_m: None,
-        chirp: None,
-    }
+    let (sigma0, limit) = (is_detected.then_some(level), (!is_detected).then_some(level));
+    Observation::backscatter(theta_rad, sigma0, limit)
 }
 
 /// A material of its own: another lobe, or a rugged curve that falls silent.

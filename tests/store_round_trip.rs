@@ -7,9 +7,9 @@ use matdb::brdf::{
 use matdb::formats::EffectEntry;
 use matdb::material::{
     Activity, Censor, Citation, Covariance, Curve, Estimate, Finding, FindingVerdict, Fit,
-    FitReport, Geometry, Given, Goodness, Input, Instrument, Layer, Making, Material, Observation,
-    Origin, Permittivity, Roughness, Scale, Session, SessionPose, Slug, Source, SourceKind, Status,
-    builtin,
+    FitReport, Geometry, Given, Goodness, HeldOut, Input, Instrument, Layer, Making, Material,
+    Observation, Origin, Permittivity, Roughness, Scale, Session, SessionPose, Slug, Source,
+    SourceKind, Status, builtin,
 };
 use matdb::measure::statistics::by_angle;
 use matdb::store::{Added, Store};
@@ -176,13 +176,14 @@ prop_compose! {
         censor in select(&[Censor::None, Censor::Left, Censor::Right]),
         theta_sd_rad in option::of(angle_rad()), power_w in option::of(positive()),
         range_m in option::of(prop_oneof![positive(), Just(0.0)]), chirp in option::of(any::<u32>()),
+        target_m in option::of([-1e3f64..1e3, -1e3f64..1e3]),
     ) -> Observation {
         let measured = censor == Censor::None;
         Observation {
             theta_i_rad, theta_r_rad, delta_phi_rad, censor,
             sigma0: measured.then_some(level),
             threshold_sigma0: if measured { threshold } else { Some(level) },
-            theta_sd_rad, power_w, range_m, chirp,
+            theta_sd_rad, power_w, range_m, chirp, target_m,
         }
     }
 }
@@ -226,6 +227,16 @@ fn number() -> impl Strategy<Value = f64> {
 }
 
 prop_compose! {
+    fn held_out()(
+        folds in any::<u32>(), blocks in any::<u32>(), block_m in option::of(positive()),
+        score in option::of(number()), score_sd in option::of(positive()), rms_db in positive(),
+    ) -> HeldOut {
+        let fold_hash = "fedcba9876543210".repeat(4);
+        HeldOut { folds, blocks, block_m, score, score_sd, rms_db, fold_hash }
+    }
+}
+
+prop_compose! {
     fn report()(
         texts in (text(), text(), option::of(text()), text(), vec(text(), 0..3)),
         named in vec((text(), number(), option::of(positive())), 0..4),
@@ -233,6 +244,7 @@ prop_compose! {
         singular_values in vec(number(), 0..4), speckle_db in option::of(number()),
         [rms_db, mean_db, z_mean, z_variance, ks_distance] in [(); 5].map(|()| number()),
         converged in any::<bool>(), counts in any::<[u32; 4]>(), seed in any::<u64>(),
+        held_out in option::of(held_out()),
     ) -> FitReport {
         let (method, stop, gauge, version, verdict) = texts;
         let interval = |sd: f64| [-sd, sd];
@@ -249,7 +261,7 @@ prop_compose! {
             goodness: Goodness {
                 rms_db, mean_db, speckle_db, z_mean, z_variance, ks_distance, rows,
             },
-            converged, stop, iterations, starts, agreeing_starts, verdict,
+            held_out, converged, stop, iterations, starts, agreeing_starts, verdict,
             data_hash: "0123456789abcdef".repeat(4), seed, version,
         }
     }

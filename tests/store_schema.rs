@@ -15,9 +15,11 @@ use matdb::material::{Activity, Input, Material, Origin};
 use matdb::store::{Added, Store};
 use rusqlite::Connection;
 use rusqlite::functions::FunctionFlags;
-use support::database::{attributed, change, complete, contents, fitted, sample, with_effects};
+use support::database::{
+    attributed, change, complete, contents, fitted, placed, sample, with_effects,
+};
 
-const NEWEST: &str = "schema-0008.sqlite";
+const NEWEST: &str = "schema-0009.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
@@ -42,7 +44,8 @@ fn held(file: &str) -> [Material; 3] {
         "schema-0002.sqlite" => fitted,
         "schema-0003.sqlite" => with_effects,
         "schema-0004.sqlite" | "schema-0005.sqlite" | "schema-0006.sqlite" => complete,
-        _ => attributed,
+        "schema-0007.sqlite" | "schema-0008.sqlite" => attributed,
+        _ => placed,
     };
     let mut held = [make("paint"), change(make("paint")), make("primer")];
     if file < "schema-0008.sqlite" {

@@ -65,6 +65,15 @@ impl Case {
         let power_w = received_w.max(threshold_w);
         let censored = received_w < threshold_w;
         let sigma0 = power_w / watts_per_sigma0;
-        Row { theta_rad, theta_sd_rad, power_w, sigma0, range_m: RANGE_M, chirp, censored }
+        Row {
+            theta_rad,
+            theta_sd_rad,
+            power_w,
+            sigma0,
+            range_m: RANGE_M,
+            chirp,
+            censored,
+            target_m: None,
+        }
     }
 }

@@ -9,8 +9,8 @@ use std::io;
 use serde::{Deserialize, Serialize};
 
 use super::folder::INDEX;
-use super::{About, CatalogueError, Folder};
-use crate::material::{Material, Slug, Status};
+use super::{About, CatalogueError, Credit, Folder};
+use crate::material::{Material, Origin, Slug, Status};
 use crate::store::{Stored, Summary};
 
 /// The version of the shape of every JSON file here.
@@ -42,6 +42,9 @@ pub(super) struct Record<'a> {
     content_hash: &'a str,
     added_at: &'a str,
     program_version: &'a str,
+    /// The catalogue that it was imported from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    origin: Option<&'a Origin>,
     material: &'a Material,
 }
 
@@ -53,6 +56,7 @@ impl Record<'_> {
             content_hash: &stored.content_hash,
             added_at: &stored.added_at,
             program_version: &stored.program_version,
+            origin: Credit::of(stored).origin(),
             material: &stored.material,
         }
     }
@@ -192,6 +196,7 @@ mod tests {
             power_w: long,
             range_m: long,
             chirp: Some(u32::MAX),
+            target_m: Some([-std::f64::consts::PI * 1e-17; 2]),
         };
         let bytes = serde_json::to_vec(&point).unwrap().len() as u64 + 1;
         assert!(check_size("paint", 300_000 * bytes).is_ok(), "{bytes}");

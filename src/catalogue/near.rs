@@ -308,18 +308,8 @@ mod tests {
     fn at(theta_deg: f64, level_db: f64, censor: Censor) -> Observation {
         let (theta_rad, level) = (theta_deg.to_radians(), ratio_from_db(level_db));
         let is_detected = censor == Censor::None;
-        Observation {
-            theta_i_rad: theta_rad,
-            theta_r_rad: theta_rad,
-            delta_phi_rad: 0.0,
-            sigma0: is_detected.then_some(level),
-            censor,
-            threshold_sigma0: (!is_detected).then_some(level),
-            theta_sd_rad: None,
-            power_w: None,
-            range_m: None,
-            chirp: None,
-        }
+        let (sigma0, limit) = (is_detected.then_some(level), (!is_detected).then_some(level));
+        Observation { censor, ..Observation::backscatter(theta_rad, sigma0, limit) }
     }
 
     fn flat(observations: &[Observation], level_db: f64) -> Option<Distance> {

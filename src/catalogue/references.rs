@@ -146,9 +146,9 @@ pub enum Credit<'a> {
     BuiltIn,
 }
 
-impl Credit<'_> {
+impl<'a> Credit<'a> {
     /// Of a stored revision.
-    pub fn of(stored: &Stored) -> Credit<'_> {
+    pub fn of(stored: &'a Stored) -> Credit<'a> {
         let built_in = builtin::get(stored.material.slug.as_str()).and_then(Result::ok);
         let origin = stored.activity.as_ref().and_then(|activity| activity.origin.as_ref());
         match origin {
@@ -157,6 +157,14 @@ impl Credit<'_> {
             }
             Some(origin) => Credit::Others(origin),
             None => Credit::Own,
+        }
+    }
+
+    /// The catalogue of others that it was imported from.
+    pub fn origin(self) -> Option<&'a Origin> {
+        match self {
+            Credit::Others(origin) => Some(origin),
+            Credit::Own | Credit::BuiltIn => None,
         }
     }
 }
@@ -223,16 +231,9 @@ impl Citable<'_> {
         Some(format!("From {}, revision {} of {day} there", origin.credit(), origin.revision))
     }
 
-    fn origin(&self) -> Option<&Origin> {
-        match self.credit {
-            Credit::Others(origin) => Some(origin),
-            Credit::Own | Credit::BuiltIn => None,
-        }
-    }
-
     /// Who published the catalogue that it was taken from.
     fn authors_there(&self) -> &[String] {
-        self.origin().map_or(&[], |origin| &origin.authors)
+        self.credit.origin().map_or(&[], |origin| &origin.authors)
     }
 
     /// The material and its sources as BibTeX.
@@ -245,8 +246,8 @@ impl Citable<'_> {
             ("title", Some(self.title())),
             ("howpublished", self.taken_from()),
             ("year", self.year.map(|year| year.to_string())),
-            ("doi", self.origin().and_then(|origin| origin.doi.clone())),
-            ("url", self.origin().and_then(|origin| origin.url.clone())),
+            ("doi", self.credit.origin().and_then(|origin| origin.doi.clone())),
+            ("url", self.credit.origin().and_then(|origin| origin.url.clone())),
             ("note", Some(status.map_or(licence.clone(), |said| format!("{licence}; {said}")))),
         ];
         let mut text = entry("misc", &self.key(), own);
@@ -285,9 +286,9 @@ impl Citable<'_> {
             "author": (!authors_there.is_empty()).then_some(authors_there),
             "issued": self.year.map(issued),
             "version": self.revision.map(|revision| revision.to_string()),
-            "container-title": self.origin().map(Origin::title),
-            "DOI": self.origin().and_then(|origin| origin.doi.clone()),
-            "URL": self.origin().and_then(|origin| origin.url.clone()),
+            "container-title": self.credit.origin().map(Origin::title),
+            "DOI": self.credit.origin().and_then(|origin| origin.doi.clone()),
+            "URL": self.credit.origin().and_then(|origin| origin.url.clone()),
             "license": self.material.licence,
             "note": note,
         }));

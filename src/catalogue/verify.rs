@@ -402,7 +402,7 @@ fn check_rebuilt(
             return Vec::new();
         }
     };
-    let (scope, notes) = Scope::new(bundle, sums);
+    let (scope, notes) = Scope::new(bundle, store, sums);
     let paths: BTreeSet<&String> = sums.keys().chain(made.keys()).collect();
     let mut wrong = paths.into_iter().filter(|path| scope.has(path)).filter_map(|path| {
         match (sums.get(path), made.get(path)) {
@@ -436,25 +436,33 @@ const MOST_NAMED: usize = 10;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Scope {
     same_version: bool,
+    same_schema: bool,
     same_parquet: bool,
 }
 
 impl Scope {
     /// The scope, and what is outside.
-    fn new(bundle: &Path, sums: &BTreeMap<String, String>) -> (Scope, Vec<String>) {
+    fn new(bundle: &Path, store: &Store, sums: &BTreeMap<String, String>) -> (Scope, Vec<String>) {
         let version = read::<Index>(bundle, INDEX).ok().and_then(|index| index.program_version);
         let has_parquet = sums.keys().any(|path| is_parquet(path));
+        let same_schema = !store.is_of_older_schema();
         let scope = Scope {
-            same_version: version.as_deref() == Some(env!("CARGO_PKG_VERSION")),
+            same_version: same_schema && version.as_deref() == Some(env!("CARGO_PKG_VERSION")),
+            same_schema,
             same_parquet: has_parquet == HAS_PARQUET,
         };
         let by = version.map_or("an older matdb".to_owned(), |version| format!("matdb {version}"));
         let other_version = format!(
             "{by} has published this and this is matdb {}: compared were the hashes of all files, the \
-             database in itself, its fits with their curves, api/v1/ with the database, and those of \
-             tables/*.csv that are there; not compared were the pages, Parquet, the records \
-             (datapackage.json, CITATION.cff and others), tables/units.csv, and whether a table is missing",
-            env!("CARGO_PKG_VERSION")
+             database in itself, its fits with their curves, {}; not compared were the pages, {}Parquet, \
+             the records (datapackage.json, CITATION.cff and others), tables/units.csv, and whether a \
+             table is missing",
+            env!("CARGO_PKG_VERSION"),
+            match same_schema {
+                true => "api/v1/ with the database, and those of tables/*.csv that are there",
+                false => "and api/v1/ with the database, whose schema is an older one",
+            },
+            if same_schema { "" } else { "tables/*.csv, " }
         );
         let other_tables = "this matdb was built with other formats of tables, so that Parquet and the \
                             records that list it were not made again";
@@ -469,6 +477,8 @@ impl Scope {
     fn has(self, path: &str) -> bool {
         const LISTS: [&str; 3] = ["datapackage.json", "dataset.jsonld", "ro-crate-metadata.json"];
         match self {
+            // Tables have other columns since.
+            Scope { same_schema: false, .. } => false,
             Scope { same_version: false, .. } => {
                 // The list of units has a line for every table that the program knows.
                 path.starts_with("tables/") && path.ends_with(".csv") && path != "tables/units.csv"
@@ -485,12 +495,21 @@ fn is_parquet(path: &str) -> bool {
 
 fn check_record(bundle: &Path, stored: &Stored) -> Option<Problem> {
     let path = api::path(stored.material.slug.as_str());
-    let wanted = serde_json::to_value(Record::new(stored)).ok();
+    let mut wanted = serde_json::to_value(Record::new(stored)).unwrap_or_default();
     match read::<Value>(bundle, &path) {
-        Ok(found) if Some(&found) == wanted.as_ref() => None,
+        Ok(found) if found == wanted => None,
+        // An older program wrote none.
+        Ok(found) if found.get("origin").is_none() && found == without(&mut wanted, "origin") => {
+            None
+        }
         Ok(_) => Some(problem(path, "says something else than the database")),
         Err(what) => Some(problem(path, what)),
     }
+}
+
+fn without(value: &mut Value, key: &str) -> Value {
+    value.as_object_mut().and_then(|object| object.remove(key));
+    value.take()
 }
 
 fn check_index(bundle: &Path, entries: &[Entry]) -> Option<Problem> {

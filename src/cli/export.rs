@@ -8,6 +8,7 @@ use super::console::Console;
 use super::database::Database;
 use super::materials::{Found, find, not_to_be_used};
 use super::output::write_all;
+use crate::catalogue::Credit;
 use crate::catalogue::exchange::{self, Exported, Subject};
 use crate::error::Error;
 
@@ -65,12 +66,12 @@ impl From<Format> for exchange::Format {
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let store = db.read()?;
     let Found { material, revision } = find(store.as_ref(), &args.material, "")?;
-    let history = match &store {
-        Some(store) => store.history(&material.slug)?,
-        None => Vec::new(),
+    let stored = match &store {
+        Some(store) if revision.is_some() => store.get(&material.slug, revision)?,
+        _ => None,
     };
-    let stored = history.iter().find(|line| Some(line.revision) == revision);
-    let added_at = stored.map(|line| line.added_at.as_str());
+    let added_at = stored.as_ref().map(|stored| stored.added_at.as_str());
+    let origin = stored.as_ref().and_then(|stored| Credit::of(stored).origin());
     let curve = args.curve.as_deref();
     if let Some(name) = curve.filter(|name| material.curves.iter().all(|c| c.name != *name)) {
         let names: Vec<&str> = material.curves.iter().map(|curve| curve.name.as_str()).collect();
@@ -82,7 +83,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             },
         });
     }
-    let subject = Subject { material: &material, revision, added_at, curve };
+    let subject = Subject { material: &material, revision, added_at, origin, curve };
     let Some(name) = args.output.file_name().and_then(|name| name.to_str()) else {
         return Err(Error::Usage {
             problem: format!("{} names no file", args.output.display()),

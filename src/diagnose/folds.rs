@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use crate::effects::Look;
-use crate::radar::random::{Key, Purpose};
+use crate::fit::held_out::deal;
 
 /// A scan in patches, and the patches in folds.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,22 +33,14 @@ impl Folds {
         for (index, look) in looks.iter().enumerate() {
             members.entry(cell(look)).or_default().push(index);
         }
-        let mut order: Vec<(f64, usize)> = (0..members.len())
-            .map(|block| {
-                let chirp = block as u64;
-                (Key { seed, chirp, sub_ray: 1, purpose: Purpose::Fit }.draws().uniform(), block)
-            })
-            .collect();
-        order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let members: Vec<Vec<usize>> = members.into_values().collect();
-        let mut filled = vec![0usize; folds];
+        let sizes: Vec<usize> = members.iter().map(Vec::len).collect();
+        let fold_of_block = deal(&sizes, folds, seed);
         let (mut block, mut fold) = (vec![0; looks.len()], vec![0; looks.len()]);
-        for (_, number) in order {
-            let (emptiest, _) = filled.iter().enumerate().min_by_key(|f| *f.1).unwrap_or((0, &0));
-            for &index in &members[number] {
-                (block[index], fold[index]) = (number, emptiest);
+        for (number, (indices, fold_of_block)) in members.iter().zip(fold_of_block).enumerate() {
+            for &index in indices {
+                (block[index], fold[index]) = (number, fold_of_block);
             }
-            filled[emptiest] += members[number].len();
         }
         let mut numbers = BTreeMap::new();
         let numbered = |look: &Look| {

@@ -98,6 +98,12 @@ impl<'a> Likelihood<'a> {
         Tables { ln_sigma0, by_coordinate, law: GammaLaw::new(self.coordinates.looks(at)) }
     }
 
+    /// ln p of each row.
+    pub fn ln_p(&self, at: &DVector<f64>) -> Vec<f64> {
+        let (tables, mut scratch) = (self.tables(at), Scratch::new(at.len()));
+        self.chirps.iter().map(|chirp| chirp.score(&tables, &mut scratch)).collect()
+    }
+
     /// For each row ln of the probability that the power is below what it is, given the fit.
     pub fn ln_below(&self, at: &DVector<f64>) -> Vec<f64> {
         let table = Table::new(&self.coordinates.model(at));

@@ -23,6 +23,7 @@ pub mod bistatic;
 pub(crate) mod coordinates;
 pub(crate) mod gamma_law;
 mod goodness;
+pub(crate) mod held_out;
 mod interval;
 mod least_squares;
 mod likelihood;

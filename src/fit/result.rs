@@ -13,6 +13,7 @@ use super::table::{Place, Table};
 use super::verdict::Finding;
 use super::{Fit, Method, Stop};
 use crate::brdf::{Brdf, ParameterError, Scattering};
+use crate::material::HeldOut;
 use crate::measure::curve::{Curve, Row};
 use crate::radar::speckle::standard_deviation_db;
 use crate::units::{db_from_ratio, shown};
@@ -67,6 +68,8 @@ pub struct FitResult {
     pub objective: f64,
     /// How well the rows are explained.
     pub goodness: Goodness,
+    /// How well rows are told that took no part, once [`FitResult::hold_out`] was asked.
+    pub held_out: Option<HeldOut>,
     /// Whether the search ended at an optimum.
     pub converged: bool,
     /// Why it ended.
@@ -82,9 +85,9 @@ pub struct FitResult {
     /// Version of this crate.
     pub version: &'static str,
     #[serde(skip)]
-    coordinates: Coordinates,
+    pub(super) coordinates: Coordinates,
     #[serde(skip)]
-    at: DVector<f64>,
+    pub(super) at: DVector<f64>,
     #[serde(skip)]
     covariance_searched: DMatrix<f64>,
 }
@@ -111,6 +114,7 @@ impl FitResult {
             noise_w: fit.noise_w.filter(|_| law).unwrap_or(0.0),
             objective: -found.best.local.value,
             goodness: goodness(fit, &coordinates, &at, &curve.rows),
+            held_out: None,
             converged: found.best.converged(),
             stop: found.best.stop,
             iterations: found.best.iterations,
@@ -285,7 +289,13 @@ fn covariance(coordinates: &Coordinates, found: &Found) -> Vec<Vec<f64>> {
     (0..at.len()).map(row).collect()
 }
 
-fn goodness(fit: &Fit, coordinates: &Coordinates, at: &DVector<f64>, rows: &[Row]) -> Goodness {
+/// Detected σ⁰ over the model, dB.
+pub(super) fn residuals_db(
+    fit: &Fit,
+    coordinates: &Coordinates,
+    at: &DVector<f64>,
+    rows: &[Row],
+) -> Vec<f64> {
     let table = Table::new(&coordinates.model(at));
     let noise_w = fit.noise_w.unwrap_or(0.0);
     let residual_db = |row: &Row| {
@@ -293,8 +303,13 @@ fn goodness(fit: &Fit, coordinates: &Coordinates, at: &DVector<f64>, rows: &[Row
         let model = table.at(&Place::new(row.theta_rad)).exp() + noise;
         db_from_ratio(row.sigma0) - db_from_ratio(model)
     };
-    let residuals_db: Vec<f64> = rows.iter().filter(|r| !r.censored).map(residual_db).collect();
+    rows.iter().filter(|r| !r.censored).map(residual_db).collect()
+}
+
+fn goodness(fit: &Fit, coordinates: &Coordinates, at: &DVector<f64>, rows: &[Row]) -> Goodness {
+    let residuals_db = residuals_db(fit, coordinates, at, rows);
     if fit.method == Method::Censored {
+        let noise_w = fit.noise_w.unwrap_or(0.0);
         let below = Likelihood::new(coordinates, rows, noise_w).ln_below(at);
         let censored: Vec<bool> = rows.iter().map(|row| row.censored).collect();
         let speckle_db = standard_deviation_db(coordinates.looks(at));

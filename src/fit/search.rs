@@ -38,20 +38,34 @@ impl Fit {
     pub(super) fn search(&self, coordinates: &Coordinates, rows: &[Row]) -> Found {
         match self.method {
             Method::Censored => self.search_likelihood(coordinates, rows),
+            Method::Tls { .. } | Method::Mse { .. } => {
+                let (best, agreeing) =
+                    self.best(coordinates, |start| self.nearest_optimum(coordinates, rows, start));
+                squares_found(coordinates, rows, best, agreeing)
+            }
+        }
+    }
+
+    /// Where the search ends from this point of it.
+    pub(super) fn nearest_optimum(
+        &self,
+        coordinates: &Coordinates,
+        rows: &[Row],
+        start: &DVector<f64>,
+    ) -> Minimum {
+        match self.method {
+            Method::Censored => {
+                let likelihood = Likelihood::new(coordinates, rows, self.noise_w.unwrap_or(0.0));
+                let cost = |at: &DVector<f64>| likelihood.local(Curvature::Scores, at);
+                search_freely(&likelihood_search(), coordinates, start, cost)
+            }
             Method::Tls { theta_sd_rad, level_sd_db } => {
                 let deviations = Deviations { theta_sd_rad, level_sd_db };
                 let cost =
                     |at: &DVector<f64>| least_squares::local(coordinates, rows, deviations, at);
-                let search = squares_search();
-                let (best, agreeing) = self
-                    .best(coordinates, |start| search_freely(&search, coordinates, start, cost));
-                squares_found(coordinates, rows, best, agreeing)
+                search_freely(&squares_search(), coordinates, start, cost)
             }
-            Method::Mse { split_rad } => {
-                let (best, agreeing) =
-                    self.best(coordinates, |start| pieces(coordinates, rows, split_rad, start));
-                squares_found(coordinates, rows, best, agreeing)
-            }
+            Method::Mse { split_rad } => pieces(coordinates, rows, split_rad, start),
         }
     }
 
@@ -60,7 +74,7 @@ impl Fit {
         let cost = |at: &DVector<f64>| likelihood.local(Curvature::Scores, at);
         let far = |at: &DVector<f64>| likelihood.local(Curvature::FromAfar, at);
         let approach = Minimise { iterations: APPROACH, tolerance: NEAR };
-        let search = Minimise { iterations: ITERATIONS, tolerance: LIKELIHOOD_TOLERANCE };
+        let search = likelihood_search();
         // With free looks a far start is explained by wild speckle before it is improved.
         let (best, agreeing) = self.best(coordinates, |start| {
             let [lower, upper] = coordinates.holding_looks(start);
@@ -110,6 +124,10 @@ pub(super) fn drawn_start(coordinates: &Coordinates, seed: u64, number: usize) -
         u + c.spread() * (2.0 * draws.uniform() - 1.0)
     };
     DVector::from_iterator(start.len(), start.iter().zip(&coordinates.list).map(moved))
+}
+
+fn likelihood_search() -> Minimise {
+    Minimise { iterations: ITERATIONS, tolerance: LIKELIHOOD_TOLERANCE }
 }
 
 fn squares_search() -> Minimise {

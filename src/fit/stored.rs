@@ -76,6 +76,7 @@ impl FitResult {
             singular_values: self.singular_values.clone(),
             objective: self.objective,
             goodness: self.stored_goodness(),
+            held_out: self.held_out.clone(),
             converged: self.converged,
             stop: self.stop.as_str().to_owned(),
             iterations: count(self.iterations),

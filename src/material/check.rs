@@ -256,6 +256,9 @@ impl Observation {
         if self.range_m.is_some_and(|range_m| !(range_m >= 0.0 && range_m.is_finite())) {
             return Err(value(place, "the range is negative", "mend it or leave it out"));
         }
+        if self.target_m.is_some_and(|[xt_m, yt_m]| !(xt_m.is_finite() && yt_m.is_finite())) {
+            return Err(value(place, "the place is not finite", "mend it or leave it out"));
+        }
         Ok(())
     }
 }

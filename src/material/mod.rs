@@ -34,7 +34,7 @@ pub use provenance::{
     Activity, Citation, Input, Making, Origin, Session, SessionPose, Source, SourceKind,
 };
 pub use reach::Reach;
-pub use report::{ChosenBy, Estimate, FitReport, Given, Goodness, Told};
+pub use report::{ChosenBy, Estimate, FitReport, Given, Goodness, HeldOut, Told};
 pub use slug::Slug;
 pub use status::Status;
 pub use texts::{LONGEST_TEXT_BYTES, is_turning, turns_the_line};
@@ -140,6 +140,9 @@ pub struct Observation {
     /// Number of the chirp.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chirp: Option<u32>,
+    /// Place on the target, (x_t, y_t) of the frame `St`, m; of a silent chirp where its ray meets the mesh.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_m: Option<[f64; 2]>,
 }
 
 /// What an observation says of the true value.
@@ -307,6 +310,24 @@ impl Curve {
 }
 
 impl Observation {
+    /// A point of backscatter of which no more is known than its σ⁰ or, without one, the limit that it
+    /// stayed below.
+    pub fn backscatter(theta_rad: f64, sigma0: Option<f64>, threshold_sigma0: Option<f64>) -> Self {
+        Observation {
+            theta_i_rad: theta_rad,
+            theta_r_rad: theta_rad,
+            delta_phi_rad: 0.0,
+            sigma0,
+            censor: if sigma0.is_some() { Censor::None } else { Censor::Left },
+            threshold_sigma0,
+            theta_sd_rad: None,
+            power_w: None,
+            range_m: None,
+            chirp: None,
+            target_m: None,
+        }
+    }
+
     /// Whether source and receiver were in the same direction.
     pub fn is_retro(&self) -> bool {
         self.theta_i_rad == self.theta_r_rad && self.delta_phi_rad == 0.0

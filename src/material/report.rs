@@ -32,6 +32,9 @@ pub struct FitReport {
     pub objective: f64,
     /// How well the curve is explained.
     pub goodness: Goodness,
+    /// How well points are told that took no part in the fit; none where that was not tried.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out: Option<HeldOut>,
     /// Whether the search ended at an optimum.
     pub converged: bool,
     /// Why it ended.
@@ -50,6 +53,26 @@ pub struct FitReport {
     pub seed: u64,
     /// Version of the program that fitted.
     pub version: String,
+}
+
+/// How well points are told by fits that they took no part in.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HeldOut {
+    /// Parts that took turns at being held out.
+    pub folds: u32,
+    /// Blocks of neighbouring points that the parts were dealt.
+    pub blocks: u32,
+    /// Side of the blocks on the target, m; none where they are runs of consecutive chirps.
+    pub block_m: Option<f64>,
+    /// Mean ln p of a point, per unit of ln power; none for least squares.
+    pub score: Option<f64>,
+    /// Its standard error over blocks, 0 or more.
+    pub score_sd: Option<f64>,
+    /// Root mean square of detections over the model that was fitted without them, dB, 0 or more.
+    pub rms_db: f64,
+    /// Hash (BLAKE3, hexadecimal) of the part of every point.
+    pub fold_hash: String,
 }
 
 /// A number that was set and not found.
@@ -165,6 +188,12 @@ pub struct Goodness {
     pub rows: u32,
 }
 
+impl HeldOut {
+    fn numbers(&self) -> impl Iterator<Item = f64> {
+        [self.block_m, self.score, self.score_sd, Some(self.rms_db)].into_iter().flatten()
+    }
+}
+
 impl FitReport {
     /// Parameters that backscatter sees only inside S = (1 − k)·f_λ and R = k·r_s: where
     /// [`gauge`](FitReport::gauge) says that there was a choice, their values are a convention.
@@ -214,8 +243,10 @@ impl FitReport {
         }
         let not_negative = [self.noise_w, self.looks.unwrap_or(0.0)];
         let deviations = self.estimates.iter().filter_map(|estimate| estimate.sd);
+        let held_out = self.held_out.iter().flat_map(|h| [h.score_sd, Some(h.rms_db), h.block_m]);
+        let deviations = deviations.chain(held_out.flatten());
         if not_negative.into_iter().chain(deviations).any(|number| number < 0.0) {
-            return refuse("the looks, the noise or a deviation is negative");
+            return refuse("the looks, the noise, a deviation or an error is negative");
         }
         if self.estimates.iter().filter_map(|e| e.interval_95).any(|[low, high]| low > high) {
             return refuse("an interval ends before it begins");
@@ -224,8 +255,9 @@ impl FitReport {
         if self.covariance.len() != n || self.covariance.iter().any(|row| row.len() != n) {
             return refuse("the covariance has another size than the list of estimates");
         }
-        if !is_hash(&self.data_hash) {
-            return refuse("the hash of the data is not 64 hexadecimal digits");
+        let fold_hash = self.held_out.as_ref().map(|held| &held.fold_hash);
+        if ![&self.data_hash].into_iter().chain(fold_hash).all(|hash| is_hash(hash)) {
+            return refuse("the hash of the data or of the folds is not 64 hexadecimal digits");
         }
         Ok(())
     }
@@ -239,6 +271,7 @@ impl FitReport {
         [rms_db, mean_db, z_mean, z_variance, ks_distance, self.noise_w, self.objective]
             .into_iter()
             .chain(speckle_db)
+            .chain(self.held_out.iter().flat_map(HeldOut::numbers))
             .chain(self.looks)
             .chain(self.given.iter().map(|given| given.value))
             .chain(self.estimates.iter().flat_map(estimate))
@@ -277,6 +310,15 @@ mod tests {
                 ks_distance: 0.1,
                 rows: 9,
             },
+            held_out: Some(HeldOut {
+                folds: 5,
+                blocks: 9,
+                block_m: Some(0.05),
+                score: Some(-1.2),
+                score_sd: Some(0.1),
+                rms_db: 5.7,
+                fold_hash: "0b".repeat(32),
+            }),
             converged: true,
             stop: "stationary".to_owned(),
             iterations: 3,
@@ -293,7 +335,7 @@ mod tests {
     fn a_report_without_a_meaning_is_refused() {
         assert_eq!(report().validate("fit"), Ok(()));
         type Spoil = fn(&mut FitReport);
-        let cases: [(Spoil, &str); 9] = [
+        let cases: [(Spoil, &str); 12] = [
             (|r| r.objective = f64::NAN, "not finite"),
             (|r| r.given[0].value = f64::INFINITY, "not finite"),
             (|r| r.estimates[0].interval_95 = Some([0.0, f64::INFINITY]), "not finite"),
@@ -303,6 +345,9 @@ mod tests {
             (|r| r.estimates[0].interval_95 = Some([1.0, 0.0]), "ends before it begins"),
             (|r| r.covariance = Vec::new(), "another size"),
             (|r| r.data_hash = "0A".repeat(32), "hexadecimal"),
+            (|r| r.held_out.as_mut().unwrap().fold_hash.clear(), "hexadecimal"),
+            (|r| r.held_out.as_mut().unwrap().score = Some(f64::NAN), "not finite"),
+            (|r| r.held_out.as_mut().unwrap().rms_db = -1.0, "negative"),
         ];
         for (spoil, expected) in cases {
             let mut spoilt = report();

@@ -1,6 +1,6 @@
 //! A backscatter curve: one row per chirp that met, or should have met, a material.
 //!
-//! As CSV: `theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored`. σ⁰ is that of
+//! As CSV: `theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored,xt_m,yt_m`. σ⁰ is that of
 //! equation (10), 4π·f·cos²θ, so that a curve belongs to the material and not to the radar. A chirp
 //! that should have been detected and was not is a row with `censored` = 1: its power and its σ⁰
 //! are those that it stayed below.
@@ -13,8 +13,17 @@ use crate::material::{Censor, Observation};
 use crate::units::{db_from_ratio, dbm_from_watts};
 
 /// Columns of a curve file, in order.
-pub const COLUMNS: [&str; 7] =
-    ["theta_deg", "theta_sd_deg", "power_dbm", "sigma0_db", "range_m", "chirp", "censored"];
+pub const COLUMNS: [&str; 9] = [
+    "theta_deg",
+    "theta_sd_deg",
+    "power_dbm",
+    "sigma0_db",
+    "range_m",
+    "chirp",
+    "censored",
+    "xt_m",
+    "yt_m",
+];
 
 /// One chirp's evidence of how a material scatters.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,6 +43,8 @@ pub struct Row {
     pub chirp: u32,
     /// Nothing was detected: power and σ⁰ are upper limits.
     pub censored: bool,
+    /// Place on the target, (x_t, y_t) of the frame `St`, m, where it is known.
+    pub target_m: Option<[f64; 2]>,
 }
 
 /// A backscatter curve, rows in any order.
@@ -114,8 +125,11 @@ impl Curve {
     pub fn write(&self) -> Vec<u8> {
         let mut text = COLUMNS.join(",") + "\n";
         for row in &self.rows {
+            let [xt_m, yt_m] = row.target_m.map_or_else(Default::default, |place| {
+                place.map(|metres| format!("{:.5}", metres + 0.0))
+            });
             text += &format!(
-                "{:.4},{:.4},{:.3},{:.3},{:.5},{},{}\n",
+                "{:.4},{:.4},{:.3},{:.3},{:.5},{},{},{xt_m},{yt_m}\n",
                 row.theta_rad.to_degrees(),
                 row.theta_sd_rad.to_degrees(),
                 dbm_from_watts(row.power_w),
@@ -136,18 +150,16 @@ impl Curve {
 
 impl Row {
     fn observation(&self) -> Observation {
-        let Row { theta_rad, theta_sd_rad, power_w, sigma0, range_m, chirp, censored } = *self;
+        let Row { theta_rad, theta_sd_rad, power_w, sigma0, range_m, chirp, censored, target_m } =
+            *self;
+        let (level, limit) = ((!censored).then_some(sigma0), censored.then_some(sigma0));
         Observation {
-            theta_i_rad: theta_rad,
-            theta_r_rad: theta_rad,
-            delta_phi_rad: 0.0,
-            sigma0: (!censored).then_some(sigma0),
-            censor: if censored { Censor::Left } else { Censor::None },
-            threshold_sigma0: censored.then_some(sigma0),
             theta_sd_rad: Some(theta_sd_rad),
             power_w: Some(power_w),
             range_m: Some(range_m),
             chirp: Some(chirp),
+            target_m,
+            ..Observation::backscatter(theta_rad, level, limit)
         }
     }
 }
@@ -171,6 +183,7 @@ fn from_observation(index: usize, o: &Observation) -> Result<Row, ObservationErr
         range_m: o.range_m.unwrap_or(0.0),
         chirp: o.chirp.unwrap_or(index as u32),
         censored: o.censor == Censor::Left,
+        target_m: o.target_m,
     })
 }
 
@@ -180,9 +193,9 @@ mod tests {
 
     #[test]
     fn a_curve_survives_its_file() {
-        let text = "theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored\n\
-                    12.5000,0.3000,-55.250,-9.125,8.01250,17,0\n\
-                    60.0000,0.3000,-77.000,-30.000,8.10000,18,1\n";
+        let text = "theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored,xt_m,yt_m\n\
+                    12.5000,0.3000,-55.250,-9.125,8.01250,17,0,-0.01250,0.20000\n\
+                    60.0000,0.3000,-77.000,-30.000,8.10000,18,1,,\n";
         let curve = Curve::read(text.as_bytes()).unwrap();
         assert_eq!(curve.detected().count(), 1);
         assert!((curve.rows[0].theta_rad - 12.5f64.to_radians()).abs() < 1e-15);

@@ -20,7 +20,7 @@ use super::incidence::{Incidence, Sighting};
 use super::nearest::Nearest;
 use super::register::{Registered, RegistrationError};
 use super::sights::sights;
-use crate::frames::{Global, Ray};
+use crate::frames::{Global, Point, Pose, Ray, Target as TargetFrame};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Chirps, Footprint, Link, Radar};
 use crate::scene::Target;
@@ -150,6 +150,7 @@ enum Fate {
 struct Bench<'a> {
     incidence: Incidence<'a>,
     link: Link,
+    target_from_global: Pose<TargetFrame, Global>,
     region: Option<u16>,
     margin_m: f64,
     exact_mesh: bool,
@@ -230,6 +231,7 @@ impl Reduction {
                 true => Incidence::new(target, registered, self.extra_sd_rad).of_facets(),
             },
             link: Link::new(radar),
+            target_from_global: radar.frames().global_from_target.inverse(),
             region: self.region,
             margin_m: self.edge_margin_m.unwrap_or(radar.spot_diameter_m),
             exact_mesh: self.exact_mesh,
@@ -267,11 +269,12 @@ impl Bench<'_> {
             return Fate::Unsure;
         }
         let power_w = watts_from_dbm(point.power_dbm);
-        Fate::Row(self.row(&sighting, range_m, power_w, chirp, false))
+        Fate::Row(self.row(ray, &sighting, range_m, power_w, chirp, false))
     }
 
     fn row(
         &self,
+        ray: &Ray<Global>,
         sighting: &Sighting,
         range_m: f64,
         power_w: f64,
@@ -280,7 +283,18 @@ impl Bench<'_> {
     ) -> Row {
         let Sighting { hit, theta_sd_rad, .. } = *sighting;
         let sigma0 = sigma0(&self.link, range_m, hit.cos_theta, power_w);
-        Row { theta_rad: hit.theta_rad(), theta_sd_rad, power_w, sigma0, range_m, chirp, censored }
+        let at = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
+        let at = (self.target_from_global * at).xyz;
+        Row {
+            theta_rad: hit.theta_rad(),
+            theta_sd_rad,
+            power_w,
+            sigma0,
+            range_m,
+            chirp,
+            censored,
+            target_m: Some([at.x, at.y]),
+        }
     }
 }
 
@@ -327,7 +341,7 @@ fn silent(bench: &Bench, chirps: &Chirps, told: &Told, left_out: &mut LeftOut) -
                 return Some(Fate::Unsure);
             }
             let range_m = sighting.hit.range_m;
-            Some(Fate::Row(bench.row(&sighting, range_m, bench.threshold_w, chirp, true)))
+            Some(Fate::Row(bench.row(ray, &sighting, range_m, bench.threshold_w, chirp, true)))
         })
         .collect();
     let mut rows = Vec::new();

@@ -253,18 +253,8 @@ mod tests {
     fn at(theta_deg: f64, sigma0: f64, censor: Censor) -> Observation {
         let theta_rad = theta_deg.to_radians();
         let is_detected = censor == Censor::None;
-        Observation {
-            theta_i_rad: theta_rad,
-            theta_r_rad: theta_rad,
-            delta_phi_rad: 0.0,
-            sigma0: is_detected.then_some(sigma0),
-            censor,
-            threshold_sigma0: (!is_detected).then_some(sigma0),
-            theta_sd_rad: None,
-            power_w: None,
-            range_m: None,
-            chirp: None,
-        }
+        let (level, limit) = (is_detected.then_some(sigma0), (!is_detected).then_some(sigma0));
+        Observation { censor, ..Observation::backscatter(theta_rad, level, limit) }
     }
 
     fn detected(level: f64) -> Observation {

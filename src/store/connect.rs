@@ -18,7 +18,7 @@ use super::{StoreError, write};
 const APPLICATION_ID: i64 = 0x6d61_7464;
 
 /// The latest schema.
-const LATEST: usize = 8;
+const LATEST: usize = 9;
 
 /// All schemas there ever were, oldest first. Append only: files in the world have stopped at each.
 fn schemas() -> [M<'static>; LATEST] {
@@ -39,8 +39,13 @@ fn schemas() -> [M<'static>; LATEST] {
             },
         ),
         M::up(include_str!("../../migrations/0008_origin_author.sql")),
+        M::up(include_str!("../../migrations/0009_held_out.sql")),
     ]
 }
+
+/// What all schemas one after the other make of an empty file, in one step: SQLite parses every table anew
+/// after each change of one. `cargo test --lib store::connect -- --ignored` writes it.
+const FRESH: &str = include_str!("schema.sql");
 
 /// What SQLite takes for the whole of a database in one step.
 const ALL_PAGES: i32 = -1;
@@ -348,6 +353,9 @@ fn schema_of(path: &Path, conn: &Connection) -> Result<usize, StoreError> {
 }
 
 fn migrate(path: &Path, conn: &mut Connection) -> Result<(), StoreError> {
+    if schema_of(path, conn)? == 0 {
+        make(path, conn)?;
+    }
     let outcome = Migrations::new(schemas().into()).to_latest(conn);
     // Another program may have done it while this one waited for its turn.
     if schema_of(path, conn)? == LATEST {
@@ -359,16 +367,74 @@ fn migrate(path: &Path, conn: &mut Connection) -> Result<(), StoreError> {
     })
 }
 
+/// Gives a file without tables those of the latest schema, unless another program was quicker.
+fn make(path: &Path, conn: &mut Connection) -> Result<(), StoreError> {
+    let fail = |error| StoreError::new(path, error);
+    let tx = conn.transaction_with_behavior(TransactionBehavior::Immediate).map_err(fail)?;
+    if schema_of(path, &tx)? == 0 {
+        tx.execute_batch(FRESH).map_err(fail)?;
+        tx.pragma_update(None, "application_id", APPLICATION_ID).map_err(fail)?;
+        tx.pragma_update(None, "user_version", LATEST as i64).map_err(fail)?;
+    }
+    tx.commit().map_err(fail)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// An empty database that went through all schemas.
+    fn migrated() -> Connection {
+        let mut conn = Connection::open_in_memory().unwrap();
+        equip(&conn).unwrap();
+        Migrations::new(schemas().into()).to_latest(&mut conn).unwrap();
+        conn
+    }
+
+    /// Statements that make a database anew, each as SQLite keeps it, and the rows of `unit`.
+    fn statements(conn: &Connection) -> Vec<String> {
+        let sql = "SELECT sql FROM sqlite_schema WHERE sql IS NOT NULL AND name NOT IN
+                       (SELECT name FROM pragma_table_list WHERE type = 'shadow') ORDER BY rowid";
+        let units =
+            "SELECT format('INSERT INTO unit VALUES (%Q, %Q, %Q)', column_name, ucum, meaning)
+                     FROM unit ORDER BY column_name";
+        let of = |sql: &str| -> Vec<String> {
+            let mut statement = conn.prepare(sql).unwrap();
+            let texts = statement.query_map([], |row| row.get(0)).unwrap();
+            texts.map(Result::unwrap).collect()
+        };
+        [of(sql), of(units)].concat()
+    }
+
+    #[test]
+    fn a_new_file_is_what_all_schemas_make_of_an_empty_one() {
+        assert_eq!(statements(&in_memory().unwrap()), statements(&migrated()));
+        let number = |name| -> i64 {
+            in_memory().unwrap().pragma_query_value(None, name, |row| row.get(0)).unwrap()
+        };
+        assert_eq!(["application_id", "user_version"].map(number), [APPLICATION_ID, LATEST as i64]);
+    }
+
+    #[test]
+    #[ignore = "writes src/store/schema.sql; run it when a schema is added"]
+    fn write_the_latest_schema() {
+        let head = "-- The latest schema in one piece, written by a test: see `FRESH` in connect.rs. Change\n\
+                    -- migrations/ instead.\n\n";
+        let text = statements(&migrated()).join(";\n\n") + ";\n";
+        fs::write(
+            concat!(env!("CARGO_MANIFEST_DIR"), "/src/store/schema.sql"),
+            head.to_owned() + &text,
+        )
+        .unwrap();
+    }
+
     #[test]
     fn the_schemas_make_a_database_that_is_known_as_ours() {
-        let mut conn = Connection::open_in_memory().unwrap();
-        assert_eq!(schema_of(Path::new(":memory:"), &conn).unwrap(), 0);
-        migrate(Path::new(":memory:"), &mut conn).unwrap();
-        assert_eq!(schema_of(Path::new(":memory:"), &conn).unwrap(), LATEST);
+        assert_eq!(
+            schema_of(Path::new(":memory:"), &Connection::open_in_memory().unwrap()).unwrap(),
+            0
+        );
+        assert_eq!(schema_of(Path::new(":memory:"), &migrated()).unwrap(), LATEST);
     }
 
     #[test]

@@ -163,6 +163,12 @@ impl Store {
         Ok(conn.map(|conn| Store { conn, path, activity: None }))
     }
 
+    /// Whether a file that was opened [frozen](Store::open_frozen) has an older schema: then what is read is
+    /// a copy in memory, brought up to date.
+    pub fn is_of_older_schema(&self) -> bool {
+        self.conn.path().is_none_or(str::is_empty)
+    }
+
     /// An empty database in memory, gone when it is dropped.
     ///
     /// # Errors

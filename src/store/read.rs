@@ -184,7 +184,7 @@ fn curves(conn: &Connection, revision_id: i64, only: Option<&str>) -> Result<Vec
 
 fn observations(conn: &Connection, revision_id: i64, curve: &str) -> Result<Vec<Observation>> {
     let sql = "SELECT theta_i_rad, theta_r_rad, delta_phi_rad, sigma0, censor, threshold_sigma0,
-             theta_sd_rad, power_w, range_m, chirp
+             theta_sd_rad, power_w, range_m, chirp, xt_m, yt_m
          FROM observation WHERE revision_id = ?1 AND curve = ?2 ORDER BY position";
     rows(conn, sql, params![revision_id, curve], |row| {
         Ok(Observation {
@@ -198,6 +198,7 @@ fn observations(conn: &Connection, revision_id: i64, curve: &str) -> Result<Vec<
             power_w: row.get(7)?,
             range_m: row.get(8)?,
             chirp: row.get(9)?,
+            target_m: Option::zip(row.get(10)?, row.get(11)?).map(|(xt_m, yt_m)| [xt_m, yt_m]),
         })
     })
 }

@@ -209,8 +209,8 @@ impl Rows<'_> {
         let mut insert = self.tx.prepare_cached(
             "INSERT INTO observation
              (revision_id, curve, position, theta_i_rad, theta_r_rad, delta_phi_rad, sigma0, censor,
-              threshold_sigma0, theta_sd_rad, power_w, range_m, chirp)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)",
+              threshold_sigma0, theta_sd_rad, power_w, range_m, chirp, xt_m, yt_m)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15)",
         )?;
         numbered(observations, |position, o| {
             let [theta_i_rad, theta_r_rad, delta_phi_rad] =
@@ -228,7 +228,9 @@ impl Rows<'_> {
                 o.theta_sd_rad,
                 o.power_w,
                 o.range_m,
-                o.chirp
+                o.chirp,
+                o.target_m.map(|[xt_m, _]| xt_m),
+                o.target_m.map(|[_, yt_m]| yt_m)
             ];
             insert.execute(values).map(|_| ())
         })?;

@@ -7,8 +7,8 @@ use std::process::Command;
 use matdb::formats::EffectEntry;
 use matdb::material::{
     Censor, Citation, Covariance, Curve, Estimate, Finding, FindingVerdict, FitReport, Geometry,
-    Given, Goodness, Instrument, Layer, Making, Material, Observation, Permittivity, Roughness,
-    Scale, Session, SessionPose, Status, file,
+    Given, Goodness, HeldOut, Instrument, Layer, Making, Material, Observation, Permittivity,
+    Roughness, Scale, Session, SessionPose, Status, file,
 };
 use matdb::store::Store;
 
@@ -200,6 +200,24 @@ pub fn attributed(slug: &str) -> Material {
     material
 }
 
+/// The same with the places of its points, and a fit that was tried on points held out.
+pub fn placed(slug: &str) -> Material {
+    let mut material = attributed(slug);
+    for observation in &mut material.curves[0].observations {
+        observation.target_m = Some([-0.125, 0.5]);
+    }
+    material.fits[0].report.as_mut().unwrap().held_out = Some(HeldOut {
+        folds: 5,
+        blocks: 20,
+        block_m: Some(0.05),
+        score: Some(-1.5),
+        score_sd: Some(0.01),
+        rms_db: 5.75,
+        fold_hash: "fedcba9876543210".repeat(4),
+    });
+    material
+}
+
 /// The same with its model stated beside the curve, as nobody made that fit, so that everything in it holds.
 pub fn sound(slug: &str) -> Material {
     let mut material = with_effects(slug);
@@ -234,6 +252,7 @@ fn report() -> FitReport {
             ks_distance: 0.1,
             rows: 3,
         },
+        held_out: None,
         converged: true,
         stop: "stationary".to_owned(),
         iterations: 12,
@@ -248,18 +267,7 @@ fn report() -> FitReport {
 
 /// A backscatter point with a detection limit.
 pub fn observation(theta_rad: f64, sigma0: Option<f64>, censor: Censor) -> Observation {
-    Observation {
-        theta_i_rad: theta_rad,
-        theta_r_rad: theta_rad,
-        delta_phi_rad: 0.0,
-        sigma0,
-        censor,
-        threshold_sigma0: Some(1e-3),
-        theta_sd_rad: None,
-        power_w: None,
-        range_m: None,
-        chirp: None,
-    }
+    Observation { censor, ..Observation::backscatter(theta_rad, sigma0, Some(1e-3)) }
 }
 
 /// The sample after somebody has changed it.

@@ -23,6 +23,8 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
         real("theta_sd_rad"),
         real("power_w"),
         real("range_m"),
+        real("xt_m"),
+        real("yt_m"),
     ];
     let table =
         Table { name: "observation".to_owned(), columns, key: Vec::new(), references: Vec::new() };
@@ -38,6 +40,8 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
             cell(point.theta_sd_rad),
             cell(point.power_w),
             cell(point.range_m),
+            cell(point.target_m.map(|[xt_m, _]| xt_m)),
+            cell(point.target_m.map(|[_, yt_m]| yt_m)),
         ]
     });
     let about = format!("{}\n{} GHz", subject.about().join("\n"), points.frequency_hz / 1e9);

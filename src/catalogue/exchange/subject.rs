@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use crate::brdf::{Brdf, Scattering};
 use crate::material::{
-    Censor, Curve, Instrument, Layer, Material, MaterialError, Observation, Permittivity, Source,
+    Curve, Instrument, Layer, Material, MaterialError, Observation, Origin, Permittivity, Source,
     SourceKind,
 };
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -23,6 +23,8 @@ pub struct Subject<'a> {
     pub revision: Option<u32>,
     /// When that was added: UTC, ISO 8601.
     pub added_at: Option<&'a str>,
+    /// The catalogue that it was imported from.
+    pub origin: Option<&'a Origin>,
     /// Name of the curve that goes out; none: what a scene renders, or was fitted.
     pub curve: Option<&'a str>,
 }
@@ -83,18 +85,8 @@ impl<'a> Subject<'a> {
     }
 
     fn sampled(&self, model: &Brdf) -> Vec<Observation> {
-        let point = |theta_rad: f64| Observation {
-            theta_i_rad: theta_rad,
-            theta_r_rad: theta_rad,
-            delta_phi_rad: 0.0,
-            sigma0: Some(model.sigma0(theta_rad)),
-            censor: Censor::None,
-            threshold_sigma0: None,
-            theta_sd_rad: None,
-            power_w: None,
-            range_m: None,
-            chirp: None,
-        };
+        let point =
+            |theta_rad| Observation::backscatter(theta_rad, Some(model.sigma0(theta_rad)), None);
         self.echoing_rad(model).into_iter().map(point).collect()
     }
 
@@ -164,6 +156,7 @@ impl<'a> Subject<'a> {
             format!("the rendered numbers are {}; licence {}", self.kind(), material.licence),
             format!("claimed from {low_ghz} to {high_ghz} GHz, {low_deg:.3} to {high_deg:.3} deg"),
         ];
+        lines.extend(self.origin.map(|origin| format!("from {}", origin.credit())));
         lines.extend(self.sources().iter().map(|source| format!("source, {source}")));
         lines.extend(material.unknown.iter().map(|sentence| format!("not known: {sentence}")));
         lines.extend(material.status.sentence());

@@ -106,17 +106,13 @@ fn observations(data: &Value) -> Result<Vec<Observation>, FormatError> {
             let problem = format!("{value} is no level in dB");
             return Err(FormatError::at(place, problem, "leave the point out, or censor it"));
         }
+        let level = (limit.censor == Censor::None).then_some(sigma0);
+        let threshold = limit.threshold.map(|threshold| per_f * threshold);
         Ok(Observation {
-            theta_i_rad,
             theta_r_rad,
             delta_phi_rad: delta,
-            sigma0: (limit.censor == Censor::None).then_some(sigma0),
             censor: limit.censor,
-            threshold_sigma0: limit.threshold.map(|threshold| per_f * threshold),
-            theta_sd_rad: None,
-            power_w: None,
-            range_m: None,
-            chirp: None,
+            ..Observation::backscatter(theta_i_rad, level, threshold)
         })
     };
     rows.enumerate()

@@ -57,18 +57,7 @@ mod tests {
     use super::*;
 
     fn point(theta_deg: f64, sigma0: Option<f64>) -> Observation {
-        Observation {
-            theta_i_rad: theta_deg.to_radians(),
-            theta_r_rad: theta_deg.to_radians(),
-            delta_phi_rad: 0.0,
-            sigma0,
-            censor: if sigma0.is_some() { Censor::None } else { Censor::Left },
-            threshold_sigma0: Some(0.01),
-            theta_sd_rad: None,
-            power_w: None,
-            range_m: None,
-            chirp: None,
-        }
+        Observation::backscatter(theta_deg.to_radians(), sigma0, Some(0.01))
     }
 
     fn rows(levels: &[Option<f64>]) -> Vec<Bin> {

@@ -7,7 +7,7 @@ use super::entry::{kind_of, place_of};
 use super::residuals;
 use super::words::{digits, grouped};
 use crate::brdf::Parameter;
-use crate::material::{ChosenBy, Fit, FitReport, Material, SourceKind, Told};
+use crate::material::{ChosenBy, Fit, FitReport, HeldOut, Material, SourceKind, Told};
 use crate::units::dbm_from_watts;
 
 /// Parameters that backscatter sees only inside a product, and the product's name.
@@ -194,6 +194,18 @@ fn products(fit: &Fit) -> Vec<ProductView> {
     vec![view("S", "(1 − k) · f_lambda", specular), view("R", "k · r_s", diffuse)]
 }
 
+fn held_out(held: &HeldOut) -> String {
+    let of = match held.block_m {
+        Some(block_m) => format!("squares of {} m", digits(block_m)),
+        None => "runs of chirps".to_owned(),
+    };
+    let score = held.score.zip(held.score_sd).map_or(String::new(), |(score, sd)| {
+        format!("; mean ln p of a point {score:.4} ± {sd:.4}")
+    });
+    let HeldOut { folds, blocks, rms_db, .. } = held;
+    format!("{rms_db:.2} dB rms in {folds} turns of {} {of}{score}", grouped(*blocks as usize))
+}
+
 fn report(report: &FitReport) -> ReportView {
     let g = &report.goodness;
     let end = if report.converged { "converged" } else { "did not converge" };
@@ -224,6 +236,7 @@ fn report(report: &FitReport) -> ReportView {
                 digits(g.ks_distance)
             ),
         ),
+        ("Points held out", report.held_out.as_ref().map_or("not tried".to_owned(), held_out)),
         ("Singular values", list(&report.singular_values)),
         ("Data, BLAKE3", report.data_hash.clone()),
         ("Seed and program", format!("{}, matdb {}", report.seed, report.version)),

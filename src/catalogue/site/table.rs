@@ -9,7 +9,7 @@ use crate::units::{db_from_ratio, dbm_from_watts};
 
 use super::entry::kind_of;
 
-const COLUMNS: [&str; 12] = [
+const COLUMNS: [&str; 14] = [
     "curve",
     "kind",
     "theta_deg",
@@ -22,6 +22,8 @@ const COLUMNS: [&str; 12] = [
     "power_dbm",
     "range_m",
     "chirp",
+    "xt_m",
+    "yt_m",
 ];
 
 /// Every point, a cell empty where there is nothing.
@@ -49,6 +51,8 @@ pub(super) fn csv(material: &Material) -> Result<Vec<u8>, CatalogueError> {
                 cell(o.power_w.map(dbm_from_watts), 4),
                 cell(o.range_m, 6),
                 o.chirp.map_or(String::new(), |chirp| chirp.to_string()),
+                cell(o.target_m.map(|[xt_m, _]| xt_m + 0.0), 6),
+                cell(o.target_m.map(|[_, yt_m]| yt_m + 0.0), 6),
             ];
             out.write_record(record).map_err(failed)?;
         }

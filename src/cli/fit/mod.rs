@@ -138,8 +138,11 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     doubts.iter().flatten().for_each(|doubt| console.notice(doubt));
     drop(store);
     let fail = |error| Error::Fit { curve: subject.label.clone(), error };
-    let found = fit.run(&start, &subject.curve).map_err(fail)?;
+    let mut found = fit.run(&start, &subject.curve).map_err(fail)?;
     let is_possible = found.model.validate().is_ok();
+    if found.converged && is_possible {
+        found.held_out = found.hold_out(&subject.curve);
+    }
     let saved = match (&args.save, found.converged && is_possible) {
         (Some(_), true) => Some(save::save(args, &subject, &name, &found, db)),
         _ => None,

@@ -3,7 +3,7 @@
 use super::save::Saved;
 use super::subject::Subject;
 use crate::cli::summary::{grouped, table};
-use crate::material::{Fit, FitReport, Goodness};
+use crate::material::{Fit, FitReport, Goodness, HeldOut};
 use crate::units::{dbm_from_watts, shown};
 
 /// All that a person wants to know of a fit.
@@ -52,6 +52,7 @@ pub(in crate::cli) fn report(report: &FitReport) -> String {
     text += &estimates(report);
     text += &level(report);
     text += &goodness(&report.goodness);
+    text += &report.held_out.as_ref().map_or(String::new(), held_out);
     let singular: Vec<String> = report.singular_values.iter().map(|v| digits(*v)).collect();
     text += &format!("singular values: {}\n", singular.join(", "));
     text += &format!(
@@ -105,6 +106,19 @@ fn goodness(goodness: &Goodness) -> String {
         "detections are {rms_db:.2} dB rms{speckle} and {mean_db:.2} dB on average off the model; \
          residuals: mean {z_mean:.2}, variance {z_variance:.2}, {ks_distance:.3} off their law\n"
     )
+}
+
+/// How the fit did on points that it had not seen.
+fn held_out(held: &HeldOut) -> String {
+    let HeldOut { folds, blocks, block_m, score, score_sd, rms_db, .. } = held;
+    let of = match block_m {
+        Some(block_m) => format!("squares of {} m", digits(*block_m)),
+        None => "runs of chirps".to_owned(),
+    };
+    let score = score
+        .zip(*score_sd)
+        .map_or(String::new(), |(score, sd)| format!(", ln p {score:.4} ± {sd:.4} a point"));
+    format!("held out in {folds} turns ({blocks} {of}): {rms_db:.2} dB rms{score}\n")
 }
 
 /// Four significant digits.

@@ -6,7 +6,7 @@ use crate::brdf::{Brdf, Scattering};
 use crate::fit::coordinates::{DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
 use crate::fit::interval::DEVIATE_95;
 use crate::fit::{Estimate, Finding, FitResult};
-use crate::material::{self, FitReport, Goodness};
+use crate::material::{self, FitReport, Goodness, HeldOut};
 use crate::measure::curve::Curve;
 
 /// How far standard deviations of two searches for one optimum may differ, relative.
@@ -40,6 +40,7 @@ pub(super) fn compare(stored: &material::Fit, found: &FitResult, curve: &Curve) 
     differences.extend(covariances(stored, &new, found));
     differences.extend(settings(stored, report, new_report, &new.estimator));
     differences.extend(goodness(&report.goodness, &new_report.goodness));
+    differences.extend(report.held_out.as_ref().and_then(|old| held_out(old, found, curve)));
     differences.extend(verdict(&report.verdict, &found.verdict));
     differences
 }
@@ -167,6 +168,24 @@ fn is_same_matrix(old: &[Vec<f64>], new: &[Vec<f64>], sds: &[f64]) -> bool {
             let mut cells = std::iter::zip(old, new).zip(sds);
             cells.all(|((old, new), sd)| is_near(*old, *new, 2.0 * SAME_SD * row_sd * sd))
         })
+}
+
+/// What was held out, if anything was.
+fn held_out(old: &HeldOut, found: &FitResult, curve: &Curve) -> Option<String> {
+    let is_same = found.hold_out(curve).is_some_and(|new| {
+        let score = |held: &HeldOut| held.score.zip(held.score_sd);
+        let same_score = match (score(old), score(&new)) {
+            (Some((old, old_sd)), Some((new, sd))) => {
+                is_near(old, new, SAME_NUMBER_SD * sd) && is_near(old_sd, sd, SAME_SD * sd)
+            }
+            (old, new) => old.is_none() && new.is_none(),
+        };
+        same_score
+            && is_near(old.rms_db, new.rms_db, SAME_LEVEL_DB)
+            && (old.folds, old.blocks, &old.fold_hash) == (new.folds, new.blocks, &new.fold_hash)
+    });
+    (!is_same)
+        .then(|| "its score on held-out points is not the one that a new fit gives".to_owned())
 }
 
 /// What was set, and whether the search came to an end.

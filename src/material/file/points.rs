@@ -6,7 +6,7 @@ use crate::material::{Censor, Observation};
 use crate::units::{ratio_from_db, watts_from_dbm};
 
 const REQUIRED: [&str; 2] = ["theta_deg", "sigma0_db"];
-const OPTIONAL: [&str; 9] = [
+const OPTIONAL: [&str; 13] = [
     "censor",
     "threshold_db",
     "theta_r_deg",
@@ -16,6 +16,10 @@ const OPTIONAL: [&str; 9] = [
     "range_m",
     "chirp",
     "censored",
+    "xt_m",
+    "yt_m",
+    "curve",
+    "kind",
 ];
 
 /// Angles that a surface can be seen under, degrees.
@@ -26,6 +30,8 @@ const LEVELS_DB: (f64, f64) = (-300.0, 300.0);
 const POWERS_DBM: (f64, f64) = (-400.0, 400.0);
 /// Ranges that are no slip, m.
 const RANGES_M: (f64, f64) = (0.0, 1e6);
+/// Places on a target that are no slip, m.
+const PLACES_M: (f64, f64) = (-1e6, 1e6);
 
 /// Reads a curve's CSV: each point behind the number of its line. Lines of `#` at the head are left alone.
 ///
@@ -36,7 +42,21 @@ const RANGES_M: (f64, f64) = (0.0, 1e6);
 /// The first cell that cannot be used, with its line and column.
 pub fn points(bytes: &[u8]) -> Result<Vec<(usize, Observation)>, FormatError> {
     let table = Table::read(&without_head(bytes), &REQUIRED, &OPTIONAL)?;
+    one_curve(&table)?;
     (0..table.len()).map(|row| Ok((table.line(row), point(&table, row)?))).collect()
+}
+
+/// Refuses a table of several curves, as that of a published page may be.
+fn one_curve(table: &Table) -> Result<(), FormatError> {
+    let name = |row: usize| table.cell(row, "curve").map(|cell| cell.text.to_owned());
+    match (1..table.len()).find(|&row| name(row) != name(0)) {
+        None => Ok(()),
+        Some(row) => Err(FormatError::at(
+            format!("line {}, column curve", table.line(row)),
+            "another curve begins here",
+            "keep the rows of one",
+        )),
+    }
 }
 
 fn point(table: &Table, row: usize) -> Result<Observation, FormatError> {
@@ -64,7 +84,26 @@ fn point(table: &Table, row: usize) -> Result<Observation, FormatError> {
         power_w: number("power_dbm", POWERS_DBM)?.map(watts_from_dbm),
         range_m: number("range_m", RANGES_M)?,
         chirp,
+        target_m: place(table, row)?,
     })
+}
+
+/// Where on the target the point lies; both coordinates or none.
+fn place(table: &Table, row: usize) -> Result<Option<[f64; 2]>, FormatError> {
+    let [xt_m, yt_m] = ["xt_m", "yt_m"].map(|column| table.number_within(row, column, PLACES_M));
+    match (xt_m?, yt_m?) {
+        (None, None) => Ok(None),
+        (Some(xt_m), Some(yt_m)) => Ok(Some([xt_m, yt_m])),
+        (xt_m, _) => Err(FormatError::at(
+            format!(
+                "line {}, column {}",
+                table.line(row),
+                if xt_m.is_some() { "yt_m" } else { "xt_m" }
+            ),
+            "the cell is empty and the other coordinate is there",
+            "give both or neither",
+        )),
+    }
 }
 
 fn censor(table: &Table, row: usize) -> Result<Censor, FormatError> {
@@ -154,5 +193,31 @@ mod tests {
             let error = read(row).unwrap_err();
             assert!(error.starts_with(said), "{error}");
         }
+    }
+
+    #[test]
+    fn a_place_has_two_coordinates_or_none() {
+        let read = |row: &str| points(format!("theta_deg,sigma0_db,xt_m,yt_m\n{row}\n").as_bytes());
+        assert_eq!(read("10,-3,0.1,-0.2").unwrap()[0].1.target_m, Some([0.1, -0.2]));
+        assert_eq!(read("10,-3,,").unwrap()[0].1.target_m, None);
+        for (row, column) in [("10,-3,0.1,", "yt_m"), ("10,-3,,0.1", "xt_m")] {
+            let said = read(row).unwrap_err().to_string();
+            assert!(
+                said.starts_with(&format!("line 2, column {column}: the cell is empty")),
+                "{said}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_published_table_is_read_when_it_has_one_curve() {
+        let read =
+            |rows: &str| points(format!("curve,kind,theta_deg,sigma0_db\n{rows}").as_bytes());
+        assert_eq!(read("scan,measured,10,-3\nscan,measured,20,-4\n").unwrap().len(), 2);
+        let said = read("scan,measured,10,-3\nother,measured,20,-4\n").unwrap_err().to_string();
+        assert!(
+            said.starts_with("line 3, column curve: another curve begins here; keep"),
+            "{said}"
+        );
     }
 }

@@ -1,0 +1,214 @@
+//! How a fit does on rows that it has not seen. Neighbouring chirps meet nearly the same place, so that
+//! whole blocks of them are held out, in turns, and the error of the score is that of blocks.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
+
+use super::likelihood::Likelihood;
+use super::result::residuals_db;
+use super::{FitResult, Method};
+use crate::material::HeldOut;
+use crate::measure::curve::{Curve, Row};
+use crate::radar::random::{Key, Purpose};
+
+/// Parts that take turns at being held out.
+const FOLDS: usize = 5;
+/// Blocks along the longer side of what was scanned.
+const ACROSS: f64 = 8.0;
+/// Blocks of consecutive chirps where nobody knows where they lie.
+const RUNS: usize = 20;
+
+impl FitResult {
+    /// Fits the curve again without each fifth of its blocks, and tries every fit on what it lacked. Blocks
+    /// are squares on the target where the rows say where they lie, else runs of consecutive chirps.
+    ///
+    /// `None` where a part leaves too few detections for the fit, or where a fit does not converge.
+    pub fn hold_out(&self, curve: &Curve) -> Option<HeldOut> {
+        let (block_of_row, block_m) = blocks(&curve.rows);
+        let blocks = block_of_row.iter().max().map_or(0, |most| most + 1);
+        let mut sizes = vec![0; blocks];
+        block_of_row.iter().for_each(|&block| sizes[block] += 1);
+        let fold_of_block = deal(&sizes, FOLDS, self.fit.seed);
+        let (mut scores, mut squares_db) = (vec![0.0; blocks], Vec::new());
+        for fold in 0..FOLDS {
+            let is_held = |row: usize| fold_of_block[block_of_row[row]] == fold;
+            let [held, kept] = [true, false].map(|wanted| -> Vec<usize> {
+                (0..curve.rows.len()).filter(|&row| is_held(row) == wanted).collect()
+            });
+            let of = |places: &[usize]| places.iter().map(|&row| curve.rows[row]).collect();
+            let at = self.fitted_to(of(&kept))?;
+            let unseen: Vec<Row> = of(&held);
+            for (row, ln_p) in held.iter().zip(self.ln_p(&at, &unseen)) {
+                scores[block_of_row[*row]] += ln_p;
+            }
+            let residuals_db = residuals_db(&self.fit, &self.coordinates, &at, &unseen);
+            squares_db.extend(residuals_db.into_iter().map(|residual| residual.powi(2)));
+        }
+        let [score, score_sd] = mean(&scores, &sizes);
+        let has_law = self.fit.method == Method::Censored;
+        let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+        Some(HeldOut {
+            folds: count(FOLDS),
+            blocks: count(blocks),
+            block_m,
+            score: has_law.then_some(score),
+            score_sd: has_law.then_some(score_sd),
+            rms_db: (squares_db.iter().sum::<f64>() / squares_db.len().max(1) as f64).sqrt(),
+            fold_hash: fold_hash(block_of_row.iter().map(|&block| fold_of_block[block])),
+        })
+    }
+
+    /// Where the search ends on these rows, from where it ended on all.
+    fn fitted_to(&self, rows: Vec<Row>) -> Option<DVector<f64>> {
+        let detected = rows.iter().filter(|row| !row.censored).count();
+        let best = (detected > self.coordinates.len())
+            .then(|| self.fit.nearest_optimum(&self.coordinates, &rows, &self.at))?;
+        best.converged().then_some(best.at)
+    }
+
+    /// ln p of each row; nothing for least squares.
+    fn ln_p(&self, at: &DVector<f64>, rows: &[Row]) -> Vec<f64> {
+        match self.fit.method {
+            Method::Censored => Likelihood::new(&self.coordinates, rows, self.noise_w).ln_p(at),
+            Method::Mse { .. } | Method::Tls { .. } => Vec::new(),
+        }
+    }
+}
+
+/// Block of every row, numbered from 0 without gaps, and their side, m, where they are squares.
+fn blocks(rows: &[Row]) -> (Vec<usize>, Option<f64>) {
+    let places: Option<Vec<[f64; 2]>> = rows.iter().map(|row| row.target_m).collect();
+    let side_m = places.as_ref().map_or(0.0, |places| extent_m(places) / ACROSS);
+    if let Some(places) = places.filter(|_| side_m > 0.0) {
+        let square = |at: &[f64; 2]| at.map(|x| (x / side_m).floor() as i64);
+        let squares: BTreeMap<[i64; 2], ()> = places.iter().map(|at| (square(at), ())).collect();
+        let numbers: BTreeMap<[i64; 2], usize> = squares.into_keys().zip(0..).collect();
+        return (places.iter().map(|at| numbers[&square(at)]).collect(), Some(side_m));
+    }
+    let mut in_time: Vec<usize> = (0..rows.len()).collect();
+    in_time.sort_by_key(|&row| rows[row].chirp);
+    let mut runs = vec![0; rows.len()];
+    for (place, row) in in_time.into_iter().enumerate() {
+        runs[row] = place * RUNS.min(rows.len()) / rows.len();
+    }
+    (runs, None)
+}
+
+/// The longer side of what places cover, m.
+fn extent_m(places: &[[f64; 2]]) -> f64 {
+    let side = |axis: usize| {
+        let along = || places.iter().map(|at| at[axis]);
+        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+    };
+    side(0).max(side(1))
+}
+
+/// Deals blocks of these sizes to folds, in an order drawn from the seed, each to the emptiest: the fold
+/// of every block.
+pub(crate) fn deal(sizes: &[usize], folds: usize, seed: u64) -> Vec<usize> {
+    let drawn = |block: usize| {
+        let key = Key { seed, chirp: block as u64, sub_ray: 1, purpose: Purpose::Fit };
+        key.draws().uniform()
+    };
+    let mut order: Vec<(f64, usize)> =
+        (0..sizes.len()).map(|block| (drawn(block), block)).collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let (mut filled, mut fold_of_block) = (vec![0; folds], vec![0; sizes.len()]);
+    for (_, block) in order {
+        let (emptiest, _) = filled.iter().enumerate().min_by_key(|f| *f.1).unwrap_or((0, &0));
+        fold_of_block[block] = emptiest;
+        filled[emptiest] += sizes[block];
+    }
+    fold_of_block
+}
+
+/// Mean of rows from the sums over their blocks, and its standard error over blocks.
+fn mean(sums: &[f64], sizes: &[usize]) -> [f64; 2] {
+    let rows: usize = sizes.iter().sum();
+    let (rows, blocks) = (rows.max(1) as f64, sums.len().max(2) as f64);
+    let mean = sums.iter().sum::<f64>() / rows;
+    let off = std::iter::zip(sums, sizes).map(|(sum, &size)| (sum - mean * size as f64).powi(2));
+    [mean, (blocks / (blocks - 1.0) * off.sum::<f64>()).sqrt() / rows]
+}
+
+fn fold_hash(fold_of_row: impl Iterator<Item = usize>) -> String {
+    let mut hasher = blake3::Hasher::new();
+    fold_of_row.for_each(|fold| {
+        hasher.update(&(fold as u64).to_le_bytes());
+    });
+    hasher.finalize().to_hex().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::twin::{Twin, mixture};
+    use super::super::{Fit, model};
+    use super::*;
+
+    fn placed(mut curve: Curve) -> Curve {
+        for (index, row) in curve.rows.iter_mut().enumerate() {
+            row.target_m = Some([(index % 40) as f64 * 0.01, (index / 40) as f64 * 0.01]);
+        }
+        curve
+    }
+
+    #[test]
+    fn a_right_law_scores_as_well_on_what_it_has_not_seen() {
+        let curve = placed(Twin { rows: 1600, ..Twin::default() }.curve(5));
+        let fit = Fit { starts: 1, looks: Some(1.0), ..Fit::default() };
+        let found = fit.run(&mixture(0.1, 3.0, 0.02, 0.004), &curve).unwrap();
+        let held = found.hold_out(&curve).unwrap();
+        assert_eq!((held.folds, held.blocks, held.block_m), (5, 81, Some(0.39 / 8.0)));
+        let (seen, score) = (found.objective / 1600.0, held.score.unwrap());
+        // One part in 1600 for each of four numbers, twice over.
+        assert!(score < seen && seen - score < 0.02, "{seen} {held:?}");
+        assert!((held.rms_db / found.goodness.rms_db - 1.0).abs() < 0.02, "{held:?}");
+        let sd = held.score_sd.unwrap();
+        assert!((0.01..0.1).contains(&sd), "{sd}");
+        assert_eq!(found.hold_out(&curve), Some(held));
+    }
+
+    #[test]
+    fn without_places_whole_runs_of_chirps_are_held_out() {
+        let curve = Twin { rows: 24, ..Twin::default() }.curve(7);
+        let fit = Fit { starts: 1, looks: Some(1.0), ..Fit::default() };
+        let found = fit.run(&model("lambert").unwrap(), &curve).unwrap();
+        let held = found.hold_out(&curve).unwrap();
+        assert_eq!((held.blocks, held.block_m), (20, None));
+        assert!(held.score.unwrap() < found.objective / 24.0, "{held:?} {found:?}");
+    }
+
+    #[test]
+    fn least_squares_has_an_error_in_decibels_and_no_score() {
+        let curve = Twin { rows: 300, ..Twin::default() }.curve(3);
+        let method = Method::Tls { theta_sd_rad: 0.05, level_sd_db: 5.6 };
+        let fit = Fit { method, starts: 1, ..Fit::default() };
+        let held = fit.run(&model("mixture").unwrap(), &curve).unwrap().hold_out(&curve).unwrap();
+        assert_eq!((held.score, held.score_sd), (None, None));
+        assert!((4.0..8.0).contains(&held.rms_db), "{held:?}");
+    }
+
+    #[test]
+    fn too_few_rows_for_a_part_give_no_score() {
+        let curve = Twin { rows: 6, ..Twin::default() }.curve(3);
+        let fixed =
+            ["diffuse.alpha", "specular.m", "k"].map(|path| (path.to_owned(), 0.5)).to_vec();
+        let fit = Fit { fixed, looks: Some(1.0), starts: 1, ..Fit::default() };
+        if let Ok(found) = fit.run(&model("mixture").unwrap(), &curve) {
+            let held = found.hold_out(&Curve { rows: curve.rows[..2].to_vec() });
+            assert_eq!(held, None);
+        }
+    }
+
+    #[test]
+    fn blocks_go_to_the_emptiest_fold() {
+        let sizes = [7, 1, 1, 1, 1, 1, 1, 1];
+        let folds = deal(&sizes, 2, 3);
+        let filled = |fold: usize| -> usize {
+            std::iter::zip(sizes, &folds).filter(|(_, f)| **f == fold).map(|(size, _)| size).sum()
+        };
+        assert_eq!((filled(0) + filled(1), filled(0).abs_diff(filled(1)) <= 6), (14, true));
+        assert_eq!(deal(&sizes, 2, 3), folds);
+    }
+}
