@@ -1,7 +1,7 @@
 -- Why: neighbouring points of a scan are no independent witnesses, and where they lie on the target tells
 -- which are neighbours. A fit that was judged only by the points it was made of flatters itself; one that
 -- was tried on points held out says how it did, and people read it beside its numbers. Findings stand where
--- people look, with the other sources that found the same.
+-- people look.
 --
 -- Of what was stored before nobody noted the places: NULL.
 
@@ -9,7 +9,7 @@ ALTER TABLE observation ADD COLUMN xt_m REAL;                       -- of the fr
 ALTER TABLE observation ADD COLUMN yt_m REAL CHECK ((yt_m IS NULL) = (xt_m IS NULL));
 
 INSERT INTO unit (column_name, ucum, meaning) VALUES
-    ('held_out_folds', '1', 'folds that took turns at being held out; NULL: not tried'),
+    ('held_out_folds', '1', 'folds that took turns at being held out; NULL: not tried or not possible'),
     ('held_out_rms_db', 'dB', 'root mean square of held-out detections over the model fitted to the others'),
     ('held_out_score', '1', 'mean ln p of held-out points; NULL: not tried, or a method without a law'),
     ('held_out_score_sd', '1', 'standard error of held_out_score over blocks of neighbours'),
@@ -55,20 +55,10 @@ JOIN source ON source.revision_id = revision.id AND source.key = fit.source
 WHERE NOT EXISTS (SELECT 1 FROM fit_parameter AS p
     WHERE p.revision_id = e.revision_id AND p.fit = e.fit AND p.path = e.name);
 
--- `replicated_on`: other sources that found the same effect on the material, in whichever revision.
 CREATE VIEW v_findings AS
 SELECT slug, number AS revision, effect, verdict, fit_before, fit_after, gain, placebo_gain, p,
     score_difference, score_difference_sd, size_db, rms_before_db, rms_after_db, confusable_with,
-    source.title AS source,
-    (SELECT json_group_array(title) FROM (
-        SELECT DISTINCT other_source.title AS title FROM finding AS other
-        JOIN revision AS other_revision ON other_revision.id = other.revision_id
-        JOIN source AS other_source
-            ON other_source.revision_id = other.revision_id AND other_source.key = other.source
-        WHERE other_revision.material_id = material.id AND other.effect = finding.effect
-            AND other.verdict = 'found' AND finding.verdict = 'found'
-            AND other_source.title <> source.title
-        ORDER BY title)) AS replicated_on
+    source.title AS source
 FROM material JOIN revision ON material_id = material.id AND number = current_revision
 JOIN finding ON finding.revision_id = revision.id
 JOIN source ON source.revision_id = revision.id AND source.key = finding.source;

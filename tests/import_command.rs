@@ -204,6 +204,37 @@ fn what_they_made_since_comes_as_revisions_unless_it_was_changed_here() {
 }
 
 #[test]
+fn nobody_else_revises_or_withdraws_what_is_ones_own() {
+    let (theirs, ours) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let add = |folder: &Path, material: &Material| {
+        Store::open(folder.join("matdb.sqlite")).unwrap().add([material]).unwrap();
+    };
+    // Both begin with the same, which nobody has imported.
+    [&theirs, &ours].map(|folder| add(folder.path(), &sound("primer")));
+    add(theirs.path(), &changed("primer"));
+    let withdraw = ["withdraw", "primer", "--reason", "they say so", "-q"];
+    matdb(theirs.path()).args(withdraw).assert().success();
+    matdb(theirs.path()).args(["publish", "site", "-q"]).assert().success();
+    let site = theirs.path().join("site");
+    assert_eq!(results(&import(ours.path(), &site, &[])), [("primer", "conflict")]);
+    assert_eq!(contents(&ours.path().join("matdb.sqlite")), [sound("primer")]);
+    // Nor does a third one what was imported from somebody.
+    let third = tempfile::tempdir().unwrap();
+    let about = |title: &str| format!("title = '{title}'\n");
+    fs::write(ours.path().join("about.toml"), about("Ours")).unwrap();
+    fs::write(theirs.path().join("about.toml"), about("Theirs")).unwrap();
+    for folder in [&ours, &theirs] {
+        let publish = ["publish", "site", "--about", "about.toml", "-q"];
+        matdb(folder.path()).args(publish).assert().success();
+    }
+    assert_eq!(
+        results(&import(third.path(), &ours.path().join("site"), &[])),
+        [("primer", "added")]
+    );
+    assert_eq!(results(&import(third.path(), &site, &[])), [("primer", "conflict")]);
+}
+
+#[test]
 fn a_catalogue_fills_an_empty_folder_and_a_dry_run_leaves_it_empty() {
     let (theirs, _) = laboratories();
     let ours = tempfile::tempdir().unwrap();

@@ -72,6 +72,8 @@ fn a_cloud_becomes_a_material_that_renders_like_it() {
             "synthetic",
             "--source",
             "made by a test",
+            "--date",
+            "2026-03-14",
             "-o",
             "measured",
         ],
@@ -91,6 +93,12 @@ fn a_cloud_becomes_a_material_that_renders_like_it() {
         compared += 1;
     }
     assert!(compared > 1000, "{compared}");
+    let session = &json(at, &["show", "mannequin-paint"])["material"]["sessions"][0];
+    assert_eq!(session["date"], "2026-03-14");
+    assert_eq!(session["pose"]["translation_m"], pose["pose"]["translation_m"]);
+    assert_eq!(session["registration_rms_m"], pose["rms_m"]);
+    let cloud_hash = blake3::hash(&fs::read(at.join("out/cloud.ply")).unwrap()).to_hex();
+    assert_eq!(session["cloud_hash"], cloud_hash.as_str());
     // The mesh stood where the scene has it: at the points the pose moves nothing.
     let about = &pose["covariance"]["about_m"];
     for row in 0..3 {

@@ -17,7 +17,7 @@ use matdb::store::Store;
 use serde_json::Value;
 use support::database::{bytes, contents, sample, sound, with_effects};
 use support::json_schema::problems;
-use support::{entries, matdb, refused};
+use support::{entries, matdb, refused, root};
 
 const ABOUT: &str = "title = 'Paints <of> \"ours\"'\nversion = '1.0'\ndoi = '10.5281/zenodo.123'\n\
     [[person]]\nfamily = 'Roe'\ngiven = 'Ann'\norcid = '0000-0002-1825-0097'\n";
@@ -355,6 +355,16 @@ fn nothing_of_somebody_elses_folder_is_touched() {
 
 #[cfg(unix)]
 #[test]
+fn nothing_is_published_inside_a_publication() {
+    let folder = laboratory();
+    publish(folder.path());
+    let before = tree(&folder.path().join("site"));
+    let said = refused(matdb(folder.path()).args(["publish", "site/deep/er"]));
+    assert!(said.contains("lies in the publication") && said.contains("beside it"), "{said}");
+    assert_eq!(tree(&folder.path().join("site")), before);
+}
+
+#[test]
 fn what_cannot_be_written_leaves_everything_as_it_was() {
     use std::os::unix::fs::PermissionsExt;
     let folder = laboratory();
@@ -537,6 +547,43 @@ fn a_fit_that_does_not_follow_from_its_curve_is_seen() {
             "{said}"
         );
     }
+}
+
+/// The statement of a migration that begins like this.
+fn statement(migration: &str, begin: &str) -> String {
+    let text = fs::read_to_string(root().join("migrations").join(migration)).unwrap();
+    let from = text.find(begin).unwrap();
+    text[from..=from + text[from..].find(';').unwrap()].to_owned()
+}
+
+#[test]
+fn a_publication_of_an_older_schema_is_verified_and_imported() {
+    let folder = laboratory();
+    let at = folder.path();
+    publish(at);
+    let site = at.join("site");
+    // Back to schema 8, which had no places.
+    let curves = statement("0004_catalogue.sql", "CREATE VIEW v_curves");
+    let fits = statement("0007_attribution.sql", "CREATE VIEW v_fits");
+    resql(
+        &site,
+        &format!(
+            "DROP VIEW v_findings; DROP VIEW v_fits; DROP VIEW v_curves;
+             ALTER TABLE observation DROP COLUMN yt_m; ALTER TABLE observation DROP COLUMN xt_m;
+             DELETE FROM unit WHERE column_name LIKE 'held_out%' OR column_name IN ('xt_m', 'yt_m');
+             {curves} {fits} PRAGMA user_version = 8;"
+        ),
+    );
+    relist(&site, "tables/observation.csv", b"of other columns");
+    let output = matdb(at).args(["verify", "site"]).output().unwrap();
+    let said = String::from_utf8([output.stdout, output.stderr].concat()).unwrap();
+    assert!(output.status.success() && said.contains("whose schema is an older one"), "{said}");
+    let other = tempfile::tempdir().unwrap();
+    matdb(other.path()).arg("import").arg(&site).assert().success();
+    assert_eq!(contents(&other.path().join("matdb.sqlite")), contents(&at.join("matdb.sqlite")));
+    // What it says of itself is held against its database all the same.
+    relist(&site, "api/v1/index.json", b"{}");
+    assert!(!matdb(at).args(["verify", "site", "-q"]).output().unwrap().status.success());
 }
 
 #[test]

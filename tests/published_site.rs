@@ -200,6 +200,28 @@ fn nothing_is_loaded_from_elsewhere_and_nothing_runs_inside_a_page() {
 }
 
 #[test]
+fn the_front_page_leads_to_the_data_and_to_where_the_catalogue_stands() {
+    let root = tempfile::tempdir().unwrap();
+    let mut store = Store::open(root.path().join("a.sqlite")).unwrap();
+    store.add(&materials()).unwrap();
+    let about = About { doi: Some("10.5281/zenodo.1".to_owned()), ..about() };
+    publish(&store, &about, &root.path().join("site"), |_| ()).unwrap();
+    let tags = tags(&read(&root.path().join("site"))["index.html"]);
+    let hrefs: Vec<&str> =
+        tags.iter().filter_map(|(_, keys)| keys.get("href")).map(String::as_str).collect();
+    for there in [
+        "catalogue.sqlite",
+        "datapackage.json",
+        "api/v1/index.json",
+        "CITATION.cff",
+        "CHANGES.md",
+        "https://doi.org/10.5281/zenodo.1",
+    ] {
+        assert!(hrefs.contains(&there), "{there}: {hrefs:?}");
+    }
+}
+
+#[test]
 fn every_link_leads_somewhere() {
     let site = site();
     for (path, html) in site.pages() {

@@ -232,7 +232,8 @@ prop_compose! {
         score in option::of(number()), score_sd in option::of(positive()), rms_db in positive(),
     ) -> HeldOut {
         let fold_hash = "fedcba9876543210".repeat(4);
-        HeldOut { folds, blocks, block_m, score, score_sd, rms_db, fold_hash }
+        let blocks_of = "squares".to_owned();
+        HeldOut { folds, blocks, blocks_of, block_m, score, score_sd, rms_db, fold_hash }
     }
 }
 
@@ -306,7 +307,7 @@ prop_compose! {
 prop_compose! {
     fn material()(
         texts in (word(), word(), text(), word(), vec(text(), 0..4)),
-        frequency_hz in [positive(), positive()], theta_rad in [angle_rad(), angle_rad()],
+        frequency_hz in [1f64..1e16, 1f64..1e16], theta_rad in [angle_rad(), angle_rad()],
         sources in vec(source(), 1..4), instruments in vec(instrument(), 0..3),
         curves in vec(curve(), 0..4), fits in vec(fit(), 1..4), effects in vec(effect(), 0..3),
         key in text(), pick in any::<usize>(), rest in rest(),

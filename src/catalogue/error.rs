@@ -33,6 +33,18 @@ pub enum CatalogueError {
         /// Why.
         problem: &'static str,
     },
+    /// The folder lies in a publication, which would not be sound any more.
+    #[error(
+        "{} lies in the publication {}, and nothing that is not its own may; name a folder beside it",
+        folder.display(),
+        publication.display()
+    )]
+    Within {
+        /// The folder.
+        folder: PathBuf,
+        /// The publication.
+        publication: PathBuf,
+    },
     /// A material is larger than anybody who verifies a publication would read.
     #[error(
         "`{slug}` takes {} MiB as JSON and a publication takes {} at most; nothing was published, thin its \

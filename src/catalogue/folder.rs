@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
 use super::CatalogueError;
+use super::publish::ABOUT;
 use super::stage::{KEPT, Stage, hindrance, parent};
 
 /// The list of hashes, which tells a publication from somebody's own folder.
@@ -53,11 +54,19 @@ impl Place {
     }
 }
 
+/// The publication in whose folder a target lies, where it would be a stranger.
+fn publication_around(target: &Path) -> Option<PathBuf> {
+    let absolute = std::path::absolute(target).ok()?;
+    let is_publication =
+        |folder: &&Path| [SUMS, ABOUT].iter().all(|file| folder.join(file).is_file());
+    absolute.ancestors().skip(1).find(is_publication).map(Path::to_owned)
+}
+
 impl Folder {
     /// Begins to write what shall stand at `target`.
     ///
     /// # Errors
-    /// When `target` holds anything but an earlier publication, or nothing can be written beside it.
+    /// When `target` holds anything but an earlier publication or lies in one, or nothing can be written beside it.
     pub fn new(target: &Path) -> Result<Folder, CatalogueError> {
         let io = |verb, path: &Path| {
             let path = path.to_owned();
@@ -73,6 +82,9 @@ impl Folder {
         }
         if let Some(problem) = hindrance(&resolved) {
             return Err(CatalogueError::Fixed { folder: target.to_owned(), problem });
+        }
+        if let Some(publication) = publication_around(&resolved) {
+            return Err(CatalogueError::Within { folder: target.to_owned(), publication });
         }
         let stage = Stage::new(&resolved).map_err(io("create", parent(&resolved)))?;
         Ok(Folder { target: resolved, place: Place::Staged(stage), sums: BTreeMap::new() })

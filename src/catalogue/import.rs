@@ -164,10 +164,33 @@ impl Import {
                 return Ok(Outcome::Unchanged);
             }
         }
-        Ok(match self.since(slug, name, &known.content_hash)?.len() {
-            0 => Outcome::Conflict { ours: known.content_hash, theirs },
-            revisions => Outcome::Continued { revisions, after: known.revision },
+        let since = self.since(slug, name, &known.content_hash)?;
+        Ok(match !since.is_empty() && self.is_theirs(&known, slug, &since)? {
+            false => Outcome::Conflict { ours: known.content_hash, theirs },
+            true => Outcome::Continued { revisions: since.len(), after: known.revision },
         })
+    }
+
+    /// Whether the catalogue that made these newer revisions is the one from which what is here was
+    /// imported: nobody else may revise, or withdraw, what is here.
+    fn is_theirs(
+        &self,
+        known: &Stored,
+        slug: &Slug,
+        since: &[u32],
+    ) -> Result<bool, CatalogueError> {
+        let Some(first) = known.activity.as_ref().and_then(|activity| activity.origin.as_ref())
+        else {
+            return Ok(false);
+        };
+        let about = self.about()?;
+        for &number in since {
+            let newer = origin(&about, &self.stored(slug, number)?);
+            if (&newer.title, &newer.authors) != (&first.title, &first.authors) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Numbers of their revisions after the one with this content; none where they never had it.

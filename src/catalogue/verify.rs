@@ -391,6 +391,10 @@ fn check_rebuilt(
     sums: &BTreeMap<String, String>,
     problems: &mut Vec<Problem>,
 ) -> Vec<String> {
+    let (scope, notes) = Scope::new(bundle, store, sums);
+    if !scope.same_schema {
+        return notes;
+    }
     let made = database_sum(bundle, sums).and_then(|database| {
         let about = read::<About>(bundle, ABOUT).map_err(|what| problem(ABOUT, what))?;
         rebuilt(store, &about, bundle, database).map_err(|error| problem(DATABASE, error))
@@ -402,7 +406,6 @@ fn check_rebuilt(
             return Vec::new();
         }
     };
-    let (scope, notes) = Scope::new(bundle, store, sums);
     let paths: BTreeSet<&String> = sums.keys().chain(made.keys()).collect();
     let mut wrong = paths.into_iter().filter(|path| scope.has(path)).filter_map(|path| {
         match (sums.get(path), made.get(path)) {

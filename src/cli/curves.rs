@@ -232,7 +232,7 @@ pub(super) fn source(
 }
 
 /// The key, or the first with a number behind it that is free.
-fn free(key: &str, is_free: impl Fn(&String) -> bool) -> String {
+pub(super) fn free(key: &str, is_free: impl Fn(&String) -> bool) -> String {
     let numbered = (2u32..).map(|number| format!("{key}-{number}"));
     std::iter::once(key.to_owned()).chain(numbered).find(is_free).unwrap_or_default()
 }

@@ -84,9 +84,12 @@ impl Wanted {
     }
 }
 
+/// Visible light: what lies above was not meant in GHz.
+const HIGHEST_GHZ: f64 = 1e6;
+
 pub(super) fn frequency(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(ghz) if ghz.is_finite() && ghz > 0.0 => Ok(ghz),
+        Ok(ghz) if ghz > 0.0 && ghz <= HIGHEST_GHZ => Ok(ghz),
         _ => Err("give a frequency in GHz above 0, such as 300".to_owned()),
     }
 }

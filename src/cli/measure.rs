@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::cloud::{CloudArgs, start};
 use super::console::Console;
-use super::curves::{Circumstances, Kind, Put, UNSAID, put};
+use super::curves::{Circumstances, Kind, Put, UNSAID, free, put};
 use super::database::Database;
 use super::door;
 use super::inputs::activity;
@@ -15,7 +15,7 @@ use super::output::write_all;
 use super::summary::grouped;
 use crate::error::Error;
 use crate::formats::figure::{Plot, Series, Style};
-use crate::material::Material;
+use crate::material::{Material, Session, SessionPose};
 use crate::measure::{Curve, Metric, Reduced, Reduction, Registered, Registration, Row};
 use crate::scene::Scene;
 use crate::store::Store;
@@ -29,7 +29,7 @@ use crate::units::db_from_ratio;
   matdb measure cloud.xyz --unit mm --scene scene.toml --pose auto -o measured
   matdb measure cloud.ply --scene scene.toml -o measured --save my-paint --kind measured \\
     --source 'Our bench, 2026' --licence CC-BY-4.0 \\
-    --instrument 'Our radar' --frequency 300 --threshold -77
+    --instrument 'Our radar' --frequency 300 --threshold -77 --date 2026-03-14
 
 Then: matdb fit measured/curve.csv, or matdb fit my-paint --save")]
 pub(super) struct Args {
@@ -71,6 +71,9 @@ pub(super) struct Args {
     source: Option<String>,
     #[command(flatten)]
     circumstances: Circumstances,
+    /// Day of the measurement, YYYY-MM-DD: with it pose, registration and the cloud's hash are stored as a session
+    #[arg(long, value_name = "DAY", requires = "save")]
+    date: Option<String>,
     /// Folder to write into; created when it is not there
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
@@ -100,15 +103,21 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 
     let record = record(args, &registered, &reduced);
     // Refused before anything is written, stored after it.
-    let doubts =
-        prepared(args, &reduced.curve, db.read()?.as_ref())?.map(|(m, _)| door::doubts(&m));
+    let measured = (&reduced.curve, &registered);
+    let doubts = prepared(args, measured, db.read()?.as_ref())?.map(|(m, _)| door::doubts(&m));
     doubts.iter().flatten().for_each(|doubt| console.notice(doubt));
     let mut pose = serde_json::to_vec_pretty(&record)?;
     pose.push(b'\n');
     let svg = plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
     let files = [("pose.json", pose), ("curve.csv", reduced.curve.write()), ("curve.svg", svg)];
     write_all(&args.output, &files)?;
-    let stored = save(args, &reduced.curve, db)?;
+    let stored = save(args, measured, db)?;
+    if stored.is_some() && args.date.is_none() {
+        console.notice(
+            "no session is stored with the curve: --date YYYY-MM-DD, the day of the measurement, keeps the \
+             pose, what the registration left over and the cloud's hash, too",
+        );
+    }
     let mixed = mixed(args, &scene);
     let notices =
         mixed.iter().chain(&cloud.notices).chain(&registered.verdicts).chain(&reduced.notices);
@@ -159,22 +168,62 @@ fn target(args: &Args, store: Option<&Store>) -> Result<Option<Material>, Error>
 /// The material with the curve in it.
 fn prepared(
     args: &Args,
-    curve: &Curve,
+    (curve, registered): (&Curve, &Registered),
     store: Option<&Store>,
 ) -> Result<Option<(Material, Put)>, Error> {
     let (Some(kind), Some(title)) = (args.kind, &args.source) else { return Ok(None) };
     let Some(mut material) = target(args, store)? else { return Ok(None) };
     let put = put(&mut material, &args.curve, curve, (kind.into(), title), &args.circumstances)?;
+    if let Some(date) = &args.date {
+        hold_session(&mut material, &put.curve, session(args, date, registered)?)?;
+    }
     Ok(Some((material, put)))
 }
 
+/// What is known of the measurement beside its points.
+fn session(args: &Args, date: &str, registered: &Registered) -> Result<Session, Error> {
+    let hash = activity("measure", &[&args.cloud.cloud])?.inputs.into_iter().next();
+    let pose = &registered.pose;
+    let rotation_rows = [0, 1, 2].map(|row| pose.rotation().row(row).to_array());
+    Ok(Session {
+        key: String::new(),
+        date: date.to_owned(),
+        temperature_k: None,
+        relative_humidity: None,
+        cloud_hash: hash.map(|input| input.hash),
+        mesh_hash: None,
+        registration_rms_m: Some(registered.rms_m),
+        normal_sd_rad: None,
+        footprint_sd_rad: None,
+        pose: Some(SessionPose { rotation_rows, translation_m: pose.translation_m().to_array() }),
+        note: None,
+    })
+}
+
+/// Ties a curve that has no session to this one, which gets a free key.
+fn hold_session(material: &mut Material, curve: &str, session: Session) -> Result<(), Error> {
+    let key = free(curve, |key| material.sessions.iter().all(|session| session.key != *key));
+    let Some(curve) = material.curves.iter_mut().find(|known| known.name == curve) else {
+        return Ok(());
+    };
+    if curve.session.is_none() {
+        curve.session = Some(key.clone());
+        material.sessions.push(Session { key, ..session });
+    }
+    Ok(material.validate()?)
+}
+
 /// Stores the curve when it is asked for; its name and the revision that holds it.
-fn save(args: &Args, curve: &Curve, db: &Database) -> Result<Option<(String, u32)>, Error> {
+fn save(
+    args: &Args,
+    measured: (&Curve, &Registered),
+    db: &Database,
+) -> Result<Option<(String, u32)>, Error> {
     if args.save.is_none() {
         return Ok(None);
     }
     let mut store = db.write()?;
-    let Some((material, put)) = prepared(args, curve, Some(&store))? else { return Ok(None) };
+    let Some((material, put)) = prepared(args, measured, Some(&store))? else { return Ok(None) };
     store.record(activity("measure", &[&args.cloud.cloud, &args.scene])?);
     let added = store.add([&material])?;
     Ok(added.first().map(|added| (put.curve, added.revision())))

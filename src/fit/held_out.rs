@@ -1,7 +1,7 @@
 //! How a fit does on rows that it has not seen. Neighbouring chirps meet nearly the same place, so that
 //! whole blocks of them are held out, in turns, and the error of the score is that of blocks.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::DVector;
 
@@ -14,19 +14,25 @@ use crate::radar::random::{Key, Purpose};
 
 /// Parts that take turns at being held out.
 const FOLDS: usize = 5;
-/// Blocks along the longer side of what was scanned.
+/// Blocks along the longer side of what was scanned, and how many must hold something.
 const ACROSS: f64 = 8.0;
+const LEAST_SQUARES: usize = 2 * FOLDS;
 /// Blocks of consecutive chirps where nobody knows where they lie.
 const RUNS: usize = 20;
 
 impl FitResult {
     /// Fits the curve again without each fifth of its blocks, and tries every fit on what it lacked. Blocks
-    /// are squares on the target where the rows say where they lie, else runs of consecutive chirps.
+    /// are squares on the target where the rows say where they lie; runs of consecutive chirps of a scan;
+    /// single rows of a sweep of the angle, of which a run would be a whole range of angles.
     ///
-    /// `None` where a part leaves too few detections for the fit, or where a fit does not converge.
+    /// `None` where there are fewer blocks than parts, where a part leaves too few detections for the fit,
+    /// or where a fit does not converge.
     pub fn hold_out(&self, curve: &Curve) -> Option<HeldOut> {
-        let (block_of_row, block_m) = blocks(&curve.rows);
+        let Blocks { of, block_of_row, block_m } = Blocks::new(&curve.rows);
         let blocks = block_of_row.iter().max().map_or(0, |most| most + 1);
+        if blocks < FOLDS {
+            return None;
+        }
         let mut sizes = vec![0; blocks];
         block_of_row.iter().for_each(|&block| sizes[block] += 1);
         let fold_of_block = deal(&sizes, FOLDS, self.fit.seed);
@@ -51,6 +57,7 @@ impl FitResult {
         Some(HeldOut {
             folds: count(FOLDS),
             blocks: count(blocks),
+            blocks_of: of.to_owned(),
             block_m,
             score: has_law.then_some(score),
             score_sd: has_law.then_some(score_sd),
@@ -76,23 +83,47 @@ impl FitResult {
     }
 }
 
-/// Block of every row, numbered from 0 without gaps, and their side, m, where they are squares.
-fn blocks(rows: &[Row]) -> (Vec<usize>, Option<f64>) {
-    let places: Option<Vec<[f64; 2]>> = rows.iter().map(|row| row.target_m).collect();
-    let side_m = places.as_ref().map_or(0.0, |places| extent_m(places) / ACROSS);
-    if let Some(places) = places.filter(|_| side_m > 0.0) {
+/// Which rows are neighbours.
+struct Blocks {
+    /// What they are: `squares`, `runs` or `points`.
+    of: &'static str,
+    /// Block of every row, numbered from 0 without gaps.
+    block_of_row: Vec<usize>,
+    /// Side of squares, m.
+    block_m: Option<f64>,
+}
+
+impl Blocks {
+    fn new(rows: &[Row]) -> Blocks {
+        let places: Option<Vec<[f64; 2]>> = rows.iter().map(|row| row.target_m).collect();
+        places.and_then(|places| Blocks::squares(&places)).unwrap_or_else(|| Blocks::in_time(rows))
+    }
+
+    fn squares(places: &[[f64; 2]]) -> Option<Blocks> {
+        let side_m = extent_m(places) / ACROSS;
         let square = |at: &[f64; 2]| at.map(|x| (x / side_m).floor() as i64);
-        let squares: BTreeMap<[i64; 2], ()> = places.iter().map(|at| (square(at), ())).collect();
-        let numbers: BTreeMap<[i64; 2], usize> = squares.into_keys().zip(0..).collect();
-        return (places.iter().map(|at| numbers[&square(at)]).collect(), Some(side_m));
+        let squares: BTreeSet<[i64; 2]> = places.iter().map(square).collect();
+        let numbers: BTreeMap<[i64; 2], usize> = squares.into_iter().zip(0..).collect();
+        let block_of_row = places.iter().map(|at| numbers[&square(at)]).collect();
+        (side_m > 0.0 && numbers.len() >= LEAST_SQUARES).then_some(Blocks {
+            of: "squares",
+            block_of_row,
+            block_m: Some(side_m),
+        })
     }
-    let mut in_time: Vec<usize> = (0..rows.len()).collect();
-    in_time.sort_by_key(|&row| rows[row].chirp);
-    let mut runs = vec![0; rows.len()];
-    for (place, row) in in_time.into_iter().enumerate() {
-        runs[row] = place * RUNS.min(rows.len()) / rows.len();
+
+    fn in_time(rows: &[Row]) -> Blocks {
+        let mut in_time: Vec<usize> = (0..rows.len()).collect();
+        in_time.sort_by_key(|&row| rows[row].chirp);
+        let angles = || in_time.iter().map(|&row| rows[row].theta_rad);
+        let is_sweep = angles().is_sorted() || angles().rev().is_sorted();
+        let blocks = if is_sweep { rows.len() } else { RUNS.min(rows.len()) };
+        let mut block_of_row = vec![0; rows.len()];
+        for (place, &row) in in_time.iter().enumerate() {
+            block_of_row[row] = place * blocks / rows.len();
+        }
+        Blocks { of: if is_sweep { "points" } else { "runs" }, block_of_row, block_m: None }
     }
-    (runs, None)
 }
 
 /// The longer side of what places cover, m.
@@ -175,8 +206,35 @@ mod tests {
         let fit = Fit { starts: 1, looks: Some(1.0), ..Fit::default() };
         let found = fit.run(&model("lambert").unwrap(), &curve).unwrap();
         let held = found.hold_out(&curve).unwrap();
-        assert_eq!((held.blocks, held.block_m), (20, None));
+        assert_eq!((held.blocks, held.blocks_of.as_str(), held.block_m), (20, "runs", None));
         assert!(held.score.unwrap() < found.objective / 24.0, "{held:?} {found:?}");
+    }
+
+    #[test]
+    fn of_a_sweep_single_points_are_held_out_and_no_range_of_angles() {
+        let mut curve = Twin { rows: 400, ..Twin::default() }.curve(7);
+        curve.rows.sort_by(|a, b| a.theta_rad.total_cmp(&b.theta_rad));
+        for (chirp, row) in (0u32..).zip(&mut curve.rows) {
+            row.chirp = chirp;
+        }
+        let fit = Fit { starts: 1, looks: Some(1.0), ..Fit::default() };
+        let found = fit.run(&mixture(0.1, 3.0, 0.02, 0.004), &curve).unwrap();
+        let held = found.hold_out(&curve).unwrap();
+        assert_eq!((held.blocks, held.blocks_of.as_str()), (400, "points"));
+        assert!((held.rms_db / found.goodness.rms_db - 1.0).abs() < 0.03, "{held:?}");
+    }
+
+    #[test]
+    fn a_few_places_are_no_squares_and_fewer_blocks_than_parts_no_score() {
+        let mut curve = Twin { rows: 100, ..Twin::default() }.curve(7);
+        for (index, row) in curve.rows.iter_mut().enumerate() {
+            row.target_m = Some([(index % 2) as f64, 0.0]);
+        }
+        let fit = Fit { starts: 1, looks: Some(1.0), ..Fit::default() };
+        let found = fit.run(&model("lambert").unwrap(), &curve).unwrap();
+        assert_eq!(found.hold_out(&curve).unwrap().blocks_of, "runs");
+        curve.rows.truncate(4);
+        assert_eq!(found.hold_out(&curve), None);
     }
 
     #[test]
@@ -187,18 +245,6 @@ mod tests {
         let held = fit.run(&model("mixture").unwrap(), &curve).unwrap().hold_out(&curve).unwrap();
         assert_eq!((held.score, held.score_sd), (None, None));
         assert!((4.0..8.0).contains(&held.rms_db), "{held:?}");
-    }
-
-    #[test]
-    fn too_few_rows_for_a_part_give_no_score() {
-        let curve = Twin { rows: 6, ..Twin::default() }.curve(3);
-        let fixed =
-            ["diffuse.alpha", "specular.m", "k"].map(|path| (path.to_owned(), 0.5)).to_vec();
-        let fit = Fit { fixed, looks: Some(1.0), starts: 1, ..Fit::default() };
-        if let Ok(found) = fit.run(&model("mixture").unwrap(), &curve) {
-            let held = found.hold_out(&Curve { rows: curve.rows[..2].to_vec() });
-            assert_eq!(held, None);
-        }
     }
 
     #[test]

@@ -69,27 +69,30 @@ struct Nearest {
     residual: f64,
     /// f′·s_θ/s_y there.
     gain: f64,
+    /// f″·s_θ²/s_y there.
+    bend: f64,
 }
 
 /// Most candidates for δ on either side of 0, and how far apart, in standard deviations.
 const CANDIDATES: i32 = 12;
 const APART: f64 = 1.0 / 3.0;
-/// Newton steps, which converge after a handful; the step of their second derivative; the offset that is
-/// no longer worth a step, all in standard deviations.
+/// Newton steps, which converge after a handful; the offset that is no longer worth one, in standard
+/// deviations.
 const STEPS: usize = 30;
-const BEND_STEP: f64 = 1e-3;
 const NEAR: f64 = 1e-8;
 
 fn nearest(table: &Table, row: &Row, deviations: Deviations) -> Nearest {
     let level_db = db_from_ratio(row.sigma0);
+    let Deviations { theta_sd_rad, level_sd_db } = deviations;
     let at = |offset: f64| {
-        let place = Place::new(row.theta_rad + offset * deviations.theta_sd_rad);
-        let residual = (DB_PER_NEPER * table.at(&place) - level_db) / deviations.level_sd_db;
-        let slope = DB_PER_NEPER * table.slope_per_rad(&place);
-        let gain = slope * deviations.theta_sd_rad / deviations.level_sd_db;
-        Nearest { place, offset, residual, gain }
+        let (place, bends) = Place::bending(row.theta_rad + offset * theta_sd_rad);
+        let residual = (DB_PER_NEPER * table.at(&place) - level_db) / level_sd_db;
+        let scale = DB_PER_NEPER * theta_sd_rad / level_sd_db;
+        let gain = scale * table.slope_per_rad(&place);
+        let bend = scale * theta_sd_rad * table.weighted(&place, &bends);
+        Nearest { place, offset, residual, gain, bend }
     };
-    if deviations.theta_sd_rad <= 0.0 {
+    if theta_sd_rad <= 0.0 {
         return at(0.0);
     }
     let cost = |offset: f64| at(offset).residual.powi(2) + offset * offset;
@@ -114,17 +117,14 @@ fn nearest(table: &Table, row: &Row, deviations: Deviations) -> Nearest {
 
 /// The floor of the valley around an offset of known cost.
 fn descend(at: &impl Fn(f64) -> Nearest, offset: f64, cost: f64) -> Nearest {
-    // Half the derivative of the cost by the offset.
-    let slope = |offset: f64| {
-        let Nearest { residual, gain, .. } = at(offset);
-        residual * gain + offset
-    };
     let (mut best, mut least, mut length) = (at(offset), cost, 1.0f64);
     for _ in 0..STEPS {
-        let here = best.residual * best.gain + best.offset;
-        let bend = slope(best.offset + BEND_STEP) - slope(best.offset - BEND_STEP);
-        let bend = bend / (2.0 * BEND_STEP);
-        let newton = -here / if bend > 0.0 { bend } else { 1.0 + best.gain.powi(2) };
+        // Halves of the first two derivatives of the cost by the offset; of the second one without what may
+        // be negative where it is.
+        let slope = best.residual * best.gain + best.offset;
+        let stiff = 1.0 + best.gain.powi(2);
+        let bend = stiff + best.residual * best.bend;
+        let newton = -slope / if bend > 0.0 { bend } else { stiff };
         if newton.abs() < NEAR || length < 1e-6 {
             break;
         }

@@ -26,6 +26,9 @@ static THETA_RAD: LazyLock<Vec<f64>> = LazyLock::new(|| {
     (0..=INTERVALS).map(knot).collect()
 });
 
+/// How fast sinh's argument grows with θ, 1/rad.
+static STRETCH_PER_RAD: LazyLock<f64> = LazyLock::new(|| BETA.sinh() / THETA_END_RAD);
+
 /// ln σ⁰ at every knot.
 #[derive(Clone, Debug)]
 pub(super) struct Table {
@@ -73,7 +76,8 @@ impl Table {
         self.weighted(place, &place.slopes_per_rad)
     }
 
-    fn weighted(&self, place: &Place, weights: &[f64; 4]) -> f64 {
+    /// The sum of the knots around a place with these weights.
+    pub fn weighted(&self, place: &Place, weights: &[f64; 4]) -> f64 {
         let knot = |index: u16| self.knots.get(usize::from(index)).copied().unwrap_or(LN_NOTHING);
         let [a, b, c, d] = place.knots.map(knot);
         weights[0] * a + weights[1] * b + weights[2] * c + weights[3] * d
@@ -83,20 +87,31 @@ impl Table {
 impl Place {
     /// The place of an angle; negative angles are mirrored, angles beyond the last knot take its place.
     pub fn new(theta_rad: f64) -> Place {
-        let theta = theta_rad.abs().min(THETA_END_RAD);
-        let stretched = theta * BETA.sinh() / THETA_END_RAD;
-        let x = stretched.asinh() / BETA * INTERVALS as f64;
+        Place::bending(theta_rad).0
+    }
+
+    /// The same with the weights of the second derivative by θ, 1/rad².
+    pub fn bending(theta_rad: f64) -> (Place, [f64; 4]) {
+        let stretch_per_rad = *STRETCH_PER_RAD;
+        let stretched = theta_rad.abs().min(THETA_END_RAD) * stretch_per_rad;
+        let root = (stretched * stretched + 1.0).sqrt();
+        // asinh without its care for what is small: x matters to a part of a cell.
+        let x = (stretched + root).ln() * (INTERVALS as f64 / BETA);
         let cell = (x as usize).min(INTERVALS - 2);
-        let (weights, slopes) = lagrange(x - cell as f64);
-        let dx_dtheta = BETA.sinh() / (THETA_END_RAD * stretched.hypot(1.0)) / BETA
-            * INTERVALS as f64
-            * if theta_rad < 0.0 { -1.0 } else { 1.0 };
+        let t = x - cell as f64;
+        let (weights, slopes) = lagrange(t);
+        let dx_dtheta = INTERVALS as f64 / BETA * stretch_per_rad / root;
+        let d2x_dtheta2 = -dx_dtheta * stretch_per_rad * stretched / (root * root);
+        let bends = [1.0 - t, 3.0 * t - 2.0, 1.0 - 3.0 * t, t];
+        let bend = |knot: usize| bends[knot] * dx_dtheta * dx_dtheta + slopes[knot] * d2x_dtheta2;
+        let turned = if theta_rad < 0.0 { -dx_dtheta } else { dx_dtheta };
         let below = if cell == 0 { 1 } else { cell - 1 };
-        Place {
+        let place = Place {
             knots: [below, cell, cell + 1, cell + 2].map(|knot| knot as u16),
             weights,
-            slopes_per_rad: slopes.map(|slope| slope * dx_dtheta),
-        }
+            slopes_per_rad: slopes.map(|slope| slope * turned),
+        };
+        (place, [bend(0), bend(1), bend(2), bend(3)])
     }
 }
 
@@ -123,6 +138,26 @@ mod tests {
     use crate::fit::twin::mixture;
 
     const DB_PER_NEPER: f64 = 10.0 / std::f64::consts::LN_10;
+
+    #[test]
+    fn the_derivatives_are_those_of_the_value() {
+        let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002));
+        for theta_rad in [-0.4, -1e-3, 0.0123, 0.071, 0.3, 1.1] {
+            let (place, bends) = Place::bending(theta_rad);
+            let at = |step: f64| table.at(&Place::new(theta_rad + step));
+            let step = 1e-7 * (1.0 + theta_rad.abs());
+            let slope = (at(step) - at(-step)) / (2.0 * step);
+            let found = table.slope_per_rad(&place);
+            assert!((found - slope).abs() < 1e-5 * (1.0 + slope.abs()), "{theta_rad}: {found}");
+            let wide = 1e-5;
+            let bend = (at(wide) - 2.0 * at(0.0) + at(-wide)) / (wide * wide);
+            let found = table.weighted(&place, &bends);
+            assert!(
+                (found - bend).abs() < 1e-2 * (1.0 + bend.abs()),
+                "{theta_rad}: {found} {bend}"
+            );
+        }
+    }
 
     #[test]
     fn interpolation_keeps_a_ten_thousandth_of_a_decibel_up_to_80_degrees() {

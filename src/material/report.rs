@@ -63,7 +63,9 @@ pub struct HeldOut {
     pub folds: u32,
     /// Blocks of neighbouring points that the parts were dealt.
     pub blocks: u32,
-    /// Side of the blocks on the target, m; none where they are runs of consecutive chirps.
+    /// What these are: `squares` of the target, `runs` of consecutive chirps, or single `points`.
+    pub blocks_of: String,
+    /// Side of squares, m; none for others.
     pub block_m: Option<f64>,
     /// Mean ln p of a point, per unit of ln power; none for least squares.
     pub score: Option<f64>,
@@ -189,6 +191,16 @@ pub struct Goodness {
 }
 
 impl HeldOut {
+    /// What the blocks are, in words.
+    pub fn of(&self) -> String {
+        match (self.blocks_of.as_str(), self.block_m) {
+            ("squares", Some(side_m)) => format!("squares of {:.3} m", side_m),
+            ("runs", _) => "runs of chirps".to_owned(),
+            ("points", _) => "single points".to_owned(),
+            (other, _) => other.to_owned(),
+        }
+    }
+
     fn numbers(&self) -> impl Iterator<Item = f64> {
         [self.block_m, self.score, self.score_sd, Some(self.rms_db)].into_iter().flatten()
     }
@@ -313,6 +325,7 @@ mod tests {
             held_out: Some(HeldOut {
                 folds: 5,
                 blocks: 9,
+                blocks_of: "squares".to_owned(),
                 block_m: Some(0.05),
                 score: Some(-1.2),
                 score_sd: Some(0.1),

@@ -31,6 +31,7 @@ impl Material {
         self.tags.iter().for_each(|tag| take("tags", tag));
         for source in &self.sources {
             take("a key of a source", &source.key);
+            take("title of a source", &source.title);
             source.citation.authors.iter().for_each(|author| take("authors", author));
         }
         for instrument in &self.instruments {
@@ -89,7 +90,6 @@ impl Material {
         for source in &self.sources {
             let citation = &source.citation;
             for (what, text) in [
-                ("title", Some(&source.title)),
                 ("doi", source.doi.as_ref()),
                 ("url", source.url.as_ref()),
                 ("licence", source.licence.as_ref()),
@@ -127,6 +127,7 @@ impl FitReport {
         let own = [&self.method, &self.stop, &self.version].into_iter().chain(&self.gauge);
         let names = self.estimates.iter().map(|estimate| &estimate.name);
         let given = self.given.iter().map(|given| &given.name);
+        let own = own.chain(self.held_out.iter().map(|held| &held.blocks_of));
         own.chain(&self.verdict).chain(names).chain(given).for_each(|text| take(place, text));
     }
 }

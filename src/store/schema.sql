@@ -450,16 +450,7 @@ WHERE NOT EXISTS (SELECT 1 FROM fit_parameter AS p
 CREATE VIEW v_findings AS
 SELECT slug, number AS revision, effect, verdict, fit_before, fit_after, gain, placebo_gain, p,
     score_difference, score_difference_sd, size_db, rms_before_db, rms_after_db, confusable_with,
-    source.title AS source,
-    (SELECT json_group_array(title) FROM (
-        SELECT DISTINCT other_source.title AS title FROM finding AS other
-        JOIN revision AS other_revision ON other_revision.id = other.revision_id
-        JOIN source AS other_source
-            ON other_source.revision_id = other.revision_id AND other_source.key = other.source
-        WHERE other_revision.material_id = material.id AND other.effect = finding.effect
-            AND other.verdict = 'found' AND finding.verdict = 'found'
-            AND other_source.title <> source.title
-        ORDER BY title)) AS replicated_on
+    source.title AS source
 FROM material JOIN revision ON material_id = material.id AND number = current_revision
 JOIN finding ON finding.revision_id = revision.id
 JOIN source ON source.revision_id = revision.id AND source.key = finding.source;
@@ -510,7 +501,7 @@ INSERT INTO unit VALUES ('frequency_min_hz', 'Hz', 'lowest frequency for which t
 
 INSERT INTO unit VALUES ('gain', '1', 'gain in ln likelihood by an effect');
 
-INSERT INTO unit VALUES ('held_out_folds', '1', 'folds that took turns at being held out; NULL: not tried');
+INSERT INTO unit VALUES ('held_out_folds', '1', 'folds that took turns at being held out; NULL: not tried or not possible');
 
 INSERT INTO unit VALUES ('held_out_rms_db', 'dB', 'root mean square of held-out detections over the model fitted to the others');
 

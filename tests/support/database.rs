@@ -209,6 +209,7 @@ pub fn placed(slug: &str) -> Material {
     material.fits[0].report.as_mut().unwrap().held_out = Some(HeldOut {
         folds: 5,
         blocks: 20,
+        blocks_of: "squares".to_owned(),
         block_m: Some(0.05),
         score: Some(-1.5),
         score_sd: Some(0.01),

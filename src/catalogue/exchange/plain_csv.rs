@@ -15,7 +15,7 @@ use crate::formats::FormatError;
 use crate::material::{
     Citation, Curve, Instrument, Material, Observation, Slug, Source, SourceKind, Status, file,
 };
-use crate::units::db_from_ratio;
+use crate::units::{db_from_ratio, shown};
 
 /// Key of the instrument that a curve was measured with.
 pub(super) const RADAR: &str = "radar";
@@ -26,16 +26,16 @@ pub(super) fn write(subject: &Subject, name: &str) -> Exported {
     let mut text: String = subject.about().iter().map(|line| format!("# {line}\n")).collect();
     text += &format!("# {}, at {} GHz\n", what(&points), points.frequency_hz / 1e9);
     text += "theta_deg,sigma0_db,censor,threshold_db,theta_r_deg,delta_phi_deg\n";
-    let db = |level: Option<f64>| level.map(|l| db_from_ratio(l).to_string()).unwrap_or_default();
+    let db = |level: Option<f64>| level.map(|l| digits(db_from_ratio(l))).unwrap_or_default();
     for point in points.observations.iter() {
         text += &format!(
             "{},{},{},{},{},{}\n",
-            point.theta_i_rad.to_degrees(),
+            digits(point.theta_i_rad.to_degrees()),
             db(point.sigma0),
             point.censor.as_str(),
             db(point.threshold_sigma0),
-            point.theta_r_rad.to_degrees(),
-            point.delta_phi_rad.to_degrees(),
+            digits(point.theta_r_rad.to_degrees()),
+            digits(point.delta_phi_rad.to_degrees()),
         );
     }
     let lost = format!(
@@ -43,6 +43,11 @@ pub(super) fn write(subject: &Subject, name: &str) -> Exported {
         what(&points)
     );
     Exported { files: vec![(name.to_owned(), text.into_bytes())], lost }
+}
+
+/// Fifteen digits, as many as decimals that somebody wrote keep on their way through radians and ratios.
+fn digits(value: f64) -> String {
+    shown(format!("{value:.14e}").parse::<f64>().unwrap_or(value) + 0.0)
 }
 
 /// Which numbers these are, in a clause.

@@ -195,10 +195,7 @@ fn products(fit: &Fit) -> Vec<ProductView> {
 }
 
 fn held_out(held: &HeldOut) -> String {
-    let of = match held.block_m {
-        Some(block_m) => format!("squares of {} m", digits(block_m)),
-        None => "runs of chirps".to_owned(),
-    };
+    let of = held.of();
     let score = held.score.zip(held.score_sd).map_or(String::new(), |(score, sd)| {
         format!("; mean ln p of a point {score:.4} ± {sd:.4}")
     });
@@ -236,7 +233,10 @@ fn report(report: &FitReport) -> ReportView {
                 digits(g.ks_distance)
             ),
         ),
-        ("Points held out", report.held_out.as_ref().map_or("not tried".to_owned(), held_out)),
+        (
+            "Points held out",
+            report.held_out.as_ref().map_or("not tried, or not possible".to_owned(), held_out),
+        ),
         ("Singular values", list(&report.singular_values)),
         ("Data, BLAKE3", report.data_hash.clone()),
         ("Seed and program", format!("{}, matdb {}", report.seed, report.version)),

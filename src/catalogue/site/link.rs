@@ -1,5 +1,6 @@
 //! What may be clicked: addresses of the web, and DOIs through their resolver.
 
+use crate::catalogue::About;
 use crate::material::Source;
 
 /// Where a source can be followed to, and the words of the link.
@@ -12,7 +13,16 @@ pub(super) struct Link {
 
 /// The link of a source, if it has a DOI or an address.
 pub(super) fn of(source: &Source) -> Option<Link> {
-    match (&source.doi, &source.url) {
+    first(&source.doi, &source.url)
+}
+
+/// Where a catalogue stands, if it has a DOI or an address.
+pub(super) fn to_catalogue(about: &About) -> Option<Link> {
+    first(&about.doi, &about.url)
+}
+
+fn first(doi: &Option<String>, url: &Option<String>) -> Option<Link> {
+    match (doi, url) {
         (Some(doi), _) => Some(Link { text: format!("doi:{doi}"), href: doi_href(doi) }),
         (None, Some(url)) => Some(Link { text: url.clone(), href: web(url) }),
         (None, None) => None,

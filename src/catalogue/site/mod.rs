@@ -94,7 +94,7 @@ impl<'a> Site<'a> {
         let context = json!({
             "about": self.about, "root": "", "portions": self.portions, "record": record,
             "materials": self.materials, "angles_deg": levels::SMALL_DEG, "title": cut(&self.about.title, 80),
-            "cite": cite::catalogue(self.about),
+            "cite": cite::catalogue(self.about), "home": link::to_catalogue(self.about),
         });
         for page in ["index.html", "compare.html"] {
             folder.write(page, self.templates.page(page, &context)?.as_bytes())?;

@@ -110,11 +110,8 @@ fn goodness(goodness: &Goodness) -> String {
 
 /// How the fit did on points that it had not seen.
 fn held_out(held: &HeldOut) -> String {
-    let HeldOut { folds, blocks, block_m, score, score_sd, rms_db, .. } = held;
-    let of = match block_m {
-        Some(block_m) => format!("squares of {} m", digits(*block_m)),
-        None => "runs of chirps".to_owned(),
-    };
+    let HeldOut { folds, blocks, score, score_sd, rms_db, .. } = held;
+    let of = held.of();
     let score = score
         .zip(*score_sd)
         .map_or(String::new(), |(score, sd)| format!(", ln p {score:.4} ± {sd:.4} a point"));

@@ -182,7 +182,8 @@ fn held_out(old: &HeldOut, found: &FitResult, curve: &Curve) -> Option<String> {
         };
         same_score
             && is_near(old.rms_db, new.rms_db, SAME_LEVEL_DB)
-            && (old.folds, old.blocks, &old.fold_hash) == (new.folds, new.blocks, &new.fold_hash)
+            && (old.folds, old.blocks, &old.blocks_of, old.block_m, &old.fold_hash)
+                == (new.folds, new.blocks, &new.blocks_of, new.block_m, &new.fold_hash)
     });
     (!is_same)
         .then(|| "its score on held-out points is not the one that a new fit gives".to_owned())
