@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
+use super::backscatter::Term;
 use super::parameter::{Visitor, visit_number};
 use super::{Scattering, half_vector};
 use crate::frames::{Direction, Surface};
@@ -33,6 +34,10 @@ impl Scattering for BlinnPhong {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         let n_h = half_vector(i, o).cos_theta();
         self.r_s * (self.alpha + 2.0) / TAU * n_h.powf(self.alpha)
+    }
+
+    fn backscatter(&self) -> Option<Vec<Term>> {
+        Some(vec![Term::diffuse(self.r_s * (self.alpha + 2.0) / TAU, self.alpha)])
     }
 }
 

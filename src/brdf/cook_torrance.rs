@@ -16,6 +16,7 @@ use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
 
+use super::backscatter::{Facets, Term};
 use super::parameter::{Visitor, visit_number};
 use super::{Scattering, half_vector};
 use crate::frames::{Direction, Surface};
@@ -109,6 +110,15 @@ impl Scattering for CookTorrance {
         let d = self.d_per_sr(h);
         let f = self.fresnel(o.xyz().dot(h.xyz()));
         f * d * self.shadowing(i, o) / (4.0 * i.cos_theta() * o.cos_theta())
+    }
+
+    fn backscatter(&self) -> Option<Vec<Term>> {
+        let shadowed = match self.shadowing {
+            Shadowing::Separable => 2,
+            Shadowing::Correlated => 1,
+        };
+        let facets = Facets { m: self.m, distribution: self.distribution, shadowed };
+        self.m_across.is_none().then(|| vec![Term::mirrors(self.f_lambda, facets)])
     }
 }
 

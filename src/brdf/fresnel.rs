@@ -13,10 +13,11 @@
 use serde::{Deserialize, Serialize};
 
 use super::Scattering;
+use super::backscatter::Term;
 use super::parameter::Visitor;
 use super::permittivity::{
-    LOBE_RANGE_RAD, default_lobe_rad, fresnel_reflectance, mirror_lobe_per_sr, permittivity,
-    visit_permittivity, visit_quantity,
+    LOBE_RANGE_RAD, default_lobe_rad, fresnel_reflectance, mirror_lobe, mirror_lobe_per_sr,
+    permittivity, visit_permittivity, visit_quantity,
 };
 use crate::frames::{Direction, Surface};
 
@@ -51,6 +52,10 @@ impl Scattering for Fresnel {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         let eps = permittivity(self.eps_real, self.eps_imag);
         mirror_lobe_per_sr(i, o, self.lobe_rad, |cos| fresnel_reflectance(eps, cos))
+    }
+
+    fn backscatter(&self) -> Option<Vec<Term>> {
+        Some(vec![mirror_lobe(self.lobe_rad, self.reflectance(0.0))])
     }
 }
 

@@ -10,6 +10,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::backscatter::{Facets, Term};
 use super::parameter::{Visitor, visit_number};
 use super::permittivity::{fresnel_reflectance, mirror_cosine, permittivity, visit_permittivity};
 use super::{Distribution, Scattering, half_vector};
@@ -42,6 +43,13 @@ impl Scattering for KirchhoffGo {
         let eps = permittivity(self.eps_real, self.eps_imag);
         let reflectance = fresnel_reflectance(eps, mirror_cosine(i, o));
         reflectance * d_per_sr / (4.0 * i.cos_theta() * o.cos_theta())
+    }
+
+    fn backscatter(&self) -> Option<Vec<Term>> {
+        let m = std::f64::consts::SQRT_2 * self.rms_slope;
+        let facets = Facets { m, distribution: Distribution::Beckmann, shadowed: 0 };
+        let eps = permittivity(self.eps_real, self.eps_imag);
+        Some(vec![Term::mirrors(fresnel_reflectance(eps, 1.0), facets)])
     }
 }
 

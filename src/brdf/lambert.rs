@@ -6,6 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Scattering;
+use super::backscatter::Term;
 use super::parameter::{Visitor, visit_number};
 use crate::frames::{Direction, Surface};
 
@@ -26,5 +27,9 @@ impl Lambert {
 impl Scattering for Lambert {
     fn f_per_sr(&self, _i: Direction<Surface>, _o: Direction<Surface>) -> f64 {
         self.albedo / std::f64::consts::PI
+    }
+
+    fn backscatter(&self) -> Option<Vec<Term>> {
+        Some(vec![Term::diffuse(self.albedo / std::f64::consts::PI, 0.0)])
     }
 }

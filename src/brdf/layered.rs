@@ -15,9 +15,10 @@ use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 
 use super::Scattering;
+use super::backscatter::Term;
 use super::parameter::Visitor;
 use super::permittivity::{
-    LOBE_RANGE_RAD, Polarisation, default_lobe_rad, interface, mirror_lobe_per_sr,
+    LOBE_RANGE_RAD, Polarisation, default_lobe_rad, interface, mirror_lobe, mirror_lobe_per_sr,
     normal_wavenumber, permittivity, unpolarised, visit_permittivity, visit_quantity,
 };
 use crate::frames::{Direction, Surface};
@@ -120,6 +121,10 @@ fn step_up(boundary: Complex<f64>, from_below: Complex<f64>) -> Complex<f64> {
 impl Scattering for Layered {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         mirror_lobe_per_sr(i, o, self.lobe_rad, |cos| self.reflectance_at(cos))
+    }
+
+    fn backscatter(&self) -> Option<Vec<Term>> {
+        Some(vec![mirror_lobe(self.lobe_rad, self.reflectance_at(1.0))])
     }
 }
 

@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::backscatter::{Term, together};
 use super::parameter::{Visitor, visit_number};
 use super::{Brdf, Scattering, specular_share};
 use crate::frames::{Direction, Surface};
@@ -37,5 +38,9 @@ impl Scattering for Mixture {
     fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         let parts = [(self.k, &*self.diffuse), (1.0 - self.k, &*self.specular)];
         specular_share(parts.into_iter(), i, o)
+    }
+
+    fn backscatter(&self) -> Option<Vec<Term>> {
+        together([(self.k, &*self.diffuse), (1.0 - self.k, &*self.specular)].into_iter())
     }
 }

@@ -24,6 +24,7 @@
 //! assert!((chalk.sigma0(60f64.to_radians()) - 0.8).abs() < 1e-12);
 //! ```
 
+mod backscatter;
 mod blinn_phong;
 mod cook_torrance;
 mod directive;
@@ -43,6 +44,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::frames::{Direction, Surface};
 
+pub use backscatter::{Facets, Term};
 pub use blinn_phong::BlinnPhong;
 pub use cook_torrance::{CookTorrance, Distribution, Shadowing};
 pub use directive::Directive;
@@ -76,6 +78,11 @@ pub trait Scattering: Sync {
     fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         let _ = (i, o);
         0.0
+    }
+
+    /// f in exact backscatter as a sum of closed forms; none for a law with a grain, or that has no such sum.
+    fn backscatter(&self) -> Option<Vec<Term>> {
+        None
     }
 
     /// f in exact backscatter at incidence `theta_rad`, 1/sr.
@@ -210,6 +217,20 @@ impl Scattering for Brdf {
             Brdf::Kirchhoff(_) | Brdf::KirchhoffGo(_) => 1.0,
             Brdf::Mixture(model) => model.specular_share(i, o),
             Brdf::Sum(model) => model.specular_share(i, o),
+        }
+    }
+
+    fn backscatter(&self) -> Option<Vec<Term>> {
+        match self {
+            Brdf::Lambert(model) => model.backscatter(),
+            Brdf::BlinnPhong(model) => model.backscatter(),
+            Brdf::CookTorrance(model) => model.backscatter(),
+            Brdf::Mixture(model) => model.backscatter(),
+            Brdf::Sum(model) => model.backscatter(),
+            Brdf::Fresnel(model) => model.backscatter(),
+            Brdf::Layered(model) => model.backscatter(),
+            Brdf::KirchhoffGo(model) => model.backscatter(),
+            Brdf::Tabulated(_) | Brdf::Kirchhoff(_) | Brdf::Directive(_) => None,
         }
     }
 }

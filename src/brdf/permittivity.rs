@@ -6,6 +6,7 @@
 
 use nalgebra::Complex;
 
+use super::backscatter::{Facets, Term};
 use super::parameter::{Parameter, Visitor, visit_number};
 use super::{Distribution, half_vector};
 use crate::frames::{Direction, Surface};
@@ -113,6 +114,12 @@ pub(super) fn mirror_lobe_per_sr(
     }
     let g = law.g1(i.cos_theta(), lobe_rad) * law.g1(o.cos_theta(), lobe_rad);
     reflectance(mirror_cosine(i, o)) * d_per_sr * g / (4.0 * i.cos_theta() * o.cos_theta())
+}
+
+/// The same in backscatter, for the reflectance at normal incidence.
+pub(super) fn mirror_lobe(lobe_rad: f64, reflectance: f64) -> Term {
+    let distribution = Distribution::Beckmann;
+    Term::mirrors(reflectance, Facets { m: lobe_rad, distribution, shadowed: 2 })
 }
 
 /// Cosine of the angle at which a facet mirrors i into o, √((1 + i·o)/2): the same from both ends.

@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
+use super::backscatter::{Term, together};
 use super::parameter::Visitor;
 use super::{Brdf, Scattering, specular_share};
 use crate::frames::{Direction, Surface};
@@ -33,6 +34,10 @@ impl Scattering for Sum {
 
     fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         specular_share(self.parts.iter().map(|part| (1.0, part)), i, o)
+    }
+
+    fn backscatter(&self) -> Option<Vec<Term>> {
+        together(self.parts.iter().map(|part| (1.0, part)))
     }
 }
 

@@ -93,28 +93,33 @@ impl Detector {
         match &self.kind {
             Kind::Beat(beat) => {
                 let peak = beat.processor.peak(&self.mean_profile_w(beat, chirp, paths)?);
-                Ok(peak.map(|peak| self.passed(paths, peak)))
+                let mean_w = paths.iter().map(|path| path.power_w).sum();
+                Ok(peak.map(|peak| self.passed(mean_w, peak)))
             }
             _ if paths.is_empty() => Ok(None),
-            Kind::Exact => Ok(Some(self.passed(paths, sum(paths)))),
-            Kind::Laws { law, speckle, range_sd_m } => {
-                let Detection { range_m, power_w } = sum(paths);
-                if power_w == 0.0 {
-                    // Nothing comes back, and no range is read from noise alone.
-                    return Ok(Some(Detection { range_m, power_w }));
-                }
-                let mut draws = self.draws(chirp, Purpose::Speckle);
-                let linear_w = measured_w(power_w, law.noise_w, *speckle, &mut draws);
-                let power_w = self.saturating.passed_w(power_w + law.noise_w, linear_w);
-                let error_m = range_sd_m * self.draws(chirp, Purpose::Range).gaussian();
-                Ok(Some(Detection { range_m: range_m + error_m, power_w }))
-            }
+            _ => Ok(Some(self.measured(chirp, sum(paths)))),
         }
     }
 
-    /// What a receiver that saturates makes of a power whose mean is that of these paths.
-    fn passed(&self, paths: &[Path], linear: Detection) -> Detection {
-        let mean_w: f64 = paths.iter().map(|path| path.power_w).sum();
+    /// What a receiver without beat signals makes of a chirp whose mean is this.
+    pub fn measured(&self, chirp: usize, mean: Detection) -> Detection {
+        let Kind::Laws { law, speckle, range_sd_m } = &self.kind else {
+            return self.passed(mean.power_w, mean);
+        };
+        let Detection { range_m, power_w } = mean;
+        if power_w == 0.0 {
+            // Nothing comes back, and no range is read from noise alone.
+            return mean;
+        }
+        let mut draws = self.draws(chirp, Purpose::Speckle);
+        let linear_w = measured_w(power_w, law.noise_w, *speckle, &mut draws);
+        let power_w = self.saturating.passed_w(power_w + law.noise_w, linear_w);
+        let error_m = range_sd_m * self.draws(chirp, Purpose::Range).gaussian();
+        Detection { range_m: range_m + error_m, power_w }
+    }
+
+    /// What a receiver that saturates makes of a power of this mean.
+    fn passed(&self, mean_w: f64, linear: Detection) -> Detection {
         // Noise alone has no other mean than itself.
         let mean_w = if mean_w > 0.0 { mean_w } else { linear.power_w };
         Detection { power_w: self.saturating.passed_w(mean_w, linear.power_w), ..linear }

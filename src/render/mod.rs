@@ -9,8 +9,10 @@
 //! | … with the physical effects that are declared | `acting.rs` |
 //! | what the receiver makes of it, and what caused that | `detect.rs`, `echo.rs` |
 //! | image and point cloud | `image.rs`, `cloud.rs` |
+//! | many scans at once, on a graphics processor | `batch.rs` |
 
 mod acting;
+mod batch;
 mod bounce;
 mod cloud;
 mod detect;
@@ -39,6 +41,7 @@ use echo::Echoes;
 use path::Paths;
 
 pub use acting::Facing;
+pub use batch::{Batch, Take, Takes};
 pub use bounce::Bounce;
 pub use cloud::cloud_table;
 pub use echo::{Echo, Truth};
@@ -146,6 +149,12 @@ pub enum RenderError {
          paths; set it to 0, or set spot.rays = 1 and remove [bounce]"
     )]
     Coherent,
+    /// A receiver works on beat signals, and a batch has powers.
+    #[error(
+        "a batch of scans has no beat signals for a [radar.receiver]; remove it, or render the scans one \
+         by one"
+    )]
+    Signals,
     /// An effect that would count twice, or that cannot be had.
     #[error("effect `{effect}` {problem}; {way_out}")]
     Effect {

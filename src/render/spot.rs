@@ -7,7 +7,7 @@
 
 use std::f64::consts::{LN_2, TAU};
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::acting::{Facing, Meeting};
@@ -126,12 +126,10 @@ impl Rays<'_> {
     ) -> Result<Vec<T>, TraceError> {
         let beam = Beam::new(self.radar);
         let count = self.rays_per_chirp;
-        let spot = |(offset, range_m): (usize, &Option<f64>)| {
-            let axis = &self.chirps.rays[first + offset];
-            // The spot is as wide as the beam where its axis meets the target, or at 8 m.
-            let range_m = range_m.unwrap_or(PATTERN_RANGE_M);
-            let tangent = beam.diameter_along_m(axis, range_m) / range_m;
-            sub_rays(axis, tangent, first + offset, count)
+        let spot = |(offset, &range_m): (usize, &Option<f64>)| {
+            let chirp = first + offset;
+            let spot = Spot::met(&beam, &self.chirps.rays[chirp], range_m, chirp, count);
+            (0..count).map(move |sample| spot.ray(sample))
         };
         let rays: Vec<Option<Ray<Global>>> =
             ranges_m.par_iter().enumerate().flat_map_iter(spot).collect();
@@ -159,25 +157,71 @@ fn edge_distances_m(
     edges::distances_m(&looks, radar.spot_diameter_m, SPOTS * radar.spot_diameter_m)
 }
 
-/// Rays through the spot; `tangent` is its diameter over the range, `chirp` turns the pattern so
-/// that neighbouring chirps do not repeat it.
-fn sub_rays(
-    axis: &Ray<Global>,
+/// The rays through the spot of one chirp.
+#[derive(Clone, Copy)]
+pub(super) struct Spot {
+    pub axis: Ray<Global>,
+    /// Unit vectors at right angles to the axis.
+    right: DVec3,
+    up: DVec3,
+    /// Diameter over range.
     tangent: f64,
+    /// Turns the pattern, so that neighbouring chirps do not repeat it.
     chirp: usize,
     count: usize,
-) -> impl Iterator<Item = Option<Ray<Global>>> {
-    let forward = axis.direction.xyz();
-    let (right, up) = across(forward);
-    let origin = axis.origin;
-    (0..count).map(move |sample| {
-        let share = (sample as f64 + 0.5) / count as f64;
-        // The share of a Gaussian's power within r is 1 − 2^(−(2r/D)²).
-        let radius = 0.5 * tangent * (-(1.0 - share).ln() / LN_2).sqrt();
+}
+
+impl Spot {
+    /// As wide as the beam where its axis meets the target, or at 8 m; a single ray is the axis.
+    pub fn met(
+        beam: &Beam,
+        axis: &Ray<Global>,
+        range_m: Option<f64>,
+        chirp: usize,
+        count: usize,
+    ) -> Spot {
+        let range_m = range_m.unwrap_or(PATTERN_RANGE_M);
+        let tangent = match count {
+            1 => 0.0,
+            _ => beam.diameter_along_m(axis, range_m) / range_m,
+        };
+        Spot::new(axis, tangent, chirp, count)
+    }
+
+    fn new(axis: &Ray<Global>, tangent: f64, chirp: usize, count: usize) -> Spot {
+        let (right, up) = across(axis.direction.xyz());
+        Spot { axis: *axis, right, up, tangent, chirp, count }
+    }
+
+    /// The ray of a sample.
+    pub fn ray(&self, sample: usize) -> Option<Ray<Global>> {
+        let Spot { axis: Ray { origin, direction }, right, up, tangent, chirp, count } = *self;
+        let radius = 0.5 * tangent * radius(sample, count);
         let turn = TAU * ((chirp + sample) as f64 * GOLDEN).fract();
         let aside = radius * (turn.cos() * right + turn.sin() * up);
-        Direction::new(forward + aside).map(|direction| Ray { origin, direction })
-    })
+        Direction::new(direction.xyz() + aside).map(|direction| Ray { origin, direction })
+    }
+
+    /// What the coordinates of one of [`samples`] add to the axis's unit vector.
+    pub fn across(&self) -> [DVec3; 2] {
+        let Spot { right, up, tangent, chirp, .. } = *self;
+        let (sin, cos) = (TAU * (chirp as f64 * GOLDEN).fract()).sin_cos();
+        [cos * right + sin * up, cos * up - sin * right].map(|unit| 0.5 * tangent * unit)
+    }
+}
+
+/// The samples of the first chirp's spot, in halves of its diameter.
+pub(super) fn samples(count: usize) -> Vec<DVec2> {
+    let place =
+        |sample| radius(sample, count) * DVec2::from_angle(TAU * (sample as f64 * GOLDEN).fract());
+    (0..count).map(place).collect()
+}
+
+/// Distance of a sample from the axis, in halves of the spot's diameter.
+fn radius(sample: usize, count: usize) -> f64 {
+    let share = (sample as f64 + 0.5) / count as f64;
+    // The share of a Gaussian's power within r is 1 − 2^(−(2r/D)²).
+    (-(1.0 - share).ln() / LN_2).sqrt()
 }
 
 /// Two unit vectors across a third, all at right angles.
@@ -197,9 +241,10 @@ mod tests {
     }
 
     fn radii_m(count: usize) -> Vec<f64> {
-        sub_rays(&axis(), 0.016 / 8.0, 3, count)
-            .map(|ray| {
-                let direction = ray.unwrap().direction.xyz();
+        let spot = Spot::new(&axis(), 0.016 / 8.0, 3, count);
+        (0..count)
+            .map(|sample| {
+                let direction = spot.ray(sample).unwrap().direction.xyz();
                 8.0 * direction.x.hypot(direction.y) / -direction.z
             })
             .collect()
@@ -221,9 +266,21 @@ mod tests {
 
     #[test]
     fn the_samples_are_centred() {
-        let sum = sub_rays(&axis(), 0.002, 0, 1000)
-            .flatten()
-            .fold(DVec3::ZERO, |sum, ray| sum + ray.direction.xyz());
+        let spot = Spot::new(&axis(), 0.002, 0, 1000);
+        let rays = (0..1000).filter_map(|sample| spot.ray(sample));
+        let sum = rays.fold(DVec3::ZERO, |sum, ray| sum + ray.direction.xyz());
         assert!((sum / 1000.0).truncate().length() < 0.002 / 100.0);
+    }
+
+    #[test]
+    fn the_samples_are_those_of_the_rays() {
+        let spot = Spot::new(&axis(), 0.002, 12_345, 100);
+        let [right, up] = spot.across();
+        for (number, sample) in samples(100).into_iter().enumerate() {
+            let aside = sample.x * right + sample.y * up;
+            let expected = Direction::<Global>::new(axis().direction.xyz() + aside).unwrap();
+            let found = spot.ray(number).unwrap().direction;
+            assert!(found.xyz().distance(expected.xyz()) < 1e-13);
+        }
     }
 }

@@ -115,10 +115,15 @@ impl Boxes {
 
     /// Distance at which the ray reaches the sphere around the facets, m; f32 is precise from there.
     pub(super) fn entry_m(&self, ray: &Ray<Global>) -> Option<f64> {
+        self.entry_beside_m(ray, 0.0)
+    }
+
+    /// The same of a sphere that is larger by `beside_m`.
+    pub(super) fn entry_beside_m(&self, ray: &Ray<Global>, beside_m: f64) -> Option<f64> {
         let to_centre = self.centre - ray.origin.xyz;
         let along_m = to_centre.dot(ray.direction.xyz());
         let beside2 = (to_centre - along_m * ray.direction.xyz()).length_squared();
-        let radius_m = self.radius_m * (1.0 + PADDING);
+        let radius_m = (self.radius_m + beside_m) * (1.0 + PADDING);
         let half_chord_m = (radius_m * radius_m - beside2).max(0.0).sqrt();
         let reached = beside2 <= radius_m * radius_m && along_m + half_chord_m > 0.0;
         reached.then(|| (along_m - half_chord_m).max(0.0))

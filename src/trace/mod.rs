@@ -19,6 +19,7 @@ use crate::frames::{Global, Point};
 
 pub use bvh::Bvh;
 pub use gpu::{Answer, Gpu, GpuError, Held};
+pub(crate) use gpu::{Cone, Lit, RAYS_PER_SHARE, Share};
 pub use inside::winding_number;
 pub use pinhole::{Fan, NoFan};
 pub use tracer::{TraceError, Tracer, closest};

@@ -1,12 +1,12 @@
 // The nearest facet of every ray, in f32 with bounds of its rounding; one invocation for each ray.
 //
 // Lengths are in radii of the sphere around the mesh, and its centre is the origin: every coordinate
-// and depth is at most 2.1. Depth is the path along the axis on which a ray's direction is 1 or -1.
+// and depth is at most 2.1 times the ray's `size`, which is 1 or little more. Depth is the path along the axis on which a ray's direction is 1 or -1.
 //
 // Let n = 2^-24. A corner from the ray's origin errs by 4.2 n: n and 1.1 n are in what comes in, 2.1 n in
 // the difference. Sheared along the ray, whose slopes err by n, it errs by 17 n; below that is 24 n.
 // An edge form is the difference of two products of such coordinates, the largest being m: it errs by
-// less than 4 (m + 2 d) (d + n m), with d for 24 n. No bound minds whether a product is fused with a sum.
+// less than 4 (m + 2 d) (d + n m), with d for 24 n. All bounds grow with `size`. No bound minds whether a product is fused with a sum.
 
 const ROUNDING: f32 = 5.9604645e-8;
 const BESIDE_ERROR: f32 = 24.0 * ROUNDING;
@@ -39,11 +39,11 @@ struct Ray {
     /// An answer that is known already, or 0.
     known: u32,
     direction: vec3f,
-    unused: u32,
+    size: f32,
 }
 
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;
-/// Three of each leaf entry.
+/// Three of each leaf entry; their fourth components are the unit normal.
 @group(0) @binding(1) var<storage, read> corners: array<vec4f>;
 @group(0) @binding(2) var<storage, read> rays: array<Ray>;
 @group(0) @binding(3) var<storage, read_write> answers: array<u32>;
@@ -145,13 +145,14 @@ fn meet(ray: Ray, entry: u32, met: ptr<function, Met>) {
     let edges = vec3f(q.x * r.y - q.y * r.x, r.x * p.y - r.y * p.x, p.x * q.y - p.y * q.x);
     let farthest = max(max(abs(p), abs(q)), abs(r));
     let most = max(farthest.x, farthest.y);
-    let doubt = 4.0 * (most + 2.0 * BESIDE_ERROR) * (BESIDE_ERROR + ROUNDING * most);
+    let beside = BESIDE_ERROR * ray.size;
+    let doubt = 4.0 * (most + 2.0 * beside) * (beside + ROUNDING * most);
     let least = min(min(edges.x, edges.y), edges.z);
     let greatest = max(max(edges.x, edges.y), edges.z);
     if least < -doubt && greatest > doubt {
         return;
     }
-    let depth = bounds(vec3f(a.z, b.z, c.z) * direction.z, edges, doubt);
+    let depth = bounds(vec3f(a.z, b.z, c.z) * direction.z, edges, doubt, DEPTH_ERROR * ray.size);
     if depth.y < 0.0 {
         return;
     }
@@ -165,7 +166,7 @@ fn meet(ray: Ray, entry: u32, met: ptr<function, Met>) {
 
 /// The depths between which a facet is met. Each corner weighs what its edge form is of their sum, and that
 /// errs by 4.1 times the doubt over the sum. A facet seen edge-on is met between its corners.
-fn bounds(corners: vec3f, edges: vec3f, doubt: f32) -> vec2f {
+fn bounds(corners: vec3f, edges: vec3f, doubt: f32, depth_error: f32) -> vec2f {
     var low = min(min(corners.x, corners.y), corners.z);
     var high = max(max(corners.x, corners.y), corners.z);
     let sum = edges.x + edges.y + edges.z;
@@ -176,5 +177,5 @@ fn bounds(corners: vec3f, edges: vec3f, doubt: f32) -> vec2f {
         low = max(low, depth - error);
         high = min(high, depth + error);
     }
-    return vec2f(low - DEPTH_ERROR, high + DEPTH_ERROR);
+    return vec2f(low - depth_error, high + depth_error);
 }

@@ -1,4 +1,4 @@
-//! All that knows `wgpu`: an adapter, buffers in its memory, and the one shader that it runs.
+//! All that knows `wgpu`: an adapter, buffers in its memory, and the two shaders that it runs.
 
 use std::fmt::Display;
 use std::future::Future;
@@ -10,7 +10,7 @@ use std::task::{Context, Poll, Waker};
 use wgpu::BufferUsages as Usage;
 
 use super::GpuError;
-use super::packed::{Aim, Corners, Node};
+use super::packed::{Aim, Corners, Node, Spot};
 
 /// Invocations of a workgroup, as in the shader.
 const WORKGROUP: u64 = 64;
@@ -19,7 +19,8 @@ const WORKGROUP: u64 = 64;
 pub(super) struct Device {
     device: wgpu::Device,
     queue: wgpu::Queue,
-    pipeline: wgpu::ComputePipeline,
+    closest: wgpu::ComputePipeline,
+    echo: wgpu::ComputePipeline,
     adapter: String,
     /// Bytes of the largest buffer.
     most: u64,
@@ -31,6 +32,14 @@ pub(super) struct Device {
 pub(super) struct Tree {
     nodes: wgpu::Buffer,
     corners: wgpu::Buffer,
+}
+
+/// What is on a tree, and how it is lit.
+pub(super) struct Table {
+    regions: wgpu::Buffer,
+    samples: wgpu::Buffer,
+    laws: wgpu::Buffer,
+    terms: wgpu::Buffer,
 }
 
 /// Rays that the device is at work on.
@@ -70,17 +79,23 @@ impl Device {
         let (failed, lost) = (note(&trouble), note(&trouble));
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| failed(&error)));
         device.set_device_lost_callback(move |_, reason| lost(&reason));
-        let module = device.create_shader_module(wgpu::include_wgsl!("closest.wgsl"));
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        let shaders = concat!(include_str!("closest.wgsl"), include_str!("echo.wgsl"));
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: None,
-            layout: None,
-            module: &module,
-            entry_point: None,
-            compilation_options: Default::default(),
-            cache: None,
+            source: wgpu::ShaderSource::Wgsl(shaders.into()),
+        });
+        let [closest, echo] = ["closest", "echo"].map(|entry_point| {
+            device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: None,
+                layout: None,
+                module: &module,
+                entry_point: Some(entry_point),
+                compilation_options: Default::default(),
+                cache: None,
+            })
         });
         let adapter = adapter.get_info().name;
-        let device = Device { device, queue, pipeline, adapter, most, trouble };
+        let device = Device { device, queue, closest, echo, adapter, most, trouble };
         device.untroubled().map(|()| device)
     }
 
@@ -90,8 +105,19 @@ impl Device {
 
     /// Rays of one call, at most `most`.
     pub fn rays_at_once(&self, most: u64) -> usize {
+        self.fitting(most, size_of::<Aim>() as u64, 1)
+    }
+
+    /// Chirps of so many shares of one call, at most `most`.
+    pub fn spots_at_once(&self, most: u64, shares: u64) -> usize {
+        let bytes = (size_of::<Spot>() as u64).max(shares * size_of::<[u32; 3]>() as u64);
+        self.fitting(most, bytes, shares)
+    }
+
+    /// Items of one call, at most `most`, that take so many bytes in a buffer and so many invocations each.
+    fn fitting(&self, most: u64, bytes: u64, invocations: u64) -> usize {
         let groups = u64::from(self.device.limits().max_compute_workgroups_per_dimension);
-        let fit = (self.most / size_of::<Aim>() as u64).min(WORKGROUP * groups);
+        let fit = (self.most / bytes).min(WORKGROUP * groups / invocations);
         most.min(fit).max(1) as usize
     }
 
@@ -107,29 +133,89 @@ impl Device {
         self.untroubled().map(|()| tree)
     }
 
-    /// Sets the device to work.
+    /// What is on a tree: the region of each leaf entry, the samples of a spot, laws and their terms.
+    pub fn table(
+        &self,
+        regions: &[u32],
+        samples: &[[f32; 2]],
+        laws: &[[u32; 2]],
+        terms: &[[u32; 4]],
+    ) -> Result<Table, GpuError> {
+        let parts: [&[u8]; 4] = [
+            bytemuck::cast_slice(regions),
+            bytemuck::cast_slice(samples),
+            bytemuck::cast_slice(laws),
+            bytemuck::cast_slice(terms),
+        ];
+        let needed = parts.iter().map(|part| part.len() as u64).fold(0, u64::max);
+        if needed > self.most {
+            let (adapter, most) = (self.adapter.clone(), self.most);
+            return Err(GpuError::TooMany { adapter, needed, most });
+        }
+        let [regions, samples, laws, terms] = parts.map(|part| self.filled(part));
+        let table = Table { regions: regions?, samples: samples?, laws: laws?, terms: terms? };
+        self.untroubled().map(|()| table)
+    }
+
+    /// Sets the device to work: an answer for each ray.
     pub fn launch(&self, tree: &Tree, aims: &[Aim]) -> Result<Flight, GpuError> {
-        let bytes = (aims.len() * size_of::<u32>()) as u64;
         let rays = self.filled(bytemuck::cast_slice(aims))?;
+        let given = [(0, &tree.nodes), (1, &tree.corners), (2, &rays)];
+        self.start(&self.closest, &given, aims.len() as u64, 1)
+    }
+
+    /// The same: three words for every share of each chirp.
+    pub fn launch_echoes(
+        &self,
+        tree: &Tree,
+        table: &Table,
+        spots: &[Spot],
+        shares: u64,
+    ) -> Result<Flight, GpuError> {
+        let chirps = self.filled(bytemuck::cast_slice(spots))?;
+        let given = [
+            (0, &tree.nodes),
+            (1, &tree.corners),
+            (4, &table.regions),
+            (5, &chirps),
+            (6, &table.samples),
+            (7, &table.laws),
+            (8, &table.terms),
+        ];
+        self.start(&self.echo, &given, spots.len() as u64 * shares, 3)
+    }
+
+    /// So many invocations, each with so many words for an answer.
+    fn start(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        given: &[(u32, &wgpu::Buffer)],
+        invocations: u64,
+        words: u64,
+    ) -> Result<Flight, GpuError> {
+        /// Where the shaders write.
+        const ANSWERS: u32 = 3;
+        let bytes = invocations * words * size_of::<u32>() as u64;
         let found = self.buffer(bytes, Usage::STORAGE | Usage::COPY_SRC)?;
         let answers = self.buffer(bytes, Usage::MAP_READ | Usage::COPY_DST)?;
-        let buffers = [&tree.nodes, &tree.corners, &rays, &found];
-        let entries: Vec<_> = std::iter::zip(0.., buffers)
-            .map(|(binding, buffer)| wgpu::BindGroupEntry {
+        let entries: Vec<_> = given
+            .iter()
+            .chain(&[(ANSWERS, &found)])
+            .map(|&(binding, buffer)| wgpu::BindGroupEntry {
                 binding,
                 resource: buffer.as_entire_binding(),
             })
             .collect();
         let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: None,
-            layout: &self.pipeline.get_bind_group_layout(0),
+            layout: &pipeline.get_bind_group_layout(0),
             entries: &entries,
         });
         let mut encoder = self.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&Default::default());
-        pass.set_pipeline(&self.pipeline);
+        pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups((aims.len() as u64).div_ceil(WORKGROUP) as u32, 1, 1);
+        pass.dispatch_workgroups(invocations.div_ceil(WORKGROUP) as u32, 1, 1);
         drop(pass);
         encoder.copy_buffer_to_buffer(&found, 0, &answers, 0, bytes);
         let submission = self.queue.submit([encoder.finish()]);
@@ -207,19 +293,8 @@ fn line(reason: &dyn Display) -> String {
 mod tests {
     use super::*;
 
-    /// An adapter; `None`, with a word about it, where there is none.
     fn device() -> Option<Device> {
-        match Device::open(u64::MAX) {
-            Ok(device) => Some(device),
-            Err(error) => {
-                assert!(
-                    std::env::var_os("MATDB_NEED_GPU").is_none(),
-                    "MATDB_NEED_GPU is set: {error}"
-                );
-                eprintln!("skipped: {error}");
-                None
-            }
-        }
+        crate::trace::gpu::tests::gpu().map(|gpu| gpu.device)
     }
 
     /// A box without anything in it.
@@ -232,6 +307,10 @@ mod tests {
         let tree = device.hold(&[EMPTY], &[POINT]).unwrap();
         let answers = device.land(device.launch(&tree, &[[7; 8], [9; 8]]).unwrap()).unwrap();
         assert_eq!(answers, [7, 9], "what is known is not asked");
+        let table = device.table(&[0], &[[0.0; 2]], &[[0; 2]], &[[0; 4]]).unwrap();
+        let spots = [[u32::MAX; 16]];
+        let echoes = device.launch_echoes(&tree, &table, &spots, 1).unwrap();
+        assert_eq!(device.land(echoes).unwrap(), [0; 3], "what is known is not asked");
         let flight = device.launch(&tree, &[[7; 8]]).unwrap();
         device.device.destroy();
         let lost = |error: GpuError| {
@@ -242,6 +321,8 @@ mod tests {
         // What was under way may still arrive.
         device.land(flight).map_or_else(lost, |answers| assert_eq!(answers, [7]));
         lost(device.launch(&tree, &[[7; 8]]).err().unwrap());
+        lost(device.launch_echoes(&tree, &table, &spots, 1).err().unwrap());
+        lost(device.table(&[0], &[[0.0; 2]], &[[0; 2]], &[[0; 4]]).err().unwrap());
         lost(device.hold(&[EMPTY], &[POINT]).err().unwrap());
     }
 

@@ -9,11 +9,12 @@
 //! - **The processor decides** in f64 the rays of which the device is not sure: those that pass near
 //!   an edge, and those that meet two facets at almost the same range. For all it measures range and angle.
 //!
-//! So the hits are those of the hierarchy, bit for bit, on any device. Power and sub-rays are
-//! the processor's.
+//! So the hits are those of the hierarchy, bit for bit, on any device. What comes back of them is the device's where
+//! whole scans are wanted and f32 will do (`echo.rs`), else the processor's.
 
 #[cfg(feature = "gpu")]
 mod device;
+mod echo;
 #[cfg(not(feature = "gpu"))]
 mod no_device;
 mod packed;
@@ -27,9 +28,11 @@ use crate::frames::{Global, Ray};
 use packed::NOTHING;
 
 #[cfg(feature = "gpu")]
-use device::{Device, Flight, Tree};
+use device::{Device, Flight, Table, Tree};
 #[cfg(not(feature = "gpu"))]
-use no_device::{Device, Flight, Tree};
+use no_device::{Device, Flight, Table, Tree};
+
+pub use echo::{Cone, Lit, RAYS_PER_SHARE, Share};
 
 /// Rays of one call of the device: enough to occupy it, and not so many that a driver thinks it hangs.
 const RAYS_AT_ONCE: u64 = 1 << 20;
@@ -54,6 +57,19 @@ pub enum GpuError {
         "the mesh takes {needed} bytes in one buffer of `{adapter}`, which has room for {most}; use the tracer `bvh`"
     )]
     TooLarge {
+        /// The device.
+        adapter: String,
+        /// Bytes that are needed.
+        needed: u64,
+        /// Bytes that it has.
+        most: u64,
+    },
+    /// More materials, or more rays in a spot, than the device takes.
+    #[error(
+        "the materials and spots of the scans take {needed} bytes in one buffer of `{adapter}`, which has room for \
+         {most}; give fewer scans at once"
+    )]
+    TooMany {
         /// The device.
         adapter: String,
         /// Bytes that are needed.
@@ -170,7 +186,7 @@ impl<'a> Held<'a> {
         self.each(rays, |_, answer| answer)
     }
 
-    /// What becomes of the answer to every ray. The device has the next rays while the processor sees to these.
+    /// What becomes of the answer to every ray.
     fn each<T: Send>(
         &self,
         rays: &[Ray<Global>],
@@ -186,18 +202,51 @@ impl<'a> Held<'a> {
             (_, Some(&facet)) => Answer::Facet(facet),
             (_, None) => Answer::Unsure,
         };
-        let mut land = |(rays, flight): (&[Ray<Global>], Flight)| -> Result<(), GpuError> {
+        let at_once = self.gpu.device.rays_at_once(RAYS_AT_ONCE);
+        let launch = |rays: &[_]| self.gpu.device.launch(tree, &packed::aims(boxes, rays));
+        in_turns(rays, at_once, launch, |rays, flight| {
             let answers = self.gpu.device.land(flight)?;
             let each = rays.par_iter().zip(answers).with_min_len(1024);
             all.par_extend(each.map(|(ray, code)| then(ray, answer(code))));
             Ok(())
-        };
-        let mut flying = None;
-        for rays in rays.chunks(self.gpu.device.rays_at_once(RAYS_AT_ONCE)) {
-            let next = self.gpu.device.launch(tree, &packed::aims(boxes, rays))?;
-            flying.replace((rays, next)).map_or(Ok(()), &mut land)?;
-        }
-        flying.map_or(Ok(()), land)?;
+        })?;
         Ok(all)
+    }
+}
+
+/// The device has the next items while the processor sees to these.
+fn in_turns<T>(
+    items: &[T],
+    at_once: usize,
+    launch: impl Fn(&[T]) -> Result<Flight, GpuError>,
+    mut land: impl FnMut(&[T], Flight) -> Result<(), GpuError>,
+) -> Result<(), GpuError> {
+    let mut flying = None;
+    for items in items.chunks(at_once) {
+        let next = launch(items)?;
+        if let Some((items, flight)) = flying.replace((items, next)) {
+            land(items, flight)?;
+        }
+    }
+    flying.map_or(Ok(()), |(items, flight)| land(items, flight))
+}
+
+#[cfg(all(test, feature = "gpu"))]
+mod tests {
+    use super::Gpu;
+
+    /// An adapter; `None`, with a word about it, where there is none.
+    pub fn gpu() -> Option<Gpu> {
+        match Gpu::new() {
+            Ok(gpu) => Some(gpu),
+            Err(error) => {
+                assert!(
+                    std::env::var_os("MATDB_NEED_GPU").is_none(),
+                    "MATDB_NEED_GPU is set: {error}"
+                );
+                eprintln!("skipped: {error}");
+                None
+            }
+        }
     }
 }

@@ -1,8 +1,10 @@
 //! A hierarchy and rays as the device takes them: in f32, in radii of the sphere around the mesh and
 //! from its centre. `closest.wgsl` reads the same words.
 
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use super::echo::Cone;
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 use crate::trace::bvh::Boxes;
@@ -17,11 +19,14 @@ const UNKNOWN: u32 = 0;
 /// A box and what is in it.
 pub(super) type Node = [u32; 8];
 
-/// The corners of a leaf entry's facet.
+/// The corners of a leaf entry's facet, and behind each a component of its unit normal.
 pub(super) type Corners = [[f32; 4]; 3];
 
 /// A ray from where it comes near the mesh.
 pub(super) type Aim = [u32; 8];
+
+/// The rays of a chirp from where its axis comes near the mesh.
+pub(super) type Spot = [u32; 16];
 
 /// Rays from farther off are not the device's, in radii: f64 places their entry to 2⁻³⁰ up to here.
 const FARTHEST: f64 = (1u64 << 20) as f64;
@@ -29,6 +34,9 @@ const FARTHEST: f64 = (1u64 << 20) as f64;
 /// A ray starts this much before it comes near the mesh, so that it meets what is there at a depth that is surely positive;
 /// in radii.
 const RUN_UP: f64 = 0.01;
+
+/// A spot that reaches as far as the mesh's radius is not the device's: its bounds would be those of the boxes.
+const LARGEST: f64 = 3.0;
 
 /// All boxes, the root first.
 pub(super) fn nodes(boxes: &Boxes) -> Vec<Node> {
@@ -46,8 +54,10 @@ pub(super) fn nodes(boxes: &Boxes) -> Vec<Node> {
 pub(super) fn corners(boxes: &Boxes, mesh: &Mesh) -> Vec<Corners> {
     let per_m = 1.0 / boxes.radius_m;
     let corners = boxes.facets.par_iter().map(|&facet| {
-        mesh.corners(facet as usize)
-            .map(|corner| ((corner - boxes.centre) * per_m).as_vec3().extend(0.0).to_array())
+        let normal = mesh.area_normal(facet as usize).normalize_or_zero().as_vec3();
+        let place = |corner: DVec3| ((corner - boxes.centre) * per_m).as_vec3();
+        let [a, b, c] = mesh.corners(facet as usize).map(place);
+        [a.extend(normal.x), b.extend(normal.y), c.extend(normal.z)].map(|v| v.to_array())
     });
     corners.collect()
 }
@@ -68,9 +78,45 @@ fn aim(boxes: &Boxes, ray: &Ray<Global>) -> Aim {
     let origin = (from_centre + start_m * direction) / boxes.radius_m;
     // Its largest component becomes 1 or -1, exactly.
     let slopes = direction / direction.abs().max_element();
-    let [x, y, z] = origin.as_vec3().to_array().map(f32::to_bits);
-    let [u, v, w] = slopes.as_vec3().to_array().map(f32::to_bits);
-    [x, y, z, UNKNOWN, u, v, w, 0]
+    let ([x, y, z], [u, v, w]) = (words(origin.as_vec3()), words(slopes.as_vec3()));
+    [x, y, z, UNKNOWN, u, v, w, 1f32.to_bits()]
+}
+
+/// The rays of chirps whose samples lie within `reach` of the middle, or what is known of them without asking.
+pub(super) fn spots(boxes: &Boxes, cones: &[Cone], reach: f64) -> Vec<Spot> {
+    cones.par_iter().with_min_len(1024).map(|cone| spot(boxes, cone, reach)).collect()
+}
+
+fn spot(boxes: &Boxes, cone: &Cone, reach: f64) -> Spot {
+    let known = |answer| {
+        let mut spot = [0; 16];
+        spot[15] = answer;
+        spot
+    };
+    let Cone { axis, across, law } = cone;
+    let (from_centre, direction) = (axis.origin.xyz - boxes.centre, axis.direction.xyz());
+    let farthest_m = from_centre.length() + boxes.radius_m;
+    let widest = across.iter().map(|aside| aside.length()).fold(0.0, f64::max);
+    let beside_m = reach * widest * farthest_m;
+    let Some(entry_m) = boxes.entry_beside_m(axis, beside_m) else { return known(NOTHING) };
+    let size = 1.0 + 2.0 * beside_m / boxes.radius_m;
+    if from_centre.length() > FARTHEST * boxes.radius_m || size > LARGEST {
+        return known(UNSURE);
+    }
+    let start_m = (entry_m - RUN_UP * boxes.radius_m).max(0.0);
+    let origin = (from_centre + start_m * direction) / boxes.radius_m;
+    let largest = direction.abs().max_element();
+    let run = (start_m * largest / boxes.radius_m) as f32;
+    let place = |vector: DVec3| words(vector.as_vec3());
+    let [x, y, z] = place(origin);
+    let [u, v, w] = place(direction / largest);
+    let [[a, b, c], [d, e, f]] = across.map(|aside| place(aside / largest));
+    let (run, size) = (run.to_bits(), (size as f32).to_bits());
+    [x, y, z, run, u, v, w, size, a, b, c, *law, d, e, f, UNKNOWN]
+}
+
+fn words(vector: Vec3) -> [u32; 3] {
+    vector.to_array().map(f32::to_bits)
 }
 
 #[cfg(test)]
@@ -111,6 +157,44 @@ mod tests {
         let nodes = nodes(bvh.boxes());
         assert_eq!(nodes.iter().map(|node| node[3] as usize).sum::<usize>(), corners.len());
         assert!((vector(&nodes[0][4..7]) - DVec3::ONE).abs().max_element() < 0.2);
+    }
+
+    #[test]
+    fn corners_carry_the_normal() {
+        let ball = ball();
+        let bvh = Bvh::new(&ball);
+        for (corners, &facet) in corners(bvh.boxes(), &ball).iter().zip(&bvh.boxes().facets) {
+            let normal = DVec3::from(corners.map(|corner| f64::from(corner[3])));
+            let expected = ball.area_normal(facet as usize).normalize();
+            assert!(normal.distance(expected) < 1e-7);
+        }
+    }
+
+    #[test]
+    fn a_spot_starts_before_the_mesh_and_reaches_beside_it() {
+        let (ball, at) = (ball(), DVec3::splat(40.0));
+        let bvh = Bvh::new(&ball);
+        let cone = |beside_m: f64, width: f64| {
+            let origin = Point::from(at + DVec3::new(beside_m, 10.0, 0.0));
+            let axis =
+                Ray { origin, direction: crate::frames::Direction::new(DVec3::NEG_Y).unwrap() };
+            spot(
+                bvh.boxes(),
+                &Cone { axis, across: [width * DVec3::X, width * DVec3::Z], law: 7 },
+                2.0,
+            )
+        };
+        let near = cone(0.0, 0.001);
+        let reach_m = 2.0 * 0.001 * 10.25;
+        let start = 1.0 + reach_m / 0.25 + RUN_UP;
+        assert!((vector(&near[..3]) - start * DVec3::Y).length() < 1e-4);
+        assert!((f64::from(f32::from_bits(near[3])) - (40.0 - start)).abs() < 1e-3);
+        assert!((f64::from(f32::from_bits(near[7])) - (1.0 + 2.0 * reach_m / 0.25)).abs() < 1e-5);
+        assert_eq!((vector(&near[4..7]), near[11], near[15]), (DVec3::NEG_Y, 7, UNKNOWN));
+        // Its axis passes the ball, its rim does not.
+        assert_eq!(cone(0.26, 0.001)[15], UNKNOWN);
+        assert_eq!(cone(0.28, 0.001)[15], NOTHING);
+        assert_eq!(cone(0.0, 0.02)[15], UNSURE);
     }
 
     #[test]

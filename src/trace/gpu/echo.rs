@@ -1,0 +1,292 @@
+//! Echoes on a graphics processor: it traces the rays of whole chirps and adds up what comes straight back of
+//! them by equation (11), in f32 (`echo.wgsl`).
+//!
+//! A chirp goes to the device as its axis and what the samples of its spot add to that; the rays are made there.
+//! What it cannot tell it leaves open, ray by ray: those that [`Answer::Unsure`](super::Answer) names, those
+//! that graze what they meet, and those that meet a law without [`Term`]s. Of all others the power is good to 0.02 dB.
+
+use glam::{DVec2, DVec3};
+
+use super::{GpuError, Held, RAYS_AT_ONCE, Table, in_turns, packed};
+use crate::brdf::{Distribution, Facets, Term};
+use crate::frames::{Global, Ray};
+
+/// Rays that one invocation sees to.
+pub const RAYS_PER_SHARE: usize = 32;
+
+/// What f32 can tell: m from here on, powers of the cosine up to there.
+const LEAST_M: f64 = 1e-3;
+const MOST_COSINES: f64 = 1100.0;
+
+/// A law without terms, as in the shader.
+const NO_TERMS: u32 = u32::MAX;
+
+/// The rays of a chirp, one for each sample of the spot.
+#[derive(Clone, Copy, Debug)]
+pub struct Cone {
+    /// The axis of the beam.
+    pub axis: Ray<Global>,
+    /// What the two coordinates of a sample add to the unit vector along the axis.
+    pub across: [DVec3; 2],
+    /// Number of the law of region 0; those of the other regions follow.
+    pub law: u32,
+}
+
+/// What up to 32 rays of a chirp bring back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Share {
+    /// Rays that are left to the processor, a bit for each, the lowest for the first.
+    pub open: u32,
+    /// Sum over the others of f·cosᵃθ/R², 1/(sr·m²).
+    pub per_sr_m2: f64,
+    /// Sum over the others of f·cosᵃθ/R, 1/(sr·m).
+    pub per_sr_m: f64,
+}
+
+/// A mesh in the memory of a graphics processor with what is on it and how it is lit.
+pub struct Lit<'a> {
+    held: &'a Held<'a>,
+    /// None of a mesh without area.
+    table: Option<Table>,
+    samples: usize,
+    /// Distance of the farthest sample from the middle.
+    reach: f64,
+}
+
+impl Held<'_> {
+    /// Of every facet the region, of every region of every target the law, whose terms are worth cosᵃθ more, and the
+    /// samples of a spot, one or more.
+    pub(crate) fn lit(
+        &self,
+        region_of_facet: &[u16],
+        laws: &[Option<Vec<Term>>],
+        cosines: f64,
+        samples: &[DVec2],
+    ) -> Result<Lit<'_>, GpuError> {
+        let table = || {
+            let facets = &self.bvh.boxes().facets;
+            let regions: Vec<u32> =
+                facets.iter().map(|&facet| region_of_facet[facet as usize].into()).collect();
+            let samples: Vec<[f32; 2]> =
+                samples.iter().map(|sample| sample.as_vec2().to_array()).collect();
+            let (laws, terms) = tabulated(laws, cosines);
+            self.gpu.device.table(&regions, &samples, &laws, &terms)
+        };
+        Ok(Lit {
+            held: self,
+            table: self.tree.as_ref().map(|_| table()).transpose()?,
+            samples: samples.len(),
+            reach: samples.iter().map(|sample| sample.length()).fold(0.0, f64::max),
+        })
+    }
+}
+
+impl Lit<'_> {
+    /// Shares of each chirp.
+    pub fn shares(&self) -> usize {
+        self.samples.div_ceil(RAYS_PER_SHARE)
+    }
+
+    /// What the rays of all chirps bring back: the shares of each, chirp after chirp.
+    pub fn echoes(&self, cones: &[Cone]) -> Result<Vec<Share>, GpuError> {
+        let Held { gpu, bvh, tree } = self.held;
+        let shares = self.shares();
+        let (Some(tree), Some(table)) = (tree, &self.table) else {
+            return Ok(vec![
+                Share { open: 0, per_sr_m2: 0.0, per_sr_m: 0.0 };
+                shares * cones.len()
+            ]);
+        };
+        let boxes = bvh.boxes();
+        let most = RAYS_AT_ONCE / self.samples as u64;
+        let at_once = gpu.device.spots_at_once(most, shares as u64);
+        let launch = |cones: &[Cone]| {
+            let spots = packed::spots(boxes, cones, self.reach);
+            gpu.device.launch_echoes(tree, table, &spots, shares as u64)
+        };
+        let mut all = Vec::with_capacity(shares * cones.len());
+        in_turns(cones, at_once, launch, |_, flight| {
+            let words = gpu.device.land(flight)?;
+            all.extend(words.chunks_exact(3).map(|words| share(words, boxes.radius_m)));
+            Ok(())
+        })?;
+        Ok(all)
+    }
+}
+
+fn share(words: &[u32], radius_m: f64) -> Share {
+    let [power, moment] = [words[1], words[2]].map(|word| f64::from(f32::from_bits(word)));
+    if !power.is_finite() || !moment.is_finite() {
+        return Share { open: u32::MAX, per_sr_m2: 0.0, per_sr_m: 0.0 };
+    }
+    let per_m = 1.0 / radius_m;
+    Share { open: words[0], per_sr_m2: power * per_m * per_m, per_sr_m: moment * per_m }
+}
+
+/// First term and number of terms of each law, and all terms; neither is empty.
+fn tabulated(laws: &[Option<Vec<Term>>], cosines: f64) -> (Vec<[u32; 2]>, Vec<[u32; 4]>) {
+    let mut terms = Vec::new();
+    let mut of_laws = Vec::with_capacity(laws.len().max(1));
+    for law in laws {
+        let told = |term: &Term| packed_term(term, cosines);
+        let own: Option<Vec<[u32; 4]>> =
+            law.as_ref().and_then(|law| law.iter().map(told).collect());
+        let count = own.as_ref().map_or(NO_TERMS, |own| own.len() as u32);
+        of_laws.push([terms.len() as u32, count]);
+        terms.extend(own.into_iter().flatten());
+    }
+    if of_laws.is_empty() {
+        of_laws.push([0, NO_TERMS]);
+    }
+    if terms.is_empty() {
+        terms.push([0; 4]);
+    }
+    (of_laws, terms)
+}
+
+/// A term as the device takes it; `None` beyond what f32 can tell.
+fn packed_term(term: &Term, cosines: f64) -> Option<[u32; 4]> {
+    let (m, form) = match term.facets {
+        None => (0.0, 0),
+        Some(Facets { m, distribution, shadowed }) if m >= LEAST_M => {
+            (m, u32::from(distribution == Distribution::Ggx) | shadowed << 1)
+        }
+        Some(_) => return None,
+    };
+    let cosines = term.cosines + cosines;
+    let values = [term.level_per_sr, cosines, m].map(|value| value as f32);
+    let is_told = cosines.abs() <= MOST_COSINES && values.iter().all(|value| value.is_finite());
+    let [level, cosines, m] = values.map(f32::to_bits);
+    is_told.then_some([level, cosines, m, form])
+}
+
+#[cfg(all(test, feature = "gpu"))]
+mod tests {
+    use super::*;
+    use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Mixture, Scattering, Shadowing};
+    use crate::frames::{Direction, Point};
+    use crate::scene::solids;
+    use crate::trace::Bvh;
+    use crate::trace::gpu::tests::gpu;
+
+    /// 0.02 dB.
+    const TOLERANCE: f64 = 0.0046;
+
+    fn law(distribution: Distribution, shadowing: Shadowing, m: f64) -> Brdf {
+        let specular = CookTorrance { f_lambda: 0.4, m, m_across: None, distribution, shadowing };
+        let diffuse = Box::new(Brdf::BlinnPhong(BlinnPhong { r_s: 0.1, alpha: 7.0 }));
+        let specular = Box::new(Brdf::CookTorrance(specular));
+        Brdf::Mixture(Mixture { k: 1e-3, diffuse, specular })
+    }
+
+    /// Narrow cones from all around to a ball of 0.3 m, its rim and what is beside it.
+    fn cones(count: usize) -> Vec<Cone> {
+        let turn = |i: usize, step: f64| (i as f64 * step).fract() - 0.5;
+        let cone = |i: usize| {
+            let from =
+                DVec3::new(turn(i, 0.755), turn(i, 0.570), turn(i, 0.382)).normalize_or(DVec3::X);
+            let to = 0.7 * DVec3::new(turn(i, 0.618), turn(i, 0.414), turn(i, 0.236));
+            let origin = Point::from((0.5 + 9.0 * turn(i, 0.303).abs()) * from);
+            let direction = origin.towards(to.into()).unwrap();
+            let (right, up) = direction.xyz().any_orthonormal_pair();
+            let across = [0.003 * right, 0.003 * up];
+            Cone { axis: Ray { origin, direction }, across, law: (i % 4) as u32 }
+        };
+        (0..count).map(cone).collect()
+    }
+
+    /// Relative error of the sum over a share, and how many rays of it were left open.
+    fn compared(
+        share: &Share,
+        bvh: &Bvh,
+        cone: &Cone,
+        samples: &[DVec2],
+        law: &Brdf,
+    ) -> (f64, u32) {
+        let mut sum = 0.0;
+        let mut open = 0;
+        for (bit, sample) in samples.iter().enumerate() {
+            if share.open >> bit & 1 == 1 {
+                open += 1;
+                continue;
+            }
+            let aside = sample.x * cone.across[0] + sample.y * cone.across[1];
+            let direction = Direction::new(cone.axis.direction.xyz() + aside).unwrap();
+            if let Some(hit) = bvh.closest(&Ray { direction, ..cone.axis }) {
+                let f_per_sr = law.retro_per_sr(hit.theta_rad());
+                sum += f_per_sr * hit.cos_theta.powi(2) / hit.range_m.powi(2);
+            }
+        }
+        (if sum > 0.0 { (share.per_sr_m2 / sum - 1.0).abs() } else { share.per_sr_m2 }, open)
+    }
+
+    #[test]
+    fn sums_are_those_of_f64() {
+        let Some(gpu) = gpu() else { return };
+        let mut ball = solids::icosphere(0.3, 3);
+        ball.append(&solids::icosphere(0.1, 1)).unwrap();
+        let bvh = Bvh::new(&ball);
+        let held = gpu.hold(&bvh).unwrap();
+        let laws = [
+            law(Distribution::Beckmann, Shadowing::Separable, 0.3),
+            law(Distribution::Beckmann, Shadowing::Correlated, 0.01),
+            law(Distribution::Ggx, Shadowing::Separable, 0.1),
+            law(Distribution::Ggx, Shadowing::Correlated, 0.6),
+        ];
+        let terms: Vec<_> = laws.iter().map(Scattering::backscatter).collect();
+        let samples: Vec<DVec2> =
+            (0..50).map(|i| 0.14 * f64::from(i).sqrt() * DVec2::from_angle(f64::from(i))).collect();
+        let lit = held.lit(&vec![0; ball.facets.len()], &terms, 2.0, &samples).unwrap();
+        let cones = cones(2000);
+        let shares = lit.echoes(&cones).unwrap();
+        assert_eq!((lit.shares(), shares.len()), (2, 4000));
+        let (mut open, mut lit) = (0, 0);
+        for (cone, shares) in cones.iter().zip(shares.chunks(2)) {
+            let law = &laws[cone.law as usize];
+            for (share, samples) in shares.iter().zip(samples.chunks(RAYS_PER_SHARE)) {
+                let (error, left) = compared(share, &bvh, cone, samples, law);
+                assert!(error < TOLERANCE, "{error}: {share:?} of {cone:?}");
+                open += left;
+                lit += u32::from(share.per_sr_m2 > 0.0);
+            }
+        }
+        assert!(lit > 1000 && lit < 3900, "{lit}");
+        assert!(20 * open < 100_000, "{open} of 100000 left open");
+    }
+
+    #[test]
+    fn what_cannot_be_told_is_left_open() {
+        let Some(gpu) = gpu() else { return };
+        let ball = solids::icosphere(0.3, 2);
+        let bvh = Bvh::new(&ball);
+        let held = gpu.hold(&bvh).unwrap();
+        let narrow = Facets { m: 1e-4, distribution: Distribution::Ggx, shadowed: 1 };
+        let term = |facets, cosines| Some(vec![Term { level_per_sr: 1.0, cosines, facets }]);
+        let laws = [None, term(Some(narrow), 0.0), term(None, 1e4), term(None, 0.0)];
+        let regions = vec![0; ball.facets.len()];
+        let lit = held.lit(&regions, &laws, 2.0, &[DVec2::ZERO]).unwrap();
+        let origin = Point::new(0.013, 0.021, 5.0);
+        let direction = Direction::new(DVec3::NEG_Z).unwrap();
+        let of_law = |law| {
+            let cone = Cone { axis: Ray { origin, direction }, across: [DVec3::ZERO; 2], law };
+            lit.echoes(&[cone]).unwrap()[0]
+        };
+        for law in 0..3 {
+            assert_eq!(of_law(law), Share { open: 1, per_sr_m2: 0.0, per_sr_m: 0.0 });
+        }
+        let told = of_law(3);
+        assert!(told.open == 0 && (told.per_sr_m / told.per_sr_m2 - 4.7).abs() < 0.02, "{told:?}");
+        // Along a plate nothing is told, and beside it there is nothing.
+        let plate = solids::plate(1.0, 1.0);
+        let bvh = Bvh::new(&plate);
+        let held = gpu.hold(&bvh).unwrap();
+        let lit = held.lit(&vec![0; plate.facets.len()], &laws, 2.0, &[DVec2::ZERO]).unwrap();
+        let from = |height_m: f64, x_m: f64| {
+            let origin = Point::new(x_m, 0.1, height_m);
+            let direction = Direction::new(DVec3::new(-1.0, 0.03, -1e-3)).unwrap();
+            let axis = Ray { origin, direction };
+            lit.echoes(&[Cone { axis, across: [DVec3::ZERO; 2], law: 3 }]).unwrap()[0].open
+        };
+        assert_eq!((from(1e-3, 1.2), from(0.9, 1.2)), (1, 0));
+    }
+}
