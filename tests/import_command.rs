@@ -210,7 +210,9 @@ fn nobody_else_revises_or_withdraws_what_is_ones_own() {
         Store::open(folder.join("matdb.sqlite")).unwrap().add([material]).unwrap();
     };
     // Both begin with the same, which nobody has imported.
-    [&theirs, &ours].map(|folder| add(folder.path(), &sound("primer")));
+    for folder in [&theirs, &ours] {
+        add(folder.path(), &sound("primer"));
+    }
     add(theirs.path(), &changed("primer"));
     let withdraw = ["withdraw", "primer", "--reason", "they say so", "-q"];
     matdb(theirs.path()).args(withdraw).assert().success();
