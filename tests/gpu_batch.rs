@@ -38,6 +38,7 @@ fn adapter(buffer_bytes: u64) -> Option<Gpu> {
 }
 
 /// A target and what it is scanned with.
+#[derive(Clone)]
 struct Bench {
     radar: Radar,
     chirps: Chirps,
@@ -126,8 +127,13 @@ impl Bench {
         assert_eq!(found.echoes.len(), takes.len());
         let radius_m = self.radius_m();
         let (mut worst_db, mut count, mut faint) = (0f64, 0, 0);
+        let quiet = Bench {
+            radar: Radar { speckle: None, noise: None, ..self.radar.clone() },
+            ..self.clone()
+        };
         for (take, found) in takes.iter().zip(&found.echoes) {
             let expected = self.alone(take, rays);
+            let means = quiet.alone(take, rays);
             assert_eq!(found.len(), expected.len());
             for (chirp, (found, expected)) in found.iter().zip(&expected).enumerate() {
                 let expected = expected.as_ref();
@@ -148,7 +154,13 @@ impl Bench {
                 let cos = if rays == 1 { cos } else { (0.1 * cos).max(2e-3) };
                 let error_m = (found.range_m - expected.range_m).abs();
                 let most_m = RANGE * (expected.range_m + radius_m / cos);
-                assert!(error_m < most_m, "chirp {chirp}: {error_m} m, {found:?} {expected:?}");
+                // Under the noise there may be an echo that the device cannot hold, and so cannot place.
+                let is_held =
+                    means[chirp].as_ref().is_some_and(|mean| mean.power_dbm > FAINTEST_DBM);
+                assert!(
+                    error_m < most_m || !is_held,
+                    "chirp {chirp}: {error_m} m, {found:?} {expected:?}"
+                );
                 worst_db = worst_db.max(error_db);
                 count += 1;
             }
