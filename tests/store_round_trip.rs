@@ -307,7 +307,7 @@ prop_compose! {
 prop_compose! {
     fn material()(
         texts in (word(), word(), text(), word(), vec(text(), 0..4)),
-        frequency_hz in [1f64..1e16, 1f64..1e16], theta_rad in [angle_rad(), angle_rad()],
+        frequency_hz in [positive(), positive()], theta_rad in [angle_rad(), angle_rad()],
         sources in vec(source(), 1..4), instruments in vec(instrument(), 0..3),
         curves in vec(curve(), 0..4), fits in vec(fit(), 1..4), effects in vec(effect(), 0..3),
         key in text(), pick in any::<usize>(), rest in rest(),
