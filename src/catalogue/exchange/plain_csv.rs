@@ -2,7 +2,7 @@
 //! `censor`, `threshold_db`, `theta_r_deg`, `delta_phi_deg`. Lines that start with `#` say what it is
 //! and from whom; on the way in those at the head are left alone.
 //!
-//! Lost: everything but the curve, and of its points the angle's deviation, power, range and chirp.
+//! Lost: everything but the curve, and of its points the angle's deviation, power, range, chirp and place.
 
 use std::path::Path;
 
