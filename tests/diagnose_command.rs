@@ -190,6 +190,11 @@ fn too_few_detections_are_said_in_files_and_one_sentence() {
     let line = |row: usize| columns.map(|name| cloud[name][row].to_string()).join(",") + "\n";
     let csv = "x_m,y_m,z_m,power_dbm,chirp\n".to_owned() + &(0..80).map(line).collect::<String>();
     fs::write(at.join("few.csv"), csv).unwrap();
+    // As an earlier diagnosis would have left them.
+    fs::create_dir(at.join("report")).unwrap();
+    for stale in ["residuals.csv", "after.toml"] {
+        fs::write(at.join("report").join(stale), "stale").unwrap();
+    }
     let few = ["diagnose", "few.csv", "--scene", "scene.toml", "-o", "report"];
     let message = refused(matdb(at).args(few));
     assert!(message.contains("80 detections") && message.contains("300"), "{message}");

@@ -29,6 +29,26 @@ struct Site {
     root: tempfile::TempDir,
 }
 
+/// Names a publication of all built-in materials to look at instead of one made here.
+const EXAMPLE: &str = "MATDB_EXAMPLE_SITE";
+
+/// All built-in materials, as the example catalogue has them.
+fn example() -> Site {
+    let root = tempfile::tempdir().unwrap();
+    if let Some(folder) = std::env::var_os(EXAMPLE) {
+        let folder =
+            std::fs::canonicalize(&folder).expect("the folder that MATDB_EXAMPLE_SITE names");
+        return Site { folder, root };
+    }
+    let materials: Vec<Material> =
+        builtin::names().map(|name| builtin::get(name).unwrap().unwrap()).collect();
+    let mut store = Store::open(root.path().join("a.sqlite")).unwrap();
+    store.add(&materials).unwrap();
+    let folder = root.path().join("site");
+    publish(&store, &About::default(), &folder, |_| ()).unwrap();
+    Site { folder, root }
+}
+
 fn site() -> Site {
     let root = tempfile::tempdir().unwrap();
     let mut materials: Vec<Material> =
@@ -278,4 +298,32 @@ fn nothing_is_wider_than_a_small_phone() {
         let width = browser.script("return document.documentElement.scrollWidth");
         assert!(width.as_u64() <= Some(320), "{page} is {width} px wide");
     }
+}
+
+#[test]
+fn every_page_of_the_example_catalogue_works_and_is_quiet() {
+    let site = example();
+    let Some(browser) = site.browser() else { return };
+    let root = site.address("").trim_end_matches('/').to_owned();
+    let names: Vec<&str> = builtin::names().collect();
+    open_index(&browser, &format!("{root}/index.html"));
+    assert_eq!(browser.text(COUNT), format!("{} materials", names.len()));
+    type_into(&browser, "#q", "ptfe");
+    browser.wait("return document.querySelectorAll('#results > li').length === 1");
+    for name in &names {
+        browser.open(&format!("{root}/material/{name}.html"));
+        browser.wait("return document.querySelectorAll('main svg path.line').length > 0");
+        let cited = "return document.getElementById('cite').textContent";
+        assert!(browser.text(cited).contains(name), "{name} does not say how to cite it");
+    }
+    open_index(&browser, &format!("{root}/index.html"));
+    browser.click("input[value=ptfe]");
+    browser.click("input[value=glass]");
+    browser.click("#compare");
+    browser.wait("return document.querySelectorAll('#values thead th').length === 3");
+    browser.open(&format!("{root}/material/ptfe.html"));
+    browser.click("#downloads a[href$='.csv']");
+    let wanted = std::fs::read(site.folder.join("material/ptfe.csv")).unwrap();
+    arrives(&site.root.path().join("ptfe.csv"), &wanted);
+    was_quiet(&browser, &root);
 }

@@ -141,7 +141,7 @@ pub struct MultiBounce {
 }
 
 /// Directions that are followed from each lit point.
-const ONWARD: usize = 64;
+const ONWARD: usize = 512;
 
 impl MultiBounce {
     pub fn new(world: &World, seed: u64, base: &Base) -> MultiBounce {

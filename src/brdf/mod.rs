@@ -44,6 +44,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::frames::{Direction, Surface};
 
+pub(crate) use backscatter::Retro;
 pub use backscatter::{Facets, Term};
 pub use blinn_phong::BlinnPhong;
 pub use cook_torrance::{CookTorrance, Distribution, Shadowing};

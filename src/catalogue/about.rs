@@ -32,6 +32,9 @@ pub struct About {
     /// Who answers for it.
     #[serde(rename = "person")]
     pub people: Vec<Person>,
+    /// Laboratories that answer for it, after the people.
+    #[serde(rename = "institute", skip_serializing_if = "Vec::is_empty")]
+    pub institutes: Vec<Institute>,
 }
 
 /// Somebody who answers for a catalogue.
@@ -48,6 +51,16 @@ pub struct Person {
     pub affiliation: Option<String>,
 }
 
+/// A laboratory that answers for a catalogue.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Institute {
+    /// Its name, without a comma: names of authors with one are read as `Family, Given`.
+    pub name: String,
+    /// Its address.
+    pub url: Option<String>,
+}
+
 impl Default for About {
     fn default() -> About {
         About {
@@ -59,6 +72,7 @@ impl Default for About {
             url: None,
             doi: None,
             people: Vec::new(),
+            institutes: Vec::new(),
         }
     }
 }
@@ -100,12 +114,16 @@ impl About {
         is_publication.then_some(about)
     }
 
-    /// Who answers for it, each as `Family, Given`.
+    /// Whether somebody answers for it.
+    pub fn has_authors(&self) -> bool {
+        !self.people.is_empty() || !self.institutes.is_empty()
+    }
+
+    /// Who answers for it, people as `Family, Given`.
     pub(super) fn authors(&self) -> Vec<String> {
-        self.people
-            .iter()
-            .map(|Person { family, given, .. }| format!("{family}, {given}"))
-            .collect()
+        let person = |Person { family, given, .. }: &Person| format!("{family}, {given}");
+        let institutes = self.institutes.iter().map(|institute| institute.name.clone());
+        self.people.iter().map(person).chain(institutes).collect()
     }
 
     fn check(&self, file: &str) -> Result<(), AboutError> {
@@ -120,6 +138,7 @@ impl About {
             names.extend([("family", family.as_str()), ("given", given.as_str())]);
             names.extend(affiliation.iter().map(|place| ("affiliation", place.as_str())));
         }
+        names.extend(about.institutes.iter().map(|institute| ("name", institute.name.as_str())));
         if let Some((key, _)) = names.into_iter().find(|(_, name)| turns_the_line(name)) {
             return Err(refused(format!(
                 "`{key}` holds a character that turns the line round; write it without"
@@ -131,7 +150,16 @@ impl About {
                  LicenseRef-proprietary"
             )));
         }
-        if let Some(url) = about.url.as_ref().filter(|url| !is_address(url)) {
+        let is_one_name = |name: &str| !name.trim().is_empty() && !name.contains(',');
+        let mut institutes = about.institutes.iter();
+        if let Some(Institute { name, .. }) = institutes.find(|one| !is_one_name(&one.name)) {
+            return Err(refused(format!(
+                "`name` of an [[institute]] is `{name}`; write a name without a comma, such as `Laboratory at \
+                 University`, since those with one are read as `Family, Given`"
+            )));
+        }
+        let urls = about.institutes.iter().filter_map(|institute| institute.url.as_ref());
+        if let Some(url) = urls.chain(&about.url).find(|url| !is_address(url)) {
             return Err(refused(format!(
                 "`url` is `{url}`; write an address that begins with http:// or https://"
             )));

@@ -1,14 +1,19 @@
 //! BibTeX.
 
-/// An entry with the fields that have a value. Of its key TeX reads letters, digits, `:` and `-` safely;
-/// whatever else is in it becomes `-`.
+/// An entry by these authors with the fields that have a value. Of its key TeX reads letters, digits, `:` and `-`
+/// safely; whatever else is in it becomes `-`.
 pub(super) fn entry<const N: usize>(
     kind: &str,
     key: &str,
+    authors: &[String],
     fields: [(&str, Option<String>); N],
 ) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || ":-".contains(c) { c } else { '-' };
     let mut text = format!("@{kind}{{{}", key.chars().map(plain).collect::<String>());
+    if !authors.is_empty() {
+        let names: Vec<String> = authors.iter().map(|author| name(author)).collect();
+        text += &format!(",\n  author = {{{}}}", names.join(" and "));
+    }
     for (name, value) in fields {
         if let Some(value) = value {
             let value = if matches!(name, "doi" | "url") { address(&value) } else { tex(&value) };
@@ -16,6 +21,11 @@ pub(super) fn entry<const N: usize>(
         }
     }
     text + "\n}\n"
+}
+
+/// A person as `Family, Given`, or an institute, which braces keep in one piece.
+fn name(author: &str) -> String {
+    if author.contains(", ") { tex(author) } else { format!("{{{}}}", tex(author)) }
 }
 
 /// An address as it is, but for what would end a field.
@@ -48,9 +58,17 @@ mod tests {
     }
 
     #[test]
+    fn an_institute_is_one_name() {
+        let authors = ["Roe, Ann".to_owned(), "Institute of Paint & Cloth and Others".to_owned()];
+        let text = entry("misc", "k", &authors, [("note", None)]);
+        let names = "{Roe, Ann and {Institute of Paint \\& Cloth and Others}}";
+        assert_eq!(text, format!("@misc{{k,\n  author = {names}\n}}\n"));
+    }
+
+    #[test]
     fn an_address_stays_one_and_ends_no_field() {
         let url = Some("https://a.example/x_y?z={1}".to_owned());
-        let text = entry("misc", "a key}, é", [("url", url), ("note", None)]);
+        let text = entry("misc", "a key}, é", &[], [("url", url), ("note", None)]);
         assert_eq!(text, "@misc{a-key----,\n  url = {https://a.example/x_y?z=%7B1%7D}\n}\n");
     }
 }

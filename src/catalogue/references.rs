@@ -240,9 +240,7 @@ impl Citable<'_> {
     pub fn bibtex(&self) -> String {
         let licence = format!("Licence {}", self.material.licence);
         let status = self.material.status.sentence();
-        let authors_there = self.authors_there().join(" and ");
         let own = [
-            ("author", Some(authors_there).filter(|authors| !authors.is_empty())),
             ("title", Some(self.title())),
             ("howpublished", self.taken_from()),
             ("year", self.year.map(|year| year.to_string())),
@@ -250,13 +248,13 @@ impl Citable<'_> {
             ("url", self.credit.origin().and_then(|origin| origin.url.clone())),
             ("note", Some(status.map_or(licence.clone(), |said| format!("{licence}; {said}")))),
         ];
-        let mut text = entry("misc", &self.key(), own);
+        let mut text = entry("misc", &self.key(), self.authors_there(), own);
         for source in &self.material.sources {
             text += &entry(
                 bibtex_type(source),
                 &format!("{}-{}", self.key(), source.key),
+                &source.citation.authors,
                 [
-                    ("author", authors(source, " and ")),
                     ("title", Some(source.title.clone())),
                     (container_field(source), source.citation.container.clone()),
                     ("volume", source.citation.volume.clone()),
@@ -318,7 +316,7 @@ impl Citable<'_> {
 fn sentence(source: &Source) -> String {
     let Citation { year, container, volume, pages, publisher, .. } = &source.citation;
     let mut text = format!("{} ({}): ", source.key, source.kind.as_str());
-    text += &authors(source, "; ").map_or(String::new(), |authors| format!("{authors}: "));
+    text += &authors(source).map_or(String::new(), |authors| format!("{authors}: "));
     text += &source.title;
     let place = [container, volume, pages, publisher].into_iter().flatten().cloned();
     let place: Vec<String> = place.chain(year.map(|year| year.to_string())).collect();
@@ -330,9 +328,9 @@ fn sentence(source: &Source) -> String {
     text + "\n"
 }
 
-fn authors(source: &Source, between: &str) -> Option<String> {
+fn authors(source: &Source) -> Option<String> {
     let authors = &source.citation.authors;
-    (!authors.is_empty()).then(|| authors.join(between))
+    (!authors.is_empty()).then(|| authors.join("; "))
 }
 
 fn is_article(source: &Source) -> bool {

@@ -17,7 +17,7 @@ use crate::material::form::licence_doubt;
 pub(super) struct Args {
     /// Folder to write; an earlier publication there is replaced
     folder: PathBuf,
-    /// TOML file with title, description, licence, url and [[person]]s of the catalogue [default: as the
+    /// TOML file with title, description, licence, url, [[person]]s and [[institute]]s of the catalogue [default: as the
     /// publication there has them, and the licence that all materials share]
     #[arg(long, value_name = "FILE")]
     about: Option<PathBuf>,
@@ -68,8 +68,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             "version {version} stood there with other data; give this one another `version` in --about FILE"
         ));
     }
-    if about.people.is_empty() {
-        console.notice("nobody is named as author; name yourselves as [[person]] in --about FILE");
+    if !about.has_authors() {
+        console.notice(
+            "nobody is named as author; name yourselves as [[person]] or [[institute]] in --about FILE",
+        );
     }
     let text = format!(
         "published {} in {}: {}\n",

@@ -4,6 +4,7 @@
 //! These are a sample of the looks, so that the size has the scatter of one drawn scan.
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use super::covariates::covariates;
 use super::field::Field;
@@ -12,10 +13,10 @@ use super::likelihood::Declared;
 use super::looks::Observation;
 use super::placebo::Placebo;
 use super::refit::{Problem, Space};
-use super::screen::{Sample, Screen};
+use super::screen::Screen;
 use super::select::{SCOUT, Selection, State, larger, sizes_db};
 use super::{Control, Controls, Diagnosis, Power};
-use crate::effects::{Effect, Prediction};
+use crate::effects::{Effect, Prediction, Traced};
 use crate::radar::random::{Key, Purpose};
 
 /// All controls, beside the base model.
@@ -25,11 +26,11 @@ pub(super) fn controls(
     effects: &[&dyn Effect],
     numbers: usize,
 ) -> Controls {
-    Controls {
-        placebo: placebo(selection, base, numbers),
-        equal_df_spline: spline(selection, base, numbers),
-        injection_recovery: powers(selection, base, effects),
-    }
+    let ((placebo, equal_df_spline), injection_recovery) = rayon::join(
+        || (placebo(selection, base, numbers), spline(selection, base, numbers)),
+        || powers(selection, base, effects),
+    );
+    Controls { placebo, equal_df_spline, injection_recovery }
 }
 
 fn placebo(selection: &Selection, base: &State, numbers: usize) -> Option<Control> {
@@ -75,19 +76,22 @@ fn powers(selection: &Selection, base: &State, effects: &[&dyn Effect]) -> Vec<P
     let sample = selection.sample;
     let problem = sample.problem(&selection.problem);
     let Diagnosis { block_m, folds, seed, .. } = *selection.settings;
-    let folds = Folds::new(problem.looks, block_m, folds, seed);
-    let bench =
-        Bench { problem, folds: &folds, settings: selection.settings, base, weight: sample.weight };
-    effects.iter().map(|effect| bench.power(*effect)).collect()
+    let folds = &Folds::new(problem.looks, block_m, folds, seed);
+    let power = |effect: &&dyn Effect| {
+        // What was traced for one effect is of no use to another.
+        let traced = &Traced::default();
+        let problem = Problem { traced, ..problem };
+        Bench { problem, folds, selection, base }.power(*effect)
+    };
+    effects.par_iter().map(power).collect()
 }
 
 /// Where effects are put in and looked for: a sample of the looks, each of which stands for several.
 struct Bench<'a> {
     problem: Problem<'a>,
     folds: &'a Folds,
-    settings: &'a Diagnosis,
+    selection: &'a Selection<'a>,
     base: &'a State<'a>,
-    weight: f64,
 }
 
 /// An effect of one strength: its size, dB, and the point.
@@ -96,12 +100,13 @@ type Rung = (f64, DVector<f64>);
 impl Bench<'_> {
     fn power(&self, effect: &dyn Effect) -> Power {
         let rungs = self.rungs(effect);
+        let tried = effect.starts(self.problem.stage, self.problem.looks).len();
         // What is found is found when stronger, too.
         let (mut missed, mut found) = (None, None);
         let mut open: &[Rung] = &rungs;
         while let Some((size_db, at)) = open.get(open.len() / 2) {
             let (weaker, stronger) = open.split_at(open.len() / 2);
-            if self.is_found(effect, at) {
+            if self.is_found(effect, tried, at) {
                 (found, open) = (Some(*size_db), weaker);
             } else {
                 (missed, open) = (Some(*size_db), stronger.get(1..).unwrap_or_default());
@@ -112,7 +117,7 @@ impl Bench<'_> {
 
     /// The effect in strengths about where a score test would just see it, weakest first.
     fn rungs(&self, effect: &dyn Effect) -> Vec<Rung> {
-        let Bench { problem, base, .. } = self;
+        let Bench { problem, base, selection, .. } = self;
         let space = base.space.with(effect);
         let screen = Screen::new(*problem, &base.space, &base.fitted.at);
         let starts = effect.starts(problem.stage, problem.looks);
@@ -125,9 +130,10 @@ impl Bench<'_> {
         } else {
             let promised = starts.iter().filter_map(|start| {
                 let [information, size_db] = screen.felt(&space, &scaled(start, 1.0));
-                let gain_of_unit = 0.5 * self.weight * information;
+                let gain_of_unit = 0.5 * selection.sample.weight * information;
                 let scale = (self.least_gain(effect) / gain_of_unit).sqrt();
-                (scale.is_finite() && size_db > 0.0).then_some((scale * size_db, scale, start))
+                let is_felt = size_db > 0.0 && is_possible(effect, start, scale);
+                is_felt.then_some((scale * size_db, scale, start))
             });
             let best = promised.min_by(|a, b| a.0.total_cmp(&b.0));
             let about = |(_, scale, start): (f64, f64, &Vec<f64>)| {
@@ -148,41 +154,39 @@ impl Bench<'_> {
     }
 
     fn least_gain(&self, effect: &dyn Effect) -> f64 {
-        self.settings.least_gain_of(effect.knobs().len(), 1)
+        self.selection.settings.least_gain_of(effect.knobs().len(), 1)
     }
 
-    /// Whether an effect is found again in data drawn with it.
-    fn is_found(&self, effect: &dyn Effect, at: &DVector<f64>) -> bool {
-        let drawn = self.drawn(&self.problem.predict(&self.base.space.with(effect), at));
+    /// Whether an effect that would be looked for from so many starts is found again in data drawn with
+    /// it. The search begins where the effect was put in: from elsewhere it would gain as much or less.
+    fn is_found(&self, effect: &dyn Effect, tried: usize, at: &DVector<f64>) -> bool {
+        let State { space: bare, fitted, .. } = self.base;
+        let with = bare.with(effect);
+        let drawn = self.drawn(&self.problem.predict(&with, at));
         let problem = Problem { observations: &drawn, ..self.problem };
-        let sample = &Sample::new(&problem);
-        let selection = Selection {
-            problem,
-            sample,
-            folds: self.folds,
-            settings: self.settings,
-            hear: &|_| (),
-        };
-        let State { space, fitted, .. } = self.base;
-        let fitted = problem.fit(space, &fitted.at, &[], &SCOUT);
-        let held_out = selection.held_out(space, &fitted.at);
-        let bare = State { space: space.clone(), fitted, held_out };
-        let Some(trial) = selection.tried(&bare, effect) else { return false };
-        let held_out = selection.held_out(&trial.space, &trial.fitted.at);
-        let [gain, se] = selection.difference(&held_out, &bare.held_out);
+        let before = problem.fit(bare, &fitted.at, &[], &SCOUT);
+        let after = problem.fit(&with, at, &[], &SCOUT);
+        let Selection { sample, settings, hear, .. } = *self.selection;
         // So many looks as the scan has, of which each of these stands for several.
-        let (gain, se) = (self.weight * gain, self.weight.sqrt() * se);
-        let fitted_gain = self.weight * trial.candidate.gain;
-        fitted_gain >= self.settings.least_gain_of(trial.candidate.numbers, trial.tried)
-            && gain.min(fitted_gain) > self.settings.standard_errors * se
-            && trial.candidate.size_db >= self.settings.least_size_db
+        let gain = sample.weight * (after.ln_likelihood - before.ln_likelihood);
+        let predicted = [(bare, &before.at), (&with, &after.at)];
+        let [now, then] = predicted.map(|(space, at)| problem.predict(space, at));
+        let is_large = larger(sizes_db(&problem, &now, &then)) >= settings.least_size_db;
+        if gain < settings.least_gain_of(effect.knobs().len(), tried) || !is_large {
+            return false;
+        }
+        let selection = Selection { problem, sample, folds: self.folds, settings, hear };
+        let [without, with] = predicted.map(|(space, at)| selection.held_out(space, at));
+        let [held_out, se] = selection.difference(&with, &without);
+        let [held_out, se] = [sample.weight * held_out, sample.weight.sqrt() * se];
+        held_out.min(gain) > settings.standard_errors * se
     }
 
     /// Data as a prediction draws them.
     fn drawn(&self, prediction: &Prediction) -> Vec<Observation> {
         let Declared { threshold_w, range_sd_m } = self.problem.declared;
         let draw = |look: usize| {
-            let seed = self.settings.seed;
+            let seed = self.selection.settings.seed;
             let chirp = look as u64;
             let mut draws = Key { seed, chirp, sub_ray: 4, purpose: Purpose::Fit }.draws();
             let mut left = draws.uniform();
@@ -222,6 +226,12 @@ const FAR_STEPS: f64 = 30.0;
 fn is_far(effect: &dyn Effect, values: &[f64]) -> bool {
     let first = effect.knobs().iter().zip(values).next();
     first.is_some_and(|(knob, value)| (value - knob.absent).abs() > FAR_STEPS * knob.step)
+}
+
+/// Whether an effect so many times as strong lies within its bounds.
+fn is_possible(effect: &dyn Effect, values: &[f64], scale: f64) -> bool {
+    let wanted = scaled(effect, values, scale);
+    effect.knobs().iter().zip(wanted).all(|(knob, value)| value >= knob.min && value <= knob.max)
 }
 
 /// So many times as strong. The first number is the strength and the others a shape, or, where a start is

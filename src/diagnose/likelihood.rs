@@ -20,6 +20,9 @@ const MOST_PULL: f64 = 4.0;
 /// Share of ranges that no model explains, and how much wider than the rest these are at least.
 const STRAY_RANGES: f64 = 0.01;
 const STRAY_WIDTH: f64 = 10.0;
+/// Share of the spread of several ways by which their mean is unsure: a few rays stand for all, and speckle
+/// weighs them anew.
+const UNSURE: f64 = 0.1;
 /// A mean so far below the threshold that nothing is ever detected, for rays that miss.
 const NOTHING: f64 = 1e-9;
 
@@ -159,12 +162,12 @@ impl<'a> Likelihood<'a> {
     fn range(&self, arrived: &Arrived, seen: &Observation) -> Option<[f64; 3]> {
         let sd_m = self.declared.range_sd_m;
         let x = self.declared.range_off_m(arrived, seen)? / sd_m;
-        let width = STRAY_WIDTH.max(arrived.spread_m / sd_m);
-        let bell = |x: f64| (-0.5 * x * x).exp();
-        let near = (1.0 - STRAY_RANGES) * bell(x);
-        let stray = STRAY_RANGES / width * bell(x / width);
+        let spread = arrived.spread_m / sd_m;
+        let (width, stray_width) = ((UNSURE * spread).hypot(1.0), STRAY_WIDTH.max(spread));
+        let bell = |share: f64, width: f64| share / width * (-0.5 * (x / width).powi(2)).exp();
+        let (near, stray) = (bell(1.0 - STRAY_RANGES, width), bell(STRAY_RANGES, stray_width));
         let p = (near + stray).max(f64::MIN_POSITIVE);
-        let weight = (near + stray / width.powi(2)) / p;
+        let weight = (near / width.powi(2) + stray / stray_width.powi(2)) / p;
         Some([p.ln(), weight * x / sd_m, weight / (sd_m * sd_m)])
     }
 }

@@ -25,6 +25,10 @@ const EFFECT_STEP: f64 = 0.25;
 /// The same where facets move under the rays, first and last. ln p then has steps, of which a quotient
 /// sees those within its width, and a search goes about as far at a time.
 const WIDE_TO_NARROW: [f64; 3] = [1.0, 0.25, 0.06];
+/// How far such steps are looked over, in standard deviations but no more than an effect's steps.
+const ALONG_AXES: [f64; 4] = [0.3, 1.0, 3.0, 10.0];
+/// Change of ln mean over a difference quotient that no smooth surface makes.
+const SMOOTH: f64 = 0.5;
 /// Times that a step which does not improve is halved.
 const HALVINGS: usize = 5;
 /// Looks that a law must have to be fitted.
@@ -280,20 +284,20 @@ impl Problem<'_> {
 
     /// The most likely points of fits without each fold in turn, by a full step from the most likely
     /// point of all looks: the folds' points differ from it by about its standard deviation, over which
-    /// ln likelihood is a parabola.
+    /// ln likelihood is a parabola. One after the other, so that what was traced for one can be asked for at once.
     pub fn fit_without(
         &self,
         space: &Space,
         at: &DVector<f64>,
         folds: &Folds,
-    ) -> Vec<DVector<f64>> {
+    ) -> impl Iterator<Item = DVector<f64>> {
         let [lower, upper] = space.bounds();
-        let bounds = [&lower, &upper];
         let terms = self.terms(space, at);
-        let slopes = self.slopes(space, at, bounds, &terms);
-        let without = |fold: usize| {
+        let slopes = self.slopes(space, at, [&lower, &upper], &terms);
+        let without = move |fold: usize| {
             let used = |look: usize| folds.fold.get(look) != Some(&fold);
             let local = local(&terms, &slopes, &used);
+            let bounds = [&lower, &upper];
             let ln_p = |terms: &[Term]| -> f64 {
                 let used = terms.iter().enumerate().filter(|(look, _)| used(*look));
                 used.map(|(_, term)| term.ln_p).sum()
@@ -307,7 +311,34 @@ impl Problem<'_> {
             }
             at.clone()
         };
-        (0..folds.folds).map(without).collect()
+        (0..folds.folds).map(without)
+    }
+
+    /// The most likely of some points on the principal axes of the curvature, where one is more likely than the
+    /// middle. A target whose ranges leave it free to turn in itself is held by its edges alone, of which
+    /// ln p sees one chirp after the other, and slopes next to nothing.
+    pub fn along_axes(&self, space: &Space, at: &DVector<f64>) -> Option<DVector<f64>> {
+        let [lower, upper] = space.bounds();
+        let terms = self.terms(space, at);
+        let slopes = self.slopes(space, at, [&lower, &upper], &terms);
+        // What an edge passes over bends ln p without end.
+        let is_smooth = |look: usize| {
+            let mut of_effects = slopes.iter().skip(space.base_len());
+            of_effects.all(|slopes| slopes[look].ln_mean.abs() * EFFECT_STEP < SMOOTH)
+        };
+        let axes = local(&terms, &slopes, &is_smooth).curvature.symmetric_eigen();
+        let mut best = (sum(&terms), None);
+        for (axis, bend) in axes.eigenvectors.column_iter().zip(&axes.eigenvalues) {
+            let reach = bend.max(f64::MIN_POSITIVE).sqrt().recip().min(1.0);
+            for length in ALONG_AXES.iter().flat_map(|by| [by * reach, -by * reach]) {
+                let there = (at + axis * length).zip_zip_map(&lower, &upper, f64::clamp);
+                let ln_p = sum(&self.terms(space, &there));
+                if ln_p > best.0 {
+                    best = (ln_p, Some(there));
+                }
+            }
+        }
+        best.1
     }
 
     /// Standard deviation of every unknown in the search; infinite for those that a bound holds or

@@ -453,8 +453,8 @@ impl Selection<'_> {
     pub(super) fn held_out(&self, space: &Space, at: &DVector<f64>) -> Vec<Scored> {
         let Problem { declared, observations, .. } = self.problem;
         let mut all: Vec<(usize, Scored)> = Vec::new();
-        for (fold, at) in self.problem.fit_without(space, at, self.folds).iter().enumerate() {
-            let prediction = self.problem.predict(space, at);
+        for (fold, at) in self.problem.fit_without(space, at, self.folds).enumerate() {
+            let prediction = self.problem.predict(space, &at);
             let held_out = |look: usize| self.folds.fold.get(look) == Some(&fold);
             all.extend(scored(&prediction, declared, observations, &held_out));
         }

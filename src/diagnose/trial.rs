@@ -12,6 +12,8 @@ use crate::effects::{Effect, Knob};
 const STARTS: usize = 2;
 /// How often a fit to the sample is continued that has not settled.
 const LONGER: usize = 3;
+/// Gain in ln likelihood for which it is continued once more.
+const WORTH_MORE: f64 = 3.0;
 /// How far the shape of a start is moved, in felt steps.
 const SHAPE_STEPS: [f64; 3] = [4.0, 2.0, 1.0];
 /// Strengths of a start that are tried.
@@ -82,6 +84,10 @@ impl Selection<'_> {
             kept += usize::from(trial.candidate.gain >= SHARE_OF_PROMISE * promised);
         }
         sort(&mut trials);
+        if let Some(first) = trials.first_mut() {
+            self.continued(state, first);
+            sort(&mut trials);
+        }
         trials
     }
 
@@ -245,6 +251,26 @@ impl Selection<'_> {
         trial.sizes_db = self.sizes_db(state, &trial.space, &trial.fitted.at);
         trial.candidate.size_db = larger(trial.sizes_db);
         trial.candidate.converged = trial.fitted.converged;
+    }
+
+    /// Goes on with the fit of the best effect while it gains: one that moves facets under the rays may rest
+    /// before a step of ln p.
+    fn continued(&self, state: &State, trial: &mut Trial) {
+        for _ in 0..LONGER {
+            let Candidate { gain, sampled, converged, numbers, .. } = trial.candidate;
+            if sampled || converged || gain < self.settings.least_gain_of(numbers, trial.tried) {
+                return;
+            }
+            if trial.effect.moves()
+                && let Some(at) = self.problem.along_axes(&trial.space, &trial.fitted.at)
+            {
+                trial.fitted.at = at;
+            }
+            self.refit(state, trial);
+            if trial.candidate.gain < gain + WORTH_MORE {
+                return;
+            }
+        }
     }
 }
 

@@ -1,12 +1,14 @@
 //! A spot of finite size: the power of a chirp is the mean over rays through a Gaussian footprint, its
 //! range their mean by power. Rays beside the target bring nothing.
 
+use std::sync::LazyLock;
+
 use rayon::prelude::*;
 
-use super::meeting::at;
+use super::meeting::{Facing, facing};
 use super::spread::sunflower;
 use super::{Arrived, Effect, Knob, Level, Look, Stage, Survey};
-use crate::brdf::{Brdf, Scattering};
+use crate::brdf::{Brdf, Retro};
 use crate::frames::{Direction, Global, Ray, Surface};
 use crate::trace::{Hit, closest};
 
@@ -30,22 +32,22 @@ struct Beside {
 }
 
 impl Beside {
-    fn of(stage: &Stage, look: &Look) -> Beside {
-        let Look { hit: Hit { range_m, cos_theta, .. }, azimuth_rad, region, .. } = *look;
-        let to_radar = Direction::from_angles(look.hit.theta_rad(), azimuth_rad);
+    fn of(stage: &Stage, ray: &Ray<Global>, hit: &Hit) -> Beside {
+        let Facing { region, to_radar, .. } = facing(stage, ray, hit);
+        let Hit { range_m, cos_theta, .. } = *hit;
         let watts_per_f = stage.link.power_w(range_m, cos_theta, 1.0);
         Beside { range_m, to_radar, watts_per_f, region }
     }
 
     /// Equation (11) of the base law, W; nothing where the region has no law.
-    fn power_w(&self, laws: &[Brdf]) -> f64 {
+    fn power_w(&self, laws: &[Retro]) -> f64 {
         let law = laws.get(usize::from(self.region));
-        law.map_or(0.0, |law| self.watts_per_f * law.f_per_sr(self.to_radar, self.to_radar))
+        law.map_or(0.0, |law| self.watts_per_f * law.per_sr(self.to_radar))
     }
 }
 
 /// The rays of a spot and what they hit.
-type Round<'a> = (&'a [Ray<Global>], &'a [Option<Hit>]);
+type Round<'a> = (&'a [Ray<Global>; RAYS], &'a [Option<Hit>]);
 
 /// The ray of a look and those of its spot, as far as they meet the target as the scene has it.
 type Spot = (Beside, Vec<Beside>);
@@ -56,31 +58,38 @@ fn spots(stage: &Stage, looks: &[Look], diameter_m: f64) -> Vec<Option<Spot>> {
     let round = |(look, centre): (&Look, &Option<Hit>)| {
         round(&look.ray, centre.map_or(0.0, |hit| diameter_m / hit.range_m))
     };
-    let rays: Vec<Ray<Global>> = looks.par_iter().zip(&centres).flat_map_iter(round).collect();
-    let hits = closest(stage.bvh, &rays);
+    let rays: Vec<[Ray<Global>; RAYS]> = looks.par_iter().zip(&centres).map(round).collect();
+    let hits = closest(stage.bvh, rays.as_flattened());
     let spot = |(look, (centre, (rays, hits))): (&Look, (&Option<Hit>, Round))| {
-        let met = |ray, hit: Option<Hit>| Some(Beside::of(stage, &at(stage, look, ray, hit?)));
-        let beside = rays.iter().zip(hits).filter_map(|(ray, hit)| met(*ray, *hit));
-        Some((met(look.ray, *centre)?, beside.collect()))
+        let met =
+            |ray: &Ray<Global>, hit: &Option<Hit>| Some(Beside::of(stage, ray, hit.as_ref()?));
+        let beside = rays.iter().zip(hits).filter_map(|(ray, hit)| met(ray, hit));
+        Some((met(&look.ray, centre)?, beside.collect()))
     };
-    let rounds = rays.par_chunks(RAYS).zip(hits.par_chunks(RAYS));
+    let rounds = rays.par_iter().zip(hits.par_chunks(RAYS));
     looks.par_iter().zip(centres.par_iter().zip(rounds)).map(spot).collect()
 }
 
 /// The rays of a spot whose diameter is seen at an angle, rad.
 fn round(axis: &Ray<Global>, diameter_rad: f64) -> [Ray<Global>; RAYS] {
-    // The intensity exp(−4 ln 2·r²/D²) has this standard deviation along each direction.
-    let sd_rad = diameter_rad / (8.0 * std::f64::consts::LN_2).sqrt();
     let forward = axis.direction.xyz();
     let (u, v) = forward.any_orthonormal_pair();
-    let beside = |(share, angle_rad): (f64, f64)| {
-        let off = sd_rad * (-2.0 * (1.0 - share).ln()).sqrt();
-        let aside = off * (angle_rad.cos() * u + angle_rad.sin() * v);
+    PLACES.map(|[along, across]| {
+        let aside = diameter_rad * (along * u + across * v);
         Ray { direction: Direction::new(forward + aside).unwrap_or(axis.direction), ..*axis }
-    };
-    let mut places = sunflower(RAYS);
-    [(); RAYS].map(|()| places.next().map_or(*axis, beside))
+    })
 }
+
+/// Where the rays of a spot pass, in diameters from its middle.
+static PLACES: LazyLock<[[f64; 2]; RAYS]> = LazyLock::new(|| {
+    // The intensity exp(−4 ln 2·r²/D²) has this standard deviation along each direction.
+    let sd = 1.0 / (8.0 * std::f64::consts::LN_2).sqrt();
+    let mut places = sunflower(RAYS).map(|(share, angle_rad)| {
+        let off = sd * (-2.0 * (1.0 - share).ln()).sqrt();
+        [off * angle_rad.cos(), off * angle_rad.sin()]
+    });
+    [(); RAYS].map(|()| places.next().unwrap_or_default())
+});
 
 /// What the base law makes of a spot on the target as the scene has it, so that other effects stay as
 /// they are.
@@ -93,7 +102,7 @@ struct Averaged {
     spread_m: f64,
 }
 
-fn averaged(laws: &[Brdf], (centre, beside): &Spot) -> Option<Averaged> {
+fn averaged(laws: &[Retro], (centre, beside): &Spot) -> Option<Averaged> {
     let sums = beside.iter().fold([0.0; 3], |[power_w, first, second], ray| {
         let (one_w, longer_m) = (ray.power_w(laws), ray.range_m - centre.range_m);
         [power_w + one_w, first + one_w * longer_m, second + one_w * longer_m * longer_m]
@@ -154,7 +163,8 @@ impl Effect for FiniteSpot {
 
     fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
         let spots = survey.downcast_ref::<Vec<Option<Spot>>>().map_or(&[][..], Vec::as_slice);
-        let averaged = |spot: &Option<Spot>| averaged(laws, spot.as_ref()?);
+        let laws: Vec<Retro> = laws.iter().map(Retro::new).collect();
+        let averaged = |spot: &Option<Spot>| averaged(&laws, spot.as_ref()?);
         Box::new(spots.par_iter().map(averaged).collect::<Vec<Option<Averaged>>>())
     }
 

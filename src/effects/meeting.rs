@@ -48,13 +48,34 @@ pub(super) fn met(stage: &Stage, look: &Look, ray: Ray<Global>) -> Option<Look> 
 
 /// The same for the closest hit of that ray.
 pub(super) fn at(stage: &Stage, look: &Look, ray: Ray<Global>, hit: Hit) -> Look {
+    facing(stage, &ray, &hit).look(look, ray, hit)
+}
+
+/// The surface that a ray meets.
+pub(super) struct Facing {
+    /// Towards the ray's origin.
+    normal: DVec3,
+    pub region: u16,
+    /// Back along the ray.
+    pub to_radar: Direction<Surface>,
+}
+
+/// The surface at the closest hit of a ray.
+pub(super) fn facing(stage: &Stage, ray: &Ray<Global>, hit: &Hit) -> Facing {
     let back = -ray.direction.xyz();
     let outward = stage.bvh.mesh().area_normal(hit.facet as usize).normalize_or(back);
     let normal = if outward.dot(back) < 0.0 { -outward } else { outward };
     let region = stage.region_of_facet.get(hit.facet as usize).copied().unwrap_or(0);
-    let to_radar = Axes::new(normal, grain(stage, region)).local(back).xyz();
-    let azimuth_rad = to_radar.y.atan2(to_radar.x);
-    Look { ray, hit, normal, azimuth_rad, region, ..*look }
+    let to_radar = Axes::new(normal, grain(stage, region)).local(back);
+    Facing { normal, region, to_radar }
+}
+
+impl Facing {
+    fn look(&self, look: &Look, ray: Ray<Global>, hit: Hit) -> Look {
+        let to_radar = self.to_radar.xyz();
+        let azimuth_rad = to_radar.y.atan2(to_radar.x);
+        Look { ray, hit, normal: self.normal, azimuth_rad, region: self.region, ..*look }
+    }
 }
 
 /// A motion of the target: a turn about `pivot`, and then a shift.
@@ -68,15 +89,17 @@ pub(super) fn seen_from(target: &Pose<Global, Global>, ray: &Ray<Global>) -> Ray
     Ray { origin: back * ray.origin, direction: back * ray.direction }
 }
 
-/// The look at a target that has moved, for the closest hit of its ray as seen from there.
+/// The look at a target that has moved, for the closest hit of its ray as seen from there, and the direction of
+/// the radar from its surface.
 pub(super) fn moved(
     stage: &Stage,
     look: &Look,
     target: Pose<Global, Global>,
     (ray, hit): (Ray<Global>, Hit),
-) -> Look {
-    let there = at(stage, look, ray, hit);
+) -> (Look, Direction<Surface>) {
+    let facing = facing(stage, &ray, &hit);
+    let there = facing.look(look, ray, hit);
     let hit = Hit { point: target * there.hit.point, ..there.hit };
     let normal = target.rotation() * there.normal;
-    Look { ray: look.ray, hit, normal, target, ..there }
+    (Look { ray: look.ray, hit, normal, target, ..there }, facing.to_radar)
 }

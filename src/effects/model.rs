@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::meeting::{moved, seen_from};
 use super::tilt::{NODES, nodes, tilted_cos_theta};
 use super::{Arrived, Effect, Look, Receiver, Saturating, Stage, Survey};
-use crate::brdf::{Brdf, Scattering};
+use crate::brdf::{Brdf, Retro, Scattering};
 use crate::frames::{Direction, Global, Pose, Ray, Surface};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::trace::{Hit, closest};
@@ -154,7 +154,10 @@ impl Model<'_> {
         let of_placed = |of: &(dyn Fn(&Placed) -> f64 + Sync)| -> Vec<f64> {
             placed.par_iter().map(|placed| placed.as_ref().map_or(0.0, of)).collect()
         };
-        let law = |(look, to_radar): &Placed| self.law_per_sr(look, *to_radar);
+        let laws: Vec<Retro> = self.laws.iter().map(Retro::new).collect();
+        let law = |(look, to_radar): &Placed| {
+            laws.get(usize::from(look.region)).map_or(0.0, |law| law.per_sr(*to_radar))
+        };
         let f_per_sr = traced.scattered.of((self.laws.clone(), moves), || of_placed(&law));
         let gains = traced.gains.of(all, || of_placed(&|(look, _)| self.gain(stage, look)));
         let arrive = |((placed, f_per_sr), gain): ((&Option<Placed>, &f64), &f64)| {
@@ -184,7 +187,7 @@ impl Model<'_> {
     pub(crate) fn placed(&self, stage: &Stage, look: Look) -> Option<Look> {
         let Some(target) = self.target(stage, &look) else { return Some(look) };
         let ray = seen_from(&target, &look.ray);
-        stage.bvh.closest(&ray).map(|hit| moved(stage, &look, target, (ray, hit)))
+        stage.bvh.closest(&ray).map(|hit| moved(stage, &look, target, (ray, hit)).0)
     }
 
     /// All looks at once, so that rays of one origin share their walk over the facets.
@@ -202,10 +205,10 @@ impl Model<'_> {
         let hits = closest(stage.bvh, &rays);
         let placed =
             |(((look, target), ray), hit): (((&Look, &Option<_>), &Ray<_>), &Option<_>)| {
-                Some(facing(match *target {
-                    None => *look,
+                Some(match *target {
+                    None => facing(*look),
                     Some(target) => moved(stage, look, target, (*ray, (*hit)?)),
-                }))
+                })
             };
         looks.par_iter().zip(&targets).zip(&rays).zip(&hits).map(placed).collect()
     }

@@ -2,7 +2,7 @@
 //!
 //! What leaves the first hit into a direction falls on the second and is scattered to the radar, if
 //! nothing hides it there: P₂ = coupling·∫ Φ·f₁(i, ω)·cos θ_ω · f₂·cos θ_o·A_eq/R₂² dω, over fixed
-//! directions, half spread by the cosine and half by the lobe, each weighed by their joint density (the
+//! directions, spread by the cosine and by a wide and a narrow lobe, each weighed by their joint density (the
 //! balance heuristic: Veach & Guibas, SIGGRAPH 1995). Its range is half the whole way, and what is
 //! reported is the mean by power.
 
@@ -22,25 +22,30 @@ pub(super) struct MultiBounce;
 
 /// A coupling that counts as none, dB.
 const NONE_DB: f64 = -60.0;
-/// Directions of each kind.
-const DIRECTIONS: usize = 16;
-/// Roughness of the lobe that directions are spread over, whatever the law's: rays can then be traced
+/// Directions of each of three kinds.
+const DIRECTIONS: usize = 24;
+/// Roughnesses of the lobes that directions are spread over, whatever the law's: rays can then be traced
 /// once for all laws.
-const LOBE: f64 = 0.25;
+const LOBES: [f64; 2] = [0.25, 0.08];
 /// A ray leaves so far from its surface, m, and this much is no obstacle.
 const CLEARANCE_M: f64 = 1e-6;
 
-/// Onward directions at a surface whose lobe has the roughness m, with the density of each, 1/sr.
-fn onward(i: Direction<Surface>, m: f64) -> impl Iterator<Item = (Direction<Surface>, f64)> {
+/// Onward directions at a surface, with the density of each, 1/sr.
+fn onward(i: Direction<Surface>) -> impl Iterator<Item = (Direction<Surface>, f64)> {
     let by_cosine = sunflower(DIRECTIONS)
         .map(|(share, azimuth_rad)| Direction::from_angles(share.sqrt().asin(), azimuth_rad));
-    let by_lobe = sunflower(DIRECTIONS).filter_map(move |(share, azimuth_rad)| {
-        let tan = m * (-(1.0 - share).ln()).sqrt();
-        let h = Direction::<Surface>::from_angles(tan.atan(), azimuth_rad).xyz();
-        Direction::new(2.0 * i.xyz().dot(h) * h - i.xyz())
-    });
-    let above = by_cosine.chain(by_lobe).filter(|o| o.cos_theta() > 1e-6);
-    above.map(move |o| (o, (o.cos_theta() / PI + lobe_density(i, o, m)) / 2.0))
+    let by_lobe = move |m: f64| {
+        sunflower(DIRECTIONS).filter_map(move |(share, azimuth_rad)| {
+            let tan = m * (-(1.0 - share).ln()).sqrt();
+            let h = Direction::<Surface>::from_angles(tan.atan(), azimuth_rad).xyz();
+            Direction::new(2.0 * i.xyz().dot(h) * h - i.xyz())
+        })
+    };
+    let all = by_cosine.chain(LOBES.into_iter().flat_map(by_lobe));
+    all.filter(|o| o.cos_theta() > 1e-6).map(move |o| {
+        let lobes: f64 = LOBES.iter().map(|m| lobe_density(i, o, *m)).sum();
+        (o, (o.cos_theta() / PI + lobes) / (1 + LOBES.len()) as f64)
+    })
 }
 
 /// Density at o of reflections of i on facets by Beckmann's law, 1/sr.
@@ -98,7 +103,8 @@ fn detour(
     let there = Axes::of(stage, &second);
     let way_m = look.hit.point.distance_m(second.hit.point) + back_m;
     let sent_w = stage.link.flux_w(look.hit.cos_theta) * o.cos_theta() / density_per_sr;
-    let share = stage.link.received_per_w(back_m, cos_exit, 1.0) / (2 * DIRECTIONS) as f64;
+    let share =
+        stage.link.received_per_w(back_m, cos_exit, 1.0) / ((1 + LOBES.len()) * DIRECTIONS) as f64;
     Some(Detour {
         regions: [look.region, second.region],
         first: [axes.local(-look.ray.direction.xyz()), o],
@@ -113,7 +119,7 @@ fn detours(stage: &Stage, look: &Look) -> Vec<Detour> {
     let Some(look) = &met(stage, look, look.ray) else { return Vec::new() };
     let axes = Axes::of(stage, look);
     let i = axes.local(-look.ray.direction.xyz());
-    onward(i, LOBE).filter_map(|(o, density)| detour(stage, look, &axes, o, density)).collect()
+    onward(i).filter_map(|(o, density)| detour(stage, look, &axes, o, density)).collect()
 }
 
 /// Power, W, and range, m, of all that a chirp returns by way of a second surface.
@@ -198,15 +204,15 @@ mod tests {
         assert_eq!(ball.with(&MultiBounce, &[0.0]), ball.bare());
     }
 
-    /// ∫ 1 dω over the hemisphere is 2π whatever the lobe, and ∫ cos θ dω is π.
+    /// ∫ cos θ dω over the hemisphere is π.
     #[test]
     fn the_directions_integrate_over_the_hemisphere() {
-        let i = Direction::from_angles(0.5, 0.3);
-        for m in [0.1, lobe().m, 1.0] {
-            let sum: f64 = onward(i, m).map(|(o, density)| o.cos_theta() / density).sum();
-            let found = sum / (2 * DIRECTIONS) as f64 / PI;
-            // Half of the directions see the whole, so that a few per cent are left.
-            assert!((found - 1.0).abs() < 0.1, "{m}: {found}");
+        for theta_rad in [0.0, 0.5, 1.0] {
+            let i = Direction::from_angles(theta_rad, 0.3);
+            let sum: f64 = onward(i).map(|(o, density)| o.cos_theta() / density).sum();
+            let found = sum / ((1 + LOBES.len()) * DIRECTIONS) as f64 / PI;
+            // A third of the directions see the whole, so that a few per cent are left.
+            assert!((found - 1.0).abs() < 0.1, "{theta_rad}: {found}");
         }
     }
 

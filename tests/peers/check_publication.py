@@ -3,12 +3,13 @@
 
     cargo build --release
     target/release/matdb add --all && target/release/matdb publish site
-    python3 -m venv venv && venv/bin/pip install frictionless==5.16.1 cffconvert==2.0.0 jsonschema-rs==0.60.3
+    python3 -m venv venv && venv/bin/pip install frictionless==5.16.1 cffconvert==2.0.0 jsonschema-rs==0.60.3 pyarrow==26.0.1
     venv/bin/python tests/peers/check_publication.py site
 
 - Frictionless: `datapackage.json`, every table against its types, keys, references and hash;
 - cffconvert: `CITATION.cff`;
 - jsonschema-rs: everything below `api/v1/` and `changes.json` with the JSON Schemas that are published beside it;
+- pyarrow: every Parquet table, cell for cell, with the CSV beside it;
 - hashlib: every file against `SHA256SUMS`, and none that is not listed.
 
 With `--ro-crate` and roc-validator==0.13.0 also `ro-crate-metadata.json`: that program fetches the context of
@@ -16,6 +17,7 @@ RO-Crate from w3id.org. It prints a line per check and every failure, and ends w
 """
 
 import argparse
+import csv
 import hashlib
 import json
 import subprocess
@@ -29,6 +31,8 @@ def main():
     parser.add_argument("--ro-crate", action="store_true", help="RO-Crate too, which needs a network")
     options = parser.parse_args()
     checks = {"Frictionless": frictionless, "cffconvert": cffconvert, "JSON Schema": schemas, "SHA256SUMS": sums}
+    if list(options.site.glob("tables/*.parquet")):
+        checks["pyarrow"] = parquet
     if options.ro_crate:
         checks["RO-Crate"] = ro_crate
     failed = False
@@ -83,6 +87,34 @@ def schemas(site):
             errors = validator.iter_errors(json.loads(path.read_text(encoding="utf-8")))
             problems += [f"{path.relative_to(site)}: /{'/'.join(map(str, error.instance_path))}: {error.message}" for error in errors]
     return sum(map(len, files.values())), problems
+
+
+def parquet(site):
+    import pyarrow.parquet
+
+    problems = []
+    paths = sorted(site.glob("tables/*.parquet"))
+    for path in paths:
+        table = pyarrow.parquet.read_table(path)
+        with path.with_suffix(".csv").open(encoding="utf-8", newline="") as file:
+            header, *rows = csv.reader(file)
+        if table.column_names != header:
+            problems.append(f"{path.name} has the columns {table.column_names}")
+            continue
+        if table.num_rows != len(rows):
+            problems.append(f"{path.name} has {table.num_rows} rows of {len(rows)}")
+        for name, cells in zip(header, zip(*rows)):
+            for row, (cell, value) in enumerate(zip(cells, table[name].to_pylist())):
+                if not same(cell, value):
+                    problems.append(f"{path.name}: {name} of row {row + 1} is {value!r}, {cell!r} in the CSV")
+    return len(paths), problems
+
+
+def same(cell, value):
+    """Whether a cell of a CSV says a value of Parquet."""
+    if value is None:
+        return cell == ""
+    return cell == value if isinstance(value, str) else type(value)(cell) == value
 
 
 def sums(site):

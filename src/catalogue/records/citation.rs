@@ -4,7 +4,7 @@
 use serde_json::{Value, json};
 
 use super::Context;
-use crate::catalogue::about::Person;
+use crate::catalogue::about::{Institute, Person};
 use crate::material::form::alternative_licences;
 
 /// The DOI's own address.
@@ -48,7 +48,7 @@ pub(super) fn cff(context: &Context) -> String {
         alternatives.iter().for_each(|licence| text += &format!("  - {}\n", quoted(licence)));
     }
     text += "authors:\n";
-    if about.people.is_empty() {
+    if !about.has_authors() {
         text += &format!("  - name: {}\n", quoted(&nobody(context)));
     }
     for Person { family, given, orcid, affiliation } in &about.people {
@@ -59,6 +59,12 @@ pub(super) fn cff(context: &Context) -> String {
         }
         if let Some(affiliation) = affiliation {
             text += &format!("    affiliation: {}\n", quoted(affiliation));
+        }
+    }
+    for Institute { name, url } in &about.institutes {
+        text += &format!("  - name: {}\n", quoted(name));
+        if let Some(url) = url {
+            text += &format!("    website: {}\n", quoted(url));
         }
     }
     text
@@ -80,9 +86,10 @@ pub(super) fn zenodo(context: &Context) -> Option<Value> {
         insert(&mut creator, "affiliation", person.affiliation.as_deref());
         creator
     };
-    let creators: Vec<Value> = match about.people.as_slice() {
-        [] => vec![json!({ "name": nobody(context) })],
-        people => people.iter().map(person).collect(),
+    let institutes = about.institutes.iter().map(|institute| json!({ "name": institute.name }));
+    let creators: Vec<Value> = match about.has_authors() {
+        true => about.people.iter().map(person).chain(institutes).collect(),
+        false => vec![json!({ "name": nobody(context) })],
     };
     let mut record = json!({
         "upload_type": "dataset",
@@ -177,6 +184,21 @@ mod tests {
         }
         let nothing = About { licence: None, ..About::default() };
         assert_eq!(self::zenodo(&Context { about: &nothing, date: None, materials: 0 }), None);
+    }
+
+    #[test]
+    fn an_institute_answers_for_a_catalogue_as_a_person_does() {
+        let text = "licence = 'CC0-1.0'\n[[institute]]\nname = 'Laboratory at University'\n\
+                    url = 'https://lab.example.org'";
+        let about = About::parse("about.toml", text).unwrap();
+        let context = Context { about: &about, date: None, materials: 1 };
+        let authors = "authors:\n  - name: \"Laboratory at University\"\n    website: \"https://lab.example.org\"\n";
+        assert!(cff(&context).ends_with(authors), "{}", cff(&context));
+        let creators = &zenodo(&context).unwrap()["creators"];
+        assert_eq!(creators, &json!([{ "name": "Laboratory at University" }]));
+        let comma = text.replace("Laboratory at", "Laboratory,");
+        let refused = About::parse("about.toml", &comma).unwrap_err().to_string();
+        assert!(refused.contains("without a comma"), "{refused}");
     }
 
     #[test]

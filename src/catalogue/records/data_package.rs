@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::citation::{doi_url, insert, nobody};
 use super::{Context, listed};
+use crate::catalogue::about::About;
 use crate::catalogue::api::Index;
 use crate::catalogue::folder::Sum;
 use crate::catalogue::tables::{Written, csv_path, unit};
@@ -71,8 +72,8 @@ fn licences(context: &Context, index: &Index) -> Vec<Value> {
 }
 
 fn contributors(context: &Context) -> Vec<Value> {
-    let people = &context.about.people;
-    if people.is_empty() {
+    let About { people, institutes, .. } = context.about;
+    if !context.about.has_authors() {
         return vec![json!({ "title": nobody(context) })];
     }
     let person = people.iter().map(|person| {
@@ -85,7 +86,12 @@ fn contributors(context: &Context) -> Vec<Value> {
         insert(&mut entry, "organization", person.affiliation.as_deref());
         entry
     });
-    person.collect()
+    let institute = institutes.iter().map(|institute| {
+        let mut entry = json!({ "title": institute.name, "roles": ["creator"] });
+        insert(&mut entry, "path", institute.url.as_deref());
+        entry
+    });
+    person.chain(institute).collect()
 }
 
 fn resource(path: &str, sum: &Sum, media_type: &str, written: Option<&Written>) -> Value {

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::citation::{doi_url, insert, nobody, orcid_url};
 use super::{Context, listed};
-use crate::catalogue::about::Person;
+use crate::catalogue::about::{Institute, Person};
 use crate::catalogue::api;
 use crate::catalogue::folder::Sum;
 use crate::material::form::alternative_licences;
@@ -28,9 +28,9 @@ pub(in crate::catalogue) fn licence_record(licence: &str) -> Value {
     }
 }
 
-/// People as schema.org has them, each with an identifier in this file.
+/// People and institutes as schema.org has them, each with an identifier in this file.
 fn people(context: &Context) -> Vec<Value> {
-    if context.about.people.is_empty() {
+    if !context.about.has_authors() {
         return vec![
             json!({ "@id": "#contributors", "@type": "Organization", "name": nobody(context) }),
         ];
@@ -47,7 +47,12 @@ fn people(context: &Context) -> Vec<Value> {
         insert(&mut entry, "affiliation", person.affiliation.as_deref());
         entry
     };
-    context.about.people.iter().enumerate().map(person).collect()
+    let institute = |(number, institute): (usize, &Institute)| {
+        let id = institute.url.clone().unwrap_or(format!("#institute-{}", number + 1));
+        json!({ "@id": id, "@type": "Organization", "name": institute.name })
+    };
+    let people = context.about.people.iter().enumerate().map(person);
+    people.chain(context.about.institutes.iter().enumerate().map(institute)).collect()
 }
 
 /// What both say of the catalogue.

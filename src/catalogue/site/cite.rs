@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use super::link::doi_href;
 use super::words::cut;
 use crate::catalogue::About;
+use crate::catalogue::about::{Institute, Person};
 use crate::catalogue::bibtex::entry;
 use crate::catalogue::records::licence_record;
 use crate::catalogue::references::{Credit, pruned};
@@ -107,7 +108,7 @@ fn distribution(path: &str, media_type: &str) -> Value {
 }
 
 fn creators(about: &About) -> Vec<Value> {
-    let person = |person: &crate::catalogue::about::Person| {
+    let person = |person: &Person| {
         pruned(json!({
             "@type": "Person",
             "familyName": person.family,
@@ -116,13 +117,20 @@ fn creators(about: &About) -> Vec<Value> {
             "identifier": person.orcid.as_ref().map(|orcid| format!("https://orcid.org/{orcid}")),
         }))
     };
-    about.people.iter().map(person).collect()
+    let institute = |institute: &Institute| {
+        pruned(json!({ "@type": "Organization", "name": institute.name, "url": institute.url }))
+    };
+    about.people.iter().map(person).chain(about.institutes.iter().map(institute)).collect()
 }
 
-/// Somebody of whom only `Family, Given` is known.
+/// Somebody of whom only `Family, Given` is known, or the name of an institute.
 fn person(author: &str) -> Value {
-    let (family, given) = author.split_once(", ").unwrap_or((author, ""));
-    json!({ "@type": "Person", "familyName": family, "givenName": given })
+    match author.split_once(", ") {
+        Some((family, given)) => {
+            json!({ "@type": "Person", "familyName": family, "givenName": given })
+        }
+        None => json!({ "@type": "Organization", "name": author }),
+    }
 }
 
 /// Names before a title.
@@ -150,21 +158,19 @@ fn bibtex(
     added_at: &str,
     status: Option<String>,
 ) -> String {
-    let named = |authors: &[String]| (!authors.is_empty()).then(|| authors.join(" and "));
     let here = (Some(about.title.clone()), &about.version, &about.doi, &about.url);
-    let (author, (place, version, doi, url), note) = match credit {
-        Credit::Own => (named(&about.authors()), here, None),
-        Credit::BuiltIn => (None, here, Some(BUILT_IN.to_owned())),
+    let (authors, (place, version, doi, url), note) = match credit {
+        Credit::Own => (about.authors(), here, None),
+        Credit::BuiltIn => (Vec::new(), here, Some(BUILT_IN.to_owned())),
         Credit::Others(o) => {
             let there = (Some(o.title().to_owned()), &o.version, &o.doi, &o.url);
-            (named(&o.authors), there, Some(format!("Republished in {}", catalogue_words(about))))
+            (o.authors.clone(), there, Some(format!("Republished in {}", catalogue_words(about))))
         }
     };
     let notes: Vec<String> = note.into_iter().chain(status).collect();
     let note = (!notes.is_empty()).then(|| notes.join("; "));
     let added_at = if let Credit::Others(origin) = credit { &origin.added_at } else { added_at };
     let fields = [
-        ("author", author),
         ("title", Some(title.to_owned())),
         ("howpublished", place),
         ("year", added_at.get(..4).map(str::to_owned)),
@@ -174,7 +180,8 @@ fn bibtex(
         ("note", note),
     ];
     let short = fields.map(|(name, value)| (name, value.map(|value| cut(&value, 400))));
-    entry("misc", &format!("matdb-{key}"), short).trim_end().to_owned()
+    let authors: Vec<String> = authors.iter().map(|author| cut(author, 400)).collect();
+    entry("misc", &format!("matdb-{key}"), &authors, short).trim_end().to_owned()
 }
 
 #[cfg(test)]

@@ -308,6 +308,16 @@ fn refuse(error: DiagnoseError, asked: Asked, console: &Console) -> Result<(), E
     let [cloud, scene] = [&cloud.cloud, scene].map(|path| path.display().to_string());
     let html = html::cannot_tell(&answer, &scene, &cloud);
     write_all(&args.output, &[("report.html", html), ("report.json", json(&answer)?)])?;
+    // What an earlier diagnosis left there would pass for part of this answer.
+    for stale in ["residuals.csv", after::AFTER].map(|name| args.output.join(name)) {
+        match std::fs::remove_file(&stale) {
+            Err(reason) if reason.kind() != std::io::ErrorKind::NotFound => {
+                let way_out = "remove it: it is of an earlier diagnosis";
+                return Err(Error::Io { verb: "remove", path: stale, reason, way_out });
+            }
+            _ => {}
+        }
+    }
     if console.json {
         console.result("", &answer)?;
     }
