@@ -496,6 +496,32 @@ fn the_commands_go_there_and_back() {
 }
 
 #[test]
+fn a_curve_in_other_units_is_taken_with_a_word_about_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let notes = |name: &str, rows: &str| {
+        fs::write(
+            folder.path().join("curve.csv"),
+            format!("theta_deg,sigma0_db,threshold_db\n{rows}"),
+        )
+        .unwrap();
+        let add = "add --from curve.csv --kind synthetic --source model --licence CC0-1.0 --frequency 300";
+        let mut command = matdb(folder.path());
+        let output = command.args(add.split_whitespace()).args(["--name", name]).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let radians = "0,-3,-40\n0.3,-8,-40\n0.6,-15,-40\n0.9,-20,-40\n1.2,-30,-40\n";
+    assert!(notes("radians", radians).contains("above 1.2°; are they in degrees?"));
+    let weak = "0,-3,-40\n20,-8,-4\n40,-15,-40\n60,-39.5,-39\n";
+    let said = notes("weak", weak);
+    assert!(said.contains("1 detection of curve `curve` lies below"), "{said}");
+    assert!(said.contains("by up to 4.0 dB"), "{said}");
+    let plain = "0,-3,-40\n20,-8,-40\n40,-15,-40\n50,-16,-40\n60,-39.5,-40\n";
+    let said = notes("plain", plain);
+    assert!(!said.contains("degrees?") && !said.contains("detection"), "{said}");
+}
+
+#[test]
 fn a_bare_curve_is_named_by_its_file_and_says_what_it_is_found_and_cited_by() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {

@@ -1,18 +1,31 @@
 //! What a material must say before it is let in: numbers without their circumstances cannot be used by
 //! anybody else, and who measured them knows them best on the day.
 
+use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
+use super::summary::counted;
 use crate::error::Error;
 use crate::material::form::{is_address, is_doi, is_licence, licence_doubt};
-use crate::material::{Curve, Fit, Instrument, Material, SourceKind};
-use crate::units::{dbm_from_watts, range, rounded, shown};
+use crate::material::{Censor, Curve, Fit, Instrument, Material, Observation, SourceKind};
+use crate::units::{db_from_ratio, dbm_from_watts, range, rounded, shown};
 
 /// Thickest layer of a sample that anybody puts before a radar, m.
 const THICKEST_M: f64 = 10.0;
 
 /// Highest frequency of anything that is called a radar, Hz.
 const HIGHEST_HZ: f64 = 1e13;
+
+/// Highest frequency of light that anybody sees, Hz, and a little beyond.
+const HIGHEST_CLAIM_HZ: f64 = 1e15;
+
+/// Points below which a curve may well be of a few angles near the normal, and the widest of them in
+/// radians that no such curve reaches.
+const FEWEST_ANGLES: usize = 5;
+const FEW_RADIANS: f64 = 0.5;
+
+/// By how much a detection is below its threshold that rounding does not explain, dB.
+const WEAK_DB: f64 = 1.0;
 
 /// Refuses a material with measured numbers that lack curve, licence, instrument or threshold, and one
 /// with values that only a slip can give.
@@ -56,6 +69,13 @@ pub(super) fn doubts(material: &Material) -> Vec<String> {
             ));
         }
     }
+    let highest_hz = material.frequency_hz[1];
+    if doubts.is_empty() && highest_hz > HIGHEST_CLAIM_HZ {
+        let ghz = shown(rounded(highest_hz / 1e9));
+        doubts.push(format!("{slug}: it is claimed to hold up to {ghz} GHz; is that in GHz?"));
+    }
+    let of_curves = material.curves.iter().flat_map(|curve| [in_radians(curve), too_weak(curve)]);
+    doubts.extend(of_curves.flatten().map(|doubt| format!("{slug}: {doubt}")));
     let mut licences: Vec<&String> = material.sources.iter().flat_map(|s| &s.licence).collect();
     licences.push(&material.licence);
     licences.sort();
@@ -64,6 +84,36 @@ pub(super) fn doubts(material: &Material) -> Vec<String> {
         doubts.extend(licence_doubt(licence).map(|doubt| format!("{slug}: {doubt}")));
     }
     doubts
+}
+
+/// That all angles of a curve are so small as radians are.
+fn in_radians(curve: &Curve) -> Option<String> {
+    let angles_deg = curve.observations.iter().map(|row| row.theta_i_rad.to_degrees());
+    let widest_deg = angles_deg.fold(0.0, f64::max);
+    let is_few = curve.observations.len() < FEWEST_ANGLES;
+    (!is_few && (FEW_RADIANS..FRAC_PI_2).contains(&widest_deg)).then(|| {
+        format!(
+            "no angle of curve `{}` is above {}°; are they in degrees?",
+            curve.name,
+            shown(rounded(widest_deg))
+        )
+    })
+}
+
+/// That detections of a curve are weaker than what they say could be detected.
+fn too_weak(curve: &Curve) -> Option<String> {
+    let below_db = |row: &Observation| {
+        let ratio = row.threshold_sigma0? / row.sigma0.filter(|_| row.censor == Censor::None)?;
+        Some(db_from_ratio(ratio)).filter(|below_db| *below_db > WEAK_DB)
+    };
+    let below: Vec<f64> = curve.observations.iter().filter_map(below_db).collect();
+    let most_db = below.iter().copied().reduce(f64::max)?;
+    Some(format!(
+        "{} of curve `{}` {} below what could be detected, by up to {most_db:.1} dB; are both in the same unit?",
+        counted(below.len(), "detection"),
+        curve.name,
+        if below.len() == 1 { "lies" } else { "lie" }
+    ))
 }
 
 /// Fits that claim to be measured without a curve that anybody measured, a clause each.

@@ -187,7 +187,7 @@ impl Effect for MultiBounce {
 mod tests {
     use super::*;
     use crate::brdf::Lambert;
-    use crate::effects::testing::{Bench, dihedral, lobe};
+    use crate::effects::testing::{Bench, dihedral};
     use crate::effects::{Model, Receiver};
 
     #[test]
