@@ -47,6 +47,12 @@ fn a_sound_database_passes_and_nothing_is_missed_in_a_changed_one() {
     for (sql, place, problem) in [
         ("UPDATE source SET title = 'other'", "cotton@1", "not what was stored"),
         (
+            "DROP VIEW v_curves; CREATE VIEW v_curves AS SELECT 1",
+            "matdb.sqlite",
+            "view v_curves is not the one that matdb makes",
+        ),
+        ("DROP INDEX entry_class", "matdb.sqlite", "index entry_class"),
+        (
             "UPDATE curve_statistic SET mean_greatest = 2 * mean_greatest",
             "cotton@1, curve backscatter",
             "statistics",

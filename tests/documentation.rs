@@ -96,6 +96,26 @@ fn a_curve_gets_from_csv_to_a_folder_for_a_web_server_as_the_docs_say() {
 }
 
 #[test]
+fn a_laboratory_publishes_its_own_curve_as_the_readme_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let (readme, page) = (read("README.md"), read("docs/publishing.md"));
+    fs::write(folder.path().join("scan.csv"), blocks(&page, "csv")[0]).unwrap();
+    fs::write(folder.path().join("about.toml"), blocks(&page, "toml")[0]).unwrap();
+    let program = assert_cmd::cargo::cargo_bin("matdb");
+    assert_cmd::Command::new("sh")
+        .args(["-euc", blocks(&readme, "bash")[0]])
+        .current_dir(folder.path())
+        .env("PATH", format!("{}:/usr/bin:/bin", program.parent().unwrap().display()))
+        .env_remove("MATDB")
+        .assert()
+        .success();
+    let front = fs::read_to_string(folder.path().join("own-site/index.html")).unwrap();
+    for name in ["Ann Roe", "Terahertz Laboratory at Example University"] {
+        assert!(front.contains(name), "{name}");
+    }
+}
+
+#[test]
 fn the_readme_names_the_test_command_and_files_that_exist() {
     let readme = read("README.md");
     assert!(blocks(&readme, "sh").iter().any(|block| block.lines().any(|l| l == "cargo test")));

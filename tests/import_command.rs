@@ -168,6 +168,9 @@ fn what_was_taken_says_from_which_catalogue_and_when_it_was_made_there() {
 fn what_they_made_since_comes_as_revisions_unless_it_was_changed_here() {
     let (theirs, ours) = laboratories();
     let site = theirs.path().join("site");
+    fs::write(theirs.path().join("about.toml"), "title = 'Theirs'\n").unwrap();
+    let publish = ["publish", "site", "--about", "about.toml", "-q"];
+    matdb(theirs.path()).args(publish).assert().success();
     let revised =
         |name: &str, finish: &str| Material { finish: Some(finish.to_owned()), ..changed(name) };
     import(ours.path(), &site, &["--as-prefix", "roe-"]);
@@ -234,6 +237,24 @@ fn nobody_else_revises_or_withdraws_what_is_ones_own() {
         [("primer", "added")]
     );
     assert_eq!(results(&import(third.path(), &site, &[])), [("primer", "conflict")]);
+}
+
+#[test]
+fn catalogues_of_nobody_are_not_taken_for_one_another() {
+    let [first, second, ours] = [(); 3].map(|()| tempfile::tempdir().unwrap());
+    for folder in [&first, &second] {
+        let mut store = Store::open(folder.path().join("matdb.sqlite")).unwrap();
+        store.add([&sound("primer")]).unwrap();
+        drop(store);
+        if folder.path() == second.path() {
+            let withdraw = ["withdraw", "primer", "--reason", "they say so", "-q"];
+            matdb(folder.path()).args(withdraw).assert().success();
+        }
+        matdb(folder.path()).args(["publish", "site", "-q"]).assert().success();
+    }
+    let import = |from: &Path| import(ours.path(), &from.join("site"), &[]);
+    assert_eq!(results(&import(first.path())), [("primer", "added")]);
+    assert_eq!(results(&import(second.path())), [("primer", "conflict")]);
 }
 
 #[test]

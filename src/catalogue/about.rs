@@ -10,7 +10,7 @@ use thiserror::Error;
 use super::folder::SUMS;
 use super::publish::ABOUT;
 use crate::material::form::{is_address, is_doi, is_licence, is_orcid};
-use crate::material::turns_the_line;
+use crate::material::{USUAL_TITLE, turns_the_line};
 
 /// What a catalogue says of itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,7 +64,7 @@ pub struct Institute {
 impl Default for About {
     fn default() -> About {
         About {
-            title: "Materials for 300 GHz imaging radar".to_owned(),
+            title: USUAL_TITLE.to_owned(),
             description: "How materials scatter, measured or fitted, each number with its source."
                 .to_owned(),
             version: None,

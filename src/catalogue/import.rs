@@ -186,7 +186,9 @@ impl Import {
         let about = self.about()?;
         for &number in since {
             let newer = origin(&about, &self.stored(slug, number)?);
-            if (&newer.title, &newer.authors) != (&first.title, &first.authors) {
+            if newer.is_anonymous()
+                || (&newer.title, &newer.authors) != (&first.title, &first.authors)
+            {
                 return Ok(false);
             }
         }

@@ -52,6 +52,9 @@ pub(super) fn run(db: &Database, console: &Console) -> Result<(), Error> {
     let file = db.path().display().to_string();
     let mut record = Record::default();
     store.damage()?.iter().for_each(|problem| record.wrong(&file, problem));
+    for changed in store.changed_schema()? {
+        record.wrong(&file, format!("{changed} is not the one that matdb makes"));
+    }
     let mut again = Again::new()?;
     if !again.has_own_units(&store)? {
         record.wrong(&file, OTHER_UNITS);

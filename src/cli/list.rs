@@ -29,6 +29,8 @@ pub(super) struct Args {
 
 /// What a person still looks through.
 const SHOWN: u32 = 200;
+/// How many more are counted.
+const MOST_COUNTED: u32 = 10_000;
 
 /// Which materials are wanted; all that is said must hold.
 #[derive(Debug, clap::Args)]
@@ -120,12 +122,14 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             materials.iter().zip(kinds(store.as_ref(), &materials)?).map(row),
         ),
     };
-    let all = store.as_ref().map_or(Ok(0), |store| store.count(&filter))?;
+    let most = MOST_COUNTED.saturating_add(limit.unwrap_or_default());
+    let all = store.as_ref().map_or(Ok(0), |store| store.count(&filter, most))?;
     if all > materials.len() {
+        let more = grouped(all - materials.len());
+        let more = if all as u64 == u64::from(most) { format!("at least {more}") } else { more };
         text += &format!(
-            "… and {} more; narrow with --class, --tag, --kind or --frequency, or see more with \
+            "… and {more} more; narrow with --class, --tag, --kind or --frequency, or see more with \
              --limit\n",
-            grouped(all - materials.len())
         );
     }
     if !missing.is_empty() {
@@ -138,9 +142,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 /// Which classes there are, where one is asked for that no material has.
 fn classes(filter: &Filter, store: &Store) -> Result<String, Error> {
     let Some(class) = &filter.class else { return Ok(String::new()) };
-    let built_in = not_added(Some(store))?.list()?;
-    let all = store.list()?.into_iter().chain(built_in).map(|summary| summary.class);
-    let classes: BTreeSet<String> = all.collect();
+    let built_in = not_added(Some(store))?.classes()?;
+    let classes: BTreeSet<String> = store.classes()?.into_iter().chain(built_in).collect();
     Ok(match classes.contains(class) {
         true => String::new(),
         false => {

@@ -5,8 +5,10 @@ pub(super) fn table<const N: usize>(
     header: &[&str; N],
     rows: impl Iterator<Item = [String; N]>,
 ) -> String {
+    // A line break in a cell would pass for a row.
+    let on_one_line = |cell: String| cell.replace(char::is_control, " ");
     let mut lines = vec![header.map(str::to_owned)];
-    lines.extend(rows);
+    lines.extend(rows.map(|row| row.map(on_one_line)));
     let widths: Vec<usize> = (0..N)
         .map(|column| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0))
         .collect();
@@ -53,6 +55,11 @@ mod tests {
     fn one_thing_is_no_things() {
         let said = [0, 1, 2000].map(|number| counted(number, "fit"));
         assert_eq!(said, ["0 fits", "1 fit", "2 000 fits"]);
+    }
+
+    #[test]
+    fn no_cell_makes_a_row() {
+        assert_eq!(table(&["a"], [["x\ny".to_owned()]].into_iter()), "a\nx y\n");
     }
 
     #[test]

@@ -32,6 +32,7 @@ pub use finding::{Finding, FindingVerdict};
 pub use instrument::{Geometry, Instrument, Scale};
 pub use provenance::{
     Activity, Citation, Input, Making, Origin, Session, SessionPose, Source, SourceKind,
+    USUAL_TITLE,
 };
 pub use reach::Reach;
 pub use report::{ChosenBy, Estimate, FitReport, Given, Goodness, HeldOut, Told};

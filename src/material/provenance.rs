@@ -160,6 +160,9 @@ pub struct Activity {
     pub origin: Option<Origin>,
 }
 
+/// Title of a catalogue to which nobody has given one.
+pub const USUAL_TITLE: &str = "Materials for 300 GHz imaging radar";
+
 /// Somebody else's catalogue that a revision was taken from, and what it was there.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Origin {
@@ -217,6 +220,12 @@ impl Origin {
         names.into_iter().any(|name| turns_the_line(name)).then(|| {
             "its catalogue or an author of that: the name holds a character that turns the line round".to_owned()
         })
+    }
+
+    /// Whether nothing tells the catalogue from others: it names nobody and has no title of its own.
+    pub fn is_anonymous(&self) -> bool {
+        let is_own = |title: &String| title != USUAL_TITLE;
+        self.authors.is_empty() && !self.title.as_ref().is_some_and(is_own)
     }
 
     /// Its title, or that it has none.

@@ -61,12 +61,21 @@ impl Store {
         filter::page(&self.conn, filter, most).map_err(|error| StoreError::new(&self.path, error))
     }
 
-    /// How many there are.
+    /// How many there are, but no more than `most`, without counting the others.
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn count(&self, filter: &Filter) -> Result<usize, StoreError> {
-        filter::count(&self.conn, filter).map_err(|error| StoreError::new(&self.path, error))
+    pub fn count(&self, filter: &Filter, most: u32) -> Result<usize, StoreError> {
+        let counted = filter::count(&self.conn, filter, most);
+        counted.map_err(|error| StoreError::new(&self.path, error))
+    }
+
+    /// Every class that a current revision is of, sorted.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn classes(&self) -> Result<Vec<String>, StoreError> {
+        filter::classes(&self.conn).map_err(|error| StoreError::new(&self.path, error))
     }
 
     /// What a list says of one material; `None` when there is none of that name.

@@ -120,6 +120,26 @@ impl Store {
         let own = super::connect::in_memory()?;
         Ok(schema(&self.conn).map_err(failed)? == schema(&own).map_err(failed)?)
     }
+
+    /// Kind and name of every table, index, trigger or view that this program makes and that is not there, or is
+    /// another one. What somebody has added does not count.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn changed_schema(&self) -> Result<Vec<String>, StoreError> {
+        let failed = |error| StoreError::new(&self.path, error);
+        let own = super::connect::in_memory()?;
+        let (own, there) = (schema(&own).map_err(failed)?, schema(&self.conn).map_err(failed)?);
+        let missing = own.iter().filter(|one| !there.contains(one));
+        let named = |[kind, name, ..]: &[Option<String>; 4]| {
+            format!(
+                "{} {}",
+                kind.as_deref().unwrap_or_default(),
+                name.as_deref().unwrap_or_default()
+            )
+        };
+        Ok(missing.map(named).collect())
+    }
 }
 
 fn copy(conn: &Connection, path: &str) -> Result<()> {

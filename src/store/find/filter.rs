@@ -49,13 +49,26 @@ pub(super) fn page(conn: &Connection, filter: &Filter, most: u32) -> Result<Vec<
     rows(conn, &sql, params_from_iter(values), summary)
 }
 
-/// How many a filter lets through.
-pub(super) fn count(conn: &Connection, filter: &Filter) -> Result<usize> {
-    let (from, values) = from_rarest(conn, filter)?;
+/// How many a filter lets through, `most` at most.
+pub(super) fn count(conn: &Connection, filter: &Filter, most: u32) -> Result<usize> {
+    let (from, mut values) = from_rarest(conn, filter)?;
+    values.push(Value::Integer(most.into()));
     let found: u32 = conn
-        .prepare_cached(&format!("SELECT count(*) {from}"))?
+        .prepare_cached(&format!("SELECT count(*) FROM (SELECT 1 {from} LIMIT ?)"))?
         .query_row(params_from_iter(values), |row| row.get(0))?;
     Ok(usize::try_from(found).unwrap_or(usize::MAX))
+}
+
+/// Every class, each found by the index from the one before.
+pub(super) fn classes(conn: &Connection) -> Result<Vec<String>> {
+    let mut next = conn.prepare_cached("SELECT min(class) FROM entry WHERE class > ?1")?;
+    let mut classes: Vec<String> = Vec::new();
+    loop {
+        let last = classes.last().map_or("", String::as_str);
+        let class: Option<String> = next.query_row([last], |row| row.get(0))?;
+        let Some(class) = class else { return Ok(classes) };
+        classes.push(class);
+    }
 }
 
 /// All conditions, by the index of the one that lets the fewest through.
