@@ -55,3 +55,34 @@ fn every_table_says_what_its_csv_says() {
     let package = fs::read_to_string(folder.path().join("site/datapackage.json")).unwrap();
     assert!(package.contains("tables/observation.parquet"));
 }
+
+#[test]
+fn an_exported_curve_is_the_stored_one_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let material = sample("paint");
+    let curve = &material.curves[0];
+    let mut store = Store::open(folder.path().join("matdb.sqlite")).unwrap();
+    store.add([&material]).unwrap();
+    drop(store);
+    let export = ["export", "paint", "--as", "parquet", "--curve", &curve.name, "-o", "p.parquet"];
+    matdb(folder.path()).args(export).assert().success();
+    let file = File::open(folder.path().join("p.parquet")).unwrap();
+    let reader = SerializedFileReader::new(file).unwrap();
+    let row = |row: parquet::record::Row| -> Vec<(String, String)> {
+        row.get_column_iter().map(|(name, field)| (name.clone(), text(field))).collect()
+    };
+    let found: Vec<_> = reader.get_row_iter(None).unwrap().map(|one| row(one.unwrap())).collect();
+    assert_eq!(found.len(), curve.observations.len());
+    let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:?}"));
+    for (found, stored) in found.iter().zip(&curve.observations) {
+        for (name, value) in [
+            ("theta_i_rad", number(Some(stored.theta_i_rad))),
+            ("sigma0", number(stored.sigma0)),
+            ("censor", stored.censor.as_str().to_owned()),
+            ("threshold_sigma0", number(stored.threshold_sigma0)),
+            ("theta_sd_rad", number(stored.theta_sd_rad)),
+        ] {
+            assert!(found.contains(&(name.to_owned(), value.clone())), "{name} {value}: {found:?}");
+        }
+    }
+}
