@@ -237,6 +237,9 @@ fn read(conn: &Connection, table: &str, sql: &str, id: i64) -> Rows {
     }
 }
 
+/// Lines that a list shows.
+const PAGE: u32 = 200;
+
 /// Median time of a call, us.
 fn median_us(times: usize, mut call: impl FnMut(usize)) -> f64 {
     let mut each: Vec<f64> = (0..times)
@@ -267,12 +270,23 @@ fn filters(store: &Store) {
         ("tag", Filter { tag: Some("tag-7".to_owned()), ..any() }),
         ("frequency", Filter { frequency_hz: Some(100e9), ..any() }),
         ("kind", Filter { kind: Some(SourceKind::Literature), ..any() }),
-        ("everything", any()),
+        (
+            "kind and frequency",
+            Filter { kind: Some(SourceKind::Synthetic), frequency_hz: Some(300e9), ..any() },
+        ),
+        (
+            "class and frequency",
+            Filter { class: Some("class-7".to_owned()), frequency_hz: Some(300e9), ..any() },
+        ),
+        ("nothing", any()),
     ] {
         let found = store.find(&filter).unwrap().len();
-        let time = median_us(21, |_| drop(black_box(store.find(&filter).unwrap())));
-        tell(&format!("filter by {what}, {found} found"), time, "us", Some(1000.0));
+        let time = median_us(21, |_| drop(black_box(store.page(&filter, PAGE).unwrap())));
+        let what = format!("filter by {what}, the first {PAGE} of {found}");
+        tell(&what, time, "us", Some(1000.0));
     }
+    let time = median_us(5, |_| drop(black_box(store.list().unwrap())));
+    tell("all lines", time / 1e3, "ms", None);
     let own = store.get(&"material-000007".parse().unwrap(), None).unwrap().unwrap();
     let probe = Probe::new(&own.material.curves[0].observations).unwrap();
     for rank in [Rank::Level, Rank::Shape] {
@@ -297,6 +311,8 @@ fn processes(path: &Path) {
         vec!["list", "--json"],
         vec!["list", "--frequency", "100"],
         vec!["list", "--kind", "literature"],
+        vec!["list", "--kind", "synthetic", "--frequency", "300"],
+        vec!["list", "--class", "no-such-class"],
         vec!["search", "paint"],
         vec!["search", "amber", "no1"],
         vec!["search", "mate"],
