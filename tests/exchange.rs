@@ -504,7 +504,8 @@ fn a_curve_in_other_units_is_taken_with_a_word_about_it() {
             format!("theta_deg,sigma0_db,threshold_db\n{rows}"),
         )
         .unwrap();
-        let add = "add --from curve.csv --kind synthetic --source model --licence CC0-1.0 --frequency 300";
+        let add = "add --from curve.csv --class paint --kind synthetic --source model --licence CC0-1.0 \
+                   --frequency 300";
         let mut command = matdb(folder.path());
         let output = command.args(add.split_whitespace()).args(["--name", name]).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

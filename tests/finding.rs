@@ -3,6 +3,8 @@
 
 mod support;
 
+use std::collections::BTreeSet;
+
 use std::fs;
 use std::path::Path;
 
@@ -110,6 +112,8 @@ fn among_many_a_page_is_the_beginning_of_the_list_and_lines_are_those_of_the_mat
     all[3] = third;
     assert!(store.damage().unwrap().is_empty());
     assert_eq!(store.summary(&all[3].slug).unwrap().unwrap().revision, 3);
+    let classes: BTreeSet<String> = all.iter().map(|m| m.class.clone()).collect();
+    assert_eq!(store.classes().unwrap(), classes.into_iter().collect::<Vec<_>>());
     let any = Filter::default;
     let tag = |tag: &str| Filter { tag: Some(tag.to_owned()), ..any() };
     let class = Some("class-3".to_owned());
@@ -141,7 +145,7 @@ fn among_many_a_page_is_the_beginning_of_the_list_and_lines_are_those_of_the_mat
         let found = store.find(&filter).unwrap();
         let slugs: Vec<_> = found.iter().map(|summary| summary.slug.clone()).collect();
         assert_eq!(slugs, expected, "{filter:?}");
-        assert_eq!(store.count(&filter, 1000).unwrap(), found.len(), "{filter:?}");
+        assert_eq!(store.count(&filter, 2000).unwrap(), found.len(), "{filter:?}");
         assert_eq!(store.count(&filter, 1).unwrap(), found.len().min(1), "{filter:?}");
         let page = store.page(&filter, 9).unwrap();
         assert_eq!(page, found[..found.len().min(9)], "{filter:?}");
