@@ -4,7 +4,6 @@
 mod support;
 
 use std::collections::BTreeSet;
-
 use std::fs;
 use std::path::Path;
 
