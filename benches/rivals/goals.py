@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from rows import best, median, named, of_workload, ours, total
 from words import bound, number, times
 
-QUESTIONS = ("filter by", "full text")
+# As lists ask, which stop at a page; what reads every line is no question.
+QUESTIONS = ("filter by class", "filter by tag", "filter by frequency", "filter by kind", "filter by nothing", "full text")
 LOW, MEDIUM = "Embree, low build", "Embree, medium build"
 
 
