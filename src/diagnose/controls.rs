@@ -158,7 +158,8 @@ impl Bench<'_> {
     }
 
     /// Whether an effect that would be looked for from so many starts is found again in data drawn with
-    /// it. The search begins where the effect was put in: from elsewhere it would gain as much or less.
+    /// it. The search begins where the effect was put in: it tells what the data hold, not whether a search
+    /// from afar would get there.
     fn is_found(&self, effect: &dyn Effect, tried: usize, at: &DVector<f64>) -> bool {
         let State { space: bare, fitted, .. } = self.base;
         let with = bare.with(effect);

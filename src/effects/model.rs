@@ -154,11 +154,12 @@ impl Model<'_> {
         let of_placed = |of: &(dyn Fn(&Placed) -> f64 + Sync)| -> Vec<f64> {
             placed.par_iter().map(|placed| placed.as_ref().map_or(0.0, of)).collect()
         };
-        let laws: Vec<Retro> = self.laws.iter().map(Retro::new).collect();
-        let law = |(look, to_radar): &Placed| {
-            laws.get(usize::from(look.region)).map_or(0.0, |law| law.per_sr(*to_radar))
-        };
-        let f_per_sr = traced.scattered.of((self.laws.clone(), moves), || of_placed(&law));
+        let f_per_sr = traced.scattered.of((self.laws.clone(), moves), || {
+            let laws: Vec<Retro> = self.laws.iter().map(Retro::new).collect();
+            of_placed(&|(look, to_radar)| {
+                laws.get(usize::from(look.region)).map_or(0.0, |law| law.per_sr(*to_radar))
+            })
+        });
         let gains = traced.gains.of(all, || of_placed(&|(look, _)| self.gain(stage, look)));
         let arrive = |((placed, f_per_sr), gain): ((&Option<Placed>, &f64), &f64)| {
             let (look, _) = placed.as_ref()?;

@@ -22,11 +22,13 @@ pub(super) struct MultiBounce;
 
 /// A coupling that counts as none, dB.
 const NONE_DB: f64 = -60.0;
-/// Directions of each of three kinds.
+/// Directions of each kind.
 const DIRECTIONS: usize = 24;
 /// Roughnesses of the lobes that directions are spread over, whatever the law's: rays can then be traced
 /// once for all laws.
 const LOBES: [f64; 2] = [0.25, 0.08];
+/// The cosine and the lobes.
+const KINDS: usize = 1 + LOBES.len();
 /// A ray leaves so far from its surface, m, and this much is no obstacle.
 const CLEARANCE_M: f64 = 1e-6;
 
@@ -44,7 +46,7 @@ fn onward(i: Direction<Surface>) -> impl Iterator<Item = (Direction<Surface>, f6
     let all = by_cosine.chain(LOBES.into_iter().flat_map(by_lobe));
     all.filter(|o| o.cos_theta() > 1e-6).map(move |o| {
         let lobes: f64 = LOBES.iter().map(|m| lobe_density(i, o, *m)).sum();
-        (o, (o.cos_theta() / PI + lobes) / (1 + LOBES.len()) as f64)
+        (o, (o.cos_theta() / PI + lobes) / KINDS as f64)
     })
 }
 
@@ -103,8 +105,7 @@ fn detour(
     let there = Axes::of(stage, &second);
     let way_m = look.hit.point.distance_m(second.hit.point) + back_m;
     let sent_w = stage.link.flux_w(look.hit.cos_theta) * o.cos_theta() / density_per_sr;
-    let share =
-        stage.link.received_per_w(back_m, cos_exit, 1.0) / ((1 + LOBES.len()) * DIRECTIONS) as f64;
+    let share = stage.link.received_per_w(back_m, cos_exit, 1.0) / (KINDS * DIRECTIONS) as f64;
     Some(Detour {
         regions: [look.region, second.region],
         first: [axes.local(-look.ray.direction.xyz()), o],
@@ -210,7 +211,7 @@ mod tests {
         for theta_rad in [0.0, 0.5, 1.0] {
             let i = Direction::from_angles(theta_rad, 0.3);
             let sum: f64 = onward(i).map(|(o, density)| o.cos_theta() / density).sum();
-            let found = sum / ((1 + LOBES.len()) * DIRECTIONS) as f64 / PI;
+            let found = sum / (KINDS * DIRECTIONS) as f64 / PI;
             // A third of the directions see the whole, so that a few per cent are left.
             assert!((found - 1.0).abs() < 0.1, "{theta_rad}: {found}");
         }

@@ -116,9 +116,8 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn has_own_schema(&self) -> Result<bool, StoreError> {
-        let failed = |error| StoreError::new(&self.path, error);
-        let own = super::connect::in_memory()?;
-        Ok(schema(&self.conn).map_err(failed)? == schema(&own).map_err(failed)?)
+        let [own, there] = self.schemas()?;
+        Ok(own == there)
     }
 
     /// Kind and name of every table, index, trigger or view that this program makes and that is not there, or is
@@ -127,9 +126,7 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn changed_schema(&self) -> Result<Vec<String>, StoreError> {
-        let failed = |error| StoreError::new(&self.path, error);
-        let own = super::connect::in_memory()?;
-        let (own, there) = (schema(&own).map_err(failed)?, schema(&self.conn).map_err(failed)?);
+        let [own, there] = self.schemas()?;
         let missing = own.iter().filter(|one| !there.contains(one));
         let named = |[kind, name, ..]: &[Option<String>; 4]| {
             format!(
@@ -139,6 +136,13 @@ impl Store {
             )
         };
         Ok(missing.map(named).collect())
+    }
+
+    /// What this program makes, and what is in the file.
+    fn schemas(&self) -> Result<[Vec<[Option<String>; 4]>; 2], StoreError> {
+        let failed = |error| StoreError::new(&self.path, error);
+        let own = super::connect::in_memory()?;
+        Ok([schema(&own).map_err(failed)?, schema(&self.conn).map_err(failed)?])
     }
 }
 
