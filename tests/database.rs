@@ -185,6 +185,8 @@ fn a_measured_curve_without_its_circumstances_is_refused() {
         let folder = from_template(change, BARE);
         let message = refused(matdb(folder.path()).args(["add", "--from", "."]));
         assert!(message.contains(expected) && message.contains("--template"), "{message}");
+        // What is to be filled in, as lines of the file.
+        assert!(message.contains("\nthreshold_dbm = …"), "{message}");
         assert!(!folder.path().join("matdb.sqlite").exists());
     }
     let synthetic =

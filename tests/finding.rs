@@ -82,6 +82,9 @@ fn a_filter_lets_through_exactly_what_it_says() {
         let found: Vec<_> = store.find(&filter).unwrap().into_iter().map(|s| s.slug).collect();
         let expected: Vec<_> = all.iter().filter(|m| holds(m)).map(|m| m.slug.clone()).collect();
         assert_eq!(found, expected, "{filter:?}");
+        let unstored: Vec<_> =
+            all.iter().filter(|m| filter.lets_through(m)).map(|m| m.slug.clone()).collect();
+        assert_eq!(unstored, found, "{filter:?}");
     }
 }
 

@@ -186,8 +186,9 @@ pub(super) fn put(
     match door::missing(material, &curve).as_slice() {
         [] => material.curves.push(curve),
         missing => {
+            let what: Vec<&str> = missing.iter().map(|gap| gap.what.as_str()).collect();
             return Err(Error::Usage {
-                problem: format!("a measured curve needs more: {}", missing.join("; ")),
+                problem: format!("a measured curve needs more: {}", what.join("; ")),
                 way_out: "name another --instrument, with --frequency and --threshold".to_owned(),
             });
         }

@@ -31,15 +31,16 @@ const WEAK_DB: f64 = 1.0;
 /// with values that only a slip can give.
 pub(super) fn check(material: &Material, file: &Path) -> Result<(), Error> {
     let of_curves = material.curves.iter().flat_map(|curve| missing(material, curve));
-    let missing: Vec<String> = of_curves.chain(measured_alone(material)).collect();
-    if !missing.is_empty() {
+    let gaps: Vec<Gap> = of_curves.chain(measured_alone(material)).collect();
+    if !gaps.is_empty() {
+        let what: Vec<&str> = gaps.iter().map(|gap| gap.what.as_str()).collect();
         return Err(Error::Usage {
             problem: format!(
                 "{}: what was measured needs more: {}",
                 file.display(),
-                missing.join("; ")
+                what.join("; ")
             ),
-            way_out: "`matdb add --template` prints a complete entry".to_owned(),
+            way_out: way_out(&gaps),
         });
     }
     match slips(material).first() {
@@ -48,6 +49,29 @@ pub(super) fn check(material: &Material, file: &Path) -> Result<(), Error> {
             problem: format!("{}: {problem}", file.display()),
             way_out: (*way_out).to_owned(),
         }),
+    }
+}
+
+/// What an entry lacks.
+pub(super) struct Gap {
+    /// A clause.
+    pub what: String,
+    /// Lines of a material.toml with places to fill in; none where others bring them.
+    lines: String,
+}
+
+/// The lines that are to be filled in, each once.
+fn way_out(gaps: &[Gap]) -> String {
+    const COMPLETE: &str = "`matdb add --template` prints a complete entry";
+    let mut lines: Vec<&str> = Vec::new();
+    for gap in gaps.iter().filter(|gap| !gap.lines.is_empty()) {
+        if !lines.contains(&gap.lines.as_str()) {
+            lines.push(&gap.lines);
+        }
+    }
+    match lines.is_empty() {
+        true => COMPLETE.to_owned(),
+        false => format!("fill this in ({COMPLETE}):\n\n{}", lines.join("\n\n")),
     }
 }
 
@@ -116,17 +140,18 @@ fn too_weak(curve: &Curve) -> Option<String> {
     ))
 }
 
-/// Fits that claim to be measured without a curve that anybody measured, a clause each.
-fn measured_alone(material: &Material) -> impl Iterator<Item = String> {
+/// Fits that claim to be measured without a curve that anybody measured.
+fn measured_alone(material: &Material) -> impl Iterator<Item = Gap> {
     let is_alone = |fit: &&Fit| {
         fit.curve.is_none() && kind(material, &fit.source) == Some(SourceKind::Measured)
     };
-    material.fits.iter().filter(is_alone).map(|fit| {
-        format!(
+    material.fits.iter().filter(is_alone).map(|fit| Gap {
+        what: format!(
             "fit `{}` has the measured source `{}` and names no curve; numbers that others fitted are \
              literature",
             fit.name, fit.source
-        )
+        ),
+        lines: String::new(),
     })
 }
 
@@ -134,29 +159,53 @@ fn kind(material: &Material, key: &str) -> Option<SourceKind> {
     material.sources.iter().find(|source| source.key == key).map(|source| source.kind)
 }
 
-/// What a curve lacks, a clause each. That there is a source at all was checked before.
-pub(super) fn missing(material: &Material, curve: &Curve) -> Vec<String> {
+/// What a curve lacks. That there is a source at all was checked before.
+pub(super) fn missing(material: &Material, curve: &Curve) -> Vec<Gap> {
     let source = material.sources.iter().find(|source| source.key == curve.source);
     let Some(source) = source.filter(|source| source.kind == SourceKind::Measured) else {
         return Vec::new();
     };
     let mut missing = Vec::new();
     if source.licence.as_ref().is_none_or(|licence| licence.trim().is_empty()) {
-        missing.push(format!("source `{}` has no licence", source.key));
+        missing.push(Gap {
+            what: format!("source `{}` has no licence", source.key),
+            lines: format!(
+                "[[source]]\nkey = \"{}\"\nlicence = \"…\"               # SPDX, such as CC-BY-4.0",
+                source.key
+            ),
+        });
     }
     let key = curve.instrument.as_ref();
     let instrument = key.and_then(|key| material.instruments.iter().find(|i| i.key == *key));
     if instrument.is_none() {
-        missing.push(format!("curve `{}` names no instrument", curve.name));
+        missing.push(Gap {
+            what: format!("curve `{}` names no instrument", curve.name),
+            lines: format!(
+                "[[curve]]\nname = \"{}\"\ninstrument = \"radar\"\n\n[[instrument]]\nkey = \"radar\"\n\
+                 name = \"…\"                  # maker and model\n\
+                 centre_frequency_ghz = …      # such as 300\n\
+                 threshold_dbm = …             # the least power that counts as a detection, such as -77",
+                curve.name
+            ),
+        });
     }
     let in_rows = curve.observations.iter().all(|row| row.threshold_sigma0.is_some());
     if !in_rows && instrument.is_none_or(|instrument| instrument.threshold_w.is_none()) {
         missing.push(match instrument {
-            Some(instrument) => format!(
-                "instrument `{}` has no threshold_dbm and not every row of curve `{}` a threshold_db",
-                instrument.key, curve.name
-            ),
-            None => format!("not every row of curve `{}` has a threshold_db", curve.name),
+            Some(Instrument { key, .. }) => Gap {
+                what: format!(
+                    "instrument `{key}` has no threshold_dbm and not every row of curve `{}` a threshold_db",
+                    curve.name
+                ),
+                lines: format!(
+                    "[[instrument]]\nkey = \"{key}\"\n\
+                     threshold_dbm = …             # the least power that counts as a detection, such as -77"
+                ),
+            },
+            None => Gap {
+                what: format!("not every row of curve `{}` has a threshold_db", curve.name),
+                lines: String::new(),
+            },
         });
     }
     missing

@@ -9,7 +9,7 @@ use super::database::Database;
 use super::materials::{not_added, with_status};
 use super::summary::{grouped, table};
 use crate::error::Error;
-use crate::material::SourceKind;
+use crate::material::{Material, SourceKind};
 use crate::store::{Filter, Store, Summary};
 
 /// List the materials in the database, all or those that you ask for
@@ -108,14 +108,18 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     if console.json {
         return console.result("", &materials);
     }
-    let missing = not_added(store.as_ref())?.find(&filter)?;
+    let built_in = not_added(store.as_ref())?;
     let mut text = match (materials.len(), &store) {
         (0, None) => format!("no material in {} yet\n", db.path().display()),
         (0, _) if filter == Filter::default() => {
             format!("no material in {} yet\n", db.path().display())
         }
         (0, Some(store)) => {
-            format!("no such material in {}{}\n", db.path().display(), classes(&filter, store)?)
+            format!(
+                "no such material in {}{}\n",
+                db.path().display(),
+                classes(&filter, store, &built_in)?
+            )
         }
         _ => table(
             &["material", "rev", "kind", "class", "curves", "points", "fits", "name"],
@@ -132,17 +136,18 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
              --limit\n",
         );
     }
-    if !missing.is_empty() {
-        let names: Vec<&str> = missing.iter().map(|summary| summary.slug.as_str()).collect();
+    let wanted = built_in.iter().filter(|material| filter.lets_through(material));
+    let names: Vec<&str> = wanted.map(|material| material.slug.as_str()).collect();
+    if !names.is_empty() {
         text += &wrapped("built in, not added:", &names);
     }
     console.result(&text, &materials)
 }
 
 /// Which classes there are, where one is asked for that no material has.
-fn classes(filter: &Filter, store: &Store) -> Result<String, Error> {
+fn classes(filter: &Filter, store: &Store, built_in: &[Material]) -> Result<String, Error> {
     let Some(class) = &filter.class else { return Ok(String::new()) };
-    let built_in = not_added(Some(store))?.classes()?;
+    let built_in = built_in.iter().map(|material| material.class.clone());
     let classes: BTreeSet<String> = store.classes()?.into_iter().chain(built_in).collect();
     Ok(match classes.contains(class) {
         true => String::new(),

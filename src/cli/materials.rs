@@ -42,9 +42,8 @@ fn split<'a>(wanted: &'a str, asked_by: &str) -> Result<(&'a str, Option<u32>), 
     Ok((name, Some(number)))
 }
 
-/// The built-in materials that the database does not have, as a database in memory: listed and searched
-/// as others are.
-pub(super) fn not_added(store: Option<&Store>) -> Result<Store, Error> {
+/// The built-in materials that the database does not have, sorted by name.
+pub(super) fn not_added(store: Option<&Store>) -> Result<Vec<Material>, Error> {
     let mut missing = Vec::new();
     for name in builtin::names() {
         let Some(material) = builtin::get(name) else { continue };
@@ -53,8 +52,13 @@ pub(super) fn not_added(store: Option<&Store>) -> Result<Store, Error> {
             missing.push(material);
         }
     }
+    Ok(missing)
+}
+
+/// The same as a database in memory, to be searched as others are.
+pub(super) fn store_of_not_added(store: Option<&Store>) -> Result<Store, Error> {
     let mut built_in = Store::in_memory()?;
-    built_in.add(&missing)?;
+    built_in.add(&not_added(store)?)?;
     Ok(built_in)
 }
 

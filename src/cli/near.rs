@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::console::Console;
 use super::database::Database;
 use super::list::{Wanted, frequency};
-use super::materials::{find, not_added};
+use super::materials::{find, store_of_not_added};
 use super::summary::table;
 use crate::catalogue::{Distance, Nearest, Probe, Rank};
 use crate::error::Error;
@@ -99,7 +99,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             way_out: "give a curve with detections below that range".to_owned(),
         });
     };
-    let missing = not_added(store.as_ref())?;
+    let missing = store_of_not_added(store.as_ref())?;
     let mut record = Record {
         measured_at_ghz: asked.frequency_hz.map(|hz| rounded(hz / 1e9)),
         angles: probe.angles(),

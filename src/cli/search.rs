@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::console::Console;
 use super::database::Database;
-use super::materials::{not_added, with_status};
+use super::materials::{store_of_not_added, with_status};
 use super::summary::table;
 use crate::error::Error;
 use crate::store::{Hit, Store};
@@ -44,7 +44,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         });
     }
     let store = db.read()?;
-    let missing = not_added(store.as_ref())?;
+    let missing = store_of_not_added(store.as_ref())?;
     let mut records = Vec::new();
     for (store, origin) in [(store.as_ref(), "database"), (Some(&missing), "built-in")] {
         let found = store.map_or(Ok(Vec::new()), |s: &Store| s.search(&words, args.limit))?;

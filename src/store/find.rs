@@ -8,7 +8,7 @@ use rusqlite::{Connection, OptionalExtension, Result, Row};
 
 use super::read::rows;
 use super::{Store, StoreError, Summary};
-use crate::material::{Fit, Slug, SourceKind};
+use crate::material::{Fit, Material, Slug, SourceKind};
 
 /// Which materials are wanted: those of which all holds that is said here.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,6 +25,20 @@ pub struct Filter {
     pub fitted: Option<bool>,
     /// `active`, `superseded` or `withdrawn`.
     pub status: Option<String>,
+}
+
+impl Filter {
+    /// Whether it lets a material through that need not be stored: the same as [`Store::find`] says of the
+    /// current revision of one that is.
+    pub fn lets_through(&self, material: &Material) -> bool {
+        let Filter { frequency_hz, tag, kind, class, fitted, status } = self;
+        frequency_hz.is_none_or(|hz| material.frequency_outside_hz(hz) == 0.0)
+            && tag.as_ref().is_none_or(|tag| material.tags.contains(tag))
+            && kind.is_none_or(|kind| material.render_kind() == Some(kind))
+            && class.as_ref().is_none_or(|class| material.class == *class)
+            && fitted.is_none_or(|fitted| material.fits.iter().any(Fit::is_fitted) == fitted)
+            && status.as_ref().is_none_or(|status| material.status.as_str() == status)
+    }
 }
 
 /// A material that words were found in.
