@@ -10,13 +10,15 @@ mod support;
 use std::cell::Cell;
 use std::ffi::{c_char, c_int, c_uint, c_void};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Once;
 
-use matdb::material::Material;
-use matdb::store::{Store, StoreError};
+use matdb::catalogue::{CatalogueError, Import};
+use matdb::material::{Activity, Material};
+use matdb::store::Store;
 use rusqlite::ffi;
-use support::database::{change, child, contents, given, is_sound, with_effects};
+use support::database::{change, child, contents, given, is_sound, sound, with_effects};
+use support::root;
 
 fn changed(slug: &str) -> Material {
     change(with_effects(slug))
@@ -27,21 +29,43 @@ fn changed(slug: &str) -> Material {
 enum Write {
     /// Opening a file that is not there.
     Make,
+    /// Opening a file of the first schema.
+    Migrate,
     /// Adding a material that is not there.
     Add,
     /// Adding a revision.
     Revise,
     /// Removing a material with two revisions.
     Remove,
+    /// Taking a material with two revisions, and one more, over from another database.
+    Import,
 }
 
-const WRITES: [Write; 4] = [Write::Make, Write::Add, Write::Revise, Write::Remove];
+const WRITES: [Write; 6] =
+    [Write::Make, Write::Migrate, Write::Add, Write::Revise, Write::Remove, Write::Import];
+
+/// A file of the first schema.
+fn first_schema() -> PathBuf {
+    root().join("tests/fixtures/schema-0001.sqlite")
+}
+
+/// The database beside another from which materials are taken over.
+fn theirs(ours: &Path) -> PathBuf {
+    ours.with_file_name("theirs.sqlite")
+}
 
 impl Write {
     /// Makes the database as it is before.
     fn prepare(self, path: &Path) {
-        if let Write::Make = self {
-            return;
+        match self {
+            Write::Make => return,
+            Write::Migrate => return drop(fs::copy(first_schema(), path).unwrap()),
+            Write::Import => {
+                let mut theirs = Store::open(theirs(path)).unwrap();
+                theirs.add([&sound("other"), &sound("subject")]).unwrap();
+                theirs.add([&change(sound("subject"))]).unwrap();
+            }
+            _ => {}
         }
         let mut store = Store::open(path).unwrap();
         store.add([&with_effects("bystander")]).unwrap();
@@ -53,14 +77,25 @@ impl Write {
         }
     }
 
-    fn run(self, path: &Path) -> Result<(), StoreError> {
+    /// Writes; `arm` is called when all that only reads is done.
+    fn run(self, path: &Path, arm: impl Fn()) -> Result<(), CatalogueError> {
+        if let Write::Import = self {
+            let by = Activity { command: "import".to_owned(), inputs: vec![], origin: None };
+            let import = Import::open(&theirs(path))?;
+            let mut ours = Store::open(path)?;
+            let plan = import.plan(Some(&ours), None)?;
+            arm();
+            return import.take(&mut ours, &plan, &by);
+        }
+        arm();
         let mut store = Store::open(path)?;
         match self {
-            Write::Make => Ok(()),
-            Write::Add => store.add([&with_effects("subject")]).map(drop),
-            Write::Revise => store.add([&changed("subject")]).map(drop),
-            Write::Remove => store.remove([&"subject".parse().unwrap()]).map(drop),
+            Write::Make | Write::Migrate | Write::Import => {}
+            Write::Add => drop(store.add([&with_effects("subject")])?),
+            Write::Revise => drop(store.add([&changed("subject")])?),
+            Write::Remove => drop(store.remove([&"subject".parse().unwrap()])?),
         }
+        Ok(())
     }
 
     fn before_and_after(self) -> [Vec<Material>; 2] {
@@ -69,6 +104,11 @@ impl Write {
         let alone = vec![bystander.clone()];
         match self {
             Write::Make => [vec![], vec![]],
+            Write::Migrate => [contents(&first_schema()), contents(&first_schema())],
+            Write::Import => {
+                let [other, first] = ["other", "subject"].map(sound);
+                [alone, vec![bystander, other, first.clone(), change(first)]]
+            }
             Write::Add => [alone, vec![bystander, first]],
             Write::Revise => {
                 [vec![bystander.clone(), first.clone()], vec![bystander, first, second]]
@@ -137,7 +177,12 @@ fn hook_connections() {
 fn any_step_may_fail() {
     // A write has some 2000 steps, and making a database ten times as many; all of them would take
     // minutes. Primes meet loops unevenly.
-    let every = |write: Write| if let Write::Make = write { 61 } else { 7 };
+    let every = |write: Write| match write {
+        Write::Make => 61,
+        Write::Migrate => 251,
+        Write::Import => 31,
+        Write::Add | Write::Revise | Write::Remove => 7,
+    };
     hook_connections();
     for write in WRITES {
         let folder = tempfile::tempdir().unwrap();
@@ -147,8 +192,7 @@ fn any_step_may_fail() {
         for step in (1..).step_by(every(write)) {
             let path = folder.path().join("now.sqlite");
             let _ = fs::copy(&before, &path);
-            STEPS_LEFT.set(step);
-            let result = write.run(&path);
+            let result = write.run(&path, || STEPS_LEFT.set(step));
             let fired = STEPS_LEFT.replace(-1) < 1;
             let done = write.is_done(&path, &format!("step {step}"));
             assert!(done || result.is_err(), "{write:?} step {step}: claims to be done");
@@ -195,8 +239,8 @@ fn dying_process() {
     let Some(path) = given() else { return };
     let number = |name| std::env::var(name).unwrap().parse::<i64>().unwrap();
     hook_connections();
-    STATEMENTS_LEFT.set(number("MATDB_TEST_STATEMENT"));
-    WRITES[number("MATDB_TEST_WRITE") as usize].run(&path).unwrap();
+    let arm = || STATEMENTS_LEFT.set(number("MATDB_TEST_STATEMENT"));
+    WRITES[number("MATDB_TEST_WRITE") as usize].run(&path, arm).unwrap();
 }
 
 #[test]
@@ -209,7 +253,7 @@ fn the_log_may_end_anywhere() {
         write.prepare(&path);
         // A second connection keeps the log from being cleared away when the first is closed.
         let keeper = Store::open(&path).unwrap();
-        write.run(&path).unwrap();
+        write.run(&path, || {}).unwrap();
         let (database, whole) = (fs::read(&path).unwrap(), fs::read(&log).unwrap());
         drop(keeper);
         let mut done = Vec::new();

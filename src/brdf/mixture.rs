@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::backscatter::{Term, together};
 use super::parameter::{Visitor, visit_number};
-use super::{Brdf, Scattering, specular_share};
+use super::{Brdf, Scattering, f_and_specular_share};
 use crate::frames::{Direction, Surface};
 
 /// A diffuse and a specular part.
@@ -35,9 +35,9 @@ impl Scattering for Mixture {
         self.k * self.diffuse.f_per_sr(i, o) + (1.0 - self.k) * self.specular.f_per_sr(i, o)
     }
 
-    fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
         let parts = [(self.k, &*self.diffuse), (1.0 - self.k, &*self.specular)];
-        specular_share(parts.into_iter(), i, o)
+        f_and_specular_share(parts.into_iter(), i, o)
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

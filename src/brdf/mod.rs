@@ -74,11 +74,15 @@ pub trait Scattering: Sync {
     /// f(i, o), 1/sr: reflected radiance per incident irradiance, equation (9).
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64;
 
-    /// Share of f(i, o), 0 to 1, that facets reflect like mirrors, rough or not; the rest is diffuse.
-    /// A model that cannot tell, such as a closure or a measured curve, counts as diffuse.
+    /// f(i, o), 1/sr, and the share of it, 0 to 1, that facets reflect like mirrors, rough or not; the
+    /// rest is diffuse. A model that cannot tell, such as a closure or a measured curve, counts as diffuse.
+    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        (self.f_per_sr(i, o), 0.0)
+    }
+
+    /// The second of [`f_and_specular_share`](Scattering::f_and_specular_share).
     fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        let _ = (i, o);
-        0.0
+        self.f_and_specular_share(i, o).1
     }
 
     /// f in exact backscatter as a sum of closed forms; none for a law with a grain, or that has no such sum.
@@ -211,14 +215,15 @@ impl Scattering for Brdf {
         }
     }
 
-    fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        match self {
+    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        let share = match self {
             Brdf::Lambert(_) | Brdf::BlinnPhong(_) | Brdf::Tabulated(_) | Brdf::Directive(_) => 0.0,
             Brdf::CookTorrance(_) | Brdf::Fresnel(_) | Brdf::Layered(_) => 1.0,
             Brdf::Kirchhoff(_) | Brdf::KirchhoffGo(_) => 1.0,
-            Brdf::Mixture(model) => model.specular_share(i, o),
-            Brdf::Sum(model) => model.specular_share(i, o),
-        }
+            Brdf::Mixture(model) => return model.f_and_specular_share(i, o),
+            Brdf::Sum(model) => return model.f_and_specular_share(i, o),
+        };
+        (self.f_per_sr(i, o), share)
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {
@@ -236,17 +241,17 @@ impl Scattering for Brdf {
     }
 }
 
-/// The specular share of weighted parts that add up in power.
-fn specular_share<'a>(
+/// f of weighted parts that add up in power, 1/sr, and its specular share.
+fn f_and_specular_share<'a>(
     parts: impl Iterator<Item = (f64, &'a Brdf)>,
     i: Direction<Surface>,
     o: Direction<Surface>,
-) -> f64 {
+) -> (f64, f64) {
     let (all, specular) = parts.fold((0.0, 0.0), |(all, specular), (weight, part)| {
-        let f = weight * part.f_per_sr(i, o);
-        (all + f, specular + f * part.specular_share(i, o))
+        let (f, share) = part.f_and_specular_share(i, o);
+        (all + weight * f, specular + weight * f * share)
     });
-    if all > 0.0 { specular / all } else { 0.0 }
+    (all, if all > 0.0 { specular / all } else { 0.0 })
 }
 
 /// h = (i + o)/|i + o|, the normal of a facet that would mirror i into o.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 use super::backscatter::{Term, together};
 use super::parameter::Visitor;
-use super::{Brdf, Scattering, specular_share};
+use super::{Brdf, Scattering, f_and_specular_share};
 use crate::frames::{Direction, Surface};
 
 /// Several models at once, at least one.
@@ -32,8 +32,8 @@ impl Scattering for Sum {
         self.parts.iter().map(|part| part.f_per_sr(i, o)).sum()
     }
 
-    fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        specular_share(self.parts.iter().map(|part| (1.0, part)), i, o)
+    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        f_and_specular_share(self.parts.iter().map(|part| (1.0, part)), i, o)
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

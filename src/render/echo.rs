@@ -111,6 +111,9 @@ fn cause(paths: &[Path], near: impl Fn(&&Path) -> bool) -> Option<&Path> {
 }
 
 fn theta_sd_rad(hits: &[Option<Hit>]) -> f64 {
+    if hits.len() == 1 {
+        return 0.0;
+    }
     let count = hits.iter().flatten().count() as f64;
     let mean_rad = hits.iter().flatten().map(Hit::theta_rad).sum::<f64>() / count;
     let square = |hit: &Hit| (hit.theta_rad() - mean_rad).powi(2);

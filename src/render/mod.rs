@@ -232,6 +232,9 @@ fn seen(
     }
 }
 
+/// Chirps that are shaded one after the other.
+const CHIRPS_PER_TASK: usize = 256;
+
 /// Turns hits into echoes at an antenna. With effects the hits are those of [`trace_placed`]. `done` is told how many chirps are finished.
 ///
 /// The result is the same for any number of threads.
@@ -252,18 +255,23 @@ pub fn shade(
     let paths = Paths::new(setup, observer, footprints, acting);
     let target_from_global = setup.radar.frames().global_from_target.inverse();
     let echoes = Echoes { setup, footprints, observer, detector: &detector, target_from_global };
-    let echo = |(chirp, hits): (usize, &[Option<Hit>])| {
-        let paths = paths.of_chirp(chirp, hits);
-        let seen = detector.observe(chirp, &paths)?;
-        done(1);
-        Ok(echoes.echo(chirp, hits, &paths, seen))
+    let rays = footprints.rays_per_chirp.max(1);
+    let of_task = |(task, hits): (usize, &[Option<Hit>])| {
+        let (mut ways, mut found) = (Vec::new(), Vec::new());
+        for (chirp, hits) in (task * CHIRPS_PER_TASK..).zip(hits.chunks(rays)) {
+            paths.fill(chirp, hits, &mut ways);
+            let seen = detector.observe(chirp, &ways)?;
+            found.extend(echoes.echo(chirp, hits, &ways, seen));
+            done(1);
+        }
+        Ok(found)
     };
-    let echoes: Vec<Option<Echo>> =
-        footprints.chirps().enumerate().map(echo).collect::<Result<_, RenderError>>()?;
+    let tasks = footprints.hits.par_chunks(CHIRPS_PER_TASK * rays).enumerate();
+    let echoes: Vec<Vec<Echo>> = tasks.map(of_task).collect::<Result<_, RenderError>>()?;
     Ok(Scan {
         chirps: setup.chirps.rays.len(),
         hits: footprints.chirps().filter(|hits| hits.iter().any(Option::is_some)).count(),
-        echoes: echoes.into_iter().flatten().collect(),
+        echoes: echoes.concat(),
         threshold_dbm: dbm_from_watts(detector.threshold_w()),
         noise_dbm: detector.noise_w().map(dbm_from_watts),
     })

@@ -109,11 +109,18 @@ impl<'a> Paths<'a> {
     /// All paths of a chirp through the hits of its rays. A direct path is there even when nothing
     /// arrives by it.
     pub fn of_chirp(&self, number: usize, hits: &[Option<Hit>]) -> Vec<Path> {
+        let mut paths = Vec::with_capacity(hits.len());
+        self.fill(number, hits, &mut paths);
+        paths
+    }
+
+    /// The same in place of what is in a list.
+    pub fn fill(&self, number: usize, hits: &[Option<Hit>], paths: &mut Vec<Path>) {
+        paths.clear();
         let axis = &self.setup.chirps.rays[number];
         let antenna = self.observer.position(axis.origin.xyz);
         let sent = Sent { paths: self, number, axis, antenna, rays: hits.len() };
         let tilts = self.acting.as_ref().map_or([0.0; 2], |acting| acting.tilts(number));
-        let mut paths = Vec::with_capacity(hits.len());
         for (ray, hit) in hits.iter().enumerate() {
             let Some(hit) = hit else { continue };
             let facing = sent.facing(ray);
@@ -125,13 +132,12 @@ impl<'a> Paths<'a> {
             if let Some(bounce) = &self.setup.bounce {
                 let gain = acting.map(|a| a.instrument_gain(number, hits.len(), *hit, facing));
                 let flux_w = sent.flux_w(&lit) * gain.unwrap_or(1.0);
-                sent.second_order(&lit, flux_w, direct, bounce, ray, &mut paths);
+                sent.second_order(&lit, flux_w, direct, bounce, ray, paths);
             }
         }
         if let Some(change) = self.changes.get(number).copied().flatten() {
-            change.share_out(&mut paths);
+            change.share_out(paths);
         }
-        paths
     }
 }
 
@@ -140,16 +146,22 @@ impl<'a> Sent<'a> {
         let setup = self.paths.setup;
         let surface = setup.surfaces[usize::from(setup.region_of_facet[hit.facet as usize])];
         let towards = |place: DVec3| (place - hit.point.xyz).normalize_or(DVec3::Z);
-        let frame = LocalFrame::new(setup.bvh.mesh(), &hit, towards(source), surface.grain);
-        let [source, antenna] = [source, self.antenna].map(|place| frame.local(towards(place)));
+        let to_source = towards(source);
+        let frame = LocalFrame::new(setup.bvh.mesh(), &hit, to_source, surface.grain);
+        let here = frame.local(to_source);
+        let antenna = match self.antenna == source {
+            true => here,
+            false => frame.local(towards(self.antenna)),
+        };
         let antenna_m = self.antenna.distance(hit.point.xyz);
-        Lit { hit, surface, frame, source, antenna, antenna_m }
+        Lit { hit, surface, frame, source: here, antenna, antenna_m }
     }
 
     fn direct(&self, lit: &Lit) -> Path {
         // What the radar lights it also sees.
         let seen = self.paths.observer == Observer::Radar || self.is_seen(lit);
-        let share = if seen { self.received(lit) } else { 0.0 };
+        let (received, specular_share) = self.received(lit);
+        let share = if seen { received } else { 0.0 };
         let [x, y, _] = lit.source.xyz().to_array();
         Path {
             range_m: 0.5 * (lit.hit.range_m + lit.antenna_m),
@@ -157,7 +169,7 @@ impl<'a> Sent<'a> {
             hit: lit.hit,
             surfaces: 1,
             azimuth_rad: y.atan2(x),
-            specular_share: lit.surface.scattering.specular_share(lit.source, lit.antenna),
+            specular_share,
         }
     }
 
@@ -172,14 +184,15 @@ impl<'a> Sent<'a> {
     ) {
         for (onward, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
             let Some(hit) = self.cast(lit, onward) else { continue };
-            let f_per_sr = lit.surface.scattering.f_per_sr(lit.source, onward);
+            let (f_per_sr, first_share) =
+                lit.surface.scattering.f_and_specular_share(lit.source, onward);
             let second = self.lit(hit, lit.hit.point.xyz);
             let seen = weight * self.pattern(bounce, &hit);
-            let power_w = flux_w * f_per_sr * onward.cos_theta() * seen * self.received(&second);
+            let (received, second_share) = self.received(&second);
+            let power_w = flux_w * f_per_sr * onward.cos_theta() * seen * received;
             if power_w > 0.0 && self.is_seen(&second) {
                 let way_m = lit.hit.range_m + hit.range_m + second.antenna_m;
-                let specular_share = lit.surface.scattering.specular_share(lit.source, onward)
-                    * second.surface.scattering.specular_share(second.source, second.antenna);
+                let specular_share = first_share * second_share;
                 let (range_m, surfaces) = (0.5 * way_m, 2);
                 paths.push(Path { range_m, power_w, surfaces, specular_share, ..direct });
             }
@@ -202,14 +215,17 @@ impl<'a> Sent<'a> {
         self.paths.link.flux_w(lit.hit.cos_theta) / self.rays as f64
     }
 
-    /// Share of the power on a lit point that the antenna receives if nothing is in the way.
-    fn received(&self, lit: &Lit) -> f64 {
+    /// Share of the power on a lit point that the antenna receives if nothing is in the way, and the
+    /// share of that which is reflected like by a mirror.
+    fn received(&self, lit: &Lit) -> (f64, f64) {
+        let (f_per_sr, specular_share) =
+            lit.surface.scattering.f_and_specular_share(lit.source, lit.antenna);
         let cos_exit = lit.antenna.cos_theta();
-        if cos_exit <= 0.0 {
-            return 0.0;
-        }
-        let f_per_sr = lit.surface.scattering.f_per_sr(lit.source, lit.antenna);
-        self.paths.link.received_per_w(lit.antenna_m, cos_exit, f_per_sr)
+        let received = match cos_exit > 0.0 {
+            true => self.paths.link.received_per_w(lit.antenna_m, cos_exit, f_per_sr),
+            false => 0.0,
+        };
+        (received, specular_share)
     }
 
     /// What a ray that leaves a lit point meets.

@@ -40,11 +40,10 @@ impl LocalFrame {
         let normal = if outward.dot(to_source) < 0.0 { -outward } else { outward };
         let along = grain - grain.dot(normal) * normal;
         // A grain that stands on the surface has no direction along it.
-        let stands = along.length() < 1e-9 * grain.length();
-        let tangent = if stands { DVec3::ZERO } else { along.normalize_or_zero() };
-        let tangent = match tangent == DVec3::ZERO {
-            true => normal.any_orthonormal_vector(),
-            false => tangent,
+        let stands = along.length_squared() <= 1e-18 * grain.length_squared();
+        let tangent = match along.try_normalize().filter(|_| !stands) {
+            Some(tangent) => tangent,
+            None => normal.any_orthonormal_vector(),
         };
         LocalFrame { normal, tangent, bitangent: normal.cross(tangent) }
     }

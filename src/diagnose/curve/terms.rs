@@ -97,7 +97,8 @@ macro_rules! described {
 
 /// The diffuse part of a law at a point, 1/sr.
 fn diffuse_per_sr(law: &Brdf, point: &Point) -> f64 {
-    (1.0 - law.specular_share(point.i, point.o)) * law.f_per_sr(point.i, point.o)
+    let (f_per_sr, specular_share) = law.f_and_specular_share(point.i, point.o);
+    (1.0 - specular_share) * f_per_sr
 }
 
 /// Cosine between the normal and the direction midway, and between that and the receiver.

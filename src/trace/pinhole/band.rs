@@ -9,9 +9,7 @@ use super::{NONE, ROUNDING};
 use crate::trace::facet::{Line, plane_m};
 use crate::trace::wide::{Wide, widest};
 
-/// The nearest facets of the rays of some rows.
-///
-/// What a ray sees depends on the order of the facets and on nothing else: bands may be cut anywhere.
+/// The nearest facets of the rays of some rows, among those that have been met.
 pub(super) struct Band<'a> {
     picture: &'a Picture<'a>,
     rows: Range<usize>,
@@ -31,9 +29,31 @@ impl<'a> Band<'a> {
         Band { picture, rows, first, low, high, facet: vec![NONE; count] }
     }
 
-    /// The nearest facets when these have been met too.
-    pub fn walked(mut self, facets: impl Iterator<Item = u32>) -> Vec<u32> {
+    /// The band when these facets, in ascending order, have been met too.
+    pub fn walked(mut self, facets: impl Iterator<Item = u32>) -> Band<'a> {
         widest(Walk { band: &mut self, facets });
+        self
+    }
+
+    /// The band when all facets that another one of the same rows has met have been met too.
+    pub fn nearer(mut self, other: Band<'a>) -> Band<'a> {
+        for own in 0..self.facet.len() - LANES {
+            let facet = other.facet[own];
+            if facet == NONE || other.high[own] < self.low[own] {
+                continue;
+            }
+            if other.low[own] > self.high[own] {
+                (self.low[own], self.high[own], self.facet[own]) =
+                    (other.low[own], other.high[own], facet);
+            } else {
+                self.decide(facet, self.first + own);
+            }
+        }
+        self
+    }
+
+    /// The nearest facet of every ray.
+    pub fn facets(mut self) -> Vec<u32> {
         self.facet.truncate(self.facet.len() - LANES);
         self.facet
     }

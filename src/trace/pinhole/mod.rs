@@ -13,8 +13,9 @@
 //! - Facets behind the origin are passed over. Those that cross its plane, or come so near to it
 //!   that their picture is of no use, have a hierarchy of their own, if they are in the field at all.
 //!
-//! Every ray sees the facets in ascending order however the work is shared, so that the result is the same
-//! on any number of threads.
+//! What a ray meets first does not depend on the order of the facets: f32 notes what is certain, and f64
+//! orders the rest by range and number. So the work may be shared by rays or by facets, and the result is the
+//! same on any number of threads.
 
 mod band;
 mod fan;
@@ -46,8 +47,14 @@ const ROUNDING: f32 = f32::EPSILON / 2.0;
 /// No facet.
 const NONE: u32 = u32::MAX;
 
-/// Facets of one task.
+/// Facets that are shared out to bands at once.
 const FACETS_PER_TASK: usize = 8192;
+
+/// So few rays that every thread can have all of them in its cache, and work is shared by facets.
+const FEW_RAYS: usize = 1 << 16;
+
+/// Shares of the facets for every thread, where there are few rays.
+const SHARES_PER_THREAD: usize = 2;
 
 /// Bands of the grid for every thread: more of them share the work more evenly.
 const BANDS_PER_THREAD: usize = 4;
@@ -113,13 +120,28 @@ fn nearer(a: Option<Hit>, b: Option<Hit>) -> Option<Hit> {
 
 /// The nearest facet of the ray at every place, or [`NONE`].
 fn nearest(picture: &Picture) -> Vec<u32> {
-    let facets = picture.mesh.facets.len();
-    let rows = picture.fan.grid.rows;
-    let threads = rayon::current_num_threads();
-    if threads == 1 {
-        return Band::new(picture, 0..rows).walked(0..facets as u32);
+    match rayon::current_num_threads() {
+        1 => shared_by_facets(picture, 1),
+        threads if picture.fan.rays.len() <= FEW_RAYS => {
+            shared_by_facets(picture, SHARES_PER_THREAD * threads)
+        }
+        threads => shared_by_rays(picture, BANDS_PER_THREAD * threads),
     }
-    let cuts = cuts(picture.fan, BANDS_PER_THREAD * threads);
+}
+
+/// Every task has all rays and some of the facets.
+fn shared_by_facets(picture: &Picture, shares: usize) -> Vec<u32> {
+    let (facets, rows) = (picture.mesh.facets.len(), picture.fan.grid.rows);
+    let cut = |share: usize| (share * facets / shares) as u32;
+    let among = |share| Band::new(picture, 0..rows).walked(cut(share)..cut(share + 1));
+    let found = (0..shares).into_par_iter().map(among).reduce_with(Band::nearer);
+    found.map_or(Vec::new(), Band::facets)
+}
+
+/// Every task has some of the rays and the facets that reach among them.
+fn shared_by_rays(picture: &Picture, bands: usize) -> Vec<u32> {
+    let facets = picture.mesh.facets.len();
+    let cuts = cuts(picture.fan, bands);
     let tasks: Vec<Vec<Vec<u32>>> = (0..facets.div_ceil(FACETS_PER_TASK))
         .into_par_iter()
         .map(|task| {
@@ -130,7 +152,7 @@ fn nearest(picture: &Picture) -> Vec<u32> {
         .collect();
     let band = |number: usize| {
         let facets = tasks.iter().flat_map(|bands| bands[number].iter().copied());
-        Band::new(picture, cuts[number]..cuts[number + 1]).walked(facets)
+        Band::new(picture, cuts[number]..cuts[number + 1]).walked(facets).facets()
     };
     (0..cuts.len() - 1).into_par_iter().flat_map_iter(band).collect()
 }

@@ -24,10 +24,17 @@ fn soup(corners: &[[f64; 3]], facets: &[[u32; 3]]) -> Mesh {
     Mesh { vertices, facets: facets.to_vec(), labels: vec![] }
 }
 
-/// Traces as the hierarchy does, bit for bit, on one thread and on three.
+/// Traces as the hierarchy does, bit for bit, on one thread and on three, and alike however the work is shared.
 fn traced(mesh: &Mesh, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
     let bvh = Bvh::new(mesh);
     let expected: Vec<_> = rays.iter().map(|ray| bvh.closest(ray)).collect();
+    let fan = Fan::new(rays).unwrap();
+    let picture = Picture::new(&fan, mesh);
+    let alone = shared_by_facets(&picture, 1);
+    for shares in [2, 7] {
+        assert!(shared_by_facets(&picture, shares) == alone, "{shares} shares of the facets");
+        assert!(shared_by_rays(&picture, shares) == alone, "{shares} bands");
+    }
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let found = pool.install(|| Fan::new(rays).unwrap().closest(mesh));
