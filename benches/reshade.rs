@@ -2,6 +2,7 @@
 //! geometry does not, against tracing it anew:
 //!
 //!     cargo bench --bench reshade
+//!     cargo bench --bench reshade -- json     quartiles, a line for each number of threads
 //!
 //! Ways are taken in turns, and medians are printed.
 
@@ -36,10 +37,13 @@ fn main() {
     let looks = diagnose::looks(&stage, &radar, &chirps).expect("chirps that meet the target");
     stage.middle = effects::middle(&looks);
     let drift = effects::find("drift").expect("the effect");
-    println!("{} chirps, {} of them on the target", chirps.rays.len(), looks.len());
+    let json = std::env::args().any(|argument| argument == "json");
+    if !json {
+        println!("{} chirps, {} of them on the target", chirps.rays.len(), looks.len());
+    }
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        let [trace, same, law, effect] = pool.install(|| {
+        let quartiles = pool.install(|| {
             let kept = Traced::default();
             let mut times = [(); 4].map(|()| Vec::new());
             for turn in 0..TURNS {
@@ -59,8 +63,20 @@ fn main() {
                     times.push(start.elapsed().as_secs_f64() * 1e3);
                 }
             }
-            times.map(median)
+            times.map(quartiles)
         });
+        if json {
+            let [traced, same, law, effect] = quartiles;
+            println!(
+                "{}",
+                serde_json::json!({
+                    "threads": threads, "chirps": chirps.rays.len(), "looks": looks.len(),
+                    "traced": traced, "same": same, "law": law, "effect": effect,
+                })
+            );
+            continue;
+        }
+        let [trace, same, law, effect] = quartiles.map(|[_, median, _]| median);
         println!(
             "{threads} threads: traced anew {trace:.3} ms; predicted again {same:.3} ms, with another \
              law {law:.3} ms, with another effect {effect:.3} ms"
@@ -86,7 +102,7 @@ fn model(m: f64, drift: &dyn Effect, drift_db: f64) -> Model<'_> {
     }
 }
 
-fn median(mut times_ms: Vec<f64>) -> f64 {
+fn quartiles(mut times_ms: Vec<f64>) -> [f64; 3] {
     times_ms.sort_by(f64::total_cmp);
-    times_ms[times_ms.len() / 2]
+    [1, 2, 3].map(|quarter| times_ms[quarter * (times_ms.len() - 1) / 4])
 }

@@ -39,7 +39,7 @@ def at_most(work, most, unit, value):
 
 def all_goals(results):
     return [
-        *tracing(results), *rendering(results), gpu(), *fits(results), *registration(results),
+        *tracing(results), *reshading(results), *rendering(results), gpu(), *fits(results), *registration(results),
         *store(results), *formats(results), memory(results),
     ]
 
@@ -64,6 +64,15 @@ def tracing(results):
         mine = ours(found)
         work = f"general rays, trace alone, {threads} thread{'s' * (threads > 1)}"
         yield at_least(work, 0.8, min(packets, default=None), mine and median(mine["trace"]), "Embree packets")
+
+
+def reshading(results):
+    for threads in [1, 2]:
+        row = next((row for row in results.get("reshade", []) if row["threads"] == threads), None)
+        slowest = row and max(median(row["law"]), median(row["effect"]))
+        chirps = f"{row['chirps']:,}".replace(",", " ") + " chirps" if row else "a scan"
+        work = f"{chirps} again with another law or effect, {threads} thread{'s' * (threads > 1)}"
+        yield at_most(work, 1, "ms", slowest)
 
 
 def rendering(results):

@@ -27,7 +27,7 @@ COLUMNS = [PINHOLE, HIERARCHY, LOW, MEDIUM, "Open3D", "Mitsuba, LLVM"]
 def page(results):
     parts = [
         head(results), goals(results), losses(results),
-        *bodies(results), growth(results), memory(results), second(results),
+        *bodies(results), reshading(results), growth(results), memory(results), second(results),
         rendering(results), formats(results), registration(results), fits(results), store(results),
         gpu(), LIMITS.read_text(encoding="utf-8").strip() + "\n",
     ]
@@ -141,6 +141,21 @@ def goal_cell(row, ratio):
     return f"≥ {bound(factor)}: {'met' if ratio >= factor else 'missed'}"
 
 
+def reshading(results):
+    found = results.get("reshade", [])
+    if not found:
+        return ""
+    ways = [("traced", "hits alone, anew"), ("same", "nothing changed"), ("law", "another law"), ("effect", "another effect")]
+    rows = [[words, *(spread(row[key]) for row in found)] for key, words in ways]
+    head = ["", *(f"{threads_of(row['threads'])}, ms" for row in found)]
+    return f"""## The same scan again
+
+What is predicted for {grouped(found[0]["looks"])} of {grouped(found[0]["chirps"])} chirps, those on the target, when geometry stays, by
+`cargo bench --bench reshade`: hits, angles and footprints are kept.
+
+{table(head, rows, right=head[1:])}"""
+
+
 def growth(results):
     text = ""
     for threads in [1, 2]:
@@ -154,10 +169,12 @@ def growth(results):
             text += f"{threads_of(threads).capitalize()}.\n\n" + table(head, lines, right=head) + "\n"
     if not text:
         return ""
+    shares = [row["agree"] for row in results.get("trace", []) if row["workload"] in GROWTH and "agree" in row]
+    agree = "All programs meet the same facet" if min(shares) == 1 else f"At worst {share(min(shares))} of the rays of a row meet the same facet"
     return f"""## Growth
 
 A ball of bumps, ever finer, under ever more rays of one origin. Build and trace together; of Embree the fastest of
-single rays and packets of 8 and 16.
+single rays and packets of 8 and 16. {agree} as ours, or one equally far, or nothing in both.
 
 {text}"""
 
@@ -180,17 +197,18 @@ def growth_cells(rows):
 def memory(results):
     lines = []
     for (key, threads), rows in workloads(results).items():
-        if key in GROWTH and threads == 2:
+        if key in GROWTH:
             found = [best(rows, tracer) for tracer in COLUMNS]
             cells = ["" if row is None else number(row["memory_mb"]) for row in found]
-            lines.append([grouped(rows[0]["facets"]), grouped(rows[0]["rays"]), number(rows[0]["mesh_mb"]), *cells])
+            size = [grouped(rows[0]["facets"]), grouped(rows[0]["rays"]), threads, number(rows[0]["mesh_mb"])]
+            lines.append([*size, *cells])
     if not lines:
         return ""
-    head = ["facets", "rays", "our mesh", *(name.replace("matdb ", "") for name in COLUMNS)]
+    head = ["facets", "rays", "threads", "our mesh", *(name.replace("matdb ", "") for name in COLUMNS)]
     return f"""## Memory
 
 The most that a process held in one turn, MB, beyond what it held with mesh and rays read: structures, hits and
-scratch, and for Mitsuba what its compiler loads. 2 threads.
+scratch, and for Mitsuba what its compiler loads.
 
 {table(head, lines, right=head)}"""
 

@@ -17,7 +17,7 @@ from page import page
 from programs import ROOT, build, cargo
 
 HERE = Path(__file__).resolve().parent
-PARTS = ["trace", "power", "registration", "fits", "render", "formats", "store"]
+PARTS = ["trace", "power", "reshade", "registration", "fits", "render", "formats", "store"]
 
 
 def main():
@@ -42,7 +42,7 @@ def arguments():
 def measure(options):
     say("build")
     build("trace_speed", "file_speed", "fit_speed", "icp_speed")
-    cargo("bench", "--no-run", "--bench", "store")
+    cargo("bench", "--no-run", "--bench", "store", "--bench", "reshade")
     found = {"schema": 1, "quick": options.quick, "machine": machine.describe()}
     found |= {"versions": {}, "failed": {}, "commits": {}} | kept(options)
     began = time.monotonic()
@@ -81,6 +81,10 @@ def measured(part, folder, quick):
         import tracing
 
         return tracing.power(quick), {}
+    if part == "reshade":
+        import reshade
+
+        return reshade.measure(), {}
     if part == "registration":
         import icp
 

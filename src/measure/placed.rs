@@ -1,14 +1,14 @@
 //! A mesh at a pose, as rays see it.
 //!
-//! The mesh itself never moves: rays are carried back into its frame, and hits forward. The
-//! hierarchy over its facets is built once.
+//! The mesh itself never moves: rays are carried back into its frame, and hits forward. Of what a tracer
+//! makes of its facets nothing is lost with a new pose.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::frames::{Global, Pose, Ray};
 use crate::geometry::Mesh;
-use crate::trace::{Bvh, Hit};
+use crate::trace::{Bvh, Hit, closest};
 
 /// A mesh that can be looked at from any side.
 pub struct Traced<'a> {
@@ -26,7 +26,7 @@ pub struct Seen {
 }
 
 impl<'a> Traced<'a> {
-    /// Builds the hierarchy.
+    /// A hierarchy over it is built when rays need one.
     pub fn new(mesh: &'a Mesh) -> Traced<'a> {
         Traced { mesh, bvh: Bvh::new(mesh) }
     }
@@ -41,20 +41,31 @@ impl<'a> Traced<'a> {
 
     /// Where one ray meets the mesh moved by `pose`.
     pub fn look(&self, pose: &Pose<Global, Global>, ray: &Ray<Global>) -> Option<Seen> {
-        let back = pose.inverse();
-        let there = Ray { origin: back * ray.origin, direction: back * ray.direction };
-        let hit = self.bvh.closest(&there)?;
-        let normal =
-            pose.rotation() * self.mesh.area_normal(hit.facet as usize).normalize_or_zero();
-        let turned = if normal.dot(ray.direction.xyz()) > 0.0 { -normal } else { normal };
-        Some(Seen { hit: Hit { point: *pose * hit.point, ..hit }, normal: turned })
+        let hit = self.bvh.closest(&carried(&pose.inverse(), ray))?;
+        Some(self.seen(pose, ray, hit))
     }
 
     /// Where each of many rays meets the mesh moved by `pose`, in their order.
     pub fn scan(&self, pose: &Pose<Global, Global>, rays: &[Ray<Global>]) -> Vec<Option<Seen>> {
         const RAYS_PER_TASK: usize = 256;
-        rays.par_iter().with_min_len(RAYS_PER_TASK).map(|ray| self.look(pose, ray)).collect()
+        let back = pose.inverse();
+        let there: Vec<Ray<Global>> = rays.iter().map(|ray| carried(&back, ray)).collect();
+        let hits = closest(&self.bvh, &there);
+        let seen = |(ray, hit): (&Ray<Global>, Option<Hit>)| Some(self.seen(pose, ray, hit?));
+        rays.par_iter().zip(hits).with_min_len(RAYS_PER_TASK).map(seen).collect()
     }
+
+    /// A hit of the mesh where it is stored, there where the pose has it.
+    fn seen(&self, pose: &Pose<Global, Global>, ray: &Ray<Global>, hit: Hit) -> Seen {
+        let normal =
+            pose.rotation() * self.mesh.area_normal(hit.facet as usize).normalize_or_zero();
+        let turned = if normal.dot(ray.direction.xyz()) > 0.0 { -normal } else { normal };
+        Seen { hit: Hit { point: *pose * hit.point, ..hit }, normal: turned }
+    }
+}
+
+fn carried(back: &Pose<Global, Global>, ray: &Ray<Global>) -> Ray<Global> {
+    Ray { origin: *back * ray.origin, direction: *back * ray.direction }
 }
 
 #[cfg(test)]
