@@ -13,6 +13,9 @@ const STEEPEST: f64 = 1.732_050_807_568_877_2;
 /// Looks at most this many mean spacings apart are neighbours.
 const NEIGHBOURHOOD: f64 = 2.5;
 
+/// Looks of one task.
+const LOOKS_PER_TASK: usize = 512;
+
 /// Distance of every look to the nearest edge in the target plane, m, but at most `reach_m`.
 ///
 /// `looks` are points of the target plane, m, and the ranges there, m; none where nothing is met.
@@ -20,40 +23,47 @@ const NEIGHBOURHOOD: f64 = 2.5;
 pub(super) fn distances_m(looks: &[(DVec2, Option<f64>)], spot_m: f64, reach_m: f64) -> Vec<f64> {
     let spacing_m = spacing_m(looks);
     let near_m = NEIGHBOURHOOD * spacing_m;
-    let all_places: Vec<DVec2> = looks.iter().map(|look| look.0).collect();
-    let looks = apart(looks, spacing_m / 4.0);
-    let places: Vec<DVec2> = looks.iter().map(|look| look.0).collect();
+    let distinct = apart(looks, spacing_m / 4.0);
+    let places: Vec<DVec2> = distinct.iter().map(|look| look.0).collect();
     let cells = Cells::new(&places, near_m);
-    let nearest_across = |number: usize, near: &[u32]| {
+    let nearest_across = |number: usize| {
         let distance_m2 = |other: &usize| places[*other].distance_squared(places[number]);
         let is_edge = |other: &usize| {
-            distance_m2(other) <= near_m * near_m && is_across(looks[number], looks[*other], spot_m)
+            distance_m2(other) <= near_m * near_m
+                && is_across(distinct[number], distinct[*other], spot_m)
         };
-        let others = near.iter().map(|&other| other as usize).filter(is_edge);
+        let others = cells.near(places[number]).filter(is_edge);
         others.min_by(|a, b| distance_m2(a).total_cmp(&distance_m2(b)))
     };
-    let across: Vec<Option<usize>> = cells.map_near(&cells, nearest_across);
+    let across: Vec<Option<usize>> = (0..places.len())
+        .into_par_iter()
+        .with_min_len(LOOKS_PER_TASK)
+        .map(nearest_across)
+        .collect();
     // Only pairs that are nearest to each other; others see past a look on their own side.
     let edge = |(look, other): (usize, &Option<usize>)| {
         let other = (*other)?;
         (across[other] == Some(look)).then(|| 0.5 * (places[look] + places[other]))
     };
     let edges: Vec<DVec2> = across.iter().enumerate().filter_map(edge).collect();
-    let distance_m = |number: usize, near: &[u32]| {
-        let distance_m2 = |&edge: &u32| edges[edge as usize].distance_squared(all_places[number]);
-        let within = near.iter().map(distance_m2).filter(|&m2| m2 <= reach_m * reach_m);
+    // Cells smaller than the spacing would be many and empty.
+    let cells = Cells::new(&edges, reach_m.max(spacing_m));
+    let distance_m = |look: &(DVec2, Option<f64>)| {
+        let distance_m2 = |edge: usize| edges[edge].distance_squared(look.0);
+        let within = cells.near(look.0).map(distance_m2).filter(|&m2| m2 <= reach_m * reach_m);
         within.fold(f64::INFINITY, f64::min).sqrt().min(reach_m)
     };
-    Cells::new(&all_places, reach_m).map_near(&Cells::new(&edges, reach_m), distance_m)
+    looks.par_iter().with_min_len(LOOKS_PER_TASK).map(distance_m).collect()
 }
 
 /// One look of each small cell, the first, so that looks on top of each other cost no more than one.
-fn apart(looks: &[(DVec2, Option<f64>)], cell_m: f64) -> Vec<(DVec2, Option<f64>)> {
-    let places: Vec<DVec2> = looks.iter().map(|look| look.0).collect();
-    let cells = Cells::new(&places, cell_m);
-    let mut first: Vec<u32> = cells.occupied().map(|points| points[0].1).collect();
-    first.sort_unstable();
-    first.into_iter().map(|number| looks[number as usize]).collect()
+fn apart(looks: &[(DVec2, Option<f64>)], side_m: f64) -> Vec<(DVec2, Option<f64>)> {
+    let frame = Frame::around(looks.iter().map(|look| look.0), side_m);
+    let mut is_taken = vec![false; frame.columns * frame.rows];
+    let is_first = |look: &&(DVec2, Option<f64>)| {
+        frame.number_at(look.0).is_some_and(|cell| !std::mem::replace(&mut is_taken[cell], true))
+    };
+    looks.iter().filter(is_first).copied().collect()
 }
 
 fn is_across(a: (DVec2, Option<f64>), b: (DVec2, Option<f64>), spot_m: f64) -> bool {
@@ -74,55 +84,99 @@ fn spacing_m(looks: &[(DVec2, Option<f64>)]) -> f64 {
     (sides_m.x * sides_m.y / count).sqrt().max(sides_m.max_element() / count)
 }
 
+/// A rectangle of square cells.
+struct Frame {
+    side_m: f64,
+    /// The cell of least column and row, counted from the origin of the plane.
+    first: [i64; 2],
+    columns: usize,
+    rows: usize,
+}
+
+impl Frame {
+    /// All cells that points are in, and those between.
+    fn around(points: impl Iterator<Item = DVec2>, side_m: f64) -> Frame {
+        let mut frame = Frame { side_m, first: [0; 2], columns: 0, rows: 0 };
+        let cells = points.map(|point| frame.cell(point));
+        let bounds = cells.fold(None, |bounds, [column, row]| {
+            let ([left, low], [right, high]) = bounds.unwrap_or(([column, row], [column, row]));
+            Some(([left.min(column), low.min(row)], [right.max(column), high.max(row)]))
+        });
+        if let Some((first, [right, high])) = bounds {
+            frame.first = first;
+            (frame.columns, frame.rows) = (span(first[0], right), span(first[1], high));
+        }
+        frame
+    }
+
+    /// Column and row of a point, counted from the origin of the plane.
+    fn cell(&self, point: DVec2) -> [i64; 2] {
+        (point / self.side_m).floor().to_array().map(|x| x as i64)
+    }
+
+    /// Number of the cell that a point is in.
+    fn number_at(&self, point: DVec2) -> Option<usize> {
+        let [column, row] = self.cell(point);
+        self.number(column, row)
+    }
+
+    /// Number of a cell, column after column; none outside.
+    fn number(&self, column: i64, row: i64) -> Option<usize> {
+        let (column, row) =
+            (column.saturating_sub(self.first[0]), row.saturating_sub(self.first[1]));
+        let within = |at: i64, count: usize| usize::try_from(at).ok().filter(|&at| at < count);
+        Some(within(column, self.columns)? * self.rows + within(row, self.rows)?)
+    }
+}
+
+/// How many there are from one to the other.
+fn span(first: i64, last: i64) -> usize {
+    usize::try_from(last.saturating_sub(first)).unwrap_or_default() + 1
+}
+
 /// Points sorted into square cells, for look-ups within one cell's side.
 struct Cells {
-    /// The cell and the number of each point, in this order.
-    sorted: Vec<([i64; 2], u32)>,
+    frame: Frame,
+    /// Where the points of each cell begin, and the end.
+    starts: Vec<u32>,
+    /// Points by number, cell after cell.
+    numbers: Vec<u32>,
 }
 
 impl Cells {
     fn new(points: &[DVec2], side_m: f64) -> Cells {
-        let cell = |point: &DVec2| (point / side_m).floor().to_array().map(|x| x as i64);
-        let mut sorted: Vec<_> = points.iter().map(cell).zip(0..).collect();
-        sorted.par_sort_unstable();
-        Cells { sorted }
-    }
-
-    /// The points of each cell that has any.
-    fn occupied(&self) -> impl Iterator<Item = &[([i64; 2], u32)]> {
-        self.sorted.chunk_by(|a, b| a.0 == b.0)
-    }
-
-    /// Points in a cell and in the eight around it.
-    fn around(&self, [column, row]: [i64; 2]) -> Vec<u32> {
-        let in_column = |aside: i64| {
-            let [first, last] =
-                [-1, 1].map(|up| [column.saturating_add(aside), row.saturating_add(up)]);
-            let start = self.sorted.partition_point(|point| point.0 < first);
-            let end = self.sorted.partition_point(|point| point.0 <= last);
-            self.sorted[start..end].iter().map(|point| point.1)
-        };
-        [-1, 0, 1].into_iter().flat_map(in_column).collect()
-    }
-
-    /// A value for every point, by its number and those of `others`, in cells of the same size, that
-    /// may be within one side of it.
-    fn map_near<T: Clone + Default + Send>(
-        &self,
-        others: &Cells,
-        value: impl Fn(usize, &[u32]) -> T + Sync,
-    ) -> Vec<T> {
-        let cells: Vec<&[([i64; 2], u32)]> = self.occupied().collect();
-        let in_cell = |points: &&[([i64; 2], u32)]| {
-            let near = others.around(points[0].0);
-            points.iter().map(|&(_, number)| value(number as usize, &near)).collect()
-        };
-        let values: Vec<Vec<T>> = cells.par_iter().map(in_cell).collect();
-        let mut by_number = vec![T::default(); self.sorted.len()];
-        for (&(_, number), value) in self.sorted.iter().zip(values.into_iter().flatten()) {
-            by_number[number as usize] = value;
+        let frame = Frame::around(points.iter().copied(), side_m);
+        let within = |(point, number): (&DVec2, u32)| Some((frame.number_at(*point)?, number));
+        let cells: Vec<(usize, u32)> = points.iter().zip(0..).filter_map(within).collect();
+        let mut starts = vec![0; frame.columns * frame.rows + 1];
+        cells.iter().for_each(|&(cell, _)| starts[cell + 1] += 1);
+        for cell in 1..starts.len() {
+            starts[cell] += starts[cell - 1];
         }
-        by_number
+        let (mut next, mut numbers) = (starts.clone(), vec![0; cells.len()]);
+        for (cell, number) in cells {
+            numbers[next[cell] as usize] = number;
+            next[cell] += 1;
+        }
+        Cells { frame, starts, numbers }
+    }
+
+    /// The points in the cell of a place and in the eight around it: all that are within a side of it.
+    fn near(&self, place: DVec2) -> impl Iterator<Item = usize> {
+        let [column, row] = self.frame.cell(place);
+        let low = row.saturating_sub(1).max(self.frame.first[1]);
+        let high = row.saturating_add(1).min(self.frame.first[1] + self.frame.rows as i64 - 1);
+        let in_column = move |aside: i64| {
+            let number = |row: i64| self.frame.number(column.saturating_add(aside), row);
+            let of_cells = |first: usize, last: usize| {
+                &self.numbers[self.starts[first] as usize..self.starts[last + 1] as usize]
+            };
+            match (number(low), number(high)) {
+                (Some(first), Some(last)) if low <= high => of_cells(first, last),
+                _ => &[],
+            }
+        };
+        [-1, 0, 1].into_iter().flat_map(in_column).map(|&number| number as usize)
     }
 }
 

@@ -142,7 +142,7 @@ fn of_facets_on_top_of_each_other_the_first_is_met() {
     let [a, b, c] = mesh.corners(0);
     mesh.vertices.push((a + b + c) / 3.0);
     mesh.facets.push([0, 1, 4]);
-    let hits = traced(&mesh, &rays(DVec3::new(0.0, 0.0, 3.0), grid(40, 0.9)));
+    let hits = judged(&mesh, &rays(DVec3::new(0.0, 0.0, 3.0), grid(40, 0.9)));
     assert!(hits.iter().flatten().all(|hit| hit.facet == 0 || hit.facet >= 2));
     assert!(hits.iter().flatten().filter(|hit| hit.facet == 0).count() > 500);
 }
@@ -172,7 +172,7 @@ fn facets_behind_across_and_beside_the_origin() {
     ];
     let mesh = soup(&corners, &[[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11], [12, 13, 14]]);
     let through = grid(50, 0.5).chain([DVec3::new(0.004, 0.003, 0.0)]);
-    let hits = traced(&mesh, &rays(origin, through));
+    let hits = judged(&mesh, &rays(origin, through));
     let met = |facet: u32| hits.iter().flatten().filter(|hit| hit.facet == facet).count();
     assert!(met(0) > 500 && met(3) > 200, "{} {}", met(0), met(3));
     assert_eq!(met(1) + met(2), 0);
