@@ -44,7 +44,11 @@ impl Term {
         Term { level_per_sr, cosines: -6.0, facets: Some(facets) }
     }
 
-    fn per_sr(&self, cos_theta: f64) -> f64 {
+    /// Its part of f, 1/sr; nothing from where the light grazes.
+    pub(crate) fn per_sr(&self, cos_theta: f64) -> f64 {
+        if cos_theta <= GRAZING {
+            return 0.0;
+        }
         let facets = self.facets.map_or(1.0, |Facets { m, distribution, shadowed }| {
             let x = (1.0 / (cos_theta * cos_theta) - 1.0) / (m * m);
             let law = match distribution {

@@ -402,7 +402,7 @@ impl Problem<'_> {
             };
             up.into_iter().zip(down).map(slope).collect()
         };
-        (0..at.len()).map(slope).collect()
+        (0..at.len()).into_par_iter().map(slope).collect()
     }
 
     /// Slopes of ln mean before the receiver by every unknown that changes it: unlike [`Term::ln_mean`]

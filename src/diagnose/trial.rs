@@ -2,6 +2,7 @@
 //! a fit of all looks for the best few.
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use super::refit::{Fitted, Space, sum};
 use super::screen::Screen;
@@ -56,11 +57,10 @@ impl Selection<'_> {
         (self.hear)(&format!("round {round}: screening {} effects", effects.len()));
         let sample = self.sample;
         let screen = Screen::new(sample.problem(&self.problem), &state.space, &state.fitted.at);
-        let mut trials: Vec<Trial> = effects
-            .iter()
-            .filter(absent)
-            .filter_map(|effect| self.promised(state, &screen, sample.weight, *effect, round))
-            .collect();
+        let promised =
+            |effect: &&'a dyn Effect| self.promised(state, &screen, sample.weight, *effect, round);
+        let absent: Vec<_> = effects.iter().filter(absent).collect();
+        let mut trials: Vec<Trial> = absent.into_par_iter().filter_map(promised).collect();
         sort(&mut trials);
         let mut best = 0.25 * self.settings.least_gain_of(1, 1) / SHARE_TO_SCOUT;
         for trial in &mut trials {

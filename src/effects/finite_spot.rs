@@ -1,14 +1,15 @@
 //! A spot of finite size: the power of a chirp is the mean over rays through a Gaussian footprint, its
 //! range their mean by power. Rays beside the target bring nothing.
 
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
 use rayon::prelude::*;
 
 use super::meeting::{Facing, facing};
+use super::model::Kept;
 use super::spread::sunflower;
 use super::{Arrived, Effect, Knob, Level, Look, Stage, Survey};
-use crate::brdf::{Brdf, Retro};
+use crate::brdf::{Brdf, Scattering, Term};
 use crate::frames::{Direction, Global, Ray, Surface};
 use crate::trace::{Hit, closest};
 
@@ -38,12 +39,6 @@ impl Beside {
         let watts_per_f = stage.link.power_w(range_m, cos_theta, 1.0);
         Beside { range_m, to_radar, watts_per_f, region }
     }
-
-    /// Equation (11) of the base law, W; nothing where the region has no law.
-    fn power_w(&self, laws: &[Retro]) -> f64 {
-        let law = laws.get(usize::from(self.region));
-        law.map_or(0.0, |law| self.watts_per_f * law.per_sr(self.to_radar))
-    }
 }
 
 /// The rays of a spot and what they hit.
@@ -51,6 +46,89 @@ type Round<'a> = (&'a [Ray<Global>; RAYS], &'a [Option<Hit>]);
 
 /// The ray of a look and those of its spot, as far as they meet the target as the scene has it.
 type Spot = (Beside, Vec<Beside>);
+
+/// What the spots of all looks meet.
+struct Spots {
+    all: Vec<Option<Spot>>,
+    /// What terms of level 1 make of them: a law's levels change more often than its shape.
+    sums: Kept<(u16, Term), Vec<Sums>>,
+}
+
+/// What a spot sends back from one region by one term of its law.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    /// Power of the ray along the axis and of all rays of the spot, W.
+    centre_w: f64,
+    power_w: f64,
+    /// Moments of what adds to the range, W·m and W·m².
+    first: f64,
+    second: f64,
+}
+
+impl Sums {
+    /// Of a region's rays, for f of a direction, 1/sr.
+    fn of((centre, beside): &Spot, region: u16, f: impl Fn(Direction<Surface>) -> f64) -> Sums {
+        let power_w = |ray: &Beside| match ray.region == region {
+            true => ray.watts_per_f * f(ray.to_radar),
+            false => 0.0,
+        };
+        let mut sums = Sums { centre_w: power_w(centre), ..Sums::default() };
+        for ray in beside {
+            let (power_w, longer_m) = (power_w(ray), ray.range_m - centre.range_m);
+            sums.power_w += power_w;
+            sums.first += power_w * longer_m;
+            sums.second += power_w * longer_m * longer_m;
+        }
+        sums
+    }
+
+    fn and(self, level: f64, more: &Sums) -> Sums {
+        Sums {
+            centre_w: self.centre_w + level * more.centre_w,
+            power_w: self.power_w + level * more.power_w,
+            first: self.first + level * more.first,
+            second: self.second + level * more.second,
+        }
+    }
+
+    /// What the base law makes of a whole spot; none where nothing comes back.
+    fn averaged(&self) -> Option<Averaged> {
+        let Sums { centre_w, power_w, first, second } = *self;
+        if centre_w <= 0.0 || power_w <= 0.0 {
+            return None;
+        }
+        let (mean_w, longer_m) = (power_w / RAYS as f64, first / power_w);
+        let spread_m = (second / power_w - longer_m * longer_m).max(0.0).sqrt();
+        Some(Averaged { centre_w, mean_w, longer_m, spread_m })
+    }
+}
+
+impl Spots {
+    /// By what level, 1/sr, and how the spots answer to each term of the laws; a law that is no sum of such is one
+    /// of level 1.
+    fn answers(&self, laws: &[Brdf]) -> Vec<(f64, Arc<Vec<Sums>>)> {
+        let mut answers = Vec::new();
+        for (region, law) in (0..).zip(laws) {
+            let by = |f: &(dyn Fn(Direction<Surface>) -> f64 + Sync)| -> Vec<Sums> {
+                let of = |spot: &Option<Spot>| {
+                    spot.as_ref().map_or(Sums::default(), |spot| Sums::of(spot, region, f))
+                };
+                self.all.par_iter().map(of).collect()
+            };
+            match law.backscatter() {
+                Some(terms) => answers.extend(terms.into_iter().map(|term| {
+                    let shape = Term { level_per_sr: 1.0, ..term };
+                    let sums = || by(&|to_radar| shape.per_sr(to_radar.cos_theta()));
+                    (term.level_per_sr, self.sums.of((region, shape), sums))
+                })),
+                None => {
+                    answers.push((1.0, Arc::new(by(&|to_radar| law.f_per_sr(to_radar, to_radar)))))
+                }
+            }
+        }
+        answers
+    }
+}
 
 fn spots(stage: &Stage, looks: &[Look], diameter_m: f64) -> Vec<Option<Spot>> {
     let axes: Vec<Ray<Global>> = looks.iter().map(|look| look.ray).collect();
@@ -102,21 +180,6 @@ struct Averaged {
     spread_m: f64,
 }
 
-fn averaged(laws: &[Retro], (centre, beside): &Spot) -> Option<Averaged> {
-    let sums = beside.iter().fold([0.0; 3], |[power_w, first, second], ray| {
-        let (one_w, longer_m) = (ray.power_w(laws), ray.range_m - centre.range_m);
-        [power_w + one_w, first + one_w * longer_m, second + one_w * longer_m * longer_m]
-    });
-    let centre_w = centre.power_w(laws);
-    let [power_w, first, second] = sums;
-    if centre_w <= 0.0 || power_w <= 0.0 {
-        return None;
-    }
-    let (mean_w, longer_m) = (power_w / RAYS as f64, first / power_w);
-    let spread_m = (second / power_w - longer_m * longer_m).max(0.0).sqrt();
-    Some(Averaged { centre_w, mean_w, longer_m, spread_m })
-}
-
 impl Effect for FiniteSpot {
     fn name(&self) -> &'static str {
         "finite-spot"
@@ -158,14 +221,17 @@ impl Effect for FiniteSpot {
 
     fn survey(&self, values: &[f64], stage: &Stage, looks: &[Look]) -> Survey {
         let diameter_m = values.first().copied().unwrap_or(0.0);
-        Box::new(spots(stage, looks, diameter_m))
+        Box::new(Spots { all: spots(stage, looks, diameter_m), sums: Kept::default() })
     }
 
     fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
-        let spots = survey.downcast_ref::<Vec<Option<Spot>>>().map_or(&[][..], Vec::as_slice);
-        let laws: Vec<Retro> = laws.iter().map(Retro::new).collect();
-        let averaged = |spot: &Option<Spot>| averaged(&laws, spot.as_ref()?);
-        Box::new(spots.par_iter().map(averaged).collect::<Vec<Option<Averaged>>>())
+        let Some(spots) = survey.downcast_ref::<Spots>() else { return Box::new(()) };
+        let answers = spots.answers(laws);
+        let averaged = |look: usize| {
+            let add = |sums: Sums, (level, of): &(f64, Arc<Vec<Sums>>)| sums.and(*level, &of[look]);
+            answers.iter().fold(Sums::default(), add).averaged()
+        };
+        Box::new((0..spots.all.len()).into_par_iter().map(averaged).collect::<Vec<_>>())
     }
 
     fn arrive(&self, _: &[f64], shaded: &Survey, arrived: &mut [Option<Arrived>]) {

@@ -15,7 +15,7 @@ impl Axes {
     /// At a normal; a grain that stands on the surface has no direction along it.
     pub(super) fn new(normal: DVec3, grain: DVec3) -> Axes {
         let along = grain - grain.dot(normal) * normal;
-        let stands = along.length() <= 1e-9 * grain.length();
+        let stands = along.length_squared() <= 1e-18 * grain.length_squared();
         let along = if stands { normal.any_orthonormal_vector() } else { along.normalize() };
         Axes(DMat3::from_cols(along, normal.cross(along), normal))
     }

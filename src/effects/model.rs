@@ -63,7 +63,7 @@ type Key = (&'static str, Vec<f64>);
 
 /// The latest results of a slow function: those of a difference quotient over every number of a pose, its
 /// middle, and the next, or as many as that.
-struct Kept<K, V, const MOST: usize = 15>(Mutex<Vec<(K, Arc<V>)>>);
+pub(super) struct Kept<K, V, const MOST: usize = 15>(Mutex<Vec<(K, Arc<V>)>>);
 
 impl<K, V, const MOST: usize> Default for Kept<K, V, MOST> {
     fn default() -> Self {
@@ -73,7 +73,7 @@ impl<K, V, const MOST: usize> Default for Kept<K, V, MOST> {
 
 impl<K: PartialEq, V, const MOST: usize> Kept<K, V, MOST> {
     /// Makes it without the lock, since other threads may want another key meanwhile.
-    fn of(&self, key: K, make: impl FnOnce() -> V) -> Arc<V> {
+    pub(super) fn of(&self, key: K, make: impl FnOnce() -> V) -> Arc<V> {
         let kept = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(found) = Self::take(&mut kept(), &key) {
             return found;
