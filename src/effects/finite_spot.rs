@@ -5,7 +5,7 @@ use std::sync::{Arc, LazyLock};
 
 use rayon::prelude::*;
 
-use super::meeting::{Facing, facing};
+use super::meeting::{Facet, Facing};
 use super::model::Kept;
 use super::spread::sunflower;
 use super::{Arrived, Effect, Knob, Level, Look, Stage, Survey};
@@ -33,11 +33,11 @@ struct Beside {
 }
 
 impl Beside {
-    fn of(stage: &Stage, ray: &Ray<Global>, hit: &Hit) -> Beside {
-        let Facing { region, to_radar, .. } = facing(stage, ray, hit);
+    fn of(stage: &Stage, facets: &[Facet], ray: &Ray<Global>, hit: &Hit) -> Option<Beside> {
+        let Facing { region, to_radar, .. } = facets.get(hit.facet as usize)?.facing(ray);
         let Hit { range_m, cos_theta, .. } = *hit;
         let watts_per_f = stage.link.power_w(range_m, cos_theta, 1.0);
-        Beside { range_m, to_radar, watts_per_f, region }
+        Some(Beside { range_m, to_radar, watts_per_f, region })
     }
 }
 
@@ -138,11 +138,17 @@ fn spots(stage: &Stage, looks: &[Look], diameter_m: f64) -> Vec<Option<Spot>> {
     };
     let rays: Vec<[Ray<Global>; RAYS]> = looks.par_iter().zip(&centres).map(round).collect();
     let hits = closest(stage.bvh, rays.as_flattened());
+    // Spots meet most facets many times.
+    let facets = 0..stage.bvh.mesh().facets.len();
+    let facets: Vec<Facet> =
+        facets.into_par_iter().with_min_len(1024).map(|facet| Facet::of(stage, facet)).collect();
     let spot = |(look, (centre, (rays, hits))): (&Look, (&Option<Hit>, Round))| {
         let met =
-            |ray: &Ray<Global>, hit: &Option<Hit>| Some(Beside::of(stage, ray, hit.as_ref()?));
-        let beside = rays.iter().zip(hits).filter_map(|(ray, hit)| met(ray, hit));
-        Some((met(&look.ray, centre)?, beside.collect()))
+            |ray: &Ray<Global>, hit: &Option<Hit>| Beside::of(stage, &facets, ray, hit.as_ref()?);
+        let centre = met(&look.ray, centre)?;
+        let mut beside = Vec::with_capacity(RAYS);
+        beside.extend(rays.iter().zip(hits).filter_map(|(ray, hit)| met(ray, hit)));
+        Some((centre, beside))
     };
     let rounds = rays.par_iter().zip(hits.par_chunks(RAYS));
     looks.par_iter().zip(centres.par_iter().zip(rounds)).map(spot).collect()

@@ -25,6 +25,15 @@ impl Axes {
         Axes::new(look.normal, grain(stage, look.region))
     }
 
+    fn normal(&self) -> DVec3 {
+        self.0.z_axis
+    }
+
+    /// Those of the other side of the surface.
+    fn from_below(&self) -> Axes {
+        Axes(DMat3::from_cols(self.0.x_axis, -self.0.y_axis, -self.0.z_axis))
+    }
+
     /// A unit vector of the world, seen from the surface.
     pub(super) fn local(&self, world: DVec3) -> Direction<Surface> {
         let above = Direction::from_angles(0.0, 0.0);
@@ -60,14 +69,37 @@ pub(super) struct Facing {
     pub to_radar: Direction<Surface>,
 }
 
+/// A facet, whichever side of it a ray meets.
+pub(super) struct Facet {
+    /// At its outward normal; none where rounding leaves it none.
+    axes: Option<Axes>,
+    grain: DVec3,
+    region: u16,
+}
+
+impl Facet {
+    pub(super) fn of(stage: &Stage, number: usize) -> Facet {
+        let region = stage.region_of_facet.get(number).copied().unwrap_or(0);
+        let (normal, grain) = (stage.bvh.mesh().area_normal(number), grain(stage, region));
+        let axes = normal.try_normalize().map(|normal| Axes::new(normal, grain));
+        Facet { axes, grain, region }
+    }
+
+    /// Its surface, towards where a ray comes from.
+    pub(super) fn facing(&self, ray: &Ray<Global>) -> Facing {
+        let back = -ray.direction.xyz();
+        let axes = match self.axes {
+            None => Axes::new(back, self.grain),
+            Some(axes) if axes.normal().dot(back) < 0.0 => axes.from_below(),
+            Some(axes) => axes,
+        };
+        Facing { normal: axes.normal(), region: self.region, to_radar: axes.local(back) }
+    }
+}
+
 /// The surface at the closest hit of a ray.
 pub(super) fn facing(stage: &Stage, ray: &Ray<Global>, hit: &Hit) -> Facing {
-    let back = -ray.direction.xyz();
-    let outward = stage.bvh.mesh().area_normal(hit.facet as usize).normalize_or(back);
-    let normal = if outward.dot(back) < 0.0 { -outward } else { outward };
-    let region = stage.region_of_facet.get(hit.facet as usize).copied().unwrap_or(0);
-    let to_radar = Axes::new(normal, grain(stage, region)).local(back);
-    Facing { normal, region, to_radar }
+    Facet::of(stage, hit.facet as usize).facing(ray)
 }
 
 impl Facing {

@@ -120,7 +120,8 @@ impl<'a> Fan<'a> {
         let blocks = rays.par_chunks(LANES).with_min_len(256);
         let flat: Vec<_> = blocks.map(|rays| widest(Flattening { frame, rays })).collect();
         let flat = &flat.as_flattened()[..rays.len()];
-        if let Some(ray) = flat.iter().position(|at| at[0].is_nan()) {
+        let is_wide = |at: &[f32; 2]| at[0].is_nan();
+        if let Some(ray) = flat.par_iter().with_min_len(CHUNK).position_first(is_wide) {
             return Err(NoFan::Wide { ray });
         }
         let mut grid = Grid::over(flat);
@@ -135,10 +136,12 @@ impl<'a> Fan<'a> {
             ray_at: vec![0; rays.len()],
             place_of,
         };
-        for ((&place, &[u, v]), ray) in fan.place_of.iter().zip(flat).zip(0..) {
-            let place = place as usize;
-            (fan.u[place], fan.v[place], fan.ray_at[place]) = (u, v, ray);
+        for (&place, ray) in fan.place_of.iter().zip(0..) {
+            fan.ray_at[place as usize] = ray;
         }
+        let (u, v) = (fan.u.par_iter_mut(), fan.v.par_iter_mut());
+        let places = fan.ray_at.par_iter().zip(u.zip(v)).with_min_len(CHUNK);
+        places.for_each(|(&ray, (u, v))| [*u, *v] = flat[ray as usize]);
         Ok(fan)
     }
 }
@@ -179,13 +182,18 @@ impl Wide for Flattening<'_> {
 impl Grid {
     /// Cells as wide as the rays' mean spacing; along a line, their spacing on it.
     fn over(flat: &[[f32; 2]]) -> Grid {
-        let (mut min, mut max) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-        for point in flat {
-            for axis in [0, 1] {
-                min[axis] = least(min[axis], point[axis]);
-                max[axis] = most(max[axis], point[axis]);
+        let bounds = |points: &[[f32; 2]]| {
+            let (mut min, mut max) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+            for point in points {
+                for axis in [0, 1] {
+                    min[axis] = least(min[axis], point[axis]);
+                    max[axis] = most(max[axis], point[axis]);
+                }
             }
-        }
+            [min, max]
+        };
+        let corners: Vec<_> = flat.par_chunks(CHUNK).flat_map_iter(bounds).collect();
+        let [min, max] = bounds(&corners);
         let sides = [0, 1].map(|axis| f64::from(max[axis]) - f64::from(min[axis]));
         let count = flat.len() as f64;
         let longest = sides[0].max(sides[1]);
