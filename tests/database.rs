@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use serde_json::Value;
-use support::{entries, matdb, refused, root, scene};
+use support::{entries, matdb, refused, refused_with_lines, root, scene};
 
 fn json(folder: &Path, arguments: &[&str]) -> Value {
     let output = matdb(folder).args(arguments).arg("--json").output().unwrap();
@@ -183,10 +183,10 @@ fn a_measured_curve_without_its_circumstances_is_refused() {
         ),
     ] {
         let folder = from_template(change, BARE);
-        let message = refused(matdb(folder.path()).args(["add", "--from", "."]));
+        let (message, lines) =
+            refused_with_lines(matdb(folder.path()).args(["add", "--from", "."]));
         assert!(message.contains(expected) && message.contains("--template"), "{message}");
-        // What is to be filled in, as lines of the file.
-        assert!(message.contains("\nthreshold_dbm = …"), "{message}");
+        assert!(lines.contains("\nthreshold_dbm = …"), "{lines}");
         assert!(!folder.path().join("matdb.sqlite").exists());
     }
     let synthetic =
@@ -196,4 +196,60 @@ fn a_measured_curve_without_its_circumstances_is_refused() {
     let rows = "theta_deg,sigma0_db,censor,threshold_db\n0,5,none,-30\n20,-10,none,-30\n";
     let folder = from_template(|text: String| text.replace("threshold_dbm = -77", "#"), rows);
     matdb(folder.path()).args(["add", "--from", "."]).assert().success();
+}
+
+#[test]
+fn references_to_nothing_and_to_what_never_ends_are_refused() {
+    let no_instrument = |text: String| {
+        let (before, rest) = text.split_once("[[instrument]]").unwrap();
+        format!("{before}{}", &rest[rest.find("\n[[").unwrap()..])
+    };
+    let devices = |text: String| text.replace("file = \"scan.csv\"", "file = \"/dev/zero\"");
+    let twice = |text: String| text.replace("tags = [", "tags = [\"matt\", \"matt\", ");
+    let empty = |text: String| text.replace("tags = [", "tags = [\" \", ");
+    for (change, expected) in [
+        (&no_instrument as &dyn Fn(String) -> String, "define it, or leave the reference out"),
+        (&devices, "not a regular file"),
+        (&twice, "tag `matt` is defined twice"),
+        (&empty, "tags: holds an empty word"),
+    ] {
+        let folder = from_template(change, BARE);
+        let message = refused(matdb(folder.path()).args(["add", "--from", "."]));
+        assert!(message.contains(expected), "{expected}: {message}");
+    }
+}
+
+#[test]
+fn what_may_surprise_later_is_said_when_it_is_added() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let curve =
+        "theta_deg,sigma0_db,censor,threshold_db\n0,-3,,\n60,-28,,\n60,,left,-33\n60,,left,-33\n";
+    fs::write(folder.join("scan.csv"), curve).unwrap();
+    let add = |name: &str, frequency: &str, more: &[&str]| {
+        let mut command = matdb(folder);
+        command.args(["add", "--from", "scan.csv", "--class", "paint", "--kind", "measured"]);
+        command.args(["--source", "Own bench", "--licence", "CC-BY-4.0", "--instrument", "Radar"]);
+        command.args(["--threshold", "-77", "--name", name, "--frequency", frequency]).args(more);
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap())
+    };
+    let [_, notices] = add("ptfe", "0.3", &["--tag", "matt"]);
+    for expected in [
+        "at 60° 2 of 3 points of curve `scan` were missed",
+        "a built-in material has this name",
+        "at 0.3 GHz; is that in GHz?",
+    ] {
+        assert!(notices.contains(expected), "{expected}: {notices}");
+    }
+    let [said, notices] = add("my-paint", "300", &["--tag", "matt"]);
+    assert!(!notices.contains("GHz") && !notices.contains("built-in"), "{notices}");
+    assert!(!said.contains("differs"), "{said}");
+    let [said, _] = add("my-paint", "300", &[]);
+    assert!(said.contains("revision 2") && said.contains("what differs: tags"), "{said}");
+    let near = json(folder, &["near", "--material", "my-paint"]);
+    let found: Vec<&str> =
+        near["materials"].as_array().unwrap().iter().flat_map(|m| m["slug"].as_str()).collect();
+    assert!(found.contains(&"ptfe") && !found.contains(&"my-paint"), "{found:?}");
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use matdb::brdf::Scattering;
 use matdb::catalogue::{Diff, references};
-use matdb::material::{Material, SourceKind, builtin};
+use matdb::material::{Material, Observation, SourceKind, builtin};
 use matdb::store::{Filter, Store};
 use matdb::units::db_from_ratio;
 use serde_json::Value;
@@ -444,6 +444,21 @@ fn curves_differ_by_their_levels_at_common_angles() {
     let field = diff.fields.iter().find(|f| f.path.starts_with("frequency_hz")).unwrap();
     assert!(field.after().ends_with(" GHz") && field.unit.as_deref() == Some("Hz"));
     assert!(Diff::new(&before, &before).is_empty());
+    assert!(diff.curves[0].limits.is_none());
+}
+
+#[test]
+fn curves_differ_by_their_detection_limits() {
+    let mut before = builtin::get("cotton").unwrap().unwrap();
+    let mut after = before.clone();
+    let level = |point: &mut Observation, factor: f64| {
+        point.threshold_sigma0 = Some(factor * point.sigma0.unwrap_or(1.0))
+    };
+    before.curves[0].observations.iter_mut().for_each(|point| level(point, 0.01));
+    after.curves[0].observations.iter_mut().for_each(|point| level(point, 0.1));
+    let diff = Diff::new(&before, &after);
+    assert!((diff.curves[0].limits.unwrap().mean_db - 10.0).abs() < 1e-9);
+    assert!(diff.line().contains("limits +10.0 dB"), "{}", diff.line());
 }
 
 /// Paths of all numbers of a material, by going through its JSON.

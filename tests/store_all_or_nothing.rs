@@ -59,7 +59,10 @@ impl Write {
     fn prepare(self, path: &Path) {
         match self {
             Write::Make => return,
-            Write::Migrate => return drop(fs::copy(first_schema(), path).unwrap()),
+            Write::Migrate => {
+                fs::copy(first_schema(), path).unwrap();
+                return;
+            }
             Write::Import => {
                 let mut theirs = Store::open(theirs(path)).unwrap();
                 theirs.add([&sound("other"), &sound("subject")]).unwrap();

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::leaves::{Leaf, leaves};
 use crate::brdf::Scattering;
-use crate::material::{Curve, Material};
+use crate::material::{Curve, Material, Observation};
 use crate::units::{db_from_ratio, dbm_from_watts, shown};
 
 /// What differs.
@@ -43,6 +43,8 @@ pub struct CurveChange {
     pub points: [Option<usize>; 2],
     /// Levels after against before at common angles of detections.
     pub levels: Option<Levels>,
+    /// Detection limits after against before, where they differ at common angles.
+    pub limits: Option<Levels>,
 }
 
 /// How levels differ, after less before.
@@ -81,9 +83,14 @@ impl Diff {
             let what = match change.points {
                 [None, _] => "new".to_owned(),
                 [_, None] => "gone".to_owned(),
-                _ => change
-                    .levels
-                    .map_or("other points".to_owned(), |l| format!("{:.1} dB rms", l.rms_db)),
+                _ => match (change.levels, change.limits) {
+                    (Some(levels), None) => format!("{:.1} dB rms", levels.rms_db),
+                    (_, Some(limits)) if change.levels.is_none_or(|l| l.largest_db == 0.0) => {
+                        format!("limits {:+.1} dB", limits.mean_db)
+                    }
+                    (Some(levels), _) => format!("{:.1} dB rms, other limits", levels.rms_db),
+                    (None, _) => "other points".to_owned(),
+                },
             };
             said.push(format!("curve {} {what}", change.curve));
         }
@@ -214,26 +221,26 @@ fn curves(before: &Material, after: &Material) -> Vec<CurveChange> {
             (Some(old), Some(new)) => old.observations == new.observations,
             _ => false,
         };
-        let levels = old.as_ref().zip(new.as_ref()).and_then(|(old, new)| {
-            let new = detections(new);
-            let pairs = detections(old)
-                .into_iter()
-                .filter_map(|(angle, level)| Some(new.get(&angle)? - level));
+        let changed = |of: fn(&Observation) -> Option<f64>| {
+            let (old, new) = (by_angle(old.as_ref()?, of), by_angle(new.as_ref()?, of));
+            let pairs = old.into_iter().filter_map(|(angle, level)| Some(new.get(&angle)? - level));
             levels(&pairs.collect::<Vec<_>>())
-        });
+        };
+        let levels = changed(|point| point.sigma0);
+        let limits = changed(|point| point.threshold_sigma0).filter(|l| l.largest_db > 0.0);
         let points = [points(&old), points(&new)];
-        (!is_same).then(|| CurveChange { curve: name.clone(), points, levels })
+        (!is_same).then(|| CurveChange { curve: name.clone(), points, levels, limits })
     };
     names.into_iter().filter_map(change).collect()
 }
 
-/// Mean level in linear power of each angle's detections in backscatter, dB; by the angle in units that
+/// Mean in linear power of what `of` says of each angle's backscatter, dB; by the angle in units that
 /// rounding does not reach.
-fn detections(curve: &Curve) -> BTreeMap<u64, f64> {
+fn by_angle(curve: &Curve, of: fn(&Observation) -> Option<f64>) -> BTreeMap<u64, f64> {
     const PER_RAD: f64 = 1e9;
     let mut sums: BTreeMap<u64, (f64, f64)> = BTreeMap::new();
     for point in curve.observations.iter().filter(|o| o.is_retro()) {
-        if let Some(sigma0) = point.sigma0 {
+        if let Some(sigma0) = of(point) {
             let sum = sums.entry((point.theta_i_rad * PER_RAD).round() as u64).or_default();
             *sum = (sum.0 + sigma0, sum.1 + 1.0);
         }

@@ -51,7 +51,7 @@ pub fn publish(
     let mut folder = Folder::new(target)?;
     // Everything else is read from the copy: one moment, whoever writes meanwhile.
     let copy = folder.place(DATABASE, |place| Ok::<(), CatalogueError>(store.copy_to(place)?))?;
-    let copy = Store::open_existing(copy)?;
+    let copy = Store::open_existing(copy)?.map(|copy| copy.known_as(store));
     let store = copy.as_ref().unwrap_or(store);
     let (materials, is_version_reused) = fill(&mut folder, store, about, progress)?;
     let published = Published {

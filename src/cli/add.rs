@@ -16,8 +16,10 @@ use super::door;
 use super::inputs::input;
 use super::materials::unknown;
 use super::staging::chosen;
+use crate::catalogue::Diff;
 use crate::effects::Level;
 use crate::error::Error;
+use crate::formats::read_regular;
 use crate::material::{Activity, Input, Material, builtin, file};
 use crate::store::Added;
 
@@ -66,6 +68,13 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let made = wanted(args, db, console)?;
     let notes = made.iter().flat_map(|(material, _)| door::doubts(material));
     notes.for_each(|doubt| console.notice(&doubt));
+    for (Material { slug, .. }, Activity { inputs, .. }) in &made {
+        if !inputs.is_empty() && builtin::names().any(|name| name == slug.as_str()) {
+            console.notice(&format!(
+                "{slug}: a built-in material has this name, and `matdb add {slug}` would make it the next revision"
+            ));
+        }
+    }
     let mut store = db.write()?;
     let (mut lines, mut records) = (String::new(), Vec::new());
     for ((material, _), added) in std::iter::zip(&made, store.add_made(&made)?) {
@@ -76,6 +85,11 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             Added::Unchanged(number) => ("unchanged", number),
         };
         lines += &format!("{what} {slug}, revision {revision}, in {}\n", db.path().display());
+        if let Added::Revision(number) = added {
+            let before = store.get(slug, Some(number - 1))?;
+            let line = before.map(|before| Diff::new(&before.material, material).line());
+            lines += &line.map_or(String::new(), |line| format!("  what differs: {line}\n"));
+        }
         records.push(json!({ "slug": slug, "result": what, "revision": revision }));
     }
     console.result(&lines, &records)
@@ -167,7 +181,7 @@ fn read(path: &Path) -> Result<(Material, Activity), Error> {
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let read_csv = |name: &str| {
-        let bytes = std::fs::read(folder.join(name)).map_err(|e| e.to_string())?;
+        let bytes = read_regular(&folder.join(name)).map_err(|e| e.to_string())?;
         inputs.borrow_mut().push(input(Path::new(name), &bytes));
         Ok(bytes)
     };

@@ -66,11 +66,12 @@ fn text<'a>(diff: &Diff, fields: impl Iterator<Item = &'a Field>, names: [&Strin
     if rows.peek().is_some() {
         text += &table(&["field", names[0], names[1]], rows);
     }
-    for CurveChange { curve, points, levels } in &diff.curves {
+    for CurveChange { curve, points, levels, limits } in &diff.curves {
         let number =
             |side: usize| points[side].map_or("none".to_owned(), |n| format!("{n} points"));
         text += &format!("curve {curve}: {} → {}", number(0), number(1));
         text += &levels.as_ref().map_or(String::new(), |levels| format!("; {}", words(levels)));
+        text += &limits.as_ref().map_or(String::new(), |l| format!("; its limits {}", words(l)));
         text += "\n";
     }
     if let Some(levels) = &diff.rendered {

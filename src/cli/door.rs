@@ -1,6 +1,7 @@
 //! What a material must say before it is let in: numbers without their circumstances cannot be used by
 //! anybody else, and who measured them knows them best on the day.
 
+use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
@@ -18,6 +19,9 @@ const HIGHEST_HZ: f64 = 1e13;
 
 /// Highest frequency of light that anybody sees, Hz, and a little beyond.
 const HIGHEST_CLAIM_HZ: f64 = 1e15;
+
+/// Lowest frequency of any radar that this program serves, Hz: what is below may be GHz without its prefix.
+const LOWEST_HZ: f64 = 1e9;
 
 /// Points below which a curve may well be of a few angles near the normal, and the widest of them in
 /// radians that no such curve reaches.
@@ -81,7 +85,7 @@ pub(super) fn doubts(material: &Material) -> Vec<String> {
     let mut doubts = Vec::new();
     for Instrument { key, centre_frequency_hz, threshold_w, .. } in &material.instruments {
         let ghz = shown(rounded(centre_frequency_hz / 1e9));
-        if *centre_frequency_hz > HIGHEST_HZ {
+        if !(LOWEST_HZ..=HIGHEST_HZ).contains(centre_frequency_hz) {
             doubts.push(format!("{slug}: instrument `{key}` is at {ghz} GHz; is that in GHz?"));
         }
         if let Some(dbm) = threshold_w.map(|w| rounded(dbm_from_watts(w))).filter(|dbm| *dbm > 0.0)
@@ -93,13 +97,20 @@ pub(super) fn doubts(material: &Material) -> Vec<String> {
             ));
         }
     }
-    let highest_hz = material.frequency_hz[1];
+    let [lowest_hz, highest_hz] = material.frequency_hz;
+    let [lowest, highest] = [lowest_hz, highest_hz].map(|hz| shown(rounded(hz / 1e9)));
     if doubts.is_empty() && highest_hz > HIGHEST_CLAIM_HZ {
-        let ghz = shown(rounded(highest_hz / 1e9));
-        doubts.push(format!("{slug}: it is claimed to hold up to {ghz} GHz; is that in GHz?"));
+        doubts.push(format!("{slug}: it is claimed to hold up to {highest} GHz; is that in GHz?"));
+    }
+    if doubts.is_empty() && highest_hz < LOWEST_HZ {
+        doubts.push(format!(
+            "{slug}: it is claimed to hold from {lowest} to {highest} GHz; is that in GHz?"
+        ));
     }
     let of_curves = material.curves.iter().flat_map(|curve| [in_radians(curve), too_weak(curve)]);
-    doubts.extend(of_curves.flatten().map(|doubt| format!("{slug}: {doubt}")));
+    let rendered = material.curves.iter().filter(|curve| curve.name == material.render);
+    let doubts_of = of_curves.flatten().chain(rendered.filter_map(mostly_missed));
+    doubts.extend(doubts_of.map(|doubt| format!("{slug}: {doubt}")));
     let mut licences: Vec<&String> = material.sources.iter().flat_map(|s| &s.licence).collect();
     licences.push(&material.licence);
     licences.sort();
@@ -137,6 +148,25 @@ fn too_weak(curve: &Curve) -> Option<String> {
         counted(below.len(), "detection"),
         curve.name,
         if below.len() == 1 { "lies" } else { "lie" }
+    ))
+}
+
+/// That a rendered curve has angles at which most points were missed: only detections are rendered there.
+fn mostly_missed(curve: &Curve) -> Option<String> {
+    const PER_DEG: f64 = 1e6;
+    let mut by_angle: BTreeMap<u64, [usize; 2]> = BTreeMap::new();
+    for row in curve.observations.iter().filter(|row| row.is_retro()) {
+        let counts = by_angle.entry((row.theta_i_rad.to_degrees() * PER_DEG).round() as u64);
+        counts.or_default()[usize::from(row.censor == Censor::Left)] += 1;
+    }
+    let (angle, [seen, missed]) =
+        by_angle.into_iter().find(|(_, [seen, missed])| (1..=*missed).contains(seen))?;
+    Some(format!(
+        "at {}° {missed} of {} points of curve `{}` were missed; scenes render the mean of the rest, which is \
+         too high: a fit (`matdb fit`) counts them all",
+        shown(angle as f64 / PER_DEG),
+        seen + missed,
+        curve.name
     ))
 }
 

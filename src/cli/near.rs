@@ -86,6 +86,8 @@ struct Record {
 struct Asked {
     observations: Vec<Observation>,
     frequency_hz: Option<f64>,
+    /// The material that the curve is of.
+    own: Option<Slug>,
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
@@ -111,9 +113,12 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     for (store, is_stored) in [(store.as_ref(), true), (Some(&missing), false)] {
         let Some(store) = store else { continue };
         let Nearest { found, left_out } =
-            probe.nearest(store, &args.filter.filter(), rank, args.limit)?;
+            probe.nearest(store, &args.filter.filter(), rank, args.limit.saturating_add(1))?;
         record.left_out += left_out;
-        for (slug, distance) in found {
+        // That a material is nearest to itself tells nobody anything.
+        for (slug, distance) in
+            found.into_iter().filter(|(slug, _)| asked.own.as_ref() != Some(slug))
+        {
             record.materials.extend(near(store, &slug, &asked, is_stored, distance)?);
         }
     }
@@ -159,7 +164,7 @@ fn asked(args: &Args, store: Option<&Store>) -> Result<Asked, Error> {
         })?;
         let refused = |error| Error::CurveFile { file: path.clone(), error };
         let observations = Curve::read(&bytes).map_err(refused)?.observations();
-        return Ok(Asked { observations, frequency_hz: stated_hz });
+        return Ok(Asked { observations, frequency_hz: stated_hz, own: None });
     }
     let name = args.material.as_deref().unwrap_or_default();
     let material = find(store, name, "")?.material;
@@ -173,7 +178,7 @@ fn asked(args: &Args, store: Option<&Store>) -> Result<Asked, Error> {
     let its_own = |key: &String| material.instruments.iter().find(|own| own.key == *key);
     let instrument = curve.instrument.as_ref().and_then(its_own);
     let frequency_hz = stated_hz.or(instrument.map(|own| own.centre_frequency_hz));
-    Ok(Asked { observations: curve.observations, frequency_hz })
+    Ok(Asked { observations: curve.observations, frequency_hz, own: Some(material.slug) })
 }
 
 fn text(record: &Record, args: &Args) -> String {

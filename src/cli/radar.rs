@@ -9,6 +9,7 @@ use super::console::Console;
 use super::output::write_all;
 use crate::error::Error;
 use crate::formats::figure::{Figure, Plot, Scale, Series, Style};
+use crate::formats::read_regular;
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
 use crate::radar::scan::PATTERN_RANGE_M;
@@ -83,7 +84,7 @@ fn load(wanted: &str) -> Result<(Radar, Chirps), Error> {
     };
     radar.validate()?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let read_csv = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
+    let read_csv = |name: &str| read_regular(&folder.join(name)).map_err(|e| e.to_string());
     let chirps = Chirps::draw(&radar, read_csv)?;
     Ok((radar, chirps))
 }

@@ -28,7 +28,7 @@ pub enum MaterialError {
         error: TabulatedError,
     },
     /// A key or name that refers to nothing.
-    #[error("{place} refers to {what} `{name}`, which is not defined; define it or name one of: {}", known.join(", "))]
+    #[error("{place} refers to {what} `{name}`, which is not defined; {}", define(known))]
     Dangling {
         /// Where the reference stands.
         place: String,
@@ -57,6 +57,13 @@ pub enum MaterialError {
         /// What to do.
         way_out: String,
     },
+}
+
+fn define(known: &[String]) -> String {
+    match known {
+        [] => "define it, or leave the reference out".to_owned(),
+        _ => format!("define it or name one of: {}", known.join(", ")),
+    }
 }
 
 impl Material {
@@ -88,6 +95,10 @@ impl Material {
                 return Err(value(place, "is empty", "fill it in"));
             }
         }
+        if self.tags.iter().any(|tag| tag.trim().is_empty()) {
+            return Err(value("tags", "holds an empty word", "fill it in or remove it"));
+        }
+        unique("tag", self.tags.iter().map(String::as_str))?;
         if self.unknown.iter().any(|sentence| sentence.trim().is_empty()) {
             return Err(value("unknown", "holds an empty sentence", "fill it in or remove it"));
         }

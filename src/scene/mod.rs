@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use crate::formats::FormatError;
+use crate::formats::{FormatError, read_regular};
 use crate::geometry::mesh::MeshError;
 use crate::radar::{Chirps, Radar, RadarError};
 
@@ -112,7 +112,7 @@ impl Scene {
         let at = |error| SceneError::Radar { file: path.to_owned(), error };
         file.radar.validate().map_err(at)?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        let read_csv = |name: &str| std::fs::read(folder.join(name)).map_err(|e| e.to_string());
+        let read_csv = |name: &str| read_regular(&folder.join(name)).map_err(|e| e.to_string());
         let chirps = Chirps::draw(&file.radar, read_csv).map_err(at)?;
         let pixel_m = pixel_m(&file);
         if file.name.chars().count() > 200 {
@@ -212,11 +212,9 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
 }
 
 fn read(path: &Path, hint: &'static str) -> Result<Vec<u8>, SceneError> {
-    // A pipe would never end, and a device has no size to trust.
-    let regular = |found: std::fs::Metadata| match found.is_file() {
-        true => Ok(()),
-        false => Err(std::io::Error::other("it is not a regular file")),
-    };
-    let bytes = std::fs::metadata(path).and_then(regular).and_then(|()| std::fs::read(path));
-    bytes.map_err(|reason| SceneError::Unreadable { file: path.to_owned(), reason, hint })
+    read_regular(path).map_err(|reason| SceneError::Unreadable {
+        file: path.to_owned(),
+        reason,
+        hint,
+    })
 }

@@ -163,6 +163,11 @@ impl Store {
         Ok(conn.map(|conn| Store { conn, path, activity: None }))
     }
 
+    /// The same, but errors name the file of which this is a copy.
+    pub(crate) fn known_as(self, original: &Store) -> Store {
+        Store { path: original.path.clone(), ..self }
+    }
+
     /// Whether a file that was opened [frozen](Store::open_frozen) has an older schema: then what is read is
     /// a copy in memory, brought up to date.
     pub fn is_of_older_schema(&self) -> bool {

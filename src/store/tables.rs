@@ -107,7 +107,13 @@ impl Store {
             file: path.to_owned(),
             reason: std::io::Error::other("its name is not UTF-8"),
         })?;
-        copy(&self.conn, text).map_err(|error| StoreError::new(path, error))
+        copy(&self.conn, text).map_err(|error| match StoreError::new(path, error) {
+            // What is damaged is what was to be copied.
+            StoreError::Corrupt { problem, .. } => {
+                StoreError::Corrupt { file: self.path.clone(), problem }
+            }
+            other => other,
+        })
     }
 
     /// Whether tables, indexes and views are exactly those that this program makes. A file from

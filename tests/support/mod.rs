@@ -70,6 +70,17 @@ pub fn refused(command: &mut Command) -> String {
     text
 }
 
+/// The same of a refusal that has lines to fill in below its sentence.
+pub fn refused_with_lines(command: &mut Command) -> (String, String) {
+    let output = command.output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(text.starts_with("error: ") && output.stdout.is_empty(), "{text}");
+    let (sentence, lines) = text.split_once("\n\n").unwrap_or_else(|| panic!("no lines: {text}"));
+    assert_eq!(sentence.lines().count(), 1, "one sentence: {sentence}");
+    (sentence.to_owned(), lines.to_owned())
+}
+
 /// Names of everything in a folder, sorted.
 pub fn entries(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> = std::fs::read_dir(folder)
