@@ -2,7 +2,7 @@
 //! `benches/rivals/formats.py` starts.
 //!
 //!     cargo run --release --example file_speed -- ply FILE
-//!     cargo run --release --example file_speed -- exr FLOATS FILE
+//!     cargo run --release --example file_speed -- exr FLOATS FILE [uncompressed]
 //!
 //! `ply` reads a mesh, which validates it. `exr` writes a square raster; its channels come one after the other,
 //! row after row, as 32-bit floats, little-endian.
@@ -12,7 +12,8 @@ mod turns;
 
 use std::hint::black_box;
 
-use matdb::formats::{MeshFormat, exr};
+use matdb::formats::MeshFormat;
+use matdb::formats::exr::{self, Packing};
 use matdb::geometry::raster::{Channel, Raster};
 use serde_json::json;
 use turns::{Answer, serve, timed};
@@ -27,11 +28,13 @@ fn main() -> Answer<()> {
             let (ms, mesh) = timed(read);
             Ok(json!({ "ms": ms, "facets": black_box(mesh?).facets.len() }))
         }),
-        ["exr", floats, file] => {
+        ["exr", floats, file, ref how @ ..] => {
             let raster = raster(&std::fs::read(floats)?);
+            let packing =
+                if how == ["uncompressed"] { Packing::Uncompressed } else { Packing::Zip16 };
             serve(|| {
                 let (ms, written) = timed(|| -> Answer<_> {
-                    let bytes = exr::write(&raster, &[])?;
+                    let bytes = exr::write_packed(&raster, &[], packing)?;
                     std::fs::write(file, &bytes)?;
                     Ok(bytes.len())
                 });

@@ -210,8 +210,8 @@ fn references_to_nothing_and_to_what_never_ends_are_refused() {
     for (change, expected) in [
         (&no_instrument as &dyn Fn(String) -> String, "define it, or leave the reference out"),
         (&devices, "not a regular file"),
-        (&twice, "tag `matt` is defined twice"),
-        (&empty, "tags: holds an empty word"),
+        (&twice, "tags holds `matt` twice"),
+        (&empty, "tags holds an empty word"),
     ] {
         let folder = from_template(change, BARE);
         let message = refused(matdb(folder.path()).args(["add", "--from", "."]));
@@ -223,8 +223,11 @@ fn references_to_nothing_and_to_what_never_ends_are_refused() {
 fn what_may_surprise_later_is_said_when_it_is_added() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
-    let curve =
-        "theta_deg,sigma0_db,censor,threshold_db\n0,-3,,\n60,-28,,\n60,,left,-33\n60,,left,-33\n";
+    let detected = (0..12).map(|step| format!("{},{},,\n", 5 * step, -3 - 2 * step));
+    let curve = format!(
+        "theta_deg,sigma0_db,censor,threshold_db\n{}60,-28,,\n60,,left,-33\n60,,left,-33\n",
+        detected.collect::<String>()
+    );
     fs::write(folder.join("scan.csv"), curve).unwrap();
     let add = |name: &str, frequency: &str, more: &[&str]| {
         let mut command = matdb(folder);

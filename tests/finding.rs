@@ -458,7 +458,7 @@ fn curves_differ_by_their_detection_limits() {
     after.curves[0].observations.iter_mut().for_each(|point| level(point, 0.1));
     let diff = Diff::new(&before, &after);
     assert!((diff.curves[0].limits.unwrap().mean_db - 10.0).abs() < 1e-9);
-    assert!(diff.line().contains("limits +10.0 dB"), "{}", diff.line());
+    assert!(diff.line().contains("limits 10.0 dB rms"), "{}", diff.line());
 }
 
 /// Paths of all numbers of a material, by going through its JSON.

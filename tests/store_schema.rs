@@ -19,7 +19,7 @@ use support::database::{
     attributed, change, complete, contents, fitted, placed, sample, with_effects,
 };
 
-const NEWEST: &str = "schema-0009.sqlite";
+const NEWEST: &str = "schema-0010.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")

@@ -9,7 +9,7 @@ from spread import spread
 
 HERE = Path(__file__).resolve().parent
 OURS = "matdb"
-LEAST_SQUARES, DISTANCE = "least squares", "orthogonal distance"
+LEAST_SQUARES, DISTANCE, REFITS = "least squares", "orthogonal distance", "1 000 bootstrap refits"
 RIVALS = {
     "scipy least_squares": (LEAST_SQUARES, "scipy_fit.py", "least_squares"),
     "scipy curve_fit": (LEAST_SQUARES, "scipy_fit.py", "curve_fit"),
@@ -30,8 +30,23 @@ def measure(folder, quick):
     running, about, missing = start(commands, THREADS)
     answers = alternate(running, missing, 3 if quick else 21, 60)
     end(running, missing)
-    versions = {name.split()[0]: of["version"] for name, of in about.items() if "version" in of}
-    return list(rows(answers, missing)), versions
+    return [*rows(answers, missing), *refits(path, quick)], versions_of(about)
+
+
+def versions_of(about):
+    return {name.split()[0]: of["version"] for name, of in about.items() if "version" in of}
+
+
+def refits(path, quick):
+    """The row of fits to curves drawn from the curve: only ours, as the goal is a time."""
+    running, _, missing = start({OURS: example("fit_speed", path, "refits")}, THREADS)
+    answers = alternate(running, missing, 2 if quick else 7, 60)
+    end(running, missing)
+    row = {"fit": REFITS, "program": OURS}
+    if OURS in missing:
+        return [row | {"missing": missing[OURS]}]
+    converged = {f"{answer['converged']} of {answer['refits']} converged" for answer in answers[OURS]}
+    return [row | {"ms": spread([answer["ms"] for answer in answers[OURS]]), "note": ", ".join(sorted(converged))}]
 
 
 def rows(answers, missing):

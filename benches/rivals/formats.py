@@ -31,6 +31,9 @@ def measure(folder, quick):
             "matdb": example("file_speed", "exr", floats, folder / "ours.exr"),
             "Mitsuba": python("mitsuba_exr.py", floats, folder / "theirs.exr"),
         },
+        "write EXR, uncompressed": {
+            "matdb": example("file_speed", "exr", floats, folder / "plain.exr", "uncompressed"),
+        },
     }
     rows = []
     for work, commands in works.items():

@@ -170,7 +170,7 @@ def growth(results):
     if not text:
         return ""
     shares = [row["agree"] for row in results.get("trace", []) if row["workload"] in GROWTH and "agree" in row]
-    agree = "All programs meet the same facet" if min(shares) == 1 else f"At worst {share(min(shares))} of the rays of a row meet the same facet"
+    agree = "All programs meet the same facet" if min(shares, default=1) == 1 else f"At worst {share(min(shares))} of the rays of a row meet the same facet"
     return f"""## Growth
 
 A ball of bumps, ever finer, under ever more rays of one origin. Build and trace together; of Embree the fastest of
@@ -258,7 +258,7 @@ def formats(results):
     return f"""## Files
 
 A binary PLY mesh from the disk's cache to a mesh that has been checked; a picture of 1024² and 7 channels to an
-OpenEXR file, with the encoder's usual compression.
+OpenEXR file, with the encoder's usual compression, and without any.
 
 {table(head, rows, right=head[2:4])}"""
 
@@ -290,14 +290,15 @@ def registration(results):
 def fits(results):
     rows = []
     for row, ratio in beside(results.get("fits", []), "fit"):
-        gap = f"{row['gap']:.0e}" if "gap" in row else ""
+        gap = f"{row['gap']:.0e}" if "gap" in row else row.get("note", "")
         rows.append([row["fit"], row["program"], *timed(row, ratio), gap])
     if not rows:
         return ""
     head = ["fit", "program", "ms", "ratio", "largest relative gap of a parameter"]
     return f"""## Fits
 
-Four parameters, 5 000 points, one start.
+Four parameters, 5 000 points, one start. Refits are least squares of curves whose points are drawn from the curve with
+replacement, from what the curve itself gave, side by side on both threads.
 
 {table(head, rows, right=head[2:])}"""
 

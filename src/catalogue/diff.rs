@@ -86,7 +86,7 @@ impl Diff {
                 _ => match (change.levels, change.limits) {
                     (Some(levels), None) => format!("{:.1} dB rms", levels.rms_db),
                     (_, Some(limits)) if change.levels.is_none_or(|l| l.largest_db == 0.0) => {
-                        format!("limits {:+.1} dB", limits.mean_db)
+                        format!("limits {:.1} dB rms", limits.rms_db)
                     }
                     (Some(levels), _) => format!("{:.1} dB rms, other limits", levels.rms_db),
                     (None, _) => "other points".to_owned(),

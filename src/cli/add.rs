@@ -19,8 +19,8 @@ use super::staging::chosen;
 use crate::catalogue::Diff;
 use crate::effects::Level;
 use crate::error::Error;
-use crate::formats::read_regular;
 use crate::material::{Activity, Input, Material, builtin, file};
+use crate::scene::read_regular;
 use crate::store::Added;
 
 /// Put materials into the database, built-in ones by name or your own from files
@@ -68,8 +68,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let made = wanted(args, db, console)?;
     let notes = made.iter().flat_map(|(material, _)| door::doubts(material));
     notes.for_each(|doubt| console.notice(&doubt));
-    for (Material { slug, .. }, Activity { inputs, .. }) in &made {
-        if !inputs.is_empty() && builtin::names().any(|name| name == slug.as_str()) {
+    for (material, _) in &made {
+        let slug = &material.slug;
+        let is_other = |own: Material| own.content_hash() != material.content_hash();
+        if builtin::get(slug.as_str()).and_then(Result::ok).is_some_and(is_other) {
             console.notice(&format!(
                 "{slug}: a built-in material has this name, and `matdb add {slug}` would make it the next revision"
             ));
@@ -85,12 +87,18 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             Added::Unchanged(number) => ("unchanged", number),
         };
         lines += &format!("{what} {slug}, revision {revision}, in {}\n", db.path().display());
-        if let Added::Revision(number) = added {
-            let before = store.get(slug, Some(number - 1))?;
-            let line = before.map(|before| Diff::new(&before.material, material).line());
-            lines += &line.map_or(String::new(), |line| format!("  what differs: {line}\n"));
+        let differs = match added {
+            // It is stored: what cannot be told now is not.
+            Added::Revision(number) => store.get(slug, Some(number - 1)).ok().flatten(),
+            Added::New | Added::Unchanged(_) => None,
+        };
+        let differs = differs.map(|before| Diff::new(&before.material, material).line());
+        if let Some(line) = &differs {
+            lines += &format!("  what differs: {line}\n");
         }
-        records.push(json!({ "slug": slug, "result": what, "revision": revision }));
+        records.push(
+            json!({ "slug": slug, "result": what, "revision": revision, "differs": differs }),
+        );
     }
     console.result(&lines, &records)
 }

@@ -60,22 +60,22 @@ pub(super) fn check(material: &Material, file: &Path) -> Result<(), Error> {
 pub(super) struct Gap {
     /// A clause.
     pub what: String,
-    /// Lines of a material.toml with places to fill in; none where others bring them.
-    lines: String,
+    /// Blocks of lines of a material.toml with places to fill in; none where others bring them.
+    blocks: Vec<String>,
 }
 
 /// The lines that are to be filled in, each once.
 fn way_out(gaps: &[Gap]) -> String {
     const COMPLETE: &str = "`matdb add --template` prints a complete entry";
-    let mut lines: Vec<&str> = Vec::new();
-    for gap in gaps.iter().filter(|gap| !gap.lines.is_empty()) {
-        if !lines.contains(&gap.lines.as_str()) {
-            lines.push(&gap.lines);
+    let mut blocks: Vec<&str> = Vec::new();
+    for block in gaps.iter().flat_map(|gap| &gap.blocks) {
+        if !blocks.contains(&block.as_str()) {
+            blocks.push(block);
         }
     }
-    match lines.is_empty() {
+    match blocks.is_empty() {
         true => COMPLETE.to_owned(),
-        false => format!("fill this in ({COMPLETE}):\n\n{}", lines.join("\n\n")),
+        false => format!("fill this in ({COMPLETE}):\n\n{}", blocks.join("\n\n")),
     }
 }
 
@@ -181,7 +181,7 @@ fn measured_alone(material: &Material) -> impl Iterator<Item = Gap> {
              literature",
             fit.name, fit.source
         ),
-        lines: String::new(),
+        blocks: Vec::new(),
     })
 }
 
@@ -199,10 +199,11 @@ pub(super) fn missing(material: &Material, curve: &Curve) -> Vec<Gap> {
     if source.licence.as_ref().is_none_or(|licence| licence.trim().is_empty()) {
         missing.push(Gap {
             what: format!("source `{}` has no licence", source.key),
-            lines: format!(
-                "[[source]]\nkey = \"{}\"\nlicence = \"…\"               # SPDX, such as CC-BY-4.0",
+            blocks: vec![format!(
+                "# into the [[source]] `{}`:\n\
+                 licence = \"…\"               # SPDX, such as CC-BY-4.0",
                 source.key
-            ),
+            )],
         });
     }
     let key = curve.instrument.as_ref();
@@ -210,13 +211,7 @@ pub(super) fn missing(material: &Material, curve: &Curve) -> Vec<Gap> {
     if instrument.is_none() {
         missing.push(Gap {
             what: format!("curve `{}` names no instrument", curve.name),
-            lines: format!(
-                "[[curve]]\nname = \"{}\"\ninstrument = \"radar\"\n\n[[instrument]]\nkey = \"radar\"\n\
-                 name = \"…\"                  # maker and model\n\
-                 centre_frequency_ghz = …      # such as 300\n\
-                 threshold_dbm = …             # the least power that counts as a detection, such as -77",
-                curve.name
-            ),
+            blocks: instrument_lines(material, curve),
         });
     }
     let in_rows = curve.observations.iter().all(|row| row.threshold_sigma0.is_some());
@@ -227,18 +222,30 @@ pub(super) fn missing(material: &Material, curve: &Curve) -> Vec<Gap> {
                     "instrument `{key}` has no threshold_dbm and not every row of curve `{}` a threshold_db",
                     curve.name
                 ),
-                lines: format!(
-                    "[[instrument]]\nkey = \"{key}\"\n\
-                     threshold_dbm = …             # the least power that counts as a detection, such as -77"
-                ),
+                blocks: vec![format!("# into the [[instrument]] `{key}`:\n{THRESHOLD}")],
             },
             None => Gap {
                 what: format!("not every row of curve `{}` has a threshold_db", curve.name),
-                lines: String::new(),
+                blocks: Vec::new(),
             },
         });
     }
     missing
+}
+
+const THRESHOLD: &str =
+    "threshold_dbm = …             # the least power that counts as a detection, such as -77";
+
+/// What names the instrument of a curve, and the instrument itself where there is none.
+fn instrument_lines(material: &Material, curve: &Curve) -> Vec<String> {
+    let known = material.instruments.first().map_or("radar", |instrument| &instrument.key);
+    let named = format!("# into the [[curve]] `{}`:\ninstrument = \"{known}\"", curve.name);
+    let itself = format!(
+        "[[instrument]]\nkey = \"{known}\"\n\
+         name = \"…\"                  # maker and model\n\
+         centre_frequency_ghz = …      # such as 300\n{THRESHOLD}"
+    );
+    [named].into_iter().chain(material.instruments.is_empty().then_some(itself)).collect()
 }
 
 /// Values that cannot be meant, each with the way out.
@@ -251,6 +258,13 @@ fn slips(material: &Material) -> Vec<(String, &'static str)> {
     const URL: &str = "write an address that begins with http:// or https://";
     let mut slips: Vec<_> =
         material.misleading_name().map(|name| (name, TURN)).into_iter().collect();
+    let tags = &material.tags;
+    let is_repeated = |(at, tag): &(usize, &String)| tags[..*at].contains(tag);
+    if tags.iter().any(|tag| tag.trim().is_empty()) {
+        slips.push(("tags holds an empty word".to_owned(), "fill it in or remove it"));
+    } else if let Some((_, tag)) = tags.iter().enumerate().find(is_repeated) {
+        slips.push((format!("tags holds `{tag}` twice"), "remove one of them"));
+    }
     let own = ("the material".to_owned(), Some(&material.licence));
     let of_sources =
         material.sources.iter().map(|s| (format!("source `{}`", s.key), s.licence.as_ref()));

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::console::Console;
 use super::database::Database;
 use super::list::{Wanted, frequency};
-use super::materials::{find, store_of_not_added};
+use super::materials::{Found, find, store_of_not_added};
 use super::summary::table;
 use crate::catalogue::{Distance, Nearest, Probe, Rank};
 use crate::error::Error;
@@ -86,7 +86,7 @@ struct Record {
 struct Asked {
     observations: Vec<Observation>,
     frequency_hz: Option<f64>,
-    /// The material that the curve is of.
+    /// The material that the curve is of, if its current revision.
     own: Option<Slug>,
 }
 
@@ -167,7 +167,9 @@ fn asked(args: &Args, store: Option<&Store>) -> Result<Asked, Error> {
         return Ok(Asked { observations, frequency_hz: stated_hz, own: None });
     }
     let name = args.material.as_deref().unwrap_or_default();
-    let material = find(store, name, "")?.material;
+    let Found { material, revision } = find(store, name, "")?;
+    let current = store.map(|store| store.summary(&material.slug)).transpose()?.flatten();
+    let is_current = current.map(|current| current.revision) == revision;
     let longest = material.curves.into_iter().rev().max_by_key(|curve| curve.observations.len());
     let Some(curve) = longest else {
         return Err(Error::Usage {
@@ -178,7 +180,11 @@ fn asked(args: &Args, store: Option<&Store>) -> Result<Asked, Error> {
     let its_own = |key: &String| material.instruments.iter().find(|own| own.key == *key);
     let instrument = curve.instrument.as_ref().and_then(its_own);
     let frequency_hz = stated_hz.or(instrument.map(|own| own.centre_frequency_hz));
-    Ok(Asked { observations: curve.observations, frequency_hz, own: Some(material.slug) })
+    Ok(Asked {
+        observations: curve.observations,
+        frequency_hz,
+        own: is_current.then_some(material.slug),
+    })
 }
 
 fn text(record: &Record, args: &Args) -> String {

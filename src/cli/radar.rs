@@ -9,12 +9,11 @@ use super::console::Console;
 use super::output::write_all;
 use crate::error::Error;
 use crate::formats::figure::{Figure, Plot, Scale, Series, Style};
-use crate::formats::read_regular;
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Beam, Chirps, F5, Field, Radar};
-use crate::scene::{SceneError, SceneFile, read_text};
+use crate::scene::{SceneError, SceneFile, read_regular, read_text};
 
 /// Show a radar: its scan, its spot and the polynomial of equation (1)
 #[derive(Debug, clap::Args)]

@@ -31,6 +31,8 @@ const ALONG_AXES: [f64; 4] = [0.3, 1.0, 3.0, 10.0];
 const SMOOTH: f64 = 0.5;
 /// Times that a step which does not improve is halved.
 const HALVINGS: usize = 5;
+/// Steps one after the other without an improvement after which a search rests: the last was damped by 6⁶.
+const RESTING: usize = 6;
 /// Looks that a law must have to be fitted.
 pub(crate) const LEAST_LOOKS: usize = 100;
 
@@ -62,6 +64,9 @@ pub(super) struct Fitted {
     pub at: DVector<f64>,
     pub ln_likelihood: f64,
     pub converged: bool,
+    /// Whether step after step from here was no improvement, shorter ones neither: to search on would be to
+    /// try them again.
+    pub rests: bool,
 }
 
 impl<'a> Space<'a> {
@@ -272,7 +277,8 @@ impl Problem<'_> {
                 local(&terms, &slopes, &|_| true)
             });
             let (ln_likelihood, converged) = (-found.local.value, found.converged());
-            Fitted { at: found.at, ln_likelihood, converged }
+            let rests = found.rejected >= RESTING;
+            Fitted { at: found.at, ln_likelihood, converged, rests }
         };
         let moves = space.moving().any(|index| lower[index] < upper[index]);
         let [wide, middle, narrow] = WIDE_TO_NARROW;

@@ -158,7 +158,8 @@ impl Selection<'_> {
             converged: false,
             accepted: false,
         };
-        let fitted = Fitted { at, ln_likelihood: f64::NEG_INFINITY, converged: false };
+        let fitted =
+            Fitted { at, ln_likelihood: f64::NEG_INFINITY, converged: false, rests: false };
         Some(Trial { effect, space, starts, tried, fitted, sizes_db: [0.0; 2], candidate })
     }
 
@@ -259,6 +260,9 @@ impl Selection<'_> {
         for _ in 0..LONGER {
             let Candidate { gain, sampled, converged, numbers, .. } = trial.candidate;
             if sampled || converged || gain < self.settings.least_gain_of(numbers, trial.tried) {
+                return;
+            }
+            if trial.fitted.rests && !trial.effect.moves() {
                 return;
             }
             if trial.effect.moves()

@@ -5,7 +5,7 @@ use std::sync::{Arc, LazyLock};
 
 use rayon::prelude::*;
 
-use super::meeting::{Facet, Facing};
+use super::meeting::{Facet, Facing, facing};
 use super::model::Kept;
 use super::spread::sunflower;
 use super::{Arrived, Effect, Knob, Level, Look, Stage, Survey};
@@ -22,6 +22,9 @@ const RAYS: usize = 64;
 /// moved the look to another surface, and the spot sees what it saw.
 const MOST_GAIN: f64 = 100.0;
 
+/// Terms of laws whose sums are kept: more than the regions of most scenes have.
+const MOST_TERMS: usize = 48;
+
 /// Where one ray of a spot meets the target.
 #[derive(Clone, Copy)]
 struct Beside {
@@ -33,11 +36,11 @@ struct Beside {
 }
 
 impl Beside {
-    fn of(stage: &Stage, facets: &[Facet], ray: &Ray<Global>, hit: &Hit) -> Option<Beside> {
-        let Facing { region, to_radar, .. } = facets.get(hit.facet as usize)?.facing(ray);
+    fn of(stage: &Stage, facing: Facing, hit: &Hit) -> Beside {
+        let Facing { region, to_radar, .. } = facing;
         let Hit { range_m, cos_theta, .. } = *hit;
         let watts_per_f = stage.link.power_w(range_m, cos_theta, 1.0);
-        Some(Beside { range_m, to_radar, watts_per_f, region })
+        Beside { range_m, to_radar, watts_per_f, region }
     }
 }
 
@@ -51,7 +54,7 @@ type Spot = (Beside, Vec<Beside>);
 struct Spots {
     all: Vec<Option<Spot>>,
     /// What terms of level 1 make of them: a law's levels change more often than its shape.
-    sums: Kept<(u16, Term), Vec<Sums>>,
+    sums: Kept<(u16, Term), Vec<Sums>, MOST_TERMS>,
 }
 
 /// What a spot sends back from one region by one term of its law.
@@ -138,13 +141,20 @@ fn spots(stage: &Stage, looks: &[Look], diameter_m: f64) -> Vec<Option<Spot>> {
     };
     let rays: Vec<[Ray<Global>; RAYS]> = looks.par_iter().zip(&centres).map(round).collect();
     let hits = closest(stage.bvh, rays.as_flattened());
-    // Spots meet most facets many times.
-    let facets = 0..stage.bvh.mesh().facets.len();
+    // Where facets are few, spots meet most of them many times.
+    let facets = stage.bvh.mesh().facets.len();
+    let facets = if facets < looks.len() * RAYS { 0..facets } else { 0..0 };
     let facets: Vec<Facet> =
         facets.into_par_iter().with_min_len(1024).map(|facet| Facet::of(stage, facet)).collect();
     let spot = |(look, (centre, (rays, hits))): (&Look, (&Option<Hit>, Round))| {
-        let met =
-            |ray: &Ray<Global>, hit: &Option<Hit>| Beside::of(stage, &facets, ray, hit.as_ref()?);
+        let met = |ray: &Ray<Global>, hit: &Option<Hit>| {
+            let hit = hit.as_ref()?;
+            let facing = match facets.get(hit.facet as usize) {
+                Some(facet) => facet.facing(ray),
+                None => facing(stage, ray, hit),
+            };
+            Some(Beside::of(stage, facing, hit))
+        };
         let centre = met(&look.ray, centre)?;
         let mut beside = Vec::with_capacity(RAYS);
         beside.extend(rays.iter().zip(hits).filter_map(|(ray, hit)| met(ray, hit)));
@@ -256,7 +266,8 @@ impl Effect for FiniteSpot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::testing::{Bench, db};
+    use crate::brdf::{CookTorrance, Lambert};
+    use crate::effects::testing::{Bench, db, lobe, paint};
     use crate::scene::solids;
 
     #[test]
@@ -266,6 +277,47 @@ mod tests {
             // Over the spot the angle still changes by 2 mrad, on a lobe of 0.2.
             assert!(db(with.power_w / bare.power_w).abs() < 0.01);
             assert!((with.range_m - bare.range_m).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn what_is_kept_of_spots_is_what_their_laws_say() {
+        let ray = |region: u16, theta_rad: f64| Beside {
+            range_m: 8.0 + 0.01 * theta_rad,
+            to_radar: Direction::from_angles(theta_rad, 0.3),
+            watts_per_f: 1e-9,
+            region,
+        };
+        let over_a_border = (ray(0, 0.1), vec![ray(0, 0.2), ray(1, 0.3), ray(1, 0.05)]);
+        let all = vec![Some(over_a_border), None, Some((ray(1, 0.2), vec![ray(1, 0.25)]))];
+        let spots = Spots { all: all.clone(), sums: Kept::default() };
+        let law = |f_lambda: f64, m: f64| paint(CookTorrance { f_lambda, m, ..lobe() });
+        let tabled = Brdf::Lambert(Lambert { albedo: 0.5 });
+        let first = [law(0.2, 0.2), law(0.1, 0.3)];
+        let other_level = [law(0.4, 0.2), law(0.1, 0.3)];
+        let other_shape = [law(0.2, 0.25), tabled];
+        for laws in [&first, &other_level, &other_shape, &first] {
+            let answers = spots.answers(laws);
+            for (look, spot) in all.iter().enumerate() {
+                let add =
+                    |sums: Sums, (level, of): &(f64, Arc<Vec<Sums>>)| sums.and(*level, &of[look]);
+                let kept = answers.iter().fold(Sums::default(), add);
+                let Some(spot) = spot else {
+                    assert!(kept.power_w == 0.0);
+                    continue;
+                };
+                let fresh = (0..).zip(laws).fold(Sums::default(), |sums, (region, law)| {
+                    sums.and(1.0, &Sums::of(spot, region, |v| law.f_per_sr(v, v)))
+                });
+                for (kept, fresh) in [
+                    (kept.centre_w, fresh.centre_w),
+                    (kept.power_w, fresh.power_w),
+                    (kept.first, fresh.first),
+                    (kept.second, fresh.second),
+                ] {
+                    assert!((kept - fresh).abs() <= 1e-12 * fresh.abs(), "{kept} {fresh}");
+                }
+            }
         }
     }
 

@@ -29,11 +29,6 @@ impl Axes {
         self.0.z_axis
     }
 
-    /// Those of the other side of the surface.
-    fn from_below(&self) -> Axes {
-        Axes(DMat3::from_cols(self.0.x_axis, -self.0.y_axis, -self.0.z_axis))
-    }
-
     /// A unit vector of the world, seen from the surface.
     pub(super) fn local(&self, world: DVec3) -> Direction<Surface> {
         let above = Direction::from_angles(0.0, 0.0);
@@ -71,8 +66,8 @@ pub(super) struct Facing {
 
 /// A facet, whichever side of it a ray meets.
 pub(super) struct Facet {
-    /// At its outward normal; none where rounding leaves it none.
-    axes: Option<Axes>,
+    /// At its outward normal and at the other one; none where rounding leaves it none.
+    sides: Option<[Axes; 2]>,
     grain: DVec3,
     region: u16,
 }
@@ -81,17 +76,17 @@ impl Facet {
     pub(super) fn of(stage: &Stage, number: usize) -> Facet {
         let region = stage.region_of_facet.get(number).copied().unwrap_or(0);
         let (normal, grain) = (stage.bvh.mesh().area_normal(number), grain(stage, region));
-        let axes = normal.try_normalize().map(|normal| Axes::new(normal, grain));
-        Facet { axes, grain, region }
+        let sides = |normal: DVec3| [normal, -normal].map(|normal| Axes::new(normal, grain));
+        Facet { sides: normal.try_normalize().map(sides), grain, region }
     }
 
     /// Its surface, towards where a ray comes from.
     pub(super) fn facing(&self, ray: &Ray<Global>) -> Facing {
         let back = -ray.direction.xyz();
-        let axes = match self.axes {
+        let axes = match self.sides {
             None => Axes::new(back, self.grain),
-            Some(axes) if axes.normal().dot(back) < 0.0 => axes.from_below(),
-            Some(axes) => axes,
+            Some([outward, inward]) if outward.normal().dot(back) < 0.0 => inward,
+            Some([outward, _]) => outward,
         };
         Facing { normal: axes.normal(), region: self.region, to_radar: axes.local(back) }
     }

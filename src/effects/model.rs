@@ -61,8 +61,8 @@ type Placed = (Look, Direction<Surface>);
 /// Name of an effect and the values that matter.
 type Key = (&'static str, Vec<f64>);
 
-/// The latest results of a slow function: those of a difference quotient over every number of a pose, its
-/// middle, and the next, or as many as that.
+/// The latest results of a slow function, by default as many as a difference quotient over every number of a pose
+/// asks for, its middle, and the next.
 pub(super) struct Kept<K, V, const MOST: usize = 15>(Mutex<Vec<(K, Arc<V>)>>);
 
 impl<K, V, const MOST: usize> Default for Kept<K, V, MOST> {
@@ -80,6 +80,10 @@ impl<K: PartialEq, V, const MOST: usize> Kept<K, V, MOST> {
         }
         let made = Arc::new(make());
         let mut kept = kept();
+        // Another thread may have made it meanwhile.
+        if let Some(found) = Self::take(&mut kept, &key) {
+            return found;
+        }
         if kept.len() >= MOST {
             kept.remove(0);
         }

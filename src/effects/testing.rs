@@ -28,7 +28,7 @@ pub(super) fn lobe() -> CookTorrance {
 }
 
 /// A painted surface.
-fn paint(lobe: CookTorrance) -> Brdf {
+pub(super) fn paint(lobe: CookTorrance) -> Brdf {
     Brdf::Mixture(Mixture {
         k: 0.3,
         diffuse: Box::new(Brdf::BlinnPhong(BlinnPhong { r_s: 0.02, alpha: 4.0 })),

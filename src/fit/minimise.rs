@@ -93,6 +93,8 @@ pub(crate) struct Minimum {
     pub local: Local,
     /// Steps tried.
     pub iterations: usize,
+    /// How many of them, from the last one back, were no improvement.
+    pub rejected: usize,
     /// Why it ended.
     pub stop: Stop,
 }
@@ -125,7 +127,7 @@ impl Minimise {
         let mut at = clamped(start, lower, upper);
         let mut local = cost(&at);
         let mut damping = DAMPING[1];
-        let mut iterations = 0;
+        let (mut iterations, mut rejected) = (0, 0);
         let stop = loop {
             if !local.value.is_finite() {
                 break Stop::NotFinite;
@@ -150,11 +152,15 @@ impl Minimise {
                 Some(there) => {
                     (at, local) = (next, there);
                     damping = (damping * EASE).max(DAMPING[0]);
+                    rejected = 0;
                 }
-                None => damping *= TIGHTEN,
+                None => {
+                    damping *= TIGHTEN;
+                    rejected += 1;
+                }
             }
         };
-        Minimum { at, local, iterations, stop }
+        Minimum { at, local, iterations, rejected, stop }
     }
 
     /// The full step from a point, on the unknowns that no bound holds.

@@ -170,6 +170,7 @@ fn pieces(
     let second = piece(coordinates, &far, &diffuse, &first.at);
     Minimum {
         iterations: first.iterations + second.iterations,
+        rejected: second.rejected,
         stop: if first.converged() { second.stop } else { first.stop },
         at: second.at,
         local: first.local.merge(second.local),

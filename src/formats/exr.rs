@@ -1,6 +1,6 @@
 //! OpenEXR: a raster's channels as 32-bit floats, with where they lie and in which units.
 //!
-//! One layer, ZIP in blocks of 16 lines, NaN kept. The grid is in the attributes `pixelSizeM`,
+//! One layer, ZIP in blocks of 16 lines or as it is, NaN kept. The grid is in the attributes `pixelSizeM`,
 //! `xMinM` and `yMinM` (double, m) and a channel's unit in `<channel>.unit`. The same raster
 //! gives the same bytes on every run and any number of threads.
 
@@ -24,8 +24,41 @@ use thiserror::Error;
 use super::FormatError;
 use crate::geometry::raster::{Channel, Raster};
 
-/// Lines that are packed together: the format's ZIP16.
-const LINES: usize = 16;
+/// How pixels are packed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Packing {
+    /// Deflated, 16 lines together: the format's ZIP.
+    #[default]
+    Zip16,
+    /// Not at all: more bytes, in less time.
+    Uncompressed,
+}
+
+impl Packing {
+    /// Lines that are packed together.
+    fn lines(self) -> usize {
+        match self {
+            Packing::Zip16 => 16,
+            Packing::Uncompressed => 1,
+        }
+    }
+
+    fn pack<'a>(self, rows: impl Iterator<Item = &'a [f32]> + Clone) -> Vec<u8> {
+        match self {
+            Packing::Zip16 => zipped(rows),
+            Packing::Uncompressed => plain(rows),
+        }
+    }
+}
+
+impl From<Packing> for Compression {
+    fn from(packing: Packing) -> Compression {
+        match packing {
+            Packing::Zip16 => Compression::ZIP16,
+            Packing::Uncompressed => Compression::Uncompressed,
+        }
+    }
+}
 
 /// How many bytes of pixels one byte of a file may unfold to; deflate stays below 1032.
 const MAX_UNFOLDING: usize = 2048;
@@ -82,8 +115,23 @@ pub enum ExrError {
 }
 
 /// The bytes of an OpenEXR file with all channels of a raster, in alphabetical order, and the
-/// caller's attributes.
+/// caller's attributes, deflated.
+///
+/// # Errors
+/// When the raster contradicts itself, or a name is given twice or cannot be written.
 pub fn write(raster: &Raster, attributes: &[(String, Attribute)]) -> Result<Vec<u8>, ExrError> {
+    write_packed(raster, attributes, Packing::Zip16)
+}
+
+/// The same, packed as is said.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_packed(
+    raster: &Raster,
+    attributes: &[(String, Attribute)],
+    packing: Packing,
+) -> Result<Vec<u8>, ExrError> {
     let layer_attributes = LayerAttributes {
         software_name: Some(text(concat!("matdb ", env!("CARGO_PKG_VERSION")))),
         other: named_attributes(raster, attributes)?,
@@ -98,17 +146,17 @@ pub fn write(raster: &Raster, attributes: &[(String, Attribute)]) -> Result<Vec<
         ..Header::new(text(""), size, channels.iter().map(described).collect())
     };
     let blocks = BlockDescription::ScanLines;
-    let header = header.with_encoding(Compression::ZIP16, blocks, LineOrder::Increasing);
+    let header = header.with_encoding(packing.into(), blocks, LineOrder::Increasing);
     let block = |number: usize| {
-        let lines = LINES * number..raster.height.min(LINES * (number + 1));
+        let lines = packing.lines() * number..raster.height.min(packing.lines() * (number + 1));
         let rows = lines.flat_map(|y| channels.iter().map(move |(_, v)| &v[y * raster.width..]));
-        packed(rows.map(|row| &row[..raster.width]))
+        packing.pack(rows.map(|row| &row[..raster.width]))
     };
     let mut file = Cursor::new(Vec::new());
     exr::block::write(&mut file, [header].into_iter().collect(), true, |_, writer| {
-        let blocks = (0..raster.height.div_ceil(LINES)).into_par_iter().map(block);
+        let blocks = (0..raster.height.div_ceil(packing.lines())).into_par_iter().map(block);
         for (number, compressed_pixels_le) in blocks.collect::<Vec<_>>().into_iter().enumerate() {
-            let y_coordinate = (LINES * number) as i32;
+            let y_coordinate = (packing.lines() * number) as i32;
             let block = CompressedScanLineBlock { y_coordinate, compressed_pixels_le };
             let compressed_block = CompressedBlock::ScanLine(block);
             writer.write_chunk(number, Chunk { layer_index: 0, compressed_block })?;
@@ -120,7 +168,7 @@ pub fn write(raster: &Raster, attributes: &[(String, Attribute)]) -> Result<Vec<
 
 /// A block of ZIP: bytes at even places, then those at odd places, all as differences from the one
 /// before (OpenEXR, `ImfZip.cpp`), deflated. It stays as it is where that would make it longer.
-fn packed<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone) -> Vec<u8> {
+fn zipped<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone) -> Vec<u8> {
     let bytes = 4 * rows.clone().map(<[f32]>::len).sum::<usize>();
     let mut apart = vec![0; bytes];
     let (even, odd) = apart.split_at_mut(bytes / 2);
@@ -136,8 +184,12 @@ fn packed<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone) -> Vec<u8> {
     let deflated = compress_to_vec_zlib(&differences, CompressionLevel::BestSpeed as u8);
     match deflated.len() < bytes {
         true => deflated,
-        false => rows.flatten().flat_map(|value| value.to_le_bytes()).collect(),
+        false => plain(rows),
     }
+}
+
+fn plain<'a>(rows: impl Iterator<Item = &'a [f32]>) -> Vec<u8> {
+    rows.flatten().flat_map(|value| value.to_le_bytes()).collect()
 }
 
 /// The raster in an OpenEXR file: its first layer, as written by [`write()`] or by any tool that
@@ -321,14 +373,16 @@ mod tests {
     #[test]
     fn a_raster_returns_bit_by_bit() {
         for (width, height) in [(125, 225), (1, 1), (33, 17)] {
-            let written = raster(width, height);
-            let read = read(&write(&written, &notes()).unwrap()).unwrap();
-            assert_eq!(bits(&read), bits(&written));
-            let without_values = |mut raster: Raster| {
-                raster.channels.iter_mut().for_each(|c| c.values.clear());
-                raster
-            };
-            assert_eq!(without_values(read), without_values(written));
+            for packing in [Packing::Zip16, Packing::Uncompressed] {
+                let written = raster(width, height);
+                let read = read(&write_packed(&written, &notes(), packing).unwrap()).unwrap();
+                assert_eq!(bits(&read), bits(&written));
+                let without_values = |mut raster: Raster| {
+                    raster.channels.iter_mut().for_each(|c| c.values.clear());
+                    raster
+                };
+                assert_eq!(without_values(read), without_values(written));
+            }
         }
     }
 

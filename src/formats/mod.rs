@@ -14,25 +14,12 @@ pub mod ply;
 pub mod stl;
 pub mod text;
 
-use std::path::Path;
-
 use glam::DVec3;
 use thiserror::Error;
 
 use crate::geometry::Mesh;
 
 pub use effect::EffectEntry;
-
-/// Reads a whole file that another one names: a pipe would never end, and a device has no size to trust.
-///
-/// # Errors
-/// When it cannot be read or is no regular file.
-pub(crate) fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
-    match std::fs::metadata(path)?.is_file() {
-        true => std::fs::read(path),
-        false => Err(std::io::Error::other("it is not a regular file")),
-    }
-}
 
 /// The formats a mesh can be read from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -95,10 +95,6 @@ impl Material {
                 return Err(value(place, "is empty", "fill it in"));
             }
         }
-        if self.tags.iter().any(|tag| tag.trim().is_empty()) {
-            return Err(value("tags", "holds an empty word", "fill it in or remove it"));
-        }
-        unique("tag", self.tags.iter().map(String::as_str))?;
         if self.unknown.iter().any(|sentence| sentence.trim().is_empty()) {
             return Err(value("unknown", "holds an empty sentence", "fill it in or remove it"));
         }

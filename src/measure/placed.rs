@@ -10,6 +10,10 @@ use crate::frames::{Global, Pose, Ray};
 use crate::geometry::Mesh;
 use crate::trace::{Bvh, Hit, closest};
 
+/// Of more facets than this for each ray a hierarchy is built: a registration scans dozens of poses, and without
+/// one each of them reads all facets.
+const FACETS_PER_RAY: usize = 20;
+
 /// A mesh that can be looked at from any side.
 pub struct Traced<'a> {
     mesh: &'a Mesh,
@@ -50,7 +54,10 @@ impl<'a> Traced<'a> {
         const RAYS_PER_TASK: usize = 256;
         let back = pose.inverse();
         let there: Vec<Ray<Global>> = rays.iter().map(|ray| carried(&back, ray)).collect();
-        let hits = closest(&self.bvh, &there);
+        let hits = match self.mesh.facets.len() > FACETS_PER_RAY * rays.len() {
+            true => there.par_iter().map(|ray| self.bvh.closest(ray)).collect(),
+            false => closest(&self.bvh, &there),
+        };
         let seen = |(ray, hit): (&Ray<Global>, Option<Hit>)| Some(self.seen(pose, ray, hit?));
         rays.par_iter().zip(hits).with_min_len(RAYS_PER_TASK).map(seen).collect()
     }
@@ -90,5 +97,25 @@ mod tests {
         assert!(seen.normal.distance(same.normal) < 1e-12);
         assert!((seen.hit.cos_theta - same.hit.cos_theta).abs() < 1e-12);
         assert!(seen.normal.dot(ray.direction.xyz()) < 0.0);
+    }
+
+    #[test]
+    fn few_and_many_rays_meet_what_each_meets_by_itself() {
+        let mesh = solids::icosphere(0.4, 3);
+        let pose = Pose::from_euler_xyz(DVec3::new(0.0, 0.3, 0.1), DVec3::new(0.05, 0.0, 0.1));
+        let origin = Point::new(0.0, 0.0, 8.0);
+        for count in [3, 200] {
+            let aim =
+                |ray: usize| Point::new(0.3 * (ray as f64).sin(), 0.3 * (ray as f64).cos(), 0.0);
+            let towards = |ray| Ray { origin, direction: origin.towards(aim(ray)).unwrap() };
+            let rays: Vec<Ray<Global>> = (0..count).map(towards).collect();
+            let traced = Traced::new(&mesh);
+            let seen = traced.scan(&pose, &rays);
+            assert_eq!(traced.bvh.is_built(), count == 3);
+            for (ray, seen) in rays.iter().zip(seen) {
+                let (seen, alone) = (seen.unwrap(), traced.look(&pose, ray).unwrap());
+                assert!(seen.hit.point.distance_m(alone.hit.point) < 1e-12);
+            }
+        }
     }
 }

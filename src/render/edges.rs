@@ -87,8 +87,8 @@ fn spacing_m(looks: &[(DVec2, Option<f64>)]) -> f64 {
 /// A rectangle of square cells.
 struct Frame {
     side_m: f64,
-    /// The cell of least column and row, counted from the origin of the plane.
-    first: [i64; 2],
+    /// The corner of least x and y, m.
+    corner: DVec2,
     columns: usize,
     rows: usize,
 }
@@ -96,42 +96,34 @@ struct Frame {
 impl Frame {
     /// All cells that points are in, and those between.
     fn around(points: impl Iterator<Item = DVec2>, side_m: f64) -> Frame {
-        let mut frame = Frame { side_m, first: [0; 2], columns: 0, rows: 0 };
-        let cells = points.map(|point| frame.cell(point));
-        let bounds = cells.fold(None, |bounds, [column, row]| {
-            let ([left, low], [right, high]) = bounds.unwrap_or(([column, row], [column, row]));
-            Some(([left.min(column), low.min(row)], [right.max(column), high.max(row)]))
+        let bounds = points.filter(|point| point.is_finite()).fold(None, |bounds, point| {
+            let (least, most): (DVec2, DVec2) = bounds.unwrap_or((point, point));
+            Some((least.min(point), most.max(point)))
         });
-        if let Some((first, [right, high])) = bounds {
-            frame.first = first;
-            (frame.columns, frame.rows) = (span(first[0], right), span(first[1], high));
-        }
-        frame
+        let Some((corner, most)) = bounds else {
+            return Frame { side_m, corner: DVec2::ZERO, columns: 0, rows: 0 };
+        };
+        let frame = Frame { side_m, corner, columns: 0, rows: 0 };
+        let [columns, rows] = frame.cell(most).map(|last| last as usize + 1);
+        Frame { columns, rows, ..frame }
     }
 
-    /// Column and row of a point, counted from the origin of the plane.
-    fn cell(&self, point: DVec2) -> [i64; 2] {
-        (point / self.side_m).floor().to_array().map(|x| x as i64)
+    /// Column and row of a point, counted from the corner.
+    fn cell(&self, point: DVec2) -> [i32; 2] {
+        ((point - self.corner) / self.side_m).floor().to_array().map(|x| x as i32)
     }
 
     /// Number of the cell that a point is in.
     fn number_at(&self, point: DVec2) -> Option<usize> {
         let [column, row] = self.cell(point);
-        self.number(column, row)
+        point.is_finite().then(|| self.number(column, row))?
     }
 
     /// Number of a cell, column after column; none outside.
-    fn number(&self, column: i64, row: i64) -> Option<usize> {
-        let (column, row) =
-            (column.saturating_sub(self.first[0]), row.saturating_sub(self.first[1]));
-        let within = |at: i64, count: usize| usize::try_from(at).ok().filter(|&at| at < count);
+    fn number(&self, column: i32, row: i32) -> Option<usize> {
+        let within = |at: i32, count: usize| usize::try_from(at).ok().filter(|&at| at < count);
         Some(within(column, self.columns)? * self.rows + within(row, self.rows)?)
     }
-}
-
-/// How many there are from one to the other.
-fn span(first: i64, last: i64) -> usize {
-    usize::try_from(last.saturating_sub(first)).unwrap_or_default() + 1
 }
 
 /// Points sorted into square cells, for look-ups within one cell's side.
@@ -164,10 +156,10 @@ impl Cells {
     /// The points in the cell of a place and in the eight around it: all that are within a side of it.
     fn near(&self, place: DVec2) -> impl Iterator<Item = usize> {
         let [column, row] = self.frame.cell(place);
-        let low = row.saturating_sub(1).max(self.frame.first[1]);
-        let high = row.saturating_add(1).min(self.frame.first[1] + self.frame.rows as i64 - 1);
-        let in_column = move |aside: i64| {
-            let number = |row: i64| self.frame.number(column.saturating_add(aside), row);
+        let low = row.saturating_sub(1).max(0);
+        let high = row.saturating_add(1).min(self.frame.rows as i32 - 1);
+        let in_column = move |aside: i32| {
+            let number = |row: i32| self.frame.number(column.saturating_add(aside), row);
             let of_cells = |first: usize, last: usize| {
                 &self.numbers[self.starts[first] as usize..self.starts[last + 1] as usize]
             };
@@ -219,6 +211,34 @@ mod tests {
     fn looks_on_top_of_each_other_cost_no_more_than_one() {
         let staring = vec![(DVec2::ONE, Some(8.0)); 1_000_000];
         assert!(distances_m(&staring, SPOT_M, 0.05).iter().all(|&m| m == 0.05));
+    }
+
+    #[test]
+    fn cells_know_every_point_within_a_side() {
+        let mut state = 1u64;
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        let points: Vec<DVec2> = (0..400).map(|_| DVec2::new(next(), 2.0 * next())).collect();
+        for side_m in [0.03, 0.2, 5.0] {
+            let cells = Cells::new(&points, side_m);
+            for place in points.iter().map(|point| *point + 0.3 * DVec2::new(next(), next())) {
+                let within = |number: &usize| points[*number].distance(place) <= side_m;
+                let mut found: Vec<usize> = cells.near(place).filter(within).collect();
+                found.sort();
+                assert!((0..points.len()).filter(within).eq(found), "{place} {side_m}");
+            }
+        }
+    }
+
+    #[test]
+    fn places_without_end_are_no_cells() {
+        let mut looks = looks(|_| Some(8.0));
+        for far in [f64::NAN, f64::INFINITY, 1e300, -1e14] {
+            looks.push((DVec2::new(far, 0.0), None));
+            assert_eq!(distances_m(&looks, SPOT_M, 0.05).len(), looks.len());
+        }
     }
 
     #[test]

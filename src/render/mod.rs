@@ -232,8 +232,8 @@ fn seen(
     }
 }
 
-/// Chirps that are shaded one after the other.
-const CHIRPS_PER_TASK: usize = 256;
+/// Rays whose chirps are shaded one after the other; a chirp that bounces is a task of its own.
+const RAYS_PER_TASK: usize = 256;
 
 /// Turns hits into echoes at an antenna. With effects the hits are those of [`trace_placed`]. `done` is told how many chirps are finished.
 ///
@@ -256,9 +256,10 @@ pub fn shade(
     let target_from_global = setup.radar.frames().global_from_target.inverse();
     let echoes = Echoes { setup, footprints, observer, detector: &detector, target_from_global };
     let rays = footprints.rays_per_chirp.max(1);
+    let per_task = if setup.bounce.is_some() { 1 } else { (RAYS_PER_TASK / rays).max(1) };
     let of_task = |(task, hits): (usize, &[Option<Hit>])| {
         let (mut ways, mut found) = (Vec::new(), Vec::new());
-        for (chirp, hits) in (task * CHIRPS_PER_TASK..).zip(hits.chunks(rays)) {
+        for (chirp, hits) in (task * per_task..).zip(hits.chunks(rays)) {
             paths.fill(chirp, hits, &mut ways);
             let seen = detector.observe(chirp, &ways)?;
             found.extend(echoes.echo(chirp, hits, &ways, seen));
@@ -266,7 +267,7 @@ pub fn shade(
         }
         Ok(found)
     };
-    let tasks = footprints.hits.par_chunks(CHIRPS_PER_TASK * rays).enumerate();
+    let tasks = footprints.hits.par_chunks(per_task * rays).enumerate();
     let echoes: Vec<Vec<Echo>> = tasks.map(of_task).collect::<Result<_, RenderError>>()?;
     Ok(Scan {
         chirps: setup.chirps.rays.len(),

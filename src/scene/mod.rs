@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use crate::formats::{FormatError, read_regular};
+use crate::formats::FormatError;
 use crate::geometry::mesh::MeshError;
 use crate::radar::{Chirps, Radar, RadarError};
 
@@ -209,6 +209,15 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
         let error = FormatError::at(place, "the text is not UTF-8", "save the file as UTF-8");
         SceneError::Format { file: path.to_owned(), error }
     })
+}
+
+/// Reads a whole file that another one names: a pipe would never end, and a device has no size to trust. What a person
+/// names may well be a pipe.
+pub(crate) fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
+    match std::fs::metadata(path)?.is_file() {
+        true => std::fs::read(path),
+        false => Err(std::io::Error::other("it is not a regular file")),
+    }
 }
 
 fn read(path: &Path, hint: &'static str) -> Result<Vec<u8>, SceneError> {

@@ -18,7 +18,7 @@ use super::{StoreError, write};
 const APPLICATION_ID: i64 = 0x6d61_7464;
 
 /// The latest schema.
-const LATEST: usize = 9;
+const LATEST: usize = 10;
 
 /// All schemas there ever were, oldest first. Append only: files in the world have stopped at each.
 fn schemas() -> [M<'static>; LATEST] {
@@ -40,6 +40,7 @@ fn schemas() -> [M<'static>; LATEST] {
         ),
         M::up(include_str!("../../migrations/0008_origin_author.sql")),
         M::up(include_str!("../../migrations/0009_held_out.sql")),
+        M::up(include_str!("../../migrations/0010_four_letters.sql")),
     ]
 }
 

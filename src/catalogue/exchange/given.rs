@@ -40,8 +40,11 @@ impl Given {
     /// Adds what any material may say and no foreign file does.
     pub(super) fn complete(&self, material: &mut Material) {
         material.description = self.description.clone().unwrap_or(material.description.clone());
-        let new = self.tags.iter().filter(|tag| !material.tags.contains(tag)).cloned();
-        material.tags.extend(new.collect::<Vec<_>>());
+        for tag in &self.tags {
+            if !material.tags.contains(tag) {
+                material.tags.push(tag.clone());
+            }
+        }
         if let Some(source) = material.sources.first_mut() {
             source.citation.authors.extend(self.authors.iter().cloned());
             source.citation.year = self.year.or(source.citation.year);

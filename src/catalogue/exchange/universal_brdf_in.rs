@@ -7,7 +7,9 @@ use std::f64::consts::PI;
 
 use serde_json::Value;
 
-use super::given::{CLASS, FREQUENCY, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, missing};
+use super::given::{
+    CLASS, FREQUENCY, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD as DETECTED, missing,
+};
 use super::plain_csv::{Lone, RADAR, of_curve};
 use super::universal_brdf::{CENSOR, OURS, THRESHOLD};
 use super::{ExchangeError, Given};
@@ -35,6 +37,10 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
     let licence = given.licence.clone().or(text(&metadata["license"]["type"]));
     let source = given.source.clone().or(text(&ours["source"])).or(text(&metadata["description"]));
     let is_named = name.is_some() || kind != Some(SourceKind::Measured);
+    let threshold_w = given.threshold_w.or(ours["instrument"]["threshold_w"].as_f64());
+    let is_limited = kind != Some(SourceKind::Measured)
+        || threshold_w.is_some()
+        || observations.iter().all(|row| row.threshold_sigma0.is_some());
     let flags = [
         (given.slug.is_some(), NAME),
         (given.class.is_some(), CLASS),
@@ -43,9 +49,11 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
         (kind.is_some(), KIND),
         (hz.is_some(), FREQUENCY),
         (is_named, INSTRUMENT),
+        (is_limited, DETECTED),
     ];
+    let is_whole = is_named && is_limited;
     let (Some(slug), Some(class), Some(licence), Some(title), Some(kind), Some(hz), true) =
-        (given.slug.clone(), given.class.clone(), licence, source, kind, hz, is_named)
+        (given.slug.clone(), given.class.clone(), licence, source, kind, hz, is_whole)
     else {
         return Err(missing(file, &flags));
     };
@@ -57,7 +65,7 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
         bandwidth_hz: number("bandwidth_hz"),
         calibration_sd_factor: number("calibration_sd_factor"),
         looks: number("looks"),
-        threshold_w: given.threshold_w.or(number("threshold_w")),
+        threshold_w,
         ..Instrument::default()
     });
     let lone = Lone { slug, class, licence, title, kind, hz, instrument, observations };

@@ -4,7 +4,7 @@ use super::record::Record;
 use super::views::View;
 use crate::cli::summary::grouped;
 use crate::error::Error;
-use crate::formats::exr::{self, Attribute};
+use crate::formats::exr::{self, Attribute, Packing};
 use crate::formats::figure::{Figure, Scale};
 use crate::formats::ply;
 use crate::geometry::Raster;
@@ -16,7 +16,7 @@ pub(super) const NAMES: &str = "power.exr, power.png, cloud.ply and scan.json";
 
 /// Encodes every file of a rendering; `all` puts hits below the threshold into the clouds, too.
 pub(super) fn encode(
-    all: bool,
+    (all, packing): (bool, Packing),
     scene: &Scene,
     views: &[View],
     images: &[Raster],
@@ -26,7 +26,7 @@ pub(super) fn encode(
     let regions: Vec<&str> = scene.target.regions.iter().map(|r| r.name.as_str()).collect();
     let materials = record.material_names();
     let materials: Vec<&str> = materials.iter().map(String::as_str).collect();
-    let exr = |image| exr::write(image, &exr_attributes(image, &materials));
+    let exr = |image| exr::write_packed(image, &exr_attributes(image, &materials), packing);
     let cloud = |view: &View| {
         let echoes: Vec<&Echo> = match all {
             true => view.scan.echoes.iter().collect(),

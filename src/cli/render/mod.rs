@@ -15,6 +15,7 @@ use super::database::Database;
 use super::output::write_all;
 use super::staging::{effects, materials, model, setup, surfaces};
 use crate::error::Error;
+use crate::formats::exr::Packing;
 use crate::geometry::Raster;
 use crate::render::{RenderError, Setup, trace_placed};
 use crate::scene::Scene;
@@ -41,6 +42,9 @@ pub(super) struct Args {
     /// Write the sampled beat signals, too: beat.npy, chirps x samples; needs [radar.receiver]
     #[arg(long)]
     beat: bool,
+    /// Do not compress power.exr: more bytes, written and read in less time
+    #[arg(long)]
+    uncompressed: bool,
     /// How the rays of the scan are traced; all give the same [default: pinhole where they share their
     /// origin, else bvh]
     #[arg(long, value_name = "NAME")]
@@ -81,9 +85,11 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         views.iter().map(|view| view.image(&scene, &material_of_region)).collect();
     stages.end("image", console);
 
+    let packing = if args.uncompressed { Packing::Uncompressed } else { Packing::Zip16 };
     let regions = &material_of_region;
     let record = Record::new(&scene, &used, model.as_ref(), regions, &views, &images, args.all);
-    let mut files = files::encode(args.all, &scene, &views, &images, &record, &material_of_region)?;
+    let mut files =
+        files::encode((args.all, packing), &scene, &views, &images, &record, &material_of_region)?;
     if let Some(shape) = beat {
         files.extend(beat::encode(&args.scene, shape, &setup, &footprints, &views)?);
     }
