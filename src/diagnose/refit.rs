@@ -16,7 +16,7 @@ use crate::brdf::Brdf;
 use crate::effects::{Effect, Look, Model, Prediction, Receiver, Stage, Traced, rank};
 use crate::fit::FitError;
 use crate::fit::coordinates::Coordinates;
-use crate::fit::minimise::{Local, Minimise};
+use crate::fit::minimise::{Local, Minimise, Stop};
 
 /// Step of a difference quotient: of a law's coordinate in its search, of an effect's number in its
 /// steps.
@@ -31,8 +31,6 @@ const ALONG_AXES: [f64; 4] = [0.3, 1.0, 3.0, 10.0];
 const SMOOTH: f64 = 0.5;
 /// Times that a step which does not improve is halved.
 const HALVINGS: usize = 5;
-/// Steps one after the other without an improvement after which a search rests: the last was damped by 6⁶.
-const RESTING: usize = 6;
 /// Looks that a law must have to be fitted.
 pub(crate) const LEAST_LOOKS: usize = 100;
 
@@ -66,7 +64,7 @@ pub(super) struct Fitted {
     pub converged: bool,
     /// Whether step after step from here was no improvement, shorter ones neither: to search on would be to
     /// try them again.
-    pub rests: bool,
+    pub is_stuck: bool,
 }
 
 impl<'a> Space<'a> {
@@ -277,8 +275,8 @@ impl Problem<'_> {
                 local(&terms, &slopes, &|_| true)
             });
             let (ln_likelihood, converged) = (-found.local.value, found.converged());
-            let rests = found.rejected >= RESTING;
-            Fitted { at: found.at, ln_likelihood, converged, rests }
+            let is_stuck = found.stop == Stop::Stuck;
+            Fitted { at: found.at, ln_likelihood, converged, is_stuck }
         };
         let moves = space.moving().any(|index| lower[index] < upper[index]);
         let [wide, middle, narrow] = WIDE_TO_NARROW;

@@ -26,8 +26,10 @@ use crate::effects::{Effect, Prediction, Receiver};
 use crate::fit::minimise::Minimise;
 
 /// Steps of a fit, and of one on the sample that only shows whether an effect is worth it.
-pub(super) const SEARCH: Minimise = Minimise { iterations: 20, tolerance: 0.1 };
-pub(super) const SCOUT: Minimise = Minimise { iterations: 12, tolerance: 0.1 };
+pub(super) const SEARCH: Minimise = Minimise { iterations: 20, tolerance: 0.1, patience: PATIENCE };
+pub(super) const SCOUT: Minimise = Minimise { iterations: 12, tolerance: 0.1, patience: PATIENCE };
+/// After so many steps in a row without an improvement the next would be a thousandth of a full one, or less.
+const PATIENCE: usize = 8;
 /// An effect that changes less than this share of what the largest does may be the error of its form.
 pub(super) const SHARE_OF_LARGEST: f64 = 0.2;
 /// Structure that is left, likewise.

@@ -159,7 +159,7 @@ impl Selection<'_> {
             accepted: false,
         };
         let fitted =
-            Fitted { at, ln_likelihood: f64::NEG_INFINITY, converged: false, rests: false };
+            Fitted { at, ln_likelihood: f64::NEG_INFINITY, converged: false, is_stuck: false };
         Some(Trial { effect, space, starts, tried, fitted, sizes_db: [0.0; 2], candidate })
     }
 
@@ -224,7 +224,7 @@ impl Selection<'_> {
         if let Some(mut best) = best {
             // One that must carry the laws far away with it comes slowly.
             for _ in 0..LONGER {
-                if best.converged {
+                if best.converged || is_at_rest(&best, trial.effect) {
                     break;
                 }
                 best = screen.problem.fit(space, &best.at, &held, &SCOUT);
@@ -262,7 +262,7 @@ impl Selection<'_> {
             if sampled || converged || gain < self.settings.least_gain_of(numbers, trial.tried) {
                 return;
             }
-            if trial.fitted.rests && !trial.effect.moves() {
+            if is_at_rest(&trial.fitted, trial.effect) {
                 return;
             }
             if trial.effect.moves()
@@ -276,6 +276,11 @@ impl Selection<'_> {
             }
         }
     }
+}
+
+/// Whether to search on would be to try the same steps again; a target that moves is searched by wider steps first.
+fn is_at_rest(fitted: &Fitted, effect: &dyn Effect) -> bool {
+    fitted.is_stuck && !effect.moves()
 }
 
 /// The best start with the laws as the scene declares them: without an effect that bends the whole curve,

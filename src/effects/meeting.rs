@@ -66,8 +66,8 @@ pub(super) struct Facing {
 
 /// A facet, whichever side of it a ray meets.
 pub(super) struct Facet {
-    /// At its outward normal and at the other one; none where rounding leaves it none.
-    sides: Option<[Axes; 2]>,
+    /// At its outward normal; none where rounding leaves it none.
+    axes: Option<Axes>,
     grain: DVec3,
     region: u16,
 }
@@ -76,17 +76,17 @@ impl Facet {
     pub(super) fn of(stage: &Stage, number: usize) -> Facet {
         let region = stage.region_of_facet.get(number).copied().unwrap_or(0);
         let (normal, grain) = (stage.bvh.mesh().area_normal(number), grain(stage, region));
-        let sides = |normal: DVec3| [normal, -normal].map(|normal| Axes::new(normal, grain));
-        Facet { sides: normal.try_normalize().map(sides), grain, region }
+        let axes = normal.try_normalize().map(|normal| Axes::new(normal, grain));
+        Facet { axes, grain, region }
     }
 
     /// Its surface, towards where a ray comes from.
     pub(super) fn facing(&self, ray: &Ray<Global>) -> Facing {
         let back = -ray.direction.xyz();
-        let axes = match self.sides {
+        let axes = match self.axes {
             None => Axes::new(back, self.grain),
-            Some([outward, inward]) if outward.normal().dot(back) < 0.0 => inward,
-            Some([outward, _]) => outward,
+            Some(axes) if axes.normal().dot(back) < 0.0 => Axes::new(-axes.normal(), self.grain),
+            Some(axes) => axes,
         };
         Facing { normal: axes.normal(), region: self.region, to_radar: axes.local(back) }
     }

@@ -58,7 +58,7 @@ pub struct BistaticResult {
 
 /// dB of what a model calls nothing.
 const NOTHING_DB: f64 = -200.0;
-const SEARCH: Minimise = Minimise { iterations: 300, tolerance: 1e-6 };
+const SEARCH: Minimise = Minimise { iterations: 300, tolerance: 1e-6, patience: usize::MAX };
 /// Step of the derivatives in the search.
 const STEP: f64 = 1e-6;
 

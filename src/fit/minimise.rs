@@ -54,7 +54,7 @@ pub enum Stop {
     Stationary,
     /// Every unknown is held by a bound: converged, but the bounds say so and not the data.
     Bounded,
-    /// No step improves although one should.
+    /// No step improves although one should, as far as patience goes.
     Stuck,
     /// The iterations ran out.
     Iterations,
@@ -82,6 +82,9 @@ pub(crate) struct Minimise {
     pub iterations: usize,
     /// Promised improvement that is no longer worth a step, in the unit of the cost.
     pub tolerance: f64,
+    /// Steps in a row without an improvement after which no more are tried, each six times as damped as the one
+    /// before.
+    pub patience: usize,
 }
 
 /// Where a search ended.
@@ -93,8 +96,6 @@ pub(crate) struct Minimum {
     pub local: Local,
     /// Steps tried.
     pub iterations: usize,
-    /// How many of them, from the last one back, were no improvement.
-    pub rejected: usize,
     /// Why it ended.
     pub stop: Stop,
 }
@@ -139,7 +140,7 @@ impl Minimise {
             if self.is_done(&local, &free) {
                 break Stop::Stationary;
             }
-            if damping > DAMPING[2] {
+            if damping > DAMPING[2] || rejected >= self.patience {
                 break Stop::Stuck;
             }
             if iterations == self.iterations {
@@ -160,7 +161,7 @@ impl Minimise {
                 }
             }
         };
-        Minimum { at, local, iterations, rejected, stop }
+        Minimum { at, local, iterations, stop }
     }
 
     /// The full step from a point, on the unknowns that no bound holds.
@@ -226,7 +227,7 @@ fn step(local: &Local, free: &[usize], damping: f64) -> DVector<f64> {
 mod tests {
     use super::*;
 
-    const SEARCH: Minimise = Minimise { iterations: 200, tolerance: 1e-14 };
+    const SEARCH: Minimise = Minimise { iterations: 200, tolerance: 1e-14, patience: usize::MAX };
 
     fn add_residual(local: &mut Local, residual: f64, jacobian: &[f64]) {
         local.value += 0.5 * residual * residual;

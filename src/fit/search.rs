@@ -73,7 +73,7 @@ impl Fit {
         let likelihood = Likelihood::new(coordinates, rows, self.noise_w.unwrap_or(0.0));
         let cost = |at: &DVector<f64>| likelihood.local(Curvature::Scores, at);
         let far = |at: &DVector<f64>| likelihood.local(Curvature::FromAfar, at);
-        let approach = Minimise { iterations: APPROACH, tolerance: NEAR };
+        let approach = Minimise { iterations: APPROACH, tolerance: NEAR, patience: usize::MAX };
         let search = likelihood_search();
         // With free looks a far start is explained by wild speckle before it is improved.
         let (best, agreeing) = self.best(coordinates, |start| {
@@ -127,11 +127,11 @@ pub(super) fn drawn_start(coordinates: &Coordinates, seed: u64, number: usize) -
 }
 
 fn likelihood_search() -> Minimise {
-    Minimise { iterations: ITERATIONS, tolerance: LIKELIHOOD_TOLERANCE }
+    Minimise { iterations: ITERATIONS, tolerance: LIKELIHOOD_TOLERANCE, patience: usize::MAX }
 }
 
 fn squares_search() -> Minimise {
-    Minimise { iterations: ITERATIONS, tolerance: SQUARES_TOLERANCE }
+    Minimise { iterations: ITERATIONS, tolerance: SQUARES_TOLERANCE, patience: usize::MAX }
 }
 
 fn search_freely(
@@ -170,7 +170,6 @@ fn pieces(
     let second = piece(coordinates, &far, &diffuse, &first.at);
     Minimum {
         iterations: first.iterations + second.iterations,
-        rejected: second.rejected,
         stop: if first.converged() { second.stop } else { first.stop },
         at: second.at,
         local: first.local.merge(second.local),

@@ -20,7 +20,7 @@ use crate::units::db_from_ratio;
 const NOTHING_DB: f64 = -200.0;
 /// Step of the derivatives in the search.
 const STEP: f64 = 1e-5;
-const SEARCH: Minimise = Minimise { iterations: 150, tolerance: 1e-5 };
+const SEARCH: Minimise = Minimise { iterations: 150, tolerance: 1e-5, patience: usize::MAX };
 /// With censored levels the fit depends on the scale, and the scale on the fit.
 const ROUNDS: usize = 3;
 
