@@ -178,12 +178,12 @@ fn hook_connections() {
 
 #[test]
 fn any_step_may_fail() {
-    // A write has some 2000 steps, and making a database ten times as many; all of them would take
-    // minutes. Primes meet loops unevenly.
+    // A write has some 2000 steps, making a database ten times as many and the others more still; all of
+    // them would take minutes. Primes meet loops unevenly.
     let every = |write: Write| match write {
         Write::Make => 61,
-        Write::Migrate => 251,
-        Write::Import => 31,
+        Write::Migrate => 1009,
+        Write::Import => 127,
         Write::Add | Write::Revise | Write::Remove => 7,
     };
     hook_connections();
@@ -211,7 +211,8 @@ fn any_step_may_fail() {
             }
             refused += 1;
         }
-        assert!(refused > 100, "{write:?}: only {refused} steps");
+        let least = if matches!(write, Write::Migrate | Write::Import) { 20 } else { 100 };
+        assert!(refused > least, "{write:?}: only {refused} steps");
     }
 }
 
