@@ -279,11 +279,6 @@ CREATE TABLE entry_tag (
 
 CREATE INDEX entry_tag_tag ON entry_tag (tag, slug);
 
-CREATE VIRTUAL TABLE search USING fts5 (
-    slug, name, class, tags, description, finish, unknown, sources,
-    tokenize = 'unicode61 remove_diacritics 2', prefix = '2 3'
-);
-
 CREATE TRIGGER search_removed AFTER DELETE ON material BEGIN
     DELETE FROM search WHERE rowid = old.id;
 END;
@@ -454,6 +449,11 @@ SELECT slug, number AS revision, effect, verdict, fit_before, fit_after, gain, p
 FROM material JOIN revision ON material_id = material.id AND number = current_revision
 JOIN finding ON finding.revision_id = revision.id
 JOIN source ON source.revision_id = revision.id AND source.key = finding.source;
+
+CREATE VIRTUAL TABLE search USING fts5 (
+    slug, name, class, tags, description, finish, unknown, sources,
+    tokenize = 'unicode61 remove_diacritics 2', prefix = '2 3 4'
+);
 
 INSERT INTO unit VALUES ('aperture_m', 'm', 'diameter of the antenna');
 
