@@ -53,6 +53,9 @@ const FACETS_PER_TASK: usize = 8192;
 /// So few rays that every thread can have all of them in its cache, and work is shared by facets.
 const FEW_RAYS: usize = 1 << 16;
 
+/// Of more facets than this for each ray their lists would cost more than a second look at the rays.
+const MANY_FACETS_PER_RAY: usize = 8;
+
 /// Shares of the facets for every thread, where there are few rays.
 const SHARES_PER_THREAD: usize = 2;
 
@@ -120,11 +123,11 @@ fn nearer(a: Option<Hit>, b: Option<Hit>) -> Option<Hit> {
 
 /// The nearest facet of the ray at every place, or [`NONE`].
 fn nearest(picture: &Picture) -> Vec<u32> {
+    let (facets, rays) = (picture.mesh.facets.len(), picture.fan.rays.len());
+    let are_few = rays <= FEW_RAYS || facets / MANY_FACETS_PER_RAY > rays;
     match rayon::current_num_threads() {
         1 => shared_by_facets(picture, 1),
-        threads if picture.fan.rays.len() <= FEW_RAYS => {
-            shared_by_facets(picture, SHARES_PER_THREAD * threads)
-        }
+        threads if are_few => shared_by_facets(picture, SHARES_PER_THREAD * threads),
         threads => shared_by_rays(picture, BANDS_PER_THREAD * threads),
     }
 }
