@@ -206,12 +206,19 @@ fn references_to_nothing_and_to_what_never_ends_are_refused() {
     };
     let devices = |text: String| text.replace("file = \"scan.csv\"", "file = \"/dev/zero\"");
     let twice = |text: String| text.replace("tags = [", "tags = [\"matt\", \"matt\", ");
+    let unfilled = |text: String| {
+        let from = text.find("[[instrument]]").unwrap();
+        let name = from + text[from..].find("name = ").unwrap();
+        let end = name + text[name..].find('\n').unwrap();
+        format!("{}name = \"…\"{}", &text[..name], &text[end..])
+    };
     let empty = |text: String| text.replace("tags = [", "tags = [\" \", ");
     for (change, expected) in [
         (&no_instrument as &dyn Fn(String) -> String, "define it, or leave the reference out"),
         (&devices, "not a regular file"),
         (&twice, "tags holds `matt` twice"),
         (&empty, "tags holds an empty word"),
+        (&unfilled, "the name of instrument `radar` is not filled in"),
     ] {
         let folder = from_template(change, BARE);
         let message = refused(matdb(folder.path()).args(["add", "--from", "."]));
@@ -250,9 +257,31 @@ fn what_may_surprise_later_is_said_when_it_is_added() {
     assert!(!notices.contains("GHz") && !notices.contains("built-in"), "{notices}");
     assert!(!said.contains("differs"), "{said}");
     let [said, _] = add("my-paint", "300", &[]);
-    assert!(said.contains("revision 2") && said.contains("what differs: tags"), "{said}");
+    assert!(said.contains("revision 2") && said.contains("what differs: without tags"), "{said}");
     let near = json(folder, &["near", "--material", "my-paint"]);
     let found: Vec<&str> =
         near["materials"].as_array().unwrap().iter().flat_map(|m| m["slug"].as_str()).collect();
     assert!(found.contains(&"ptfe") && !found.contains(&"my-paint"), "{found:?}");
+}
+
+#[test]
+fn what_was_kept_is_not_lost_without_a_word() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let said = |arguments: &[&str]| {
+        let output = matdb(folder).args(arguments).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8([output.stdout, output.stderr].concat()).unwrap()
+    };
+    variant(folder, "ptfe", "m = 0.05", "m = 0.06");
+    said(&["add", "--from", "ptfe"]);
+    let before = fs::read(folder.join("matdb.sqlite")).unwrap();
+    let over = ["export", "ptfe", "--as", "mitsuba", "-o", "matdb.sqlite"];
+    assert!(refused(matdb(folder).args(over)).contains("a database is there"));
+    assert!(fs::read(folder.join("matdb.sqlite")).unwrap() == before);
+    said(&["withdraw", "ptfe", "--reason", "The plate was wet."]);
+    for command in [["show", "ptfe@1"], ["cite", "ptfe@1"]] {
+        assert!(said(&command).contains("withdrawn: The plate was wet."), "{command:?}");
+    }
+    assert!(said(&["add", "--from", "ptfe"]).contains("it was withdrawn: The plate was wet."));
 }

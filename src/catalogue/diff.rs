@@ -96,7 +96,14 @@ impl Diff {
         }
         let mut parts: Vec<String> = self.fields.iter().map(|field| part(&field.path)).collect();
         parts.dedup();
-        said.extend(parts);
+        let stays = |part: &String| {
+            let mut own = self.fields.iter().filter(|field| self::part(&field.path) == *part);
+            own.any(|field| field.after.is_some())
+        };
+        let (changed, gone): (Vec<String>, Vec<String>) = parts.into_iter().partition(stays);
+        // What is lost matters most.
+        said.splice(0..0, gone.iter().map(|part| format!("without {part}")));
+        said.extend(changed);
         let more = said.len().saturating_sub(MOST);
         said.truncate(MOST);
         match (said.is_empty(), more) {
@@ -107,9 +114,10 @@ impl Diff {
     }
 }
 
-/// The first two names of a path: what of a material it belongs to.
+/// The first two names of a path, places in a list left out: what of a material it belongs to.
 fn part(path: &str) -> String {
-    path.splitn(3, '.').take(2).collect::<Vec<_>>().join(" ")
+    let is_name = |piece: &&str| piece.parse::<usize>().is_err();
+    path.split('.').take(2).filter(is_name).collect::<Vec<_>>().join(" ")
 }
 
 impl Field {

@@ -4,8 +4,6 @@ mod foreign;
 
 use std::cell::RefCell;
 use std::collections::HashSet;
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
@@ -13,7 +11,7 @@ use serde_json::json;
 use super::console::Console;
 use super::database::Database;
 use super::door;
-use super::inputs::input;
+use super::inputs::{input, read_small};
 use super::materials::unknown;
 use super::staging::chosen;
 use crate::catalogue::Diff;
@@ -92,6 +90,12 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             Added::Revision(number) => store.get(slug, Some(number - 1)).ok().flatten(),
             Added::New | Added::Unchanged(_) => None,
         };
+        if let Some(before) = &differs
+            && let (Some(said), None) =
+                (before.material.status.sentence(), material.status.sentence())
+        {
+            console.notice(&format!("{slug}: it was {said}; this revision makes it active again"));
+        }
         let differs = differs.map(|before| Diff::new(&before.material, material).line());
         if let Some(line) = &differs {
             lines += &format!("  what differs: {line}\n");
@@ -177,7 +181,7 @@ fn made(inputs: Vec<Input>) -> Activity {
 }
 
 fn read(path: &Path) -> Result<(Material, Activity), Error> {
-    let bytes = read_whole(path)?;
+    let bytes = read_small(path).map_err(|reason| unreadable(path, reason))?;
     let inputs = RefCell::new(vec![input(path, &bytes)]);
     let text = String::from_utf8(bytes).map_err(|error| Error::Usage {
         problem: format!(
@@ -197,26 +201,6 @@ fn read(path: &Path) -> Result<(Material, Activity), Error> {
     chosen(&material.effects, Level::Material, format!("{}: [[effect]]", path.display()))?;
     door::check(&material, path)?;
     Ok((material, made(inputs.into_inner())))
-}
-
-/// Largest material.toml, bytes: points stand in tables of their own.
-const LARGEST_FILE_BYTES: u64 = 64 << 20;
-
-fn read_whole(path: &Path) -> Result<Vec<u8>, Error> {
-    let read = || -> std::io::Result<Vec<u8>> {
-        let mut bytes = Vec::new();
-        File::open(path)?.take(LARGEST_FILE_BYTES + 1).read_to_end(&mut bytes)?;
-        Ok(bytes)
-    };
-    let bytes = read().map_err(|reason| unreadable(path, reason))?;
-    match bytes.len() as u64 > LARGEST_FILE_BYTES {
-        false => Ok(bytes),
-        true => Err(Error::Usage {
-            problem: format!("{} is larger than {} MiB", path.display(), LARGEST_FILE_BYTES >> 20),
-            way_out: "put points into a CSV file that a [[curve]] names, and shorten texts"
-                .to_owned(),
-        }),
-    }
 }
 
 fn unreadable(path: &Path, reason: std::io::Error) -> Error {

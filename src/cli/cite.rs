@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::console::Console;
 use super::database::Database;
-use super::materials::find;
+use super::materials::{find, not_to_be_used_since};
 use crate::catalogue::{Citable, Credit, references};
 use crate::error::Error;
 
@@ -29,6 +29,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let store = db.read()?;
     let found = find(store.as_ref(), &args.name, "")?;
     let material = &found.material;
+    let later = not_to_be_used_since(store.as_ref(), &material.slug, found.revision)?;
+    later.iter().for_each(|later| console.notice(later));
     let stored = match (&store, found.revision) {
         (Some(store), Some(_)) => store.get(&material.slug, found.revision)?,
         _ => None,

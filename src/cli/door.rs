@@ -265,6 +265,15 @@ fn slips(material: &Material) -> Vec<(String, &'static str)> {
     } else if let Some((_, tag)) = tags.iter().enumerate().find(is_repeated) {
         slips.push((format!("tags holds `{tag}` twice"), "remove one of them"));
     }
+    let names = material
+        .instruments
+        .iter()
+        .map(|i| (format!("the name of instrument `{}`", i.key), &i.name));
+    let titles =
+        material.sources.iter().map(|s| (format!("the title of source `{}`", s.key), &s.title));
+    let is_blank = |text: &str| text.chars().all(|c| c.is_whitespace() || c == '…' || c == '.');
+    let blank = names.chain(titles).find(|(_, text)| is_blank(text));
+    slips.extend(blank.map(|(place, _)| (format!("{place} is not filled in"), "fill it in")));
     let own = ("the material".to_owned(), Some(&material.licence));
     let of_sources =
         material.sources.iter().map(|s| (format!("source `{}`", s.key), s.licence.as_ref()));

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::console::Console;
 use super::database::Database;
-use super::materials::{Found, find, not_to_be_used};
+use super::materials::{Found, find, not_to_be_used, not_to_be_used_since};
 use super::output::write_all;
 use crate::catalogue::Credit;
 use crate::catalogue::exchange::{self, Exported, Subject};
@@ -94,7 +94,9 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let folder = args.output.parent().filter(|folder| !folder.as_os_str().is_empty());
     let folder = folder.unwrap_or(Path::new("."));
     write_all(folder, &files)?;
-    not_to_be_used(&material).iter().for_each(|notice| console.notice(notice));
+    let later = not_to_be_used_since(store.as_ref(), &material.slug, revision)?;
+    let notices = later.or_else(|| not_to_be_used(&material));
+    notices.iter().for_each(|notice| console.notice(notice));
     let written: Vec<String> = files
         .iter()
         .map(|(name, _)| args.output.with_file_name(name).display().to_string())

@@ -1,6 +1,6 @@
 //! `matdb import`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::console::Console;
 use super::database::Database;
@@ -31,7 +31,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
-    let import = Import::open(&args.bundle)?;
+    let import = Import::open(publication(&args.bundle))?;
     // The database that is asked for may be made by this.
     let ours = if db.path().exists() { db.read()? } else { None };
     let materials = import.plan(ours.as_ref(), args.as_prefix.as_deref())?;
@@ -44,6 +44,17 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     }
     let imported = Imported { dry_run: args.dry_run, materials };
     console.result(&text(&imported, db), &imported)
+}
+
+/// The publication that a database lies in: it says whose it is, and has its hash.
+fn publication(bundle: &Path) -> &Path {
+    match bundle.parent() {
+        Some(folder) if bundle.ends_with("catalogue.sqlite") && bundle.is_file() => {
+            let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+            if folder.join("SHA256SUMS").is_file() { folder } else { bundle }
+        }
+        _ => bundle,
+    }
 }
 
 fn text(imported: &Imported, db: &Database) -> String {

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::formats::text::nearest;
-use crate::material::{Material, builtin};
+use crate::material::{Material, Slug, builtin};
 use crate::store::Store;
 
 /// A material and where it was found.
@@ -73,6 +73,19 @@ pub(super) fn with_status(cell: &str, status: &str) -> String {
 /// That a material should not be used any more.
 pub(super) fn not_to_be_used(material: &Material) -> Option<String> {
     Some(format!("`{}` is {}", material.slug, material.status.sentence()?))
+}
+
+/// That a later revision says so.
+pub(super) fn not_to_be_used_since(
+    store: Option<&Store>,
+    slug: &Slug,
+    revision: Option<u32>,
+) -> Result<Option<String>, Error> {
+    let current = store.map(|store| store.get(slug, None)).transpose()?.flatten();
+    let later = current.filter(|current| revision.is_some_and(|own| own < current.revision));
+    Ok(later.and_then(|later| {
+        Some(format!("{}, says revision {}", not_to_be_used(&later.material)?, later.revision))
+    }))
 }
 
 /// The error for a name that nobody knows, with the nearest known one.

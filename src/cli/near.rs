@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::console::Console;
 use super::database::Database;
+use super::inputs::read_small;
 use super::list::{Wanted, frequency};
 use super::materials::{Found, find, store_of_not_added};
 use super::summary::table;
@@ -156,7 +157,7 @@ fn near(
 fn asked(args: &Args, store: Option<&Store>) -> Result<Asked, Error> {
     let stated_hz = args.measured_at.map(|ghz| ghz * 1e9);
     if let Some(path) = &args.curve {
-        let bytes = std::fs::read(path).map_err(|reason| Error::Io {
+        let bytes = read_small(path).map_err(|reason| Error::Io {
             verb: "read",
             path: path.clone(),
             reason,

@@ -1,6 +1,6 @@
 //! Writing a set of files into a folder: all of them, or none.
 
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -96,6 +96,14 @@ enum Staged<'a> {
     Through(&'a [u8], PathBuf),
 }
 
+/// Whether SQLite keeps a database there.
+fn is_database(path: &Path) -> bool {
+    const MAGIC: &[u8; 16] = b"SQLite format 3\0";
+    let mut head = [0; MAGIC.len()];
+    let read = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut head));
+    read.is_ok() && head == *MAGIC
+}
+
 /// Where a file goes: a link stays, and what it leads to is replaced.
 fn target(path: PathBuf) -> std::io::Result<PathBuf> {
     match path.symlink_metadata() {
@@ -114,6 +122,9 @@ fn stage<'a, Name: AsRef<str> + Sync>(
             return Ok((name.as_ref(), Staged::Through(bytes, path)));
         }
         let path = target(path)?;
+        if is_database(&path) {
+            return Err(std::io::Error::other("a database is there, which is not written over"));
+        }
         let beside = path.parent().unwrap_or(folder);
         let mut builder = Builder::new();
         builder.prefix(".matdb-");

@@ -9,6 +9,7 @@ use super::{Args, html, json};
 use crate::brdf::Brdf;
 use crate::cli::console::Console;
 use crate::cli::effects::level;
+use crate::cli::inputs::read_small;
 use crate::cli::output::write_all;
 use crate::diagnose::curve::{
     CurveDiagnoseError, CurveDiagnosis, CurveFound, CurveReport, CurveRow, CurveUnknown, Kind,
@@ -35,7 +36,7 @@ pub(super) fn run(path: &Path, args: &Args, console: &Console) -> Result<(), Err
 }
 
 fn read(path: &Path, noise_db: Option<f64>) -> Result<Points, Error> {
-    let bytes = std::fs::read(path).map_err(|reason| Error::Io {
+    let bytes = read_small(path).map_err(|reason| Error::Io {
         verb: "read",
         path: path.to_owned(),
         reason,

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::Args;
 use crate::brdf::Brdf;
+use crate::cli::inputs::read_small;
 use crate::cli::materials::{Found, find};
 use crate::error::Error;
 use crate::material;
@@ -38,7 +39,7 @@ impl Subject {
             let way_out = "check the path, or name a material";
             Error::Io { verb: "read", path: path.to_owned(), reason, way_out }
         };
-        let bytes = std::fs::read(path).map_err(unreadable)?;
+        let bytes = read_small(path).map_err(unreadable)?;
         let refused = |error| Error::CurveFile { file: path.to_owned(), error };
         let curve = Curve::read(&bytes).map_err(refused)?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
