@@ -175,18 +175,19 @@ fn a_measured_curve_without_its_circumstances_is_refused() {
         let text = text.replace("licence = \"CC-BY-4.0\"             # SPDX, of", "# of");
         text.replace("instrument = \"radar\"\n", "")
     };
-    for (change, expected) in [
-        (&lacks as &dyn Fn(String) -> String, all),
+    for (change, expected, line) in [
+        (&lacks as &dyn Fn(String) -> String, all, "\ninstrument = \"radar\""),
         (
             &|text: String| text.replace("threshold_dbm = -77", "#"),
             "instrument `radar` has no threshold_dbm",
+            "\nthreshold_dbm = …",
         ),
     ] {
         let folder = from_template(change, BARE);
         let (message, lines) =
             refused_with_lines(matdb(folder.path()).args(["add", "--from", "."]));
         assert!(message.contains(expected) && message.contains("--template"), "{message}");
-        assert!(lines.contains("\nthreshold_dbm = …"), "{lines}");
+        assert!(lines.contains(line), "{lines}");
         assert!(!folder.path().join("matdb.sqlite").exists());
     }
     let synthetic =
