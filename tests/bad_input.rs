@@ -68,7 +68,7 @@ fn texts_that_nobody_reads_and_names_that_turn_a_line_round_stay_outside() {
     let file = fs::File::create(folder.path().join("material.toml")).unwrap();
     file.set_len((64 << 20) + 1).unwrap();
     let message = refused(matdb(folder.path()).args(["add", "--from", "material.toml"]));
-    check(&message, &["material.toml is larger than 64 MiB", "CSV"]);
+    check(&message, &["material.toml: it is larger than 64 MiB", "CSV"]);
 }
 
 #[test]
