@@ -204,5 +204,11 @@ fn read(path: &Path) -> Result<(Material, Activity), Error> {
 }
 
 fn unreadable(path: &Path, reason: std::io::Error) -> Error {
-    Error::Io { verb: "read", path: path.to_owned(), reason, way_out: "check the path" }
+    let way_out = match reason.kind() {
+        std::io::ErrorKind::FileTooLarge => {
+            "put points into a CSV file that a [[curve]] names, and shorten texts"
+        }
+        _ => "check the path",
+    };
+    Error::Io { verb: "read", path: path.to_owned(), reason, way_out }
 }

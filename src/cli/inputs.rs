@@ -1,7 +1,7 @@
 //! Which command made a revision of what, for `Store::record`.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use crate::error::Error;
@@ -18,7 +18,7 @@ pub(super) fn read_small(path: &Path) -> std::io::Result<Vec<u8>> {
         false => Ok(bytes),
         true => {
             let problem = format!("it is larger than {} MiB", LARGEST_FILE_BYTES >> 20);
-            Err(std::io::Error::other(problem))
+            Err(std::io::Error::new(ErrorKind::FileTooLarge, problem))
         }
     }
 }
