@@ -98,7 +98,7 @@ impl Diff {
         parts.dedup();
         let stays = |part: &String| {
             let mut own = self.fields.iter().filter(|field| self::part(&field.path) == *part);
-            own.any(|field| field.after.is_some())
+            part == STATUS || own.any(|field| field.after.is_some())
         };
         let (changed, gone): (Vec<String>, Vec<String>) = parts.into_iter().partition(stays);
         // What is lost matters most.
@@ -114,10 +114,14 @@ impl Diff {
     }
 }
 
+/// What goes without saying while an entry is active.
+const STATUS: &str = "status";
+
 /// The first two names of a path, places in a list left out: what of a material it belongs to.
 fn part(path: &str) -> String {
     let is_name = |piece: &&str| piece.parse::<usize>().is_err();
-    path.split('.').take(2).filter(is_name).collect::<Vec<_>>().join(" ")
+    let pieces = if path.starts_with(STATUS) { 1 } else { 2 };
+    path.split('.').take(pieces).filter(is_name).collect::<Vec<_>>().join(" ")
 }
 
 impl Field {
