@@ -30,7 +30,7 @@ pub enum Packing {
     /// Deflated, 16 lines together: the format's ZIP.
     #[default]
     Zip16,
-    /// Not at all: more bytes, in less time.
+    /// Not at all, for programs that cannot unpack.
     Uncompressed,
 }
 

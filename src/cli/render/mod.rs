@@ -42,7 +42,7 @@ pub(super) struct Args {
     /// Write the sampled beat signals, too: beat.npy, chirps x samples; needs [radar.receiver]
     #[arg(long)]
     beat: bool,
-    /// Do not compress power.exr: more bytes, written and read in less time
+    /// Do not compress power.exr, for programs that cannot unpack it
     #[arg(long)]
     uncompressed: bool,
     /// How the rays of the scan are traced; all give the same [default: pinhole where they share their
