@@ -28,7 +28,7 @@ fn main() -> Answer<()> {
             let (ms, mesh) = timed(read);
             Ok(json!({ "ms": ms, "facets": black_box(mesh?).facets.len() }))
         }),
-        ["exr", floats, file, ref how @ ..] => {
+        ["exr", floats, file, ref how @ ..] if matches!(how, [] | ["uncompressed"]) => {
             let raster = raster(&std::fs::read(floats)?);
             let packing =
                 if how == ["uncompressed"] { Packing::Uncompressed } else { Packing::Zip16 };
