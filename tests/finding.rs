@@ -298,6 +298,13 @@ fn a_class_that_nobody_has_is_answered_with_those_there_are() {
         said.contains("no class is called `nix`, there are: ") && said.contains("textile"),
         "{said}"
     );
+    let said = text(folder.path(), &["list", "--tag", "nix"]);
+    assert!(
+        said.contains("no tag is called `nix`, there are: ") && said.contains("composite"),
+        "{said}"
+    );
+    let known = text(folder.path(), &["list", "--tag", "polymer", "--class", "metal"]);
+    assert!(known.contains("no such material") && !known.contains("is called"), "{known}");
     let said = refused(matdb(folder.path()).args([
         "withdraw",
         "ptfe",

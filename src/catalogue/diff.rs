@@ -94,10 +94,10 @@ impl Diff {
             };
             said.push(format!("curve {} {what}", change.curve));
         }
-        let mut parts: Vec<String> = self.fields.iter().map(|field| part(&field.path)).collect();
+        let mut parts: Vec<String> = self.fields.iter().map(|field| part(&field.place())).collect();
         parts.dedup();
         let stays = |part: &String| {
-            let mut own = self.fields.iter().filter(|field| self::part(&field.path) == *part);
+            let mut own = self.fields.iter().filter(|field| self::part(&field.place()) == *part);
             part == STATUS || own.any(|field| field.after.is_some())
         };
         let (changed, gone): (Vec<String>, Vec<String>) = parts.into_iter().partition(stays);
@@ -125,6 +125,13 @@ fn part(path: &str) -> String {
 }
 
 impl Field {
+    /// Where it is, for people: without the unit in the name, which the values come with.
+    pub fn place(&self) -> String {
+        let end = ENDS.iter().find(|(_, unit)| self.unit.as_deref() == Some(unit));
+        let short = |name| end.and_then(|(end, _)| str::strip_suffix(name, end)).unwrap_or(name);
+        self.path.split('.').map(short).collect::<Vec<_>>().join(".")
+    }
+
     /// The value before, for people; `—` where there is none.
     pub fn before(&self) -> String {
         self.words(self.before.as_ref())
@@ -201,17 +208,19 @@ fn units(material: &Material) -> impl Iterator<Item = (String, String)> {
     })
 }
 
+/// Ends of names that say a unit, and its UCUM code.
+const ENDS: [(&str, &str); 8] = [
+    ("_rad", "rad"),
+    ("_hz", "Hz"),
+    ("_m", "m"),
+    ("_w", "W"),
+    ("_k", "K"),
+    ("_db", "dB"),
+    ("_deg", "deg"),
+    ("_s", "s"),
+];
+
 fn unit(path: &str, units: &BTreeMap<String, String>) -> Option<String> {
-    const ENDS: [(&str, &str); 8] = [
-        ("_rad", "rad"),
-        ("_hz", "Hz"),
-        ("_m", "m"),
-        ("_w", "W"),
-        ("_k", "K"),
-        ("_db", "dB"),
-        ("_deg", "deg"),
-        ("_s", "s"),
-    ];
     let by_name = || {
         // Of a range it is the list that has the unit in its name.
         let name = path.rsplit('.').find(|name| name.parse::<usize>().is_err())?;

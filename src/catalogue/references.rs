@@ -167,6 +167,12 @@ impl<'a> Credit<'a> {
             Credit::Own | Credit::BuiltIn => None,
         }
     }
+
+    /// The year to cite a stored revision by: of what was imported that in which the others made it.
+    pub fn year(self, stored: &Stored) -> Option<u16> {
+        let added_at = self.origin().map_or(&stored.added_at, |origin| &origin.added_at);
+        added_at.get(..4)?.parse().ok()
+    }
 }
 
 /// How to cite a revision of a material: which one it is, wherever it came from.
@@ -202,7 +208,8 @@ impl Citable<'_> {
 
     /// The material and its sources as sentences.
     pub fn text(&self) -> String {
-        let mut text = format!("{}. {}.\n", self.title(), self.material.licence);
+        let year = self.year.map_or(String::new(), |year| format!(", {year}"));
+        let mut text = format!("{}{year}. {}.\n", self.title(), self.material.licence);
         text += &self.taken_from().map_or(String::new(), |from| format!("{from}.\n"));
         let status = self.material.status.sentence();
         text += &status.map_or(String::new(), |said| format!("This entry is {said}\n"));

@@ -36,12 +36,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         _ => None,
     };
     let credit = stored.as_ref().map_or(Credit::BuiltIn, Credit::of);
-    // What was imported is of the year in which the others made it.
-    let added_at = match credit {
-        Credit::Others(origin) => Some(&origin.added_at),
-        Credit::Own | Credit::BuiltIn => stored.as_ref().map(|stored| &stored.added_at),
-    };
-    let year = added_at.and_then(|added_at| added_at.get(..4)?.parse().ok());
+    let year = stored.as_ref().and_then(|stored| credit.year(stored));
     let citable = Citable { material, revision: found.revision, year, credit };
     let csl = citable.csl();
     let text = match (args.bibtex, args.csl) {

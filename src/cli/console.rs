@@ -32,7 +32,7 @@ impl Console {
     /// Something a person should know, though it is no error.
     pub fn notice(&self, text: &str) {
         if !self.quiet {
-            eprintln!("note: {}", harmless(text));
+            eprintln!("note: {}", readable(text));
         }
     }
 
@@ -69,8 +69,29 @@ impl Console {
 
 /// The text without control characters, which a file could use to write over the terminal, and without
 /// those that turn the direction of a line.
-pub fn harmless(text: &str) -> String {
+fn harmless(text: &str) -> String {
     text.chars().filter(|c| (!c.is_control() || *c == '\n') && !is_turning(*c)).collect()
+}
+
+/// A message as it may be shown: [`harmless`], and words that are longer than any name or path is cut.
+///
+/// ```
+/// let message = format!("no material `{}`", "a".repeat(10_000));
+/// assert!(matdb::cli::readable(&message).ends_with("aaa… (10001 letters)"));
+/// ```
+pub fn readable(text: &str) -> String {
+    const LONGEST: usize = 1000;
+    const SHOWN: usize = 80;
+    let text = harmless(text);
+    let word = |word: &str| match word.chars().count() {
+        0..=LONGEST => word.to_owned(),
+        letters => {
+            let rest = &word[word.trim_end().len()..];
+            let start: String = word.chars().take(SHOWN).collect();
+            format!("{start}… ({} letters){rest}", letters - rest.chars().count())
+        }
+    };
+    text.split_inclusive(char::is_whitespace).map(word).collect()
 }
 
 /// Writes to standard output; a reader that has left, as `head` does, is no error.

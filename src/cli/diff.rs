@@ -62,7 +62,7 @@ fn text<'a>(diff: &Diff, fields: impl Iterator<Item = &'a Field>, names: [&Strin
         return format!("{} and {} say the same\n", names[0], names[1]);
     }
     let mut text = String::new();
-    let mut rows = fields.map(|f| [f.path.clone(), cut(&f.before()), cut(&f.after())]).peekable();
+    let mut rows = fields.map(|f| [f.place(), cut(&f.before()), cut(&f.after())]).peekable();
     if rows.peek().is_some() {
         text += &table(&["field", names[0], names[1]], rows);
     }

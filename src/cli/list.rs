@@ -118,7 +118,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             format!(
                 "no such material in {}{}\n",
                 db.path().display(),
-                classes(&filter, store, &built_in)?
+                others(&filter, store, &built_in)?
             )
         }
         _ => table(
@@ -144,18 +144,31 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     console.result(&text, &materials)
 }
 
-/// Which classes there are, where one is asked for that no material has.
-fn classes(filter: &Filter, store: &Store, built_in: &[Material]) -> Result<String, Error> {
-    let Some(class) = &filter.class else { return Ok(String::new()) };
-    let built_in = built_in.iter().map(|material| material.class.clone());
-    let classes: BTreeSet<String> = store.classes()?.into_iter().chain(built_in).collect();
-    Ok(match classes.contains(class) {
-        true => String::new(),
-        false => {
-            let there = classes.into_iter().collect::<Vec<_>>().join(", ");
-            format!("; no class is called `{class}`, there are: {there}")
+/// Which classes or tags there are, where one is asked for that no material has.
+fn others(filter: &Filter, store: &Store, built_in: &[Material]) -> Result<String, Error> {
+    /// More tags than these are no help.
+    const MOST_TAGS: usize = 100;
+    let mut said = String::new();
+    let mut tell = |what: &str, asked: &str, there: BTreeSet<String>| {
+        let there = there.into_iter().collect::<Vec<_>>().join(", ");
+        said += &format!("; no {what} is called `{asked}`, there are: {there}");
+    };
+    if let Some(class) = &filter.class {
+        let built_in = built_in.iter().map(|material| material.class.clone());
+        let there: BTreeSet<String> = store.classes()?.into_iter().chain(built_in).collect();
+        if !there.contains(class) {
+            tell("class", class, there);
         }
-    })
+    }
+    if let Some(tag) = &filter.tag {
+        let built_in = built_in.iter().flat_map(|material| material.tags.clone());
+        let alone = Filter { tag: Some(tag.clone()), ..Filter::default() };
+        if store.count(&alone, 1)? == 0 && !built_in.clone().any(|known| known == *tag) {
+            let there = store.tags(MOST_TAGS)?.into_iter().chain(built_in);
+            tell("tag", tag, there.collect());
+        }
+    }
+    Ok(said)
 }
 
 /// Names after a title, on lines that a narrow terminal holds.

@@ -41,7 +41,7 @@ use clap::{ArgAction, Parser, Subcommand};
 
 use crate::error::Error;
 use console::Console;
-pub use console::harmless;
+pub use console::readable;
 use database::Database;
 
 /// A material database and renderer for 300 GHz imaging radar.

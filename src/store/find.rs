@@ -92,6 +92,14 @@ impl Store {
         filter::classes(&self.conn).map_err(|error| StoreError::new(&self.path, error))
     }
 
+    /// The first `most` tags that any material has, sorted.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn tags(&self, most: usize) -> Result<Vec<String>, StoreError> {
+        filter::tags(&self.conn, most).map_err(|error| StoreError::new(&self.path, error))
+    }
+
     /// What a list says of one material; `None` when there is none of that name.
     ///
     /// # Errors

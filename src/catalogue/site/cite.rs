@@ -38,21 +38,23 @@ impl Citation {
         let what =
             format!("{name} ({}, revision {}, content {hash})", material.slug, stored.revision);
         let credit = Credit::of(stored);
+        let year = credit.year(stored);
+        let dated = what.clone() + &year.map_or(String::new(), |year| format!(", {year}"));
         let mut text = match &credit {
             Credit::Own => {
-                format!("{}{what}. In: {}", listed(&about.authors()), catalogue_words(about))
+                format!("{}{dated}. In: {}", listed(&about.authors()), catalogue_words(about))
             }
-            Credit::BuiltIn => format!("{what}. {BUILT_IN}. In: {}", catalogue_words(about)),
+            Credit::BuiltIn => format!("{dated}. {BUILT_IN}. In: {}", catalogue_words(about)),
             Credit::Others(origin) => {
                 let there = origin.catalogue();
                 let authors = listed(&origin.authors);
-                format!("{authors}{what}. In: {there}. Republished in: {}", catalogue_words(about))
+                format!("{authors}{dated}. In: {there}. Republished in: {}", catalogue_words(about))
             }
         };
         let status = material.status.sentence();
         text += &status.as_ref().map_or(String::new(), |said| format!(" This entry is {said}"));
         let key = format!("{}-{}", material.slug, stored.revision);
-        let bibtex = bibtex(about, &credit, &key, &what, &stored.added_at, status.clone());
+        let bibtex = bibtex(about, &credit, &key, &what, year, status.clone());
         let creator = match credit {
             Credit::Own => creators(about),
             Credit::BuiltIn => Vec::new(),
@@ -155,7 +157,7 @@ fn bibtex(
     credit: &Credit,
     key: &str,
     title: &str,
-    added_at: &str,
+    year: Option<u16>,
     status: Option<String>,
 ) -> String {
     let here = (Some(about.title.clone()), &about.version, &about.doi, &about.url);
@@ -169,11 +171,10 @@ fn bibtex(
     };
     let notes: Vec<String> = note.into_iter().chain(status).collect();
     let note = (!notes.is_empty()).then(|| notes.join("; "));
-    let added_at = if let Credit::Others(origin) = credit { &origin.added_at } else { added_at };
     let fields = [
         ("title", Some(title.to_owned())),
         ("howpublished", place),
-        ("year", added_at.get(..4).map(str::to_owned)),
+        ("year", year.map(|year| year.to_string())),
         ("version", version.clone()),
         ("doi", doi.clone()),
         ("url", url.clone()),

@@ -59,16 +59,27 @@ pub(super) fn count(conn: &Connection, filter: &Filter, most: u32) -> Result<usi
     Ok(usize::try_from(found).unwrap_or(usize::MAX))
 }
 
-/// Every class, each found by the index from the one before.
+/// Every class.
 pub(super) fn classes(conn: &Connection) -> Result<Vec<String>> {
-    let mut next = conn.prepare_cached("SELECT min(class) FROM entry WHERE class > ?1")?;
-    let mut classes: Vec<String> = Vec::new();
-    loop {
-        let last = classes.last().map_or("", String::as_str);
-        let class: Option<String> = next.query_row([last], |row| row.get(0))?;
-        let Some(class) = class else { return Ok(classes) };
-        classes.push(class);
+    distinct(conn, "SELECT min(class) FROM entry WHERE class > ?1", usize::MAX)
+}
+
+/// The first `most` tags.
+pub(super) fn tags(conn: &Connection, most: usize) -> Result<Vec<String>> {
+    distinct(conn, "SELECT min(tag) FROM entry_tag WHERE tag > ?1", most)
+}
+
+/// The first `most` values of an indexed column, each found by the index from the one before.
+fn distinct(conn: &Connection, next: &str, most: usize) -> Result<Vec<String>> {
+    let mut next = conn.prepare_cached(next)?;
+    let mut values: Vec<String> = Vec::new();
+    while values.len() < most {
+        let last = values.last().map_or("", String::as_str);
+        let value: Option<String> = next.query_row([last], |row| row.get(0))?;
+        let Some(value) = value else { break };
+        values.push(value);
     }
+    Ok(values)
 }
 
 /// All conditions, by the index of the one that lets the fewest through.
