@@ -123,3 +123,44 @@ fn nothing_slips_into_the_mannequin() {
         assert!(hit.is_some_and(|hit| hit.point.xyz.z > 0.0), "the torso's front: {hit:?}");
     }
 }
+
+/// A square sheet of two by two metres with hills and valleys, facing +z.
+fn relief(cells: u32) -> Mesh {
+    let mut mesh = Mesh::default();
+    let across = cells + 1;
+    for (j, i) in (0..across).flat_map(|j| (0..across).map(move |i| (j, i))) {
+        let [x, y] = [i, j].map(|n| 2.0 * f64::from(n) / f64::from(cells) - 1.0);
+        mesh.vertices.push(DVec3::new(x, y, 0.05 * (37.0 * x).sin() * (23.0 * y + x).cos()));
+    }
+    for (j, i) in (0..cells).flat_map(|j| (0..cells).map(move |i| (j, i))) {
+        let a = j * across + i;
+        let [b, c, d] = [a + 1, a + across + 1, a + across];
+        mesh.facets.extend([[a, b, c], [a, c, d]]);
+    }
+    mesh
+}
+
+#[test]
+fn on_ten_million_facets() {
+    let mesh = relief(2237);
+    assert!(mesh.facets.len() > 10_000_000);
+    let origin = Point::new(0.3, -0.2, 8.0);
+    let towards = |n: u32| {
+        // Every third aims at a corner of the mesh, the others between them.
+        let at = mesh.vertices[(n as usize * 78_643) % mesh.vertices.len()];
+        let aside = if n.is_multiple_of(3) { 0.0 } else { 3.1e-4 };
+        origin.towards((at + DVec3::new(aside, 0.7 * aside, 0.0)).into()).unwrap()
+    };
+    let rays: Vec<_> = (0..64).map(|n| Ray { origin, direction: towards(n) }).collect();
+    let fast = traced(&mesh, &rays);
+    let slow = Tracer::Brute.closest(&Bvh::new(&mesh), &rays).unwrap();
+    assert!(slow.iter().flatten().count() > 60);
+    for (ray, (fast, slow)) in fast.iter().zip(&slow).enumerate() {
+        let range_m = |hit: &Option<Hit>| hit.map_or(f64::INFINITY, |hit| hit.range_m);
+        let [fast_m, slow_m] = [range_m(fast), range_m(slow)];
+        assert!(
+            fast_m == slow_m || (fast_m - slow_m).abs() < RANGE * slow_m,
+            "ray {ray}: {fast:?} is not {slow:?}"
+        );
+    }
+}

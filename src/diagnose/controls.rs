@@ -57,7 +57,8 @@ fn spline(selection: &Selection, base: &State, numbers: usize) -> Option<Control
     let laws = selection.problem.mean_slopes(&base.space, &base.fitted.at);
     let mut best: Option<Control> = None;
     for covariate in &mut all {
-        covariate.cells = numbers.max(2);
+        // One number more than these is the level, which the laws absorb.
+        covariate.cells = numbers.max(1);
         let field = Field::spline(problem.looks, std::slice::from_ref(covariate));
         let structure = field.structure(problem, &prediction, &laws, selection.folds);
         let [held_out_gain, held_out_se] = structure.gain;
@@ -94,8 +95,15 @@ struct Bench<'a> {
     base: &'a State<'a>,
 }
 
-/// An effect of one strength: its size, dB, and the point.
+/// An effect of one strength: its size as put in, dB, and the point.
 type Rung = (f64, DVector<f64>);
+
+/// What came of looking for an effect.
+struct Search {
+    is_found: bool,
+    /// What the effect left to be seen once the laws had taken their part of it, dB.
+    size_db: f64,
+}
 
 impl Bench<'_> {
     fn power(&self, effect: &dyn Effect) -> Power {
@@ -104,12 +112,13 @@ impl Bench<'_> {
         // What is found is found when stronger, too.
         let (mut missed, mut found) = (None, None);
         let mut open: &[Rung] = &rungs;
-        while let Some((size_db, at)) = open.get(open.len() / 2) {
+        while let Some((_, at)) = open.get(open.len() / 2) {
             let (weaker, stronger) = open.split_at(open.len() / 2);
-            if self.is_found(effect, tried, at) {
-                (found, open) = (Some(*size_db), weaker);
+            let Search { is_found, size_db } = self.search(effect, tried, at);
+            if is_found {
+                (found, open) = (Some(size_db), weaker);
             } else {
-                (missed, open) = (Some(*size_db), stronger.get(1..).unwrap_or_default());
+                (missed, open) = (Some(size_db), stronger.get(1..).unwrap_or_default());
             }
         }
         Power { name: effect.name(), least_db: found, missed_db: missed }
@@ -126,18 +135,21 @@ impl Bench<'_> {
         let joined = |values: &Vec<f64>| Space::joined(&base.fitted.at, effect, values);
         let scaled = |values: &Vec<f64>, scale: f64| joined(&scaled(effect, values, scale));
         let points: Vec<DVector<f64>> = if starts.iter().any(|start| is_far(effect, start)) {
-            starts.iter().map(joined).collect()
+            starts.iter().flat_map(|start| stronger(effect, start)).map(|at| joined(&at)).collect()
         } else {
             let promised = starts.iter().filter_map(|start| {
                 let [information, size_db] = screen.felt(&space, &scaled(start, 1.0));
                 let gain_of_unit = 0.5 * selection.sample.weight * information;
                 let scale = (self.least_gain(effect) / gain_of_unit).sqrt();
-                let is_felt = size_db > 0.0 && is_possible(effect, start, scale);
-                is_felt.then_some((scale * size_db, scale, start))
+                // As strong as its bounds allow is as strong as it can be missed.
+                let most = most_scale(effect, start);
+                let is_felt = size_db > 0.0 && most > 0.0 && scale.is_finite();
+                is_felt.then_some((scale.min(most) * size_db, scale, start))
             });
             let best = promised.min_by(|a, b| a.0.total_cmp(&b.0));
             let about = |(_, scale, start): (f64, f64, &Vec<f64>)| {
-                SCALES.map(|times| scaled(start, times * scale)).to_vec()
+                let most = most_scale(effect, start);
+                SCALES.map(|times| scaled(start, (times * scale).min(most))).to_vec()
             };
             best.map(about).unwrap_or_default()
         };
@@ -150,6 +162,7 @@ impl Bench<'_> {
         let is_felt = |(size_db, _): &Rung| *size_db > LEAST_RUNG_DB;
         let mut rungs: Vec<Rung> = sized.filter(is_felt).collect();
         rungs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        rungs.dedup_by(|a, b| a.1 == b.1);
         rungs
     }
 
@@ -157,13 +170,13 @@ impl Bench<'_> {
         self.selection.settings.least_gain_of(effect.knobs().len(), 1)
     }
 
-    /// Whether an effect that would be looked for from so many starts is found again in data drawn with
-    /// it. The search begins where the effect was put in: it tells what the data hold, not whether a search
-    /// from afar would get there.
-    fn is_found(&self, effect: &dyn Effect, tried: usize, at: &DVector<f64>) -> bool {
+    /// Looks for an effect, as if from so many starts, in data drawn with it. The search begins where the effect
+    /// was put in: it tells what the data hold, not whether a search from afar would get there.
+    fn search(&self, effect: &dyn Effect, tried: usize, at: &DVector<f64>) -> Search {
         let State { space: bare, fitted, .. } = self.base;
         let with = bare.with(effect);
-        let drawn = self.drawn(&self.problem.predict(&with, at));
+        let truth = self.problem.predict(&with, at);
+        let drawn = self.drawn(&truth);
         let problem = Problem { observations: &drawn, ..self.problem };
         let before = problem.fit(bare, &fitted.at, &[], &SCOUT);
         let after = problem.fit(&with, at, &[], &SCOUT);
@@ -173,14 +186,15 @@ impl Bench<'_> {
         let predicted = [(bare, &before.at), (&with, &after.at)];
         let [now, then] = predicted.map(|(space, at)| problem.predict(space, at));
         let is_large = larger(sizes_db(&problem, &now, &then)) >= settings.least_size_db;
+        let size_db = larger(sizes_db(&problem, &now, &truth));
         if gain < settings.least_gain_of(effect.knobs().len(), tried) || !is_large {
-            return false;
+            return Search { is_found: false, size_db };
         }
         let selection = Selection { problem, sample, folds: self.folds, settings, hear };
         let [without, with] = predicted.map(|(space, at)| selection.held_out(space, at));
         let [held_out, se] = selection.difference(&with, &without);
         let [held_out, se] = [sample.weight * held_out, sample.weight.sqrt() * se];
-        held_out.min(gain) > settings.standard_errors * se
+        Search { is_found: held_out.min(gain) > settings.standard_errors * se, size_db }
     }
 
     /// Data as a prediction draws them.
@@ -220,6 +234,8 @@ const MOST_STARTS: usize = 12;
 const LEAST_RUNG_DB: f64 = 0.05;
 /// Strengths, in those that a score test would just see.
 const SCALES: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];
+/// Steps of a number beyond where a search for it begins.
+const STEPS: [f64; 4] = [0.0, 2.0, 5.0, 10.0];
 /// Steps from where an effect is absent beyond which no line leads there: a level or a number of looks
 /// whose end stands for none.
 const FAR_STEPS: f64 = 30.0;
@@ -229,10 +245,31 @@ fn is_far(effect: &dyn Effect, values: &[f64]) -> bool {
     first.is_some_and(|(knob, value)| (value - knob.absent).abs() > FAR_STEPS * knob.step)
 }
 
-/// Whether an effect so many times as strong lies within its bounds.
-fn is_possible(effect: &dyn Effect, values: &[f64], scale: f64) -> bool {
-    let wanted = scaled(effect, values, scale);
-    effect.knobs().iter().zip(wanted).all(|(knob, value)| value >= knob.min && value <= knob.max)
+/// The effect at a start, and ever further from where it is absent, within its bounds.
+fn stronger(effect: &dyn Effect, start: &[f64]) -> Vec<Vec<f64>> {
+    let Some((knob, value)) = effect.knobs().iter().zip(start).next() else { return Vec::new() };
+    let away = knob.step.copysign(value - knob.absent);
+    let at = |steps: f64| {
+        let mut at = start.to_vec();
+        at[0] = (value + steps * away).clamp(knob.min, knob.max);
+        at
+    };
+    STEPS.map(at).to_vec()
+}
+
+/// The most times as strong that an effect can be within its bounds; 0 where the start itself is beyond them.
+fn most_scale(effect: &dyn Effect, values: &[f64]) -> f64 {
+    let once = scaled(effect, values, 1.0);
+    let most = effect.knobs().iter().zip(once).enumerate().map(|(index, (knob, value))| {
+        let change = value - knob.absent;
+        match (index == 0 || values[index] == knob.absent, change) {
+            _ if value < knob.min || value > knob.max => 0.0,
+            (false, _) | (true, 0.0) => f64::INFINITY,
+            (true, up) if up > 0.0 => (knob.max - knob.absent) / up,
+            (true, down) => (knob.min - knob.absent) / down,
+        }
+    });
+    most.fold(f64::INFINITY, f64::min)
 }
 
 /// So many times as strong. The first number is the strength and the others a shape, or, where a start is

@@ -65,6 +65,7 @@ const GATE_M: f64 = 0.1;
 pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>, DiagnoseError> {
     let footprints = trace(radar, chirps, stage.bvh, 1, &|_| {})?;
     let places: Vec<_> = chirps.target_points_m(&radar.frames()).collect();
+    let progress = chirps.progress();
     let look = |index: usize| {
         let hit = (*footprints.hits.get(index)?)?;
         let ray = *chirps.rays.get(index)?;
@@ -83,7 +84,7 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>,
             xt_m: place.x,
             yt_m: place.y,
             edge_m: footprints.edge_m.get(index).copied().unwrap_or(0.0),
-            ..missed(chirps, index)?
+            ..missed(chirps, &progress, index)?
         })
     };
     Ok((0..chirps.rays.len()).into_par_iter().filter_map(look).collect())
@@ -95,10 +96,9 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>,
 ///
 /// # Errors
 /// When points have no chirp number and no direction from a common origin, when they lie on the rays of
-/// other chirps than their numbers say, or when more than a quarter is not on the target.
+/// other chirps than their numbers say, when more than a quarter are second ones of their chirps, or is
+/// not on the target.
 pub fn matched(cloud: &Cloud, chirps: &Chirps, looks: &[Look]) -> Result<Matched, DiagnoseError> {
-    let index_of_chirp: HashMap<u32, usize> =
-        looks.iter().enumerate().map(|(index, look)| (look.chirp, index)).collect();
     let is_numbered = cloud.points().iter().all(|point| point.chirp.is_some());
     let directions = Directions::new(chirps);
     let by_direction = match (is_numbered, directions) {
@@ -110,48 +110,93 @@ pub fn matched(cloud: &Cloud, chirps: &Chirps, looks: &[Look]) -> Result<Matched
             None
         }
     };
-    let mut observations = vec![Observation::default(); looks.len()];
+    let numbered = sorted(cloud, chirps, looks, by_direction.as_ref());
+    if numbered.is_of_target(cloud) {
+        return Ok(numbered.matched);
+    }
+    let (matched, points) = (numbered.on_target, cloud.points().len());
+    if numbered.second as f64 > MOST_STRAYS * points as f64 {
+        return Err(DiagnoseError::Repeated { second: numbered.second, points });
+    }
+    // Rows that somebody counted are no chirps of the scan.
+    let directions = if is_numbered { Directions::new(chirps) } else { None };
+    let placed = directions.map(|by| sorted(cloud, chirps, looks, Some(&by)));
+    match placed.filter(|placed| placed.is_of_target(cloud)) {
+        Some(placed) => Err(DiagnoseError::Strange { placed: placed.on_target, matched, points }),
+        None => Err(DiagnoseError::Elsewhere { matched, points }),
+    }
+}
+
+/// A cloud sorted by looks, and how well that went.
+struct Sorted {
+    matched: Matched,
+    /// Detections on the target, one of a chirp.
+    on_target: usize,
+    /// Further ones of chirps that have one.
+    second: usize,
+}
+
+impl Sorted {
+    fn is_of_target(&self, cloud: &Cloud) -> bool {
+        let points = cloud.points().len();
+        (points - self.on_target) as f64 <= MOST_STRAYS * points as f64
+    }
+}
+
+/// Gives points to chirps by their directions, or by their numbers.
+fn sorted(
+    cloud: &Cloud,
+    chirps: &Chirps,
+    looks: &[Look],
+    by_direction: Option<&Directions>,
+) -> Sorted {
+    let index_of_chirp: HashMap<u32, usize> =
+        looks.iter().enumerate().map(|(index, look)| (look.chirp, index)).collect();
     let index_of_sent: HashMap<u32, usize> = chirps.number.iter().copied().zip(0..).collect();
-    let (mut strays, mut on_target) = (Vec::new(), 0);
+    let progress = chirps.progress();
+    let mut observations = vec![Observation::default(); looks.len()];
+    let (mut strays, mut on_target, mut second) = (Vec::new(), 0, 0);
     for point in cloud.points() {
-        let chirp = point.chirp.or_else(|| by_direction.as_ref()?.chirp(chirps, point.point));
+        let chirp = match by_direction {
+            Some(directions) => directions.chirp(chirps, point.point),
+            None => point.chirp,
+        };
         let index = chirp.and_then(|chirp| index_of_chirp.get(&chirp).copied());
         let seen = index.and_then(|index| Some((looks.get(index)?, observations.get_mut(index)?)));
         match seen {
             None => {
                 let sent = chirp.and_then(|chirp| index_of_sent.get(&chirp).copied());
-                let look = sent.and_then(|index| missed(chirps, index));
+                let look = sent.and_then(|index| missed(chirps, &progress, index));
                 let range_m = look.map_or(0.0, |look| range_m(point, &look));
                 strays.push(Stray { look, range_m });
             }
-            Some((look, observation))
-                if off_m(point, look) <= GATE_M && observation.power_w.is_none() =>
-            {
-                on_target += 1;
-                let range_m = Some(range_m(point, look));
-                let power_w = Some(watts_from_dbm(point.power_dbm));
-                *observation = Observation { power_w, range_m };
-            }
-            Some((look, _)) => {
-                strays.push(Stray { look: Some(*look), range_m: range_m(point, look) });
+            Some((look, observation)) => {
+                let range_m = range_m(point, look);
+                match (off_m(point, look) <= GATE_M, observation.power_w) {
+                    (true, None) => {
+                        on_target += 1;
+                        let power_w = Some(watts_from_dbm(point.power_dbm));
+                        *observation = Observation { power_w, range_m: Some(range_m) };
+                    }
+                    (is_near, _) => {
+                        second += usize::from(is_near);
+                        strays.push(Stray { look: Some(*look), range_m });
+                    }
+                }
             }
         }
     }
-    let (matched, points) = (on_target, cloud.points().len());
-    match (points - matched) as f64 > MOST_STRAYS * points as f64 {
-        true => Err(DiagnoseError::Elsewhere { matched, points }),
-        false => Ok(Matched { observations, strays }),
-    }
+    Sorted { matched: Matched { observations, strays }, on_target, second }
 }
 
 /// The look of a chirp that meets nothing.
-fn missed(chirps: &Chirps, index: usize) -> Option<Look> {
+fn missed(chirps: &Chirps, progress: &[f64], index: usize) -> Option<Look> {
     let ray = *chirps.rays.get(index)?;
     let hit = Hit { facet: u32::MAX, range_m: 0.0, point: ray.origin, cos_theta: 1.0 };
     Some(Look {
         chirp: *chirps.number.get(index)?,
         time_s: chirps.time_s.get(index).copied().unwrap_or(0.0),
-        progress: chirps.progress(index),
+        progress: *progress.get(index)?,
         ray,
         hit,
         normal: -ray.direction.xyz(),

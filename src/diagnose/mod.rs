@@ -173,6 +173,30 @@ pub enum DiagnoseError {
         /// How much too high their numbers are.
         off: i64,
     },
+    /// Chirp numbers that are not those of the scan.
+    #[error(
+        "by their chirp numbers {matched} of the cloud's {points} points lie on the target, and by their \
+         directions {placed}: the numbers are not those of the scene's scan; leave the column `chirp` out"
+    )]
+    Strange {
+        /// Points on the target when directions tell their chirps.
+        placed: usize,
+        /// Points on the target when their numbers do.
+        matched: usize,
+        /// Points.
+        points: usize,
+    },
+    /// Several detections of each chirp.
+    #[error(
+        "{second} of the cloud's {points} points are further ones of chirps that have one on the target \
+         already; keep one point of each chirp"
+    )]
+    Repeated {
+        /// Points of chirps that have one.
+        second: usize,
+        /// Points.
+        points: usize,
+    },
     /// A cloud of something else.
     #[error(
         "{matched} of the cloud's {points} points lie where the scan meets the mesh; check the scene, \
@@ -196,6 +220,15 @@ pub enum DiagnoseError {
         detected: usize,
         /// As declared, dBm.
         threshold_dbm: f64,
+    },
+    /// Effects that go with time, of a scan that does not tell it.
+    #[error(
+        "the scan of the scene has no times, and {effects} cannot be told without; give its chirps a column \
+         `time_s`"
+    )]
+    Untimed {
+        /// Their names.
+        effects: String,
     },
     /// A law that fits nowhere.
     #[error(
@@ -272,6 +305,7 @@ impl Diagnosis {
         let Subject { looks, observations, strays, .. } = *subject;
         let folds = Folds::new(looks, self.block_m, self.folds, self.seed);
         check(subject, &folds)?;
+        check_times(looks, effects)?;
         let traced = &Traced::default();
         let problem = Problem { stage, looks, observations, declared, receiver, traced };
         let sample = &Sample::new(&problem);
@@ -279,12 +313,16 @@ impl Diagnosis {
         hear("refitting the base laws");
         let base = selection.base(Space::new(&problem, laws, at_work)?);
         let (before, z_before) = (base.held_out.clone(), self.z(&problem, &base));
-        let (wild, all) = (residual::wild(&z_before), looks.len());
+        // Whether the target is another one is judged with much speckle: to find that there is some is
+        // the task of an effect.
+        let wide = Problem { receiver: select::wide(receiver), ..problem };
+        let (wild, all) = (residual::wild(&self.z(&wide, &base)), looks.len());
         if wild as f64 > MOST_WILD * all as f64 {
             return Err(DiagnoseError::Unlike { wild, looks: all });
         }
         let Selected { state, ranking, added, structure } = selection.run(base.clone(), effects);
-        let numbers = ranking.first().map_or(1, |candidate| candidate.numbers);
+        let first = ranking.iter().find(|candidate| candidate.accepted).or(ranking.first());
+        let numbers = first.map_or(1, |candidate| candidate.numbers);
         hear("controls");
         let controls = controls::controls(&selection, &base, effects, numbers);
         let z_after = self.z(&problem, &state);
@@ -434,6 +472,18 @@ fn check(subject: &Subject, folds: &Folds) -> Result<(), DiagnoseError> {
     }
 }
 
+fn check_times(looks: &[Look], effects: &[&dyn Effect]) -> Result<(), DiagnoseError> {
+    if looks.windows(2).any(|pair| pair[0].time_s != pair[1].time_s) {
+        return Ok(());
+    }
+    let untold = effects.iter().filter(|effect| effect.goes_with_time());
+    let untold: Vec<&str> = untold.map(|effect| effect.name()).collect();
+    match untold.is_empty() {
+        true => Ok(()),
+        false => Err(DiagnoseError::Untimed { effects: untold.join(" and ") }),
+    }
+}
+
 fn values(
     problem: &Problem,
     state: &select::State,
@@ -467,7 +517,8 @@ fn before_after(before: Errors, after: Errors, folds: &Folds) -> BeforeAfter {
     let noise_floor_db = after.noise_floor_db;
     let excess = before.rmse_db.powi(2) - noise_floor_db.powi(2);
     let removed = before.rmse_db.powi(2) - after.rmse_db.powi(2);
-    let explained_share = (excess > 0.0).then_some(removed / excess);
+    let is_above = before.rmse_db > score::AT_THE_FLOOR * noise_floor_db;
+    let explained_share = is_above.then_some(removed / excess);
     let Folds { folds, blocks, .. } = *folds;
     BeforeAfter { before, after, noise_floor_db, explained_share, folds, blocks, held_out: true }
 }

@@ -166,7 +166,7 @@ pub struct Base {
 pub struct Power {
     /// Effect.
     pub name: &'static str,
-    /// The smallest size, dB as put in, that was found; none where none was.
+    /// The smallest size, dB left when the laws are refitted, that was found; none where none was.
     pub least_db: Option<f64>,
     /// The largest size below it, dB, that was not found; none where all were.
     pub missed_db: Option<f64>,
@@ -175,8 +175,8 @@ pub struct Power {
 /// What the answer is to be held against.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Controls {
-    /// Largest held-out gain in ln p, and its standard error, of a random smooth field with as many
-    /// numbers as the best effect.
+    /// Held-out gain in ln p, and its standard error, of a random smooth field with as many numbers as the
+    /// first effect that was added, or else as the one that gained most.
     pub placebo: Option<Control>,
     /// The same of a spline over the best covariate.
     pub equal_df_spline: Option<Control>,

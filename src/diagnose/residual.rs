@@ -3,7 +3,7 @@
 //!
 //! A detected look has u = F(y), a censored one u uniform below F(T), and z = Φ⁻¹(u) is standard normal
 //! if the model is right (Dunn & Smyth 1996, DOI 10.1080/10618600.1996.10474708). The mean of z² − 1 is
-//! binned over each covariate; Q = Σ n·(mean)² is compared with its law under random signs of whole
+//! looked at as a whole and, less that, binned over each covariate; Q = Σ n·(mean)² is compared with its law under random signs of whole
 //! patches, which keeps whatever neighbouring looks share. A patch whose looks all lean to one side
 //! cannot be told so: maps are therefore of cells larger than a patch. Every strength must reach a
 //! declared size, too: with thousands of looks everything is significant. The means themselves are
@@ -37,13 +37,16 @@ const OUTLYING_DB: f64 = 10.0;
 const LOPSIDED: f64 = 0.2;
 const LOPSIDED_REACH: f64 = 3.5;
 const LOPSIDED_BY_CHANCE: f64 = 1e-6;
+/// The scatter as a covariate of its own, and the beginning of the scatter over others.
+const SPREAD: &str = "spread";
 /// Side of a cell of the map, in patches.
 const MAP_CELL: f64 = 2.0;
 
 /// Structure that a model leaves.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Unexplained {
-    /// What it goes with; `spread over …` where the scatter and not the level does.
+    /// What it goes with; `spread` where the scatter is another one everywhere, `spread over …` where it, and not
+    /// the level, goes with something.
     pub covariate: String,
     /// Root mean square over the looks of what goes with it, beyond chance, dB.
     pub strength_db: f64,
@@ -97,14 +100,20 @@ impl Tests {
         folds: &Folds,
     ) -> Vec<Unexplained> {
         // A spread s times the declared one has z² of mean s²: half of the excess is that of s.
-        let squares: Vec<f64> = z.iter().map(|z| z * z - 1.0).collect();
+        let whole: Vec<f64> = z.iter().map(|z| z * z - 1.0).collect();
+        let mean = whole.iter().sum::<f64>() / whole.len().max(1) as f64;
+        // What all looks have alike is not said of every covariate again.
+        let centred: Vec<f64> = whole.iter().map(|square| square - mean).collect();
         let bins = self.bins(looks, covariates);
         let limit = self.family_error / (bins.len() as f64).max(1.0);
         let sd_db = speckle_sd_db(prediction.receiver.looks);
         let found = bins.iter().zip(0..).filter_map(|((name, bin), number)| {
-            let (excess, p_value) = self.test(&squares, bin, folds, number);
+            let (squares, covariate) = match name {
+                None => (&whole, SPREAD.to_owned()),
+                Some(name) => (&centred, format!("{SPREAD} over {name}")),
+            };
+            let (excess, p_value) = self.test(squares, bin, folds, number);
             let strength_db = 0.5 * sd_db * excess;
-            let covariate = format!("spread over {name}");
             let counts = p_value <= limit && strength_db >= self.least_size_db;
             counts.then_some(Unexplained { covariate, strength_db, p_value })
         });
@@ -149,11 +158,16 @@ impl Tests {
         (excess, (above + 1) as f64 / (self.draws + 1) as f64)
     }
 
-    /// Bin of every look by every covariate.
-    fn bins(&self, looks: &[Look], covariates: &[Covariate]) -> Vec<(&'static str, Vec<usize>)> {
-        let of = |c: &Covariate| (c.name, quantile_bins(&c.values));
+    /// Bin of every look by every covariate, and one for all.
+    fn bins(
+        &self,
+        looks: &[Look],
+        covariates: &[Covariate],
+    ) -> Vec<(Option<&'static str>, Vec<usize>)> {
+        let of = |c: &Covariate| (Some(c.name), quantile_bins(&c.values));
         let mut bins: Vec<_> = covariates.iter().map(of).collect();
-        bins.push(("map", self.map(looks)));
+        bins.push((Some("map"), self.map(looks)));
+        bins.push((None, vec![0; looks.len()]));
         bins
     }
 

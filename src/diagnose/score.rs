@@ -13,6 +13,9 @@ use super::looks::Observation;
 use crate::effects::Prediction;
 use crate::units::dbm_from_watts;
 
+/// Times the noise floor below which an error has no excess to explain a share of.
+pub(super) const AT_THE_FLOOR: f64 = 1.05;
+
 /// dB in one e-fold.
 pub(super) const DB: f64 = 10.0 / std::f64::consts::LN_10;
 

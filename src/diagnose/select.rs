@@ -48,7 +48,8 @@ pub(super) const SAME: f64 = 3.0;
 const SHARE_OF_RIVAL: f64 = 0.9;
 /// Others of each effect that are tried again.
 const MOST_RIVALS: usize = 2;
-/// Looks of a first fit of the base, that is not caught far from the data.
+/// Looks of a first fit of the base, that is not caught far from the data, and of the question whether it
+/// is of the right target at all.
 const WIDE_LOOKS: f64 = 4.0;
 
 /// One effect of one round.
@@ -127,8 +128,7 @@ pub(super) struct Selection<'p> {
 impl Selection<'_> {
     /// The model without effects.
     pub fn base<'a>(&self, space: Space<'a>) -> State<'a> {
-        let Receiver { looks, .. } = self.problem.receiver;
-        let receiver = Receiver { looks: looks.min(WIDE_LOOKS), ..self.problem.receiver };
+        let receiver = wide(self.problem.receiver);
         let wide = Problem { receiver, ..self.sample.problem(&self.problem) };
         let near = wide.fit(&space, &space.start(), &[], &SEARCH).at;
         // The scene's own laws may be right already, as for a cloud without speckle that it rendered.
@@ -179,6 +179,7 @@ impl Selection<'_> {
         self.exchange(&mut state, &mut added);
         self.prune(&mut state, &mut added);
         let mut structure = self.structure(&state);
+        let had_some = !added.is_empty();
         while let Some(least) = smallest(&added)
             && self.is_structured(&structure, 0.0)
             && added[least].evidence.size_db < structure.size_db
@@ -192,6 +193,11 @@ impl Selection<'_> {
             }
             (state, structure) = (without, left);
             added.remove(least);
+        }
+        // What is fitted anew without its effects differs from the base in the last digits.
+        if had_some && added.is_empty() {
+            state = base;
+            structure = self.structure(&state);
         }
         added.iter_mut().for_each(|one| one.class.retain(|name| !state.space.has(name)));
         ranking.iter_mut().for_each(|one| one.accepted &= state.space.has(one.name));
@@ -215,7 +221,9 @@ impl Selection<'_> {
         // Laws that were fitted without the effect may be far from any that go with it.
         let (start, held) = (space.restarted(&fitted.at), space.costly(&fitted.at));
         let again = self.problem.fit(space, &start, &held, &SEARCH);
-        if again.ln_likelihood > fitted.ln_likelihood + SEARCH.tolerance {
+        let gain = again.ln_likelihood - fitted.ln_likelihood;
+        let has_arrived = again.converged && !fitted.converged && gain >= -SEARCH.tolerance;
+        if gain > SEARCH.tolerance || has_arrived {
             fitted = match held.is_empty() {
                 true => again,
                 false => self.problem.fit(space, &again.at, &[], &SCOUT),
@@ -469,6 +477,11 @@ impl Selection<'_> {
         let before = self.problem.predict(&state.space, &state.fitted.at);
         sizes_db(&self.problem, &before, &self.problem.predict(space, at))
     }
+}
+
+/// The receiver with speckle in which nothing of the right target is far off.
+pub(super) fn wide(receiver: Receiver) -> Receiver {
+    Receiver { looks: receiver.looks.min(WIDE_LOOKS), ..receiver }
 }
 
 /// Root mean square change of the means of all detections, and change of the spread, dB.

@@ -45,6 +45,10 @@ impl Effect for Drift {
         [0.5, 1.0, 1.5, 2.0, 3.0].map(|waves| vec![0.3, 0.3, 0.3, waves]).to_vec()
     }
 
+    fn goes_with_time(&self) -> bool {
+        true
+    }
+
     fn gain(&self, values: &[f64], _: &Stage, look: &Look) -> f64 {
         let &[slope_db, sin_db, cos_db, waves] = values else { return 1.0 };
         let (sin, cos) = (TAU * waves * look.progress).sin_cos();

@@ -222,6 +222,11 @@ pub trait Effect: Sync {
     /// miss it, such as places over the target.
     fn starts(&self, stage: &Stage, looks: &[Look]) -> Vec<Vec<f64>>;
 
+    /// Whether it goes with the time of a chirp.
+    fn goes_with_time(&self) -> bool {
+        false
+    }
+
     /// Whether it moves the target, which is where rays are traced anew.
     fn moves(&self) -> bool {
         false

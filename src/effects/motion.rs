@@ -62,6 +62,10 @@ impl Effect for Motion {
         vec![vec![0.0; KNOBS.len()]]
     }
 
+    fn goes_with_time(&self) -> bool {
+        true
+    }
+
     fn moves(&self) -> bool {
         true
     }

@@ -68,6 +68,11 @@ impl Table {
         self.cell(row, column).map(|cell| cell.number()).transpose()
     }
 
+    /// Whether there is such a column.
+    pub fn has(&self, column: &str) -> bool {
+        self.columns.iter().any(|known| known == column)
+    }
+
     /// A finite number that must be there.
     pub fn required_number(&self, row: usize, column: &str) -> Result<f64, FormatError> {
         self.number(row, column)?.ok_or_else(|| {

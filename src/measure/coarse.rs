@@ -44,7 +44,7 @@ pub(super) fn align(
     let mut reach_m = settings.reach_m;
     while aligned.scans < settings.max_scans && !aligned.still {
         let seen: Vec<Seen> =
-            view.traced.scan(&aligned.pose, view.chirps).into_iter().flatten().collect();
+            view.traced.scan(&aligned.pose, &view.chirps).into_iter().flatten().collect();
         let (moved, steps) = align_to(view, settings, &seen, reach_m)?;
         aligned.pose = rigid(&(moved * aligned.pose));
         aligned.scans += 1;

@@ -3,12 +3,14 @@
 //! The mesh itself never moves: rays are carried back into its frame, and hits forward. Of what a tracer
 //! makes of its facets nothing is lost with a new pose.
 
+use std::sync::OnceLock;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::frames::{Global, Pose, Ray};
 use crate::geometry::Mesh;
-use crate::trace::{Bvh, Hit, closest};
+use crate::trace::{Bvh, Fan, Hit};
 
 /// Of more facets than this for each ray a hierarchy is built: a registration scans dozens of poses, and without
 /// one each of them reads all facets.
@@ -18,6 +20,37 @@ const FACETS_PER_RAY: usize = 20;
 pub struct Traced<'a> {
     mesh: &'a Mesh,
     bvh: Bvh<'a>,
+}
+
+/// Rays that a mesh is looked at with, at one pose after another; those of one origin are sorted once.
+pub struct Aims<'a> {
+    rays: &'a [Ray<Global>],
+    fan: OnceLock<Option<Fan<'a>>>,
+}
+
+impl<'a> Aims<'a> {
+    /// Of these rays.
+    pub fn new(rays: &'a [Ray<Global>]) -> Aims<'a> {
+        Aims { rays, fan: OnceLock::new() }
+    }
+
+    /// The rays, in the order of what they see.
+    pub fn rays(&self) -> &'a [Ray<Global>] {
+        self.rays
+    }
+
+    /// What the rays meet when they are carried by a pose.
+    fn closest(&self, bvh: &Bvh, pose: &Pose<Global, Global>) -> Vec<Option<Hit>> {
+        let there: Vec<Ray<Global>> = self.rays.iter().map(|ray| carried(pose, ray)).collect();
+        let is_flat = bvh.mesh().facets.len() <= FACETS_PER_RAY * self.rays.len();
+        let fan = is_flat
+            .then(|| self.fan.get_or_init(|| Fan::new(self.rays).ok()))
+            .and_then(Option::as_ref);
+        match fan.and_then(|fan| fan.carried(&there, pose)) {
+            Some(fan) => fan.closest(bvh.mesh()),
+            None => there.par_iter().map(|ray| bvh.closest(ray)).collect(),
+        }
+    }
 }
 
 /// Where a ray meets the mesh at a pose.
@@ -50,16 +83,11 @@ impl<'a> Traced<'a> {
     }
 
     /// Where each of many rays meets the mesh moved by `pose`, in their order.
-    pub fn scan(&self, pose: &Pose<Global, Global>, rays: &[Ray<Global>]) -> Vec<Option<Seen>> {
+    pub fn scan(&self, pose: &Pose<Global, Global>, aims: &Aims) -> Vec<Option<Seen>> {
         const RAYS_PER_TASK: usize = 256;
-        let back = pose.inverse();
-        let there: Vec<Ray<Global>> = rays.iter().map(|ray| carried(&back, ray)).collect();
-        let hits = match self.mesh.facets.len() > FACETS_PER_RAY * rays.len() {
-            true => there.par_iter().map(|ray| self.bvh.closest(ray)).collect(),
-            false => closest(&self.bvh, &there),
-        };
+        let hits = aims.closest(&self.bvh, &pose.inverse());
         let seen = |(ray, hit): (&Ray<Global>, Option<Hit>)| Some(self.seen(pose, ray, hit?));
-        rays.par_iter().zip(hits).with_min_len(RAYS_PER_TASK).map(seen).collect()
+        aims.rays.par_iter().zip(hits).with_min_len(RAYS_PER_TASK).map(seen).collect()
     }
 
     /// A hit of the mesh where it is stored, there where the pose has it.
@@ -110,7 +138,7 @@ mod tests {
             let towards = |ray| Ray { origin, direction: origin.towards(aim(ray)).unwrap() };
             let rays: Vec<Ray<Global>> = (0..count).map(towards).collect();
             let traced = Traced::new(&mesh);
-            let seen = traced.scan(&pose, &rays);
+            let seen = traced.scan(&pose, &Aims::new(&rays));
             assert_eq!(traced.bvh.is_built(), count == 3);
             for (ray, seen) in rays.iter().zip(seen) {
                 let (seen, alone) = (seen.unwrap(), traced.look(&pose, ray).unwrap());

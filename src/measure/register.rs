@@ -13,6 +13,7 @@ use thiserror::Error;
 use super::cloud::Cloud;
 use super::coarse::{self, Aligned};
 use super::icp::{Gap, Kernel, Motion, NormalEquations, bulk_sd_m, rigid};
+use super::sights::sights;
 use super::start::{self, Start};
 use super::uncertainty::{Uncertainty, uncertainty};
 use super::view::{RayGap, View};
@@ -250,7 +251,8 @@ impl Registration {
         if points < self.least_points {
             return Err(RegistrationError::TooFew { points, least: self.least_points });
         }
-        let view = View::new(mesh, radar, chirps, cloud)?;
+        let sights = sights(cloud, radar, chirps)?;
+        let view = View::new(mesh, &chirps.rays, cloud, &sights);
         let rough = start::rough(&view, self)?;
         let along_ray = self.metric == Metric::AlongRay;
         let still_m = if along_ray { HAND_OVER_M } else { self.still_m };

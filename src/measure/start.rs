@@ -78,7 +78,7 @@ fn onto_the_cloud(view: &View, mut pose: Pose<Global, Global>) -> Option<Pose<Gl
     // What comes into view changes the middle; it settles soon.
     const SHIFTS: usize = 3;
     for _ in 0..SHIFTS {
-        let seen = view.traced.scan(&pose, view.chirps).into_iter().flatten();
+        let seen = view.traced.scan(&pose, &view.chirps).into_iter().flatten();
         let places: Vec<DVec3> = seen.map(|seen| seen.hit.point.xyz).collect();
         if places.is_empty() {
             return None;

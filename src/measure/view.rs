@@ -4,12 +4,9 @@ use glam::DVec3;
 
 use super::cloud::Cloud;
 use super::icp::Gap;
-use super::placed::{Seen, Traced};
-use super::register::RegistrationError;
-use super::sights::sights;
+use super::placed::{Aims, Seen, Traced};
 use crate::frames::{Global, Pose, Ray};
 use crate::geometry::Mesh;
-use crate::radar::{Chirps, Radar};
 
 /// Surfaces seen at a flatter angle tell no range: cosine of 80°.
 const FLATTEST_COS: f64 = 0.173_648;
@@ -20,8 +17,8 @@ const SIDEWAYS_SHARE: f64 = 0.5;
 /// Mesh, scan and measurement.
 pub(super) struct View<'a> {
     pub traced: Traced<'a>,
-    pub chirps: &'a [Ray<Global>],
-    pub sights: Vec<Ray<Global>>,
+    pub chirps: Aims<'a>,
+    pub sights: Aims<'a>,
     pub points: Vec<DVec3>,
     /// Median of the measured points by axis: turns are about it.
     pub pivot: DVec3,
@@ -30,20 +27,21 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> View<'a> {
+    /// `sights` are the rays of the cloud's points.
     pub fn new(
         mesh: &'a Mesh,
-        radar: &Radar,
-        chirps: &'a Chirps,
+        chirps: &'a [Ray<Global>],
         cloud: &Cloud,
-    ) -> Result<View<'a>, RegistrationError> {
-        let sights = sights(cloud, radar, chirps)?;
+        sights: &'a [Ray<Global>],
+    ) -> View<'a> {
         let points: Vec<DVec3> = cloud.points().iter().map(|point| point.point.xyz).collect();
         let pivot = median_point(&points);
         // A thousandth of a spot: only coinciding points are nearer, and a length divides.
         const LEAST_M: f64 = 1e-5;
         let length_m = median(points.iter().map(|p| p.distance(pivot))).max(LEAST_M);
         let traced = Traced::new(mesh);
-        Ok(View { traced, chirps: &chirps.rays, sights, points, pivot, length_m })
+        let (chirps, sights) = (Aims::new(chirps), Aims::new(sights));
+        View { traced, chirps, sights, points, pivot, length_m }
     }
 
     /// Gaps along the measured rays, one per point; `None` where the ray misses, is too flat, or
@@ -62,7 +60,7 @@ impl<'a> View<'a> {
             let gap = Gap { at: hit.point.xyz, gradient, size_m: range_error_m / steep };
             Some(RayGap { gap, range_error_m })
         };
-        seen.iter().zip(&self.sights).zip(&self.points).map(gap).collect()
+        seen.iter().zip(self.sights.rays()).zip(&self.points).map(gap).collect()
     }
 }
 

@@ -45,6 +45,7 @@ pub(super) struct Acting<'a> {
     middle: DVec3,
     /// Where the ray of every chirp passes 8 m in the target frame, m.
     places: Vec<DVec2>,
+    progress: Vec<f64>,
     receiver: Receiver,
 }
 
@@ -63,6 +64,7 @@ impl<'a> Acting<'a> {
             grain_of_region: setup.surfaces.iter().map(|surface| surface.grain).collect(),
             middle: DVec3::ZERO,
             places: setup.chirps.target_points_m(&setup.radar.frames()).collect(),
+            progress: setup.chirps.progress(),
             receiver: model.received(),
         };
         acting.middle = middle(&acting.looks());
@@ -209,7 +211,7 @@ impl<'a> Acting<'a> {
         Look {
             chirp: chirps.number[chirp],
             time_s: chirps.time_s[chirp],
-            progress: chirps.progress(chirp),
+            progress: self.progress[chirp],
             ray,
             hit: Hit {
                 facet: NOWHERE,

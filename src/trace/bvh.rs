@@ -1,46 +1,28 @@
-//! Bounding volume hierarchy by `obvhs`: boxes in f32, the decision in f64.
-//!
-//! The library's own triangle tests lose rays on shared edges; ours is in `facet.rs`.
+//! A hierarchy of boxes over a mesh, for any ray: f32 finds, f64 decides.
 
 use std::sync::OnceLock;
-use std::time::Duration;
-
-use glam::{DVec3, Vec3A};
-use obvhs::BvhBuildParams;
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
-use obvhs::ray::{Ray as BoxRay, RayHit};
 
 use super::Hit;
-use super::facet::{Line, met};
+use super::boxes::Boxes;
+use super::eightfold::Eightfold;
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
-
-/// Boxes are grown by this share of the mesh's radius, some eighty times the rounding of f32.
-const PADDING: f64 = 1e-5;
 
 /// A hierarchy over one mesh, built when the first ray asks for it.
 pub struct Bvh<'a> {
     mesh: &'a Mesh,
     /// The facets that it holds; none for all that have an area.
     only: Option<Vec<u32>>,
+    /// What a graphics processor takes.
     boxes: OnceLock<Boxes>,
-}
-
-/// The boxes, in f32 and from the centre of a sphere around the facets.
-pub(super) struct Boxes {
-    pub(super) tree: Bvh2,
-    /// Facet of each leaf entry.
-    pub(super) facets: Vec<u32>,
-    pub(super) centre: DVec3,
-    pub(super) radius_m: f64,
+    /// What the processor walks through.
+    eightfold: OnceLock<Eightfold>,
 }
 
 impl<'a> Bvh<'a> {
     /// A hierarchy over all facets that have an area.
     pub fn new(mesh: &'a Mesh) -> Bvh<'a> {
-        Bvh { mesh, only: None, boxes: OnceLock::new() }
+        Bvh { mesh, only: None, boxes: OnceLock::new(), eightfold: OnceLock::new() }
     }
 
     /// The same over some facets, which must have an area.
@@ -55,92 +37,39 @@ impl<'a> Bvh<'a> {
 
     /// Whether a ray has asked for it yet.
     pub fn is_built(&self) -> bool {
-        self.boxes.get().is_some()
+        self.eightfold.get().is_some() || self.boxes.get().is_some()
     }
 
     /// The closest hit of one ray; of equally near facets the one with the smallest number.
     pub fn closest(&self, ray: &Ray<Global>) -> Option<Hit> {
-        self.boxes().closest(self.mesh, ray)
-    }
-
-    /// The hierarchy itself, which is built if it is not yet.
-    pub(super) fn boxes(&self) -> &Boxes {
-        self.boxes.get_or_init(|| {
-            let live = |&facet: &u32| !self.mesh.is_degenerate(facet as usize);
-            let all = || (0..self.mesh.facets.len() as u32).filter(live).collect();
-            Boxes::new(self.mesh, self.only.clone().unwrap_or_else(all))
-        })
-    }
-}
-
-impl Boxes {
-    fn new(mesh: &Mesh, facets: Vec<u32>) -> Boxes {
-        let (centre, radius_m) = bounding_sphere(mesh, &facets);
-        let padding = Vec3A::splat((PADDING * radius_m) as f32);
-        let boxes: Vec<Aabb> = facets
-            .iter()
-            .map(|&facet| {
-                let corners = mesh.corners(facet as usize).map(|c| (c - centre).as_vec3a());
-                let tight = Aabb::from_points(&corners);
-                Aabb::new(tight.min - padding, tight.max + padding)
-            })
-            .collect();
-        let tree = build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Duration::default());
-        let facets = tree.primitive_indices.iter().map(|&entry| facets[entry as usize]).collect();
-        Boxes { tree, facets, centre, radius_m }
-    }
-
-    fn closest(&self, mesh: &Mesh, ray: &Ray<Global>) -> Option<Hit> {
-        let start_m = self.entry_m(ray)?;
-        let origin = ray.origin.xyz + start_m * ray.direction.xyz() - self.centre;
-        let box_ray = BoxRay::new_inf(origin.as_vec3a(), ray.direction.xyz().as_vec3a());
-        let line = Line::new(ray);
-        let mut best: Option<(f64, u32)> = None;
-        self.tree.ray_traverse(box_ray, &mut RayHit::none(), |_, entry| {
-            let facet = self.facets[entry];
-            if let Some(range_m) = line.crossing_m(mesh, facet as usize)
-                && best.is_none_or(|nearest| (range_m, facet) < nearest)
-            {
-                best = Some((range_m, facet));
-            }
-            // Later boxes are skipped only when they are farther by more than f32 can blur.
-            best.map_or(f32::INFINITY, |(range_m, _)| {
-                (range_m - start_m + 2.0 * PADDING * self.radius_m) as f32
-            })
+        let eightfold = self.eightfold.get_or_init(|| match self.boxes.get() {
+            Some(boxes) => Eightfold::new(self.mesh, boxes),
+            None => Eightfold::new(self.mesh, &self.built()),
         });
-        let (_, facet) = best?;
-        let [hit] = met(mesh, [facet], [ray]);
-        hit
+        eightfold.closest(self.mesh, ray)
     }
 
-    /// Distance at which the ray reaches the sphere around the facets, m; f32 is precise from there.
-    pub(super) fn entry_m(&self, ray: &Ray<Global>) -> Option<f64> {
-        self.entry_beside_m(ray, 0.0)
+    /// The boxes themselves, which are built if they are not yet.
+    pub(super) fn boxes(&self) -> &Boxes {
+        self.boxes.get_or_init(|| self.built())
     }
 
-    /// The same of a sphere that is larger by `beside_m`.
-    pub(super) fn entry_beside_m(&self, ray: &Ray<Global>, beside_m: f64) -> Option<f64> {
-        let to_centre = self.centre - ray.origin.xyz;
-        let along_m = to_centre.dot(ray.direction.xyz());
-        let beside2 = (to_centre - along_m * ray.direction.xyz()).length_squared();
-        let radius_m = (self.radius_m + beside_m) * (1.0 + PADDING);
-        let half_chord_m = (radius_m * radius_m - beside2).max(0.0).sqrt();
-        let reached = beside2 <= radius_m * radius_m && along_m + half_chord_m > 0.0;
-        reached.then(|| (along_m - half_chord_m).max(0.0))
+    fn built(&self) -> Boxes {
+        let live = |&facet: &u32| !self.mesh.is_degenerate(facet as usize);
+        match &self.only {
+            Some(facets) => Boxes::new(self.mesh, facets),
+            None => {
+                let all: Vec<u32> = (0..self.mesh.facets.len() as u32).filter(live).collect();
+                Boxes::new(self.mesh, &all)
+            }
+        }
     }
-}
-
-/// A sphere around the corners of some facets: centre and radius, m.
-fn bounding_sphere(mesh: &Mesh, facets: &[u32]) -> (DVec3, f64) {
-    let corners = || facets.iter().flat_map(|&facet| mesh.corners(facet as usize));
-    let min = corners().fold(DVec3::INFINITY, DVec3::min);
-    let max = corners().fold(DVec3::NEG_INFINITY, DVec3::max);
-    let centre = 0.5 * (min + max);
-    (centre, corners().map(|corner| corner.distance(centre)).fold(0.0, f64::max))
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::frames::Point;
     use crate::trace::brute;

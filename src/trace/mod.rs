@@ -6,8 +6,10 @@
 //! All take any mesh that passes [`Mesh::validate`](crate::geometry::Mesh::validate) and lies within
 //! 100 km, where f32 does its work; facets without area are never hit.
 
+mod boxes;
 pub mod brute;
 mod bvh;
+mod eightfold;
 mod facet;
 mod gpu;
 mod inside;

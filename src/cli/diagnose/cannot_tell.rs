@@ -53,7 +53,7 @@ fn would_help(error: &DiagnoseError) -> &'static str {
         DiagnoseError::Render(_) => {
             "A scene whose target the scan meets: check its place, its unit of length and the scan."
         }
-        DiagnoseError::Misnumbered { .. } => {
+        DiagnoseError::Misnumbered { .. } | DiagnoseError::Strange { .. } => {
             "Chirp numbers as the scan of the scene has them; without the column `chirp` the points are \
              given to their chirps by direction."
         }
@@ -61,11 +61,16 @@ fn would_help(error: &DiagnoseError) -> &'static str {
             "The power below which the radar reports nothing, as `threshold_dbm` under [radar] in the \
              scene, and powers in dBm at the receiver."
         }
+        DiagnoseError::Repeated { .. } => "One detection of each chirp, such as the strongest.",
+        DiagnoseError::Untimed { .. } => {
+            "The time of every chirp, as column `time_s` of the file under [radar.scan]."
+        }
         DiagnoseError::Elsewhere { .. } | DiagnoseError::Unlike { .. } => {
             "The scene that was measured, with the target where it stood: `matdb measure` finds the pose."
         }
-        // What later reasons say of themselves stands in `reason`.
-        _ => "Check the scene against the measurement, and scan more.",
+        DiagnoseError::Fit(_) => {
+            "Materials of the scene with another law, which `matdb fit` writes, to begin from."
+        }
     }
 }
 

@@ -148,6 +148,10 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     let at_work = model(&declared, &scene, cast.used, cast.of_region);
     let at_work = at_work.as_ref().map_or(&[][..], |model| &model.effects);
     let effects = undeclared(effects, at_work, console)?;
+    let effects = match timed(effects, &scene, !args.effects.is_empty(), console) {
+        Ok(effects) => effects,
+        Err(error) => return refuse(error, asked, console),
+    };
     let cloud = match cloud.read(scene.radar()) {
         // That nothing was detected is an answer, too.
         Err(Error::Cloud { error: CloudError::Empty, .. }) => {
@@ -215,6 +219,31 @@ fn undeclared(
     }
     if !known.is_empty() {
         console.notice(&format!("declared already, so at work and not tried: {names}"));
+    }
+    Ok(tried)
+}
+
+/// The effects without those that go with time where the scan has no times; who names these is told why
+/// not.
+fn timed(
+    effects: Vec<&'static dyn Effect>,
+    scene: &Scene,
+    are_named: bool,
+    console: &Console,
+) -> Result<Vec<&'static dyn Effect>, DiagnoseError> {
+    if scene.chirps.is_timed() {
+        return Ok(effects);
+    }
+    let (untold, tried): (Vec<_>, Vec<_>) =
+        effects.into_iter().partition(|effect| effect.goes_with_time());
+    let names: Vec<&str> = untold.iter().map(|effect| effect.name()).collect();
+    let names = names.join(" and ");
+    match (untold.is_empty(), are_named) {
+        (true, _) => {}
+        (false, true) => return Err(DiagnoseError::Untimed { effects: names }),
+        (false, false) => {
+            console.notice(&format!("the scan has no times, so these are not tried: {names}"));
+        }
     }
     Ok(tried)
 }

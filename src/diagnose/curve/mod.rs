@@ -30,6 +30,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use thiserror::Error;
 
+use super::score::AT_THE_FLOOR;
 use super::{SCHEMA, Value, Verdict};
 use crate::brdf::{Brdf, CookTorrance, Distribution, Lambert, Shadowing, Sum};
 use crate::effects::Level;
@@ -373,8 +374,6 @@ fn before_after(
     let floor_db = points.noise.sd_db;
     let above = before.rmse_db.powi(2) - floor_db.powi(2);
     let gone = before.rmse_db.powi(2) - after.rmse_db.powi(2);
-    /// Nearer to the floor than this there is nothing to explain.
-    const AT_THE_FLOOR: f64 = 1.05;
     let explained_share = (before.rmse_db > AT_THE_FLOOR * floor_db).then(|| gone / above);
     CurveBeforeAfter {
         before,

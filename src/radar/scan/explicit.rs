@@ -12,9 +12,9 @@ use crate::radar::mirror::MirrorAngles;
 /// A direction this near to unit length was meant to be one.
 const UNIT_LENGTH: f64 = 1e-6;
 
-/// Reads `chirp,time_s,ox_m,oy_m,oz_m,dx,dy,dz`; the mirror's angles stay empty.
+/// Reads `chirp,ox_m,oy_m,oz_m,dx,dy,dz` and, where it is there, `time_s`; the mirror's angles stay empty.
 pub(super) fn rays(file: &str, bytes: &[u8]) -> Result<Chirps, RadarError> {
-    let columns = ["chirp", "time_s", "ox_m", "oy_m", "oz_m", "dx", "dy", "dz"];
+    let columns = ["chirp", "ox_m", "oy_m", "oz_m", "dx", "dy", "dz"];
     let mut stretched = 0;
     let mut chirps = read(file, bytes, &columns, |table, row, chirps| {
         let vector = |names: [&str; 3]| -> Result<DVec3, FormatError> {
@@ -38,9 +38,9 @@ pub(super) fn rays(file: &str, bytes: &[u8]) -> Result<Chirps, RadarError> {
     Ok(chirps)
 }
 
-/// Reads `chirp,time_s,gamma_rad,phi_rad`; the rays are left for the caller to draw.
+/// Reads `chirp,gamma_rad,phi_rad` and, where it is there, `time_s`; the rays are left for the caller to draw.
 pub(super) fn angles(file: &str, bytes: &[u8]) -> Result<Chirps, RadarError> {
-    let columns = ["chirp", "time_s", "gamma_rad", "phi_rad"];
+    let columns = ["chirp", "gamma_rad", "phi_rad"];
     read(file, bytes, &columns, |table, row, chirps| {
         let gamma_rad = table.required_number(row, "gamma_rad")?;
         let phi_rad = table.required_number(row, "phi_rad")?;
@@ -61,8 +61,9 @@ fn read(
     mut rest: impl FnMut(&Table, usize, &mut Chirps) -> Result<(), FormatError>,
 ) -> Result<Chirps, RadarError> {
     let at = |error| RadarError::Explicit { file: file.to_owned(), error };
-    let table = Table::read(bytes, columns, &[]).map_err(at)?;
+    let table = Table::read(bytes, columns, &["time_s"]).map_err(at)?;
     let mut chirps = Chirps::default();
+    let has_times = table.has("time_s");
     for row in 0..table.len() {
         let number = table.whole_number(row, "chirp").map_err(at)?;
         if i32::try_from(number).is_err() {
@@ -71,7 +72,11 @@ fn read(
             return Err(at(FormatError::at(table.place(row), problem, way_out)));
         }
         chirps.number.push(number);
-        chirps.time_s.push(table.required_number(row, "time_s").map_err(at)?);
+        let time_s = match has_times {
+            true => table.required_number(row, "time_s").map_err(at)?,
+            false => 0.0,
+        };
+        chirps.time_s.push(time_s);
         rest(&table, row, &mut chirps).map_err(at)?;
     }
     if table.is_empty() {
@@ -111,6 +116,16 @@ mod tests {
         let text = "chirp,time_s,gamma_rad,phi_rad\n0,0,0.01,3\n";
         let chirps = angles("angles.csv", text.as_bytes()).unwrap();
         assert_eq!(chirps.mirror, [MirrorAngles { gamma_rad: 0.01, phi_rad: 3.0 }]);
+    }
+
+    #[test]
+    fn a_scan_without_times_has_none() {
+        let timed = rays("rays.csv", RAYS.as_bytes()).unwrap();
+        assert!(timed.is_timed() && timed.progress() == [0.0, 1.0]);
+        let untimed = RAYS.replace("time_s,", "").replace("0.5,", "").replace("0.6,", "");
+        let chirps = rays("rays.csv", untimed.as_bytes()).unwrap();
+        assert!(!chirps.is_timed() && chirps.time_s == [0.0, 0.0]);
+        assert!(refused(&RAYS.replace("0.6,", ",")).contains("line 3, column time_s"));
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub const PATTERN_RANGE_M: f64 = 8.0;
 pub struct Chirps {
     /// Number of the chirp: from 0, or as an explicit file gives it.
     pub number: Vec<u32>,
-    /// Time of the chirp, s.
+    /// Time of the chirp, s; 0 throughout where nobody knows.
     pub time_s: Vec<f64>,
     /// Where it looks.
     pub rays: Vec<Ray<Global>>,
@@ -42,16 +42,26 @@ pub struct Field {
 }
 
 impl Chirps {
-    /// Share of the scan that is over at a chirp, 0 to 1: by time, or by its place where the scan has
-    /// no times.
-    pub fn progress(&self, index: usize) -> f64 {
-        let [first, last] = [self.time_s.first(), self.time_s.last()].map(|t| t.copied());
-        match (first, last, self.time_s.get(index)) {
-            (Some(first), Some(last), Some(time_s)) if last > first => {
-                ((time_s - first) / (last - first)).clamp(0.0, 1.0)
-            }
-            _ => index as f64 / self.rays.len().saturating_sub(1).max(1) as f64,
+    /// Share of the scan that is over at every chirp, 0 to 1: by time, or by its place where no two
+    /// chirps differ in time.
+    ///
+    /// ```
+    /// let chirps = matdb::radar::Chirps { time_s: vec![2.0, 6.0, 5.0], ..Default::default() };
+    /// assert_eq!(chirps.progress(), [0.0, 1.0, 0.75]);
+    /// ```
+    pub fn progress(&self) -> Vec<f64> {
+        let first = self.time_s.iter().copied().fold(f64::INFINITY, f64::min);
+        let last = self.time_s.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        if last > first {
+            return self.time_s.iter().map(|time_s| (time_s - first) / (last - first)).collect();
         }
+        let most = self.rays.len().saturating_sub(1).max(1) as f64;
+        (0..self.rays.len()).map(|index| index as f64 / most).collect()
+    }
+
+    /// Whether chirps differ in time, so that what goes with time can be told.
+    pub fn is_timed(&self) -> bool {
+        self.time_s.windows(2).any(|pair| pair[0] != pair[1])
     }
 
     /// The chirps of a radar's pattern; `read` fetches an explicit pattern's file by its path.

@@ -107,7 +107,7 @@ impl Lit<'_> {
         let mut all = Vec::with_capacity(shares * cones.len());
         in_turns(cones, at_once, launch, |_, flight| {
             let words = gpu.device.land(flight)?;
-            all.extend(words.chunks_exact(3).map(|words| share(words, boxes.radius_m)));
+            all.extend(words.chunks_exact(3).map(|words| share(words, boxes.sphere.radius_m)));
             Ok(())
         })?;
         Ok(all)

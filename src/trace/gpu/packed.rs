@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::echo::Cone;
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
-use crate::trace::bvh::Boxes;
+use crate::trace::boxes::Boxes;
 
 /// Answers of the device beside the number of a leaf entry: the ray meets nothing, or f32 cannot tell what.
 pub(super) const NOTHING: u32 = u32::MAX;
@@ -40,7 +40,7 @@ const LARGEST: f64 = 3.0;
 
 /// All boxes, the root first.
 pub(super) fn nodes(boxes: &Boxes) -> Vec<Node> {
-    let per_m = 1.0 / boxes.radius_m;
+    let per_m = 1.0 / boxes.sphere.radius_m;
     let word = |metres: f32| ((f64::from(metres) * per_m) as f32).to_bits();
     let nodes = boxes.tree.nodes.par_iter().map(|node| {
         let [[x, y, z], [u, v, w]] =
@@ -52,10 +52,10 @@ pub(super) fn nodes(boxes: &Boxes) -> Vec<Node> {
 
 /// The corners of all leaf entries.
 pub(super) fn corners(boxes: &Boxes, mesh: &Mesh) -> Vec<Corners> {
-    let per_m = 1.0 / boxes.radius_m;
+    let per_m = 1.0 / boxes.sphere.radius_m;
     let corners = boxes.facets.par_iter().map(|&facet| {
         let normal = mesh.area_normal(facet as usize).normalize_or_zero().as_vec3();
-        let place = |corner: DVec3| ((corner - boxes.centre) * per_m).as_vec3();
+        let place = |corner: DVec3| ((corner - boxes.sphere.centre) * per_m).as_vec3();
         let [a, b, c] = mesh.corners(facet as usize).map(place);
         [a.extend(normal.x), b.extend(normal.y), c.extend(normal.z)].map(|v| v.to_array())
     });
@@ -69,13 +69,13 @@ pub(super) fn aims(boxes: &Boxes, rays: &[Ray<Global>]) -> Vec<Aim> {
 
 fn aim(boxes: &Boxes, ray: &Ray<Global>) -> Aim {
     let known = |answer| [0, 0, 0, answer, 0, 0, 0, 0];
-    let Some(entry_m) = boxes.entry_m(ray) else { return known(NOTHING) };
-    let (from_centre, direction) = (ray.origin.xyz - boxes.centre, ray.direction.xyz());
-    if from_centre.length() > FARTHEST * boxes.radius_m {
+    let Some(entry_m) = boxes.sphere.entry_m(ray) else { return known(NOTHING) };
+    let (from_centre, direction) = (ray.origin.xyz - boxes.sphere.centre, ray.direction.xyz());
+    if from_centre.length() > FARTHEST * boxes.sphere.radius_m {
         return known(UNSURE);
     }
-    let start_m = (entry_m - RUN_UP * boxes.radius_m).max(0.0);
-    let origin = (from_centre + start_m * direction) / boxes.radius_m;
+    let start_m = (entry_m - RUN_UP * boxes.sphere.radius_m).max(0.0);
+    let origin = (from_centre + start_m * direction) / boxes.sphere.radius_m;
     // Its largest component becomes 1 or -1, exactly.
     let slopes = direction / direction.abs().max_element();
     let ([x, y, z], [u, v, w]) = (words(origin.as_vec3()), words(slopes.as_vec3()));
@@ -94,19 +94,19 @@ fn spot(boxes: &Boxes, cone: &Cone, reach: f64) -> Spot {
         spot
     };
     let Cone { axis, across, law } = cone;
-    let (from_centre, direction) = (axis.origin.xyz - boxes.centre, axis.direction.xyz());
-    let farthest_m = from_centre.length() + boxes.radius_m;
+    let (from_centre, direction) = (axis.origin.xyz - boxes.sphere.centre, axis.direction.xyz());
+    let farthest_m = from_centre.length() + boxes.sphere.radius_m;
     let widest = across.iter().map(|aside| aside.length()).fold(0.0, f64::max);
     let beside_m = reach * widest * farthest_m;
-    let Some(entry_m) = boxes.entry_beside_m(axis, beside_m) else { return known(NOTHING) };
-    let size = 1.0 + 2.0 * beside_m / boxes.radius_m;
-    if from_centre.length() > FARTHEST * boxes.radius_m || size > LARGEST {
+    let Some(entry_m) = boxes.sphere.entry_beside_m(axis, beside_m) else { return known(NOTHING) };
+    let size = 1.0 + 2.0 * beside_m / boxes.sphere.radius_m;
+    if from_centre.length() > FARTHEST * boxes.sphere.radius_m || size > LARGEST {
         return known(UNSURE);
     }
-    let start_m = (entry_m - RUN_UP * boxes.radius_m).max(0.0);
-    let origin = (from_centre + start_m * direction) / boxes.radius_m;
+    let start_m = (entry_m - RUN_UP * boxes.sphere.radius_m).max(0.0);
+    let origin = (from_centre + start_m * direction) / boxes.sphere.radius_m;
     let largest = direction.abs().max_element();
-    let run = (start_m * largest / boxes.radius_m) as f32;
+    let run = (start_m * largest / boxes.sphere.radius_m) as f32;
     let place = |vector: DVec3| words(vector.as_vec3());
     let [x, y, z] = place(origin);
     let [u, v, w] = place(direction / largest);

@@ -23,7 +23,7 @@ pub(super) struct Band<'a> {
 
 impl<'a> Band<'a> {
     pub fn new(picture: &'a Picture, rows: Range<usize>) -> Band<'a> {
-        let [first, end] = [rows.start, rows.end].map(|row| picture.fan.grid.row_start(row));
+        let [first, end] = [rows.start, rows.end].map(|row| picture.fan.sorted.grid.row_start(row));
         let count = end - first + LANES;
         let [low, high] = [(); 2].map(|()| vec![f32::NEG_INFINITY; count]);
         Band { picture, rows, first, low, high, facet: vec![NONE; count] }
@@ -61,7 +61,7 @@ impl<'a> Band<'a> {
     /// Facets in ascending order.
     #[inline(always)]
     fn walk(&mut self, facets: impl Iterator<Item = u32>) {
-        let grid = &self.picture.fan.grid;
+        let grid = &self.picture.fan.sorted.grid;
         for block in blocks(facets) {
             let patches = self.picture.patches(&block);
             let forms = patches.forms(grid);
@@ -90,8 +90,10 @@ impl<'a> Band<'a> {
     /// Notes where a facet is the nearest, for the first `count` rays from a place on; true when f32 cannot tell of some.
     #[inline(always)]
     fn note(&mut self, facet: u32, form: &Form, place: usize, count: usize) -> bool {
-        let (fan, own, count) = (self.picture.fan, place - self.first, count as f32);
-        let (Some(u), Some(v)) = (lanes(&fan.u, place), lanes(&fan.v, place)) else { return false };
+        let (sorted, own, count) = (&self.picture.fan.sorted, place - self.first, count as f32);
+        let (Some(u), Some(v)) = (lanes(&sorted.u, place), lanes(&sorted.v, place)) else {
+            return false;
+        };
         let (Some(low), Some(high), Some(best)) = (
             lanes_mut(&mut self.low, own),
             lanes_mut(&mut self.high, own),
@@ -109,10 +111,10 @@ impl<'a> Band<'a> {
     #[cold]
     #[inline(never)]
     fn settle(&mut self, facet: u32, form: &Form, cells: Cells) {
-        let fan = self.picture.fan;
+        let sorted = &self.picture.fan.sorted;
         for (start, count) in self.blocks(cells) {
             for place in start..start + count.min(LANES) {
-                let (at, own) = ([fan.u[place], fan.v[place]], place - self.first);
+                let (at, own) = ([sorted.u[place], sorted.v[place]], place - self.first);
                 if self.facet[own] != facet && form.may_meet(at, self.low[own]) {
                     self.decide(facet, place);
                 }
@@ -122,7 +124,7 @@ impl<'a> Band<'a> {
 
     fn decide(&mut self, facet: u32, place: usize) {
         let Picture { fan, mesh, .. } = *self.picture;
-        let ray = &fan.rays[fan.ray_at[place] as usize];
+        let ray = &fan.rays[fan.sorted.ray_at[place] as usize];
         let Some(range_m) = Line::new(ray).crossing_m(mesh, facet as usize) else { return };
         let own = place - self.first;
         let so_far = self.facet[own];
@@ -140,7 +142,7 @@ impl<'a> Band<'a> {
     /// Where the rays of some cells begin, [`LANES`] and fewer at a time, and how many are left in their row.
     #[inline(always)]
     fn blocks(&self, cells: Cells) -> impl Iterator<Item = (usize, usize)> + use<'a> {
-        let grid = &self.picture.fan.grid;
+        let grid = &self.picture.fan.sorted.grid;
         let Cells { columns: [left, right], rows: [first, last] } = cells;
         (first.max(self.rows.start)..(last + 1).min(self.rows.end)).flat_map(move |row| {
             let [start, end] = grid.places(row, left, right);

@@ -1,11 +1,13 @@
 //! Rays of one origin as points of a plane, sorted into cells.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use thiserror::Error;
 
 use super::lanes::{LANES, least, most};
-use crate::frames::{Global, Ray};
+use crate::frames::{Global, Pose, Ray};
 use crate::trace::wide::{Wide, widest};
 
 /// Least cosine between a ray and the axis of its fan: 84°.
@@ -33,13 +35,18 @@ pub struct Fan<'a> {
     pub(super) origin: DVec3,
     /// Turns a direction into the frame of the fan.
     pub(super) frame: DMat3,
-    pub(super) grid: Grid,
+    pub(super) sorted: Arc<Sorted>,
+}
+
+/// The rays of a fan in its frame, cell after cell.
+pub(super) struct Sorted {
+    pub grid: Grid,
     /// Coordinates of the rays, cell after cell, and [`LANES`] more that are read and not used.
-    pub(super) u: Vec<f32>,
-    pub(super) v: Vec<f32>,
+    pub u: Vec<f32>,
+    pub v: Vec<f32>,
     /// The ray at each place of these lists, and the place of each ray.
-    pub(super) ray_at: Vec<u32>,
-    pub(super) place_of: Vec<u32>,
+    pub ray_at: Vec<u32>,
+    pub place_of: Vec<u32>,
 }
 
 /// Cells over (u, v), and which places belong to each, row by row.
@@ -126,23 +133,45 @@ impl<'a> Fan<'a> {
         }
         let mut grid = Grid::over(flat);
         let place_of = grid.sort(flat);
-        let mut fan = Fan {
-            rays,
-            origin,
-            frame,
+        let mut sorted = Sorted {
             grid,
             u: vec![0.0; rays.len() + LANES],
             v: vec![0.0; rays.len() + LANES],
             ray_at: vec![0; rays.len()],
             place_of,
         };
-        for (&place, ray) in fan.place_of.iter().zip(0..) {
-            fan.ray_at[place as usize] = ray;
+        for (&place, ray) in sorted.place_of.iter().zip(0..) {
+            sorted.ray_at[place as usize] = ray;
         }
-        let (u, v) = (fan.u.par_iter_mut(), fan.v.par_iter_mut());
-        let places = fan.ray_at.par_iter().zip(u.zip(v)).with_min_len(CHUNK);
+        let (u, v) = (sorted.u.par_iter_mut(), sorted.v.par_iter_mut());
+        let places = sorted.ray_at.par_iter().zip(u.zip(v)).with_min_len(CHUNK);
         places.for_each(|(&ray, (u, v))| [*u, *v] = flat[ray as usize]);
-        Ok(fan)
+        Ok(Fan { rays, origin, frame, sorted: Arc::new(sorted) })
+    }
+
+    /// The fan of the same rays at another pose, which need not be sorted again; `None` unless there are as
+    /// many. Each of `rays` must be the one of this fan, carried by `pose`.
+    ///
+    /// ```
+    /// use matdb::frames::{Point, Pose, Ray};
+    /// use matdb::trace::Fan;
+    /// let origin = Point::new(0.0, 0.0, 8.0);
+    /// let ray = |x: f64| Ray { origin, direction: origin.towards(Point::new(x, 0.2, 0.0)).unwrap() };
+    /// let rays = [ray(0.0), ray(0.1), ray(0.2)];
+    /// let pose = Pose::from_euler_xyz([0.0, 0.3, 0.1].into(), [0.5, 0.0, 0.2].into());
+    /// let carried = rays.map(|ray| Ray { origin: pose * ray.origin, direction: pose * ray.direction });
+    /// let mesh = matdb::scene::solids::icosphere(0.5, 2);
+    /// let again = Fan::new(&rays).unwrap().carried(&carried, &pose).unwrap();
+    /// assert_eq!(again.closest(&mesh), Fan::new(&carried).unwrap().closest(&mesh));
+    /// ```
+    pub fn carried<'b>(
+        &self,
+        rays: &'b [Ray<Global>],
+        pose: &Pose<Global, Global>,
+    ) -> Option<Fan<'b>> {
+        let origin = rays.first().filter(|_| rays.len() == self.rays.len())?.origin.xyz;
+        let frame = self.frame * pose.rotation().transpose();
+        Some(Fan { rays, origin, frame, sorted: Arc::clone(&self.sorted) })
     }
 }
 

@@ -83,7 +83,7 @@ impl Fan<'_> {
             }
             hits
         };
-        let (rays, places) = (self.rays.par_chunks(LANES), self.place_of.par_chunks(LANES));
+        let (rays, places) = (self.rays.par_chunks(LANES), self.sorted.place_of.par_chunks(LANES));
         let hits: Vec<_> = rays.zip(places).with_min_len(64).map(hits).collect();
         let mut hits = hits.into_flattened();
         hits.truncate(self.rays.len());
@@ -134,7 +134,7 @@ fn nearest(picture: &Picture) -> Vec<u32> {
 
 /// Every task has all rays and some of the facets.
 fn shared_by_facets(picture: &Picture, shares: usize) -> Vec<u32> {
-    let (facets, rows) = (picture.mesh.facets.len(), picture.fan.grid.rows);
+    let (facets, rows) = (picture.mesh.facets.len(), picture.fan.sorted.grid.rows);
     let cut = |share: usize| (share * facets / shares) as u32;
     let among = |share| Band::new(picture, 0..rows).walked(cut(share)..cut(share + 1));
     let found = (0..shares).into_par_iter().map(among).reduce_with(Band::nearer);
@@ -162,7 +162,7 @@ fn shared_by_rays(picture: &Picture, bands: usize) -> Vec<u32> {
 
 /// Rows at which bands of about equally many rays begin, and the end.
 fn cuts(fan: &Fan, bands: usize) -> Vec<usize> {
-    let (grid, rays) = (&fan.grid, fan.rays.len());
+    let (grid, rays) = (&fan.sorted.grid, fan.rays.len());
     let mut cuts = vec![0];
     for row in 1..grid.rows {
         if grid.row_start(row) * bands >= cuts.len() * rays {
