@@ -3,13 +3,14 @@
 import unittest
 
 from goals import all_goals
+from machine import RUN
 from page import page
 
 MACHINE = {
     "cpu": "Abacus", "family": "1", "architecture": "wood", "cores": 2, "features": ["beads"], "memory_gb": 1,
     "system": "Table 1", "date": "2000-01-01", "commit": "0123456789ab", "rustc": "rustc 1", "load_before": 0.0,
 }
-EMPTY = {"schema": 1, "quick": False, "machine": MACHINE, "versions": {}, "failed": {}, "commits": {}, "minutes": 1}
+EMPTY = {"schema": 1, "quick": False, "machine": MACHINE, "versions": {}, "failed": {}, "parts": {}, "minutes": 1}
 
 
 def trace(workload, tracer, build, trace, threads=2, way="", **more):
@@ -99,6 +100,22 @@ class Page(unittest.TestCase):
         self.assertEqual(self.lines(results, "- store"), ["- store could not be measured: no cargo"])
         self.assertEqual(self.lines(results, "- fits"), ["- fits: measured at `ba9876543210`"])
         self.assertEqual(self.lines(results, "- trace"), [])
+
+    def test_parts_of_another_run_tell_when_it_was(self):
+        run = {key: MACHINE[key] for key in RUN}
+        other = run | {"date": "1999-12-31", "commit": "ba9876543210", "load_before": 1.5}
+        results = {
+            "commits": {"fits": MACHINE["commit"]},
+            "parts": {
+                "trace": run | {"minutes": 7.0},
+                "fits": other | {"minutes": 3.0},
+                "store": other | {"minutes": 42.2, "cpu": "Slide rule"},
+            },
+        }
+        told = "measured on 1999-12-31 at `ba9876543210`, {} minutes, load before them 1.5"
+        self.assertEqual(self.lines(results, "- trace"), [])
+        self.assertEqual(self.lines(results, "- fits"), ["- fits: " + told.format(3)])
+        self.assertEqual(self.lines(results, "- store"), ["- store: " + told.format(42) + ", by Slide rule"])
 
     def test_registration_must_be_faster_than_the_fastest_and_as_exact(self):
         results = {"registration": [
