@@ -17,7 +17,10 @@ from page import page
 from programs import ROOT, build, cargo
 
 HERE = Path(__file__).resolve().parent
-PARTS = ["trace", "power", "reshade", "registration", "fits", "render", "formats", "store"]
+PARTS = ["trace", "reshade", "registration", "fits", "render", "formats", "store"]
+
+# Parts of older results, and the one that measures the same now.
+OLDER = {"power": "trace"}
 
 
 def main():
@@ -68,7 +71,10 @@ def kept(options):
     if not options.only or not options.results.exists():
         return {}
     stored = json.loads(options.results.read_text(encoding="utf-8"))
-    kept = {key: stored[key] for key in ["versions", "failed", "commits", "parts", *PARTS] if key in stored}
+    kept = {key: stored[key] for key in ["versions", "failed", "commits", "parts", *PARTS, *OLDER] if key in stored}
+    for part in [part for part, now in OLDER.items() if now in options.only]:
+        kept.pop(part, None)
+        kept.get("commits", {}).pop(part, None)
     return kept | {"quick": options.quick or stored["quick"]}
 
 
@@ -83,10 +89,6 @@ def measured(part, folder, quick):
         import tracing
 
         return tracing.measure(folder, quick, say)
-    if part == "power":
-        import tracing
-
-        return tracing.power(quick), {}
     if part == "reshade":
         import reshade
 
