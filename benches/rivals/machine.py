@@ -8,6 +8,8 @@ from pathlib import Path
 
 from programs import ROOT
 
+# What may be another for parts that were measured in another run.
+RUN = ["cpu", "date", "commit", "load_before"]
 FEATURES = ["avx512f", "avx2", "fma", "neon", "asimd"]
 
 

@@ -38,8 +38,7 @@ def head(results):
     machine, versions = results["machine"], results["versions"]
     quick = "**A trial run of few turns and small sizes: its numbers mean nothing.**\n\n" if results["quick"] else ""
     told = ", ".join(f"{name} {version}" for name, version in sorted(versions.items()))
-    commit = machine["commit"]
-    older = "".join(f"\n- {part}: measured at `{at}`" for part, at in results["commits"].items() if at != commit)
+    older = "".join(f"\n- {part}: measured {when}" for part, when in other_runs(results))
     failed = "".join(f"\n- {part} could not be measured: {why}" for part, why in results["failed"].items())
     return f"""# Performance
 
@@ -50,9 +49,22 @@ brackets. Times are ms and belong to one machine. Ratios say more: **× 3 means 
 `matdb`**.
 
 - {machine["cpu"]} (family and model {machine["family"]}), {machine["cores"]} cores of {machine["architecture"]} with {", ".join(machine["features"])}; {machine["memory_gb"]} GB; {machine["system"]}
-- {machine["date"]}, commit `{commit}`, {machine["rustc"]}; {results["minutes"]:.0f} minutes, load before them {machine["load_before"]}
+- {machine["date"]}, commit `{machine["commit"]}`, {machine["rustc"]}; {results["minutes"]:.0f} minutes, load before them {machine["load_before"]}
 - {told or "no rival"}{older}{failed}
 """
+
+
+def other_runs(results):
+    """The parts that the head's day, commit and load are not those of. Of some, older results know the commit alone."""
+    machine, known = results["machine"], {part: {"commit": at} for part, at in results.get("commits", {}).items()}
+    for part, run in (known | results.get("parts", {})).items():
+        if all(machine[key] == run[key] for key in run if key != "minutes"):
+            continue
+        when = f"at `{run['commit']}`"
+        if "minutes" in run:
+            when = f"on {run['date']} {when}, {run['minutes']:.0f} minutes, load before them {run['load_before']}"
+            when += f", by {run['cpu']}" * (run["cpu"] != machine["cpu"])
+        yield part, when
 
 
 def goals(results):

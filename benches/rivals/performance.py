@@ -17,7 +17,10 @@ from page import page
 from programs import ROOT, build, cargo
 
 HERE = Path(__file__).resolve().parent
-PARTS = ["trace", "power", "reshade", "registration", "fits", "render", "formats", "store"]
+PARTS = ["trace", "reshade", "registration", "fits", "render", "formats", "store"]
+
+# Parts of older results, and the one that measures the same now.
+OLDER = {"power": "trace"}
 
 
 def main():
@@ -44,12 +47,13 @@ def measure(options):
     build("trace_speed", "file_speed", "fit_speed", "icp_speed")
     cargo("bench", "--no-run", "--bench", "store", "--bench", "reshade")
     found = {"schema": 1, "quick": options.quick, "machine": machine.describe()}
-    found |= {"versions": {}, "failed": {}, "commits": {}} | kept(options)
+    found |= {"versions": {}, "failed": {}, "parts": {}} | kept(options)
+    run = {key: found["machine"][key] for key in machine.RUN}
     began = time.monotonic()
     for part in options.only or PARTS:
         say(part)
-        found["commits"][part] = found["machine"]["commit"]
         found["failed"].pop(part, None)
+        part_began = time.monotonic()
         with tempfile.TemporaryDirectory(prefix="rivals-") as folder:
             try:
                 found[part], versions = measured(part, folder, options.quick)
@@ -58,7 +62,8 @@ def measure(options):
                 traceback.print_exc()
                 found.pop(part, None)
                 found["failed"][part] = said(reason)
-    return found | {"minutes": round((time.monotonic() - began) / 60, 1)}
+        found["parts"][part] = run | {"minutes": minutes_since(part_began)}
+    return found | {"minutes": minutes_since(began)}
 
 
 def kept(options):
@@ -66,8 +71,15 @@ def kept(options):
     if not options.only or not options.results.exists():
         return {}
     stored = json.loads(options.results.read_text(encoding="utf-8"))
-    kept = {key: stored[key] for key in ["versions", "failed", "commits", *PARTS] if key in stored}
+    kept = {key: stored[key] for key in ["versions", "failed", "commits", "parts", *PARTS, *OLDER] if key in stored}
+    for part in [part for part, now in OLDER.items() if now in options.only]:
+        kept.pop(part, None)
+        kept.get("commits", {}).pop(part, None)
     return kept | {"quick": options.quick or stored["quick"]}
+
+
+def minutes_since(began):
+    return round((time.monotonic() - began) / 60, 1)
 
 
 def measured(part, folder, quick):
@@ -77,10 +89,6 @@ def measured(part, folder, quick):
         import tracing
 
         return tracing.measure(folder, quick, say)
-    if part == "power":
-        import tracing
-
-        return tracing.power(quick), {}
     if part == "reshade":
         import reshade
 

@@ -29,7 +29,9 @@ def compare(files, workload, threads):
     commands = {}
     for tracer in tracers.ALL:
         commands |= tracer(files, workload, threads)
-    running, about, missing = start(commands, threads)
+    # What our power takes on top: in the same turns, so that it meets the same load.
+    power = {"power": example("trace_speed", "power")} if workload.key == "paper" else {}
+    running, about, missing = start(commands | power, threads)
     answers = alternate(running, missing, workload.turns, workload.seconds)
     memory_mb = {name: program.memory_mb for name, program in running.items()}
     end(running, missing)
@@ -48,12 +50,13 @@ def compare(files, workload, threads):
             hits = unsorted(hits, files.order)
         reference = hits if reference is None else reference
         more = {"tracer": name, "agree": agreement(reference, hits), "memory_mb": round(memory_mb[name], 1)}
-        rows += [of | more | row for row in ways(answers[name])]
+        powers = answers.get("power") if name.startswith("matdb") else None
+        rows += [of | more | row for row in ways(answers[name], powers)]
     return rows, about
 
 
-def ways(answers):
-    """A program may trace in several ways after one build."""
+def ways(answers, powers):
+    """A program may trace in several ways after one build. `powers` took the same turns."""
     names = answers[0].get("traces", {"": 0})
     for way in names:
         traces = [answer["traces"][way] if way else answer["trace"] for answer in answers]
@@ -62,6 +65,9 @@ def ways(answers):
         row["total"] = spread([build + trace for build, trace in zip(builds, traces)])
         if "once" in answers[0]:
             row["once"] = spread([answer["once"] for answer in answers])
+        if powers:
+            sums = [build + trace + of["power"] for build, trace, of in zip(builds, traces, powers, strict=True)]
+            row["power"], row["with_power"] = spread([of["power"] for of in powers]), spread(sums)
         yield row
 
 
@@ -77,15 +83,3 @@ def agreement(ours, theirs):
     with np.errstate(invalid="ignore"):
         near = np.isfinite(range_m) & (np.abs(other_m - range_m) <= RANGE_GAP * range_m)
     return float(np.mean((facet == other) | near))
-
-
-def power(quick):
-    """From hits to echoes of the paper's scan, by number of threads."""
-    rows = []
-    for threads in [1, 2]:
-        running, _, missing = start({"power": example("trace_speed", "power")}, threads)
-        answers = alternate(running, missing, 5 if quick else 41, 10)
-        end(running, missing)
-        times = [answer["power"] for answer in answers.get("power", [])]
-        rows.append({"threads": threads, "power": spread(times)} if times else {"threads": threads, **missing})
-    return rows

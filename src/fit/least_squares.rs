@@ -31,33 +31,62 @@ pub(super) struct Deviations {
     pub level_sd_db: f64,
 }
 
-/// ½Σ of squared residuals of detected rows, scaled by the deviations.
-pub(super) fn local(
-    coordinates: &Coordinates,
-    rows: &[Row],
+/// A curve made ready for many evaluations.
+#[derive(Clone, Debug)]
+pub(super) struct Squares<'a> {
+    coordinates: &'a Coordinates,
     deviations: Deviations,
-    at: &DVector<f64>,
-) -> Local {
-    let table = Table::new(&coordinates.model(at));
-    let by_coordinate = derivatives(coordinates, at, &table);
-    let sum_of = |rows: &[Row]| {
-        let mut sum = Local::zero(at.len());
-        let mut jacobian = vec![0.0; at.len()];
-        for row in rows.iter().filter(|row| !row.censored) {
-            let nearest = nearest(&table, row, deviations);
-            let stretch = nearest.gain.hypot(1.0);
-            for (slot, table) in jacobian.iter_mut().zip(&by_coordinate) {
-                let slope = table.as_ref().map_or(0.0, |table| table.at(&nearest.place));
-                *slot = DB_PER_NEPER * slope / deviations.level_sd_db / stretch;
+    /// None for a row that was not detected: it keeps its place, so that the same rows are summed together.
+    levels: Vec<Option<Level>>,
+}
+
+/// A detected row.
+#[derive(Clone, Copy, Debug)]
+struct Level {
+    theta_rad: f64,
+    level_db: f64,
+    /// The place of its own angle, and the weights of the second derivative there.
+    place: Place,
+    bends: [f64; 4],
+}
+
+impl<'a> Squares<'a> {
+    /// Prepares the rows.
+    pub fn new(coordinates: &'a Coordinates, rows: &[Row], deviations: Deviations) -> Squares<'a> {
+        let level = |row: &Row| (!row.censored).then(|| Level::new(row));
+        Squares { coordinates, deviations, levels: rows.iter().map(level).collect() }
+    }
+
+    /// ½Σ of squared residuals of detected rows, scaled by the deviations.
+    pub fn local(&self, at: &DVector<f64>) -> Local {
+        let table = Table::new(&self.coordinates.model(at));
+        let by_coordinate = derivatives(self.coordinates, at, &table);
+        let sum_of = |levels: &[Option<Level>]| {
+            let mut sum = Local::zero(at.len());
+            let mut jacobian = vec![0.0; at.len()];
+            for level in levels.iter().flatten() {
+                let nearest = nearest(&table, level, self.deviations);
+                let stretch = nearest.gain.hypot(1.0);
+                for (slot, table) in jacobian.iter_mut().zip(&by_coordinate) {
+                    let slope = table.as_ref().map_or(0.0, |table| table.at(&nearest.place));
+                    *slot = DB_PER_NEPER * slope / self.deviations.level_sd_db / stretch;
+                }
+                // Unlike r²(1 + g²)/2 this is not moved by a small error of δ.
+                sum.value += 0.5 * (nearest.residual.powi(2) + nearest.offset.powi(2));
+                sum.add(nearest.residual * stretch, 1.0, &jacobian);
             }
-            // Unlike r²(1 + g²)/2 this is not moved by a small error of δ.
-            sum.value += 0.5 * (nearest.residual.powi(2) + nearest.offset.powi(2));
-            sum.add(nearest.residual * stretch, 1.0, &jacobian);
-        }
-        sum
-    };
-    let parts: Vec<Local> = rows.par_chunks(CHUNK).map(sum_of).collect();
-    parts.into_iter().fold(Local::zero(at.len()), Local::merge)
+            sum
+        };
+        let parts: Vec<Local> = self.levels.par_chunks(CHUNK).map(sum_of).collect();
+        parts.into_iter().fold(Local::zero(at.len()), Local::merge)
+    }
+}
+
+impl Level {
+    fn new(row: &Row) -> Level {
+        let (place, bends) = Place::bending(row.theta_rad);
+        Level { theta_rad: row.theta_rad, level_db: db_from_ratio(row.sigma0), place, bends }
+    }
 }
 
 /// The point of the curve that a row is nearest to.
@@ -81,23 +110,25 @@ const APART: f64 = 1.0 / 3.0;
 const STEPS: usize = 30;
 const NEAR: f64 = 1e-8;
 
-fn nearest(table: &Table, row: &Row, deviations: Deviations) -> Nearest {
-    let level_db = db_from_ratio(row.sigma0);
+fn nearest(table: &Table, level: &Level, deviations: Deviations) -> Nearest {
     let Deviations { theta_sd_rad, level_sd_db } = deviations;
-    let at = |offset: f64| {
-        let (place, bends) = Place::bending(row.theta_rad + offset * theta_sd_rad);
-        let residual = (DB_PER_NEPER * table.at(&place) - level_db) / level_sd_db;
+    let there = |offset: f64, place: Place, bends: &[f64; 4]| {
+        let residual = (DB_PER_NEPER * table.at(&place) - level.level_db) / level_sd_db;
         let scale = DB_PER_NEPER * theta_sd_rad / level_sd_db;
         let gain = scale * table.slope_per_rad(&place);
-        let bend = scale * theta_sd_rad * table.weighted(&place, &bends);
+        let bend = scale * theta_sd_rad * table.weighted(&place, bends);
         Nearest { place, offset, residual, gain, bend }
     };
+    let mut best = there(0.0, level.place, &level.bends);
     if theta_sd_rad <= 0.0 {
-        return at(0.0);
+        return best;
     }
+    let at = |offset: f64| {
+        let (place, bends) = Place::bending(level.theta_rad + offset * theta_sd_rad);
+        there(offset, place, &bends)
+    };
     let cost = |offset: f64| at(offset).residual.powi(2) + offset * offset;
     let offset = |candidate: i32| APART * f64::from(candidate);
-    let mut best = at(0.0);
     let mut least = best.residual.powi(2);
     // An offset beyond the residual costs more by itself than none does.
     let beyond = (best.residual.abs() / APART).min(f64::from(CANDIDATES)) as i32 + 2;
@@ -154,7 +185,8 @@ mod tests {
         let curve = Twin { rows: 200, ..Twin::default() }.curve(1);
         for deviations in [TLS, Deviations { theta_sd_rad: 0.0, ..TLS }] {
             let at = coordinates.start();
-            let cost = |at: &DVector<f64>| local(&coordinates, &curve.rows, deviations, at);
+            let squares = Squares::new(&coordinates, &curve.rows, deviations);
+            let cost = |at: &DVector<f64>| squares.local(at);
             for index in 0..at.len() {
                 let value = |step: f64| {
                     let mut there = at.clone();
@@ -176,7 +208,7 @@ mod tests {
     fn the_nearest_point_is_nearer_than_its_neighbours() {
         let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002));
         for row in (Twin { rows: 100, ..Twin::default() }).curve(3).rows {
-            let found = nearest(&table, &row, TLS);
+            let found = nearest(&table, &Level::new(&row), TLS);
             let cost = found.residual.powi(2) + found.offset.powi(2);
             for step in -400..=400 {
                 let offset = f64::from(step) / 100.0;

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::coordinates::Coordinates;
 use super::interval::{End, Profile};
-use super::least_squares::{self, Deviations};
+use super::least_squares::{Deviations, Squares};
 use super::likelihood::{Curvature, Likelihood};
 use super::minimise::{Local, Minimise, Minimum, Stop};
 use super::uncertainty::{Uncertainty, observed_information};
@@ -61,8 +61,8 @@ impl Fit {
             }
             Method::Tls { theta_sd_rad, level_sd_db } => {
                 let deviations = Deviations { theta_sd_rad, level_sd_db };
-                let cost =
-                    |at: &DVector<f64>| least_squares::local(coordinates, rows, deviations, at);
+                let squares = Squares::new(coordinates, rows, deviations);
+                let cost = |at: &DVector<f64>| squares.local(at);
                 search_freely(&squares_search(), coordinates, start, cost)
             }
             Method::Mse { split_rad } => pieces(coordinates, rows, split_rad, start),
@@ -184,7 +184,8 @@ fn piece(coordinates: &Coordinates, rows: &[Row], moves: &[bool], start: &DVecto
     for (index, _) in moves.iter().enumerate().filter(|(_, moves)| !**moves) {
         (lower[index], upper[index]) = (start[index], start[index]);
     }
-    let cost = |at: &DVector<f64>| least_squares::local(coordinates, rows, DB, at);
+    let squares = Squares::new(coordinates, rows, DB);
+    let cost = |at: &DVector<f64>| squares.local(at);
     let mut found = squares_search().run(&start, [&lower, &upper], cost);
     let mask = DVector::from_iterator(moves.len(), moves.iter().map(|&m| f64::from(u8::from(m))));
     let mask: DMatrix<f64> = &mask * mask.transpose();

@@ -63,6 +63,11 @@ impl From<Packing> for Compression {
 /// How many bytes of pixels one byte of a file may unfold to; deflate stays below 1032.
 const MAX_UNFOLDING: usize = 2048;
 
+/// Bytes of a file that go with a block: its place, its first line and its length.
+const BESIDE_BLOCK: usize = 16;
+/// Bytes that are set aside for a header; a longer one only makes the file grow.
+const FOR_HEADER: usize = 1 << 14;
+
 /// The endings of channel names that tell a unit, and the unit.
 const UNITS: [(&str, &str); 9] = [
     ("_dbm", "dBm"),
@@ -152,10 +157,12 @@ pub fn write_packed(
         let rows = lines.flat_map(|y| channels.iter().map(move |(_, v)| &v[y * raster.width..]));
         packing.pack(rows.map(|row| &row[..raster.width]))
     };
-    let mut file = Cursor::new(Vec::new());
+    let blocks = (0..raster.height.div_ceil(packing.lines())).into_par_iter().map(block);
+    let blocks: Vec<Vec<u8>> = blocks.collect();
+    let bytes = blocks.iter().map(|block| block.len() + BESIDE_BLOCK).sum::<usize>() + FOR_HEADER;
+    let mut file = Cursor::new(Vec::with_capacity(bytes));
     exr::block::write(&mut file, [header].into_iter().collect(), true, |_, writer| {
-        let blocks = (0..raster.height.div_ceil(packing.lines())).into_par_iter().map(block);
-        for (number, compressed_pixels_le) in blocks.collect::<Vec<_>>().into_iter().enumerate() {
+        for (number, compressed_pixels_le) in blocks.into_iter().enumerate() {
             let y_coordinate = (packing.lines() * number) as i32;
             let block = CompressedScanLineBlock { y_coordinate, compressed_pixels_le };
             let compressed_block = CompressedBlock::ScanLine(block);
@@ -188,8 +195,11 @@ fn zipped<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone) -> Vec<u8> {
     }
 }
 
-fn plain<'a>(rows: impl Iterator<Item = &'a [f32]>) -> Vec<u8> {
-    rows.flatten().flat_map(|value| value.to_le_bytes()).collect()
+fn plain<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone) -> Vec<u8> {
+    let mut values = Vec::with_capacity(rows.clone().map(<[f32]>::len).sum());
+    // Row by row, so that a row is copied and not gathered byte by byte.
+    rows.for_each(|row| values.extend(row.iter().map(|value| value.to_le_bytes())));
+    values.into_flattened()
 }
 
 /// The raster in an OpenEXR file: its first layer, as written by [`write()`] or by any tool that

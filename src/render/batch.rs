@@ -84,8 +84,14 @@ impl Batch<'_> {
         let (all, turn) = (chirps * takes.len(), (RAYS_PER_TURN / work.rays).max(1));
         let mut means = Vec::with_capacity(all);
         let mut rays_on_processor = 0;
-        for first in (0..all).step_by(turn) {
-            let (some, open) = work.means(first..all.min(first + turn))?;
+        while means.len() < all {
+            let first = means.len();
+            // In the mesh's frame each scan has an origin of its own: the processor traces rays of one origin best.
+            let end = match self.tracer {
+                Tracer::Gpu(_) => all,
+                _ => (first / chirps + 1) * chirps,
+            };
+            let (some, open) = work.means(first..end.min(first + turn))?;
             means.extend(some);
             rays_on_processor += open;
         }
@@ -336,6 +342,7 @@ mod tests {
                 rays_per_chirp,
             };
             let found = batch.run(&takes).unwrap();
+            assert!(!bvh.is_built());
             assert_eq!(found.rays, 2 * rays_per_chirp * chirps.rays.len());
             assert_eq!(found.rays_on_processor, found.rays);
             for (take, found) in takes.iter().zip(&found.echoes) {

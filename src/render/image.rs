@@ -23,6 +23,9 @@ struct Shown<'a> {
     /// None for a false alarm.
     incidence_rad: Option<f64>,
     material: Option<u16>,
+    /// Pixels that its spot may cover, rows counted from above.
+    columns: Range<usize>,
+    rows: Range<usize>,
 }
 
 /// Sums over the detections whose spot covers one pixel.
@@ -54,16 +57,17 @@ pub fn power_image(
 ) -> Raster {
     let mut raster = grid(field, spot_m, pixel_m);
     let mut pixels = vec![Pixel::default(); raster.width * raster.height];
-    let shown: Vec<Shown> =
-        scan.detections().map(|echo| Shown::new(echo, material_of_region)).collect();
+    let detections: Vec<&Echo> = scan.detections().collect();
+    let shown = |&echo| Shown::new(echo, &raster, spot_m, material_of_region);
+    let shown: Vec<Shown> = detections.par_iter().map(shown).collect();
     // A band of rows has all that falls on it in the order of the scan, however many threads there are.
     let band_rows = raster.height.div_ceil(BANDS);
+    let of_bands = by_bands(&shown, band_rows);
     let bands = pixels.par_chunks_mut(raster.width * band_rows).enumerate();
-    bands.for_each(|(band, pixels)| {
+    bands.zip(of_bands).for_each(|((band, pixels), shown)| {
         let first = band * band_rows;
-        let rows = first..(first + band_rows).min(raster.height);
-        for shown in &shown {
-            for (index, distance_m) in covered(&raster, shown.echo, spot_m, rows.clone()) {
+        for shown in shown {
+            for (index, distance_m) in shown.covered(&raster, spot_m, first..first + band_rows) {
                 let weight = (-4.0 * std::f64::consts::LN_2 * (distance_m / spot_m).powi(2)).exp();
                 pixels[index - first * raster.width].add(shown, weight);
             }
@@ -84,43 +88,53 @@ fn grid(field: Field, spot_m: f64, pixel_m: f64) -> Raster {
     Raster { width, height, x_min_m, y_min_m, pixel_m, channels: Vec::new() }
 }
 
-/// Pixels in some rows whose centre lies within the spot of an echo, with their distance from its
-/// centre, m.
-fn covered<'a>(
-    raster: &'a Raster,
-    echo: &'a Echo,
-    spot_m: f64,
-    rows: Range<usize>,
-) -> impl Iterator<Item = (usize, f64)> + 'a {
-    let radius_m = spot_m / 2.0;
-    let span = |centre_m: f64, min_m: f64, count: usize| {
-        let first = ((centre_m - radius_m - min_m) / raster.pixel_m - 0.5).ceil().max(0.0);
-        let end = ((centre_m + radius_m - min_m) / raster.pixel_m + 0.5).floor();
-        // Float to integer saturates, so that a detection outside the grid gives an empty span.
-        (first as usize).min(count)..(end as usize).min(count)
-    };
-    let columns = span(echo.xt_m, raster.x_min_m, raster.width);
-    let from_below = span(echo.yt_m, raster.y_min_m, raster.height);
-    let first = from_below.start.max(raster.height - rows.end);
-    let end = from_below.end.min(raster.height - rows.start);
-    (first..end).flat_map(move |up| {
-        let row = raster.height - 1 - up;
-        columns.clone().filter_map(move |column| {
-            let (dx, dy) = (raster.x_m(column) - echo.xt_m, raster.y_m(row) - echo.yt_m);
-            let distance_m = dx.hypot(dy);
-            (distance_m <= radius_m).then_some((row * raster.width + column, distance_m))
-        })
-    })
+/// For each band of so many rows what may fall on it, in order.
+fn by_bands<'a, 'e>(shown: &'a [Shown<'e>], band_rows: usize) -> [Vec<&'a Shown<'e>>; BANDS] {
+    let mut of_bands = [const { Vec::new() }; BANDS];
+    for shown in shown {
+        let bands = shown.rows.start / band_rows..shown.rows.end.div_ceil(band_rows);
+        bands.for_each(|band| of_bands[band].push(shown));
+    }
+    of_bands
 }
 
 impl<'a> Shown<'a> {
-    fn new(echo: &'a Echo, material_of_region: &[u16]) -> Shown<'a> {
+    fn new(echo: &'a Echo, raster: &Raster, spot_m: f64, material_of_region: &[u16]) -> Shown<'a> {
+        let radius_m = spot_m / 2.0;
+        let span = |centre_m: f64, min_m: f64, count: usize| {
+            let first = ((centre_m - radius_m - min_m) / raster.pixel_m - 0.5).ceil().max(0.0);
+            let end = ((centre_m + radius_m - min_m) / raster.pixel_m + 0.5).floor();
+            // Float to integer saturates, so that a detection outside the grid gives an empty span.
+            (first as usize).min(count)..(end as usize).min(count)
+        };
+        let from_below = span(echo.yt_m, raster.y_min_m, raster.height);
         Shown {
             echo,
             power_w: watts_from_dbm(echo.power_dbm),
             incidence_rad: echo.truth.map(|truth| truth.hit.theta_rad()),
             material: echo.truth.map(|truth| material_of_region[usize::from(truth.region)]),
+            columns: span(echo.xt_m, raster.x_min_m, raster.width),
+            rows: raster.height - from_below.end..raster.height - from_below.start,
         }
+    }
+
+    /// Pixels in some rows whose centre lies within the spot, with their distance from its centre, m.
+    fn covered(
+        &self,
+        raster: &Raster,
+        spot_m: f64,
+        rows: Range<usize>,
+    ) -> impl Iterator<Item = (usize, f64)> {
+        let radius_m = spot_m / 2.0;
+        let rows = self.rows.start.max(rows.start)..self.rows.end.min(rows.end);
+        rows.flat_map(move |row| {
+            self.columns.clone().filter_map(move |column| {
+                let dx = raster.x_m(column) - self.echo.xt_m;
+                let dy = raster.y_m(row) - self.echo.yt_m;
+                let distance_m = dx.hypot(dy);
+                (distance_m <= radius_m).then_some((row * raster.width + column, distance_m))
+            })
+        })
     }
 }
 

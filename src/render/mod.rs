@@ -258,13 +258,15 @@ pub fn shade(
     let rays = footprints.rays_per_chirp.max(1);
     let per_task = if setup.bounce.is_some() { 1 } else { (RAYS_PER_TASK / rays).max(1) };
     let of_task = |(task, hits): (usize, &[Option<Hit>])| {
-        let (mut ways, mut found) = (Vec::new(), Vec::new());
-        for (chirp, hits) in (task * per_task..).zip(hits.chunks(rays)) {
+        let chirps = hits.chunks(rays);
+        let count = chirps.len();
+        let (mut ways, mut found) = (Vec::new(), Vec::with_capacity(count));
+        for (chirp, hits) in (task * per_task..).zip(chirps) {
             paths.fill(chirp, hits, &mut ways);
             let seen = detector.observe(chirp, &ways)?;
             found.extend(echoes.echo(chirp, hits, &ways, seen));
-            done(1);
         }
+        done(count);
         Ok(found)
     };
     let tasks = footprints.hits.par_chunks(per_task * rays).enumerate();

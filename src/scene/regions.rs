@@ -1,6 +1,9 @@
 //! Regions: which facets are made of what. Later regions win.
 
+use std::ops::Range;
+
 use glam::DVec3;
+use rayon::prelude::*;
 use thiserror::Error;
 
 use super::file::{BoxEntry, HalfSpaceEntry, RegionEntry, SphereEntry};
@@ -72,6 +75,9 @@ pub struct MeshSpan {
     pub end: usize,
 }
 
+/// The region of a facet that none has claimed; regions are too few to reach it.
+const UNCLAIMED: u16 = u16::MAX;
+
 /// Index of the region of every facet: the last of `regions` that selects it.
 pub fn assign(
     mesh: &Mesh,
@@ -81,59 +87,63 @@ pub fn assign(
     if regions.len() > usize::from(u16::MAX) {
         return Err(RegionError::TooMany { count: regions.len() });
     }
-    let mut assigned: Vec<Option<u16>> = vec![None; mesh.facets.len()];
+    let mut assigned = vec![UNCLAIMED; mesh.facets.len()];
     for (number, region) in regions.iter().enumerate() {
         if regions[..number].iter().any(|earlier| earlier.name == region.name) {
             return Err(RegionError::Twice { region: region.name.clone() });
         }
-        for facet in selected(mesh, spans, region)? {
-            assigned[facet] = Some(number as u16);
-        }
+        claim(&mut assigned, number as u16, mesh, spans, region)?;
     }
     for span in spans {
-        let count = assigned[span.first..span.end].iter().filter(|a| a.is_none()).count();
+        let count = assigned[span.first..span.end].iter().filter(|&&a| a == UNCLAIMED).count();
         if count > 0 {
             return Err(RegionError::Unclaimed { count, mesh: span.name.clone() });
         }
     }
-    Ok(assigned.into_iter().flatten().collect())
+    Ok(assigned)
 }
 
-fn selected(
+/// Gives the facets that a region selects its number.
+fn claim(
+    assigned: &mut [u16],
+    number: u16,
     mesh: &Mesh,
     spans: &[MeshSpan],
     region: &RegionEntry,
-) -> Result<Vec<usize>, RegionError> {
-    let mut facets = facets_of_mesh(mesh, spans, region)?;
-    for (property, value) in &region.facets {
-        let wanted = label_number(mesh, region, property, &value.to_string())?;
-        facets.retain(|&facet| wanted[facet]);
-    }
+) -> Result<(), RegionError> {
+    let facets = facets_of_mesh(mesh, spans, region)?;
+    let labels = region.facets.iter();
+    let labels: Vec<(&[u32], u32)> = labels
+        .map(|(property, value)| label_number(mesh, region, property, &value.to_string()))
+        .collect::<Result<_, _>>()?;
     let tests = geometric_tests(region)?;
-    facets.retain(|&facet| {
-        let centroid = mesh.centroid(facet);
-        tests.iter().all(|inside| inside(centroid))
-    });
-    if facets.is_empty() {
+    let is_inside = |centroid: DVec3| tests.iter().all(|inside| inside(centroid));
+    let is_selected = |facet: usize| {
+        labels.iter().all(|(name_of_facet, wanted)| name_of_facet[facet] == *wanted)
+            && (tests.is_empty() || is_inside(mesh.centroid(facet)))
+    };
+    let of_mesh = assigned[facets.clone()].par_iter_mut().zip(facets);
+    let selected = of_mesh.filter(|(_, facet)| is_selected(*facet));
+    if selected.map(|(assigned, _)| *assigned = number).count() == 0 {
         let way_out = format!(
             "{}; move or widen its selectors",
             span_text(mesh, spans, region.mesh.as_deref())
         );
         return Err(RegionError::Empty { region: region.name.clone(), way_out });
     }
-    Ok(facets)
+    Ok(())
 }
 
 fn facets_of_mesh(
     mesh: &Mesh,
     spans: &[MeshSpan],
     region: &RegionEntry,
-) -> Result<Vec<usize>, RegionError> {
+) -> Result<Range<usize>, RegionError> {
     let Some(wanted) = &region.mesh else {
-        return Ok((0..mesh.facets.len()).collect());
+        return Ok(0..mesh.facets.len());
     };
     match spans.iter().find(|span| span.name == *wanted) {
-        Some(span) => Ok((span.first..span.end).collect()),
+        Some(span) => Ok(span.first..span.end),
         None => Err(RegionError::UnknownMesh {
             region: region.name.clone(),
             mesh: wanted.clone(),
@@ -142,13 +152,13 @@ fn facets_of_mesh(
     }
 }
 
-/// Whether each facet carries a label, or the names that would have been valid.
-fn label_number(
-    mesh: &Mesh,
+/// The label of each facet and the one that is wanted, or the names that would have been valid.
+fn label_number<'a>(
+    mesh: &'a Mesh,
     region: &RegionEntry,
     property: &str,
     value: &str,
-) -> Result<Vec<bool>, RegionError> {
+) -> Result<(&'a [u32], u32), RegionError> {
     let refuse = |problem| RegionError::Selector { region: region.name.clone(), problem };
     let properties = || mesh.labels.iter().map(|l| l.property.as_str());
     let Some(labels) = mesh.labels.iter().find(|l| l.property == property) else {
@@ -159,10 +169,10 @@ fn label_number(
         let way_out = suggest(value, labels.names.iter().map(String::as_str));
         return Err(refuse(format!("no facet has {property} = `{value}`; {way_out}")));
     };
-    Ok(labels.name_of_facet.iter().map(|&name| name as usize == wanted).collect())
+    Ok((&labels.name_of_facet, wanted as u32))
 }
 
-type Inside = Box<dyn Fn(DVec3) -> bool>;
+type Inside = Box<dyn Fn(DVec3) -> bool + Sync>;
 
 fn geometric_tests(region: &RegionEntry) -> Result<Vec<Inside>, RegionError> {
     let refuse = |problem: &str| RegionError::Selector {

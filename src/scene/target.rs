@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::file::{MeshEntry, SceneFile};
 use super::regions::{MeshSpan, assign};
@@ -84,7 +85,11 @@ impl Target {
             let placed = place(loaded, entry, path)?;
             let at = |error| SceneError::Mesh { file: PathBuf::from(&entry.file), error };
             meshes.push(report(&placed, entry, file_blake3, mesh.facets.len()).map_err(at)?);
-            mesh.append(&placed).map_err(at)?;
+            match meshes.len() {
+                // A scene mostly has one mesh, and that may be large: it is not copied.
+                1 => mesh = placed,
+                _ => mesh.append(&placed).map_err(at)?,
+            }
         }
         let spans: Vec<MeshSpan> = meshes.iter().map(MeshReport::span).collect();
         let region_of_facet = assign(&mesh, &spans, &file.region)
@@ -158,8 +163,9 @@ fn load_mesh(entry: &MeshEntry, scene: &Path) -> Result<(Mesh, Option<String>), 
         return Err(value(scene, &format!("mesh `{}`", entry.name), &problem, way_out));
     };
     let bytes = read(&file, "; meshes are looked for beside the scene file")?;
-    let mesh = format.read(&bytes).map_err(|error| SceneError::Format { file, error })?;
-    Ok((mesh, Some(blake3::hash(&bytes).to_hex().to_string())))
+    let (mesh, hash) = rayon::join(|| format.read(&bytes), || blake3::hash(&bytes));
+    let mesh = mesh.map_err(|error| SceneError::Format { file, error })?;
+    Ok((mesh, Some(hash.to_hex().to_string())))
 }
 
 /// Made once, however many stand in a scene.
@@ -199,11 +205,11 @@ fn place(mut mesh: Mesh, entry: &MeshEntry, scene: &Path) -> Result<Mesh, SceneE
         return Err(refuse(key, "must be finite", "mend the numbers"));
     }
     let global_from_model: Pose<Global, Model> = Pose::from_euler_xyz(turn, shift);
-    for vertex in &mut mesh.vertices {
+    mesh.vertices.par_iter_mut().for_each(|vertex| {
         *vertex = (global_from_model * Point::from(*vertex * entry.scale * stretch)).xyz;
-    }
+    });
     let near = |v: &DVec3| v.is_finite() && v.abs().max_element() < FARTHEST_M;
-    let lost = mesh.vertices.iter().position(|v| !near(v));
+    let lost = mesh.vertices.par_iter().position_first(|v| !near(v));
     match lost {
         None => Ok(mesh),
         Some(vertex) => {
@@ -226,7 +232,8 @@ fn report(
     first_facet: usize,
 ) -> Result<MeshReport, MeshError> {
     mesh.validate()?;
-    let degenerate_facets = (0..mesh.facets.len()).filter(|&f| mesh.is_degenerate(f)).count();
+    let degenerate = (0..mesh.facets.len()).into_par_iter().filter(|&f| mesh.is_degenerate(f));
+    let (degenerate_facets, placed_blake3) = rayon::join(|| degenerate.count(), || hash(mesh));
     if degenerate_facets == mesh.facets.len() {
         return Err(MeshError::NoArea { facets: degenerate_facets });
     }
@@ -234,7 +241,7 @@ fn report(
         name: entry.name.clone(),
         file: entry.file.clone(),
         file_blake3,
-        placed_blake3: hash(mesh),
+        placed_blake3,
         vertices: mesh.vertices.len(),
         facets: mesh.facets.len(),
         degenerate_facets,
@@ -247,12 +254,12 @@ fn hash(mesh: &Mesh) -> String {
     const TOGETHER: usize = 1024;
     let mut hasher = blake3::Hasher::new();
     for vertices in mesh.vertices.chunks(TOGETHER) {
-        let coordinates = vertices.iter().flat_map(DVec3::to_array);
-        hasher.update(&coordinates.flat_map(f64::to_le_bytes).collect::<Vec<u8>>());
+        let bytes = vertices.iter().map(|vertex| vertex.to_array().map(f64::to_le_bytes));
+        hasher.update(bytes.collect::<Vec<_>>().as_flattened().as_flattened());
     }
     for facets in mesh.facets.chunks(TOGETHER) {
-        let indices = facets.as_flattened().iter();
-        hasher.update(&indices.flat_map(|index| index.to_le_bytes()).collect::<Vec<u8>>());
+        let bytes = facets.iter().map(|facet| facet.map(u32::to_le_bytes));
+        hasher.update(bytes.collect::<Vec<_>>().as_flattened().as_flattened());
     }
     hasher.finalize().to_hex().to_string()
 }
