@@ -43,6 +43,8 @@ material = "mannequin-paint"
 const CORNER: &str = "v 5 5 0\nv 6 5 0\nv 5 6 0\nf 1 2 3\n";
 
 const DRIFT: &str = "[[radar.effect]]\nname = \"drift\"\nslope_db = 5.0\n";
+const PATCH: &str = "[[effect]]\nname = \"foreign-patch\"\nlevel_db = 6.0\ncentre_x_m = 0.05\n\
+                     centre_y_m = 0.1\nradius_m = 0.08\n";
 const ANISOTROPY: &str = "[[effect]]\nname = \"anisotropy\"\nratio = 2.5\nturn_deg = 30.0\n";
 
 /// What speckle lets some 2000 detections of 4 looks tell of a scan's powers, dB rms.
@@ -137,6 +139,32 @@ fn an_effect_of_the_instrument_is_rendered_once_it_is_added() {
     // Its own file it may write again; the search now begins at revision 2.
     run(at, &add, "stored mannequin-paint@");
     assert!(entries(at).contains(&"scene-after.toml".to_owned()));
+}
+
+#[test]
+fn an_effect_of_the_scene_stands_in_the_scene_beside_the_old_one() {
+    let folder = measured(PATCH, None);
+    let at = folder.path();
+    let (before, hidden) =
+        (noiseless(at, "scene.toml", "matdb.sqlite"), noiseless(at, "hidden.toml", "matdb.sqlite"));
+    assert!(rms_db(&before, &hidden) > HIDDEN_DB, "{}", rms_db(&before, &hidden));
+    let add = diagnose("scene.toml", "foreign-patch,covering-layer", &["--add"]);
+    let said = run(at, &add, "stored mannequin-paint@2 in matdb.sqlite; scene-after.toml renders");
+    assert!(said.contains("centre_m = (") && said.contains(") m"), "where it is, is told: {said}");
+    let page = fs::read_to_string(at.join("report/report.html")).unwrap();
+    assert!(page.contains("<th scope=\"row\">centre_m</th>") && page.contains("The ring is"));
+    assert_eq!(fs::read_to_string(at.join("scene.toml")).unwrap(), SCENE);
+
+    // It belongs to the scene: neither the material nor the radar takes it in.
+    let stored = contents(&at.join("matdb.sqlite"));
+    assert!(stored.len() == 2 && stored.iter().all(|material| material.effects.is_empty()));
+    for scene in ["scene-after.toml", "report/after.toml"] {
+        let file = SceneFile::parse(&fs::read_to_string(at.join(scene)).unwrap()).unwrap();
+        let [patch] = &file.effect[..] else { panic!("{scene}: {:?}", file.effect) };
+        assert_eq!((patch.name.as_str(), file.radar.effect.len()), ("foreign-patch", 0));
+        let after = noiseless(at, scene, "matdb.sqlite");
+        assert!(rms_db(&after, &hidden) < FOUND_DB, "{scene}: {}", rms_db(&after, &hidden));
+    }
 }
 
 #[test]

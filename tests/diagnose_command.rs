@@ -6,8 +6,9 @@ mod support;
 use std::fs;
 use std::path::Path;
 
-use matdb::effects::library;
-use serde_json::Value;
+use matdb::diagnose::curve::terms;
+use matdb::effects::{Knob, library};
+use serde_json::{Value, json};
 use support::{entries, matdb, read_cloud, refused};
 
 /// A sphere and a plate under few chirps with speckle.
@@ -134,6 +135,16 @@ fn a_report_is_complete_and_its_table_gives_its_errors() {
         assert!(text.contains(part), "`{part}` is not in:\n{text}");
     }
     page(&at.join("report/report.html"));
+
+    // What another cloud does not need goes, and what somebody else put there stays.
+    fs::write(at.join("report/notes.txt"), "mine").unwrap();
+    fs::write(at.join("report/unknown-map.png"), "stale").unwrap();
+    matdb(at).args(["render", "-q", "scene.toml", "-o", "out"]).assert().success();
+    matdb(at).args(DIAGNOSE).assert().success();
+    let mut left = FILES.to_vec();
+    left.retain(|name| !name.starts_with("material-"));
+    left.insert(left.iter().position(|name| *name > "notes.txt").unwrap(), "notes.txt");
+    assert_eq!(entries(&at.join("report")), left);
 }
 
 #[test]
@@ -192,9 +203,13 @@ fn too_few_detections_are_said_in_files_and_one_sentence() {
     fs::write(at.join("few.csv"), csv).unwrap();
     // As an earlier diagnosis would have left them.
     fs::create_dir(at.join("report")).unwrap();
-    for stale in ["residuals.csv", "after.toml"] {
+    for stale in ["residuals.csv", "ranking.png", "unknown-map.svg", "curve.svg"] {
         fs::write(at.join("report").join(stale), "stale").unwrap();
     }
+    fs::write(at.join("report/report.json"), "{\"schema\": 2, \"verdict\": \"explained\"}")
+        .unwrap();
+    fs::write(at.join("report/after.toml"), "# The scene as `matdb diagnose` leaves it.\n")
+        .unwrap();
     let few = ["diagnose", "few.csv", "--scene", "scene.toml", "-o", "report"];
     let message = refused(matdb(at).args(few));
     assert!(message.contains("80 detections") && message.contains("300"), "{message}");
@@ -249,18 +264,36 @@ fn the_library_is_listed_and_every_entry_is_complete() {
     };
     let list = run(&["effects"]);
     let records: Value = serde_json::from_str(&run(&["effects", "--json"])).unwrap();
-    assert_eq!(records.as_array().unwrap().len(), library().len());
-    for (effect, record) in library().iter().zip(records.as_array().unwrap()) {
-        let name = effect.name();
-        assert!(list.lines().any(|line| line.starts_with(&format!("{name} "))), "{name}");
-        let entry = run(&["effects", name]);
-        assert!(entry.contains(effect.is()) && entry.contains(effect.shows()), "{entry}");
-        for knob in effect.knobs() {
-            assert!(entry.contains(knob.name), "{name}: {}", knob.name);
-        }
-        assert_eq!(record["name"], name);
-        assert_eq!(record["parameters"].as_array().unwrap().len(), effect.knobs().len());
+    let records = records.as_array().unwrap();
+    assert!(list.lines().all(|line| line.chars().count() <= 100), "{list}");
+    let (of_clouds, of_curves) = list.split_once("Of a curve").unwrap();
+    let check =
+        |list: &str, record: &Value, of: &str, name: &str, says: [&str; 2], knobs: &[Knob]| {
+            assert!(list.lines().any(|line| line.starts_with(&format!("{name} "))), "{name}");
+            let entry = run(&["effects", name]);
+            assert!(says.iter().all(|text| entry.contains(text)), "{entry}");
+            for knob in knobs {
+                assert!(entry.contains(knob.name), "{name}: {}", knob.name);
+            }
+            assert_eq!((&record["name"], &record["applies_to"]), (&name.into(), &json!([of])));
+            assert_eq!(record["parameters"].as_array().unwrap().len(), knobs.len());
+        };
+    let mut rest = records.iter();
+    for (effect, record) in library().iter().zip(rest.by_ref()) {
+        let says = [effect.is(), effect.shows()];
+        check(of_clouds, record, "cloud", effect.name(), says, effect.knobs());
     }
+    for (term, record) in terms().iter().zip(rest.by_ref()) {
+        let says = [term.is(), term.shows()];
+        check(of_curves, record, "curve", term.name(), says, term.knobs());
+    }
+    let unknown = rest.next().unwrap();
+    assert_eq!(unknown["name"], "unknown");
+    assert_eq!(unknown["applies_to"], json!(["cloud", "curve"]));
+    assert_eq!((rest.next(), unknown["level"].is_null()), (None, true));
+    // Both have a film, and it is not the same one.
+    let films: Value = serde_json::from_str(&run(&["effects", "thin-film", "--json"])).unwrap();
+    assert_eq!(films.as_array().unwrap().len(), 2);
     let message = refused(matdb(folder.path()).args(["effects", "drfit"]));
     assert!(message.contains("did you mean `drift`?"), "{message}");
 }

@@ -75,6 +75,16 @@ fn a_report_is_complete_and_its_table_gives_its_errors() {
     }
     let html = fs::read_to_string(at.join("out/report.html")).unwrap();
     assert!(html.contains("stray-light") && html.contains("<svg") && !html.contains("http"));
+
+    // What a diagnosis of a cloud left goes, and so does all of this when nothing can be said.
+    for name in ["residual-map.png", "unknown-map.svg"] {
+        fs::write(at.join("out").join(name), "stale").unwrap();
+    }
+    matdb(at).args(command).assert().success();
+    assert_eq!(entries(&at.join("out")), FILES);
+    fs::write(at.join("few.csv"), "theta_deg,sigma0_db\n0,1\n10,0\n").unwrap();
+    refused(matdb(at).args(["diagnose", "--curve", "few.csv", "-o", "out"]));
+    assert_eq!(entries(&at.join("out")), ["report.html", "report.json"]);
 }
 
 #[test]
@@ -104,6 +114,16 @@ fn what_means_nothing_is_refused_in_a_sentence() {
         assert!(message.contains(says), "{message}");
     }
     assert_eq!(json(&at.join("out/report.json"))["verdict"], "cannot-tell");
+    // What only a cloud has a use for is refused before anything is read.
+    for flag in ["--add", "--material paint", "--unit mm", "--power w", "--frame target"] {
+        let command = format!("diagnose --curve coating.csv -o more {flag}");
+        let output = matdb(at).args(command.split(' ')).output().unwrap();
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{flag}: {message}");
+        let (first, flag) = (message.lines().next().unwrap(), flag.split(' ').next().unwrap());
+        assert!(first.contains(flag) && first.contains("cannot be used with"), "{message}");
+        assert!(!at.join("more").exists());
+    }
 }
 
 /// Rows of a CSV by column.
@@ -139,6 +159,26 @@ fn coatings(folder: &Path) -> BTreeMap<String, String> {
     tables
 }
 
+/// A diagnosis as a line of the table in `docs/diagnosing.md`.
+fn line(file: &str, report: &Value) -> String {
+    let errors = ["before", "after"].map(|model| number(&report["error"][model]["rmse_db"]));
+    let noise_db = number(&report["error"]["noise_floor_db"]);
+    let named = report["effects"].as_array().unwrap().iter().map(|found| {
+        let evidence = ["held_out_gain", "held_out_se"].map(|key| number(&found["evidence"][key]));
+        format!("`{}` ({:.0} ± {:.0})", found["name"].as_str().unwrap(), evidence[0], evidence[1])
+    });
+    let unknown = report["unexplained"].as_array().unwrap().iter().map(|unknown| {
+        let covariate = unknown["covariate"].as_str().unwrap();
+        format!("{:.2} dB with {covariate}", number(&unknown["strength_db"]))
+    });
+    let listed = |all: Vec<String>| if all.is_empty() { "–".to_owned() } else { all.join(", ") };
+    let [named, unknown] = [named.collect(), unknown.collect()].map(listed);
+    format!(
+        "| `{file}` | {} | {:.2} | {:.2} | {noise_db:.2} | {named} | {unknown} |",
+        report["curve"]["points"], errors[0], errors[1]
+    )
+}
+
 #[test]
 fn structure_is_found_in_measured_coatings() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/ua-loft-black-coatings");
@@ -155,12 +195,14 @@ fn structure_is_found_in_measured_coatings() {
     /// What the provenance of the data says that one lobe and Lambert leave, dB, with room.
     const LEFT_DB: [f64; 2] = [0.4, 2.0];
     let mut named = Vec::new();
+    println!("| curve | levels | before | after | noise | named | unknown |");
     for file in entries(at) {
         matdb(at).args(["diagnose", "-q", "--curve", &file, "-o", "out"]).assert().success();
         let report = json(&at.join("out/report.json"));
         let [before, after] =
             ["before", "after"].map(|model| number(&report["error"][model]["rmse_db"]));
         let noise_db = number(&report["error"]["noise_floor_db"]);
+        println!("{}", line(&file, &report));
         assert_eq!(report["verdict"], "unexplained", "{file}");
         assert!((LEFT_DB[0]..LEFT_DB[1]).contains(&before), "{file}: {before}");
         assert!((0.05..0.3).contains(&noise_db) && before > 2.0 * noise_db, "{file}: {noise_db}");
@@ -173,12 +215,13 @@ fn structure_is_found_in_measured_coatings() {
             assert!(after < 0.95 * before, "{named:?}");
         }
     }
-    println!("{named:#?}");
     assert!(!named.is_empty(), "nothing was named in any coating");
     for name in ["AnoBlackEC1onAlum", "AnoBlackEC2onAlum", "AnoBlackNiTEonSteel"] {
         let file = data.join(format!("{name}.bsdf"));
         let file = file.to_str().unwrap();
         matdb(at).args(["diagnose", "-q", "--curve", file, "-o", "out"]).assert().success();
-        assert_eq!(json(&at.join("out/report.json"))["verdict"], "unexplained", "{name}");
+        let report = json(&at.join("out/report.json"));
+        println!("{}", line(&format!("{name}.bsdf"), &report));
+        assert_eq!(report["verdict"], "unexplained", "{name}");
     }
 }

@@ -4,19 +4,20 @@ use serde::Serialize;
 
 use super::console::Console;
 use super::summary::table;
+use crate::diagnose::curve::{Term, term, terms};
 use crate::effects::{Effect, Knob, Level, find, library};
 use crate::error::Error;
 use crate::formats::text::nearest;
 use crate::units::shown;
 
-/// List the physical effects that `diagnose` tries, or explain one
+/// List the physical effects that `diagnose` tries on a scan and on a curve, or explain one
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb effects
   matdb effects drift
   matdb effects --json | jq '.[].name'")]
 pub(super) struct Args {
-    /// The effect to explain
+    /// The effect to explain; `unknown` is what none explains
     name: Option<String>,
 }
 
@@ -24,53 +25,63 @@ pub(super) struct Args {
 #[derive(Serialize)]
 struct Record {
     name: &'static str,
-    level: Level,
+    /// What it is looked for in: `cloud`, `curve`.
+    applies_to: &'static [&'static str],
+    /// None of what has no name.
+    level: Option<Level>,
     is: &'static str,
     shows: &'static str,
     parameters: &'static [Knob],
 }
 
-/// What has no name, as a script reads it.
-#[derive(Serialize)]
-struct Unknown {
-    name: &'static str,
-    is: &'static str,
-    shows: &'static str,
-}
-
-const UNKNOWN: Unknown = Unknown {
+const UNKNOWN: Record = Record {
     name: "unknown",
-    is: "What no effect in this list does to the data: a smooth term over all covariates and the target \
-         plane, beside the law and the effects that were found, which names nothing.",
+    applies_to: &["cloud", "curve"],
+    level: None,
+    is: "What no effect in this list does to the data, beside the law and the effects that were found: in a \
+         cloud a smooth term over all covariates and the target plane, in a curve one over an angle, or \
+         neighbouring angles that err to the same side. It names nothing.",
     shows: "The verdict is `unexplained`; `unexplained` in report.json says with which covariates it goes \
-            and how large it is, the picture unknown-map shows where, and residuals.csv has it chirp by \
-            chirp as unknown_db. It is never stored and never rendered.",
+            and how large it is. Of a cloud the picture unknown-map shows where, and residuals.csv has it \
+            chirp by chirp as unknown_db. It is never stored and never rendered.",
+    parameters: &[],
 };
 
 impl Record {
-    fn new(effect: &dyn Effect) -> Record {
+    fn of_cloud(effect: &dyn Effect) -> Record {
         Record {
             name: effect.name(),
-            level: effect.level(),
+            applies_to: &["cloud"],
+            level: Some(effect.level()),
             is: effect.is(),
             shows: effect.shows(),
             parameters: effect.knobs(),
         }
     }
+
+    fn of_curve(term: &dyn Term) -> Record {
+        Record {
+            name: term.name(),
+            applies_to: &["curve"],
+            level: Some(term.level()),
+            is: term.is(),
+            shows: term.shows(),
+            parameters: term.knobs(),
+        }
+    }
 }
 
 pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
-    match &args.name {
-        Some(name) if name == UNKNOWN.name => console.result(&unknown(), &UNKNOWN),
-        Some(name) => {
-            let record = Record::new(known(name)?);
-            console.result(&entry(&record), &record)
-        }
-        None => {
-            let records = library().map(Record::new);
-            console.result(&list(&records), &records)
-        }
+    let named = library().map(Record::of_cloud).into_iter().chain(terms().map(Record::of_curve));
+    let all: Vec<Record> = named.chain([UNKNOWN]).collect();
+    let Some(name) = &args.name else { return console.result(&list(&all), &all) };
+    // A name can stand for an effect of a cloud and for another one of a curve.
+    let of_name: Vec<&Record> = all.iter().filter(|record| record.name == name).collect();
+    if of_name.is_empty() {
+        return Err(stranger(name, all.iter().map(|record| record.name)));
     }
+    let entries: Vec<String> = of_name.iter().map(|record| entry(record)).collect();
+    console.result(&entries.join("\n"), &of_name)
 }
 
 /// The effects of these names; all of them without any.
@@ -90,17 +101,33 @@ pub(super) fn chosen(names: &[String]) -> Result<Vec<&'static dyn Effect>, Error
 
 fn known(name: &str) -> Result<&'static dyn Effect, Error> {
     find(name).ok_or_else(|| {
-        if name == UNKNOWN.name {
-            let problem = "`unknown` is no effect to try".to_owned();
-            let way_out = "leave it out: what no effect explains is always looked for".to_owned();
-            return Error::Usage { problem, way_out };
-        }
-        let way_out = match nearest(name, library().map(|effect| effect.name())) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => "`matdb effects` lists them".to_owned(),
+        let refused = |problem: String, way_out: &str| {
+            let way_out = way_out.to_owned();
+            Error::Usage { problem, way_out }
         };
-        Error::Usage { problem: format!("there is no effect `{name}`"), way_out }
+        if name == UNKNOWN.name {
+            return refused(
+                "`unknown` is no effect to try".to_owned(),
+                "leave it out: what no effect explains is always looked for",
+            );
+        }
+        if term(name).is_some() {
+            return refused(
+                format!("`{name}` is an effect of curves and not of clouds"),
+                "give the curve with --curve, or name effects of clouds: `matdb effects` lists them",
+            );
+        }
+        stranger(name, library().map(|effect| effect.name()).into_iter())
     })
+}
+
+/// That no effect has this name, and which of the known ones may be meant.
+fn stranger(name: &str, known: impl Iterator<Item = &'static str>) -> Error {
+    let way_out = match nearest(name, known) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => "`matdb effects` lists them".to_owned(),
+    };
+    Error::Usage { problem: format!("there is no effect `{name}`"), way_out }
 }
 
 /// Where an effect belongs, in a word.
@@ -112,37 +139,39 @@ pub(super) fn level(level: Level) -> &'static str {
     }
 }
 
-fn list(records: &[Record]) -> String {
+fn list(all: &[Record]) -> String {
     let row = |record: &Record| {
-        let names: Vec<&str> = record.parameters.iter().map(|knob| knob.name).collect();
-        let parameters = match names.as_slice() {
-            [first, .., last] if names.len() > 3 => format!("{first} … {last}"),
-            few => few.join(", "),
-        };
-        let level = level(record.level).to_owned();
-        [record.name.to_owned(), level, parameters, short(record.is).to_owned()]
+        let level = record.level.map_or("", level).to_owned();
+        [record.name.to_owned(), level, short(record.shows)]
     };
-    table(&["effect", "level", "parameters", "what it is"], records.iter().map(row))
-        + "`matdb effects NAME` says how one shows, and what its numbers are; `unknown` is what none of \
-           them explains\n"
+    let of = |what: &str| {
+        let records = all.iter().filter(|record| record.applies_to == [what]);
+        table(&["effect", "level", "what it looks like"], records.map(row))
+    };
+    format!(
+        "Of a scan, `matdb diagnose CLOUD`:\n{}\nOf a curve, `matdb diagnose --curve FILE`:\n{}\n\
+         `matdb effects NAME` says what one is, how it shows, and what its numbers are; `unknown` is\n\
+         what none of them explains.\n",
+        of("cloud"),
+        of("curve")
+    )
 }
 
-fn unknown() -> String {
-    let Unknown { name, is, shows } = UNKNOWN;
-    format!("{name}\n{is}\n\nHow it shows: {shows}\n")
-}
-
-/// A sentence up to where it goes into detail.
-fn short(sentence: &'static str) -> &'static str {
-    const LONG: usize = 80;
-    let first = |text: &'static str, ends: &[&str]| {
-        let end = ends.iter().filter_map(|end| text.find(end)).min().unwrap_or(text.len());
-        text.get(..end).unwrap_or(text).trim_end_matches('.')
-    };
-    match first(sentence, &[":", ";", ". "]) {
-        long if long.len() > LONG => first(long, &[", "]),
-        short => short,
+/// The first sentence, or as many of its words as fit into a line of a hundred beside the longest name.
+fn short(text: &str) -> String {
+    const LONG: usize = 66;
+    let sentence = text.split_once(". ").map_or(text, |(first, _)| first).trim_end_matches('.');
+    if sentence.chars().count() <= LONG {
+        return sentence.to_owned();
     }
+    let mut words = String::new();
+    for word in sentence.split(' ') {
+        if words.chars().count() + word.chars().count() + 2 > LONG {
+            break;
+        }
+        words = words + word + " ";
+    }
+    words + "…"
 }
 
 fn entry(record: &Record) -> String {
@@ -155,9 +184,16 @@ fn entry(record: &Record) -> String {
             shown(knob.absent),
         ]
     });
-    let parameters = table(&["parameter", "unit", "from", "to", "absent or start"], rows);
-    let Record { name, is, shows, .. } = record;
-    format!("{name} ({})\n{is}\n\nHow it shows: {shows}\n\n{parameters}", level(record.level))
+    let parameters = match record.parameters {
+        [] => String::new(),
+        _ => {
+            "\n".to_owned() + &table(&["parameter", "unit", "from", "to", "absent or start"], rows)
+        }
+    };
+    let Record { name, applies_to, is, shows, .. } = record;
+    let level = record.level.map_or(String::new(), |of| format!("{}, ", level(of)));
+    let of = applies_to.join(" and of a ");
+    format!("{name} ({level}of a {of})\n{is}\n\nHow it shows: {shows}\n{parameters}")
 }
 
 /// A UCUM code as people write the unit.

@@ -252,7 +252,8 @@ pub enum DiagnoseError {
     },
     /// The target is too small for held-out patches.
     #[error(
-        "the looks fill {blocks} patches and {LEAST_BLOCKS} are needed; make block_m smaller or scan more"
+        "the looks fill {blocks} patches and {LEAST_BLOCKS} are needed; scan a larger part of the target, \
+         or a larger target"
     )]
     TooSmall {
         /// Patches.

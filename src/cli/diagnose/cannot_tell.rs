@@ -39,8 +39,8 @@ fn would_help(error: &DiagnoseError) -> &'static str {
              scene are in one frame; `matdb measure` finds the pose."
         }
         DiagnoseError::TooSmall { .. } => {
-            "A target that fills more of the field of view, or several scans of it: held-out patches \
-             need room."
+            "A scan that meets more of the target, or a target that fills more of the field of view: \
+             held-out patches need room."
         }
         DiagnoseError::Unnumbered => {
             "The chirp number of every point, as column `chirp`: without it nobody knows which chirps \

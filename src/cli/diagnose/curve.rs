@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use super::earlier::Earlier;
 use super::plots::Picture;
 use super::words::{fixed, listed, plus_minus, value};
 use super::{Args, html, json};
@@ -91,7 +92,9 @@ fn publish(
         svg,
         png,
     ];
+    let earlier = Earlier::in_folder(folder);
     write_all(folder, &files)?;
+    earlier.remove_all_but(&files)?;
     console.result(&text(report, folder), report)
 }
 
@@ -110,7 +113,10 @@ fn refuse(
         "effects": [],
     });
     let page = html::curve::cannot_tell(&curve, &error.to_string(), WOULD_HELP);
-    write_all(folder, &[("report.html", page), ("report.json", json(&answer)?)])?;
+    let files = [("report.html", page), ("report.json", json(&answer)?)];
+    let earlier = Earlier::in_folder(folder);
+    write_all(folder, &files)?;
+    earlier.remove_all_but(&files)?;
     if console.json {
         console.result("", &answer)?;
     }

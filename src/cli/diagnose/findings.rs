@@ -1,5 +1,6 @@
 //! What a diagnosis tried, as a material keeps it: found or not.
 
+use super::words::not_found;
 use crate::diagnose::{Candidate, Found, Report, Unexplained};
 use crate::material::{Finding, FindingVerdict};
 
@@ -52,19 +53,6 @@ pub(super) fn findings(
     all.extend(not_found(report).map(absent));
     all.extend(report.unexplained.iter().map(unexplained));
     all
-}
-
-/// Each effect that was tried and neither found nor as good as one that was, as the last round saw it.
-fn not_found(report: &Report) -> impl Iterator<Item = &Candidate> {
-    let is_found = |name: &str| {
-        report.effects.iter().any(|effect| effect.name == name || effect.class.contains(&name))
-    };
-    let is_last = |place: usize, name: &str| {
-        !report.ranking.iter().skip(place + 1).any(|later| later.name == name)
-    };
-    let ranking = report.ranking.iter().enumerate();
-    let last = ranking.filter(move |(place, tried)| is_last(*place, tried.name));
-    last.map(|(_, tried)| tried).filter(move |tried| !is_found(tried.name))
 }
 
 fn finite(number: f64) -> Option<f64> {

@@ -3,6 +3,7 @@
 mod after;
 mod cannot_tell;
 mod curve;
+mod earlier;
 mod findings;
 mod html;
 mod plots;
@@ -32,12 +33,14 @@ use crate::scene::{Scene, read_text};
 use crate::trace::Bvh;
 use crate::units::watts_from_dbm;
 use cannot_tell::CannotTell;
+use earlier::Earlier;
 use publish::Publication;
 use takers::Cast;
 
 /// Find the physical effect that a scene lacks to explain a measured cloud, or a law a measured curve
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("cloud", |cloud| cloud.required(false)))]
+#[command(mut_arg("unit", of_clouds), mut_arg("power", of_clouds), mut_arg("frame", of_clouds))]
 #[command(after_help = "Examples:
   matdb diagnose cloud.ply --scene scene.toml -o diagnosis
   matdb diagnose cloud.ply --scene scene.toml --effects drift,fov-gain -o diagnosis
@@ -68,10 +71,10 @@ pub(super) struct Args {
     effects: Vec<String>,
     /// Store what is found, and what was tried and not found, as new revisions of the materials; with
     /// something found the scene, too, as SCENE-after.toml beside it
-    #[arg(long)]
+    #[arg(long, conflicts_with = "curve")]
     add: bool,
     /// The material that takes refitted law and effects in [default: all of the scene with enough looks]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", conflicts_with = "curve")]
     material: Option<String>,
     /// Seed of folds and of everything random
     #[arg(long, default_value_t = 0)]
@@ -79,6 +82,11 @@ pub(super) struct Args {
     /// Folder to write into; created when it is not there
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
+}
+
+/// A flag that a curve has no use for.
+fn of_clouds(flag: clap::Arg) -> clap::Arg {
+    flag.conflicts_with("curve")
 }
 
 /// What a report says beside the diagnosis itself.
@@ -336,17 +344,10 @@ fn refuse(error: DiagnoseError, asked: Asked, console: &Console) -> Result<(), E
     let answer = CannotTell::new(&error);
     let [cloud, scene] = [&cloud.cloud, scene].map(|path| path.display().to_string());
     let html = html::cannot_tell(&answer, &scene, &cloud);
-    write_all(&args.output, &[("report.html", html), ("report.json", json(&answer)?)])?;
-    // What an earlier diagnosis left there would pass for part of this answer.
-    for stale in ["residuals.csv", after::AFTER].map(|name| args.output.join(name)) {
-        match std::fs::remove_file(&stale) {
-            Err(reason) if reason.kind() != std::io::ErrorKind::NotFound => {
-                let way_out = "remove it: it is of an earlier diagnosis";
-                return Err(Error::Io { verb: "remove", path: stale, reason, way_out });
-            }
-            _ => {}
-        }
-    }
+    let files = [("report.html", html), ("report.json", json(&answer)?)];
+    let earlier = Earlier::in_folder(&args.output);
+    write_all(&args.output, &files)?;
+    earlier.remove_all_but(&files)?;
     if console.json {
         console.result("", &answer)?;
     }

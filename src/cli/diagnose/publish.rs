@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use super::after::{self, AFTER, MARK};
+use super::earlier::Earlier;
 use super::takers::{Cast, Taker, pinned};
 use super::{Asked, Context, html, json, plots, residuals, text, typed};
 use crate::cli::console::Console;
@@ -15,6 +16,9 @@ use crate::error::Error;
 use crate::formats::FormatError;
 use crate::material::file;
 use crate::scene::Scene;
+
+/// First line of a material's file.
+const FOUND: &str = "# A material with what `matdb diagnose` found in it.\n";
 
 type Files = Vec<(String, Vec<u8>)>;
 
@@ -49,6 +53,7 @@ impl Publication<'_> {
             files.extend(picture.files()?);
         }
         let page = |context: &Context| html::report(self.report, context, &pictures);
+        let earlier = Earlier::in_folder(&self.asked.args.output);
         if is_stored {
             self.add(&takers, &mut files, &mut context, &page, db)?;
         } else {
@@ -62,6 +67,7 @@ impl Publication<'_> {
                 false => write_all(&self.asked.args.output, &files)?,
             }
         }
+        earlier.remove_all_but(&files)?;
         notices.iter().for_each(|notice| console.notice(notice));
         self.left_out(&takers).iter().for_each(|notice| console.notice(notice));
         files.sort_by_key(|(name, _)| name != "report.html");
@@ -123,7 +129,7 @@ impl Publication<'_> {
                 continue;
             };
             let name = format!("material-{}.toml", self.cast.name(taker.number).replace('@', "-"));
-            files.push((name, file::write(&material)?.into_bytes()));
+            files.push((name, (FOUND.to_owned() + &file::write(&material)?).into_bytes()));
             slugs.push(material.slug.to_string());
         }
         Ok((files, self.names(takers, &slugs)))

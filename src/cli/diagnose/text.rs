@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::words::{covariate, gone, listed, plus_minus, sentence, value, verdict};
+use super::words::{covariate, gone, listed, not_found, numbers, plus_minus, sentence, verdict};
 use crate::cli::effects::level;
 use crate::diagnose::{Errors, Found, Report};
 
@@ -18,13 +18,8 @@ pub(super) fn text(report: &Report, files: &[String], folder: &Path) -> String {
     if report.set_aside > 0 {
         text += &format!("set aside: {} detections that lie elsewhere\n", report.set_aside);
     }
-    let accepted = |name: &str| {
-        report.effects.iter().any(|found| found.name == name || found.class.contains(&name))
-    };
-    let mut others: Vec<&str> =
-        report.ranking.iter().map(|c| c.name).filter(|name| !accepted(name)).collect();
+    let mut others: Vec<&str> = not_found(report).map(|tried| tried.name).collect();
     others.sort_unstable();
-    others.dedup();
     if !others.is_empty() {
         text += &format!("tried and not supported: {}\n", listed(&others));
     }
@@ -38,11 +33,8 @@ fn lower(sentence: &str) -> String {
 }
 
 fn effect(found: &Found) -> String {
-    let numbers: Vec<String> = found
-        .parameters
-        .iter()
-        .map(|(name, number)| format!("{name} = {}", value(number)))
-        .collect();
+    let numbers: Vec<String> =
+        numbers(&found.parameters).iter().map(|number| number.join(" = ")).collect();
     let others: Vec<&str> = found.class.iter().copied().filter(|n| *n != found.name).collect();
     let class = match others.is_empty() {
         true => String::new(),

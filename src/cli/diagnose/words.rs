@@ -1,7 +1,7 @@
 //! Numbers and names of a diagnosis, as a person reads them on the terminal and in the page.
 
 use crate::cli::effects::unit;
-use crate::diagnose::{Report, Value, Verdict};
+use crate::diagnose::{Candidate, Parameters, Report, Triple, Value, Verdict};
 use crate::effects::Level;
 
 /// How much of the error above the noise floor is gone. The floor is an estimate: what ends below it has nothing left
@@ -64,6 +64,38 @@ pub(super) fn value(value: &Value) -> String {
         None => format!("{} (deviation not told)", digits(*value)),
     };
     in_unit(number, unit)
+}
+
+/// Three numbers that belong together, with their deviations and their unit.
+fn triple(triple: &Triple) -> String {
+    let Triple { value, sd, unit } = triple;
+    let number = |axis: usize| match sd {
+        Some(sd) => plus_minus(value[axis], sd[axis]),
+        None => digits(value[axis]),
+    };
+    in_unit(format!("({})", [0, 1, 2].map(number).join(", ")), unit)
+}
+
+/// The numbers of an effect by name, and where on the target it is.
+pub(super) fn numbers(parameters: &Parameters) -> Vec<[String; 2]> {
+    // Shift and turn of a pose are among the numbers already, axis by axis.
+    let is_new = |name: &str| !parameters.contains_key(name.replacen('_', "_z_", 1).as_str());
+    let numbers = parameters.iter().map(|(name, number)| [(*name).to_owned(), value(number)]);
+    let triples = parameters.triples.iter().filter(|(name, _)| is_new(name));
+    numbers.chain(triples.map(|(name, three)| [(*name).to_owned(), triple(three)])).collect()
+}
+
+/// Each effect that was tried and neither found nor as good as one that was, as the last round saw it.
+pub(super) fn not_found(report: &Report) -> impl Iterator<Item = &Candidate> {
+    let is_found = |name: &str| {
+        report.effects.iter().any(|effect| effect.name == name || effect.class.contains(&name))
+    };
+    let is_last = |place: usize, name: &str| {
+        !report.ranking.iter().skip(place + 1).any(|later| later.name == name)
+    };
+    let ranking = report.ranking.iter().enumerate();
+    let last = ranking.filter(move |(place, tried)| is_last(*place, tried.name));
+    last.map(|(_, tried)| tried).filter(move |tried| !is_found(tried.name))
 }
 
 /// A number with its unit, of which a pure number has none.
@@ -179,6 +211,26 @@ mod tests {
         let shown = |sd, unit| value(&Value { value: 1.5, sd, unit });
         assert_eq!(shown(Some(0.25), "deg"), "1.50 ± 0.25 °");
         assert_eq!(shown(None, "1"), "1.5 (deviation not told)");
+    }
+
+    #[test]
+    fn a_place_is_told_and_a_shift_is_told_once() {
+        let number = Value { value: 0.25, sd: Some(0.01), unit: "m" };
+        let three = |sd| Triple { value: [0.1, -1.25, 0.0], sd, unit: "m" };
+        let mut parameters = Parameters::default();
+        for name in ["centre_x_m", "centre_y_m", "translation_z_m"] {
+            parameters.numbers.insert(name, number.clone());
+        }
+        parameters.triples.insert("centre_m", three(None));
+        parameters.triples.insert("translation_m", three(Some([0.01; 3])));
+        let told = numbers(&parameters);
+        let names: Vec<&str> = told.iter().map(|[name, _]| name.as_str()).collect();
+        assert_eq!(names, ["centre_x_m", "centre_y_m", "translation_z_m", "centre_m"]);
+        assert_eq!(told[3][1], "(0.1, −1.25, 0) m");
+        assert_eq!(
+            triple(&three(Some([0.01; 3]))),
+            "(0.100 ± 0.010, −1.250 ± 0.010, 0.000 ± 0.010) m"
+        );
     }
 
     #[test]

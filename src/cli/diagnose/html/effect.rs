@@ -1,7 +1,9 @@
 //! What was found, effect by effect.
 
-use super::page::{escaped, list, meanings, numbers, paragraph, table, words};
-use crate::cli::diagnose::words::{belongs, digits, fixed, in_unit, listed, plus_minus, value};
+use super::page::{escaped, list, meanings, numbers, paragraph, quiet, table, words};
+use crate::cli::diagnose::words::{
+    belongs, digits, fixed, in_unit, listed, numbers as of_effect, plus_minus,
+};
 use crate::cli::effects::level;
 use crate::diagnose::{Evidence, Found};
 use crate::effects::{Knob, find};
@@ -29,16 +31,23 @@ fn parameters(found: &Found, knobs: &[Knob]) -> String {
         let knob = knobs.iter().find(|knob| knob.name == name);
         knob.map_or("–".to_owned(), |knob| in_unit(digits(knob.absent), knob.unit))
     };
-    let rows: Vec<[String; 3]> = found
-        .parameters
-        .iter()
-        .map(|(name, number)| [(*name).to_owned(), value(number), absent(name)])
-        .collect();
+    let rows = of_effect(&found.parameters).into_iter().map(|[name, number]| {
+        let absent = absent(&name);
+        [name, number, absent]
+    });
+    let place = match found.parameters.triples.contains_key("centre_m") {
+        true => quiet(
+            "centre_m is the point of the target where its centre lies, in the global frame of the \
+             scene; centre_x_m and centre_y_m are its place in the target plane, as on the maps.",
+        ),
+        false => String::new(),
+    };
+    let rows: Vec<[String; 3]> = rows.collect();
     table(
         "Its numbers ± standard deviation, fitted together with everything else",
         [words("number"), numbers("found"), numbers("means absent, or starts the search")],
         &rows,
-    )
+    ) + &place
 }
 
 fn evidence(evidence: &Evidence) -> String {
@@ -76,8 +85,9 @@ fn class(found: &Found) -> String {
     let meaning = |&name: &&'static str| (name, find(name).map_or("", |effect| effect.shows()));
     let meanings_of_others: Vec<(&str, &str)> = others.iter().map(meaning).collect();
     let text = format!(
-        "These data cannot tell it from {}, which would predict them as well; it is named first only \
-         because it does so best. What would tell them apart:",
+        "These data cannot tell it from {}, which would predict them as well; it is named first because \
+         it is the simplest of them or, where others are as simple, the likelier. What would tell them \
+         apart:",
         listed(&others)
     );
     paragraph(&text) + &meanings(&meanings_of_others)

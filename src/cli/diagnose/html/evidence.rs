@@ -3,7 +3,7 @@
 use super::page::{list, numbers, paragraph, quiet, table, words};
 use crate::cli::diagnose::Context;
 use crate::cli::diagnose::words::{
-    covariate, fixed, gone, plus_minus, probability, signed, value as with_unit,
+    covariate, fixed, gone, not_found, plus_minus, probability, signed, value as with_unit,
 };
 use crate::diagnose::{Base, BeforeAfter, Candidate, Control, Controls, Report, Unexplained};
 
@@ -184,42 +184,43 @@ fn power(controls: &Controls) -> String {
     ) + &table("What these data would have shown", columns, &rows)
 }
 
-/// What was tried and not added, best first.
+/// What was tried and not found, best first.
 pub(super) fn tried(report: &Report) -> String {
-    let accepted = |name: &str| report.effects.iter().any(|found| found.name == name);
-    let last = report.ranking.iter().map(|candidate| candidate.round).max().unwrap_or(0);
-    let mut candidates: Vec<&Candidate> = report
-        .ranking
-        .iter()
-        .filter(|candidate| candidate.round == last && !accepted(candidate.name))
-        .collect();
+    let mut candidates: Vec<&Candidate> = not_found(report).collect();
     if candidates.is_empty() {
-        return paragraph("Nothing was tried beyond what was added.");
+        return paragraph(
+            "Nothing was tried beyond what was found and what it cannot be told from.",
+        );
     }
     candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     let dash = || "–".to_owned();
     let row = |candidate: &&Candidate| {
         let held_out = candidate.held_out.map_or_else(dash, |[gain, se]| plus_minus(gain, se));
+        // The size is only known of what was fitted.
+        let size_db = Some(candidate.size_db).filter(|size_db| *size_db > 0.0);
         [
             candidate.name.to_owned(),
+            if candidate.sampled { "sample" } else { "all chirps" }.to_owned(),
             fixed(candidate.gain, 1),
             candidate.placebo_gain.map_or_else(dash, |gain| fixed(gain, 1)),
             held_out,
-            format!("{:.2}", candidate.size_db),
+            size_db.map_or_else(dash, |size_db| format!("{size_db:.2}")),
         ]
     };
-    let rows: Vec<[String; 5]> = candidates.iter().map(row).collect();
+    let rows: Vec<[String; 6]> = candidates.iter().map(row).collect();
     let columns = [
         words("effect"),
+        words("by"),
         numbers("gain in ln likelihood"),
         numbers("best placebo"),
         numbers("held-out gain in ln p"),
         numbers("size, dB"),
     ];
     paragraph(
-        "Each was fitted on top of the final model. That an effect is not supported does not say that it \
-         is absent: it may be too weak for these data. Only the best few are judged on held-out \
-         patches.",
+        "Each was tried together with what had been found by its last round. Those marked “sample” were \
+         only screened: held against a sample of the chirps, where they promised too little to be fitted \
+         to all. That an effect is not supported does not say that it is absent: it may be too weak for \
+         these data. Only the best few are judged on held-out patches.",
     ) + &table("Tried and not supported", columns, &rows)
 }
 

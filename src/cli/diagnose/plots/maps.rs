@@ -1,11 +1,15 @@
 //! Residuals over the target plane, before and after.
 
+use std::f64::consts::TAU;
+
 use super::{Picture, shown};
 use crate::cli::diagnose::words::signed;
-use crate::diagnose::{Report, Row};
+use crate::diagnose::{Found, Report, Row};
+use crate::formats::figure::drawing::{Drawing, Shape};
 use crate::formats::figure::{Figure, FigureError, Scale};
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
+use crate::radar::scan::PATTERN_RANGE_M;
 
 /// Looks in a pixel, in the mean, from which speckle does not hide the rest.
 const LOOKS_PER_PIXEL: f64 = 8.0;
@@ -115,6 +119,8 @@ fn maps(
     let empty = raster(&report.rows, pixel_m);
     let rasters = panels.iter().map(|(_, (pick, _))| filled(&empty, &report.rows, *pick));
     let rasters: Vec<Raster> = rasters.collect();
+    let rings: Vec<Ring> =
+        report.effects.iter().filter_map(|f| Ring::new(f, &report.rows)).collect();
     let reach = rasters.first().map_or(0.0, |first| reach(first, subject.reach));
     let drawing = |(raster, (title, (_, note))): (&Raster, &(&'static str, Panel))| {
         let figure = Figure {
@@ -129,12 +135,62 @@ fn maps(
             x_label: "x in the target plane, m",
             y_label: "y in the target plane, m",
         };
-        figure.drawing()
+        let mut drawing = figure.drawing()?;
+        let rings = rings.iter().filter_map(|ring| ring.on(&drawing, raster));
+        let rings: Vec<Shape> = rings.collect();
+        drawing.shapes.extend(rings);
+        Ok(drawing)
     };
-    let drawn = rasters.iter().zip(panels).map(drawing).collect::<Result<_, _>>()?;
-    let caption = format!("{} Pixels of {:.0} mm.", subject.caption, 1e3 * pixel_m);
+    let drawn = rasters.iter().zip(panels).map(drawing).collect::<Result<_, FigureError>>()?;
+    let ring = match rings.is_empty() {
+        true => "",
+        false => {
+            " The ring is the patch that was found, as wide as on a surface that faces the radar."
+        }
+    };
+    let caption = format!("{} Pixels of {:.0} mm.{ring}", subject.caption, 1e3 * pixel_m);
     let Subject { file, title, .. } = *subject;
     Ok(Picture { file, title, caption, panels: drawn, columns: panels.len() })
+}
+
+/// Where an effect with a centre and a radius was found, in the target plane.
+struct Ring {
+    x_m: f64,
+    y_m: f64,
+    radius_m: f64,
+}
+
+impl Ring {
+    fn new(found: &Found, rows: &[Row]) -> Option<Ring> {
+        let number = |name: &str| found.parameters.get(name).map(|number| number.value);
+        let [x_m, y_m] = [number("centre_x_m")?, number("centre_y_m")?];
+        let off_m = |row: &&Row| (row.xt_m - x_m).hypot(row.yt_m - y_m);
+        let nearest = rows.iter().min_by(|a, b| off_m(a).total_cmp(&off_m(b)))?;
+        // The radius is one on the surface, and the plane lies where the pattern is told.
+        Some(Ring { x_m, y_m, radius_m: number("radius_m")? * PATTERN_RANGE_M / nearest.range_m })
+    }
+
+    /// As a line on a map of this raster.
+    fn on(&self, map: &Drawing, raster: &Raster) -> Option<Shape> {
+        const CORNERS: u32 = 72;
+        let [left_px, top_px, cell_px] = map.shapes.iter().find_map(|shape| match *shape {
+            Shape::Cells { left_px, top_px, cell_px, .. } => Some([left_px, top_px, cell_px]),
+            _ => None,
+        })?;
+        // What lies beyond the map is drawn along its frame.
+        let px = |length_m: f64, cells: usize| {
+            (length_m / raster.pixel_m).clamp(0.0, cells as f64) * f64::from(cell_px)
+        };
+        let point = |corner: u32| {
+            let (sin, cos) = (f64::from(corner) / f64::from(CORNERS) * TAU).sin_cos();
+            let x_px = px(self.x_m + self.radius_m * cos - raster.x_min_m, raster.width);
+            let up_px = px(self.y_m + self.radius_m * sin - raster.y_min_m, raster.height);
+            let bottom_px = f64::from(top_px) + f64::from(cell_px) * raster.height as f64;
+            ((f64::from(left_px) + x_px) as f32, (bottom_px - up_px) as f32)
+        };
+        let points = (0..=CORNERS).map(point).collect();
+        Some(Shape::Line { points, colour: [0; 3], thickness_px: 2.0 })
+    }
 }
 
 const CHANNEL: &str = "residual";
@@ -213,6 +269,28 @@ mod tests {
         // The lowest row but the margin's is the last but one.
         assert_eq!(values[3 * 6 + 1], -51.5);
         assert_eq!(values.iter().filter(|v| v.is_nan()).count(), 29);
+    }
+
+    #[test]
+    fn a_ring_stands_where_its_patch_is() {
+        let empty = raster(&[Row { xt_m: 0.105, yt_m: 0.055, ..row() }, row()], 0.01);
+        let cells = Shape::Cells {
+            left_px: 20,
+            top_px: 30,
+            cell_px: 10,
+            columns: empty.width,
+            colours: Vec::new(),
+        };
+        let map = Drawing { width_px: 0.0, height_px: 0.0, shapes: vec![cells] };
+        let ring = Ring { x_m: 0.05, y_m: 0.02, radius_m: 0.03 };
+        let Some(Shape::Line { points, .. }) = ring.on(&map, &empty) else { panic!() };
+        // The map begins 10 mm left of and below the origin, and ends 70 mm above it.
+        assert!(
+            (points[0].0 - 110.0).abs() < 1e-3 && (points[0].1 - 80.0).abs() < 1e-3,
+            "{points:?}"
+        );
+        let top = points[18];
+        assert!((top.0 - 80.0).abs() < 1e-3 && (top.1 - 50.0).abs() < 1e-3, "{top:?}");
     }
 
     #[test]

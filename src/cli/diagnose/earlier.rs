@@ -1,0 +1,152 @@
+//! What an earlier diagnosis left in a folder: it would pass for part of a later answer.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use super::after::AFTER;
+use crate::cli::inputs::read_small;
+use crate::error::Error;
+
+/// The report for scripts, which every diagnosis writes.
+const REPORT: &str = "report.json";
+
+/// Every picture that a diagnosis of a cloud or of a curve can draw.
+const PICTURES: [&str; 8] = [
+    "residual-map",
+    "quantile-map",
+    "unknown-map",
+    "residual-trends",
+    "quantiles",
+    "ranking",
+    "error",
+    "curve",
+];
+
+/// Files of an earlier diagnosis.
+pub(super) struct Earlier {
+    folder: PathBuf,
+    names: Vec<String>,
+}
+
+impl Earlier {
+    /// What stands in a folder now; nothing where no diagnosis has been written to.
+    pub fn in_folder(folder: &Path) -> Earlier {
+        let names = if is_diagnosis(&folder.join(REPORT)) { names(folder) } else { Vec::new() };
+        Earlier { folder: folder.to_owned(), names }
+    }
+
+    /// Takes away what is not among the files that have been written since.
+    pub fn remove_all_but<Name: AsRef<str>>(
+        self,
+        written: &[(Name, Vec<u8>)],
+    ) -> Result<(), Error> {
+        let is_new = |name: &str| written.iter().any(|(written, _)| written.as_ref() == name);
+        let stale = self.names.iter().filter(|name| !is_new(name));
+        stale.map(|name| self.folder.join(name)).try_for_each(remove)
+    }
+}
+
+/// Names of all that a diagnosis can write into a folder, so far as they stand there.
+fn names(folder: &Path) -> Vec<String> {
+    let tables = ["report.html", REPORT, "residuals.csv"].map(str::to_owned);
+    let pictures =
+        PICTURES.iter().flat_map(|name| ["svg", "png"].map(|end| format!("{name}.{end}")));
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let files = files.filter_map(|entry| entry.file_name().into_string().ok());
+    // Scenes and materials may be somebody's own of the same name.
+    let is_input =
+        |name: &String| name == AFTER || (name.starts_with("material-") && name.ends_with(".toml"));
+    let inputs = files.filter(is_input).filter(|name| is_ours(&folder.join(name)));
+    let names = tables.into_iter().chain(pictures).chain(inputs);
+    names.filter(|name| is_file(&folder.join(name))).collect()
+}
+
+/// Whether a report there is a diagnosis's.
+fn is_diagnosis(report: &Path) -> bool {
+    let report = serde_json::from_slice::<serde_json::Value>(&bytes(report)).ok();
+    report.is_some_and(|report| report.get("schema").is_some() && report.get("verdict").is_some())
+}
+
+/// Whether the first line of a scene or a material says who wrote it.
+fn is_ours(path: &Path) -> bool {
+    let text = bytes(path);
+    let first = String::from_utf8_lossy(text.split(|&byte| byte == b'\n').next().unwrap_or(&[]));
+    first.starts_with('#') && first.contains("`matdb diagnose")
+}
+
+/// What stands in a file; nothing where it is none, or none that a diagnosis wrote.
+fn bytes(path: &Path) -> Vec<u8> {
+    match path.metadata() {
+        Ok(found) if found.is_file() => read_small(path).unwrap_or_default(),
+        _ => Vec::new(),
+    }
+}
+
+fn is_file(path: &Path) -> bool {
+    path.symlink_metadata().is_ok_and(|found| found.is_file() || found.is_symlink())
+}
+
+fn remove(path: PathBuf) -> Result<(), Error> {
+    match std::fs::remove_file(&path) {
+        Err(reason) if reason.kind() != ErrorKind::NotFound => {
+            let way_out = "remove it: it is of an earlier diagnosis";
+            Err(Error::Io { verb: "remove", path, reason, way_out })
+        }
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::diagnose::after::MARK;
+
+    fn folder_with(files: &[(&str, &str)]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, text) in files {
+            std::fs::write(folder.path().join(name), text).unwrap();
+        }
+        folder
+    }
+
+    fn left(folder: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(folder).unwrap();
+        let mut names: Vec<String> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    const VERDICT: &str = "{\"schema\": 2, \"verdict\": \"explained\"}";
+
+    #[test]
+    fn what_is_not_written_again_goes_and_what_others_wrote_stays() {
+        let folder = folder_with(&[
+            (REPORT, VERDICT),
+            ("after.toml", MARK),
+            ("curve.png", ""),
+            ("unknown-map.svg", ""),
+            ("residuals.csv", ""),
+            ("material-paint.toml", "# A material with what `matdb diagnose` found in it.\n"),
+            ("material-mine.toml", "name = \"mine\"\n"),
+            ("notes.txt", ""),
+        ]);
+        std::fs::create_dir(folder.path().join("error.png")).unwrap();
+        let earlier = Earlier::in_folder(folder.path());
+        earlier.remove_all_but(&[(REPORT, Vec::new()), ("curve.png", Vec::new())]).unwrap();
+        let stay = ["curve.png", "error.png", "material-mine.toml", "notes.txt", REPORT];
+        assert_eq!(left(folder.path()), stay);
+    }
+
+    #[test]
+    fn a_folder_without_a_diagnosis_and_a_scene_of_somebody_stay_as_they_are() {
+        for report in ["", "{\"schema\": 2}"] {
+            let folder = folder_with(&[(REPORT, report), ("curve.png", ""), ("after.toml", MARK)]);
+            Earlier::in_folder(folder.path()).remove_all_but::<&str>(&[]).unwrap();
+            assert_eq!(left(folder.path()), ["after.toml", "curve.png", REPORT]);
+        }
+        let own = folder_with(&[(REPORT, VERDICT), ("after.toml", "name = \"mine\"\n")]);
+        Earlier::in_folder(own.path()).remove_all_but::<&str>(&[]).unwrap();
+        assert_eq!(left(own.path()), ["after.toml"]);
+    }
+}
