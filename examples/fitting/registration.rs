@@ -6,7 +6,7 @@ use glam::DVec3;
 use matdb::brdf::Scattering;
 use matdb::frames::{Global, Point, Pose};
 use matdb::measure::icp::Motion;
-use matdb::measure::placed::Traced;
+use matdb::measure::placed::{Aims, Traced};
 use matdb::measure::{Cloud, CloudPoint, Registered, Registration, Start};
 use matdb::radar::Link;
 use matdb::radar::random::{Draws, Key, Purpose};
@@ -105,7 +105,7 @@ fn measured(scene: &Scene, draws: &mut Draws) -> Result<Cloud, Failure> {
     let radar = scene.radar();
     let link = Link::new(radar);
     let here = Pose::<Global, Global>::from_euler_xyz(DVec3::ZERO, DVec3::ZERO);
-    let seen = Traced::new(&scene.target.mesh).scan(&here, &scene.chirps.rays);
+    let seen = Traced::new(&scene.target.mesh).scan(&here, &Aims::new(&scene.chirps.rays));
     let mut points = Vec::new();
     for ((seen, ray), number) in seen.into_iter().zip(&scene.chirps.rays).zip(&scene.chirps.number)
     {

@@ -164,6 +164,9 @@ pub(super) fn covariate(name: &str) -> (String, &'static str) {
         return (format!("scatter over {inner}"), hint);
     }
     let (words, hint) = match name {
+        "spread" => {
+            ("scatter", "All powers scatter more or less than declared: speckle, or its law.")
+        }
         "theta" => ("angle of incidence", "The law of scattering has another shape."),
         "azimuth" => ("azimuth of the radar about the normal", "The surface has a direction."),
         "range" => ("range", "The power balance or the range calibration is off."),
@@ -246,5 +249,6 @@ mod tests {
     fn unknown_covariates_keep_their_name() {
         assert_eq!(covariate("moon phase").0, "moon phase");
         assert_eq!(covariate("spread over theta").0, "scatter over angle of incidence");
+        assert_eq!(covariate("spread").0, "scatter");
     }
 }
