@@ -3,12 +3,10 @@
 //! A ray is told from the facets that it surely passes beside in f32, with a bound of the rounding; f64 decides the
 //! few that are left. The library's own triangle tests lose rays on shared edges; ours is in `facet.rs`.
 
-use std::array::from_fn;
-
 use super::Hit;
 use super::boxes::{Boxes, PADDING, Sphere};
 use super::facet::{Line, met};
-use super::wide::{Wide, widest};
+use super::wide::{Wide, least, most, widest};
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 
@@ -45,8 +43,8 @@ struct Node {
 struct Block {
     corners: [[Lanes; 3]; 3],
     facets: [u32; LANES],
-    /// How many there are.
-    count: u32,
+    /// A bit for each that there is.
+    live: u32,
     /// Whether the next block has more of the same box.
     goes_on: bool,
 }
@@ -103,11 +101,12 @@ impl Eightfold {
             let mut block = Block {
                 corners: [[[0.0; LANES]; 3]; 3],
                 facets: [0; LANES],
-                count: facets.len() as u32,
+                live: 0,
                 goes_on: true,
             };
             for (lane, &facet) in facets.iter().enumerate() {
                 block.facets[lane] = facet;
+                block.live |= 1 << lane;
                 for (corner, at) in mesh.corners(facet as usize).into_iter().enumerate() {
                     let at = (at - self.sphere.centre).as_vec3().to_array();
                     (0..3).for_each(|axis| block.corners[corner][axis][lane] = at[axis]);
@@ -209,21 +208,17 @@ impl Wide for Walk<'_> {
                 continue;
             }
             if within & BLOCK == 0 {
-                let (mut hits, near) = aim.boxes(&nodes[within as usize], limit);
+                let (hits, near) = aim.boxes(&nodes[within as usize], limit);
                 stack.make_room();
                 let base = stack.len;
-                while hits != 0 {
-                    let lane = hits.trailing_zeros() as usize % LANES;
-                    hits &= hits - 1;
+                for lane in hits {
                     stack.sort_in(base, near[lane], nodes[within as usize].within[lane]);
                 }
                 continue;
             }
             for block in &blocks[(within ^ BLOCK) as usize..] {
-                let mut hits = aim.facets(block);
-                while hits != 0 {
-                    let facet = block.facets[hits.trailing_zeros() as usize % LANES];
-                    hits &= hits - 1;
+                for lane in aim.facets(block) {
+                    let facet = block.facets[lane];
                     if let Some(range_m) = line.crossing_m(mesh, facet as usize)
                         && nearest.is_none_or(|nearest| (range_m, facet) < nearest)
                     {
@@ -276,9 +271,9 @@ impl Aim {
         }
     }
 
-    /// A bit for every box that the ray reaches before `limit`, and where it enters it.
+    /// Marks every box that the ray reaches before `limit`, and where it enters it.
     #[inline(always)]
-    fn boxes(&self, node: &Node, limit: f32) -> (u32, Lanes) {
+    fn boxes(&self, node: &Node, limit: f32) -> (Marks, Lanes) {
         let (mut near, mut far) = ([0.0; LANES], [limit; LANES]);
         for axis in 0..3 {
             let (origin, per) = (self.origin[axis], self.per[axis]);
@@ -289,59 +284,107 @@ impl Aim {
             for lane in 0..LANES {
                 // Along a face that it runs in, a ray is at no number; it then is within.
                 let (enters, leaves) = ((first[lane] - origin) * per, (last[lane] - origin) * per);
-                near[lane] = if enters > near[lane] { enters } else { near[lane] };
-                far[lane] = if leaves < far[lane] { leaves } else { far[lane] };
+                near[lane] = most(enters, near[lane]);
+                far[lane] = least(leaves, far[lane]);
             }
         }
-        (bits(|lane| near[lane] <= far[lane]), near)
+        let mut within = [0.0; LANES];
+        for lane in 0..LANES {
+            within[lane] = far[lane] - near[lane];
+        }
+        (Marks::of_positive(&within), near)
     }
 
-    /// A bit for every facet that the ray does not surely pass beside.
+    /// Marks every facet that the ray does not surely pass beside.
     #[inline(always)]
-    fn facets(&self, block: &Block) -> u32 {
+    fn facets(&self, block: &Block) -> Marks {
+        let [a, b, c] = [
+            self.beside(&block.corners[0]),
+            self.beside(&block.corners[1]),
+            self.beside(&block.corners[2]),
+        ];
+        let [mut left, mut right] = [[f32::INFINITY; LANES]; 2];
+        for [from, to] in [[&a, &b], [&b, &c], [&c, &a]] {
+            for lane in 0..LANES {
+                // The volume of an edge is of either sign when it is nearer to zero than its doubt.
+                let edge = from.x[lane] * to.y[lane] - from.y[lane] * to.x[lane];
+                let doubt = from.doubt[lane] + to.doubt[lane];
+                left[lane] = least(left[lane], doubt + edge);
+                right[lane] = least(right[lane], doubt - edge);
+            }
+        }
+        let mut within = [0.0; LANES];
+        for lane in 0..LANES {
+            within[lane] = most(left[lane], right[lane]);
+        }
+        Marks(Marks::of_positive(&within).0 & block.live)
+    }
+
+    /// Corners beside the ray.
+    #[inline(always)]
+    fn beside(&self, corner: &[Lanes; 3]) -> Beside {
         let [along, across, up] = self.axes;
-        let place = |corner: &[Lanes; 3]| {
-            let depth: Lanes = from_fn(|lane| corner[along][lane] - self.origin[along]);
-            let beside = |axis: usize, shear: f32| -> Lanes {
-                from_fn(|lane| corner[axis][lane] - self.origin[axis] - shear * depth[lane])
-            };
-            [beside(across, self.shear[0]), beside(up, self.shear[1])]
-        };
-        let [a, b, c] = [0, 1, 2].map(|corner| place(&block.corners[corner]));
-        let reach = |at: &[Lanes; 2]| -> Lanes {
-            from_fn(|lane| self.doubt_m * (at[0][lane].abs() + at[1][lane].abs() + self.doubt_m))
-        };
-        let [reach_a, reach_b, reach_c] = [reach(&a), reach(&b), reach(&c)];
-        // The volume of an edge: of either sign when it is nearer to zero than the doubt.
-        let sides = |from: &[Lanes; 2], to: &[Lanes; 2], reaches: [&Lanes; 2]| {
-            let edge: Lanes =
-                from_fn(|lane| from[0][lane] * to[1][lane] - from[1][lane] * to[0][lane]);
-            let doubt: Lanes =
-                from_fn(|lane| reaches[0][lane] + reaches[1][lane] + f32::MIN_POSITIVE);
-            let [left, right]: [Lanes; 2] = [
-                from_fn(|lane| edge[lane] + doubt[lane]),
-                from_fn(|lane| doubt[lane] - edge[lane]),
-            ];
-            [left, right]
-        };
-        let ab = sides(&a, &b, [&reach_a, &reach_b]);
-        let bc = sides(&b, &c, [&reach_b, &reach_c]);
-        let ca = sides(&c, &a, [&reach_c, &reach_a]);
-        let inside = bits(|lane| {
-            let all = |side: usize| {
-                (ab[side][lane] >= 0.0) & (bc[side][lane] >= 0.0) & (ca[side][lane] >= 0.0)
-            };
-            all(0) | all(1)
-        });
-        inside & ((1 << block.count) - 1)
+        let mut beside = Beside { x: [0.0; LANES], y: [0.0; LANES], doubt: [0.0; LANES] };
+        for lane in 0..LANES {
+            let depth = corner[along][lane] - self.origin[along];
+            let x = corner[across][lane] - self.origin[across] - self.shear[0] * depth;
+            let y = corner[up][lane] - self.origin[up] - self.shear[1] * depth;
+            beside.x[lane] = x;
+            beside.y[lane] = y;
+            // The product of two doubts, too; and one of what is too small for an f32.
+            beside.doubt[lane] =
+                self.doubt_m * (x.abs() + y.abs() + self.doubt_m) + f32::MIN_POSITIVE;
+        }
+        beside
     }
 }
 
-/// A bit for every lane of which something is true.
-#[inline(always)]
-fn bits(is_true: impl Fn(usize) -> bool) -> u32 {
-    let marked: [u32; LANES] = from_fn(|lane| u32::from(is_true(lane)) << lane);
-    marked.iter().fold(0, |bits, bit| bits | bit)
+/// Corners of facets by how far they lie beside a ray, m, and what that is worth in the volume of an edge, m².
+struct Beside {
+    x: Lanes,
+    y: Lanes,
+    doubt: Lanes,
+}
+
+/// Lanes of which something is true, a bit for each.
+#[derive(Clone, Copy)]
+struct Marks(u32);
+
+impl Marks {
+    /// Of numbers that are not negative, by their signs.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn of_positive(&[a, b, c, d, e, f, g, h]: &Lanes) -> Marks {
+        use std::arch::x86_64::{_mm_movemask_ps, _mm_setr_ps};
+        // One instruction for four lanes, where comparisons would be put together bit by bit.
+        // SAFETY: SSE, all that these need, is part of x86-64.
+        let [low, high] = unsafe {
+            [_mm_movemask_ps(_mm_setr_ps(a, b, c, d)), _mm_movemask_ps(_mm_setr_ps(e, f, g, h))]
+        };
+        Marks((low | high << 4) as u32 ^ 0xff)
+    }
+
+    /// Of numbers that are not negative, by their signs.
+    #[cfg(not(target_arch = "x86_64"))]
+    #[inline(always)]
+    fn of_positive(numbers: &Lanes) -> Marks {
+        let mut marks = 0;
+        for lane in 0..LANES {
+            marks |= (numbers[lane].to_bits() >> 31 ^ 1) << lane;
+        }
+        Marks(marks)
+    }
+}
+
+impl Iterator for Marks {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let lane = (self.0 != 0).then(|| self.0.trailing_zeros() as usize % LANES)?;
+        self.0 &= self.0 - 1;
+        Some(lane)
+    }
 }
 
 /// Branches that a ray has yet to look into, the nearest of a node on top.

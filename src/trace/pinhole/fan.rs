@@ -6,9 +6,9 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::lanes::{LANES, least, most};
+use super::lanes::LANES;
 use crate::frames::{Global, Pose, Ray};
-use crate::trace::wide::{Wide, widest};
+use crate::trace::wide::{Wide, least, most, widest};
 
 /// Least cosine between a ray and the axis of its fan: 84°.
 const LEAST_COS: f64 = 0.1;

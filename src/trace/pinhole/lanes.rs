@@ -2,6 +2,8 @@
 //!
 //! Plain loops over arrays of fixed length, which become vector instructions ([`Wide`](crate::trace::wide::Wide)).
 
+use crate::trace::wide::least;
+
 /// Rays of a block.
 pub(super) const LANES: usize = 16;
 
@@ -95,15 +97,4 @@ impl Form {
         }
         any != 0
     }
-}
-
-// Other than the standard library's these need not mind NaN, and are one instruction.
-#[inline(always)]
-pub(super) fn least(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-pub(super) fn most(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }

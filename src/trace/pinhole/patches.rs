@@ -1,8 +1,9 @@
 //! Facets in the picture, a block of them side by side.
 
 use super::fan::Grid;
-use super::lanes::{Form, LANES, Lanes, least, most};
+use super::lanes::{Form, LANES, Lanes};
 use super::{NONE, ROUNDING};
+use crate::trace::wide::{least, most};
 
 /// A block of facets, and the cells that their boxes touch.
 pub(super) struct Patches {
