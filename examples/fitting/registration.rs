@@ -105,7 +105,8 @@ fn measured(scene: &Scene, draws: &mut Draws) -> Result<Cloud, Failure> {
     let radar = scene.radar();
     let link = Link::new(radar);
     let here = Pose::<Global, Global>::from_euler_xyz(DVec3::ZERO, DVec3::ZERO);
-    let seen = Traced::new(&scene.target.mesh).scan(&here, &Aims::new(&scene.chirps.rays));
+    let seen = Traced::new(&scene.target.mesh)
+        .scan(&here, &Aims::new(&scene.target.mesh, &scene.chirps.rays));
     let mut points = Vec::new();
     for ((seen, ray), number) in seen.into_iter().zip(&scene.chirps.rays).zip(&scene.chirps.number)
     {

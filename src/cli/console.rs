@@ -77,7 +77,7 @@ fn harmless(text: &str) -> String {
 ///
 /// ```
 /// let message = format!("no material `{}`", "a".repeat(10_000));
-/// assert!(matdb::cli::readable(&message).ends_with("aaa… (10001 letters)"));
+/// assert!(matdb::cli::readable(&message).ends_with("aaa… (10002 letters)"));
 /// ```
 pub fn readable(text: &str) -> String {
     const LONGEST: usize = 1000;

@@ -66,7 +66,7 @@ fn spline(selection: &Selection, base: &State, numbers: usize) -> Option<Control
             let over = covariate.name.to_owned();
             let gain = structure.fitted_gain;
             best =
-                Some(Control { numbers: field.numbers(), over, gain, held_out_gain, held_out_se });
+                Some(Control { numbers: covariate.cells, over, gain, held_out_gain, held_out_se });
         }
     }
     best
@@ -110,7 +110,7 @@ impl Bench<'_> {
         let rungs = self.rungs(effect);
         let tried = effect.starts(self.problem.stage, self.problem.looks).len();
         // What is found is found when stronger, too.
-        let (mut missed, mut found) = (None, None);
+        let (mut missed, mut found): (Vec<f64>, Option<f64>) = (Vec::new(), None);
         let mut open: &[Rung] = &rungs;
         while let Some((_, at)) = open.get(open.len() / 2) {
             let (weaker, stronger) = open.split_at(open.len() / 2);
@@ -118,10 +118,14 @@ impl Bench<'_> {
             if is_found {
                 (found, open) = (Some(size_db), weaker);
             } else {
-                (missed, open) = (Some(size_db), stronger.get(1..).unwrap_or_default());
+                missed.push(size_db);
+                open = stronger.get(1..).unwrap_or_default();
             }
         }
-        Power { name: effect.name(), least_db: found, missed_db: missed }
+        // Sizes as they are left need not be in the order of those put in.
+        let is_below = |db: &f64| found.is_none_or(|found| *db < found);
+        let missed_db = missed.into_iter().filter(is_below).max_by(f64::total_cmp);
+        Power { name: effect.name(), least_db: found, missed_db }
     }
 
     /// The effect in strengths about where a score test would just see it, weakest first.

@@ -53,11 +53,6 @@ impl Field {
         field
     }
 
-    /// How many numbers it has.
-    pub fn numbers(&self) -> usize {
-        self.names.len()
-    }
-
     /// Over these covariates alone.
     pub fn spline(looks: &[Look], covariates: &[Covariate]) -> Field {
         let mut field = Field { entries: vec![Vec::new(); looks.len()], names: Vec::new() };

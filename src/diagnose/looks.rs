@@ -12,6 +12,7 @@ use super::DiagnoseError;
 use crate::effects::{Look, Model, Stage};
 use crate::frames::{Direction, Global, Point, Pose};
 use crate::measure::cloud::{Cloud, CloudPoint};
+use crate::measure::median_point;
 use crate::measure::nearest::Nearest;
 use crate::radar::{Chirps, Radar};
 use crate::render::{LocalFrame, trace};
@@ -101,30 +102,42 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>,
 pub fn matched(cloud: &Cloud, chirps: &Chirps, looks: &[Look]) -> Result<Matched, DiagnoseError> {
     let is_numbered = cloud.points().iter().all(|point| point.chirp.is_some());
     let directions = Directions::new(chirps);
-    let by_direction = match (is_numbered, directions) {
-        (false, None) => return Err(DiagnoseError::Unnumbered),
-        (false, directions) => directions,
-        (true, directions) => {
-            let off = directions.and_then(|directions| directions.number_off(chirps, cloud));
-            off.map_or(Ok(()), |off| Err(DiagnoseError::Misnumbered { off }))?;
-            None
-        }
-    };
-    let numbered = sorted(cloud, chirps, looks, by_direction.as_ref());
-    if numbered.is_of_target(cloud) {
-        return Ok(numbered.matched);
+    let directions = directions.as_ref();
+    if !is_numbered && directions.is_none() {
+        return Err(DiagnoseError::Unnumbered);
     }
-    let (matched, points) = (numbered.on_target, cloud.points().len());
-    if numbered.second as f64 > MOST_STRAYS * points as f64 {
-        return Err(DiagnoseError::Repeated { second: numbered.second, points });
+    let off = directions.filter(|_| is_numbered).and_then(|by| by.number_off(chirps, cloud));
+    off.map_or(Ok(()), |off| Err(DiagnoseError::Misnumbered { off }))?;
+    let given = sorted(cloud, chirps, looks, directions.filter(|_| !is_numbered));
+    if given.is_of_target(cloud) {
+        return Ok(given.matched);
     }
-    // Rows that somebody counted are no chirps of the scan.
-    let directions = if is_numbered { Directions::new(chirps) } else { None };
-    let placed = directions.map(|by| sorted(cloud, chirps, looks, Some(&by)));
+    let (matched, points) = (given.on_target, cloud.points().len());
+    if given.second as f64 > MOST_STRAYS * points as f64 {
+        return Err(DiagnoseError::Repeated { second: given.second, points });
+    }
+    // Rows that somebody counted are no chirps of the scan; a cloud that is only out of place keeps its own.
+    let is_strange = is_numbered && !is_moved(cloud, chirps);
+    let placed = directions.filter(|_| is_strange).map(|by| sorted(cloud, chirps, looks, Some(by)));
     match placed.filter(|placed| placed.is_of_target(cloud)) {
         Some(placed) => Err(DiagnoseError::Strange { placed: placed.on_target, matched, points }),
         None => Err(DiagnoseError::Elsewhere { matched, points }),
     }
+}
+
+/// Whether most points lie beside the rays of their chirps by one and the same shift.
+fn is_moved(cloud: &Cloud, chirps: &Chirps) -> bool {
+    let index_of_sent: HashMap<u32, usize> = chirps.number.iter().copied().zip(0..).collect();
+    let beside_m = |point: &CloudPoint| {
+        let ray = chirps.rays.get(*index_of_sent.get(&point.chirp?)?)?;
+        let along = ray.direction.xyz();
+        let from_origin = point.point.xyz - ray.origin.xyz;
+        Some(from_origin - from_origin.dot(along) * along)
+    };
+    let shifts: Vec<DVec3> = cloud.points().iter().filter_map(beside_m).collect();
+    let shift = median_point(&shifts);
+    let alike = shifts.iter().filter(|own| own.distance(shift) <= GATE_M).count();
+    alike as f64 >= (1.0 - MOST_STRAYS) * cloud.points().len() as f64
 }
 
 /// A cloud sorted by looks, and how well that went.

@@ -306,7 +306,6 @@ impl Diagnosis {
         let Subject { looks, observations, strays, .. } = *subject;
         let folds = Folds::new(looks, self.block_m, self.folds, self.seed);
         check(subject, &folds)?;
-        check_times(looks, effects)?;
         let traced = &Traced::default();
         let problem = Problem { stage, looks, observations, declared, receiver, traced };
         let sample = &Sample::new(&problem);
@@ -470,18 +469,6 @@ fn check(subject: &Subject, folds: &Folds) -> Result<(), DiagnoseError> {
     match folds.blocks < LEAST_BLOCKS {
         true => Err(DiagnoseError::TooSmall { blocks: folds.blocks }),
         false => Ok(()),
-    }
-}
-
-fn check_times(looks: &[Look], effects: &[&dyn Effect]) -> Result<(), DiagnoseError> {
-    if looks.windows(2).any(|pair| pair[0].time_s != pair[1].time_s) {
-        return Ok(());
-    }
-    let untold = effects.iter().filter(|effect| effect.goes_with_time());
-    let untold: Vec<&str> = untold.map(|effect| effect.name()).collect();
-    match untold.is_empty() {
-        true => Ok(()),
-        false => Err(DiagnoseError::Untimed { effects: untold.join(" and ") }),
     }
 }
 

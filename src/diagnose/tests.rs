@@ -299,16 +299,6 @@ fn a_scan_with_too_little_says_so() {
     assert!(matches!(below, DiagnoseError::Threshold { below, .. } if below > 500), "{below}");
     let unlike = refused(&|look| if look % 2 == 0 { 2e-11 } else { 1e-5 });
     assert!(matches!(unlike, DiagnoseError::Unlike { .. }), "{unlike}");
-    // What goes with time is not told by a scan that has none.
-    let untimed: Vec<Look> = looks.iter().map(|look| Look { time_s: 0.0, ..*look }).collect();
-    let powers = |_| Observation { power_w: Some(2e-11), range_m: None };
-    let observations: Vec<Observation> = looks.iter().map(powers).collect();
-    let subject = Subject { looks: &untimed, observations: &observations, ..subject };
-    let timeless = Diagnosis::default().run(&subject, &crate::effects::library()).unwrap_err();
-    assert!(
-        matches!(&timeless, DiagnoseError::Untimed { effects } if effects == "motion and drift"),
-        "{timeless}"
-    );
 }
 
 #[test]
@@ -368,12 +358,19 @@ fn a_cloud_finds_its_looks() {
     };
     let on_target = &numbered.points()[..8];
     let rows =
-        on_target.iter().zip(0..).map(|(point, row)| CloudPoint { chirp: Some(row), ..*point });
+        on_target.iter().zip(0..).map(|(point, row)| CloudPoint { chirp: Some(5 * row), ..*point });
     let strange = given(rows.collect());
     assert!(
         matches!(strange, DiagnoseError::Strange { placed: 8, matched: 0, points: 8 }),
         "{strange}"
     );
+    // A cloud that lies beside its rays as a whole is out of place, whatever it meets there.
+    let aside = on_target.iter().map(|point| CloudPoint {
+        point: Point::from(point.point.xyz + DVec3::new(0.15, 0.0, 0.0)),
+        ..*point
+    });
+    let aside = given(aside.collect());
+    assert!(matches!(aside, DiagnoseError::Elsewhere { matched: 0, points: 8 }), "{aside}");
     let twice = given([on_target, on_target].concat());
     assert!(matches!(twice, DiagnoseError::Repeated { second: 8, points: 16 }), "{twice}");
     // A cloud of something else is refused.

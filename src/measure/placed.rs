@@ -3,8 +3,6 @@
 //! The mesh itself never moves: rays are carried back into its frame, and hits forward. Of what a tracer
 //! makes of its facets nothing is lost with a new pose.
 
-use std::sync::OnceLock;
-
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -25,13 +23,14 @@ pub struct Traced<'a> {
 /// Rays that a mesh is looked at with, at one pose after another; those of one origin are sorted once.
 pub struct Aims<'a> {
     rays: &'a [Ray<Global>],
-    fan: OnceLock<Option<Fan<'a>>>,
+    fan: Option<Fan<'a>>,
 }
 
 impl<'a> Aims<'a> {
-    /// Of these rays.
-    pub fn new(rays: &'a [Ray<Global>]) -> Aims<'a> {
-        Aims { rays, fan: OnceLock::new() }
+    /// For looking at a mesh with these rays.
+    pub fn new(mesh: &Mesh, rays: &'a [Ray<Global>]) -> Aims<'a> {
+        let is_flat = mesh.facets.len() <= FACETS_PER_RAY * rays.len();
+        Aims { rays, fan: if is_flat { Fan::new(rays).ok() } else { None } }
     }
 
     /// The rays, in the order of what they see.
@@ -42,11 +41,7 @@ impl<'a> Aims<'a> {
     /// What the rays meet when they are carried by a pose.
     fn closest(&self, bvh: &Bvh, pose: &Pose<Global, Global>) -> Vec<Option<Hit>> {
         let there: Vec<Ray<Global>> = self.rays.iter().map(|ray| carried(pose, ray)).collect();
-        let is_flat = bvh.mesh().facets.len() <= FACETS_PER_RAY * self.rays.len();
-        let fan = is_flat
-            .then(|| self.fan.get_or_init(|| Fan::new(self.rays).ok()))
-            .and_then(Option::as_ref);
-        match fan.and_then(|fan| fan.carried(&there, pose)) {
+        match self.fan.as_ref().and_then(|fan| fan.carried(&there, pose)) {
             Some(fan) => fan.closest(bvh.mesh()),
             None => there.par_iter().map(|ray| bvh.closest(ray)).collect(),
         }
@@ -138,7 +133,7 @@ mod tests {
             let towards = |ray| Ray { origin, direction: origin.towards(aim(ray)).unwrap() };
             let rays: Vec<Ray<Global>> = (0..count).map(towards).collect();
             let traced = Traced::new(&mesh);
-            let seen = traced.scan(&pose, &Aims::new(&rays));
+            let seen = traced.scan(&pose, &Aims::new(&mesh, &rays));
             assert_eq!(traced.bvh.is_built(), count == 3);
             for (ray, seen) in rays.iter().zip(seen) {
                 let (seen, alone) = (seen.unwrap(), traced.look(&pose, ray).unwrap());

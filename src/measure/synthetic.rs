@@ -37,7 +37,7 @@ impl Measured {
         let radar = Radar::default();
         let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
         let here = Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO);
-        let seen = Traced::new(&mesh).scan(&here, &Aims::new(&chirps.rays));
+        let seen = Traced::new(&mesh).scan(&here, &Aims::new(&mesh, &chirps.rays));
         let link = Link::new(&radar);
         let mut draws = draws(seed, 0);
         let point = |((seen, ray), number): ((_, &Ray<Global>), &u32)| {

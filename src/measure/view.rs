@@ -40,7 +40,7 @@ impl<'a> View<'a> {
         const LEAST_M: f64 = 1e-5;
         let length_m = median(points.iter().map(|p| p.distance(pivot))).max(LEAST_M);
         let traced = Traced::new(mesh);
-        let (chirps, sights) = (Aims::new(chirps), Aims::new(sights));
+        let (chirps, sights) = (Aims::new(mesh, chirps), Aims::new(mesh, sights));
         View { traced, chirps, sights, points, pivot, length_m }
     }
 
@@ -83,7 +83,7 @@ pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Median of each coordinate: a few points far off do not move it.
-pub(super) fn median_point(points: &[DVec3]) -> DVec3 {
+pub(crate) fn median_point(points: &[DVec3]) -> DVec3 {
     let axis = |axis: usize| median(points.iter().map(|point| point[axis]));
     DVec3::new(axis(0), axis(1), axis(2))
 }

@@ -86,10 +86,10 @@ impl Batch<'_> {
         let mut rays_on_processor = 0;
         while means.len() < all {
             let first = means.len();
-            // In the mesh's frame each scan has an origin of its own: the processor traces rays of one origin best.
+            // In the mesh's frame each scan has an origin of its own, and the pinhole takes one.
             let end = match self.tracer {
-                Tracer::Gpu(_) => all,
-                _ => (first / chirps + 1) * chirps,
+                Tracer::Automatic | Tracer::Pinhole => (first / chirps + 1) * chirps,
+                Tracer::Bvh | Tracer::Brute | Tracer::Gpu(_) => all,
             };
             let (some, open) = work.means(first..end.min(first + turn))?;
             means.extend(some);

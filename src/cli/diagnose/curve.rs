@@ -92,9 +92,9 @@ fn publish(
         svg,
         png,
     ];
-    let earlier = Earlier::in_folder(folder);
+    let earlier = Earlier::in_folder(folder, &[Path::new(name)]);
     write_all(folder, &files)?;
-    earlier.remove_all_but(&files)?;
+    earlier.remove_all_but(&files, console);
     console.result(&text(report, folder), report)
 }
 
@@ -114,9 +114,9 @@ fn refuse(
     });
     let page = html::curve::cannot_tell(&curve, &error.to_string(), WOULD_HELP);
     let files = [("report.html", page), ("report.json", json(&answer)?)];
-    let earlier = Earlier::in_folder(folder);
+    let earlier = Earlier::in_folder(folder, &[Path::new(&curve)]);
     write_all(folder, &files)?;
-    earlier.remove_all_but(&files)?;
+    earlier.remove_all_but(&files, console);
     if console.json {
         console.result("", &answer)?;
     }

@@ -4,8 +4,8 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::after::AFTER;
+use crate::cli::console::Console;
 use crate::cli::inputs::read_small;
-use crate::error::Error;
 
 /// The report for scripts, which every diagnosis writes.
 const REPORT: &str = "report.json";
@@ -29,20 +29,31 @@ pub(super) struct Earlier {
 }
 
 impl Earlier {
-    /// What stands in a folder now; nothing where no diagnosis has been written to.
-    pub fn in_folder(folder: &Path) -> Earlier {
+    /// What stands in a folder now beside these, which are read; nothing where no diagnosis has been
+    /// written to.
+    pub fn in_folder(folder: &Path, read: &[&Path]) -> Earlier {
         let names = if is_diagnosis(&folder.join(REPORT)) { names(folder) } else { Vec::new() };
+        let real = |path: &Path| path.canonicalize().ok();
+        let read: Vec<Option<PathBuf>> = read.iter().map(|path| real(path)).collect();
+        let is_read = |name: &String| read.contains(&real(&folder.join(name)));
+        let names = names.into_iter().filter(|name| !is_read(name)).collect();
         Earlier { folder: folder.to_owned(), names }
     }
 
-    /// Takes away what is not among the files that have been written since.
-    pub fn remove_all_but<Name: AsRef<str>>(
-        self,
-        written: &[(Name, Vec<u8>)],
-    ) -> Result<(), Error> {
+    /// Takes away what is not among the files that have been written since, and tells what it cannot: the
+    /// answer is there all the same.
+    pub fn remove_all_but<Name: AsRef<str>>(self, written: &[(Name, Vec<u8>)], console: &Console) {
         let is_new = |name: &str| written.iter().any(|(written, _)| written.as_ref() == name);
-        let stale = self.names.iter().filter(|name| !is_new(name));
-        stale.map(|name| self.folder.join(name)).try_for_each(remove)
+        for name in self.names.iter().filter(|name| !is_new(name)) {
+            let path = self.folder.join(name);
+            match std::fs::remove_file(&path) {
+                Err(reason) if reason.kind() != ErrorKind::NotFound => console.notice(&format!(
+                    "{} is of an earlier diagnosis and cannot be removed: {reason}; remove it",
+                    path.display()
+                )),
+                _ => {}
+            }
+        }
     }
 }
 
@@ -86,16 +97,6 @@ fn is_file(path: &Path) -> bool {
     path.symlink_metadata().is_ok_and(|found| found.is_file() || found.is_symlink())
 }
 
-fn remove(path: PathBuf) -> Result<(), Error> {
-    match std::fs::remove_file(&path) {
-        Err(reason) if reason.kind() != ErrorKind::NotFound => {
-            let way_out = "remove it: it is of an earlier diagnosis";
-            Err(Error::Io { verb: "remove", path, reason, way_out })
-        }
-        _ => Ok(()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,6 +118,8 @@ mod tests {
         names
     }
 
+    const QUIET: Console = Console { json: false, quiet: true, verbose: false };
+
     const VERDICT: &str = "{\"schema\": 2, \"verdict\": \"explained\"}";
 
     #[test]
@@ -127,14 +130,17 @@ mod tests {
             ("curve.png", ""),
             ("unknown-map.svg", ""),
             ("residuals.csv", ""),
+            ("quantiles.png", ""),
             ("material-paint.toml", "# A material with what `matdb diagnose` found in it.\n"),
             ("material-mine.toml", "name = \"mine\"\n"),
             ("notes.txt", ""),
         ]);
         std::fs::create_dir(folder.path().join("error.png")).unwrap();
-        let earlier = Earlier::in_folder(folder.path());
-        earlier.remove_all_but(&[(REPORT, Vec::new()), ("curve.png", Vec::new())]).unwrap();
-        let stay = ["curve.png", "error.png", "material-mine.toml", "notes.txt", REPORT];
+        // Whatever is diagnosed stays.
+        let earlier = Earlier::in_folder(folder.path(), &[&folder.path().join("residuals.csv")]);
+        earlier.remove_all_but(&[(REPORT, Vec::new()), ("curve.png", Vec::new())], &QUIET);
+        let stay =
+            ["curve.png", "error.png", "material-mine.toml", "notes.txt", REPORT, "residuals.csv"];
         assert_eq!(left(folder.path()), stay);
     }
 
@@ -142,11 +148,11 @@ mod tests {
     fn a_folder_without_a_diagnosis_and_a_scene_of_somebody_stay_as_they_are() {
         for report in ["", "{\"schema\": 2}"] {
             let folder = folder_with(&[(REPORT, report), ("curve.png", ""), ("after.toml", MARK)]);
-            Earlier::in_folder(folder.path()).remove_all_but::<&str>(&[]).unwrap();
+            Earlier::in_folder(folder.path(), &[]).remove_all_but::<&str>(&[], &QUIET);
             assert_eq!(left(folder.path()), ["after.toml", "curve.png", REPORT]);
         }
         let own = folder_with(&[(REPORT, VERDICT), ("after.toml", "name = \"mine\"\n")]);
-        Earlier::in_folder(own.path()).remove_all_but::<&str>(&[]).unwrap();
+        Earlier::in_folder(own.path(), &[]).remove_all_but::<&str>(&[], &QUIET);
         assert_eq!(left(own.path()), ["after.toml"]);
     }
 }

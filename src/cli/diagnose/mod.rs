@@ -137,6 +137,13 @@ struct Asked<'a> {
     args: &'a Args,
 }
 
+impl Asked<'_> {
+    /// The files that are read.
+    fn read(&self) -> [&Path; 2] {
+        [&self.cloud.cloud, self.scene]
+    }
+}
+
 fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error> {
     let Asked { cloud, scene: path, args } = asked;
     let given = read_text(path)?;
@@ -345,9 +352,9 @@ fn refuse(error: DiagnoseError, asked: Asked, console: &Console) -> Result<(), E
     let [cloud, scene] = [&cloud.cloud, scene].map(|path| path.display().to_string());
     let html = html::cannot_tell(&answer, &scene, &cloud);
     let files = [("report.html", html), ("report.json", json(&answer)?)];
-    let earlier = Earlier::in_folder(&args.output);
+    let earlier = Earlier::in_folder(&args.output, &asked.read());
     write_all(&args.output, &files)?;
-    earlier.remove_all_but(&files)?;
+    earlier.remove_all_but(&files, console);
     if console.json {
         console.result("", &answer)?;
     }

@@ -53,7 +53,7 @@ impl Publication<'_> {
             files.extend(picture.files()?);
         }
         let page = |context: &Context| html::report(self.report, context, &pictures);
-        let earlier = Earlier::in_folder(&self.asked.args.output);
+        let earlier = Earlier::in_folder(&self.asked.args.output, &self.asked.read());
         if is_stored {
             self.add(&takers, &mut files, &mut context, &page, db)?;
         } else {
@@ -67,7 +67,7 @@ impl Publication<'_> {
                 false => write_all(&self.asked.args.output, &files)?,
             }
         }
-        earlier.remove_all_but(&files)?;
+        earlier.remove_all_but(&files, console);
         notices.iter().for_each(|notice| console.notice(notice));
         self.left_out(&takers).iter().for_each(|notice| console.notice(notice));
         files.sort_by_key(|(name, _)| name != "report.html");
