@@ -142,19 +142,21 @@ fn relief(cells: u32) -> Mesh {
 
 #[test]
 fn on_ten_million_facets() {
-    let mesh = relief(2237);
+    const CELLS: u32 = 2237;
+    let mesh = relief(CELLS);
     assert!(mesh.facets.len() > 10_000_000);
     let origin = Point::new(0.3, -0.2, 8.0);
     let towards = |n: u32| {
-        // Every third aims at a corner of the mesh, the others between them.
-        let at = mesh.vertices[(n as usize * 78_643) % mesh.vertices.len()];
+        // Every third aims at a corner within the sheet, the others between them.
+        let [i, j] = [7919, 78_643].map(|step| 1 + n * step % (CELLS - 2));
+        let at = mesh.vertices[(j * (CELLS + 1) + i) as usize];
         let aside = if n.is_multiple_of(3) { 0.0 } else { 3.1e-4 };
         origin.towards((at + DVec3::new(aside, 0.7 * aside, 0.0)).into()).unwrap()
     };
-    let rays: Vec<_> = (0..64).map(|n| Ray { origin, direction: towards(n) }).collect();
+    let rays: Vec<_> = (0..24).map(|n| Ray { origin, direction: towards(n) }).collect();
     let fast = traced(&mesh, &rays);
     let slow = Tracer::Brute.closest(&Bvh::new(&mesh), &rays).unwrap();
-    assert!(slow.iter().flatten().count() > 60);
+    assert!(slow.iter().all(Option::is_some));
     for (ray, (fast, slow)) in fast.iter().zip(&slow).enumerate() {
         let range_m = |hit: &Option<Hit>| hit.map_or(f64::INFINITY, |hit| hit.range_m);
         let [fast_m, slow_m] = [range_m(fast), range_m(slow)];

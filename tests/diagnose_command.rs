@@ -297,3 +297,32 @@ fn the_library_is_listed_and_every_entry_is_complete() {
     let message = refused(matdb(folder.path()).args(["effects", "drfit"]));
     assert!(message.contains("did you mean `drift`?"), "{message}");
 }
+
+#[test]
+fn a_scan_without_times_is_diagnosed_without_what_goes_with_time() {
+    let folder = rendered("4");
+    let at = folder.path();
+    matdb(at).args(["radar", "-q", "scene.toml", "-o", "radar"]).assert().success();
+    let rays = fs::read_to_string(at.join("radar/scan.csv")).unwrap();
+    let wanted = ["chirp", "ox_m", "oy_m", "oz_m", "dx", "dy", "dz"];
+    let header: Vec<&str> = rays.lines().next().unwrap().split(',').collect();
+    let places = wanted.map(|name| header.iter().position(|column| *column == name).unwrap());
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        places.map(|place| cells[place]).join(",") + "\n"
+    };
+    fs::write(at.join("rays.csv"), rays.lines().map(row).collect::<String>()).unwrap();
+    let scan = "pattern = \"rays\"\nfile = \"rays.csv\"\n";
+    let untimed = SCENE.replace("pattern = \"elliptical\"\nchirps = 3000\n", scan);
+    fs::write(at.join("untimed.toml"), untimed).unwrap();
+    let asked = |effects: &str| {
+        let mut asked = matdb(at);
+        asked.args(["diagnose", "out/cloud.ply", "--scene", "untimed.toml", "-o", "report"]);
+        asked.args(["--effects", effects]);
+        asked
+    };
+    let said = refused(&mut asked("drift"));
+    assert!(said.contains("drift cannot be told without") && said.contains("time_s"), "{said}");
+    assert_eq!(json(&at.join("report/report.json"))["verdict"], "cannot-tell");
+    asked("fov-gain").assert().success();
+}

@@ -129,6 +129,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     }
 }
 
+/// Said of a scene by which every chirp would tell its power exactly.
+const NO_SPECKLE: &str = "the scene declares no speckle, so that any scatter of the powers is an effect to be found; a \
+                          measured cloud has some: state `looks` under [radar.speckle]";
+
 /// What is asked of a cloud.
 #[derive(Clone, Copy)]
 struct Asked<'a> {
@@ -163,8 +167,8 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     let at_work = model(&declared, &scene, cast.used, cast.of_region);
     let at_work = at_work.as_ref().map_or(&[][..], |model| &model.effects);
     let effects = undeclared(effects, at_work, console)?;
-    let effects = match timed(effects, &scene, !args.effects.is_empty(), console) {
-        Ok(effects) => effects,
+    let (effects, untold) = match timed(effects, &scene, !args.effects.is_empty()) {
+        Ok(timed) => timed,
         Err(error) => return refuse(error, asked, console),
     };
     let cloud = match cloud.read(scene.radar()) {
@@ -176,7 +180,11 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     };
     let laws: Vec<Brdf> =
         material_of_region.iter().map(|&m| used[usize::from(m)].scattering.clone()).collect();
-    let beyond = notices(&used, scene.radar());
+    let mut beyond = notices(&used, scene.radar());
+    if scene.radar().speckle.is_none() {
+        beyond.push(NO_SPECKLE.to_owned());
+    }
+    beyond.extend(untold);
     cloud.notices.iter().chain(&beyond).for_each(|notice| console.notice(notice));
     let bar = console.spinner("diagnosing");
     let hear = |what: &str| bar.set_message(format!("diagnosing: {what}"));
@@ -238,29 +246,27 @@ fn undeclared(
     Ok(tried)
 }
 
-/// The effects without those that go with time where the scan has no times; who names these is told why
-/// not.
+/// The effects without those that go with time where the scan has no times, and a word on these; who names
+/// them is told why not.
 fn timed(
     effects: Vec<&'static dyn Effect>,
     scene: &Scene,
     are_named: bool,
-    console: &Console,
-) -> Result<Vec<&'static dyn Effect>, DiagnoseError> {
+) -> Result<(Vec<&'static dyn Effect>, Option<String>), DiagnoseError> {
     if scene.chirps.is_timed() {
-        return Ok(effects);
+        return Ok((effects, None));
     }
     let (untold, tried): (Vec<_>, Vec<_>) =
         effects.into_iter().partition(|effect| effect.goes_with_time());
     let names: Vec<&str> = untold.iter().map(|effect| effect.name()).collect();
     let names = names.join(" and ");
     match (untold.is_empty(), are_named) {
-        (true, _) => {}
-        (false, true) => return Err(DiagnoseError::Untimed { effects: names }),
+        (true, _) => Ok((tried, None)),
+        (false, true) => Err(DiagnoseError::Untimed { effects: names }),
         (false, false) => {
-            console.notice(&format!("the scan has no times, so these are not tried: {names}"));
+            Ok((tried, Some(format!("the scan has no times, so these are not tried: {names}"))))
         }
     }
-    Ok(tried)
 }
 
 fn diagnosed(

@@ -69,6 +69,9 @@ impl Publication<'_> {
         }
         earlier.remove_all_but(&files, console);
         notices.iter().for_each(|notice| console.notice(notice));
+        if !self.report.base.converged {
+            console.notice("the final fit did not converge: take the numbers with care");
+        }
         self.left_out(&takers).iter().for_each(|notice| console.notice(notice));
         files.sort_by_key(|(name, _)| name != "report.html");
         let names: Vec<String> = files.into_iter().map(|(name, _)| name).collect();
