@@ -326,11 +326,12 @@ impl Aim {
     #[inline(always)]
     fn beside(&self, corner: &[Lanes; 3]) -> Beside {
         let [along, across, up] = self.axes;
+        let [depths, xs, ys] = [&corner[along], &corner[across], &corner[up]];
         let mut beside = Beside { x: [0.0; LANES], y: [0.0; LANES], doubt: [0.0; LANES] };
         for lane in 0..LANES {
-            let depth = corner[along][lane] - self.origin[along];
-            let x = corner[across][lane] - self.origin[across] - self.shear[0] * depth;
-            let y = corner[up][lane] - self.origin[up] - self.shear[1] * depth;
+            let depth = depths[lane] - self.origin[along];
+            let x = xs[lane] - self.origin[across] - self.shear[0] * depth;
+            let y = ys[lane] - self.origin[up] - self.shear[1] * depth;
             beside.x[lane] = x;
             beside.y[lane] = y;
             // The product of two doubts, too; and one of what is too small for an f32.

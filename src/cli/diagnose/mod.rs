@@ -40,7 +40,7 @@ use takers::Cast;
 /// Find the physical effect that a scene lacks to explain a measured cloud, or a law a measured curve
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("cloud", |cloud| cloud.required(false)))]
-#[command(mut_arg("unit", of_clouds), mut_arg("power", of_clouds), mut_arg("frame", of_clouds))]
+#[command(mut_args(of_clouds))]
 #[command(after_help = "Examples:
   matdb diagnose cloud.ply --scene scene.toml -o diagnosis
   matdb diagnose cloud.ply --scene scene.toml --effects drift,fov-gain -o diagnosis
@@ -84,9 +84,12 @@ pub(super) struct Args {
     output: PathBuf,
 }
 
-/// A flag that a curve has no use for.
+/// Refuses flags that a curve has no use for.
 fn of_clouds(flag: clap::Arg) -> clap::Arg {
-    flag.conflicts_with("curve")
+    match ["unit", "power", "frame"].contains(&flag.get_id().as_str()) {
+        true => flag.conflicts_with("curve"),
+        false => flag,
+    }
 }
 
 /// What a report says beside the diagnosis itself.
