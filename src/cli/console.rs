@@ -73,7 +73,8 @@ fn harmless(text: &str) -> String {
     text.chars().filter(|c| (!c.is_control() || *c == '\n') && !is_turning(*c)).collect()
 }
 
-/// A message as it may be shown: [`harmless`], and words that are longer than any name or path is cut.
+/// A message as it may be shown: without control characters and those that turn a line, and with words cut
+/// that are longer than any name or path is.
 ///
 /// ```
 /// let message = format!("no material `{}`", "a".repeat(10_000));
