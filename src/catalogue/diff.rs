@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::leaves::{Leaf, leaves};
+use super::tables::ENDINGS;
 use crate::brdf::Scattering;
 use crate::material::{Curve, Material, Observation};
 use crate::units::{db_from_ratio, dbm_from_watts, shown};
@@ -127,7 +128,7 @@ fn part(path: &str) -> String {
 impl Field {
     /// Where it is, for people: without the unit in the name, which the values come with.
     pub fn place(&self) -> String {
-        let end = ENDS.iter().find(|(_, unit)| self.unit.as_deref() == Some(unit));
+        let end = ENDINGS.iter().find(|(_, unit)| self.unit.as_deref() == Some(unit));
         let short = |name| end.and_then(|(end, _)| str::strip_suffix(name, end)).unwrap_or(name);
         self.path.split('.').map(short).collect::<Vec<_>>().join(".")
     }
@@ -208,23 +209,11 @@ fn units(material: &Material) -> impl Iterator<Item = (String, String)> {
     })
 }
 
-/// Ends of names that say a unit, and its UCUM code.
-const ENDS: [(&str, &str); 8] = [
-    ("_rad", "rad"),
-    ("_hz", "Hz"),
-    ("_m", "m"),
-    ("_w", "W"),
-    ("_k", "K"),
-    ("_db", "dB"),
-    ("_deg", "deg"),
-    ("_s", "s"),
-];
-
 fn unit(path: &str, units: &BTreeMap<String, String>) -> Option<String> {
     let by_name = || {
         // Of a range it is the list that has the unit in its name.
         let name = path.rsplit('.').find(|name| name.parse::<usize>().is_err())?;
-        ENDS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, unit)| (*unit).to_owned())
+        ENDINGS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, unit)| (*unit).to_owned())
     };
     units.get(path).cloned().or_else(by_name)
 }

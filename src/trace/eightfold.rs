@@ -363,7 +363,7 @@ impl Marks {
         Marks::of_signs_one_by_one(numbers)
     }
 
-    /// The compiler puts a mask together bit by bit, which costs a fifth of the walk.
+    /// From comparisons the compiler puts a mask together bit by bit.
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     fn of_signs_by_sse(&[a, b, c, d, e, f, g, h]: &Lanes) -> Marks {

@@ -11,7 +11,7 @@ use crate::store::{Store, Table};
 
 #[cfg(feature = "parquet")]
 pub(super) use parquet::parquet_of;
-pub(super) use units::unit;
+pub(super) use units::{ENDINGS, unit};
 
 /// Whether this program writes Parquet.
 pub const HAS_PARQUET: bool = cfg!(feature = "parquet");

@@ -2,7 +2,7 @@
 //! database says the same (`tests/publish_command.rs` compares).
 
 /// Endings of names and their units.
-const ENDINGS: [(&str, &str); 8] = [
+pub(in crate::catalogue) const ENDINGS: [(&str, &str); 8] = [
     ("_hz", "Hz"),
     ("_rad", "rad"),
     ("_m", "m"),
