@@ -4,7 +4,7 @@
 use super::Evidence;
 use super::screen::Screen;
 use super::select::{Added, Candidate, SAME, Selection, State, numbers};
-use super::support::Left;
+use super::support::{Largest, Left};
 use super::trial::Trial;
 use crate::effects::Effect;
 
@@ -23,9 +23,9 @@ impl Selection<'_> {
             let rivals: Vec<&dyn Effect> = rivals.into_iter().filter(is_new).collect();
             if !rivals.is_empty() {
                 let without = self.without(state, added.len());
-                let largest_db = added.iter().map(|a| a.evidence.size_db).fold(0.0, f64::max);
+                let largest = Largest::of(added);
                 for rival in rivals {
-                    self.contest(&without, state, &mut one, rival, largest_db);
+                    self.contest(&without, state, &mut one, rival, largest);
                 }
             }
             added.push(one);
@@ -40,11 +40,11 @@ impl Selection<'_> {
         state: &mut State<'a>,
         last: &mut Added<'a>,
         rival: &'a dyn Effect,
-        largest_db: f64,
+        largest: Largest,
     ) {
         last.class.retain(|name| *name != rival.name());
         let Some(mut trial) = self.tried(without, rival) else { return };
-        let Some((held_out, _)) = self.support(without, &mut trial, largest_db, &Left::default())
+        let Some((held_out, _)) = self.support(without, &mut trial, largest, &Left::default())
         else {
             return;
         };

@@ -67,6 +67,7 @@ use refit::{Problem, Space};
 use residual::Tests;
 use screen::Sample;
 use select::{Selected, Selection};
+use support::Largest;
 
 /// Version of [`Report`] as JSON.
 pub const SCHEMA: u32 = 2;
@@ -327,7 +328,7 @@ impl Diagnosis {
         let controls = controls::controls(&selection, &base, effects, numbers);
         let z_after = self.z(&problem, &state);
         let prediction = problem.predict(&state.space, &state.fitted.at);
-        let largest_db = added.iter().map(|a| a.evidence.size_db).fold(0.0, f64::max);
+        let largest_db = Largest::of(&added).size_db;
         let covariates = covariates(looks, &prediction, observations);
         hear("testing what is left");
         let mut unexplained =

@@ -19,7 +19,7 @@ use super::refit::{Fitted, Problem, Space, sum};
 use super::residual::{self, Unexplained, speckle_sd_db};
 use super::score::{DB, Scored, scored};
 use super::screen::{Sample, Screen};
-use super::support::{Claim, Left};
+use super::support::{Claim, Largest, Left};
 use super::trial::Trial;
 use super::{Diagnosis, Evidence};
 use crate::effects::{Effect, Prediction, Receiver};
@@ -146,9 +146,8 @@ impl Selection<'_> {
         let mut state = base.clone();
         for round in 1..=self.settings.most_effects + 1 {
             let mut trials = self.trials(&state, effects, round);
-            let largest_db = added.iter().map(|a: &Added| a.evidence.size_db).fold(0.0, f64::max);
             let chosen = match round <= self.settings.most_effects {
-                true => self.chosen(&state, &mut trials, largest_db),
+                true => self.chosen(&state, &mut trials, Largest::of(&added)),
                 false => None,
             };
             let Some(Chosen { trial: index, held_out, class, rivals }) = chosen else {
@@ -289,7 +288,6 @@ impl Selection<'_> {
                     let without = self.without(state, index);
                     let loss = state.fitted.ln_likelihood - without.fitted.ln_likelihood;
                     let [gain, se] = self.difference(&state.held_out, &without.held_out);
-                    let largest_db = added.iter().map(|a| a.evidence.size_db).fold(0.0, f64::max);
                     let sizes_db = self.sizes_db(&without, &state.space, &state.fitted.at);
                     let numbers = state.space.effects[index].knobs().len();
                     let is_needed = self.is_supported(&Claim {
@@ -297,7 +295,8 @@ impl Selection<'_> {
                         least: self.settings.least_gain_of(numbers, 1),
                         held_out: [gain, se],
                         sizes_db,
-                        least_db: SHARE_OF_LARGEST * largest_db,
+                        share_of_size: SHARE_OF_LARGEST,
+                        largest: Largest::of(added),
                     });
                     (index, without, loss, is_needed)
                 })
@@ -318,12 +317,12 @@ impl Selection<'_> {
         &self,
         state: &State<'a>,
         trials: &mut [Trial<'a>],
-        largest_db: f64,
+        largest: Largest,
     ) -> Option<Chosen<'a>> {
         let mut passed: Vec<(usize, Vec<Scored>, f64)> = Vec::new();
         let left = Left::default();
         for (index, trial) in trials.iter_mut().enumerate().filter(|t| !t.1.candidate.sampled) {
-            if let Some((held_out, gain)) = self.support(state, trial, largest_db, &left) {
+            if let Some((held_out, gain)) = self.support(state, trial, largest, &left) {
                 passed.push((index, held_out, gain));
             }
         }

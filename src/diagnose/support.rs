@@ -2,15 +2,21 @@
 
 use std::cell::OnceCell;
 
-use super::Diagnosis;
 use super::field::Structure;
 use super::score::{Scored, errors};
-use super::select::{Candidate, SHARE_OF_LARGEST, Selection, State};
+use super::select::{Added, Candidate, SHARE_OF_LARGEST, Selection, State, larger};
 use super::trial::Trial;
+use super::{Diagnosis, Evidence};
 
 /// Share of the largest effect that one of the scatter must reach: a form that is off here and there
 /// scatters more than it shifts.
 const SHARE_OF_SPREAD: f64 = 0.4;
+/// Share of the largest gain below which an effect may make up for the error of another's form, and that of
+/// one of the scatter, which gains little for its size.
+const SHARE_OF_GAIN: f64 = 0.1;
+const SHARE_OF_GAIN_OF_SPREAD: f64 = 0.05;
+/// Gain of each look beyond which it tells that something was out of place, and no more of how large a form is.
+const MOST_OF_A_LOOK: f64 = 2.0;
 /// Share of its gain that an effect of the scatter must keep where a field has corrected the means.
 const SHARE_BESIDE_FIELD: f64 = 0.5;
 /// Share of the size of such an effect that neighbours may have in common: scatter is each look's own.
@@ -20,17 +26,35 @@ const MOST_SHARED: f64 = 0.6;
 const SHARE_KEPT: f64 = 0.6;
 const FAR_BEYOND: f64 = 4.0;
 
+/// The largest of the effects that were added: size, dB, and gain in ln likelihood.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Largest {
+    pub size_db: f64,
+    gain: f64,
+}
+
+impl Largest {
+    pub fn of(added: &[Added]) -> Largest {
+        let largest = |of: fn(&Evidence) -> f64| {
+            added.iter().map(|one| of(&one.evidence)).fold(0.0, f64::max)
+        };
+        Largest { size_db: largest(|e| e.size_db), gain: largest(|e| e.gain) }
+    }
+}
+
 /// What an effect has to say for itself.
 pub(super) struct Claim {
-    /// Gain in ln likelihood, and the least that counts.
+    /// Gain in ln likelihood, and the least that counts by itself.
     pub gain: f64,
     pub least: f64,
     /// Gain in ln p of held-out patches and its standard error.
     pub held_out: [f64; 2],
-    /// What it changes of the means and of the spread, dB, and the least that counts beside what others
-    /// change.
+    /// What it changes of the means and of the spread, dB.
     pub sizes_db: [f64; 2],
-    pub least_db: f64,
+    /// Share of the largest size that it must reach.
+    pub share_of_size: f64,
+    /// What it has to stand beside.
+    pub largest: Largest,
 }
 
 impl Claim {
@@ -38,6 +62,11 @@ impl Claim {
     fn counts(&self) -> f64 {
         self.held_out[0].min(self.gain)
     }
+}
+
+/// Whether an effect of these sizes changes the scatter more than the means.
+fn is_spread([mean_db, spread_db]: [f64; 2]) -> bool {
+    spread_db > mean_db
 }
 
 /// What a model leaves, once it is asked for: by a field, and what neighbours have in common, dB.
@@ -54,19 +83,19 @@ impl Selection<'_> {
         &self,
         state: &State<'a>,
         trial: &mut Trial<'a>,
-        largest_db: f64,
+        largest: Largest,
         left: &Left,
     ) -> Option<(Vec<Scored>, f64)> {
         let Candidate { gain, numbers, size_db, .. } = trial.candidate;
-        let [mean_db, spread_db] = trial.sizes_db;
-        let is_spread = spread_db > mean_db;
-        let share = if is_spread { SHARE_OF_SPREAD } else { SHARE_OF_LARGEST };
+        let is_spread = is_spread(trial.sizes_db);
+        let share_of_size = if is_spread { SHARE_OF_SPREAD } else { SHARE_OF_LARGEST };
         let mut claim = Claim {
             gain,
             least: self.settings.least_gain_of(numbers, trial.tried),
             held_out: [f64::INFINITY, 0.0],
             sizes_db: trial.sizes_db,
-            least_db: share * largest_db,
+            share_of_size,
+            largest,
         };
         // Held-out patches are dear: nobody asks them of what fails without.
         if !self.is_supported(&claim) {
@@ -92,16 +121,18 @@ impl Selection<'_> {
     /// Whether fit, held-out patches and size speak for an effect.
     pub(super) fn is_supported(&self, claim: &Claim) -> bool {
         let Diagnosis { least_size_db, standard_errors, .. } = *self.settings;
-        let Claim { gain, least, held_out: [held_out, se], sizes_db: [mean_db, spread_db], .. } =
-            *claim;
+        let Claim { gain, least, held_out: [held_out, se], largest, .. } = *claim;
+        let is_spread = is_spread(claim.sizes_db);
         // What acts in one small place, as no scatter does, has no standard error over places; it
         // must be far beyond chance and be found again where it was not fitted.
-        let is_local = spread_db <= mean_db
+        let is_local = !is_spread
             && gain >= FAR_BEYOND * least
             && held_out >= SHARE_KEPT * gain
             && held_out > se;
-        gain >= least
-            && mean_db.max(spread_db) >= least_size_db.max(claim.least_db)
+        let share = if is_spread { SHARE_OF_GAIN_OF_SPREAD } else { SHARE_OF_GAIN };
+        let most = MOST_OF_A_LOOK * self.problem.looks.len() as f64;
+        gain >= least.max(share * largest.gain.min(most))
+            && larger(claim.sizes_db) >= least_size_db.max(claim.share_of_size * largest.size_db)
             && (claim.counts() > standard_errors * se || is_local)
     }
 
