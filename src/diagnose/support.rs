@@ -40,6 +40,12 @@ impl Largest {
         };
         Largest { size_db: largest(|e| e.size_db), gain: largest(|e| e.gain) }
     }
+
+    /// The gain of one more effect below which it may be the error of this one's form, by so many looks.
+    fn least_gain(self, is_spread: bool, looks: usize) -> f64 {
+        let share = if is_spread { SHARE_OF_GAIN_OF_SPREAD } else { SHARE_OF_GAIN };
+        share * self.gain.min(MOST_OF_A_LOOK * looks as f64)
+    }
 }
 
 /// What an effect has to say for itself.
@@ -129,9 +135,8 @@ impl Selection<'_> {
             && gain >= FAR_BEYOND * least
             && held_out >= SHARE_KEPT * gain
             && held_out > se;
-        let share = if is_spread { SHARE_OF_GAIN_OF_SPREAD } else { SHARE_OF_GAIN };
-        let most = MOST_OF_A_LOOK * self.problem.looks.len() as f64;
-        gain >= least.max(share * largest.gain.min(most))
+        let beside = largest.least_gain(is_spread, self.problem.looks.len());
+        gain >= least.max(beside)
             && larger(claim.sizes_db) >= least_size_db.max(claim.share_of_size * largest.size_db)
             && (claim.counts() > standard_errors * se || is_local)
     }
@@ -140,5 +145,22 @@ impl Selection<'_> {
     fn is_farther_off(&self, now: &[Scored], before: &[Scored]) -> bool {
         let [now, before] = [now, before].map(|scored| errors(scored, self.folds));
         now.rmse_db > before.rmse_db + now.rmse_se_db
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stands_beside_a_large_effect_must_be_large_itself() {
+        let none = Largest::default();
+        assert_eq!(none.least_gain(false, 18_529), 0.0);
+        let large = Largest { size_db: 2.0, gain: 7_580.0 };
+        assert_eq!(large.least_gain(false, 18_529), 758.0);
+        assert_eq!(large.least_gain(true, 18_529), 379.0);
+        // A pose far off gains without end at edges, and hides nothing else for that.
+        let far = Largest { gain: 170_150.0, ..large };
+        assert_eq!(far.least_gain(false, 8_708), 1_741.6);
     }
 }
