@@ -117,6 +117,8 @@ struct Context {
     is_added: bool,
     /// Materials that were stored, with their revisions.
     added: Vec<String>,
+    /// The revisions that were current before these, where they are new.
+    replaced: Vec<String>,
     /// Files of materials that were not.
     material_files: Vec<String>,
 }
@@ -326,6 +328,7 @@ fn context(asked: Asked, scene: &Scene, db: &Database) -> Context {
         folder: args.output.clone(),
         is_added: args.add,
         added: Vec::new(),
+        replaced: Vec::new(),
         material_files: Vec::new(),
     }
 }
