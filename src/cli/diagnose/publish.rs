@@ -7,7 +7,7 @@ use super::after::{self, AFTER, MARK};
 use super::earlier::Earlier;
 use super::takers::{Cast, Taker, pinned, replaced};
 use super::words::listed;
-use super::{Asked, Context, html, json, plots, residuals, text, typed};
+use super::{Asked, Context, Placed, Record, html, json, plots, residuals, text, typed};
 use crate::cli::console::Console;
 use crate::cli::database::Database;
 use crate::cli::inputs::activity;
@@ -43,11 +43,16 @@ impl Publication<'_> {
         db: &Database,
         console: &Console,
     ) -> Result<(), Error> {
-        let (pictures, notices) = plots::pictures(self.report, self.scene.radar().spot_diameter_m);
+        let spot_m = self.scene.radar().spot_diameter_m;
+        let (pictures, notices) = plots::pictures(self.report, spot_m);
+        context.places = plots::strongest(&self.report.rows, spot_m);
         let takers = self.cast.takers(self.report, self.wanted);
         let is_stored = self.asked.args.add && !self.report.effects.is_empty();
+        let not_tried = context.not_tried.clone();
+        let meshes = self.scene.file.mesh.iter().map(Placed::new).collect();
+        let record = Record { report: self.report, not_tried: &not_tried, meshes };
         let mut files: Files = vec![
-            ("report.json".to_owned(), json(self.report)?),
+            ("report.json".to_owned(), json(&record)?),
             ("residuals.csv".to_owned(), residuals::csv(&self.report.rows)),
         ];
         for picture in &pictures {
@@ -76,8 +81,8 @@ impl Publication<'_> {
         self.left_out(&takers).iter().for_each(|notice| console.notice(notice));
         files.sort_by_key(|(name, _)| name != "report.html");
         let names: Vec<String> = files.into_iter().map(|(name, _)| name).collect();
-        let said = text::text(self.report, &names, &self.asked.args.output);
-        console.result(&(said + &self.stored(&context, db)), self.report)
+        let said = text::text(self.report, &context.places, &names, &self.asked.args.output);
+        console.result(&(said + &self.stored(&context, db)), &record)
     }
 
     /// Stores what was found in the database and beside the scene, and writes the report.
