@@ -54,10 +54,10 @@ fn head(told: Told) -> String {
     );
     format!(
         "<header>\n<p class=\"quiet\">Diagnosis of the curve {}</p>\n<h1>{}</h1>\n\
-         <p class=\"verdict\">{}.</p>\n</header>\n",
+         <p class=\"verdict\">{}</p>\n</header>\n",
         escaped(name),
         heading(report.verdict, report.effects.len()),
-        escaped(&sentence(report))
+        escaped(&sentence_of(&sentence(report)))
     ) + &quiet(&facts)
 }
 
