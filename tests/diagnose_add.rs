@@ -119,7 +119,8 @@ fn an_effect_of_the_instrument_is_rendered_once_it_is_added() {
         (noiseless(at, "scene.toml", "matdb.sqlite"), noiseless(at, "hidden.toml", "matdb.sqlite"));
     assert!(rms_db(&before, &hidden) > HIDDEN_DB, "{}", rms_db(&before, &hidden));
     let add = diagnose("scene.toml", "drift,fov-gain", &["--add"]);
-    run(at, &add, "stored mannequin-paint@2 in matdb.sqlite; scene-after.toml renders");
+    let said = run(at, &add, "stored mannequin-paint@2 in matdb.sqlite; scene-after.toml renders");
+    assert!(said.contains("what they had is mannequin-paint@1"), "{said}");
     assert_eq!(fs::read_to_string(at.join("scene.toml")).unwrap(), SCENE);
 
     let [builtin, diagnosed] = &contents(&at.join("matdb.sqlite"))[..] else { panic!() };
@@ -192,6 +193,10 @@ fn an_effect_of_a_material_becomes_a_revision_or_a_file() {
         Some(from),
         "the diagnosis states its numbers"
     );
+    let stated = diagnosed.sources.iter().find(|source| source.key == *from).unwrap();
+    let hash = blake3::hash(&fs::read(at.join("out/cloud.ply")).unwrap()).to_hex();
+    let cloud = format!("Diagnosis of cloud.ply (BLAKE3 {})", &hash[..12]);
+    assert!(stated.title.starts_with(&cloud), "{}", stated.title);
     let verdict = |name: &str| {
         let found = diagnosed.findings.iter().find(|finding| finding.effect == name);
         found.map(|finding| (finding.verdict, finding.fit_after.as_deref()))

@@ -108,10 +108,16 @@ fn a_report_is_complete_and_its_table_gives_its_errors() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(entries(&at.join("report")), FILES);
     let report = json(&at.join("report/report.json"));
-    assert_eq!(report["schema"], 2);
+    assert_eq!(report["schema"], 3);
     // The speckle is of one look, and the scene says four.
     assert_eq!(report["verdict"], "explained", "{report}");
     assert_eq!(report["effects"][0]["name"], "speckle");
+
+    assert_eq!(report["not_tried"].as_array().unwrap().len(), library().len() - 2);
+    let stood = json!({
+        "name": "plate", "rotation_deg": [-15.0, 10.0, 0.0], "translation_m": [0.0, 0.83, 0.0],
+    });
+    assert_eq!(report["meshes"][1], stood);
 
     let csv = fs::read_to_string(at.join("report/residuals.csv")).unwrap();
     let observed = column(&csv, "observed_dbm");
@@ -215,7 +221,7 @@ fn too_few_detections_are_said_in_files_and_one_sentence() {
     assert!(message.contains("80 detections") && message.contains("300"), "{message}");
     assert_eq!(entries(&at.join("report")), ["report.html", "report.json"]);
     let report = json(&at.join("report/report.json"));
-    assert_eq!(report["schema"], 2);
+    assert_eq!(report["schema"], 3);
     assert_eq!(report["verdict"], "cannot-tell");
     assert_eq!(report["effects"].as_array().unwrap().len(), 0);
     for key in ["reason", "would_help"] {
@@ -325,4 +331,7 @@ fn a_scan_without_times_is_diagnosed_without_what_goes_with_time() {
     assert!(said.contains("drift cannot be told without") && said.contains("time_s"), "{said}");
     assert_eq!(json(&at.join("report/report.json"))["verdict"], "cannot-tell");
     asked("fov-gain").assert().success();
+    let left_out = json(&at.join("report/report.json"))["not_tried"].clone();
+    let expected = json!({"name": "drift", "reason": "not-asked"});
+    assert!(left_out.as_array().unwrap().contains(&expected), "{left_out}");
 }

@@ -60,7 +60,7 @@ fn a_report_is_complete_and_its_table_gives_its_errors() {
     assert_eq!(entries(&at.join("out")), FILES);
     let report = json(&at.join("out/report.json"));
     assert_eq!(serde_json::from_slice::<Value>(&output.stdout).unwrap(), report);
-    assert_eq!((&report["schema"], &report["verdict"]), (&2.into(), &"explained".into()));
+    assert_eq!((&report["schema"], &report["verdict"]), (&3.into(), &"explained".into()));
     assert_eq!(report["effects"][0]["name"], "stray-light", "{report}");
     let csv = fs::read_to_string(at.join("out/residuals.csv")).unwrap();
     for (column, model) in [(4, "before"), (5, "after")] {
@@ -73,8 +73,26 @@ fn a_report_is_complete_and_its_table_gives_its_errors() {
         let rmse_db = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
         assert!((rmse_db - number(&report["error"][model]["rmse_db"])).abs() < 2e-4, "{model}");
     }
+    assert_eq!(report["not_tried"], serde_json::json!([]));
     let html = fs::read_to_string(at.join("out/report.html")).unwrap();
+    assert!(html.contains("The missing effect is found") && html.contains("(instrument)"));
     assert!(html.contains("stray-light") && html.contains("<svg") && !html.contains("http"));
+
+    // Whoever blames the bench is told what to try before, and what was left out.
+    let some = ["diagnose", "--curve", "coating.csv", "--effects", "stray-light", "-o", "out"];
+    let output = matdb(at).args(some).output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        said.contains("before stray-light is blamed") && said.contains("--model mixture"),
+        "{said}"
+    );
+    let left_out = json(&at.join("out/report.json"))["not_tried"].clone();
+    assert_eq!(left_out.as_array().unwrap().len(), 9);
+    assert_eq!(left_out[0]["reason"], "not-asked");
+    let html = fs::read_to_string(at.join("out/report.html")).unwrap();
+    assert!(
+        html.contains("Before stray-light is blamed") && html.contains("Left out of the search")
+    );
 
     // What a diagnosis of a cloud left goes, and so does all of this when nothing can be said.
     for name in ["residual-map.png", "unknown-map.svg"] {

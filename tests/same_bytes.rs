@@ -58,3 +58,45 @@ fn with_everything_switched_on_they_still_do() {
         }
     }
 }
+
+/// A ball under few chirps with speckle.
+const BALL: &str = "
+seed = 3
+[radar]
+threshold_dbm = -95.0
+[radar.speckle]
+looks = 4
+[radar.scan]
+pattern = \"elliptical\"
+chirps = 1500
+[[mesh]]
+name = \"ball\"
+file = \"builtin:sphere\"
+size_m = [0.5, 0.5, 0.5]
+translation_m = [0.0, 1.25, 0.0]
+[[region]]
+name = \"skin\"
+material = \"mannequin-paint\"
+";
+
+#[test]
+fn a_diagnosis_on_one_thread_and_on_two_says_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("ball.toml"), BALL).unwrap();
+    std::fs::write(at.join("one-look.toml"), BALL.replace("looks = 4", "looks = 1")).unwrap();
+    matdb(at).args(["render", "-q", "one-look.toml", "-o", "."]).assert().success();
+    let diagnosed = |threads: &str| {
+        let asked = "diagnose -q cloud.ply --scene ball.toml --effects speckle,fov-gain -o";
+        matdb(at)
+            .env("RAYON_NUM_THREADS", threads)
+            .args(asked.split(' ').chain([threads]))
+            .assert()
+            .success();
+        ["report.json", "residuals.csv"]
+            .map(|name| std::fs::read(at.join(threads).join(name)).unwrap())
+    };
+    let [one, two] = ["1", "2"].map(diagnosed);
+    assert!(String::from_utf8_lossy(&one[0]).contains("explained"), "something was found");
+    assert!(one == two);
+}

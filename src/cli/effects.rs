@@ -130,18 +130,9 @@ fn stranger(name: &str, known: impl Iterator<Item = &'static str>) -> Error {
     Error::Usage { problem: format!("there is no effect `{name}`"), way_out }
 }
 
-/// Where an effect belongs, in a word.
-pub(super) fn level(level: Level) -> &'static str {
-    match level {
-        Level::Instrument => "instrument",
-        Level::Material => "material",
-        Level::Scene => "scene",
-    }
-}
-
 fn list(all: &[Record]) -> String {
     let row = |record: &Record| {
-        let level = record.level.map_or("", level).to_owned();
+        let level = record.level.map_or("", Level::as_str).to_owned();
         [record.name.to_owned(), level, short(record.shows)]
     };
     let of = |what: &str| {
@@ -191,7 +182,7 @@ fn entry(record: &Record) -> String {
         }
     };
     let Record { name, applies_to, is, shows, .. } = record;
-    let level = record.level.map_or(String::new(), |of| format!("{}, ", level(of)));
+    let level = record.level.map_or(String::new(), |of| format!("{}, ", of.as_str()));
     let of = applies_to.join(" and of a ");
     format!("{name} ({level}of a {of})\n{is}\n\nHow it shows: {shows}\n{parameters}")
 }

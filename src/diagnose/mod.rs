@@ -69,8 +69,8 @@ use screen::Sample;
 use select::{Selected, Selection};
 use support::Largest;
 
-/// Version of [`Report`] as JSON.
-pub const SCHEMA: u32 = 2;
+/// Version of a report as JSON.
+pub const SCHEMA: u32 = 3;
 
 /// Detections without which nothing is said.
 const LEAST_DETECTIONS: usize = 300;
@@ -368,12 +368,11 @@ impl Diagnosis {
             parameters,
             looks: receiver.looks,
             threshold_dbm: dbm_from_watts(declared.threshold_w),
-            pose: "as the scene has it",
             converged: state.fitted.converged,
         };
         Ok(Report {
             schema: SCHEMA,
-            verdict: verdict(&unexplained, &effects),
+            verdict: Verdict::new(!effects.is_empty(), !unexplained.is_empty()),
             effects,
             ranking,
             unexplained,
@@ -402,14 +401,6 @@ impl Diagnosis {
         let Diagnosis { seed, draws, block_m, family_error, .. } = *self;
         let least_size_db = self.least_size_db.max(select::SHARE_OF_FORM * largest_db);
         Tests { seed, draws, block_m, family_error, least_size_db }
-    }
-}
-
-fn verdict(unexplained: &[Unexplained], effects: &[Found]) -> Verdict {
-    match (unexplained.is_empty(), effects.is_empty()) {
-        (false, _) => Verdict::Unexplained,
-        (true, true) => Verdict::NoMissingEffect,
-        (true, false) => Verdict::Explained,
     }
 }
 

@@ -1,4 +1,4 @@
-//! What a diagnosis says: the schema of `report.json`.
+//! What a diagnosis says: most of the schema of `report.json`.
 
 use std::collections::BTreeMap;
 
@@ -18,6 +18,17 @@ pub enum Verdict {
     Explained,
     /// Structure is left that no effect explains.
     Unexplained,
+}
+
+impl Verdict {
+    /// The verdict where effects were added or not, and structure is left or not.
+    pub(super) fn new(is_extended: bool, is_unexplained: bool) -> Verdict {
+        match (is_extended, is_unexplained) {
+            (_, true) => Verdict::Unexplained,
+            (true, false) => Verdict::Explained,
+            (false, false) => Verdict::NoMissingEffect,
+        }
+    }
 }
 
 /// A number and its standard deviation.
@@ -155,8 +166,6 @@ pub struct Base {
     pub looks: f64,
     /// Threshold, dBm, as declared.
     pub threshold_dbm: f64,
-    /// Which pose was used.
-    pub pose: &'static str,
     /// Whether the final fit converged.
     pub converged: bool,
 }

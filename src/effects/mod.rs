@@ -169,6 +169,17 @@ pub enum Level {
     Scene,
 }
 
+impl Level {
+    /// The word that files use.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Level::Instrument => "instrument",
+            Level::Material => "material",
+            Level::Scene => "scene",
+        }
+    }
+}
+
 /// One number of an effect.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Knob {

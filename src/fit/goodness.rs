@@ -41,8 +41,8 @@ pub(super) fn shares(ln_below: &[f64], censored: &[bool], seed: u64) -> Vec<f64>
     ln_below.iter().zip(censored).enumerate().map(share).collect()
 }
 
-/// Φ(z).
-pub(super) fn normal_share(z: f64) -> f64 {
+/// Φ(z): the probability of a normal number below z.
+pub(crate) fn normal_share(z: f64) -> f64 {
     0.5 * erfc(-z / std::f64::consts::SQRT_2)
 }
 

@@ -47,6 +47,7 @@ use crate::measure::curve::{Curve, Row};
 use crate::units::shown;
 
 pub use goodness::Goodness;
+pub(crate) use goodness::normal_share;
 pub use minimise::Stop;
 pub use models::{model, model_names};
 pub use result::{Band, Estimate, FitResult};

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::entry::place_of;
 use super::words::digits;
+use crate::effects::find;
 use crate::material::{Finding, FindingVerdict, Layer, Material, Permittivity, Session, Status};
 
 /// What a page says of these.
@@ -51,6 +52,7 @@ struct SessionView {
 #[derive(Serialize)]
 struct FindingView {
     effect: String,
+    level: &'static str,
     verdict: &'static str,
     numbers: [Option<String>; 3],
     confusable: String,
@@ -153,6 +155,7 @@ fn finding(material: &Material, finding: &Finding) -> FindingView {
     let score = finding.score_difference.map(|gain| digits(gain) + &error.unwrap_or_default());
     FindingView {
         effect: finding.effect.clone(),
+        level: find(&finding.effect).map_or("", |effect| effect.level().as_str()),
         verdict,
         numbers: [finding.size_db.map(digits), score, finding.p.map(digits)],
         confusable: finding.confusable_with.join(", "),

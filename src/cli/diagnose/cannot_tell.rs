@@ -20,14 +20,13 @@ pub(super) struct CannotTell {
 }
 
 impl CannotTell {
-    pub fn new(error: &DiagnoseError) -> CannotTell {
-        CannotTell {
-            schema: SCHEMA,
-            verdict: "cannot-tell",
-            reason: error.to_string(),
-            would_help: would_help(error).to_owned(),
-            effects: [],
-        }
+    pub fn new(reason: String, would_help: String) -> CannotTell {
+        CannotTell { schema: SCHEMA, verdict: "cannot-tell", reason, would_help, effects: [] }
+    }
+
+    /// Of a cloud.
+    pub fn of_cloud(error: &DiagnoseError) -> CannotTell {
+        CannotTell::new(error.to_string(), would_help(error).to_owned())
     }
 }
 
@@ -80,10 +79,10 @@ mod tests {
 
     #[test]
     fn the_record_says_why_and_what_would_help() {
-        let answer = CannotTell::new(&DiagnoseError::TooFew { detected: 12 });
+        let answer = CannotTell::of_cloud(&DiagnoseError::TooFew { detected: 12 });
         let json = serde_json::to_value(&answer).unwrap();
         assert_eq!(json["verdict"], "cannot-tell");
-        assert_eq!(json["schema"], 2);
+        assert_eq!(json["schema"], 3);
         assert_eq!(json["effects"], serde_json::json!([]));
         assert!(json["reason"].as_str().unwrap().contains("12 detections"));
         assert!(json["would_help"].as_str().unwrap().contains("threshold"));

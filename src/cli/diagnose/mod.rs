@@ -13,6 +13,7 @@ mod takers;
 #[cfg(test)]
 mod testing;
 mod text;
+mod tried;
 mod words;
 
 use std::path::{Path, PathBuf};
@@ -29,13 +30,16 @@ use crate::effects::{Effect, Receiver, Stage, middle};
 use crate::error::Error;
 use crate::measure::{Cloud, CloudError};
 use crate::radar::{Link, Radar};
+use crate::scene::file::MeshEntry;
 use crate::scene::{Scene, read_text};
 use crate::trace::Bvh;
 use crate::units::watts_from_dbm;
 use cannot_tell::CannotTell;
 use earlier::Earlier;
+use plots::Place;
 use publish::Publication;
 use takers::Cast;
+use tried::{Choice, NotTried, Reason};
 
 /// Find the physical effect that a scene lacks to explain a measured cloud, or a law a measured curve
 #[derive(Debug, clap::Args)]
@@ -102,6 +106,10 @@ struct Context {
     regions: Vec<(String, String)>,
     /// Sentences on materials that are not to be used, or are extrapolated to the radar's frequency.
     beyond: Vec<String>,
+    /// Effects that were left out.
+    not_tried: Vec<NotTried>,
+    /// Where something unknown is strongest.
+    places: Vec<Place>,
     seed: u64,
     /// This command, as a person would type it again.
     command: String,
@@ -117,6 +125,8 @@ struct Context {
     is_added: bool,
     /// Materials that were stored, with their revisions.
     added: Vec<String>,
+    /// The revisions that were current before these, where they are new.
+    replaced: Vec<String>,
     /// Files of materials that were not.
     material_files: Vec<String>,
 }
@@ -169,11 +179,19 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     let declared = super::staging::effects(&scene, path, cast.used, cast.of_region)?;
     let at_work = model(&declared, &scene, cast.used, cast.of_region);
     let at_work = at_work.as_ref().map_or(&[][..], |model| &model.effects);
-    let effects = undeclared(effects, at_work, console)?;
-    let (effects, untold) = match timed(effects, &scene, !args.effects.is_empty()) {
-        Ok(timed) => timed,
-        Err(error) => return refuse(error, asked, console),
-    };
+    let choice = Choice::new(&effects, at_work, scene.chirps.is_timed());
+    let untimed = choice.left_out(Reason::NoTimes);
+    if !untimed.is_empty() && !args.effects.is_empty() {
+        let effects = untimed.join(" and ");
+        return refuse(DiagnoseError::Untimed { effects }, asked, console);
+    }
+    if choice.tried.is_empty() {
+        return Err(Error::Usage {
+            problem: format!("the scene declares {} already", args.effects.join(", ")),
+            way_out: "name other effects, or diagnose with the scene that lacks them".to_owned(),
+        });
+    }
+    choice.tell(console);
     let cloud = match cloud.read(scene.radar()) {
         // That nothing was detected is an answer, too.
         Err(Error::Cloud { error: CloudError::Empty, .. }) => {
@@ -187,15 +205,15 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     if scene.radar().speckle.is_none() {
         beyond.push(NO_SPECKLE.to_owned());
     }
-    beyond.extend(untold);
     cloud.notices.iter().chain(&beyond).for_each(|notice| console.notice(notice));
     let bar = console.spinner("diagnosing");
     let hear = |what: &str| bar.set_message(format!("diagnosing: {what}"));
-    let answer = diagnosed(&scene, &cloud, &laws, at_work, args.seed, &effects, &hear);
+    let answer = diagnosed(&scene, &cloud, &laws, at_work, args.seed, &choice.tried, &hear);
     bar.finish_and_clear();
     match answer {
         Ok(report) => {
-            let context = Context { beyond, ..context(asked, &scene, db) };
+            let not_tried = choice.not_tried;
+            let context = Context { beyond, not_tried, ..context(asked, &scene, db) };
             let (given, report) = (given.as_str(), &report);
             Publication { asked, scene: &scene, given, cast, wanted, report }
                 .publish(context, db, console)
@@ -224,53 +242,6 @@ fn check_declared(scene: &Scene, path: &Path) -> Result<(), Error> {
 
 /// Effects with their values.
 type AtWork<'a> = [(&'a dyn Effect, Vec<f64>)];
-
-/// The effects without those that scene, radar or materials declare and that are at work already.
-fn undeclared(
-    effects: Vec<&'static dyn Effect>,
-    at_work: &AtWork,
-    console: &Console,
-) -> Result<Vec<&'static dyn Effect>, Error> {
-    let is_declared = |effect: &&'static dyn Effect| {
-        at_work.iter().any(|(declared, _)| declared.name() == effect.name())
-    };
-    let (known, tried): (Vec<_>, Vec<_>) = effects.into_iter().partition(is_declared);
-    let names: Vec<&str> = known.iter().map(|effect| effect.name()).collect();
-    let names = names.join(", ");
-    if tried.is_empty() {
-        return Err(Error::Usage {
-            problem: format!("the scene declares {names} already"),
-            way_out: "name other effects, or diagnose with the scene that lacks them".to_owned(),
-        });
-    }
-    if !known.is_empty() {
-        console.notice(&format!("declared already, so at work and not tried: {names}"));
-    }
-    Ok(tried)
-}
-
-/// The effects without those that go with time where the scan has no times, and a word on these; who names
-/// them is told why not.
-fn timed(
-    effects: Vec<&'static dyn Effect>,
-    scene: &Scene,
-    are_named: bool,
-) -> Result<(Vec<&'static dyn Effect>, Option<String>), DiagnoseError> {
-    if scene.chirps.is_timed() {
-        return Ok((effects, None));
-    }
-    let (untold, tried): (Vec<_>, Vec<_>) =
-        effects.into_iter().partition(|effect| effect.goes_with_time());
-    let names: Vec<&str> = untold.iter().map(|effect| effect.name()).collect();
-    let names = names.join(" and ");
-    match (untold.is_empty(), are_named) {
-        (true, _) => Ok((tried, None)),
-        (false, true) => Err(DiagnoseError::Untimed { effects: names }),
-        (false, false) => {
-            Ok((tried, Some(format!("the scan has no times, so these are not tried: {names}"))))
-        }
-    }
-}
 
 fn diagnosed(
     scene: &Scene,
@@ -318,6 +289,8 @@ fn context(asked: Asked, scene: &Scene, db: &Database) -> Context {
         cloud_path: cloud.cloud.display().to_string(),
         regions: regions.iter().map(|r| (r.name.clone(), r.material.clone())).collect(),
         beyond: Vec::new(),
+        not_tried: Vec::new(),
+        places: Vec::new(),
         seed: args.seed,
         program: program(db),
         command: command(std::env::args_os().skip(1)),
@@ -326,6 +299,7 @@ fn context(asked: Asked, scene: &Scene, db: &Database) -> Context {
         folder: args.output.clone(),
         is_added: args.add,
         added: Vec::new(),
+        replaced: Vec::new(),
         material_files: Vec::new(),
     }
 }
@@ -357,9 +331,9 @@ fn typed(path: &Path) -> String {
 /// Writes that nothing can be said, and why; the error is the way out.
 fn refuse(error: DiagnoseError, asked: Asked, console: &Console) -> Result<(), Error> {
     let Asked { cloud, scene, args } = asked;
-    let answer = CannotTell::new(&error);
-    let [cloud, scene] = [&cloud.cloud, scene].map(|path| path.display().to_string());
-    let html = html::cannot_tell(&answer, &scene, &cloud);
+    let answer = CannotTell::of_cloud(&error);
+    let of = format!("{} with {}", cloud.cloud.display(), scene.display());
+    let html = html::cannot_tell(&answer, &of);
     let files = [("report.html", html), ("report.json", json(&answer)?)];
     let earlier = Earlier::in_folder(&args.output, &asked.read());
     write_all(&args.output, &files)?;
@@ -368,6 +342,32 @@ fn refuse(error: DiagnoseError, asked: Asked, console: &Console) -> Result<(), E
         console.result("", &answer)?;
     }
     Err(error.into())
+}
+
+/// What `report.json` holds of an answer: all of it, what was not tried, and what stood where.
+#[derive(serde::Serialize)]
+struct Record<'a, Report> {
+    #[serde(flatten)]
+    report: &'a Report,
+    not_tried: &'a [NotTried],
+    /// A curve has none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    meshes: Vec<Placed<'a>>,
+}
+
+/// A mesh where the scene file puts it.
+#[derive(serde::Serialize)]
+struct Placed<'a> {
+    name: &'a str,
+    rotation_deg: [f64; 3],
+    translation_m: [f64; 3],
+}
+
+impl<'a> Placed<'a> {
+    fn new(mesh: &'a MeshEntry) -> Placed<'a> {
+        let MeshEntry { name, rotation_deg, translation_m, .. } = mesh;
+        Placed { name, rotation_deg: *rotation_deg, translation_m: *translation_m }
+    }
 }
 
 fn json(value: &impl serde::Serialize) -> Result<Vec<u8>, Error> {

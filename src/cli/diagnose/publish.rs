@@ -5,8 +5,9 @@ use std::path::Path;
 
 use super::after::{self, AFTER, MARK};
 use super::earlier::Earlier;
-use super::takers::{Cast, Taker, pinned};
-use super::{Asked, Context, html, json, plots, residuals, text, typed};
+use super::takers::{Cast, Taker, pinned, replaced};
+use super::words::listed;
+use super::{Asked, Context, Placed, Record, html, json, plots, residuals, text, typed};
 use crate::cli::console::Console;
 use crate::cli::database::Database;
 use crate::cli::inputs::activity;
@@ -14,7 +15,7 @@ use crate::cli::output::{Written, write_all};
 use crate::diagnose::Report;
 use crate::error::Error;
 use crate::formats::FormatError;
-use crate::material::file;
+use crate::material::{Activity, Input, file};
 use crate::scene::Scene;
 
 /// First line of a material's file.
@@ -42,11 +43,16 @@ impl Publication<'_> {
         db: &Database,
         console: &Console,
     ) -> Result<(), Error> {
-        let (pictures, notices) = plots::pictures(self.report, self.scene.radar().spot_diameter_m);
+        let spot_m = self.scene.radar().spot_diameter_m;
+        let (pictures, notices) = plots::pictures(self.report, spot_m);
+        context.places = plots::strongest(&self.report.rows, spot_m);
         let takers = self.cast.takers(self.report, self.wanted);
         let is_stored = self.asked.args.add && !self.report.effects.is_empty();
+        let not_tried = context.not_tried.clone();
+        let meshes = self.scene.file.mesh.iter().map(Placed::new).collect();
+        let record = Record { report: self.report, not_tried: &not_tried, meshes };
         let mut files: Files = vec![
-            ("report.json".to_owned(), json(self.report)?),
+            ("report.json".to_owned(), json(&record)?),
             ("residuals.csv".to_owned(), residuals::csv(&self.report.rows)),
         ];
         for picture in &pictures {
@@ -75,8 +81,8 @@ impl Publication<'_> {
         self.left_out(&takers).iter().for_each(|notice| console.notice(notice));
         files.sort_by_key(|(name, _)| name != "report.html");
         let names: Vec<String> = files.into_iter().map(|(name, _)| name).collect();
-        let said = text::text(self.report, &names, &self.asked.args.output);
-        console.result(&(said + &self.stored(&context, db)), self.report)
+        let said = text::text(self.report, &context.places, &names, &self.asked.args.output);
+        console.result(&(said + &self.stored(&context, db)), &record)
     }
 
     /// Stores what was found in the database and beside the scene, and writes the report.
@@ -89,16 +95,21 @@ impl Publication<'_> {
         db: &Database,
     ) -> Result<(), Error> {
         let mut store = db.write()?;
+        let activity = self.activity()?;
+        let title = self.title(&activity);
         let (mut materials, mut last) = (Vec::new(), Vec::new());
         for taker in takers {
-            materials.extend(self.cast.revised(taker, self.report, &self.title(), Some(&store))?);
+            materials.extend(self.cast.revised(taker, self.report, &title, Some(&store))?);
             last.push(materials.len() - 1);
         }
         let scene = self.asked.scene;
-        store.record(activity("diagnose", &[&self.asked.cloud.cloud, scene])?);
+        store.record(activity);
         let written = store.add_if(&materials, |added| {
-            let pin = |&at: &usize| Some(pinned(materials.get(at)?, *added.get(at)?));
-            context.added = last.iter().filter_map(pin).collect();
+            let stored =
+                || last.iter().filter_map(|&at| Some((materials.get(at)?, *added.get(at)?)));
+            context.added = stored().map(|(material, added)| pinned(material, added)).collect();
+            context.replaced =
+                stored().filter_map(|(material, added)| replaced(material, added)).collect();
             let names = self.names(takers, &context.added);
             files.push((AFTER.to_owned(), self.after(&names, MARK)?));
             files.push(("report.html".to_owned(), page(context)?));
@@ -113,8 +124,10 @@ impl Publication<'_> {
     /// Stores what was tried and not found, and writes the files.
     fn add_tried(&self, files: &Files, context: &mut Context, db: &Database) -> Result<(), Error> {
         let mut store = db.write()?;
-        let (materials, last) = self.cast.tried(self.report, self.wanted, &self.title(), &store)?;
-        store.record(activity("diagnose", &[&self.asked.cloud.cloud, self.asked.scene])?);
+        let activity = self.activity()?;
+        let title = self.title(&activity);
+        let (materials, last) = self.cast.tried(self.report, self.wanted, &title, &store)?;
+        store.record(activity);
         let written = store.add_if(&materials, |added| {
             let pin = |&at: &usize| Some(pinned(materials.get(at)?, *added.get(at)?));
             context.added = last.iter().filter_map(pin).collect();
@@ -128,7 +141,8 @@ impl Publication<'_> {
     fn alone(&self, takers: &[Taker]) -> Result<(Files, Vec<String>), Error> {
         let (mut files, mut slugs) = (Vec::new(), Vec::new());
         for taker in takers {
-            let Some(material) = self.cast.alone(taker, self.report, &self.title())? else {
+            let title = self.title(&self.activity()?);
+            let Some(material) = self.cast.alone(taker, self.report, &title)? else {
                 continue;
             };
             let name = format!("material-{}.toml", self.cast.name(taker.number).replace('@', "-"));
@@ -161,12 +175,18 @@ impl Publication<'_> {
         Ok((head.to_owned() + &file.write(self.given).map_err(unwritable)?).into_bytes())
     }
 
-    /// Where the stored numbers come from.
-    fn title(&self) -> String {
-        let name =
-            |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let [cloud, scene] = [&*self.asked.cloud.cloud, self.asked.scene].map(name);
-        format!("Diagnosis of {cloud} with {scene}, seed {}", self.asked.args.seed)
+    /// The command and the files that it was given.
+    fn activity(&self) -> Result<Activity, Error> {
+        activity("diagnose", &self.asked.read())
+    }
+
+    /// Where the stored numbers come from: files of one name differ by what is in them.
+    fn title(&self, activity: &Activity) -> String {
+        let file = |input: &Input| {
+            format!("{} (BLAKE3 {})", input.name, input.hash.get(..12).unwrap_or_default())
+        };
+        let files: Vec<String> = activity.inputs.iter().map(file).collect();
+        format!("Diagnosis of {}, seed {}", files.join(" with "), self.asked.args.seed)
     }
 
     /// Sentences on materials that keep what they had.
@@ -198,10 +218,27 @@ impl Publication<'_> {
                 let file = db.path().display();
                 match context.added.join(", ") {
                     none if none.is_empty() => format!("stored what was found in {scene}\n"),
-                    names => format!("stored {names} in {file}; {scene} renders what was found\n"),
+                    names => format!(
+                        "stored {names} in {file}; {scene} renders what was found\n{}",
+                        elsewhere(&context.replaced)
+                    ),
                 }
             }
         }
+    }
+}
+
+/// What becomes of other scenes with materials whose revision is no longer the current one.
+fn elsewhere(replaced: &[String]) -> String {
+    let old: Vec<&str> = replaced.iter().map(String::as_str).collect();
+    let bare: Vec<&str> = old.iter().filter_map(|name| name.split('@').next()).collect();
+    match old.is_empty() {
+        true => String::new(),
+        false => format!(
+            "scenes that name {} without a revision take the new one from now on; what they had is {}\n",
+            listed(&bare),
+            listed(&old)
+        ),
     }
 }
 

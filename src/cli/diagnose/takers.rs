@@ -231,3 +231,11 @@ fn with_found(
 pub(super) fn pinned(material: &Material, added: Added) -> String {
     format!("{}@{}", material.slug, added.revision())
 }
+
+/// The revision that was current before, where what was added is a new one.
+pub(super) fn replaced(material: &Material, added: Added) -> Option<String> {
+    match added {
+        Added::Revision(new) => Some(format!("{}@{}", material.slug, new.saturating_sub(1))),
+        Added::New | Added::Unchanged(_) => None,
+    }
+}

@@ -2,19 +2,22 @@
 
 use std::path::Path;
 
-use super::words::{covariate, gone, listed, not_found, numbers, plus_minus, sentence, verdict};
-use crate::cli::effects::level;
+use super::plots::Place;
+use super::words::{
+    covariate, gone, listed, not_found, numbers, others, plus_minus, sentence, strongest, verdict,
+};
 use crate::diagnose::{Errors, Found, Report};
 
 /// Lines of what remains that are shown; the page has all.
 const MOST_UNEXPLAINED: usize = 3;
 
 /// About ten lines: the verdict, what was found, the error, what is left, where it stands.
-pub(super) fn text(report: &Report, files: &[String], folder: &Path) -> String {
-    let mut text = format!("{}: {}\n", verdict(report), lower(&sentence(report)));
+pub(super) fn text(report: &Report, places: &[Place], files: &[String], folder: &Path) -> String {
+    let mut text = format!("{}: {}\n", verdict(report.verdict), lower(&sentence(report)));
     text += &report.effects.iter().map(effect).collect::<String>();
     text += &error(report);
     text += &remains(report);
+    text += &strongest(places).map_or(String::new(), |places| format!("  {places}\n"));
     if report.set_aside > 0 {
         text += &format!("set aside: {} detections that lie elsewhere\n", report.set_aside);
     }
@@ -35,7 +38,7 @@ fn lower(sentence: &str) -> String {
 fn effect(found: &Found) -> String {
     let numbers: Vec<String> =
         numbers(&found.parameters).iter().map(|number| number.join(" = ")).collect();
-    let others: Vec<&str> = found.class.iter().copied().filter(|n| *n != found.name).collect();
+    let others = others(&found.class, found.name);
     let class = match others.is_empty() {
         true => String::new(),
         false => format!("    these data cannot tell it from {}\n", listed(&others)),
@@ -43,7 +46,7 @@ fn effect(found: &Found) -> String {
     format!(
         "  {} ({}): {}\n    held-out gain in ln p {}, changes the data by {:.2} dB\n{class}",
         found.name,
-        level(found.level),
+        found.level.as_str(),
         numbers.join(", "),
         plus_minus(found.evidence.held_out_gain, found.evidence.held_out_se),
         found.evidence.size_db

@@ -1,5 +1,6 @@
 //! Numbers and names of a diagnosis, as a person reads them on the terminal and in the page.
 
+use super::plots::Place;
 use crate::cli::effects::unit;
 use crate::diagnose::{Candidate, Parameters, Report, Triple, Value, Verdict};
 use crate::effects::Level;
@@ -11,12 +12,27 @@ pub(super) fn gone(share: f64) -> String {
 }
 
 /// The verdict in a word or two.
-pub(super) fn verdict(report: &Report) -> &'static str {
-    match report.verdict {
+pub(super) fn verdict(verdict: Verdict) -> &'static str {
+    match verdict {
         Verdict::NoMissingEffect => "nothing is missing",
         Verdict::Explained => "explained",
         Verdict::Unexplained => "unexplained",
     }
+}
+
+/// The verdict as a heading over so many effects.
+pub(super) fn heading(verdict: Verdict, effects: usize) -> &'static str {
+    match (verdict, effects) {
+        (Verdict::NoMissingEffect, _) => "Nothing is missing",
+        (Verdict::Explained, 2..) => "The missing effects are found",
+        (Verdict::Explained, _) => "The missing effect is found",
+        (Verdict::Unexplained, _) => "Something unknown remains",
+    }
+}
+
+/// The effects of a class beside the one that was added.
+pub(super) fn others(class: &[&'static str], name: &str) -> Vec<&'static str> {
+    class.iter().copied().filter(|other| *other != name).collect()
 }
 
 /// The verdict in a sentence.
@@ -96,6 +112,16 @@ pub(super) fn not_found(report: &Report) -> impl Iterator<Item = &Candidate> {
     let ranking = report.ranking.iter().enumerate();
     let last = ranking.filter(move |(place, tried)| is_last(*place, tried.name));
     last.map(|(_, tried)| tried).filter(move |tried| !is_found(tried.name))
+}
+
+/// Where something unknown is strongest; nothing where there is no such place.
+pub(super) fn strongest(places: &[Place]) -> Option<String> {
+    let place = |place: &Place| {
+        let Place { x_m, y_m, db } = *place;
+        format!("{} dB at x = {} m, y = {} m", signed(db, 1), fixed(x_m, 2), fixed(y_m, 2))
+    };
+    let places: Vec<String> = places.iter().map(place).collect();
+    (!places.is_empty()).then(|| format!("strongest in the target plane: {}", places.join("; ")))
 }
 
 /// A number with its unit, of which a pure number has none.

@@ -1,6 +1,7 @@
 //! What `matdb show` says of composition, sessions and findings.
 
 use crate::cli::summary::table;
+use crate::effects::find;
 use crate::material::{
     Finding, FindingVerdict, Instrument, Layer, Material, Permittivity, Session,
 };
@@ -116,11 +117,12 @@ pub(super) fn findings(material: &Material) -> String {
     if material.findings.is_empty() {
         return String::new();
     }
-    let header = ["effect", "verdict", "gain ln L", "held out ln p", "size dB", "or", "source"];
+    let header =
+        ["effect", "level", "verdict", "gain ln L", "held out ln p", "size dB", "or", "source"];
     "\nwhat diagnoses tried\n".to_owned() + &table(&header, material.findings.iter().map(finding))
 }
 
-fn finding(finding: &Finding) -> [String; 7] {
+fn finding(finding: &Finding) -> [String; 8] {
     let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.1}"));
     let error = finding.score_difference_sd.map(|sd| format!(" ± {sd:.1}"));
     let verdict = match finding.verdict {
@@ -130,6 +132,7 @@ fn finding(finding: &Finding) -> [String; 7] {
     };
     [
         finding.effect.clone(),
+        find(&finding.effect).map_or("", |effect| effect.level().as_str()).to_owned(),
         verdict.to_owned(),
         number(finding.gain),
         number(finding.score_difference) + &error.unwrap_or_default(),

@@ -36,6 +36,7 @@ use crate::brdf::{Brdf, CookTorrance, Distribution, Lambert, Shadowing, Sum};
 use crate::effects::Level;
 use crate::fit::FitError;
 use crate::fit::bistatic::{Bistatic, Sample};
+use crate::units::{rounded, shown};
 
 pub use points::{Kind, Noise, NoiseSource, Point, Points};
 pub use select::Ranked;
@@ -97,8 +98,8 @@ pub enum CurveDiagnoseError {
     },
     /// Too few runs of angles.
     #[error(
-        "the angles make {blocks} runs of {width_deg:.1}° and {LEAST_BLOCKS} are needed to hold some out; \
-         measure more angles or more incidences"
+        "the angles make {blocks} runs of {}° and {LEAST_BLOCKS} are needed to hold some out; \
+         measure more angles or more incidences", shown(rounded(*.width_deg))
     )]
     TooShort {
         /// Runs.
@@ -340,11 +341,7 @@ impl CurveDiagnosis {
     ) -> CurveReport {
         let Selection { points, folds, .. } = *selection;
         let (effects, parameters) = remains::values(selection, after, added);
-        let verdict = match (unexplained.is_empty(), effects.is_empty()) {
-            (false, _) => Verdict::Unexplained,
-            (true, true) => Verdict::NoMissingEffect,
-            (true, false) => Verdict::Explained,
-        };
+        let verdict = Verdict::new(!effects.is_empty(), !unexplained.is_empty());
         let scans = points.points.last().map_or(0, |point| point.scan + 1);
         CurveReport {
             schema: SCHEMA,

@@ -6,14 +6,13 @@
 //! what a model in error leaves has tails, and a few angles must not decide alone.
 
 use nalgebra::{DMatrix, DVector};
-use statrs::function::erf::erfc;
 
 use super::points::{Point, Points};
 use super::terms::Term;
 use crate::brdf::{Brdf, Scattering};
-use crate::fit::FitError;
 use crate::fit::coordinates::Coordinates;
 use crate::fit::minimise::{Local, Minimise, Minimum};
+use crate::fit::{FitError, normal_share};
 use crate::units::db_from_ratio;
 
 /// dB of what a model calls nothing.
@@ -257,7 +256,7 @@ fn log_below(z: f64) -> f64 {
     if z < -30.0 {
         return -0.5 * z * z - (-z * std::f64::consts::TAU.sqrt()).ln();
     }
-    (0.5 * erfc(-z / std::f64::consts::SQRT_2)).max(f64::MIN_POSITIVE).ln()
+    normal_share(z).max(f64::MIN_POSITIVE).ln()
 }
 
 /// φ(z)/Φ(z).

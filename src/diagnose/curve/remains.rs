@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use statrs::function::erf::erfc;
-
 use super::folds::autocorrelation;
 use super::model::Scored;
 use super::points::Points;
 use super::select::{Added, Selection, State};
 use super::smooth::{Covariate, Smooth, covariates};
 use super::{CurveBaseValue, CurveFound, CurveUnknown, Value, errors};
+use crate::fit::normal_share;
 
 /// Name of what nothing explains.
 const UNKNOWN: &str = "unknown";
@@ -103,7 +102,7 @@ fn over(selection: &Selection, state: &State, covariate: &Covariate) -> Option<C
         held_out_gain: Some(gain),
         held_out_se: Some(se),
         held_out_rmse_db: Some(errors(points, &after).rmse_db),
-        p_value: above(gain / se.max(f64::MIN_POSITIVE)),
+        p_value: normal_share(-gain / se.max(f64::MIN_POSITIVE)),
     })
 }
 
@@ -116,7 +115,7 @@ fn together(selection: &Selection, state: &State) -> Option<CurveUnknown> {
     let square = seen.iter().map(|&index| residual_db[index].powi(2)).sum::<f64>()
         / seen.len().max(1) as f64;
     let shared = autocorrelation(points, &residual_db, 1);
-    let p_value = above(shared * (seen.len() as f64).sqrt());
+    let p_value = normal_share(-shared * (seen.len() as f64).sqrt());
     let strength_db = (shared.max(0.0) * square).sqrt();
     let is_found = p_value <= settings.family_error && strength_db >= settings.least_size_db;
     is_found.then_some(CurveUnknown {
@@ -128,11 +127,6 @@ fn together(selection: &Selection, state: &State) -> Option<CurveUnknown> {
         held_out_rmse_db: None,
         p_value,
     })
-}
-
-/// Probability of a normal number above z.
-fn above(z: f64) -> f64 {
-    0.5 * erfc(z / std::f64::consts::SQRT_2)
 }
 
 fn residual_db(selection: &Selection, state: &State) -> Vec<f64> {

@@ -1,107 +1,149 @@
 //! `report.html` of a curve.
 
-use super::page::{
-    self, escaped, list, meanings, numbers, paragraph, quiet, section, table, words,
-};
-use crate::cli::diagnose::curve::{numbers as of_term, remains, sentence, source, verdict};
+use super::evidence::{no_share, not_tried, share};
+use super::page::{self, escaped, meanings, numbers, paragraph, quiet, section, table, words};
+use super::{LN_P, SUPPORTED, effect};
+use crate::cli::diagnose::curve::Told;
+use crate::cli::diagnose::curve::words::{advice, angle, sentence, source};
 use crate::cli::diagnose::plots::Picture;
-use crate::cli::diagnose::words::{fixed, plus_minus, value};
-use crate::diagnose::curve::{CurveFound, CurveReport, Ranked, term};
+use crate::cli::diagnose::words::{
+    digits, fixed, heading, plus_minus, probability, signed, value, verdict,
+};
+use crate::cli::summary::{counted, grouped};
+use crate::diagnose::Verdict;
+use crate::diagnose::curve::{CurveReport, CurveUnknown, Kind, Ranked};
 use crate::error::Error;
 
 /// The page of a diagnosis.
-pub(in crate::cli::diagnose) fn report(
-    report: &CurveReport,
-    name: &str,
-    picture: &Picture,
-) -> Result<Vec<u8>, Error> {
+pub(in crate::cli::diagnose) fn report(told: Told, picture: &Picture) -> Result<Vec<u8>, Error> {
+    let Told { report, name, .. } = told;
     let found = match report.effects.as_slice() {
-        [] => paragraph("No effect is supported on angles that took no part in its fit."),
-        found => found.iter().map(article).collect(),
+        [] => paragraph(
+            "No effect is supported. An effect is only added when it predicts runs of angles that took \
+             no part in its fit, by more than two standard errors, and changes the levels by a size that \
+             counts.",
+        ),
+        found => found.iter().map(effect::of_curve).collect(),
     };
-    let unknown: Vec<String> = report.unexplained.iter().map(remains).collect();
-    let left = match unknown.is_empty() {
-        true => paragraph("Nothing that is tested for."),
-        false => {
-            paragraph(
-                "The residuals still go with what stands below. No effect that was tried explains it, \
-                 so it gets no name.",
-            ) + &list(&unknown)
-        }
-    };
-    let html = format!(
-        "<header>\n<p class=\"quiet\">Diagnosis of the curve {}</p>\n<h1>{}</h1>\n\
-         <p class=\"verdict\">{}.</p>\n</header>\n",
-        escaped(name),
-        escaped(verdict(report)),
-        escaped(&sentence(report))
-    ) + &section("What was found", &found)
+    let html = head(told)
+        + &section("What was found", &found)
         + &section("Error before and after", &errors(report))
         + &section("Picture", &page::figure(picture)?)
-        + &section("What remains", &left)
-        + &section("What was tried", &tried(&report.ranking))
-        + &section("The base law", &base(report));
-    Ok(page::page(&format!("{name}: {}", verdict(report)), &html).into_bytes())
+        + &section("What remains", &unexplained(&report.unexplained))
+        + &section("What was tried", &(tried(&report.ranking) + &not_tried(told.not_tried)))
+        + &section("The base law", &base(report))
+        + &section("How to go on", &way_on(told))
+        + &section("Words", &meanings(&WORDS));
+    Ok(page::page(&format!("{name}: {}", verdict(report.verdict)), &html).into_bytes())
 }
 
-/// The page when nothing can be said.
-pub(in crate::cli::diagnose) fn cannot_tell(name: &str, reason: &str, would_help: &str) -> Vec<u8> {
-    let html = format!(
-        "<header>\n<p class=\"quiet\">Diagnosis of the curve {}</p>\n<h1>Cannot tell</h1>\n</header>\n",
-        escaped(name)
-    ) + &section("Why", &paragraph(reason))
-        + &section("What would help", &paragraph(would_help));
-    page::page("Cannot tell", &html).into_bytes()
-}
-
-fn article(found: &CurveFound) -> String {
-    let [is, shows] = term(found.name).map_or(["", ""], |term| [term.is(), term.shows()]);
-    let evidence = &found.evidence;
-    let mut facts = vec![
-        of_term(found),
-        format!(
-            "Held-out angles are predicted better with it: ln p rises by {}.",
-            plus_minus(evidence.held_out_gain, evidence.held_out_se)
-        ),
-        format!("It changes the levels by {:.2} dB (root mean square).", evidence.size_db),
-    ];
-    let others: Vec<&str> =
-        found.class.iter().copied().filter(|name| *name != found.name).collect();
-    if !others.is_empty() {
-        facts.push(format!("This curve cannot tell it from {}.", others.join(", ")));
-    }
+fn head(told: Told) -> String {
+    let Told { report, name, model, seed, .. } = told;
+    let facts = &report.curve;
+    let over = match facts.kind {
+        Kind::Backscatter => "of backscatter".to_owned(),
+        Kind::InPlane => {
+            format!("in the plane of incidence, at {} of incidence", counted(facts.scans, "angle"))
+        }
+    };
+    let facts = format!(
+        "{} levels {over}, {} of them not detected. The law: {}. Everything random follows seed {seed}.",
+        grouped(facts.points),
+        grouped(facts.censored),
+        model.unwrap_or("one GGX lobe over Lambert"),
+    );
     format!(
-        "<article>\n<h3><code>{}</code></h3>\n{}{}{}</article>\n",
-        escaped(found.name),
-        paragraph(is),
-        list(&facts),
-        meanings(&[("How it shows, and what tells it from its neighbours", shows)])
-    )
+        "<header>\n<p class=\"quiet\">Diagnosis of the curve {}</p>\n<h1>{}</h1>\n\
+         <p class=\"verdict\">{}</p>\n</header>\n",
+        escaped(name),
+        heading(report.verdict, report.effects.len()),
+        escaped(&sentence_of(&sentence(report)))
+    ) + &quiet(&facts)
 }
 
 fn errors(report: &CurveReport) -> String {
     let error = &report.error;
-    let row = |name: &str, errors: &crate::diagnose::curve::CurveErrors| {
-        [
-            name.to_owned(),
-            fixed(errors.rmse_db, 2),
-            fixed(errors.bias_db, 2),
-            fixed(errors.log_score, 3),
-        ]
+    let (before, after) = (&error.before, &error.after);
+    let row = |name: &str, [before, after, right]: [String; 3], meaning: &str| {
+        [name.to_owned(), before, after, right, meaning.to_owned()]
     };
-    let rows = [row("before", &error.before), row("after", &error.after)];
-    let columns =
-        [words("law"), numbers("rms, dB"), numbers("mean, dB"), numbers("ln p per level")];
+    let rows = [
+        row(
+            "rms error, dB",
+            [before.rmse_db, after.rmse_db, error.noise_floor_db].map(|db| fixed(db, 2)),
+            "Root mean square of measured − predicted levels over the detections. The last column is the \
+             noise of a level.",
+        ),
+        row(
+            "mean error, dB",
+            [signed(before.bias_db, 2), signed(after.bias_db, 2), "0".to_owned()],
+            "Measured − predicted, in the mean.",
+        ),
+        row(
+            "ln p per level",
+            [fixed(before.log_score, 3), fixed(after.log_score, 3), "–".to_owned()],
+            "How probable the law called what was measured, levels below a threshold included. More is \
+             better.",
+        ),
+    ];
+    let columns = [
+        words("what"),
+        numbers("before"),
+        numbers("after"),
+        numbers("a law that is right"),
+        words("what it means"),
+    ];
     let how = format!(
-        "Every level is predicted by a fit that it took no part in: {} runs of {:.1}°, dealt out to {} \
-         folds. The noise of a level is {:.2} dB, {}.",
+        "Every level is predicted by a fit that it took no part in: the angles make {} runs of {}°, dealt \
+         out to {} folds, the same before and after. Residuals go together over {}°. Before is the base \
+         law, refitted to the curve. The noise of a level is {}.",
         error.blocks,
-        error.block_deg,
+        digits(error.block_deg),
         error.folds,
-        error.noise_floor_db,
+        digits(error.correlation_deg),
         source(error.noise_source)
     );
-    paragraph(&how) + &table("Errors on held-out angles", columns, &rows)
+    let gone = match (report.effects.is_empty(), error.explained_share) {
+        (true, _) => "Nothing was added, so that before and after are the same.".to_owned(),
+        (false, Some(gone)) => share(gone),
+        (false, None) => no_share("law", "at few angles, which the picture shows"),
+    };
+    paragraph(&how) + &table("Errors on held-out angles", columns, &rows) + &paragraph(&gone)
+}
+
+fn unexplained(found: &[CurveUnknown]) -> String {
+    if found.is_empty() {
+        return paragraph(
+            "Nothing that is tested for: the residuals go with no angle, and neighbouring ones err to the \
+             same side no more than by chance.",
+        );
+    }
+    let dash = || "–".to_owned();
+    let row = |one: &CurveUnknown| {
+        let gain = one.held_out_gain.zip(one.held_out_se);
+        [
+            angle(one.covariate).to_owned(),
+            format!("{:.2}", one.strength_db),
+            probability(one.p_value),
+            gain.map_or_else(dash, |(gain, se)| plus_minus(gain, se)),
+            one.held_out_rmse_db.map_or_else(dash, |db| format!("{db:.2}")),
+        ]
+    };
+    let rows: Vec<[String; 5]> = found.iter().map(row).collect();
+    let columns = [
+        words("goes with"),
+        numbers("strength, dB"),
+        numbers("by chance"),
+        numbers("held-out gain in ln p"),
+        numbers("rms error with it, dB"),
+    ];
+    paragraph(
+        "The residuals still go with what stands below. No effect that was tried explains it, so it gets no \
+         name.",
+    ) + &table("Structure in what remains", columns, &rows)
+        + &quiet(
+            "Strength: root mean square over the levels. The gain is that of a smooth curve over the angle.",
+        )
 }
 
 fn tried(ranking: &[Ranked]) -> String {
@@ -124,7 +166,11 @@ fn tried(ranking: &[Ranked]) -> String {
         words(""),
     ];
     let rows: Vec<[String; 6]> = ranking.iter().map(row).collect();
-    table("Every effect of every round", columns, &rows)
+    paragraph(
+        "Each was tried together with what had been found by its round. That an effect is not supported \
+         does not say that it is absent: it may be too weak for these data. Only the best few are judged \
+         on held-out angles.",
+    ) + &table("Every effect of every round", columns, &rows)
 }
 
 fn base(report: &CurveReport) -> String {
@@ -140,3 +186,38 @@ fn base(report: &CurveReport) -> String {
             false => "The final fit did not converge: take the numbers with care.",
         })
 }
+
+fn way_on(told: Told) -> String {
+    let general = match (told.report.verdict, told.report.effects.is_empty()) {
+        (Verdict::NoMissingEffect, _) => {
+            "There is nothing to add. A weak effect may hide in the noise: repeats and more angles show less."
+        }
+        (_, false) => {
+            "The verdict is about the law that the curve was held against: another one (--model) may \
+             need no effect. A curve belongs to no material, so nothing was stored."
+        }
+        (_, true) => {
+            "See at which angles it is in the picture, and in residuals.csv level by level. Try another law \
+             with --model, and measure again: what comes back is no noise."
+        }
+    };
+    paragraph(general)
+        + &advice(told).map_or(String::new(), |advice| paragraph(&sentence_of(&advice)))
+}
+
+/// Words as a sentence of its own.
+fn sentence_of(words: &str) -> String {
+    let mut letters = words.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).chain(['.']).collect()
+}
+
+const WORDS: [(&str, &str); 4] = [
+    (
+        "Held out",
+        "Predicted by a fit that had not seen it. Runs of neighbouring angles are held out together, because their errors go together.",
+    ),
+    ("Supported", SUPPORTED),
+    ("ln p, ln likelihood", LN_P),
+    ("Noise", "What repeats of one level scatter by. A law that is right errs by so much."),
+];

@@ -2,8 +2,11 @@
 
 use super::page::{list, numbers, paragraph, quiet, table, words};
 use crate::cli::diagnose::Context;
+use crate::cli::diagnose::plots::Place;
+use crate::cli::diagnose::tried::NotTried;
 use crate::cli::diagnose::words::{
-    covariate, fixed, gone, not_found, plus_minus, probability, signed, value as with_unit,
+    covariate, fixed, gone, not_found, plus_minus, probability, signed, strongest,
+    value as with_unit,
 };
 use crate::diagnose::{Base, BeforeAfter, Candidate, Control, Controls, Report, Unexplained};
 
@@ -88,21 +91,26 @@ fn explained(error: &BeforeAfter) -> String {
         }
         false => "",
     };
-    let share = match error.explained_share {
-        Some(share) => {
-            format!("Of the squared error above the noise floor, {} is gone.", gone(share))
-                .replace('-', "−")
-        }
-        // Effects were added: what is small in all may be large in one place.
-        None => "Over the whole scan the base model is within a twentieth of the noise floor, so that no share is \
-                 told: what was found is in few chirps, which the maps show."
-            .to_owned(),
-    };
-    share + leak
+    // Effects were added: what is small in all may be large in one place.
+    let gone = error.explained_share.map(share);
+    gone.unwrap_or_else(|| no_share("model", "in few chirps, which the maps show")) + leak
+}
+
+/// How much of the squared error above what noise leaves is gone.
+pub(super) fn share(share: f64) -> String {
+    format!("Of the squared error above the noise, {} is gone.", gone(share)).replace('-', "−")
+}
+
+/// Why no share is told.
+pub(super) fn no_share(base: &str, place: &str) -> String {
+    format!(
+        "In all the base {base} is within a twentieth of the noise, so that no share is told: what was \
+         found is {place}."
+    )
 }
 
 /// What no effect explains.
-pub(super) fn unexplained(found: &[Unexplained]) -> String {
+pub(super) fn unexplained(found: &[Unexplained], places: &[Place]) -> String {
     if found.is_empty() {
         return paragraph(
             "Nothing that is tested for: neither the level nor the scatter of the residuals goes with \
@@ -123,6 +131,9 @@ pub(super) fn unexplained(found: &[Unexplained]) -> String {
          gets no name: see the maps for where it is. Covariates hang together on most targets, so \
          several lines can have one cause.",
     ) + &table("Structure in what remains, strongest first", columns, &rows)
+        + &strongest(places).map_or(String::new(), |places| {
+            paragraph(&format!("What is unknown is {places}, as marked on its map."))
+        })
         + &quiet(
             "Strength: root mean square over the chirps of what goes with it, beyond chance. By chance: \
              how probable so much is if nothing is there, for one test alone.",
@@ -141,18 +152,12 @@ pub(super) fn controls(controls: &Controls) -> String {
             name.to_owned(),
             control.over.clone(),
             control.numbers.to_string(),
-            fixed(control.gain, 1),
             plus_minus(control.held_out_gain, control.held_out_se),
         ])
     };
-    let rows: Vec<[String; 5]> = named.into_iter().filter_map(row).collect();
-    let columns = [
-        words("control"),
-        words("over"),
-        numbers("numbers"),
-        numbers("gain in ln likelihood"),
-        numbers("held-out gain in ln p"),
-    ];
+    let rows: Vec<[String; 4]> = named.into_iter().filter_map(row).collect();
+    let columns =
+        [words("control"), words("over"), numbers("numbers"), numbers("held-out gain in ln p")];
     let mut html = String::new();
     if !rows.is_empty() {
         html += &paragraph(
@@ -225,6 +230,16 @@ pub(super) fn tried(report: &Report) -> String {
     ) + &table("Tried and not supported", columns, &rows)
 }
 
+/// What was left out of the search.
+pub(super) fn not_tried(left_out: &[NotTried]) -> String {
+    if left_out.is_empty() {
+        return String::new();
+    }
+    let row = |one: &NotTried| [one.name.to_owned(), one.reason.words().to_owned()];
+    let rows: Vec<[String; 2]> = left_out.iter().map(row).collect();
+    table("Left out of the search", [words("effect"), words("because")], &rows)
+}
+
 /// The model that the effects are added to.
 pub(super) fn base(base: &Base, context: &Context) -> String {
     let region = |number: usize| {
@@ -246,7 +261,9 @@ pub(super) fn base(base: &Base, context: &Context) -> String {
     let facts = [
         format!("Looks of speckle, as the scene declares: {}.", fixed_or_none(base.looks)),
         format!("Threshold, as the scene declares: {} dBm.", fixed(base.threshold_dbm, 1)),
-        format!("Pose: {}.", base.pose),
+        "Pose: the meshes stand as the scene places them; it is not refitted, but `pose` is one of the \
+         effects."
+            .to_owned(),
         converged,
     ];
     table("The material laws, refitted with the effects", columns, &rows) + &list(&facts)

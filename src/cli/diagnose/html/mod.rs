@@ -7,7 +7,7 @@ mod page;
 
 use super::cannot_tell::CannotTell;
 use super::plots::Picture;
-use super::words::{sentence, verdict};
+use super::words::{self, sentence, verdict};
 use super::{Context, typed};
 use crate::cli::summary::grouped;
 use crate::diagnose::{Report, Verdict};
@@ -24,25 +24,27 @@ pub(super) fn report(
     html += &found(report);
     html += &section("Error before and after", &evidence::errors(report));
     html += &section("Pictures", &figures(pictures)?);
-    html += &section("What remains", &evidence::unexplained(&report.unexplained));
+    html += &section("What remains", &evidence::unexplained(&report.unexplained, &context.places));
     let controls = evidence::controls(&report.controls);
     if !controls.is_empty() {
         html += &section("Controls", &controls);
     }
-    html += &section("Tried and not supported", &evidence::tried(report));
+    html += &section(
+        "Tried and not supported",
+        &(evidence::tried(report) + &evidence::not_tried(&context.not_tried)),
+    );
     html += &section("The base model", &evidence::base(&report.base, context));
     html += &section("How to go on", &way_on(report, context));
     html += &section("Words", &meanings(&WORDS));
-    let title = format!("{}: {}", context.scene, verdict(report));
+    let title = format!("{}: {}", context.scene, verdict(report.verdict));
     Ok(page::page(&title, &html).into_bytes())
 }
 
-/// The page when nothing can be said.
-pub(super) fn cannot_tell(answer: &CannotTell, scene: &str, cloud: &str) -> Vec<u8> {
+/// The page when nothing can be said of something.
+pub(super) fn cannot_tell(answer: &CannotTell, of: &str) -> Vec<u8> {
     let html = format!(
-        "<header>\n<p class=\"quiet\">Diagnosis of {} with {}</p>\n<h1>Cannot tell</h1>\n</header>\n",
-        escaped(cloud),
-        escaped(scene)
+        "<header>\n<p class=\"quiet\">Diagnosis of {}</p>\n<h1>Cannot tell</h1>\n</header>\n",
+        escaped(of)
     );
     let html = html
         + "<p class=\"verdict\">These data do not allow an answer. That is no answer either: an \
@@ -62,21 +64,13 @@ fn heading(report: &Report, context: &Context) -> String {
         grouped(report.set_aside),
         context.seed
     );
-    let heading = match report.verdict {
-        Verdict::NoMissingEffect => "Nothing is missing",
-        Verdict::Explained => "The missing effect is found",
-        Verdict::Unexplained => "Something unknown remains",
-    };
-    let heading = match (report.verdict, report.effects.len()) {
-        (Verdict::Explained, 2..) => "The missing effects are found",
-        _ => heading,
-    };
     format!(
-        "<header>\n<p class=\"quiet\">{}: diagnosis of {} with {}</p>\n<h1>{heading}</h1>\n\
+        "<header>\n<p class=\"quiet\">{}: diagnosis of {} with {}</p>\n<h1>{}</h1>\n\
          <p class=\"verdict\">{}</p>\n</header>\n",
         escaped(&context.scene),
         escaped(&context.cloud_path),
         escaped(&context.scene_path),
+        words::heading(report.verdict, report.effects.len()),
         escaped(&sentence(report))
     ) + &quiet(&facts)
         + &context.beyond.iter().map(|sentence| paragraph(sentence)).collect::<String>()
@@ -89,7 +83,7 @@ fn found(report: &Report) -> String {
              took no part in its fit, by more than two standard errors, gains more than placebos with \
              as many numbers, and changes the data by a size that counts.",
         ),
-        found => found.iter().map(effect::article).collect(),
+        found => found.iter().map(effect::of_cloud).collect(),
     };
     section("What was found", &html)
 }
@@ -148,19 +142,16 @@ fn are(names: &[String]) -> String {
     format!("{} {}", names.join(", "), if names.len() == 1 { "is" } else { "are" })
 }
 
+const SUPPORTED: &str = "Better than the model without it, on what was held out, by more than chance. A comparison of models, not a proof.";
+const LN_P: &str = "Logarithm of the probability that a model gave to what was measured. 8 more is a factor of 3000.";
+
 const WORDS: [(&str, &str); 6] = [
     (
         "Held out",
         "Predicted by a fit that had not seen it. Patches of the target are held out together, because neighbouring spots overlap.",
     ),
-    (
-        "Supported",
-        "Better than the model without it, on held-out patches, by more than chance. A comparison of models, not a proof.",
-    ),
-    (
-        "ln p, ln likelihood",
-        "Logarithm of the probability that a model gave to what was measured. 8 more is a factor of 3000.",
-    ),
+    ("Supported", SUPPORTED),
+    ("ln p, ln likelihood", LN_P),
     (
         "Noise floor",
         "The error that speckle and noise leave to a model that is right. Nothing honest gets below it.",

@@ -13,8 +13,10 @@ use crate::radar::scan::PATTERN_RANGE_M;
 
 /// Looks in a pixel, in the mean, from which speckle does not hide the rest.
 const LOOKS_PER_PIXEL: f64 = 8.0;
-/// Colours reach as far as this share of the pixels.
-const SHARE: f64 = 0.98;
+/// Colours reach as far as this share of the pixels where speckle is among them.
+const MOST: f64 = 0.98;
+/// The same where nothing is: few pixels may be all that there is.
+const NEARLY_ALL: f64 = 0.999;
 
 /// What a map shows.
 struct Subject {
@@ -24,6 +26,8 @@ struct Subject {
     gaps: &'static str,
     /// Shortest and longest reach of the colours.
     reach: [f64; 2],
+    /// Share of the pixels within that reach.
+    share: f64,
     caption: &'static str,
 }
 
@@ -38,6 +42,7 @@ pub(super) fn residuals(report: &Report, spot_m: f64) -> Result<Picture, FigureE
         quantity: "observed − predicted, dB",
         gaps: "no detection",
         reach: [0.5, 10.0],
+        share: MOST,
         caption: "Observed − predicted power over the target plane, averaged over the detections \
                   of each pixel. Red is more power than predicted, blue less. A model that is right leaves speckle without shape.",
     };
@@ -59,6 +64,7 @@ pub(super) fn quantiles(report: &Report, spot_m: f64) -> Result<Picture, FigureE
         quantity: "mean z, standard deviations",
         gaps: "no chirp",
         reach: [0.5, 3.0],
+        share: MOST,
         caption: "Mean quantile residual z over the target plane. It counts the chirps that hit the \
                   target and saw nothing, too: z is standard normal if the model is right, and blue \
                   where less comes back than the model says.",
@@ -83,9 +89,11 @@ pub(super) fn unknown(report: &Report, spot_m: f64) -> Result<Picture, FigureErr
         title: "What is unknown, over the target",
         quantity: "power that the model lacks, dB",
         gaps: "no chirp",
-        reach: [0.5, 10.0],
+        reach: [0.5, 20.0],
+        share: NEARLY_ALL,
         caption: "What a smooth term over all covariates would add to the model's mean power, averaged \
-                  over the chirps of each pixel. It has no name: no effect in the library does this to the data.",
+                  over the chirps of each pixel. It has no name: no effect in the library does this to the data. Small rings stand \
+                  where it is strongest.",
     };
     if report.rows.iter().all(|row| row.unknown_db == 0.0) {
         let Subject { file, title, .. } = subject;
@@ -96,7 +104,61 @@ pub(super) fn unknown(report: &Report, spot_m: f64) -> Result<Picture, FigureErr
     let rms_db = (squares / report.rows.len().max(1) as f64).sqrt();
     let note = format!("rms {rms_db:.2} dB over all chirps");
     let title = subject.title;
-    maps(&subject, report, spot_m, &[(title, (&|row: &Row| Some(row.unknown_db), note))])
+    let mut picture =
+        maps(&subject, report, spot_m, &[(title, (&|row: &Row| Some(row.unknown_db), note))])?;
+    let raster = raster(&report.rows, pixel_m(&report.rows, spot_m));
+    for map in &mut picture.panels {
+        let rings = strongest(&report.rows, spot_m)
+            .into_iter()
+            .map(|Place { x_m, y_m, .. }| Ring { x_m, y_m, radius_m: 1.5 * raster.pixel_m });
+        let rings: Vec<Shape> = rings.filter_map(|ring| ring.on(map, &raster)).collect();
+        map.shapes.extend(rings);
+    }
+    Ok(picture)
+}
+
+/// Where something unknown is strong, in the target plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::cli::diagnose) struct Place {
+    pub x_m: f64,
+    pub y_m: f64,
+    /// Power that the model lacks there, in the mean of a pixel, dB.
+    pub db: f64,
+}
+
+/// Places that are told.
+const MOST_PLACES: usize = 3;
+/// Pixels between two of them at least.
+const APART: f64 = 4.0;
+/// Share of the strongest that another place has at least.
+const AS_STRONG: f64 = 0.5;
+
+/// Where the unknown is strongest, the strongest first; nothing where nothing is unknown.
+pub(in crate::cli::diagnose) fn strongest(rows: &[Row], spot_m: f64) -> Vec<Place> {
+    let pixel_m = pixel_m(rows, spot_m);
+    let map = filled(&raster(rows, pixel_m), rows, &|row| Some(row.unknown_db));
+    let values = map.channels.first().map_or(&[][..], |channel| &channel.values);
+    let place = |(index, &db): (usize, &f32)| Place {
+        x_m: map.x_min_m + (0.5 + (index % map.width) as f64) * pixel_m,
+        y_m: map.y_min_m + (map.height as f64 - 0.5 - (index / map.width) as f64) * pixel_m,
+        db: f64::from(db),
+    };
+    let places = values.iter().enumerate().map(place);
+    let mut places: Vec<Place> = places.filter(|place| place.db.abs() > 0.0).collect();
+    places.sort_by(|a, b| b.db.abs().total_cmp(&a.db.abs()));
+    let mut told: Vec<Place> = Vec::new();
+    for place in places {
+        let is_near =
+            |other: &Place| (place.x_m - other.x_m).hypot(place.y_m - other.y_m) < APART * pixel_m;
+        let is_weak = told.first().is_some_and(|first| place.db.abs() < AS_STRONG * first.db.abs());
+        if told.len() == MOST_PLACES || is_weak {
+            break;
+        }
+        if !told.iter().any(is_near) {
+            told.push(place);
+        }
+    }
+    told
 }
 
 /// The panels of the models that a picture shows, with their titles.
@@ -121,7 +183,7 @@ fn maps(
     let rasters: Vec<Raster> = rasters.collect();
     let rings: Vec<Ring> =
         report.effects.iter().filter_map(|f| Ring::new(f, &report.rows)).collect();
-    let reach = rasters.first().map_or(0.0, |first| reach(first, subject.reach));
+    let reach = rasters.first().map_or(0.0, |first| reach(first, subject.reach, subject.share));
     let drawing = |(raster, (title, (_, note))): (&Raster, &(&'static str, Panel))| {
         let figure = Figure {
             raster,
@@ -209,14 +271,14 @@ fn pixel_m(rows: &[Row], spot_m: f64) -> f64 {
 
 fn raster(rows: &[Row], pixel_m: f64) -> Raster {
     // What a scan of a metre needs many times over; a stray look must not ask for more memory.
-    const MOST: f64 = 1000.0;
+    const MOST_PIXELS: f64 = 1000.0;
     let axis = |pick: fn(&Row) -> f64| {
         let values = rows.iter().map(pick).filter(|x| x.is_finite());
         let [low, high] =
             values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
         // A pixel more at each side keeps the target off the frame.
         let first = (low / pixel_m).floor() - 1.0;
-        let count = ((high / pixel_m).floor() - first + 2.0).clamp(1.0, MOST);
+        let count = ((high / pixel_m).floor() - first + 2.0).clamp(1.0, MOST_PIXELS);
         (first * pixel_m, count as usize)
     };
     let ((x_min_m, width), (y_min_m, height)) = (axis(|row| row.xt_m), axis(|row| row.yt_m));
@@ -242,12 +304,12 @@ fn filled(empty: &Raster, rows: &[Row], pick: &dyn Fn(&Row) -> Option<f64>) -> R
     Raster { channels, ..empty.clone() }
 }
 
-/// How far the colours of both maps reach: as far as nearly all of the first, in steps of a half.
-fn reach(raster: &Raster, [least, most]: [f64; 2]) -> f64 {
+/// How far the colours of both maps reach: as far as this share of the first, in steps of a half.
+fn reach(raster: &Raster, [least, most]: [f64; 2], share: f64) -> f64 {
     let values = raster.channels.iter().flat_map(|c| &c.values).filter(|v| v.is_finite());
     let mut sizes: Vec<f32> = values.map(|v| v.abs()).collect();
     sizes.sort_by(f32::total_cmp);
-    let place = (SHARE * sizes.len() as f64) as usize;
+    let place = (share * sizes.len() as f64) as usize;
     let size = sizes.get(place).or(sizes.last()).copied().map_or(0.0, f64::from);
     (2.0 * size).ceil().clamp(2.0 * least, 2.0 * most) / 2.0
 }
@@ -294,6 +356,27 @@ mod tests {
     }
 
     #[test]
+    fn the_strongest_places_are_apart_and_small_ones_are_within_the_colours() {
+        let look = |i: u32| {
+            let (xt_m, yt_m) = (0.004 * f64::from(i % 100), 0.004 * f64::from(i / 100));
+            let unknown_db = match [xt_m, yt_m].map(|at| at < 0.02) {
+                [true, true] => 4.0,
+                [false, true] if xt_m > 0.36 => -3.0,
+                _ => 0.2,
+            };
+            Row { xt_m, yt_m, unknown_db, ..row() }
+        };
+        let rows: Vec<Row> = (0..10_000).map(look).collect();
+        let places = strongest(&rows, 0.016);
+        let [first, second] = places[..] else { panic!("{places:?}") };
+        assert!(first.db > 3.0 && first.x_m < 0.03 && first.y_m < 0.03, "{first:?}");
+        assert!(second.db < -2.0 && second.x_m > 0.35 && second.y_m < 0.03, "{second:?}");
+        let map = filled(&raster(&rows, 0.016), &rows, &|row| Some(row.unknown_db));
+        assert_eq!([MOST, NEARLY_ALL].map(|share| reach(&map, [0.5, 20.0], share)), [0.5, 4.0]);
+        assert_eq!(strongest(&[row()], 0.016), []);
+    }
+
+    #[test]
     fn a_sparse_scan_has_larger_pixels_and_colours_reach_a_round_value() {
         let place = |i: u32, step_m: f64| Row {
             xt_m: step_m * f64::from(i % 100),
@@ -305,6 +388,6 @@ mod tests {
         assert_eq!(pixel_m(&dense, 0.016), 0.016);
         assert!((pixel_m(&sparse, 0.016) / 0.016 - 8f64.sqrt()).abs() < 0.1);
         let map = filled(&raster(&dense, 0.016), &dense, &|_| Some(-1.3));
-        assert_eq!(reach(&map, [0.5, 10.0]), 1.5);
+        assert_eq!(reach(&map, [0.5, 10.0], MOST), 1.5);
     }
 }
