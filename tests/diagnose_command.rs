@@ -115,9 +115,9 @@ fn a_report_is_complete_and_its_table_gives_its_errors() {
 
     assert_eq!(report["not_tried"].as_array().unwrap().len(), library().len() - 2);
     let stood = json!({
-        "name": "plate", "rotation_deg": [-15.0, 10.0, 0.0], "translation_m": [0.0, 0.83, 0.0],
+        "mesh": "plate", "rotation_deg": [-15.0, 10.0, 0.0], "translation_m": [0.0, 0.83, 0.0],
     });
-    assert_eq!(report["meshes"][1], stood);
+    assert_eq!(report["base"]["pose"][1], stood);
 
     let csv = fs::read_to_string(at.join("report/residuals.csv")).unwrap();
     let observed = column(&csv, "observed_dbm");

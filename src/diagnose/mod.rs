@@ -55,8 +55,8 @@ pub use likelihood::Declared;
 pub use looks::{Matched, Observation, Stray, looks, matched};
 pub(crate) use refit::LEAST_LOOKS;
 pub use report::{
-    Base, BaseValue, BeforeAfter, Control, Controls, Evidence, Found, Parameters, Power, Report,
-    Row, Triple, Value, Verdict,
+    Base, BaseValue, BeforeAfter, Control, Controls, Evidence, Found, MeshPose, Parameters, Power,
+    Report, Row, Triple, Value, Verdict,
 };
 pub use residual::Unexplained;
 pub use score::Errors;
@@ -146,6 +146,8 @@ pub struct Subject<'a> {
     pub observations: &'a [Observation],
     /// Detections that are no look's.
     pub strays: &'a [Stray],
+    /// Where the meshes stand, to be told in the report.
+    pub pose: &'a [MeshPose],
 }
 
 /// Why nothing can be said.
@@ -368,6 +370,7 @@ impl Diagnosis {
             parameters,
             looks: receiver.looks,
             threshold_dbm: dbm_from_watts(declared.threshold_w),
+            pose: subject.pose.to_vec(),
             converged: state.fitted.converged,
         };
         Ok(Report {

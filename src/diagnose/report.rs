@@ -157,6 +157,17 @@ pub struct BaseValue {
     pub value: Value,
 }
 
+/// Where a mesh stands in the global frame.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MeshPose {
+    /// Its name.
+    pub mesh: String,
+    /// Turns about x, y and z, deg.
+    pub rotation_deg: [f64; 3],
+    /// Shift, m.
+    pub translation_m: [f64; 3],
+}
+
 /// What the effects are added to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Base {
@@ -166,6 +177,8 @@ pub struct Base {
     pub looks: f64,
     /// Threshold, dBm, as declared.
     pub threshold_dbm: f64,
+    /// Where the meshes stand, as declared; a diagnosis leaves them there.
+    pub pose: Vec<MeshPose>,
     /// Whether the final fit converged.
     pub converged: bool,
 }

@@ -161,6 +161,7 @@ fn diagnosed_with(
         looks,
         observations,
         strays: &[],
+        pose: &[],
     };
     let started = std::time::Instant::now();
     let report = Diagnosis { seed, ..Diagnosis::default() }.run(&subject, library).unwrap();
@@ -285,6 +286,7 @@ fn a_scan_with_too_little_says_so() {
         looks: &looks,
         observations: &observations,
         strays: &[],
+        pose: &[],
     };
     let refused = |powers_w: &dyn Fn(usize) -> f64| {
         let seen = |look| Observation { power_w: Some(powers_w(look)), range_m: None };

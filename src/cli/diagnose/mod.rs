@@ -25,7 +25,9 @@ use super::effects::chosen;
 use super::output::write_all;
 use super::staging::{materials, model, notices};
 use crate::brdf::Brdf;
-use crate::diagnose::{Declared, DiagnoseError, Diagnosis, Report, Subject, looks, matched};
+use crate::diagnose::{
+    Declared, DiagnoseError, Diagnosis, MeshPose, Report, Subject, looks, matched,
+};
 use crate::effects::{Effect, Receiver, Stage, middle};
 use crate::error::Error;
 use crate::measure::{Cloud, CloudError};
@@ -267,6 +269,7 @@ fn diagnosed(
     stage.middle = middle(&looks);
     let matched = matched(cloud, &scene.chirps, &looks)?;
     let (receiver, declared) = receiver(radar);
+    let pose: Vec<MeshPose> = scene.file.mesh.iter().map(pose).collect();
     let subject = Subject {
         stage: &stage,
         laws,
@@ -276,8 +279,15 @@ fn diagnosed(
         looks: &looks,
         observations: &matched.observations,
         strays: &matched.strays,
+        pose: &pose,
     };
     Diagnosis { seed, ..Diagnosis::default() }.run_with(&subject, effects, hear)
+}
+
+fn pose(mesh: &MeshEntry) -> MeshPose {
+    let MeshEntry { name, rotation_deg, translation_m, .. } = mesh;
+    let (rotation_deg, translation_m) = (*rotation_deg, *translation_m);
+    MeshPose { mesh: name.clone(), rotation_deg, translation_m }
 }
 
 fn context(asked: Asked, scene: &Scene, db: &Database) -> Context {
@@ -344,30 +354,12 @@ fn refuse(error: DiagnoseError, asked: Asked, console: &Console) -> Result<(), E
     Err(error.into())
 }
 
-/// What `report.json` holds of an answer: all of it, what was not tried, and what stood where.
+/// What `report.json` holds of an answer: all of it, and what was not tried.
 #[derive(serde::Serialize)]
 struct Record<'a, Report> {
     #[serde(flatten)]
     report: &'a Report,
     not_tried: &'a [NotTried],
-    /// A curve has none.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    meshes: Vec<Placed<'a>>,
-}
-
-/// A mesh where the scene file puts it.
-#[derive(serde::Serialize)]
-struct Placed<'a> {
-    name: &'a str,
-    rotation_deg: [f64; 3],
-    translation_m: [f64; 3],
-}
-
-impl<'a> Placed<'a> {
-    fn new(mesh: &'a MeshEntry) -> Placed<'a> {
-        let MeshEntry { name, rotation_deg, translation_m, .. } = mesh;
-        Placed { name, rotation_deg: *rotation_deg, translation_m: *translation_m }
-    }
 }
 
 fn json(value: &impl serde::Serialize) -> Result<Vec<u8>, Error> {

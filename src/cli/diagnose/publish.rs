@@ -7,7 +7,7 @@ use super::after::{self, AFTER, MARK};
 use super::earlier::Earlier;
 use super::takers::{Cast, Taker, pinned, replaced};
 use super::words::listed;
-use super::{Asked, Context, Placed, Record, html, json, plots, residuals, text, typed};
+use super::{Asked, Context, Record, html, json, plots, residuals, text, typed};
 use crate::cli::console::Console;
 use crate::cli::database::Database;
 use crate::cli::inputs::activity;
@@ -49,8 +49,7 @@ impl Publication<'_> {
         let takers = self.cast.takers(self.report, self.wanted);
         let is_stored = self.asked.args.add && !self.report.effects.is_empty();
         let not_tried = context.not_tried.clone();
-        let meshes = self.scene.file.mesh.iter().map(Placed::new).collect();
-        let record = Record { report: self.report, not_tried: &not_tried, meshes };
+        let record = Record { report: self.report, not_tried: &not_tried };
         let mut files: Files = vec![
             ("report.json".to_owned(), json(&record)?),
             ("residuals.csv".to_owned(), residuals::csv(&self.report.rows)),

@@ -100,7 +100,7 @@ fn publish(told: Told, folder: &Path, console: &Console) -> Result<(), Error> {
     let Told { report, name, not_tried, .. } = told;
     let picture = picture(report)?;
     let [svg, png] = picture.files()?;
-    let record = Record { report, not_tried, meshes: Vec::new() };
+    let record = Record { report, not_tried };
     let files = [
         ("report.html".to_owned(), html::curve::report(told, &picture)?),
         ("report.json".to_owned(), json(&record)?),

@@ -8,7 +8,9 @@ use crate::cli::diagnose::words::{
     covariate, fixed, gone, not_found, plus_minus, probability, signed, strongest,
     value as with_unit,
 };
-use crate::diagnose::{Base, BeforeAfter, Candidate, Control, Controls, Report, Unexplained};
+use crate::diagnose::{
+    Base, BeforeAfter, Candidate, Control, Controls, MeshPose, Report, Unexplained,
+};
 
 /// Errors without and with the effects, and what a model that is right would have.
 pub(super) fn errors(report: &Report) -> String {
@@ -261,12 +263,20 @@ pub(super) fn base(base: &Base, context: &Context) -> String {
     let facts = [
         format!("Looks of speckle, as the scene declares: {}.", fixed_or_none(base.looks)),
         format!("Threshold, as the scene declares: {} dBm.", fixed(base.threshold_dbm, 1)),
-        "Pose: the meshes stand as the scene places them; it is not refitted, but `pose` is one of the \
-         effects."
-            .to_owned(),
+        pose(&base.pose),
         converged,
     ];
     table("The material laws, refitted with the effects", columns, &rows) + &list(&facts)
+}
+
+fn pose(meshes: &[MeshPose]) -> String {
+    let one = |at: &MeshPose| {
+        format!("{} at {:?} m, turned by {:?}°", at.mesh, at.translation_m, at.rotation_deg)
+    };
+    format!(
+        "Pose, as the scene declares: {}. It is not refitted, but `pose` is one of the effects.",
+        meshes.iter().map(one).collect::<Vec<_>>().join("; ")
+    )
 }
 
 /// Many looks are none: without speckle declared there is nothing to draw.
