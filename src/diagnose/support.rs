@@ -154,13 +154,13 @@ mod tests {
 
     #[test]
     fn what_stands_beside_a_large_effect_must_be_large_itself() {
-        let none = Largest::default();
-        assert_eq!(none.least_gain(false, 18_529), 0.0);
+        let is_near = |gain: f64, expected: f64| (gain - expected).abs() < 1e-9;
         let large = Largest { size_db: 2.0, gain: 7_580.0 };
-        assert_eq!(large.least_gain(false, 18_529), 758.0);
-        assert_eq!(large.least_gain(true, 18_529), 379.0);
+        assert!(is_near(Largest::default().least_gain(false, 18_529), 0.0));
+        assert!(is_near(large.least_gain(false, 18_529), 758.0));
+        assert!(is_near(large.least_gain(true, 18_529), 379.0));
         // A pose far off gains without end at edges, and hides nothing else for that.
         let far = Largest { gain: 170_150.0, ..large };
-        assert_eq!(far.least_gain(false, 8_708), 1_741.6);
+        assert!(is_near(far.least_gain(false, 8_708), 1_741.6));
     }
 }
