@@ -6,9 +6,12 @@
 //!
 //! Ways are taken in turns, and medians are printed.
 
-use std::hint::black_box;
-use std::time::Instant;
+#[path = "support/clock.rs"]
+mod clock;
 
+use std::hint::black_box;
+
+use clock::{quartiles, timed};
 use glam::DVec3;
 use matdb::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
 use matdb::diagnose;
@@ -58,9 +61,7 @@ fn main() {
                     &|| drop(black_box(predict(0.2, 1.0 + change))),
                 ];
                 for (times, way) in times.iter_mut().zip(ways) {
-                    let start = Instant::now();
-                    way();
-                    times.push(start.elapsed().as_secs_f64() * 1e3);
+                    times.push(timed(way).0);
                 }
             }
             times.map(quartiles)
@@ -100,9 +101,4 @@ fn model(m: f64, drift: &dyn Effect, drift_db: f64) -> Model<'_> {
         receiver: Receiver::LINEAR,
         effects: vec![(drift, values.collect())],
     }
-}
-
-fn quartiles(mut times_ms: Vec<f64>) -> [f64; 3] {
-    times_ms.sort_by(f64::total_cmp);
-    [1, 2, 3].map(|quarter| times_ms[quarter * (times_ms.len() - 1) / 4])
 }

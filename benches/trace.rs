@@ -3,11 +3,13 @@
 //!
 //! `cargo bench --bench trace` runs the paper's scan on the mannequin and how times grow with facets and
 //! rays, on one thread and on two; `-- paper` runs the first alone. Ways are taken in turns, and the
-//! median of several is printed: ratios say something on any machine, times only on one.
+//! median of several is printed: ratios say something on any machine, times only on one. With `json`, too, a line
+//! for each mesh and its rays has the quartiles of the graphics processor; without one nothing is traced.
 
-use std::hint::black_box;
-use std::time::Instant;
+#[path = "support/clock.rs"]
+mod clock;
 
+use clock::quartiles;
 use glam::DVec3;
 use matdb::frames::{Global, Point, Ray};
 use matdb::geometry::Mesh;
@@ -18,7 +20,7 @@ use matdb::trace::{Answer, Bvh, Fan, Gpu, GpuError, Tracer};
 const ORIGIN: DVec3 = DVec3::new(0.0, 1.1, 8.0);
 
 fn main() {
-    let only_paper = std::env::args().any(|argument| argument == "paper");
+    let only_paper = is_given("paper");
     let gpu = Gpu::new();
     match &gpu {
         Ok(gpu) => println!("graphics processor: {}", gpu.adapter()),
@@ -26,6 +28,9 @@ fn main() {
         Err(error) => println!("{error}"),
     }
     let gpu = gpu.ok();
+    if is_given("json") && gpu.is_none() {
+        return;
+    }
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
@@ -35,6 +40,10 @@ fn main() {
             }
         });
     }
+}
+
+fn is_given(word: &str) -> bool {
+    std::env::args().any(|argument| argument == word)
 }
 
 /// The elliptical scan on the mannequin.
@@ -110,8 +119,19 @@ fn compare(mesh: &Mesh, rays: &[Ray<Global>], turns: usize, gpu: Option<&Gpu>) {
         (build + trace) / pinhole,
         (build + trace) / (grid + pinhole)
     );
-    if gpu.is_some() {
-        let [hold, find, decide] = [hold, find, decide].map(median);
+    if let Some(gpu) = gpu {
+        let [holds, answers, hits] = [hold, find, decide].map(quartiles);
+        if is_given("json") {
+            println!(
+                "{}",
+                serde_json::json!({
+                    "adapter": gpu.adapter(), "threads": rayon::current_num_threads(),
+                    "facets": mesh.facets.len(), "rays": rays.len(),
+                    "hold": holds, "answers": answers, "hits": hits,
+                })
+            );
+        }
+        let [hold, find, decide] = [holds, answers, hits].map(|[_, median, _]| median);
         println!(
             "  graphics processor: takes the hierarchy over in {hold:.2} ms, answers in {find:.2} ms, {:.2} million \
              rays a second, and leaves {unsure} open; hits in {decide:.2} ms, {:.2} of the hierarchy's time",
@@ -123,12 +143,9 @@ fn compare(mesh: &Mesh, rays: &[Ray<Global>], turns: usize, gpu: Option<&Gpu>) {
 
 /// Time of a call, ms.
 fn timed<T>(call: impl FnOnce() -> T) -> f64 {
-    let start = Instant::now();
-    black_box(call());
-    start.elapsed().as_secs_f64() * 1e3
+    clock::timed(call).0
 }
 
-fn median(mut times_ms: Vec<f64>) -> f64 {
-    times_ms.sort_by(f64::total_cmp);
-    times_ms[times_ms.len() / 2]
+fn median(times_ms: Vec<f64>) -> f64 {
+    quartiles(times_ms)[1]
 }

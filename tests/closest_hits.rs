@@ -4,15 +4,18 @@
 
 mod support;
 
-use glam::DVec3;
+use glam::{DQuat, DVec3, EulerRot};
 use matdb::frames::{Direction, Global, Point, Ray};
 use matdb::geometry::Mesh;
 use matdb::scene::{Scene, mannequin, solids};
 use matdb::trace::{Bvh, Fan, Hit, Tracer};
 use support::entries;
+use support::meshes::{edges, needles, one_facet, pile, ray, square};
 
 /// Both measure in f64 by different formulas; at 8 m a unit in the last place is 2e-15 m.
 const RANGE: f64 = 1e-12;
+/// The same where the plane of a sliver is hardly known.
+const SLIVER: f64 = 1e-6;
 /// Rounding of the facet's normal.
 const COSINE: f64 = 1e-12;
 
@@ -28,25 +31,30 @@ fn traced(mesh: &Mesh, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
     fast
 }
 
-fn check(name: &str) {
-    let scene = Scene::load(&support::scene(name)).unwrap();
-    let (rays, mesh) = (&scene.chirps.rays, &scene.target.mesh);
+/// The same, after comparing them with the naive loop: ranges to a share of themselves.
+fn judged(mesh: &Mesh, rays: &[Ray<Global>], share: f64) -> Vec<Option<Hit>> {
     let fast = traced(mesh, rays);
     let slow = Tracer::Brute.closest(&Bvh::new(mesh), rays).unwrap();
-    assert!(fast.len() > 1000 && slow.iter().flatten().count() > 1000);
-    for (chirp, pair) in fast.iter().zip(&slow).enumerate() {
+    for (ray, pair) in fast.iter().zip(&slow).enumerate() {
         match pair {
             (None, None) => {}
             (Some(fast), Some(slow)) => {
                 let apart_m = (fast.range_m - slow.range_m).abs();
-                assert!(apart_m < RANGE * slow.range_m, "chirp {chirp}: {fast:?} is not {slow:?}");
-                assert!(fast.point.distance_m(slow.point) < RANGE * slow.range_m);
+                assert!(apart_m < share * slow.range_m, "ray {ray}: {fast:?} is not {slow:?}");
+                assert!(fast.point.distance_m(slow.point) < share * slow.range_m);
                 let turned = (fast.cos_theta - slow.cos_theta).abs();
-                assert!(fast.facet != slow.facet || turned < COSINE, "chirp {chirp}");
+                assert!(fast.facet != slow.facet || turned < COSINE, "ray {ray}");
             }
-            _ => panic!("{name}, chirp {chirp}: {pair:?}"),
+            _ => panic!("ray {ray}: {pair:?}"),
         }
     }
+    fast
+}
+
+fn check(name: &str) {
+    let scene = Scene::load(&support::scene(name)).unwrap();
+    let hits = judged(&scene.target.mesh, &scene.chirps.rays, RANGE);
+    assert!(hits.len() > 1000 && hits.iter().flatten().count() > 1000, "{name}");
 }
 
 #[test]
@@ -59,12 +67,7 @@ fn on_every_scene() {
 
 /// Rays through every corner of a mesh, the middle of every edge, and two more of its points.
 fn through_edges(mesh: &Mesh, origin: Point<Global>) -> Vec<Ray<Global>> {
-    let of_facet = |facet: usize| {
-        let [a, b, c] = mesh.corners(facet);
-        [a, 0.5 * (a + b), b + (c - b) / 3.0, a.lerp(c, 0.618)]
-    };
-    let ray = |at: DVec3| Ray { origin, direction: origin.towards(at.into()).unwrap() };
-    (0..mesh.facets.len()).flat_map(of_facet).map(ray).collect()
+    edges(mesh).into_iter().map(|at| ray(origin.xyz, at)).collect()
 }
 
 #[test]
@@ -121,6 +124,97 @@ fn nothing_slips_into_the_mannequin() {
     assert!(rays.len() > 5000 && Fan::new(&rays).is_ok());
     for hit in traced(&body, &rays) {
         assert!(hit.is_some_and(|hit| hit.point.xyz.z > 0.0), "the torso's front: {hit:?}");
+    }
+}
+
+#[test]
+fn on_piles_needles_slivers_and_one_facet() {
+    let hits = |hits: Vec<Option<Hit>>| hits.into_iter().flatten().count();
+    let fan = |from: DVec3, aims: &mut dyn Iterator<Item = DVec3>| -> Vec<Ray<Global>> {
+        aims.map(|at| ray(from, at)).collect()
+    };
+    let eye = 3.0 * DVec3::Z;
+    assert!(hits(judged(&pile(), &fan(eye, &mut square(60, 0.9)), SLIVER)) > 1000);
+    let mut aims = (0..3000).map(|i| DVec3::new(1.7e-7 * f64::from(i), 0.31, 0.0));
+    assert!(hits(judged(&needles(), &fan(8.0 * DVec3::Z, &mut aims), SLIVER)) > 300);
+    // Down onto it, away from it, and along its plane.
+    let one = one_facet();
+    assert!(hits(judged(&one, &fan(4.0 * DVec3::Z, &mut square(20, 1.2)), SLIVER)) > 100);
+    assert_eq!(
+        hits(judged(&one, &fan(DVec3::NEG_Z, &mut square(20, 0.2).map(|at| at - eye)), SLIVER)),
+        0
+    );
+    assert_eq!(hits(judged(&one, &fan(-3.0 * DVec3::X, &mut square(20, 1.2)), SLIVER)), 0);
+}
+
+/// Rays along every edge of a mesh and across every facet in its plane, in both directions, from so far outside of it.
+fn in_planes(mesh: &Mesh, off_m: f64) -> Vec<Ray<Global>> {
+    let of_facet = |facet: usize| {
+        let [a, b, c] = mesh.corners(facet);
+        let ways =
+            [(a, b), (b, c), (c, a), (a, b.midpoint(c)), (b, c.midpoint(a)), (c, a.midpoint(b))];
+        ways.into_iter().flat_map(move |(from, to)| {
+            let along = off_m * (to - from).normalize();
+            [ray(from - along, to), ray(to + along, from)]
+        })
+    };
+    (0..mesh.facets.len()).flat_map(of_facet).collect()
+}
+
+/// The hit of a ray by every tracer.
+fn by_all(mesh: &Mesh, bvh: &Bvh, ray: &Ray<Global>) -> [Option<Hit>; 3] {
+    // Of one ray the pinhole has no picture.
+    let rays: Vec<Ray<Global>> = std::iter::once(*ray).chain(beside(ray)).collect();
+    traced(mesh, &rays);
+    [Tracer::Pinhole, Tracer::Bvh, Tracer::Brute].map(|way| way.closest(bvh, &rays).unwrap()[0])
+}
+
+const PLACE_M: DVec3 = DVec3::new(0.1, 1.2, -0.3);
+
+/// Turned about the origin and moved, so that no number is round.
+fn placed(mut mesh: Mesh) -> Mesh {
+    let turn = DQuat::from_euler(EulerRot::XYZ, 0.3, 0.7, -0.4);
+    mesh.vertices.iter_mut().for_each(|at| *at = turn * *at + PLACE_M);
+    mesh
+}
+
+#[test]
+fn what_is_seen_edge_on_hides_nothing() {
+    // A sheet in four by four parts, and a wall around it that every ray in the plane of the sheet meets.
+    let mut sheet = relief(4);
+    sheet.vertices.iter_mut().for_each(|at| at.z = 0.0);
+    // Off its middle, so that no ray meets the wall at an edge.
+    let mut wall = solids::cuboid(DVec3::new(31.0, 33.0, 35.0), 40.0);
+    wall.vertices.iter_mut().for_each(|at| *at += DVec3::new(0.37, 0.21, 0.43));
+    let wall = placed(wall);
+    let sheet = placed(sheet);
+    let mut both = sheet.clone();
+    both.append(&wall).unwrap();
+    let bvh = Bvh::new(&both);
+    for off_m in [0.5, 1.0, 8.0] {
+        for ray in in_planes(&sheet, off_m) {
+            let behind = Bvh::new(&wall).closest(&ray).unwrap();
+            for hit in by_all(&both, &bvh, &ray) {
+                let apart_m = hit.map(|hit| (hit.range_m - behind.range_m).abs());
+                assert!(apart_m.is_some_and(|m| m < 1e-6 * behind.range_m), "{ray:?}: {hit:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn rays_along_edges_of_a_closed_mesh_meet_nothing_beside_it() {
+    /// Just above the angle from which a facet counts as seen edge-on, m.
+    const ROUNDING_M: f64 = 1e-5;
+    let ball = placed(solids::icosphere(0.5, 1));
+    let bvh = Bvh::new(&ball);
+    for off_m in [0.5, 8.0] {
+        for ray in in_planes(&ball, off_m) {
+            for hit in by_all(&ball, &bvh, &ray).into_iter().flatten() {
+                let from_middle_m = hit.point.xyz.distance(PLACE_M);
+                assert!((0.45..0.5 + ROUNDING_M).contains(&from_middle_m), "{ray:?}: {hit:?}");
+            }
+        }
     }
 }
 

@@ -10,12 +10,13 @@ use std::fs;
 use std::path::Path;
 
 use glam::DVec3;
-use matdb::frames::{Direction, Global, Point, Ray};
+use matdb::frames::{Direction, Global, Ray};
 use matdb::geometry::Mesh;
 use matdb::scene::{Scene, mannequin, solids};
 use matdb::trace::{Answer, Bvh, Gpu, GpuError, Hit, TraceError, Tracer};
 use proptest::prelude::*;
 use support::entries;
+use support::meshes::{edges, mesh, needles, one_facet, pile, ray, square};
 
 /// Set to anything, it makes the absence of an adapter a failure.
 const NEEDED: &str = "MATDB_NEED_GPU";
@@ -54,31 +55,6 @@ fn traced(gpu: &Gpu, mesh: &Mesh, rays: &[Ray<Global>]) -> (Vec<Option<Hit>>, us
         );
     }
     (hits, answers.iter().filter(|&&answer| answer == Answer::Unsure).count())
-}
-
-fn ray(from: DVec3, to: DVec3) -> Ray<Global> {
-    let origin = Point::from(from);
-    Ray { origin, direction: origin.towards(to.into()).unwrap() }
-}
-
-fn mesh(corners: &[[f64; 3]], facets: &[[u32; 3]]) -> Mesh {
-    let vertices = corners.iter().copied().map(DVec3::from).collect();
-    Mesh { vertices, facets: facets.to_vec(), labels: vec![] }
-}
-
-/// Points of a square in the plane z = 0.
-fn square(side: usize, half_m: f64) -> impl Iterator<Item = DVec3> {
-    let at = move |i: usize| half_m * (2.0 * (i as f64 + 0.5) / side as f64 - 1.0);
-    (0..side * side).map(move |i| DVec3::new(at(i % side), at(i / side), 0.0))
-}
-
-/// Every corner, the middle of every edge, and two more of its points.
-fn edges(mesh: &Mesh) -> Vec<DVec3> {
-    let of_facet = |facet: usize| {
-        let [a, b, c] = mesh.corners(facet);
-        [a, 0.5 * (a + b), b + (c - b) / 3.0, a.lerp(c, 0.618)]
-    };
-    (0..mesh.facets.len()).flat_map(of_facet).collect()
 }
 
 #[test]
@@ -138,26 +114,7 @@ fn nothing_slips_through_the_edges_and_corners_of_closed_meshes() {
 #[test]
 fn facets_on_top_of_each_other_behind_across_and_without_area() {
     let Some(gpu) = adapter(u64::MAX) else { return };
-    // Twice the same, once turned around, a part of its plane, one without area, one behind the rays'
-    // origin, one across it, and a needle that begins there.
-    let corners = [
-        [-1.0, -1.0, 0.3],
-        [1.0, -1.0, -0.2],
-        [0.9, 1.0, 0.1],
-        [-1.0, 1.0, 0.0],
-        [-1.0, -1.0, 5.0],
-        [1.0, -1.0, 5.0],
-        [0.0, 1.0, 5.0],
-        [-9.0, -0.2, -20.0],
-        [9.0, -0.2, -20.0],
-        [0.0, -0.2, 30.0],
-        [0.0, 0.0, 3.0],
-        [0.01, 0.01, -4.0],
-        [0.03, 0.0, -4.0],
-    ];
-    let facets =
-        [[0, 1, 2], [1, 2, 0], [0, 2, 1], [0, 2, 3], [0, 0, 2], [4, 5, 6], [7, 8, 9], [10, 11, 12]];
-    let mesh = mesh(&corners, &facets);
+    let mesh = pile();
     let rays: Vec<_> = square(60, 0.9).map(|at| ray(3.0 * DVec3::Z, at)).collect();
     let (hits, _) = traced(&gpu, &mesh, &rays);
     let met = |facet: u32| hits.iter().flatten().filter(|hit| hit.facet == facet).count();
@@ -168,29 +125,14 @@ fn facets_on_top_of_each_other_behind_across_and_without_area() {
 #[test]
 fn needles_slivers_and_one_facet() {
     let Some(gpu) = adapter(u64::MAX) else { return };
-    // A fan of needles 1 m long and 1 µm wide, and slivers seen almost edge-on.
-    let mut needles = Mesh::default();
-    for i in 0..400u32 {
-        let (x, n) = (1e-6 * f64::from(i), needles.vertices.len() as u32);
-        needles.vertices.extend([
-            DVec3::new(x, -0.5, 0.0),
-            DVec3::new(x + 1e-6, -0.5, 0.0),
-            DVec3::new(x, 0.5, 0.1),
-            DVec3::new(0.1 + x, 0.0, 0.0),
-            DVec3::new(0.1 + x * 1.1, 0.2, 0.3),
-            DVec3::new(0.1 + x, 0.1, -3.0),
-        ]);
-        needles.facets.extend([[n, n + 1, n + 2], [n + 3, n + 4, n + 5]]);
-    }
     let from = DVec3::new(0.1, 0.0, 8.0);
     let aims = (0..3000).map(|i| DVec3::new(1.7e-7 * f64::from(i), 0.31, 0.0));
     let rays: Vec<_> = aims
         .map(|at| ray(8.0 * DVec3::Z, at))
         .chain(square(40, 0.25).map(|at| ray(from, at + DVec3::new(0.1, 0.1, 0.0))))
         .collect();
-    assert!(traced(&gpu, &needles, &rays).0.iter().flatten().count() > 300);
+    assert!(traced(&gpu, &needles(), &rays).0.iter().flatten().count() > 300);
 
-    let one = mesh(&[[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]], &[[0, 1, 2]]);
     // Down onto it, along its plane, and away.
     let rays: Vec<_> = square(20, 1.2)
         .flat_map(|at| {
@@ -201,7 +143,7 @@ fn needles_slivers_and_one_facet() {
             ]
         })
         .collect();
-    let (hits, _) = traced(&gpu, &one, &rays);
+    let (hits, _) = traced(&gpu, &one_facet(), &rays);
     let down = hits.iter().step_by(3).flatten().count();
     assert!(down > 100 && hits.iter().flatten().count() == down, "{down}");
 }

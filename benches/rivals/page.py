@@ -3,7 +3,7 @@
 import math
 from pathlib import Path
 
-from goals import LOW, MEDIUM, all_goals
+from goals import LOW, MEDIUM, all_goals, mrays_per_s
 from rows import HIERARCHY, PINHOLE, best, median, named, of_workload, ours
 from words import bound, grouped, number, share, spread, table, times
 
@@ -29,7 +29,7 @@ def page(results):
         head(results), goals(results), losses(results),
         *bodies(results), reshading(results), growth(results), memory(results), second(results),
         rendering(results), formats(results), registration(results), fits(results), store(results),
-        gpu(), LIMITS.read_text(encoding="utf-8").strip() + "\n",
+        gpu(results), LIMITS.read_text(encoding="utf-8").strip() + "\n",
     ]
     return "\n".join(part for part in parts if part)
 
@@ -331,8 +331,24 @@ By `cargo bench --bench store`.
 {table(["what", "measured", "goal"], rows, right=["measured"])}"""
 
 
-def gpu():
-    return "## GPU\n\nNo GPU was at hand, so there is no figure of one.\n"
+def gpu(results):
+    found = results.get("gpu", [])
+    if not found:
+        return "## GPU\n\nNo GPU was at hand, so there is no figure of one.\n"
+    rows = [
+        [
+            grouped(row["facets"]), grouped(row["rays"]), row["threads"], spread(row["hold"]), spread(row["answers"]),
+            number(mrays_per_s(row)), spread(row["hits"]),
+        ]
+        for row in found
+    ]
+    head = ["facets", "rays", "threads", "hold the hierarchy", "answers", "million rays/s", "hits"]
+    return f"""## GPU
+
+{found[0]["adapter"]}, by `cargo bench --features gpu --bench trace`, ms. The hierarchy has been built; “answers” is what the
+device says of the rays, “hits” is that and what the processor decides and measures of them.
+
+{table(head, rows, right=head)}"""
 
 
 def name_of(row):

@@ -17,7 +17,7 @@ from page import page
 from programs import ROOT, build, cargo
 
 HERE = Path(__file__).resolve().parent
-PARTS = ["trace", "reshade", "registration", "fits", "render", "formats", "store"]
+PARTS = ["trace", "reshade", "registration", "fits", "render", "formats", "store", "gpu"]
 
 # Parts of older results, and the one that measures the same now.
 OLDER = {"power": "trace"}
@@ -109,6 +109,10 @@ def measured(part, folder, quick):
         import formats
 
         return formats.measure(folder, quick), {}
+    if part == "gpu":
+        import gpu
+
+        return gpu.measure(quick), {}
     import store
 
     return store.measure(quick), {}

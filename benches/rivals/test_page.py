@@ -1,8 +1,9 @@
 """The page of a small hand-made result: ratios, goals, losses and what is missing."""
 
 import unittest
+from unittest import mock
 
-from goals import all_goals
+from goals import PUBLISHED, all_goals
 from machine import RUN
 from page import page
 
@@ -140,6 +141,19 @@ class Page(unittest.TestCase):
     def test_memory_counts_the_mesh_itself(self):
         results = {"trace": [trace("facets 7", "matdb pinhole", 0.0, 1.0)]}
         self.assertEqual(self.goal(results, "memory").measured, "1.40 × the mesh")
+
+    def test_a_gpu_that_was_measured_is_told_and_held_against_what_is_published(self):
+        row = {"adapter": "Loom", "threads": 2, "facets": 20, "hold": [1.0] * 3, "hits": [9.0] * 3}
+        results = {"gpu": [row | {"rays": 10_000, "answers": [1.0] * 3}, row | {"rays": 10**6, "answers": [4.0, 5.0, 6.0]}]}
+        goal = self.goal(results, "GPU")
+        self.assertEqual((goal.measured, goal.verdict()), ("200 million rays/s by Loom", "no rate published"))
+        for published, reached in [(400, True), (401, False)]:
+            with mock.patch.dict(PUBLISHED, {"Loom": published}):
+                self.assertIs(self.goal(results, "GPU").reached, reached)
+        self.assertEqual(self.lines(results, "| 20 | 1 000 000 |"), [
+            "| 20 | 1 000 000 | 2 | 1.00 | 5.00 (4.00–6.00) | 200 | 9.00 |"
+        ])
+        self.assertNotIn("No GPU was at hand", page(EMPTY | results))
 
     def test_a_page_without_results_names_every_goal_as_not_measured(self):
         for goal in all_goals(EMPTY):

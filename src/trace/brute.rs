@@ -2,6 +2,7 @@
 //! own method. Slow, obvious, and the judge of every faster tracer.
 
 use super::Hit;
+use super::facet::GRAZING;
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 
@@ -32,13 +33,12 @@ fn intersect(mesh: &Mesh, facet: usize, ray: &Ray<Global>) -> Option<f64> {
     let (ab, ac, direction) = (b - a, c - a, ray.direction.xyz());
     let p = direction.cross(ac);
     let determinant = ab.dot(p);
-    if determinant == 0.0 {
-        return None;
-    }
     let from_a = ray.origin.xyz - a;
     let q = from_a.cross(ab);
     let u = from_a.dot(p) / determinant;
     let v = direction.dot(q) / determinant;
     let t = ac.dot(q) / determinant;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0).then_some(t)
+    let is_within = u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0;
+    // Last, as few facets come so far.
+    (is_within && determinant.abs() > GRAZING * ab.length() * ac.length()).then_some(t)
 }

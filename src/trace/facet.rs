@@ -51,21 +51,28 @@ impl<'a> Line<'a> {
 /// when it lies behind or along the ray.
 #[inline]
 pub(super) fn plane_m(mesh: &Mesh, facet: usize, ray: &Ray<Global>) -> Option<f64> {
-    let [a, b, c] = mesh.corners(facet);
-    let range_m = crossed_m(ray.origin.xyz, ray.direction.xyz(), a, normal(a, b, c));
+    let corners = mesh.corners(facet);
+    let range_m = crossed_m(ray.origin.xyz, ray.direction.xyz(), corners, normal(corners));
     (range_m > 0.0 && range_m.is_finite()).then_some(range_m)
 }
 
 /// Normal of a facet, as long as twice its area.
 #[inline(always)]
-fn normal(a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
+fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-/// Where a ray crosses the plane through a corner, m: of the same bits wherever it is asked for.
+/// Cosine of incidence below which a ray runs along a facet whose edges stand square, and sooner along a sliver: where
+/// it would cross the plane is left to rounding.
+pub(super) const GRAZING: f64 = 1e-10;
+
+/// Where a ray crosses the plane of a facet, m, NaN when it runs along it: of the same bits wherever it is asked for.
 #[inline(always)]
-fn crossed_m(origin: DVec3, along: DVec3, corner: DVec3, normal: DVec3) -> f64 {
-    (corner - origin).dot(normal) / along.dot(normal)
+fn crossed_m(origin: DVec3, along: DVec3, [a, b, c]: [DVec3; 3], normal: DVec3) -> f64 {
+    let sinks = along.dot(normal);
+    let edges2 = (b - a).length_squared() * (c - a).length_squared();
+    let range_m = (a - origin).dot(normal) / sinks;
+    if sinks * sinks <= GRAZING * GRAZING * edges2 { f64::NAN } else { range_m }
 }
 
 /// Where rays meet the planes of their facets, side by side; `None` where the plane lies behind or along the
@@ -94,8 +101,8 @@ pub(super) fn met<const N: usize>(
         let [origin, along, a, b, c] =
             [&origin, &along, &a, &b, &c].map(|list| [list[0][lane], list[1][lane], list[2][lane]]);
         let [origin, along, a, b, c] = [origin, along, a, b, c].map(DVec3::from_array);
-        let normal = normal(a, b, c);
-        range_m[lane] = crossed_m(origin, along, a, normal);
+        let normal = normal([a, b, c]);
+        range_m[lane] = crossed_m(origin, along, [a, b, c], normal);
         let per_length = 1.0 / normal.dot(normal).sqrt();
         let unit = if per_length.is_finite() { normal * per_length } else { DVec3::ZERO };
         cos_theta[lane] = along.dot(unit).abs();

@@ -4,6 +4,7 @@
 pub mod browser;
 pub mod database;
 pub mod json_schema;
+pub mod meshes;
 pub mod server;
 
 use std::collections::BTreeMap;

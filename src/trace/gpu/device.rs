@@ -292,9 +292,19 @@ fn line(reason: &dyn Display) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frames::{Point, Ray};
+    use crate::scene::solids;
+    use crate::trace::gpu::tests::gpu;
+    use crate::trace::{Bvh, TraceError, Tracer};
 
     fn device() -> Option<Device> {
-        crate::trace::gpu::tests::gpu().map(|gpu| gpu.device)
+        gpu(u64::MAX).map(|gpu| gpu.device)
+    }
+
+    fn lost(error: GpuError) {
+        let text = error.to_string();
+        assert!(matches!(error, GpuError::Lost { .. }) && text.lines().count() == 1, "{text}");
+        assert!(text.ends_with("try again, or use the tracer `bvh`"), "{text}");
     }
 
     /// A box without anything in it.
@@ -313,17 +323,39 @@ mod tests {
         assert_eq!(device.land(echoes).unwrap(), [0; 3], "what is known is not asked");
         let flight = device.launch(&tree, &[[7; 8]]).unwrap();
         device.device.destroy();
-        let lost = |error: GpuError| {
-            let text = error.to_string();
-            assert!(matches!(error, GpuError::Lost { .. }) && text.lines().count() == 1, "{text}");
-            assert!(text.ends_with("try again, or use the tracer `bvh`"), "{text}");
-        };
         // What was under way may still arrive.
         device.land(flight).map_or_else(lost, |answers| assert_eq!(answers, [7]));
         lost(device.launch(&tree, &[[7; 8]]).err().unwrap());
         lost(device.launch_echoes(&tree, &table, &spots, 1).err().unwrap());
         lost(device.table(&[0], &[[0.0; 2]], &[[0; 2]], &[[0; 4]]).err().unwrap());
         lost(device.hold(&[EMPTY], &[POINT]).err().unwrap());
+    }
+
+    #[test]
+    fn a_device_that_is_lost_between_turns_gives_an_error_and_no_hits() {
+        // So small that the rays take turns.
+        let Some(gpu) = gpu(4096) else { return };
+        let ball = solids::icosphere(0.5, 0);
+        let bvh = Bvh::new(&ball);
+        let held = gpu.hold(&bvh).unwrap();
+        let origin = Point::new(0.0, 0.0, 8.0);
+        let aim = |i: usize| Point::new(1e-3 * i as f64 - 0.5, 0.1, 0.0);
+        let ray = |i| Ray { origin, direction: origin.towards(aim(i)).unwrap() };
+        let rays: Vec<_> = (0..1000).map(ray).collect();
+        assert!(3 * gpu.device.rays_at_once(u64::MAX) < rays.len());
+        let expected = Tracer::Bvh.closest(&bvh, &rays).unwrap();
+        assert_eq!(Tracer::Gpu(&held).closest(&bvh, &rays).unwrap(), expected);
+        // While the first answers are seen to, the next are under way and others are still to come.
+        let broken = held.each(&rays, |_, answer| {
+            gpu.device.device.destroy();
+            answer
+        });
+        lost(broken.unwrap_err());
+        match Tracer::Gpu(&held).closest(&bvh, &rays) {
+            Err(TraceError::Gpu(error)) => lost(error),
+            other => panic!("{other:?}"),
+        }
+        assert_eq!(Tracer::Bvh.closest(&bvh, &rays).unwrap(), expected, "the hierarchy stays");
     }
 
     #[test]

@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn sums_are_those_of_f64() {
-        let Some(gpu) = gpu() else { return };
+        let Some(gpu) = gpu(u64::MAX) else { return };
         let mut ball = solids::icosphere(0.3, 3);
         ball.append(&solids::icosphere(0.1, 1)).unwrap();
         let bvh = Bvh::new(&ball);
@@ -256,7 +256,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_told_is_left_open() {
-        let Some(gpu) = gpu() else { return };
+        let Some(gpu) = gpu(u64::MAX) else { return };
         let ball = solids::icosphere(0.3, 2);
         let bvh = Bvh::new(&ball);
         let held = gpu.hold(&bvh).unwrap();

@@ -235,9 +235,9 @@ fn in_turns<T>(
 mod tests {
     use super::Gpu;
 
-    /// An adapter; `None`, with a word about it, where there is none.
-    pub fn gpu() -> Option<Gpu> {
-        match Gpu::new() {
+    /// An adapter with buffers of at most so many bytes; `None`, with a word about it, where there is none.
+    pub fn gpu(buffer_bytes: u64) -> Option<Gpu> {
+        match Gpu::limited(buffer_bytes) {
             Ok(gpu) => Some(gpu),
             Err(error) => {
                 assert!(
