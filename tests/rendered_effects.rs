@@ -194,7 +194,7 @@ fn several_effects_act_together_as_their_model_predicts() {
         ("compression", &[-45.0]),
         ("drift", &[1.0, 0.3, 0.0, 2.0]),
         ("multi-bounce", &[0.0]),
-        ("foreign-patch", &[4.0, 0.1, 0.0, 0.05]),
+        ("foreign-patch", &[4.0, 0.1, 0.0, 0.05, 0.016]),
     ] {
         let effect = find(name).unwrap();
         effects.add(resolve(&[entry(effect, values)], effect.level()).unwrap());

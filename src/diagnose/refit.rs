@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::folds::Folds;
 use super::likelihood::{Declared, Likelihood, Term};
 use super::looks::Observation;
+use super::select::SEARCH;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Look, Model, Prediction, Receiver, Stage, Traced, rank};
 use crate::fit::FitError;
@@ -306,7 +307,7 @@ impl Problem<'_> {
                 let used = terms.iter().enumerate().filter(|(look, _)| used(*look));
                 used.map(|(_, term)| term.ln_p).sum()
             };
-            let (here, mut there) = (ln_p(&terms), Minimise::newton(at, bounds, &local));
+            let (here, mut there) = (ln_p(&terms), SEARCH.newton(at, bounds, &local));
             for _ in 0..HALVINGS {
                 if ln_p(&self.terms(space, &there)) >= here {
                     return there;

@@ -16,6 +16,9 @@ use crate::effects::{Look, Traced};
 /// Looks that a screening needs; more only take time.
 const ENOUGH: usize = 2500;
 
+/// Standard deviation, in the search, of a number of a law that hardly matters any more: a factor of a thousand.
+const OPEN: f64 = 7.0;
+
 /// A start is scaled at most so far.
 const MOST_SCALE: f64 = 5.0;
 
@@ -53,6 +56,8 @@ pub(super) struct Screen<'a> {
     absorbs: Option<Cholesky<f64, Dyn>>,
     /// The step that the model's own numbers would still take.
     own_step: DVector<f64>,
+    /// Whether the looks leave a number of a law open: a fit has carried it so far that it hardly matters.
+    pub leaves_laws_open: bool,
 }
 
 /// One look's change by an effect: of ln mean, and of the range, m.
@@ -64,6 +69,11 @@ impl<'a> Screen<'a> {
         let terms = problem.terms(space, at);
         let [lower, upper] = space.bounds();
         let mut slopes = problem.slopes(space, at, [&lower, &upper], &terms);
+        let information = |slopes: &Vec<Slope>| -> f64 {
+            terms.iter().zip(slopes).map(|(term, s)| inner(term, change(s), change(s))).sum()
+        };
+        let mut of_laws = slopes.iter().take(space.base_len());
+        let leaves_laws_open = of_laws.any(|slopes| information(slopes) * OPEN * OPEN < 1.0);
         slopes.retain(|slopes| slopes.iter().any(|s| s.ln_mean != 0.0 || s.range_m != 0.0));
         let product = |a: &[Slope], b: &[Slope]| {
             let pairs = terms.iter().zip(a.iter().zip(b));
@@ -79,7 +89,7 @@ impl<'a> Screen<'a> {
         };
         let own = DVector::from_iterator(slopes.len(), slopes.iter().map(pull));
         let own_step = absorbs.as_ref().map_or(DVector::zeros(slopes.len()), |c| c.solve(&own));
-        Screen { problem, terms, slopes, absorbs, own_step }
+        Screen { problem, terms, slopes, absorbs, own_step, leaves_laws_open }
     }
 
     /// Gain in ln likelihood that a start promises.

@@ -8,6 +8,8 @@
 //! placebos and a stated least, and it changes the data by a stated least size. Where placebos beat all, two that predict held-out patches are tried together: each alone is a
 //! worse picture of both than a wave.
 
+use std::cell::OnceCell;
+
 use nalgebra::DVector;
 use serde::Serialize;
 
@@ -146,7 +148,7 @@ impl Selection<'_> {
         let mut state = base.clone();
         for round in 1..=self.settings.most_effects + 1 {
             let mut trials = self.trials(&state, effects, round);
-            let chosen = match round <= self.settings.most_effects {
+            let chosen = match added.len() < self.settings.most_effects {
                 true => self.chosen(&state, &mut trials, Largest::of(&added)),
                 false => None,
             };
@@ -327,44 +329,36 @@ impl Selection<'_> {
             }
         }
         passed.sort_by(|a, b| b.2.total_cmp(&a.2));
-        let mut screen = None;
-        while let Some(best) = passed.first() {
-            let trial = trials.get_mut(best.0)?;
-            let screen = screen
-                .get_or_insert_with(|| Screen::new(self.problem, &state.space, &state.fitted.at));
-            let placebo = self.placebo_gain(state, screen, trial.effect.knobs().len());
-            trial.candidate.placebo_gain = Some(placebo);
-            if trial.candidate.gain > placebo {
-                break;
-            }
+        let screen = OnceCell::new();
+        let mut beats_placebos = |index: usize| {
+            let Some(Trial { effect, candidate, .. }) = trials.get_mut(index) else { return false };
+            let new = || Screen::new(self.problem, &state.space, &state.fitted.at);
+            let placebo = self.placebo_gain(state, screen.get_or_init(new), effect.knobs().len());
+            candidate.placebo_gain = Some(placebo);
+            candidate.gain > placebo
+        };
+        while passed.first().is_some_and(|best| !beats_placebos(best.0)) {
             passed.remove(0);
         }
         let first = passed.first()?;
-        let behind = |other: &(usize, Vec<Scored>, f64)| self.difference(&first.1, &other.1);
         // Of those that the data do not tell apart the simplest comes first, by the rule of one standard error,
         // and of equally simple ones the likelier.
         let is_tied = |other: &&(usize, Vec<Scored>, f64)| {
-            let [worse, se] = behind(other);
+            let [worse, se] = self.difference(&first.1, &other.1);
             worse <= se.max(SAME)
         };
-        let tied = || passed.iter().filter(is_tied);
-        let count = |one: &(usize, Vec<Scored>, f64)| {
+        let mut tied: Vec<_> = passed.iter().filter(is_tied).collect();
+        tied.retain(|one| one.0 == first.0 || beats_placebos(one.0));
+        let count = |one: &&&(usize, Vec<Scored>, f64)| {
             let Trial { space, fitted, .. } = &trials[one.0];
             numbers(space, &fitted.at)
         };
-        let best = tied().min_by_key(|one| count(one))?;
-        let class = tied().filter(|other| other.0 != best.0);
+        let best = *tied.iter().min_by_key(count)?;
+        let class = tied.iter().filter(|other| other.0 != best.0);
         let class = class.map(|one| trials[one.0].candidate.name).collect();
         let rivals =
             passed.iter().filter(|one| one.0 != best.0 && one.2 >= SHARE_OF_RIVAL * first.2);
         let rivals = rivals.take(MOST_RIVALS).map(|one| trials[one.0].effect).collect();
-        if trials[best.0].candidate.placebo_gain.is_none()
-            && let Some(screen) = &screen
-        {
-            let numbers = trials[best.0].candidate.numbers;
-            let placebo = self.placebo_gain(state, screen, numbers);
-            trials[best.0].candidate.placebo_gain = Some(placebo);
-        }
         Some(Chosen { trial: best.0, held_out: best.1.clone(), class, rivals })
     }
 

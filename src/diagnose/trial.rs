@@ -19,8 +19,10 @@ const WORTH_MORE: f64 = 3.0;
 const SHAPE_STEPS: [f64; 3] = [4.0, 2.0, 1.0];
 /// Strengths of a start that are tried.
 const STRENGTHS: [f64; 6] = [0.3, 1.0, 3.0, 7.0, 12.0, 20.0];
-/// And of those none that promises less than this share of what the best does.
+/// Of the starts that are followed none promises less than this share of what the best does.
 const SHARE_OF_START: f64 = 0.7;
+/// One that gains less than this share of its promise is moved by what it gains.
+const SHARE_OF_WORD: f64 = 0.3;
 /// Effects that promise less than this share of the best are not fitted at all.
 const SHARE_TO_SCOUT: f64 = 0.05;
 /// Effects of each round that are fitted to all looks and predict held-out patches: at most so many,
@@ -130,16 +132,14 @@ impl Selection<'_> {
             is_new
         });
         starts.truncate(STARTS);
-        let first = state.fitted.at.len();
-        for (promise, start) in &mut starts {
-            self.shape(screen, &space, effect, weight, (promise, start));
-            self.scale(screen, &space, effect, first, start);
-        }
+        starts.iter_mut().for_each(|start| self.placed(screen, &space, effect, start));
         // A start at which the effect is absent promises nothing, and is tried all the same.
         let is_absent = tried == 1 && starts.iter().all(|start| start.0 == 0.0);
-        if state.space.effects.is_empty()
-            && !is_absent
-            && let Some(start) = from_declared_laws(screen, &state.space, &space, effect, &values)
+        // Without an effect that bends the whole curve, such as a ceiling, the laws may have come far from any that
+        // go with it.
+        let is_first = state.space.effects.is_empty() && !is_absent;
+        if (is_first || screen.leaves_laws_open)
+            && let Some(start) = from_declared_laws(screen, state, &space, effect, &values)
         {
             // Followed whatever it promises: the promise is of a step from the fitted laws.
             starts.push((starts.first().map_or(0.0, |start| start.0), start));
@@ -163,50 +163,36 @@ impl Selection<'_> {
         Some(Trial { effect, space, starts, tried, fitted, sizes_db: [0.0; 2], candidate })
     }
 
-    /// Moves what only shapes an effect, such as a place, to where the start promises more.
-    fn shape(
+    /// Moves a start to where it is worth most: what only shapes the effect, such as a place, by what it promises, and
+    /// then its strength by what it gains.
+    fn placed(
         &self,
         screen: &Screen,
         space: &Space,
         effect: &dyn Effect,
-        weight: f64,
-        (promise, start): (&mut f64, &mut DVector<f64>),
+        start: &mut (f64, DVector<f64>),
     ) {
-        let first = start.len().saturating_sub(effect.knobs().len());
-        let shapes = effect.knobs().iter().enumerate().skip(1);
-        let is_shape = |(_, knob): &(usize, &Knob)| knob.absent != knob.max && *promise > 0.0;
-        for (index, knob) in shapes.filter(is_shape).collect::<Vec<_>>().repeat(SHAPE_STEPS.len()) {
-            for steps in SHAPE_STEPS.iter().flat_map(|s| [*s, -*s]) {
-                let mut moved = start.clone();
-                let place = &mut moved[first + index];
-                *place = (*place + steps).clamp(knob.min / knob.step, knob.max / knob.step);
-                let there = weight * screen.promise(space, &moved);
-                if there > *promise {
-                    (*promise, *start) = (there, moved);
-                }
-            }
+        let weight = self.sample.weight;
+        if start.0 > 0.0 {
+            climb(effect, start, SHAPE_STEPS.len(), |at| weight * screen.promise(space, at));
         }
-    }
-
-    /// Makes a start as strong as it gains most: far from the data, outliers would hold it.
-    fn scale(
-        &self,
-        screen: &Screen,
-        space: &Space,
-        effect: &dyn Effect,
-        first: usize,
-        start: &mut DVector<f64>,
-    ) {
         let Some(knob) = effect.knobs().first() else { return };
+        let (first, promise) = (start.1.len() - effect.knobs().len(), start.0);
+        let gain = |at: &DVector<f64>| weight * screen.gain(space, at);
         let scaled = |scale: f64| {
-            let mut scaled = start.clone();
-            let value = knob.absent + scale * (start[first] * knob.step - knob.absent);
+            let mut scaled = start.1.clone();
+            let value = knob.absent + scale * (start.1[first] * knob.step - knob.absent);
             scaled[first] = value.clamp(knob.min, knob.max) / knob.step;
-            (screen.gain(space, &scaled), scaled)
+            (gain(&scaled), scaled)
         };
-        let best = STRENGTHS.map(scaled).into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((_, scaled)) = best {
-            *start = scaled;
+        let mut strengths = STRENGTHS.map(scaled).to_vec();
+        strengths.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // Far from the data a promise takes in what is no part of it, and none of the strengths keeps it.
+        if strengths.first().is_some_and(|best| best.0 < SHARE_OF_WORD * promise) {
+            strengths.iter_mut().for_each(|start| climb(effect, start, 1, gain));
+        }
+        if let Some(best) = strengths.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+            start.1 = best.1;
         }
     }
 
@@ -278,21 +264,44 @@ impl Selection<'_> {
     }
 }
 
+/// Moves what only shapes an effect for so many rounds to where a start is worth more.
+fn climb(
+    effect: &dyn Effect,
+    (worth, start): &mut (f64, DVector<f64>),
+    rounds: usize,
+    worth_of: impl Fn(&DVector<f64>) -> f64,
+) {
+    let first = start.len().saturating_sub(effect.knobs().len());
+    let shapes = effect.knobs().iter().enumerate().skip(1);
+    let is_shape = |(_, knob): &(usize, &Knob)| knob.absent != knob.max;
+    for (index, knob) in shapes.filter(is_shape).collect::<Vec<_>>().repeat(rounds) {
+        for steps in SHAPE_STEPS.iter().flat_map(|s| [*s, -*s]) {
+            let mut moved = start.clone();
+            let place = &mut moved[first + index];
+            *place = (*place + steps).clamp(knob.min / knob.step, knob.max / knob.step);
+            let there = worth_of(&moved);
+            if there > *worth {
+                (*worth, *start) = (there, moved);
+            }
+        }
+    }
+}
+
 /// Whether to search on would be to try the same steps again; a target that moves is searched by wider steps first.
 fn is_at_rest(fitted: &Fitted, effect: &dyn Effect) -> bool {
     fitted.is_stuck && !effect.moves()
 }
 
-/// The best start with the laws as the scene declares them: without an effect that bends the whole curve,
-/// such as a ceiling, the fitted laws may be far from any that go with it.
+/// The best start with the laws as the scene declares them.
 fn from_declared_laws(
     screen: &Screen,
-    base: &Space,
+    state: &State,
     space: &Space,
     effect: &dyn Effect,
     values: &[Vec<f64>],
 ) -> Option<DVector<f64>> {
-    let starts = values.iter().map(|values| Space::joined(&base.start(), effect, values));
+    let declared = state.space.restarted(&state.fitted.at);
+    let starts = values.iter().map(|values| Space::joined(&declared, effect, values));
     let gains = starts.map(|start| (screen.gain(space, &start), start));
     gains.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, start)| start)
 }

@@ -2,17 +2,19 @@
 
 use super::covering_layer::share_of_spot;
 use super::{Effect, Knob, Level, Look, Stage};
+use crate::frames::{Direction, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::units::ratio_from_db;
 
 /// The effect `foreign-patch`.
 pub(super) struct ForeignPatch;
 
-const KNOBS: [Knob; 4] = [
+const KNOBS: [Knob; 5] = [
     Knob::new("level_db", "dB", [-30.0, 30.0], 0.0, 0.5),
     Knob::new("centre_x_m", "m", [-3.0, 3.0], 0.0, 0.01),
     Knob::new("centre_y_m", "m", [-3.0, 3.0], 0.0, 0.01),
     Knob::new("radius_m", "m", [0.005, 1.0], 0.05, 0.01),
+    Knob::new("fade_m", "m", [0.0, 0.1], 0.016, 0.004),
 ];
 
 /// Sides of the cells where a search begins, m, and most of them along an edge of the target.
@@ -21,15 +23,27 @@ const MOST_CELLS: usize = 20;
 /// Levels where it begins, dB.
 const LEVELS_DB: [f64; 2] = [1.0, -1.0];
 
-/// Distance from a look to the ray of the centre, along the surface as it lies at the look, m.
-fn apart_m(stage: &Stage, look: &Look, [x_m, y_m]: [f64; 2]) -> f64 {
+/// Where the fading has ended, in its widths: no more than 10⁻⁵ of the level is left there.
+const FADED: f64 = 3.0;
+
+/// Distance of a look from the centre on the target, m; infinite where it is more than `far_m`, which costs
+/// no ray.
+fn apart_m(stage: &Stage, look: &Look, [x_m, y_m]: [f64; 2], far_m: f64) -> f64 {
     let axes = stage.radar.frames().global_from_target.rotation();
     let aside = (x_m - look.xt_m) * axes.x_axis + (y_m - look.yt_m) * axes.y_axis;
+    // Beside the ray of the centre by as much at least.
     let forward = look.ray.direction.xyz();
-    // At a glancing surface the way along it is long, and its plane holds only near by.
-    let facing = look.normal.dot(-forward).max(0.1);
-    let onto_surface = aside + forward * (look.normal.dot(aside) / facing);
-    onto_surface.length() * look.hit.range_m / PATTERN_RANGE_M
+    let beside_m =
+        aside.reject_from_normalized(forward).length() * look.hit.range_m / PATTERN_RANGE_M;
+    let towards = Direction::new(PATTERN_RANGE_M * forward + aside);
+    let Some(direction) = towards.filter(|_| beside_m <= far_m) else { return f64::INFINITY };
+    // The centre belongs to the target, wherever that has moved.
+    let ray = Ray { origin: look.ray.origin, direction };
+    let centre = match stage.bvh.closest(&ray) {
+        Some(hit) => hit.point.xyz,
+        None => ray.origin.xyz + look.hit.range_m * direction.xyz(),
+    };
+    (look.target.inverse() * look.hit.point).xyz.distance(centre)
 }
 
 /// Least and largest of some numbers; zeros when there are none.
@@ -53,8 +67,8 @@ impl Effect for ForeignPatch {
 
     fn is(&self) -> &'static str {
         "A round place on the target is of another material, that returns more or less by so many \
-         dB. Its centre is where the field of view has these x_t and y_t, its radius is along the \
-         surface."
+         dB. Its centre is on the surface where the field of view has these x_t and y_t; its radius is the \
+         straight way from there, over the edge of which it fades as under a spot of that diameter."
     }
 
     fn shows(&self) -> &'static str {
@@ -79,7 +93,10 @@ impl Effect for ForeignPatch {
                     [left + (column as f64 + 0.5) * width, low + (row as f64 + 0.5) * height];
                 let radius_m = (0.5 * side_m).clamp(0.02, 0.3);
                 if looks.iter().any(|l| (l.xt_m - x).hypot(l.yt_m - y) < radius_m) {
-                    starts.extend(LEVELS_DB.map(|db| vec![db, inside(x), inside(y), radius_m]));
+                    let fade_m = KNOBS[4].absent;
+                    starts.extend(
+                        LEVELS_DB.map(|db| vec![db, inside(x), inside(y), radius_m, fade_m]),
+                    );
                 }
             }
         }
@@ -87,12 +104,12 @@ impl Effect for ForeignPatch {
     }
 
     fn gain(&self, values: &[f64], stage: &Stage, look: &Look) -> f64 {
-        let &[level_db, x_m, y_m, radius_m] = values else { return 1.0 };
+        let &[level_db, x_m, y_m, radius_m, fade_m] = values else { return 1.0 };
         if level_db == 0.0 {
             return 1.0;
         }
-        let beyond_m = radius_m - apart_m(stage, look, [x_m, y_m]);
-        let share = share_of_spot(beyond_m, stage.radar.spot_diameter_m);
+        let apart_m = apart_m(stage, look, [x_m, y_m], radius_m + FADED * fade_m);
+        let share = share_of_spot(radius_m - apart_m, fade_m);
         1.0 + share * (ratio_from_db(level_db) - 1.0)
     }
 }
@@ -105,7 +122,8 @@ mod tests {
     #[test]
     fn only_what_lies_within_the_radius_changes() {
         let bench = Bench::plate();
-        let (bare, with) = (bench.bare(), bench.with(&ForeignPatch, &[4.0, 0.05, -0.1, 0.06]));
+        let (bare, with) =
+            (bench.bare(), bench.with(&ForeignPatch, &[4.0, 0.05, -0.1, 0.06, 0.016]));
         let mut seen = [0; 2];
         for ((look, bare), with) in bench.looks.iter().zip(&bare).zip(&with) {
             let apart_m = (look.xt_m - 0.05).hypot(look.yt_m + 0.1);

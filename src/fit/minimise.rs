@@ -100,6 +100,10 @@ pub(crate) struct Minimum {
     pub stop: Stop,
 }
 
+/// How far an unknown is thought to go. One that promises less than the tolerance so far is held: where the cost is flat,
+/// a step would be without measure, and all others would fail with it.
+const REACH: f64 = 10.0;
+
 /// Smallest, first and largest damping λ, and how it falls and rises.
 const DAMPING: [f64; 3] = [1e-9, 1e-3, 1e9];
 const EASE: f64 = 0.2;
@@ -133,7 +137,7 @@ impl Minimise {
             if !local.value.is_finite() {
                 break Stop::NotFinite;
             }
-            let free = free(&at, &local.gradient, lower, upper);
+            let free = self.free(&at, &local, lower, upper);
             if free.is_empty() {
                 break Stop::Bounded;
             }
@@ -166,17 +170,36 @@ impl Minimise {
 
     /// The full step from a point, on the unknowns that no bound holds.
     pub fn newton(
+        &self,
         at: &DVector<f64>,
         [lower, upper]: [&DVector<f64>; 2],
         local: &Local,
     ) -> DVector<f64> {
-        let free = free(at, &local.gradient, lower, upper);
+        let free = self.free(at, local, lower, upper);
         clamped(&(at + step(local, &free, DAMPING[0])), lower, upper)
     }
 
     fn is_done(&self, local: &Local, free: &[usize]) -> bool {
         let newton = step(local, free, DAMPING[0]);
         -0.5 * local.gradient.dot(&newton) < self.tolerance
+    }
+
+    /// Unknowns that no bound holds, which are those inside and those that want to go inside, and that matter.
+    fn free(
+        &self,
+        at: &DVector<f64>,
+        local: &Local,
+        lower: &DVector<f64>,
+        upper: &DVector<f64>,
+    ) -> Vec<usize> {
+        let is_free = |&i: &usize| {
+            let (slope, bend) = (local.gradient[i], local.curvature[(i, i)]);
+            let held_below = at[i] <= lower[i] && slope >= 0.0;
+            let held_above = at[i] >= upper[i] && slope <= 0.0;
+            let is_flat = slope.abs() * REACH + 0.5 * bend * REACH * REACH < self.tolerance;
+            lower[i] < upper[i] && !held_below && !held_above && !is_flat
+        };
+        (0..at.len()).filter(is_free).collect()
     }
 }
 
@@ -189,21 +212,6 @@ impl Minimum {
 
 fn clamped(at: &DVector<f64>, lower: &DVector<f64>, upper: &DVector<f64>) -> DVector<f64> {
     at.zip_zip_map(lower, upper, |x, low, high| x.max(low).min(high))
-}
-
-/// Unknowns that no bound holds: those inside, and those that want to go inside.
-fn free(
-    at: &DVector<f64>,
-    gradient: &DVector<f64>,
-    lower: &DVector<f64>,
-    upper: &DVector<f64>,
-) -> Vec<usize> {
-    let is_free = |&i: &usize| {
-        let held_below = at[i] <= lower[i] && gradient[i] >= 0.0;
-        let held_above = at[i] >= upper[i] && gradient[i] <= 0.0;
-        lower[i] < upper[i] && !held_below && !held_above
-    };
-    (0..at.len()).filter(is_free).collect()
 }
 
 fn step(local: &Local, free: &[usize], damping: f64) -> DVector<f64> {
@@ -281,5 +289,21 @@ mod tests {
         let bounds = [&vector([-5.0, -5.0]), &vector([5.0, 5.0])];
         let found = SEARCH.run(&vector([3.0, 1.0]), bounds, flat);
         assert!(found.converged() && found.local.value < 1e-12);
+    }
+
+    #[test]
+    fn an_unknown_that_hardly_matters_does_not_spoil_the_steps_of_the_rest() {
+        // Its full step is 10⁵ long, and leads where the cost is worse.
+        let cost = |at: &DVector<f64>| {
+            let mut local = Local::zero(2);
+            add_residual(&mut local, at[0] - 3.0, &[1.0, 0.0]);
+            add_residual(&mut local, 1.0 - 1e-5 * at[1].min(1.0), &[0.0, -1e-5]);
+            local.value += 1e-3 * (at[1] - 1.0).max(0.0);
+            local
+        };
+        let bounds = [&vector([-1e9; 2]), &vector([1e9; 2])];
+        let search = Minimise { tolerance: 0.1, patience: 3, ..SEARCH };
+        let found = search.run(&vector([0.0, 0.0]), bounds, cost);
+        assert!(found.converged() && (found.at[0] - 3.0).abs() < 0.5, "{found:?}");
     }
 }
