@@ -203,6 +203,22 @@ fn what_is_seen_edge_on_hides_nothing() {
 }
 
 #[test]
+fn a_needle_along_the_rays_hides_no_wall() {
+    // Its picture has an area that f32 is sure of, and its plane is left to rounding.
+    let needle = [[0.0, 0.0, 1.0], [4e-6, 0.0, 0.0], [0.0, 4e-6, 0.0]];
+    let wall = [[-1.0, -1.0, -1.0], [3.0, -1.0, -1.0], [-1.0, 3.0, -1.0]];
+    let vertices = needle.into_iter().chain(wall).map(DVec3::from).collect();
+    let mesh = Mesh { vertices, facets: vec![[0, 1, 2], [3, 4, 5]], labels: Vec::new() };
+    let origin = Point::new(0.0, 0.0, 8.0);
+    let at = |k: u32| 8e-6 * f64::from(k) / 19.0;
+    let through = (0..400).map(|k| Point::new(at(k % 20), at(k / 20), 0.0));
+    let rays: Vec<_> =
+        through.map(|to| Ray { origin, direction: origin.towards(to).unwrap() }).collect();
+    let hits = judged(&mesh, &rays, SLIVER);
+    assert!(hits.iter().all(Option::is_some), "the wall is behind");
+}
+
+#[test]
 fn rays_along_edges_of_a_closed_mesh_meet_nothing_beside_it() {
     /// Just above the angle from which a facet counts as seen edge-on, m.
     const ROUNDING_M: f64 = 1e-5;

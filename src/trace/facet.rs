@@ -53,7 +53,7 @@ impl<'a> Line<'a> {
 pub(super) fn plane_m(mesh: &Mesh, facet: usize, ray: &Ray<Global>) -> Option<f64> {
     let corners = mesh.corners(facet);
     let range_m = crossed_m(ray.origin.xyz, ray.direction.xyz(), corners, normal(corners));
-    (range_m > 0.0 && range_m.is_finite()).then_some(range_m)
+    is_ahead(range_m).then_some(range_m)
 }
 
 /// Normal of a facet, as long as twice its area.
@@ -75,20 +75,35 @@ fn crossed_m(origin: DVec3, along: DVec3, [a, b, c]: [DVec3; 3], normal: DVec3) 
     if sinks * sinks <= GRAZING * GRAZING * edges2 { f64::NAN } else { range_m }
 }
 
-/// Where rays meet the planes of their facets, side by side; `None` where the plane lies behind or along the
-/// ray, and for a number that is no facet's.
+/// Whether a plane is crossed at this distance, m. In plain comparisons, which stay side by side.
 #[inline(always)]
-pub(super) fn met<const N: usize>(
+fn is_ahead(range_m: f64) -> bool {
+    (range_m > 0.0) & (range_m < f64::INFINITY)
+}
+
+/// Where a ray meets the plane of a facet; `None` where the plane lies behind or along the ray.
+#[inline]
+pub(super) fn met(mesh: &Mesh, facet: u32, ray: &Ray<Global>) -> Option<Hit> {
+    let mut hit = [None];
+    met_by(mesh, [facet], [ray], &mut hit);
+    hit[0]
+}
+
+/// The same for rays of one origin side by side, with as many hits as are wanted; `None`, too, for a number that
+/// is no facet's.
+#[inline(always)]
+pub(super) fn met_by<const N: usize>(
     mesh: &Mesh,
     facets: [u32; N],
     rays: [&Ray<Global>; N],
-) -> [Option<Hit>; N] {
-    let [mut origin, mut along, mut a, mut b, mut c] = [[[0.0; N]; 3]; 5];
+    hits: &mut [Option<Hit>],
+) {
+    let origin = rays[0].origin.xyz;
+    let [mut along, mut a, mut b, mut c] = [[[0.0; N]; 3]; 4];
     for lane in 0..N {
         let set = |list: &mut [[f64; N]; 3], at: DVec3| {
             list.iter_mut().zip(at.to_array()).for_each(|(list, at)| list[lane] = at);
         };
-        set(&mut origin, rays[lane].origin.xyz);
         set(&mut along, rays[lane].direction.xyz());
         if let Some(corners) = mesh.facets.get(facets[lane] as usize) {
             let corners = corners.map(|vertex| mesh.vertices[vertex as usize]);
@@ -98,26 +113,25 @@ pub(super) fn met<const N: usize>(
     let mut point = [[0.0; N]; 3];
     let [mut range_m, mut cos_theta] = [[0.0; N]; 2];
     for lane in 0..N {
-        let [origin, along, a, b, c] =
-            [&origin, &along, &a, &b, &c].map(|list| [list[0][lane], list[1][lane], list[2][lane]]);
-        let [origin, along, a, b, c] = [origin, along, a, b, c].map(DVec3::from_array);
+        let [along, a, b, c] = [&along, &a, &b, &c]
+            .map(|list| DVec3::new(list[0][lane], list[1][lane], list[2][lane]));
         let normal = normal([a, b, c]);
         range_m[lane] = crossed_m(origin, along, [a, b, c], normal);
         let per_length = 1.0 / normal.dot(normal).sqrt();
-        let unit = if per_length.is_finite() { normal * per_length } else { DVec3::ZERO };
+        let unit = if per_length < f64::INFINITY { normal * per_length } else { DVec3::ZERO };
         cos_theta[lane] = along.dot(unit).abs();
         let at = origin + range_m[lane] * along;
         for (list, at) in point.iter_mut().zip(at.to_array()) {
             list[lane] = at;
         }
     }
-    std::array::from_fn(|lane| {
-        let range_m = range_m[lane];
-        (range_m > 0.0 && range_m.is_finite()).then(|| Hit {
+    for (lane, hit) in hits.iter_mut().enumerate().take(N) {
+        let [x, y, z] = [0, 1, 2].map(|axis| point[axis][lane]);
+        *hit = is_ahead(range_m[lane]).then_some(Hit {
             facet: facets[lane],
-            range_m,
-            point: Point::new(point[0][lane], point[1][lane], point[2][lane]),
+            range_m: range_m[lane],
+            point: Point::new(x, y, z),
             cos_theta: cos_theta[lane],
-        })
-    })
+        });
+    }
 }

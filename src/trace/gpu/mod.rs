@@ -172,7 +172,7 @@ impl<'a> Held<'a> {
             Answer::Nothing => None,
             Answer::Unsure => self.bvh.closest(ray),
             Answer::Facet(facet) => {
-                let [hit] = met(self.bvh.mesh(), [facet], [ray]);
+                let hit = met(self.bvh.mesh(), facet, ray);
                 hit.or_else(|| self.bvh.closest(ray))
             }
         })

@@ -29,7 +29,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::facet::met;
+use super::facet::met_by;
 use super::wide::{Wide, widest};
 use super::{Bvh, Hit};
 use crate::frames::{Global, Ray};
@@ -75,18 +75,16 @@ impl Fan<'_> {
         let nearest = nearest(&picture);
         let left_out = picture.left_out();
         let bvh = (!left_out.is_empty()).then(|| Bvh::over(mesh, left_out));
-        let hits = |(rays, places): (&[Ray<Global>], &[u32])| {
-            let mut hits = widest(Meeting { mesh, rays, places, nearest: &nearest });
+        let mut hits = vec![None; self.rays.len()];
+        let blocks = self.rays.par_chunks(LANES).zip(self.sorted.place_of.par_chunks(LANES));
+        let blocks = blocks.zip(hits.par_chunks_mut(LANES)).with_min_len(64);
+        blocks.for_each(|((rays, places), hits)| {
+            widest(Meeting { mesh, rays, places, nearest: &nearest, hits });
             if let Some(bvh) = &bvh {
                 let behind = rays.iter().map(|ray| bvh.closest(ray));
                 hits.iter_mut().zip(behind).for_each(|(hit, other)| *hit = nearer(*hit, other));
             }
-            hits
-        };
-        let (rays, places) = (self.rays.par_chunks(LANES), self.sorted.place_of.par_chunks(LANES));
-        let hits: Vec<_> = rays.zip(places).with_min_len(64).map(hits).collect();
-        let mut hits = hits.into_flattened();
-        hits.truncate(self.rays.len());
+        });
         hits
     }
 }
@@ -97,19 +95,23 @@ struct Meeting<'a> {
     rays: &'a [Ray<Global>],
     places: &'a [u32],
     nearest: &'a [u32],
+    hits: &'a mut [Option<Hit>],
 }
 
 impl Wide for Meeting<'_> {
-    type Answer = [Option<Hit>; LANES];
+    type Answer = ();
 
     #[inline(always)]
-    fn run(self) -> [Option<Hit>; LANES] {
+    fn run(self) {
         let mut facets = [NONE; LANES];
         for (facet, &place) in facets.iter_mut().zip(self.places) {
             *facet = self.nearest[place as usize];
         }
-        let rays = std::array::from_fn(|lane| self.rays.get(lane).unwrap_or(&self.rays[0]));
-        met(self.mesh, facets, rays)
+        if facets != [NONE; LANES] {
+            let mut rays = [&self.rays[0]; LANES];
+            rays.iter_mut().zip(self.rays).for_each(|(lane, ray)| *lane = ray);
+            met_by(self.mesh, facets, rays, self.hits);
+        }
     }
 }
 

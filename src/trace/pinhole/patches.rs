@@ -3,7 +3,11 @@
 use super::fan::Grid;
 use super::lanes::{Form, LANES, Lanes};
 use super::{NONE, ROUNDING};
+use crate::trace::facet::GRAZING;
 use crate::trace::wide::{least, most};
+
+/// Twice the bound below which a ray runs along a facet, for rounding.
+const ALONG: f32 = 2.0 * GRAZING as f32;
 
 /// A block of facets, and the cells that their boxes touch.
 pub(super) struct Patches {
@@ -94,6 +98,9 @@ impl Patches {
     /// e = 36·ηL(M + L). Where rounding turned the sign of the whole area, a point inside may
     /// show −2e, hence a doubt of 2e. The shares of two corners err by 2e/area each and the
     /// inverse depths by a few η.
+    ///
+    /// A ray in the plane of a facet passes it by (`facet.rs`), if |d·n| ≤ 10⁻¹⁰·|ab|·|ac|. With depths from z to Z it
+    /// is |d·n| ≥ z³/Z·area/(1 + 2M), and an edge is no longer than 1.5·ZL + (Z − z)(1 + 2M).
     #[inline(always)]
     pub fn forms(&self, grid: &Grid) -> Forms {
         let Patches { corners: [a, b, c], low, high, .. } = self;
@@ -124,17 +131,23 @@ impl Patches {
                 forms.ca[axis][lane] = sign * ca[axis];
             }
             let (near, far) = (high[2][lane], low[2][lane]);
-            let is_sure = area > 3.0 * doubt;
+            let (depth, wide) = (far / near, 1.0 + 2.0 * reach);
+            let edge = 1.5 * length + (1.0 - depth) * wide;
+            let runs_along = depth * depth * depth * area <= ALONG * wide * edge * edge;
+            let has_size = area > 3.0 * doubt;
+            let is_sure = has_size & !runs_along;
             let per_area = 1.0 / area;
             let rounding = 8.0 * ROUNDING * near;
             let spread = 3.0 * doubt * per_area * (near - far);
             let at = a[2][lane];
             let w = [at, (b[2][lane] - at) * per_area, (c[2][lane] - at) * per_area];
-            // Seen edge-on: nothing is sure but that it is no nearer than its nearest corner.
+            // Seen edge-on: nothing is sure but that it is no nearer than its nearest corner, and for rays along it
+            // not even that it is met.
             forms.w[0][lane] = if is_sure { w[0] } else { near };
             forms.w[1][lane] = if is_sure { w[1] } else { 0.0 };
             forms.w[2][lane] = if is_sure { w[2] } else { 0.0 };
-            forms.w_doubt[lane] = if is_sure { spread + rounding } else { rounding };
+            let unsure = if has_size { f32::INFINITY } else { rounding };
+            forms.w_doubt[lane] = if is_sure { spread + rounding } else { unsure };
             forms.has_area[lane] = u32::from(is_sure & (near < 64.0 * far));
             (forms.area[lane], forms.doubt[lane]) = (area, doubt);
         }
