@@ -32,6 +32,12 @@ impl Share {
         Some(beta.inverse_cdf(0.95))
     }
 
+    /// What the true share is above with 95 % confidence, likewise.
+    pub fn lower_95(self) -> Option<f64> {
+        let others = Share { count: self.of - self.count, of: self.of };
+        others.upper_95().map(|upper| 1.0 - upper)
+    }
+
     /// For a cell of a table.
     pub fn cell(self) -> String {
         match self.ratio() {

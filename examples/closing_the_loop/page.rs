@@ -119,7 +119,8 @@ const LEGEND: &str = "
   taken at its word.
 - *Right name first*: the first effect of the report is the one that was put in. *Exactly*: it is the only one.
 - *Or in its class*: the first name comes with others that predict the data as well, and the right one is among them.
-  No target counts this.
+  A target counts this only where no data of this kind could tell the two apart; these cases are listed, with the reason.
+- *Above* and *below*: where the true share lies with 95 % confidence (Clopper and Pearson).
 - *Extra names*: names that are not the truth's, without a wrong first one, which is a miss already. *All wrong names*
   counts that one, too.
 - *False alarm*: any name, or any verdict but `no-missing-effect`, where nothing is missing.

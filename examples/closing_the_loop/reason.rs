@@ -62,6 +62,9 @@ fn of_effect(right: &str, label: &Label, run: &Run) -> String {
             "named an effect whose fingerprint is alike".into()
         }
         Some(_) => "named an effect that explains clearly more".into(),
+        None if run.found().is_empty() => {
+            "stopped by what is asked for beside gain and size".into()
+        }
         None => "passed alone, and not beside what was named".into(),
     }
 }
@@ -82,7 +85,7 @@ fn stopped(tried: &Candidate) -> Option<&'static str> {
         return Some("no better than a placebo");
     }
     match tried.held_out {
-        None => Some("held-out patches were not predicted"),
+        None => Some("its size or gain too small beside what was named, or for its many starts"),
         Some([gain, se]) if gain <= standard_errors * se => {
             Some("held-out gain within its standard errors")
         }

@@ -75,7 +75,7 @@ impl Runner {
         let cloud = cloud.iter().find(|path| path.exists());
         let cloud = cloud.ok_or_else(|| format!("{}: there is no cloud", case.display()))?;
         let keep = self.keep.join(format!("{}-{}", name(case), key(case, cloud)?));
-        if let Some(run) = kept(&keep) {
+        if let Some(run) = self.kept(&keep) {
             return Ok(run);
         }
         let scratch = tempfile::tempdir()?;
@@ -104,6 +104,11 @@ impl Runner {
         let one = Kept { seconds, jobs: self.jobs, program: self.program.clone(), message };
         fs::write(keep.join(RUN), serde_json::to_string(&one)?)?;
         read(&keep).ok_or_else(|| format!("{} cannot be read", keep.display()).into())
+    }
+
+    /// A run of this very program that gave a report; one that failed is tried again.
+    fn kept(&self, folder: &Path) -> Option<Run> {
+        read(folder).filter(|run| run.report.is_ok() && run.program == self.program)
     }
 
     /// What it said when the status was not 0.
@@ -136,11 +141,6 @@ fn key(case: &Path, cloud: &Path) -> Result<String, Failure> {
         hash.update(&fs::read(file).map_err(|error| format!("{}: {error}", file.display()))?);
     }
     Ok(hash.finalize().to_hex()[..8].to_owned())
-}
-
-/// A run that gave a report; one that failed is tried again.
-fn kept(folder: &Path) -> Option<Run> {
-    read(folder).filter(|run| run.report.is_ok())
 }
 
 fn read(folder: &Path) -> Option<Run> {

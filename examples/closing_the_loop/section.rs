@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use matdb::diagnose::Diagnosis;
 use matdb::effects::library;
 
 use super::label::{Expected, Strength};
@@ -18,6 +19,7 @@ pub fn section(set: &Set) -> String {
         ("What the cases are", about(set)),
         ("One effect", by_strength(cases)),
         ("What each effect was called", confusions(cases)),
+        ("Counted as right", alike(cases)),
         ("Two effects", of_pairs(cases)),
         ("Nothing missing", complete(cases)),
         ("Effects that no library has", unknown(cases)),
@@ -115,6 +117,28 @@ fn confusions(cases: &[Case]) -> String {
         text += &format!("\n{}", table(&head, rows));
     }
     text
+}
+
+/// Cases of which no data of this kind could tell the right name.
+fn alike(cases: &[Case]) -> String {
+    let row = |case: &Case| {
+        let why = case.alike()?;
+        let mut cells = miss(case);
+        cells.pop();
+        Some((cells, why))
+    };
+    let (rows, whys): (Vec<_>, BTreeSet<&str>) = cases.iter().filter_map(row).unzip();
+    if rows.is_empty() {
+        return String::new();
+    }
+    let why: Vec<&str> = whys.into_iter().collect();
+    format!(
+        "The first name was another, the right one was told as one that predicts the data as well, the two gains in ln \
+         likelihood differ by {} at most, and there is a reason: {}.\n\n{}",
+        Diagnosis::default().least_gain,
+        why.join("; "),
+        listing(&MISS[..MISS.len() - 1], rows)
+    )
 }
 
 /// Cases by what was put in.
@@ -296,17 +320,12 @@ fn time(cases: &[Case]) -> String {
     let answered = cases.iter().filter(|case| case.run.report.is_ok());
     let seconds = Sorted::new(answered.map(|case| case.run.seconds));
     let jobs: BTreeSet<u64> = cases.iter().map(|case| case.run.jobs as u64).collect();
-    let programs: BTreeSet<&str> = cases.iter().map(|case| case.run.program.as_str()).collect();
     let threads = match jobs.last() {
         Some(&most) if most > 1 => ", each on one thread",
         _ => "",
     };
-    let mixed = match programs.len() {
-        0 | 1 => String::new(),
-        many => format!(" The reports come from {many} builds of the program."),
-    };
     format!(
-        "`add` and `diagnose` together: median {} s, worst {} s; {} ran at a time{threads}.{mixed}\n",
+        "`add` and `diagnose` together: median {} s, worst {} s; {} ran at a time{threads}.\n",
         digits(seconds.median(), 1),
         digits(seconds.worst(), 1),
         runs(&jobs),
@@ -319,25 +338,27 @@ fn misses(cases: &[Case]) -> String {
         return "There is none.\n".into();
     }
     missed.sort_by_key(|case| (put_in(case), case.label.strength, case.label.seed));
-    let head = [
-        "put in",
-        "strength",
-        "rms, dB",
-        "seed",
-        "geometry",
-        "case",
-        "said",
-        "gain of the right one",
-        "gain of the wrong one",
-        "reason",
-    ];
     format!(
         "Gains are in ln likelihood, of the first round; ≈ marks one that is only of a sample of the chirps. The \
          reason follows from the report by rule, from the round in which a wrong effect was added, or else the last. \
          An effect with a measure of its own has an rms of 0.\n\n{}",
-        listing(&head, missed.into_iter().map(miss))
+        listing(&MISS, missed.into_iter().map(miss))
     )
 }
+
+/// What is told of a case that was missed.
+const MISS: [&str; 10] = [
+    "put in",
+    "strength",
+    "rms, dB",
+    "seed",
+    "geometry",
+    "case",
+    "said",
+    "gain of the right one",
+    "gain of the wrong one",
+    "reason",
+];
 
 fn miss(case: &Case) -> Vec<String> {
     let Case { label, run } = case;

@@ -17,7 +17,9 @@ pub struct Target {
 impl Target {
     fn at_least(what: &'static str, aim: &'static str, share: Share, least: f64) -> Target {
         let met = share.ratio().map(|ratio| ratio >= least);
-        Target { what, aim, reached: share.cell(), met }
+        let surely = share.lower_95().map(|lower| format!("; above {:.0} %", 100.0 * lower));
+        let reached = format!("{}{}", share.cell(), surely.unwrap_or_default());
+        Target { what, aim, reached, met }
     }
 
     fn at_most(
@@ -42,7 +44,7 @@ impl Target {
 
 /// All targets, of one set of cases.
 pub fn targets(cases: &[Case]) -> Vec<Target> {
-    let first = |strength| share(&singles(cases, strength), Case::named_first);
+    let first = |strength| share(&singles(cases, strength), Case::named_as_well_as_can_be);
     let named = those(cases, |label| label.expected == Expected::Named);
     let one = those(cases, |label| label.single().is_some());
     let extra = mean(&one, Case::extra);
@@ -79,19 +81,22 @@ pub fn targets(cases: &[Case]) -> Vec<Target> {
             "≤ 3 %",
             alarms.ratio(),
             0.03,
-            alarms.cell(),
+            match alarms.upper_95() {
+                Some(upper) => format!("{}; below {:.0} %", alarms.cell(), 100.0 * upper),
+                None => alarms.cell(),
+            },
         ),
         Target::at_least("two effects: both named", "≥ 80 %", both, 0.80),
         Target::at_least("unknown effect: called unexplained", "≥ 90 %", unexplained, 0.90),
         Target::at_most(
-            "error after over noise floor, median",
+            "known effects: error after over noise floor, median",
             "≤ 1.03",
             middle,
             1.03,
             digits(middle, 3),
         ),
         Target::at_most(
-            "error after over noise floor, 90th percentile",
+            "known effects: error after over noise floor, 90th percentile",
             "≤ 1.10",
             most,
             1.10,
