@@ -1,6 +1,7 @@
 //! How long a whole diagnosis of a scan of 18 529 chirps takes, for several hidden effects:
 //!
 //!     cargo bench --bench diagnose
+//!     cargo bench --bench diagnose -- json     a line for each
 //!
 //! Every scan is rendered first, and the time of that, in the same run, is the measure: machines
 //! differ, and their clocks drift. The goal is 60 s on two cores.
@@ -23,7 +24,10 @@ fn main() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let bench = std::fs::read_to_string(root.join("scenes/bench.toml")).expect("the scene");
-    println!("hidden          diagnosis     render      ratio   verdict");
+    let json = std::env::args().any(|argument| argument == "json");
+    if !json {
+        println!("hidden          diagnosis     render      ratio   verdict");
+    }
     for (name, effect) in HIDDEN {
         let scene = folder.path().join(format!("{name}.toml"));
         std::fs::write(&scene, format!("{bench}\n{effect}")).expect("room for a scene");
@@ -39,8 +43,18 @@ fn main() {
             why.as_ref(),
         ]);
         let ratio = diagnose_s / render_s;
-        let verdict = verdict(&why.join("report.json"));
-        println!("{name:<14} {diagnose_s:>8.1} s {render_s:>8.2} s {ratio:>10.0}   {verdict}");
+        let said = verdict(&why.join("report.json"));
+        match json {
+            true => println!(
+                "{}",
+                serde_json::json!({
+                    "hidden": name, "diagnose_s": diagnose_s, "render_s": render_s, "said": said,
+                })
+            ),
+            false => {
+                println!("{name:<14} {diagnose_s:>8.1} s {render_s:>8.2} s {ratio:>10.0}   {said}")
+            }
+        }
     }
 }
 

@@ -42,7 +42,7 @@ def at_most(work, most, unit, value):
 
 def all_goals(results):
     return [
-        *tracing(results), *reshading(results), *rendering(results), gpu(results), *fits(results), *registration(results),
+        *tracing(results), *reshading(results), *rendering(results), diagnosis(results), gpu(results), *fits(results), *registration(results),
         *store(results), *formats(results), memory(results),
     ]
 
@@ -90,6 +90,11 @@ def rendering(results):
     found = results.get("render")
     ratio = median(found["render"]) / median(found["write"]) if found else None
     yield at_most("whole `render` of the paper's scene over writing its files", 3, "", ratio)
+
+
+def diagnosis(results):
+    slowest = max((row["diagnose_s"] for row in results.get("diagnosis", [])), default=None)
+    return at_most("whole diagnosis of 18 529 chirps, the slowest of several", 60, "s", slowest)
 
 
 def gpu(results):

@@ -29,7 +29,7 @@ def page(results):
         head(results), goals(results), losses(results),
         *bodies(results), reshading(results), growth(results), memory(results), second(results),
         rendering(results), formats(results), registration(results), fits(results), store(results),
-        gpu(results), LIMITS.read_text(encoding="utf-8").strip() + "\n",
+        diagnosis(results), gpu(results), LIMITS.read_text(encoding="utf-8").strip() + "\n",
     ]
     return "\n".join(part for part in parts if part)
 
@@ -166,6 +166,23 @@ What is predicted for {grouped(found[0]["looks"])} of {grouped(found[0]["chirps"
 `cargo bench --bench reshade`: hits, angles and footprints are kept.
 
 {table(head, rows, right=head[1:])}"""
+
+
+def diagnosis(results):
+    found = results.get("diagnosis", [])
+    if not found:
+        return ""
+    rows = [
+        [row["hidden"], number(row["diagnose_s"]), number(row["render_s"]), times(row["diagnose_s"] / row["render_s"]), row["said"]]
+        for row in found
+    ]
+    head = ["hidden", "diagnosis, s", "render, s", "ratio", "said"]
+    return f"""## Diagnosis
+
+`matdb diagnose` from start to files written, once for each, by `cargo bench --bench diagnose`: the scan of the paper's size of
+`scenes/bench.toml`, rendered in the same run with what is hidden, on all cores. Nobody else is known to do this.
+
+{table(head, rows, right=head[1:4])}"""
 
 
 def growth(results):

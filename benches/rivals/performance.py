@@ -17,7 +17,7 @@ from page import page
 from programs import ROOT, build, cargo
 
 HERE = Path(__file__).resolve().parent
-PARTS = ["trace", "reshade", "registration", "fits", "render", "formats", "store", "gpu"]
+PARTS = ["trace", "reshade", "registration", "fits", "render", "formats", "diagnosis", "store", "gpu"]
 
 # Parts of older results, and the one that measures the same now.
 OLDER = {"power": "trace"}
@@ -45,7 +45,7 @@ def arguments():
 def measure(options):
     say("build")
     build("trace_speed", "file_speed", "fit_speed", "icp_speed")
-    cargo("bench", "--no-run", "--bench", "store", "--bench", "reshade")
+    cargo("bench", "--no-run", "--bench", "store", "--bench", "reshade", "--bench", "diagnose")
     found = {"schema": 1, "quick": options.quick, "machine": machine.describe()}
     found |= {"versions": {}, "failed": {}, "parts": {}} | kept(options)
     run = {key: found["machine"][key] for key in machine.RUN}
@@ -109,6 +109,10 @@ def measured(part, folder, quick):
         import formats
 
         return formats.measure(folder, quick), {}
+    if part == "diagnosis":
+        import diagnosis
+
+        return diagnosis.measure(), {}
     if part == "gpu":
         import gpu
 

@@ -64,6 +64,13 @@ class Page(unittest.TestCase):
         self.assertEqual((goal.measured, goal.reached), ("1.10 ms", False))
         self.assertEqual(self.lines(results, "| another law"), ["| another law | 0.500 (0.400–0.600) |"])
 
+    def test_the_slowest_diagnosis_counts(self):
+        row = {"hidden": "drift", "diagnose_s": 20.0, "render_s": 0.5, "said": "explained: drift"}
+        results = {"diagnosis": [row, row | {"hidden": "pose", "diagnose_s": 61.0}]}
+        goal = self.goal(results, "whole diagnosis")
+        self.assertEqual((goal.measured, goal.reached), ("61.0 s", False))
+        self.assertEqual(self.lines(results, "| drift"), ["| drift | 20.0 | 0.500 | × 40.0 | explained: drift |"])
+
     def test_the_default_tracer_is_the_measure_and_not_the_faster_one(self):
         results = {
             "trace": [trace("paper", "matdb pinhole", 0.0, 2.0), trace("paper", "matdb hierarchy", 0.5, 0.5)]
