@@ -30,6 +30,7 @@ mod folds;
 mod likelihood;
 mod looks;
 mod placebo;
+mod ranges;
 mod refit;
 mod report;
 mod residual;
@@ -88,8 +89,8 @@ const LEAST_BLOCKS: usize = 15;
 pub struct Diagnosis {
     /// Seed of folds, placebos and randomised residuals.
     pub seed: u64,
-    /// Side of the patches that are held out together, m; three correlation lengths or more. 0.05:
-    /// three spots.
+    /// Side of the patches that are held out together, m at 8 m; three correlation lengths or more. 0.05:
+    /// three spots of 16 mm.
     pub block_m: f64,
     /// Number of folds, 2 or more.
     pub folds: usize,
@@ -104,10 +105,18 @@ pub struct Diagnosis {
     pub least_size_db: f64,
     /// Least structure of the means, dB, that counts as unexplained.
     pub least_structure_db: f64,
-    /// Probability that a complete model is called unexplained.
+    /// Probability that the tests of the scatter find something in a complete model, all together.
     pub family_error: f64,
     /// Random signs drawn for each residual test.
     pub draws: usize,
+}
+
+impl Diagnosis {
+    /// For a spot of this diameter, m at 8 m: patches are three of a large one.
+    pub fn for_spot(diameter_m: f64) -> Diagnosis {
+        let usual = Diagnosis::default();
+        Diagnosis { block_m: usual.block_m.max(3.0 * diameter_m), ..usual }
+    }
 }
 
 impl Default for Diagnosis {

@@ -6,6 +6,8 @@
 //! those that move only the law about the mean; the standard deviations come from the scores'
 //! products at the end (Berndt, Hall, Hall & Hausman 1974).
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -23,6 +25,8 @@ use crate::fit::minimise::{Local, Minimise, Stop};
 /// steps.
 const LAW_STEP: f64 = 5e-4;
 const EFFECT_STEP: f64 = 0.25;
+/// The step of a shift of the target, m.
+const SHIFT_STEP_M: f64 = 2e-3;
 /// The same where facets move under the rays, first and last. ln p then has steps, of which a quotient
 /// sees those within its width, and a search goes about as far at a time.
 const WIDE_TO_NARROW: [f64; 3] = [1.0, 0.25, 0.06];
@@ -144,6 +148,18 @@ impl<'a> Space<'a> {
         })
     }
 
+    /// The effect of an unknown, and which of its numbers it is; none for those of the laws.
+    fn knob(&self, index: usize) -> Option<(&'a dyn Effect, usize)> {
+        let mut number = index.checked_sub(self.base_len())?;
+        for effect in &self.effects {
+            if number < effect.knobs().len() {
+                return Some((*effect, number));
+            }
+            number -= effect.knobs().len();
+        }
+        None
+    }
+
     /// Unknowns of the laws; those of the effects follow.
     pub fn base_len(&self) -> usize {
         self.turned.iter().map(|(_, coordinates)| coordinates.len()).sum()
@@ -249,7 +265,11 @@ impl Problem<'_> {
 
     /// Every chirp's part of the likelihood at a point.
     pub fn terms(&self, space: &Space, at: &DVector<f64>) -> Vec<Term> {
-        let prediction = self.predict(space, at);
+        self.terms_of(&space.model(self.receiver, at))
+    }
+
+    fn terms_of(&self, model: &Model) -> Vec<Term> {
+        let prediction = model.predict_with(self.stage, self.looks, self.traced);
         let likelihood = Likelihood::new(&prediction, self.declared);
         let seen = self.observations.par_iter().enumerate();
         seen.map(|(look, seen)| likelihood.term(look, seen)).collect()
@@ -390,24 +410,49 @@ impl Problem<'_> {
         bounds: [&DVector<f64>; 2],
         here: &[Term],
     ) -> Vec<Vec<Slope>> {
+        let shifts = |index: usize| {
+            let (effect, knob) = space.knob(index)?;
+            let shift = move |look| effect.shifts(knob, look);
+            let (axis, _) = shift(self.looks.first()?)?;
+            Some((axis, shift, effect.knobs()[knob].step))
+        };
+        let is_free = |index: &usize| bounds[0][*index] < bounds[1][*index];
+        let free = || (0..at.len()).filter(is_free);
+        let axes: BTreeSet<usize> = free().filter_map(|i| Some(shifts(i)?.0)).collect();
+        let by_shift: BTreeMap<usize, Vec<Slope>> = axes
+            .into_par_iter()
+            .map(|axis| (axis, self.slopes_by_shift(effect_step * SHIFT_STEP_M, space, at, axis)))
+            .collect();
         let slope = |index: usize| {
-            let ([more, less], width) = space.beside(at, bounds, index, effect_step);
-            if width <= 0.0 {
+            if !is_free(&index) {
                 return vec![Slope::default(); self.looks.len()];
             }
+            if let Some((axis, shift, step)) = shifts(index) {
+                let per_unit = |look| shift(look).map_or(0.0, |(_, per_unit)| per_unit * step);
+                let slopes = self.looks.iter().zip(&by_shift[&axis]);
+                return slopes.map(|(look, slope)| slope.times(per_unit(look))).collect();
+            }
+            let ([more, less], width) = space.beside(at, bounds, index, effect_step);
             let terms = |there: &DVector<f64>| match there == at {
                 true => here.to_vec(),
                 false => self.terms(space, there),
             };
-            let (up, down) = (terms(&more), terms(&less));
-            let slope = |(a, b): (Term, Term)| Slope {
-                ln_p: (a.ln_p - b.ln_p) / width,
-                ln_mean: (a.ln_mean - b.ln_mean) / width,
-                range_m: (a.range_m - b.range_m) / width,
-            };
-            up.into_iter().zip(down).map(slope).collect()
+            quotients(&terms(&more), &terms(&less), width)
         };
         (0..at.len()).into_par_iter().map(slope).collect()
+    }
+
+    /// Slopes of every look by a shift of the target along an axis, per m: with them those by all unknowns that
+    /// do nothing else are known.
+    fn slopes_by_shift(
+        &self,
+        step_m: f64,
+        space: &Space,
+        at: &DVector<f64>,
+        axis: usize,
+    ) -> Vec<Slope> {
+        let terms = |by_m: f64| self.terms_of(&space.model(self.receiver, at).shifted(axis, by_m));
+        quotients(&terms(step_m), &terms(-step_m), 2.0 * step_m)
     }
 
     /// Slopes of ln mean before the receiver by every unknown that changes it: unlike [`Term::ln_mean`]
@@ -434,6 +479,24 @@ pub(super) struct Slope {
     pub ln_p: f64,
     pub ln_mean: f64,
     pub range_m: f64,
+}
+
+impl Slope {
+    fn times(self, by: f64) -> Slope {
+        let Slope { ln_p, ln_mean, range_m } = self;
+        Slope { ln_p: by * ln_p, ln_mean: by * ln_mean, range_m: by * range_m }
+    }
+}
+
+/// Slopes of all looks from their terms at two points that are so far apart; none where they are one.
+fn quotients(more: &[Term], less: &[Term], width: f64) -> Vec<Slope> {
+    let per_width = if width > 0.0 { 1.0 / width } else { 0.0 };
+    let difference = |(a, b): (&Term, &Term)| Slope {
+        ln_p: a.ln_p - b.ln_p,
+        ln_mean: a.ln_mean - b.ln_mean,
+        range_m: a.range_m - b.range_m,
+    };
+    more.iter().zip(less).map(|pair| difference(pair).times(per_width)).collect()
 }
 
 /// ln likelihood.

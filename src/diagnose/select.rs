@@ -24,7 +24,7 @@ use super::screen::{Sample, Screen};
 use super::support::{Claim, Largest, Left};
 use super::trial::Trial;
 use super::{Diagnosis, Evidence};
-use crate::effects::{Effect, Prediction, Receiver};
+use crate::effects::{Effect, Knob, Prediction, Receiver};
 use crate::fit::minimise::Minimise;
 
 /// Steps of a fit, and of one on the sample that only shows whether an effect is worth it.
@@ -499,13 +499,15 @@ pub(super) fn larger([a, b]: [f64; 2]) -> f64 {
     a.max(b)
 }
 
-/// How many numbers of the last effect of a model are not where it is absent.
+/// How many numbers of the last effect of a model are not where it is absent. Where a target stands every number
+/// tells, however small.
 pub(super) fn numbers(space: &Space, at: &DVector<f64>) -> usize {
     let Some((effect, values)) = space.effects.last().zip(space.effect_values(at).pop()) else {
         return 0;
     };
     let knobs = effect.knobs().iter().zip(values);
-    knobs.filter(|(knob, value)| (value - knob.absent).abs() > knob.step).count()
+    let is_used = |(knob, value): &(&Knob, f64)| (value - knob.absent).abs() > knob.step;
+    knobs.filter(|number| effect.moves() || is_used(number)).count()
 }
 
 /// Which of the effects is the smallest.

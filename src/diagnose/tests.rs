@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::*;
 use crate::brdf::{BlinnPhong, CookTorrance, Distribution, Mixture, Shadowing};
-use crate::effects::{Knob, Level, Model};
+use crate::effects::{Knob, Level, Model, find};
 use crate::frames::{Point, Ray};
 use crate::geometry::Mesh;
 use crate::radar::random::{Key, Purpose};
@@ -123,6 +123,16 @@ fn diagnosed_with(
     truth: &[(&'static dyn Effect, f64)],
     seed: u64,
 ) -> Report {
+    let effects = truth.iter().map(|(effect, value)| (*effect, vec![*value]));
+    diagnosed_of(library, effects.collect(), seed)
+}
+
+/// The same, with all numbers of every effect.
+fn diagnosed_of(
+    library: &[&'static dyn Effect],
+    effects: Vec<(&'static dyn Effect, Vec<f64>)>,
+    seed: u64,
+) -> Report {
     let (radar, mesh) = (Radar::default(), target());
     let bvh = Bvh::new(&mesh);
     let regions = vec![0; mesh.facets.len()];
@@ -134,11 +144,10 @@ fn diagnosed_with(
     let noise_w = watts_from_dbm(-100.0);
     let receiver = Receiver { looks: 4.0, noise_w, ..Receiver::LINEAR };
     let declared = Declared { threshold_w: watts_from_dbm(-77.0), range_sd_m: RANGE_SD_M };
-    let effects = truth.iter().map(|(effect, value)| (*effect as &dyn Effect, vec![*value]));
-    let model = Model { laws: vec![law()], receiver, effects: effects.collect() };
+    let model = Model { laws: vec![law()], receiver, effects };
     let prediction = model.predict(&stage, &looks);
     let seen = |(look, arrived): (usize, &Option<crate::effects::Arrived>)| {
-        let arrived = arrived.unwrap();
+        let Some(arrived) = arrived else { return Observation::default() };
         let key = Key { seed, chirp: look as u64, sub_ray: 0, purpose: Purpose::Speckle };
         let mut draws = key.draws();
         let power_w = (arrived.power_w + noise_w) * draws.gamma(receiver.looks);
@@ -233,6 +242,28 @@ fn two_missing_effects_are_both_found() {
     let mut names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
     names.sort_unstable();
     assert_eq!(names, ["bowl", "drift"], "{report:#?}");
+}
+
+/// Farther than powers lead a search, which have an edge at every facet.
+#[test]
+fn a_target_that_has_moved_far_is_found_by_its_ranges() {
+    let library = ["pose", "motion"].map(|name| find(name).unwrap());
+    let mut path = vec![0.0; library[1].knobs().len()];
+    let way_m = [("z1_m", 0.03), ("x2_m", -0.02), ("y3_m", 0.01)];
+    for (knob, value) in library[1].knobs().iter().zip(&mut path) {
+        *value = way_m.iter().find(|(name, _)| *name == knob.name).map_or(0.0, |(_, m)| *m);
+    }
+    let report = diagnosed_of(&library, vec![(library[1], path)], 5);
+    let names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
+    assert_eq!(names, ["motion"], "{report:#?}");
+    let found = &report.effects[0].parameters;
+    for (name, m) in way_m {
+        // What moves along the plate is seen by the sphere and its edges alone.
+        let Value { value, sd, .. } = found[name];
+        let sd = sd.unwrap();
+        assert!((value - m).abs() < 4.0 * sd && sd < 0.003, "{name}: {:?}", found[name]);
+    }
+    assert!(report.error.after.rmse_db < 1.05 * report.error.after.noise_floor_db);
 }
 
 #[test]

@@ -4,6 +4,7 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
+use super::ranges;
 use super::refit::{Fitted, Space, sum};
 use super::screen::Screen;
 use super::select::{Candidate, SCOUT, SEARCH, Selection, State, larger};
@@ -133,6 +134,9 @@ impl Selection<'_> {
         });
         starts.truncate(STARTS);
         starts.iter_mut().for_each(|start| self.placed(screen, &space, effect, start));
+        if effect.moves() {
+            starts.iter_mut().for_each(|(_, start)| self.ranged(screen, &space, effect, start));
+        }
         // A start at which the effect is absent promises nothing, and is tried all the same.
         let is_absent = tried == 1 && starts.iter().all(|start| start.0 == 0.0);
         // Without an effect that bends the whole curve, such as a ceiling, the laws may have come far from any that
@@ -193,6 +197,21 @@ impl Selection<'_> {
         }
         if let Some(best) = strengths.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
             start.1 = best.1;
+        }
+    }
+
+    /// Moves a start to where the ranges put the target, if that is likelier.
+    fn ranged(
+        &self,
+        screen: &Screen,
+        space: &Space,
+        effect: &dyn Effect,
+        start: &mut DVector<f64>,
+    ) {
+        let ln_p = |at: &DVector<f64>| sum(&screen.problem.terms(space, at));
+        let there = ranges::placed(&self.problem, space, effect, start);
+        if ln_p(&there) > ln_p(start) {
+            *start = there;
         }
     }
 

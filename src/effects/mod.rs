@@ -243,6 +243,12 @@ pub trait Effect: Sync {
         false
     }
 
+    /// The global axis along which a number of its values does nothing but shift the target, after all that its
+    /// others do, and by how many m per unit under a look; `None` for numbers that do anything else.
+    fn shifts(&self, _knob: usize, _look: &Look) -> Option<(usize, f64)> {
+        None
+    }
+
     /// How it moves the target under the ray of a look, by its values alone; `None` where it rests.
     fn motion(
         &self,

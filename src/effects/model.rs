@@ -7,6 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::meeting::{moved, seen_from};
+use super::pose::Pose as PoseEffect;
 use super::tilt::{NODES, nodes, tilted_cos_theta};
 use super::{Arrived, Effect, Look, Receiver, Saturating, Stage, Survey};
 use crate::brdf::{Brdf, Retro, Scattering};
@@ -142,6 +143,14 @@ impl Prediction {
 }
 
 impl Model<'_> {
+    /// The same with the target shifted along an axis, m, after all that its effects do with it.
+    pub(crate) fn shifted(mut self, axis: usize, by_m: f64) -> Self {
+        let mut pose = vec![0.0; PoseEffect.knobs().len()];
+        pose[axis] = by_m;
+        self.effects.push((&PoseEffect, pose));
+        self
+    }
+
     /// What arrives of every look.
     pub fn predict(&self, stage: &Stage, looks: &[Look]) -> Prediction {
         self.predict_with(stage, looks, &Traced::default())
@@ -219,7 +228,7 @@ impl Model<'_> {
     }
 
     /// Where the effects have the target under a look; `None` where the scene has it.
-    fn target(&self, stage: &Stage, look: &Look) -> Option<Pose<Global, Global>> {
+    pub(crate) fn target(&self, stage: &Stage, look: &Look) -> Option<Pose<Global, Global>> {
         let motions = self.effects.iter().filter(|(effect, _)| effect.moves());
         let motions = motions.filter_map(|(effect, values)| effect.motion(values, stage, look));
         motions.reduce(|target, motion| motion * target)

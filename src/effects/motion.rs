@@ -1,5 +1,5 @@
-//! A target that moves during the scan: a shift Σ a_k·cos(kπp) along each axis, with k = 1 to 3 and p the
-//! share of the scan that is over. Few cosines make any smooth path; the mean belongs to the pose.
+//! A target that moves during the scan: a shift Σ a_k·cos(kπp) along each axis, with k = 0 to 8 and p the
+//! share of the scan that is over. Few cosines make any smooth path.
 
 use std::f64::consts::PI;
 
@@ -12,26 +12,55 @@ use crate::frames::{Global, Pose};
 /// The effect `motion`.
 pub(super) struct Motion;
 
-const SHIFT_M: [f64; 2] = [-0.1, 0.1];
-const KNOBS: [Knob; 9] = [
-    Knob::new("x1_m", "m", SHIFT_M, 0.0, 2e-3),
-    Knob::new("y1_m", "m", SHIFT_M, 0.0, 2e-3),
-    Knob::new("z1_m", "m", SHIFT_M, 0.0, 2e-3),
-    Knob::new("x2_m", "m", SHIFT_M, 0.0, 2e-3),
-    Knob::new("y2_m", "m", SHIFT_M, 0.0, 2e-3),
-    Knob::new("z2_m", "m", SHIFT_M, 0.0, 2e-3),
-    Knob::new("x3_m", "m", SHIFT_M, 0.0, 2e-3),
-    Knob::new("y3_m", "m", SHIFT_M, 0.0, 2e-3),
-    Knob::new("z3_m", "m", SHIFT_M, 0.0, 2e-3),
+/// Cosines of a path, the constant among them: up to four cycles a scan.
+const TERMS: usize = 9;
+const KNOBS: [Knob; 3 * TERMS] = [
+    along("x0_m"),
+    along("y0_m"),
+    along("z0_m"),
+    along("x1_m"),
+    along("y1_m"),
+    along("z1_m"),
+    along("x2_m"),
+    along("y2_m"),
+    along("z2_m"),
+    along("x3_m"),
+    along("y3_m"),
+    along("z3_m"),
+    along("x4_m"),
+    along("y4_m"),
+    along("z4_m"),
+    along("x5_m"),
+    along("y5_m"),
+    along("z5_m"),
+    along("x6_m"),
+    along("y6_m"),
+    along("z6_m"),
+    along("x7_m"),
+    along("y7_m"),
+    along("z7_m"),
+    along("x8_m"),
+    along("y8_m"),
+    along("z8_m"),
 ];
+
+const fn along(axis: &'static str) -> Knob {
+    Knob::new(axis, "m", [-0.1, 0.1], 0.0, 2e-3)
+}
+
+/// The axis of a number, and the share of it by which the target has moved.
+fn along_axis(knob: usize, progress: f64) -> (usize, f64) {
+    (knob % 3, ((knob / 3) as f64 * PI * progress).cos())
+}
 
 /// How far a target has moved, m.
 fn shift_m(values: &[f64], progress: f64) -> DVec3 {
-    let term = |(k, axes): (usize, &[f64])| match axes {
-        &[x, y, z] => DVec3::new(x, y, z) * ((k + 1) as f64 * PI * progress).cos(),
-        _ => DVec3::ZERO,
-    };
-    values.chunks(3).enumerate().map(term).sum()
+    let mut shift_m = DVec3::ZERO;
+    for (knob, value) in values.iter().enumerate() {
+        let (axis, share) = along_axis(knob, progress);
+        shift_m[axis] += share * value;
+    }
+    shift_m
 }
 
 impl Effect for Motion {
@@ -70,6 +99,10 @@ impl Effect for Motion {
         true
     }
 
+    fn shifts(&self, knob: usize, look: &Look) -> Option<(usize, f64)> {
+        Some(along_axis(knob, look.progress))
+    }
+
     fn motion(&self, values: &[f64], _: &Stage, look: &Look) -> Option<Pose<Global, Global>> {
         let moves = values.iter().any(|&value| value != 0.0);
         let shift_m = shift_m(values, look.progress);
@@ -85,8 +118,8 @@ mod tests {
     #[test]
     fn the_range_follows_the_path() {
         let bench = Bench::plate();
-        let mut values = [0.0; 9];
-        values[5] = 4e-3;
+        let mut values = [0.0; KNOBS.len()];
+        values[8] = 4e-3;
         for (progress, expected_m) in [(0.0, 4e-3), (0.25, 0.0), (0.5, -4e-3), (1.0, 4e-3)] {
             let look = Look { progress, ..bench.looks[7] };
             let found = bench.moved(&Motion, &values, &look).unwrap();

@@ -62,6 +62,10 @@ impl Effect for Pose {
         true
     }
 
+    fn shifts(&self, knob: usize, _: &Look) -> Option<(usize, f64)> {
+        (knob < 3).then_some((knob, 1.0))
+    }
+
     fn motion(&self, values: &[f64], stage: &Stage, _: &Look) -> Option<Motion> {
         let &[x, y, z, roll, pitch, yaw] = values else { return None };
         let (shift_m, turn_deg) = (DVec3::new(x, y, z), DVec3::new(roll, pitch, yaw));

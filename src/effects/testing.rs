@@ -239,3 +239,26 @@ fn names_and_knobs_are_told_apart() {
         }
     }
 }
+
+#[test]
+fn what_is_said_to_shift_the_target_does_nothing_else() {
+    let bench = Bench::plate();
+    let (stage, look) = (bench.stage(), Look { progress: 0.3, ..bench.looks[7] });
+    let mut shifts = 0;
+    for effect in library() {
+        let knobs = effect.knobs();
+        let values: Vec<f64> = knobs.iter().map(|knob| 3.0 * knob.step).collect();
+        for (number, knob) in knobs.iter().enumerate() {
+            let Some((axis, per_unit)) = effect.shifts(number, &look) else { continue };
+            let mut more = values.clone();
+            more[number] += knob.step;
+            let [before, after] = [values.clone(), more]
+                .map(|values| effect.motion(&values, &stage, &look).unwrap() * look.hit.point);
+            let mut way_m = after.xyz - before.xyz;
+            way_m[axis] -= per_unit * knob.step;
+            assert!(way_m.length() < 1e-12, "{} {}: {way_m}", effect.name(), knob.name);
+            shifts += 1;
+        }
+    }
+    assert!(shifts > 6);
+}

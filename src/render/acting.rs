@@ -190,7 +190,9 @@ impl<'a> Acting<'a> {
             Some(direction) if rays > 1 => Ray { direction, ..axis },
             _ => axis,
         };
-        self.look(chirp, ray, hit, facing)
+        let look = self.look(chirp, ray, hit, facing);
+        let moved = facing.and_then(|_| self.model.target(&self.stage(), &look));
+        Look { target: moved.unwrap_or(look.target), ..look }
     }
 
     fn look(&self, chirp: usize, ray: Ray<Global>, hit: Hit, facing: Option<Facing>) -> Look {

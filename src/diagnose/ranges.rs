@@ -1,0 +1,104 @@
+//! Where ranges put a target that does not stand still where the scene has it: robust least squares of measured
+//! less predicted ranges, with every ray traced anew after each step, as in the registration of points to
+//! planes (Chen & Medioni, Image and Vision Computing 10, 1992).
+//!
+//! Powers have edges everywhere, at which a search that begins far away stays; ranges change smoothly with the place
+//! of a surface, and those of rays that meet another surface by then have no weight.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::looks::Observation;
+use super::refit::{Problem, Space};
+use crate::effects::{Effect, Look};
+use crate::frames::{Global, Pose};
+use crate::measure::median;
+
+/// Rounds of tracing at most, and the step, in those of the effect's numbers, that is worth no further one.
+const ROUNDS: usize = 12;
+const ARRIVED: f64 = 0.01;
+/// Where the weight of a range ends, in standard deviations: Tukey's biweight with 95 % efficiency.
+const BIWEIGHT: f64 = 4.685;
+/// Median of absolute deviations to standard deviation, of a normal law.
+const SD_PER_MEDIAN: f64 = 1.4826;
+/// How far a number is thought to go, in its steps; what no range tells stays.
+const REACH: f64 = 10.0;
+/// Step over which the way of a surface point is seen, in those of the numbers.
+const STEP: f64 = 1e-3;
+
+/// A point with the numbers of its last effect where the ranges put the target; the same point where these
+/// tell nothing.
+pub(super) fn placed(
+    problem: &Problem,
+    space: &Space,
+    effect: &dyn Effect,
+    start: &DVector<f64>,
+) -> DVector<f64> {
+    let mut at = start.clone();
+    let first = at.len() - effect.knobs().len();
+    let [lower, upper] = space.bounds();
+    for _ in 0..ROUNDS {
+        let Some(step) = step(problem, space, effect, &at) else { return start.clone() };
+        for (index, by) in (first..).zip(&step) {
+            at[index] = (at[index] + by).clamp(lower[index], upper[index]);
+        }
+        if step.amax() < ARRIVED {
+            break;
+        }
+    }
+    at
+}
+
+/// A look with a range: measured less predicted, m, and the change of the predicted one by every number, m per step.
+struct Row {
+    off_m: f64,
+    by_number: Vec<f64>,
+}
+
+fn step(
+    problem: &Problem,
+    space: &Space,
+    effect: &dyn Effect,
+    at: &DVector<f64>,
+) -> Option<DVector<f64>> {
+    let model = space.model(problem.receiver, at);
+    let values = space.effect_values(at).pop()?;
+    let row = |(look, seen): (&Look, &Observation)| {
+        let range_m = seen.range_m.filter(|_| problem.declared.range_sd_m > 0.0)?;
+        let placed = model.placed(problem.stage, *look)?;
+        let by_number =
+            (0..values.len()).map(|number| slope(problem, effect, &values, number, &placed));
+        Some(Row { off_m: range_m - placed.hit.range_m, by_number: by_number.collect() })
+    };
+    let rows: Vec<Row> =
+        problem.looks.par_iter().zip(problem.observations).filter_map(row).collect();
+    let deviation_m = median(rows.iter().map(|row| row.off_m.abs()));
+    let sd_m = (SD_PER_MEDIAN * deviation_m).max(problem.declared.range_sd_m);
+    let mut normal = DMatrix::identity(values.len(), values.len()) / REACH.powi(2);
+    let mut right = DVector::zeros(values.len());
+    for Row { off_m, by_number } in &rows {
+        let x = off_m / (BIWEIGHT * sd_m);
+        let weight = if x.abs() < 1.0 { ((1.0 - x * x) / sd_m).powi(2) } else { 0.0 };
+        let slopes = DVector::from_column_slice(by_number);
+        normal.ger(weight, &slopes, &slopes, 1.0);
+        right.axpy(weight * off_m, &slopes, 1.0);
+    }
+    normal.cholesky().map(|cholesky| cholesky.solve(&right))
+}
+
+/// Change of the range of a look by one number, m per step: the way of the surface point that it meets, seen
+/// along the ray.
+fn slope(
+    problem: &Problem,
+    effect: &dyn Effect,
+    values: &[f64],
+    number: usize,
+    look: &Look,
+) -> f64 {
+    let motion = |values: &[f64]| effect.motion(values, problem.stage, look).unwrap_or(Pose::NONE);
+    let mut moved = values.to_vec();
+    moved[number] += STEP * effect.knobs()[number].step;
+    let motion: Pose<Global, Global> = motion(&moved) * motion(values).inverse();
+    let way_m = (motion * look.hit.point).xyz - look.hit.point.xyz;
+    -way_m.dot(look.normal) / (STEP * look.hit.cos_theta.max(0.05))
+}
