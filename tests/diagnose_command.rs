@@ -261,6 +261,44 @@ fn nothing_detected_and_scenes_that_no_diagnosis_predicts_are_said() {
 }
 
 #[test]
+fn a_cloud_of_another_scene_is_no_answer() {
+    let folder = rendered("4");
+    let at = folder.path();
+    // Without the sphere, the larger part of the cloud has nothing to lie on; and of the sphere there is another.
+    let (sphere, _) = SCENE.split_once("[[mesh]]\nname = \"plate\"").unwrap();
+    let region = &SCENE[SCENE.find("[[region]]").unwrap()..];
+    let aside =
+        SCENE.replace("translation_m = [0.0, 1.25, 0.0]", "translation_m = [0.0, 1.25, 0.15]");
+    for (name, scene) in [("half.toml", format!("{sphere}{region}")), ("aside.toml", aside)] {
+        fs::write(at.join(name), scene).unwrap();
+        let asked = ["diagnose", "out/cloud.ply", "--scene", name, "-o", "report"];
+        let message = refused(matdb(at).args(asked));
+        assert!(
+            message.contains("of the cloud") || message.contains("of its"),
+            "{name}: {message}"
+        );
+        let report = json(&at.join("report/report.json"));
+        assert_eq!(report["verdict"], "cannot-tell", "{name}");
+        assert_eq!(report["effects"], json!([]), "{name}");
+    }
+}
+
+#[test]
+fn nothing_that_is_read_is_written_over() {
+    let folder = rendered("4");
+    let at = folder.path();
+    fs::copy(at.join("out/cloud.ply"), at.join("residuals.csv")).unwrap();
+    let cloud = ["diagnose", "residuals.csv", "--scene", "scene.toml", "-o", "."];
+    assert!(refused(matdb(at).args(cloud)).contains("which is read"));
+    let curve = ["diagnose", "--curve", "residuals.csv", "-o", "."];
+    assert!(refused(matdb(at).args(curve)).contains("which is read"));
+    fs::write(at.join("out/after.toml"), "name = \"mine\"\n").unwrap();
+    let own = ["diagnose", "out/cloud.ply", "--scene", "scene.toml", "-o", "out"];
+    assert!(refused(matdb(at).args(own)).contains("no diagnosis wrote it"));
+    assert!(!at.join("report.json").exists() && !at.join("out/report.json").exists());
+}
+
+#[test]
 fn the_library_is_listed_and_every_entry_is_complete() {
     let folder = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {
@@ -331,7 +369,13 @@ fn a_scan_without_times_is_diagnosed_without_what_goes_with_time() {
     assert!(said.contains("drift cannot be told without") && said.contains("time_s"), "{said}");
     assert_eq!(json(&at.join("report/report.json"))["verdict"], "cannot-tell");
     asked("fov-gain").assert().success();
-    let left_out = json(&at.join("report/report.json"))["not_tried"].clone();
+    let left_out = || json(&at.join("report/report.json"))["not_tried"].clone();
     let expected = json!({"name": "drift", "reason": "not-asked"});
-    assert!(left_out.as_array().unwrap().contains(&expected), "{left_out}");
+    assert!(left_out().as_array().unwrap().contains(&expected), "{}", left_out());
+    let all = ["diagnose", "out/cloud.ply", "--scene", "untimed.toml", "-o", "report"];
+    matdb(at).args(all).assert().success();
+    let untimed = ["drift", "motion"].map(|name| json!({"name": name, "reason": "no-times"}));
+    let mut found = left_out().as_array().unwrap().clone();
+    found.sort_by_key(|one| one["name"].to_string());
+    assert_eq!(found, untimed);
 }

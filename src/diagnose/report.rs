@@ -101,7 +101,7 @@ impl std::ops::Deref for Parameters {
 pub struct Evidence {
     /// Gain in ln likelihood over the model before.
     pub gain: f64,
-    /// The largest gain of a placebo with as many numbers.
+    /// The largest gain of a placebo with as many numbers, but at most six.
     pub placebo_gain: f64,
     /// Gain in ln p of held-out patches.
     pub held_out_gain: f64,

@@ -65,7 +65,8 @@ fn would_help(error: &DiagnoseError) -> &'static str {
             "The time of every chirp, as column `time_s` of the file under [radar.scan]."
         }
         DiagnoseError::Elsewhere { .. } | DiagnoseError::Unlike { .. } => {
-            "The scene that was measured, with the target where it stood: `matdb measure` finds the pose."
+            "The scene that was measured, with all of the target where it stood: `matdb measure` finds the \
+             pose, and a mesh that lacks parts of the target leaves their detections without a place."
         }
         DiagnoseError::Fit(_) => {
             "Materials of the scene with another law, which `matdb fit` writes, to begin from."

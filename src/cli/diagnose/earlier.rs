@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::after::AFTER;
 use crate::cli::console::Console;
 use crate::cli::inputs::read_small;
+use crate::error::Error;
 
 /// The report for scripts, which every diagnosis writes.
 const REPORT: &str = "report.json";
@@ -26,6 +27,30 @@ const PICTURES: [&str; 8] = [
 pub(super) struct Earlier {
     folder: PathBuf,
     names: Vec<String>,
+}
+
+/// Refuses a folder in which a diagnosis would write over what it reads, or over somebody's own scene or material;
+/// `inputs` are the names of these that it writes.
+pub(super) fn check(folder: &Path, read: &[&Path], inputs: &[String]) -> Result<(), Error> {
+    let real = |path: &Path| path.canonicalize().ok();
+    let written = || tables().chain(inputs.iter().cloned());
+    for path in read.iter().filter(|path| real(path).is_some()) {
+        if let Some(name) = written().find(|name| real(&folder.join(name)) == real(path)) {
+            return Err(Error::Usage {
+                problem: format!("{name} would be written over {}, which is read", path.display()),
+                way_out: "choose another folder with -o".to_owned(),
+            });
+        }
+    }
+    for path in inputs.iter().map(|name| folder.join(name)) {
+        if is_file(&path) && !is_ours(&path) {
+            return Err(Error::Usage {
+                problem: format!("{} is there and no diagnosis wrote it", path.display()),
+                way_out: "rename it, or choose another folder with -o".to_owned(),
+            });
+        }
+    }
+    Ok(())
 }
 
 impl Earlier {
@@ -57,19 +82,23 @@ impl Earlier {
     }
 }
 
-/// Names of all that a diagnosis can write into a folder, so far as they stand there.
-fn names(folder: &Path) -> Vec<String> {
+/// Names of all that every diagnosis can write but scenes and materials.
+fn tables() -> impl Iterator<Item = String> {
     let tables = ["report.html", REPORT, "residuals.csv"].map(str::to_owned);
     let pictures =
         PICTURES.iter().flat_map(|name| ["svg", "png"].map(|end| format!("{name}.{end}")));
+    tables.into_iter().chain(pictures)
+}
+
+/// Names of all that a diagnosis can write into a folder, so far as they stand there.
+fn names(folder: &Path) -> Vec<String> {
     let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let files = files.filter_map(|entry| entry.file_name().into_string().ok());
     // Scenes and materials may be somebody's own of the same name.
     let is_input =
         |name: &String| name == AFTER || (name.starts_with("material-") && name.ends_with(".toml"));
     let inputs = files.filter(is_input).filter(|name| is_ours(&folder.join(name)));
-    let names = tables.into_iter().chain(pictures).chain(inputs);
-    names.filter(|name| is_file(&folder.join(name))).collect()
+    tables().chain(inputs).filter(|name| is_file(&folder.join(name))).collect()
 }
 
 /// Whether a report there is a diagnosis's.
@@ -142,6 +171,24 @@ mod tests {
         let stay =
             ["curve.png", "error.png", "material-mine.toml", "notes.txt", REPORT, "residuals.csv"];
         assert_eq!(left(folder.path()), stay);
+    }
+
+    #[test]
+    fn nothing_that_is_read_or_somebodys_own_is_written_over() {
+        let folder =
+            folder_with(&[("residuals.csv", ""), ("curve.csv", ""), ("after.toml", "x = 1\n")]);
+        let at = |name: &str| folder.path().join(name);
+        let refused = |read: &str, inputs: &[&str]| {
+            let inputs: Vec<String> = inputs.iter().map(|name| (*name).to_owned()).collect();
+            check(folder.path(), &[&at(read)], &inputs).map_err(|error| error.to_string())
+        };
+        assert_eq!(refused("curve.csv", &["material-paint.toml"]), Ok(()));
+        assert!(refused("residuals.csv", &[]).unwrap_err().contains("which is read"));
+        assert!(refused("curve.csv", &["after.toml"]).unwrap_err().contains("no diagnosis wrote"));
+        std::fs::write(at("after.toml"), MARK).unwrap();
+        assert_eq!(refused("curve.csv", &["after.toml"]), Ok(()));
+        assert!(refused("after.toml", &["after.toml"]).unwrap_err().contains("which is read"));
+        assert!(check(&at("not-there"), &[&at("curve.csv")], &[]).is_ok());
     }
 
     #[test]

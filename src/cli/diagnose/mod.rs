@@ -16,6 +16,7 @@ mod text;
 mod tried;
 mod words;
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use super::cloud::CloudArgs;
@@ -39,7 +40,7 @@ use crate::units::watts_from_dbm;
 use cannot_tell::CannotTell;
 use earlier::Earlier;
 use plots::Place;
-use publish::Publication;
+use publish::{Publication, material_file};
 use takers::Cast;
 use tried::{Choice, NotTried, Reason};
 
@@ -173,9 +174,11 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     let names: Vec<String> = scene.target.regions.iter().map(|r| r.material.clone()).collect();
     let cast = Cast { used: &used, names: &names, of_region: &material_of_region };
     // A diagnosis takes a while: what hinders its storing is said before.
-    after::check_places(path, &args.output, args.add)?;
+    let inputs = names.iter().map(|name| material_file(name)).chain([after::AFTER.to_owned()]);
+    earlier::check(&args.output, &asked.read(), &inputs.collect::<Vec<_>>())?;
     let wanted = cast.wanted(args.material.as_deref())?;
     if args.add {
+        after::check_beside(path)?;
         cast.check()?;
     }
     let declared = super::staging::effects(&scene, path, cast.used, cast.of_region)?;
@@ -281,7 +284,8 @@ fn diagnosed(
         strays: &matched.strays,
         pose: &pose,
     };
-    Diagnosis { seed, ..Diagnosis::default() }.run_with(&subject, effects, hear)
+    Diagnosis { seed, ..Diagnosis::for_spot(radar.spot_diameter_m) }
+        .run_with(&subject, effects, hear)
 }
 
 fn pose(mesh: &MeshEntry) -> MeshPose {
@@ -303,7 +307,7 @@ fn context(asked: Asked, scene: &Scene, db: &Database) -> Context {
         places: Vec::new(),
         seed: args.seed,
         program: program(db),
-        command: command(std::env::args_os().skip(1)),
+        command: command(db, std::env::args_os().skip(1).collect()),
         after: typed(&args.output.join(after::AFTER)),
         beside: typed(&path.with_file_name(after::name_beside(path))),
         folder: args.output.clone(),
@@ -322,16 +326,21 @@ fn program(db: &Database) -> String {
     }
 }
 
-/// The program with these arguments, as a shell takes it.
-fn command(arguments: impl Iterator<Item = std::ffi::OsString>) -> String {
-    let arguments = arguments.map(|argument| typed(Path::new(&argument)));
-    std::iter::once("matdb".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
+/// The program with these arguments, as a shell takes it, and with its database, which a variable may have named.
+fn command(db: &Database, arguments: Vec<OsString>) -> String {
+    let names_it = |argument: &OsString| argument.to_string_lossy().starts_with("--db");
+    let program = match arguments.iter().any(names_it) {
+        true => "matdb".to_owned(),
+        false => program(db),
+    };
+    let arguments = arguments.iter().map(|argument| typed(Path::new(argument)));
+    std::iter::once(program).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 
 /// A path as a shell takes it.
 fn typed(path: &Path) -> String {
     let text = path.display().to_string();
-    let plain = |c: char| c.is_alphanumeric() || "_-./+,:@%".contains(c);
+    let plain = |c: char| c.is_alphanumeric() || "_-./+,:@%=".contains(c);
     match text.chars().all(plain) {
         true => text,
         false => format!("'{}'", text.replace('\'', "'\\''")),
@@ -386,7 +395,11 @@ mod tests {
     #[test]
     fn a_path_can_be_typed_again() {
         assert_eq!(typed(Path::new("out/a-1.ply")), "out/a-1.ply");
-        assert_eq!(command(["a b", "-o"].map(Into::into).into_iter()), "matdb 'a b' -o");
+        let db = Database::new(Some(Path::new("a.sqlite")));
+        let typed_again =
+            |arguments: &[&str]| command(&db, arguments.iter().map(Into::into).collect());
+        assert_eq!(typed_again(&["a b", "-o"]), "matdb --db a.sqlite 'a b' -o");
+        assert_eq!(typed_again(&["--db=a.sqlite", "x"]), "matdb --db=a.sqlite x");
         assert_eq!(typed(Path::new("my cloud.ply")), "'my cloud.ply'");
         assert_eq!(typed(Path::new("it's;rm")), "'it'\\''s;rm'");
     }

@@ -23,6 +23,11 @@ const FOUND: &str = "# A material with what `matdb diagnose` found in it.\n";
 
 type Files = Vec<(String, Vec<u8>)>;
 
+/// Name of the file of a material that a scene names so.
+pub(super) fn material_file(name: &str) -> String {
+    format!("material-{}.toml", name.replace('@', "-"))
+}
+
 /// A diagnosis on its way out.
 pub(super) struct Publication<'a> {
     pub asked: Asked<'a>,
@@ -144,7 +149,7 @@ impl Publication<'_> {
             let Some(material) = self.cast.alone(taker, self.report, &title)? else {
                 continue;
             };
-            let name = format!("material-{}.toml", self.cast.name(taker.number).replace('@', "-"));
+            let name = material_file(self.cast.name(taker.number));
             files.push((name, (FOUND.to_owned() + &file::write(&material)?).into_bytes()));
             slugs.push(material.slug.to_string());
         }

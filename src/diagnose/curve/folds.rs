@@ -86,10 +86,12 @@ fn runs(points: &Points, width_rad: f64) -> (Vec<usize>, usize) {
     (block.iter().map(number).collect(), used.len())
 }
 
-/// Median distance of neighbours, rad.
+/// Median distance of neighbours, rad; repeats are no neighbours.
 fn step_rad(points: &Points) -> f64 {
+    const SAME_RAD: f64 = 1e-6;
     let angle = |index: usize| points.points.get(index).map_or(0.0, |p| points.angle_rad(p));
-    let mut steps: Vec<f64> = points.neighbours().map(|[a, b]| angle(b) - angle(a)).collect();
+    let steps = points.neighbours().map(|[a, b]| angle(b) - angle(a));
+    let mut steps: Vec<f64> = steps.filter(|step| *step > SAME_RAD).collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).copied().unwrap_or(0.0)
 }
@@ -126,6 +128,18 @@ pub(super) fn autocorrelation(points: &Points, values: &[f64], lag: usize) -> f6
 mod tests {
     use super::*;
     use crate::diagnose::curve::testing::{curve_of, noisy};
+
+    #[test]
+    fn repeats_of_an_angle_are_no_steps_between_angles() {
+        let mut points = curve_of(noisy(&[30.0], 1.0, 0.2, |_| 0.0));
+        points.points = points.points.iter().flat_map(|point| [*point; 3]).collect();
+        let key = |k| Key { seed: 5, chirp: k, sub_ray: 0, purpose: Purpose::Fit };
+        let count = points.points.len() as u64;
+        let white: Vec<f64> = (0..count).map(|k| key(k).draws().uniform() - 0.5).collect();
+        let folds = Folds::new(&points, &white, 5, 0);
+        assert!((folds.width_rad.to_degrees() - 3.0).abs() < 1e-6, "{folds:?}");
+        assert!(folds.blocks < points.points.len() / 6, "{folds:?}");
+    }
 
     #[test]
     fn white_noise_is_held_out_in_short_runs_and_a_smooth_error_in_long_ones() {

@@ -7,7 +7,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::cannot_tell::CannotTell;
-use super::earlier::Earlier;
+use super::earlier::{self, Earlier};
 use super::tried::{NotTried, of_curve};
 use super::{Args, Record, html, json};
 use crate::brdf::Brdf;
@@ -26,6 +26,7 @@ use words::text;
 
 /// Diagnoses the curve of a file.
 pub(super) fn run(path: &Path, args: &Args, console: &Console) -> Result<(), Error> {
+    earlier::check(&args.output, &[path], &[])?;
     let points = read(path, args.noise_db)?;
     let law = law(args.model.as_deref())?;
     let terms = chosen(&args.effects)?;

@@ -80,8 +80,8 @@ fn found(report: &Report) -> String {
     let html = match report.effects.as_slice() {
         [] => paragraph(
             "No effect is supported. An effect is only added when it predicts parts of the scan that \
-             took no part in its fit, by more than two standard errors, gains more than placebos with \
-             as many numbers, and changes the data by a size that counts.",
+             took no part in its fit, by more than two standard errors (one in a small place, if the gain is \
+             far beyond chance), gains more than placebos, and changes the data by a size that counts.",
         ),
         found => found.iter().map(effect::of_cloud).collect(),
     };
