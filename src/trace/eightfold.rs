@@ -124,8 +124,7 @@ impl Eightfold {
     pub fn closest(&self, mesh: &Mesh, ray: &Ray<Global>) -> Option<Hit> {
         let start_m = self.sphere.entry_m(ray)?;
         let facet = widest(Walk { eightfold: self, mesh, ray, start_m })?;
-        let hit = met(mesh, facet, ray);
-        hit
+        met(mesh, facet, ray)
     }
 }
 
