@@ -11,18 +11,15 @@ use rayon::prelude::*;
 use super::looks::Observation;
 use super::refit::{Problem, Space};
 use crate::effects::{Effect, Look};
+use crate::fit::minimise::REACH;
 use crate::frames::{Global, Pose};
-use crate::measure::median;
+use crate::measure::icp::bulk_sd_m;
 
 /// Rounds of tracing at most, and the step, in those of the effect's numbers, that is worth no further one.
 const ROUNDS: usize = 12;
 const ARRIVED: f64 = 0.01;
 /// Where the weight of a range ends, in standard deviations: Tukey's biweight with 95 % efficiency.
 const BIWEIGHT: f64 = 4.685;
-/// Median of absolute deviations to standard deviation, of a normal law.
-const SD_PER_MEDIAN: f64 = 1.4826;
-/// How far a number is thought to go, in its steps; what no range tells stays.
-const REACH: f64 = 10.0;
 /// Step over which the way of a surface point is seen, in those of the numbers.
 const STEP: f64 = 1e-3;
 
@@ -72,8 +69,8 @@ fn step(
     };
     let rows: Vec<Row> =
         problem.looks.par_iter().zip(problem.observations).filter_map(row).collect();
-    let deviation_m = median(rows.iter().map(|row| row.off_m.abs()));
-    let sd_m = (SD_PER_MEDIAN * deviation_m).max(problem.declared.range_sd_m);
+    let sd_m = bulk_sd_m(rows.iter().map(|row| row.off_m)).max(problem.declared.range_sd_m);
+    // What no range tells stays.
     let mut normal = DMatrix::identity(values.len(), values.len()) / REACH.powi(2);
     let mut right = DVector::zeros(values.len());
     for Row { off_m, by_number } in &rows {

@@ -21,12 +21,12 @@ use crate::fit::FitError;
 use crate::fit::coordinates::Coordinates;
 use crate::fit::minimise::{Local, Minimise, Stop};
 
+/// The felt step of a shift of the target, m, as of the numbers of effects that shift it.
+const SHIFT_STEP_M: f64 = 2e-3;
 /// Step of a difference quotient: of a law's coordinate in its search, of an effect's number in its
 /// steps.
 const LAW_STEP: f64 = 5e-4;
 const EFFECT_STEP: f64 = 0.25;
-/// The step of a shift of the target, m.
-const SHIFT_STEP_M: f64 = 2e-3;
 /// The same where facets move under the rays, first and last. ln p then has steps, of which a quotient
 /// sees those within its width, and a search goes about as far at a time.
 const WIDE_TO_NARROW: [f64; 3] = [1.0, 0.25, 0.06];

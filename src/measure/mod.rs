@@ -32,4 +32,4 @@ pub use reduce::{LeftOut, Reduced, Reduction, ReductionError};
 pub use register::{Metric, Registered, Registration, RegistrationError, Stop};
 pub use start::Start;
 pub use statistics::AngleStatistics;
-pub(crate) use view::{median, median_point};
+pub(crate) use view::median_point;

@@ -73,7 +73,7 @@ pub(super) struct RayGap {
 }
 
 /// The median; 0 for none.
-pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     if values.is_empty() {
         return 0.0;
