@@ -60,7 +60,7 @@ class Page(unittest.TestCase):
     def test_the_slower_change_counts_when_a_scan_is_predicted_again(self):
         row = {"threads": 1, "chirps": 18529, "looks": 9000, "traced": [3.0] * 3, "same": [0.1] * 3}
         results = {"reshade": [row | {"law": [0.4, 0.5, 0.6], "effect": [0.9, 1.1, 1.2]}]}
-        goal = self.goal(results, "18 529 chirps again")
+        goal = self.goal(results, "a scan of 18 529 chirps, 9 000 of them")
         self.assertEqual((goal.measured, goal.reached), ("1.10 ms", False))
         self.assertEqual(self.lines(results, "| another law"), ["| another law | 0.500 (0.400–0.600) |"])
 
@@ -147,7 +147,13 @@ class Page(unittest.TestCase):
 
     def test_memory_counts_the_mesh_itself(self):
         results = {"trace": [trace("facets 7", "matdb pinhole", 0.0, 1.0)]}
-        self.assertEqual(self.goal(results, "memory").measured, "1.40 × the mesh")
+        self.assertEqual(self.goal(results, "memory, 10 M facets, mesh included, pinhole").measured, "1.40 × the mesh")
+        self.assertIsNone(self.goal(results, "memory, 10 M facets, mesh included, hierarchy").reached)
+
+    def test_a_goal_is_held_against_the_fastest_of_a_rivals_ways(self):
+        ms = {"matdb": 2.0, "scipy least_squares": 20.0, "scipy curve_fit": 10.0}
+        rows = [{"fit": "least squares", "program": program, "ms": [ms] * 3} for program, ms in ms.items()]
+        self.assertEqual(self.goal({"fits": rows}, "least squares", "scipy").measured, "× 5.00")
 
     def test_a_gpu_that_was_measured_is_told_and_held_against_what_is_published(self):
         row = {"adapter": "Loom", "threads": 2, "facets": 20, "hold": [1.0] * 3, "hits": [9.0] * 3}
