@@ -386,4 +386,12 @@ fn a_tracer_that_does_not_take_the_rays() {
     assert!(!folder.path().join("out").exists());
     with(&["--tracer", "bvh"]).assert().success();
     with(&[]).assert().success();
+    fs::remove_dir_all(folder.path().join("out")).unwrap();
+    // A ray without a direction is none of any tracer's.
+    fs::write(folder.path().join("r.csv"), rays.replace("0.1,1.1,8,0,0,-1", "0,1.1,8,0,0,0"))
+        .unwrap();
+    for more in [&[][..], &["--tracer", "brute"]] {
+        check(&refused(&mut with(more)), &["r.csv", "line 3", "no length", "unit vector"]);
+    }
+    assert!(!folder.path().join("out").exists());
 }

@@ -16,16 +16,28 @@ pub(super) trait Wide {
 pub(super) fn widest<W: Wide>(work: W) -> W::Answer {
     #[cfg(target_arch = "x86_64")]
     {
-        if is_x86_feature_detected!("avx512f") {
+        if at_most_bits() >= 512 && is_x86_feature_detected!("avx512f") {
             // SAFETY: the processor has just been asked for the only feature that it needs.
             return unsafe { x86::of_512_bits(work) };
         }
-        if is_x86_feature_detected!("avx2") {
+        if at_most_bits() >= 256 && is_x86_feature_detected!("avx2") {
             // SAFETY: as above.
             return unsafe { x86::of_256_bits(work) };
         }
     }
     work.run()
+}
+
+/// Widths that are left out of account, so that tests can hold one against another.
+#[cfg(all(test, target_arch = "x86_64"))]
+static AT_MOST_BITS: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(512);
+
+#[cfg(target_arch = "x86_64")]
+fn at_most_bits() -> u32 {
+    #[cfg(test)]
+    return AT_MOST_BITS.load(std::sync::atomic::Ordering::Relaxed);
+    #[cfg(not(test))]
+    512
 }
 
 /// The lesser; the second where the first is no number. Other than the standard library's it is one instruction.
@@ -52,5 +64,36 @@ mod x86 {
     #[target_feature(enable = "avx2")]
     pub fn of_256_bits<W: Wide>(work: W) -> W::Answer {
         work.run()
+    }
+}
+
+#[cfg(all(test, target_arch = "x86_64"))]
+mod tests {
+    use std::sync::atomic::Ordering;
+
+    use super::*;
+    use crate::frames::{Point, Ray};
+    use crate::scene::mannequin;
+    use crate::trace::{Bvh, Tracer};
+
+    #[test]
+    fn every_width_gives_the_same_bits() {
+        let body = mannequin::mannequin();
+        let origin = Point::new(0.0, 1.1, 8.0);
+        let towards = |k: u32| {
+            let [x, y] = [k % 120, k / 120].map(|i| 2.2 * (f64::from(i) + 0.3) / 120.0 - 1.1);
+            Ray { origin, direction: origin.towards(Point::new(x, y + 1.1, 0.0)).unwrap() }
+        };
+        let rays: Vec<_> = (0..120 * 120).map(towards).collect();
+        let hits = |bits: u32| {
+            AT_MOST_BITS.store(bits, Ordering::Relaxed);
+            let bvh = Bvh::new(&body);
+            let found = [Tracer::Pinhole, Tracer::Bvh].map(|by| by.closest(&bvh, &rays).unwrap());
+            AT_MOST_BITS.store(512, Ordering::Relaxed);
+            found
+        };
+        let [plain, of_256, of_512] = [128, 256, 512].map(hits);
+        assert!(plain[0].iter().flatten().count() > 2_000);
+        assert!(plain == of_256 && plain == of_512);
     }
 }
