@@ -26,7 +26,7 @@
 //! | `speckle` | Gamma of fewer looks | L |
 //! | `fov-gain` | −edge_db·(ρ/0.5 m)² dB at distance ρ from the field's centre | edge_db |
 //! | `angle-error` | each chirp's normal n + a·u + b·v with Gaussian a, b | their sd |
-//! | `finite-spot` | 64 rays over a Gaussian footprint, powers averaged, misses count as nothing | diameter at half the intensity |
+//! | `finite-spot` | 256 rays over a Gaussian footprint, one in each cell of equal power, powers averaged, misses count as nothing | diameter at half the intensity |
 //! | `noise-floor` | a higher N in the phasors | N |
 //! | `covering-layer` | −loss/cos θ dB on one side of a plane that cuts the target | two-way loss |
 //! | `anisotropy` | D with slopes m√q along a grain and m/√q across, G1 with m in the radar's azimuth | q |

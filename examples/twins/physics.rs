@@ -1,5 +1,7 @@
 //! From the base law to the mean power of every chirp, with whatever effects act on the way.
 
+use std::f64::consts::TAU;
+
 use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 use serde_json::Value;
@@ -101,8 +103,9 @@ pub trait Effect: Sync {
 /// An effect and its size.
 pub type Acting<'a> = (&'a dyn Effect, f64);
 
-/// Rays that stand for a spot.
-const SPOT_RAYS: usize = 64;
+/// Rays that stand for a spot: one at a random place of every cell of equal power, so many by radius and by
+/// angle. Placed freely, so few would scatter by more than a weak effect changes.
+const SPOT_CELLS: usize = 16;
 
 /// Mean power without thermal noise, and range, of every `stride`-th chirp; `None` where nothing is
 /// met.
@@ -183,6 +186,11 @@ fn looks(world: &World, seed: u64, acting: &[Acting], sight: &Sight) -> Vec<Opti
     let sd = diameter_m / range_m / (8.0 * std::f64::consts::LN_2).sqrt();
     let (u, v) = forward.any_orthonormal_pair();
     let mut random = draws(seed, sight.chirp, Stream::Spot);
-    let aside = |_| forward + sd * (random.gaussian() * u + random.gaussian() * v);
-    (0..SPOT_RAYS).map(aside).map(traced).collect()
+    let mut within = |cell: usize| (cell as f64 + random.uniform()) / SPOT_CELLS as f64;
+    let aside = |cell: usize| {
+        let radius = sd * (-2.0 * (1.0 - within(cell / SPOT_CELLS)).ln()).sqrt();
+        let (across, along) = (TAU * within(cell % SPOT_CELLS)).sin_cos();
+        forward + radius * (along * u + across * v)
+    };
+    (0..SPOT_CELLS * SPOT_CELLS).map(aside).map(traced).collect()
 }

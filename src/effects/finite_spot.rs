@@ -18,6 +18,10 @@ pub(super) struct FiniteSpot;
 
 /// Rays that stand for a spot. On a ball a highlight may be a tenth of it.
 const RAYS: usize = 64;
+/// The widest spot, m.
+const MOST_M: f64 = 0.2;
+/// How far they reach, in standard deviations of the spot's intensity.
+const REACH_SD: f64 = 3.0;
 /// What other effects make of a look's power at most, and one over that at least: beyond it they have
 /// moved the look to another surface, and the spot sees what it saw.
 const MOST_GAIN: f64 = 100.0;
@@ -30,16 +34,16 @@ const MOST_TERMS: usize = 48;
 struct Beside {
     range_m: f64,
     to_radar: Direction<Surface>,
-    /// Power, W, where f is 1/sr.
+    /// Power, W, where f is 1/sr, by its share of the spot.
     watts_per_f: f64,
     region: u16,
 }
 
 impl Beside {
-    fn of(stage: &Stage, facing: Facing, hit: &Hit) -> Beside {
+    fn of(stage: &Stage, facing: Facing, hit: &Hit, share: f64) -> Beside {
         let Facing { region, to_radar, .. } = facing;
         let Hit { range_m, cos_theta, .. } = *hit;
-        let watts_per_f = stage.link.power_w(range_m, cos_theta, 1.0);
+        let watts_per_f = share * stage.link.power_w(range_m, cos_theta, 1.0);
         Beside { range_m, to_radar, watts_per_f, region }
     }
 }
@@ -100,7 +104,7 @@ impl Sums {
         if centre_w <= 0.0 || power_w <= 0.0 {
             return None;
         }
-        let (mean_w, longer_m) = (power_w / RAYS as f64, first / power_w);
+        let (mean_w, longer_m) = (power_w, first / power_w);
         let spread_m = (second / power_w - longer_m * longer_m).max(0.0).sqrt();
         Some(Averaged { centre_w, mean_w, longer_m, spread_m })
     }
@@ -147,17 +151,18 @@ fn spots(stage: &Stage, looks: &[Look], diameter_m: f64) -> Vec<Option<Spot>> {
     let facets: Vec<Facet> =
         facets.into_par_iter().with_min_len(1024).map(|facet| Facet::of(stage, facet)).collect();
     let spot = |(look, (centre, (rays, hits))): (&Look, (&Option<Hit>, Round))| {
-        let met = |ray: &Ray<Global>, hit: &Option<Hit>| {
+        let met = |ray: &Ray<Global>, hit: &Option<Hit>, share: f64| {
             let hit = hit.as_ref()?;
             let facing = match facets.get(hit.facet as usize) {
                 Some(facet) => facet.facing(ray),
                 None => facing(stage, ray, hit),
             };
-            Some(Beside::of(stage, facing, hit))
+            Some(Beside::of(stage, facing, hit, share))
         };
-        let centre = met(&look.ray, centre)?;
+        let centre = met(&look.ray, centre, 1.0)?;
         let mut beside = Vec::with_capacity(RAYS);
-        beside.extend(rays.iter().zip(hits).filter_map(|(ray, hit)| met(ray, hit)));
+        let rays = rays.iter().zip(hits).zip(PLACES.iter());
+        beside.extend(rays.filter_map(|((ray, hit), place)| met(ray, hit, place.share)));
         Some((centre, beside))
     };
     let rounds = rays.par_iter().zip(hits.par_chunks(RAYS));
@@ -168,21 +173,40 @@ fn spots(stage: &Stage, looks: &[Look], diameter_m: f64) -> Vec<Option<Spot>> {
 fn round(axis: &Ray<Global>, diameter_rad: f64) -> [Ray<Global>; RAYS] {
     let forward = axis.direction.xyz();
     let (u, v) = forward.any_orthonormal_pair();
-    PLACES.map(|[along, across]| {
+    PLACES.map(|Place { along, across, .. }| {
         let aside = diameter_rad * (along * u + across * v);
         Ray { direction: Direction::new(forward + aside).unwrap_or(axis.direction), ..*axis }
     })
 }
 
-/// Where the rays of a spot pass, in diameters from its middle.
-static PLACES: LazyLock<[[f64; 2]; RAYS]> = LazyLock::new(|| {
+/// Where a ray of a spot passes, in diameters from its middle, and its share of the power.
+#[derive(Clone, Copy, Default)]
+struct Place {
+    along: f64,
+    across: f64,
+    share: f64,
+}
+
+/// The rays of a spot: evenly on a disc and weighted by its intensity, as a highlight two spots away may
+/// outshine what lies in the middle.
+static PLACES: LazyLock<[Place; RAYS]> = LazyLock::new(|| {
     // The intensity exp(−4 ln 2·r²/D²) has this standard deviation along each direction.
     let sd = 1.0 / (8.0 * std::f64::consts::LN_2).sqrt();
-    let mut places = sunflower(RAYS).map(|(share, angle_rad)| {
-        let off = sd * (-2.0 * (1.0 - share).ln()).sqrt();
-        [off * angle_rad.cos(), off * angle_rad.sin()]
+    let mut places = sunflower(RAYS).map(|(area, angle_rad)| {
+        let off_sd = REACH_SD * area.sqrt();
+        let (along, across) = (sd * off_sd * angle_rad.cos(), sd * off_sd * angle_rad.sin());
+        Place { along, across, share: (-0.5 * off_sd * off_sd).exp() }
     });
-    [(); RAYS].map(|()| places.next().unwrap_or_default())
+    let places = [(); RAYS].map(|()| places.next().unwrap_or_default());
+    let sum: f64 = places.iter().map(|place| place.share).sum();
+    let second = |place: &Place| place.share * (place.along.powi(2) + place.across.powi(2));
+    // What lies beyond their reach is made up for in the width.
+    let wider = (2.0 * sd * sd * sum / places.iter().map(second).sum::<f64>()).sqrt();
+    places.map(|Place { along, across, share }| Place {
+        along: wider * along,
+        across: wider * across,
+        share: share / sum,
+    })
 });
 
 /// What the base law makes of a spot on the target as the scene has it, so that other effects stay as
@@ -206,7 +230,7 @@ impl Effect for FiniteSpot {
     }
 
     fn knobs(&self) -> &'static [Knob] {
-        const KNOBS: [Knob; 1] = [Knob::new("diameter_m", "m", [0.0, 0.1], 0.0, 0.008)];
+        const KNOBS: [Knob; 1] = [Knob::new("diameter_m", "m", [0.0, MOST_M], 0.0, 0.008)];
         &KNOBS
     }
 
@@ -223,7 +247,7 @@ impl Effect for FiniteSpot {
 
     fn starts(&self, stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
         let nominal_m = stage.radar.spot_diameter_m;
-        [0.1, 0.3, 0.75, 1.5].map(|share| vec![(share * nominal_m).clamp(1e-3, 0.1)]).to_vec()
+        [0.1, 0.3, 0.75, 1.5].map(|share| vec![(share * nominal_m).clamp(1e-3, MOST_M)]).to_vec()
     }
 
     /// To where the intensity is 19 dB down.
@@ -267,7 +291,9 @@ impl Effect for FiniteSpot {
 mod tests {
     use super::*;
     use crate::brdf::{CookTorrance, Lambert};
+    use crate::effects::meeting::met;
     use crate::effects::testing::{Bench, db, lobe, paint};
+    use crate::effects::{Model, Receiver};
     use crate::scene::solids;
 
     #[test]
@@ -321,13 +347,48 @@ mod tests {
         }
     }
 
+    /// The mean over a fine grid of rays through a spot, W.
+    fn finely_w(bench: &Bench, look: &Look, diameter_m: f64) -> f64 {
+        const HALF: i32 = 40;
+        let (stage, law) = (bench.stage(), paint(lobe()));
+        let model = Model { laws: vec![law], receiver: Receiver::LINEAR, effects: Vec::new() };
+        let forward = look.ray.direction.xyz();
+        let (u, v) = forward.any_orthonormal_pair();
+        let sd_rad = diameter_m / look.hit.range_m / (8.0 * std::f64::consts::LN_2).sqrt();
+        let [mut power_w, mut weights] = [0.0; 2];
+        for (i, j) in (-HALF..=HALF).flat_map(|i| (-HALF..=HALF).map(move |j| (i, j))) {
+            let [x, y] = [i, j].map(|k| 4.0 * f64::from(k) / f64::from(HALF));
+            let weight = (-0.5 * (x * x + y * y)).exp();
+            let direction = Direction::new(forward + sd_rad * (x * u + y * v)).unwrap();
+            let beside = met(&stage, look, Ray { direction, ..look.ray });
+            weights += weight;
+            power_w += beside.map_or(0.0, |look| weight * model.arrived(&stage, &look).power_w);
+        }
+        power_w / weights
+    }
+
+    #[test]
+    fn a_spot_on_a_ball_is_that_of_a_fine_grid() {
+        let bench = Bench::sphere();
+        for diameter_m in [0.02, 0.05, 0.1] {
+            let spots = bench.with(&FiniteSpot, &[diameter_m]);
+            let off_db: Vec<f64> = std::iter::zip(&bench.looks, spots)
+                .step_by(3)
+                .map(|(look, spot)| db(spot.power_w / finely_w(&bench, look, diameter_m)))
+                .collect();
+            let rms = (off_db.iter().map(|x| x * x).sum::<f64>() / off_db.len() as f64).sqrt();
+            let most = off_db.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+            assert!(rms < 0.2 && most < 0.5, "{diameter_m} m: {rms:.3} dB, at most {most:.3}");
+        }
+    }
+
     #[test]
     fn half_a_spot_beside_the_edge_is_half_the_power() {
         let bench = Bench::of(solids::plate(0.5, 2.0));
         let edge = bench.looks.iter().position(|look| look.xt_m > 0.2499);
         let edge = edge.expect("the last column of looks is on the edge");
         let ratio = bench.with(&FiniteSpot, &[0.016])[edge].power_w / bench.bare()[edge].power_w;
-        // Of 24 rays a few lie on the edge itself.
+        // A few rays lie on the edge itself.
         assert!((ratio - 0.5).abs() < 0.1, "{ratio}");
     }
 }
