@@ -18,8 +18,9 @@ use super::select::SEARCH;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Look, Model, Prediction, Receiver, Stage, Traced, rank};
 use crate::fit::FitError;
-use crate::fit::coordinates::Coordinates;
+use crate::fit::coordinates::{Coordinates, frequencies};
 use crate::fit::minimise::{Local, Minimise, Stop};
+use crate::fit::uncertainty::deviations;
 
 /// The felt step of a shift of the target, m, as of the numbers of effects that shift it.
 const SHIFT_STEP_M: f64 = 2e-3;
@@ -84,7 +85,7 @@ impl<'a> Space<'a> {
             let here = |look: &&Look| usize::from(look.region) == region;
             if problem.looks.iter().filter(here).count() >= LEAST_LOOKS {
                 let looks = Some(problem.receiver.looks);
-                turned.push((region, Coordinates::new(law, &[], &[], looks)?));
+                turned.push((region, Coordinates::new(law, &frequencies(law), &[], looks)?));
             }
         }
         Ok(Space { laws: laws.to_vec(), turned, at_work, effects: Vec::new() })
@@ -381,10 +382,8 @@ impl Problem<'_> {
             }
         }
         let mut sd = vec![f64::INFINITY; at.len()];
-        if let Some(inverse) = products.cholesky().map(|c| c.inverse()) {
-            for (row, &i) in free.iter().enumerate() {
-                sd[i] = inverse[(row, row)].sqrt();
-            }
+        for (&i, found) in free.iter().zip(deviations(&products)) {
+            sd[i] = found.unwrap_or(f64::INFINITY);
         }
         sd
     }

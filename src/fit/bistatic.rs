@@ -7,7 +7,7 @@
 use nalgebra::DVector;
 use serde::Serialize;
 
-use super::coordinates::Coordinates;
+use super::coordinates::{Coordinates, frequencies};
 use super::minimise::{Local, Minimise, Minimum};
 use super::search::drawn_start;
 use super::{FitError, Stop};
@@ -68,7 +68,7 @@ impl Bistatic {
     /// # Errors
     /// A start out of range, a sample that is not above 0, fewer samples than unknowns.
     pub fn run(&self, start: &Brdf, samples: &[Sample]) -> Result<BistaticResult, FitError> {
-        let coordinates = Coordinates::new(start, &[], &[], Some(1.0))?;
+        let coordinates = Coordinates::new(start, &frequencies(start), &[], Some(1.0))?;
         self.validate(samples, coordinates.len())?;
         let bounds = [coordinates.lower(), coordinates.upper()];
         let cost = |at: &DVector<f64>| local(&coordinates, samples, at);

@@ -132,6 +132,13 @@ pub(crate) struct Coordinates {
     looks: f64,
 }
 
+/// The frequencies in a law: they are the radar's, and nothing that a surface could tell.
+pub(crate) fn frequencies(law: &Brdf) -> Vec<(String, f64)> {
+    let is_frequency = |path: &str| path.rsplit('.').next() == Some("frequency_hz");
+    let parameters = law.parameters().into_iter().filter(|p| is_frequency(&p.path));
+    parameters.map(|parameter| (parameter.path, parameter.value)).collect()
+}
+
 impl Coordinates {
     /// The coordinates of a model; `fixed` parameters keep the values given there, `bounds` narrow ranges.
     /// Looks are searched for where `looks` is none.

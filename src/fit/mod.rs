@@ -36,7 +36,7 @@ mod stored;
 mod table;
 #[cfg(test)]
 mod twin;
-mod uncertainty;
+pub(crate) mod uncertainty;
 mod verdict;
 
 use serde::{Deserialize, Serialize};

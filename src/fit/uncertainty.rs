@@ -29,6 +29,27 @@ pub(super) struct Uncertainty {
     pub loose: Vec<usize>,
 }
 
+/// Standard deviations by the curvature of −ln p alone; none for an unknown that does not bend it, or of which the
+/// data know no more than a combination with others.
+pub(crate) fn deviations(curvature: &DMatrix<f64>) -> Vec<Option<f64>> {
+    /// Beyond this an unknown is a difference of others within rounding.
+    const MOST_INFLATION: f64 = 1e6;
+    let scale: Vec<f64> = curvature.diagonal().iter().map(|bend| bend.max(0.0).sqrt()).collect();
+    let bent: Vec<usize> = (0..scale.len()).filter(|&k| scale[k] > 0.0).collect();
+    let unit = DMatrix::from_fn(bent.len(), bent.len(), |a, b| {
+        curvature[(bent[a], bent[b])] / (scale[bent[a]] * scale[bent[b]])
+    });
+    let mut deviations = vec![None; scale.len()];
+    let Some(inverse) = unit.try_inverse() else { return deviations };
+    for (place, &k) in bent.iter().enumerate() {
+        let variance = inverse[(place, place)];
+        if (0.0..MOST_INFLATION).contains(&variance) {
+            deviations[k] = Some(variance.sqrt() / scale[k]);
+        }
+    }
+    deviations
+}
+
 impl Uncertainty {
     /// Reads the information at a point of the search.
     pub fn new(coordinates: &Coordinates, at: &DVector<f64>, information: &DMatrix<f64>) -> Self {

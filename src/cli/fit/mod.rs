@@ -17,6 +17,7 @@ use super::materials::find;
 use super::plot::{ending, layers, one_file, plot, points};
 use crate::brdf::Brdf;
 use crate::error::Error;
+use crate::fit::coordinates::frequencies;
 use crate::fit::{Fit, FitResult, Method, model, model_names};
 use crate::formats::text::nearest;
 use crate::radar::speckle::standard_deviation_db;
@@ -257,19 +258,13 @@ fn fixed(args: &Args, start: &Brdf) -> Result<Vec<(String, f64)>, Error> {
         }
         fixed.push((path.to_owned(), value));
     }
-    fixed.extend(frequencies(start).filter(|(path, _)| !is_held(path, &fixed)).collect::<Vec<_>>());
+    let own = frequencies(start);
+    fixed.extend(own.into_iter().filter(|(path, _)| !is_held(path, &fixed)).collect::<Vec<_>>());
     Ok(fixed)
 }
 
 fn is_held(path: &str, fixed: &[(String, f64)]) -> bool {
     fixed.iter().any(|(known, _)| known == path)
-}
-
-/// The frequencies in a model: they are the radar's, and nothing that a surface could tell.
-fn frequencies(model: &Brdf) -> impl Iterator<Item = (String, f64)> {
-    let is_frequency = |path: &str| path.rsplit('.').next() == Some("frequency_hz");
-    let parameters = model.parameters().into_iter().filter(move |p| is_frequency(&p.path));
-    parameters.map(|parameter| (parameter.path, parameter.value))
 }
 
 fn draw(path: &Path, subject: &Subject, fit: &crate::material::Fit) -> Result<Vec<String>, Error> {

@@ -10,8 +10,9 @@ use nalgebra::{DMatrix, DVector};
 use super::points::{Point, Points};
 use super::terms::Term;
 use crate::brdf::{Brdf, Scattering};
-use crate::fit::coordinates::Coordinates;
+use crate::fit::coordinates::{Coordinates, frequencies};
 use crate::fit::minimise::{Local, Minimise, Minimum};
+use crate::fit::uncertainty::deviations;
 use crate::fit::{FitError, normal_share};
 use crate::units::db_from_ratio;
 
@@ -69,7 +70,7 @@ impl Scored {
 
 impl Model {
     pub fn new(law: &Brdf) -> Result<Model, FitError> {
-        let coordinates = Coordinates::new(law, &[], &[], Some(1.0))?;
+        let coordinates = Coordinates::new(law, &frequencies(law), &[], Some(1.0))?;
         match coordinates.len() {
             0 => Err(FitError::NothingFree),
             _ => Ok(Model { coordinates, terms: Vec::new() }),
@@ -219,26 +220,15 @@ impl Model {
     pub fn deviations(&self, fitted: &Fitted, correlated: f64) -> Vec<Option<f64>> {
         let [lower, upper] = self.bounds();
         let at = &fitted.at;
-        let scale: Vec<f64> =
-            (0..at.len()).map(|k| fitted.curvature[(k, k)].max(0.0).sqrt()).collect();
-        let free: Vec<usize> = (0..at.len())
-            .filter(|&k| at[k] > lower[k] && at[k] < upper[k] && scale[k] > 0.0)
-            .collect();
-        let unit = DMatrix::from_fn(free.len(), free.len(), |a, b| {
-            let (a, b) = (free[a], free[b]);
-            fitted.curvature[(a, b)] / (scale[a] * scale[b])
-        });
-        let mut deviations = vec![None; at.len()];
-        let Some(inverse) = unit.try_inverse() else { return deviations };
-        for (place, &k) in free.iter().enumerate() {
-            let variance = inverse[(place, place)];
-            /// Beyond this the unknown is a difference of others within rounding.
-            const MOST_INFLATION: f64 = 1e6;
-            if (0.0..MOST_INFLATION).contains(&variance) {
-                deviations[k] = Some((correlated * variance).sqrt() / scale[k]);
-            }
+        let free: Vec<usize> =
+            (0..at.len()).filter(|&k| at[k] > lower[k] && at[k] < upper[k]).collect();
+        let curvature =
+            DMatrix::from_fn(free.len(), free.len(), |a, b| fitted.curvature[(free[a], free[b])]);
+        let mut all = vec![None; at.len()];
+        for (&k, sd) in free.iter().zip(deviations(&curvature)) {
+            all[k] = sd.map(|sd| correlated.sqrt() * sd);
         }
-        deviations
+        all
     }
 }
 

@@ -196,7 +196,7 @@ impl Selection<'_> {
         ranked.held_out.is_some_and(enough) && ranked.size_db >= self.settings.least_size_db
     }
 
-    /// Supported terms that predict held-out angles as well as the best.
+    /// Other supported terms that predict held-out angles as well as the best.
     fn class(&self, trials: &[Trial], best: usize) -> Vec<&'static str> {
         let Some(winner) = trials.get(best).and_then(|trial| trial.state.as_ref()) else {
             return Vec::new();
@@ -206,7 +206,8 @@ impl Selection<'_> {
             let [behind, se] = self.gain(&state.held_out, &winner.held_out);
             self.is_supported(&trial.ranked) && behind <= SAME.max(se)
         };
-        trials.iter().filter(as_good).map(|trial| trial.ranked.name).collect()
+        let others = trials.iter().enumerate().filter(|(index, _)| *index != best);
+        others.map(|(_, trial)| trial).filter(as_good).map(|trial| trial.ranked.name).collect()
     }
 
     /// Gain in ln p of held-out angles and its standard error over runs.
