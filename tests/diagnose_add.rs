@@ -45,6 +45,8 @@ const CORNER: &str = "v 5 5 0\nv 6 5 0\nv 5 6 0\nf 1 2 3\n";
 const DRIFT: &str = "[[radar.effect]]\nname = \"drift\"\nslope_db = 5.0\n";
 const PATCH: &str = "[[effect]]\nname = \"foreign-patch\"\nlevel_db = 6.0\ncentre_x_m = 0.05\n\
                      centre_y_m = 0.1\nradius_m = 0.08\n";
+const LAYER: &str = "[[effect]]\nname = \"covering-layer\"\nloss_db = 4.0\nboundary_m = 0.1\n\
+                     direction_deg = 0.0\n";
 const ANISOTROPY: &str = "[[effect]]\nname = \"anisotropy\"\nratio = 2.5\nturn_deg = 30.0\n";
 
 /// What speckle lets some 2000 detections of 4 looks tell of a scan's powers, dB rms.
@@ -166,6 +168,27 @@ fn an_effect_of_the_scene_stands_in_the_scene_beside_the_old_one() {
         let after = noiseless(at, scene, "matdb.sqlite");
         assert!(rms_db(&after, &hidden) < FOUND_DB, "{scene}: {}", rms_db(&after, &hidden));
     }
+}
+
+#[test]
+fn a_layer_is_told_by_what_it_covers_and_by_its_border() {
+    let folder = measured(LAYER, None);
+    let at = folder.path();
+    run(at, &diagnose("scene.toml", "foreign-patch,covering-layer", &[]), "covering-layer");
+    let report = fs::read_to_string(at.join("report/report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let found = &report["effects"][0];
+    assert_eq!(found["name"], "covering-layer");
+    // Of a ball of 0.25 m in radius at x = 0, what lies beyond x = 0.1.
+    let along =
+        |name: &str, axis: usize| found["parameters"][name]["value"][axis].as_f64().unwrap();
+    let [centre_m, extent_m] = ["centre_m", "extent_m"].map(|name| along(name, 0));
+    assert!((centre_m - 0.175).abs() < 0.02 && (extent_m - 0.15).abs() < 0.04, "{found}");
+    assert!((along("centre_m", 1) - 1.25).abs() < 0.03 && along("extent_m", 1) > 0.3, "{found}");
+    let page = fs::read_to_string(at.join("report/report.html")).unwrap();
+    assert!(
+        page.contains("<th scope=\"row\">extent_m</th>") && page.contains("border of the layer")
+    );
 }
 
 #[test]

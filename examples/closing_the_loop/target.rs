@@ -4,14 +4,18 @@ use super::label::{Expected, Strength};
 use super::numbers::{Share, Sorted, digits};
 use super::score::{Case, expecting, mean, pairs, share, singles, those};
 
+/// Cases with nothing missing from which the share of false alarms is judged.
+const LEAST_COMPLETE: usize = 60;
+
 /// A target and what became of it.
 pub struct Target {
     pub what: &'static str,
     pub aim: &'static str,
     /// As text.
     pub reached: String,
-    /// None where there is no case to tell.
+    /// None where there is no case to tell, or there are too few.
     pub met: Option<bool>,
+    is_too_few: bool,
 }
 
 impl Target {
@@ -19,7 +23,7 @@ impl Target {
         let met = share.ratio().map(|ratio| ratio >= least);
         let surely = share.lower_95().map(|lower| format!("; above {:.0} %", 100.0 * lower));
         let reached = format!("{}{}", share.cell(), surely.unwrap_or_default());
-        Target { what, aim, reached, met }
+        Target { what, aim, reached, met, is_too_few: false }
     }
 
     fn at_most(
@@ -29,7 +33,16 @@ impl Target {
         most: f64,
         text: String,
     ) -> Target {
-        Target { what, aim, reached: text, met: value.map(|value| value <= most) }
+        let met = value.map(|value| value <= most);
+        Target { what, aim, reached: text, met, is_too_few: false }
+    }
+
+    /// Leaves open what too few cases tell.
+    fn by_at_least(self, cases: usize, least: usize) -> Target {
+        match (1..least).contains(&cases) {
+            true => Target { met: None, is_too_few: true, ..self },
+            false => self,
+        }
     }
 
     /// For a cell of a table.
@@ -37,6 +50,7 @@ impl Target {
         match self.met {
             Some(true) => format!("{}: met", self.reached),
             Some(false) => format!("**{}: missed**", self.reached),
+            None if self.is_too_few => format!("{}: too few to tell", self.reached),
             None => "no such case".into(),
         }
     }
@@ -77,7 +91,7 @@ pub fn targets(cases: &[Case]) -> Vec<Target> {
             digits(extra, 2),
         ),
         Target::at_most(
-            "nothing missing: false alarms",
+            "nothing missing: false alarms, by at least 60 cases",
             "≤ 3 %",
             alarms.ratio(),
             0.03,
@@ -85,7 +99,8 @@ pub fn targets(cases: &[Case]) -> Vec<Target> {
                 Some(upper) => format!("{}; below {:.0} %", alarms.cell(), 100.0 * upper),
                 None => alarms.cell(),
             },
-        ),
+        )
+        .by_at_least(alarms.of, LEAST_COMPLETE),
         Target::at_least("two effects: both named", "≥ 80 %", both, 0.80),
         Target::at_least("unknown effect: called unexplained", "≥ 90 %", unexplained, 0.90),
         Target::at_most(

@@ -89,14 +89,13 @@ pub(super) fn chosen(names: &[String]) -> Result<Vec<&'static dyn Effect>, Error
     if names.is_empty() {
         return Ok(library().to_vec());
     }
-    let mut chosen: Vec<&'static dyn Effect> = Vec::new();
-    for name in names {
-        let effect = known(name)?;
-        if chosen.iter().all(|other| other.name() != effect.name()) {
-            chosen.push(effect);
-        }
-    }
-    Ok(chosen)
+    each_once(names).map(|name| known(name)).collect()
+}
+
+/// Names without those that were given before.
+pub(super) fn each_once(names: &[String]) -> impl Iterator<Item = &String> {
+    let is_first = |index: usize| names.iter().take(index).all(|earlier| *earlier != names[index]);
+    names.iter().enumerate().filter(move |(index, _)| is_first(*index)).map(|(_, name)| name)
 }
 
 fn known(name: &str) -> Result<&'static dyn Effect, Error> {

@@ -3,7 +3,7 @@
 //! The scan pattern is known, so that every chirp is traced against the target. One that should have
 //! hit and gave no detection is evidence too: its power stayed below the threshold.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -55,9 +55,11 @@ pub struct Matched {
 }
 
 /// Share of a cloud beside the target, from which it is not of this target.
-const MOST_STRAYS: f64 = 0.25;
+pub(super) const MOST_STRAYS: f64 = 0.25;
 /// Detections further than this from where their chirp meets the target are not from there, m.
 const GATE_M: f64 = 0.1;
+/// Nearer than this to a chirp's ray a detection is that chirp's, m: less than from one chirp to the next.
+const ON_RAY_M: f64 = 0.01;
 
 /// One look, along the axis of the beam, for every chirp that meets the target.
 ///
@@ -98,7 +100,7 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>,
 /// # Errors
 /// When points have no chirp number and no direction from a common origin, when they lie on the rays of
 /// other chirps than their numbers say, when more than a quarter are second ones of their chirps, or is
-/// not on the target.
+/// neither on the target nor past its edge by a wide spot.
 pub fn matched(cloud: &Cloud, chirps: &Chirps, looks: &[Look]) -> Result<Matched, DiagnoseError> {
     let is_numbered = cloud.points().iter().all(|point| point.chirp.is_some());
     let directions = Directions::new(chirps);
@@ -156,7 +158,8 @@ impl Sorted {
     }
 }
 
-/// Gives points to chirps by their directions, or by their numbers.
+/// Gives points to chirps by their directions, or by their numbers. A stray still speaks for the target
+/// where it lies on its chirp's ray and by what others meet: a wide spot sees past the edge.
 fn sorted(
     cloud: &Cloud,
     chirps: &Chirps,
@@ -169,6 +172,13 @@ fn sorted(
     let progress = chirps.progress();
     let mut observations = vec![Observation::default(); looks.len()];
     let (mut strays, mut on_target, mut second) = (Vec::new(), 0, 0);
+    let places: Vec<DVec3> = looks.iter().map(|look| look.hit.point.xyz).collect();
+    let met = Nearest::new(&places);
+    let is_by_target = |point: &CloudPoint, look: &Look| {
+        let nearest_m = met.as_ref().map_or(f64::INFINITY, |met| met.find(point.point.xyz).1);
+        nearest_m <= GATE_M && beside_m(point, look) <= ON_RAY_M
+    };
+    let mut past_the_edge = HashSet::new();
     for point in cloud.points() {
         let chirp = match by_direction {
             Some(directions) => directions.chirp(chirps, point.point),
@@ -181,6 +191,11 @@ fn sorted(
                 let sent = chirp.and_then(|chirp| index_of_sent.get(&chirp).copied());
                 let look = sent.and_then(|index| missed(chirps, &progress, index));
                 let range_m = look.map_or(0.0, |look| range_m(point, &look));
+                if let Some(look) = look.filter(|look| is_by_target(point, look)) {
+                    let is_first = past_the_edge.insert(look.chirp);
+                    on_target += usize::from(is_first);
+                    second += usize::from(!is_first);
+                }
                 strays.push(Stray { look, range_m });
             }
             Some((look, observation)) => {
@@ -263,10 +278,14 @@ fn range_m(point: &CloudPoint, look: &Look) -> f64 {
     point.range_m.unwrap_or_else(|| look.ray.origin.distance_m(point.point))
 }
 
-/// How far a point lies from where its chirp meets the target: along the ray and beside it, m.
-fn off_m(point: &CloudPoint, look: &Look) -> f64 {
+/// How far a point lies beside the ray of its chirp, m.
+fn beside_m(point: &CloudPoint, look: &Look) -> f64 {
     let along = look.ray.direction.xyz();
     let from_origin = point.point.xyz - look.ray.origin.xyz;
-    let beside_m = (from_origin - from_origin.dot(along) * along).length();
-    (range_m(point, look) - look.hit.range_m).abs() + beside_m
+    (from_origin - from_origin.dot(along) * along).length()
+}
+
+/// How far a point lies from where its chirp meets the target: along the ray and beside it, m.
+fn off_m(point: &CloudPoint, look: &Look) -> f64 {
+    (range_m(point, look) - look.hit.range_m).abs() + beside_m(point, look)
 }

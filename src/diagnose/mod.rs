@@ -356,16 +356,16 @@ impl Diagnosis {
         let neighbours =
             residual::of_neighbours(&z_after, looks, stage.radar.spot_diameter_m, sd_db, &folds);
         let model = state.space.model(receiver, &state.fitted.at);
+        // Those past the edge were let in for the sake of a wide spot, which may not have been found.
+        let off = strays.iter().filter(|stray| !stray.is_on_target(&model, stage)).count();
+        let points = strays.len() + observations.iter().filter(|o| o.power_w.is_some()).count();
+        if off as f64 > looks::MOST_STRAYS * points as f64 {
+            return Err(DiagnoseError::Elsewhere { matched: points - off, points });
+        }
         if selection.is_shared(&neighbours, largest_db) {
             unexplained.push(neighbours);
         }
-        unexplained.extend(residual::outliers(
-            &z_after,
-            &prediction,
-            declared,
-            observations,
-            strays.iter().filter(|stray| !stray.is_on_target(&model, stage)).count(),
-        ));
+        unexplained.extend(residual::outliers(&z_after, &prediction, declared, observations, off));
         unexplained.extend(residual::steps(observations));
         unexplained.extend(residual::lopsided(&z_after, sd_db));
         unexplained.sort_by(|a, b| b.strength_db.total_cmp(&a.strength_db));
@@ -485,10 +485,12 @@ fn values(
     let sd = problem.sd(space, at);
     let finite = |sd: f64| sd.is_finite().then_some(sd);
     let base = space.base_values(at).into_iter().zip(&sd);
-    let base = base.map(|((region, name, value, slope), sd)| BaseValue {
-        region,
-        name,
-        value: Value { value, sd: finite(sd * slope), unit: "1" },
+    let laws = space.model(problem.receiver, at).laws;
+    let base = base.map(|((region, name, value, slope), sd)| {
+        let parameters = laws.get(region).map_or(Vec::new(), Brdf::parameters);
+        let unit =
+            parameters.iter().find(|known| known.path == name).map_or("1", |known| known.unit);
+        BaseValue { region, name, value: Value { value, sd: finite(sd * slope), unit } }
     });
     let mut sds = sd.iter().skip(space.base_len());
     let effects = space.effects.iter().zip(space.effect_values(at)).zip(added);

@@ -2,11 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec3;
 use serde::Serialize;
 
 use super::{Candidate, Errors, Unexplained};
 use crate::brdf::Brdf;
-use crate::effects::{Level, Look};
+use crate::effects::{Level, Look, along_m};
 
 /// The answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -60,7 +61,7 @@ pub struct Parameters {
     #[serde(flatten)]
     pub numbers: BTreeMap<&'static str, Value>,
     /// The same as vectors in the global frame: `translation_m` and `rotation_deg` of a pose,
-    /// `centre_m` of a place on the target.
+    /// `centre_m` of a place on the target, and `extent_m`, the sides of the box whose middle that is, where it is no ball.
     #[serde(flatten)]
     pub triples: BTreeMap<&'static str, Triple>,
 }
@@ -82,6 +83,21 @@ impl Parameters {
             if let Some(look) = nearest {
                 let value = look.hit.point.xyz.to_array();
                 triples.insert("centre_m", Triple { value, sd: None, unit: "m" });
+            }
+        }
+        let border = numbers.get("boundary_m").zip(numbers.get("direction_deg"));
+        if let Some((boundary, direction)) = border {
+            let is_beyond = |look: &&Look| along_m(look, direction.value) > boundary.value;
+            let points: Vec<DVec3> =
+                looks.iter().filter(is_beyond).map(|look| look.hit.point.xyz).collect();
+            let least = points.iter().copied().reduce(DVec3::min);
+            let most = points.iter().copied().reduce(DVec3::max);
+            if let Some((least, most)) = least.zip(most) {
+                for (name, value) in
+                    [("centre_m", 0.5 * (least + most)), ("extent_m", most - least)]
+                {
+                    triples.insert(name, Triple { value: value.to_array(), sd: None, unit: "m" });
+                }
             }
         }
         Parameters { numbers, triples }

@@ -248,13 +248,14 @@ pub(super) fn outliers(
         (declared.range_off_m(arrived, seen)?.abs() > OUTLYING * sd_m).then_some(())
     };
     let strays = observations.iter().zip(&prediction.arrived).filter_map(off).count();
+    // Strays are not among the looks.
     let found = [
-        (wild, "outlying powers"),
-        (strays, "outlying ranges"),
-        (false_alarms, "stray detections"),
+        (wild, count, "outlying powers"),
+        (strays, count, "outlying ranges"),
+        (false_alarms, count + false_alarms as f64, "stray detections"),
     ];
-    let (number, covariate) = found.into_iter().max_by_key(|(number, _)| *number)?;
-    let share = number as f64 / count;
+    let (number, of, covariate) = found.into_iter().max_by_key(|(number, ..)| *number)?;
+    let share = number as f64 / of;
     // A thousandth of all chirps may be anything.
     let expected = OUTLIERS * count;
     let p_value = (0.5 * erfc((number as f64 - expected) / (2.0 * expected).sqrt())).max(1e-300);

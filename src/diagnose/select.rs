@@ -146,12 +146,13 @@ impl Selection<'_> {
     pub fn run<'a>(&self, base: State<'a>, effects: &[&'a dyn Effect]) -> Selected<'a> {
         let (mut ranking, mut added) = (Vec::new(), Vec::new());
         let mut state = base.clone();
-        for round in 1..=self.settings.most_effects + 1 {
-            let mut trials = self.trials(&state, effects, round);
-            let chosen = match added.len() < self.settings.most_effects {
-                true => self.chosen(&state, &mut trials, Largest::of(&added)),
-                false => None,
-            };
+        for round in 1.. {
+            if added.len() >= self.settings.most_effects {
+                break;
+            }
+            let largest = Largest::of(&added);
+            let mut trials = self.trials(&state, effects, round, largest);
+            let chosen = self.chosen(&state, &mut trials, largest);
             let Some(Chosen { trial: index, held_out, class, rivals }) = chosen else {
                 let pair = match added.len() + 2 <= self.settings.most_effects {
                     true => self.pair(&state, &mut trials),

@@ -415,3 +415,50 @@ fn a_cloud_finds_its_looks() {
     assert!((found.observations[20].power_w.unwrap() - 1e-9).abs() < 1e-20);
     assert!((found.observations[20].range_m.unwrap() - looks[20].hit.range_m - 1e-3).abs() < 1e-9);
 }
+
+#[test]
+fn a_wide_spot_sees_past_the_edge() {
+    use crate::measure::cloud::{Cloud, CloudPoint};
+    let (radar, mut mesh) = (Radar::default(), solids::plate(0.5, 0.5));
+    mesh.vertices.iter_mut().for_each(|v| *v += DVec3::new(0.0, 1.1, 0.0));
+    let (bvh, regions) = (Bvh::new(&mesh), vec![0; mesh.facets.len()]);
+    let stage = Stage {
+        radar: &radar,
+        link: Link::new(&radar),
+        bvh: &bvh,
+        region_of_facet: &regions,
+        grain_of_region: &[DVec3::Y],
+        middle: DVec3::new(0.0, 1.1, 0.0),
+    };
+    let chirps = chirps(&radar);
+    let looks = looks(&stage, &radar, &chirps).unwrap();
+    // Every chirp within 8 cm of the plate answers, at the plate's range.
+    let cloud = |by_m: f64| {
+        let point = |(chirp, ray): (&u32, &Ray<_>)| {
+            let range_m = (0.0 - ray.origin.xyz.z) / ray.direction.xyz().z;
+            let xyz = ray.origin.xyz + range_m * ray.direction.xyz();
+            let is_near = (xyz - DVec3::new(0.0, 1.1, 0.0)).abs().max_element() < 0.33;
+            let point = Point::from(xyz + by_m * ray.direction.xyz());
+            is_near.then_some(CloudPoint {
+                chirp: Some(*chirp),
+                point,
+                range_m: None,
+                power_dbm: -60.0,
+            })
+        };
+        Cloud::new(chirps.number.iter().zip(&chirps.rays).filter_map(point).collect()).unwrap()
+    };
+    let seen = cloud(0.0);
+    let found = matched(&seen, &chirps, &looks).unwrap();
+    assert!(found.strays.len() * 3 > seen.points().len(), "{}", found.strays.len());
+    // Twice as often, and half a metre behind, they are not of it.
+    let stray = |point: &&CloudPoint| looks.iter().all(|look| Some(look.chirp) != point.chirp);
+    let strays: Vec<CloudPoint> = seen.points().iter().filter(stray).copied().collect();
+    let mut twice = [seen.points(), &strays, &strays].concat();
+    twice.iter_mut().for_each(|point| point.chirp = None);
+    let twice = Cloud::new(twice).unwrap();
+    let twice = matched(&twice, &chirps, &looks).unwrap_err();
+    assert!(matches!(twice, DiagnoseError::Repeated { .. }), "{twice}");
+    let behind = matched(&cloud(0.5), &chirps, &looks).unwrap_err();
+    assert!(matches!(behind, DiagnoseError::Elsewhere { matched: 0, .. }), "{behind}");
+}

@@ -8,6 +8,7 @@ use super::ranges;
 use super::refit::{Fitted, Space, sum};
 use super::screen::Screen;
 use super::select::{Candidate, SCOUT, SEARCH, Selection, State, larger};
+use super::support::Largest;
 use crate::effects::{Effect, Knob};
 
 /// Starts of an effect that are followed.
@@ -32,6 +33,9 @@ const SHORTLIST: usize = 5;
 /// A refit that keeps less of its promise does not count among them.
 const SHARE_OF_PROMISE: f64 = 0.3;
 const SHARE_OF_BEST: f64 = 0.3;
+/// One that gains less than this share of what it must beside the effects that are there is not searched for
+/// further.
+const SHARE_OF_HOPE: f64 = 0.5;
 
 /// A fit of one more effect.
 pub(super) struct Trial<'a> {
@@ -55,6 +59,7 @@ impl Selection<'_> {
         state: &State<'a>,
         effects: &[&'a dyn Effect],
         round: usize,
+        largest: Largest,
     ) -> Vec<Trial<'a>> {
         let absent = |effect: &&&dyn Effect| !state.space.has(effect.name());
         (self.hear)(&format!("round {round}: screening {} effects", effects.len()));
@@ -76,9 +81,10 @@ impl Selection<'_> {
         sort(&mut trials);
         // Measured by what the refits keep: a sample may promise what all looks do not.
         let (mut best, mut kept) = (0.5 * self.settings.least_gain_of(1, 1) / SHARE_OF_BEST, 0);
+        let hopeless = SHARE_OF_HOPE * largest.least_gain_of_any(self.problem.looks.len());
         for trial in &mut trials {
             let promised = trial.candidate.gain;
-            if kept == SHORTLIST || promised < SHARE_OF_BEST * best {
+            if kept == SHORTLIST || promised < hopeless.max(SHARE_OF_BEST * best) {
                 break;
             }
             (self.hear)(&format!("round {round}: refitting with {}", trial.effect.name()));
@@ -88,7 +94,7 @@ impl Selection<'_> {
         }
         sort(&mut trials);
         if let Some(first) = trials.first_mut() {
-            self.continued(state, first);
+            self.continued(state, first, hopeless);
             sort(&mut trials);
         }
         trials
@@ -261,10 +267,11 @@ impl Selection<'_> {
 
     /// Goes on with the fit of the best effect while it gains: one that moves facets under the rays may rest
     /// before a step of ln p.
-    fn continued(&self, state: &State, trial: &mut Trial) {
+    fn continued(&self, state: &State, trial: &mut Trial, hopeless: f64) {
         for _ in 0..LONGER {
             let Candidate { gain, sampled, converged, numbers, .. } = trial.candidate;
-            if sampled || converged || gain < self.settings.least_gain_of(numbers, trial.tried) {
+            let least = self.settings.least_gain_of(numbers, trial.tried).max(hopeless);
+            if sampled || converged || gain < least {
                 return;
             }
             if is_at_rest(&trial.fitted, trial.effect) {

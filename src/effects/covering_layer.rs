@@ -16,8 +16,8 @@ const KNOBS: [Knob; 3] = [
 /// A flat layer seen along itself is as deep as it is wide.
 const LEAST_COS_THETA: f64 = 0.02;
 
-/// How far a look lies beyond the line, m, along `direction_deg` from x_t towards y_t.
-fn along_m(look: &Look, direction_deg: f64) -> f64 {
+/// How far a look lies from the field's centre, m, along `direction_deg` from x_t towards y_t.
+pub(crate) fn along_m(look: &Look, direction_deg: f64) -> f64 {
     let (sin, cos) = direction_deg.to_radians().sin_cos();
     look.xt_m * cos + look.yt_m * sin
 }

@@ -32,6 +32,7 @@ use crate::radar::{Link, Radar};
 use crate::trace::{Bvh, Hit};
 
 pub use ceiling::{Ceiling, Passed, Saturating};
+pub(crate) use covering_layer::along_m;
 pub use declared::SceneEffects;
 pub(crate) use entry::rank;
 pub use entry::{Chosen, EffectError, entry, resolve};

@@ -12,7 +12,8 @@ use crate::cli::console::Console;
 use crate::cli::database::Database;
 use crate::cli::inputs::activity;
 use crate::cli::output::{Written, write_all};
-use crate::diagnose::Report;
+use crate::diagnose::{LEAST_LOOKS, Report};
+use crate::effects::Level;
 use crate::error::Error;
 use crate::formats::FormatError;
 use crate::material::{Activity, Input, file};
@@ -82,11 +83,19 @@ impl Publication<'_> {
         if !self.report.base.converged {
             console.notice("the final fit did not converge: take the numbers with care");
         }
+        let homeless = self.homeless(&takers);
+        if !homeless.is_empty() {
+            console.notice(&format!(
+                "kept in the report alone, as no material has the {LEAST_LOOKS} chirps on the target that take {}: {}",
+                if homeless.len() == 1 { "it" } else { "them" },
+                listed(&homeless)
+            ));
+        }
         self.left_out(&takers).iter().for_each(|notice| console.notice(notice));
         files.sort_by_key(|(name, _)| name != "report.html");
         let names: Vec<String> = files.into_iter().map(|(name, _)| name).collect();
         let said = text::text(self.report, &context.places, &names, &self.asked.args.output);
-        console.result(&(said + &self.stored(&context, db)), &record)
+        console.result(&(said + &self.stored(&context, &homeless, db)), &record)
     }
 
     /// Stores what was found in the database and beside the scene, and writes the report.
@@ -204,8 +213,14 @@ impl Publication<'_> {
         })
     }
 
+    /// Effects of a material that none takes in.
+    fn homeless(&self, takers: &[Taker]) -> Vec<&'static str> {
+        let of_material = self.report.effects.iter().filter(|found| found.level == Level::Material);
+        of_material.filter(|_| takers.is_empty()).map(|found| found.name).collect()
+    }
+
     /// A line on what was stored.
-    fn stored(&self, context: &Context, db: &Database) -> String {
+    fn stored(&self, context: &Context, homeless: &[&str], db: &Database) -> String {
         match (self.asked.args.add, self.report.effects.is_empty()) {
             (false, _) => String::new(),
             (true, true) => match context.added.join(", ") {
@@ -221,7 +236,13 @@ impl Publication<'_> {
                 let scene = &context.beside;
                 let file = db.path().display();
                 match context.added.join(", ") {
-                    none if none.is_empty() => format!("stored what was found in {scene}\n"),
+                    none if none.is_empty() && homeless.len() == self.report.effects.len() => {
+                        format!("nothing could be stored; {scene} is as the scene was\n")
+                    }
+                    none if none.is_empty() => match homeless {
+                        [] => format!("stored what was found in {scene}\n"),
+                        some => format!("stored what was found but {} in {scene}\n", listed(some)),
+                    },
                     names => format!(
                         "stored {names} in {file}; {scene} renders what was found\n{}",
                         elsewhere(&context.replaced)

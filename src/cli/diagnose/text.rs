@@ -19,7 +19,10 @@ pub(super) fn text(report: &Report, places: &[Place], files: &[String], folder: 
     text += &remains(report);
     text += &strongest(places).map_or(String::new(), |places| format!("  {places}\n"));
     if report.set_aside > 0 {
-        text += &format!("set aside: {} detections that lie elsewhere\n", report.set_aside);
+        text += &format!(
+            "set aside: {} detections that lie elsewhere than their chirps meet the target\n",
+            report.set_aside
+        );
     }
     let mut others: Vec<&str> = not_found(report).map(|tried| tried.name).collect();
     others.sort_unstable();

@@ -12,6 +12,7 @@ use super::tried::{NotTried, of_curve};
 use super::{Args, Record, html, json};
 use crate::brdf::Brdf;
 use crate::cli::console::Console;
+use crate::cli::effects::each_once;
 use crate::cli::inputs::read_small;
 use crate::cli::output::write_all;
 use crate::diagnose::curve::{
@@ -74,7 +75,7 @@ fn chosen(names: &[String]) -> Result<Vec<&'static dyn Term>, Error> {
         return Ok(terms().to_vec());
     }
     let known: Vec<&str> = terms().iter().map(|term| term.name()).collect();
-    names.iter().map(|name| term(name).ok_or_else(|| unknown("effect", name, &known))).collect()
+    each_once(names).map(|name| term(name).ok_or_else(|| unknown("effect", name, &known))).collect()
 }
 
 fn unknown(what: &str, name: &str, known: &[&str]) -> Error {
@@ -122,7 +123,7 @@ fn refuse(
     folder: &Path,
     console: &Console,
 ) -> Result<(), Error> {
-    let answer = CannotTell::new(error.to_string(), WOULD_HELP.to_owned());
+    let answer = CannotTell::new(error.to_string(), would_help(&error).to_owned());
     let page = html::cannot_tell(&answer, &format!("the curve {curve}"));
     let files = [("report.html", page), ("report.json", json(&answer)?)];
     let earlier = Earlier::in_folder(folder, &[Path::new(&curve)]);
@@ -134,8 +135,19 @@ fn refuse(
     Err(Error::CurveDiagnosis { curve, error })
 }
 
-const WOULD_HELP: &str = "More angles, or the same ones at more angles of incidence: runs of \
-                          neighbouring angles are held out together, and several of them are needed.";
+fn would_help(error: &CurveDiagnoseError) -> &'static str {
+    match error {
+        CurveDiagnoseError::TooFew { .. } | CurveDiagnoseError::TooShort { .. } => {
+            "More angles, or the same ones at more angles of incidence: runs of neighbouring angles are \
+             held out together, and several of them are needed."
+        }
+        CurveDiagnoseError::Noise { .. } => {
+            "The scatter of a level, in dB: by --noise-db, from repeats, or left out to be told from \
+             neighbouring angles."
+        }
+        CurveDiagnoseError::Fit(_) => "Another law to begin from, by --model.",
+    }
+}
 
 /// Every level as a line.
 fn csv(rows: &[CurveRow]) -> Vec<u8> {

@@ -30,12 +30,17 @@ struct Article<'a> {
 pub(super) fn of_cloud(found: &Found) -> String {
     let effect = find(found.name);
     let shows = |name: &'static str| (name, find(name).map_or("", |effect| effect.shows()));
-    let place = match found.parameters.triples.contains_key("centre_m") {
-        true => quiet(
+    let has = |name: &str| found.parameters.triples.contains_key(name);
+    let place = match (has("centre_m"), has("extent_m")) {
+        (true, true) => quiet(
+            "centre_m is the middle and extent_m the size of the box around the part of the target that it covers, \
+             along the global axes of the scene; its border is a line on the maps, where it crosses them.",
+        ),
+        (true, false) => quiet(
             "centre_m is the point of the target where its centre lies, in the global frame of the \
              scene; centre_x_m and centre_y_m are its place in the target plane, as on the maps.",
         ),
-        false => String::new(),
+        (false, _) => String::new(),
     };
     let Evidence { gain, placebo_gain, held_out_gain, held_out_se, size_db } = &found.evidence;
     Article {

@@ -110,7 +110,8 @@ pub(super) fn unknown(report: &Report, spot_m: f64) -> Result<Picture, FigureErr
     for map in &mut picture.panels {
         let rings = strongest(&report.rows, spot_m)
             .into_iter()
-            .map(|Place { x_m, y_m, .. }| Ring { x_m, y_m, radius_m: 1.5 * raster.pixel_m });
+            .map(|Place { x_m, y_m, .. }| (x_m, y_m, 1.5 * raster.pixel_m))
+            .map(|(x_m, y_m, radius_m)| Outline::Ring { x_m, y_m, radius_m });
         let rings: Vec<Shape> = rings.filter_map(|ring| ring.on(map, &raster)).collect();
         map.shapes.extend(rings);
     }
@@ -181,8 +182,8 @@ fn maps(
     let empty = raster(&report.rows, pixel_m);
     let rasters = panels.iter().map(|(_, (pick, _))| filled(&empty, &report.rows, *pick));
     let rasters: Vec<Raster> = rasters.collect();
-    let rings: Vec<Ring> =
-        report.effects.iter().filter_map(|f| Ring::new(f, &report.rows)).collect();
+    let outlines: Vec<Outline> =
+        report.effects.iter().filter_map(|f| Outline::new(f, &report.rows)).collect();
     let reach = rasters.first().map_or(0.0, |first| reach(first, subject.reach, subject.share));
     let drawing = |(raster, (title, (_, note))): (&Raster, &(&'static str, Panel))| {
         let figure = Figure {
@@ -198,60 +199,97 @@ fn maps(
             y_label: "y in the target plane, m",
         };
         let mut drawing = figure.drawing()?;
-        let rings = rings.iter().filter_map(|ring| ring.on(&drawing, raster));
-        let rings: Vec<Shape> = rings.collect();
-        drawing.shapes.extend(rings);
+        let lines = outlines.iter().filter_map(|outline| outline.on(&drawing, raster));
+        let lines: Vec<Shape> = lines.collect();
+        drawing.shapes.extend(lines);
         Ok(drawing)
     };
-    let drawn = rasters.iter().zip(panels).map(drawing).collect::<Result<_, FigureError>>()?;
-    let ring = match rings.is_empty() {
-        true => "",
-        false => {
-            " The ring is the patch that was found, as wide as on a surface that faces the radar."
-        }
+    let drawn =
+        rasters.iter().zip(panels).map(drawing).collect::<Result<Vec<Drawing>, FigureError>>()?;
+    let is_drawn = |outline: &&Outline| {
+        drawn.first().is_some_and(|map: &Drawing| outline.on(map, &empty).is_some())
     };
-    let caption = format!("{} Pixels of {:.0} mm.{ring}", subject.caption, 1e3 * pixel_m);
+    let told: String = outlines.iter().filter(is_drawn).map(Outline::caption).collect();
+    let caption = format!("{} Pixels of {:.0} mm.{told}", subject.caption, 1e3 * pixel_m);
     let Subject { file, title, .. } = *subject;
     Ok(Picture { file, title, caption, panels: drawn, columns: panels.len() })
 }
 
-/// Where an effect with a centre and a radius was found, in the target plane.
-struct Ring {
-    x_m: f64,
-    y_m: f64,
-    radius_m: f64,
+/// Where an effect of one part of the target was found, in the target plane.
+enum Outline {
+    /// Round a patch.
+    Ring { x_m: f64, y_m: f64, radius_m: f64 },
+    /// The border of a layer: so far from the middle, in a direction from x towards y.
+    Line { off_m: f64, direction_deg: f64 },
 }
 
-impl Ring {
-    fn new(found: &Found, rows: &[Row]) -> Option<Ring> {
+impl Outline {
+    fn new(found: &Found, rows: &[Row]) -> Option<Outline> {
         let number = |name: &str| found.parameters.get(name).map(|number| number.value);
+        if let Some((off_m, direction_deg)) = number("boundary_m").zip(number("direction_deg")) {
+            return Some(Outline::Line { off_m, direction_deg });
+        }
         let [x_m, y_m] = [number("centre_x_m")?, number("centre_y_m")?];
         let off_m = |row: &&Row| (row.xt_m - x_m).hypot(row.yt_m - y_m);
         let nearest = rows.iter().min_by(|a, b| off_m(a).total_cmp(&off_m(b)))?;
         // The radius is one on the surface, and the plane lies where the pattern is told.
-        Some(Ring { x_m, y_m, radius_m: number("radius_m")? * PATTERN_RANGE_M / nearest.range_m })
+        let radius_m = number("radius_m")? * PATTERN_RANGE_M / nearest.range_m;
+        Some(Outline::Ring { x_m, y_m, radius_m })
     }
 
-    /// As a line on a map of this raster.
-    fn on(&self, map: &Drawing, raster: &Raster) -> Option<Shape> {
+    /// What a caption says of it.
+    fn caption(&self) -> &'static str {
+        match self {
+            Outline::Ring { .. } => {
+                " The ring is the patch that was found, as wide as on a surface that faces the radar."
+            }
+            Outline::Line { .. } => " The line is the border of the layer that was found.",
+        }
+    }
+
+    /// Its points in the target plane, m.
+    fn points_m(&self) -> Vec<[f64; 2]> {
         const CORNERS: u32 = 72;
+        /// As far as a field of view reaches, and how finely a line is followed.
+        const HALF_M: f64 = 4.0;
+        const STEPS: i32 = 2000;
+        match *self {
+            Outline::Ring { x_m, y_m, radius_m } => {
+                let corners = (0..=CORNERS).map(|k| f64::from(k) / f64::from(CORNERS) * TAU);
+                let corner = |turn: f64| [x_m + radius_m * turn.cos(), y_m + radius_m * turn.sin()];
+                corners.map(corner).collect()
+            }
+            Outline::Line { off_m, direction_deg } => {
+                let (sin, cos) = direction_deg.to_radians().sin_cos();
+                let along = (-STEPS..=STEPS).map(|k| HALF_M * f64::from(k) / f64::from(STEPS));
+                along.map(|t| [off_m * cos - t * sin, off_m * sin + t * cos]).collect()
+            }
+        }
+    }
+
+    /// As a line on a map of this raster: as far as it lies there, and a ring beyond it along its frame.
+    fn on(&self, map: &Drawing, raster: &Raster) -> Option<Shape> {
         let [left_px, top_px, cell_px] = map.shapes.iter().find_map(|shape| match *shape {
             Shape::Cells { left_px, top_px, cell_px, .. } => Some([left_px, top_px, cell_px]),
             _ => None,
         })?;
-        // What lies beyond the map is drawn along its frame.
-        let px = |length_m: f64, cells: usize| {
-            (length_m / raster.pixel_m).clamp(0.0, cells as f64) * f64::from(cell_px)
+        let [wide_m, high_m] = [raster.width, raster.height].map(|n| n as f64 * raster.pixel_m);
+        let px = |length_m: f64| length_m / raster.pixel_m * f64::from(cell_px);
+        let inside = |[x_m, y_m]: [f64; 2]| [x_m - raster.x_min_m, y_m - raster.y_min_m];
+        let is_inside =
+            |[x, y]: &[f64; 2]| (0.0..=wide_m).contains(x) && (0.0..=high_m).contains(y);
+        let point = |[x, y]: [f64; 2]| {
+            ((f64::from(left_px) + px(x)) as f32, (f64::from(top_px) + px(high_m - y)) as f32)
         };
-        let point = |corner: u32| {
-            let (sin, cos) = (f64::from(corner) / f64::from(CORNERS) * TAU).sin_cos();
-            let x_px = px(self.x_m + self.radius_m * cos - raster.x_min_m, raster.width);
-            let up_px = px(self.y_m + self.radius_m * sin - raster.y_min_m, raster.height);
-            let bottom_px = f64::from(top_px) + f64::from(cell_px) * raster.height as f64;
-            ((f64::from(left_px) + x_px) as f32, (bottom_px - up_px) as f32)
+        let kept = |place: [f64; 2]| match self {
+            Outline::Ring { .. } => {
+                Some([place[0].clamp(0.0, wide_m), place[1].clamp(0.0, high_m)])
+            }
+            Outline::Line { .. } => Some(place).filter(is_inside),
         };
-        let points = (0..=CORNERS).map(point).collect();
-        Some(Shape::Line { points, colour: [0; 3], thickness_px: 2.0 })
+        let points: Vec<_> =
+            self.points_m().into_iter().map(inside).filter_map(kept).map(point).collect();
+        (points.len() > 1).then(|| Shape::Line { points, colour: [0; 3], thickness_px: 2.0 })
     }
 }
 
@@ -344,7 +382,7 @@ mod tests {
             colours: Vec::new(),
         };
         let map = Drawing { width_px: 0.0, height_px: 0.0, shapes: vec![cells] };
-        let ring = Ring { x_m: 0.05, y_m: 0.02, radius_m: 0.03 };
+        let ring = Outline::Ring { x_m: 0.05, y_m: 0.02, radius_m: 0.03 };
         let Some(Shape::Line { points, .. }) = ring.on(&map, &empty) else { panic!() };
         // The map begins 10 mm left of and below the origin, and ends 70 mm above it.
         assert!(
@@ -353,6 +391,13 @@ mod tests {
         );
         let top = points[18];
         assert!((top.0 - 80.0).abs() < 1e-3 && (top.1 - 50.0).abs() < 1e-3, "{top:?}");
+        // A border 40 mm up goes from side to side, and one beyond the map is not drawn.
+        let border = |off_m| Outline::Line { off_m, direction_deg: 90.0 }.on(&map, &empty);
+        let Some(Shape::Line { points, .. }) = border(0.04) else { panic!() };
+        let [from, to] = [points[0], points[points.len() - 1]];
+        assert!((from.1 - 60.0).abs() < 1e-3 && (to.1 - 60.0).abs() < 1e-3, "{from:?}");
+        assert!((from.0 - to.0).abs() > 120.0, "{from:?} {to:?}");
+        assert!(border(0.2).is_none());
     }
 
     #[test]

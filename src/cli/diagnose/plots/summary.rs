@@ -25,7 +25,7 @@ pub(super) fn ranking(report: &Report) -> Result<Picture, FigureError> {
     let guide = placebos.reduce(f64::max).map(|gain| (gain.max(0.0), "best placebo"));
     let bars = Bars {
         title: "Which effect would help",
-        subtitle: "each fitted alone together with the base",
+        subtitle: "each tried alone beside the base",
         label: "gain in ln likelihood over the base model",
         bars: first.iter().map(bar).collect(),
         guide,
@@ -35,7 +35,8 @@ pub(super) fn ranking(report: &Report) -> Result<Picture, FigureError> {
     Ok(Picture {
         file: "ranking",
         title: "What every effect gained",
-        caption: "Gain in ln likelihood when one effect is fitted with the base model (round 1). Blue \
+        caption: "Gain in ln likelihood when one effect is fitted with the base model (round 1); those that promise \
+                  little are fitted to a sample of the chirps at most, and their gain is counted up from there. Blue \
                   ones were added in the end. A large gain alone does not: an effect must also \
                   predict patches of the scan that took no part in its fit. “Held out” is that gain \
                   ± its standard error, only worked out for the best few. The line is the largest gain \
