@@ -269,14 +269,11 @@ fn a_cloud_of_another_scene_is_no_answer() {
     let region = &SCENE[SCENE.find("[[region]]").unwrap()..];
     let aside =
         SCENE.replace("translation_m = [0.0, 1.25, 0.0]", "translation_m = [0.0, 1.25, 0.15]");
-    for (name, scene, reason) in [
-        ("half.toml", format!("{sphere}{region}"), "lie where the scan meets the mesh"),
-        ("aside.toml", aside, "far off at"),
-    ] {
+    for (name, scene) in [("half.toml", format!("{sphere}{region}")), ("aside.toml", aside)] {
         fs::write(at.join(name), scene).unwrap();
         let asked = ["diagnose", "out/cloud.ply", "--scene", name, "-o", "report"];
         let message = refused(matdb(at).args(asked));
-        assert!(message.contains(reason), "{name}: {message}");
+        assert!(message.contains("lie where the scan meets the mesh"), "{name}: {message}");
         let report = json(&at.join("report/report.json"));
         assert_eq!(report["verdict"], "cannot-tell", "{name}");
         assert_eq!(report["effects"], json!([]), "{name}");
