@@ -61,8 +61,9 @@ def other_runs(results):
         if all(machine[key] == run[key] for key in run if key != "minutes"):
             continue
         when = f"at `{run['commit']}`"
-        if "minutes" in run:
-            when = f"on {run['date']} {when}, {run['minutes']:.0f} minutes, load before them {run['load_before']}"
+        if "date" in run:
+            took = f"{run['minutes']:.0f} minutes, load before them" if "minutes" in run else "load before it"
+            when = f"on {run['date']} {when}, {took} {run['load_before']}"
             when += f", by {run['cpu']}" * (run["cpu"] != machine["cpu"])
         yield part, when
 
