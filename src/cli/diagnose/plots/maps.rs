@@ -289,7 +289,7 @@ impl Outline {
         };
         let points: Vec<_> =
             self.points_m().into_iter().map(inside).filter_map(kept).map(point).collect();
-        (points.len() > 1).then(|| Shape::Line { points, colour: [0; 3], thickness_px: 2.0 })
+        (points.len() > 1).then_some(Shape::Line { points, colour: [0; 3], thickness_px: 2.0 })
     }
 }
 
