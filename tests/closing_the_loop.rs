@@ -252,7 +252,8 @@ fn the_page_begins_with_targets_and_what_was_reached() {
     let mut by_hand = by_hand();
     let met: Vec<Option<bool>> = targets(&by_hand.cases).iter().map(|target| target.met).collect();
     let no = Some(false);
-    // Extra names: 1 of 9 cases. Too few lack nothing to tell of false alarms. The 90th percentile is 1.10, which is allowed. One error has grown.
+    // Extra names: 1 of 9 cases. Too few lack nothing to tell of false alarms. The 90th percentile is 1.10, which
+    // is allowed. One error has grown.
     assert_eq!(met, [no, no, no, no, None, no, no, Some(true), Some(true), no]);
     let text = page(&[by_hand], Some("the seeds 90 to 99"));
     assert!(

@@ -281,6 +281,27 @@ fn a_cloud_of_another_scene_is_no_answer() {
 }
 
 #[test]
+fn a_mesh_that_hardly_covers_the_cloud_is_no_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    // All that lies beside the smaller plate is within what a wide spot could see, and none is found.
+    let (radar, _) = SCENE.split_once("[[mesh]]").unwrap();
+    let region = &SCENE[SCENE.find("[[region]]").unwrap()..];
+    for (name, side_m) in [("measured.toml", 0.6), ("small.toml", 0.45)] {
+        let plate = format!(
+            "[[mesh]]\nname = \"plate\"\nfile = \"builtin:plate\"\nsize_m = [{side_m}, {side_m}, 0]\n\
+             translation_m = [0, 1.1, 0]\n"
+        );
+        fs::write(at.join(name), format!("{radar}{plate}{region}")).unwrap();
+    }
+    matdb(at).args(["render", "-q", "measured.toml", "-o", "out"]).assert().success();
+    let asked = ["diagnose", "out/cloud.ply", "--scene", "small.toml", "-o", "report"];
+    let message = refused(matdb(at).args(asked).args(["--effects", "fov-gain,speckle"]));
+    assert!(message.contains("lie where the scan meets the mesh"), "{message}");
+    assert_eq!(json(&at.join("report/report.json"))["verdict"], "cannot-tell");
+}
+
+#[test]
 fn nothing_that_is_read_is_written_over() {
     let folder = rendered("4");
     let at = folder.path();

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from rows import HIERARCHY, PINHOLE, best, median, named, of_workload, ours, total
-from words import bound, number, times
+from words import bound, grouped, number, times
 
 # As lists ask, which stop at a page; what reads every line is no question.
 QUESTIONS = ("filter by class", "filter by tag", "filter by frequency", "filter by kind", "filter by nothing", "full text")
@@ -81,8 +81,7 @@ def reshading(results):
     for threads in [1, 2]:
         row = next((row for row in results.get("reshade", []) if row["threads"] == threads), None)
         slowest = row and max(median(row["law"]), median(row["effect"]))
-        spaced = lambda count: f"{count:,}".replace(",", " ")
-        chirps = f"a scan of {spaced(row['chirps'])} chirps, {spaced(row['looks'])} of them on the target," if row else "a scan"
+        chirps = f"a scan of {grouped(row['chirps'])} chirps, {grouped(row['looks'])} of them on the target," if row else "a scan"
         work = f"{chirps} again with another law or effect, {threads} thread{'s' * (threads > 1)}"
         yield at_most(work, 1, "ms", slowest)
 

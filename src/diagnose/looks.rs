@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::DiagnoseError;
 use crate::effects::{Look, Model, Stage};
-use crate::frames::{Direction, Global, Point, Pose};
+use crate::frames::{Direction, Global, Point, Pose, Ray};
 use crate::measure::cloud::{Cloud, CloudPoint};
 use crate::measure::median_point;
 use crate::measure::nearest::Nearest;
@@ -130,13 +130,10 @@ pub fn matched(cloud: &Cloud, chirps: &Chirps, looks: &[Look]) -> Result<Matched
 /// Whether most points lie beside the rays of their chirps by one and the same shift.
 fn is_moved(cloud: &Cloud, chirps: &Chirps) -> bool {
     let index_of_sent: HashMap<u32, usize> = chirps.number.iter().copied().zip(0..).collect();
-    let beside_m = |point: &CloudPoint| {
-        let ray = chirps.rays.get(*index_of_sent.get(&point.chirp?)?)?;
-        let along = ray.direction.xyz();
-        let from_origin = point.point.xyz - ray.origin.xyz;
-        Some(from_origin - from_origin.dot(along) * along)
+    let shift = |point: &CloudPoint| {
+        Some(beside(point, chirps.rays.get(*index_of_sent.get(&point.chirp?)?)?))
     };
-    let shifts: Vec<DVec3> = cloud.points().iter().filter_map(beside_m).collect();
+    let shifts: Vec<DVec3> = cloud.points().iter().filter_map(shift).collect();
     let shift = median_point(&shifts);
     let alike = shifts.iter().filter(|own| own.distance(shift) <= GATE_M).count();
     alike as f64 >= (1.0 - MOST_STRAYS) * cloud.points().len() as f64
@@ -176,7 +173,7 @@ fn sorted(
     let met = Nearest::new(&places);
     let is_by_target = |point: &CloudPoint, look: &Look| {
         let nearest_m = met.as_ref().map_or(f64::INFINITY, |met| met.find(point.point.xyz).1);
-        nearest_m <= GATE_M && beside_m(point, look) <= ON_RAY_M
+        nearest_m <= GATE_M && beside(point, &look.ray).length() <= ON_RAY_M
     };
     let mut past_the_edge = HashSet::new();
     for point in cloud.points() {
@@ -278,14 +275,14 @@ fn range_m(point: &CloudPoint, look: &Look) -> f64 {
     point.range_m.unwrap_or_else(|| look.ray.origin.distance_m(point.point))
 }
 
-/// How far a point lies beside the ray of its chirp, m.
-fn beside_m(point: &CloudPoint, look: &Look) -> f64 {
-    let along = look.ray.direction.xyz();
-    let from_origin = point.point.xyz - look.ray.origin.xyz;
-    (from_origin - from_origin.dot(along) * along).length()
+/// Where a point lies beside a ray, m.
+fn beside(point: &CloudPoint, ray: &Ray<Global>) -> DVec3 {
+    let along = ray.direction.xyz();
+    let from_origin = point.point.xyz - ray.origin.xyz;
+    from_origin - from_origin.dot(along) * along
 }
 
 /// How far a point lies from where its chirp meets the target: along the ray and beside it, m.
 fn off_m(point: &CloudPoint, look: &Look) -> f64 {
-    (range_m(point, look) - look.hit.range_m).abs() + beside_m(point, look)
+    (range_m(point, look) - look.hit.range_m).abs() + beside(point, &look.ray).length()
 }

@@ -333,6 +333,13 @@ impl Diagnosis {
             return Err(DiagnoseError::Unlike { wild, looks: all });
         }
         let Selected { state, ranking, added, structure } = selection.run(base.clone(), effects);
+        let model = state.space.model(receiver, &state.fitted.at);
+        // Those past the edge were let in for the sake of a wide spot, which may not have been found.
+        let off = strays.iter().filter(|stray| !stray.is_on_target(&model, stage)).count();
+        let points = strays.len() + observations.iter().filter(|o| o.power_w.is_some()).count();
+        if off as f64 > looks::MOST_STRAYS * points as f64 {
+            return Err(DiagnoseError::Elsewhere { matched: points - off, points });
+        }
         let first = ranking.iter().find(|candidate| candidate.accepted).or(ranking.first());
         let numbers = first.map_or(1, |candidate| candidate.numbers);
         hear("controls");
@@ -355,13 +362,6 @@ impl Diagnosis {
         let sd_db = residual::speckle_sd_db(prediction.receiver.looks);
         let neighbours =
             residual::of_neighbours(&z_after, looks, stage.radar.spot_diameter_m, sd_db, &folds);
-        let model = state.space.model(receiver, &state.fitted.at);
-        // Those past the edge were let in for the sake of a wide spot, which may not have been found.
-        let off = strays.iter().filter(|stray| !stray.is_on_target(&model, stage)).count();
-        let points = strays.len() + observations.iter().filter(|o| o.power_w.is_some()).count();
-        if off as f64 > looks::MOST_STRAYS * points as f64 {
-            return Err(DiagnoseError::Elsewhere { matched: points - off, points });
-        }
         if selection.is_shared(&neighbours, largest_db) {
             unexplained.push(neighbours);
         }

@@ -41,13 +41,8 @@ impl Largest {
         Largest { size_db: largest(|e| e.size_db), gain: largest(|e| e.gain) }
     }
 
-    /// The least of the gains below.
-    pub fn least_gain_of_any(self, looks: usize) -> f64 {
-        self.least_gain(true, looks).min(self.least_gain(false, looks))
-    }
-
     /// The gain of one more effect below which it may be the error of this one's form, by so many looks.
-    fn least_gain(self, is_spread: bool, looks: usize) -> f64 {
+    pub fn least_gain(self, is_spread: bool, looks: usize) -> f64 {
         let share = if is_spread { SHARE_OF_GAIN_OF_SPREAD } else { SHARE_OF_GAIN };
         share * self.gain.min(MOST_OF_A_LOOK * looks as f64)
     }

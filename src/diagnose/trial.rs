@@ -81,7 +81,8 @@ impl Selection<'_> {
         sort(&mut trials);
         // Measured by what the refits keep: a sample may promise what all looks do not.
         let (mut best, mut kept) = (0.5 * self.settings.least_gain_of(1, 1) / SHARE_OF_BEST, 0);
-        let hopeless = SHARE_OF_HOPE * largest.least_gain_of_any(self.problem.looks.len());
+        // An effect of the scatter needs the lesser gain.
+        let hopeless = SHARE_OF_HOPE * largest.least_gain(true, self.problem.looks.len());
         for trial in &mut trials {
             let promised = trial.candidate.gain;
             if kept == SHORTLIST || promised < hopeless.max(SHARE_OF_BEST * best) {
