@@ -11,7 +11,6 @@ use rayon::prelude::*;
 use super::looks::Observation;
 use super::refit::{Problem, Space};
 use crate::effects::{Effect, Look};
-use crate::fit::minimise::REACH;
 use crate::frames::{Global, Pose};
 use crate::measure::icp::bulk_sd_m;
 
@@ -23,19 +22,23 @@ const BIWEIGHT: f64 = 4.685;
 /// Step over which the way of a surface point is seen, in those of the numbers.
 const STEP: f64 = 1e-3;
 
-/// A point with the numbers of its last effect where the ranges put the target; the same point where these
-/// tell nothing.
+/// A point with the numbers of its last effect where the ranges put the target, and where they tell
+/// nothing, as of a shift of a plane in itself, within so many steps of the start; the start where they tell nothing
+/// at all.
 pub(super) fn placed(
     problem: &Problem,
     space: &Space,
     effect: &dyn Effect,
     start: &DVector<f64>,
+    within: f64,
 ) -> DVector<f64> {
     let mut at = start.clone();
     let first = at.len() - effect.knobs().len();
     let [lower, upper] = space.bounds();
     for _ in 0..ROUNDS {
-        let Some(step) = step(problem, space, effect, &at) else { return start.clone() };
+        let Some(step) = step(problem, space, effect, [start, &at], within) else {
+            return start.clone();
+        };
         for (index, by) in (first..).zip(&step) {
             at[index] = (at[index] + by).clamp(lower[index], upper[index]);
         }
@@ -52,11 +55,13 @@ struct Row {
     by_number: Vec<f64>,
 }
 
+/// The step from the second point, on the way from the first; numbers are normal about this one beforehand.
 fn step(
     problem: &Problem,
     space: &Space,
     effect: &dyn Effect,
-    at: &DVector<f64>,
+    [start, at]: [&DVector<f64>; 2],
+    within: f64,
 ) -> Option<DVector<f64>> {
     let model = space.model(problem.receiver, at);
     let values = space.effect_values(at).pop()?;
@@ -70,9 +75,9 @@ fn step(
     let rows: Vec<Row> =
         problem.looks.par_iter().zip(problem.observations).filter_map(row).collect();
     let sd_m = bulk_sd_m(rows.iter().map(|row| row.off_m)).max(problem.declared.range_sd_m);
-    // What no range tells stays.
-    let mut normal = DMatrix::identity(values.len(), values.len()) / REACH.powi(2);
-    let mut right = DVector::zeros(values.len());
+    let moved = (at - start).remove_rows(0, at.len() - values.len());
+    let mut normal = DMatrix::identity(values.len(), values.len()) / within.powi(2);
+    let mut right = -moved / within.powi(2);
     for Row { off_m, by_number } in &rows {
         let x = off_m / (BIWEIGHT * sd_m);
         let weight = if x.abs() < 1.0 { ((1.0 - x * x) / sd_m).powi(2) } else { 0.0 };

@@ -19,6 +19,8 @@ const LONGER: usize = 3;
 const WORTH_MORE: f64 = 3.0;
 /// How far the shape of a start is moved, in felt steps.
 const SHAPE_STEPS: [f64; 3] = [4.0, 2.0, 1.0];
+/// How far from a start the ranges may put the target where they tell nothing, in felt steps.
+const WITHIN: [f64; 2] = [1.0, 10.0];
 /// Strengths of a start that are tried.
 const STRENGTHS: [f64; 6] = [0.3, 1.0, 3.0, 7.0, 12.0, 20.0];
 /// Of the starts that are followed none promises less than this share of what the best does.
@@ -216,9 +218,10 @@ impl Selection<'_> {
         start: &mut DVector<f64>,
     ) {
         let ln_p = |at: &DVector<f64>| sum(&screen.problem.terms(space, at));
-        let there = ranges::placed(&self.problem, space, effect, start);
-        if ln_p(&there) > ln_p(start) {
-            *start = there;
+        let there = WITHIN.map(|steps| ranges::placed(&self.problem, space, effect, start, steps));
+        let all = there.into_iter().chain([start.clone()]).map(|at| (ln_p(&at), at));
+        if let Some(best) = all.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            *start = best.1;
         }
     }
 

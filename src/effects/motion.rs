@@ -1,5 +1,6 @@
-//! A target that moves during the scan: a shift Σ a_k·cos(kπp) along each axis, with k = 0 to 8 and p the
-//! share of the scan that is over. Few cosines make any smooth path.
+//! A target that moves during the scan: along each axis a shift Σ a_k·φ_k(p) with p the share of the scan that is
+//! over. φ_0 to φ_7 are cos(kπp); φ_8 and φ_9 what such cosines leave of a line and of a parabola,
+//! so that paths whose ends slope converge as 1/k⁴ and not as 1/k² (Lanczos, Discourse on Fourier Series, 1966).
 
 use std::f64::consts::PI;
 
@@ -12,8 +13,9 @@ use crate::frames::{Global, Pose};
 /// The effect `motion`.
 pub(super) struct Motion;
 
-/// Cosines of a path, the constant among them: up to four cycles a scan.
-const TERMS: usize = 9;
+/// Cosines of a path, the constant among them, and all its terms: up to three and a half cycles a scan.
+const COSINES: usize = 8;
+const TERMS: usize = COSINES + 2;
 const KNOBS: [Knob; 3 * TERMS] = [
     along("x0_m"),
     along("y0_m"),
@@ -42,25 +44,43 @@ const KNOBS: [Knob; 3 * TERMS] = [
     along("x8_m"),
     along("y8_m"),
     along("z8_m"),
+    along("x9_m"),
+    along("y9_m"),
+    along("z9_m"),
 ];
 
 const fn along(axis: &'static str) -> Knob {
     Knob::new(axis, "m", [-0.1, 0.1], 0.0, 2e-3)
 }
 
-/// The axis of a number, and the share of it by which the target has moved.
-fn along_axis(knob: usize, progress: f64) -> (usize, f64) {
-    (knob % 3, ((knob / 3) as f64 * PI * progress).cos())
+/// The terms of a path where a share of the scan is over; all are 1 at its beginning.
+fn terms(progress: f64) -> [f64; TERMS] {
+    let mut cosines = [1.0; COSINES];
+    cosines[1] = (PI * progress).cos();
+    for k in 2..COSINES {
+        cosines[k] = 2.0 * cosines[1] * cosines[k - 1] - cosines[k - 2];
+    }
+    let along = 1.0 - 2.0 * progress;
+    let begin = [1.0; COSINES];
+    let line = left(along, 1, &cosines) / left(1.0, 1, &begin);
+    let parabola = left(0.5 * along * along - 1.0 / 6.0, 2, &cosines) / left(1.0 / 3.0, 2, &begin);
+    let mut terms = [line; TERMS];
+    terms[..COSINES].copy_from_slice(&cosines);
+    terms[COSINES + 1] = parabola;
+    terms
+}
+
+/// What is left of a function beside its cosines, of which that with k half waves has the coefficient
+/// 8/(πk)², for k = first, first + 2, ...
+fn left(function: f64, first: usize, cosines: &[f64; COSINES]) -> f64 {
+    let part = |k: usize| 8.0 / (PI * k as f64).powi(2) * cosines[k];
+    function - (first..COSINES).step_by(2).map(part).sum::<f64>()
 }
 
 /// How far a target has moved, m.
 fn shift_m(values: &[f64], progress: f64) -> DVec3 {
-    let mut shift_m = DVec3::ZERO;
-    for (knob, value) in values.iter().enumerate() {
-        let (axis, share) = along_axis(knob, progress);
-        shift_m[axis] += share * value;
-    }
-    shift_m
+    let axes = values.chunks_exact(3).zip(terms(progress));
+    axes.map(|(values, share)| share * DVec3::from_slice(values)).sum()
 }
 
 impl Effect for Motion {
@@ -100,7 +120,7 @@ impl Effect for Motion {
     }
 
     fn shifts(&self, knob: usize, look: &Look) -> Option<(usize, f64)> {
-        Some(along_axis(knob, look.progress))
+        Some((knob % 3, *terms(look.progress).get(knob / 3)?))
     }
 
     fn motion(&self, values: &[f64], _: &Stage, look: &Look) -> Option<Pose<Global, Global>> {
@@ -112,8 +132,40 @@ impl Effect for Motion {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{DMatrix, DVector};
+
     use super::*;
     use crate::effects::testing::Bench;
+
+    #[test]
+    fn the_last_terms_are_what_cosines_leave_at_the_ends() {
+        const STEPS: usize = 2_000;
+        let middles = (0..STEPS).map(|step| terms((step as f64 + 0.5) / STEPS as f64));
+        let mut sums = [[0.0; TERMS]; TERMS];
+        for terms in middles {
+            for (row, a) in sums.iter_mut().zip(terms) {
+                row.iter_mut().zip(terms).for_each(|(sum, b)| *sum += a * b / STEPS as f64);
+            }
+        }
+        for (i, row) in sums.iter().enumerate() {
+            for (j, sum) in row.iter().enumerate().filter(|(j, _)| *j != i) {
+                assert!(sum.abs() < 1e-5, "{i}, {j}: {sum}");
+            }
+        }
+        assert!(terms(0.0).iter().all(|term| (term - 1.0).abs() < 1e-12));
+    }
+
+    /// A path of two and a half cycles that slopes at both ends.
+    #[test]
+    fn few_terms_make_any_smooth_path() {
+        let path_m = |row: usize| 0.05 * (5.0 * PI * row as f64 / 400.0 + 0.4).sin();
+        let rows: Vec<[f64; TERMS]> = (0..=400).map(|row| terms(f64::from(row) / 400.0)).collect();
+        let matrix = DMatrix::from_fn(rows.len(), TERMS, |row, term| rows[row][term]);
+        let path = DVector::from_fn(rows.len(), |row, _| path_m(row));
+        let values = matrix.clone().svd(true, true).solve(&path, 1e-12).unwrap();
+        let off_m = (matrix * values - path).amax();
+        assert!(off_m < 2e-3, "{off_m}");
+    }
 
     #[test]
     fn the_range_follows_the_path() {

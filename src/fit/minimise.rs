@@ -102,7 +102,7 @@ pub(crate) struct Minimum {
 
 /// How far an unknown is thought to go. One that promises less than the tolerance so far is held: where the cost is flat,
 /// a step would be without measure, and all others would fail with it.
-pub(crate) const REACH: f64 = 10.0;
+const REACH: f64 = 10.0;
 
 /// Smallest, first and largest damping λ, and how it falls and rises.
 const DAMPING: [f64; 3] = [1e-9, 1e-3, 1e9];
