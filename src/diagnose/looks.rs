@@ -215,7 +215,7 @@ fn sorted(
 }
 
 /// The look of a chirp that meets nothing.
-fn missed(chirps: &Chirps, progress: &[f64], index: usize) -> Option<Look> {
+pub(super) fn missed(chirps: &Chirps, progress: &[f64], index: usize) -> Option<Look> {
     let ray = *chirps.rays.get(index)?;
     let hit = Hit { facet: u32::MAX, range_m: 0.0, point: ray.origin, cos_theta: 1.0 };
     Some(Look {

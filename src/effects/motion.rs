@@ -13,7 +13,7 @@ use crate::frames::{Global, Pose};
 /// The effect `motion`.
 pub(super) struct Motion;
 
-/// Cosines of a path, the constant among them, and all its terms: up to three and a half cycles a scan.
+/// Cosines of a path, the constant among them, and all its terms: up to about two and a half cycles a scan.
 const COSINES: usize = 8;
 const TERMS: usize = COSINES + 2;
 const KNOBS: [Knob; 3 * TERMS] = [
@@ -155,10 +155,10 @@ mod tests {
         assert!(terms(0.0).iter().all(|term| (term - 1.0).abs() < 1e-12));
     }
 
-    /// A path of two and a half cycles that slopes at both ends.
+    /// A path of two cycles that slopes at both ends, of which as many cosines leave 12 mm.
     #[test]
     fn few_terms_make_any_smooth_path() {
-        let path_m = |row: usize| 0.05 * (5.0 * PI * row as f64 / 400.0 + 0.4).sin();
+        let path_m = |row: usize| 0.05 * (4.0 * PI * row as f64 / 400.0 + 0.4).sin();
         let rows: Vec<[f64; TERMS]> = (0..=400).map(|row| terms(f64::from(row) / 400.0)).collect();
         let matrix = DMatrix::from_fn(rows.len(), TERMS, |row, term| rows[row][term]);
         let path = DVector::from_fn(rows.len(), |row, _| path_m(row));
