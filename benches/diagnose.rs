@@ -11,11 +11,17 @@ use std::process::Command;
 use std::time::Instant;
 
 /// What is hidden in a scan: its name, and what the scene that made it says of it.
-const HIDDEN: [(&str, &str); 6] = [
+const HIDDEN: [(&str, &str); 8] = [
     ("nothing", ""),
     ("drift", "[[radar.effect]]\nname = 'drift'\nslope_db = 2.0\n"),
     ("foreign-patch", "[[effect]]\nname = 'foreign-patch'\nlevel_db = 6.0\ncentre_y_m = 0.2\n"),
     ("pose", "[[effect]]\nname = 'pose'\nrotation_y_deg = 0.3\n"),
+    ("motion", "[[effect]]\nname = 'motion'\nz1_m = 0.02\nx2_m = -0.01\ny3_m = 0.005\n"),
+    (
+        "motion, fov-gain",
+        "[[effect]]\nname = 'motion'\nz1_m = 0.02\nx2_m = -0.01\n\
+         [[radar.effect]]\nname = 'fov-gain'\nedge_db = -3.0\n",
+    ),
     ("finite-spot", "[[radar.effect]]\nname = 'finite-spot'\ndiameter_m = 0.03\n"),
     ("multi-bounce", "[[effect]]\nname = 'multi-bounce'\ncoupling_db = 10.0\n"),
 ];

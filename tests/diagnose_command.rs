@@ -255,6 +255,10 @@ fn nothing_detected_and_scenes_that_no_diagnosis_predicts_are_said() {
         assert!(message.contains("more.toml") && message.contains(way_out), "{message}");
         assert!(!at.join("more").exists());
     }
+    fs::write(at.join("more.toml"), scene.replace("looks = 4", "looks = 4\ncoherent_ratio = 2"))
+        .unwrap();
+    let coherent = ["diagnose", "out/cloud.ply", "--scene", "more.toml", "-o", "more"];
+    assert!(refused(matdb(at).args(coherent)).contains("`coherent_ratio`"));
     let unknown = ["diagnose", "out/cloud.ply", "--scene", "scene.toml", "-o", "more"];
     let message = refused(matdb(at).args(unknown).args(["--effects", "unknown"]));
     assert!(message.contains("always looked for"), "{message}");
@@ -396,4 +400,19 @@ fn a_scan_without_times_is_diagnosed_without_what_goes_with_time() {
     let mut found = left_out().as_array().unwrap().clone();
     found.sort_by_key(|one| one["name"].to_string());
     assert_eq!(found, untimed);
+    // Without ranges nothing tells where the target is.
+    let scene = fs::read_to_string(at.join("scene.toml")).unwrap();
+    fs::write(at.join("unranged.toml"), scene.replace("range_sd_m = 0.002", "range_sd_m = 0"))
+        .unwrap();
+    let mut all =
+        ["diagnose", "out/cloud.ply", "--scene", "unranged.toml", "-o", "unranged"].to_vec();
+    matdb(at).args(&all).assert().success();
+    let left_out = json(&at.join("unranged/report.json"))["not_tried"].clone();
+    for name in ["pose", "motion"] {
+        let expected = json!({"name": name, "reason": "no-ranges"});
+        assert!(left_out.as_array().unwrap().contains(&expected), "{left_out}");
+    }
+    all.extend(["--effects", "pose"]);
+    let said = refused(matdb(at).args(all));
+    assert!(said.contains("pose cannot be told by powers alone"), "{said}");
 }

@@ -113,6 +113,9 @@ fn what_means_nothing_is_refused_in_a_sentence() {
     fs::write(at.join("bad.csv"), "theta_i_deg,theta_s_deg,brdf_per_sr\n10,20,-1\n").unwrap();
     fs::write(at.join("bad.bsdf"), "Source Measured\n").unwrap();
     fs::write(at.join("few.csv"), "theta_deg,sigma0_db\n0,1\n10,0\n").unwrap();
+    let sweep = (1..40).map(|k| format!("{0},{0},{1}\n", 2 * k, 0.3 + 0.001 * f64::from(k * k)));
+    let head = "theta_i_deg,theta_s_deg,brdf_per_sr\n".to_owned();
+    fs::write(at.join("sweep.csv"), head + &sweep.collect::<String>()).unwrap();
     for (arguments, says) in [
         (
             vec!["x.ply", "--curve", "coating.csv"],
@@ -124,6 +127,7 @@ fn what_means_nothing_is_refused_in_a_sentence() {
         (vec!["--curve", "coating.csv", "--model", "lamber"], "did you mean `lambert`?"),
         (vec!["--curve", "coating.csv", "--effects", "stray"], "no effect `stray`"),
         (vec!["--curve", "coating.csv", "--noise-db", "0"], "above 0 and up to 100"),
+        (vec!["--curve", "sweep.csv"], "the levels tell no noise"),
         (vec!["--curve", "few.csv"], "2 detected levels"),
     ] {
         let mut command = vec!["diagnose", "-o", "out"];

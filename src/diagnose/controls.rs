@@ -34,7 +34,7 @@ pub(super) fn controls(
 }
 
 fn placebo(selection: &Selection, base: &State, numbers: usize) -> Option<Control> {
-    let placebo = Placebo::new(numbers, selection.settings.seed, 0);
+    let placebo = Placebo::new(numbers, selection.settings.seed);
     let mut space = base.space.clone();
     space.effects.push(&placebo);
     let zero = vec![0.0; placebo.knobs().len()];

@@ -203,14 +203,19 @@ impl Field {
     }
 }
 
-/// Every look's part of the likelihood with factors on the means.
-pub(super) fn terms(problem: &Problem, prediction: &Prediction, ln_factor: &[f64]) -> Vec<Term> {
-    let mut prediction = prediction.clone();
+/// With factors on the mean powers of the first looks, of which the logarithms are given.
+pub(super) fn scaled(mut prediction: Prediction, ln_factor: &[f64]) -> Prediction {
     for (arrived, ln_factor) in prediction.arrived.iter_mut().zip(ln_factor) {
         if let Some(arrived) = arrived {
             arrived.power_w *= ln_factor.exp();
         }
     }
+    prediction
+}
+
+/// Every look's part of the likelihood with factors on the means.
+pub(super) fn terms(problem: &Problem, prediction: &Prediction, ln_factor: &[f64]) -> Vec<Term> {
+    let prediction = scaled(prediction.clone(), ln_factor);
     let likelihood = Likelihood::new(&prediction, problem.declared);
     let seen = problem.observations.iter().enumerate();
     seen.map(|(look, seen)| likelihood.term(look, seen)).collect()

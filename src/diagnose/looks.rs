@@ -256,11 +256,22 @@ impl Directions {
     }
 
     /// By how much most chirp numbers are too high; `None` where they are not, all alike. A cloud that is
-    /// out of place lies on rays to either side, as the scan goes to and fro.
+    /// out of place lies on rays to either side, as the scan goes to and fro, and one that lies on its own rays
+    /// may lie on those of a second pass as well.
     fn number_off(&self, chirps: &Chirps, cloud: &Cloud) -> Option<i64> {
+        /// As much nearer to another ray as f32 in a file may round a point.
+        const NEARER_M: f64 = 1e-5;
+        let index_of_sent: HashMap<u32, usize> = chirps.number.iter().copied().zip(0..).collect();
+        let beside_m = |point: &CloudPoint, chirp: u32| {
+            let ray = chirps.rays.get(*index_of_sent.get(&chirp)?)?;
+            Some(beside(point, ray).length())
+        };
         let off = |point: &CloudPoint| {
-            let nearest = self.chirp(chirps, point.point)?;
-            Some(i64::from(point.chirp?) - i64::from(nearest))
+            let (own, nearest) = (point.chirp?, self.chirp(chirps, point.point)?);
+            let is_own = beside_m(point, own)
+                .zip(beside_m(point, nearest))
+                .is_some_and(|(own_m, nearest_m)| own_m <= nearest_m + NEARER_M);
+            Some(if is_own { 0 } else { i64::from(own) - i64::from(nearest) })
         };
         let mut counts: HashMap<i64, usize> = HashMap::new();
         for off in cloud.points().par_iter().filter_map(off).collect::<Vec<_>>() {

@@ -242,6 +242,15 @@ pub enum DiagnoseError {
         /// Their names.
         effects: String,
     },
+    /// Effects that move the target, of a scene without an error of ranges.
+    #[error(
+        "the scene states no error of ranges, and {effects} cannot be told by powers alone; give `range_sd_m` \
+         under [radar.noise]"
+    )]
+    Unranged {
+        /// Their names.
+        effects: String,
+    },
     /// A law that fits nowhere.
     #[error(
         "the refitted model is far off at {wild} of {looks} chirps, as for another target or power \
@@ -370,15 +379,20 @@ impl Diagnosis {
         unexplained.extend(residual::lopsided(&z_after, sd_db));
         unexplained.sort_by(|a, b| b.strength_db.total_cmp(&a.strength_db));
         let (parameters, effects) = values(&problem, &state, added);
+        let with_unknown = is_structured
+            .then(|| selection.held_out_with(&state.space, &state.fitted.at, &structure.ln_factor));
+        let errors = |scored: &[score::Scored]| score::errors(scored, &folds);
         let error = before_after(
-            score::errors(&before, &folds),
-            score::errors(&state.held_out, &folds),
+            [&before, &state.held_out].map(|scored| errors(scored)),
+            with_unknown.as_deref().map(errors),
             &folds,
         );
         let base = Base {
             parameters,
             looks: receiver.looks,
             threshold_dbm: dbm_from_watts(declared.threshold_w),
+            noise_dbm: (receiver.noise_w > 0.0).then(|| dbm_from_watts(receiver.noise_w)),
+            range_sd_m: declared.range_sd_m,
             pose: subject.pose.to_vec(),
             converged: state.fitted.converged,
         };
@@ -495,24 +509,38 @@ fn values(
     let mut sds = sd.iter().skip(space.base_len());
     let effects = space.effects.iter().zip(space.effect_values(at)).zip(added);
     let found = effects.map(|((effect, values), added)| {
+        let place = effect.place(&values);
         let knobs = effect.knobs().iter().zip(values).zip(sds.by_ref());
         let value = |((knob, value), sd): ((&Knob, f64), &f64)| {
             (knob.name, Value { value, sd: finite(sd * knob.step), unit: knob.unit })
         };
-        let parameters = Parameters::new(knobs.map(value).collect(), problem.looks);
+        let parameters = Parameters::new(knobs.map(value).collect(), place, problem.looks);
         let select::Added { class, evidence, .. } = added;
-        Found { name: effect.name(), level: effect.level(), class, parameters, evidence }
+        Found { name: effect.name(), level: effect.level(), class, parameters, place, evidence }
     });
     let found = found.collect();
     (base.collect(), found)
 }
 
-fn before_after(before: Errors, after: Errors, folds: &Folds) -> BeforeAfter {
+fn before_after(
+    [before, after]: [Errors; 2],
+    with_unknown: Option<Errors>,
+    folds: &Folds,
+) -> BeforeAfter {
     let noise_floor_db = after.noise_floor_db;
     let excess = before.rmse_db.powi(2) - noise_floor_db.powi(2);
     let removed = before.rmse_db.powi(2) - after.rmse_db.powi(2);
     let is_above = before.rmse_db > score::AT_THE_FLOOR * noise_floor_db;
     let explained_share = is_above.then_some(removed / excess);
     let Folds { folds, blocks, .. } = *folds;
-    BeforeAfter { before, after, noise_floor_db, explained_share, folds, blocks, held_out: true }
+    BeforeAfter {
+        before,
+        after,
+        with_unknown,
+        noise_floor_db,
+        explained_share,
+        folds,
+        blocks,
+        held_out: true,
+    }
 }

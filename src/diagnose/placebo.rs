@@ -21,8 +21,8 @@ pub(super) struct Placebo {
 
 impl Placebo {
     /// With up to six numbers.
-    pub fn new(numbers: usize, seed: u64, draw: u64) -> Placebo {
-        let mut draws = Key { seed, chirp: draw, sub_ray: 2, purpose: Purpose::Fit }.draws();
+    pub fn new(numbers: usize, seed: u64) -> Placebo {
+        let mut draws = Key { seed, chirp: 0, sub_ray: 2, purpose: Purpose::Fit }.draws();
         let wave = |_| {
             let [shortest, longest] = WAVES_M;
             let length_m = shortest * (longest / shortest).powf(draws.uniform());

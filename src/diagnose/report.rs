@@ -2,12 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
 use serde::Serialize;
 
 use super::{Candidate, Errors, Unexplained};
 use crate::brdf::Brdf;
-use crate::effects::{Level, Look, along_m};
+use crate::effects::{Level, Look, Place};
 
 /// The answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -67,7 +66,11 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    pub(super) fn new(numbers: BTreeMap<&'static str, Value>, looks: &[Look]) -> Parameters {
+    pub(super) fn new(
+        numbers: BTreeMap<&'static str, Value>,
+        place: Option<Place>,
+        looks: &[Look],
+    ) -> Parameters {
         let mut triples = BTreeMap::new();
         for (name, unit) in [("translation_m", "m"), ("rotation_deg", "deg")] {
             let (stem, end) = name.split_once('_').unwrap_or((name, ""));
@@ -77,27 +80,10 @@ impl Parameters {
                 triples.insert(name, Triple { value: [x.value, y.value, z.value], sd, unit });
             }
         }
-        if let (Some(x), Some(y)) = (numbers.get("centre_x_m"), numbers.get("centre_y_m")) {
-            let off = |look: &&Look| (look.xt_m - x.value).hypot(look.yt_m - y.value);
-            let nearest = looks.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-            if let Some(look) = nearest {
-                let value = look.hit.point.xyz.to_array();
-                triples.insert("centre_m", Triple { value, sd: None, unit: "m" });
-            }
-        }
-        let border = numbers.get("boundary_m").zip(numbers.get("direction_deg"));
-        if let Some((boundary, direction)) = border {
-            let is_beyond = |look: &&Look| along_m(look, direction.value) > boundary.value;
-            let points: Vec<DVec3> =
-                looks.iter().filter(is_beyond).map(|look| look.hit.point.xyz).collect();
-            let least = points.iter().copied().reduce(DVec3::min);
-            let most = points.iter().copied().reduce(DVec3::max);
-            if let Some((least, most)) = least.zip(most) {
-                for (name, value) in
-                    [("centre_m", 0.5 * (least + most)), ("extent_m", most - least)]
-                {
-                    triples.insert(name, Triple { value: value.to_array(), sd: None, unit: "m" });
-                }
+        if let Some((centre, extent)) = place.and_then(|place| place.on_target_m(looks)) {
+            let told = [("centre_m", Some(centre)), ("extent_m", extent)];
+            for (name, value) in told.into_iter().filter_map(|(name, at)| Some((name, at?))) {
+                triples.insert(name, Triple { value: value.to_array(), sd: None, unit: "m" });
             }
         }
         Parameters { numbers, triples }
@@ -117,7 +103,7 @@ impl std::ops::Deref for Parameters {
 pub struct Evidence {
     /// Gain in ln likelihood over the model before.
     pub gain: f64,
-    /// The largest gain of a placebo with as many numbers, but at most six.
+    /// The gain of a placebo with as many numbers, but at most six.
     pub placebo_gain: f64,
     /// Gain in ln p of held-out patches.
     pub held_out_gain: f64,
@@ -138,6 +124,9 @@ pub struct Found {
     pub class: Vec<&'static str>,
     /// Its numbers by name, fitted together with everything else.
     pub parameters: Parameters,
+    /// The part of the target where it acts; none where it acts everywhere.
+    #[serde(skip)]
+    pub place: Option<Place>,
     /// Why it was added.
     pub evidence: Evidence,
 }
@@ -149,6 +138,9 @@ pub struct BeforeAfter {
     pub before: Errors,
     /// With the effects.
     pub after: Errors,
+    /// With the effects and the smooth term of what is unknown, which has not seen a patch that it is judged
+    /// on either; none where nothing of that kind is left.
+    pub with_unknown: Option<Errors>,
     /// The rmse of a model that is right, dB.
     pub noise_floor_db: f64,
     /// (before − after)/(before − floor) of the squared rmse; none where before is at the floor.
@@ -164,7 +156,7 @@ pub struct BeforeAfter {
 /// A law's number as fitted.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BaseValue {
-    /// First region whose law it is.
+    /// Region whose law it is.
     pub region: usize,
     /// Its name.
     pub name: String,
@@ -193,6 +185,10 @@ pub struct Base {
     pub looks: f64,
     /// Threshold, dBm, as declared.
     pub threshold_dbm: f64,
+    /// Thermal noise, dBm, as declared; none where there is none.
+    pub noise_dbm: Option<f64>,
+    /// Standard deviation of a range, m, as declared; 0 where ranges are not used.
+    pub range_sd_m: f64,
     /// Where the meshes stand, as declared; a diagnosis leaves them there.
     pub pose: Vec<MeshPose>,
     /// Whether the final fit converged.

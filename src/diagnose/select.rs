@@ -14,7 +14,7 @@ use nalgebra::DVector;
 use serde::Serialize;
 
 use super::covariates::covariates;
-use super::field::{Field, Structure, terms};
+use super::field::{Field, Structure, scaled, terms};
 use super::folds::Folds;
 use super::placebo::Placebo;
 use super::refit::{Fitted, Problem, Space, sum};
@@ -40,8 +40,6 @@ pub(super) const SHARE_OF_FORM: f64 = 0.25;
 const FIELD_ERRORS: f64 = 3.0;
 /// Probability by chance of what neighbours have in common.
 const CHANCE: f64 = 1e-3;
-/// Placebos of each comparison.
-const PLACEBOS: u64 = 3;
 /// Effects of one round of which pairs are tried.
 const MOST_PAIRED: usize = 4;
 /// Difference in ln p of all held-out looks that tells no two effects apart: odds of twenty to one.
@@ -434,31 +432,40 @@ impl Selection<'_> {
         self.folds.sum(&differences)
     }
 
+    /// What a placebo with so many numbers promises.
     pub(super) fn placebo_gain(&self, state: &State, screen: &Screen, numbers: usize) -> f64 {
-        let gain = |draw: u64| {
-            let placebo = Placebo::new(numbers, self.settings.seed, draw);
-            let mut space = state.space.clone();
-            space.effects.push(&placebo);
-            let knobs = placebo.knobs();
-            let only = |k: usize| {
-                let values: Vec<f64> = knobs
-                    .iter()
-                    .enumerate()
-                    .map(|(i, knob)| if i == k { knob.step } else { 0.0 })
-                    .collect();
-                Space::joined(&state.fitted.at, &placebo, &values)
-            };
-            screen.promise_of_all(&space, &(0..knobs.len()).map(only).collect::<Vec<_>>())
+        let placebo = Placebo::new(numbers, self.settings.seed);
+        let mut space = state.space.clone();
+        space.effects.push(&placebo);
+        let knobs = placebo.knobs();
+        let only = |k: usize| {
+            let values: Vec<f64> = knobs
+                .iter()
+                .enumerate()
+                .map(|(i, knob)| if i == k { knob.step } else { 0.0 })
+                .collect();
+            Space::joined(&state.fitted.at, &placebo, &values)
         };
-        (0..PLACEBOS).map(gain).fold(0.0, f64::max)
+        let starts: Vec<_> = (0..knobs.len()).map(only).collect();
+        screen.promise_of_all(&space, &starts).max(0.0)
     }
 
     /// Every look, predicted by a fit without its fold.
     pub(super) fn held_out(&self, space: &Space, at: &DVector<f64>) -> Vec<Scored> {
+        self.held_out_with(space, at, &[])
+    }
+
+    /// The same with factors on the means, of which the logarithms are given.
+    pub(super) fn held_out_with(
+        &self,
+        space: &Space,
+        at: &DVector<f64>,
+        ln_factor: &[f64],
+    ) -> Vec<Scored> {
         let Problem { declared, observations, .. } = self.problem;
         let mut all: Vec<(usize, Scored)> = Vec::new();
         for (fold, at) in self.problem.fit_without(space, at, self.folds).enumerate() {
-            let prediction = self.problem.predict(space, &at);
+            let prediction = scaled(self.problem.predict(space, &at), ln_factor);
             let held_out = |look: usize| self.folds.fold.get(look) == Some(&fold);
             all.extend(scored(&prediction, declared, observations, &held_out));
         }

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::*;
 use crate::brdf::{BlinnPhong, CookTorrance, Distribution, Mixture, Shadowing};
-use crate::effects::{Knob, Level, Model, find};
+use crate::effects::{Knob, Level, Model, Place, find};
 use crate::frames::{Point, Ray};
 use crate::geometry::Mesh;
 use crate::radar::random::{Key, Purpose};
@@ -259,7 +259,8 @@ fn a_target_that_has_moved_far_is_found_by_its_ranges() {
     let found = &report.effects[0].parameters;
     for (name, m) in way_m {
         let Value { value, sd, .. } = found[name];
-        assert!((value - m).abs() < 4.0 * sd.unwrap(), "{name}: {:?}", found[name]);
+        let sd = sd.unwrap();
+        assert!((value - m).abs() < 4.0 * sd && sd < 0.02, "{name}: {:?}", found[name]);
     }
     // Along the plate the target's place is seen by the sphere, which the scan passes in between.
     let values: Vec<f64> = library[1].knobs().iter().map(|knob| found[knob.name].value).collect();
@@ -298,6 +299,33 @@ fn what_no_effect_explains_is_called_unexplained() {
     let stripe = |row: &Row| row.unknown_db * (9.0 * row.xt_m).sin().signum();
     let mean_db = report.rows.iter().map(stripe).sum::<f64>() / report.rows.len() as f64;
     assert!((0.4..1.3).contains(&mean_db), "{mean_db}");
+}
+
+#[test]
+fn places_are_on_the_target() {
+    let (radar, mesh) = (Radar::default(), target());
+    let bvh = Bvh::new(&mesh);
+    let regions = vec![0; mesh.facets.len()];
+    let stage = Stage {
+        radar: &radar,
+        link: Link::new(&radar),
+        bvh: &bvh,
+        region_of_facet: &regions,
+        grain_of_region: &[DVec3::Y],
+        middle: DVec3::new(0.0, 1.1, 0.0),
+    };
+    let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
+    let (plate_z_m, on_sphere_z_m) = (0.0, 0.1 + 0.35);
+    let round = Place::Round { x_m: 0.1, y_m: 0.0, radius_m: 0.1 };
+    let (centre, extent) = round.on_target_m(&looks).unwrap();
+    assert!(extent.is_none() && (centre.z - on_sphere_z_m).abs() < 0.01, "{centre}");
+    // Left of the sphere there is the plate alone, to x = −0.45 m.
+    let beyond = Place::Beyond { off_m: 0.3, direction_deg: 180.0 };
+    let (centre, extent) = beyond.on_target_m(&looks).unwrap();
+    let extent = extent.unwrap();
+    assert!((centre.z - plate_z_m).abs() < 1e-6 && extent.z < 1e-6, "{centre} {extent}");
+    assert!((centre.x - 0.5 * extent.x + 0.45).abs() < 0.02 && extent.y > 0.8, "{centre} {extent}");
+    assert_eq!(Place::Beyond { off_m: 2.0, direction_deg: 0.0 }.on_target_m(&looks), None);
 }
 
 #[test]
@@ -394,6 +422,21 @@ fn a_cloud_finds_its_looks() {
         let refused = matched(&Cloud::new(points).unwrap(), &chirps(&radar), &looks);
         let Err(DiagnoseError::Misnumbered { off: found }) = refused else { panic!("{refused:?}") };
         assert_eq!(found, i64::from(off));
+    }
+    // A scan that goes twice over its rays has two chirps for every place.
+    let once = chirps(&radar);
+    let mut passes = once.clone();
+    passes.rays.extend_from_slice(&once.rays);
+    passes.number.extend(once.number.iter().map(|number| number + (SIDE * SIDE) as u32));
+    passes.time_s.extend_from_slice(&once.time_s);
+    let looks_twice = super::looks::looks(&stage, &radar, &passes).unwrap();
+    for first in [0, (SIDE * SIDE) as u32] {
+        let of_pass = numbered.points()[..8]
+            .iter()
+            .map(|point| CloudPoint { chirp: point.chirp.map(|chirp| chirp + first), ..*point });
+        let cloud = Cloud::new(of_pass.collect()).unwrap();
+        let found = matched(&cloud, &passes, &looks_twice).unwrap();
+        assert_eq!(found.observations.iter().filter(|o| o.power_w.is_some()).count(), 8);
     }
     // As are the numbers of rows.
     let given = |points: Vec<CloudPoint>| {

@@ -1,7 +1,7 @@
 //! A layer over part of the target, such as clothing: −loss/cos θ dB beyond a line across the field of
 //! view, which is a plane through the radar.
 
-use super::{Effect, Knob, Level, Look, Stage};
+use super::{Effect, Knob, Level, Look, Place, Stage};
 use crate::units::ratio_from_db;
 
 /// The effect `covering-layer`.
@@ -17,7 +17,7 @@ const KNOBS: [Knob; 3] = [
 const LEAST_COS_THETA: f64 = 0.02;
 
 /// How far a look lies from the field's centre, m, along `direction_deg` from x_t towards y_t.
-pub(crate) fn along_m(look: &Look, direction_deg: f64) -> f64 {
+pub(super) fn along_m(look: &Look, direction_deg: f64) -> f64 {
     let (sin, cos) = direction_deg.to_radians().sin_cos();
     look.xt_m * cos + look.yt_m * sin
 }
@@ -68,6 +68,11 @@ impl Effect for CoveringLayer {
             .iter()
             .flat_map(|&side| [1.0 / 3.0, 2.0 / 3.0].map(|share| line(side, share)))
             .collect()
+    }
+
+    fn place(&self, values: &[f64]) -> Option<Place> {
+        let &[_, off_m, direction_deg] = values else { return None };
+        Some(Place::Beyond { off_m, direction_deg })
     }
 
     fn gain(&self, values: &[f64], stage: &Stage, look: &Look) -> f64 {

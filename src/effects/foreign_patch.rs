@@ -1,7 +1,7 @@
 //! A round place with another material: so many dB within a radius along the surface.
 
 use super::covering_layer::share_of_spot;
-use super::{Effect, Knob, Level, Look, Stage};
+use super::{Effect, Knob, Level, Look, Place, Stage};
 use crate::frames::{Direction, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::units::ratio_from_db;
@@ -101,6 +101,11 @@ impl Effect for ForeignPatch {
             }
         }
         starts
+    }
+
+    fn place(&self, values: &[f64]) -> Option<Place> {
+        let &[_, x_m, y_m, radius_m, _] = values else { return None };
+        Some(Place::Round { x_m, y_m, radius_m })
     }
 
     fn gain(&self, values: &[f64], stage: &Stage, look: &Look) -> f64 {

@@ -19,6 +19,7 @@ mod entry;
 mod lobes;
 mod meeting;
 mod model;
+mod place;
 mod spread;
 mod tilt;
 
@@ -32,11 +33,11 @@ use crate::radar::{Link, Radar};
 use crate::trace::{Bvh, Hit};
 
 pub use ceiling::{Ceiling, Passed, Saturating};
-pub(crate) use covering_layer::along_m;
 pub use declared::SceneEffects;
 pub(crate) use entry::rank;
 pub use entry::{Chosen, EffectError, entry, resolve};
 pub use model::{Model, Prediction, Tilts, Traced};
+pub use place::Place;
 pub use tilt::tilted_cos_theta;
 
 /// Declares the file of every effect and lists them all, in the order in which they act.
@@ -230,6 +231,11 @@ pub trait Effect: Sync {
     /// What it does to the data and how to tell it from its neighbours, for a person.
     fn shows(&self) -> &'static str;
 
+    /// What its values come to, for a person, where they are too many to be read one by one.
+    fn told(&self, _values: &[f64]) -> Option<String> {
+        None
+    }
+
     /// Where a search for it begins: values that are present but weak. Several where one start would
     /// miss it, such as places over the target.
     fn starts(&self, stage: &Stage, looks: &[Look]) -> Vec<Vec<f64>>;
@@ -257,6 +263,11 @@ pub trait Effect: Sync {
         _stage: &Stage,
         _look: &Look,
     ) -> Option<Pose<Global, Global>> {
+        None
+    }
+
+    /// The part of the target where it acts; `None` where it acts everywhere.
+    fn place(&self, _values: &[f64]) -> Option<Place> {
         None
     }
 

@@ -97,13 +97,25 @@ impl Effect for Motion {
     }
 
     fn is(&self) -> &'static str {
-        "The target moves slowly while the scan runs, as a person who sways or breathes."
+        "The target moves slowly while the scan runs, as a person who sways or breathes: along each axis of the \
+         scene by the sum of ten terms that all are 1 as the scan begins, with p for the share of it that is over. 0 to 7 are \
+         cos(kπp), 8 and 9 what these leave of a line and of a parabola."
     }
 
     fn shows(&self) -> &'static str {
         "The ranges are off by an amount that changes smoothly along the scan, and places that the \
          mirror passes twice disagree. A wrong pose is off alike from the first chirp to the last; a \
          drift of the gain leaves the ranges as they are."
+    }
+
+    fn told(&self, values: &[f64]) -> Option<String> {
+        const STEPS: u32 = 500;
+        let way_m = || (0..=STEPS).map(|step| shift_m(values, f64::from(step) / f64::from(STEPS)));
+        let span_m = way_m().reduce(DVec3::max)? - way_m().reduce(DVec3::min)?;
+        let [x_mm, y_mm, z_mm] = (1e3 * span_m).to_array();
+        Some(format!(
+            "a path that spans {x_mm:.1} mm along x, {y_mm:.1} mm along y and {z_mm:.1} mm along z"
+        ))
     }
 
     /// At rest: ranges say at once where to.
@@ -178,5 +190,7 @@ mod tests {
             let nearer_m = (look.hit.range_m - found.hit.range_m) * look.hit.cos_theta;
             assert!((nearer_m - expected_m).abs() < 1e-9, "{progress}: {nearer_m}");
         }
+        let told = Motion.told(&values).unwrap();
+        assert!(told.ends_with("0.0 mm along x, 0.0 mm along y and 8.0 mm along z"), "{told}");
     }
 }

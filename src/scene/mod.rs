@@ -206,7 +206,8 @@ fn check_pixel(
 pub fn read_text(path: &Path) -> Result<String, SceneError> {
     String::from_utf8(read(path, "")?).map_err(|error| {
         let place = format!("byte {}", error.utf8_error().valid_up_to());
-        let error = FormatError::at(place, "the text is not UTF-8", "save the file as UTF-8");
+        let way_out = "a scene is a text file in UTF-8; were cloud and scene swapped?";
+        let error = FormatError::at(place, "the text is not UTF-8", way_out);
         SceneError::Format { file: path.to_owned(), error }
     })
 }

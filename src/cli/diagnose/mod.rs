@@ -32,17 +32,17 @@ use crate::diagnose::{
 use crate::effects::{Effect, Receiver, Stage, middle};
 use crate::error::Error;
 use crate::measure::{Cloud, CloudError};
-use crate::radar::{Link, Radar};
+use crate::radar::{Link, Pattern, Radar};
 use crate::scene::file::MeshEntry;
 use crate::scene::{Scene, read_text};
 use crate::trace::Bvh;
 use crate::units::watts_from_dbm;
 use cannot_tell::CannotTell;
 use earlier::Earlier;
-use plots::Place;
+use plots::Peak;
 use publish::{Publication, material_file};
 use takers::Cast;
-use tried::{Choice, NotTried, Reason};
+use tried::{Choice, NotTried, Reason, Told};
 
 /// Find the physical effect that a scene lacks to explain a measured cloud, or a law a measured curve
 #[derive(Debug, clap::Args)]
@@ -112,7 +112,7 @@ struct Context {
     /// Effects that were left out.
     not_tried: Vec<NotTried>,
     /// Where something unknown is strongest.
-    places: Vec<Place>,
+    places: Vec<Peak>,
     seed: u64,
     /// This command, as a person would type it again.
     command: String,
@@ -175,7 +175,9 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     let cast = Cast { used: &used, names: &names, of_region: &material_of_region };
     // A diagnosis takes a while: what hinders its storing is said before.
     let inputs = names.iter().map(|name| material_file(name)).chain([after::AFTER.to_owned()]);
-    earlier::check(&args.output, &asked.read(), &inputs.collect::<Vec<_>>())?;
+    let named = files_of(&scene, path);
+    let read = asked.read().into_iter().chain(named.iter().map(PathBuf::as_path));
+    earlier::check(&args.output, &read.collect::<Vec<_>>(), &inputs.collect::<Vec<_>>())?;
     let wanted = cast.wanted(args.material.as_deref())?;
     if args.add {
         after::check_beside(path)?;
@@ -184,11 +186,18 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     let declared = super::staging::effects(&scene, path, cast.used, cast.of_region)?;
     let at_work = model(&declared, &scene, cast.used, cast.of_region);
     let at_work = at_work.as_ref().map_or(&[][..], |model| &model.effects);
-    let choice = Choice::new(&effects, at_work, scene.chirps.is_timed());
-    let untimed = choice.left_out(Reason::NoTimes);
-    if !untimed.is_empty() && !args.effects.is_empty() {
-        let effects = untimed.join(" and ");
+    let (_, Declared { range_sd_m, .. }) = receiver(scene.radar());
+    let told = Told { times: scene.chirps.is_timed(), ranges: range_sd_m > 0.0 };
+    let choice = Choice::new(&effects, at_work, told);
+    let asked_for = |reason: Reason| {
+        let names = choice.left_out(reason);
+        (!names.is_empty() && !args.effects.is_empty()).then(|| names.join(" and "))
+    };
+    if let Some(effects) = asked_for(Reason::NoTimes) {
         return refuse(DiagnoseError::Untimed { effects }, asked, console);
+    }
+    if let Some(effects) = asked_for(Reason::NoRanges) {
+        return refuse(DiagnoseError::Unranged { effects }, asked, console);
     }
     if choice.tried.is_empty() {
         return Err(Error::Usage {
@@ -227,6 +236,17 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     }
 }
 
+/// Files that a scene names: meshes and a scan.
+fn files_of(scene: &Scene, path: &Path) -> Vec<PathBuf> {
+    let meshes = scene.file.mesh.iter().map(|mesh| mesh.file.as_str());
+    let scan = match &scene.radar().scan {
+        Pattern::Rays(explicit) | Pattern::Angles(explicit) => Some(explicit.file.as_str()),
+        _ => None,
+    };
+    let files = meshes.filter(|file| !file.starts_with("builtin:")).chain(scan);
+    files.map(|file| after::folder_of(path).join(file)).collect()
+}
+
 /// Refuses what a scene declares and no diagnosis predicts: it would be found as an effect.
 fn check_declared(scene: &Scene, path: &Path) -> Result<(), Error> {
     let radar = scene.radar();
@@ -234,6 +254,11 @@ fn check_declared(scene: &Scene, path: &Path) -> Result<(), Error> {
         ("several rays in a spot", "set spot.rays = 1 and declare [[radar.effect]] `finite-spot`")
     } else if scene.file.bounce.is_some() {
         ("a second bounce", "replace [bounce] by [[effect]] `multi-bounce`")
+    } else if radar.speckle.is_some_and(|speckle| speckle.coherent_ratio > 0.0) {
+        (
+            "a coherent share of an echo",
+            "leave `coherent_ratio` under [radar.speckle] at 0 and state the `looks` that scatter as much",
+        )
     } else if radar.receiver.is_some() {
         ("a range receiver", "replace [radar.receiver] by [radar.noise] and [radar.speckle]")
     } else if !scene.file.receiver.is_empty() {
@@ -311,7 +336,7 @@ fn context(asked: Asked, scene: &Scene, db: &Database) -> Context {
         after: typed(&args.output.join(after::AFTER)),
         beside: typed(&path.with_file_name(after::name_beside(path))),
         folder: args.output.clone(),
-        is_added: args.add,
+        is_added: false,
         added: Vec::new(),
         replaced: Vec::new(),
         material_files: Vec::new(),

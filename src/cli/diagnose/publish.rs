@@ -63,6 +63,8 @@ impl Publication<'_> {
         for picture in &pictures {
             files.extend(picture.files()?);
         }
+        let homeless = self.homeless(&takers);
+        context.is_added = is_stored && homeless.len() < self.report.effects.len();
         let page = |context: &Context| html::report(self.report, context, &pictures);
         let earlier = Earlier::in_folder(&self.asked.args.output, &self.asked.read());
         if is_stored {
@@ -83,7 +85,6 @@ impl Publication<'_> {
         if !self.report.base.converged {
             console.notice("the final fit did not converge: take the numbers with care");
         }
-        let homeless = self.homeless(&takers);
         if !homeless.is_empty() {
             console.notice(&format!(
                 "kept in the report alone, as no material has the {LEAST_LOOKS} chirps on the target that take {}: {}",

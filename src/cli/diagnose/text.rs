@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use super::plots::Place;
+use super::plots::Peak;
 use super::words::{
-    covariate, gone, listed, not_found, numbers, others, plus_minus, sentence, strongest, verdict,
+    covariate, gone, listed, not_found, numbers, others, plus_minus, sentence, strongest, told,
+    verdict,
 };
 use crate::diagnose::{Errors, Found, Report};
 
@@ -12,7 +13,7 @@ use crate::diagnose::{Errors, Found, Report};
 const MOST_UNEXPLAINED: usize = 3;
 
 /// About ten lines: the verdict, what was found, the error, what is left, where it stands.
-pub(super) fn text(report: &Report, places: &[Place], files: &[String], folder: &Path) -> String {
+pub(super) fn text(report: &Report, places: &[Peak], files: &[String], folder: &Path) -> String {
     let mut text = format!("{}: {}\n", verdict(report.verdict), lower(&sentence(report)));
     text += &report.effects.iter().map(effect).collect::<String>();
     text += &error(report);
@@ -39,8 +40,10 @@ fn lower(sentence: &str) -> String {
 }
 
 fn effect(found: &Found) -> String {
-    let numbers: Vec<String> =
-        numbers(&found.parameters).iter().map(|number| number.join(" = ")).collect();
+    let each = || {
+        let each = numbers(&found.parameters);
+        each.iter().map(|number| number.join(" = ")).collect::<Vec<_>>().join(", ")
+    };
     let others = others(&found.class, found.name);
     let class = match others.is_empty() {
         true => String::new(),
@@ -50,7 +53,7 @@ fn effect(found: &Found) -> String {
         "  {} ({}): {}\n    held-out gain in ln p {}, changes the data by {:.2} dB\n{class}",
         found.name,
         found.level.as_str(),
-        numbers.join(", "),
+        told(found).unwrap_or_else(each),
         plus_minus(found.evidence.held_out_gain, found.evidence.held_out_se),
         found.evidence.size_db
     )
@@ -66,8 +69,11 @@ fn error(report: &Report) -> String {
         true => rms(&error.before),
         false => format!("{} → {}", rms(&error.before), rms(&error.after)),
     };
+    let unknown = error.with_unknown.as_ref().map_or(String::new(), |errors| {
+        format!("; {} dB with a smooth term for what is unknown", rms(errors))
+    });
     format!(
-        "error on held-out patches: {change} dB rms (noise floor {:.2} dB){share}\n",
+        "error on held-out patches: {change} dB rms (noise floor {:.2} dB){share}{unknown}\n",
         error.noise_floor_db
     )
 }

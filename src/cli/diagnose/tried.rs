@@ -15,6 +15,9 @@ pub(super) enum Reason {
     Declared,
     /// It goes with time, which the scan does not tell.
     NoTimes,
+    /// It moves the target, and the scene declares no error of ranges: the pose is trusted unless ranges speak
+    /// against it, and at edges powers alone would move any target.
+    NoRanges,
     /// `--effects` names others.
     NotAsked,
 }
@@ -24,6 +27,7 @@ impl Reason {
         match self {
             Reason::Declared => "declared already, so at work in the model",
             Reason::NoTimes => "the scan has no times",
+            Reason::NoRanges => "the scene states no `range_sd_m` under [radar.noise]",
             Reason::NotAsked => "--effects names others",
         }
     }
@@ -36,6 +40,13 @@ pub(super) struct NotTried {
     pub reason: Reason,
 }
 
+/// What a scan tells beside powers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Told {
+    pub times: bool,
+    pub ranges: bool,
+}
+
 /// The library, sorted out for one scan.
 pub(super) struct Choice {
     pub tried: Vec<&'static dyn Effect>,
@@ -44,15 +55,17 @@ pub(super) struct Choice {
 
 impl Choice {
     /// What can be tried of the effects that are asked for.
-    pub fn new(asked: &[&'static dyn Effect], at_work: &AtWork, is_timed: bool) -> Choice {
+    pub fn new(asked: &[&'static dyn Effect], at_work: &AtWork, told: Told) -> Choice {
         let reason = |effect: &dyn Effect| {
             let is_named = |other: &dyn Effect| other.name() == effect.name();
             if at_work.iter().any(|(declared, _)| is_named(*declared)) {
                 Some(Reason::Declared)
             } else if !asked.iter().any(|other| is_named(*other)) {
                 Some(Reason::NotAsked)
-            } else if !is_timed && effect.goes_with_time() {
+            } else if !told.times && effect.goes_with_time() {
                 Some(Reason::NoTimes)
+            } else if !told.ranges && effect.moves() {
+                Some(Reason::NoRanges)
             } else {
                 None
             }
@@ -71,7 +84,7 @@ impl Choice {
 
     /// Says what is not tried although nobody asked for that.
     pub fn tell(&self, console: &Console) {
-        for reason in [Reason::Declared, Reason::NoTimes] {
+        for reason in [Reason::Declared, Reason::NoTimes, Reason::NoRanges] {
             let names = self.left_out(reason).join(", ");
             if !names.is_empty() {
                 console.notice(&format!("not tried ({}): {names}", reason.words()));
@@ -94,11 +107,14 @@ mod tests {
 
     #[test]
     fn every_effect_is_tried_or_has_a_reason() {
-        let asked = ["fov-gain", "drift", "pose"].map(|name| find(name).unwrap());
-        let choice = Choice::new(&asked, &[(find("pose").unwrap(), Vec::new())], false);
+        let asked = ["fov-gain", "drift", "pose", "motion"].map(|name| find(name).unwrap());
+        let at_work = [(find("pose").unwrap(), Vec::new())];
+        let choice = Choice::new(&asked, &at_work, Told { times: true, ranges: false });
+        assert_eq!(choice.left_out(Reason::NoRanges), ["motion"]);
+        let choice = Choice::new(&asked, &at_work, Told { times: false, ranges: true });
         assert_eq!(choice.tried[0].name(), "fov-gain");
         assert_eq!(choice.left_out(Reason::Declared), ["pose"]);
-        assert_eq!(choice.left_out(Reason::NoTimes), ["drift"]);
+        assert_eq!(choice.left_out(Reason::NoTimes), ["motion", "drift"]);
         assert_eq!(choice.tried.len() + choice.not_tried.len(), library().len());
     }
 }

@@ -1,14 +1,18 @@
 //! Numbers and names of a diagnosis, as a person reads them on the terminal and in the page.
 
-use super::plots::Place;
+use super::plots::Peak;
 use crate::cli::effects::unit;
-use crate::diagnose::{Candidate, Parameters, Report, Triple, Value, Verdict};
-use crate::effects::Level;
+use crate::diagnose::{Candidate, Found, Parameters, Report, Triple, Value, Verdict};
+use crate::effects::{Level, find};
 
 /// How much of the error above the noise floor is gone. The floor is an estimate: what ends below it has nothing left
-/// to explain.
+/// to explain, and what ends as far above it as it began has lost none.
 pub(super) fn gone(share: f64) -> String {
-    if share < 1.0 { format!("{:.0} %", 100.0 * share) } else { "all".to_owned() }
+    match share {
+        1.0.. => "all".to_owned(),
+        0.005.. => format!("{:.0} %", 100.0 * share),
+        _ => "none".to_owned(),
+    }
 }
 
 /// The verdict in a word or two.
@@ -101,6 +105,13 @@ pub(super) fn numbers(parameters: &Parameters) -> Vec<[String; 2]> {
     numbers.chain(triples.map(|(name, three)| [(*name).to_owned(), triple(three)])).collect()
 }
 
+/// What the numbers of an effect come to, where they are too many to be read.
+pub(super) fn told(found: &Found) -> Option<String> {
+    let effect = find(found.name)?;
+    let values = effect.knobs().iter().map(|knob| Some(found.parameters.get(knob.name)?.value));
+    effect.told(&values.collect::<Option<Vec<f64>>>()?)
+}
+
 /// Each effect that was tried and neither found nor as good as one that was, as the last round saw it.
 pub(super) fn not_found(report: &Report) -> impl Iterator<Item = &Candidate> {
     let is_found = |name: &str| {
@@ -115,9 +126,9 @@ pub(super) fn not_found(report: &Report) -> impl Iterator<Item = &Candidate> {
 }
 
 /// Where something unknown is strongest; nothing where there is no such place.
-pub(super) fn strongest(places: &[Place]) -> Option<String> {
-    let place = |place: &Place| {
-        let Place { x_m, y_m, db } = *place;
+pub(super) fn strongest(places: &[Peak]) -> Option<String> {
+    let place = |place: &Peak| {
+        let Peak { x_m, y_m, db } = *place;
         format!("{} dB at x = {} m, y = {} m", signed(db, 1), fixed(x_m, 2), fixed(y_m, 2))
     };
     let places: Vec<String> = places.iter().map(place).collect();
@@ -199,7 +210,7 @@ pub(super) fn covariate(name: &str) -> (String, &'static str) {
         "x_t" => ("x in the target plane", "Something changes across the field of view."),
         "y_t" => ("y in the target plane", "Something changes along the field of view."),
         "distance from centre" => {
-            ("distance from the centre of the field of view", "The gain changes in rings.")
+            ("distance from the middle of the target", "The gain changes in rings.")
         }
         "distance from edge" => ("distance from the nearest edge", "The beam has a width."),
         "progress" => ("time", "Something changed while the scan ran."),
@@ -207,7 +218,7 @@ pub(super) fn covariate(name: &str) -> (String, &'static str) {
         "region" => ("region", "A region has another material than declared."),
         "map" => ("place on the target", "Something stands at one place and not at others."),
         "bearing from centre" => {
-            ("bearing from the centre of the field of view", "The beam or the antenna is lopsided.")
+            ("bearing from the middle of the target", "The beam or the antenna is lopsided.")
         }
         "range residual" => {
             ("measured less expected range", "What is strong or weak also lies elsewhere in range.")

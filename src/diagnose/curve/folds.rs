@@ -98,9 +98,10 @@ fn step_rad(points: &Points) -> f64 {
 
 /// Lag at which the autocorrelation falls below 1/e, rad, at least one step.
 fn correlation_rad(points: &Points, residual_db: &[f64], step_rad: f64) -> f64 {
-    let lag = (1..residual_db.len() / 4)
+    let longest = (residual_db.len() / 4).max(1);
+    let lag = (1..longest)
         .find(|&lag| autocorrelation(points, residual_db, lag) < (-1f64).exp())
-        .unwrap_or(1);
+        .unwrap_or(longest);
     lag as f64 * step_rad
 }
 

@@ -107,6 +107,12 @@ pub enum CurveDiagnoseError {
         /// Their width, degrees.
         width_deg: f64,
     },
+    /// Nothing tells the noise.
+    #[error(
+        "the levels tell no noise: no incidence has three angles, none is repeated and no `sd_db` is \
+         given; state it by --noise-db, or measure more angles of each incidence"
+    )]
+    Noiseless,
     /// A noise that is none.
     #[error("a noise of {noise_db} dB has no meaning; give a value above 0 and up to 100")]
     Noise {
@@ -295,13 +301,16 @@ impl CurveDiagnosis {
         law: &Brdf,
         terms: &[&'static dyn Term],
     ) -> Result<CurveReport, CurveDiagnoseError> {
-        let noise_db = points.noise.sd_db;
-        if !(noise_db > 0.0 && noise_db <= 100.0) {
-            return Err(CurveDiagnoseError::Noise { noise_db });
-        }
         let detected = points.points.iter().filter(|point| !point.censored).count();
         if detected < LEAST_POINTS {
             return Err(CurveDiagnoseError::TooFew { detected });
+        }
+        let noise_db = points.noise.sd_db;
+        if noise_db == f64::INFINITY {
+            return Err(CurveDiagnoseError::Noiseless);
+        }
+        if !(noise_db > 0.0 && noise_db <= 100.0) {
+            return Err(CurveDiagnoseError::Noise { noise_db });
         }
         let model = Model::new(&self.first_fit(points, law)?)?;
         let all = vec![true; points.points.len()];

@@ -62,7 +62,7 @@ pub enum NoiseSource {
 /// Noise of the levels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Noise {
-    /// Standard deviation of a level, dB.
+    /// Standard deviation of a level, dB; infinite where nothing tells it.
     pub sd_db: f64,
     /// How it is known.
     pub source: NoiseSource,
@@ -144,7 +144,10 @@ impl Points {
         of_file: Option<Noise>,
     ) -> Points {
         let declared = noise_db.map(|sd_db| Noise { sd_db, source: NoiseSource::Declared });
-        let estimated = || Noise { sd_db: neighbours(&points), source: NoiseSource::Neighbours };
+        let estimated = || Noise {
+            sd_db: neighbours(&points).unwrap_or(f64::INFINITY),
+            source: NoiseSource::Neighbours,
+        };
         let known = of_file.unwrap_or_else(estimated);
         let known = Noise { sd_db: known.sd_db.max(LEAST_NOISE_DB), ..known };
         let noise = declared.unwrap_or(known);
@@ -209,8 +212,8 @@ fn stated(values: &[InPlane]) -> Option<Noise> {
     Some(Noise { sd_db: square.sqrt(), source: NoiseSource::File })
 }
 
-/// Scatter about the line through the neighbours.
-fn neighbours(points: &[Point]) -> f64 {
+/// Scatter about the line through the neighbours; `None` where no scan has three angles.
+fn neighbours(points: &[Point]) -> Option<f64> {
     let seen: Vec<&Point> = points.iter().filter(|point| !point.censored).collect();
     let off = |three: &[&Point]| match three {
         [a, b, c] if a.scan == c.scan => {
@@ -226,7 +229,7 @@ fn neighbours(points: &[Point]) -> f64 {
     };
     let mut sizes: Vec<f64> = seen.windows(3).filter_map(off).collect();
     sizes.sort_by(f64::total_cmp);
-    sizes.get((BELOW * sizes.len() as f64) as usize).map_or(1.0, |size| size / SIZE)
+    sizes.get((BELOW * sizes.len() as f64) as usize).map(|size| size / SIZE)
 }
 
 /// f of a point, 1/sr.

@@ -141,9 +141,9 @@ fn would_help(error: &CurveDiagnoseError) -> &'static str {
             "More angles, or the same ones at more angles of incidence: runs of neighbouring angles are \
              held out together, and several of them are needed."
         }
-        CurveDiagnoseError::Noise { .. } => {
-            "The scatter of a level, in dB: by --noise-db, from repeats, or left out to be told from \
-             neighbouring angles."
+        CurveDiagnoseError::Noise { .. } | CurveDiagnoseError::Noiseless => {
+            "The scatter of a level, in dB: by --noise-db, from repeats, or told from neighbouring angles, of \
+             which every incidence has three or more."
         }
         CurveDiagnoseError::Fit(_) => "Another law to begin from, by --model.",
     }

@@ -190,7 +190,7 @@ fn base(report: &CurveReport) -> String {
 fn way_on(told: Told) -> String {
     let general = match (told.report.verdict, told.report.effects.is_empty()) {
         (Verdict::NoMissingEffect, _) => {
-            "There is nothing to add. A weak effect may hide in the noise: repeats and more angles show less."
+            "There is nothing to add. A weak effect may hide in the noise: repeats and more angles show weaker ones."
         }
         (_, false) => {
             "The verdict is about the law that the curve was held against: another one (--model) may \

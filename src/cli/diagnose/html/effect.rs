@@ -3,11 +3,11 @@
 use super::page::{escaped, list, meanings, numbers, paragraph, quiet, table, words};
 use crate::cli::diagnose::curve::words::numbers as of_term;
 use crate::cli::diagnose::words::{
-    belongs, digits, fixed, in_unit, listed, numbers as of_effect, others, plus_minus,
+    belongs, digits, fixed, in_unit, listed, numbers as of_effect, others, plus_minus, told,
 };
 use crate::diagnose::curve::{CurveEvidence, CurveFound, term};
 use crate::diagnose::{Evidence, Found};
-use crate::effects::{Knob, Level, find};
+use crate::effects::{Knob, Level, Place, find};
 
 /// An effect as the page shows it: what it is, its numbers, why it was added, what it could be instead.
 struct Article<'a> {
@@ -30,17 +30,16 @@ struct Article<'a> {
 pub(super) fn of_cloud(found: &Found) -> String {
     let effect = find(found.name);
     let shows = |name: &'static str| (name, find(name).map_or("", |effect| effect.shows()));
-    let has = |name: &str| found.parameters.triples.contains_key(name);
-    let place = match (has("centre_m"), has("extent_m")) {
-        (true, true) => quiet(
+    let place = match found.place {
+        Some(Place::Beyond { .. }) => quiet(
             "centre_m is the middle and extent_m the size of the box around the part of the target that it covers, \
              along the global axes of the scene; its border is a line on the maps, where it crosses them.",
         ),
-        (true, false) => quiet(
+        Some(Place::Round { .. }) => quiet(
             "centre_m is the point of the target where its centre lies, in the global frame of the \
              scene; centre_x_m and centre_y_m are its place in the target plane, as on the maps.",
         ),
-        (false, _) => String::new(),
+        None => told(found).map_or(String::new(), |words| quiet(&format!("Together: {words}."))),
     };
     let Evidence { gain, placebo_gain, held_out_gain, held_out_se, size_db } = &found.evidence;
     Article {
@@ -53,8 +52,8 @@ pub(super) fn of_cloud(found: &Found) -> String {
         evidence: vec![
             held_out("Parts of the scan", *held_out_gain, *held_out_se),
             format!(
-                "In the fit itself it gains {} in ln likelihood; as many numbers that mean nothing gain {} \
-                 at most.",
+                "In the fit itself it gains {} in ln likelihood; as many numbers, but at most six, that mean nothing \
+                 gain {} at most.",
                 fixed(*gain, 1),
                 fixed(*placebo_gain, 1)
             ),

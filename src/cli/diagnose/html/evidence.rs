@@ -2,7 +2,7 @@
 
 use super::page::{list, numbers, paragraph, quiet, table, words};
 use crate::cli::diagnose::Context;
-use crate::cli::diagnose::plots::Place;
+use crate::cli::diagnose::plots::Peak;
 use crate::cli::diagnose::tried::NotTried;
 use crate::cli::diagnose::words::{
     covariate, fixed, gone, not_found, plus_minus, probability, signed, strongest,
@@ -82,6 +82,13 @@ pub(super) fn errors(report: &Report) -> String {
             true => "Nothing was added, so that before and after are the same.".to_owned(),
             false => explained(error),
         })
+        + &error.with_unknown.as_ref().map_or(String::new(), |errors| {
+            paragraph(&format!(
+                "With a smooth term for what is unknown, which saw none of the patches that it is judged on either, {:.2} ± \
+                 {:.2} dB rms are left.",
+                errors.rmse_db, errors.rmse_se_db
+            ))
+        })
 }
 
 /// How much of what could be explained is.
@@ -112,7 +119,7 @@ pub(super) fn no_share(base: &str, place: &str) -> String {
 }
 
 /// What no effect explains.
-pub(super) fn unexplained(found: &[Unexplained], places: &[Place]) -> String {
+pub(super) fn unexplained(found: &[Unexplained], places: &[Peak]) -> String {
     if found.is_empty() {
         return paragraph(
             "Nothing that is tested for: neither the level nor the scatter of the residuals goes with \
@@ -220,7 +227,7 @@ pub(super) fn tried(report: &Report) -> String {
         words("effect"),
         words("by"),
         numbers("gain in ln likelihood"),
-        numbers("best placebo"),
+        numbers("placebo"),
         numbers("held-out gain in ln p"),
         numbers("size, dB"),
     ];
@@ -255,7 +262,7 @@ pub(super) fn base(base: &Base, context: &Context) -> String {
             [number.name.clone(), with_unit(&number.value), name, material]
         })
         .collect();
-    let columns = [words("number"), numbers("fitted"), words("first region"), words("material")];
+    let columns = [words("number"), numbers("fitted"), words("region"), words("material")];
     let converged = match base.converged {
         true => "The final fit converged.".to_owned(),
         false => "The final fit did not converge: take the numbers with care.".to_owned(),
@@ -263,10 +270,25 @@ pub(super) fn base(base: &Base, context: &Context) -> String {
     let facts = [
         format!("Looks of speckle, as the scene declares: {}.", fixed_or_none(base.looks)),
         format!("Threshold, as the scene declares: {} dBm.", fixed(base.threshold_dbm, 1)),
+        noise(base),
         pose(&base.pose),
         converged,
     ];
     table("The material laws, refitted with the effects", columns, &rows) + &list(&facts)
+}
+
+fn noise(base: &Base) -> String {
+    let thermal = match base.noise_dbm {
+        Some(dbm) => format!("Thermal noise, as the scene declares: {} dBm", fixed(dbm, 1)),
+        None => "The scene declares no thermal noise".to_owned(),
+    };
+    match base.range_sd_m > 0.0 {
+        true => {
+            let sd_mm = fixed(1e3 * base.range_sd_m, 2);
+            format!("{thermal}; standard deviation of a range: {sd_mm} mm.")
+        }
+        false => format!("{thermal} and no error of ranges, which are not used."),
+    }
 }
 
 fn pose(meshes: &[MeshPose]) -> String {

@@ -81,7 +81,7 @@ fn found(report: &Report) -> String {
         [] => paragraph(
             "No effect is supported. An effect is only added when it predicts parts of the scan that \
              took no part in its fit, by more than two standard errors (one in a small place, if the gain is \
-             far beyond chance), gains more than placebos, and changes the data by a size that counts.",
+             far beyond chance), gains more than a placebo, and changes the data by a size that counts.",
         ),
         found => found.iter().map(effect::of_cloud).collect(),
     };
@@ -96,7 +96,7 @@ fn way_on(report: &Report, context: &Context) -> String {
     match (report.verdict, report.effects.is_empty()) {
         (Verdict::NoMissingEffect, _) => paragraph(
             "There is nothing to add. Whether a weak effect could hide in these data is a question of \
-             their number: more chirps, more looks of speckle or a second target show less.",
+             their number: more chirps, more looks of speckle or a second target show weaker ones.",
         ),
         (_, false) => {
             let more = match report.verdict {
@@ -160,5 +160,8 @@ const WORDS: [(&str, &str); 6] = [
         "z",
         "Quantile residual: the place of a measured power within its law, as a normal number. Standard normal if the model is right.",
     ),
-    ("Placebo", "A random smooth field without meaning, with as many numbers as an effect."),
+    (
+        "Placebo",
+        "A random smooth field without meaning, with as many numbers as an effect, but at most six.",
+    ),
 ];

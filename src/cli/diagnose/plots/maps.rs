@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use super::{Picture, shown};
 use crate::cli::diagnose::words::signed;
 use crate::diagnose::{Found, Report, Row};
+use crate::effects::Place;
 use crate::formats::figure::drawing::{Drawing, Shape};
 use crate::formats::figure::{Figure, FigureError, Scale};
 use crate::geometry::Raster;
@@ -110,7 +111,7 @@ pub(super) fn unknown(report: &Report, spot_m: f64) -> Result<Picture, FigureErr
     for map in &mut picture.panels {
         let rings = strongest(&report.rows, spot_m)
             .into_iter()
-            .map(|Place { x_m, y_m, .. }| (x_m, y_m, 1.5 * raster.pixel_m))
+            .map(|Peak { x_m, y_m, .. }| (x_m, y_m, 1.5 * raster.pixel_m))
             .map(|(x_m, y_m, radius_m)| Outline::Ring { x_m, y_m, radius_m });
         let rings: Vec<Shape> = rings.filter_map(|ring| ring.on(map, &raster)).collect();
         map.shapes.extend(rings);
@@ -120,7 +121,7 @@ pub(super) fn unknown(report: &Report, spot_m: f64) -> Result<Picture, FigureErr
 
 /// Where something unknown is strong, in the target plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::cli::diagnose) struct Place {
+pub(in crate::cli::diagnose) struct Peak {
     pub x_m: f64,
     pub y_m: f64,
     /// Power that the model lacks there, in the mean of a pixel, dB.
@@ -135,22 +136,22 @@ const APART: f64 = 4.0;
 const AS_STRONG: f64 = 0.5;
 
 /// Where the unknown is strongest, the strongest first; nothing where nothing is unknown.
-pub(in crate::cli::diagnose) fn strongest(rows: &[Row], spot_m: f64) -> Vec<Place> {
+pub(in crate::cli::diagnose) fn strongest(rows: &[Row], spot_m: f64) -> Vec<Peak> {
     let pixel_m = pixel_m(rows, spot_m);
     let map = filled(&raster(rows, pixel_m), rows, &|row| Some(row.unknown_db));
     let values = map.channels.first().map_or(&[][..], |channel| &channel.values);
-    let place = |(index, &db): (usize, &f32)| Place {
+    let place = |(index, &db): (usize, &f32)| Peak {
         x_m: map.x_min_m + (0.5 + (index % map.width) as f64) * pixel_m,
         y_m: map.y_min_m + (map.height as f64 - 0.5 - (index / map.width) as f64) * pixel_m,
         db: f64::from(db),
     };
     let places = values.iter().enumerate().map(place);
-    let mut places: Vec<Place> = places.filter(|place| place.db.abs() > 0.0).collect();
+    let mut places: Vec<Peak> = places.filter(|place| place.db.abs() > 0.0).collect();
     places.sort_by(|a, b| b.db.abs().total_cmp(&a.db.abs()));
-    let mut told: Vec<Place> = Vec::new();
+    let mut told: Vec<Peak> = Vec::new();
     for place in places {
         let is_near =
-            |other: &Place| (place.x_m - other.x_m).hypot(place.y_m - other.y_m) < APART * pixel_m;
+            |other: &Peak| (place.x_m - other.x_m).hypot(place.y_m - other.y_m) < APART * pixel_m;
         let is_weak = told.first().is_some_and(|first| place.db.abs() < AS_STRONG * first.db.abs());
         if told.len() == MOST_PLACES || is_weak {
             break;
@@ -225,16 +226,16 @@ enum Outline {
 
 impl Outline {
     fn new(found: &Found, rows: &[Row]) -> Option<Outline> {
-        let number = |name: &str| found.parameters.get(name).map(|number| number.value);
-        if let Some((off_m, direction_deg)) = number("boundary_m").zip(number("direction_deg")) {
-            return Some(Outline::Line { off_m, direction_deg });
+        match found.place? {
+            Place::Beyond { off_m, direction_deg } => Some(Outline::Line { off_m, direction_deg }),
+            Place::Round { x_m, y_m, radius_m } => {
+                let off_m = |row: &&Row| (row.xt_m - x_m).hypot(row.yt_m - y_m);
+                let nearest = rows.iter().min_by(|a, b| off_m(a).total_cmp(&off_m(b)))?;
+                // The radius is one on the surface, and the plane lies where the pattern is told.
+                let radius_m = radius_m * PATTERN_RANGE_M / nearest.range_m;
+                Some(Outline::Ring { x_m, y_m, radius_m })
+            }
         }
-        let [x_m, y_m] = [number("centre_x_m")?, number("centre_y_m")?];
-        let off_m = |row: &&Row| (row.xt_m - x_m).hypot(row.yt_m - y_m);
-        let nearest = rows.iter().min_by(|a, b| off_m(a).total_cmp(&off_m(b)))?;
-        // The radius is one on the surface, and the plane lies where the pattern is told.
-        let radius_m = number("radius_m")? * PATTERN_RANGE_M / nearest.range_m;
-        Some(Outline::Ring { x_m, y_m, radius_m })
     }
 
     /// What a caption says of it.

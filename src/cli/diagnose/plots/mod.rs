@@ -9,7 +9,7 @@ use crate::diagnose::Report;
 use crate::error::Error;
 use crate::formats::figure::drawing::Drawing;
 use crate::formats::figure::{FigureError, Series, Style};
-pub(super) use maps::{Place, strongest};
+pub(super) use maps::{Peak, strongest};
 
 /// The models that a picture shows: where nothing was added there is no after.
 fn shown<T>(report: &Report, [before, after]: [T; 2]) -> Vec<T> {

@@ -22,7 +22,7 @@ pub(super) fn ranking(report: &Report) -> Result<Picture, FigureError> {
         }
     };
     let placebos = first.iter().filter_map(|c| c.placebo_gain).filter(|gain| gain.is_finite());
-    let guide = placebos.reduce(f64::max).map(|gain| (gain.max(0.0), "best placebo"));
+    let guide = placebos.reduce(f64::max).map(|gain| (gain.max(0.0), "placebo"));
     let bars = Bars {
         title: "Which effect would help",
         subtitle: "each tried alone beside the base",
@@ -30,18 +30,29 @@ pub(super) fn ranking(report: &Report) -> Result<Picture, FigureError> {
         bars: first.iter().map(bar).collect(),
         guide,
     };
+    let added = match report.effects.is_empty() {
+        true => "",
+        false => " Blue ones were added in the end.",
+    };
+    let placebo = match guide {
+        Some(_) => {
+            " The line is the gain of a random smooth field with as many numbers as one of those, but at most six; the \
+             largest where they differ."
+        }
+        None => "",
+    };
     // Without any candidate there is nothing to draw and nothing wrong.
     let panels = if first.is_empty() { Vec::new() } else { vec![bars.drawing()?] };
     Ok(Picture {
         file: "ranking",
         title: "What every effect gained",
         caption: "Gain in ln likelihood when one effect is fitted with the base model (round 1); those that promise \
-                  little are fitted to a sample of the chirps at most, and their gain is counted up from there. Blue \
-                  ones were added in the end. A large gain alone does not: an effect must also \
-                  predict patches of the scan that took no part in its fit. “Held out” is that gain \
-                  ± its standard error, only worked out for the best few. The line is the largest gain \
-                  of random fields with as many numbers as one of those."
-            .to_owned(),
+                  little are fitted to a sample of the chirps at most, and their gain is counted up from there. A large \
+                  gain alone does not add an effect: it must also predict patches of the scan that took no part in its \
+                  fit. “Held out” is that gain ± its standard error, only worked out for the best few."
+            .to_owned()
+            + added
+            + placebo,
         panels,
         columns: 1,
     })
