@@ -73,6 +73,8 @@ use support::Largest;
 /// Version of a report as JSON.
 pub const SCHEMA: u32 = 3;
 
+/// Times the noise floor beyond which a target is another one: what no effect explains leaves less than two.
+const MOST_FLOORS: f64 = 3.0;
 /// Detections without which nothing is said.
 const LEAST_DETECTIONS: usize = 300;
 /// Share of detections below the threshold that may be the rounding of a file.
@@ -233,6 +235,18 @@ pub enum DiagnoseError {
         /// As declared, dBm.
         threshold_dbm: f64,
     },
+    /// With everything that was found the model is still far off.
+    #[error(
+        "with all that was found the model is still off by {rmse_db:.1} dB, where speckle and noise leave \
+         {noise_floor_db:.1} dB, as for another target; check mesh, pose and radar of the scene, or register the \
+         cloud with `matdb measure`"
+    )]
+    FarOff {
+        /// Rms error on held-out patches, dB.
+        rmse_db: f64,
+        /// That of a model that is right, dB.
+        noise_floor_db: f64,
+    },
     /// Effects that go with time, of a scan that does not tell it.
     #[error(
         "the scan of the scene has no times, and {effects} cannot be told without; give its chirps a column \
@@ -349,6 +363,11 @@ impl Diagnosis {
         if off as f64 > looks::MOST_STRAYS * points as f64 {
             return Err(DiagnoseError::Elsewhere { matched: points - off, points });
         }
+        let after = score::errors(&state.held_out, &folds);
+        let Errors { rmse_db, noise_floor_db, .. } = after;
+        if rmse_db > MOST_FLOORS * noise_floor_db {
+            return Err(DiagnoseError::FarOff { rmse_db, noise_floor_db });
+        }
         let first = ranking.iter().find(|candidate| candidate.accepted).or(ranking.first());
         let numbers = first.map_or(1, |candidate| candidate.numbers);
         hear("controls");
@@ -382,11 +401,8 @@ impl Diagnosis {
         let with_unknown = is_structured
             .then(|| selection.held_out_with(&state.space, &state.fitted.at, &structure.ln_factor));
         let errors = |scored: &[score::Scored]| score::errors(scored, &folds);
-        let error = before_after(
-            [&before, &state.held_out].map(|scored| errors(scored)),
-            with_unknown.as_deref().map(errors),
-            &folds,
-        );
+        let error =
+            before_after([errors(&before), after], with_unknown.as_deref().map(errors), &folds);
         let base = Base {
             parameters,
             looks: receiver.looks,

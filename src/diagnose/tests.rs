@@ -370,6 +370,9 @@ fn a_scan_with_too_little_says_so() {
     assert!(matches!(below, DiagnoseError::Threshold { below, .. } if below > 500), "{below}");
     let unlike = refused(&|look| if look % 2 == 0 { 2e-11 } else { 1e-5 });
     assert!(matches!(unlike, DiagnoseError::Unlike { .. }), "{unlike}");
+    // Fifteen decibels up or down by chance are nothing that any of the effects does.
+    let far = refused(&|look| if (look * 7919) % 13 < 6 { 2e-11 } else { 6e-10 });
+    assert!(matches!(far, DiagnoseError::FarOff { .. }), "{far}");
 }
 
 #[test]

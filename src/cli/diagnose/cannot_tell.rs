@@ -67,7 +67,9 @@ fn would_help(error: &DiagnoseError) -> &'static str {
         DiagnoseError::Unranged { .. } => {
             "Ranges, and their standard deviation as `range_sd_m` under [radar.noise] in the scene."
         }
-        DiagnoseError::Elsewhere { .. } | DiagnoseError::Unlike { .. } => {
+        DiagnoseError::Elsewhere { .. }
+        | DiagnoseError::Unlike { .. }
+        | DiagnoseError::FarOff { .. } => {
             "The scene that was measured, with all of the target where it stood: `matdb measure` finds the \
              pose, and a mesh that lacks parts of the target leaves their detections without a place."
         }
