@@ -16,11 +16,12 @@ use matdb::formats::MeshFormat;
 use matdb::formats::exr::{self, Packing};
 use matdb::geometry::raster::{Channel, Raster};
 use serde_json::json;
-use turns::{Answer, serve, timed};
+use turns::{Answer, join_pool, serve, timed};
 
 const SIDE: usize = 1024;
 
 fn main() -> Answer<()> {
+    join_pool()?;
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["ply", file] => serve(|| {

@@ -11,7 +11,7 @@ use matdb::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowi
 use matdb::fit::{Fit, Method};
 use matdb::measure::curve::Curve;
 use rayon::prelude::*;
-use turns::{Answer, serve, timed};
+use turns::{Answer, join_pool, serve, timed};
 
 const LEVEL_SD_DB: f64 = 2.0;
 const THETA_SD_DEG: f64 = 1.0;
@@ -57,6 +57,7 @@ fn refits(fit: &Fit, curve: &Curve) -> Answer<()> {
 }
 
 fn main() -> Answer<()> {
+    join_pool()?;
     let path = std::env::args().nth(1).ok_or("give a curve: theta_deg,sigma0_db")?;
     let curve = Curve::read(&std::fs::read(path)?)?;
     let squares = |theta_sd_rad| {

@@ -16,7 +16,7 @@ use matdb::measure::placed::{Aims, Traced};
 use matdb::measure::{Cloud, CloudPoint, Registration, Start};
 use matdb::radar::random::{Key, Purpose};
 use matdb::scene::{Scene, SceneFile};
-use turns::{Answer, serve, timed};
+use turns::{Answer, join_pool, serve, timed};
 
 const RANGE_SD_M: f64 = 2e-3;
 const PUSH_M: f64 = 0.032;
@@ -25,6 +25,7 @@ const PUSH_DEG: f64 = 5.0;
 const CHIRPS: usize = 42_000;
 
 fn main() -> Answer<()> {
+    join_pool()?;
     let folder = std::env::args().nth(1).ok_or("give a folder for the clouds")?;
     let scene = scene()?;
     let cloud = measured(&scene)?;

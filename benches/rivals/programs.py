@@ -117,10 +117,10 @@ def start(commands, threads):
     return running, about, missing
 
 
-def alternate(running, missing, turns, seconds):
+def alternate(running, missing, turns, seconds, warm_up_s=0):
     """The answers of all turns; a first turn of each program is not counted, and every round has another
     order. After so many seconds no further round begins, if there have been enough. A program that fails
-    becomes a missing one."""
+    becomes a missing one. For `warm_up_s` before each turn a program does its work over and over, uncounted."""
     answers = {name: [] for name in running}
     began = time.monotonic()
     for number in range(turns + 1):
@@ -129,6 +129,9 @@ def alternate(running, missing, turns, seconds):
         for name in names:
             time.sleep(REST_S)
             try:
+                until = time.monotonic() + warm_up_s
+                while time.monotonic() < until:
+                    running[name].turn()
                 take = running[name].watched_turn if number == 1 else running[name].turn
                 answer = take()
             except Missing as reason:

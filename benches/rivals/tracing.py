@@ -32,7 +32,7 @@ def compare(files, workload, threads):
     # What our power takes on top: in the same turns, so that it meets the same load.
     power = {"power": example("trace_speed", "power")} if workload.key == "paper" else {}
     running, about, missing = start(commands | power, threads)
-    answers = alternate(running, missing, workload.turns, workload.seconds)
+    answers = alternate(running, missing, workload.turns, workload.seconds, workload.warm_up_s)
     memory_mb = {name: program.memory_mb for name, program in running.items()}
     end(running, missing)
     of = {

@@ -22,11 +22,12 @@ use matdb::render::{Observer, Setup, Surface, shade, trace};
 use matdb::scene::mannequin::mannequin;
 use matdb::trace::{Bvh, Fan, Hit, Tracer};
 use serde_json::{Value, json};
-use turns::{Answer, serve, timed};
+use turns::{Answer, join_pool, serve, timed};
 
 type Hits = Vec<Option<Hit>>;
 
 fn main() -> Answer<()> {
+    join_pool()?;
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["write", mesh, rays] => {

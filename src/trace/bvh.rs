@@ -42,11 +42,18 @@ impl<'a> Bvh<'a> {
 
     /// The closest hit of one ray; of equally near facets the one with the smallest number.
     pub fn closest(&self, ray: &Ray<Global>) -> Option<Hit> {
+        let mut hit = [None];
+        self.closest_of(std::slice::from_ref(ray), &mut hit);
+        hit[0]
+    }
+
+    /// The closest hit of each of some rays, as many as there are places for.
+    pub(super) fn closest_of(&self, rays: &[Ray<Global>], hits: &mut [Option<Hit>]) {
         let eightfold = self.eightfold.get_or_init(|| match self.boxes.get() {
             Some(boxes) => Eightfold::new(self.mesh, boxes),
             None => Eightfold::new(self.mesh, &self.built()),
         });
-        eightfold.closest(self.mesh, ray)
+        eightfold.closest(self.mesh, rays, hits);
     }
 
     /// The boxes themselves, which are built if they are not yet.

@@ -19,7 +19,7 @@ type Lanes = [f32; LANES];
 const BLOCK: u32 = 1 << 31;
 
 /// Branches that are kept beside each other; more are put aside.
-const STACK: usize = 128;
+const STACK: usize = 64;
 
 /// The hierarchy, from the centre of its sphere.
 pub(super) struct Eightfold {
@@ -120,11 +120,9 @@ impl Eightfold {
         BLOCK | first
     }
 
-    /// The closest hit of one ray; of equally near facets the one with the smallest number.
-    pub fn closest(&self, mesh: &Mesh, ray: &Ray<Global>) -> Option<Hit> {
-        let start_m = self.sphere.entry_m(ray)?;
-        let facet = widest(Walk { eightfold: self, mesh, ray, start_m })?;
-        met(mesh, facet, ray)
+    /// The closest hit of each ray; of equally near facets the one with the smallest number.
+    pub fn closest(&self, mesh: &Mesh, rays: &[Ray<Global>], hits: &mut [Option<Hit>]) {
+        widest(Walks { eightfold: self, mesh, rays, hits });
     }
 }
 
@@ -181,39 +179,53 @@ fn facets(boxes: &Boxes, branch: usize) -> Vec<u32> {
     facets
 }
 
-/// A ray on its way through the boxes.
-struct Walk<'a> {
+/// Rays on their way through the boxes.
+struct Walks<'a> {
     eightfold: &'a Eightfold,
     mesh: &'a Mesh,
-    ray: &'a Ray<Global>,
-    /// Where it reaches the sphere, m.
-    start_m: f64,
+    rays: &'a [Ray<Global>],
+    hits: &'a mut [Option<Hit>],
 }
 
-impl Wide for Walk<'_> {
-    /// The nearest facet.
-    type Answer = Option<u32>;
+impl Wide for Walks<'_> {
+    type Answer = ();
 
     #[inline(always)]
-    fn run(self) -> Option<u32> {
-        let Walk { eightfold: &Eightfold { ref nodes, ref blocks, sphere }, mesh, ray, start_m } =
-            self;
-        let (aim, line) = (Aim::new(&sphere, ray, start_m), Line::new(ray));
-        let (mut nearest, mut limit): (Option<(f64, u32)>, f32) = (None, f32::INFINITY);
+    fn run(self) {
         let mut stack = Stack::new();
+        for (ray, hit) in self.rays.iter().zip(self.hits) {
+            let facet = self.eightfold.nearest(self.mesh, ray, &mut stack);
+            *hit = facet.and_then(|facet| met(self.mesh, facet, ray));
+        }
+    }
+}
+
+impl Eightfold {
+    /// The nearest facet of a ray, by a stack that is empty before and after.
+    #[inline(always)]
+    fn nearest(&self, mesh: &Mesh, ray: &Ray<Global>, stack: &mut Stack) -> Option<u32> {
+        let Eightfold { nodes, blocks, sphere } = self;
+        let start_m = sphere.entry_m(ray)?;
+        let (aim, line) = (Aim::new(sphere, ray, start_m), Line::new(ray));
+        let (mut nearest, mut limit): (Option<(f64, u32)>, f32) = (None, f32::INFINITY);
         stack.push(0.0, 0);
-        while let Some((near, within)) = stack.pop() {
+        'branches: while let Some((near, mut within)) = stack.pop() {
             if near > limit {
                 continue;
             }
-            if within & BLOCK == 0 {
-                let (hits, near) = aim.boxes(&nodes[within as usize], limit);
+            while within & BLOCK == 0 {
+                let node = &nodes[within as usize];
+                let (hits, near) = aim.boxes(node, limit);
+                if let Some(lane) = hits.only() {
+                    within = node.within[lane];
+                    continue;
+                }
                 stack.make_room();
                 let base = stack.len;
                 for lane in hits {
-                    stack.sort_in(base, near[lane], nodes[within as usize].within[lane]);
+                    stack.sort_in(base, near[lane], node.within[lane]);
                 }
-                continue;
+                continue 'branches;
             }
             for block in &blocks[(within ^ BLOCK) as usize..] {
                 for lane in aim.facets(block) {
@@ -275,23 +287,24 @@ impl Aim {
     /// Marks every box that the ray reaches before `limit`, and where it enters it.
     #[inline(always)]
     fn boxes(&self, node: &Node, limit: f32) -> (Marks, Lanes) {
-        let (mut near, mut far) = ([0.0; LANES], [limit; LANES]);
-        for axis in 0..3 {
-            let (origin, per) = (self.origin[axis], self.per[axis]);
-            let (first, last) = match per < 0.0 {
-                true => (&node.high[axis], &node.low[axis]),
-                false => (&node.low[axis], &node.high[axis]),
-            };
-            for lane in 0..LANES {
-                // Along a face that it runs in, a ray is at no number; it then is within.
-                let (enters, leaves) = ((first[lane] - origin) * per, (last[lane] - origin) * per);
-                near[lane] = most(enters, near[lane]);
-                far[lane] = least(leaves, far[lane]);
-            }
-        }
-        let mut within = [0.0; LANES];
+        let side = |axis: usize, turned: bool| match (self.per[axis] < 0.0) != turned {
+            true => &node.high[axis],
+            false => &node.low[axis],
+        };
+        let first: [&Lanes; 3] = std::array::from_fn(|axis| side(axis, false));
+        let last: [&Lanes; 3] = std::array::from_fn(|axis| side(axis, true));
+        let ([x, y, z], [per_x, per_y, per_z]) = (self.origin, self.per);
+        let (mut near, mut within) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
-            within[lane] = far[lane] - near[lane];
+            let met = |sides: [&Lanes; 3]| {
+                let [at_x, at_y, at_z] = sides.map(|side| side[lane]);
+                [(at_x - x) * per_x, (at_y - y) * per_y, (at_z - z) * per_z]
+            };
+            // Along a face that it runs in, a ray is at no number; it then is within.
+            let [a, b, c] = met(first);
+            near[lane] = most(c, most(b, most(a, 0.0)));
+            let [a, b, c] = met(last);
+            within[lane] = least(c, least(b, least(a, limit))) - near[lane];
         }
         (Marks::of_signs(&within), near)
     }
@@ -299,53 +312,33 @@ impl Aim {
     /// Marks every facet that the ray does not surely pass beside.
     #[inline(always)]
     fn facets(&self, block: &Block) -> Marks {
-        let [a, b, c] = [
-            self.beside(&block.corners[0]),
-            self.beside(&block.corners[1]),
-            self.beside(&block.corners[2]),
-        ];
-        let [mut left, mut right] = [[f32::INFINITY; LANES]; 2];
-        for [from, to] in [[&a, &b], [&b, &c], [&c, &a]] {
-            for lane in 0..LANES {
-                // The volume of an edge is of either sign when it is nearer to zero than its doubt.
-                let edge = from.x[lane] * to.y[lane] - from.y[lane] * to.x[lane];
-                let doubt = from.doubt[lane] + to.doubt[lane];
-                left[lane] = least(left[lane], doubt + edge);
-                right[lane] = least(right[lane], doubt - edge);
-            }
-        }
+        let [along, across, up] = self.axes;
+        let of = |corner: usize| [along, across, up].map(|axis| &block.corners[corner][axis]);
+        let corners = [of(0), of(1), of(2)];
+        let origin = self.axes.map(|axis| self.origin[axis]);
         let mut within = [0.0; LANES];
         for lane in 0..LANES {
-            within[lane] = most(left[lane], right[lane]);
+            let beside = |corner: usize| {
+                let depth = corners[corner][0][lane] - origin[0];
+                let x = corners[corner][1][lane] - origin[1] - self.shear[0] * depth;
+                let y = corners[corner][2][lane] - origin[2] - self.shear[1] * depth;
+                // The product of two doubts, too; and one of what is too small for an f32.
+                let doubt = self.margin_m * (x.abs() + y.abs() + self.margin_m) + f32::MIN_POSITIVE;
+                [x, y, doubt]
+            };
+            let (a, b, c) = (beside(0), beside(1), beside(2));
+            let edge = |from: [f32; 3], to: [f32; 3]| {
+                let edge = from[0] * to[1] - from[1] * to[0];
+                let doubt = from[2] + to[2];
+                [doubt + edge, doubt - edge]
+            };
+            let (ab, bc, ca) = (edge(a, b), edge(b, c), edge(c, a));
+            let left = least(least(ab[0], bc[0]), ca[0]);
+            let right = least(least(ab[1], bc[1]), ca[1]);
+            within[lane] = most(left, right);
         }
         Marks(Marks::of_signs(&within).0 & block.live)
     }
-
-    /// Corners beside the ray.
-    #[inline(always)]
-    fn beside(&self, corner: &[Lanes; 3]) -> Beside {
-        let [along, across, up] = self.axes;
-        let [depths, xs, ys] = [&corner[along], &corner[across], &corner[up]];
-        let mut beside = Beside { x: [0.0; LANES], y: [0.0; LANES], doubt: [0.0; LANES] };
-        for lane in 0..LANES {
-            let depth = depths[lane] - self.origin[along];
-            let x = xs[lane] - self.origin[across] - self.shear[0] * depth;
-            let y = ys[lane] - self.origin[up] - self.shear[1] * depth;
-            beside.x[lane] = x;
-            beside.y[lane] = y;
-            // The product of two doubts, too; and one of what is too small for an f32.
-            beside.doubt[lane] =
-                self.margin_m * (x.abs() + y.abs() + self.margin_m) + f32::MIN_POSITIVE;
-        }
-        beside
-    }
-}
-
-/// Corners of facets by how far they lie beside a ray, m, and what that is worth in the volume of an edge, m².
-struct Beside {
-    x: Lanes,
-    y: Lanes,
-    doubt: Lanes,
 }
 
 /// Lanes of which something is true, a bit for each.
@@ -385,6 +378,14 @@ impl Marks {
     }
 }
 
+impl Marks {
+    /// The lane, when there is one alone.
+    #[inline(always)]
+    fn only(self) -> Option<usize> {
+        self.0.is_power_of_two().then(|| self.0.trailing_zeros() as usize % LANES)
+    }
+}
+
 impl Iterator for Marks {
     type Item = usize;
 
@@ -420,9 +421,15 @@ impl Stack {
     #[inline(always)]
     fn make_room(&mut self) {
         if self.len + LANES > STACK {
-            self.aside.extend_from_slice(&self.top[..self.len]);
-            self.len = 0;
+            self.put_aside();
         }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn put_aside(&mut self) {
+        self.aside.extend_from_slice(&self.top[..self.len]);
+        self.len = 0;
     }
 
     /// Pushes a branch; those from `base` on stay sorted.
@@ -460,6 +467,12 @@ mod tests {
     use crate::frames::Point;
     use crate::scene::solids;
 
+    fn hit(eightfold: &Eightfold, mesh: &Mesh, ray: Ray<Global>) -> Option<Hit> {
+        let mut hits = [None];
+        eightfold.closest(mesh, &[ray], &mut hits);
+        hits[0]
+    }
+
     proptest! {
         /// Rays at corners, along edges and beside them by what f32 cannot see, from near and far, at any scale.
         #[test]
@@ -484,7 +497,7 @@ mod tests {
             let boxes = Boxes::new(&mesh, &[0]);
             let eightfold = Eightfold::new(&mesh, &boxes);
             let exact = Line::new(&ray).crossing_m(&mesh, 0);
-            prop_assert_eq!(eightfold.closest(&mesh, &ray).map(|hit| hit.range_m), exact);
+            prop_assert_eq!(hit(&eightfold, &mesh, ray).map(|hit| hit.range_m), exact);
         }
 
         #[test]
@@ -507,7 +520,7 @@ mod tests {
                 let [from, to] = [DVec3::new(x, 0.25, 2.0), DVec3::new(x, 0.25, -2.0)];
                 let origin: Point<Global> = (turn * from).into();
                 let direction = origin.towards((turn * to).into()).unwrap();
-                let hit = eightfold.closest(&cube, &Ray { origin, direction });
+                let hit = hit(&eightfold, &cube, Ray { origin, direction });
                 assert!(hit.is_some_and(|hit| (hit.range_m - 1.5).abs() < 1e-12), "{x}: {hit:?}");
             }
         }
@@ -530,7 +543,7 @@ mod tests {
             let direction = origin.towards(ball.centroid(facet as usize).into()).unwrap();
             let ray = Ray { origin, direction };
             let expected = crate::trace::Bvh::new(&ball).closest(&ray);
-            assert_eq!(heap.closest(&ball, &ray), expected);
+            assert_eq!(hit(&heap, &ball, ray), expected);
         }
     }
 

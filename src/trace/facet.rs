@@ -30,13 +30,15 @@ impl<'a> Line<'a> {
     }
 
     /// Distance to a facet, m; `None` when the ray passes beside it or away from it.
-    #[inline]
+    #[inline(always)]
     pub fn crossing_m(&self, mesh: &Mesh, facet: usize) -> Option<f64> {
         let Line { ray, along, beside: [across, up], shear } = *self;
-        let [a, b, c] = mesh.corners(facet).map(|corner| {
-            let at = corner - ray.origin.xyz;
+        let beside = |corner: DVec3| {
+            let at = (corner - ray.origin.xyz).to_array();
             [at[across] - shear[0] * at[along], at[up] - shear[1] * at[along]]
-        });
+        };
+        let [a, b, c] = mesh.corners(facet);
+        let [a, b, c] = [beside(a), beside(b), beside(c)];
         let edge = |from: [f64; 2], to: [f64; 2]| from[0] * to[1] - from[1] * to[0];
         let [ab, bc, ca] = [edge(a, b), edge(b, c), edge(c, a)];
         let all = |inside: fn(f64) -> bool| inside(ab) && inside(bc) && inside(ca);

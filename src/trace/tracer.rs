@@ -44,8 +44,8 @@ impl Tracer<'_> {
     pub fn closest(self, bvh: &Bvh, rays: &[Ray<Global>]) -> Result<Vec<Option<Hit>>, TraceError> {
         Ok(match self {
             Tracer::Pinhole => Fan::new(rays)?.closest(bvh.mesh()),
-            Tracer::Bvh => each(rays, &|ray| bvh.closest(ray)),
-            Tracer::Brute => each(rays, &|ray| brute::closest(bvh.mesh(), ray)),
+            Tracer::Bvh => by_hierarchy(bvh, rays),
+            Tracer::Brute => rays.par_iter().map(|ray| brute::closest(bvh.mesh(), ray)).collect(),
             Tracer::Gpu(held) if std::ptr::eq(held.bvh(), bvh) => held.closest(rays)?,
             Tracer::Gpu(_) => return Err(GpuError::OtherMesh.into()),
             Tracer::Automatic => closest(bvh, rays),
@@ -57,15 +57,17 @@ impl Tracer<'_> {
 pub fn closest(bvh: &Bvh, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
     match Fan::new(rays) {
         Ok(fan) => fan.closest(bvh.mesh()),
-        Err(_) => each(rays, &|ray| bvh.closest(ray)),
+        Err(_) => by_hierarchy(bvh, rays),
     }
 }
 
-fn each(
-    rays: &[Ray<Global>],
-    closest: &(dyn Fn(&Ray<Global>) -> Option<Hit> + Sync),
-) -> Vec<Option<Hit>> {
-    rays.par_iter().with_min_len(64).map(closest).collect()
+fn by_hierarchy(bvh: &Bvh, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
+    /// Rays of one task.
+    const RAYS: usize = 64;
+    let mut hits = vec![None; rays.len()];
+    let tasks = rays.par_chunks(RAYS).zip(hits.par_chunks_mut(RAYS));
+    tasks.for_each(|(rays, hits)| bvh.closest_of(rays, hits));
+    hits
 }
 
 #[cfg(test)]
@@ -96,6 +98,22 @@ mod tests {
         for (slow, fast) in Tracer::Brute.closest(&bvh, &rays).unwrap().iter().zip(&two) {
             assert!((slow.unwrap().range_m - fast.unwrap().range_m).abs() < 1e-14);
         }
+    }
+
+    #[test]
+    fn rays_of_many_tasks_meet_what_each_meets_alone() {
+        let mesh = solids::icosphere(0.5, 3);
+        let bvh = Bvh::new(&mesh);
+        let towards = |k: u32| {
+            let turn = f64::from(k) * 2.4;
+            let aside = 0.6 * (f64::from(k) / 1000.0).sqrt();
+            ray([turn.sin(), turn.cos(), 3.0], [aside * turn.cos(), aside * turn.sin(), 0.0])
+        };
+        let rays: Vec<_> = (0..1000).map(towards).collect();
+        let alone: Vec<_> = rays.iter().map(|ray| bvh.closest(ray)).collect();
+        let missed = alone.iter().filter(|hit| hit.is_none()).count();
+        assert!((100..900).contains(&missed), "{missed}");
+        assert_eq!(Tracer::Bvh.closest(&bvh, &rays).unwrap(), alone);
     }
 
     #[test]
