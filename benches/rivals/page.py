@@ -15,7 +15,8 @@ BODIES = [
         "The paper's scan",
         """ The elliptical scan, from one origin, of the mannequin at 8 m. Rivals get their rays sorted along a
 Z-curve and are not charged for it; `matdb` takes them in the order of the scan, and its own sorting, once for each
-scan pattern, is told apart. “Agree” is the share of rays that meet the same facet as ours, or one equally far to 10⁻⁶ of
+scan pattern, is told apart. Right before each turn a program does the same for 40 ms uncounted, so that its threads and
+caches are awake. “Agree” is the share of rays that meet the same facet as ours, or one equally far to 10⁻⁶ of
 the range, or nothing in both.""",
     ),
     ("body", "The same body under a square of rays", ""),

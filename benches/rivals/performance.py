@@ -19,9 +19,6 @@ from programs import ROOT, build, cargo
 HERE = Path(__file__).resolve().parent
 PARTS = ["trace", "reshade", "registration", "fits", "render", "formats", "diagnosis", "store", "gpu"]
 
-# Parts of older results, and the one that measures the same now.
-OLDER = {"power": "trace"}
-
 
 def main():
     options = arguments()
@@ -71,10 +68,7 @@ def kept(options):
     if not options.only or not options.results.exists():
         return {}
     stored = json.loads(options.results.read_text(encoding="utf-8"))
-    kept = {key: stored[key] for key in ["versions", "failed", "commits", "parts", *PARTS, *OLDER] if key in stored}
-    for part in [part for part, now in OLDER.items() if now in options.only]:
-        kept.pop(part, None)
-        kept.get("commits", {}).pop(part, None)
+    kept = {key: stored[key] for key in ["versions", "failed", "commits", "parts", *PARTS] if key in stored}
     return kept | {"quick": options.quick or stored["quick"]}
 
 

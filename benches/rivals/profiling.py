@@ -61,7 +61,9 @@ def render(folder):
 WORKS = {
     "scan": trace("pinhole", "paper", 500),
     "power": lambda folder: (example("trace_speed", "power"), 500),
+    "million": trace("pinhole", 10**6, 20),
     "hierarchy": trace("bvh", "paper", 100),
+    "second": trace("bvh", "second", 40),
     "render": render,
     "registration": lambda folder: (example("icp_speed", folder), 50),
     "fits": fits,

@@ -36,7 +36,7 @@ class Workload:
 
 
 FULL = [
-    Workload("paper", "body", "paper", 41, 15, robust=True, warm_up_s=0.04),
+    Workload("paper", "body", "paper", 41, 45, robust=True, warm_up_s=0.04),
     Workload("body", "body", 10**6, 11, 15, robust=True),
     Workload("second bounce", "body", "second", 7, 15),
     Workload("facets 3", 10**3, 10**6, 7, 8),

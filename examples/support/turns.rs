@@ -8,7 +8,7 @@ use serde_json::Value;
 
 pub type Answer<T> = Result<T, Box<dyn Error>>;
 
-/// Makes the calling thread one of the pool's, as those are that compute the scans of a data set; to be called first.
+/// Makes the calling thread one of the pool's, as that of the others' programs is one of theirs; to be called first.
 ///
 /// Linux may put a thread that has slept behind the one that wakes it: of two that wake each other in a row, both then
 /// share a core for milliseconds, which is longer than a scan takes.

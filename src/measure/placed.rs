@@ -43,7 +43,7 @@ impl<'a> Aims<'a> {
         let there: Vec<Ray<Global>> = self.rays.iter().map(|ray| carried(pose, ray)).collect();
         match self.fan.as_ref().and_then(|fan| fan.carried(&there, pose)) {
             Some(fan) => fan.closest(bvh.mesh()),
-            None => there.par_iter().map(|ray| bvh.closest(ray)).collect(),
+            None => bvh.closest_of_each(&there),
         }
     }
 }

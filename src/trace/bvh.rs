@@ -2,9 +2,11 @@
 
 use std::sync::OnceLock;
 
-use super::Hit;
+use rayon::prelude::*;
+
 use super::boxes::Boxes;
 use super::eightfold::Eightfold;
+use super::{Hit, no_hits};
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 
@@ -43,17 +45,25 @@ impl<'a> Bvh<'a> {
     /// The closest hit of one ray; of equally near facets the one with the smallest number.
     pub fn closest(&self, ray: &Ray<Global>) -> Option<Hit> {
         let mut hit = [None];
-        self.closest_of(std::slice::from_ref(ray), &mut hit);
+        self.eightfold().closest(self.mesh, std::slice::from_ref(ray), &mut hit);
         hit[0]
     }
 
-    /// The closest hit of each of some rays, as many as there are places for.
-    pub(super) fn closest_of(&self, rays: &[Ray<Global>], hits: &mut [Option<Hit>]) {
-        let eightfold = self.eightfold.get_or_init(|| match self.boxes.get() {
+    /// The closest hit of each ray, by all threads.
+    pub fn closest_of_each(&self, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
+        /// Rays of one task.
+        const RAYS: usize = 64;
+        let mut hits = no_hits(rays.len());
+        let tasks = rays.par_chunks(RAYS).zip(hits.par_chunks_mut(RAYS));
+        tasks.for_each(|(rays, hits)| self.eightfold().closest(self.mesh, rays, hits));
+        hits
+    }
+
+    fn eightfold(&self) -> &Eightfold {
+        self.eightfold.get_or_init(|| match self.boxes.get() {
             Some(boxes) => Eightfold::new(self.mesh, boxes),
             None => Eightfold::new(self.mesh, &self.built()),
-        });
-        eightfold.closest(self.mesh, rays, hits);
+        })
     }
 
     /// The boxes themselves, which are built if they are not yet.
@@ -126,6 +136,15 @@ mod tests {
         assert!(bvh.closest(&ray(DVec3::Z, DVec3::new(9.0, 0.0, 0.0))).is_none());
         // Along the plate: parallel to both facets.
         assert!(bvh.closest(&ray(DVec3::new(-3.0, 0.0, 0.0), DVec3::ZERO)).is_none());
+    }
+
+    #[test]
+    fn a_mesh_without_facets_is_not_hit() {
+        let empty = Mesh { vertices: vec![], facets: vec![], labels: vec![] };
+        let none = Bvh::new(&empty);
+        assert_eq!(none.closest(&ray(DVec3::Z, DVec3::ZERO)), None);
+        let only_slivers = Mesh { facets: vec![[0, 0, 2]], ..plate() };
+        assert_eq!(Bvh::new(&only_slivers).closest(&ray(DVec3::Z, DVec3::ZERO)), None);
     }
 
     #[test]

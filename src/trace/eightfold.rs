@@ -18,8 +18,8 @@ type Lanes = [f32; LANES];
 /// Marks the number of a block among those of nodes.
 const BLOCK: u32 = 1 << 31;
 
-/// Branches that are kept beside each other; more are put aside.
-const STACK: usize = 64;
+/// Branches that are kept beside each other; more are put aside, which tests shall see too.
+const STACK: usize = if cfg!(test) { 2 * LANES } else { 64 };
 
 /// The hierarchy, from the centre of its sphere.
 pub(super) struct Eightfold {
@@ -346,6 +346,12 @@ impl Aim {
 struct Marks(u32);
 
 impl Marks {
+    /// The lane, when there is one alone.
+    #[inline(always)]
+    fn only(self) -> Option<usize> {
+        self.0.is_power_of_two().then(|| self.0.trailing_zeros() as usize % LANES)
+    }
+
     /// Of numbers whose sign is not set.
     #[inline(always)]
     fn of_signs(numbers: &Lanes) -> Marks {
@@ -375,14 +381,6 @@ impl Marks {
             marks |= u32::from(number.is_sign_positive()) << lane;
         }
         Marks(marks)
-    }
-}
-
-impl Marks {
-    /// The lane, when there is one alone.
-    #[inline(always)]
-    fn only(self) -> Option<usize> {
-        self.0.is_power_of_two().then(|| self.0.trailing_zeros() as usize % LANES)
     }
 }
 

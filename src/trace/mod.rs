@@ -17,6 +17,8 @@ mod pinhole;
 mod tracer;
 mod wide;
 
+use rayon::prelude::*;
+
 use crate::frames::{Global, Point};
 
 pub use bvh::Bvh;
@@ -37,6 +39,11 @@ pub struct Hit {
     pub point: Point<Global>,
     /// Cosine of the angle between the reversed ray and the facet's normal turned to the radar.
     pub cos_theta: f64,
+}
+
+/// Room for the hits of so many rays, whose memory all threads touch first: one alone would take as long as the search.
+fn no_hits(rays: usize) -> Vec<Option<Hit>> {
+    (0..rays).into_par_iter().with_min_len(1 << 14).map(|_| None).collect()
 }
 
 impl Hit {

@@ -44,7 +44,7 @@ impl Tracer<'_> {
     pub fn closest(self, bvh: &Bvh, rays: &[Ray<Global>]) -> Result<Vec<Option<Hit>>, TraceError> {
         Ok(match self {
             Tracer::Pinhole => Fan::new(rays)?.closest(bvh.mesh()),
-            Tracer::Bvh => by_hierarchy(bvh, rays),
+            Tracer::Bvh => bvh.closest_of_each(rays),
             Tracer::Brute => rays.par_iter().map(|ray| brute::closest(bvh.mesh(), ray)).collect(),
             Tracer::Gpu(held) if std::ptr::eq(held.bvh(), bvh) => held.closest(rays)?,
             Tracer::Gpu(_) => return Err(GpuError::OtherMesh.into()),
@@ -57,17 +57,8 @@ impl Tracer<'_> {
 pub fn closest(bvh: &Bvh, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
     match Fan::new(rays) {
         Ok(fan) => fan.closest(bvh.mesh()),
-        Err(_) => by_hierarchy(bvh, rays),
+        Err(_) => bvh.closest_of_each(rays),
     }
-}
-
-fn by_hierarchy(bvh: &Bvh, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
-    /// Rays of one task.
-    const RAYS: usize = 64;
-    let mut hits = vec![None; rays.len()];
-    let tasks = rays.par_chunks(RAYS).zip(hits.par_chunks_mut(RAYS));
-    tasks.for_each(|(rays, hits)| bvh.closest_of(rays, hits));
-    hits
 }
 
 #[cfg(test)]

@@ -31,7 +31,7 @@ use rayon::prelude::*;
 
 use super::facet::met_by;
 use super::wide::{Wide, widest};
-use super::{Bvh, Hit};
+use super::{Bvh, Hit, no_hits};
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 use band::Band;
@@ -75,7 +75,7 @@ impl Fan<'_> {
         let nearest = nearest(&picture);
         let left_out = picture.left_out();
         let bvh = (!left_out.is_empty()).then(|| Bvh::over(mesh, left_out));
-        let mut hits = vec![None; self.rays.len()];
+        let mut hits = no_hits(self.rays.len());
         let blocks = self.rays.par_chunks(LANES).zip(self.sorted.place_of.par_chunks(LANES));
         let blocks = blocks.zip(hits.par_chunks_mut(LANES)).with_min_len(64);
         blocks.for_each(|((rays, places), hits)| {
