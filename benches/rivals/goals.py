@@ -50,7 +50,7 @@ def all_goals(results):
 def tracing(results):
     rows = results.get("trace", [])
     paper = of_workload(rows, "paper", 2)
-    whole = with_power(results, ours(paper))
+    whole = with_power(ours(paper))
     work = "paper's scan, facets → hits → power, 2 threads"
     for tracer, factor, name in [(MEDIUM, 8, "Embree medium"), (LOW, 4, "Embree low")]:
         yield at_least(work, factor, total(best(paper, tracer)), whole, f"{name}, build + trace")
@@ -67,14 +67,9 @@ def tracing(results):
         yield at_least(work, 0.8, min(packets, default=None), mine and median(mine["trace"]), "Embree packets")
 
 
-def with_power(results, mine):
-    """From facets to power. Older results have the power apart, timed after the tracers."""
-    if mine is None:
-        return None
-    if "with_power" in mine:
-        return median(mine["with_power"])
-    apart = [row["power"] for row in results.get("power", []) if row["threads"] == mine["threads"] and "power" in row]
-    return total(mine) + median(apart[0]) if apart else None
+def with_power(mine):
+    """From facets to power."""
+    return median(mine["with_power"]) if mine and "with_power" in mine else None
 
 
 def reshading(results):

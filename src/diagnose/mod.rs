@@ -237,7 +237,7 @@ pub enum DiagnoseError {
     },
     /// With everything that was found the model is still far off.
     #[error(
-        "with all that was found the model is still off by {rmse_db:.1} dB, where speckle and noise leave \
+        "even with the effects that would fit best the model is off by {rmse_db:.1} dB, where speckle and noise leave \
          {noise_floor_db:.1} dB, as for another target; check mesh, pose and radar of the scene, or register the \
          cloud with `matdb measure`"
     )]

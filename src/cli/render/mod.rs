@@ -45,8 +45,8 @@ pub(super) struct Args {
     /// Do not compress power.exr, for programs that cannot unpack it
     #[arg(long)]
     uncompressed: bool,
-    /// How the rays of the scan are traced; all give the same [default: pinhole where they share their
-    /// origin, else bvh]
+    /// How the rays of the scan are traced; all find the same, `brute` to its rounding [default: pinhole
+    /// where they share their origin, else bvh]
     #[arg(long, value_name = "NAME")]
     tracer: Option<Rays>,
 }
