@@ -91,7 +91,7 @@ fn a_curve_gets_from_csv_to_a_folder_for_a_web_server_as_the_docs_say() {
         .env_remove("MATDB")
         .assert()
         .success();
-    let listed = fs::read_dir(folder.path().join("site/material")).unwrap().count();
+    let listed = fs::read_dir(folder.path().join("own-site/material")).unwrap().count();
     assert_eq!(listed, 2, "its page and its table, and no other material");
 }
 

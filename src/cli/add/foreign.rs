@@ -86,11 +86,9 @@ impl Beside {
 
     fn given(&self) -> Result<Given, Error> {
         let frequency_hz = self.frequency.map(|ghz| ghz * 1e9);
-        // From radio to ultraviolet: a frequency in Hz is far beyond.
-        let is_wave = |hz: f64| (1e6..=1e16).contains(&hz);
-        let is_possible = |w: f64| w > 0.0 && w.is_finite();
+        let is_possible = |hz: f64| hz > 0.0 && hz.is_finite();
         let threshold_w = self.threshold.map(watts_from_dbm);
-        if !frequency_hz.is_none_or(is_wave) || !threshold_w.is_none_or(is_possible) {
+        if !frequency_hz.is_none_or(is_possible) || !threshold_w.is_none_or(is_possible) {
             return Err(Error::Usage {
                 problem: "--frequency or --threshold cannot be".to_owned(),
                 way_out: "give a frequency in GHz such as 300, a threshold in dBm such as -77"
