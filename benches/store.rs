@@ -282,7 +282,7 @@ fn filters(store: &Store) {
     ] {
         let found = store.find(&filter).unwrap().len();
         let time = median_us(21, |_| drop(black_box(store.page(&filter, PAGE).unwrap())));
-        let what = format!("filter by {what}, the first {PAGE} of {found}");
+        let what = format!("filter by {what}, at most {PAGE} of {found}");
         tell(&what, time, "us", Some(1000.0));
     }
     let time = median_us(5, |_| drop(black_box(store.list().unwrap())));

@@ -56,17 +56,13 @@ brackets. Times are ms and belong to one machine. Ratios say more: **× 3 means 
 
 
 def other_runs(results):
-    """The parts that the head's day, commit and load are not those of. Of some, older results know the commit alone."""
-    machine, known = results["machine"], {part: {"commit": at} for part, at in results.get("commits", {}).items()}
-    for part, run in (known | results.get("parts", {})).items():
+    """The parts that the head's day, commit and load are not those of."""
+    machine = results["machine"]
+    for part, run in results.get("parts", {}).items():
         if all(machine[key] == run[key] for key in run if key != "minutes"):
             continue
-        when = f"at `{run['commit']}`"
-        if "date" in run:
-            took = f"{run['minutes']:.0f} minutes, load before them" if "minutes" in run else "load before it"
-            when = f"on {run['date']} {when}, {took} {run['load_before']}"
-            when += f", by {run['cpu']}" * (run["cpu"] != machine["cpu"])
-        yield part, when
+        when = f"on {run['date']} at `{run['commit']}`, {run['minutes']:.0f} minutes, load before them {run['load_before']}"
+        yield part, when + f", by {run['cpu']}" * (run["cpu"] != machine["cpu"])
 
 
 def goals(results):

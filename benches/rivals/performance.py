@@ -68,7 +68,7 @@ def kept(options):
     if not options.only or not options.results.exists():
         return {}
     stored = json.loads(options.results.read_text(encoding="utf-8"))
-    kept = {key: stored[key] for key in ["versions", "failed", "commits", "parts", *PARTS] if key in stored}
+    kept = {key: stored[key] for key in ["versions", "failed", "parts", *PARTS] if key in stored}
     return kept | {"quick": options.quick or stored["quick"]}
 
 

@@ -101,20 +101,16 @@ class Page(unittest.TestCase):
                  "coherent": True, "tracer": "Open3D", "missing": "No module named 'open3d'"},
             ],
             "failed": {"store": "no cargo"},
-            "commits": {"trace": MACHINE["commit"], "fits": "ba9876543210"},
         }
         row, = self.lines(results, "| Open3D |")
         self.assertIn("No module named 'open3d'", row)
         self.assertEqual(self.lines(results, "Nowhere"), ["Nowhere in this run."])
         self.assertEqual(self.lines(results, "- store"), ["- store could not be measured: no cargo"])
-        self.assertEqual(self.lines(results, "- fits"), ["- fits: measured at `ba9876543210`"])
-        self.assertEqual(self.lines(results, "- trace"), [])
 
     def test_parts_of_another_run_tell_when_it_was(self):
         run = {key: MACHINE[key] for key in RUN}
         other = run | {"date": "1999-12-31", "commit": "ba9876543210", "load_before": 1.5}
         results = {
-            "commits": {"fits": MACHINE["commit"]},
             "parts": {
                 "trace": run | {"minutes": 7.0},
                 "fits": other | {"minutes": 3.0},
