@@ -118,6 +118,9 @@ fn a_report_is_complete_and_its_table_gives_its_errors() {
         "mesh": "plate", "rotation_deg": [-15.0, 10.0, 0.0], "translation_m": [0.0, 0.83, 0.0],
     });
     assert_eq!(report["base"]["pose"][1], stood);
+    assert!((number(&report["base"]["noise_dbm"]) + 110.0).abs() < 1e-9, "{report}");
+    assert_eq!(report["base"]["range_sd_m"], 0.002);
+    assert!(report["error"]["with_unknown"].is_null(), "nothing unknown is left: {report}");
 
     let csv = fs::read_to_string(at.join("report/residuals.csv")).unwrap();
     let observed = column(&csv, "observed_dbm");

@@ -127,6 +127,12 @@ fn diagnosed_with(
     diagnosed_of(library, effects.collect(), seed)
 }
 
+/// One region around the middle of the target.
+fn stage<'a>(radar: &'a Radar, bvh: &'a Bvh<'a>, region_of_facet: &'a [u16]) -> Stage<'a> {
+    let (link, middle) = (Link::new(radar), DVec3::new(0.0, 1.1, 0.0));
+    Stage { radar, link, bvh, region_of_facet, grain_of_region: &[DVec3::Y], middle }
+}
+
 /// The same, with all numbers of every effect.
 fn diagnosed_of(
     library: &[&'static dyn Effect],
@@ -136,10 +142,7 @@ fn diagnosed_of(
     let (radar, mesh) = (Radar::default(), target());
     let bvh = Bvh::new(&mesh);
     let regions = vec![0; mesh.facets.len()];
-    let (link, grain_of_region) = (Link::new(&radar), [DVec3::Y]);
-    let (region_of_facet, grain_of_region) = (&regions[..], &grain_of_region[..]);
-    let middle = DVec3::new(0.0, 1.1, 0.0);
-    let stage = Stage { radar: &radar, link, bvh: &bvh, region_of_facet, grain_of_region, middle };
+    let stage = stage(&radar, &bvh, &regions);
     let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
     let noise_w = watts_from_dbm(-100.0);
     let receiver = Receiver { looks: 4.0, noise_w, ..Receiver::LINEAR };
@@ -295,6 +298,9 @@ fn what_no_effect_explains_is_called_unexplained() {
     let report = diagnosed(&[(&STRIPES, 1.2)], 31);
     assert_eq!(report.verdict, Verdict::Unexplained, "{report:#?}");
     assert!(report.unexplained.iter().any(|u| u.covariate == "x_t"), "{report:#?}");
+    let with_unknown = report.error.with_unknown.as_ref().unwrap().rmse_db;
+    assert!(with_unknown < report.error.after.rmse_db, "{:#?}", report.error);
+    assert!(with_unknown > 0.98 * report.error.noise_floor_db, "{:#?}", report.error);
     // The map of what is unknown has the stripes, of 1.2 dB and drawn to nothing by the field's prior.
     let stripe = |row: &Row| row.unknown_db * (9.0 * row.xt_m).sin().signum();
     let mean_db = report.rows.iter().map(stripe).sum::<f64>() / report.rows.len() as f64;
@@ -306,14 +312,7 @@ fn places_are_on_the_target() {
     let (radar, mesh) = (Radar::default(), target());
     let bvh = Bvh::new(&mesh);
     let regions = vec![0; mesh.facets.len()];
-    let stage = Stage {
-        radar: &radar,
-        link: Link::new(&radar),
-        bvh: &bvh,
-        region_of_facet: &regions,
-        grain_of_region: &[DVec3::Y],
-        middle: DVec3::new(0.0, 1.1, 0.0),
-    };
+    let stage = stage(&radar, &bvh, &regions);
     let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
     let (plate_z_m, on_sphere_z_m) = (0.0, 0.1 + 0.35);
     let round = Place::Round { x_m: 0.1, y_m: 0.0, radius_m: 0.1 };
@@ -333,15 +332,7 @@ fn a_scan_with_too_little_says_so() {
     let (radar, mesh) = (Radar::default(), target());
     let bvh = Bvh::new(&mesh);
     let regions = vec![0; mesh.facets.len()];
-    let (link, grains) = (Link::new(&radar), [DVec3::Y]);
-    let stage = Stage {
-        radar: &radar,
-        link,
-        bvh: &bvh,
-        region_of_facet: &regions,
-        grain_of_region: &grains,
-        middle: DVec3::new(0.0, 1.1, 0.0),
-    };
+    let stage = stage(&radar, &bvh, &regions);
     let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
     let receiver = Receiver { looks: 4.0, noise_w: 0.0, ..Receiver::LINEAR };
     let declared = Declared { threshold_w: 1e-11, range_sd_m: RANGE_SD_M };
@@ -381,15 +372,7 @@ fn a_cloud_finds_its_looks() {
     let (radar, mesh) = (Radar::default(), target());
     let bvh = Bvh::new(&mesh);
     let regions = vec![0; mesh.facets.len()];
-    let (link, grains) = (Link::new(&radar), [DVec3::Y]);
-    let stage = Stage {
-        radar: &radar,
-        link,
-        bvh: &bvh,
-        region_of_facet: &regions,
-        grain_of_region: &grains,
-        middle: DVec3::new(0.0, 1.1, 0.0),
-    };
+    let stage = stage(&radar, &bvh, &regions);
     let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
     let missed = (0..(SIDE * SIDE) as u32).find(|c| looks.iter().all(|l| l.chirp != *c)).unwrap();
     let point = |look: &Look, chirp: u32, off_m: f64| {
@@ -478,14 +461,7 @@ fn a_wide_spot_sees_past_the_edge() {
     let (radar, mut mesh) = (Radar::default(), solids::plate(0.5, 0.5));
     mesh.vertices.iter_mut().for_each(|v| *v += DVec3::new(0.0, 1.1, 0.0));
     let (bvh, regions) = (Bvh::new(&mesh), vec![0; mesh.facets.len()]);
-    let stage = Stage {
-        radar: &radar,
-        link: Link::new(&radar),
-        bvh: &bvh,
-        region_of_facet: &regions,
-        grain_of_region: &[DVec3::Y],
-        middle: DVec3::new(0.0, 1.1, 0.0),
-    };
+    let stage = stage(&radar, &bvh, &regions);
     let chirps = chirps(&radar);
     let looks = looks(&stage, &radar, &chirps).unwrap();
     // Every chirp within 8 cm of the plate answers, at the plate's range.

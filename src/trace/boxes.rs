@@ -36,8 +36,7 @@ impl Boxes {
                 Aabb::new(tight.min - padding, tight.max + padding)
             })
             .collect();
-        // Walked eight boxes at a time, the trees of its slower presets gain at most a fiftieth; to build them takes up
-        // to eight times as long.
+        // Walked eight boxes at a time, the trees of its slower presets are hardly faster, and they take far longer to build.
         let tree = build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut Duration::default());
         let facets = tree.primitive_indices.iter().map(|&entry| facets[entry as usize]).collect();
         Boxes { tree, facets, sphere }

@@ -318,6 +318,7 @@ impl Aim {
         let origin = self.axes.map(|axis| self.origin[axis]);
         let mut within = [0.0; LANES];
         for lane in 0..LANES {
+            // How far a corner lies beside the ray, m, and what that is worth in the volume of an edge, m².
             let beside = |corner: usize| {
                 let depth = corners[corner][0][lane] - origin[0];
                 let x = corners[corner][1][lane] - origin[1] - self.shear[0] * depth;
@@ -327,6 +328,7 @@ impl Aim {
                 [x, y, doubt]
             };
             let (a, b, c) = (beside(0), beside(1), beside(2));
+            // The volume of an edge is of either sign when it is nearer to zero than its doubt.
             let edge = |from: [f32; 3], to: [f32; 3]| {
                 let edge = from[0] * to[1] - from[1] * to[0];
                 let doubt = from[2] + to[2];

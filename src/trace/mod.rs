@@ -41,7 +41,8 @@ pub struct Hit {
     pub cos_theta: f64,
 }
 
-/// Room for the hits of so many rays, whose memory all threads touch first: one alone would take as long as the search.
+/// Room for the hits of so many rays, whose memory all threads touch first: to first touch it is much of the work of
+/// many rays.
 fn no_hits(rays: usize) -> Vec<Option<Hit>> {
     (0..rays).into_par_iter().with_min_len(1 << 14).map(|_| None).collect()
 }

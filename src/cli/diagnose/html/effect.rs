@@ -53,7 +53,7 @@ pub(super) fn of_cloud(found: &Found) -> String {
             held_out("Parts of the scan", *held_out_gain, *held_out_se),
             format!(
                 "In the fit itself it gains {} in ln likelihood; as many numbers, but at most six, that mean nothing \
-                 gain {} at most.",
+                 gain {}.",
                 fixed(*gain, 1),
                 fixed(*placebo_gain, 1)
             ),
