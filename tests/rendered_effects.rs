@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3};
 use matdb::brdf::Brdf;
 use matdb::diagnose;
 use matdb::effects::{
-    Effect, Knob, Level, Look, Model, Receiver, SceneEffects, Stage, entry, find, library, middle,
+    Effect, Knob, Level, Model, Receiver, SceneEffects, Shot, Stage, entry, find, library, middle,
     resolve,
 };
 use matdb::formats::EffectEntry;
@@ -87,7 +87,7 @@ impl Bench {
         self.scene.target.regions.iter().map(|region| region.grain).collect()
     }
 
-    fn with_stage<T>(&self, then: impl FnOnce(&Stage, &[Look]) -> T) -> T {
+    fn with_stage<T>(&self, then: impl FnOnce(&Stage, &[Shot]) -> T) -> T {
         let (radar, grains) = (self.scene.radar(), self.grains());
         let mut stage = Stage {
             radar,

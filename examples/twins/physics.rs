@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde_json::Value;
 
 use super::base::{Base, Local};
-use super::scan::{Look, Sight, Stream, World, draws, look, ray};
+use super::scan::{Shot, Sight, Stream, World, draws, look, ray};
 
 /// How strong an effect is to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -80,7 +80,7 @@ pub trait Effect: Sync {
     fn tilt(&self, _size: f64, _chirp: usize) -> DVec2 {
         DVec2::ZERO
     }
-    fn surface(&self, _size: f64, _look: &Look, _law: &mut Local) {}
+    fn surface(&self, _size: f64, _look: &Shot, _law: &mut Local) {}
     /// Power and range that arrive by other ways, W and m.
     fn detour(&self, _size: f64, _chirp: usize) -> Option<Report> {
         None
@@ -149,7 +149,7 @@ fn mean(world: &World, seed: u64, base: &Base, acting: &[Acting], sight: &Sight)
 }
 
 /// Equation (11) at one place.
-fn echo_w(world: &World, base: &Base, acting: &[Acting], chirp: usize, look: &Look) -> f64 {
+fn echo_w(world: &World, base: &Base, acting: &[Acting], chirp: usize, look: &Shot) -> f64 {
     let tilt: DVec2 = acting.iter().map(|(effect, size)| effect.tilt(*size, chirp)).sum();
     let mut look = *look;
     if tilt != DVec2::ZERO {
@@ -164,7 +164,7 @@ fn echo_w(world: &World, base: &Base, acting: &[Acting], chirp: usize, look: &Lo
 }
 
 /// What the rays of one chirp meet on the target as it really stands.
-fn looks(world: &World, seed: u64, acting: &[Acting], sight: &Sight) -> Vec<Option<Look>> {
+fn looks(world: &World, seed: u64, acting: &[Acting], sight: &Sight) -> Vec<Option<Shot>> {
     let moved: Vec<Displacement> =
         acting.iter().filter_map(|(effect, size)| effect.displacement(*size, sight)).collect();
     let diameter_m = acting.iter().find_map(|(effect, size)| effect.spot_diameter_m(*size));

@@ -34,7 +34,7 @@ pub fn draws(seed: u64, chirp: usize, stream: Stream) -> Draws {
 
 /// Where a ray meets the surface, in the frame of the declared mesh.
 #[derive(Clone, Copy, Debug)]
-pub struct Look {
+pub struct Shot {
     pub point: DVec3,
     /// Turned to the radar.
     pub normal: DVec3,
@@ -42,7 +42,7 @@ pub struct Look {
     pub range_m: f64,
 }
 
-impl Look {
+impl Shot {
     pub fn cos_theta(&self) -> f64 {
         self.normal.dot(self.to_radar)
     }
@@ -59,7 +59,7 @@ pub struct Sight {
     pub off_centre_m: DVec2,
     /// Turn of the scanning mirror, rad; 0 for a scan without one.
     pub mirror_rad: f64,
-    pub look: Option<Look>,
+    pub look: Option<Shot>,
 }
 
 /// A scan of a target, ready for effects.
@@ -119,12 +119,12 @@ impl<'a> World<'a> {
 }
 
 /// The closest hit of a ray.
-pub fn look(bvh: &Bvh, ray: &Ray<Global>) -> Option<Look> {
+pub fn look(bvh: &Bvh, ray: &Ray<Global>) -> Option<Shot> {
     let hit = bvh.closest(ray)?;
     let to_radar = -ray.direction.xyz();
     let normal = bvh.mesh().area_normal(hit.facet as usize).try_normalize()?;
     let normal = if normal.dot(to_radar) < 0.0 { -normal } else { normal };
-    Some(Look { point: hit.point.xyz, normal, to_radar, range_m: hit.range_m })
+    Some(Shot { point: hit.point.xyz, normal, to_radar, range_m: hit.range_m })
 }
 
 /// A ray from a point along a vector of any length.

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::base::{Base, Local};
 use super::physics::Effect;
-use super::scan::{Look, World};
+use super::scan::{Shot, World};
 
 fn ratio(db: f64) -> f64 {
     10f64.powf(0.1 * db)
@@ -26,7 +26,7 @@ impl Effect for Subsurface {
     fn parameters(&self, size: f64) -> Value {
         json!({ "sigma0_db": 10.0 * size.log10(), "form": "constant sigma0, f = sigma0/(4 pi cos^2)" })
     }
-    fn surface(&self, size: f64, _: &Look, law: &mut Local) {
+    fn surface(&self, size: f64, _: &Shot, law: &mut Local) {
         law.sigma0_volume += size;
     }
 }
@@ -64,7 +64,7 @@ impl Effect for CoveringLayer {
             "half_space": { "normal": self.axis.to_array(), "offset_m": self.at_m },
         })
     }
-    fn surface(&self, size: f64, look: &Look, law: &mut Local) {
+    fn surface(&self, size: f64, look: &Shot, law: &mut Local) {
         if look.point.dot(self.axis) > self.at_m {
             law.gain *= ratio(-size / look.cos_theta().max(0.05));
         }
@@ -93,7 +93,7 @@ impl Effect for Anisotropy {
     fn parameters(&self, size: f64) -> Value {
         json!({ "ratio": size.exp(), "meaning": "m along the grain over m across it", "grain": self.grain.to_array() })
     }
-    fn surface(&self, size: f64, look: &Look, law: &mut Local) {
+    fn surface(&self, size: f64, look: &Shot, law: &mut Local) {
         let flat = |v: DVec3| (v - v.dot(look.normal) * look.normal).normalize_or_zero();
         law.cos2_azimuth = flat(self.grain).dot(flat(look.to_radar)).powi(2);
         let half = (0.5 * size).exp();
@@ -146,7 +146,7 @@ impl Effect for ThinFilm {
     fn material(&self, _: f64, base: &mut Base) {
         base.m = self.m;
     }
-    fn surface(&self, size: f64, look: &Look, law: &mut Local) {
+    fn surface(&self, size: f64, look: &Shot, law: &mut Local) {
         let tenth = 10.0 * look.cos_theta().clamp(-1.0, 1.0).acos().to_degrees();
         let low = (tenth as usize).min(self.table.len() - 2);
         let part = (tenth - low as f64).clamp(0.0, 1.0);
@@ -189,7 +189,7 @@ impl Effect for CorrelatedShadowing {
     fn material(&self, size: f64, base: &mut Base) {
         base.m = size;
     }
-    fn surface(&self, _: f64, _: &Look, law: &mut Local) {
+    fn surface(&self, _: f64, _: &Shot, law: &mut Local) {
         law.shadowings = 1.0;
     }
 }
@@ -205,8 +205,8 @@ impl ForeignPatch {
     /// Lies about a point that is met under less than 40°.
     pub fn new(random: &mut Draws, world: &World) -> ForeignPatch {
         let near = |c: f64| c > 40f64.to_radians().cos();
-        let looks: Vec<Look> = world.sights.iter().filter_map(|sight| sight.look).collect();
-        let facing: Vec<&Look> = looks.iter().filter(|look| near(look.cos_theta())).collect();
+        let looks: Vec<Shot> = world.sights.iter().filter_map(|sight| sight.look).collect();
+        let facing: Vec<&Shot> = looks.iter().filter(|look| near(look.cos_theta())).collect();
         let place = (random.uniform() * facing.len() as f64) as usize;
         let centre = facing.get(place).map_or(world.middle, |look| look.point);
         let radius_m = 0.04 + 0.05 * random.uniform();
@@ -229,7 +229,7 @@ impl Effect for ForeignPatch {
             "m_ratio": self.m,
         })
     }
-    fn surface(&self, size: f64, look: &Look, law: &mut Local) {
+    fn surface(&self, size: f64, look: &Shot, law: &mut Local) {
         if look.point.distance(self.centre) < self.radius_m {
             law.specular *= ratio(size);
             law.diffuse *= ratio(size);

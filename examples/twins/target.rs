@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::base::Base;
 use super::physics::{Displacement, Effect, Report};
-use super::scan::{Look, Sight, Stream, World, draws, look, ray};
+use super::scan::{Shot, Sight, Stream, World, draws, look, ray};
 
 /// A random unit vector.
 pub fn direction(random: &mut Draws) -> DVec3 {
@@ -170,7 +170,7 @@ impl Effect for MultiBounce {
 }
 
 /// All that comes back from one lit point by way of a second one.
-fn second_segment(world: &World, base: &Base, a: &Look, random: &mut Draws) -> Option<Report> {
+fn second_segment(world: &World, base: &Base, a: &Shot, random: &mut Draws) -> Option<Report> {
     let mut sum = Report { range_m: 0.0, power_w: 0.0 };
     for sample in 0..ONWARD {
         let [to, facet] = onward(base, a, sample % 2 == 0, random);
@@ -196,7 +196,7 @@ fn second_segment(world: &World, base: &Base, a: &Look, random: &mut Draws) -> O
 }
 
 /// A direction away from A and the facet normal that would mirror the radar's ray into it.
-fn onward(base: &Base, a: &Look, diffuse: bool, random: &mut Draws) -> [DVec3; 2] {
+fn onward(base: &Base, a: &Shot, diffuse: bool, random: &mut Draws) -> [DVec3; 2] {
     let (u, v) = a.normal.any_orthonormal_pair();
     let (sin, cos) = (TAU * random.uniform()).sin_cos();
     let uniform = random.uniform();
@@ -211,7 +211,7 @@ fn onward(base: &Base, a: &Look, diffuse: bool, random: &mut Draws) -> [DVec3; 2
 }
 
 /// The second surface as the antenna sees it, and half the length of the whole way, m.
-fn returned(world: &World, a: &Look, to: DVec3) -> Option<(Look, f64)> {
+fn returned(world: &World, a: &Shot, to: DVec3) -> Option<(Shot, f64)> {
     const OFF_SURFACE_M: f64 = 1e-4;
     let b = look(&world.bvh, &ray(a.point + OFF_SURFACE_M * a.normal, to)?)?;
     let back = world.origin - b.point;
@@ -223,5 +223,5 @@ fn returned(world: &World, a: &Look, to: DVec3) -> Option<(Look, f64)> {
     let seen = look(&world.bvh, &ray(world.origin, -to_radar)?)?;
     let hidden = seen.range_m < range_m - 10.0 * OFF_SURFACE_M;
     let half_m = 0.5 * (a.range_m + b.range_m + range_m);
-    (!hidden).then_some((Look { to_radar, range_m, ..b }, half_m))
+    (!hidden).then_some((Shot { to_radar, range_m, ..b }, half_m))
 }

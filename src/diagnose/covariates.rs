@@ -1,7 +1,7 @@
 //! What residuals may go with.
 
 use super::looks::Observation;
-use crate::effects::{Look, Prediction};
+use crate::effects::{Prediction, Shot};
 use crate::radar::random::{Key, Purpose};
 
 /// One number for each look, and how finely it is looked at.
@@ -13,13 +13,13 @@ pub(super) struct Covariate {
 
 /// Every covariate that varies.
 pub(super) fn covariates(
-    looks: &[Look],
+    looks: &[Shot],
     prediction: &Prediction,
     observations: &[Observation],
 ) -> Vec<Covariate> {
     let [x0, y0] =
-        [|look: &Look| look.xt_m, |look: &Look| look.yt_m].map(|pick| middle(looks, pick));
-    let of_look = |name, cells, pick: &dyn Fn(&Look) -> f64| Covariate {
+        [|look: &Shot| look.xt_m, |look: &Shot| look.yt_m].map(|pick| middle(looks, pick));
+    let of_look = |name, cells, pick: &dyn Fn(&Shot) -> f64| Covariate {
         name,
         values: looks.iter().map(pick).collect(),
         cells,
@@ -64,7 +64,7 @@ fn range_residuals_m(observations: &[Observation], arrived_m: &[Option<f64>]) ->
     own.iter().enumerate().map(|(look, own_m)| own_m.unwrap_or_else(|| other(look))).collect()
 }
 
-fn middle(looks: &[Look], pick: fn(&Look) -> f64) -> f64 {
+fn middle(looks: &[Shot], pick: fn(&Shot) -> f64) -> f64 {
     let ends = [f64::INFINITY, f64::NEG_INFINITY];
     let [low, high] = looks.iter().map(pick).fold(ends, |[low, high], x| [low.min(x), high.max(x)]);
     0.5 * (low + high)

@@ -13,7 +13,7 @@ use super::folds::Folds;
 use super::likelihood::{Likelihood, Term};
 use super::refit::Problem;
 use super::score::DB;
-use crate::effects::{Look, Prediction};
+use crate::effects::{Prediction, Shot};
 
 /// Side of a cell of the map, m.
 const MAP_CELL_M: f64 = 0.08;
@@ -47,14 +47,14 @@ pub(super) struct Structure {
 
 impl Field {
     /// Over these covariates and the target plane.
-    pub fn new(looks: &[Look], covariates: &[Covariate]) -> Field {
+    pub fn new(looks: &[Shot], covariates: &[Covariate]) -> Field {
         let mut field = Field::spline(looks, covariates);
         field.add_map(looks);
         field
     }
 
     /// Over these covariates alone.
-    pub fn spline(looks: &[Look], covariates: &[Covariate]) -> Field {
+    pub fn spline(looks: &[Shot], covariates: &[Covariate]) -> Field {
         let mut field = Field { entries: vec![Vec::new(); looks.len()], names: Vec::new() };
         for covariate in covariates {
             let knots = quantiles(&covariate.values, covariate.cells);
@@ -68,7 +68,7 @@ impl Field {
         field
     }
 
-    fn add_map(&mut self, looks: &[Look]) {
+    fn add_map(&mut self, looks: &[Shot]) {
         let mut corners = std::collections::BTreeMap::new();
         for (entry, look) in self.entries.iter_mut().zip(looks) {
             let [x, y] = [look.xt_m, look.yt_m].map(|x| x / MAP_CELL_M);

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::effects::Look;
+use crate::effects::Shot;
 use crate::fit::held_out::deal;
 
 /// A scan in patches, and the patches in folds.
@@ -25,10 +25,10 @@ pub struct Folds {
 
 impl Folds {
     /// Square patches of side `block_m`, m, dealt out to `folds` folds of about equal numbers of looks.
-    pub fn new(looks: &[Look], block_m: f64, folds: usize, seed: u64) -> Folds {
+    pub fn new(looks: &[Shot], block_m: f64, folds: usize, seed: u64) -> Folds {
         let folds = folds.max(2);
         let cell =
-            |look: &Look| [look.yt_m, look.xt_m].map(|x| (x / block_m.max(1e-6)).floor() as i64);
+            |look: &Shot| [look.yt_m, look.xt_m].map(|x| (x / block_m.max(1e-6)).floor() as i64);
         let mut members: BTreeMap<[i64; 2], Vec<usize>> = BTreeMap::new();
         for (index, look) in looks.iter().enumerate() {
             members.entry(cell(look)).or_default().push(index);
@@ -43,7 +43,7 @@ impl Folds {
             }
         }
         let mut numbers = BTreeMap::new();
-        let numbered = |look: &Look| {
+        let numbered = |look: &Shot| {
             let side_m = block_m.max(1e-6) / 3.0;
             let place = [look.yt_m, look.xt_m].map(|x| (x / side_m).floor() as i64);
             let next = numbers.len();

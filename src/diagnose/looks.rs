@@ -9,7 +9,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::DiagnoseError;
-use crate::effects::{Look, Model, Stage};
+use crate::effects::{Model, Shot, Stage};
 use crate::frames::{Direction, Global, Point, Pose, Ray};
 use crate::measure::cloud::{Cloud, CloudPoint};
 use crate::measure::median_point;
@@ -32,7 +32,7 @@ pub struct Observation {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stray {
     /// The chirp; of no range where it misses, and none where the scan has no such chirp.
-    pub look: Option<Look>,
+    pub look: Option<Shot>,
     /// Range of the detection, m.
     pub range_m: f64,
 }
@@ -65,7 +65,7 @@ const ON_RAY_M: f64 = 0.01;
 ///
 /// # Errors
 /// When no chirp does.
-pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>, DiagnoseError> {
+pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Shot>, DiagnoseError> {
     let footprints = trace(radar, chirps, stage.bvh, 1, &|_| {})?;
     let places: Vec<_> = chirps.target_points_m(&radar.frames()).collect();
     let progress = chirps.progress();
@@ -79,7 +79,7 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>,
         let towards: Direction<_> = frame.local(back);
         let [x, y, _] = towards.xyz().to_array();
         let place = places.get(index)?;
-        Some(Look {
+        Some(Shot {
             hit,
             normal: frame.normal,
             azimuth_rad: y.atan2(x),
@@ -101,7 +101,7 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Look>,
 /// When points have no chirp number and no direction from a common origin, when they lie on the rays of
 /// other chirps than their numbers say, when more than a quarter are second ones of their chirps, or is
 /// neither on the target nor past its edge by a wide spot.
-pub fn matched(cloud: &Cloud, chirps: &Chirps, looks: &[Look]) -> Result<Matched, DiagnoseError> {
+pub fn matched(cloud: &Cloud, chirps: &Chirps, looks: &[Shot]) -> Result<Matched, DiagnoseError> {
     let is_numbered = cloud.points().iter().all(|point| point.chirp.is_some());
     let directions = Directions::new(chirps);
     let directions = directions.as_ref();
@@ -160,7 +160,7 @@ impl Sorted {
 fn sorted(
     cloud: &Cloud,
     chirps: &Chirps,
-    looks: &[Look],
+    looks: &[Shot],
     by_direction: Option<&Directions>,
 ) -> Sorted {
     let index_of_chirp: HashMap<u32, usize> =
@@ -171,7 +171,7 @@ fn sorted(
     let (mut strays, mut on_target, mut second) = (Vec::new(), 0, 0);
     let places: Vec<DVec3> = looks.iter().map(|look| look.hit.point.xyz).collect();
     let met = Nearest::new(&places);
-    let is_by_target = |point: &CloudPoint, look: &Look| {
+    let is_by_target = |point: &CloudPoint, look: &Shot| {
         let nearest_m = met.as_ref().map_or(f64::INFINITY, |met| met.find(point.point.xyz).1);
         nearest_m <= GATE_M && beside(point, &look.ray).length() <= ON_RAY_M
     };
@@ -215,10 +215,10 @@ fn sorted(
 }
 
 /// The look of a chirp that meets nothing.
-pub(super) fn missed(chirps: &Chirps, progress: &[f64], index: usize) -> Option<Look> {
+pub(super) fn missed(chirps: &Chirps, progress: &[f64], index: usize) -> Option<Shot> {
     let ray = *chirps.rays.get(index)?;
     let hit = Hit { facet: u32::MAX, range_m: 0.0, point: ray.origin, cos_theta: 1.0 };
-    Some(Look {
+    Some(Shot {
         chirp: *chirps.number.get(index)?,
         time_s: chirps.time_s.get(index).copied().unwrap_or(0.0),
         progress: *progress.get(index)?,
@@ -282,7 +282,7 @@ impl Directions {
     }
 }
 
-fn range_m(point: &CloudPoint, look: &Look) -> f64 {
+fn range_m(point: &CloudPoint, look: &Shot) -> f64 {
     point.range_m.unwrap_or_else(|| look.ray.origin.distance_m(point.point))
 }
 
@@ -294,6 +294,6 @@ fn beside(point: &CloudPoint, ray: &Ray<Global>) -> DVec3 {
 }
 
 /// How far a point lies from where its chirp meets the target: along the ray and beside it, m.
-fn off_m(point: &CloudPoint, look: &Look) -> f64 {
+fn off_m(point: &CloudPoint, look: &Shot) -> f64 {
     (range_m(point, look) - look.hit.range_m).abs() + beside(point, &look.ray).length()
 }

@@ -46,7 +46,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Knob, Look, Prediction, Receiver, Stage, Traced};
+use crate::effects::{Effect, Knob, Prediction, Receiver, Shot, Stage, Traced};
 use crate::fit::FitError;
 use crate::render::RenderError;
 use crate::units::dbm_from_watts;
@@ -152,7 +152,7 @@ pub struct Subject<'a> {
     /// Threshold and range error.
     pub declared: Declared,
     /// Every chirp that meets the target.
-    pub looks: &'a [Look],
+    pub looks: &'a [Shot],
     /// What each of them saw.
     pub observations: &'a [Observation],
     /// Detections that are no look's.

@@ -2,7 +2,7 @@
 //!
 //! What it gains is what as many free numbers gain by following noise, or whatever else is missing.
 
-use crate::effects::{Effect, Knob, Level, Look, Stage};
+use crate::effects::{Effect, Knob, Level, Shot, Stage};
 use crate::radar::random::{Key, Purpose};
 
 /// Most numbers of a placebo.
@@ -55,11 +55,11 @@ impl Effect for Placebo {
         "What as many free numbers gain by chance."
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![0.0; self.waves.len()]]
     }
 
-    fn gain(&self, values: &[f64], _: &Stage, look: &Look) -> f64 {
+    fn gain(&self, values: &[f64], _: &Stage, look: &Shot) -> f64 {
         let wave = |([phase, kx, ky], db): (&[f64; 3], &f64)| {
             db * (phase + kx * look.xt_m + ky * look.yt_m).cos()
         };

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::looks::Observation;
 use super::refit::{Problem, Space};
-use crate::effects::{Effect, Look};
+use crate::effects::{Effect, Shot};
 use crate::frames::{Global, Pose};
 use crate::measure::icp::bulk_sd_m;
 
@@ -65,7 +65,7 @@ fn step(
 ) -> Option<DVector<f64>> {
     let model = space.model(problem.receiver, at);
     let values = space.effect_values(at).pop()?;
-    let row = |(look, seen): (&Look, &Observation)| {
+    let row = |(look, seen): (&Shot, &Observation)| {
         let range_m = seen.range_m.filter(|_| problem.declared.range_sd_m > 0.0)?;
         let placed = model.placed(problem.stage, *look)?;
         let by_number =
@@ -95,7 +95,7 @@ fn slope(
     effect: &dyn Effect,
     values: &[f64],
     number: usize,
-    look: &Look,
+    look: &Shot,
 ) -> f64 {
     let motion = |values: &[f64]| effect.motion(values, problem.stage, look).unwrap_or(Pose::NONE);
     let mut moved = values.to_vec();

@@ -16,7 +16,7 @@ use super::likelihood::{Declared, Likelihood, Term};
 use super::looks::Observation;
 use super::select::SEARCH;
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Look, Model, Prediction, Receiver, Stage, Traced, rank};
+use crate::effects::{Effect, Model, Prediction, Receiver, Shot, Stage, Traced, rank};
 use crate::fit::FitError;
 use crate::fit::coordinates::{Coordinates, frequencies};
 use crate::fit::minimise::{Local, Minimise, Stop};
@@ -44,7 +44,7 @@ pub(crate) const LEAST_LOOKS: usize = 100;
 #[derive(Clone, Copy)]
 pub(super) struct Problem<'a> {
     pub stage: &'a Stage<'a>,
-    pub looks: &'a [Look],
+    pub looks: &'a [Shot],
     pub observations: &'a [Observation],
     pub declared: Declared,
     pub receiver: Receiver,
@@ -82,7 +82,7 @@ impl<'a> Space<'a> {
     ) -> Result<Space<'a>, FitError> {
         let mut turned = Vec::new();
         for (region, law) in laws.iter().enumerate() {
-            let here = |look: &&Look| usize::from(look.region) == region;
+            let here = |look: &&Shot| usize::from(look.region) == region;
             if problem.looks.iter().filter(here).count() >= LEAST_LOOKS {
                 let looks = Some(problem.receiver.looks);
                 turned.push((region, Coordinates::new(law, &frequencies(law), &[], looks)?));

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::{Candidate, Errors, Unexplained};
 use crate::brdf::Brdf;
-use crate::effects::{Level, Look, Place};
+use crate::effects::{Level, Place, Shot};
 
 /// The answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -69,7 +69,7 @@ impl Parameters {
     pub(super) fn new(
         numbers: BTreeMap<&'static str, Value>,
         place: Option<Place>,
-        looks: &[Look],
+        looks: &[Shot],
     ) -> Parameters {
         let mut triples = BTreeMap::new();
         for (name, unit) in [("translation_m", "m"), ("rotation_deg", "deg")] {

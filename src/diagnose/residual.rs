@@ -22,7 +22,7 @@ use super::folds::Folds;
 use super::likelihood::{Declared, Likelihood};
 use super::looks::Observation;
 use super::score::DB;
-use crate::effects::{Arrived, Look, Prediction};
+use crate::effects::{Arrived, Prediction, Shot};
 use crate::radar::random::{Key, Purpose};
 
 /// Bins of a covariate, with as many looks each.
@@ -94,7 +94,7 @@ impl Tests {
     pub fn run(
         &self,
         z: &[f64],
-        looks: &[Look],
+        looks: &[Shot],
         prediction: &Prediction,
         covariates: &[Covariate],
         folds: &Folds,
@@ -161,7 +161,7 @@ impl Tests {
     /// Bin of every look by every covariate, and one for all.
     fn bins(
         &self,
-        looks: &[Look],
+        looks: &[Shot],
         covariates: &[Covariate],
     ) -> Vec<(Option<&'static str>, Vec<usize>)> {
         let of = |c: &Covariate| (Some(c.name), quantile_bins(&c.values));
@@ -171,9 +171,9 @@ impl Tests {
         bins
     }
 
-    fn map(&self, looks: &[Look]) -> Vec<usize> {
+    fn map(&self, looks: &[Shot]) -> Vec<usize> {
         let side_m = MAP_CELL * self.block_m;
-        let cell = |look: &Look| [look.xt_m, look.yt_m].map(|x| (x / side_m).floor() as i64);
+        let cell = |look: &Shot| [look.xt_m, look.yt_m].map(|x| (x / side_m).floor() as i64);
         let mut cells: Vec<[i64; 2]> = looks.iter().map(cell).collect();
         let of_look = cells.clone();
         cells.sort_unstable();
@@ -195,21 +195,21 @@ fn quantile_bins(values: &[f64]) -> Vec<usize> {
 /// Neighbours are one to two spots apart, beyond the reach of a speckle that two spots share.
 pub(super) fn of_neighbours(
     z: &[f64],
-    looks: &[Look],
+    looks: &[Shot],
     spot_m: f64,
     sd_db: f64,
     folds: &Folds,
 ) -> Unexplained {
-    let cell = |look: &Look| [look.xt_m, look.yt_m].map(|x| (x / (2.0 * spot_m)).floor() as i64);
+    let cell = |look: &Shot| [look.xt_m, look.yt_m].map(|x| (x / (2.0 * spot_m)).floor() as i64);
     let mut members: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
     for (index, look) in looks.iter().enumerate() {
         members.entry(cell(look)).or_default().push(index);
     }
-    let shared = |(look, z_here): (&Look, &f64)| {
+    let shared = |(look, z_here): (&Shot, &f64)| {
         let [i, j] = cell(look);
         let near = (-1..=1).flat_map(|di| (-1..=1).map(move |dj| [i + di, j + dj]));
         let near = near.filter_map(|at| members.get(&at)).flatten();
-        let apart_m = |other: &Look| (other.xt_m - look.xt_m).hypot(other.yt_m - look.yt_m);
+        let apart_m = |other: &Shot| (other.xt_m - look.xt_m).hypot(other.yt_m - look.yt_m);
         let zs = near.filter_map(|&index| {
             let other = looks.get(index)?;
             let counts = (spot_m..2.0 * spot_m).contains(&apart_m(other));

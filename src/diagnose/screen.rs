@@ -11,7 +11,7 @@ use super::likelihood::Term;
 use super::looks::Observation;
 use super::refit::{Problem, Slope, Space, sum};
 use super::score::DB;
-use crate::effects::{Look, Traced};
+use crate::effects::{Shot, Traced};
 
 /// Looks that a screening needs; more only take time.
 const ENOUGH: usize = 2500;
@@ -24,7 +24,7 @@ const MOST_SCALE: f64 = 5.0;
 
 /// Every so many looks of a scan.
 pub(super) struct Sample {
-    looks: Vec<Look>,
+    looks: Vec<Shot>,
     observations: Vec<Observation>,
     traced: Traced,
     /// Looks that each of them stands for.
@@ -35,7 +35,7 @@ impl Sample {
     /// Of a problem.
     pub fn new(problem: &Problem) -> Sample {
         let every = (problem.looks.len() / ENOUGH).max(1);
-        let looks: Vec<Look> = problem.looks.iter().step_by(every).copied().collect();
+        let looks: Vec<Shot> = problem.looks.iter().step_by(every).copied().collect();
         let observations = problem.observations.iter().step_by(every).copied().collect();
         let weight = problem.looks.len() as f64 / looks.len().max(1) as f64;
         Sample { looks, observations, traced: Traced::default(), weight }

@@ -64,11 +64,11 @@ fn chirps(radar: &Radar) -> crate::radar::Chirps {
 struct Gain {
     name: &'static str,
     knobs: [Knob; 1],
-    db: fn(&Look) -> f64,
+    db: fn(&Shot) -> f64,
 }
 
 impl Gain {
-    const fn new(name: &'static str, db: fn(&Look) -> f64) -> Gain {
+    const fn new(name: &'static str, db: fn(&Shot) -> f64) -> Gain {
         let knob =
             Knob { name: "edge_db", unit: "dB", min: -8.0, max: 8.0, absent: 0.0, step: 0.3 };
         Gain { name, knobs: [knob], db }
@@ -102,10 +102,10 @@ impl Effect for Gain {
     fn shows(&self) -> &'static str {
         ""
     }
-    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![0.3], vec![-0.3]]
     }
-    fn gain(&self, values: &[f64], _: &Stage, look: &Look) -> f64 {
+    fn gain(&self, values: &[f64], _: &Stage, look: &Shot) -> f64 {
         10f64.powf(0.1 * values.first().unwrap() * (self.db)(look))
     }
 }
@@ -375,7 +375,7 @@ fn a_cloud_finds_its_looks() {
     let stage = stage(&radar, &bvh, &regions);
     let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
     let missed = (0..(SIDE * SIDE) as u32).find(|c| looks.iter().all(|l| l.chirp != *c)).unwrap();
-    let point = |look: &Look, chirp: u32, off_m: f64| {
+    let point = |look: &Shot, chirp: u32, off_m: f64| {
         let range_m = look.hit.range_m + off_m;
         let point = Point::from(look.ray.origin.xyz + range_m * look.ray.direction.xyz());
         CloudPoint { chirp: Some(chirp), point, range_m: None, power_dbm: -60.0 }

@@ -1,6 +1,6 @@
 //! Normals that differ from the mesh's from chirp to chirp: two Gaussian tilts of one spread.
 
-use super::{Effect, Knob, Level, Look, Receiver, Stage};
+use super::{Effect, Knob, Level, Receiver, Shot, Stage};
 
 /// The effect `angle-error`.
 pub(super) struct AngleError;
@@ -30,7 +30,7 @@ impl Effect for AngleError {
          scatter alike at every angle."
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![0.4], vec![1.0], vec![3.0]]
     }
 

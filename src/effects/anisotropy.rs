@@ -1,7 +1,7 @@
 //! Facet slopes that differ along and across a grain: m·√q along it and m/√q across.
 
 use super::lobes::rescaled;
-use super::{Effect, Knob, Level, Look, Stage};
+use super::{Effect, Knob, Level, Shot, Stage};
 use crate::brdf::{Brdf, CookTorrance, Scattering};
 use crate::frames::Direction;
 
@@ -52,11 +52,11 @@ impl Effect for Anisotropy {
          of the angle, which have no direction; a tilted pose has one, but goes up and down once."
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         [[1.2, 0.0], [1.2, 45.0], [1.2, -45.0], [1.0 / 1.2, 0.0]].map(|v| v.to_vec()).to_vec()
     }
 
-    fn scatter(&self, values: &[f64], _: &Stage, law: &Brdf, look: &Look, f_per_sr: f64) -> f64 {
+    fn scatter(&self, values: &[f64], _: &Stage, law: &Brdf, look: &Shot, f_per_sr: f64) -> f64 {
         let &[ratio, turn_deg] = values else { return f_per_sr };
         if ratio == 1.0 {
             return f_per_sr;
@@ -80,7 +80,7 @@ mod tests {
         let bench = Bench::plate();
         let law = Brdf::CookTorrance(lobe());
         let found = |azimuth_rad: f64, turn_deg: f64| {
-            let mut look = Look { azimuth_rad, ..bench.looks[0] };
+            let mut look = Shot { azimuth_rad, ..bench.looks[0] };
             look.hit.cos_theta = 0.3f64.cos();
             let f = law.retro_per_sr(0.3);
             Anisotropy.scatter(&[1.5, turn_deg], &bench.stage(), &law, &look, f) / f

@@ -4,7 +4,7 @@
 //! One that does so at once holds the speckle down, too, each look by itself or the mean of all; a gain
 //! control slower than a chirp lets all of it pass.
 
-use super::{Ceiling, Effect, Knob, Level, Look, Receiver, Stage};
+use super::{Ceiling, Effect, Knob, Level, Receiver, Shot, Stage};
 use crate::units::watts_from_dbm;
 
 /// The effect `compression`.
@@ -42,7 +42,7 @@ impl Effect for Compression {
          raises the flanks beside it."
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         // Powers that a ceiling leaves no room for are outliers, which show no way to the right one.
         let levels_dbm = (-27..=-7).map(|level| 3.0 * f64::from(level));
         let ways = [[1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];

@@ -1,7 +1,7 @@
 //! Shadowing and masking as one event: in backscatter G1 where the law has G1².
 
 use super::lobes::rescaled;
-use super::{Effect, Knob, Level, Look, Stage};
+use super::{Effect, Knob, Level, Shot, Stage};
 use crate::brdf::{Brdf, CookTorrance, Scattering, Shadowing};
 use crate::frames::Direction;
 
@@ -33,11 +33,11 @@ impl Effect for CorrelatedShadowing {
          factor that grows with angle, and needs no rough lobe."
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![0.5], vec![1.0]]
     }
 
-    fn scatter(&self, values: &[f64], _: &Stage, law: &Brdf, look: &Look, f_per_sr: f64) -> f64 {
+    fn scatter(&self, values: &[f64], _: &Stage, law: &Brdf, look: &Shot, f_per_sr: f64) -> f64 {
         let &[share] = values else { return f_per_sr };
         if share == 0.0 {
             return f_per_sr;

@@ -1,7 +1,7 @@
 //! A layer over part of the target, such as clothing: −loss/cos θ dB beyond a line across the field of
 //! view, which is a plane through the radar.
 
-use super::{Effect, Knob, Level, Look, Place, Stage};
+use super::{Effect, Knob, Level, Place, Shot, Stage};
 use crate::units::ratio_from_db;
 
 /// The effect `covering-layer`.
@@ -17,7 +17,7 @@ const KNOBS: [Knob; 3] = [
 const LEAST_COS_THETA: f64 = 0.02;
 
 /// How far a look lies from the field's centre, m, along `direction_deg` from x_t towards y_t.
-pub(super) fn along_m(look: &Look, direction_deg: f64) -> f64 {
+pub(super) fn along_m(look: &Shot, direction_deg: f64) -> f64 {
     let (sin, cos) = direction_deg.to_radians().sin_cos();
     look.xt_m * cos + look.yt_m * sin
 }
@@ -56,7 +56,7 @@ impl Effect for CoveringLayer {
     }
 
     /// Lines that cut off a third and two thirds of the looks, from four sides.
-    fn starts(&self, _stage: &Stage, looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, looks: &[Shot]) -> Vec<Vec<f64>> {
         let line = |direction_deg: f64, share: f64| {
             let mut along: Vec<f64> = looks.iter().map(|l| along_m(l, direction_deg)).collect();
             along.sort_by(f64::total_cmp);
@@ -75,7 +75,7 @@ impl Effect for CoveringLayer {
         Some(Place::Beyond { off_m, direction_deg })
     }
 
-    fn gain(&self, values: &[f64], stage: &Stage, look: &Look) -> f64 {
+    fn gain(&self, values: &[f64], stage: &Stage, look: &Shot) -> f64 {
         let &[loss_db, boundary_m, direction_deg] = values else { return 1.0 };
         let left = ratio_from_db(-loss_db / look.hit.cos_theta.max(LEAST_COS_THETA));
         let beyond_m = along_m(look, direction_deg) - boundary_m;
@@ -90,7 +90,7 @@ mod tests {
 
     fn gain_db(yt_m: f64, theta_deg: f64) -> f64 {
         let bench = Bench::plate();
-        let mut look = Look { yt_m, ..bench.looks[0] };
+        let mut look = Shot { yt_m, ..bench.looks[0] };
         look.hit.cos_theta = theta_deg.to_radians().cos();
         db(CoveringLayer.gain(&[1.5, 0.1, 90.0], &bench.stage(), &look))
     }

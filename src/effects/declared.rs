@@ -1,7 +1,7 @@
 //! The effects that a scene, its radar and its materials declare, each where it acts.
 
 use super::entry::{Chosen, rank};
-use super::{Effect, Knob, Level, Look, Model, Receiver, Stage};
+use super::{Effect, Knob, Level, Model, Receiver, Shot, Stage};
 use crate::brdf::Brdf;
 use crate::radar::Radar;
 use crate::units::watts_from_dbm;
@@ -60,7 +60,7 @@ struct OnRegions {
 }
 
 impl OnRegions {
-    fn acts_on(&self, look: &Look) -> bool {
+    fn acts_on(&self, look: &Shot) -> bool {
         self.is_of_it.get(usize::from(look.region)).copied().unwrap_or(false)
     }
 }
@@ -86,7 +86,7 @@ impl Effect for OnRegions {
         self.effect.shows()
     }
 
-    fn starts(&self, stage: &Stage, looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, stage: &Stage, looks: &[Shot]) -> Vec<Vec<f64>> {
         self.effect.starts(stage, looks)
     }
 
@@ -95,7 +95,7 @@ impl Effect for OnRegions {
         values: &[f64],
         stage: &Stage,
         law: &Brdf,
-        look: &Look,
+        look: &Shot,
         f_per_sr: f64,
     ) -> f64 {
         match self.acts_on(look) {
@@ -104,7 +104,7 @@ impl Effect for OnRegions {
         }
     }
 
-    fn gain(&self, values: &[f64], stage: &Stage, look: &Look) -> f64 {
+    fn gain(&self, values: &[f64], stage: &Stage, look: &Shot) -> f64 {
         if self.acts_on(look) { self.effect.gain(values, stage, look) } else { 1.0 }
     }
 }

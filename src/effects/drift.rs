@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Effect, Knob, Level, Look, Stage};
+use super::{Effect, Knob, Level, Shot, Stage};
 use crate::units::ratio_from_db;
 
 /// The effect `drift`.
@@ -41,7 +41,7 @@ impl Effect for Drift {
          stay right, which motion does not leave."
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         [0.5, 1.0, 1.5, 2.0, 3.0].map(|waves| vec![0.3, 0.3, 0.3, waves]).to_vec()
     }
 
@@ -49,7 +49,7 @@ impl Effect for Drift {
         true
     }
 
-    fn gain(&self, values: &[f64], _: &Stage, look: &Look) -> f64 {
+    fn gain(&self, values: &[f64], _: &Stage, look: &Shot) -> f64 {
         let &[slope_db, sin_db, cos_db, waves] = values else { return 1.0 };
         let (sin, cos) = (TAU * waves * look.progress).sin_cos();
         ratio_from_db(slope_db * (look.progress - 0.5) + sin_db * sin + cos_db * cos)
@@ -63,7 +63,7 @@ mod tests {
 
     fn gain_db(values: [f64; 4], progress: f64) -> f64 {
         let bench = Bench::plate();
-        db(Drift.gain(&values, &bench.stage(), &Look { progress, ..bench.looks[0] }))
+        db(Drift.gain(&values, &bench.stage(), &Shot { progress, ..bench.looks[0] }))
     }
 
     #[test]

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::meeting::{Facet, Facing, facing};
 use super::model::Kept;
 use super::spread::sunflower;
-use super::{Arrived, Effect, Knob, Level, Look, Stage, Survey};
+use super::{Arrived, Effect, Knob, Level, Shot, Stage, Survey};
 use crate::brdf::{Brdf, Scattering, Term};
 use crate::frames::{Direction, Global, Ray, Surface};
 use crate::trace::{Hit, closest};
@@ -137,10 +137,10 @@ impl Spots {
     }
 }
 
-fn spots(stage: &Stage, looks: &[Look], diameter_m: f64) -> Vec<Option<Spot>> {
+fn spots(stage: &Stage, looks: &[Shot], diameter_m: f64) -> Vec<Option<Spot>> {
     let axes: Vec<Ray<Global>> = looks.iter().map(|look| look.ray).collect();
     let centres = closest(stage.bvh, &axes);
-    let round = |(look, centre): (&Look, &Option<Hit>)| {
+    let round = |(look, centre): (&Shot, &Option<Hit>)| {
         round(&look.ray, centre.map_or(0.0, |hit| diameter_m / hit.range_m))
     };
     let rays: Vec<[Ray<Global>; RAYS]> = looks.par_iter().zip(&centres).map(round).collect();
@@ -150,7 +150,7 @@ fn spots(stage: &Stage, looks: &[Look], diameter_m: f64) -> Vec<Option<Spot>> {
     let facets = if facets < looks.len() * RAYS { 0..facets } else { 0..0 };
     let facets: Vec<Facet> =
         facets.into_par_iter().with_min_len(1024).map(|facet| Facet::of(stage, facet)).collect();
-    let spot = |(look, (centre, (rays, hits))): (&Look, (&Option<Hit>, Round))| {
+    let spot = |(look, (centre, (rays, hits))): (&Shot, (&Option<Hit>, Round))| {
         let met = |ray: &Ray<Global>, hit: &Option<Hit>, share: f64| {
             let hit = hit.as_ref()?;
             let facing = match facets.get(hit.facet as usize) {
@@ -245,7 +245,7 @@ impl Effect for FiniteSpot {
          on flat places too."
     }
 
-    fn starts(&self, stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         let nominal_m = stage.radar.spot_diameter_m;
         [0.1, 0.3, 0.75, 1.5].map(|share| vec![(share * nominal_m).clamp(1e-3, MOST_M)]).to_vec()
     }
@@ -259,7 +259,7 @@ impl Effect for FiniteSpot {
         values.first().filter(|diameter_m| **diameter_m > 0.0).map(|_| values.to_vec())
     }
 
-    fn survey(&self, values: &[f64], stage: &Stage, looks: &[Look]) -> Survey {
+    fn survey(&self, values: &[f64], stage: &Stage, looks: &[Shot]) -> Survey {
         let diameter_m = values.first().copied().unwrap_or(0.0);
         Box::new(Spots { all: spots(stage, looks, diameter_m), sums: Kept::default() })
     }
@@ -348,7 +348,7 @@ mod tests {
     }
 
     /// The mean over a fine grid of rays through a spot, W.
-    fn finely_w(bench: &Bench, look: &Look, diameter_m: f64) -> f64 {
+    fn finely_w(bench: &Bench, look: &Shot, diameter_m: f64) -> f64 {
         const HALF: i32 = 40;
         let (stage, law) = (bench.stage(), paint(lobe()));
         let model = Model { laws: vec![law], receiver: Receiver::LINEAR, effects: Vec::new() };

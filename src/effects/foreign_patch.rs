@@ -1,7 +1,7 @@
 //! A round place with another material: so many dB within a radius along the surface.
 
 use super::covering_layer::share_of_spot;
-use super::{Effect, Knob, Level, Look, Place, Stage};
+use super::{Effect, Knob, Level, Place, Shot, Stage};
 use crate::frames::{Direction, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::units::ratio_from_db;
@@ -28,7 +28,7 @@ const FADED: f64 = 3.0;
 
 /// Distance of a look from the centre on the target, m; infinite where it is more than `far_m`, which costs
 /// no ray.
-fn apart_m(stage: &Stage, look: &Look, [x_m, y_m]: [f64; 2], far_m: f64) -> f64 {
+fn apart_m(stage: &Stage, look: &Shot, [x_m, y_m]: [f64; 2], far_m: f64) -> f64 {
     let axes = stage.radar.frames().global_from_target.rotation();
     let aside = (x_m - look.xt_m) * axes.x_axis + (y_m - look.yt_m) * axes.y_axis;
     // Beside the ray of the centre by as much at least.
@@ -78,7 +78,7 @@ impl Effect for ForeignPatch {
     }
 
     /// The cells of two grids over the target that hold a look, brighter and darker.
-    fn starts(&self, _stage: &Stage, looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, looks: &[Shot]) -> Vec<Vec<f64>> {
         let [left, right] = span(looks.iter().map(|look| look.xt_m));
         let [low, high] = span(looks.iter().map(|look| look.yt_m));
         let inside = |centre_m: f64| centre_m.clamp(-3.0, 3.0);
@@ -108,7 +108,7 @@ impl Effect for ForeignPatch {
         Some(Place::Round { x_m, y_m, radius_m })
     }
 
-    fn gain(&self, values: &[f64], stage: &Stage, look: &Look) -> f64 {
+    fn gain(&self, values: &[f64], stage: &Stage, look: &Shot) -> f64 {
         let &[level_db, x_m, y_m, radius_m, fade_m] = values else { return 1.0 };
         if level_db == 0.0 {
             return 1.0;

@@ -1,6 +1,6 @@
 //! Gain that changes with the distance ρ from the centre of the field of view: edge_db·(ρ/0.5 m)² dB.
 
-use super::{Effect, Knob, Level, Look, Stage};
+use super::{Effect, Knob, Level, Shot, Stage};
 use crate::units::ratio_from_db;
 
 /// The effect `fov-gain`.
@@ -35,11 +35,11 @@ impl Effect for FovGain {
          tells them apart."
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![-1.0], vec![1.0]]
     }
 
-    fn gain(&self, values: &[f64], _: &Stage, look: &Look) -> f64 {
+    fn gain(&self, values: &[f64], _: &Stage, look: &Shot) -> f64 {
         let &[edge_db] = values else { return 1.0 };
         // Beyond the reach of any field of view the square must not run away.
         let off_centre = (look.xt_m.powi(2) + look.yt_m.powi(2)) / (EDGE_M * EDGE_M);
@@ -56,7 +56,7 @@ mod tests {
     fn three_db_are_lost_at_half_a_metre_and_none_in_the_centre() {
         let bench = Bench::plate();
         let at = |xt_m, yt_m| {
-            let look = Look { xt_m, yt_m, ..bench.looks[0] };
+            let look = Shot { xt_m, yt_m, ..bench.looks[0] };
             db(FovGain.gain(&[-3.0], &bench.stage(), &look))
         };
         assert!((at(0.3, -0.4) + 3.0).abs() < 1e-9);

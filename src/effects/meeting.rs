@@ -3,7 +3,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{Look, Stage};
+use super::{Shot, Stage};
 use crate::frames::{Direction, Global, Pose, Ray, Surface};
 use crate::trace::Hit;
 
@@ -21,7 +21,7 @@ impl Axes {
     }
 
     /// Of a look.
-    pub(super) fn of(stage: &Stage, look: &Look) -> Axes {
+    pub(super) fn of(stage: &Stage, look: &Shot) -> Axes {
         Axes::new(look.normal, grain(stage, look.region))
     }
 
@@ -46,12 +46,12 @@ fn grain(stage: &Stage, region: u16) -> DVec3 {
 }
 
 /// The look, had its chirp taken another ray.
-pub(super) fn met(stage: &Stage, look: &Look, ray: Ray<Global>) -> Option<Look> {
+pub(super) fn met(stage: &Stage, look: &Shot, ray: Ray<Global>) -> Option<Shot> {
     stage.bvh.closest(&ray).map(|hit| at(stage, look, ray, hit))
 }
 
 /// The same for the closest hit of that ray.
-pub(super) fn at(stage: &Stage, look: &Look, ray: Ray<Global>, hit: Hit) -> Look {
+pub(super) fn at(stage: &Stage, look: &Shot, ray: Ray<Global>, hit: Hit) -> Shot {
     facing(stage, &ray, &hit).look(look, ray, hit)
 }
 
@@ -98,10 +98,10 @@ pub(super) fn facing(stage: &Stage, ray: &Ray<Global>, hit: &Hit) -> Facing {
 }
 
 impl Facing {
-    fn look(&self, look: &Look, ray: Ray<Global>, hit: Hit) -> Look {
+    fn look(&self, look: &Shot, ray: Ray<Global>, hit: Hit) -> Shot {
         let to_radar = self.to_radar.xyz();
         let azimuth_rad = to_radar.y.atan2(to_radar.x);
-        Look { ray, hit, normal: self.normal, azimuth_rad, region: self.region, ..*look }
+        Shot { ray, hit, normal: self.normal, azimuth_rad, region: self.region, ..*look }
     }
 }
 
@@ -120,13 +120,13 @@ pub(super) fn seen_from(target: &Pose<Global, Global>, ray: &Ray<Global>) -> Ray
 /// the radar from its surface.
 pub(super) fn moved(
     stage: &Stage,
-    look: &Look,
+    look: &Shot,
     target: Pose<Global, Global>,
     (ray, hit): (Ray<Global>, Hit),
-) -> (Look, Direction<Surface>) {
+) -> (Shot, Direction<Surface>) {
     let facing = facing(stage, &ray, &hit);
     let there = facing.look(look, ray, hit);
     let hit = Hit { point: target * there.hit.point, ..there.hit };
     let normal = target.rotation() * there.normal;
-    (Look { ray: look.ray, hit, normal, target, ..there }, facing.to_radar)
+    (Shot { ray: look.ray, hit, normal, target, ..there }, facing.to_radar)
 }

@@ -1,7 +1,7 @@
 //! Physical effects beyond the paper's model: one file each, one interface, the same object in a
 //! diagnosis and in a prediction.
 //!
-//! A prediction starts from what the scene knows of every chirp, a [`Look`], and asks every effect in
+//! A prediction starts from what the scene knows of every chirp, a [`Shot`], and asks every effect in
 //! turn for each of four things; an effect answers those that it changes:
 //!
 //! 1. where and how the chirp meets the target ([`Effect::motion`]): pose, motion;
@@ -83,14 +83,14 @@ pub fn find(name: &str) -> Option<&'static dyn Effect> {
 }
 
 /// Middle of the points where looks meet the target, m, global frame; the origin without looks.
-pub fn middle(looks: &[Look]) -> DVec3 {
+pub fn middle(looks: &[Shot]) -> DVec3 {
     let sum: DVec3 = looks.iter().map(|look| look.hit.point.xyz).sum();
     sum / looks.len().max(1) as f64
 }
 
 /// One chirp that meets the target, as far as the scene knows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
+pub struct Shot {
     /// Chirp number.
     pub chirp: u32,
     /// Time of the chirp, s.
@@ -238,7 +238,7 @@ pub trait Effect: Sync {
 
     /// Where a search for it begins: values that are present but weak. Several where one start would
     /// miss it, such as places over the target.
-    fn starts(&self, stage: &Stage, looks: &[Look]) -> Vec<Vec<f64>>;
+    fn starts(&self, stage: &Stage, looks: &[Shot]) -> Vec<Vec<f64>>;
 
     /// Whether it goes with the time of a chirp.
     fn goes_with_time(&self) -> bool {
@@ -252,7 +252,7 @@ pub trait Effect: Sync {
 
     /// The global axis along which a number of its values does nothing but shift the target, after all that its
     /// others do, and by how many m per unit under a look; `None` for numbers that do anything else.
-    fn shifts(&self, _knob: usize, _look: &Look) -> Option<(usize, f64)> {
+    fn shifts(&self, _knob: usize, _look: &Shot) -> Option<(usize, f64)> {
         None
     }
 
@@ -261,7 +261,7 @@ pub trait Effect: Sync {
         &self,
         _values: &[f64],
         _stage: &Stage,
-        _look: &Look,
+        _look: &Shot,
     ) -> Option<Pose<Global, Global>> {
         None
     }
@@ -282,14 +282,14 @@ pub trait Effect: Sync {
         _values: &[f64],
         _stage: &Stage,
         _law: &Brdf,
-        _look: &Look,
+        _look: &Shot,
         f_per_sr: f64,
     ) -> f64 {
         f_per_sr
     }
 
     /// Factor on the power of a look, a ratio.
-    fn gain(&self, _values: &[f64], _stage: &Stage, _look: &Look) -> f64 {
+    fn gain(&self, _values: &[f64], _stage: &Stage, _look: &Shot) -> f64 {
         1.0
     }
 
@@ -299,7 +299,7 @@ pub trait Effect: Sync {
     }
 
     /// Rays beyond a chirp's own, traced once and used for whatever laws: one entry for each look.
-    fn survey(&self, _values: &[f64], _stage: &Stage, _looks: &[Look]) -> Survey {
+    fn survey(&self, _values: &[f64], _stage: &Stage, _looks: &[Shot]) -> Survey {
         Box::new(())
     }
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::meeting::{moved, seen_from};
 use super::pose::Pose as PoseEffect;
 use super::tilt::{NODES, nodes, tilted_cos_theta};
-use super::{Arrived, Effect, Look, Receiver, Saturating, Stage, Survey};
+use super::{Arrived, Effect, Receiver, Saturating, Shot, Stage, Survey};
 use crate::brdf::{Brdf, Retro, Scattering};
 use crate::frames::{Direction, Global, Pose, Ray, Surface};
 use crate::radar::scan::PATTERN_RANGE_M;
@@ -57,7 +57,7 @@ pub struct Traced {
 }
 
 /// A look where the effects place it, and the direction of the radar from its surface.
-type Placed = (Look, Direction<Surface>);
+type Placed = (Shot, Direction<Surface>);
 
 /// Name of an effect and the values that matter.
 type Key = (&'static str, Vec<f64>);
@@ -152,12 +152,12 @@ impl Model<'_> {
     }
 
     /// What arrives of every look.
-    pub fn predict(&self, stage: &Stage, looks: &[Look]) -> Prediction {
+    pub fn predict(&self, stage: &Stage, looks: &[Shot]) -> Prediction {
         self.predict_with(stage, looks, &Traced::default())
     }
 
     /// The same with what may have been traced for these very looks before.
-    pub fn predict_with(&self, stage: &Stage, looks: &[Look], traced: &Traced) -> Prediction {
+    pub fn predict_with(&self, stage: &Stage, looks: &[Shot], traced: &Traced) -> Prediction {
         let keys = |matters: fn(&dyn Effect) -> bool| -> Vec<Key> {
             let matters = self.effects.iter().filter(|(effect, _)| matters(*effect));
             matters.map(|(effect, values)| (effect.name(), values.clone())).collect()
@@ -198,27 +198,27 @@ impl Model<'_> {
     }
 
     /// Where a look meets the target, as the effects place it; `None` where its ray misses.
-    pub(crate) fn placed(&self, stage: &Stage, look: Look) -> Option<Look> {
+    pub(crate) fn placed(&self, stage: &Stage, look: Shot) -> Option<Shot> {
         let Some(target) = self.target(stage, &look) else { return Some(look) };
         let ray = seen_from(&target, &look.ray);
         stage.bvh.closest(&ray).map(|hit| moved(stage, &look, target, (ray, hit)).0)
     }
 
     /// All looks at once, so that rays of one origin share their walk over the facets.
-    fn all_placed(&self, stage: &Stage, looks: &[Look]) -> Vec<Option<Placed>> {
-        let facing = |look: Look| (look, to_radar(&look));
+    fn all_placed(&self, stage: &Stage, looks: &[Shot]) -> Vec<Option<Placed>> {
+        let facing = |look: Shot| (look, to_radar(&look));
         let targets = looks.par_iter().map(|look| self.target(stage, look));
         let targets: Vec<Option<Pose<Global, Global>>> = targets.collect();
         if targets.iter().all(Option::is_none) {
             return looks.par_iter().map(|look| Some(facing(*look))).collect();
         }
-        let seen = |(look, target): (&Look, &Option<Pose<Global, Global>>)| {
+        let seen = |(look, target): (&Shot, &Option<Pose<Global, Global>>)| {
             target.map_or(look.ray, |target| seen_from(&target, &look.ray))
         };
         let rays: Vec<Ray<Global>> = looks.par_iter().zip(&targets).map(seen).collect();
         let hits = closest(stage.bvh, &rays);
         let placed =
-            |(((look, target), ray), hit): (((&Look, &Option<_>), &Ray<_>), &Option<_>)| {
+            |(((look, target), ray), hit): (((&Shot, &Option<_>), &Ray<_>), &Option<_>)| {
                 Some(match *target {
                     None => facing(*look),
                     Some(target) => moved(stage, look, target, (*ray, (*hit)?)),
@@ -228,14 +228,14 @@ impl Model<'_> {
     }
 
     /// Where the effects have the target under a look; `None` where the scene has it.
-    pub(crate) fn target(&self, stage: &Stage, look: &Look) -> Option<Pose<Global, Global>> {
+    pub(crate) fn target(&self, stage: &Stage, look: &Shot) -> Option<Pose<Global, Global>> {
         let motions = self.effects.iter().filter(|(effect, _)| effect.moves());
         let motions = motions.filter_map(|(effect, values)| effect.motion(values, stage, look));
         motions.reduce(|target, motion| motion * target)
     }
 
     /// Ranges, m, at which a chirp may see the target, along its axis or beside it.
-    pub(crate) fn ranges_m(&self, stage: &Stage, look: &Look) -> Vec<f64> {
+    pub(crate) fn ranges_m(&self, stage: &Stage, look: &Shot) -> Vec<f64> {
         const ROUND: usize = 8;
         const RINGS: [f64; 3] = [1.0 / 3.0, 2.0 / 3.0, 1.0];
         let beside = self.effects.iter().map(|(effect, values)| effect.sees_beside_m(values));
@@ -250,7 +250,7 @@ impl Model<'_> {
         let range_m = |direction: DVec3| {
             let ray = Ray { direction: Direction::new(direction)?, ..look.ray };
             let hit = match moves {
-                true => self.placed(stage, Look { ray, ..*look })?.hit,
+                true => self.placed(stage, Shot { ray, ..*look })?.hit,
                 false => stage.bvh.closest(&ray)?,
             };
             Some(hit.range_m)
@@ -261,7 +261,7 @@ impl Model<'_> {
     }
 
     /// What arrives of one look by itself.
-    pub(crate) fn arrived(&self, stage: &Stage, look: &Look) -> Arrived {
+    pub(crate) fn arrived(&self, stage: &Stage, look: &Shot) -> Arrived {
         Arrived::at_once(self.power_w(stage, look), look.hit.range_m)
     }
 
@@ -269,7 +269,7 @@ impl Model<'_> {
     pub(crate) fn arrive(
         &self,
         stage: &Stage,
-        looks: &[Look],
+        looks: &[Shot],
         traced: &Traced,
         arrived: &mut [Option<Arrived>],
     ) {
@@ -291,19 +291,19 @@ impl Model<'_> {
     }
 
     /// Equation (11) with every effect on the surface and the gain.
-    fn power_w(&self, stage: &Stage, look: &Look) -> f64 {
+    fn power_w(&self, stage: &Stage, look: &Shot) -> f64 {
         let f_per_sr = self.law_per_sr(look, to_radar(look));
         self.gain(stage, look) * self.scattered_w(stage, look, f_per_sr)
     }
 
     /// f of the law of a look by itself, 1/sr.
-    fn law_per_sr(&self, look: &Look, to_radar: Direction<Surface>) -> f64 {
+    fn law_per_sr(&self, look: &Shot, to_radar: Direction<Surface>) -> f64 {
         let law = self.laws.get(usize::from(look.region));
         law.map_or(0.0, |law| law.f_per_sr(to_radar, to_radar))
     }
 
     /// Equation (11) with every effect on the surface, W.
-    fn scattered_w(&self, stage: &Stage, look: &Look, law_per_sr: f64) -> f64 {
+    fn scattered_w(&self, stage: &Stage, look: &Shot, law_per_sr: f64) -> f64 {
         let Some(law) = self.laws.get(usize::from(look.region)) else { return 0.0 };
         let f_per_sr = self
             .effects
@@ -313,17 +313,17 @@ impl Model<'_> {
     }
 
     /// What all gains make of the power of a look.
-    fn gain(&self, stage: &Stage, look: &Look) -> f64 {
+    fn gain(&self, stage: &Stage, look: &Shot) -> f64 {
         self.effects.iter().map(|(effect, values)| effect.gain(values, stage, look)).product()
     }
 
     /// What the tilts of a normal make of the power, W, of a look.
-    fn tilts(&self, stage: &Stage, look: &Look, power_w: f64, receiver: &Receiver) -> Tilts {
+    fn tilts(&self, stage: &Stage, look: &Shot, power_w: f64, receiver: &Receiver) -> Tilts {
         let theta_rad = look.hit.theta_rad();
         nodes(receiver.tilt_sd_rad).map(|(tilts, weight)| {
             let tilted = tilted_cos_theta(theta_rad, tilts).map(|cos_theta| {
                 let hit = Hit { cos_theta, ..look.hit };
-                self.power_w(stage, &Look { hit, ..*look })
+                self.power_w(stage, &Shot { hit, ..*look })
             });
             let factor = if power_w > 0.0 { tilted.unwrap_or(0.0) / power_w } else { 0.0 };
             (factor, weight)
@@ -332,6 +332,6 @@ impl Model<'_> {
 }
 
 /// The direction of the radar from the surface of a look.
-fn to_radar(look: &Look) -> Direction<Surface> {
+fn to_radar(look: &Shot) -> Direction<Surface> {
     Direction::from_angles(look.hit.theta_rad(), look.azimuth_rad)
 }

@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use glam::{DMat3, DVec3};
 
 use super::meeting::motion;
-use super::{Effect, Knob, Level, Look, Stage};
+use super::{Effect, Knob, Level, Shot, Stage};
 use crate::frames::{Global, Pose};
 
 /// The effect `motion`.
@@ -119,7 +119,7 @@ impl Effect for Motion {
     }
 
     /// At rest: ranges say at once where to.
-    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![0.0; KNOBS.len()]]
     }
 
@@ -131,11 +131,11 @@ impl Effect for Motion {
         true
     }
 
-    fn shifts(&self, knob: usize, look: &Look) -> Option<(usize, f64)> {
+    fn shifts(&self, knob: usize, look: &Shot) -> Option<(usize, f64)> {
         Some((knob % 3, *terms(look.progress).get(knob / 3)?))
     }
 
-    fn motion(&self, values: &[f64], _: &Stage, look: &Look) -> Option<Pose<Global, Global>> {
+    fn motion(&self, values: &[f64], _: &Stage, look: &Shot) -> Option<Pose<Global, Global>> {
         let moves = values.iter().any(|&value| value != 0.0);
         let shift_m = shift_m(values, look.progress);
         moves.then(|| motion(DMat3::IDENTITY, DVec3::ZERO, shift_m))
@@ -185,7 +185,7 @@ mod tests {
         let mut values = [0.0; KNOBS.len()];
         values[8] = 4e-3;
         for (progress, expected_m) in [(0.0, 4e-3), (0.25, 0.0), (0.5, -4e-3), (1.0, 4e-3)] {
-            let look = Look { progress, ..bench.looks[7] };
+            let look = Shot { progress, ..bench.looks[7] };
             let found = bench.moved(&Motion, &values, &look).unwrap();
             let nearer_m = (look.hit.range_m - found.hit.range_m) * look.hit.cos_theta;
             assert!((nearer_m - expected_m).abs() < 1e-9, "{progress}: {nearer_m}");

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::meeting::{Axes, met};
 use super::spread::sunflower;
-use super::{Arrived, Effect, Knob, Level, Look, Stage, Survey};
+use super::{Arrived, Effect, Knob, Level, Shot, Stage, Survey};
 use crate::brdf::{Brdf, Distribution, Scattering};
 use crate::frames::{Direction, Point, Ray, Surface};
 use crate::units::ratio_from_db;
@@ -84,7 +84,7 @@ impl Detour {
 /// Where a ray from the first surface meets a second one that the radar sees.
 fn detour(
     stage: &Stage,
-    look: &Look,
+    look: &Shot,
     axes: &Axes,
     o: Direction<Surface>,
     density_per_sr: f64,
@@ -116,7 +116,7 @@ fn detour(
 }
 
 /// All ways of a chirp by second surfaces of the target as the scene has it.
-fn detours(stage: &Stage, look: &Look) -> Vec<Detour> {
+fn detours(stage: &Stage, look: &Shot) -> Vec<Detour> {
     let Some(look) = &met(stage, look, look.ray) else { return Vec::new() };
     let axes = Axes::of(stage, look);
     let i = axes.local(-look.ray.direction.xyz());
@@ -154,7 +154,7 @@ impl Effect for MultiBounce {
          without being bright; convex targets never show this."
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![-10.0], vec![0.0], vec![10.0]]
     }
 
@@ -162,7 +162,7 @@ impl Effect for MultiBounce {
         values.first().filter(|coupling_db| **coupling_db > NONE_DB).map(|_| Vec::new())
     }
 
-    fn survey(&self, _: &[f64], stage: &Stage, looks: &[Look]) -> Survey {
+    fn survey(&self, _: &[f64], stage: &Stage, looks: &[Shot]) -> Survey {
         let all: Vec<Vec<Detour>> = looks.par_iter().map(|look| detours(stage, look)).collect();
         Box::new(all)
     }

@@ -1,6 +1,6 @@
 //! Thermal noise beyond what the radar declares: N + N_extra.
 
-use super::{Effect, Knob, Level, Look, Receiver, Stage};
+use super::{Effect, Knob, Level, Receiver, Shot, Stage};
 use crate::units::watts_from_dbm;
 
 /// The effect `noise-floor`.
@@ -35,7 +35,7 @@ impl Effect for NoiseFloor {
          but at one σ⁰ and not at one power, and also far above the threshold."
     }
 
-    fn starts(&self, stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         let [least, most] = [NONE_DBM + 1.0, -30.0];
         let below_db = [13.0, 8.0, 4.0];
         below_db.map(|b| vec![(stage.radar.threshold_dbm - b).clamp(least, most)]).to_vec()

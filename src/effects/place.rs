@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::Look;
+use super::Shot;
 use super::covering_layer::along_m;
 
 /// A part of the target plane.
@@ -29,11 +29,11 @@ pub enum Place {
 impl Place {
     /// Where it is on a target in the global frame, m: the point that is its centre or, of what is not round, the middle of the
     /// box around it and the sides of that. `None` where no look lies in it.
-    pub fn on_target_m(&self, looks: &[Look]) -> Option<(DVec3, Option<DVec3>)> {
-        let point = |look: &Look| look.hit.point.xyz;
+    pub fn on_target_m(&self, looks: &[Shot]) -> Option<(DVec3, Option<DVec3>)> {
+        let point = |look: &Shot| look.hit.point.xyz;
         match *self {
             Place::Round { x_m, y_m, .. } => {
-                let off_m = |look: &&Look| (look.xt_m - x_m).hypot(look.yt_m - y_m);
+                let off_m = |look: &&Shot| (look.xt_m - x_m).hypot(look.yt_m - y_m);
                 let nearest = looks.iter().min_by(|a, b| off_m(a).total_cmp(&off_m(b)))?;
                 Some((point(nearest), None))
             }

@@ -4,7 +4,7 @@
 use glam::{DMat3, DVec3};
 
 use super::meeting::motion;
-use super::{Effect, Knob, Level, Look, Stage};
+use super::{Effect, Knob, Level, Shot, Stage};
 use crate::frames::{Global, Pose as FramePose};
 
 /// From where the scene has the target to where it stands.
@@ -54,7 +54,7 @@ impl Effect for Pose {
     }
 
     /// Nowhere else: ranges say at once where to.
-    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![0.0; KNOBS.len()]]
     }
 
@@ -62,11 +62,11 @@ impl Effect for Pose {
         true
     }
 
-    fn shifts(&self, knob: usize, _: &Look) -> Option<(usize, f64)> {
+    fn shifts(&self, knob: usize, _: &Shot) -> Option<(usize, f64)> {
         (knob < 3).then_some((knob, 1.0))
     }
 
-    fn motion(&self, values: &[f64], stage: &Stage, _: &Look) -> Option<Motion> {
+    fn motion(&self, values: &[f64], stage: &Stage, _: &Shot) -> Option<Motion> {
         let &[x, y, z, roll, pitch, yaw] = values else { return None };
         let (shift_m, turn_deg) = (DVec3::new(x, y, z), DVec3::new(roll, pitch, yaw));
         let rests = shift_m == DVec3::ZERO && turn_deg == DVec3::ZERO;

@@ -1,6 +1,6 @@
 //! Fewer looks of speckle than the radar declares.
 
-use super::{Effect, Knob, Level, Look, Receiver, Stage};
+use super::{Effect, Knob, Level, Receiver, Shot, Stage};
 
 /// The effect `speckle`.
 pub(super) struct Speckle;
@@ -34,7 +34,7 @@ impl Effect for Speckle {
     }
 
     /// As shares of the declared looks, or absolute where the radar declares no speckle.
-    fn starts(&self, stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         let declared = stage.radar.speckle.map(|speckle| speckle.looks);
         match declared {
             Some(looks) => {

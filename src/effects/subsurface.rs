@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-use super::{Effect, Knob, Level, Look, Stage};
+use super::{Effect, Knob, Level, Shot, Stage};
 use crate::brdf::Brdf;
 
 /// The effect `subsurface`.
@@ -42,11 +42,11 @@ impl Effect for Subsurface {
          threshold; too small an exponent of the diffuse lobe lifts all angles smoothly."
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         [5e-4, 5e-3].into_iter().flat_map(|sigma_v| [0.0, 2.0].map(|q| vec![sigma_v, q])).collect()
     }
 
-    fn scatter(&self, values: &[f64], _: &Stage, _: &Brdf, look: &Look, f_per_sr: f64) -> f64 {
+    fn scatter(&self, values: &[f64], _: &Stage, _: &Brdf, look: &Shot, f_per_sr: f64) -> f64 {
         let &[sigma_v, cosine_power] = values else { return f_per_sr };
         let cos_theta = look.hit.cos_theta.max(LEAST_COS_THETA);
         f_per_sr + sigma_v * cos_theta.powf(cosine_power - 2.0) / (4.0 * PI)

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::meeting::met;
-use super::{Arrived, Effect, Look, Model, Prediction, Receiver, Stage, library, middle};
+use super::{Arrived, Effect, Model, Prediction, Receiver, Shot, Stage, library, middle};
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
 use crate::frames::{Point, Pose, Ray};
 use crate::geometry::Mesh;
@@ -42,7 +42,7 @@ pub(super) struct Bench {
     radar: Radar,
     regions: Vec<u16>,
     law: Brdf,
-    pub looks: Vec<Look>,
+    pub looks: Vec<Shot>,
 }
 
 const GRAIN: [DVec3; 1] = [DVec3::Y];
@@ -89,7 +89,7 @@ impl Bench {
     }
 
     /// A look where an effect places it.
-    pub(super) fn moved(&self, effect: &dyn Effect, values: &[f64], look: &Look) -> Option<Look> {
+    pub(super) fn moved(&self, effect: &dyn Effect, values: &[f64], look: &Shot) -> Option<Shot> {
         let effects = vec![(effect, values.to_vec())];
         let receiver = Receiver::LINEAR;
         Model { laws: Vec::new(), receiver, effects }.placed(&self.stage(), *look)
@@ -106,7 +106,7 @@ impl Bench {
     }
 }
 
-fn look(stage: &Stage, chirp: u32) -> Option<Look> {
+fn look(stage: &Stage, chirp: u32) -> Option<Shot> {
     let at = |step: u32| HALF_M * (2.0 * f64::from(step) / f64::from(SIDE - 1) - 1.0);
     let (xt_m, yt_m) = (at(chirp % SIDE), at(chirp / SIDE));
     let origin = Point::new(0.0, 0.0, 8.0);
@@ -116,7 +116,7 @@ fn look(stage: &Stage, chirp: u32) -> Option<Look> {
     let (time_s, normal) = (f64::from(chirp) * 2e-4, DVec3::Z);
     let (azimuth_rad, region, edge_m) = (0.0, 0, 0.05);
     let target = Pose::NONE;
-    let blank = Look {
+    let blank = Shot {
         chirp,
         time_s,
         progress,
@@ -243,7 +243,7 @@ fn names_and_knobs_are_told_apart() {
 #[test]
 fn what_is_said_to_shift_the_target_does_nothing_else() {
     let bench = Bench::plate();
-    let (stage, look) = (bench.stage(), Look { progress: 0.3, ..bench.looks[7] });
+    let (stage, look) = (bench.stage(), Shot { progress: 0.3, ..bench.looks[7] });
     let mut shifts = 0;
     for effect in library() {
         let knobs = effect.knobs();

@@ -9,7 +9,7 @@
 //! average, so that the ripple in θ shows.
 
 use super::lobes::first_lobe;
-use super::{Effect, Knob, Level, Look, Stage};
+use super::{Effect, Knob, Level, Shot, Stage};
 use crate::brdf::{Brdf, Fresnel, Layer, Layered, Scattering};
 use crate::frames::Direction;
 
@@ -81,7 +81,7 @@ impl Effect for ThinFilm {
          shape of the lobe."
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Look]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
         // A ripple is found only from within half a fringe.
         let thin_m = [1e-4, 2e-4, 3e-4, 4.5e-4, 6e-4, 8e-4].into_iter();
         let thicknesses_m: Vec<f64> =
@@ -103,7 +103,7 @@ impl Effect for ThinFilm {
         values: &[f64],
         stage: &Stage,
         law: &Brdf,
-        look: &Look,
+        look: &Shot,
         f_per_sr: f64,
     ) -> f64 {
         let &[coverage, thickness_m, index, from_below, substrate_ratio] = values else {

@@ -1,6 +1,6 @@
 //! The effects of a setup, acting on the radar's own echoes.
 //!
-//! Every ray of a chirp is a [`Look`] that a [`Model`] predicts: where it meets the target, and the
+//! Every ray of a chirp is a [`Shot`] that a [`Model`] predicts: where it meets the target, and the
 //! mean power that comes straight back. What the model makes of a whole echo
 //! ([`Effect::arrive`](crate::effects::Effect::arrive)) it makes of the sum over the paths of the
 //! chirp, and every path has its share of the change. Second-order paths know the gains of the
@@ -15,7 +15,7 @@ use super::surface::LocalFrame;
 use super::{Observer, RenderError, Setup};
 use crate::brdf::Scattering;
 use crate::effects::{
-    Arrived, Level, Look, Model, Receiver, Stage, Traced, middle, tilted_cos_theta,
+    Arrived, Level, Model, Receiver, Shot, Stage, Traced, middle, tilted_cos_theta,
 };
 use crate::frames::{Direction, Global, Point, Pose, Ray, Surface};
 use crate::radar::Link;
@@ -82,7 +82,7 @@ impl<'a> Acting<'a> {
         let look = hit.map_or(self.blank(chirp, *ray), |hit| self.look(chirp, *ray, hit, None));
         match self.model.placed(&self.stage(), look) {
             Some(placed) if placed == look => (hit, None),
-            Some(Look { hit, normal, azimuth_rad, .. }) if hit.facet != NOWHERE => {
+            Some(Shot { hit, normal, azimuth_rad, .. }) if hit.facet != NOWHERE => {
                 (Some(hit), Some(Facing { normal, azimuth_rad }))
             }
             _ => (None, None),
@@ -99,7 +99,7 @@ impl<'a> Acting<'a> {
         tilts: [f64; 2],
     ) -> Path {
         let (stage, look) = (self.stage(), self.seen(chirp, rays, path.hit, facing));
-        let power_w = |model: &Model, look: &Look| model.arrived(&stage, look).power_w;
+        let power_w = |model: &Model, look: &Shot| model.arrived(&stage, look).power_w;
         let with_w = tilted(&look, tilts).map_or(0.0, |look| power_w(self.model, &look));
         let Some(Facing { azimuth_rad, .. }) = facing else {
             // Where nothing acts, not even rounding may differ.
@@ -149,12 +149,12 @@ impl<'a> Acting<'a> {
             let facing = footprints.facings.get::<usize>(index).copied().flatten();
             Some(self.seen(chirp, footprints.rays_per_chirp, hit, facing))
         };
-        let chirps: Vec<(usize, Look, Arrived)> = sums
+        let chirps: Vec<(usize, Shot, Arrived)> = sums
             .iter()
             .enumerate()
             .filter_map(|(chirp, sum)| Some((chirp, first(chirp)?, (*sum)?)))
             .collect();
-        let looks: Vec<Look> = chirps.iter().map(|(_, look, _)| *look).collect();
+        let looks: Vec<Shot> = chirps.iter().map(|(_, look, _)| *look).collect();
         let mut after: Vec<Option<Arrived>> = chirps.iter().map(|(_, _, sum)| Some(*sum)).collect();
         self.model.arrive(&self.stage(), &looks, &Traced::default(), &mut after);
         let mut changes = vec![None; sums.len()];
@@ -176,7 +176,7 @@ impl<'a> Acting<'a> {
     }
 
     /// One look for every chirp whose axis meets the target as the scene has it.
-    fn looks(&self) -> Vec<Look> {
+    fn looks(&self) -> Vec<Shot> {
         let look = |(chirp, ray): (usize, &Ray<Global>)| {
             Some(self.look(chirp, *ray, self.setup.bvh.closest(ray)?, None))
         };
@@ -184,7 +184,7 @@ impl<'a> Acting<'a> {
     }
 
     /// A ray of a chirp where it was traced to.
-    fn seen(&self, chirp: usize, rays: usize, hit: Hit, facing: Option<Facing>) -> Look {
+    fn seen(&self, chirp: usize, rays: usize, hit: Hit, facing: Option<Facing>) -> Shot {
         let axis = self.setup.chirps.rays[chirp];
         let ray = match axis.origin.towards(hit.point) {
             Some(direction) if rays > 1 => Ray { direction, ..axis },
@@ -192,10 +192,10 @@ impl<'a> Acting<'a> {
         };
         let look = self.look(chirp, ray, hit, facing);
         let moved = facing.and_then(|_| self.model.target(&self.stage(), &look));
-        Look { target: moved.unwrap_or(look.target), ..look }
+        Shot { target: moved.unwrap_or(look.target), ..look }
     }
 
-    fn look(&self, chirp: usize, ray: Ray<Global>, hit: Hit, facing: Option<Facing>) -> Look {
+    fn look(&self, chirp: usize, ray: Ray<Global>, hit: Hit, facing: Option<Facing>) -> Shot {
         let region = self.setup.region_of_facet[hit.facet as usize];
         let Facing { normal, azimuth_rad } = facing.unwrap_or_else(|| {
             let back = -ray.direction.xyz();
@@ -204,13 +204,13 @@ impl<'a> Acting<'a> {
             let [x, y, _] = frame.local(back).xyz().to_array();
             Facing { normal: frame.normal, azimuth_rad: y.atan2(x) }
         });
-        Look { hit, normal, azimuth_rad, region, ..self.blank(chirp, ray) }
+        Shot { hit, normal, azimuth_rad, region, ..self.blank(chirp, ray) }
     }
 
     /// A ray that has met nothing.
-    fn blank(&self, chirp: usize, ray: Ray<Global>) -> Look {
+    fn blank(&self, chirp: usize, ray: Ray<Global>) -> Shot {
         let chirps = self.setup.chirps;
-        Look {
+        Shot {
             chirp: chirps.number[chirp],
             time_s: chirps.time_s[chirp],
             progress: self.progress[chirp],
@@ -256,12 +256,12 @@ impl Change {
 
 /// The look with its normal tilted in the plane of incidence and across it; `None` where the facet
 /// then shows its back.
-fn tilted(look: &Look, [along, across]: [f64; 2]) -> Option<Look> {
+fn tilted(look: &Shot, [along, across]: [f64; 2]) -> Option<Shot> {
     if along == 0.0 && across == 0.0 {
         return Some(*look);
     }
     let cos_theta = tilted_cos_theta(look.hit.theta_rad(), [along, across])?;
-    Some(Look { hit: Hit { cos_theta, ..look.hit }, ..*look })
+    Some(Shot { hit: Hit { cos_theta, ..look.hit }, ..*look })
 }
 
 /// Refuses what would be counted twice, and what an effect cannot say.
