@@ -111,6 +111,12 @@ where
     }
 }
 
+/// Levels of models in models that can be stored; deeper ones could not be read everywhere.
+pub const MOST_LEVELS: usize = 8;
+
+/// Models within one that can be stored, itself included.
+pub const MOST_MODELS: usize = 64;
+
 /// Every model that can be stored in a database or a material file, told apart by `model`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "model", rename_all = "kebab-case")]
@@ -176,6 +182,39 @@ impl Brdf {
     /// Checks every parameter against its range.
     pub fn validate(&self) -> Result<(), ParameterError> {
         self.parameters().iter().try_for_each(Parameter::validate)
+    }
+
+    /// Checks how deep parts stand in parts, at most [`MOST_LEVELS`], and how many models there are in all, at
+    /// most [`MOST_MODELS`].
+    ///
+    /// # Errors
+    /// When there are more, in words for a sentence.
+    pub fn check_size(&self) -> Result<(), String> {
+        let mut level = vec![self];
+        let mut models = 0;
+        for depth in 1.. {
+            models += level.len();
+            if models > MOST_MODELS {
+                return Err(format!("it has more than {MOST_MODELS} models in it"));
+            }
+            if depth > MOST_LEVELS {
+                return Err(format!("parts stand in parts more than {MOST_LEVELS} deep"));
+            }
+            level = level.into_iter().flat_map(Brdf::parts).collect();
+            if level.is_empty() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The models that this one is made of; none but for a mixture and a sum.
+    fn parts(&self) -> Vec<&Brdf> {
+        match self {
+            Brdf::Mixture(Mixture { diffuse, specular, .. }) => vec![&**diffuse, &**specular],
+            Brdf::Sum(Sum { parts }) => parts.iter().collect(),
+            _ => Vec::new(),
+        }
     }
 
     fn visit(&mut self, prefix: &str, visitor: &mut Visitor) {

@@ -13,6 +13,18 @@ pub enum CatalogueError {
     /// The database refused.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// The database or what was made of it is damaged.
+    #[error(
+        "{} is damaged: {problem}; nothing was published, `matdb check` lists all damage and `matdb check \
+         --repair` mends what can be",
+        database.display()
+    )]
+    Damaged {
+        /// The database.
+        database: PathBuf,
+        /// The first thing that is wrong.
+        problem: String,
+    },
     /// The folder holds something else than an earlier publication; it was not touched.
     #[error(
         "{} holds `{stranger}`, which no publication of matdb has put there; name a new folder, or move \

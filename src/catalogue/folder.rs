@@ -28,7 +28,7 @@ pub struct Sum {
     pub bytes: u64,
 }
 
-/// A publication that is being written. What is dropped before it is [kept](Folder::keep) leaves no trace.
+/// A publication that is being written. What is dropped before it is [kept](Folder::keep_if) leaves no trace.
 #[derive(Debug)]
 pub struct Folder {
     target: PathBuf,
@@ -169,14 +169,18 @@ impl Folder {
         &self.sums
     }
 
-    /// Writes the list of hashes and puts everything in its place.
+    /// Writes the list of hashes and, if `check` finds nothing wrong in the folder, puts everything in its place.
     ///
     /// # Errors
-    /// When the places cannot be exchanged; what was there then stays.
-    pub fn keep(mut self) -> Result<(), CatalogueError> {
+    /// Those of `check`, and when the places cannot be exchanged; what was there then stays.
+    pub fn keep_if(
+        mut self,
+        check: impl FnOnce(&Path) -> Result<(), CatalogueError>,
+    ) -> Result<(), CatalogueError> {
         let list: String =
             self.sums.iter().map(|(path, sum)| format!("{}  {path}\n", sum.sha256)).collect();
         self.write(SUMS, list.as_bytes())?;
+        check(self.place.path())?;
         let Folder { target, place, .. } = self;
         match place {
             Place::Staged(stage) => stage.keep().map_err(|reason| CatalogueError::Io {
@@ -298,12 +302,12 @@ mod tests {
         first.write("x/old.txt", b"1").unwrap();
         first.write(INDEX, b"{}").unwrap();
         assert!(!target.exists());
-        first.keep().unwrap();
+        first.keep_if(|_| Ok(())).unwrap();
         assert_eq!(fs::read(target.join("x/old.txt")).unwrap(), b"1");
         let mut second = Folder::new(&target).unwrap();
         second.write("new.txt", b"abc").unwrap();
         drop(Folder::new(&target).unwrap());
-        second.keep().unwrap();
+        second.keep_if(|_| Ok(())).unwrap();
         assert!(!target.join("x").exists());
         let sums = fs::read_to_string(target.join(SUMS)).unwrap();
         // SHA-256 of "abc", FIPS 180-2 appendix B.1.

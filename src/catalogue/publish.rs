@@ -7,6 +7,7 @@ use super::api::{Entry, Index};
 use super::folder::Sum;
 use super::records::ZENODO;
 use super::site::Site;
+use super::verify::check_staged;
 use super::{About, CatalogueError, Folder, api, records, tables};
 use crate::material::form::{alternative_licences, is_licence, licence_names};
 use crate::store::Store;
@@ -40,7 +41,7 @@ pub struct Published {
 /// An earlier publication there is replaced. `progress` hears of every material done.
 ///
 /// # Errors
-/// When the database cannot be read, its materials share no licence and `about` declares none, the folder holds
+/// When the database cannot be read or is damaged, its materials share no licence and `about` declares none, the folder holds
 /// anything else, or something cannot be written.
 pub fn publish(
     store: &Store,
@@ -48,6 +49,8 @@ pub fn publish(
     target: &Path,
     progress: impl FnMut(usize),
 ) -> Result<Published, CatalogueError> {
+    // A copy would be packed anew, and with it damage that shows in the original alone.
+    check_sound(store)?;
     let mut folder = Folder::new(target)?;
     // Everything else is read from the copy: one moment, whoever writes meanwhile.
     let copy = folder.place(DATABASE, |place| Ok::<(), CatalogueError>(store.copy_to(place)?))?;
@@ -61,8 +64,25 @@ pub fn publish(
         is_without_zenodo: !folder.sums().contains_key(ZENODO),
         undeclared_licences: undeclared(&store.licences()?, about),
     };
-    folder.keep()?;
+    folder.keep_if(|staged| match check_staged(staged, store)?.into_iter().next() {
+        None => Ok(()),
+        Some(found) => Err(damaged(store, found.to_string())),
+    })?;
     Ok(published)
+}
+
+/// Refuses a database that is damaged, or has tables, triggers, indexes or views of somebody else.
+fn check_sound(store: &Store) -> Result<(), CatalogueError> {
+    let mut problems = store.damage()?;
+    problems.extend(store.changed_schema()?);
+    match problems.into_iter().next() {
+        None => Ok(()),
+        Some(problem) => Err(damaged(store, problem)),
+    }
+}
+
+fn damaged(store: &Store, problem: String) -> CatalogueError {
+    CatalogueError::Damaged { database: store.path().to_owned(), problem }
 }
 
 /// The hash of every file that publishing `store` over `published` would write beside its database, of
@@ -91,7 +111,12 @@ fn fill(
     let about = &About { licence: licence(store, about)?, ..about.clone() };
     let (mut entries, mut site) = (Vec::new(), Site::new(about)?);
     for (number, summary) in store.list()?.iter().enumerate() {
-        let Some(stored) = store.get(&summary.slug, None)? else { continue };
+        let Some(stored) = store.get(&summary.slug, None)? else {
+            return Err(damaged(
+                store,
+                format!("lists name `{}`, which is not there", summary.slug),
+            ));
+        };
         api::write(folder, &stored)?;
         site.add(folder, &stored, &store.history(&summary.slug)?)?;
         entries.push(Entry::new(summary, &stored));

@@ -95,7 +95,7 @@ pub fn verify(bundle: &Path) -> Result<Verified, CatalogueError> {
     }
     match database(&bundle.join(DATABASE)) {
         Ok(store) => {
-            verified.checked = check_content(bundle, &store, &sums, problems);
+            verified.checked = check_content(bundle, &store, &sums, Refit::All, problems);
             // What is wrong already would be found wrong again in every file made of it.
             if problems.is_empty() {
                 verified.notes = check_rebuilt(bundle, &store, &sums, problems);
@@ -109,7 +109,27 @@ pub fn verify(bundle: &Path) -> Result<Verified, CatalogueError> {
 /// Checks a database: its pages and indexes are sound, every revision has the content that its hash
 /// says, what else is stored follows from that, and every fit of a current revision from its curve. `report` hears of everything that is wrong.
 pub fn check_store(store: &Store, report: &mut dyn FnMut(Problem)) -> Checked {
-    check_each(store, report, |_, _, _| ())
+    check_each(store, Refit::All, report, |_, _, _| ())
+}
+
+/// What is wrong with a publication before it takes its place: its files, read from the disk, against their hashes
+/// and against its database. Fits are not made again, and no file is: both have just been.
+pub(super) fn check_staged(bundle: &Path, store: &Store) -> Result<Vec<Problem>, CatalogueError> {
+    let mut problems = Vec::new();
+    let sums = sums(bundle, &mut problems)?;
+    check_files(bundle, &sums, &mut problems)?;
+    if !store.has_own_schema()? {
+        problems.push(problem(DATABASE, "its tables, indexes or views are not those of matdb"));
+    }
+    check_content(bundle, store, &sums, Refit::None, &mut problems);
+    Ok(problems)
+}
+
+/// Which fits are made again.
+#[derive(Clone, Copy, PartialEq)]
+enum Refit {
+    None,
+    All,
 }
 
 /// Opens the database of a publication.
@@ -246,6 +266,7 @@ fn check_file(bundle: &Path, path: &str, sum: &str) -> Option<Problem> {
 /// Goes through a database; `each` sees every current revision with its line in the list.
 fn check_each(
     store: &Store,
+    refit: Refit,
     report: &mut dyn FnMut(Problem),
     mut each: impl FnMut(&Summary, &Stored, &mut dyn FnMut(Problem)),
 ) -> Checked {
@@ -260,7 +281,8 @@ fn check_each(
     };
     for summary in &summaries {
         checked.materials += 1;
-        let done = check_material(store, &mut again, summary, report, &mut checked, &mut each);
+        let done =
+            check_material(store, &mut again, summary, refit, report, &mut checked, &mut each);
         if let Err(error) = done {
             report(problem(summary.slug.as_str(), error));
         }
@@ -309,6 +331,7 @@ fn check_material(
     store: &Store,
     again: &mut Again,
     summary: &Summary,
+    refit: Refit,
     report: &mut dyn FnMut(Problem),
     checked: &mut Checked,
     each: &mut impl FnMut(&Summary, &Stored, &mut dyn FnMut(Problem)),
@@ -318,7 +341,10 @@ fn check_material(
         // Reading recomputes the hash.
         let stored = match store.get(&summary.slug, Some(revision)) {
             Ok(Some(stored)) => stored,
-            Ok(None) => continue,
+            Ok(None) => {
+                report(problem(place(), "is not there"));
+                continue;
+            }
             Err(StoreError::Corrupt { problem: what, .. }) => {
                 report(problem(place(), what));
                 continue;
@@ -332,7 +358,9 @@ fn check_material(
         }
         derived(again, store, &stored)?.into_iter().for_each(&mut *report);
         if revision == summary.revision {
-            checked.fits += check_fits(&stored, report);
+            if refit == Refit::All {
+                checked.fits += check_fits(&stored, report);
+            }
             each(summary, &stored, report);
         }
     }
@@ -366,11 +394,12 @@ fn check_content(
     bundle: &Path,
     store: &Store,
     sums: &BTreeMap<String, String>,
+    refit: Refit,
     problems: &mut Vec<Problem>,
 ) -> Checked {
     let mut entries = Vec::new();
     let checked =
-        check_each(store, &mut |found| problems.push(found), |summary, stored, report| {
+        check_each(store, refit, &mut |found| problems.push(found), |summary, stored, report| {
             entries.push(Entry::new(summary, stored));
             if let Some(found) = check_record(bundle, stored) {
                 report(found);

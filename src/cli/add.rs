@@ -83,12 +83,13 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             Added::New => ("added", 1),
             Added::Revision(number) => ("revised", number),
             Added::Unchanged(number) => ("unchanged", number),
+            Added::Repaired(number) => ("repaired", number),
         };
         lines += &format!("{what} {slug}, revision {revision}, in {}\n", db.path().display());
         let differs = match added {
             // It is stored: what cannot be told now is not.
             Added::Revision(number) => store.get(slug, Some(number - 1)).ok().flatten(),
-            Added::New | Added::Unchanged(_) => None,
+            Added::New | Added::Unchanged(_) | Added::Repaired(_) => None,
         };
         if let Some(before) = &differs
             && let (Some(said), None) =

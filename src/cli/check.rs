@@ -8,6 +8,7 @@ use super::summary::counted;
 use crate::catalogue::{OTHER_UNITS, derived, without_report};
 use crate::error::Error;
 use crate::fit::again::{lacks_report, problems};
+use crate::material::builtin;
 use crate::store::{Again, Store, StoreError, Stored, Summary};
 
 /// Verify the whole database: pages, hashes, values, statistics of curves, and fits by fitting again
@@ -15,9 +16,14 @@ use crate::store::{Again, Store, StoreError, Stored, Summary};
 #[command(after_help = "Examples:
   matdb check
   matdb check --json | jq '.findings[].place'
+  matdb check --repair                 mend what can be, then verify
 
 Ends with status 1 when anything is wrong.")]
-pub(super) struct Args {}
+pub(super) struct Args {
+    /// First make indexes, lists and statistics anew, and damaged built-in materials; nothing that is sound changes
+    #[arg(long)]
+    repair: bool,
+}
 
 /// What was looked at, and what is wrong.
 #[derive(Default, Serialize)]
@@ -25,6 +31,9 @@ struct Record {
     revisions: usize,
     curves: usize,
     fits: usize,
+    /// What `--repair` has mended, a sentence each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    repaired: Vec<String>,
     findings: Vec<Wrong>,
 }
 
@@ -42,7 +51,11 @@ impl Record {
     }
 }
 
-pub(super) fn run(db: &Database, console: &Console) -> Result<(), Error> {
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    let mut record = Record::default();
+    if args.repair && db.read()?.is_some() {
+        record.repaired = db.write()?.repair(&builtin::all()?)?;
+    }
     let Some(store) = db.read()? else {
         return Err(Error::Usage {
             problem: format!("there is no database {}", db.path().display()),
@@ -50,10 +63,9 @@ pub(super) fn run(db: &Database, console: &Console) -> Result<(), Error> {
         });
     };
     let file = db.path().display().to_string();
-    let mut record = Record::default();
     store.damage()?.iter().for_each(|problem| record.wrong(&file, problem));
     for changed in store.changed_schema()? {
-        record.wrong(&file, format!("{changed} is not the one that matdb makes"));
+        record.wrong(&file, changed);
     }
     let mut again = Again::new()?;
     if !again.has_own_units(&store)? {
@@ -63,7 +75,14 @@ pub(super) fn run(db: &Database, console: &Console) -> Result<(), Error> {
     let total = materials.iter().map(|material| material.revision as usize).sum();
     let progress = console.progress("checking", total);
     for Summary { slug, .. } in &materials {
-        for summary in store.history(slug)? {
+        let history = match store.history(slug) {
+            Err(StoreError::Corrupt { problem, .. }) => {
+                record.wrong(slug.as_str(), problem);
+                continue;
+            }
+            history => history?,
+        };
+        for summary in history {
             let place = format!("{slug}@{}", summary.revision);
             match store.get(slug, Some(summary.revision)) {
                 Ok(Some(stored)) => {
@@ -82,15 +101,20 @@ pub(super) fn run(db: &Database, console: &Console) -> Result<(), Error> {
         0 => Ok(()),
         count => Err(Error::Usage {
             problem: format!("{} wrong in {file}", counted(count, "thing")),
-            way_out: "restore it from a copy, or add the materials again".to_owned(),
+            way_out: match args.repair {
+                true => {
+                    "add the damaged materials again, or restore the file from a copy".to_owned()
+                }
+                false => "`matdb check --repair` mends what can be".to_owned(),
+            },
         }),
     }
 }
 
 fn text(record: &Record, file: &str) -> String {
-    let Record { revisions, curves, fits, findings } = record;
-    let mut text: String =
-        findings.iter().map(|wrong| format!("{}: {}\n", wrong.place, wrong.problem)).collect();
+    let Record { revisions, curves, fits, repaired, findings } = record;
+    let mut text: String = repaired.iter().map(|what| format!("{file}: {what}\n")).collect();
+    text.extend(findings.iter().map(|wrong| format!("{}: {}\n", wrong.place, wrong.problem)));
     text += &format!(
         "looked at {} and {} and made {} again in {file}: {}\n",
         counted(*revisions, "revision"),

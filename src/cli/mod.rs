@@ -128,7 +128,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Cite(args) => cite::run(args, db, &console),
         Command::Plot(args) => plot::run(args, db, &console),
         Command::Fit(args) => fit::run(args, db, &console),
-        Command::Check(_) => check::run(db, &console),
+        Command::Check(args) => check::run(args, db, &console),
         Command::Rm(args) => rm::run(args, db, &console),
         Command::Withdraw(args) => withdraw::run(args, db, &console),
         Command::Publish(args) => publish::run(args, db, &console),

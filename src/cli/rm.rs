@@ -30,7 +30,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         }
         let slug = name.parse().ok();
         match (slug, &known) {
-            (Some(slug), Some(store)) if store.get(&slug, None)?.is_some() => slugs.push(slug),
+            (Some(slug), Some(store)) if store.holds(&slug)? => slugs.push(slug),
             _ => return Err(absent(name, known.as_ref(), db)?),
         }
     }

@@ -61,6 +61,14 @@ static ENTRIES: [Entry; 38] = entries![
     "wood",
 ];
 
+/// Every built-in material, sorted by name.
+///
+/// # Errors
+/// None in a program that was built from a sound tree.
+pub fn all() -> Result<Vec<Material>, FileError> {
+    names().filter_map(get).collect()
+}
+
 /// Names of the built-in materials, sorted.
 pub fn names() -> impl Iterator<Item = &'static str> {
     ENTRIES.iter().map(|entry| entry.slug)

@@ -140,6 +140,9 @@ impl Material {
 
     fn check_fit(&self, fit: &Fit) -> Result<(), MaterialError> {
         let place = format!("fit `{}`", fit.name);
+        fit.model.check_size().map_err(|problem| {
+            value(&place, &problem, "write the law with fewer parts, or tabulate it as a [[curve]]")
+        })?;
         let known: Vec<String> = fit.model.parameters().into_iter().map(|p| p.path).collect();
         fit.model
             .validate()

@@ -4,6 +4,7 @@
 use rusqlite::types::{Value, ValueRef};
 use rusqlite::{Connection, Result, Statement, params};
 
+use super::repair::unit_rows;
 use super::tables::{Table, tables};
 use super::{Store, StoreError, Stored, connect, write};
 
@@ -59,17 +60,20 @@ impl Again {
     /// # Errors
     /// When the file cannot be read.
     pub fn has_own_units(&self, store: &Store) -> std::result::Result<bool, StoreError> {
-        let units = |conn: &Connection| -> Result<Vec<[Option<String>; 3]>> {
-            let sql = "SELECT column_name, ucum, meaning FROM unit ORDER BY column_name";
-            conn.prepare(sql)?
-                .query_map([], |row| Ok([row.get(0)?, row.get(1)?, row.get(2)?]))?
-                .collect()
-        };
         let failed = |error| StoreError::new(&store.path, error);
-        Ok(units(&store.conn).map_err(failed)? == units(&self.scratch).map_err(failed)?)
+        Ok(unit_rows(&store.conn).map_err(failed)? == unit_rows(&self.scratch).map_err(failed)?)
     }
 
-    fn compare(&mut self, conn: &Connection, stored: &Stored) -> Result<Vec<Difference>> {
+    /// The database that revisions are written into, empty between two of them.
+    pub(super) fn scratch(&self) -> &Connection {
+        &self.scratch
+    }
+
+    pub(super) fn compare(
+        &mut self,
+        conn: &Connection,
+        stored: &Stored,
+    ) -> Result<Vec<Difference>> {
         let tx = self.scratch.transaction()?;
         // What it would be found by is compared elsewhere, and is not made.
         write::Adding::new(&tx).add(&stored.material, None)?;
@@ -79,7 +83,7 @@ impl Again {
         let of = params![stored.material.slug.as_str(), stored.revision];
         let old: i64 = conn.query_row(sql, of, |row| row.get(0))?;
         let mut differences = Vec::new();
-        for table in self.tables.iter().filter(|table| hangs_on_a_revision(table)) {
+        for table in self.tables.iter().filter(|table| follows_from_content(table)) {
             if table.name == STATISTICS && !has_statistics(conn, old)? {
                 continue;
             }
@@ -94,7 +98,8 @@ impl Again {
     }
 }
 
-fn hangs_on_a_revision(table: &Table) -> bool {
+/// Whether every row of a table follows from the content of a revision.
+pub(super) fn follows_from_content(table: &Table) -> bool {
     table.columns.iter().any(|column| column.name == "revision_id")
         && !MAKING.contains(&table.name.as_str())
 }

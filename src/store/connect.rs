@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use rusqlite::backup::{Backup, StepResult};
+use rusqlite::config::DbConfig;
 use rusqlite::functions::FunctionFlags;
 use rusqlite::{Connection, ErrorCode, OpenFlags, Transaction, TransactionBehavior};
 use rusqlite_migration::{M, Migrations};
@@ -107,10 +108,10 @@ fn open_writable(path: &Path) -> Result<Connection, StoreError> {
         match quiet(path) {
             // A write of ours that was cut short, which SQLite takes back when it opens the file.
             Err(StoreError::Interrupted { .. }) if !names_another_file(path) => {
-                schema_of(path, &immutable(path).map_err(fail)?)?
+                check_admissible(path, &immutable(path).map_err(fail)?)?;
             }
-            conn => schema_of(path, &conn?)?,
-        };
+            conn => check_admissible(path, &conn?)?,
+        }
     }
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
     let mut conn = connect(path, flags).map_err(fail)?;
@@ -140,10 +141,31 @@ fn modern(path: &Path, conn: Connection) -> Result<Option<Connection>, StoreErro
     }
 }
 
+/// Refuses a file of somebody else, of a newer schema, or with triggers of somebody else: these would run
+/// whenever we write.
+fn check_admissible(path: &Path, conn: &Connection) -> Result<(), StoreError> {
+    schema_of(path, conn)?;
+    let strangers = strange_triggers(conn).map_err(|error| StoreError::new(path, error))?;
+    match strangers.into_iter().next() {
+        None => Ok(()),
+        Some(name) => Err(StoreError::Trigger { file: path.to_owned(), name }),
+    }
+}
+
+/// Names of triggers that no schema of ours has.
+fn strange_triggers(conn: &Connection) -> rusqlite::Result<Vec<String>> {
+    let sql = "SELECT name, sql FROM sqlite_schema WHERE type = 'trigger'";
+    let triggers: Vec<(String, String)> =
+        super::read::rows(conn, sql, [], |row| Ok((row.get(0)?, row.get(1)?)))?;
+    let strangers = triggers.into_iter().filter(|(_, sql)| !FRESH.contains(&format!("{sql};\n")));
+    Ok(strangers.map(|(name, _)| name).collect())
+}
+
 /// A copy of an older database in memory, brought up to date there. Who only reads changes no file,
 /// and may not even be allowed to.
 fn modern_copy(path: &Path, old: &Connection) -> Result<Connection, StoreError> {
     let fail = |error| StoreError::new(path, error);
+    check_admissible(path, old)?;
     let mut copy = in_memory_copy(path, old)?;
     migrate(path, &mut copy)?;
     copy.pragma_update(None, "query_only", true).map_err(fail)?;
@@ -268,8 +290,19 @@ fn check_length(path: &Path, conn: &Connection) -> Result<(), StoreError> {
     }
 }
 
+/// A path in a form that SQLite takes for nothing but a path: a bare `file:a.sqlite` is an address to it, and
+/// `:memory:` no file at all.
+pub(super) fn literal(path: &Path) -> PathBuf {
+    Path::new(".").join(path)
+}
+
 fn connect(path: &Path, flags: OpenFlags) -> rusqlite::Result<Connection> {
-    let conn = Connection::open_with_flags(path, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
+    connect_by_name(&literal(path), flags)
+}
+
+/// Opens what SQLite understands by a name, which may be an address.
+fn connect_by_name(name: &Path, flags: OpenFlags) -> rusqlite::Result<Connection> {
+    let conn = Connection::open_with_flags(name, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
     conn.busy_timeout(PATIENCE)?;
     equip(&conn)?;
     Ok(conn)
@@ -278,6 +311,11 @@ fn connect(path: &Path, flags: OpenFlags) -> rusqlite::Result<Connection> {
 /// What every connection needs.
 fn equip(conn: &Connection) -> rusqlite::Result<()> {
     conn.pragma_update(None, "foreign_keys", true)?;
+    // A file from elsewhere gets no functions with side effects, no cell that reaches out of its page, and no
+    // way past the tables (sqlite.org/security.html).
+    conn.pragma_update(None, "trusted_schema", false)?;
+    conn.pragma_update(None, "cell_size_check", true)?;
+    conn.set_db_config(DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true)?;
     // Enough for every statement that writes a material; a smaller cache would parse most of them
     // again for each.
     conn.set_prepared_statement_cache_capacity(64);
@@ -293,7 +331,7 @@ fn equip(conn: &Connection) -> rusqlite::Result<()> {
 fn immutable(path: &Path) -> rusqlite::Result<Connection> {
     let escaped: String = path.as_os_str().as_encoded_bytes().iter().map(escape).collect();
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI;
-    connect(Path::new(&format!("file:{escaped}?immutable=1")), flags)
+    connect_by_name(Path::new(&format!("file:{escaped}?immutable=1")), flags)
 }
 
 fn escape(byte: &u8) -> String {

@@ -56,11 +56,35 @@ pub enum StoreError {
         way_out: String,
     },
     /// The file contradicts itself.
-    #[error("{} is damaged: {problem}; restore it from a copy", file.display())]
+    #[error(
+        "{} is damaged: {problem}; `matdb check` lists all damage, `matdb check --repair` mends what can be, \
+         a copy of the file brings back the rest",
+        file.display()
+    )]
     Corrupt {
         /// The file.
         file: PathBuf,
         /// What was noticed.
+        problem: String,
+    },
+    /// Somebody has added a trigger, which would run whenever the program writes; it was not touched.
+    #[error(
+        "{} has a trigger `{name}` that matdb has not made and that would run whenever it writes; remove it in \
+         another program with DROP TRIGGER \"{name}\"",
+        file.display()
+    )]
+    Trigger {
+        /// The file.
+        file: PathBuf,
+        /// Name of the trigger.
+        name: String,
+    },
+    /// What was written could not be read again as it was; nothing was stored.
+    #[error("{problem}; nothing was stored in {}, report it with this message", file.display())]
+    NotReadable {
+        /// The file.
+        file: PathBuf,
+        /// Which material, and what came back.
         problem: String,
     },
     /// No room left.
@@ -133,6 +157,9 @@ impl StoreError {
             | InvalidColumnType(..)
             | Utf8Error(..)
             | IntegralValueOutOfRange(..) => return corrupt(error.to_string()),
+            ToSqlConversionFailure(reason) => {
+                return StoreError::NotReadable { problem: reason.to_string(), file: file.clone() };
+            }
             _ => return StoreError::Sqlite { file, error },
         };
         match failure.code {

@@ -4,9 +4,9 @@ mod filter;
 pub(super) mod outline;
 mod words;
 
-use rusqlite::{Connection, OptionalExtension, Result, Row};
+use rusqlite::{Connection, OptionalExtension, Result, Row, Transaction, TransactionBehavior};
 
-use super::read::rows;
+use super::read::{current_revision, damaged, rows};
 use super::{Store, StoreError, Summary};
 use crate::material::{Fit, Material, Slug, SourceKind};
 
@@ -134,7 +134,12 @@ impl Store {
 fn one(conn: &Connection, slug: &Slug) -> Result<Option<Summary>> {
     let sql = "SELECT slug, name, class, revision, kind, status, curves, observations, fits
                FROM entry WHERE slug = ?1";
-    conn.prepare_cached(sql)?.query_row([slug.as_str()], summary).optional()
+    let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
+    let found = tx.prepare_cached(sql)?.query_row([slug.as_str()], summary).optional()?;
+    if found.is_none() && current_revision(&tx, slug)?.is_some() {
+        return Err(damaged(format!("`{slug}` is there, but no list knows it")));
+    }
+    Ok(found)
 }
 
 fn words_of(conn: &Connection, slug: &Slug) -> Result<Option<String>> {

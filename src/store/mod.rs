@@ -20,6 +20,7 @@ mod connect;
 mod error;
 mod find;
 mod read;
+mod repair;
 mod tables;
 mod write;
 
@@ -54,6 +55,8 @@ pub enum Added {
     Revision(u32),
     /// It is what the current revision, of this number, already says.
     Unchanged(u32),
+    /// It is what the current revision, of this number, was, whose rows were damaged: they were written anew.
+    Repaired(u32),
 }
 
 impl Added {
@@ -61,7 +64,7 @@ impl Added {
     pub fn revision(self) -> u32 {
         match self {
             Added::New => 1,
-            Added::Revision(number) | Added::Unchanged(number) => number,
+            Added::Revision(number) | Added::Unchanged(number) | Added::Repaired(number) => number,
         }
     }
 }
@@ -161,6 +164,11 @@ impl Store {
         let path = path.as_ref().to_owned();
         let conn = connect::frozen(&path)?;
         Ok(conn.map(|conn| Store { conn, path, activity: None }))
+    }
+
+    /// The file, by the name under which it was opened.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// The same, but errors name the file of which this is a copy.
@@ -299,10 +307,11 @@ impl Store {
         read::licences(&self.conn).map_err(|error| StoreError::new(&self.path, error))
     }
 
-    /// One revision of a material, or the current one; `None` when there is none.
+    /// One revision of a material, or the current one; `None` when there is no such material, or it never had that
+    /// revision.
     ///
     /// # Errors
-    /// When the file cannot be read, or holds something else than was stored.
+    /// When the file cannot be read, holds something else than was stored, or has lost the revision.
     pub fn get(&self, slug: &Slug, revision: Option<u32>) -> Result<Option<Stored>, StoreError> {
         let stored = read::get(&self.conn, slug, revision)
             .map_err(|error| StoreError::new(&self.path, error))?;
@@ -350,10 +359,19 @@ impl Store {
         read::damage(&self.conn).map_err(|error| StoreError::new(&self.path, error))
     }
 
-    /// Every revision of a material, oldest first; none when there is no such material.
+    /// Whether there is a material of that name, sound or damaged.
     ///
     /// # Errors
     /// When the file cannot be read.
+    pub fn holds(&self, slug: &Slug) -> Result<bool, StoreError> {
+        let current = read::current_revision(&self.conn, slug);
+        Ok(current.map_err(|error| StoreError::new(&self.path, error))?.is_some())
+    }
+
+    /// Every revision of a material, oldest first; none when there is no such material.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or a material has no revision.
     pub fn history(&self, slug: &Slug) -> Result<Vec<RevisionSummary>, StoreError> {
         read::history(&self.conn, slug).map_err(|error| StoreError::new(&self.path, error))
     }

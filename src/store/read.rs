@@ -4,6 +4,7 @@ mod provenance;
 
 pub(super) use provenance::statistics;
 
+use rusqlite::ffi;
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, Type, ValueRef};
 use rusqlite::{
     Connection, Error, OptionalExtension, Params, Result, Row, Transaction, TransactionBehavior,
@@ -28,7 +29,8 @@ pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSumm
                FROM material JOIN revision ON material_id = material.id
                LEFT JOIN origin ON origin.revision_id = revision.id
                WHERE slug = ?1 ORDER BY number";
-    rows(conn, sql, [slug.as_str()], |row| {
+    let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
+    let history: Vec<RevisionSummary> = rows(&tx, sql, [slug.as_str()], |row| {
         let (of, title): (Option<i64>, Option<String>) = (row.get(3)?, row.get(4)?);
         let origin = of.map(|_| Origin { title, ..Origin::default() }.title().to_owned());
         Ok(RevisionSummary {
@@ -37,7 +39,37 @@ pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSumm
             added_at: row.get(1)?,
             program_version: row.get(2)?,
         })
-    })
+    })?;
+    if history.is_empty() {
+        check_absent(&tx, slug)?;
+    }
+    Ok(history)
+}
+
+/// Number of the current revision of a material, found by looking through all of them: a damaged index cannot
+/// hide it. `None` when there is none of that name.
+pub(super) fn current_revision(conn: &Connection, slug: &Slug) -> Result<Option<u32>> {
+    conn.prepare_cached("SELECT current_revision FROM material NOT INDEXED WHERE slug = ?1")?
+        .query_row([slug.as_str()], |row| row.get(0))
+        .optional()
+}
+
+/// Fails when a material of which nothing was found is there after all.
+pub(super) fn check_absent(conn: &Connection, slug: &Slug) -> Result<()> {
+    match current_revision(conn, slug)? {
+        None => Ok(()),
+        Some(number) => Err(missing(slug, number)),
+    }
+}
+
+/// The error for a revision that must be there and is not.
+fn missing(slug: &Slug, number: u32) -> Error {
+    damaged(format!("`{slug}` is there, but its revision {number} is not"))
+}
+
+/// The error for a file that contradicts itself.
+pub(super) fn damaged(problem: String) -> Error {
+    Error::SqliteFailure(ffi::Error::new(ffi::SQLITE_CORRUPT), Some(problem))
 }
 
 /// The licences of the current revisions, each once, sorted.
@@ -52,15 +84,32 @@ pub(super) fn licences(conn: &Connection) -> Result<Vec<String>> {
 pub(super) fn get(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result<Option<Stored>> {
     // All rows from one moment, whoever writes meanwhile.
     let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
-    let Some((revision_id, mut stored)) = revision(&tx, slug, number)? else { return Ok(None) };
+    get_in(&tx, slug, number)
+}
+
+/// Reads one revision of a material, or the current one, within a transaction.
+pub(super) fn get_in(
+    conn: &Connection,
+    slug: &Slug,
+    number: Option<u32>,
+) -> Result<Option<Stored>> {
+    let Some((revision_id, mut stored)) = revision(conn, slug, number)? else {
+        let current = current_revision(conn, slug)?;
+        // Revisions are removed all together, so that one up to the current is missing by damage.
+        return match (current, number) {
+            (None, _) => Ok(None),
+            (Some(current), Some(wanted)) if wanted == 0 || wanted > current => Ok(None),
+            (Some(current), _) => Err(missing(slug, number.unwrap_or(current))),
+        };
+    };
     let material = &mut stored.material;
-    material.sources = provenance::sources(&tx, revision_id)?;
-    material.instruments = provenance::instruments(&tx, revision_id)?;
-    material.curves = curves(&tx, revision_id, None)?;
-    material.fits = fits(&tx, revision_id)?;
-    material.effects = effects(&tx, revision_id)?;
-    provenance::fill(material, &tx, revision_id)?;
-    stored.activity = provenance::activity(&tx, revision_id)?;
+    material.sources = provenance::sources(conn, revision_id)?;
+    material.instruments = provenance::instruments(conn, revision_id)?;
+    material.curves = curves(conn, revision_id, None)?;
+    material.fits = fits(conn, revision_id)?;
+    material.effects = effects(conn, revision_id)?;
+    provenance::fill(material, conn, revision_id)?;
+    stored.activity = provenance::activity(conn, revision_id)?;
     Ok(Some(stored))
 }
 
@@ -68,6 +117,9 @@ pub(super) fn get(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result
 pub(super) fn rendered(conn: &Connection, slug: &Slug) -> Result<Option<(Brdf, [f64; 2])>> {
     let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
     let found = rendered_in(&tx, slug)?;
+    if found.is_none() {
+        check_absent(&tx, slug)?;
+    }
     Ok(found.and_then(|(model, theta_rad)| Some((model?, theta_rad))))
 }
 

@@ -103,7 +103,8 @@ impl Store {
     /// # Errors
     /// When `path` exists already or cannot be written.
     pub fn copy_to(&self, path: &Path) -> Result<(), StoreError> {
-        let text = path.to_str().ok_or_else(|| StoreError::Open {
+        let literal = super::connect::literal(path);
+        let text = literal.to_str().ok_or_else(|| StoreError::Open {
             file: path.to_owned(),
             reason: std::io::Error::other("its name is not UTF-8"),
         })?;
@@ -126,22 +127,21 @@ impl Store {
         Ok(own == there)
     }
 
-    /// Kind and name of every table, index, trigger or view that this program makes and that is not there, or is
-    /// another one. What somebody has added does not count.
+    /// Every table, index, trigger or view that is not as this program makes it, a clause each: what is missing or
+    /// another one, and what somebody has added.
     ///
     /// # Errors
     /// When the file cannot be read.
     pub fn changed_schema(&self) -> Result<Vec<String>, StoreError> {
         let [own, there] = self.schemas()?;
-        let missing = own.iter().filter(|one| !there.contains(one));
-        let named = |[kind, name, ..]: &[Option<String>; 4]| {
-            format!(
-                "{} {}",
-                kind.as_deref().unwrap_or_default(),
-                name.as_deref().unwrap_or_default()
-            )
-        };
-        Ok(missing.map(named).collect())
+        let mut changed = Vec::new();
+        for one in own.iter().filter(|one| !there.contains(one)) {
+            changed.push(format!("{} is not the one that matdb makes", named(one)));
+        }
+        for one in there.iter().filter(|one| !own.iter().any(|own| own[..2] == one[..2])) {
+            changed.push(format!("{} is none that matdb makes", named(one)));
+        }
+        Ok(changed)
     }
 
     /// What this program makes, and what is in the file.
@@ -150,6 +150,11 @@ impl Store {
         let own = super::connect::in_memory()?;
         Ok([schema(&own).map_err(failed)?, schema(&self.conn).map_err(failed)?])
     }
+}
+
+/// Kind and name of an object of a schema.
+fn named([kind, name, ..]: &[Option<String>; 4]) -> String {
+    format!("{} {}", kind.as_deref().unwrap_or_default(), name.as_deref().unwrap_or_default())
 }
 
 fn copy(conn: &Connection, path: &str) -> Result<()> {
@@ -162,7 +167,7 @@ fn copy(conn: &Connection, path: &str) -> Result<()> {
 }
 
 /// Kind, name, table and statement of everything in the file.
-fn schema(conn: &Connection) -> Result<Vec<[Option<String>; 4]>> {
+pub(super) fn schema(conn: &Connection) -> Result<Vec<[Option<String>; 4]>> {
     // What ANALYZE leaves helps to find rows and answers nothing.
     let sql = "SELECT type, name, tbl_name, sql FROM sqlite_schema
                WHERE name NOT LIKE 'sqlite\\_stat%' ESCAPE '\\' ORDER BY type, name";
@@ -317,5 +322,6 @@ mod tests {
         assert!(store.has_own_schema().unwrap());
         store.conn.execute_batch("CREATE VIEW more AS SELECT 1").unwrap();
         assert!(!store.has_own_schema().unwrap());
+        assert_eq!(store.changed_schema().unwrap(), ["view more is none that matdb makes"]);
     }
 }

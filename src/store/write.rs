@@ -2,10 +2,15 @@
 
 mod provenance;
 
-use rusqlite::{Connection, Error, OptionalExtension, Params, Result, Transaction, params};
+use rusqlite::types::Value;
+use rusqlite::{
+    Connection, Error, OptionalExtension, Params, Result, Transaction, params, params_from_iter,
+};
 use serde::Serialize;
 
+use super::again::follows_from_content;
 use super::find::outline;
+use super::tables::tables;
 use super::{Added, Outlined, Removed, read};
 use crate::formats::EffectEntry;
 use crate::material::{Activity, Covariance, Curve, Fit, Material, Slug};
@@ -31,32 +36,44 @@ impl<'a> Adding<'a> {
         Adding { tx, waiting: Vec::new(), outlines: Vec::new() }
     }
 
-    /// Adds a material, or a revision to it, with what made it.
+    /// Adds a material, or a revision to it, with what made it, and reads it back.
+    ///
+    /// What the current revision says already is not added again. Where its rows are damaged, they are written
+    /// anew: the hash that was stored with them tells that they were this content.
     pub fn add(&mut self, material: &Material, activity: Option<&Activity>) -> Result<Added> {
         let tx = self.tx;
         let content_hash = material.content_hash();
-        let (added, number) = match current(tx, &material.slug)? {
-            Some((number, stored)) if stored == content_hash => {
-                return Ok(Added::Unchanged(number));
+        let (added, material_id) = match current(tx, &material.slug)? {
+            Some(current) if is_intact(tx, material, &current, &content_hash) => {
+                return Ok(Added::Unchanged(current.number));
             }
-            Some((number, _)) => (Added::Revision(number + 1), number + 1),
-            None => (Added::New, 1),
+            Some(Current { material_id, number, content_hash: Some((revision_id, stored)) })
+                if stored == content_hash =>
+            {
+                rewrite(tx, revision_id, material)?;
+                (Added::Repaired(number), material_id)
+            }
+            Some(current) => {
+                let number = next_number(tx, &current)?;
+                let made = revision(tx, material, number, &content_hash, activity)?;
+                (Added::Revision(number), made)
+            }
+            None => (Added::New, revision(tx, material, 1, &content_hash, activity)?),
         };
-        let (material_id, revision_id) = revision(tx, material, number, &content_hash)?;
-        let rows = Rows { tx, revision_id };
-        rows.material(material)?;
-        activity.map_or(Ok(()), |activity| rows.activity(activity))?;
+        read_back(tx, material, &content_hash)?;
+        self.find_by(material_id, material)?;
+        Ok(added)
+    }
+
+    /// Remembers a material whose lines in lists and searches are to be made.
+    pub fn find_by(&mut self, material_id: i64, material: &Material) -> Result<()> {
         self.waiting.push(material_id);
-        let model = material.scattering().ok();
-        self.outlines.push(outline::line(
-            &material.slug,
-            model.as_ref(),
-            material.reach().span_rad(),
-        ));
+        let (model, reach) = (material.scattering().ok(), material.reach());
+        self.outlines.push(outline::line(&material.slug, model.as_ref(), reach.span_rad()));
         if self.waiting.len() >= AT_ONCE {
             self.lines()?;
         }
-        Ok(added)
+        Ok(())
     }
 
     /// Makes what is still missing.
@@ -112,61 +129,136 @@ pub(super) fn remove(conn: &mut Connection, slugs: &[&Slug]) -> Result<Vec<Optio
 }
 
 fn remove_one(tx: &Transaction, slug: &Slug) -> Result<Option<Removed>> {
-    let count = "SELECT count(*) FROM revision JOIN material ON material.id = material_id
-                 WHERE slug = ?1";
-    let revisions = tx.query_row(count, [slug.as_str()], |row| row.get(0))?;
-    let found = tx.execute("DELETE FROM material WHERE slug = ?1", [slug.as_str()])?;
-    Ok((found > 0).then_some(Removed { revisions }))
+    // No index is asked: what is damaged can be removed, too.
+    let sql = "SELECT id FROM material NOT INDEXED WHERE slug = ?1";
+    let found = tx.query_row(sql, [slug.as_str()], |row| row.get::<_, i64>(0)).optional()?;
+    let Some(material_id) = found else { return Ok(None) };
+    let count = "SELECT count(*) FROM revision NOT INDEXED WHERE material_id = ?1";
+    let revisions = tx.query_row(count, [material_id], |row| row.get(0))?;
+    tx.execute("DELETE FROM material WHERE id = ?1", [material_id])?;
+    Ok(Some(Removed { revisions }))
 }
 
-/// Number and content hash of the current revision.
-fn current(tx: &Transaction, slug: &Slug) -> Result<Option<(u32, String)>> {
-    let sql = "SELECT number, content_hash FROM material
-               JOIN revision ON material_id = material.id AND number = current_revision
+/// The current revision of a material.
+struct Current {
+    material_id: i64,
+    number: u32,
+    /// Number of its row, and [`Material::content_hash`] when it was added; none where it is missing.
+    content_hash: Option<(i64, String)>,
+}
+
+fn current(tx: &Transaction, slug: &Slug) -> Result<Option<Current>> {
+    let sql = "SELECT material.id, current_revision, revision.id, content_hash FROM material
+               LEFT JOIN revision ON material_id = material.id AND number = current_revision
                WHERE slug = ?1";
     tx.prepare_cached(sql)?
-        .query_row([slug.as_str()], |row| Ok((row.get(0)?, row.get(1)?)))
+        .query_row([slug.as_str()], |row| {
+            Ok(Current {
+                material_id: row.get(0)?,
+                number: row.get(1)?,
+                content_hash: Option::zip(row.get(2)?, row.get(3)?),
+            })
+        })
         .optional()
 }
 
-/// Writes a revision's own row and makes it the current one; gives the numbers of material and revision.
-fn revision(tx: &Transaction, material: &Material, number: u32, hash: &str) -> Result<(i64, i64)> {
+/// Whether the current revision says what a material does, and its hash, too.
+fn is_intact(tx: &Transaction, material: &Material, current: &Current, hash: &str) -> bool {
+    current.content_hash.as_ref().is_some_and(|(_, stored)| stored == hash)
+        && read_back(tx, material, hash).is_ok()
+}
+
+/// The number after that of every revision that a material has.
+fn next_number(tx: &Transaction, current: &Current) -> Result<u32> {
+    let sql = "SELECT coalesce(max(number), 0) FROM revision NOT INDEXED WHERE material_id = ?1";
+    let greatest: u32 = tx.query_row(sql, [current.material_id], |row| row.get(0))?;
+    Ok(greatest.max(current.number) + 1)
+}
+
+/// Reads a material as everybody will, and fails where that is not what was to be written.
+fn read_back(tx: &Transaction, material: &Material, content_hash: &str) -> Result<()> {
+    let slug = &material.slug;
+    let problem = match read::get_in(tx, slug, None) {
+        Ok(Some(back)) if back.material.content_hash() == content_hash => return Ok(()),
+        Ok(Some(_)) => format!("`{slug}` was read back with another content"),
+        Ok(None) => format!("`{slug}` was not there when it was read back"),
+        Err(error) => format!("`{slug}` could not be read back: {error}"),
+    };
+    Err(Error::ToSqlConversionFailure(problem.into()))
+}
+
+/// Writes the rows of a revision anew; who made it, and when, stays.
+pub(super) fn rewrite(tx: &Transaction, revision_id: i64, material: &Material) -> Result<()> {
+    tx.pragma_update(None, "defer_foreign_keys", true)?;
+    for table in tables(tx)?.iter().filter(|table| follows_from_content(table)) {
+        let sql = format!("DELETE FROM \"{}\" WHERE revision_id = ?1", table.name);
+        tx.execute(&sql, [revision_id])?;
+    }
+    let values = std::iter::repeat_n("?", CONTENT.split(',').count());
+    let values = values.collect::<Vec<_>>().join(", ");
+    let update = format!("UPDATE revision SET ({CONTENT}) = ({values}) WHERE id = {revision_id}");
+    tx.execute(&update, params_from_iter(content(material)?))?;
+    Rows { tx, revision_id }.material(material)
+}
+
+/// Columns of a revision's own row that its content gives.
+const CONTENT: &str = "name, class, description, licence, tags, frequency_min_hz, frequency_max_hz, \
+     theta_min_rad, theta_max_rad, render, status, status_reason, superseded_by, finish, unknown";
+
+/// Their values.
+fn content(material: &Material) -> Result<[Value; 15]> {
+    let ([frequency_min_hz, frequency_max_hz], [theta_min_rad, theta_max_rad]) =
+        (material.frequency_hz, material.theta_rad);
+    let status = &material.status;
+    Ok([
+        material.name.clone().into(),
+        material.class.clone().into(),
+        material.description.clone().into(),
+        material.licence.clone().into(),
+        json(&material.tags)?.into(),
+        frequency_min_hz.into(),
+        frequency_max_hz.into(),
+        theta_min_rad.into(),
+        theta_max_rad.into(),
+        material.render.clone().into(),
+        status.as_str().to_owned().into(),
+        status.reason().map(str::to_owned).into(),
+        status.superseded_by().map(Slug::to_string).into(),
+        material.finish.clone().into(),
+        json(&material.unknown)?.into(),
+    ])
+}
+
+/// Writes a revision, makes it the current one, and gives the number of the material.
+fn revision(
+    tx: &Transaction,
+    material: &Material,
+    number: u32,
+    hash: &str,
+    activity: Option<&Activity>,
+) -> Result<i64> {
     let upsert = "INSERT INTO material (slug, current_revision) VALUES (?1, ?2)
                   ON CONFLICT (slug) DO UPDATE SET current_revision = excluded.current_revision
                   RETURNING id";
     let material_id: i64 = tx
         .prepare_cached(upsert)?
         .query_row(params![material.slug.as_str(), number], |row| row.get(0))?;
-    let ([frequency_min_hz, frequency_max_hz], [theta_min_rad, theta_max_rad]) =
-        (material.frequency_hz, material.theta_rad);
-    let insert = "INSERT INTO revision
-        (material_id, number, content_hash, name, class, description, licence, tags,
-         frequency_min_hz, frequency_max_hz, theta_min_rad, theta_max_rad, render,
-         added_at, program_version, status, status_reason, superseded_by, finish, unknown)
-        VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13,
-         strftime('%Y-%m-%dT%H:%M:%SZ', 'now'), ?14, ?15, ?16, ?17, ?18, ?19)";
-    let revision_id = tx.prepare_cached(insert)?.insert(params![
-        material_id,
-        number,
-        hash,
-        material.name,
-        material.class,
-        material.description,
-        material.licence,
-        json(&material.tags)?,
-        frequency_min_hz,
-        frequency_max_hz,
-        theta_min_rad,
-        theta_max_rad,
-        material.render,
-        env!("CARGO_PKG_VERSION"),
-        material.status.as_str(),
-        material.status.reason(),
-        material.status.superseded_by().map(Slug::as_str),
-        material.finish,
-        json(&material.unknown)?,
-    ])?;
-    Ok((material_id, revision_id))
+    let insert = format!(
+        "INSERT INTO revision ({CONTENT}, material_id, number, content_hash, program_version, added_at)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, strftime('%Y-%m-%dT%H:%M:%SZ', 'now'))"
+    );
+    let own: [Value; 4] = [
+        material_id.into(),
+        number.into(),
+        hash.to_owned().into(),
+        env!("CARGO_PKG_VERSION").to_owned().into(),
+    ];
+    let values = content(material)?.into_iter().chain(own);
+    let revision_id = tx.prepare_cached(&insert)?.insert(params_from_iter(values))?;
+    let rows = Rows { tx, revision_id };
+    rows.material(material)?;
+    activity.map_or(Ok(()), |activity| rows.activity(activity))?;
+    Ok(material_id)
 }
 
 /// Writes what hangs on one revision.

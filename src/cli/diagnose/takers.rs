@@ -236,6 +236,6 @@ pub(super) fn pinned(material: &Material, added: Added) -> String {
 pub(super) fn replaced(material: &Material, added: Added) -> Option<String> {
     match added {
         Added::Revision(new) => Some(format!("{}@{}", material.slug, new.saturating_sub(1))),
-        Added::New | Added::Unchanged(_) => None,
+        Added::New | Added::Unchanged(_) | Added::Repaired(_) => None,
     }
 }

@@ -12,7 +12,7 @@ use crate::cli::materials::{Found, find};
 use crate::error::Error;
 use crate::fit::{Finding, FitResult};
 use crate::material::{Curve, FitReport, Material, SourceKind};
-use crate::store::{Added, Store};
+use crate::store::Store;
 
 /// Where a fit was stored.
 #[derive(Serialize)]
@@ -190,10 +190,7 @@ pub(super) fn save(
     if !args.keep_render && !is_open {
         material.render = name.to_owned();
     }
-    let revision = match store.add([&material])?.first() {
-        Some(Added::Revision(number) | Added::Unchanged(number)) => *number,
-        _ => 1,
-    };
+    let revision = store.add([&material])?.first().map_or(1, |added| added.revision());
     Ok(Saved {
         material: material.slug.to_string(),
         revision,

@@ -1,0 +1,337 @@
+//! Promise: nothing that is accepted makes a database unreadable; what is damaged is said to be damaged, never
+//! served, never stood in for by a built-in material, and can be mended or removed; and no file but the one that
+//! `--db` names is ever touched.
+
+mod support;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use matdb::brdf::{Brdf, Lambert, MOST_LEVELS, MOST_MODELS, Mixture, Sum};
+use matdb::material::{Material, builtin};
+use matdb::store::{Added, Store, StoreError};
+use rusqlite::Connection;
+use support::database::{contents, is_sound, sound};
+use support::{matdb, refused};
+
+/// A database of built-in materials, `matdb.sqlite` in a folder of its own.
+fn database(names: &[&str]) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    matdb(folder.path()).arg("add").args(names).assert().success();
+    let path = folder.path().join("matdb.sqlite");
+    (folder, path)
+}
+
+/// Changes a file as another program would, without its rules.
+fn tamper(path: &Path, sql: &str) {
+    let conn = Connection::open(path).unwrap();
+    conn.execute_batch(&format!("PRAGMA foreign_keys = off; {sql}")).unwrap();
+}
+
+/// Makes the index by which materials are found answer for none of them: its page becomes an empty one.
+fn empty_index_of_names(path: &Path) {
+    let conn = Connection::open(path).unwrap();
+    conn.pragma_update(None, "journal_mode", "delete").unwrap();
+    let index = "SELECT rootpage FROM sqlite_schema WHERE name = 'sqlite_autoindex_material_1'";
+    let page: u32 = conn.query_row(index, [], |row| row.get(0)).unwrap();
+    let size: u32 = conn.pragma_query_value(None, "page_size", |row| row.get(0)).unwrap();
+    drop(conn);
+    let mut bytes = fs::read(path).unwrap();
+    // sqlite.org/fileformat.html: a leaf of an index, no free block, no cell, cells begin at the end of the page.
+    let (page, size) = (page as usize, size as usize);
+    let end = u16::try_from(size).unwrap().to_be_bytes();
+    bytes[(page - 1) * size..][..8].copy_from_slice(&[0x0a, 0, 0, 0, 0, end[0], end[1], 0]);
+    fs::write(path, bytes).unwrap();
+}
+
+/// A sum in a sum, so many levels of models in all.
+fn nested(levels: usize) -> Brdf {
+    let innermost = Brdf::Lambert(Lambert { albedo: 0.1 });
+    (1..levels).fold(innermost, |part, _| Brdf::Sum(Sum { parts: vec![part] }))
+}
+
+fn wide(models: usize) -> Brdf {
+    Brdf::Sum(Sum { parts: vec![Brdf::Lambert(Lambert { albedo: 0.01 }); models - 1] })
+}
+
+fn of_model(model: Brdf) -> Material {
+    let mut material = builtin::get("ptfe").unwrap().unwrap();
+    material.slug = "own".parse().unwrap();
+    material.fits[0].parameter_sources.clear();
+    material.fits[0].covariance = None;
+    material.fits[0].model = model;
+    material
+}
+
+#[test]
+fn a_law_of_many_models_is_refused_at_the_door_and_one_within_the_limits_goes_all_the_way() {
+    let deep = |levels: usize| {
+        let albedo = || Box::new(Brdf::Lambert(Lambert { albedo: 0.1 }));
+        (1..levels).fold(Brdf::Lambert(Lambert { albedo: 0.1 }), |part, _| {
+            Brdf::Mixture(Mixture { k: 0.5, diffuse: albedo(), specular: Box::new(part) })
+        })
+    };
+    let mut store = Store::in_memory().unwrap();
+    for (model, problem) in [
+        (nested(MOST_LEVELS + 1), "8 deep"),
+        (nested(63), "8 deep"),
+        (deep(MOST_LEVELS + 1), "8 deep"),
+        (wide(MOST_MODELS + 1), "64 models"),
+    ] {
+        let message = store.add([&of_model(model)]).unwrap_err().to_string();
+        assert!(message.contains(problem) && message.contains("fewer parts"), "{message}");
+        assert!(store.list().unwrap().is_empty());
+    }
+    for model in [nested(MOST_LEVELS), deep(MOST_LEVELS), wide(MOST_MODELS)] {
+        let (folder, path) = database(&["ptfe"]);
+        Store::open(&path).unwrap().add([&of_model(model)]).unwrap();
+        for command in
+            ["show own", "check", "search own", "publish site", "verify site", "rm own"]
+        {
+            matdb(folder.path()).args(command.split(' ')).assert().success();
+        }
+    }
+}
+
+#[test]
+fn a_file_with_a_deep_law_is_refused_with_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = include_str!("../materials/ptfe/material.toml");
+    let at = text.find("[fit.scattering]").unwrap();
+    let mut law = String::from("[fit.scattering]\nmodel = \"sum\"\n");
+    let mut table = "fit.scattering".to_owned();
+    for level in 0..20 {
+        table += ".parts";
+        law +=
+            &format!("[[{table}]]\nmodel = \"{}\"\n", if level < 19 { "sum" } else { "lambert" });
+    }
+    law += "albedo = 0.1\n";
+    let head =
+        text[..at].replace("parameter_source = { \"specular.f_lambda\" = \"fresnel\" }\n", "");
+    fs::write(folder.path().join("material.toml"), head + &law).unwrap();
+    let message = refused(matdb(folder.path()).args(["add", "--from", "material.toml"]));
+    assert!(message.contains("8 deep"), "{message}");
+    assert!(!folder.path().join("matdb.sqlite").exists());
+}
+
+/// Damage of one material, `ptfe`, and what mends it.
+const DAMAGE: [(&str, &str); 4] = [
+    ("a revision that is not there", "UPDATE material SET current_revision = 9 WHERE slug = 'ptfe'"),
+    (
+        "a number that was changed",
+        "UPDATE fit_parameter SET value = value / 2 WHERE path = 'k' AND revision_id IN
+         (SELECT revision.id FROM revision JOIN material ON material.id = material_id WHERE slug = 'ptfe')",
+    ),
+    (
+        "rows that were removed",
+        "DELETE FROM source WHERE revision_id IN
+         (SELECT revision.id FROM revision JOIN material ON material.id = material_id WHERE slug = 'ptfe')",
+    ),
+    (
+        "a law that cannot be read",
+        "UPDATE fit SET model = '{\"model\":\"witchcraft\"}' WHERE revision_id IN
+         (SELECT revision.id FROM revision JOIN material ON material.id = material_id WHERE slug = 'ptfe')",
+    ),
+];
+
+/// A scene of one material.
+fn scene_of(folder: &Path, material: &str) -> PathBuf {
+    let path = folder.join("scene.toml");
+    let text = fs::read_to_string(support::scene("bench.toml")).unwrap();
+    let own: Vec<String> = text
+        .lines()
+        .map(|line| match line.trim_start().starts_with("material = ") {
+            true => format!("material = \"{material}\""),
+            false => line.to_owned(),
+        })
+        .collect();
+    fs::write(&path, own.join("\n")).unwrap();
+    path
+}
+
+#[test]
+fn a_damaged_material_is_damage_and_no_built_in_stands_in_for_it() {
+    for (case, sql) in DAMAGE {
+        let (folder, path) = database(&["ptfe", "glass"]);
+        tamper(&path, sql);
+        scene_of(folder.path(), "ptfe");
+        for command in [
+            "show ptfe",
+            "near --material ptfe",
+            "render scene.toml -o out",
+            "export ptfe --as mitsuba --output ptfe.xml",
+        ] {
+            let message = refused(matdb(folder.path()).args(command.split(' ')));
+            assert!(message.contains("is damaged"), "{case}, {command}: {message}");
+            assert!(message.contains("check --repair"), "{case}, {command}: {message}");
+        }
+        assert!(!folder.path().join("out").exists());
+        matdb(folder.path()).args(["show", "glass"]).assert().success();
+    }
+}
+
+#[test]
+fn an_index_that_has_lost_a_name_hides_nothing() {
+    let (folder, path) = database(&["ptfe", "glass"]);
+    let whole = contents(&path);
+    empty_index_of_names(&path);
+    let message = refused(matdb(folder.path()).args(["show", "ptfe"]));
+    assert!(message.contains("is damaged") && message.contains("`ptfe` is there"), "{message}");
+    matdb(folder.path()).arg("check").assert().failure();
+    let output = matdb(folder.path()).args(["check", "--repair"]).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && text.contains("made anew"), "{text}");
+    assert!(is_sound(&path));
+    assert_eq!(contents(&path), whole);
+}
+
+#[test]
+fn a_damaged_database_is_not_published_and_the_site_there_stays() {
+    let (folder, path) = database(&["ptfe", "glass"]);
+    matdb(folder.path()).args(["publish", "site"]).assert().success();
+    let site = folder.path().join("site");
+    let sums = fs::read(site.join("SHA256SUMS")).unwrap();
+    let sound = fs::read(&path).unwrap();
+    let strange = [
+        ("an index that lost its names", ""),
+        ("a stranger's table", "CREATE TABLE more (x)"),
+        ("a stranger's view", "CREATE VIEW more AS SELECT 1"),
+        ("a list without a name", "DELETE FROM entry WHERE slug = 'ptfe'"),
+    ];
+    for (case, sql) in DAMAGE.into_iter().chain(strange) {
+        fs::write(&path, &sound).unwrap();
+        match sql {
+            "" => empty_index_of_names(&path),
+            sql => tamper(&path, sql),
+        }
+        let message = refused(matdb(folder.path()).args(["publish", "site"]));
+        assert!(
+            message.contains("nothing was published") || message.contains("is damaged"),
+            "{case}: {message}"
+        );
+        assert_eq!(fs::read(site.join("SHA256SUMS")).unwrap(), sums, "{case}");
+        matdb(folder.path()).args(["verify", "site"]).assert().success();
+    }
+}
+
+#[test]
+fn the_same_content_mends_a_damaged_material_and_rm_removes_it() {
+    for (case, sql) in DAMAGE {
+        let (folder, path) = database(&["ptfe", "glass"]);
+        let whole = contents(&path);
+        tamper(&path, sql);
+        let damaged = fs::read(&path).unwrap();
+        let output = matdb(folder.path()).args(["add", "ptfe"]).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success() && !text.contains("unchanged"), "{case}: {text}");
+        matdb(folder.path()).args(["show", "ptfe"]).assert().success();
+        matdb(folder.path()).args(["add", "ptfe"]).assert().success().stdout(
+            "unchanged ptfe, revision 1, in matdb.sqlite\n".replace(
+                "revision 1",
+                if case.contains("not there") { "revision 10" } else { "revision 1" },
+            ),
+        );
+
+        fs::write(&path, &damaged).unwrap();
+        matdb(folder.path()).args(["rm", "ptfe"]).assert().success();
+        matdb(folder.path()).arg("check").assert().success();
+
+        fs::write(&path, &damaged).unwrap();
+        matdb(folder.path()).args(["check", "--repair"]).assert().success();
+        assert_eq!(contents(&path), whole, "{case}");
+        assert!(is_sound(&path), "{case}");
+    }
+}
+
+#[test]
+fn what_is_not_at_hand_is_left_and_named_and_what_is_sound_is_mended_around_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("matdb.sqlite");
+    let own = sound("own");
+    let ptfe = builtin::get("ptfe").unwrap().unwrap();
+    Store::open(&path).unwrap().add([&own, &ptfe]).unwrap();
+    tamper(
+        &path,
+        "UPDATE source SET title = 'other'; UPDATE unit SET ucum = 'furlong' WHERE ucum = 'm'; DROP INDEX entry_class",
+    );
+    let output = matdb(folder.path()).args(["check", "--repair", "--json"]).output().unwrap();
+    assert!(!output.status.success());
+    let record: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let findings = record["findings"].as_array().unwrap();
+    assert_eq!(findings.len(), 1, "{record}");
+    assert_eq!(findings[0]["place"], "own@1", "{record}");
+    assert!(record["repaired"].as_array().unwrap().len() >= 3, "{record}");
+    // Whoever has the content brings it back, under the number, date and maker that it had.
+    let before = Store::open_existing(&path).unwrap().unwrap().history(&own.slug).unwrap();
+    assert_eq!(Store::open(&path).unwrap().add([&own]).unwrap(), [Added::Repaired(1)]);
+    assert_eq!(Store::open_existing(&path).unwrap().unwrap().history(&own.slug).unwrap(), before);
+    assert_eq!(contents(&path), [own, ptfe]);
+    matdb(folder.path()).arg("check").assert().success();
+}
+
+#[test]
+fn triggers_tables_and_indexes_of_others_are_seen_and_a_trigger_never_runs() {
+    for (sql, named) in [
+        (
+            "CREATE TRIGGER evil AFTER INSERT ON revision BEGIN DELETE FROM material; END",
+            "trigger evil",
+        ),
+        ("CREATE TABLE more (x)", "table more"),
+        ("CREATE INDEX more ON source (title)", "index more"),
+        ("CREATE VIEW more AS SELECT 1", "view more"),
+    ] {
+        let (folder, path) = database(&["ptfe"]);
+        tamper(&path, sql);
+        let output = matdb(folder.path()).arg("check").output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(!output.status.success() && text.contains(named), "{sql}: {text}");
+    }
+    let (folder, path) = database(&["ptfe"]);
+    tamper(&path, "CREATE TRIGGER evil AFTER INSERT ON revision BEGIN DELETE FROM material; END");
+    let before = fs::read(&path).unwrap();
+    for command in ["add glass", "rm ptfe", "withdraw ptfe --reason x", "check --repair"] {
+        let message = refused(matdb(folder.path()).args(command.split(' ')));
+        assert!(
+            message.contains("trigger `evil`") && message.contains("DROP TRIGGER"),
+            "{message}"
+        );
+    }
+    assert_eq!(fs::read(&path).unwrap(), before);
+    tamper(&path, "DROP TRIGGER evil");
+    matdb(folder.path()).args(["add", "glass"]).assert().success();
+}
+
+#[test]
+fn a_database_is_a_path_whatever_its_name_means_to_sqlite() {
+    let folder = tempfile::tempdir().unwrap();
+    let foreign = folder.path().join("foreign.sqlite");
+    Connection::open(&foreign).unwrap().execute_batch("CREATE TABLE t (x)").unwrap();
+    let before = fs::read(&foreign).unwrap();
+    for name in
+        ["file:foreign.sqlite", ":memory:", "file:x?mode=memory", "file:foreign.sqlite?vfs=unix"]
+    {
+        matdb(folder.path()).args(["--db", name, "add", "ptfe"]).assert().success();
+        matdb(folder.path()).args(["--db", name, "show", "ptfe"]).assert().success();
+        matdb(folder.path()).args(["--db", name, "publish", "site"]).assert().success();
+        assert!(folder.path().join(name).is_file(), "{name}");
+    }
+    assert_eq!(fs::read(&foreign).unwrap(), before);
+    let message = refused(matdb(folder.path()).args(["--db", "foreign.sqlite", "add", "ptfe"]));
+    assert!(message.contains("is not a matdb database"), "{message}");
+}
+
+#[test]
+fn what_cannot_be_read_back_is_not_stored() {
+    let (_folder, path) = database(&["ptfe"]);
+    // Rows that a faulty disk or program lets vanish on their way.
+    let mut store = Store::open(&path).unwrap();
+    tamper(
+        &path,
+        "CREATE TRIGGER lost AFTER INSERT ON source BEGIN UPDATE source SET title = 'x'; END",
+    );
+    let error = store.add([&builtin::get("glass").unwrap().unwrap()]).unwrap_err();
+    let message = error.to_string();
+    assert!(matches!(error, StoreError::NotReadable { .. }), "{message}");
+    assert!(message.contains("`glass`") && message.contains("nothing was stored"), "{message}");
+    assert_eq!(contents(&path).len(), 1);
+}
