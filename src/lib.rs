@@ -38,7 +38,9 @@
 //! | [`diagnose`] | a measured cloud → the effect that the model lacks |
 //! | [`store`] | the only SQL |
 //! | [`catalogue`] | a database as a catalogue for others: site, tables, records |
-//! | [`error`], [`cli`] | every error in one type; one command per file |
+//! | [`error`] | every error in one type |
+//! | [`setup`], [`adopt`] | from names to a scene ready to render; what goes back into the database |
+//! | [`cli`] | one command per file |
 //!
 //! Inside are SI units, watts and radians; dB, dBm and degrees appear where people and files do, and
 //! every name says which.
@@ -64,4 +66,6 @@ pub mod diagnose;
 pub mod store;
 pub mod catalogue;
 pub mod error;
+pub mod setup;
+pub mod adopt;
 pub mod cli;

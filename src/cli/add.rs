@@ -11,14 +11,14 @@ use serde_json::json;
 use super::console::Console;
 use super::database::Database;
 use super::door;
-use super::inputs::{input, read_small};
-use super::materials::unknown;
-use super::staging::chosen;
+use super::inputs::read_small;
+use crate::adopt::input;
 use crate::catalogue::Diff;
 use crate::effects::Level;
 use crate::error::Error;
 use crate::material::{Activity, Input, Material, builtin, file};
 use crate::scene::read_regular;
+use crate::setup::{resolve_effects, unknown_material};
 use crate::store::Added;
 
 /// Put materials into the database, built-in ones by name or your own from files
@@ -126,7 +126,7 @@ fn wanted(
             }
             None => {
                 let store = db.read()?;
-                return Err(unknown(store.as_ref(), &name, "")?);
+                return Err(unknown_material(store.as_ref(), &name, "")?);
             }
         }
     }
@@ -198,7 +198,7 @@ fn read(path: &Path) -> Result<(Material, Activity), Error> {
         Ok(bytes)
     };
     let material = file::parse(&path.display().to_string(), &text, read_csv)?;
-    chosen(&material.effects, Level::Material, format!("{}: [[effect]]", path.display()))?;
+    resolve_effects(&material.effects, Level::Material, format!("{}: [[effect]]", path.display()))?;
     door::check(&material, path)?;
     Ok((material, made(inputs.into_inner())))
 }

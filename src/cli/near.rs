@@ -8,12 +8,12 @@ use super::console::Console;
 use super::database::Database;
 use super::inputs::read_small;
 use super::list::{Wanted, frequency};
-use super::materials::{Found, find, store_of_not_added};
 use super::summary::table;
 use crate::catalogue::{Distance, Nearest, Probe, Rank};
 use crate::error::Error;
 use crate::material::{Observation, Slug};
 use crate::measure::Curve;
+use crate::setup::{MaterialRevision, find_material, store_of_not_added};
 use crate::store::Store;
 use crate::units::{range, rounded, shown};
 
@@ -168,7 +168,7 @@ fn asked(args: &Args, store: Option<&Store>) -> Result<Asked, Error> {
         return Ok(Asked { observations, frequency_hz: stated_hz, own: None });
     }
     let name = args.material.as_deref().unwrap_or_default();
-    let Found { material, revision } = find(store, name, "")?;
+    let MaterialRevision { material, revision } = find_material(store, name, "")?;
     let current = store.map(|store| store.summary(&material.slug)).transpose()?.flatten();
     let is_current = current.map(|current| current.revision) == revision;
     let longest = material.curves.into_iter().rev().max_by_key(|curve| curve.observations.len());

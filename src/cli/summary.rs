@@ -29,6 +29,14 @@ pub(super) fn table<const N: usize>(
     lines.iter().map(line).collect()
 }
 
+/// A cell of a table with the status of its material, which is left out while it is active.
+pub(super) fn with_status(cell: &str, status: &str) -> String {
+    match status {
+        "active" => cell.to_owned(),
+        status => format!("{cell}, {status}"),
+    }
+}
+
 /// A whole number with thin groups of three: `18 529`.
 pub(super) fn grouped(number: usize) -> String {
     let digits = number.to_string();

@@ -302,3 +302,20 @@ pub struct Report {
     #[serde(skip)]
     pub rows: Vec<Row>,
 }
+
+impl Report {
+    /// The effects that were tried and neither found nor as good as one that was, each as the last round that
+    /// tried it saw it.
+    pub fn not_found(&self) -> impl Iterator<Item = &Candidate> {
+        self.ranking.iter().enumerate().filter_map(|(place, tried)| {
+            let mut later = self.ranking.iter().skip(place + 1);
+            let is_last = !later.any(|later| later.name == tried.name);
+            (is_last && !self.has_found(tried.name)).then_some(tried)
+        })
+    }
+
+    /// Whether an effect was found, or one from which the data cannot tell it apart.
+    fn has_found(&self, name: &str) -> bool {
+        self.effects.iter().any(|effect| effect.name == name || effect.class.contains(&name))
+    }
+}

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::unreadable;
+use crate::adopt::input;
 use crate::catalogue::exchange::{Foreign, Given};
 use crate::cli::door;
-use crate::cli::inputs::{input, read_small};
+use crate::cli::inputs::read_small;
 use crate::error::Error;
 use crate::material::{Input, Material, Slug, SourceKind};
 use crate::units::watts_from_dbm;
