@@ -4,7 +4,7 @@ use super::findings::findings;
 use super::provenance::add_source;
 use super::scene_after::entries;
 use crate::brdf::Brdf;
-use crate::diagnose::{LEAST_LOOKS, Report};
+use crate::diagnose::{LEAST_SHOTS, Report};
 use crate::effects::Level;
 use crate::error::Error;
 use crate::formats::EffectEntry;
@@ -190,7 +190,7 @@ impl Adoption<'_> {
             }
         }
         let (shots, region) = most;
-        (shots >= LEAST_LOOKS).then_some(region)
+        (shots >= LEAST_SHOTS).then_some(region)
     }
 
     /// A material with the refitted law and the effects in it: those that it declares and those found.

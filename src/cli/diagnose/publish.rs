@@ -13,7 +13,7 @@ use crate::adopt::{
 use crate::cli::console::Console;
 use crate::cli::database::Database;
 use crate::cli::output::{Written, write_all};
-use crate::diagnose::LEAST_LOOKS;
+use crate::diagnose::LEAST_SHOTS;
 use crate::effects::Level;
 use crate::error::Error;
 use crate::formats::FormatError;
@@ -83,7 +83,7 @@ impl Publication<'_> {
         }
         if !homeless.is_empty() {
             console.notice(&format!(
-                "kept in the report alone, as no material has the {LEAST_LOOKS} chirps on the target that take {}: {}",
+                "kept in the report alone, as no material has the {LEAST_SHOTS} chirps on the target that take {}: {}",
                 if homeless.len() == 1 { "it" } else { "them" },
                 listed(&homeless)
             ));
