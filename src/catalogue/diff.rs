@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::leaves::{Leaf, leaves};
-use super::tables::ENDINGS;
+use super::units::ENDINGS;
 use crate::brdf::Scattering;
 use crate::material::{Curve, Material, Observation};
 use crate::units::{db_from_ratio, dbm_from_watts, shown};

@@ -6,11 +6,12 @@
 
 use std::path::Path;
 
+use super::error::ExchangeError;
+use super::exported::Exported;
 use super::given::{
-    CLASS, FREQUENCY, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD, file_name, missing,
+    CLASS, FREQUENCY, Given, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD, file_name, missing,
 };
-use super::subject::Points;
-use super::{ExchangeError, Exported, Given, Subject};
+use super::subject::{Points, Subject};
 use crate::formats::FormatError;
 use crate::material::{
     Citation, Curve, Instrument, Material, Observation, Slug, Source, SourceKind, Status, file,

@@ -11,7 +11,7 @@ use super::levels::{Levels, TABLE_DEG, range_deg};
 use super::link::{self, Link};
 use super::script::inert;
 use super::words::{cut, digits, gaps, meaning};
-use crate::catalogue::About;
+use crate::catalogue::about::About;
 use crate::effects;
 use crate::material::{FindingVerdict, Material, Source, SourceKind};
 use crate::store::{RevisionSummary, Stored};

@@ -23,7 +23,9 @@ mod words;
 
 use serde_json::json;
 
-use super::{About, CatalogueError, Folder};
+use super::about::About;
+use super::error::CatalogueError;
+use super::folder::Folder;
 use crate::store::{RevisionSummary, Stored};
 
 use cite::Citation;

@@ -6,7 +6,7 @@ use minijinja::{AutoEscape, Environment, UndefinedBehavior, escape_formatter};
 use serde::Serialize;
 
 use super::words::clean;
-use crate::catalogue::CatalogueError;
+use crate::catalogue::error::CatalogueError;
 
 const PAGES: [(&str, &str); 6] = [
     ("base.html", include_str!("templates/base.html")),
