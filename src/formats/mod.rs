@@ -9,6 +9,7 @@ pub mod effect;
 mod error;
 pub mod exr;
 pub mod figure;
+pub mod html;
 mod line;
 mod mesh_format;
 pub mod npy;
@@ -16,6 +17,7 @@ pub mod obj;
 pub mod ply;
 pub mod stl;
 pub mod text;
+pub mod words;
 
 pub use effect::EffectEntry;
 pub use error::FormatError;
