@@ -30,7 +30,7 @@
 //! | | |
 //! |---|---|
 //! | [`units`], [`frames`], [`geometry`] | numbers with units, coordinate frames as types, plain meshes and rasters |
-//! | [`mod@formats`], [`brdf`], [`radar`] | bytes to plain data and back; how surfaces scatter; the instrument |
+//! | [`files`], [`mod@formats`], [`brdf`], [`radar`] | all files or none; bytes to plain data and back; how surfaces scatter; the instrument |
 //! | [`material`], [`scene`], [`trace`] | what is known of a surface; what is looked at; closest hits |
 //! | [`effects`] | physical effects beyond the paper's model, one file each |
 //! | [`render`] | scan × target × materials → detections, image, cloud |
@@ -52,6 +52,7 @@
 pub mod units;
 pub mod frames;
 pub mod geometry;
+pub mod files;
 pub mod formats;
 pub mod brdf;
 pub mod radar;

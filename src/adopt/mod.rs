@@ -10,6 +10,4 @@ pub use provenance::{activity, add_source, free_key, input};
 pub use recipients::{
     Adoption, Recipient, check_fit_name, find_recipient, pinned_name, replaced_name,
 };
-pub use scene_after::{
-    AFTER, MARK, check_beside, folder_of, name_beside, relocate_files, scene_with_found,
-};
+pub use scene_after::{AFTER, MARK, check_beside, name_beside, relocate_files, scene_with_found};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::error::Error;
+use crate::files::FilesError;
 use crate::material::{Activity, Citation, Input, Material, Source, SourceKind};
 
 /// A file that was read: its name without its folder, and the BLAKE3 hash of its bytes.
@@ -15,10 +15,10 @@ pub fn input(path: &Path, bytes: &[u8]) -> Input {
 ///
 /// # Errors
 /// A file that cannot be read any more.
-pub fn activity(command: &str, paths: &[&Path]) -> Result<Activity, Error> {
+pub fn activity(command: &str, paths: &[&Path]) -> Result<Activity, FilesError> {
     let mut inputs = Vec::new();
     for path in paths {
-        let bytes = std::fs::read(path).map_err(|reason| Error::Io {
+        let bytes = std::fs::read(path).map_err(|reason| FilesError {
             verb: "read",
             path: (*path).to_owned(),
             reason,

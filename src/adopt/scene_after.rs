@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::diagnose::Found;
 use crate::effects::Level;
 use crate::error::Error;
+use crate::files::{FilesError, folder_of};
 use crate::formats::EffectEntry;
 use crate::radar::Pattern;
 use crate::scene::{Scene, SceneFile};
@@ -64,11 +65,6 @@ fn utf8(path: PathBuf) -> Result<String, Error> {
     })
 }
 
-/// The folder that a scene file is in.
-pub fn folder_of(scene: &Path) -> &Path {
-    scene.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
 /// Name of the scene file that `--add` writes next to `scene`.
 pub fn name_beside(scene: &Path) -> String {
     format!("{}-after.toml", scene.file_stem().unwrap_or_default().to_string_lossy())
@@ -97,12 +93,8 @@ fn real(folder: &Path) -> Result<PathBuf, Error> {
         let rest = whole.strip_prefix(there).unwrap_or(Path::new(""));
         Ok(there.canonicalize()?.join(rest))
     });
-    real.map_err(|reason| Error::Io {
-        verb: "find",
-        path: folder.to_owned(),
-        reason,
-        way_out: "check the path",
-    })
+    Ok(real
+        .map_err(|reason| FilesError { verb: "find", ..FilesError::unreadable(folder, reason) })?)
 }
 
 /// The relative path to a folder from another one; both are absolute.

@@ -11,11 +11,11 @@ use serde_json::json;
 use super::console::Console;
 use super::database::Database;
 use super::door;
-use super::inputs::read_small;
 use crate::adopt::input;
 use crate::catalogue::Diff;
 use crate::effects::Level;
 use crate::error::Error;
+use crate::files::{FilesError, read_small};
 use crate::material::{Activity, Input, Material, builtin, file};
 use crate::scene::read_regular;
 use crate::setup::{resolve_effects, unknown_material};
@@ -163,7 +163,7 @@ fn material_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
     if path.join(NAME).exists() {
         return Ok(vec![path.join(NAME)]);
     }
-    let entries = std::fs::read_dir(path).map_err(|reason| unreadable(path, reason))?;
+    let entries = std::fs::read_dir(path).map_err(|reason| FilesError::unreadable(path, reason))?;
     let mut files: Vec<PathBuf> =
         entries.flatten().map(|e| e.path().join(NAME)).filter(|f| f.exists()).collect();
     files.sort();
@@ -181,7 +181,7 @@ fn made(inputs: Vec<Input>) -> Activity {
 }
 
 fn read(path: &Path) -> Result<(Material, Activity), Error> {
-    let bytes = read_small(path).map_err(|reason| unreadable(path, reason))?;
+    let bytes = read_small(path).map_err(unreadable)?;
     let inputs = RefCell::new(vec![input(path, &bytes)]);
     let text = String::from_utf8(bytes).map_err(|error| Error::Usage {
         problem: format!(
@@ -203,12 +203,13 @@ fn read(path: &Path) -> Result<(Material, Activity), Error> {
     Ok((material, made(inputs.into_inner())))
 }
 
-fn unreadable(path: &Path, reason: std::io::Error) -> Error {
-    let way_out = match reason.kind() {
-        std::io::ErrorKind::FileTooLarge => {
-            "put points into a CSV file that a [[curve]] names, and shorten texts"
-        }
-        _ => "check the path",
-    };
-    Error::Io { verb: "read", path: path.to_owned(), reason, way_out }
+/// The error for a material's file, with the way out for one that is too large.
+fn unreadable(error: FilesError) -> FilesError {
+    match error.reason.kind() {
+        std::io::ErrorKind::FileTooLarge => FilesError {
+            way_out: "put points into a CSV file that a [[curve]] names, and shorten texts",
+            ..error
+        },
+        _ => error,
+    }
 }

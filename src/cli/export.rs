@@ -1,15 +1,15 @@
 //! `matdb export`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::json;
 
 use super::console::Console;
 use super::database::Database;
-use super::output::write_all;
 use crate::catalogue::Credit;
 use crate::catalogue::exchange::{self, Exported, Subject};
 use crate::error::Error;
+use crate::files::{folder_of, write_all};
 use crate::setup::{MaterialRevision, find_material, later_status_warning, status_warning};
 
 /// Write a material in somebody else's format, and say what it cannot carry
@@ -92,9 +92,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         });
     };
     let Exported { files, lost } = exchange::export(&subject, args.format.into(), name)?;
-    let folder = args.output.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let folder = folder.unwrap_or(Path::new("."));
-    write_all(folder, &files)?;
+    write_all(folder_of(&args.output), &files)?;
     let later = later_status_warning(store.as_ref(), &material.slug, revision)?;
     let notices = later.or_else(|| status_warning(&material));
     notices.iter().for_each(|notice| console.notice(notice));

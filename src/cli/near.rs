@@ -6,11 +6,11 @@ use serde::Serialize;
 
 use super::console::Console;
 use super::database::Database;
-use super::inputs::read_small;
 use super::list::{Wanted, frequency};
 use super::summary::table;
 use crate::catalogue::{Distance, Nearest, Probe, Rank};
 use crate::error::Error;
+use crate::files::read_small;
 use crate::material::{Observation, Slug};
 use crate::measure::Curve;
 use crate::setup::{MaterialRevision, find_material, store_of_not_added};
@@ -157,12 +157,7 @@ fn near(
 fn asked(args: &Args, store: Option<&Store>) -> Result<Asked, Error> {
     let stated_hz = args.measured_at.map(|ghz| ghz * 1e9);
     if let Some(path) = &args.curve {
-        let bytes = read_small(path).map_err(|reason| Error::Io {
-            verb: "read",
-            path: path.clone(),
-            reason,
-            way_out: "check the path",
-        })?;
+        let bytes = read_small(path)?;
         let refused = |error| Error::CurveFile { file: path.clone(), error };
         let observations = Curve::read(&bytes).map_err(refused)?.observations();
         return Ok(Asked { observations, frequency_hz: stated_hz, own: None });

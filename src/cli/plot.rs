@@ -6,9 +6,9 @@ use serde_json::json;
 
 use super::console::Console;
 use super::database::Database;
-use super::output::write_all;
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Scattering, Shadowing};
 use crate::error::Error;
+use crate::files::{folder_of, write_all};
 use crate::fit::stored_band;
 use crate::formats::figure::{Plot, Series, Style};
 use crate::material::{Censor, Fit, Material, Observation, Reach};
@@ -91,8 +91,7 @@ pub(super) fn one_file(path: &Path, plot: &Plot) -> Result<Vec<String>, Error> {
         Ending::Svg => plot.svg()?.into_bytes(),
         Ending::Png => plot.png()?,
     };
-    let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    write_all(folder, &[(&name, bytes)])?;
+    write_all(folder_of(path), &[(&name, bytes)])?;
     Ok(vec![path.display().to_string()])
 }
 

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use crate::adopt::AFTER;
 use crate::cli::console::Console;
-use crate::cli::inputs::read_small;
 use crate::error::Error;
+use crate::files::read_small;
 
 /// The report for scripts, which every diagnosis writes.
 const REPORT: &str = "report.json";

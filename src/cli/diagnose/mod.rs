@@ -20,16 +20,14 @@ use super::cloud::CloudArgs;
 use super::console::Console;
 use super::database::{Database, USUAL};
 use super::effects::chosen;
-use super::output::write_all;
-use crate::adopt::{
-    AFTER, Adoption, check_beside, check_fit_name, find_recipient, folder_of, name_beside,
-};
+use crate::adopt::{AFTER, Adoption, check_beside, check_fit_name, find_recipient, name_beside};
 use crate::brdf::Brdf;
 use crate::diagnose::{
     Declared, DiagnoseError, Diagnosis, MeshPose, Report, Subject, match_cloud, trace_shots,
 };
 use crate::effects::{Effect, Receiver, Stage, middle};
 use crate::error::Error;
+use crate::files::{folder_of, write_all};
 use crate::measure::{Cloud, CloudError};
 use crate::radar::{Link, Pattern, Radar};
 use crate::scene::file::MeshEntry;

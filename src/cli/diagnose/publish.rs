@@ -7,15 +7,15 @@ use super::earlier::Earlier;
 use super::words::listed;
 use super::{Asked, Context, Record, html, json, plots, residuals, text, typed};
 use crate::adopt::{
-    AFTER, Adoption, MARK, Recipient, activity, folder_of, name_beside, pinned_name,
-    relocate_files, replaced_name, scene_with_found,
+    AFTER, Adoption, MARK, Recipient, activity, name_beside, pinned_name, relocate_files,
+    replaced_name, scene_with_found,
 };
 use crate::cli::console::Console;
 use crate::cli::database::Database;
-use crate::cli::output::{Written, write_all};
 use crate::diagnose::LEAST_SHOTS;
 use crate::effects::Level;
 use crate::error::Error;
+use crate::files::{Placement, folder_of, write_all};
 use crate::formats::FormatError;
 use crate::material::{Activity, Input, file};
 
@@ -128,7 +128,9 @@ impl Publication<'_> {
             let file =
                 scene_with_found(&self.adoption.ready.scene, &self.adoption.report.effects, &names);
             let beside = [(name_beside(scene), self.text(MARK, &file)?)];
-            Written::new(&[(&self.asked.args.output, files), (folder_of(scene), &beside)])
+            let folder = folder_of(scene);
+            Placement::new(&[(&self.asked.args.output, files), (folder, &beside)])
+                .map_err(Error::from)
         })?;
         written.keep();
         Ok(())
@@ -144,7 +146,7 @@ impl Publication<'_> {
         let written = store.add_if(&materials, |added| {
             let pin = |&at: &usize| Some(pinned_name(materials.get(at)?, *added.get(at)?));
             context.added = last.iter().filter_map(pin).collect();
-            Written::new(&[(&self.asked.args.output, files)])
+            Placement::new(&[(&self.asked.args.output, files)]).map_err(Error::from)
         })?;
         written.keep();
         Ok(())
@@ -180,7 +182,7 @@ impl Publication<'_> {
 
     /// The command and the files that it was given.
     fn activity(&self) -> Result<Activity, Error> {
-        activity("diagnose", &self.asked.read())
+        Ok(activity("diagnose", &self.asked.read())?)
     }
 
     /// Where the stored numbers come from: files of one name differ by what is in them.

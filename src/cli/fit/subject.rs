@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::Args;
 use crate::brdf::Brdf;
-use crate::cli::inputs::read_small;
 use crate::error::Error;
+use crate::files::{FilesError, read_small};
 use crate::material;
 use crate::measure::curve::Curve;
 use crate::setup::{MaterialRevision, find_material};
@@ -35,11 +35,10 @@ impl Subject {
 
     fn of_file(args: &Args, path: &Path) -> Result<Subject, Error> {
         let label = path.display().to_string();
-        let unreadable = |reason| {
-            let way_out = "check the path, or name a material";
-            Error::Io { verb: "read", path: path.to_owned(), reason, way_out }
-        };
-        let bytes = read_small(path).map_err(unreadable)?;
+        let bytes = read_small(path).map_err(|error| FilesError {
+            way_out: "check the path, or name a material",
+            ..error
+        })?;
         let refused = |error| Error::CurveFile { file: path.to_owned(), error };
         let curve = Curve::read(&bytes).map_err(refused)?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::error::Error;
+use crate::files::FilesError;
 use crate::formats::npy;
 use crate::render::{Footprints, RenderError, Setup, beat_signals};
 use crate::scene::Scene;
@@ -70,7 +71,7 @@ pub(super) fn encode(
             Ok(()) => Ok((name, bytes)),
             Err(reason) => {
                 let (verb, path, way_out) = ("encode", name.into(), "leave out --beat");
-                Err(Error::Io { verb, path, reason, way_out })
+                Err(FilesError { verb, path, reason, way_out }.into())
             }
         }
     };

@@ -11,8 +11,8 @@ use std::path::PathBuf;
 
 use super::console::Console;
 use super::database::Database;
-use super::output::write_all;
 use crate::error::Error;
+use crate::files::write_all;
 use crate::formats::exr::Packing;
 use crate::geometry::Raster;
 use crate::render::{RenderError, Setup, trace_placed};
