@@ -9,6 +9,7 @@ use crate::catalogue::{AboutError, CatalogueError};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::curve::CurveDiagnoseError;
 use crate::effects::EffectError;
+use crate::files::FilesError;
 use crate::fit::FitError;
 use crate::formats::FormatError;
 use crate::formats::exr::ExrError;
@@ -154,17 +155,8 @@ pub enum Error {
     #[error("cannot write the record as JSON: {0}; please report this")]
     Json(#[from] serde_json::Error),
     /// A file or folder cannot be read or written.
-    #[error("cannot {verb} {}: {reason}; {way_out}", path.display())]
-    Io {
-        /// `read`, `write`, `create`.
-        verb: &'static str,
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system says.
-        reason: std::io::Error,
-        /// What to do.
-        way_out: &'static str,
-    },
+    #[error(transparent)]
+    Files(#[from] FilesError),
     /// A flag that means nothing.
     #[error("{problem}; {way_out}")]
     Usage {

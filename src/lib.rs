@@ -30,7 +30,7 @@
 //! | | |
 //! |---|---|
 //! | [`units`], [`frames`], [`geometry`] | numbers with units, coordinate frames as types, plain meshes and rasters |
-//! | [`mod@formats`], [`brdf`], [`radar`] | bytes to plain data and back; how surfaces scatter; the instrument |
+//! | [`files`], [`mod@formats`], [`brdf`], [`radar`] | all files or none; bytes to plain data and back; how surfaces scatter; the instrument |
 //! | [`material`], [`scene`], [`trace`] | what is known of a surface; what is looked at; closest hits |
 //! | [`effects`] | physical effects beyond the paper's model, one file each |
 //! | [`render`] | scan × target × materials → detections, image, cloud |
@@ -38,7 +38,9 @@
 //! | [`diagnose`] | a measured cloud → the effect that the model lacks |
 //! | [`store`] | the only SQL |
 //! | [`catalogue`] | a database as a catalogue for others: site, tables, records |
-//! | [`error`], [`cli`] | every error in one type; one command per file |
+//! | [`error`] | every error in one type |
+//! | [`setup`], [`adopt`] | from names to a scene ready to render; what goes back into the database |
+//! | [`cli`] | one command per file |
 //!
 //! Inside are SI units, watts and radians; dB, dBm and degrees appear where people and files do, and
 //! every name says which.
@@ -50,6 +52,7 @@
 pub mod units;
 pub mod frames;
 pub mod geometry;
+pub mod files;
 pub mod formats;
 pub mod brdf;
 pub mod radar;
@@ -64,4 +67,6 @@ pub mod diagnose;
 pub mod store;
 pub mod catalogue;
 pub mod error;
+pub mod setup;
+pub mod adopt;
 pub mod cli;

@@ -85,8 +85,7 @@ fn a_law_of_many_models_is_refused_at_the_door_and_one_within_the_limits_goes_al
     for model in [nested(MOST_LEVELS), deep(MOST_LEVELS), wide(MOST_MODELS)] {
         let (folder, path) = database(&["ptfe"]);
         Store::open(&path).unwrap().add([&of_model(model)]).unwrap();
-        for command in
-            ["show own", "check", "search own", "publish site", "verify site", "rm own"]
+        for command in ["show own", "check", "search own", "publish site", "verify site", "rm own"]
         {
             matdb(folder.path()).args(command.split(' ')).assert().success();
         }

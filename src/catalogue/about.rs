@@ -7,8 +7,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::folder::SUMS;
-use super::publish::ABOUT;
+use super::layout::{ABOUT, SUMS};
 use crate::material::form::{is_address, is_doi, is_licence, is_orcid};
 use crate::material::{USUAL_TITLE, turns_the_line};
 

@@ -8,8 +8,11 @@ use std::io;
 
 use serde::{Deserialize, Serialize};
 
-use super::folder::INDEX;
-use super::{About, CatalogueError, Credit, Folder};
+use super::about::About;
+use super::error::CatalogueError;
+use super::folder::Folder;
+use super::layout::{INDEX, material_path};
+use super::references::Credit;
 use crate::material::{Material, Origin, Slug, Status};
 use crate::store::{Stored, Summary};
 
@@ -18,14 +21,6 @@ pub(super) const SCHEMA_VERSION: u32 = 1;
 
 /// Largest file of a single material, bytes: about 800 000 points. Nobody writes or reads a larger one.
 pub(super) const LARGEST_MATERIAL_BYTES: u64 = 256 << 20;
-
-/// Where a material's file stands.
-pub(super) fn path(slug: &str) -> String {
-    format!("{FOLDER}{slug}.json")
-}
-
-/// The folder of the materials' files.
-pub(super) const FOLDER: &str = "api/v1/materials/";
 
 /// The JSON Schemas that come with a publication.
 pub(super) const SCHEMAS: [(&str, &str); 3] = [
@@ -102,7 +97,7 @@ impl Entry {
             curves: summary.curves,
             observations: summary.observations,
             fits: summary.fits,
-            path: path(summary.slug.as_str()),
+            path: material_path(summary.slug.as_str()),
             status: stored.material.status.clone(),
         }
     }
@@ -152,8 +147,8 @@ impl Index {
 /// Writes a material's own file.
 pub(super) fn write(folder: &mut Folder, stored: &Stored) -> Result<(), CatalogueError> {
     let slug = stored.material.slug.as_str();
-    json(folder, &path(slug), &Record::new(stored))?;
-    folder.sums().get(&path(slug)).map_or(Ok(()), |sum| check_size(slug, sum.bytes))
+    json(folder, &material_path(slug), &Record::new(stored))?;
+    folder.sums().get(&material_path(slug)).map_or(Ok(()), |sum| check_size(slug, sum.bytes))
 }
 
 /// Refuses a material that nobody who verifies would read.

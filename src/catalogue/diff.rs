@@ -6,8 +6,9 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::leaves::{Leaf, leaves};
-use super::tables::ENDINGS;
+use super::units::ENDINGS;
 use crate::brdf::Scattering;
+use crate::formats::words::{round_significant, significant};
 use crate::material::{Curve, Material, Observation};
 use crate::units::{db_from_ratio, dbm_from_watts, shown};
 
@@ -164,20 +165,15 @@ impl Field {
 
     /// Six significant digits, or all where those are the same before and after.
     fn digits(&self, number: f64) -> String {
-        let [before, after] =
-            [&self.before, &self.after].map(|value| value.as_ref()?.as_f64().map(short));
-        shown(if before == after { number } else { short(number) })
+        let [before, after] = [&self.before, &self.after]
+            .map(|value| Some(round_significant(value.as_ref()?.as_f64()?, 6)));
+        if before == after { shown(number) } else { significant(number, 6) }
     }
-}
-
-/// Six significant digits.
-fn short(value: f64) -> f64 {
-    format!("{value:.5e}").parse().unwrap_or(value)
 }
 
 /// Without what a change of unit leaves in the last digits.
 fn rounded(value: f64) -> f64 {
-    format!("{value:.9e}").parse().unwrap_or(value)
+    round_significant(value, 10)
 }
 
 fn fields(before: &Material, after: &Material) -> Vec<Field> {

@@ -9,15 +9,9 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
-use super::CatalogueError;
-use super::publish::ABOUT;
-use super::stage::{KEPT, Stage, hindrance, parent};
-
-/// The list of hashes, which tells a publication from somebody's own folder.
-pub(super) const SUMS: &str = "SHA256SUMS";
-
-/// A file that every publication has.
-pub(super) const INDEX: &str = "api/v1/index.json";
+use super::error::CatalogueError;
+use super::layout::{ABOUT, INDEX, KEPT, SUMS};
+use super::stage::{Stage, hindrance, parent};
 
 /// A file of a publication.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::publish::DATABASE;
-use super::verify::{about, database, is_newer};
-use super::{About, CatalogueError, verify};
+use super::about::About;
+use super::error::CatalogueError;
+use super::layout::DATABASE;
+use super::verify::{about, database, is_newer, verify};
 use crate::effects::{Level, resolve};
 use crate::material::{Activity, Material, Origin, Slug};
 use crate::store::{Added, RevisionSummary, Store, StoreError, Stored};

@@ -3,20 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use super::about::About;
 use super::api::{Entry, Index};
-use super::folder::Sum;
-use super::records::ZENODO;
+use super::error::CatalogueError;
+use super::folder::{Folder, Sum};
+use super::layout::{ABOUT, DATABASE, ZENODO};
 use super::site::Site;
 use super::verify::check_staged;
-use super::{About, CatalogueError, Folder, api, records, tables};
+use super::{api, records, tables};
 use crate::material::form::{alternative_licences, is_licence, licence_names};
 use crate::store::Store;
-
-/// The database of a publication.
-pub(super) const DATABASE: &str = "catalogue.sqlite";
-
-/// What the catalogue says of itself.
-pub(super) const ABOUT: &str = "about.json";
 
 /// Licences that a sentence names one by one.
 const MOST_NAMED: usize = 5;

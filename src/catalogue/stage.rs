@@ -8,10 +8,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::{Builder, TempDir};
 
-use super::folder::SUMS;
-
-/// What may stand in a published folder besides: it belongs to version control and to web hosts.
-pub(super) const KEPT: [&str; 3] = [".git", ".nojekyll", "CNAME"];
+use super::layout::{KEPT, SUMS};
 
 /// Ends the name of what stood at the target while something else takes its place.
 const BEFORE: &str = "before";

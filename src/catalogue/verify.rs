@@ -11,11 +11,13 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::CatalogueError;
-use super::api::{self, Entry, Index, LARGEST_MATERIAL_BYTES, Record, SCHEMA_VERSION};
-use super::folder::{INDEX, SUMS, Sum, files, hashed};
-use super::publish::{ABOUT, DATABASE, rebuilt};
-use super::{About, HAS_PARQUET};
+use super::about::About;
+use super::api::{Entry, Index, LARGEST_MATERIAL_BYTES, Record, SCHEMA_VERSION};
+use super::error::CatalogueError;
+use super::folder::{Sum, files, hashed};
+use super::layout::{ABOUT, DATABASE, INDEX, MATERIALS, SUMS, material_path};
+use super::publish::rebuilt;
+use super::tables::HAS_PARQUET;
 use crate::fit::again::{lacks_report, problems};
 use crate::material::Fit;
 use crate::store::{Again, RevisionSummary, Store, StoreError, Stored, Summary};
@@ -246,7 +248,7 @@ fn check_files(
 fn check_file(bundle: &Path, path: &str, sum: &str) -> Option<Problem> {
     let limit = match path {
         path if path == DATABASE || path.starts_with("tables/") => LARGEST_TABLE_BYTES,
-        path if path.starts_with(api::FOLDER) => LARGEST_MATERIAL_BYTES,
+        path if path.starts_with(MATERIALS) => LARGEST_MATERIAL_BYTES,
         _ => LARGEST_FILE_BYTES,
     };
     let file = bundle.join(path);
@@ -407,7 +409,7 @@ fn check_content(
         });
     problems.extend(check_index(bundle, &entries));
     let known: BTreeSet<&str> = entries.iter().map(|entry| entry.path.as_str()).collect();
-    let strangers = sums.keys().filter(|path| path.starts_with(api::FOLDER));
+    let strangers = sums.keys().filter(|path| path.starts_with(MATERIALS));
     let strangers = strangers.filter(|path| !known.contains(path.as_str()));
     problems.extend(strangers.map(|path| problem(path, "is of no material of the database")));
     checked
@@ -525,7 +527,7 @@ fn is_parquet(path: &str) -> bool {
 }
 
 fn check_record(bundle: &Path, stored: &Stored) -> Option<Problem> {
-    let path = api::path(stored.material.slug.as_str());
+    let path = material_path(stored.material.slug.as_str());
     let mut wanted = serde_json::to_value(Record::new(stored)).unwrap_or_default();
     match read::<Value>(bundle, &path) {
         Ok(found) if found == wanted => None,

@@ -11,14 +11,14 @@ use serde_json::json;
 use super::console::Console;
 use super::database::Database;
 use super::door;
-use super::inputs::{input, read_small};
-use super::materials::unknown;
-use super::staging::chosen;
+use crate::adopt::input;
 use crate::catalogue::Diff;
 use crate::effects::Level;
 use crate::error::Error;
+use crate::files::{FilesError, read_small};
 use crate::material::{Activity, Input, Material, builtin, file};
 use crate::scene::read_regular;
+use crate::setup::{resolve_effects, unknown_material};
 use crate::store::Added;
 
 /// Put materials into the database, built-in ones by name or your own from files
@@ -127,7 +127,7 @@ fn wanted(
             }
             None => {
                 let store = db.read()?;
-                return Err(unknown(store.as_ref(), &name, "")?);
+                return Err(unknown_material(store.as_ref(), &name, "")?);
             }
         }
     }
@@ -164,7 +164,7 @@ fn material_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
     if path.join(NAME).exists() {
         return Ok(vec![path.join(NAME)]);
     }
-    let entries = std::fs::read_dir(path).map_err(|reason| unreadable(path, reason))?;
+    let entries = std::fs::read_dir(path).map_err(|reason| FilesError::unreadable(path, reason))?;
     let mut files: Vec<PathBuf> =
         entries.flatten().map(|e| e.path().join(NAME)).filter(|f| f.exists()).collect();
     files.sort();
@@ -182,7 +182,7 @@ fn made(inputs: Vec<Input>) -> Activity {
 }
 
 fn read(path: &Path) -> Result<(Material, Activity), Error> {
-    let bytes = read_small(path).map_err(|reason| unreadable(path, reason))?;
+    let bytes = read_small(path).map_err(unreadable)?;
     let inputs = RefCell::new(vec![input(path, &bytes)]);
     let text = String::from_utf8(bytes).map_err(|error| Error::Usage {
         problem: format!(
@@ -199,17 +199,18 @@ fn read(path: &Path) -> Result<(Material, Activity), Error> {
         Ok(bytes)
     };
     let material = file::parse(&path.display().to_string(), &text, read_csv)?;
-    chosen(&material.effects, Level::Material, format!("{}: [[effect]]", path.display()))?;
+    resolve_effects(&material.effects, Level::Material, format!("{}: [[effect]]", path.display()))?;
     door::check(&material, path)?;
     Ok((material, made(inputs.into_inner())))
 }
 
-fn unreadable(path: &Path, reason: std::io::Error) -> Error {
-    let way_out = match reason.kind() {
-        std::io::ErrorKind::FileTooLarge => {
-            "put points into a CSV file that a [[curve]] names, and shorten texts"
-        }
-        _ => "check the path",
-    };
-    Error::Io { verb: "read", path: path.to_owned(), reason, way_out }
+/// The error for a material's file, with the way out for one that is too large.
+fn unreadable(error: FilesError) -> FilesError {
+    match error.reason.kind() {
+        std::io::ErrorKind::FileTooLarge => FilesError {
+            way_out: "put points into a CSV file that a [[curve]] names, and shorten texts",
+            ..error
+        },
+        _ => error,
+    }
 }

@@ -4,9 +4,9 @@ use serde_json::json;
 
 use super::console::Console;
 use super::database::Database;
-use super::materials::{find, not_to_be_used_since};
 use crate::catalogue::{Citable, Credit, references};
 use crate::error::Error;
+use crate::setup::{find_material, later_status_warning};
 
 /// Say how to cite a material, and which source each of its numbers rests on
 #[derive(Debug, clap::Args)]
@@ -27,9 +27,9 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let store = db.read()?;
-    let found = find(store.as_ref(), &args.name, "")?;
+    let found = find_material(store.as_ref(), &args.name, "")?;
     let material = &found.material;
-    let later = not_to_be_used_since(store.as_ref(), &material.slug, found.revision)?;
+    let later = later_status_warning(store.as_ref(), &material.slug, found.revision)?;
     later.iter().for_each(|later| console.notice(later));
     let stored = match (&store, found.revision) {
         (Some(store), Some(_)) => store.get(&material.slug, found.revision)?,

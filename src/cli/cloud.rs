@@ -6,6 +6,7 @@ use glam::{DMat3, DVec3};
 use serde::Deserialize;
 
 use crate::error::Error;
+use crate::files::FilesError;
 use crate::frames::{Global, Pose};
 use crate::measure::{Cloud, CloudFormat, CloudReading, PowerUnit, Start};
 use crate::radar::Radar;
@@ -149,10 +150,5 @@ fn pose_file(path: &Path) -> Result<Pose<Global, Global>, Error> {
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, Error> {
-    std::fs::read(path).map_err(|reason| Error::Io {
-        verb: "read",
-        path: path.to_owned(),
-        reason,
-        way_out: "check the path",
-    })
+    Ok(std::fs::read(path).map_err(|reason| FilesError::unreadable(path, reason))?)
 }

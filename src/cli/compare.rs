@@ -7,17 +7,16 @@ use serde_json::{Value, json};
 use super::cloud::{CloudArgs, pose};
 use super::console::Console;
 use super::database::Database;
-use super::output::write_all;
-use super::staging::{Used, effects, materials, model, notices, setup, surfaces};
 use super::summary::grouped;
 use crate::error::Error;
+use crate::files::write_all;
 use crate::formats::figure::{Figure, Plot, Scale, Series, Style, beside};
 use crate::frames::Point;
 use crate::geometry::Raster;
 use crate::measure::compare::{Agreement, Line, along, difference, measured_scan};
-use crate::render::{Observer, Scan, power_image, shade, trace_placed};
+use crate::render::{Observer, Scan, shade, trace_placed};
 use crate::scene::Scene;
-use crate::trace::Bvh;
+use crate::setup::ReadyScene;
 
 /// Compare a measured cloud with the rendered scene: images side by side, a line scan, the error
 #[derive(Debug, clap::Args)]
@@ -55,16 +54,15 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let vertices = scene.target.mesh.vertices.iter_mut();
     vertices.for_each(|vertex| *vertex = (moved * Point::from(*vertex)).xyz);
     let cloud = args.cloud.read(scene.radar())?;
-    let Simulated { scan: simulated, material_of_region, notices } = simulate(args, &scene, db)?;
-    let notices = [cloud.notices.clone(), notices].concat();
+    let mut ready = ReadyScene::new(scene, &args.scene, db.read()?.as_ref())?;
+    if let Some(name) = &args.fit {
+        ready.choose_fit(name)?;
+    }
+    let simulated = simulate(&ready)?;
+    let notices = [cloud.notices.clone(), ready.notices()].concat();
+    let scene = &ready.scene;
     let measured = measured_scan(scene.radar(), &scene.chirps, &cloud);
-
-    let field = scene.chirps.field(&scene.radar().frames());
-    let image = |scan: &Scan| {
-        let spot_m = scene.radar().spot_diameter_m;
-        power_image(scan, field, spot_m, &material_of_region, scene.pixel_m())
-    };
-    let images = [image(&measured), image(&simulated)];
+    let images = [ready.image(&measured), ready.image(&simulated)];
     let (error, agreement) = difference(&images[0], &images[1]);
     if agreement.both == 0 {
         return Err(Error::Usage {
@@ -108,54 +106,13 @@ fn line(text: &str) -> Result<Line, Error> {
     }
 }
 
-/// The scene as it is rendered.
-struct Simulated {
-    scan: Scan,
-    material_of_region: Vec<u16>,
-    /// Sentences on materials that are extrapolated.
-    notices: Vec<String>,
-}
-
-fn simulate(args: &Args, scene: &Scene, db: &Database) -> Result<Simulated, Error> {
-    let at = |error| Error::Render {
-        scene: args.scene.clone(),
-        antenna: String::new(),
-        error: Box::new(error),
-    };
-    let (mut used, material_of_region) = materials(scene, &args.scene, db)?;
-    if let Some(name) = &args.fit {
-        choose_fit(name, &mut used)?;
-    }
-    let surfaces = surfaces(scene, &used, &material_of_region);
-    let effects = effects(scene, &args.scene, &used, &material_of_region)?;
-    let model = model(&effects, scene, &used, &material_of_region);
-    let bvh = Bvh::new(&scene.target.mesh);
-    let setup = setup(scene, &bvh, &surfaces, model.as_ref());
-    let footprints = trace_placed(&setup, scene.file.spot.rays, &|_| {}).map_err(at)?;
-    let scan = shade(&setup, &footprints, Observer::Radar, &|_| {}).map_err(at)?;
-    let notices = notices(&used, scene.radar());
-    Ok(Simulated { scan, material_of_region, notices })
-}
-
-/// Takes the fit of this name in every material that has one; at least one must.
-fn choose_fit(name: &str, used: &mut [Used]) -> Result<(), Error> {
-    let mut chosen = 0;
-    for material in used.iter_mut() {
-        let fits = &material.found.material.fits;
-        if let Some(fit) = fits.iter().find(|fit| fit.name == *name) {
-            material.scattering = fit.model.clone();
-            chosen += 1;
-        }
-    }
-    if chosen > 0 {
-        return Ok(());
-    }
-    let fits = used.iter().flat_map(|used| &used.found.material.fits);
-    let names: Vec<&str> = fits.map(|fit| fit.name.as_str()).collect();
-    Err(Error::Usage {
-        problem: format!("no material of the scene has a fit `{name}`"),
-        way_out: format!("there are: {}", names.join(", ")),
-    })
+/// The scan of the scene as it is rendered.
+fn simulate(ready: &ReadyScene) -> Result<Scan, Error> {
+    let at = |error| ready.render_error("", error);
+    let assembly = ready.assemble();
+    let setup = assembly.setup();
+    let footprints = trace_placed(&setup, ready.scene.file.spot.rays, &|_| {}).map_err(at)?;
+    shade(&setup, &footprints, Observer::Radar, &|_| {}).map_err(at)
 }
 
 fn side_by_side(

@@ -7,6 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
 use crate::error::Error;
+use crate::files::FilesError;
 use crate::material::is_turning;
 
 /// How much a command says.
@@ -103,12 +104,13 @@ pub(super) fn write_out(text: &str) -> Result<(), Error> {
 fn written(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Error> {
     let mut out = BufWriter::new(io::stdout().lock());
     match write(&mut out).and_then(|()| out.flush()) {
-        Err(reason) if reason.kind() != ErrorKind::BrokenPipe => Err(Error::Io {
+        Err(reason) if reason.kind() != ErrorKind::BrokenPipe => Err(FilesError {
             verb: "write",
             path: PathBuf::from("standard output"),
             reason,
             way_out: "make room or redirect it elsewhere",
-        }),
+        }
+        .into()),
         _ => Ok(()),
     }
 }

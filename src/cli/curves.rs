@@ -3,9 +3,10 @@
 use clap::ValueEnum;
 
 use super::door;
+use crate::adopt::{add_source, free_key};
 use crate::error::Error;
 use crate::material::form::is_licence;
-use crate::material::{Citation, Curve, Instrument, Material, Source, SourceKind};
+use crate::material::{Curve, Instrument, Material, SourceKind};
 use crate::measure;
 use crate::units::watts_from_dbm;
 
@@ -114,7 +115,7 @@ impl Circumstances {
         }
         let name = self.instrument.clone()?;
         let centre_frequency_hz = self.frequency? * 1e9;
-        let key = free("radar", |key| material.instruments.iter().all(|i| i.key != *key));
+        let key = free_key("radar", material.instruments.iter().map(|instrument| &instrument.key));
         material.instruments.push(Instrument {
             key: key.clone(),
             name,
@@ -143,7 +144,7 @@ pub(super) fn put(
     circumstances: &Circumstances,
 ) -> Result<Put, Error> {
     circumstances.check(material, kind)?;
-    let source = source(material, kind, title, name, circumstances.licence.as_deref());
+    let source = add_source(material, kind, title, name, circumstances.licence.as_deref());
     let slug = material.slug.clone();
     let is_same = |known: &&Curve| {
         measure::Curve::from_observations(&known.observations).is_ok_and(|known| known == *curve)
@@ -200,40 +201,4 @@ pub(super) fn put(
 fn title_of<'a>(material: &'a Material, key: &str) -> &'a str {
     let source = material.sources.iter().find(|source| source.key == key);
     source.map_or("nowhere", |source| &source.title)
-}
-
-/// The key of a source of this kind and title, added under a free key when it is not there.
-pub(super) fn source(
-    material: &mut Material,
-    kind: SourceKind,
-    title: &str,
-    key: &str,
-    licence: Option<&str>,
-) -> String {
-    let same = |source: &&Source| {
-        let is_licence = licence.is_none() || source.licence.as_deref() == licence;
-        source.kind == kind && source.title == title && is_licence
-    };
-    if let Some(known) = material.sources.iter().find(same) {
-        return known.key.clone();
-    }
-    let key = free(key, |key| material.sources.iter().all(|source| source.key != *key));
-    material.sources.push(Source {
-        key: key.clone(),
-        kind,
-        title: title.to_owned(),
-        doi: None,
-        url: None,
-        licence: licence.map(str::to_owned),
-        note: None,
-        citation: Citation::default(),
-        making: None,
-    });
-    key
-}
-
-/// The key, or the first with a number behind it that is free.
-pub(super) fn free(key: &str, is_free: impl Fn(&String) -> bool) -> String {
-    let numbered = (2u32..).map(|number| format!("{key}-{number}"));
-    std::iter::once(key.to_owned()).chain(numbered).find(is_free).unwrap_or_default()
 }

@@ -2,10 +2,10 @@
 
 use super::console::Console;
 use super::database::Database;
-use super::materials::find;
 use super::summary::{counted, table};
 use crate::catalogue::{CurveChange, Diff, Field, Levels};
 use crate::error::Error;
+use crate::setup::find_material;
 
 /// Show what differs between two revisions or two materials
 #[derive(Debug, clap::Args)]
@@ -28,8 +28,8 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let store = db.read()?;
-    let before = find(store.as_ref(), &args.before, "")?.material;
-    let after = find(store.as_ref(), &args.after, "")?.material;
+    let before = find_material(store.as_ref(), &args.before, "")?.material;
+    let after = find_material(store.as_ref(), &args.after, "")?.material;
     let diff = Diff::new(&before, &after);
     let names = [&args.before, &args.after];
     let text = match args.all {

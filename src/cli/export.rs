@@ -1,16 +1,16 @@
 //! `matdb export`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::json;
 
 use super::console::Console;
 use super::database::Database;
-use super::materials::{Found, find, not_to_be_used, not_to_be_used_since};
-use super::output::write_all;
 use crate::catalogue::Credit;
 use crate::catalogue::exchange::{self, Exported, Subject};
 use crate::error::Error;
+use crate::files::{folder_of, write_all};
+use crate::setup::{MaterialRevision, find_material, later_status_warning, status_warning};
 
 /// Write a material in somebody else's format, and say what it cannot carry
 #[derive(Debug, clap::Args)]
@@ -65,7 +65,8 @@ impl From<Format> for exchange::Format {
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let store = db.read()?;
-    let Found { material, revision } = find(store.as_ref(), &args.material, "")?;
+    let MaterialRevision { material, revision } =
+        find_material(store.as_ref(), &args.material, "")?;
     let stored = match &store {
         Some(store) if revision.is_some() => store.get(&material.slug, revision)?,
         _ => None,
@@ -91,11 +92,9 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         });
     };
     let Exported { files, lost } = exchange::export(&subject, args.format.into(), name)?;
-    let folder = args.output.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let folder = folder.unwrap_or(Path::new("."));
-    write_all(folder, &files)?;
-    let later = not_to_be_used_since(store.as_ref(), &material.slug, revision)?;
-    let notices = later.or_else(|| not_to_be_used(&material));
+    write_all(folder_of(&args.output), &files)?;
+    let later = later_status_warning(store.as_ref(), &material.slug, revision)?;
+    let notices = later.or_else(|| status_warning(&material));
     notices.iter().for_each(|notice| console.notice(notice));
     let written: Vec<String> = files
         .iter()

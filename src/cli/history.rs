@@ -4,11 +4,11 @@ use serde::Serialize;
 
 use super::console::Console;
 use super::database::Database;
-use super::materials::{find, unknown};
 use super::summary::table;
 use crate::catalogue::Diff;
 use crate::error::Error;
 use crate::material::{Activity, Material, Origin};
+use crate::setup::{find_material, unknown_material};
 
 /// List the revisions of a material: when, by which command of which files, and what changed
 #[derive(Debug, clap::Args)]
@@ -76,7 +76,7 @@ fn origins(records: &[Record]) -> impl Iterator<Item = &Origin> {
 fn none(args: &Args, db: &Database, has_store: bool) -> Result<Error, Error> {
     let store = if has_store { db.read()? } else { None };
     let name = &args.name;
-    match find(store.as_ref(), name, "") {
+    match find_material(store.as_ref(), name, "") {
         Ok(_) if name.contains('@') => Ok(Error::Usage {
             problem: format!("`{name}` is one revision"),
             way_out: "give the bare name; `matdb show` shows one revision".to_owned(),
@@ -85,7 +85,7 @@ fn none(args: &Args, db: &Database, has_store: bool) -> Result<Error, Error> {
             problem: format!("`{name}` is built in and not in {}", db.path().display()),
             way_out: format!("`matdb add {name}` begins its history"),
         }),
-        Err(_) => unknown(store.as_ref(), name, ""),
+        Err(_) => unknown_material(store.as_ref(), name, ""),
     }
 }
 

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::console::Console;
 use super::database::Database;
-use super::inputs::activity;
 use super::summary::counted;
+use crate::adopt::activity;
 use crate::catalogue::{Import, Imported, Outcome, Taken};
 use crate::error::Error;
 

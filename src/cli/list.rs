@@ -6,10 +6,10 @@ use clap::ValueEnum;
 
 use super::console::Console;
 use super::database::Database;
-use super::materials::{not_added, with_status};
-use super::summary::{grouped, table};
+use super::summary::{grouped, table, with_status};
 use crate::error::Error;
 use crate::material::{Material, SourceKind};
+use crate::setup::builtin_not_added;
 use crate::store::{Filter, Store, Summary};
 
 /// List the materials in the database, all or those that you ask for
@@ -108,7 +108,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     if console.json {
         return console.result("", &materials);
     }
-    let built_in = not_added(store.as_ref())?;
+    let built_in = builtin_not_added(store.as_ref())?;
     let mut text = match (materials.len(), &store) {
         (0, None) => format!("no material in {} yet\n", db.path().display()),
         (0, _) if filter == Filter::default() => {

@@ -6,18 +6,18 @@ use serde_json::{Value, json};
 
 use super::cloud::{CloudArgs, start};
 use super::console::Console;
-use super::curves::{Circumstances, Kind, Put, UNSAID, free, put};
+use super::curves::{Circumstances, Kind, Put, UNSAID, put};
 use super::database::Database;
 use super::door;
-use super::inputs::activity;
-use super::materials::find;
-use super::output::write_all;
 use super::summary::grouped;
+use crate::adopt::{activity, free_key};
 use crate::error::Error;
+use crate::files::write_all;
 use crate::formats::figure::{Plot, Series, Style};
 use crate::material::{Material, Session, SessionPose};
 use crate::measure::{Curve, Metric, Reduced, Reduction, Registered, Registration, Row};
 use crate::scene::Scene;
+use crate::setup::find_material;
 use crate::store::Store;
 use crate::units::db_from_ratio;
 
@@ -160,7 +160,7 @@ fn target(args: &Args, store: Option<&Store>) -> Result<Option<Material>, Error>
             way_out: UNSAID.to_owned(),
         });
     }
-    let material = find(store, name, "--save: ")?.material;
+    let material = find_material(store, name, "--save: ")?.material;
     args.kind.map_or(Ok(()), |kind| args.circumstances.check(&material, kind.into()))?;
     Ok(Some(material))
 }
@@ -202,7 +202,7 @@ fn session(args: &Args, date: &str, registered: &Registered) -> Result<Session, 
 
 /// Ties a curve that has no session to this one, which gets a free key.
 fn hold_session(material: &mut Material, curve: &str, session: Session) -> Result<(), Error> {
-    let key = free(curve, |key| material.sessions.iter().all(|session| session.key != *key));
+    let key = free_key(curve, material.sessions.iter().map(|session| &session.key));
     let Some(curve) = material.curves.iter_mut().find(|known| known.name == curve) else {
         return Ok(());
     };

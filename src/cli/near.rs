@@ -6,14 +6,14 @@ use serde::Serialize;
 
 use super::console::Console;
 use super::database::Database;
-use super::inputs::read_small;
 use super::list::{Wanted, frequency};
-use super::materials::{Found, find, store_of_not_added};
 use super::summary::table;
 use crate::catalogue::{Distance, Nearest, Probe, Rank};
 use crate::error::Error;
+use crate::files::read_small;
 use crate::material::{Observation, Slug};
 use crate::measure::Curve;
+use crate::setup::{MaterialRevision, find_material, store_of_not_added};
 use crate::store::Store;
 use crate::units::{range, rounded, shown};
 
@@ -157,18 +157,13 @@ fn near(
 fn asked(args: &Args, store: Option<&Store>) -> Result<Asked, Error> {
     let stated_hz = args.measured_at.map(|ghz| ghz * 1e9);
     if let Some(path) = &args.curve {
-        let bytes = read_small(path).map_err(|reason| Error::Io {
-            verb: "read",
-            path: path.clone(),
-            reason,
-            way_out: "check the path",
-        })?;
+        let bytes = read_small(path)?;
         let refused = |error| Error::CurveFile { file: path.clone(), error };
         let observations = Curve::read(&bytes).map_err(refused)?.observations();
         return Ok(Asked { observations, frequency_hz: stated_hz, own: None });
     }
     let name = args.material.as_deref().unwrap_or_default();
-    let Found { material, revision } = find(store, name, "")?;
+    let MaterialRevision { material, revision } = find_material(store, name, "")?;
     let current = store.map(|store| store.summary(&material.slug)).transpose()?.flatten();
     let is_current = current.map(|current| current.revision) == revision;
     let longest = material.curves.into_iter().rev().max_by_key(|curve| curve.observations.len());

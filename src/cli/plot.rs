@@ -6,13 +6,13 @@ use serde_json::json;
 
 use super::console::Console;
 use super::database::Database;
-use super::materials::{Found, find};
-use super::output::write_all;
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Scattering, Shadowing};
 use crate::error::Error;
+use crate::files::{folder_of, write_all};
 use crate::fit::stored_band;
 use crate::formats::figure::{Plot, Series, Style};
 use crate::material::{Censor, Fit, Material, Observation, Reach};
+use crate::setup::{MaterialRevision, find_material};
 use crate::units::db_from_ratio;
 
 /// Below this a level says only that nothing comes back.
@@ -45,7 +45,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         None => appendix(&args.output)?,
         Some(name) => {
             let store = db.read()?;
-            let Found { material, .. } = find(store.as_ref(), name, "")?;
+            let MaterialRevision { material, .. } = find_material(store.as_ref(), name, "")?;
             let series = match &args.sweep {
                 None => curves(&material)?,
                 Some(sweep) => swept(&material, sweep)?,
@@ -91,8 +91,7 @@ pub(super) fn one_file(path: &Path, plot: &Plot) -> Result<Vec<String>, Error> {
         Ending::Svg => plot.svg()?.into_bytes(),
         Ending::Png => plot.png()?,
     };
-    let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    write_all(folder, &[(&name, bytes)])?;
+    write_all(folder_of(path), &[(&name, bytes)])?;
     Ok(vec![path.display().to_string()])
 }
 

@@ -7,6 +7,7 @@ use super::database::Database;
 use super::summary::counted;
 use crate::catalogue::{About, HAS_PARQUET, named_licences, publish};
 use crate::error::Error;
+use crate::files::FilesError;
 use crate::material::form::licence_doubt;
 
 /// Publish the database as a catalogue: a static site and the data in open formats
@@ -83,7 +84,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 }
 
 fn about(path: &Path) -> Result<About, Error> {
-    let text = std::fs::read_to_string(path).map_err(|reason| Error::Io {
+    let text = std::fs::read_to_string(path).map_err(|reason| FilesError {
         verb: "read",
         path: path.to_owned(),
         reason,

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::console::Console;
-use super::output::write_all;
 use crate::error::Error;
+use crate::files::write_all;
 use crate::formats::figure::{Figure, Plot, Scale, Series, Style};
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;

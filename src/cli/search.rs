@@ -4,9 +4,9 @@ use serde::Serialize;
 
 use super::console::Console;
 use super::database::Database;
-use super::materials::{store_of_not_added, with_status};
-use super::summary::table;
+use super::summary::{table, with_status};
 use crate::error::Error;
+use crate::setup::store_of_not_added;
 use crate::store::{Hit, Store};
 
 /// Search materials for words: names, tags, class, description, finish, what is not known, sources

@@ -7,12 +7,12 @@ use serde_json::json;
 use super::console::Console;
 use super::database::Database;
 use super::fit::words::report;
-use super::materials::{Found, find, not_to_be_used_since};
 use super::summary::{counted, table};
 use crate::brdf::Scattering;
 use crate::error::Error;
 use crate::formats::EffectEntry;
 use crate::material::{Fit, Material};
+use crate::setup::{MaterialRevision, find_material, later_status_warning};
 use crate::store::RevisionSummary;
 use crate::units::{db_from_ratio, range, rounded, shown};
 
@@ -28,8 +28,8 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let store = db.read()?;
-    let Found { material, revision } = find(store.as_ref(), &args.name, "")?;
-    let later = not_to_be_used_since(store.as_ref(), &material.slug, revision)?;
+    let MaterialRevision { material, revision } = find_material(store.as_ref(), &args.name, "")?;
+    let later = later_status_warning(store.as_ref(), &material.slug, revision)?;
     later.iter().for_each(|later| console.notice(later));
     let origin = match revision {
         Some(number) => format!("revision {number} in {}", db.path().display()),

@@ -4,10 +4,10 @@ use serde_json::json;
 
 use super::console::Console;
 use super::database::Database;
-use super::inputs::activity;
-use super::materials::{find, unknown};
+use crate::adopt::activity;
 use crate::error::Error;
 use crate::material::{Material, Slug, Status};
+use crate::setup::{find_material, unknown_material};
 use crate::store::Store;
 
 /// Say that a material must not be used any more, and why; it and its revisions stay
@@ -37,7 +37,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         _ => None,
     };
     let Some(stored) = stored else {
-        find(known.as_ref(), &args.name, "")?;
+        find_material(known.as_ref(), &args.name, "")?;
         return Err(Error::Usage {
             problem: format!("`{}` is not in {}", args.name, db.path().display()),
             way_out: "give the bare name of one that `matdb list` shows".to_owned(),
@@ -62,9 +62,9 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 /// The name of the better one, which must be there.
 fn successor(store: Option<&Store>, name: &str, by: &str) -> Result<Slug, Error> {
     const ASKED_BY: &str = "--superseded-by: ";
-    let error = match find(store, by, ASKED_BY) {
+    let error = match find_material(store, by, ASKED_BY) {
         Ok(found) if found.material.slug.as_str() == by => return Ok(found.material.slug),
-        Ok(_) => unknown(store, by, ASKED_BY)?,
+        Ok(_) => unknown_material(store, by, ASKED_BY)?,
         Err(error) => error,
     };
     match error {

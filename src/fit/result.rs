@@ -13,10 +13,11 @@ use super::table::{Place, Table};
 use super::verdict::Finding;
 use super::{Fit, Method, Stop};
 use crate::brdf::{Brdf, ParameterError, Scattering};
+use crate::formats::words::significant;
 use crate::material::HeldOut;
 use crate::measure::curve::{Curve, Row};
 use crate::radar::speckle::standard_deviation_db;
-use crate::units::{db_from_ratio, shown};
+use crate::units::db_from_ratio;
 
 /// One fitted number.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -167,10 +168,7 @@ impl FitResult {
         findings.extend(self.judge_rows(rows));
         findings.extend(self.judge_numbers(found));
         if let Err(ParameterError { path, value, .. }) = range {
-            let problem = format!(
-                "{path} would be {}",
-                shown(format!("{value:.3e}").parse().unwrap_or(value))
-            );
+            let problem = format!("{path} would be {}", significant(value, 4));
             let held = self.fit.fixed.iter().map(|(path, _)| path.clone()).collect();
             let of_levels = |f: &Finding| matches!(f, Finding::AtBound { name, .. } if [SPECULAR_LEVEL, DIFFUSE_LEVEL].contains(&name.as_str()));
             findings.retain(|finding| !of_levels(finding));

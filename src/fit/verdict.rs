@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::minimise::Stop;
-use crate::units::shown;
+use crate::formats::words::{listed, significant};
 
 /// One thing that the reader of a fit must know.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -111,7 +111,7 @@ impl fmt::Display for Finding {
                 f,
                 "backscatter sees f_lambda and k only as S = (1 - k) f_lambda, r_s and k only as \
                  R = k r_s, both up to the calibration; k = {} was chosen",
-                rounded(*k)
+                significant(*k, 5)
             ),
             Finding::NotConverged { stop } => {
                 let why = match stop {
@@ -129,12 +129,12 @@ impl fmt::Display for Finding {
             Finding::NoSpecularRows { below_deg } => write!(
                 f,
                 "no detection below {} degrees: of the specular part the data show the flank at most",
-                rounded(*below_deg)
+                significant(*below_deg, 5)
             ),
             Finding::NoDiffuseRows { above_deg } => write!(
                 f,
                 "no detection above {} degrees: the data do not show the diffuse part",
-                rounded(*above_deg)
+                significant(*above_deg, 5)
             ),
             Finding::CensoredIgnored { censored, rows } => write!(
                 f,
@@ -142,24 +142,32 @@ impl fmt::Display for Finding {
                  flattens the tail; and it takes the mean of decibels, which speckle pulls down"
             ),
             Finding::AtBound { name, value } => {
-                write!(f, "{name} stopped at its bound {}", rounded(*value))
+                write!(f, "{name} stopped at its bound {}", significant(*value, 5))
             }
             Finding::OnlyTogether { names } => {
-                write!(f, "{} act only together: the data tell their combination", list(names))
+                write!(f, "{} act only together: the data tell their combination", listed(names))
             }
             Finding::Unconstrained { name } => write!(f, "the data say nothing of {name}"),
             Finding::HardToTellApart { names: [a, b], correlation } => {
                 write!(f, "{a} and {b} are hard to tell apart: correlation {correlation:.3}")
             }
             Finding::OpenInterval { name, value } => {
-                write!(f, "the data do not limit {name} before its bound {}", rounded(*value))
+                write!(
+                    f,
+                    "the data do not limit {name} before its bound {}",
+                    significant(*value, 5)
+                )
             }
             Finding::OutOfRange { problem, held } => {
                 write!(f, "no parameters in their ranges give this level: {problem}; ")?;
                 match held.is_empty() {
                     true => write!(f, "check the calibration of the radar"),
                     false => {
-                        write!(f, "let go of {}, or check the calibration of the radar", list(held))
+                        write!(
+                            f,
+                            "let go of {}, or check the calibration of the radar",
+                            listed(held)
+                        )
                     }
                 }
             }
@@ -169,18 +177,6 @@ impl fmt::Display for Finding {
                  their law, chance explains {limit:.3}"
             ),
         }
-    }
-}
-
-fn rounded(value: f64) -> String {
-    shown(format!("{value:.4e}").parse().unwrap_or(value))
-}
-
-fn list(names: &[String]) -> String {
-    match names {
-        [] => String::new(),
-        [one] => one.clone(),
-        [most @ .., last] => format!("{} and {last}", most.join(", ")),
     }
 }
 

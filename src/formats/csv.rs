@@ -1,6 +1,6 @@
 //! CSV tables with a header, and errors that name the line and the column.
 
-use super::FormatError;
+use super::error::FormatError;
 
 /// A table of text cells under named columns.
 #[derive(Clone, Debug, PartialEq)]

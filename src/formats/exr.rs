@@ -21,7 +21,7 @@ use miniz_oxide::deflate::{CompressionLevel, compress_to_vec_zlib};
 use rayon::prelude::*;
 use thiserror::Error;
 
-use super::FormatError;
+use super::error::FormatError;
 use crate::geometry::raster::{Channel, Raster};
 
 /// How pixels are packed.

@@ -6,7 +6,8 @@
 
 use std::borrow::Cow;
 
-use super::{FormatError, excerpt, point};
+use super::error::FormatError;
+use super::line::{excerpt, point};
 use crate::geometry::mesh::LabelBuilder;
 use crate::geometry::{FacetLabels, Mesh};
 

@@ -6,7 +6,8 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::{FormatError, excerpt, point};
+use super::error::FormatError;
+use super::line::{excerpt, point};
 use crate::geometry::Mesh;
 use crate::geometry::mesh::LabelBuilder;
 

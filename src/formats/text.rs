@@ -4,7 +4,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
-use super::FormatError;
+use super::error::FormatError;
 
 /// Reads a TOML document into a type that refuses unknown keys.
 ///

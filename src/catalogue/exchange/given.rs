@@ -1,6 +1,6 @@
 //! What a person says of a foreign file that does not say it itself.
 
-use super::ExchangeError;
+use super::error::ExchangeError;
 use crate::material::{Material, Slug, SourceKind};
 
 /// What a person says beside a foreign file; what is none must stand in the file.

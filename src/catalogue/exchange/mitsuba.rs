@@ -15,8 +15,9 @@ use std::f64::consts::{PI, SQRT_2};
 
 use num_complex::Complex;
 
-use super::subject::one_line;
-use super::{ExchangeError, Exported, Subject};
+use super::error::ExchangeError;
+use super::exported::Exported;
+use super::subject::{Subject, one_line};
 use crate::brdf::{
     Brdf, CookTorrance, Distribution, Fresnel, Lambert, Mixture, Scattering, Shadowing,
 };

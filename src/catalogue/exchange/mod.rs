@@ -14,6 +14,7 @@
 //! bytes. What comes in becomes a [`Material`] that says where it is from.
 
 mod error;
+mod exported;
 mod given;
 mod mitsuba;
 mod open_material;
@@ -30,6 +31,7 @@ mod universal_brdf_in;
 use crate::material::Material;
 
 pub use error::ExchangeError;
+pub use exported::Exported;
 pub use given::Given;
 pub use subject::Subject;
 
@@ -48,15 +50,6 @@ pub enum Format {
     Mitsuba,
     #[allow(missing_docs)]
     Sionna,
-}
-
-/// A material in somebody else's format.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Exported {
-    /// Files by name, all for one folder; the first has the name that was asked for.
-    pub files: Vec<(String, Vec<u8>)>,
-    /// What the format could not carry, and what stands in for it, in a sentence.
-    pub lost: String,
 }
 
 /// Writes a material in a format; `name` is that of the file, with its ending.

@@ -14,8 +14,9 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use serde_json::{Value, json};
 
-use super::subject::{one_line, sigma0_per_f};
-use super::{ExchangeError, Exported, Subject};
+use super::error::ExchangeError;
+use super::exported::Exported;
+use super::subject::{Subject, one_line, sigma0_per_f};
 use crate::brdf::{Brdf, Scattering};
 use crate::frames::Direction;
 use crate::material::SourceKind;

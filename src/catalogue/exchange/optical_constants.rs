@@ -8,9 +8,9 @@
 //! where it is tabulated apart from k. Lost: frequencies further away than a third, the conditions
 //! other than the temperature, HTML.
 
-use super::given::{CLASS, LICENCE, NAME, file_name, missing};
+use super::error::ExchangeError;
+use super::given::{CLASS, Given, LICENCE, NAME, file_name, missing};
 use super::page::{Block, Page, number, parse};
-use super::{ExchangeError, Given};
 use crate::brdf::{Brdf, Fresnel};
 use crate::formats::FormatError;
 use crate::material::{

@@ -3,8 +3,10 @@
 //!
 //! Lost: everything but the curve.
 
+use super::error::ExchangeError;
+use super::exported::Exported;
 use super::plain_csv::what;
-use super::{ExchangeError, Exported, Subject};
+use super::subject::Subject;
 use crate::catalogue::tables::parquet_of;
 use crate::store::{Cell, Column, ColumnKind, Table};
 

@@ -6,12 +6,14 @@
 
 use std::path::Path;
 
+use super::error::ExchangeError;
+use super::exported::Exported;
 use super::given::{
-    CLASS, FREQUENCY, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD, file_name, missing,
+    CLASS, FREQUENCY, Given, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD, file_name, missing,
 };
-use super::subject::Points;
-use super::{ExchangeError, Exported, Given, Subject};
+use super::subject::{Points, Subject};
 use crate::formats::FormatError;
+use crate::formats::words::round_significant;
 use crate::material::{
     Citation, Curve, Instrument, Material, Observation, Slug, Source, SourceKind, Status, file,
 };
@@ -47,7 +49,7 @@ pub(super) fn write(subject: &Subject, name: &str) -> Exported {
 
 /// Fifteen digits, as many as decimals that somebody wrote keep on their way through radians and ratios.
 fn digits(value: f64) -> String {
-    shown(format!("{value:.14e}").parse::<f64>().unwrap_or(value) + 0.0)
+    shown(round_significant(value, 15) + 0.0)
 }
 
 /// Which numbers these are, in a clause.

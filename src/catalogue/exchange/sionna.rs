@@ -12,8 +12,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::subject::one_line;
-use super::{ExchangeError, Exported, Subject};
+use super::error::ExchangeError;
+use super::exported::Exported;
+use super::subject::{Subject, one_line};
 use crate::brdf::{Brdf, CookTorrance, Directive, Fresnel, Scattering};
 use crate::frames::Direction;
 use crate::units::{db_from_ratio, ratio_from_db};

@@ -14,9 +14,10 @@
 
 use serde_json::{Map, Value, json};
 
+use super::error::ExchangeError;
+use super::exported::Exported;
 use super::plain_csv::what;
-use super::subject::{Points, cited, one_line, sigma0_per_f};
-use super::{ExchangeError, Exported, Subject};
+use super::subject::{Points, Subject, cited, one_line, sigma0_per_f};
 use crate::material::{Censor, Observation, SourceKind};
 
 const SCHEMA: &str = "https://raw.githubusercontent.com/BiRD-project/BiRD_view/master/BRDF_JSON_schema/brdf_json_schema_v1.0.json";

@@ -7,12 +7,13 @@ use std::f64::consts::PI;
 
 use serde_json::Value;
 
+use super::error::ExchangeError;
 use super::given::{
-    CLASS, FREQUENCY, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD as DETECTED, missing,
+    CLASS, FREQUENCY, Given, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD as DETECTED,
+    missing,
 };
 use super::plain_csv::{Lone, RADAR, of_curve};
 use super::universal_brdf::{CENSOR, OURS, THRESHOLD};
-use super::{ExchangeError, Given};
 use crate::formats::FormatError;
 use crate::material::{Censor, Instrument, Material, Observation, SourceKind};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;

@@ -8,9 +8,10 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use crate::catalogue::api::{Entry, Index, SCHEMA_VERSION};
-use crate::catalogue::folder::INDEX;
-use crate::catalogue::{CatalogueError, Folder, api};
+use crate::catalogue::api::{self, Entry, Index, SCHEMA_VERSION};
+use crate::catalogue::error::CatalogueError;
+use crate::catalogue::folder::Folder;
+use crate::catalogue::layout::INDEX;
 use crate::material::{Slug, Status};
 
 const CHANGES: &str = "changes.json";

@@ -3,18 +3,13 @@
 
 use serde_json::{Value, json};
 
-use super::Context;
+use super::context::Context;
 use crate::catalogue::about::{Institute, Person};
 use crate::material::form::alternative_licences;
 
 /// The DOI's own address.
 pub(super) fn doi_url(doi: &str) -> String {
     format!("https://doi.org/{doi}")
-}
-
-/// Who is named where nobody named themselves.
-pub(super) fn nobody(context: &Context) -> String {
-    format!("Contributors to {}", context.about.title)
 }
 
 /// `CITATION.cff`.
@@ -49,7 +44,7 @@ pub(super) fn cff(context: &Context) -> String {
     }
     text += "authors:\n";
     if !about.has_authors() {
-        text += &format!("  - name: {}\n", quoted(&nobody(context)));
+        text += &format!("  - name: {}\n", quoted(&context.anonymous_author()));
     }
     for Person { family, given, orcid, affiliation } in &about.people {
         text += &format!("  - family-names: {}\n", quoted(family));
@@ -89,7 +84,7 @@ pub(super) fn zenodo(context: &Context) -> Option<Value> {
     let institutes = about.institutes.iter().map(|institute| json!({ "name": institute.name }));
     let creators: Vec<Value> = match about.has_authors() {
         true => about.people.iter().map(person).chain(institutes).collect(),
-        false => vec![json!({ "name": nobody(context) })],
+        false => vec![json!({ "name": context.anonymous_author() })],
     };
     let mut record = json!({
         "upload_type": "dataset",

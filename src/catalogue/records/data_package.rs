@@ -5,12 +5,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
-use super::citation::{doi_url, insert, nobody};
-use super::{Context, listed};
+use super::citation::{doi_url, insert};
+use super::context::Context;
 use crate::catalogue::about::About;
 use crate::catalogue::api::Index;
 use crate::catalogue::folder::Sum;
-use crate::catalogue::tables::{Written, csv_path, unit};
+use crate::catalogue::layout::{csv_path, listed_media_type};
+use crate::catalogue::tables::Written;
+use crate::catalogue::units::unit;
 use crate::material::form::{is_licence, licence_names};
 use crate::store::{Column, ColumnKind, Reference, Table};
 
@@ -24,7 +26,7 @@ pub(super) fn package(
     let schemas: BTreeMap<String, &Written> =
         tables.iter().map(|written| (csv_path(&written.table.name), written)).collect();
     let resource = |(path, sum): (&String, &Sum)| {
-        let media_type = listed(path)?;
+        let media_type = listed_media_type(path)?;
         Some(resource(path, sum, media_type, schemas.get(path).copied()))
     };
     let mut package = json!({
@@ -74,7 +76,7 @@ fn licences(context: &Context, index: &Index) -> Vec<Value> {
 fn contributors(context: &Context) -> Vec<Value> {
     let About { people, institutes, .. } = context.about;
     if !context.about.has_authors() {
-        return vec![json!({ "title": nobody(context) })];
+        return vec![json!({ "title": context.anonymous_author() })];
     }
     let person = people.iter().map(|person| {
         let mut entry = json!({

@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use super::citation::{doi_url, insert, nobody, orcid_url};
-use super::{Context, listed};
+use super::citation::{doi_url, insert, orcid_url};
+use super::context::Context;
 use crate::catalogue::about::{Institute, Person};
-use crate::catalogue::api;
 use crate::catalogue::folder::Sum;
+use crate::catalogue::layout::{MATERIALS, listed_media_type};
 use crate::material::form::alternative_licences;
 
 /// Where SPDX has the text of a licence; none of an expression of several, or of a licence that is not on its list.
@@ -21,7 +21,7 @@ fn licence_url(licence: &str) -> Option<String> {
 }
 
 /// A licence as schema.org has it: by its address, or else by its name.
-pub(in crate::catalogue) fn licence_record(licence: &str) -> Value {
+pub(crate) fn licence_record(licence: &str) -> Value {
     match licence_url(licence) {
         Some(url) => url.into(),
         None => json!({ "@type": "CreativeWork", "name": licence }),
@@ -32,7 +32,7 @@ pub(in crate::catalogue) fn licence_record(licence: &str) -> Value {
 fn people(context: &Context) -> Vec<Value> {
     if !context.about.has_authors() {
         return vec![
-            json!({ "@id": "#contributors", "@type": "Organization", "name": nobody(context) }),
+            json!({ "@id": "#contributors", "@type": "Organization", "name": context.anonymous_author() }),
         ];
     }
     let person = |(number, person): (usize, &Person)| {
@@ -88,7 +88,7 @@ pub(super) fn dataset(context: &Context, sums: &BTreeMap<String, Sum>) -> Value 
         Some(json!({
             "@type": "DataDownload",
             "contentUrl": path,
-            "encodingFormat": listed(path)?,
+            "encodingFormat": listed_media_type(path)?,
             "contentSize": sum.bytes.to_string(),
             "sha256": sum.sha256,
         }))
@@ -105,7 +105,7 @@ pub(super) fn crate_metadata(context: &Context, sums: &BTreeMap<String, Sum>) ->
             "@id": path,
             "@type": "File",
             "name": name,
-            "encodingFormat": listed(path)?,
+            "encodingFormat": listed_media_type(path)?,
             "contentSize": sum.bytes.to_string(),
         }))
     };
@@ -123,9 +123,9 @@ pub(super) fn crate_metadata(context: &Context, sums: &BTreeMap<String, Sum>) ->
     })];
     let mut single = Vec::new();
     if context.materials > 0 {
-        parts.push(json!({ "@id": api::FOLDER }));
+        parts.push(json!({ "@id": MATERIALS }));
         single.push(json!({
-            "@id": api::FOLDER,
+            "@id": MATERIALS,
             "@type": "Dataset",
             "name": "Materials",
             "description": "One JSON file per material; api/v1/index.json lists them",

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::words::{decibels, grouped, percent};
+use super::words::grouped;
+use crate::formats::words::{decibels, percent};
 use crate::material::{Censor, Curve, Observation};
 use crate::measure::statistics::{self, Median};
 use crate::units::db_from_ratio;

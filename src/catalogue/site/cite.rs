@@ -5,8 +5,7 @@ use serde_json::{Value, json};
 
 use super::link::doi_href;
 use super::words::cut;
-use crate::catalogue::About;
-use crate::catalogue::about::{Institute, Person};
+use crate::catalogue::about::{About, Institute, Person};
 use crate::catalogue::bibtex::entry;
 use crate::catalogue::records::licence_record;
 use crate::catalogue::references::{Credit, pruned};

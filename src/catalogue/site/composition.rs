@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::entry::place_of;
-use super::words::digits;
 use crate::effects::find;
+use crate::formats::words::digits;
 use crate::material::{Finding, FindingVerdict, Layer, Material, Permittivity, Session, Status};
 
 /// What a page says of these.

@@ -6,8 +6,9 @@ use super::bins::{Bin, bins};
 use super::entry::{kind_of, place_of};
 use super::levels::{FAINTEST_DB, Levels, TABLE_DEG, angles_deg, range_deg};
 use super::plot::{Plot, Series, Shape};
-use super::words::{digits, grouped, percent};
+use super::words::grouped;
 use crate::fit::stored_band;
+use crate::formats::words::{digits, percent};
 use crate::material::{Censor, Curve, Fit, Instrument, Material, Observation, SourceKind};
 use crate::units::{db_from_ratio, dbm_from_watts};
 

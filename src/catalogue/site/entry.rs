@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use super::levels::{Levels, SMALL_DEG, range_deg};
-use super::words::{clean, cut};
+use super::words::cut;
+use crate::formats::html::clean;
 use crate::material::{Material, SourceKind};
 
 /// Letters of a name and of a description that are searched and shown: nobody types more.

@@ -5,8 +5,9 @@ use serde_json::Value;
 
 use super::entry::{kind_of, place_of};
 use super::residuals;
-use super::words::{digits, grouped};
+use super::words::grouped;
 use crate::brdf::Parameter;
+use crate::formats::words::digits;
 use crate::material::{ChosenBy, Fit, FitReport, HeldOut, Material, SourceKind, Told};
 use crate::units::dbm_from_watts;
 

@@ -1,7 +1,7 @@
 //! Levels of a model over the angle, in the range for which a material's numbers are claimed.
 
-use super::words::decibels;
 use crate::brdf::Scattering;
+use crate::formats::words::decibels;
 use crate::material::{Material, Reach};
 use crate::units::db_from_ratio;
 

@@ -1,6 +1,6 @@
 //! What may be clicked: addresses of the web, and DOIs through their resolver.
 
-use crate::catalogue::About;
+use crate::catalogue::about::About;
 use crate::material::Source;
 
 /// Where a source can be followed to, and the words of the link.

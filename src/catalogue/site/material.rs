@@ -10,9 +10,10 @@ use super::fit::{self, FitView};
 use super::levels::{Levels, TABLE_DEG, range_deg};
 use super::link::{self, Link};
 use super::script::inert;
-use super::words::{cut, digits, gaps, meaning};
-use crate::catalogue::About;
+use super::words::{cut, gaps, meaning};
+use crate::catalogue::about::About;
 use crate::effects;
+use crate::formats::words::digits;
 use crate::material::{FindingVerdict, Material, Source, SourceKind};
 use crate::store::{RevisionSummary, Stored};
 

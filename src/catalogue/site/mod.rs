@@ -1,8 +1,8 @@
 //! The site: an index, a page per material, and a page that compares. It works from a folder and from
 //! any web server, and loads nothing from anywhere else.
 //!
-//! Everything that a database says is text to a page: [`templates`] escapes it, [`script`] keeps it
-//! inside its quotes, [`words`] takes control characters out and [`link`] decides what may be clicked.
+//! Everything that a database says is text to a page: [`templates`] escapes it and takes control characters
+//! out, [`script`] keeps it inside its quotes and [`link`] decides what may be clicked.
 
 mod bins;
 mod cite;
@@ -23,7 +23,9 @@ mod words;
 
 use serde_json::json;
 
-use super::{About, CatalogueError, Folder};
+use super::about::About;
+use super::error::CatalogueError;
+use super::folder::Folder;
 use crate::store::{RevisionSummary, Stored};
 
 use cite::Citation;

@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use super::words::clean;
 use crate::formats::figure::ticks::ticks;
+use crate::formats::html::clean;
 
 const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 420.0;

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-use crate::catalogue::CatalogueError;
+use crate::catalogue::error::CatalogueError;
 use crate::material::{Material, SourceKind};
 use crate::units::{db_from_ratio, dbm_from_watts};
 

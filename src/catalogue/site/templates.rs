@@ -1,12 +1,9 @@
-//! The template engine: the only file that knows which one it is.
+//! The pages' templates. Whatever is put into one is escaped.
 
-use minijinja::syntax::SyntaxConfig;
-use minijinja::value::{Serde, Value};
-use minijinja::{AutoEscape, Environment, UndefinedBehavior, escape_formatter};
 use serde::Serialize;
 
-use super::words::clean;
-use crate::catalogue::CatalogueError;
+use crate::catalogue::error::CatalogueError;
+use crate::formats::html::{PageError, Templates as Engine};
 
 const PAGES: [(&str, &str); 6] = [
     ("base.html", include_str!("templates/base.html")),
@@ -17,30 +14,13 @@ const PAGES: [(&str, &str); 6] = [
     ("compare.html", include_str!("templates/compare.html")),
 ];
 
-/// The pages' templates. Whatever is put into one is escaped.
-pub(super) struct Templates(Environment<'static>);
+/// The templates of the site.
+pub(super) struct Templates(Engine);
 
 impl Templates {
     /// Reads the templates that come with the program.
     pub(super) fn new() -> Result<Templates, CatalogueError> {
-        let mut env = Environment::new();
-        env.set_auto_escape_callback(|_| AutoEscape::Html);
-        env.set_undefined_behavior(UndefinedBehavior::Strict);
-        let syntax = SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build();
-        env.set_syntax(syntax.map_err(|error| failed("syntax", &error))?);
-        env.set_formatter(|out, state, value| match value.as_str() {
-            Some(text) if !value.is_safe() => {
-                escape_formatter(out, state, &Value::from(clean(text)))
-            }
-            _ => escape_formatter(out, state, value),
-        });
-        // Drawings are ours; the text in them is escaped where they are drawn.
-        env.add_filter("drawing", |svg: String| Value::from_safe_string(svg));
-        env.add_filter("urlword", |text: String| urlword(&text));
-        for (name, text) in PAGES {
-            env.add_template(name, text).map_err(|error| failed(name, &error))?;
-        }
-        Ok(Templates(env))
+        Ok(Templates(Engine::new(&PAGES).map_err(failed)?))
     }
 
     /// A page of this context.
@@ -49,20 +29,10 @@ impl Templates {
         name: &str,
         context: &impl Serialize,
     ) -> Result<String, CatalogueError> {
-        let page = self.0.get_template(name).and_then(|page| page.render(Serde(context)));
-        page.map_err(|error| failed(name, &error))
+        self.0.page(name, context).map_err(failed)
     }
 }
 
-/// Text as a value in an address.
-fn urlword(text: &str) -> String {
-    let escaped = |byte: u8| match byte.is_ascii_alphanumeric() {
-        true => char::from(byte).to_string(),
-        false => format!("%{byte:02X}"),
-    };
-    text.bytes().map(escaped).collect()
-}
-
-fn failed(name: &str, error: &minijinja::Error) -> CatalogueError {
-    CatalogueError::Page { name: name.to_owned(), reason: format!("{error:#}") }
+fn failed(PageError { name, reason }: PageError) -> CatalogueError {
+    CatalogueError::Page { name, reason }
 }

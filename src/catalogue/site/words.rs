@@ -1,16 +1,9 @@
-//! Text and numbers as people read them.
+//! Words of the site: kinds, titles, and what is not known.
 
 use std::borrow::Cow;
 
+use crate::formats::words::{capitalised, grouped_with};
 use crate::material::SourceKind;
-use crate::units::shown;
-
-/// Text without control characters, which no page may hold; line ends and tabs stay.
-pub(super) fn clean(text: &str) -> String {
-    let visible =
-        |c: char| if c.is_control() && !matches!(c, '\n' | '\t') { '\u{fffd}' } else { c };
-    text.chars().map(visible).collect()
-}
 
 /// Text on one line of at most so many characters, without marks that turn its direction: for titles,
 /// which cannot be kept apart from what surrounds them.
@@ -21,34 +14,9 @@ pub(super) fn cut(text: &str, most: usize) -> String {
     if line().nth(most).is_some() { short.trim_end().to_owned() + "…" } else { short }
 }
 
-/// Four significant digits.
-pub(super) fn digits(value: f64) -> String {
-    shown(format!("{value:.3e}").parse().unwrap_or(value)).replace('-', "−")
-}
-
-/// Decibels to a tenth; −0.0 is 0.0.
-pub(super) fn decibels(level_db: f64) -> String {
-    match level_db.is_finite() {
-        true => format!("{:.1}", level_db + 0.0).replace("-0.0", "0.0").replace('-', "−"),
-        false => "nothing".to_owned(),
-    }
-}
-
-/// A share as a person would say it.
-pub(super) fn percent(part: usize, whole: usize) -> String {
-    match (part, whole) {
-        (0, _) => "none".to_owned(),
-        (part, whole) if part == whole => "all".to_owned(),
-        (part, whole) => format!("{:.1} %", 100.0 * part as f64 / whole as f64),
-    }
-}
-
-/// A count with its thousands apart.
+/// A count with its thousands apart, which a line cannot break.
 pub(super) fn grouped(count: usize) -> String {
-    let digits = count.to_string();
-    let groups: Vec<&str> =
-        digits.as_bytes().rchunks(3).rev().map(|g| std::str::from_utf8(g).unwrap_or("")).collect();
-    groups.join("\u{202f}")
+    grouped_with(count, '\u{202f}')
 }
 
 /// What a kind promises, and what it does not.
@@ -70,16 +38,11 @@ pub(super) fn gaps(description: &str) -> Vec<String> {
         let text = rest.get(at + "Not known:".len()..).unwrap_or("").trim().to_owned();
         let end = text.find(". ").map_or(text.len(), |dot| dot + 1);
         let (sentence, after) = text.split_at(end);
-        found.push(capital(sentence));
+        found.push(capitalised(sentence.trim()));
         rest = after.to_owned().into();
     }
     found.retain(|sentence| !sentence.is_empty());
     found
-}
-
-fn capital(sentence: &str) -> String {
-    let mut letters = sentence.trim().chars();
-    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
 #[cfg(test)]
@@ -87,8 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn control_characters_and_marks_of_direction_do_not_reach_a_title() {
-        assert_eq!(clean("a\0b\u{1b}[2J\nc"), "a\u{fffd}b\u{fffd}[2J\nc");
+    fn line_ends_and_marks_of_direction_do_not_reach_a_title() {
         assert_eq!(cut("ab\u{202e}cd\nef", 6), "abcd e…");
         assert_eq!(cut("abc", 3), "abc");
     }
@@ -101,10 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_short_and_signed_with_a_minus() {
-        assert_eq!([digits(-0.016040620), digits(2.0)], ["−0.01604", "2"]);
-        assert_eq!([-10.0, -0.04, f64::NEG_INFINITY].map(decibels), ["−10.0", "0.0", "nothing"]);
+    fn counts_have_their_thousands_apart() {
         assert_eq!([grouped(7), grouped(18_529)], ["7", "18\u{202f}529"]);
-        assert_eq!([percent(0, 9), percent(1, 8), percent(9, 9)], ["none", "12.5 %", "all"]);
     }
 }

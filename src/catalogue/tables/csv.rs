@@ -3,8 +3,9 @@
 
 use std::io;
 
-use super::units::unit;
-use crate::catalogue::{CatalogueError, Folder};
+use crate::catalogue::error::CatalogueError;
+use crate::catalogue::folder::Folder;
+use crate::catalogue::units::unit;
 use crate::store::{Cell, ColumnKind, Store, StoreError, Table};
 
 /// Writes a table row by row; gives the number of rows.

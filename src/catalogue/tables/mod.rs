@@ -4,14 +4,14 @@
 mod csv;
 #[cfg(feature = "parquet")]
 mod parquet;
-mod units;
 
-use super::{CatalogueError, Folder};
+use super::error::CatalogueError;
+use super::folder::Folder;
+use super::layout::csv_path;
 use crate::store::{Store, Table};
 
 #[cfg(feature = "parquet")]
 pub(super) use parquet::parquet_of;
-pub(super) use units::{ENDINGS, unit};
 
 /// Whether this program writes Parquet.
 pub const HAS_PARQUET: bool = cfg!(feature = "parquet");
@@ -20,11 +20,6 @@ pub const HAS_PARQUET: bool = cfg!(feature = "parquet");
 pub(super) struct Written {
     pub table: Table,
     pub rows: u64,
-}
-
-/// Where a table's CSV stands.
-pub(super) fn csv_path(table: &str) -> String {
-    format!("tables/{table}.csv")
 }
 
 /// Writes every table, and `tables/units.csv` with the unit of every numeric column.

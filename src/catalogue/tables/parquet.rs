@@ -15,8 +15,9 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 
-use super::units::unit;
-use crate::catalogue::{CatalogueError, Folder};
+use crate::catalogue::error::CatalogueError;
+use crate::catalogue::folder::Folder;
+use crate::catalogue::units::unit;
 use crate::store::{Cell, Column, ColumnKind, Store, Table};
 
 /// Rows that are held at a time.
@@ -55,7 +56,7 @@ fn rows(store: &Store, table: &Table, place: &Path) -> Result<(), CatalogueError
 }
 
 /// A table of a few rows, in memory; `about` goes into its metadata.
-pub(in crate::catalogue) fn parquet_of<'a>(
+pub(crate) fn parquet_of<'a>(
     table: &Table,
     about: &str,
     rows: impl Iterator<Item = Vec<Cell<'a>>>,

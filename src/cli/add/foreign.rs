@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use super::unreadable;
+use crate::adopt::input;
 use crate::catalogue::exchange::{Foreign, Given};
 use crate::cli::door;
-use crate::cli::inputs::{input, read_small};
 use crate::error::Error;
+use crate::files::read_small;
 use crate::material::{Input, Material, Slug, SourceKind};
 use crate::units::watts_from_dbm;
 
@@ -136,7 +137,7 @@ pub(super) fn read(
     path: &Path,
     args: &Beside,
 ) -> Result<(Material, Input), Error> {
-    let bytes = read_small(path).map_err(|reason| unreadable(path, reason))?;
+    let bytes = read_small(path).map_err(unreadable)?;
     let material = format.read(&path.display().to_string(), &bytes, &args.given()?)?;
     door::check(&material, path)?;
     Ok((material, input(path, &bytes)))

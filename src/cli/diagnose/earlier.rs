@@ -3,10 +3,10 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use super::after::AFTER;
+use crate::adopt::AFTER;
 use crate::cli::console::Console;
-use crate::cli::inputs::read_small;
 use crate::error::Error;
+use crate::files::read_small;
 
 /// The report for scripts, which every diagnosis writes.
 const REPORT: &str = "report.json";
@@ -129,7 +129,7 @@ fn is_file(path: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::diagnose::after::MARK;
+    use crate::adopt::MARK;
 
     fn folder_with(files: &[(&str, &str)]) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();

@@ -1,15 +1,12 @@
 //! `matdb diagnose`.
 
-mod after;
 mod cannot_tell;
 mod curve;
 mod earlier;
-mod findings;
 mod html;
 mod plots;
 mod publish;
 mod residuals;
-mod takers;
 #[cfg(test)]
 mod testing;
 mod text;
@@ -23,25 +20,25 @@ use super::cloud::CloudArgs;
 use super::console::Console;
 use super::database::{Database, USUAL};
 use super::effects::chosen;
-use super::output::write_all;
-use super::staging::{materials, model, notices};
+use crate::adopt::{AFTER, Adoption, check_beside, check_fit_name, find_recipient, name_beside};
 use crate::brdf::Brdf;
 use crate::diagnose::{
-    Declared, DiagnoseError, Diagnosis, MeshPose, Report, Subject, looks, matched,
+    Declared, DiagnoseError, Diagnosis, MeshPose, Report, Subject, match_cloud, trace_shots,
 };
 use crate::effects::{Effect, Receiver, Stage, middle};
 use crate::error::Error;
+use crate::files::{folder_of, write_all};
 use crate::measure::{Cloud, CloudError};
 use crate::radar::{Link, Pattern, Radar};
 use crate::scene::file::MeshEntry;
 use crate::scene::{Scene, read_text};
+use crate::setup::ReadyScene;
 use crate::trace::Bvh;
 use crate::units::watts_from_dbm;
 use cannot_tell::CannotTell;
 use earlier::Earlier;
 use plots::Peak;
 use publish::{Publication, material_file};
-use takers::Cast;
 use tried::{Choice, NotTried, Reason, Told};
 
 /// Find the physical effect that a scene lacks to explain a measured cloud, or a law a measured curve
@@ -80,7 +77,7 @@ pub(super) struct Args {
     /// something found the scene, too, as SCENE-after.toml beside it
     #[arg(long, conflicts_with = "curve")]
     add: bool,
-    /// The material that takes refitted law and effects in [default: all of the scene with enough looks]
+    /// The material that takes refitted law and effects in [default: all of the scene with enough chirps]
     #[arg(long, value_name = "NAME", conflicts_with = "curve")]
     material: Option<String>,
     /// Seed of folds and of everything random
@@ -170,21 +167,20 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
     let scene = Scene::load(path)?;
     check_declared(&scene, path)?;
     let effects = chosen(&args.effects)?;
-    let (used, material_of_region) = materials(&scene, path, db)?;
-    let names: Vec<String> = scene.target.regions.iter().map(|r| r.material.clone()).collect();
-    let cast = Cast { used: &used, names: &names, of_region: &material_of_region };
+    let ready = ReadyScene::new(scene, path, db.read()?.as_ref())?;
+    let scene = &ready.scene;
     // A diagnosis takes a while: what hinders its storing is said before.
-    let inputs = names.iter().map(|name| material_file(name)).chain([after::AFTER.to_owned()]);
-    let named = files_of(&scene, path);
+    let materials = ready.materials.iter().map(|material| material_file(&material.name));
+    let inputs = materials.chain([AFTER.to_owned()]);
+    let named = files_of(scene, path);
     let read = asked.read().into_iter().chain(named.iter().map(PathBuf::as_path));
     earlier::check(&args.output, &read.collect::<Vec<_>>(), &inputs.collect::<Vec<_>>())?;
-    let wanted = cast.wanted(args.material.as_deref())?;
+    let wanted = args.material.as_deref().map(|name| find_recipient(&ready, name)).transpose()?;
     if args.add {
-        after::check_beside(path)?;
-        cast.check()?;
+        check_beside(path)?;
+        check_fit_name(&ready)?;
     }
-    let declared = super::staging::effects(&scene, path, cast.used, cast.of_region)?;
-    let at_work = model(&declared, &scene, cast.used, cast.of_region);
+    let at_work = ready.model();
     let at_work = at_work.as_ref().map_or(&[][..], |model| &model.effects);
     let (_, Declared { range_sd_m, .. }) = receiver(scene.radar());
     let told = Told { times: scene.chirps.is_timed(), ranges: range_sd_m > 0.0 };
@@ -213,24 +209,22 @@ fn of_cloud(asked: Asked, db: &Database, console: &Console) -> Result<(), Error>
         }
         read => read?,
     };
-    let laws: Vec<Brdf> =
-        material_of_region.iter().map(|&m| used[usize::from(m)].scattering.clone()).collect();
-    let mut beyond = notices(&used, scene.radar());
+    let laws = ready.laws();
+    let mut beyond = ready.notices();
     if scene.radar().speckle.is_none() {
         beyond.push(NO_SPECKLE.to_owned());
     }
     cloud.notices.iter().chain(&beyond).for_each(|notice| console.notice(notice));
     let bar = console.spinner("diagnosing");
     let hear = |what: &str| bar.set_message(format!("diagnosing: {what}"));
-    let answer = diagnosed(&scene, &cloud, &laws, at_work, args.seed, &choice.tried, &hear);
+    let answer = diagnosed(scene, &cloud, &laws, at_work, args.seed, &choice.tried, &hear);
     bar.finish_and_clear();
     match answer {
         Ok(report) => {
             let not_tried = choice.not_tried;
-            let context = Context { beyond, not_tried, ..context(asked, &scene, db) };
-            let (given, report) = (given.as_str(), &report);
-            Publication { asked, scene: &scene, given, cast, wanted, report }
-                .publish(context, db, console)
+            let context = Context { beyond, not_tried, ..context(asked, scene, db) };
+            let adoption = Adoption { ready: &ready, report: &report, wanted };
+            Publication { asked, given: &given, adoption }.publish(context, db, console)
         }
         Err(error) => refuse(error, asked, console),
     }
@@ -244,7 +238,7 @@ fn files_of(scene: &Scene, path: &Path) -> Vec<PathBuf> {
         _ => None,
     };
     let files = meshes.filter(|file| !file.starts_with("builtin:")).chain(scan);
-    files.map(|file| after::folder_of(path).join(file)).collect()
+    files.map(|file| folder_of(path).join(file)).collect()
 }
 
 /// Refuses what a scene declares and no diagnosis predicts: it would be found as an effect.
@@ -293,9 +287,9 @@ fn diagnosed(
         grain_of_region: &grain_of_region,
         middle: glam::DVec3::ZERO,
     };
-    let looks = looks(&stage, radar, &scene.chirps)?;
-    stage.middle = middle(&looks);
-    let matched = matched(cloud, &scene.chirps, &looks)?;
+    let shots = trace_shots(&stage, radar, &scene.chirps)?;
+    stage.middle = middle(&shots);
+    let matched = match_cloud(cloud, &scene.chirps, &shots)?;
     let (receiver, declared) = receiver(radar);
     let pose: Vec<MeshPose> = scene.file.mesh.iter().map(pose).collect();
     let subject = Subject {
@@ -304,7 +298,7 @@ fn diagnosed(
         at_work,
         receiver,
         declared,
-        looks: &looks,
+        shots: &shots,
         observations: &matched.observations,
         strays: &matched.strays,
         pose: &pose,
@@ -333,8 +327,8 @@ fn context(asked: Asked, scene: &Scene, db: &Database) -> Context {
         seed: args.seed,
         program: program(db),
         command: command(db, std::env::args_os().skip(1).collect()),
-        after: typed(&args.output.join(after::AFTER)),
-        beside: typed(&path.with_file_name(after::name_beside(path))),
+        after: typed(&args.output.join(AFTER)),
+        beside: typed(&path.with_file_name(name_beside(path))),
         folder: args.output.clone(),
         is_added: false,
         added: Vec::new(),

@@ -3,21 +3,21 @@
 
 use std::path::Path;
 
-use super::after::{self, AFTER, MARK};
 use super::earlier::Earlier;
-use super::takers::{Cast, Taker, pinned, replaced};
 use super::words::listed;
 use super::{Asked, Context, Record, html, json, plots, residuals, text, typed};
+use crate::adopt::{
+    AFTER, Adoption, MARK, Recipient, activity, name_beside, pinned_name, relocate_files,
+    replaced_name, scene_with_found,
+};
 use crate::cli::console::Console;
 use crate::cli::database::Database;
-use crate::cli::inputs::activity;
-use crate::cli::output::{Written, write_all};
-use crate::diagnose::{LEAST_LOOKS, Report};
+use crate::diagnose::LEAST_SHOTS;
 use crate::effects::Level;
 use crate::error::Error;
+use crate::files::{Placement, folder_of, write_all};
 use crate::formats::FormatError;
 use crate::material::{Activity, Input, file};
-use crate::scene::Scene;
 
 /// First line of a material's file.
 const FOUND: &str = "# A material with what `matdb diagnose` found in it.\n";
@@ -32,13 +32,9 @@ pub(super) fn material_file(name: &str) -> String {
 /// A diagnosis on its way out.
 pub(super) struct Publication<'a> {
     pub asked: Asked<'a>,
-    pub scene: &'a Scene,
     /// Text of the scene file.
     pub given: &'a str,
-    pub cast: Cast<'a>,
-    /// Number of the material that alone takes everything in.
-    pub wanted: Option<usize>,
-    pub report: &'a Report,
+    pub adoption: Adoption<'a>,
 }
 
 impl Publication<'_> {
@@ -49,23 +45,23 @@ impl Publication<'_> {
         db: &Database,
         console: &Console,
     ) -> Result<(), Error> {
-        let spot_m = self.scene.radar().spot_diameter_m;
-        let (pictures, notices) = plots::pictures(self.report, spot_m);
-        context.places = plots::strongest(&self.report.rows, spot_m);
-        let takers = self.cast.takers(self.report, self.wanted);
-        let is_stored = self.asked.args.add && !self.report.effects.is_empty();
+        let spot_m = self.adoption.ready.scene.radar().spot_diameter_m;
+        let (pictures, notices) = plots::pictures(self.adoption.report, spot_m);
+        context.places = plots::strongest(&self.adoption.report.rows, spot_m);
+        let takers = self.adoption.recipients();
+        let is_stored = self.asked.args.add && !self.adoption.report.effects.is_empty();
         let not_tried = context.not_tried.clone();
-        let record = Record { report: self.report, not_tried: &not_tried };
+        let record = Record { report: self.adoption.report, not_tried: &not_tried };
         let mut files: Files = vec![
             ("report.json".to_owned(), json(&record)?),
-            ("residuals.csv".to_owned(), residuals::csv(&self.report.rows)),
+            ("residuals.csv".to_owned(), residuals::csv(&self.adoption.report.rows)),
         ];
         for picture in &pictures {
             files.extend(picture.files()?);
         }
         let homeless = self.homeless(&takers);
-        context.is_added = is_stored && homeless.len() < self.report.effects.len();
-        let page = |context: &Context| html::report(self.report, context, &pictures);
+        context.is_added = is_stored && homeless.len() < self.adoption.report.effects.len();
+        let page = |context: &Context| html::report(self.adoption.report, context, &pictures);
         let earlier = Earlier::in_folder(&self.asked.args.output, &self.asked.read());
         if is_stored {
             self.add(&takers, &mut files, &mut context, &page, db)?;
@@ -82,12 +78,12 @@ impl Publication<'_> {
         }
         earlier.remove_all_but(&files, console);
         notices.iter().for_each(|notice| console.notice(notice));
-        if !self.report.base.converged {
+        if !self.adoption.report.base.converged {
             console.notice("the final fit did not converge: take the numbers with care");
         }
         if !homeless.is_empty() {
             console.notice(&format!(
-                "kept in the report alone, as no material has the {LEAST_LOOKS} chirps on the target that take {}: {}",
+                "kept in the report alone, as no material has the {LEAST_SHOTS} chirps on the target that take {}: {}",
                 if homeless.len() == 1 { "it" } else { "them" },
                 listed(&homeless)
             ));
@@ -95,14 +91,15 @@ impl Publication<'_> {
         self.left_out(&takers).iter().for_each(|notice| console.notice(notice));
         files.sort_by_key(|(name, _)| name != "report.html");
         let names: Vec<String> = files.into_iter().map(|(name, _)| name).collect();
-        let said = text::text(self.report, &context.places, &names, &self.asked.args.output);
+        let said =
+            text::text(self.adoption.report, &context.places, &names, &self.asked.args.output);
         console.result(&(said + &self.stored(&context, &homeless, db)), &record)
     }
 
     /// Stores what was found in the database and beside the scene, and writes the report.
     fn add(
         &self,
-        takers: &[Taker],
+        takers: &[Recipient],
         files: &mut Files,
         context: &mut Context,
         page: &dyn Fn(&Context) -> Result<Vec<u8>, Error>,
@@ -113,7 +110,7 @@ impl Publication<'_> {
         let title = self.title(&activity);
         let (mut materials, mut last) = (Vec::new(), Vec::new());
         for taker in takers {
-            materials.extend(self.cast.revised(taker, self.report, &title, Some(&store))?);
+            materials.extend(self.adoption.revise(taker, &title, &store)?);
             last.push(materials.len() - 1);
         }
         let scene = self.asked.scene;
@@ -121,15 +118,19 @@ impl Publication<'_> {
         let written = store.add_if(&materials, |added| {
             let stored =
                 || last.iter().filter_map(|&at| Some((materials.get(at)?, *added.get(at)?)));
-            context.added = stored().map(|(material, added)| pinned(material, added)).collect();
+            context.added =
+                stored().map(|(material, added)| pinned_name(material, added)).collect();
             context.replaced =
-                stored().filter_map(|(material, added)| replaced(material, added)).collect();
-            let names = self.names(takers, &context.added);
+                stored().filter_map(|(material, added)| replaced_name(material, added)).collect();
+            let names = self.adoption.region_names(takers, &context.added);
             files.push((AFTER.to_owned(), self.after(&names, MARK)?));
             files.push(("report.html".to_owned(), page(context)?));
-            let file = after::with_found(self.scene, &self.report.effects, &names);
-            let beside = [(after::name_beside(scene), self.text(MARK, &file)?)];
-            Written::new(&[(&self.asked.args.output, files), (after::folder_of(scene), &beside)])
+            let file =
+                scene_with_found(&self.adoption.ready.scene, &self.adoption.report.effects, &names);
+            let beside = [(name_beside(scene), self.text(MARK, &file)?)];
+            let folder = folder_of(scene);
+            Placement::new(&[(&self.asked.args.output, files), (folder, &beside)])
+                .map_err(Error::from)
         })?;
         written.keep();
         Ok(())
@@ -140,45 +141,35 @@ impl Publication<'_> {
         let mut store = db.write()?;
         let activity = self.activity()?;
         let title = self.title(&activity);
-        let (materials, last) = self.cast.tried(self.report, self.wanted, &title, &store)?;
+        let (materials, last) = self.adoption.record_not_found(&title, &store)?;
         store.record(activity);
         let written = store.add_if(&materials, |added| {
-            let pin = |&at: &usize| Some(pinned(materials.get(at)?, *added.get(at)?));
+            let pin = |&at: &usize| Some(pinned_name(materials.get(at)?, *added.get(at)?));
             context.added = last.iter().filter_map(pin).collect();
-            Written::new(&[(&self.asked.args.output, files)])
+            Placement::new(&[(&self.asked.args.output, files)]).map_err(Error::from)
         })?;
         written.keep();
         Ok(())
     }
 
     /// The files of materials that are not stored, and the materials of the regions with them.
-    fn alone(&self, takers: &[Taker]) -> Result<(Files, Vec<String>), Error> {
+    fn alone(&self, takers: &[Recipient]) -> Result<(Files, Vec<String>), Error> {
         let (mut files, mut slugs) = (Vec::new(), Vec::new());
         for taker in takers {
             let title = self.title(&self.activity()?);
-            let Some(material) = self.cast.alone(taker, self.report, &title)? else {
-                continue;
-            };
-            let name = material_file(self.cast.name(taker.number));
+            let material = self.adoption.make_material(taker, &title)?;
+            let name = material_file(&self.adoption.ready.materials[taker.number].name);
             files.push((name, (FOUND.to_owned() + &file::write(&material)?).into_bytes()));
             slugs.push(material.slug.to_string());
         }
-        Ok((files, self.names(takers, &slugs)))
-    }
-
-    /// The materials of the regions, those of the takers by their new names.
-    fn names(&self, takers: &[Taker], new: &[String]) -> Vec<String> {
-        let name = |(&of, given): (&u16, &String)| {
-            let taken = takers.iter().position(|taker| taker.number == usize::from(of));
-            taken.and_then(|taken| new.get(taken)).unwrap_or(given).clone()
-        };
-        std::iter::zip(self.cast.of_region, self.cast.names).map(name).collect()
+        Ok((files, self.adoption.region_names(takers, &slugs)))
     }
 
     /// The scene with what was found, to stand beside the report.
     fn after(&self, materials: &[String], head: &str) -> Result<Vec<u8>, Error> {
-        let file = after::with_found(self.scene, &self.report.effects, materials);
-        self.text(head, &after::moved(file, self.asked.scene, &self.asked.args.output)?)
+        let file =
+            scene_with_found(&self.adoption.ready.scene, &self.adoption.report.effects, materials);
+        self.text(head, &relocate_files(file, self.asked.scene, &self.asked.args.output)?)
     }
 
     fn text(&self, head: &str, file: &crate::scene::SceneFile) -> Result<Vec<u8>, Error> {
@@ -191,7 +182,7 @@ impl Publication<'_> {
 
     /// The command and the files that it was given.
     fn activity(&self) -> Result<Activity, Error> {
-        activity("diagnose", &self.asked.read())
+        Ok(activity("diagnose", &self.asked.read())?)
     }
 
     /// Where the stored numbers come from: files of one name differ by what is in them.
@@ -204,25 +195,29 @@ impl Publication<'_> {
     }
 
     /// Sentences on materials that keep what they had.
-    fn left_out(&self, takers: &[Taker]) -> Option<String> {
+    fn left_out(&self, takers: &[Recipient]) -> Option<String> {
         let stays = |number: &usize| takers.iter().all(|taker| taker.number != *number);
-        let names: Vec<&str> =
-            (0..self.cast.used.len()).filter(stays).map(|number| self.cast.name(number)).collect();
-        let is_told = !self.report.effects.is_empty() && !names.is_empty();
+        let materials = &self.adoption.ready.materials;
+        let names: Vec<&str> = (0..materials.len())
+            .filter(stays)
+            .map(|number| materials[number].name.as_str())
+            .collect();
+        let is_told = !self.adoption.report.effects.is_empty() && !names.is_empty();
         is_told.then(|| {
             format!("as before, without a law or effects of their own: {}", names.join(", "))
         })
     }
 
     /// Effects of a material that none takes in.
-    fn homeless(&self, takers: &[Taker]) -> Vec<&'static str> {
-        let of_material = self.report.effects.iter().filter(|found| found.level == Level::Material);
+    fn homeless(&self, takers: &[Recipient]) -> Vec<&'static str> {
+        let of_material =
+            self.adoption.report.effects.iter().filter(|found| found.level == Level::Material);
         of_material.filter(|_| takers.is_empty()).map(|found| found.name).collect()
     }
 
     /// A line on what was stored.
     fn stored(&self, context: &Context, homeless: &[&str], db: &Database) -> String {
-        match (self.asked.args.add, self.report.effects.is_empty()) {
+        match (self.asked.args.add, self.adoption.report.effects.is_empty()) {
             (false, _) => String::new(),
             (true, true) => match context.added.join(", ") {
                 none if none.is_empty() => {
@@ -237,7 +232,9 @@ impl Publication<'_> {
                 let scene = &context.beside;
                 let file = db.path().display();
                 match context.added.join(", ") {
-                    none if none.is_empty() && homeless.len() == self.report.effects.len() => {
+                    none if none.is_empty()
+                        && homeless.len() == self.adoption.report.effects.len() =>
+                    {
                         format!("nothing could be stored; {scene} is as the scene was\n")
                     }
                     none if none.is_empty() => match homeless {

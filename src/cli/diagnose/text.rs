@@ -4,8 +4,7 @@ use std::path::Path;
 
 use super::plots::Peak;
 use super::words::{
-    covariate, gone, listed, not_found, numbers, others, plus_minus, sentence, strongest, told,
-    verdict,
+    covariate, gone, listed, numbers, others, plus_minus, sentence, strongest, told, verdict,
 };
 use crate::diagnose::{Errors, Found, Report};
 
@@ -25,7 +24,7 @@ pub(super) fn text(report: &Report, places: &[Peak], files: &[String], folder: &
             report.set_aside
         );
     }
-    let mut others: Vec<&str> = not_found(report).map(|tried| tried.name).collect();
+    let mut others: Vec<&str> = report.not_found().map(|tried| tried.name).collect();
     others.sort_unstable();
     if !others.is_empty() {
         text += &format!("tried and not supported: {}\n", listed(&others));

@@ -2,7 +2,7 @@
 
 use super::plots::Peak;
 use crate::cli::effects::unit;
-use crate::diagnose::{Candidate, Found, Parameters, Report, Triple, Value, Verdict};
+use crate::diagnose::{Found, Parameters, Report, Triple, Value, Verdict};
 use crate::effects::{Level, find};
 
 /// How much of the error above the noise floor is gone. The floor is an estimate: what ends below it has nothing left
@@ -110,19 +110,6 @@ pub(super) fn told(found: &Found) -> Option<String> {
     let effect = find(found.name)?;
     let values = effect.knobs().iter().map(|knob| Some(found.parameters.get(knob.name)?.value));
     effect.told(&values.collect::<Option<Vec<f64>>>()?)
-}
-
-/// Each effect that was tried and neither found nor as good as one that was, as the last round saw it.
-pub(super) fn not_found(report: &Report) -> impl Iterator<Item = &Candidate> {
-    let is_found = |name: &str| {
-        report.effects.iter().any(|effect| effect.name == name || effect.class.contains(&name))
-    };
-    let is_last = |place: usize, name: &str| {
-        !report.ranking.iter().skip(place + 1).any(|later| later.name == name)
-    };
-    let ranking = report.ranking.iter().enumerate();
-    let last = ranking.filter(move |(place, tried)| is_last(*place, tried.name));
-    last.map(|(_, tried)| tried).filter(move |tried| !is_found(tried.name))
 }
 
 /// Where something unknown is strongest; nothing where there is no such place.

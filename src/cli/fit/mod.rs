@@ -13,7 +13,6 @@ use super::console::Console;
 use super::curves::{Circumstances, Kind};
 use super::database::Database;
 use super::door;
-use super::materials::find;
 use super::plot::{ending, layers, one_file, plot, points};
 use crate::brdf::Brdf;
 use crate::error::Error;
@@ -21,6 +20,7 @@ use crate::fit::coordinates::frequencies;
 use crate::fit::{Fit, FitResult, Method, model, model_names};
 use crate::formats::text::nearest;
 use crate::radar::speckle::standard_deviation_db;
+use crate::setup::find_material;
 use crate::store::Store;
 use crate::units::watts_from_dbm;
 use save::{Saved, Target};
@@ -187,7 +187,7 @@ fn start(args: &Args, subject: &Subject, store: Option<&Store>) -> Result<Brdf, 
     if let Some(model) = model(name) {
         return Ok(model);
     }
-    match find(store, name, "--model: ") {
+    match find_material(store, name, "--model: ") {
         Ok(found) => Ok(found.material.scattering()?),
         Err(Error::UnknownMaterial { .. }) => Err(no_model(name)),
         Err(error) => Err(error),

@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::{Args, Subject};
+use crate::adopt::{activity, add_source};
 use crate::cli::curves::{self, Put};
 use crate::cli::database::Database;
-use crate::cli::inputs::activity;
-use crate::cli::materials::{Found, find};
 use crate::error::Error;
 use crate::fit::{Finding, FitResult};
 use crate::material::{Curve, FitReport, Material, SourceKind};
+use crate::setup::{MaterialRevision, find_material};
 use crate::store::Store;
 
 /// Where a fit was stored.
@@ -65,7 +65,7 @@ impl Target {
 fn of_material(
     args: &Args,
     subject: &Subject,
-    found: &Found,
+    found: &MaterialRevision,
     wanted: Option<&str>,
     store: Option<&Store>,
 ) -> Result<Target, Error> {
@@ -84,7 +84,7 @@ fn of_material(
         ));
     }
     // As it is now: it may have been revised while the fit ran.
-    let material = find(store, slug.as_str(), "")?.material;
+    let material = find_material(store, slug.as_str(), "")?.material;
     let same = |curve: &&Curve| curve.name == subject.curve_name;
     let [fitted, current] =
         [&found.material, &material].map(|material| material.curves.iter().find(same).cloned());
@@ -123,7 +123,7 @@ fn of_file(
             curves::UNSAID,
         ));
     };
-    let mut material = match find(store, name, "--save: ") {
+    let mut material = match find_material(store, name, "--save: ") {
         Err(Error::UnknownMaterial { asked_by, name, way_out }) => {
             let meant = match way_out.starts_with("did you mean") {
                 true => format!("{way_out} Else "),
@@ -157,7 +157,7 @@ fn chosen(material: &mut Material, found: &FitResult) -> Vec<(String, String)> {
     for (paths, title, key) in [(held, CHOSEN, "chosen"), (by_convention, CONVENTION, "convention")]
     {
         if !paths.is_empty() {
-            let key = curves::source(material, SourceKind::Synthetic, title, key, None);
+            let key = add_source(material, SourceKind::Synthetic, title, key, None);
             sources.extend(paths.into_iter().map(|path| (path, key.clone())));
         }
     }

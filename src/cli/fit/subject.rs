@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::Args;
 use crate::brdf::Brdf;
-use crate::cli::inputs::read_small;
-use crate::cli::materials::{Found, find};
 use crate::error::Error;
+use crate::files::{FilesError, read_small};
 use crate::material;
 use crate::measure::curve::Curve;
+use crate::setup::{MaterialRevision, find_material};
 use crate::store::Store;
 
 /// A curve and where it comes from.
@@ -19,7 +19,7 @@ pub(super) struct Subject {
     pub curve_name: String,
     pub curve: Curve,
     /// The material whose curve it is; `None` for a file.
-    pub found: Option<Found>,
+    pub found: Option<MaterialRevision>,
     /// The file, if it is one.
     pub file: Option<PathBuf>,
 }
@@ -29,17 +29,16 @@ impl Subject {
         let path = Path::new(&args.what);
         match args.what.ends_with(".csv") || path.is_file() {
             true => Subject::of_file(args, path),
-            false => Subject::of_material(args, find(store, &args.what, "")?),
+            false => Subject::of_material(args, find_material(store, &args.what, "")?),
         }
     }
 
     fn of_file(args: &Args, path: &Path) -> Result<Subject, Error> {
         let label = path.display().to_string();
-        let unreadable = |reason| {
-            let way_out = "check the path, or name a material";
-            Error::Io { verb: "read", path: path.to_owned(), reason, way_out }
-        };
-        let bytes = read_small(path).map_err(unreadable)?;
+        let bytes = read_small(path).map_err(|error| FilesError {
+            way_out: "check the path, or name a material",
+            ..error
+        })?;
         let refused = |error| Error::CurveFile { file: path.to_owned(), error };
         let curve = Curve::read(&bytes).map_err(refused)?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -47,7 +46,7 @@ impl Subject {
         Ok(Subject { label, curve_name, curve, found: None, file: Some(path.to_owned()) })
     }
 
-    fn of_material(args: &Args, found: Found) -> Result<Subject, Error> {
+    fn of_material(args: &Args, found: MaterialRevision) -> Result<Subject, Error> {
         let slug = &found.material.slug;
         let curves = &found.material.curves;
         let longest = || curves.iter().rev().max_by_key(|curve| curve.observations.len());

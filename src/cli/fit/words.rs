@@ -3,8 +3,9 @@
 use super::save::Saved;
 use super::subject::Subject;
 use crate::cli::summary::{grouped, table};
+use crate::formats::words::significant;
 use crate::material::{Fit, FitReport, Goodness, HeldOut};
-use crate::units::{dbm_from_watts, shown};
+use crate::units::dbm_from_watts;
 
 /// All that a person wants to know of a fit.
 pub(super) fn result(
@@ -46,14 +47,15 @@ pub(in crate::cli) fn report(report: &FitReport) -> String {
         report.method, report.stop, report.iterations, report.agreeing_starts, report.starts
     );
     if !report.given.is_empty() {
-        let given = report.given.iter().map(|g| format!("{} = {}", g.name, digits(g.value)));
+        let given =
+            report.given.iter().map(|g| format!("{} = {}", g.name, significant(g.value, 4)));
         text += &format!("given: {}\n", given.collect::<Vec<_>>().join(", "));
     }
     text += &estimates(report);
     text += &level(report);
     text += &goodness(&report.goodness);
     text += &report.held_out.as_ref().map_or(String::new(), held_out);
-    let singular: Vec<String> = report.singular_values.iter().map(|v| digits(*v)).collect();
+    let singular: Vec<String> = report.singular_values.iter().map(|v| significant(*v, 4)).collect();
     text += &format!("singular values: {}\n", singular.join(", "));
     text += &format!(
         "data {}, seed {}, matdb {}\n",
@@ -76,12 +78,13 @@ fn estimates(report: &FitReport) -> String {
     table(
         &["estimate", "value", "± sd", "95 % interval"],
         report.estimates.iter().map(|e| {
-            let interval =
-                e.interval_95.map(|[low, high]| format!("{} to {}", digits(low), digits(high)));
+            let interval = e
+                .interval_95
+                .map(|[low, high]| format!("{} to {}", significant(low, 4), significant(high, 4)));
             [
                 e.name.clone(),
-                digits(e.value),
-                e.sd.map_or_else(unknown, digits),
+                significant(e.value, 4),
+                e.sd.map_or_else(unknown, |sd| significant(sd, 4)),
                 interval.unwrap_or_else(unknown),
             ]
         }),
@@ -89,7 +92,7 @@ fn estimates(report: &FitReport) -> String {
 }
 
 fn level(report: &FitReport) -> String {
-    let looks = report.looks.map_or("not used".to_owned(), digits);
+    let looks = report.looks.map_or("not used".to_owned(), |looks| significant(looks, 4));
     let noise = match report.noise_w > 0.0 {
         true => format!("{:.1} dBm", dbm_from_watts(report.noise_w)),
         false => "none".to_owned(),
@@ -116,9 +119,4 @@ fn held_out(held: &HeldOut) -> String {
         .zip(*score_sd)
         .map_or(String::new(), |(score, sd)| format!(", ln p {score:.4} ± {sd:.4} a point"));
     format!("held out in {folds} turns ({blocks} {of}): {rms_db:.2} dB rms{score}\n")
-}
-
-/// Four significant digits.
-fn digits(value: f64) -> String {
-    shown(format!("{value:.3e}").parse().unwrap_or(value))
 }

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use super::views::View;
 use crate::error::Error;
+use crate::files::FilesError;
 use crate::formats::npy;
 use crate::render::{Footprints, RenderError, Setup, beat_signals};
 use crate::scene::Scene;
+use crate::setup::View;
 
 /// Bytes that the signals of all antennas together may take.
 const MOST_BYTES: usize = 1 << 30;
@@ -52,7 +53,7 @@ pub(super) fn encode(
     views: &[View],
 ) -> Result<Vec<(String, Vec<u8>)>, Error> {
     let encode = |view: &View| {
-        let name = view.file("beat", "npy");
+        let name = view.file_name("beat", "npy");
         let at = |error| Error::Render {
             scene: scene.to_owned(),
             antenna: format!("{name}: "),
@@ -70,7 +71,7 @@ pub(super) fn encode(
             Ok(()) => Ok((name, bytes)),
             Err(reason) => {
                 let (verb, path, way_out) = ("encode", name.into(), "leave out --beat");
-                Err(Error::Io { verb, path, reason, way_out })
+                Err(FilesError { verb, path, reason, way_out }.into())
             }
         }
     };

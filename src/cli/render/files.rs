@@ -1,7 +1,6 @@
 //! The files of a rendering, as bytes: three for each antenna, and the record.
 
 use super::record::Record;
-use super::views::View;
 use crate::cli::summary::grouped;
 use crate::error::Error;
 use crate::formats::exr::{self, Attribute, Packing};
@@ -10,19 +9,21 @@ use crate::formats::ply;
 use crate::geometry::Raster;
 use crate::render::{Echo, cloud_table};
 use crate::scene::Scene;
+use crate::setup::{ReadyScene, View};
 
 /// Names of the radar's files, in the order they are written.
 pub(super) const NAMES: &str = "power.exr, power.png, cloud.ply and scan.json";
 
 /// Encodes every file of a rendering; `all` puts hits below the threshold into the clouds, too.
 pub(super) fn encode(
-    (all, packing): (bool, Packing),
-    scene: &Scene,
+    all: bool,
+    packing: Packing,
+    ready: &ReadyScene,
     views: &[View],
     images: &[Raster],
     record: &Record,
-    material_of_region: &[u16],
 ) -> Result<Vec<(String, Vec<u8>)>, Error> {
+    let scene = &ready.scene;
     let regions: Vec<&str> = scene.target.regions.iter().map(|r| r.name.as_str()).collect();
     let materials = record.material_names();
     let materials: Vec<&str> = materials.iter().map(String::as_str).collect();
@@ -32,16 +33,16 @@ pub(super) fn encode(
             true => view.scan.echoes.iter().collect(),
             false => view.scan.detections().collect(),
         };
-        let table = cloud_table(&echoes, material_of_region, &regions, &materials);
+        let table = cloud_table(&echoes, &ready.material_of_region, &regions, &materials);
         ply::write_table(&table)
     };
     let mut files = Vec::new();
     for (view, image) in std::iter::zip(views, images) {
         let (figure, (exr, cloud)) =
             rayon::join(|| power_figure(scene, view, image), || (exr(image), cloud(view)));
-        files.push((view.file("power", "exr"), exr?));
-        files.push((view.file("power", "png"), figure?));
-        files.push((view.file("cloud", "ply"), cloud?));
+        files.push((view.file_name("power", "exr"), exr?));
+        files.push((view.file_name("power", "png"), figure?));
+        files.push((view.file_name("cloud", "ply"), cloud?));
     }
     let mut json = serde_json::to_vec_pretty(record)?;
     json.push(b'\n');

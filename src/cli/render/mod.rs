@@ -6,20 +6,18 @@ mod record;
 mod report;
 mod stages;
 mod tracer;
-mod views;
 
 use std::path::PathBuf;
 
 use super::console::Console;
 use super::database::Database;
-use super::output::write_all;
-use super::staging::{effects, materials, model, setup, surfaces};
 use crate::error::Error;
+use crate::files::write_all;
 use crate::formats::exr::Packing;
 use crate::geometry::Raster;
 use crate::render::{RenderError, Setup, trace_placed};
-use crate::scene::Scene;
-use crate::trace::{Bvh, GpuError};
+use crate::setup::ReadyScene;
+use crate::trace::GpuError;
 use record::Record;
 use stages::Stages;
 use tracer::{Rays, gpu, tracer};
@@ -53,43 +51,34 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let mut stages = Stages::start();
-    let scene = Scene::load(&args.scene)?;
-    let (used, material_of_region) = materials(&scene, &args.scene, db)?;
-    let surfaces = surfaces(&scene, &used, &material_of_region);
-    let effects = effects(&scene, &args.scene, &used, &material_of_region)?;
-    let model = model(&effects, &scene, &used, &material_of_region);
-    let at = |(antenna, error): (String, RenderError)| Error::Render {
-        scene: args.scene.clone(),
-        antenna,
-        error: Box::new(error),
-    };
-    let beat = args.beat.then(|| beat::Shape::new(&scene)).transpose()?;
+    let ready = ReadyScene::open(&args.scene, db.read()?.as_ref())?;
+    let beat = args.beat.then(|| beat::Shape::new(&ready.scene)).transpose()?;
     stages.end("load", console);
 
-    let bvh = Bvh::new(&scene.target.mesh);
-    let failed = |error: GpuError| at((String::new(), RenderError::Tracer(error.into())));
+    let assembly = ready.assemble();
+    let failed = |error: GpuError| ready.render_error("", RenderError::Tracer(error.into()));
     let gpu = gpu(args.tracer, console).map_err(failed)?;
-    let held = gpu.as_ref().map(|gpu| gpu.hold(&bvh)).transpose().map_err(failed)?;
-    let tracer = tracer(args.tracer, held.as_ref());
-    let setup = Setup { tracer, ..setup(&scene, &bvh, &surfaces, model.as_ref()) };
-    let bar = console.progress("tracing", scene.chirps.rays.len());
-    let rays = scene.file.spot.rays;
+    let held = gpu.as_ref().map(|gpu| gpu.hold(assembly.bvh())).transpose().map_err(failed)?;
+    let setup = Setup { tracer: tracer(args.tracer, held.as_ref()), ..assembly.setup() };
+    let chirps = ready.scene.chirps.rays.len();
+    let bar = console.progress("tracing", chirps);
+    let rays = ready.scene.file.spot.rays;
     let footprints = trace_placed(&setup, rays, &|chirps| bar.inc(chirps as u64));
     bar.finish_and_clear();
-    let footprints = footprints.map_err(|error| at((String::new(), error)))?;
+    let footprints = footprints.map_err(|error| ready.render_error("", error))?;
     stages.end("trace", console);
 
-    let views = views::all(&setup, &footprints, &scene, console).map_err(at)?;
+    let bar = console.progress("receiving", (1 + ready.scene.file.receiver.len()) * chirps);
+    let views = assembly.views(&setup, &footprints, &|chirps| bar.inc(chirps as u64));
+    bar.finish_and_clear();
+    let views = views?;
     stages.end("power", console);
-    let images: Vec<Raster> =
-        views.iter().map(|view| view.image(&scene, &material_of_region)).collect();
+    let images: Vec<Raster> = views.iter().map(|view| ready.image(&view.scan)).collect();
     stages.end("image", console);
 
     let packing = if args.uncompressed { Packing::Uncompressed } else { Packing::Zip16 };
-    let regions = &material_of_region;
-    let record = Record::new(&scene, &used, model.as_ref(), regions, &views, &images, args.all);
-    let mut files =
-        files::encode((args.all, packing), &scene, &views, &images, &record, &material_of_region)?;
+    let record = Record::new(&ready, assembly.model(), &views, &images, args.all);
+    let mut files = files::encode(args.all, packing, &ready, &views, &images, &record)?;
     if let Some(shape) = beat {
         files.extend(beat::encode(&args.scene, shape, &setup, &footprints, &views)?);
     }

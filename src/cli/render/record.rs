@@ -3,9 +3,6 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::views::View;
-use crate::cli::materials::Found;
-use crate::cli::staging::{self, Used};
 use crate::effects::{Level, Model, entry};
 use crate::formats::EffectEntry;
 use crate::geometry::Raster;
@@ -13,6 +10,7 @@ use crate::material::Status;
 use crate::radar::Radar;
 use crate::render::{Scan, Truth};
 use crate::scene::{MeshReport, Scene};
+use crate::setup::{MaterialRevision, ReadyScene, SceneMaterial, View};
 use crate::units::{range, rounded};
 
 /// Version of the layout of `scan.json`; it grows with every change that a reader could trip over.
@@ -52,7 +50,7 @@ pub(super) struct Record<'a> {
     #[serde(skip)]
     scan_notices: &'a [String],
     #[serde(skip)]
-    used: &'a [Used],
+    ready: &'a ReadyScene,
 }
 
 #[derive(Serialize)]
@@ -134,14 +132,13 @@ pub(super) struct PowerRange {
 
 impl<'a> Record<'a> {
     pub fn new(
-        scene: &'a Scene,
-        used: &'a [Used],
+        ready: &'a ReadyScene,
         model: Option<&Model>,
-        material_of_region: &'a [u16],
         views: &[View<'a>],
         images: &[Raster],
         all_hits: bool,
     ) -> Record<'a> {
+        let ReadyScene { scene, materials: used, material_of_region, .. } = ready;
         let file = &scene.file;
         let (scan, image) = (&views[0].scan, &images[0]);
         let regions = regions(scene, material_of_region, scan);
@@ -189,7 +186,7 @@ impl<'a> Record<'a> {
                 .filter_map(|(view, image)| ReceiverRecord::new(scene, view, image))
                 .collect(),
             scan_notices: &scene.chirps.notices,
-            used,
+            ready,
         }
     }
 
@@ -201,7 +198,9 @@ impl<'a> Record<'a> {
     pub fn notices(&self) -> Vec<String> {
         let mut notices = self.scan_notices.to_vec();
         let strange = |(material, _): &(&MaterialRecord, _)| material.detections_outside_theta > 0;
-        for (material, used) in std::iter::zip(&self.materials, self.used).filter(strange) {
+        for (material, used) in
+            std::iter::zip(&self.materials, &self.ready.materials).filter(strange)
+        {
             let MaterialRecord { name, theta_outside_deg, .. } = material;
             let span_rad = used.found.material.reach().span_rad();
             notices.push(format!(
@@ -248,7 +247,7 @@ impl<'a> Record<'a> {
                  target is too near or too bright for the power balance to hold"
             ));
         }
-        notices.extend(staging::notices(self.used, self.radar));
+        notices.extend(self.ready.notices());
         notices
     }
 
@@ -301,11 +300,11 @@ impl<'a> ReceiverRecord<'a> {
 
 impl<'a> MaterialRecord<'a> {
     fn new(
-        used: &'a Used,
+        used: &'a SceneMaterial,
         radar: &Radar,
         (detections_outside_theta, theta_outside_rad): (usize, f64),
     ) -> MaterialRecord<'a> {
-        let Found { material, revision } = &used.found;
+        let MaterialRevision { material, revision } = &used.found;
         let outside_hz = material.frequency_outside_hz(radar.centre_frequency_ghz * 1e9);
         let effects = used.effects.iter().map(|(effect, values)| entry(*effect, values));
         MaterialRecord {

@@ -1,8 +1,8 @@
 //! Named values as bars, from left to right.
 
-use super::FigureError;
 use super::axes::{Axes, Axis};
 use super::drawing::{Anchor, Drawing, Rgb, Shape, Weight, text_width_px};
+use super::error::FigureError;
 use super::style::{
     DIGIT_HEIGHT, GAP_PX, LINE_SPACING, MARGIN_PX, PALETTE, STROKE_PX, TICK_LABEL_PX, TICK_PX, text,
 };

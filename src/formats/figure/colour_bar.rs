@@ -1,7 +1,7 @@
 //! Values to colours, and the bar beside a raster that explains them.
 
-use super::FigureError;
 use super::drawing::{Anchor, Rgb, Shape, Weight, text_width_px};
+use super::error::FigureError;
 use super::style::{
     DIGIT_HEIGHT, GAP_PX, LABEL_PX, LINE_SPACING, TICK_LABEL_PX, TICK_PX, line, text, ticks_along,
     upward, widest,

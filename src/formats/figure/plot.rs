@@ -1,8 +1,8 @@
 //! Curves and points over two axes.
 
-use super::FigureError;
 use super::axes::{Axes, Axis};
 use super::drawing::{Anchor, Drawing, Rgb, Shape, Weight, text_width_px};
+use super::error::FigureError;
 use super::style::{DIGIT_HEIGHT, GAP_PX, MARGIN_PX, PALETTE, STROKE_PX, TICK_LABEL_PX, text};
 
 /// Longest sides of the data area, px.

@@ -1,9 +1,9 @@
 //! One channel of a raster as a figure for a paper: pixels, axes, colour bar, title.
 
-use super::FigureError;
 use super::axes::{Axes, Axis};
 use super::colour_bar::{Bar, Colours, Scale, nothing};
 use super::drawing::{Drawing, Shape};
+use super::error::FigureError;
 use super::style::{GAP_PX, MARGIN_PX, TITLE_MIN_WIDTH_PX};
 use crate::geometry::raster::Raster;
 

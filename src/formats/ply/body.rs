@@ -3,7 +3,7 @@
 use ply_rs::ply::Encoding;
 
 use super::header::{Element, Header, Scalar, Shape};
-use crate::formats::FormatError;
+use crate::formats::error::FormatError;
 
 /// The part of the file's data that is still unread.
 pub(super) struct Body<'a> {

@@ -5,7 +5,8 @@ use std::io::Cursor;
 use ply_rs::parser::{ParseError, Parser, Reader};
 use ply_rs::ply::{DefaultElement, ElementDef, Encoding, PropertyDef, PropertyType, ScalarType};
 
-use crate::formats::{FormatError, excerpt};
+use crate::formats::error::FormatError;
+use crate::formats::line::excerpt;
 
 /// How a number is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,9 +5,9 @@ use std::fmt::Write;
 use glam::DVec3;
 
 use super::body::{Body, Row};
-use super::common;
 use super::header::{Element, Header, Scalar, Shape};
-use crate::formats::FormatError;
+use super::parallel;
+use crate::formats::error::FormatError;
 use crate::geometry::Mesh;
 use crate::geometry::mesh::LabelBuilder;
 
@@ -31,7 +31,7 @@ pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
             "vertex" => mesh.vertices = read_vertices(&mut body, element)?,
             "face" => {
                 let list = corner_list(element)?;
-                if let Some(facets) = common::triangles(&mut body, element, vertices) {
+                if let Some(facets) = parallel::triangles(&mut body, element, vertices) {
                     mesh.facets = facets;
                     continue;
                 }
@@ -48,7 +48,7 @@ pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
 
 fn read_vertices(body: &mut Body, element: &Element) -> Result<Vec<DVec3>, FormatError> {
     let (x, y, z) = (element.scalar("x")?, element.scalar("y")?, element.scalar("z")?);
-    if let Some(vertices) = common::vertices(body, element, [x, y, z]) {
+    if let Some(vertices) = parallel::vertices(body, element, [x, y, z]) {
         return Ok(vertices);
     }
     let mut vertices = Vec::with_capacity(element.count);

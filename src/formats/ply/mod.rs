@@ -10,9 +10,9 @@
 //! that are declared once, and on elements that have properties.
 
 mod body;
-mod common;
 mod header;
 mod mesh;
+mod parallel;
 mod table;
 
 pub use header::Scalar;

@@ -2,7 +2,7 @@
 
 use super::body::{Body, Row};
 use super::header::{Header, Scalar, Shape};
-use crate::formats::FormatError;
+use crate::formats::error::FormatError;
 
 /// The scalar properties of a PLY file's `vertex` element.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -13,12 +13,12 @@ use super::{Args, Record, html, json};
 use crate::brdf::Brdf;
 use crate::cli::console::Console;
 use crate::cli::effects::each_once;
-use crate::cli::inputs::read_small;
-use crate::cli::output::write_all;
 use crate::diagnose::curve::{
     CurveDiagnoseError, CurveDiagnosis, CurveReport, CurveRow, Points, Term, base_law, term, terms,
 };
 use crate::error::Error;
+use crate::files::read_small;
+use crate::files::write_all;
 use crate::fit::{model, model_names};
 use crate::formats::text::nearest;
 use crate::measure::{Curve, in_plane};
@@ -46,12 +46,7 @@ pub(super) fn run(path: &Path, args: &Args, console: &Console) -> Result<(), Err
 }
 
 fn read(path: &Path, noise_db: Option<f64>) -> Result<Points, Error> {
-    let bytes = read_small(path).map_err(|reason| Error::Io {
-        verb: "read",
-        path: path.to_owned(),
-        reason,
-        way_out: "check the path",
-    })?;
+    let bytes = read_small(path)?;
     let refused = |error| Error::CurveFile { file: path.to_owned(), error };
     if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("bsdf")) {
         return Ok(Points::in_plane(&in_plane::read_bsdf(&bytes).map_err(refused)?, noise_db));

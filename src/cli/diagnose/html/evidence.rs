@@ -5,8 +5,7 @@ use crate::cli::diagnose::Context;
 use crate::cli::diagnose::plots::Peak;
 use crate::cli::diagnose::tried::NotTried;
 use crate::cli::diagnose::words::{
-    covariate, fixed, gone, not_found, plus_minus, probability, signed, strongest,
-    value as with_unit,
+    covariate, fixed, gone, plus_minus, probability, signed, strongest, value as with_unit,
 };
 use crate::diagnose::{
     Base, BeforeAfter, Candidate, Control, Controls, MeshPose, Report, Unexplained,
@@ -201,7 +200,7 @@ fn power(controls: &Controls) -> String {
 
 /// What was tried and not found, best first.
 pub(super) fn tried(report: &Report) -> String {
-    let mut candidates: Vec<&Candidate> = not_found(report).collect();
+    let mut candidates: Vec<&Candidate> = report.not_found().collect();
     if candidates.is_empty() {
         return paragraph(
             "Nothing was tried beyond what was found and what it cannot be told from.",

@@ -2,7 +2,7 @@
 //! database says the same (`tests/publish_command.rs` compares).
 
 /// Endings of names and their units.
-pub(in crate::catalogue) const ENDINGS: [(&str, &str); 8] = [
+pub(super) const ENDINGS: [(&str, &str); 8] = [
     ("_hz", "Hz"),
     ("_rad", "rad"),
     ("_m", "m"),
@@ -30,7 +30,7 @@ const TOLD: [(&str, &str, &str); 8] = [
 
 /// UCUM code of a numeric column; `1` for a pure number. `Err` says where the unit stands when it
 /// differs from row to row.
-pub(in crate::catalogue) fn unit(table: &str, column: &str) -> Result<&'static str, &'static str> {
+pub(super) fn unit(table: &str, column: &str) -> Result<&'static str, &'static str> {
     if let Some((.., place)) = TOLD.iter().find(|told| (told.0, told.1) == (table, column)) {
         return Err(place);
     }

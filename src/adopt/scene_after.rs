@@ -1,22 +1,24 @@
-//! The scene with what was found, as a file.
+//! The scene file that declares what a diagnosis found.
 
 use std::path::{Path, PathBuf};
 
 use crate::diagnose::Found;
 use crate::effects::Level;
 use crate::error::Error;
+use crate::files::{FilesError, folder_of};
 use crate::formats::EffectEntry;
 use crate::radar::Pattern;
 use crate::scene::{Scene, SceneFile};
 
-/// Name of the scene with what was found, in the folder of the report.
-pub(super) const AFTER: &str = "after.toml";
+/// Name of the scene file with what was found, in the folder of the report.
+pub const AFTER: &str = "after.toml";
 
 /// First line of a scene that `--add` wrote and may write again.
-pub(super) const MARK: &str = "# Written by `matdb diagnose --add`, which may write it again.\n";
+pub const MARK: &str = "# Written by `matdb diagnose --add`, which may write it again.\n";
 
-/// The scene with effects of its own and of its radar; `materials` are those of its regions.
-pub(super) fn with_found(scene: &Scene, found: &[Found], materials: &[String]) -> SceneFile {
+/// The scene file with the effects of the scene and of the radar that were found; `materials` are the names that
+/// its regions get.
+pub fn scene_with_found(scene: &Scene, found: &[Found], materials: &[String]) -> SceneFile {
     let mut file = scene.file.clone();
     file.effect.extend(entries(found, Level::Scene));
     file.radar.effect.extend(entries(found, Level::Instrument));
@@ -26,7 +28,7 @@ pub(super) fn with_found(scene: &Scene, found: &[Found], materials: &[String]) -
     file
 }
 
-/// What was found of a level, as files write it.
+/// The effects of a level that were found, as entries of a file.
 pub(super) fn entries(found: &[Found], level: Level) -> impl Iterator<Item = EffectEntry> + '_ {
     found.iter().filter(move |one| one.level == level).map(|one| EffectEntry {
         name: one.name.to_owned(),
@@ -35,39 +37,47 @@ pub(super) fn entries(found: &[Found], level: Level) -> impl Iterator<Item = Eff
     })
 }
 
-/// The scene with its files as they are found from `folder` instead of from beside `scene`.
-pub(super) fn moved(mut file: SceneFile, scene: &Path, folder: &Path) -> Result<SceneFile, Error> {
+/// The scene file with the paths of its meshes and of its scan made relative to `folder`, where they were
+/// relative to the folder of `scene`.
+///
+/// # Errors
+/// A folder that cannot be found; a path that is not UTF-8.
+pub fn relocate_files(
+    mut file: SceneFile,
+    scene: &Path,
+    folder: &Path,
+) -> Result<SceneFile, Error> {
     let way = way(&real(folder_of(scene))?, &real(folder)?);
-    let text = |path: PathBuf| {
-        path.into_os_string().into_string().map_err(|path| Error::Usage {
-            problem: format!("{} is not UTF-8, and a scene cannot say it", path.display()),
-            way_out: "rename the folder, or write into one beside the scene with -o".to_owned(),
-        })
-    };
     for mesh in file.mesh.iter_mut().filter(|mesh| !mesh.file.starts_with("builtin:")) {
-        mesh.file = text(way.join(&mesh.file))?;
+        mesh.file = utf8(way.join(&mesh.file))?;
     }
     if let Pattern::Rays(scan) | Pattern::Angles(scan) = &mut file.radar.scan {
-        scan.file = text(way.join(&scan.file))?;
+        scan.file = utf8(way.join(&scan.file))?;
     }
     Ok(file)
 }
 
-/// The folder that a scene stands in.
-pub(super) fn folder_of(scene: &Path) -> &Path {
-    scene.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+/// A path as a scene file can hold it.
+fn utf8(path: PathBuf) -> Result<String, Error> {
+    path.into_os_string().into_string().map_err(|path| Error::Usage {
+        problem: format!("{} is not UTF-8, and a scene cannot say it", path.display()),
+        way_out: "rename the folder, or write into one beside the scene with -o".to_owned(),
+    })
 }
 
-/// Name of the scene with what was found that `--add` puts beside the old one.
-pub(super) fn name_beside(scene: &Path) -> String {
+/// Name of the scene file that `--add` writes next to `scene`.
+pub fn name_beside(scene: &Path) -> String {
     format!("{}-after.toml", scene.file_stem().unwrap_or_default().to_string_lossy())
 }
 
-/// Refuses, for `--add`, to write over a scene beside this one that somebody else wrote.
-pub(super) fn check_beside(scene: &Path) -> Result<(), Error> {
+/// Checks that `--add` may write its scene file next to `scene`.
+///
+/// # Errors
+/// A file of that name that `--add` did not write.
+pub fn check_beside(scene: &Path) -> Result<(), Error> {
     let beside = folder_of(scene).join(name_beside(scene));
-    let is_ours = || std::fs::read(&beside).is_ok_and(|text| text.starts_with(MARK.as_bytes()));
-    if beside.symlink_metadata().is_ok() && !is_ours() {
+    let is_there = beside.symlink_metadata().is_ok();
+    if is_there && !std::fs::read(&beside).is_ok_and(|text| text.starts_with(MARK.as_bytes())) {
         return Err(Error::Usage {
             problem: format!("{} is there and --add did not write it", beside.display()),
             way_out: "rename it, or leave --add out".to_owned(),
@@ -78,19 +88,16 @@ pub(super) fn check_beside(scene: &Path) -> Result<(), Error> {
 
 /// A folder without links and detours, whether or not it is there yet.
 fn real(folder: &Path) -> Result<PathBuf, Error> {
-    let unreadable = |reason| Error::Io {
-        verb: "find",
-        path: folder.to_owned(),
-        reason,
-        way_out: "check the path",
-    };
-    let whole = std::path::absolute(folder).map_err(unreadable)?;
-    let there = whole.ancestors().find(|path| path.exists()).unwrap_or(&whole);
-    let rest = whole.strip_prefix(there).unwrap_or(Path::new(""));
-    Ok(there.canonicalize().map_err(unreadable)?.join(rest))
+    let real = std::path::absolute(folder).and_then(|whole| {
+        let there = whole.ancestors().find(|path| path.exists()).unwrap_or(&whole);
+        let rest = whole.strip_prefix(there).unwrap_or(Path::new(""));
+        Ok(there.canonicalize()?.join(rest))
+    });
+    Ok(real
+        .map_err(|reason| FilesError { verb: "find", ..FilesError::unreadable(folder, reason) })?)
 }
 
-/// The way to a folder from another; both are absolute.
+/// The relative path to a folder from another one; both are absolute.
 fn way(to: &Path, from: &Path) -> PathBuf {
     let shared = std::iter::zip(to.components(), from.components()).take_while(|(a, b)| a == b);
     let shared = shared.count();

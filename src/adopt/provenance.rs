@@ -1,0 +1,72 @@
+//! Where numbers come from: the command and the files that made a revision, and the sources of a material.
+
+use std::path::Path;
+
+use crate::files::FilesError;
+use crate::material::{Activity, Citation, Input, Material, Source, SourceKind};
+
+/// A file that was read: its name without its folder, and the BLAKE3 hash of its bytes.
+pub fn input(path: &Path, bytes: &[u8]) -> Input {
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+    Input { name, hash: blake3::hash(bytes).to_hex().to_string() }
+}
+
+/// A command and the files that it was given, for [`Store::record`](crate::store::Store::record).
+///
+/// # Errors
+/// A file that cannot be read any more.
+pub fn activity(command: &str, paths: &[&Path]) -> Result<Activity, FilesError> {
+    let mut inputs = Vec::new();
+    for path in paths {
+        let bytes = std::fs::read(path).map_err(|reason| FilesError {
+            verb: "read",
+            path: (*path).to_owned(),
+            reason,
+            way_out: "leave the command's files where they are while it runs",
+        })?;
+        inputs.push(input(path, &bytes));
+    }
+    Ok(Activity { command: command.to_owned(), inputs, origin: None })
+}
+
+/// The key of the source of this kind, title and licence (any, for `None`), which is added to the material
+/// under `key`, or that with a number, where it is not there.
+pub fn add_source(
+    material: &mut Material,
+    kind: SourceKind,
+    title: &str,
+    key: &str,
+    licence: Option<&str>,
+) -> String {
+    for source in &material.sources {
+        let is_licence = licence.is_none() || source.licence.as_deref() == licence;
+        if source.kind == kind && source.title == title && is_licence {
+            return source.key.clone();
+        }
+    }
+    let key = free_key(key, material.sources.iter().map(|source| &source.key));
+    material.sources.push(Source {
+        key: key.clone(),
+        kind,
+        title: title.to_owned(),
+        doi: None,
+        url: None,
+        licence: licence.map(str::to_owned),
+        note: None,
+        citation: Citation::default(),
+        making: None,
+    });
+    key
+}
+
+/// `key`, or the first of `key-2`, `key-3`, … that is not among `known`.
+pub fn free_key<'a>(key: &str, known: impl Iterator<Item = &'a String>) -> String {
+    let known: Vec<&String> = known.collect();
+    let mut free = key.to_owned();
+    let mut number = 2;
+    while known.contains(&&free) {
+        free = format!("{key}-{number}");
+        number += 1;
+    }
+    free
+}

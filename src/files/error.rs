@@ -1,0 +1,27 @@
+//! Why a file cannot be read or written.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+/// A file or folder that cannot be read or written.
+#[derive(Debug, Error)]
+#[error("cannot {verb} {}: {reason}; {way_out}", path.display())]
+pub struct FilesError {
+    /// `read`, `write`, `create the folder`.
+    pub verb: &'static str,
+    /// The file or folder.
+    pub path: PathBuf,
+    /// What the system says.
+    pub reason: io::Error,
+    /// What to do.
+    pub way_out: &'static str,
+}
+
+impl FilesError {
+    /// That a file cannot be read; the way out is to check its path.
+    pub fn unreadable(path: &Path, reason: io::Error) -> FilesError {
+        FilesError { verb: "read", path: path.to_owned(), reason, way_out: "check the path" }
+    }
+}

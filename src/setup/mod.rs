@@ -1,0 +1,27 @@
+//! From names to values that the renderer takes: a material by `NAME` or `NAME@REVISION`, from a database or
+//! from those that are built in, and a scene with the materials, laws and effects of its regions.
+//!
+//! ```
+//! use matdb::render::{Observer, shade, trace_placed};
+//! use matdb::setup::ReadyScene;
+//!
+//! let ready = ReadyScene::open("scenes/mannequin.toml".as_ref(), None)?;
+//! let assembly = ready.assemble();
+//! let setup = assembly.setup();
+//! # let at = |error| ready.render_error("", error);
+//! let footprints = trace_placed(&setup, ready.scene.file.spot.rays, &|_| {}).map_err(at)?;
+//! let scan = shade(&setup, &footprints, Observer::Radar, &|_| {}).map_err(at)?;
+//! assert!(scan.detections().count() > 0);
+//! # Ok::<(), matdb::error::Error>(())
+//! ```
+
+mod materials;
+mod scene;
+mod view;
+
+pub use materials::{
+    MaterialRevision, builtin_not_added, find_material, later_status_warning, status_warning,
+    store_of_not_added, unknown_material,
+};
+pub use scene::{Assembly, ReadyScene, SceneMaterial, resolve_effects};
+pub use view::View;

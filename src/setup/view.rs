@@ -1,0 +1,59 @@
+//! A scan as each antenna of a scene receives it: the radar itself, and every receiver apart from it.
+
+use glam::DVec3;
+
+use super::scene::Assembly;
+use crate::error::Error;
+use crate::frames::Point;
+use crate::render::{Footprints, Observer, Scan, Setup, shade};
+use crate::scene::file::ReceiverEntry;
+
+/// What one antenna received.
+pub struct View<'a> {
+    /// The receiver; none for the radar itself.
+    pub receiver: Option<&'a ReceiverEntry>,
+    /// The antenna as the renderer takes it.
+    pub observer: Observer,
+    /// Its echoes.
+    pub scan: Scan,
+}
+
+impl View<'_> {
+    /// Name of a file: `power.png` for the radar, `power-NAME.png` for a receiver.
+    pub fn file_name(&self, stem: &str, extension: &str) -> String {
+        match self.receiver {
+            None => format!("{stem}.{extension}"),
+            Some(receiver) => format!("{stem}-{}.{extension}", receiver.name),
+        }
+    }
+}
+
+impl<'a> Assembly<'a> {
+    /// The radar's own view first, then those of the receivers; `advance` hears of chirps as they are done.
+    ///
+    /// # Errors
+    /// What the renderer refuses, with the scene's file and the receiver that it is about.
+    pub fn views(
+        &self,
+        setup: &Setup,
+        footprints: &Footprints,
+        advance: &(dyn Fn(usize) + Sync),
+    ) -> Result<Vec<View<'a>>, Error> {
+        let ready = self.ready();
+        let scan = shade(setup, footprints, Observer::Radar, advance)
+            .map_err(|error| ready.render_error("", error))?;
+        let mut views = vec![View { receiver: None, observer: Observer::Radar, scan }];
+        for (number, receiver) in (1u32..).zip(&ready.scene.file.receiver) {
+            let observer = Observer::Receiver {
+                number,
+                position: Point::from(DVec3::from_array(receiver.position_m)),
+                aperture_m2: receiver.aperture_m2.unwrap_or(ready.scene.radar().aperture_m2),
+            };
+            let scan = shade(setup, footprints, observer, advance).map_err(|error| {
+                ready.render_error(&format!("receiver `{}`: ", receiver.name), error)
+            })?;
+            views.push(View { receiver: Some(receiver), observer, scan });
+        }
+        Ok(views)
+    }
+}
