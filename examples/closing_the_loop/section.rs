@@ -92,7 +92,7 @@ fn confusions(cases: &[Case]) -> String {
     let names: Vec<&str> = library().iter().map(|effect| effect.name()).collect();
     let columns: Vec<&str> = names.iter().copied().chain([NONE, NO_ANSWER]).collect();
     let mut text =
-        "Rows: what was put in. Columns: the first name of the report, by the number of its row.\n"
+        "Rows: the true effect. Columns: the first name of the report, by the number of its row.\n"
             .to_owned();
     for strength in Strength::ALL {
         let counts = confusion(&singles(cases, strength));
@@ -133,8 +133,8 @@ fn alike(cases: &[Case]) -> String {
     }
     let why: Vec<&str> = whys.into_iter().collect();
     format!(
-        "The first name was another, the right one was told as one that predicts the data as well, the two gains in ln \
-         likelihood differ by {} at most, and there is a reason: {}.\n\n{}",
+        "In these cases the first name is another effect. The right one is named as predicting the data as well, the two \
+         gains in ln likelihood differ by at most {}, and there is a reason: {}.\n\n{}",
         Diagnosis::default().least_gain,
         why.join("; "),
         listing(&MISS[..MISS.len() - 1], rows)
@@ -224,7 +224,7 @@ fn unknown(cases: &[Case]) -> String {
     let by_name = groups(&cases);
     let rows = by_name.into_iter().map(|(name, cases)| row(name, &cases)).chain([all]);
     format!(
-        "“Named” counts cases that got a name nonetheless, whatever their verdict.\n\n{}",
+        "“Named” counts cases that got a name, whatever their verdict.\n\n{}",
         table(&head, rows)
     )
 }
@@ -275,8 +275,8 @@ fn errors(cases: &[Case]) -> String {
     rows.push(row("nothing missing", &expecting(cases, Expected::Complete)));
     rows.push(row("unknown effects", &expecting(cases, Expected::Unknown)));
     format!(
-        "Medians over cases where nothing else is said; “explained share” is of what the error before has beyond the \
-         floor, in squares.\n\n{}",
+        "Columns are medians over cases unless they say otherwise. “Explained share” is the share of the squared error \
+         before, beyond the floor, that the named effects remove.\n\n{}",
         table(&head, rows)
     )
 }
@@ -309,9 +309,9 @@ fn parameters(cases: &[Case]) -> String {
         ]
     });
     format!(
-        "Cases in which the right effect was named, alone or not, and numbers that mean the same in label and report. \
-         Levels are off by dB, the rest by per cent of the truth. A stated sd is about noise; what the truth does in \
-         another form than the program's own comes on top.\n\n{}",
+        "Cases in which the right effect was named, alone or not, and parameters that mean the same in label and report. \
+         Errors of levels are in dB, others in per cent of the truth. A stated sd covers noise only; the truth can have \
+         another form than the program's effect, which adds an error.\n\n{}",
         table(&head, rows)
     )
 }
@@ -339,9 +339,9 @@ fn misses(cases: &[Case]) -> String {
     }
     missed.sort_by_key(|case| (put_in(case), case.label.strength, case.label.seed));
     format!(
-        "Gains are in ln likelihood, of the first round; ≈ marks one that is only of a sample of the chirps. The \
-         reason follows from the report by rule, from the round in which a wrong effect was added, or else the last. \
-         An effect with a measure of its own has an rms of 0.\n\n{}",
+        "Gains are in ln likelihood, of the first round; ≈ marks a gain from a sample of the chirps. The reason follows \
+         by rule from the report, from the round in which a wrong effect was added, else from the last. Effects with \
+         their own measure have an rms of 0.\n\n{}",
         listing(&MISS, missed.into_iter().map(miss))
     )
 }
