@@ -223,7 +223,7 @@ fn constants(path: &Path) -> Result<String, Failure> {
 ### Optical constants (measured, 100 GHz to 3 THz)
 
 n and k near 300 GHz of `thz-optical-constants/summary_300GHz.csv` (refractiveindex.info, CC0; the references are in the
-file), as ε = (n − jk)² into `fresnel`; nothing is fitted. “Backscatter” is what a smooth, thick piece sends back at
+file), as ε = (n − jk)² into `fresnel`; nothing is fitted. “Backscatter” is what a smooth, thick piece returns at
 normal incidence.
 
 | material | ε′ | ε″ | backscatter, dB | the file's own, dB | samples from 100 to 500 GHz |

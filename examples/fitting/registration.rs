@@ -80,7 +80,7 @@ result states (square root of the trace over three axes). A median error should 
         }
     }
     text += "
-The paper's metric is biased by construction: the measured and the virtual cloud have different borders, and nearest neighbours pull
+The paper's metric is biased by construction. The measured and the virtual cloud have different borders, and nearest neighbours pull
 the mesh along its surface by a part of the point spacing.
 ";
     Ok(text)

@@ -151,7 +151,7 @@ fn heading(seeds: usize) -> String {
         "## Bias and coverage (synthetic, {seeds} seeds)
 
 Truth: the paper's mixture with α = 6, m = 0.07, S = (1 − k)·f_λ = 0.05, R = k·r_s = 0.0016. Each seed draws 1500 chirps at measured angles
-uniform from 0° to 70°, tilts each true normal by the angle error in two directions, multiplies by the speckle of L looks and discards
+uniform from 0° to 70°. It tilts each true normal by the angle error in two directions, multiplies by the speckle of L looks, and discards
 powers below −77 dBm at 8 m. Every method starts once, at α = 3, m = 0.1, S = 0.02, R = 0.004. TLS gets the true deviations of both axes; the default
 estimates L.
 

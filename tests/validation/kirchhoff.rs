@@ -165,8 +165,8 @@ pub fn section() -> Section {
             series.into(),
         ),
         table(
-            "Rough: `kirchhoff` with Gaussian correlation against `kirchhoff-go` with the rms slope √2·h/l. The rays leave \
-             out a term of the order 1/(2kh)², so that the difference in dB falls as A/(kh)²; A = 3 dB is tolerated.",
+            "Rough: `kirchhoff` with Gaussian correlation against `kirchhoff-go` with the rms slope √2·h/l. The geometric limit omits a term of the order 1/(2kh)², so the difference in dB falls as A/(kh)²; A \
+             = 3 dB is tolerated.",
             rays_rows(),
         ),
         table(
