@@ -1,5 +1,7 @@
 //! Promise: every page of docs/ stands in the table of contents, every relative link and anchor of the
-//! documentation resolves, and the page of the commands is what `--help` says.
+//! documentation resolves, and the pages of the commands and the effects are what the program says.
+//!
+//! `MATDB_WRITE_EFFECTS=1 cargo test --test book` writes the page of the effects.
 
 mod support;
 
@@ -11,12 +13,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-use support::{entries, root};
+use serde_json::Value;
+use support::{entries, matdb, root};
 
 /// Pages outside the book that link into it.
 const OTHER_PAGES: [&str; 2] = ["README.md", "CONTRIBUTING.md"];
 
 const CONTENTS: &str = "docs/SUMMARY.md";
+
+const EFFECTS: &str = "docs/effects.md";
+const EFFECTS_COMMAND: &str = "MATDB_WRITE_EFFECTS=1 cargo test --test book";
 
 /// A page's lines of prose: those outside fenced blocks, with the words in backquotes taken out.
 fn prose(text: &str) -> Vec<String> {
@@ -134,6 +140,52 @@ fn the_page_of_the_commands_is_what_help_says() {
         "docs/commands.md is stale; write it by `{}`",
         commands::COMMAND
     );
+}
+
+/// The reference of the effects, from `matdb effects --json`.
+fn effects_page(effects: &[Value]) -> String {
+    let mut page = format!(
+        "# Effects\n\nEvery physical effect: what it is, how its residual looks, and its parameters with unit and range. A \
+         parameter that is left\nout has its default. [Scene keys](scenes.md#effects) says where effects are \
+         declared.\n\nGenerated from `matdb effects --json` by `{EFFECTS_COMMAND}`.\n"
+    );
+    for (title, kind) in [("Of a scan", "cloud"), ("Of a curve", "curve")] {
+        page += &format!("\n## {title}\n");
+        let is_of_kind = |effect: &&Value| effect["applies_to"] == serde_json::json!([kind]);
+        page.extend(effects.iter().filter(is_of_kind).map(effect_section));
+    }
+    page
+}
+
+fn effect_section(effect: &Value) -> String {
+    let text = |key: &str| effect[key].as_str().unwrap_or_default().to_owned();
+    let mut section = format!(
+        "\n### {}\n\nLevel: {}. {}\n\n*How it shows:* {}\n\n| parameter | unit | from | to | default |\n\
+         |---|---|--:|--:|--:|\n",
+        text("name"),
+        text("level"),
+        text("is"),
+        text("shows")
+    );
+    for parameter in effect["parameters"].as_array().unwrap() {
+        let [min, max, absent] = ["min", "max", "absent"].map(|key| parameter[key].to_string());
+        let [name, unit] = ["name", "unit"].map(|key| parameter[key].as_str().unwrap());
+        section += &format!("| `{name}` | {unit} | {min} | {max} | {absent} |\n");
+    }
+    section
+}
+
+#[test]
+fn the_page_of_the_effects_is_what_the_program_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = matdb(folder.path()).args(["effects", "--json"]).assert().success();
+    let effects: Vec<Value> = serde_json::from_slice(&output.get_output().stdout).unwrap();
+    let (path, made) = (root().join(EFFECTS), effects_page(&effects));
+    if std::env::var_os("MATDB_WRITE_EFFECTS").is_some() {
+        return fs::write(path, made).unwrap();
+    }
+    let committed = fs::read_to_string(path).unwrap_or_default();
+    assert!(committed == made, "{EFFECTS} is stale; write it by `{EFFECTS_COMMAND}`");
 }
 
 #[test]

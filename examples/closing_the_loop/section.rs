@@ -87,36 +87,38 @@ fn by_strength(cases: &[Case]) -> String {
     table(&head, Strength::ALL.map(row))
 }
 
-/// First name by truth, a table for each strength.
+/// What each effect was called, by strength: the first name of the report and how often.
 fn confusions(cases: &[Case]) -> String {
-    let names: Vec<&str> = library().iter().map(|effect| effect.name()).collect();
-    let columns: Vec<&str> = names.iter().copied().chain([NONE, NO_ANSWER]).collect();
-    let mut text =
-        "Rows: the true effect. Columns: the first name of the report, by the number of its row.\n"
-            .to_owned();
-    for strength in Strength::ALL {
-        let counts = confusion(&singles(cases, strength));
-        if counts.is_empty() {
-            continue;
-        }
-        let mut head = vec![strength.name().to_owned()];
-        head.extend((1..=names.len()).map(|number| number.to_string()));
-        head.extend([NONE, NO_ANSWER].map(str::to_owned));
-        let rows = names.iter().enumerate().map(|(row, truth)| {
-            let cell = |(column, name): (usize, &&str)| match counts
-                .get(&((*truth).to_owned(), (*name).to_owned()))
-            {
-                None => "·".to_owned(),
-                Some(count) if row == column => format!("**{count}**"),
-                Some(count) => count.to_string(),
-            };
-            let mut cells = vec![format!("{} {truth}", row + 1)];
-            cells.extend(columns.iter().enumerate().map(cell));
-            cells
-        });
-        text += &format!("\n{}", table(&head, rows));
+    let counts = Strength::ALL.map(|strength| confusion(&singles(cases, strength)));
+    if counts.iter().all(BTreeMap::is_empty) {
+        return String::new();
     }
-    text
+    let mut head = vec!["true effect"];
+    head.extend(Strength::ALL.map(Strength::name));
+    let rows = library().map(|effect| {
+        let mut cells = vec![effect.name().to_owned()];
+        cells.extend(counts.iter().map(|counts| names_of(effect.name(), counts)));
+        cells
+    });
+    format!(
+        "First name of the report and number of cases; the right name is bold.\n\n{}",
+        listing(&head, rows)
+    )
+}
+
+/// First names that cases of one effect got, with their numbers, the right one first.
+fn names_of(truth: &str, counts: &BTreeMap<(String, String), usize>) -> String {
+    let others = library().map(|effect| effect.name()).into_iter().chain([NONE, NO_ANSWER]);
+    let names = std::iter::once(truth).chain(others.filter(|name| *name != truth));
+    let mut cell = Vec::new();
+    for name in names {
+        match counts.get(&(truth.to_owned(), name.to_owned())) {
+            Some(count) if name == truth => cell.push(format!("**{count}**")),
+            Some(count) => cell.push(format!("{name} {count}")),
+            None => {}
+        }
+    }
+    if cell.is_empty() { "·".to_owned() } else { cell.join(", ") }
 }
 
 /// Cases of which no data of this kind could tell the right name.
