@@ -318,7 +318,7 @@ fn the_film_is_rendered_as_thick_as_its_layer_is() {
 /// The docs' table says for each how it is kept: kind, what is rendered, the claimed range.
 #[test]
 fn the_table_of_the_docs_is_the_catalogue() {
-    let docs = std::fs::read_to_string(root().join("docs/materials.md")).unwrap();
+    let docs = std::fs::read_to_string(root().join("docs/built-in-materials.md")).unwrap();
     let rows: Vec<&str> = docs.lines().filter(|line| line.starts_with("| `")).collect();
     let made: Vec<String> = all().iter().map(row).collect();
     let first = rows.iter().position(|row| row.starts_with("| `acrylate-resist`")).unwrap_or(0);

@@ -181,7 +181,7 @@ fn coatings(folder: &Path) -> BTreeMap<String, String> {
     tables
 }
 
-/// A diagnosis as a line of the table in `docs/diagnosing.md`.
+/// A diagnosis as a line of the table in `docs/diagnosing-a-curve.md`.
 fn line(file: &str, report: &Value) -> String {
     let errors = ["before", "after"].map(|model| number(&report["error"][model]["rmse_db"]));
     let noise_db = number(&report["error"]["noise_floor_db"]);

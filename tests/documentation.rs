@@ -77,38 +77,42 @@ fn a_curve_gets_from_csv_to_a_folder_for_a_web_server_as_the_docs_say() {
     let page = read("docs/publishing.md");
     let (_, own) = page.split_once("## Your own curve").unwrap();
     fs::write(folder.path().join("scan.csv"), blocks(own, "csv")[0]).unwrap();
-    let script: String = blocks(own, "sh")[0]
-        .lines()
-        .filter(|line| !line.starts_with("rsync "))
-        .collect::<Vec<_>>()
-        .join("\n");
-    let program = assert_cmd::cargo::cargo_bin("matdb");
-    let path = format!("{}:/usr/bin:/bin", program.parent().unwrap().display());
-    assert_cmd::Command::new("sh")
-        .args(["-euc", &script])
-        .current_dir(folder.path())
-        .env("PATH", path)
-        .env_remove("MATDB")
-        .assert()
-        .success();
+    let lines = blocks(own, "sh")[0].lines().filter(|line| !line.starts_with("rsync "));
+    run_shell(folder.path(), &lines.collect::<Vec<_>>().join("\n")).success();
     let listed = fs::read_dir(folder.path().join("own-site/material")).unwrap().count();
     assert_eq!(listed, 2, "its page and its table, and no other material");
 }
 
-#[test]
-fn a_laboratory_publishes_its_own_curve_as_the_readme_says() {
-    let folder = tempfile::tempdir().unwrap();
-    let (readme, page) = (read("README.md"), read("docs/publishing.md"));
-    fs::write(folder.path().join("scan.csv"), blocks(&page, "csv")[0]).unwrap();
-    fs::write(folder.path().join("about.toml"), blocks(&page, "toml")[0]).unwrap();
+/// Runs lines of a shell in `folder`, where `matdb` is the program under test.
+fn run_shell(folder: &Path, script: &str) -> assert_cmd::assert::Assert {
     let program = assert_cmd::cargo::cargo_bin("matdb");
     assert_cmd::Command::new("sh")
-        .args(["-euc", blocks(&readme, "bash")[0]])
-        .current_dir(folder.path())
-        .env("PATH", format!("{}:/usr/bin:/bin", program.parent().unwrap().display()))
+        .args(["-euc", script])
+        .current_dir(folder)
+        .env(
+            "PATH",
+            format!("{}:/usr/local/bin:/usr/bin:/bin", program.parent().unwrap().display()),
+        )
         .env_remove("MATDB")
         .assert()
-        .success();
+}
+
+/// A folder with what the documentation uses of a clone.
+fn clone() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for part in ["scenes", "examples/lab"] {
+        copy(&root().join(part), &folder.path().join(part));
+    }
+    folder
+}
+
+#[test]
+fn a_laboratory_publishes_its_own_curve_as_the_readme_says() {
+    let folder = clone();
+    let (readme, page) = (read("README.md"), read("docs/publishing.md"));
+    assert_eq!(blocks(&page, "csv")[0], read("examples/lab/scan.csv"));
+    assert_eq!(blocks(&page, "toml")[0], read("examples/lab/about.toml"));
+    run_shell(folder.path(), blocks(&readme, "bash")[0]).success();
     let front = fs::read_to_string(folder.path().join("own-site/index.html")).unwrap();
     for name in ["Ann Roe", "Terahertz Laboratory at Example University"] {
         assert!(front.contains(name), "{name}");
@@ -121,6 +125,104 @@ fn the_readme_names_the_test_command_and_files_that_exist() {
     assert!(blocks(&readme, "sh").iter().any(|block| block.lines().any(|l| l == "cargo test")));
     for link in readme.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
         assert!(link.starts_with("https://") || root().join(link).exists(), "{link}");
+    }
+}
+
+/// The commands of a tutorial, and the lines that it says they print. Times and hashes differ.
+fn tutorial(page: &str) -> (String, Vec<String>) {
+    let text = read(page);
+    let script = blocks(&text, "sh").concat();
+    let lines = blocks(&text, "text").into_iter().flat_map(str::lines);
+    let lasting = lines.filter(|line| !line.starts_with("wrote "));
+    (script, lasting.map(str::to_owned).collect())
+}
+
+fn assert_printed(printed: &[u8], lines: &[String]) {
+    let printed = String::from_utf8_lossy(printed);
+    for line in lines {
+        assert!(printed.contains(line.as_str()), "`{line}` is not in\n{printed}");
+    }
+}
+
+#[test]
+fn the_tutorial_of_a_first_image_runs() {
+    let folder = clone();
+    let page = "docs/first-image.md";
+    fs::write(folder.path().join("first.toml"), blocks(&read(page), "toml")[0]).unwrap();
+    let (script, lines) = tutorial(page);
+    let output = run_shell(folder.path(), &script).success().get_output().clone();
+    assert_printed(&output.stdout, &lines);
+    for (made, shown) in [("out/power.png", "mannequin"), ("first/power.png", "first-image")] {
+        let shown = root().join(format!("docs/{shown}.png"));
+        assert!(fs::read(folder.path().join(made)).unwrap() == fs::read(shown).unwrap(), "{made}");
+    }
+}
+
+#[test]
+fn the_tutorial_from_a_cloud_to_a_material_runs() {
+    if std::process::Command::new("python3").arg("--version").output().is_err() {
+        return eprintln!("skipped: there is no python3");
+    }
+    let folder = clone();
+    let (script, lines) = tutorial("docs/own-cloud.md");
+    let output = run_shell(folder.path(), &script).success().get_output().clone();
+    assert_printed(&output.stdout, &lines);
+}
+
+/// What the README runs as well is not run again.
+#[test]
+fn the_tutorial_of_a_model_that_misses_runs() {
+    let folder = clone();
+    let (script, _) = tutorial("docs/why-does-my-model-miss.md");
+    let readme = read("README.md");
+    let is_new = |line: &&str| !line.contains("diagnose") || !readme.contains(&format!("{line} "));
+    let script: Vec<&str> = script.lines().filter(is_new).collect();
+    assert_eq!(script.len(), 5, "{script:?}");
+    let output = run_shell(folder.path(), &script.join("\n")).success().get_output().clone();
+    assert_printed(&output.stdout, &["nothing is missing".to_owned()]);
+}
+
+#[test]
+fn the_radar_of_the_docs_is_accepted() {
+    let folder = clone();
+    let page = "docs/place-your-radar.md";
+    let scene = read(page);
+    fs::write(folder.path().join("mine.toml"), blocks(&scene, "toml")[0]).unwrap();
+    let (script, lines) = tutorial(page);
+    let output = run_shell(folder.path(), &script).success().get_output().clone();
+    assert_printed(&output.stdout, &lines);
+    // The other blocks are changes to a scene: the side view, and rays from a file.
+    let target = "[[mesh]]\nname = \"body\"\nfile = \"builtin:mannequin\"\n\
+                  [[region]]\nname = \"paint\"\nmaterial = \"mannequin-paint\"\n";
+    fs::write(folder.path().join("rays.csv"), blocks(&scene, "csv")[0]).unwrap();
+    for (place, change) in blocks(&scene, "toml").into_iter().enumerate().skip(1) {
+        let file = folder.path().join("changed.toml");
+        fs::write(file, format!("{change}{target}")).unwrap();
+        let out = format!("out-{place}");
+        matdb(folder.path()).args(["render", "changed.toml", "-o", &out]).assert().success();
+    }
+}
+
+/// Every key of the radar stands in its reference page.
+#[test]
+fn the_reference_of_the_radar_names_every_key() {
+    let page = read("docs/radar-keys.md");
+    let radar = matdb::radar::Radar {
+        receiver: Some(Default::default()),
+        speckle: Some(Default::default()),
+        noise: Some(Default::default()),
+        ..Default::default()
+    };
+    let radar = serde_json::to_value(radar).unwrap();
+    let mut tables = vec![radar];
+    while let Some(table) = tables.pop() {
+        for (key, value) in table.as_object().unwrap() {
+            assert!(
+                page.contains(&format!("`{key}`")) || page.contains(&format!(".{key}]")),
+                "{key}"
+            );
+            tables.extend(value.is_object().then(|| value.clone()));
+        }
     }
 }
 
@@ -152,7 +254,7 @@ fn the_way_from_a_cloud_to_a_material_runs() {
 
 #[test]
 fn the_diagnosis_of_a_curve_runs_on_the_columns_of_the_docs() {
-    let text = read("docs/diagnosing.md");
+    let text = read("docs/diagnosing-a-curve.md");
     let folder = tempfile::tempdir().unwrap();
     let mut table = blocks(&text, "csv")[0].lines().next().unwrap().to_owned() + "\n";
     for (incidence_deg, receiver_deg) in (-25..=25).flat_map(|k| [(20, 3 * k), (50, 3 * k)]) {
@@ -224,7 +326,7 @@ fn every_command_has_help_with_an_example() {
 
 #[test]
 fn the_built_in_table_of_the_docs_is_complete() {
-    let text = read("docs/materials.md");
+    let text = read("docs/built-in-materials.md");
     for name in matdb::material::builtin::names() {
         assert!(text.contains(&format!("| `{name}` |")), "{name}");
         let material = matdb::material::builtin::get(name).unwrap().unwrap();

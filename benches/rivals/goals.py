@@ -93,7 +93,7 @@ def diagnosis(results):
 
 
 def gpu(results):
-    goal = Goal("GPU", "within 2 × of the best published rate", "no GPU was at hand", None)
+    goal = Goal("GPU", "within 2 × of the best published rate", "no GPU was available", None)
     fastest = max(results.get("gpu", []), key=mrays_per_s, default=None)
     if fastest is None:
         return goal

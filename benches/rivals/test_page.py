@@ -53,7 +53,7 @@ class Page(unittest.TestCase):
         row, = self.lines(results, "| Embree, medium build, packets of 16 |")
         self.assertIn("| × 10.0 |", row)
         told, = self.lines(results, "2 threads.")
-        self.assertIn("0.250 (0.200–0.300) ms more", told)
+        self.assertIn("takes another 0.250 (0.200–0.300) ms", told)
 
     def test_the_slower_change_counts_when_a_scan_is_predicted_again(self):
         row = {"threads": 1, "chirps": 18529, "looks": 9000, "traced": [3.0] * 3, "same": [0.1] * 3}
@@ -160,12 +160,12 @@ class Page(unittest.TestCase):
         self.assertEqual(self.lines(results, "| 20 | 1 000 000 |"), [
             "| 20 | 1 000 000 | 2 | 1.00 | 5.00 (4.00–6.00) | 200 | 9.00 |"
         ])
-        self.assertNotIn("No GPU was at hand", page(EMPTY | results))
+        self.assertNotIn("No GPU was available", page(EMPTY | results))
 
     def test_a_page_without_results_names_every_goal_as_not_measured(self):
         for goal in all_goals(EMPTY):
             self.assertIsNone(goal.reached, goal)
-        self.assertIn("No GPU was at hand", page(EMPTY))
+        self.assertIn("No GPU was available", page(EMPTY))
 
 
 if __name__ == "__main__":

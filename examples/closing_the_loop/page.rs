@@ -22,12 +22,11 @@ pub const COMMAND: &str = "cargo run --release --example closing_the_loop -- --c
 pub fn page(sets: &[Set], tuned_on: Option<&str>) -> String {
     let mut page = format!(
         "# Closing the loop\n\n\
-         Does `matdb diagnose` name the effect that a model lacks? Scans with a known truth were simulated, the truth \
-         put aside, and the program run on each as a user would: `matdb add --from material/material.toml`, then \
-         `matdb diagnose`. Only when all reports were there the truths were opened and counted. Everything here is \
-         synthetic; nothing was measured. This page is written by\n\n\
+         This study measures how often `matdb diagnose` names the effect that a model lacks. Scans with a known truth \
+         are simulated, and the program runs on each as a user would: `matdb add --from material/material.toml`, then \
+         `matdb diagnose`. The truths are opened and counted after all reports exist. All data are synthetic.\n\n\
+         Generated, after `cargo build --release`, with a `--cases` per set, by\n\n\
          ```sh\n{COMMAND}\n```\n\n\
-         after `cargo build --release`, with a `--cases` for each set, and no number in it is written by hand.\n\n\
          ## Summary\n\n"
     );
     let all: Vec<Vec<Target>> = sets.iter().map(|set| targets(&set.cases)).collect();
@@ -38,7 +37,7 @@ pub fn page(sets: &[Set], tuned_on: Option<&str>) -> String {
     page += &match tuned_on {
         Some(cases) => format!("\nSettings of the diagnosis were tuned on: {cases}.\n"),
         None => {
-            "\nIt is not stated on which cases the settings of the diagnosis were tuned.\n".into()
+            "\nThe cases on which the settings of the diagnosis were tuned are not stated.\n".into()
         }
     };
     page += LEGEND;
@@ -58,11 +57,11 @@ fn in_words(set: &Set, targets: &[Target]) -> String {
         .collect();
     let wrong = set.cases.iter().filter(|case| case.missed()).count();
     let missed_text = match missed.is_empty() {
-        true => "None of them was missed.".to_owned(),
+        true => "None was missed.".to_owned(),
         false => format!("Missed: {}.", missed.join("; ")),
     };
     format!(
-        "**{}**: {} of {} cases came out as they should, and {} of the {} targets that they can tell about are met. \
+        "**{}**: {} of {} cases came out as they should, and {} of the {} targets that they can judge are met. \
          {missed_text}\n\n",
         set.title,
         set.cases.len() - wrong,
@@ -114,17 +113,14 @@ fn aligned<S: AsRef<str>>(
 const LEGEND: &str = "
 ## How it is counted
 
-- Weak, moderate and strong are the size of what the refitted base model leaves without the effect: 0.35, 0.9 and 2.2 dB
-  rms, or as much of the effect's own measure. A label that says what was reached, and not only what was wanted, is
-  taken at its word.
-- *Right name first*: the first effect of the report is the one that was put in. *Exactly*: it is the only one.
-- *Or in its class*: the first name comes with others that predict the data as well, and the right one is among them.
-  A target counts this only where no data of this kind could tell the two apart; these cases are listed, with the reason.
-- *Above* and *below*: where the true share lies with 95 % confidence (Clopper and Pearson).
-- *Extra names*: names that are not the truth's, without a wrong first one, which is a miss already. *All wrong names*
-  counts that one, too.
+- *Weak, moderate, strong*: what the refitted base model leaves without the effect: 0.35, 0.9 and 2.2 dB rms, or as much of the effect's
+  own measure. Where a label states the size that was reached, that size counts.
+- *Right name first*: the first effect of the report is the true one. *Exactly*: it is the only one.
+- *Or in its class*: the first name comes with others that predict the data as well, and the true one is among them. A target counts
+  this only where no data of this kind could distinguish the two; these cases are listed, with the reason.
+- *Above*, *below*: bounds of the true share with 95 % confidence (Clopper and Pearson).
+- *Extra names*: names that are not true, except a wrong first name, which is a miss already. *All wrong names* includes it.
 - *False alarm*: any name, or any verdict but `no-missing-effect`, where nothing is missing.
 - *No answer*: `cannot-tell`, or a command that failed. It counts as a miss, and as a false alarm where nothing is missing.
-- The error is root mean square of observed − expected power over held-out detections. The noise floor is the error of
-  a model that is right.
+- *Error*: root mean square of observed − expected power over held-out detections. *Noise floor*: the error of a correct model.
 ";

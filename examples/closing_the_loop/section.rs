@@ -87,36 +87,38 @@ fn by_strength(cases: &[Case]) -> String {
     table(&head, Strength::ALL.map(row))
 }
 
-/// First name by truth, a table for each strength.
+/// What each effect was called, by strength: the first name of the report and how often.
 fn confusions(cases: &[Case]) -> String {
-    let names: Vec<&str> = library().iter().map(|effect| effect.name()).collect();
-    let columns: Vec<&str> = names.iter().copied().chain([NONE, NO_ANSWER]).collect();
-    let mut text =
-        "Rows: what was put in. Columns: the first name of the report, by the number of its row.\n"
-            .to_owned();
-    for strength in Strength::ALL {
-        let counts = confusion(&singles(cases, strength));
-        if counts.is_empty() {
-            continue;
-        }
-        let mut head = vec![strength.name().to_owned()];
-        head.extend((1..=names.len()).map(|number| number.to_string()));
-        head.extend([NONE, NO_ANSWER].map(str::to_owned));
-        let rows = names.iter().enumerate().map(|(row, truth)| {
-            let cell = |(column, name): (usize, &&str)| match counts
-                .get(&((*truth).to_owned(), (*name).to_owned()))
-            {
-                None => "·".to_owned(),
-                Some(count) if row == column => format!("**{count}**"),
-                Some(count) => count.to_string(),
-            };
-            let mut cells = vec![format!("{} {truth}", row + 1)];
-            cells.extend(columns.iter().enumerate().map(cell));
-            cells
-        });
-        text += &format!("\n{}", table(&head, rows));
+    let counts = Strength::ALL.map(|strength| confusion(&singles(cases, strength)));
+    if counts.iter().all(BTreeMap::is_empty) {
+        return String::new();
     }
-    text
+    let mut head = vec!["true effect"];
+    head.extend(Strength::ALL.map(Strength::name));
+    let rows = library().map(|effect| {
+        let mut cells = vec![effect.name().to_owned()];
+        cells.extend(counts.iter().map(|counts| names_of(effect.name(), counts)));
+        cells
+    });
+    format!(
+        "First name of the report and number of cases; the right name is bold.\n\n{}",
+        listing(&head, rows)
+    )
+}
+
+/// First names that cases of one effect got, with their numbers, the right one first.
+fn names_of(truth: &str, counts: &BTreeMap<(String, String), usize>) -> String {
+    let others = library().map(|effect| effect.name()).into_iter().chain([NONE, NO_ANSWER]);
+    let names = std::iter::once(truth).chain(others.filter(|name| *name != truth));
+    let mut cell = Vec::new();
+    for name in names {
+        match counts.get(&(truth.to_owned(), name.to_owned())) {
+            Some(count) if name == truth => cell.push(format!("**{count}**")),
+            Some(count) => cell.push(format!("{name} {count}")),
+            None => {}
+        }
+    }
+    if cell.is_empty() { "·".to_owned() } else { cell.join(", ") }
 }
 
 /// Cases of which no data of this kind could tell the right name.
@@ -133,8 +135,8 @@ fn alike(cases: &[Case]) -> String {
     }
     let why: Vec<&str> = whys.into_iter().collect();
     format!(
-        "The first name was another, the right one was told as one that predicts the data as well, the two gains in ln \
-         likelihood differ by {} at most, and there is a reason: {}.\n\n{}",
+        "In these cases the first name is another effect. The right one is named as predicting the data as well, the two \
+         gains in ln likelihood differ by at most {}, and there is a reason: {}.\n\n{}",
         Diagnosis::default().least_gain,
         why.join("; "),
         listing(&MISS[..MISS.len() - 1], rows)
@@ -224,7 +226,7 @@ fn unknown(cases: &[Case]) -> String {
     let by_name = groups(&cases);
     let rows = by_name.into_iter().map(|(name, cases)| row(name, &cases)).chain([all]);
     format!(
-        "“Named” counts cases that got a name nonetheless, whatever their verdict.\n\n{}",
+        "“Named” counts cases that got a name, whatever their verdict.\n\n{}",
         table(&head, rows)
     )
 }
@@ -275,8 +277,8 @@ fn errors(cases: &[Case]) -> String {
     rows.push(row("nothing missing", &expecting(cases, Expected::Complete)));
     rows.push(row("unknown effects", &expecting(cases, Expected::Unknown)));
     format!(
-        "Medians over cases where nothing else is said; “explained share” is of what the error before has beyond the \
-         floor, in squares.\n\n{}",
+        "Columns are medians over cases unless they say otherwise. “Explained share” is the share of the squared error \
+         before, beyond the floor, that the named effects remove.\n\n{}",
         table(&head, rows)
     )
 }
@@ -309,9 +311,9 @@ fn parameters(cases: &[Case]) -> String {
         ]
     });
     format!(
-        "Cases in which the right effect was named, alone or not, and numbers that mean the same in label and report. \
-         Levels are off by dB, the rest by per cent of the truth. A stated sd is about noise; what the truth does in \
-         another form than the program's own comes on top.\n\n{}",
+        "Cases in which the right effect was named, alone or not, and parameters that mean the same in label and report. \
+         Errors of levels are in dB, others in per cent of the truth. A stated sd covers noise only; the truth can have \
+         another form than the program's effect, which adds an error.\n\n{}",
         table(&head, rows)
     )
 }
@@ -339,9 +341,9 @@ fn misses(cases: &[Case]) -> String {
     }
     missed.sort_by_key(|case| (put_in(case), case.label.strength, case.label.seed));
     format!(
-        "Gains are in ln likelihood, of the first round; ≈ marks one that is only of a sample of the chirps. The \
-         reason follows from the report by rule, from the round in which a wrong effect was added, or else the last. \
-         An effect with a measure of its own has an rms of 0.\n\n{}",
+        "Gains are in ln likelihood, of the first round; ≈ marks a gain from a sample of the chirps. The reason follows \
+         by rule from the report, from the round in which a wrong effect was added, else from the last. Effects with \
+         their own measure have an rms of 0.\n\n{}",
         listing(&MISS, missed.into_iter().map(miss))
     )
 }

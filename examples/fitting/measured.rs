@@ -55,17 +55,16 @@ Two published sets, imported from CSV and not copied into the project:
   scanned in the plane of incidence, the others over the hemisphere; incidences 10°, 30°, 50°, 70°.
 - Sintered PTFE at 633 nm, T. A. Germer, NIST, Applied Optics (2017): `nist-ptfe-brdf/PTFE.data.csv`, column `f_r11`.
 
-They are bistatic, so they are fitted by `fit::bistatic`: least squares in dB over all pairs of directions, no speckle
-and no threshold. Left out: directions within 4.9° of backscatter, where the detector stands in the beam and
-the reading drops to nothing, and values below 0.001/sr, which stray light may be. “Repeat” is the rms scatter of one
-repeat about the true mean; a model that explains the surface would leave that.
+They are bistatic, so `fit::bistatic` fits them: least squares in dB over all pairs of directions, without speckle and threshold. Left out are
+directions within 4.9° of backscatter, where the detector blocks the beam and the reading drops to nothing, and values below 0.001/sr, which
+may be stray light. *Repeat* is the rms scatter of one repeat about the true mean: the residual of a model that explains the surface.
 ";
 
 const JUDGEMENT: &str = "
-No model quite reaches the repeat where there is one: the rest is the models' own error, and intervals from these residuals would mean
-nothing, so none are given. Closest is Aeroglaze with two GGX lobes; blasted NiTE and the anodised blacks stay above
-1.2 dB with every model. PTFE is Lambertian within 0.25 dB up to 60°; the lobe that the fits add there takes 0.1 dB off
-and is the broad rise of a volume scatterer, not a facet lobe. These fits say how flexible the models are; their numbers are not for 300 GHz.
+No model reaches the repeat where there is one. The remaining error is the models' own; intervals from these residuals would mean nothing, so none
+are given. Closest is Aeroglaze with two GGX lobes. Blasted NiTE and the anodised blacks stay above 1.2 dB with every model. PTFE is
+Lambertian within 0.25 dB up to 60°. The lobe that the fits add there removes 0.1 dB and is the broad rise of a volume scatterer, not a
+facet lobe. These fits show how flexible the models are; their numbers do not hold at 300 GHz.
 ";
 
 fn table(set: &Measured) -> Result<String, Failure> {
@@ -224,7 +223,7 @@ fn constants(path: &Path) -> Result<String, Failure> {
 ### Optical constants (measured, 100 GHz to 3 THz)
 
 n and k near 300 GHz of `thz-optical-constants/summary_300GHz.csv` (refractiveindex.info, CC0; the references are in the
-file), as ε = (n − jk)² into `fresnel`; nothing is fitted. “Backscatter” is what a smooth, thick piece sends back at
+file), as ε = (n − jk)² into `fresnel`; nothing is fitted. “Backscatter” is what a smooth, thick piece returns at
 normal incidence.
 
 | material | ε′ | ε″ | backscatter, dB | the file's own, dB | samples from 100 to 500 GHz |

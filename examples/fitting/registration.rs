@@ -55,10 +55,10 @@ pub fn section(seeds: usize) -> Result<String, Failure> {
         "## Registration (synthetic, {seeds} seeds)
 
 Each seed measures a target with the paper's scan, 2 mm of range noise, the scattering of `mannequin-paint` (a
-modelled built-in) and the threshold of −77 dBm, pushes the mesh 30 mm and 5° off in random directions, and registers
-it. The error is the shift of the middle of the measured points and the turn. Good is within 0.5 mm and 0.05°; the
-goal is 48 of 50. The paper's is point-to-point ICP as in its Sec. V-B. “Predicted” is the standard deviation that the
-result itself claims (square root of the trace over three axes), which a median error should be a little below.
+modelled built-in) and the threshold of −77 dBm. It displaces the mesh by 30 mm and 5° in random directions and registers
+it. The error is the shift of the middle of the measured points, and the rotation. *Good* is within 0.5 mm and 0.05°; the
+goal is 48 of 50. “The paper's” is point-to-point ICP as in its Sec. V-B. *Predicted* is the standard deviation that the
+result states (square root of the trace over three axes). A median error should be slightly below it.
 
 | target | method | points | good | median shift, mm | worst | median turn, ° | worst | predicted, mm and ° |
 |---|---|--:|--:|--:|--:|--:|--:|--:|
@@ -80,8 +80,8 @@ result itself claims (square root of the trace over three axes), which a median 
         }
     }
     text += "
-The paper's metric misses by construction: the measured and the virtual cloud end at different places, and nearest
-neighbours pull the mesh along its surface by a share of the spacing.
+The paper's metric is biased by construction. The measured and the virtual cloud have different borders, and nearest neighbours pull
+the mesh along its surface by a part of the point spacing.
 ";
     Ok(text)
 }

@@ -39,17 +39,17 @@ pub fn section(seeds: usize) -> Result<String, Failure> {
     let mut text = format!(
         "## The whole way round (synthetic, {seeds} seeds)
 
-A scene's mesh, all of the known material above, is rendered with speckle of {LOOKS} looks, thermal noise of −112 dBm
-and 2 mm of range noise. Its detections are registered from 30 mm and 5° off, reduced to a curve with the silent
-chirps as upper limits, and fitted with the default method, which also estimates L. The mesh is then moved to the
-found pose and rendered again, without noise, with the fitted parameters. The mesh is exact here, as `measure --exact-mesh`
-takes it: its facets have no error of normal, and rows whose facet the pose does not tell for sure are left out.
+The mesh of a scene, made of the known material above, is rendered with speckle of {LOOKS} looks, thermal noise of −112 dBm and 2 mm of range
+noise. The detections are registered from 30 mm and 5° off, reduced to a curve with silent chirps as upper limits, and fitted with the default
+method, which also estimates L. The mesh is then moved to the found pose and rendered with the fitted parameters, without noise. The mesh is exact, as
+with `measure --exact-mesh`: its facets have no error of normal, and rows with an uncertain facet are left out.
 
-Image error: rms over the detected chirps of measured dBm − rendered dBm. The floor is the same for the true pose and
-the true parameters, where only speckle, noise and the threshold's selection are left; speckle alone has
-{speckle_db:.2} dB about its mean. With the found pose some chirps meet the facet beside, which turns the angle by degrees
-at once; a smooth surface would not. “Between” compares the mean images of fit and truth at the true pose. “None”: the fit did not
-converge and gives no interval, which counts as outside.
+- *Image error*: rms over the detected chirps of measured dBm − rendered dBm.
+- *Floor*: the same for the true pose and the true parameters. Speckle, noise and the selection by the threshold remain; speckle alone has
+  {speckle_db:.2} dB about its mean.
+- With the found pose some chirps hit the neighbouring facet, which changes the angle by degrees at once. A smooth surface would not do that.
+- *Between*: the mean images of fit and truth at the true pose.
+- *None*: the fit did not converge and has no interval, which counts as outside.
 "
     );
     for target in ["mannequin", "human"] {

@@ -150,14 +150,14 @@ fn heading(seeds: usize) -> String {
     format!(
         "## Bias and coverage (synthetic, {seeds} seeds)
 
-The truth: the paper's mixture with α = 6, m = 0.07, S = (1 − k)·f_λ = 0.05, R = k·r_s = 0.0016. Each seed draws
-1500 chirps at measured angles uniform from 0° to 70°, tilts each true normal by the angle error in two directions,
-multiplies by the speckle of L looks and cuts at −77 dBm at 8 m. Every method starts at α = 3, m = 0.1, S = 0.02,
-R = 0.004, and there only. TLS is told the true deviations of both axes; the default estimates L.
+Truth: the paper's mixture with α = 6, m = 0.07, S = (1 − k)·f_λ = 0.05, R = k·r_s = 0.0016. Each seed draws 1500 chirps at measured angles
+uniform from 0° to 70°. It tilts each true normal by the angle error in two directions, multiplies by the speckle of L looks, and discards
+powers below −77 dBm at 8 m. Every method starts once, at α = 3, m = 0.1, S = 0.02, R = 0.004. TLS gets the true deviations of both axes; the default
+estimates L.
 
-Bias is the mean of estimate − truth: of α as it is, of m, S and R in percent of the truth, at 55° in dB of σ⁰ with
-its standard error. Coverage is the share of seeds, in percent, whose 95 % interval holds the truth; an interval that
-was not given counts as a miss. The last column is the share of fits that say they converged, in percent.
+- *Bias*: mean of estimate − truth. For α absolute, for m, S and R in percent of the truth, at 55° in dB of σ⁰ with its standard error.
+- *Coverage*: share of seeds, in percent, whose 95 % interval contains the truth. A missing interval counts as a miss.
+- *Converged*: share of converged fits, in percent.
 "
     )
 }
@@ -173,7 +173,7 @@ fn judged(misses: &[String], seeds: usize) -> String {
     let mut text = format!(
         "\nThe default's goal is a coverage from {low} to {high} % and a bias at 55° below {TAIL_DB} dB. A share of \
          95 % over\n{seeds} seeds has a binomial deviation of {deviation:.1} %, so a few of the {shares} shares leave \
-         that range by chance.\nWhat left it:\n\n"
+         that range by chance.\nOutside the range:\n\n"
     );
     misses.iter().for_each(|miss| _ = writeln!(text, "- {miss}."));
     if misses.is_empty() {

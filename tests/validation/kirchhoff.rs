@@ -161,16 +161,16 @@ pub fn section() -> Section {
     let tables = vec![
         table(
             "The series of `kirchhoff` against the integral over the correlation that it sums, in backscatter at 0°, 10° \
-             and 30°, kh = 0.1, 0.5 and 1.5, l = 1 mm. Both are exact but for rounding and quadrature.",
+             and 30°, kh = 0.1, 0.5 and 1.5, l = 1 mm. Both are exact except for rounding and quadrature.",
             series.into(),
         ),
         table(
-            "Rough: `kirchhoff` with Gaussian correlation against `kirchhoff-go` with the rms slope √2·h/l. The rays leave \
-             out a term of the order 1/(2kh)², so that the difference in dB falls as A/(kh)²; A = 3 dB is tolerated.",
+            "Rough: `kirchhoff` with Gaussian correlation against `kirchhoff-go` with the rms slope √2·h/l. The geometric limit omits a term of the order 1/(2kh)², so the difference in dB falls as A/(kh)²; A \
+             = 3 dB is tolerated.",
             rays_rows(),
         ),
         table(
-            "Smooth: the mirror keeps exp(−(2kh·cos θ)²) of its power, and what is diffuse grows as h².",
+            "Smooth: the specular part keeps exp(−(2kh·cos θ)²) of its power, and the diffuse part grows as h².",
             smooth,
         ),
     ];

@@ -91,9 +91,9 @@ pub fn section() -> Section {
     let text = "`cook-torrance` (separable, f_λ = 1) against the plugin `roughconductor` of Mitsuba 3.9.1 (variant \
                 `scalar_rgb`, material `none`, so that F = 1), for roughness 0.05 to 0.7, backscatter, pairs near the \
                 mirror direction and any two directions. `tests/fixtures/rough-conductor.py` made the values in \
-                `tests/fixtures/rough-conductor.csv`; the renderer is not needed to run the test. D is the slope law; with f \
-                it checks Smith's G as well. The reference has single precision, which the exponents of the tails \
-                multiply by up to 40: hence 1e-4."
+                `tests/fixtures/rough-conductor.csv`; the renderer is not needed to run the test. D is the slope \
+                distribution; f checks Smith's G as well. The reference has single precision, and the \
+                exponents of the tails multiply its rounding by up to 40: hence 1e-4."
         .to_owned();
     let tables = vec![Table { text, rows: groups.iter().flat_map(row).collect() }];
     let not_covered = vec![

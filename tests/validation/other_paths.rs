@@ -222,17 +222,20 @@ fn second_order_rows() -> Vec<Row> {
 }
 
 pub fn section() -> Section {
-    let bistatic = "A glossy plate (`blinn-phong`, α = 6) lit by the default radar and seen by a receiver 6 m away, against \
-                    P_t·f(i, o)·cos θ_i·cos θ_o·A_eq/R_o² from the plane and the two antennas: flat facets are exact. A Lambert \
+    let bistatic = "A glossy plate (`blinn-phong`, α = 6) lit by the default radar and seen by a receiver 6 m away, \
+    against \
+                    P_t·f(i, o)·cos θ_i·cos θ_o·A_eq/R_o² from the plane and the two antennas: flat facets are exact. \
+                    A Lambert \
                     sphere of 0.05 m radius with the projected footprint, lit from 0° and seen from α, against \
                     ⅔·r²·(sin α + (π − α)·cos α), which holds for antennas far away; at 8 m it is good to 1 %.";
-    let second = "Two wings of 0.2 m at right angles, open towards the radar. Chalky ones (albedo 0.7): what the second \
-                  wing adds to the echo of a point at a distance a from the edge, over that echo, is ρ·½(1 − a/√(a² + w²)) for an antenna \
-                  far away; the integral takes the ranges and angles of 8 m into account. Mirrors (`cook-torrance`, m = 0.02): \
-                  every path over both wings is as long as one to the edge, within what a lobe of that width spreads. Directions \
-                  are drawn at random, 10 000 from each point, which leaves about one per cent. On the axis a corner mirrors \
-                  every point of the spot to its opposite; with the Gaussian g of the spot the antenna sees it as 2g, and as \
-                  max(2g, 1) with full side lobes: ∫g·2g over ∫g·max(2g, 1) is 1/1.25, to 3 % for 400 rays.";
+    let second = "Two wings of 0.2 m at right angles, open towards the radar. Chalky ones (albedo 0.7): the second wing adds to the echo of a point at a distance a from the edge ρ·½(1 − a/√(a² + w²)) of \
+                  that echo, for an antenna far away. The integral includes the ranges and angles of 8 m. Mirrors (`cook-torrance`, m \
+                  = 0.02): \
+                  every path over both wings is as long as one to the edge, within what a lobe of that width spreads. \
+                  Directions \
+                  are drawn at random, 10 000 from each point, which leaves a scatter of about one per cent. On the axis a corner mirrors every point of the spot to its opposite. With the Gaussian g of the \
+                  spot the antenna sees it with weight 2g, or max(2g, 1) with full side lobes. ∫g·2g over ∫g·max(2g, \
+                  1) is 1/1.25, to 3 % for 400 rays.";
     Section {
         title: "Other antennas and second surfaces",
         tables: vec![

@@ -131,10 +131,10 @@ const HEAD: &str = "| what | found | tolerance | verdict |\n|---|---|---|---|\n"
 
 fn introduction() -> String {
     format!(
-        "What the code computes, against what is known without it: closed forms, published figures, \
-         limits that two models must share, and another renderer. `tests/validation.rs` computes every \
-         number, compares it with its tolerance, and compares this page with the numbers; {COMMAND}. \
-         Nothing here is measured: the code is judged, not whether a model suits a material."
+        "This page compares what the code computes with closed forms, published figures, limits that two models must \
+         share, and another renderer. It checks the code, not whether a model suits a material; nothing here is \
+         measured. Generated: `tests/validation.rs` computes every number and fails when one leaves its tolerance or \
+         differs from this page; {COMMAND}."
     )
 }
 

@@ -295,21 +295,22 @@ pub fn section() -> Section {
     let tables = vec![
         Table {
             text: "Reciprocity: the worst |f(i, o) − f(o, i)|/f over 5000 pairs of directions for each set of \
-                   parameters below, half of them near each other's mirror direction. The formulas are symmetric; rounding is all that may be left."
+                   parameters below, half of them near each other's mirror direction. The formulas are symmetric, so only rounding may remain."
                 .to_owned(),
             rows: reciprocity(&models),
         },
         Table {
             text: format!(
                 "Energy: the largest ∫ f cos θ_o dω_o over incidences of {angles} degrees, with parameters \
-                 that reflect the most. More than 1 is more than what came in; 0.35 % is what the \
-                 approximation of Beckmann's G1 may add, the rest is quadrature."
+                 that reflect the most. Above 1 a surface reflects more than it receives. The tolerance allows 0.35 % \
+                 for the approximation \
+                 of Beckmann's G1, the rest for quadrature."
             ),
             rows: energy,
         },
         Table {
             text: "The quadrature: Gauss and Legendre's rule on panels that narrow towards the mirror \
-                   direction and the horizon. What is left is the steps in Beckmann's G1 and in tabulated curves."
+                   direction and the horizon. The steps in Beckmann's G1 and in tabulated curves remain."
                 .to_owned(),
             rows: vec![Row::new(
                 "largest change of a number above with twice the nodes",

@@ -203,12 +203,12 @@ fn cylinder_rows() -> Vec<Row> {
 
 pub fn section() -> Section {
     let plate = "A plate with Lambert's law of albedo 0.5, eight metres from the default radar, against equation (11) \
-                 computed from the ray and the plane. Flat facets are exact, so that only rounding is tolerated.";
-    let round = "A sphere and an upright cylinder of 0.2 m radius made of flat facets, at 8 m: the sum of the powers of a \
-                 raster against the integral of equation (11) over the visible disc or strip (relative difference), and the \
-                 incidence (up to 60°) against asin(offset/radius). Inscribed facets of width e err by the order (e/r)² in power, \
-                 which is what is tolerated; a facet's normal errs by at most half the turn from one facet to the next, by a \
-                 quarter in the mean, and 0.3 is tolerated.";
+                 computed from the ray and the plane. Flat facets are exact, so only rounding is tolerated.";
+    let round = "A sphere and an upright cylinder of 0.2 m radius made of flat facets, at 8 m: the sum of the powers of a raster against the integral of equation (11) over the visible disc or \
+                 strip (relative difference). The incidence angle, up to 60°, against asin(offset/radius). Inscribed facets of width e have an error of the \
+                 order (e/r)² in power, which is tolerated. The \
+                 normal of a facet is wrong by at most half the angle between neighbours, by a quarter in the mean; \
+                 0.3 is tolerated.";
     let tables = vec![
         Table { text: plate.to_owned(), rows: plate_rows() },
         Table {

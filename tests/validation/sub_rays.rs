@@ -106,11 +106,12 @@ fn rows(name: &str, expected_order: f64, error: impl Fn(usize) -> f64) -> Vec<Ro
 }
 
 pub fn section() -> Section {
-    let text = "Equation (7) by N rays per chirp against the integral over the Gaussian spot of 16 mm: a straight edge under \
-                200 spots up to 2 cm from it (share of the full power, against the error function) and a sphere of 8 mm \
-                radius in the middle of the spot (relative). N points spread evenly miss the area of a figure by about the \
-                root of the number of points near its outline, N^(−3/4); half of that is tolerated. On the sphere every ray \
-errs on its own by the normal of its facet (20 480 of them), and the mean of such errors falls as N^(−1/2)."
+    let text = "Equation (7) by N rays per chirp against the integral over the Gaussian spot of 16 mm. A straight \
+    edge under 200 spots up to 2 cm from it: share of the full power, against the error function. A \
+    sphere of 8 mm radius in the middle of the spot: relative difference. N evenly spread points miss the area of a figure by \
+                about the root of the number of points near its \
+                outline, N^(−3/4); half of that is tolerated. On the sphere every ray has an independent error from \
+                the normal of its facet (20 480 of them), and the mean of such errors falls as N^(−1/2)."
         .to_owned();
     let mut all = rows("edge", ORDER, edge_error);
     all.extend(rows("sphere", FACETS_ORDER, sphere_error));

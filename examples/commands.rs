@@ -1,0 +1,95 @@
+//! Prints docs/commands.md, the reference of the command line, from the definitions behind `--help`:
+//!
+//!     cargo run --example commands > docs/commands.md
+
+use clap::{Arg, Command, CommandFactory};
+
+/// What writes the page.
+pub const COMMAND: &str = "cargo run --example commands > docs/commands.md";
+
+fn main() {
+    print!("{}", page());
+}
+
+/// The whole page.
+pub fn page() -> String {
+    let mut program = matdb::cli::Cli::command();
+    program.build();
+    let mut text = format!(
+        "# Commands\n\nGenerated from the program's `--help` by `{COMMAND}`; edit the help instead. `matdb help COMMAND` shows \
+         the same.\n\nEvery command takes these options:\n\n"
+    );
+    text += &table(program.get_arguments().filter(|argument| argument.is_global_set()));
+    for command in program.get_subcommands_mut().filter(|command| command.get_name() != "help") {
+        text += &section(command);
+    }
+    text
+}
+
+/// One command: what it does, how it is called, its arguments and its examples.
+fn section(command: &mut Command) -> String {
+    let about = command.get_about().map(ToString::to_string).unwrap_or_default();
+    let usage = command.render_usage().to_string();
+    let usage = usage.trim_start_matches("Usage: ");
+    let mut text =
+        format!("\n## {}\n\n{}.\n\n```text\n{usage}\n```\n\n", command.get_name(), prose(&about));
+    let own = command.get_arguments().filter(|a| !a.is_global_set() && a.get_id() != "help");
+    text += &table(own);
+    if let Some(after) = command.get_after_long_help().or(command.get_after_help()) {
+        text += &format!("\n```text\n{}\n```\n", after.to_string().trim_end());
+    }
+    text
+}
+
+/// A row for each argument; empty where there is none.
+fn table<'a>(arguments: impl Iterator<Item = &'a Arg>) -> String {
+    let rows: String = arguments.map(row).collect();
+    if rows.is_empty() { rows } else { format!("| argument | meaning |\n|---|---|\n{rows}") }
+}
+
+fn row(argument: &Arg) -> String {
+    let help = argument.get_long_help().or(argument.get_help()).map(ToString::to_string);
+    let mut meaning = prose(&help.unwrap_or_default());
+    let is_flag = !argument.get_action().takes_values();
+    let defaults: Vec<_> =
+        argument.get_default_values().iter().map(|value| value.to_string_lossy()).collect();
+    if !is_flag && !defaults.is_empty() && !argument.is_hide_default_value_set() {
+        meaning += &format!(" [default: `{}`]", defaults.join(","));
+    }
+    if let Some(variable) = argument.get_env() {
+        meaning += &format!(" [env: `{}`]", variable.to_string_lossy());
+    }
+    if !is_flag && !argument.is_hide_possible_values_set() {
+        meaning += &possible_values(argument);
+    }
+    format!("| `{}` | {meaning} |\n", name(argument).replace('|', "\\|"))
+}
+
+/// The values to choose from, each with its help where it has one.
+fn possible_values(argument: &Arg) -> String {
+    let of_value = |value: &clap::builder::PossibleValue| {
+        let help = value.get_help().map(|help| format!(" – {}", prose(&help.to_string())));
+        format!("<br>`{}`{}", value.get_name(), help.unwrap_or_default())
+    };
+    argument.get_possible_values().iter().filter(|v| !v.is_hide_set()).map(of_value).collect()
+}
+
+/// As an argument is typed: `-o, --output <DIR>` or `<SCENE>`.
+fn name(argument: &Arg) -> String {
+    let short = argument.get_short().map(|short| format!("-{short}"));
+    let long = argument.get_long().map(|long| format!("--{long}"));
+    let value = if argument.get_action().takes_values() {
+        let names = argument.get_value_names().unwrap_or_default();
+        names.iter().map(|name| format!("<{name}>")).collect::<Vec<_>>().join(" ")
+    } else {
+        String::new()
+    };
+    let flags = [short, long].into_iter().flatten().collect::<Vec<_>>().join(", ");
+    format!("{flags} {value}").trim().to_owned()
+}
+
+/// Help as a cell of a table: on one line, with what Markdown would read as markup quoted.
+fn prose(help: &str) -> String {
+    let line = help.split_whitespace().collect::<Vec<_>>().join(" ");
+    line.replace('|', "\\|").replace('<', "&lt;").replace("[[", "\\[\\[")
+}
