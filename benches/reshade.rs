@@ -37,12 +37,13 @@ fn main() {
         grain_of_region: &[DVec3::Y],
         middle: DVec3::ZERO,
     };
-    let looks = diagnose::looks(&stage, &radar, &chirps).expect("chirps that meet the target");
-    stage.middle = effects::middle(&looks);
+    let shots =
+        diagnose::trace_shots(&stage, &radar, &chirps).expect("chirps that meet the target");
+    stage.middle = effects::middle(&shots);
     let drift = effects::find("drift").expect("the effect");
     let json = std::env::args().any(|argument| argument == "json");
     if !json {
-        println!("{} chirps, {} of them on the target", chirps.rays.len(), looks.len());
+        println!("{} chirps, {} of them on the target", chirps.rays.len(), shots.len());
     }
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
@@ -52,7 +53,7 @@ fn main() {
             for turn in 0..TURNS {
                 let change = turn as f64 / TURNS as f64;
                 let predict = |m: f64, drift_db: f64| {
-                    model(m, drift, drift_db).predict_with(&stage, &looks, &kept)
+                    model(m, drift, drift_db).predict_with(&stage, &shots, &kept)
                 };
                 let ways: [&dyn Fn(); 4] = [
                     &|| drop(black_box(Tracer::Pinhole.closest(&bvh, &chirps.rays))),
@@ -71,7 +72,7 @@ fn main() {
             println!(
                 "{}",
                 serde_json::json!({
-                    "threads": threads, "chirps": chirps.rays.len(), "looks": looks.len(),
+                    "threads": threads, "chirps": chirps.rays.len(), "looks": shots.len(),
                     "traced": traced, "same": same, "law": law, "effect": effect,
                 })
             );

@@ -97,9 +97,9 @@ impl Bench {
             grain_of_region: &grains,
             middle: DVec3::ZERO,
         };
-        let looks = diagnose::looks(&stage, radar, &self.scene.chirps).unwrap();
-        stage.middle = middle(&looks);
-        then(&stage, &looks)
+        let shots = diagnose::trace_shots(&stage, radar, &self.scene.chirps).unwrap();
+        stage.middle = middle(&shots);
+        then(&stage, &shots)
     }
 
     fn model<'a>(&self, effects: &'a SceneEffects) -> Model<'a> {
@@ -138,13 +138,13 @@ fn one(name: &str, values: &[f64]) -> SceneEffects {
 fn agrees(bench: &Bench, effects: &SceneEffects, case: &str) -> usize {
     let model = bench.model(effects);
     let echoes = bench.render(&model, 1).unwrap();
-    bench.with_stage(|stage, looks| {
-        let predicted = model.predict(stage, looks);
+    bench.with_stage(|stage, shots| {
+        let predicted = model.predict(stage, shots);
         let mut missed = 0;
-        for ((number, look), arrived) in looks.iter().enumerate().zip(&predicted.arrived) {
-            let echo = echoes.iter().find(|echo| echo.chirp == look.chirp);
+        for ((number, shot), arrived) in shots.iter().enumerate().zip(&predicted.arrived) {
+            let echo = echoes.iter().find(|echo| echo.chirp == shot.chirp);
             let (Some(arrived), Some(echo)) = (arrived, echo) else {
-                assert!(arrived.is_none() && echo.is_none(), "{case}, chirp {}", look.chirp);
+                assert!(arrived.is_none() && echo.is_none(), "{case}, chirp {}", shot.chirp);
                 missed += 1;
                 continue;
             };
@@ -153,7 +153,7 @@ fn agrees(bench: &Bench, effects: &SceneEffects, case: &str) -> usize {
             assert!(off_db < POWER_DB || echo.power_dbm == power_dbm, "{case}: {off_db} dB");
             assert!((echo.range_m - arrived.range_m).abs() < RANGE_M, "{case}: {echo:?}");
         }
-        looks.len() - missed
+        shots.len() - missed
     })
 }
 
@@ -168,7 +168,7 @@ fn every_effect_changes_every_echo_as_its_model_predicts() {
         if ["speckle", "noise-floor", "angle-error"].contains(&effect.name()) {
             continue;
         }
-        let starts = bench.with_stage(|stage, looks| effect.starts(stage, looks));
+        let starts = bench.with_stage(|stage, shots| effect.starts(stage, shots));
         let mut felt = 0;
         for start in starts {
             // A search may begin from nothing; a step from there is an effect.
@@ -178,7 +178,7 @@ fn every_effect_changes_every_echo_as_its_model_predicts() {
             let values: Vec<f64> = start.iter().zip(knobs).map(|(v, k)| v + step(k)).collect();
             let case = format!("{} at {values:?}", effect.name());
             let effects = one(effect.name(), &values);
-            assert!(agrees(&bench, &effects, &case) > 300, "{case}: few looks are left");
+            assert!(agrees(&bench, &effects, &case) > 300, "{case}: few shots are left");
             felt += usize::from(bench.render(&bench.model(&effects), 1).unwrap() != bare);
         }
         assert!(felt > 0, "{} changes nothing here", effect.name());
@@ -322,13 +322,13 @@ fn tilts_that_vary_scatter_the_power_where_the_curve_is_steep() {
     let sd_deg = 0.5;
     let effects = one("angle-error", &[sd_deg]);
     let model = bench.model(&effects);
-    let predicted = bench.with_stage(|stage, looks| model.predict(stage, looks));
+    let predicted = bench.with_stage(|stage, shots| model.predict(stage, shots));
     let (bare, with) = (bench.bare(), bench.render(&model, 1).unwrap());
     let shift = |(with, bare): (&Echo, &Echo)| {
         (with.power_dbm - bare.power_dbm) / 10.0 * std::f64::consts::LN_10
     };
     let shifts: Vec<f64> = std::iter::zip(&with, &bare).map(shift).collect();
-    let spread = |look: usize| predicted.tilt_spread(look).powi(2);
+    let spread = |shot: usize| predicted.tilt_spread(shot).powi(2);
     let expected = (0..shifts.len()).map(spread).sum::<f64>() / shifts.len() as f64;
     let [mean, variance] = moments(&shifts);
     // The deviation of a variance over 10 000 draws is 1.4 %, and second order adds about as much.

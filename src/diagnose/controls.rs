@@ -1,7 +1,7 @@
 //! What an answer is to be held against: terms that mean nothing and gain something all the same, and the
 //! size from which each effect is found again in drawn data.
 //!
-//! These are a sample of the looks, so that the size has the scatter of one drawn scan.
+//! These are a sample of the shots, so that the size has the scatter of one drawn scan.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -10,11 +10,11 @@ use super::covariates::covariates;
 use super::field::Field;
 use super::folds::Folds;
 use super::likelihood::Declared;
-use super::looks::Observation;
 use super::placebo::Placebo;
 use super::refit::{Problem, Space};
 use super::screen::Screen;
 use super::select::{SCOUT, Selection, State, larger, sizes_db};
+use super::shots::Observation;
 use super::{Control, Controls, Diagnosis, Power};
 use crate::effects::{Effect, Prediction, Traced};
 use crate::radar::random::{Key, Purpose};
@@ -53,13 +53,13 @@ fn placebo(selection: &Selection, base: &State, numbers: usize) -> Option<Contro
 fn spline(selection: &Selection, base: &State, numbers: usize) -> Option<Control> {
     let problem = &selection.problem;
     let prediction = problem.predict(&base.space, &base.fitted.at);
-    let mut all = covariates(problem.looks, &prediction, problem.observations);
+    let mut all = covariates(problem.shots, &prediction, problem.observations);
     let laws = selection.problem.mean_slopes(&base.space, &base.fitted.at);
     let mut best: Option<Control> = None;
     for covariate in &mut all {
         // One number more than these is the level, which the laws absorb.
         covariate.cells = numbers.max(1);
-        let field = Field::spline(problem.looks, std::slice::from_ref(covariate));
+        let field = Field::spline(problem.shots, std::slice::from_ref(covariate));
         let structure = field.structure(problem, &prediction, &laws, selection.folds);
         let [held_out_gain, held_out_se] = structure.gain;
         if best.as_ref().is_none_or(|best| held_out_gain > best.held_out_gain) {
@@ -77,7 +77,7 @@ fn powers(selection: &Selection, base: &State, effects: &[&dyn Effect]) -> Vec<P
     let sample = selection.sample;
     let problem = sample.problem(&selection.problem);
     let Diagnosis { block_m, folds, seed, .. } = *selection.settings;
-    let folds = &Folds::new(problem.looks, block_m, folds, seed);
+    let folds = &Folds::new(problem.shots, block_m, folds, seed);
     let power = |effect: &&dyn Effect| {
         // What was traced for one effect is of no use to another.
         let traced = &Traced::default();
@@ -87,7 +87,7 @@ fn powers(selection: &Selection, base: &State, effects: &[&dyn Effect]) -> Vec<P
     effects.par_iter().map(power).collect()
 }
 
-/// Where effects are put in and looked for: a sample of the looks, each of which stands for several.
+/// Where effects are put in and looked for: a sample of the shots, each of which stands for several.
 struct Bench<'a> {
     problem: Problem<'a>,
     folds: &'a Folds,
@@ -108,7 +108,7 @@ struct Search {
 impl Bench<'_> {
     fn power(&self, effect: &dyn Effect) -> Power {
         let rungs = self.rungs(effect);
-        let tried = effect.starts(self.problem.stage, self.problem.looks).len();
+        let tried = effect.starts(self.problem.stage, self.problem.shots).len();
         // What is found is found when stronger, too.
         let (mut missed, mut found): (Vec<f64>, Option<f64>) = (Vec::new(), None);
         let mut open: &[Rung] = &rungs;
@@ -133,7 +133,7 @@ impl Bench<'_> {
         let Bench { problem, base, selection, .. } = self;
         let space = base.space.with(effect);
         let screen = Screen::new(*problem, &base.space, &base.fitted.at);
-        let starts = effect.starts(problem.stage, problem.looks);
+        let starts = effect.starts(problem.stage, problem.shots);
         let every = starts.len().div_ceil(MOST_STARTS).max(1);
         let starts: Vec<Vec<f64>> = starts.into_iter().step_by(every).collect();
         let joined = |values: &Vec<f64>| Space::joined(&base.fitted.at, effect, values);
@@ -185,7 +185,7 @@ impl Bench<'_> {
         let before = problem.fit(bare, &fitted.at, &[], &SCOUT);
         let after = problem.fit(&with, at, &[], &SCOUT);
         let Selection { sample, settings, hear, .. } = *self.selection;
-        // So many looks as the scan has, of which each of these stands for several.
+        // So many shots as the scan has, of which each of these stands for several.
         let gain = sample.weight * (after.ln_likelihood - before.ln_likelihood);
         let predicted = [(bare, &before.at), (&with, &after.at)];
         let [now, then] = predicted.map(|(space, at)| problem.predict(space, at));
@@ -204,13 +204,13 @@ impl Bench<'_> {
     /// Data as a prediction draws them.
     fn drawn(&self, prediction: &Prediction) -> Vec<Observation> {
         let Declared { threshold_w, range_sd_m } = self.problem.declared;
-        let draw = |look: usize| {
+        let draw = |shot: usize| {
             let seed = self.selection.settings.seed;
-            let chirp = look as u64;
+            let chirp = shot as u64;
             let mut draws = Key { seed, chirp, sub_ray: 4, purpose: Purpose::Fit }.draws();
             let mut left = draws.uniform();
             let mut tilted_w = 0.0;
-            for (power_w, weight) in prediction.powers_w(look) {
+            for (power_w, weight) in prediction.powers_w(shot) {
                 if left >= 0.0 {
                     tilted_w = power_w;
                 }
@@ -219,7 +219,7 @@ impl Bench<'_> {
             let mean_w = tilted_w + prediction.receiver.noise_w;
             let drawn_w = mean_w * draws.gamma(prediction.receiver.looks);
             let power_w = prediction.saturating.passed_w(mean_w, drawn_w);
-            let arrived = prediction.arrived.get(look).copied().flatten();
+            let arrived = prediction.arrived.get(shot).copied().flatten();
             let range_m = arrived
                 .map(|a| a.range_m + range_sd_m.hypot(a.spread_m) * draws.gaussian())
                 .filter(|_| range_sd_m > 0.0);
@@ -228,7 +228,7 @@ impl Bench<'_> {
                 false => Observation::default(),
             }
         };
-        (0..self.problem.looks.len()).map(draw).collect()
+        (0..self.problem.shots.len()).map(draw).collect()
     }
 }
 

@@ -21,10 +21,10 @@ const MAP_CELL_M: f64 = 0.08;
 const SIZES: [f64; 3] = [0.03, 0.1, 0.4];
 const STEPS: usize = 3;
 
-/// A field's numbers at one look: which, and with which weight.
+/// A field's numbers at one shot: which, and with which weight.
 type Entry = Vec<(usize, f64)>;
 
-/// A design over the looks of a scan.
+/// A design over the shots of a scan.
 pub(super) struct Field {
     entries: Vec<Entry>,
     /// Name of what a number goes over.
@@ -33,7 +33,7 @@ pub(super) struct Field {
 
 /// What the field finds.
 pub(super) struct Structure {
-    /// ln factor on the mean of every look, by a field that has not seen its fold.
+    /// ln factor on the mean of every shot, by a field that has not seen its fold.
     pub ln_factor: Vec<f64>,
     /// Gain in held-out ln p, and its standard error.
     pub gain: [f64; 2],
@@ -47,15 +47,15 @@ pub(super) struct Structure {
 
 impl Field {
     /// Over these covariates and the target plane.
-    pub fn new(looks: &[Shot], covariates: &[Covariate]) -> Field {
-        let mut field = Field::spline(looks, covariates);
-        field.add_map(looks);
+    pub fn new(shots: &[Shot], covariates: &[Covariate]) -> Field {
+        let mut field = Field::spline(shots, covariates);
+        field.add_map(shots);
         field
     }
 
     /// Over these covariates alone.
-    pub fn spline(looks: &[Shot], covariates: &[Covariate]) -> Field {
-        let mut field = Field { entries: vec![Vec::new(); looks.len()], names: Vec::new() };
+    pub fn spline(shots: &[Shot], covariates: &[Covariate]) -> Field {
+        let mut field = Field { entries: vec![Vec::new(); shots.len()], names: Vec::new() };
         for covariate in covariates {
             let knots = quantiles(&covariate.values, covariate.cells);
             let first = field.names.len();
@@ -68,10 +68,10 @@ impl Field {
         field
     }
 
-    fn add_map(&mut self, looks: &[Shot]) {
+    fn add_map(&mut self, shots: &[Shot]) {
         let mut corners = std::collections::BTreeMap::new();
-        for (entry, look) in self.entries.iter_mut().zip(looks) {
-            let [x, y] = [look.xt_m, look.yt_m].map(|x| x / MAP_CELL_M);
+        for (entry, shot) in self.entries.iter_mut().zip(shots) {
+            let [x, y] = [shot.xt_m, shot.yt_m].map(|x| x / MAP_CELL_M);
             let [i, j] = [x, y].map(f64::floor);
             for (di, dj) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
                 let weight = (1.0 - (x - i - di).abs()) * (1.0 - (y - j - dj).abs());
@@ -97,11 +97,11 @@ impl Field {
         let at_size = |size: f64| {
             let mut ln_factor = vec![0.0; self.entries.len()];
             for fold in 0..folds.folds {
-                let used = |look: usize| folds.fold.get(look) != Some(&fold);
+                let used = |shot: usize| folds.fold.get(shot) != Some(&fold);
                 let numbers = self.fit(problem, prediction, laws, size, &used);
-                for (look, factor) in ln_factor.iter_mut().enumerate() {
-                    if !used(look) {
-                        *factor = self.ln_factor(&numbers, laws, look);
+                for (shot, factor) in ln_factor.iter_mut().enumerate() {
+                    if !used(shot) {
+                        *factor = self.ln_factor(&numbers, laws, shot);
                     }
                 }
             }
@@ -113,23 +113,23 @@ impl Field {
         let (size, gain, ln_factor) = best.unwrap_or_default();
         let numbers = self.fit(problem, prediction, laws, size, &|_| true);
         let detected: Vec<usize> = (0..self.entries.len())
-            .filter(|look| problem.observations.get(*look).is_some_and(|o| o.power_w.is_some()))
+            .filter(|shot| problem.observations.get(*shot).is_some_and(|o| o.power_w.is_some()))
             .collect();
         let rms_db = |part: &dyn Fn(usize) -> f64| {
             // As it is seen: what a receiver does not pass counts for nothing.
             let seen =
-                |look: usize| part(look) * prediction.saturating.passes(prediction.mean_w(look));
-            let sum: f64 = detected.iter().map(|look| seen(*look).powi(2)).sum();
+                |shot: usize| part(shot) * prediction.saturating.passes(prediction.mean_w(shot));
+            let sum: f64 = detected.iter().map(|shot| seen(*shot).powi(2)).sum();
             DB * (sum / detected.len().max(1) as f64).sqrt()
         };
         let mut names = self.names.clone();
         names.dedup();
-        let part = |name: &&'static str| (*name, rms_db(&|look| self.part(&numbers, name, look)));
+        let part = |name: &&'static str| (*name, rms_db(&|shot| self.part(&numbers, name, shot)));
         let mut parts_db: Vec<(&'static str, f64)> = names.iter().map(part).collect();
         parts_db.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let size_db = rms_db(&|look| ln_factor.get(look).copied().unwrap_or(0.0));
+        let size_db = rms_db(&|shot| ln_factor.get(shot).copied().unwrap_or(0.0));
         let factors: Vec<f64> =
-            (0..self.entries.len()).map(|look| self.ln_factor(&numbers, laws, look)).collect();
+            (0..self.entries.len()).map(|shot| self.ln_factor(&numbers, laws, shot)).collect();
         let there = terms(problem, prediction, &factors);
         let fitted_gain = there.iter().zip(&here).map(|(a, b)| a.ln_p - b.ln_p).sum();
         Structure { size_db, ln_factor, gain, fitted_gain, parts_db }
@@ -148,17 +148,17 @@ impl Field {
         let mut numbers = DVector::zeros(count);
         // A receiver that saturates passes less of a change.
         let passes: Vec<f64> = (0..self.entries.len())
-            .map(|look| prediction.saturating.passes(prediction.mean_w(look)))
+            .map(|shot| prediction.saturating.passes(prediction.mean_w(shot)))
             .collect();
         for _ in 0..STEPS {
             let factors: Vec<f64> =
-                (0..self.entries.len()).map(|look| self.ln_factor(&numbers, laws, look)).collect();
+                (0..self.entries.len()).map(|shot| self.ln_factor(&numbers, laws, shot)).collect();
             let terms = terms(problem, prediction, &factors);
             let mut curvature = DMatrix::zeros(count, count);
             let mut downhill = DVector::zeros(count);
-            for (look, term) in terms.iter().enumerate().filter(|(look, _)| used(*look)) {
-                let mut row = self.row(laws, look);
-                row.iter_mut().for_each(|(_, a)| *a *= passes[look]);
+            for (shot, term) in terms.iter().enumerate().filter(|(shot, _)| used(*shot)) {
+                let mut row = self.row(laws, shot);
+                row.iter_mut().for_each(|(_, a)| *a *= passes[shot]);
                 for &(i, a) in &row {
                     downhill[i] += a * term.slope;
                     for &(j, b) in row.iter().filter(|(j, _)| *j <= i) {
@@ -181,29 +181,29 @@ impl Field {
         numbers
     }
 
-    fn row(&self, laws: &[Vec<f64>], look: usize) -> Entry {
-        let mut row = self.entries.get(look).cloned().unwrap_or_default();
+    fn row(&self, laws: &[Vec<f64>], shot: usize) -> Entry {
+        let mut row = self.entries.get(shot).cloned().unwrap_or_default();
         let first = self.names.len();
         let of_laws = laws
             .iter()
             .enumerate()
-            .filter_map(|(k, slopes)| slopes.get(look).map(|slope| (first + k, *slope)));
+            .filter_map(|(k, slopes)| slopes.get(shot).map(|slope| (first + k, *slope)));
         row.extend(of_laws.filter(|(_, slope)| *slope != 0.0));
         row
     }
 
-    fn ln_factor(&self, numbers: &DVector<f64>, laws: &[Vec<f64>], look: usize) -> f64 {
+    fn ln_factor(&self, numbers: &DVector<f64>, laws: &[Vec<f64>], shot: usize) -> f64 {
         // Beyond this the mean is no longer a small change of the model's.
-        self.row(laws, look).iter().map(|(i, a)| a * numbers[*i]).sum::<f64>().clamp(-3.0, 3.0)
+        self.row(laws, shot).iter().map(|(i, a)| a * numbers[*i]).sum::<f64>().clamp(-3.0, 3.0)
     }
 
-    fn part(&self, numbers: &DVector<f64>, name: &str, look: usize) -> f64 {
-        let entry = self.entries.get(look).into_iter().flatten();
+    fn part(&self, numbers: &DVector<f64>, name: &str, shot: usize) -> f64 {
+        let entry = self.entries.get(shot).into_iter().flatten();
         entry.filter(|(i, _)| self.names[*i] == name).map(|(i, a)| a * numbers[*i]).sum()
     }
 }
 
-/// With factors on the mean powers of the first looks, of which the logarithms are given.
+/// With factors on the mean powers of the first shots, of which the logarithms are given.
 pub(super) fn scaled(mut prediction: Prediction, ln_factor: &[f64]) -> Prediction {
     for (arrived, ln_factor) in prediction.arrived.iter_mut().zip(ln_factor) {
         if let Some(arrived) = arrived {
@@ -213,12 +213,12 @@ pub(super) fn scaled(mut prediction: Prediction, ln_factor: &[f64]) -> Predictio
     prediction
 }
 
-/// Every look's part of the likelihood with factors on the means.
+/// Every shot's part of the likelihood with factors on the means.
 pub(super) fn terms(problem: &Problem, prediction: &Prediction, ln_factor: &[f64]) -> Vec<Term> {
     let prediction = scaled(prediction.clone(), ln_factor);
     let likelihood = Likelihood::new(&prediction, problem.declared);
     let seen = problem.observations.iter().enumerate();
-    seen.map(|(look, seen)| likelihood.term(look, seen)).collect()
+    seen.map(|(shot, seen)| likelihood.term(shot, seen)).collect()
 }
 
 /// The two knots about a value and the share of each.

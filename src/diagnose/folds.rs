@@ -10,50 +10,50 @@ use crate::fit::held_out::deal;
 /// A scan in patches, and the patches in folds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Folds {
-    /// Patch of every look.
+    /// Patch of every shot.
     pub block: Vec<usize>,
-    /// Fold of every look.
+    /// Fold of every shot.
     pub fold: Vec<usize>,
     /// Number of patches.
     pub blocks: usize,
     /// Number of folds.
     pub folds: usize,
-    /// Smaller patch of every look, a third as wide, and how many of them there are.
+    /// Smaller patch of every shot, a third as wide, and how many of them there are.
     cell: Vec<usize>,
     cells: usize,
 }
 
 impl Folds {
-    /// Square patches of side `block_m`, m, dealt out to `folds` folds of about equal numbers of looks.
-    pub fn new(looks: &[Shot], block_m: f64, folds: usize, seed: u64) -> Folds {
+    /// Square patches of side `block_m`, m, dealt out to `folds` folds of about equal numbers of shots.
+    pub fn new(shots: &[Shot], block_m: f64, folds: usize, seed: u64) -> Folds {
         let folds = folds.max(2);
         let cell =
-            |look: &Shot| [look.yt_m, look.xt_m].map(|x| (x / block_m.max(1e-6)).floor() as i64);
+            |shot: &Shot| [shot.yt_m, shot.xt_m].map(|x| (x / block_m.max(1e-6)).floor() as i64);
         let mut members: BTreeMap<[i64; 2], Vec<usize>> = BTreeMap::new();
-        for (index, look) in looks.iter().enumerate() {
-            members.entry(cell(look)).or_default().push(index);
+        for (index, shot) in shots.iter().enumerate() {
+            members.entry(cell(shot)).or_default().push(index);
         }
         let members: Vec<Vec<usize>> = members.into_values().collect();
         let sizes: Vec<usize> = members.iter().map(Vec::len).collect();
         let fold_of_block = deal(&sizes, folds, seed);
-        let (mut block, mut fold) = (vec![0; looks.len()], vec![0; looks.len()]);
+        let (mut block, mut fold) = (vec![0; shots.len()], vec![0; shots.len()]);
         for (number, (indices, fold_of_block)) in members.iter().zip(fold_of_block).enumerate() {
             for &index in indices {
                 (block[index], fold[index]) = (number, fold_of_block);
             }
         }
         let mut numbers = BTreeMap::new();
-        let numbered = |look: &Shot| {
+        let numbered = |shot: &Shot| {
             let side_m = block_m.max(1e-6) / 3.0;
-            let place = [look.yt_m, look.xt_m].map(|x| (x / side_m).floor() as i64);
+            let place = [shot.yt_m, shot.xt_m].map(|x| (x / side_m).floor() as i64);
             let next = numbers.len();
             *numbers.entry(place).or_insert(next)
         };
-        let cell = looks.iter().map(numbered).collect();
+        let cell = shots.iter().map(numbered).collect();
         Folds { block, fold, blocks: members.len(), folds, cell, cells: numbers.len() }
     }
 
-    /// Sum and its standard error over patches of one number for each look. The patches are smaller
+    /// Sum and its standard error over patches of one number for each shot. The patches are smaller
     /// than those of the folds, or a local effect would lie in one and have no standard error.
     pub fn sum(&self, values: &[f64]) -> [f64; 2] {
         let mut sums = vec![0.0; self.cells];

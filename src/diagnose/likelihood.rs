@@ -9,13 +9,13 @@
 use crate::effects::{Arrived, Prediction};
 use crate::fit::gamma_law::{GammaLaw, LnProbability};
 
-use super::looks::Observation;
+use super::shots::Observation;
 
 /// Share of chirps that no model explains.
 const OUTLIERS: f64 = 1e-4;
 /// Their density in ln power, as wide as 60 dB.
 const OUTLIER_DENSITY: f64 = 1.0 / 13.8;
-/// Standard deviations of the score of a look that count at most where a start is sought.
+/// Standard deviations of the score of a shot that count at most where a start is sought.
 const MOST_PULL: f64 = 4.0;
 /// Share of ranges that no model explains, and how much wider than the rest these are at least.
 const STRAY_RANGES: f64 = 0.01;
@@ -75,24 +75,24 @@ impl<'a> Likelihood<'a> {
         Likelihood { prediction, declared, law: GammaLaw::new(prediction.receiver.looks) }
     }
 
-    /// ln of the mean power of a look with thermal noise, and its weight, for every tilt.
-    pub fn ln_means(&self, look: usize) -> impl Iterator<Item = (f64, f64)> {
+    /// ln of the mean power of a shot with thermal noise, and its weight, for every tilt.
+    pub fn ln_means(&self, shot: usize) -> impl Iterator<Item = (f64, f64)> {
         let floor_w = NOTHING * self.declared.threshold_w;
         let noise_w = self.prediction.receiver.noise_w;
-        let powers = self.prediction.powers_w(look);
+        let powers = self.prediction.powers_w(shot);
         powers.map(move |(power_w, weight)| ((power_w + noise_w).max(floor_w).ln(), weight))
     }
 
     /// ln of the mean over all tilts.
-    fn ln_mean(&self, look: usize) -> f64 {
-        self.prediction.mean_w(look).max(NOTHING * self.declared.threshold_w).ln()
+    fn ln_mean(&self, shot: usize) -> f64 {
+        self.prediction.mean_w(shot).max(NOTHING * self.declared.threshold_w).ln()
     }
 
     /// One chirp's part of the likelihood.
-    pub fn term(&self, look: usize, seen: &Observation) -> Term {
+    pub fn term(&self, shot: usize, seen: &Observation) -> Term {
         let ln_seen = seen.power_w.unwrap_or(self.declared.threshold_w).ln();
         let (mut p, mut slope, mut bend, mut pull) = (0.0, 0.0, 0.0, 0.0);
-        for (ln_mean, weight) in self.ln_means(look) {
+        for (ln_mean, weight) in self.ln_means(shot) {
             let law = match seen.power_w {
                 Some(_) => self.detected(ln_seen, ln_mean),
                 None => self.limited(ln_seen, ln_mean),
@@ -107,9 +107,9 @@ impl<'a> Likelihood<'a> {
         let most = MOST_PULL * self.prediction.receiver.looks.sqrt();
         let pull = pull.clamp(-most, most);
         p += OUTLIERS * anything;
-        let ln_mean = self.ln_mean(look);
+        let ln_mean = self.ln_mean(shot);
         let lost = self.entered(ln_mean, ln_seen).0 - ln_seen;
-        let arrived = self.prediction.arrived.get(look).copied().flatten();
+        let arrived = self.prediction.arrived.get(shot).copied().flatten();
         let range_m = arrived.map_or(0.0, |arrived| arrived.range_m);
         let ranged = arrived.and_then(|arrived| self.range(&arrived, seen));
         let [ln_range, range_slope, range_bend] = ranged.unwrap_or_default();
@@ -125,12 +125,12 @@ impl<'a> Likelihood<'a> {
         }
     }
 
-    /// Probability that the power of a look stays below a level, W.
-    pub fn below(&self, look: usize, level_w: f64) -> f64 {
+    /// Probability that the power of a shot stays below a level, W.
+    pub fn below(&self, shot: usize, level_w: f64) -> f64 {
         let part = |(ln_mean, weight): (f64, f64)| {
             weight * self.limited(level_w.ln(), ln_mean).value.exp()
         };
-        self.ln_means(look).map(part).sum()
+        self.ln_means(shot).map(part).sum()
     }
 
     /// Probability that a power of this mean is detected.

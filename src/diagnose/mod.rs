@@ -3,7 +3,7 @@
 //!
 //! The observation model comes first (`likelihood.rs`): speckle, thermal noise, and chirps that should
 //! have been detected and were not. The base laws are refitted, so that "before" is the best that can
-//! be had without the effect. A score test screens the library on a sample of the looks; the best few are
+//! be had without the effect. A score test screens the library on a sample of the shots; the best few are
 //! fitted with the base and must predict patches of the scan that took no part in their fit. When none
 //! is left that does, effects that the others made superfluous are taken away, and what remains is
 //! looked at: by a smooth field over every covariate, by what neighbours have in common, by the
@@ -11,7 +11,7 @@
 //!
 //! | step | file |
 //! |---|---|
-//! | every chirp against the target, the cloud against the chirps | `looks.rs` |
+//! | every chirp against the target, the cloud against the chirps | `shots.rs` |
 //! | probability of what was seen | `likelihood.rs` |
 //! | base and effects together | `refit.rs` |
 //! | what an effect promises | `screen.rs` |
@@ -28,7 +28,7 @@ mod exchange;
 mod field;
 mod folds;
 mod likelihood;
-mod looks;
+mod shots;
 mod placebo;
 mod ranges;
 mod refit;
@@ -53,8 +53,7 @@ use crate::units::dbm_from_watts;
 
 pub use folds::Folds;
 pub use likelihood::Declared;
-pub use looks::{Matched, Observation, Stray, looks, matched};
-pub(crate) use refit::LEAST_LOOKS;
+pub(crate) use refit::LEAST_SHOTS;
 pub use report::{
     Base, BaseValue, BeforeAfter, Control, Controls, Evidence, Found, MeshPose, Parameters, Power,
     Report, Row, Triple, Value, Verdict,
@@ -62,6 +61,7 @@ pub use report::{
 pub use residual::Unexplained;
 pub use score::Errors;
 pub use select::Candidate;
+pub use shots::{CloudMatch, Observation, Stray, match_cloud, trace_shots};
 
 use covariates::covariates;
 use refit::{Problem, Space};
@@ -152,10 +152,10 @@ pub struct Subject<'a> {
     /// Threshold and range error.
     pub declared: Declared,
     /// Every chirp that meets the target.
-    pub looks: &'a [Shot],
+    pub shots: &'a [Shot],
     /// What each of them saw.
     pub observations: &'a [Observation],
-    /// Detections that are no look's.
+    /// Detections that are no shot's.
     pub strays: &'a [Stray],
     /// Where the meshes stand, to be told in the report.
     pub pose: &'a [MeshPose],
@@ -267,14 +267,14 @@ pub enum DiagnoseError {
     },
     /// A law that fits nowhere.
     #[error(
-        "the refitted model is far off at {wild} of {looks} chirps, as for another target or power \
+        "the refitted model is far off at {wild} of {shots} chirps, as for another target or power \
          balance; check mesh, pose and radar of the scene, or register the cloud with `matdb measure`"
     )]
     Unlike {
         /// Chirps beyond 4.5 standard deviations.
         wild: usize,
         /// Chirps that meet the target.
-        looks: usize,
+        shots: usize,
     },
     /// Too little was detected.
     #[error(
@@ -287,22 +287,22 @@ pub enum DiagnoseError {
     },
     /// The target is too small for held-out patches.
     #[error(
-        "the looks fill {blocks} patches and {LEAST_BLOCKS} are needed; scan a larger part of the target, \
+        "the chirps on the target fill {blocks} patches and {LEAST_BLOCKS} are needed; scan a larger part of the target, \
          or a larger target"
     )]
     TooSmall {
         /// Patches.
         blocks: usize,
     },
-    /// As many observations as looks are needed.
+    /// As many observations as shots are needed.
     #[error(
-        "{observations} observations are not one for each of {looks} looks; match the cloud again"
+        "{observations} observations are not one for each of {shots} chirps on the target; match the cloud again"
     )]
     Unmatched {
         /// Observations.
         observations: usize,
-        /// Looks.
-        looks: usize,
+        /// Shots.
+        shots: usize,
     },
     /// No law of speckle.
     #[error("{looks} looks of speckle give no likelihood; declare between 0.1 and 10000")]
@@ -338,11 +338,11 @@ impl Diagnosis {
         hear: &(dyn Fn(&str) + Sync),
     ) -> Result<Report, DiagnoseError> {
         let Subject { stage, laws, at_work, receiver, declared, .. } = *subject;
-        let Subject { looks, observations, strays, .. } = *subject;
-        let folds = Folds::new(looks, self.block_m, self.folds, self.seed);
+        let Subject { shots, observations, strays, .. } = *subject;
+        let folds = Folds::new(shots, self.block_m, self.folds, self.seed);
         check(subject, &folds)?;
         let traced = &Traced::default();
-        let problem = Problem { stage, looks, observations, declared, receiver, traced };
+        let problem = Problem { stage, shots, observations, declared, receiver, traced };
         let sample = &Sample::new(&problem);
         let selection = Selection { problem, sample, folds: &folds, settings: self, hear };
         hear("refitting the base laws");
@@ -351,16 +351,16 @@ impl Diagnosis {
         // Whether the target is another one is judged with much speckle: to find that there is some is
         // the task of an effect.
         let wide = Problem { receiver: select::wide(receiver), ..problem };
-        let (wild, all) = (residual::wild(&self.z(&wide, &base)), looks.len());
+        let (wild, all) = (residual::wild(&self.z(&wide, &base)), shots.len());
         if wild as f64 > MOST_WILD * all as f64 {
-            return Err(DiagnoseError::Unlike { wild, looks: all });
+            return Err(DiagnoseError::Unlike { wild, shots: all });
         }
         let Selected { state, ranking, added, structure } = selection.run(base.clone(), effects);
         let model = state.space.model(receiver, &state.fitted.at);
         // Those past the edge were let in for the sake of a wide spot, which may not have been found.
         let off = strays.iter().filter(|stray| !stray.is_on_target(&model, stage)).count();
         let points = strays.len() + observations.iter().filter(|o| o.power_w.is_some()).count();
-        if off as f64 > looks::MOST_STRAYS * points as f64 {
+        if off as f64 > shots::MOST_STRAYS * points as f64 {
             return Err(DiagnoseError::Elsewhere { matched: points - off, points });
         }
         let after = score::errors(&state.held_out, &folds);
@@ -375,10 +375,10 @@ impl Diagnosis {
         let z_after = self.z(&problem, &state);
         let prediction = problem.predict(&state.space, &state.fitted.at);
         let largest_db = Largest::of(&added).size_db;
-        let covariates = covariates(looks, &prediction, observations);
+        let covariates = covariates(shots, &prediction, observations);
         hear("testing what is left");
         let mut unexplained =
-            self.tests(largest_db).run(&z_after, looks, &prediction, &covariates, &folds);
+            self.tests(largest_db).run(&z_after, shots, &prediction, &covariates, &folds);
         let is_structured = selection.is_structured(&structure, largest_db);
         if is_structured {
             unexplained.extend(residual::of_field(&structure));
@@ -389,7 +389,7 @@ impl Diagnosis {
         };
         let sd_db = residual::speckle_sd_db(prediction.receiver.looks);
         let neighbours =
-            residual::of_neighbours(&z_after, looks, stage.radar.spot_diameter_m, sd_db, &folds);
+            residual::of_neighbours(&z_after, shots, stage.radar.spot_diameter_m, sd_db, &folds);
         if selection.is_shared(&neighbours, largest_db) {
             unexplained.push(neighbours);
         }
@@ -456,35 +456,35 @@ fn rows(
 ) -> Vec<Row> {
     let row = |index: usize| {
         let seen = subject.observations.get(index)?;
-        let look = subject.looks.get(index)?;
+        let shot = subject.shots.get(index)?;
         let arrived = prediction.arrived.get(index).copied().flatten();
         Some(Row {
-            chirp: look.chirp,
+            chirp: shot.chirp,
             observed_dbm: seen.power_w.map(dbm_from_watts),
             before_dbm: before.get(index)?.expected_dbm,
             after_dbm: after.get(index)?.expected_dbm,
             z_before: *z_before.get(index)?,
             z_after: *z_after.get(index)?,
             fold: *folds.fold.get(index)?,
-            theta_deg: look.hit.theta_rad().to_degrees(),
-            azimuth_deg: look.azimuth_rad.to_degrees(),
-            range_m: look.hit.range_m,
+            theta_deg: shot.hit.theta_rad().to_degrees(),
+            azimuth_deg: shot.azimuth_rad.to_degrees(),
+            range_m: shot.hit.range_m,
             range_residual_m: seen.range_m.zip(arrived).map(|(seen_m, a)| seen_m - a.range_m),
-            xt_m: look.xt_m,
-            yt_m: look.yt_m,
-            edge_m: look.edge_m,
-            time_s: look.time_s,
-            region: look.region,
+            xt_m: shot.xt_m,
+            yt_m: shot.yt_m,
+            edge_m: shot.edge_m,
+            time_s: shot.time_s,
+            region: shot.region,
             unknown_db: score::DB * ln_unknown.get(index).copied().unwrap_or(0.0),
         })
     };
-    (0..subject.looks.len()).filter_map(row).collect()
+    (0..subject.shots.len()).filter_map(row).collect()
 }
 
 fn check(subject: &Subject, folds: &Folds) -> Result<(), DiagnoseError> {
-    let (observations, looks) = (subject.observations.len(), subject.looks.len());
-    if observations != looks {
-        return Err(DiagnoseError::Unmatched { observations, looks });
+    let (observations, shots) = (subject.observations.len(), subject.shots.len());
+    if observations != shots {
+        return Err(DiagnoseError::Unmatched { observations, shots });
     }
     if !(0.1..=1e4).contains(&subject.receiver.looks) {
         return Err(DiagnoseError::Looks { looks: subject.receiver.looks });
@@ -530,7 +530,7 @@ fn values(
         let value = |((knob, value), sd): ((&Knob, f64), &f64)| {
             (knob.name, Value { value, sd: finite(sd * knob.step), unit: knob.unit })
         };
-        let parameters = Parameters::new(knobs.map(value).collect(), place, problem.looks);
+        let parameters = Parameters::new(knobs.map(value).collect(), place, problem.shots);
         let select::Added { class, evidence, .. } = added;
         Found { name: effect.name(), level: effect.level(), class, parameters, place, evidence }
     });

@@ -55,13 +55,13 @@ impl Effect for Placebo {
         "What as many free numbers gain by chance."
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![0.0; self.waves.len()]]
     }
 
-    fn gain(&self, values: &[f64], _: &Stage, look: &Shot) -> f64 {
+    fn gain(&self, values: &[f64], _: &Stage, shot: &Shot) -> f64 {
         let wave = |([phase, kx, ky], db): (&[f64; 3], &f64)| {
-            db * (phase + kx * look.xt_m + ky * look.yt_m).cos()
+            db * (phase + kx * shot.xt_m + ky * shot.yt_m).cos()
         };
         10f64.powf(0.1 * self.waves.iter().zip(values).map(wave).sum::<f64>())
     }

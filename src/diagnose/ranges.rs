@@ -8,8 +8,8 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::looks::Observation;
 use super::refit::{Problem, Space};
+use super::shots::Observation;
 use crate::effects::{Effect, Shot};
 use crate::frames::{Global, Pose};
 use crate::measure::icp::bulk_sd_m;
@@ -49,7 +49,7 @@ pub(super) fn placed(
     at
 }
 
-/// A look with a range: measured less predicted, m, and the change of the predicted one by every number, m per step.
+/// A shot with a range: measured less predicted, m, and the change of the predicted one by every number, m per step.
 struct Row {
     off_m: f64,
     by_number: Vec<f64>,
@@ -65,15 +65,15 @@ fn step(
 ) -> Option<DVector<f64>> {
     let model = space.model(problem.receiver, at);
     let values = space.effect_values(at).pop()?;
-    let row = |(look, seen): (&Shot, &Observation)| {
+    let row = |(shot, seen): (&Shot, &Observation)| {
         let range_m = seen.range_m.filter(|_| problem.declared.range_sd_m > 0.0)?;
-        let placed = model.placed(problem.stage, *look)?;
+        let placed = model.placed(problem.stage, *shot)?;
         let by_number =
             (0..values.len()).map(|number| slope(problem, effect, &values, number, &placed));
         Some(Row { off_m: range_m - placed.hit.range_m, by_number: by_number.collect() })
     };
     let rows: Vec<Row> =
-        problem.looks.par_iter().zip(problem.observations).filter_map(row).collect();
+        problem.shots.par_iter().zip(problem.observations).filter_map(row).collect();
     let sd_m = bulk_sd_m(rows.iter().map(|row| row.off_m)).max(problem.declared.range_sd_m);
     let moved = (at - start).remove_rows(0, at.len() - values.len());
     let mut normal = DMatrix::identity(values.len(), values.len()) / within.powi(2);
@@ -88,19 +88,19 @@ fn step(
     normal.cholesky().map(|cholesky| cholesky.solve(&right))
 }
 
-/// Change of the range of a look by one number, m per step: the way of the surface point that it meets, seen
+/// Change of the range of a shot by one number, m per step: the way of the surface point that it meets, seen
 /// along the ray.
 fn slope(
     problem: &Problem,
     effect: &dyn Effect,
     values: &[f64],
     number: usize,
-    look: &Shot,
+    shot: &Shot,
 ) -> f64 {
-    let motion = |values: &[f64]| effect.motion(values, problem.stage, look).unwrap_or(Pose::NONE);
+    let motion = |values: &[f64]| effect.motion(values, problem.stage, shot).unwrap_or(Pose::NONE);
     let mut moved = values.to_vec();
     moved[number] += STEP * effect.knobs()[number].step;
     let motion: Pose<Global, Global> = motion(&moved) * motion(values).inverse();
-    let way_m = (motion * look.hit.point).xyz - look.hit.point.xyz;
-    -way_m.dot(look.normal) / (STEP * look.hit.cos_theta.max(0.05))
+    let way_m = (motion * shot.hit.point).xyz - shot.hit.point.xyz;
+    -way_m.dot(shot.normal) / (STEP * shot.hit.cos_theta.max(0.05))
 }

@@ -1,6 +1,6 @@
 //! Base laws and effects, fitted together by maximum likelihood.
 //!
-//! Unknowns are the coordinates of every law that enough looks meet and the numbers of every effect in
+//! Unknowns are the coordinates of every law that enough shots meet and the numbers of every effect in
 //! units of their steps. The score of each chirp is a central difference of ln p. The curvature is
 //! Σ L·(y/μ)·g·gᵀ with g the slope of ln μ for unknowns that move means, and the scores' products for
 //! those that move only the law about the mean; the standard deviations come from the scores'
@@ -13,8 +13,8 @@ use rayon::prelude::*;
 
 use super::folds::Folds;
 use super::likelihood::{Declared, Likelihood, Term};
-use super::looks::Observation;
 use super::select::SEARCH;
+use super::shots::Observation;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Model, Prediction, Receiver, Shot, Stage, Traced, rank};
 use crate::fit::FitError;
@@ -37,18 +37,18 @@ const ALONG_AXES: [f64; 4] = [0.3, 1.0, 3.0, 10.0];
 const SMOOTH: f64 = 0.5;
 /// Times that a step which does not improve is halved.
 const HALVINGS: usize = 5;
-/// Looks that a law must have to be fitted.
-pub(crate) const LEAST_LOOKS: usize = 100;
+/// Shots that a law must have to be fitted.
+pub(crate) const LEAST_SHOTS: usize = 100;
 
 /// What was seen, and of what.
 #[derive(Clone, Copy)]
 pub(super) struct Problem<'a> {
     pub stage: &'a Stage<'a>,
-    pub looks: &'a [Shot],
+    pub shots: &'a [Shot],
     pub observations: &'a [Observation],
     pub declared: Declared,
     pub receiver: Receiver,
-    /// Of these looks.
+    /// Of these shots.
     pub traced: &'a Traced,
 }
 
@@ -74,7 +74,7 @@ pub(super) struct Fitted {
 }
 
 impl<'a> Space<'a> {
-    /// Laws of regions with few looks stay as they are.
+    /// Laws of regions with few shots stay as they are.
     pub fn new(
         problem: &Problem,
         laws: &[Brdf],
@@ -82,8 +82,8 @@ impl<'a> Space<'a> {
     ) -> Result<Space<'a>, FitError> {
         let mut turned = Vec::new();
         for (region, law) in laws.iter().enumerate() {
-            let here = |look: &&Shot| usize::from(look.region) == region;
-            if problem.looks.iter().filter(here).count() >= LEAST_LOOKS {
+            let here = |shot: &&Shot| usize::from(shot.region) == region;
+            if problem.shots.iter().filter(here).count() >= LEAST_SHOTS {
                 let looks = Some(problem.receiver.looks);
                 turned.push((region, Coordinates::new(law, &frequencies(law), &[], looks)?));
             }
@@ -261,7 +261,7 @@ impl<'a> Space<'a> {
 impl Problem<'_> {
     /// What a point predicts.
     pub fn predict(&self, space: &Space, at: &DVector<f64>) -> Prediction {
-        space.model(self.receiver, at).predict_with(self.stage, self.looks, self.traced)
+        space.model(self.receiver, at).predict_with(self.stage, self.shots, self.traced)
     }
 
     /// Every chirp's part of the likelihood at a point.
@@ -270,10 +270,10 @@ impl Problem<'_> {
     }
 
     fn terms_of(&self, model: &Model) -> Vec<Term> {
-        let prediction = model.predict_with(self.stage, self.looks, self.traced);
+        let prediction = model.predict_with(self.stage, self.shots, self.traced);
         let likelihood = Likelihood::new(&prediction, self.declared);
         let seen = self.observations.par_iter().enumerate();
-        seen.map(|(look, seen)| likelihood.term(look, seen)).collect()
+        seen.map(|(shot, seen)| likelihood.term(shot, seen)).collect()
     }
 
     /// The most likely point from a start. The unknowns numbered in `held` stay.
@@ -309,7 +309,7 @@ impl Problem<'_> {
     }
 
     /// The most likely points of fits without each fold in turn, by a full step from the most likely
-    /// point of all looks: the folds' points differ from it by about its standard deviation, over which
+    /// point of all shots: the folds' points differ from it by about its standard deviation, over which
     /// ln likelihood is a parabola. One after the other, so that what was traced for one can be asked for at once.
     pub fn fit_without(
         &self,
@@ -321,11 +321,11 @@ impl Problem<'_> {
         let terms = self.terms(space, at);
         let slopes = self.slopes(space, at, [&lower, &upper], &terms);
         let without = move |fold: usize| {
-            let used = |look: usize| folds.fold.get(look) != Some(&fold);
+            let used = |shot: usize| folds.fold.get(shot) != Some(&fold);
             let local = local(&terms, &slopes, &used);
             let bounds = [&lower, &upper];
             let ln_p = |terms: &[Term]| -> f64 {
-                let used = terms.iter().enumerate().filter(|(look, _)| used(*look));
+                let used = terms.iter().enumerate().filter(|(shot, _)| used(*shot));
                 used.map(|(_, term)| term.ln_p).sum()
             };
             let (here, mut there) = (ln_p(&terms), SEARCH.newton(at, bounds, &local));
@@ -348,9 +348,9 @@ impl Problem<'_> {
         let terms = self.terms(space, at);
         let slopes = self.slopes(space, at, [&lower, &upper], &terms);
         // What an edge passes over bends ln p without end.
-        let is_smooth = |look: usize| {
+        let is_smooth = |shot: usize| {
             let mut of_effects = slopes.iter().skip(space.base_len());
-            of_effects.all(|slopes| slopes[look].ln_mean.abs() * EFFECT_STEP < SMOOTH)
+            of_effects.all(|slopes| slopes[shot].ln_mean.abs() * EFFECT_STEP < SMOOTH)
         };
         let axes = local(&terms, &slopes, &is_smooth).curvature.symmetric_eigen();
         let mut best = (sum(&terms), None);
@@ -388,7 +388,7 @@ impl Problem<'_> {
         sd
     }
 
-    /// Slopes of every look by every unknown: forward differences for those of the laws, which are
+    /// Slopes of every shot by every unknown: forward differences for those of the laws, which are
     /// smooth, and central ones over felt steps for those of effects, which facets make rough.
     pub fn slopes(
         &self,
@@ -411,8 +411,8 @@ impl Problem<'_> {
     ) -> Vec<Vec<Slope>> {
         let shifts = |index: usize| {
             let (effect, knob) = space.knob(index)?;
-            let shift = move |look| effect.shifts(knob, look);
-            let (axis, _) = shift(self.looks.first()?)?;
+            let shift = move |shot| effect.shifts(knob, shot);
+            let (axis, _) = shift(self.shots.first()?)?;
             Some((axis, shift, effect.knobs()[knob].step))
         };
         let is_free = |index: &usize| bounds[0][*index] < bounds[1][*index];
@@ -424,12 +424,12 @@ impl Problem<'_> {
             .collect();
         let slope = |index: usize| {
             if !is_free(&index) {
-                return vec![Slope::default(); self.looks.len()];
+                return vec![Slope::default(); self.shots.len()];
             }
             if let Some((axis, shift, step)) = shifts(index) {
-                let per_unit = |look| shift(look).map_or(0.0, |(_, per_unit)| per_unit * step);
-                let slopes = self.looks.iter().zip(&by_shift[&axis]);
-                return slopes.map(|(look, slope)| slope.times(per_unit(look))).collect();
+                let per_unit = |shot| shift(shot).map_or(0.0, |(_, per_unit)| per_unit * step);
+                let slopes = self.shots.iter().zip(&by_shift[&axis]);
+                return slopes.map(|(shot, slope)| slope.times(per_unit(shot))).collect();
             }
             let ([more, less], width) = space.beside(at, bounds, index, effect_step);
             let terms = |there: &DVector<f64>| match there == at {
@@ -441,7 +441,7 @@ impl Problem<'_> {
         (0..at.len()).into_par_iter().map(slope).collect()
     }
 
-    /// Slopes of every look by a shift of the target along an axis, per m: with them those by all unknowns that
+    /// Slopes of every shot by a shift of the target along an axis, per m: with them those by all unknowns that
     /// do nothing else are known.
     fn slopes_by_shift(
         &self,
@@ -460,8 +460,8 @@ impl Problem<'_> {
         let [lower, upper] = space.bounds();
         let ln_means = |at: &DVector<f64>| -> Vec<f64> {
             let prediction = self.predict(space, at);
-            let ln_mean = |look| prediction.mean_w(look).max(f64::MIN_POSITIVE).ln();
-            (0..self.looks.len()).map(ln_mean).collect()
+            let ln_mean = |shot| prediction.mean_w(shot).max(f64::MIN_POSITIVE).ln();
+            (0..self.shots.len()).map(ln_mean).collect()
         };
         let slopes = (0..at.len()).map(|index| {
             let (ends, width) = space.beside(at, [&lower, &upper], index, EFFECT_STEP);
@@ -472,7 +472,7 @@ impl Problem<'_> {
     }
 }
 
-/// Slopes of one look by one unknown.
+/// Slopes of one shot by one unknown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Slope {
     pub ln_p: f64,
@@ -487,7 +487,7 @@ impl Slope {
     }
 }
 
-/// Slopes of all looks from their terms at two points that are so far apart; none where they are one.
+/// Slopes of all shots from their terms at two points that are so far apart; none where they are one.
 fn quotients(more: &[Term], less: &[Term], width: f64) -> Vec<Slope> {
     let per_width = if width > 0.0 { 1.0 / width } else { 0.0 };
     let difference = |(a, b): (&Term, &Term)| Slope {
@@ -503,18 +503,18 @@ pub(super) fn sum(terms: &[Term]) -> f64 {
     terms.iter().map(|term| term.ln_p).sum()
 }
 
-/// −ln likelihood near a point, by the looks that count.
+/// −ln likelihood near a point, by the shots that count.
 fn local(terms: &[Term], slopes: &[Vec<Slope>], counts: &dyn Fn(usize) -> bool) -> Local {
     let unknowns = slopes.len();
     let moves = |s: &Slope| s.ln_mean.abs() > 1e-9 || s.range_m.abs() > 1e-12;
     let moves_mean: Vec<bool> = slopes.iter().map(|s| s.iter().any(moves)).collect();
     let mut sum = Local::zero(unknowns);
     let mut rows = [vec![0.0; unknowns], vec![0.0; unknowns], vec![0.0; unknowns]];
-    for (look, term) in terms.iter().enumerate().filter(|(look, _)| counts(*look)) {
+    for (shot, term) in terms.iter().enumerate().filter(|(shot, _)| counts(*shot)) {
         sum.value -= term.ln_p;
         let [means, ranges, laws] = &mut rows;
         for (index, slopes) in slopes.iter().enumerate() {
-            let slope = slopes[look];
+            let slope = slopes[shot];
             sum.gradient[index] -= slope.ln_p;
             match moves_mean[index] {
                 true => (means[index], ranges[index]) = (slope.ln_mean, slope.range_m),

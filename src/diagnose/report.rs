@@ -69,7 +69,7 @@ impl Parameters {
     pub(super) fn new(
         numbers: BTreeMap<&'static str, Value>,
         place: Option<Place>,
-        looks: &[Shot],
+        shots: &[Shot],
     ) -> Parameters {
         let mut triples = BTreeMap::new();
         for (name, unit) in [("translation_m", "m"), ("rotation_deg", "deg")] {
@@ -80,7 +80,7 @@ impl Parameters {
                 triples.insert(name, Triple { value: [x.value, y.value, z.value], sd, unit });
             }
         }
-        if let Some((centre, extent)) = place.and_then(|place| place.on_target_m(looks)) {
+        if let Some((centre, extent)) = place.and_then(|place| place.on_target_m(shots)) {
             let told = [("centre_m", Some(centre)), ("extent_m", extent)];
             for (name, value) in told.into_iter().filter_map(|(name, at)| Some((name, at?))) {
                 triples.insert(name, Triple { value: value.to_array(), sd: None, unit: "m" });
@@ -149,7 +149,7 @@ pub struct BeforeAfter {
     pub folds: usize,
     /// Patches.
     pub blocks: usize,
-    /// Always: no look was predicted by a fit that it took part in.
+    /// Always: no shot was predicted by a fit that it took part in.
     pub held_out: bool,
 }
 
@@ -233,18 +233,18 @@ pub struct Control {
     pub held_out_se: f64,
 }
 
-/// One look, as a table of residuals has it.
+/// One shot, as a table of residuals has it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// Chirp number.
     pub chirp: u32,
     /// Received power, dBm; none where nothing was detected.
     pub observed_dbm: Option<f64>,
-    /// E[dBm | detected] of the base model, from a fit without this look's fold.
+    /// E[dBm | detected] of the base model, from a fit without this shot's fold.
     pub before_dbm: f64,
     /// The same with the effects.
     pub after_dbm: f64,
-    /// Randomised quantile residual of the base model, fitted to all looks.
+    /// Randomised quantile residual of the base model, fitted to all shots.
     pub z_before: f64,
     /// The same with the effects.
     pub z_after: f64,
@@ -268,7 +268,7 @@ pub struct Row {
     pub time_s: f64,
     /// Region, from 0.
     pub region: u16,
-    /// What a smooth field over all covariates, fitted without this look's fold, would add to the mean
+    /// What a smooth field over all covariates, fitted without this shot's fold, would add to the mean
     /// power of the final model, dB; 0 where such a field finds nothing.
     pub unknown_db: f64,
 }
@@ -298,7 +298,7 @@ pub struct Report {
     /// The laws of every region as fitted with the effects.
     #[serde(skip)]
     pub laws: Vec<Brdf>,
-    /// Every look.
+    /// Every shot.
     #[serde(skip)]
     pub rows: Vec<Row>,
 }

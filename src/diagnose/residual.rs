@@ -1,12 +1,12 @@
 //! What a model leaves: randomised quantile residuals, and tests of their scatter, of what neighbours
 //! have in common, and of outliers.
 //!
-//! A detected look has u = F(y), a censored one u uniform below F(T), and z = Φ⁻¹(u) is standard normal
+//! A detected shot has u = F(y), a censored one u uniform below F(T), and z = Φ⁻¹(u) is standard normal
 //! if the model is right (Dunn & Smyth 1996, DOI 10.1080/10618600.1996.10474708). The mean of z² − 1 is
 //! looked at as a whole and, less that, binned over each covariate; Q = Σ n·(mean)² is compared with its law under random signs of whole
-//! patches, which keeps whatever neighbouring looks share. A patch whose looks all lean to one side
+//! patches, which keeps whatever neighbouring shots share. A patch whose shots all lean to one side
 //! cannot be told so: maps are therefore of cells larger than a patch. Every strength must reach a
-//! declared size, too: with thousands of looks everything is significant. The means themselves are
+//! declared size, too: with thousands of shots everything is significant. The means themselves are
 //! looked at by `field.rs`.
 
 use std::collections::HashMap;
@@ -20,14 +20,14 @@ use super::covariates::{Covariate, quantiles};
 use super::field::Structure;
 use super::folds::Folds;
 use super::likelihood::{Declared, Likelihood};
-use super::looks::Observation;
 use super::score::DB;
+use super::shots::Observation;
 use crate::effects::{Arrived, Prediction, Shot};
 use crate::radar::random::{Key, Purpose};
 
-/// Bins of a covariate, with as many looks each.
+/// Bins of a covariate, with as many shots each.
 const BINS: usize = 12;
-/// Standard deviations beyond which a look is an outlier, the share of them that is no news, and the
+/// Standard deviations beyond which a shot is an outlier, the share of them that is no news, and the
 /// size that one of them stands for, dB.
 const OUTLYING: f64 = 4.5;
 const OUTLIERS: f64 = 1e-3;
@@ -48,7 +48,7 @@ pub struct Unexplained {
     /// What it goes with; `spread` where the scatter is another one everywhere, `spread over …` where it, and not
     /// the level, goes with something.
     pub covariate: String,
-    /// Root mean square over the looks of what goes with it, beyond chance, dB.
+    /// Root mean square over the shots of what goes with it, beyond chance, dB.
     pub strength_db: f64,
     /// Probability of so much by chance, not corrected for the number of tests.
     pub p_value: f64,
@@ -65,7 +65,7 @@ pub(super) struct Tests {
     pub least_size_db: f64,
 }
 
-/// z of every look.
+/// z of every shot.
 pub(super) fn z(
     prediction: &Prediction,
     declared: Declared,
@@ -73,11 +73,11 @@ pub(super) fn z(
     seed: u64,
 ) -> Vec<f64> {
     let likelihood = Likelihood::new(prediction, declared);
-    let one = |(look, seen): (usize, &Observation)| {
+    let one = |(shot, seen): (usize, &Observation)| {
         let level_w = seen.power_w.unwrap_or(declared.threshold_w);
-        let key = Key { seed, chirp: look as u64, sub_ray: 3, purpose: Purpose::Fit };
+        let key = Key { seed, chirp: shot as u64, sub_ray: 3, purpose: Purpose::Fit };
         let part = if seen.power_w.is_some() { 1.0 } else { key.draws().uniform() };
-        let u = part * likelihood.below(look, level_w);
+        let u = part * likelihood.below(shot, level_w);
         -std::f64::consts::SQRT_2 * erfc_inv(2.0 * u.clamp(1e-9, 1.0 - 1e-9))
     };
     observations.iter().enumerate().map(one).collect()
@@ -94,7 +94,7 @@ impl Tests {
     pub fn run(
         &self,
         z: &[f64],
-        looks: &[Shot],
+        shots: &[Shot],
         prediction: &Prediction,
         covariates: &[Covariate],
         folds: &Folds,
@@ -102,9 +102,9 @@ impl Tests {
         // A spread s times the declared one has z² of mean s²: half of the excess is that of s.
         let whole: Vec<f64> = z.iter().map(|z| z * z - 1.0).collect();
         let mean = whole.iter().sum::<f64>() / whole.len().max(1) as f64;
-        // What all looks have alike is not said of every covariate again.
+        // What all shots have alike is not said of every covariate again.
         let centred: Vec<f64> = whole.iter().map(|square| square - mean).collect();
-        let bins = self.bins(looks, covariates);
+        let bins = self.bins(shots, covariates);
         let limit = self.family_error / (bins.len() as f64).max(1.0);
         let sd_db = speckle_sd_db(prediction.receiver.looks);
         let found = bins.iter().zip(0..).filter_map(|((name, bin), number)| {
@@ -158,80 +158,80 @@ impl Tests {
         (excess, (above + 1) as f64 / (self.draws + 1) as f64)
     }
 
-    /// Bin of every look by every covariate, and one for all.
+    /// Bin of every shot by every covariate, and one for all.
     fn bins(
         &self,
-        looks: &[Shot],
+        shots: &[Shot],
         covariates: &[Covariate],
     ) -> Vec<(Option<&'static str>, Vec<usize>)> {
         let of = |c: &Covariate| (Some(c.name), quantile_bins(&c.values));
         let mut bins: Vec<_> = covariates.iter().map(of).collect();
-        bins.push((Some("map"), self.map(looks)));
-        bins.push((None, vec![0; looks.len()]));
+        bins.push((Some("map"), self.map(shots)));
+        bins.push((None, vec![0; shots.len()]));
         bins
     }
 
-    fn map(&self, looks: &[Shot]) -> Vec<usize> {
+    fn map(&self, shots: &[Shot]) -> Vec<usize> {
         let side_m = MAP_CELL * self.block_m;
-        let cell = |look: &Shot| [look.xt_m, look.yt_m].map(|x| (x / side_m).floor() as i64);
-        let mut cells: Vec<[i64; 2]> = looks.iter().map(cell).collect();
-        let of_look = cells.clone();
+        let cell = |shot: &Shot| [shot.xt_m, shot.yt_m].map(|x| (x / side_m).floor() as i64);
+        let mut cells: Vec<[i64; 2]> = shots.iter().map(cell).collect();
+        let of_shot = cells.clone();
         cells.sort_unstable();
         cells.dedup();
-        of_look.iter().map(|cell| cells.binary_search(cell).unwrap_or(0)).collect()
+        of_shot.iter().map(|cell| cells.binary_search(cell).unwrap_or(0)).collect()
     }
 }
 
-/// Bins of equal numbers of looks; equal values share a bin.
+/// Bins of equal numbers of shots; equal values share a bin.
 fn quantile_bins(values: &[f64]) -> Vec<usize> {
     let ends = quantiles(values, BINS);
     let inner = ends.get(1..ends.len().saturating_sub(1)).unwrap_or_default();
     values.iter().map(|value| inner.partition_point(|end| end <= value)).collect()
 }
 
-/// What neighbouring looks have in common, though their noise is their own: the root mean square of a
+/// What neighbouring shots have in common, though their noise is their own: the root mean square of a
 /// structure that no field needs to resolve, dB, and how often chance makes as much.
 ///
 /// Neighbours are one to two spots apart, beyond the reach of a speckle that two spots share.
 pub(super) fn of_neighbours(
     z: &[f64],
-    looks: &[Shot],
+    shots: &[Shot],
     spot_m: f64,
     sd_db: f64,
     folds: &Folds,
 ) -> Unexplained {
-    let cell = |look: &Shot| [look.xt_m, look.yt_m].map(|x| (x / (2.0 * spot_m)).floor() as i64);
+    let cell = |shot: &Shot| [shot.xt_m, shot.yt_m].map(|x| (x / (2.0 * spot_m)).floor() as i64);
     let mut members: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
-    for (index, look) in looks.iter().enumerate() {
-        members.entry(cell(look)).or_default().push(index);
+    for (index, shot) in shots.iter().enumerate() {
+        members.entry(cell(shot)).or_default().push(index);
     }
-    let shared = |(look, z_here): (&Shot, &f64)| {
-        let [i, j] = cell(look);
+    let shared = |(shot, z_here): (&Shot, &f64)| {
+        let [i, j] = cell(shot);
         let near = (-1..=1).flat_map(|di| (-1..=1).map(move |dj| [i + di, j + dj]));
         let near = near.filter_map(|at| members.get(&at)).flatten();
-        let apart_m = |other: &Shot| (other.xt_m - look.xt_m).hypot(other.yt_m - look.yt_m);
+        let apart_m = |other: &Shot| (other.xt_m - shot.xt_m).hypot(other.yt_m - shot.yt_m);
         let zs = near.filter_map(|&index| {
-            let other = looks.get(index)?;
+            let other = shots.get(index)?;
             let counts = (spot_m..2.0 * spot_m).contains(&apart_m(other));
             z.get(index).filter(|_| counts)
         });
         let (sum, count) = zs.fold((0.0, 0.0), |(s, n), z| (s + z, n + 1.0));
         if count > 0.0 { z_here * sum / count } else { 0.0 }
     };
-    let products: Vec<f64> = looks.par_iter().zip(z).map(shared).collect();
+    let products: Vec<f64> = shots.par_iter().zip(z).map(shared).collect();
     let [sum, se] = folds.sum(&products);
-    let covariance = sum / looks.len().max(1) as f64;
+    let covariance = sum / shots.len().max(1) as f64;
     let strength_db = sd_db * covariance.max(0.0).sqrt();
     let p_value = 0.5 * erfc(sum / se.max(f64::MIN_POSITIVE) / std::f64::consts::SQRT_2);
     Unexplained { covariate: "neighbourhood".to_owned(), strength_db, p_value }
 }
 
-/// How many looks lie beyond [`OUTLYING`] standard deviations in power.
+/// How many shots lie beyond [`OUTLYING`] standard deviations in power.
 pub(super) fn wild(z: &[f64]) -> usize {
     z.iter().filter(|z| z.abs() > OUTLYING).count()
 }
 
-/// Looks that no spread explains: beyond [`OUTLYING`] standard deviations in power or in range, or with
+/// Shots that no spread explains: beyond [`OUTLYING`] standard deviations in power or in range, or with
 /// a detection far off the target.
 pub(super) fn outliers(
     z: &[f64],
@@ -248,7 +248,7 @@ pub(super) fn outliers(
         (declared.range_off_m(arrived, seen)?.abs() > OUTLYING * sd_m).then_some(())
     };
     let strays = observations.iter().zip(&prediction.arrived).filter_map(off).count();
-    // Strays are not among the looks.
+    // Strays are not among the shots.
     let found = [
         (wild, count, "outlying powers"),
         (strays, count, "outlying ranges"),
@@ -271,7 +271,7 @@ pub(super) fn outliers(
 /// though no mean and no spread is wrong. Its third moment is 0 under the model, with the standard
 /// deviation √(6/n); the displacement that it means is (z² − 1)/6 of it (Cornish and Fisher).
 pub(super) fn lopsided(z: &[f64], sd_db: f64) -> Option<Unexplained> {
-    // A few looks far out are told as outliers.
+    // A few shots far out are told as outliers.
     let inner: Vec<f64> = z.iter().map(|z| z.clamp(-LOPSIDED_REACH, LOPSIDED_REACH)).collect();
     let count = inner.len().max(1) as f64;
     let mean = inner.iter().sum::<f64>() / count;
@@ -324,8 +324,8 @@ mod tests {
 
     #[test]
     fn a_law_of_another_form_is_told_and_a_normal_one_is_not() {
-        let z = |look: u64| {
-            let key = Key { seed: 4, chirp: look, sub_ray: 9, purpose: Purpose::Fit };
+        let z = |shot: u64| {
+            let key = Key { seed: 4, chirp: shot, sub_ray: 9, purpose: Purpose::Fit };
             key.draws().gaussian()
         };
         let normal: Vec<f64> = (0..10_000).map(z).collect();

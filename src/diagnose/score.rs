@@ -9,7 +9,7 @@ use statrs::function::gamma::ln_gamma;
 
 use super::folds::Folds;
 use super::likelihood::{Declared, Likelihood};
-use super::looks::Observation;
+use super::shots::Observation;
 use crate::effects::Prediction;
 use crate::units::dbm_from_watts;
 
@@ -19,7 +19,7 @@ pub(super) const AT_THE_FLOOR: f64 = 1.05;
 /// dB in one e-fold.
 pub(super) const DB: f64 = 10.0 / std::f64::consts::LN_10;
 
-/// One look, predicted without having been fitted.
+/// One shot, predicted without having been fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scored {
     /// ln p.
@@ -36,7 +36,7 @@ pub(super) struct Scored {
     pub share: Option<f64>,
 }
 
-/// The error of a model over held-out looks.
+/// The error of a model over held-out shots.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Errors {
     /// Root mean square over detections about E[dB | detected], dB.
@@ -47,13 +47,13 @@ pub struct Errors {
     pub bias_db: f64,
     /// Its standard error, likewise, dB.
     pub bias_se_db: f64,
-    /// Mean ln p of all looks, the censored ones included.
+    /// Mean ln p of all shots, the censored ones included.
     pub log_score: f64,
     /// Share of detections within the central half of their law.
     pub coverage_50: f64,
     /// The same of the central 90 %.
     pub coverage_90: f64,
-    /// Brier score of the probability of a detection, over all looks.
+    /// Brier score of the probability of a detection, over all shots.
     pub brier: f64,
     /// The rmse of a model that is right, dB.
     pub noise_floor_db: f64,
@@ -112,7 +112,7 @@ fn moments_above(looks: f64, ln_threshold: f64) -> [f64; 2] {
     [mean, (sums[2] / sums[0] - mean * mean).max(0.0)]
 }
 
-/// Scores the looks for which `wanted` holds.
+/// Scores the shots for which `wanted` holds.
 pub(super) fn scored(
     prediction: &Prediction,
     declared: Declared,
@@ -121,14 +121,14 @@ pub(super) fn scored(
 ) -> Vec<(usize, Scored)> {
     let likelihood = Likelihood::new(prediction, declared);
     let above = Above::new(prediction.receiver.looks);
-    let one = |(look, seen): (usize, &Observation)| {
-        let below = |level_w: f64| likelihood.below(look, level_w);
-        let [mean, variance] = detected_moments(&likelihood, &above, prediction, declared, look);
+    let one = |(shot, seen): (usize, &Observation)| {
+        let below = |level_w: f64| likelihood.below(shot, level_w);
+        let [mean, variance] = detected_moments(&likelihood, &above, prediction, declared, shot);
         let expected_dbm = DB * mean + dbm_from_watts(1.0);
         let missed = below(declared.threshold_w);
         let share = |power_w: f64| (below(power_w) - missed) / (1.0 - missed).max(1e-300);
         Scored {
-            ln_p: likelihood.term(look, seen).ln_p,
+            ln_p: likelihood.term(shot, seen).ln_p,
             expected_dbm,
             variance_db2: DB * DB * variance,
             residual_db: seen.power_w.map(|power_w| dbm_from_watts(power_w) - expected_dbm),
@@ -136,8 +136,8 @@ pub(super) fn scored(
             share: seen.power_w.map(share),
         }
     };
-    let looks = observations.iter().enumerate().filter(|(look, _)| wanted(*look));
-    looks.map(|(look, seen)| (look, one((look, seen)))).collect()
+    let shots = observations.iter().enumerate().filter(|(shot, _)| wanted(*shot));
+    shots.map(|(shot, seen)| (shot, one((shot, seen)))).collect()
 }
 
 /// Mean and variance of ln y given a detection, over the tilts.
@@ -146,11 +146,11 @@ fn detected_moments(
     above: &Above,
     prediction: &Prediction,
     declared: Declared,
-    look: usize,
+    shot: usize,
 ) -> [f64; 2] {
     let ln_threshold = declared.threshold_w.ln();
     let mut sums = [0.0; 3];
-    for (ln_mean, weight) in likelihood.ln_means(look) {
+    for (ln_mean, weight) in likelihood.ln_means(shot) {
         // What is detected where nothing is expected lies at the threshold.
         let passed = prediction.saturating.of(ln_mean.max(ln_threshold - FARTHEST));
         let [mean, variance] = above.at((ln_threshold - passed.ln_mean) / passed.slope);
@@ -165,7 +165,7 @@ fn detected_moments(
     [mean, (sums[2] / sums[0] - mean * mean).max(0.0)]
 }
 
-/// Sums up looks.
+/// Sums up shots.
 pub(super) fn errors(scored: &[Scored], folds: &Folds) -> Errors {
     let mean = |values: &mut dyn Iterator<Item = f64>| {
         let (sum, count) = values.fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));

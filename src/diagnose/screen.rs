@@ -1,4 +1,4 @@
-//! What an effect would gain, without fitting it: a score test on a sample of the looks.
+//! What an effect would gain, without fitting it: a score test on a sample of the shots.
 //!
 //! The change Δ of ln mean and range by an effect at given values has the score U = Σ s·Δ and, with
 //! what the model so far can absorb taken out, the information I = Δᵀ(W − WJ(JᵀWJ)⁻¹JᵀW)Δ. Scaled as
@@ -8,12 +8,12 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::likelihood::Term;
-use super::looks::Observation;
 use super::refit::{Problem, Slope, Space, sum};
 use super::score::DB;
+use super::shots::Observation;
 use crate::effects::{Shot, Traced};
 
-/// Looks that a screening needs; more only take time.
+/// Shots that a screening needs; more only take time.
 const ENOUGH: usize = 2500;
 
 /// Standard deviation, in the search, of a number of a law that hardly matters any more: a factor of a thousand.
@@ -22,29 +22,29 @@ const OPEN: f64 = 7.0;
 /// A start is scaled at most so far.
 const MOST_SCALE: f64 = 5.0;
 
-/// Every so many looks of a scan.
+/// Every so many shots of a scan.
 pub(super) struct Sample {
-    looks: Vec<Shot>,
+    shots: Vec<Shot>,
     observations: Vec<Observation>,
     traced: Traced,
-    /// Looks that each of them stands for.
+    /// Shots that each of them stands for.
     pub weight: f64,
 }
 
 impl Sample {
     /// Of a problem.
     pub fn new(problem: &Problem) -> Sample {
-        let every = (problem.looks.len() / ENOUGH).max(1);
-        let looks: Vec<Shot> = problem.looks.iter().step_by(every).copied().collect();
+        let every = (problem.shots.len() / ENOUGH).max(1);
+        let shots: Vec<Shot> = problem.shots.iter().step_by(every).copied().collect();
         let observations = problem.observations.iter().step_by(every).copied().collect();
-        let weight = problem.looks.len() as f64 / looks.len().max(1) as f64;
-        Sample { looks, observations, traced: Traced::default(), weight }
+        let weight = problem.shots.len() as f64 / shots.len().max(1) as f64;
+        Sample { shots, observations, traced: Traced::default(), weight }
     }
 
-    /// The problem of these looks alone.
+    /// The problem of these shots alone.
     pub fn problem<'a>(&'a self, whole: &Problem<'a>) -> Problem<'a> {
-        let Sample { looks, observations, traced, .. } = self;
-        Problem { looks, observations, traced, ..*whole }
+        let Sample { shots, observations, traced, .. } = self;
+        Problem { shots, observations, traced, ..*whole }
     }
 }
 
@@ -56,11 +56,11 @@ pub(super) struct Screen<'a> {
     absorbs: Option<Cholesky<f64, Dyn>>,
     /// The step that the model's own numbers would still take.
     own_step: DVector<f64>,
-    /// Whether the looks leave a number of a law open: a fit has carried it so far that it hardly matters.
+    /// Whether the shots leave a number of a law open: a fit has carried it so far that it hardly matters.
     pub leaves_laws_open: bool,
 }
 
-/// One look's change by an effect: of ln mean, and of the range, m.
+/// One shot's change by an effect: of ln mean, and of the range, m.
 type Change = [f64; 2];
 
 impl<'a> Screen<'a> {

@@ -1,7 +1,7 @@
 //! Which effect a model lacks: all are tried, and one is believed if it predicts what it has not seen.
 //!
-//! Every effect is screened on a sample of the looks; those that promise enough are fitted together with
-//! the base, first on the sample, the best few on all looks. These predict held-out patches from fits
+//! Every effect is screened on a sample of the shots; those that promise enough are fitted together with
+//! the base, first on the sample, the best few on all shots. These predict held-out patches from fits
 //! without them. One is accepted when that gain, or the one in the fit if it is less, is more than two
 //! standard errors over patches (or, for what shifts means in one small place, far beyond chance and
 //! found again where it was not fitted), held-out errors do not grow, its gain in the fit beats that of
@@ -42,7 +42,7 @@ const FIELD_ERRORS: f64 = 3.0;
 const CHANCE: f64 = 1e-3;
 /// Effects of one round of which pairs are tried.
 const MOST_PAIRED: usize = 4;
-/// Difference in ln p of all held-out looks that tells no two effects apart: odds of twenty to one.
+/// Difference in ln p of all held-out shots that tells no two effects apart: odds of twenty to one.
 pub(super) const SAME: f64 = 3.0;
 /// Share of the best held-out gain that others reach which may yet prove better.
 const SHARE_OF_RIVAL: f64 = 0.9;
@@ -63,7 +63,7 @@ pub struct Candidate {
     pub numbers: usize,
     /// Gain in ln likelihood over the model so far.
     pub gain: f64,
-    /// Whether that is from a sample of the looks, too little to be fitted to all of them.
+    /// Whether that is from a sample of the shots, too little to be fitted to all of them.
     pub sampled: bool,
     /// Largest gain of a placebo with as many numbers, at most six; only for effects on the short list.
     pub placebo_gain: Option<f64>,
@@ -88,12 +88,12 @@ pub(super) struct Selected<'a> {
     pub structure: Structure,
 }
 
-/// A model, fitted to all looks and by folds.
+/// A model, fitted to all shots and by folds.
 #[derive(Clone)]
 pub(super) struct State<'a> {
     pub space: Space<'a>,
     pub fitted: Fitted,
-    /// Every look, predicted by a fit without its fold.
+    /// Every shot, predicted by a fit without its fold.
     pub held_out: Vec<Scored>,
 }
 
@@ -117,7 +117,7 @@ struct Chosen<'a> {
 /// All that the selection needs.
 pub(super) struct Selection<'p> {
     pub problem: Problem<'p>,
-    /// Some of its looks, for a first view.
+    /// Some of its shots, for a first view.
     pub sample: &'p Sample,
     pub folds: &'p Folds,
     pub settings: &'p Diagnosis,
@@ -205,7 +205,7 @@ impl Selection<'_> {
     }
 
     /// The fit of an effect that is taken in, with everything free that its trial held, and its held-out
-    /// looks.
+    /// shots.
     pub(super) fn settled(
         &self,
         before: &State,
@@ -254,16 +254,16 @@ impl Selection<'_> {
             residual::z(&prediction, problem.declared, problem.observations, self.settings.seed);
         let sd_db = speckle_sd_db(prediction.receiver.looks);
         let spot_m = problem.stage.radar.spot_diameter_m;
-        residual::of_neighbours(&z, problem.looks, spot_m, sd_db, self.folds).strength_db
+        residual::of_neighbours(&z, problem.shots, spot_m, sd_db, self.folds).strength_db
     }
 
     /// The field beside a model.
     pub(super) fn structure(&self, state: &State) -> Structure {
         let problem = &self.problem;
         let prediction = problem.predict(&state.space, &state.fitted.at);
-        let covariates = covariates(problem.looks, &prediction, problem.observations);
+        let covariates = covariates(problem.shots, &prediction, problem.observations);
         let laws = problem.mean_slopes(&state.space, &state.fitted.at);
-        Field::new(problem.looks, &covariates).structure(problem, &prediction, &laws, self.folds)
+        Field::new(problem.shots, &covariates).structure(problem, &prediction, &laws, self.folds)
     }
 
     /// A fit of one more term, and its held-out gain with the standard error.
@@ -426,7 +426,7 @@ impl Selection<'_> {
         ln_p(&trial.space, &trial.fitted) - ln_p(&state.space, &state.fitted)
     }
 
-    /// Sum over all looks of a difference in ln p, and its standard error over patches.
+    /// Sum over all shots of a difference in ln p, and its standard error over patches.
     pub(super) fn difference(&self, a: &[Scored], b: &[Scored]) -> [f64; 2] {
         let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a.ln_p - b.ln_p).collect();
         self.folds.sum(&differences)
@@ -450,7 +450,7 @@ impl Selection<'_> {
         screen.promise_of_all(&space, &starts).max(0.0)
     }
 
-    /// Every look, predicted by a fit without its fold.
+    /// Every shot, predicted by a fit without its fold.
     pub(super) fn held_out(&self, space: &Space, at: &DVector<f64>) -> Vec<Scored> {
         self.held_out_with(space, at, &[])
     }
@@ -466,10 +466,10 @@ impl Selection<'_> {
         let mut all: Vec<(usize, Scored)> = Vec::new();
         for (fold, at) in self.problem.fit_without(space, at, self.folds).enumerate() {
             let prediction = scaled(self.problem.predict(space, &at), ln_factor);
-            let held_out = |look: usize| self.folds.fold.get(look) == Some(&fold);
+            let held_out = |shot: usize| self.folds.fold.get(shot) == Some(&fold);
             all.extend(scored(&prediction, declared, observations, &held_out));
         }
-        all.sort_by_key(|(look, _)| *look);
+        all.sort_by_key(|(shot, _)| *shot);
         all.into_iter().map(|(_, scored)| scored).collect()
     }
 
@@ -490,14 +490,14 @@ pub(super) fn sizes_db(problem: &Problem, before: &Prediction, after: &Predictio
     // Spreads add in squares.
     let wider = |a: f64, b: f64| (a * a - b * b).abs().sqrt();
     let [now, then] = [after, before].map(|p| speckle_sd_db(p.receiver.looks));
-    let mean = |p: &Prediction, look: usize| p.passed_w(look).max(f64::MIN_POSITIVE).ln();
+    let mean = |p: &Prediction, shot: usize| p.passed_w(shot).max(f64::MIN_POSITIVE).ln();
     let observations = problem.observations.iter().enumerate();
     let changes: Vec<f64> = observations
         .filter(|(_, o)| o.power_w.is_some())
-        .map(|(look, _)| DB * (mean(after, look) - mean(before, look)))
+        .map(|(shot, _)| DB * (mean(after, shot) - mean(before, shot)))
         .collect();
     let tilt = |p: &Prediction| {
-        let spreads: Vec<f64> = (0..p.tilts.len()).map(|look| p.tilt_spread(look)).collect();
+        let spreads: Vec<f64> = (0..p.tilts.len()).map(|shot| p.tilt_spread(shot)).collect();
         DB * rms(&spreads)
     };
     [rms(&changes), wider(now, then).max(wider(tilt(after), tilt(before)))]

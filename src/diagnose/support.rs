@@ -15,11 +15,11 @@ const SHARE_OF_SPREAD: f64 = 0.4;
 /// one of the scatter, which gains little for its size.
 const SHARE_OF_GAIN: f64 = 0.1;
 const SHARE_OF_GAIN_OF_SPREAD: f64 = 0.05;
-/// Gain of each look beyond which it tells that something was out of place, and no more of how large a form is.
-const MOST_OF_A_LOOK: f64 = 2.0;
+/// Gain of each shot beyond which it tells that something was out of place, and no more of how large a form is.
+const MOST_OF_A_SHOT: f64 = 2.0;
 /// Share of its gain that an effect of the scatter must keep where a field has corrected the means.
 const SHARE_BESIDE_FIELD: f64 = 0.5;
-/// Share of the size of such an effect that neighbours may have in common: scatter is each look's own.
+/// Share of the size of such an effect that neighbours may have in common: scatter is each shot's own.
 const MOST_SHARED: f64 = 0.6;
 /// Share of its gain that an effect of one small place keeps where it is held out, and how many least
 /// gains it is worth.
@@ -41,10 +41,10 @@ impl Largest {
         Largest { size_db: largest(|e| e.size_db), gain: largest(|e| e.gain) }
     }
 
-    /// The gain of one more effect below which it may be the error of this one's form, by so many looks.
-    pub fn least_gain(self, is_spread: bool, looks: usize) -> f64 {
+    /// The gain of one more effect below which it may be the error of this one's form, by so many shots.
+    pub fn least_gain(self, is_spread: bool, shots: usize) -> f64 {
         let share = if is_spread { SHARE_OF_GAIN_OF_SPREAD } else { SHARE_OF_GAIN };
-        share * self.gain.min(MOST_OF_A_LOOK * looks as f64)
+        share * self.gain.min(MOST_OF_A_SHOT * shots as f64)
     }
 }
 
@@ -83,7 +83,7 @@ pub(super) struct Left {
 }
 
 impl Selection<'_> {
-    /// What held-out looks are under a trial and the gain that speaks for it; `None` where it is not
+    /// What held-out shots are under a trial and the gain that speaks for it; `None` where it is not
     /// supported.
     pub(super) fn support<'a>(
         &self,
@@ -135,7 +135,7 @@ impl Selection<'_> {
             && gain >= FAR_BEYOND * least
             && held_out >= SHARE_KEPT * gain
             && held_out > se;
-        let beside = largest.least_gain(is_spread, self.problem.looks.len());
+        let beside = largest.least_gain(is_spread, self.problem.shots.len());
         gain >= least.max(beside)
             && larger(claim.sizes_db) >= least_size_db.max(claim.share_of_size * largest.size_db)
             && (claim.counts() > standard_errors * se || is_local)

@@ -60,7 +60,7 @@ fn chirps(radar: &Radar) -> crate::radar::Chirps {
     }
 }
 
-/// What a law of gain over the looks is called and how it is fitted.
+/// What a law of gain over the shots is called and how it is fitted.
 struct Gain {
     name: &'static str,
     knobs: [Knob; 1],
@@ -75,15 +75,15 @@ impl Gain {
     }
 }
 
-static BOWL: Gain = Gain::new("bowl", |look| (look.xt_m.powi(2) + look.yt_m.powi(2)) / 0.25);
-static DRIFT: Gain = Gain::new("drift", |look| look.progress - 0.5);
-static SLANT: Gain = Gain::new("slant", |look| look.xt_m);
+static BOWL: Gain = Gain::new("bowl", |shot| (shot.xt_m.powi(2) + shot.yt_m.powi(2)) / 0.25);
+static DRIFT: Gain = Gain::new("drift", |shot| shot.progress - 0.5);
+static SLANT: Gain = Gain::new("slant", |shot| shot.xt_m);
 /// A slant with a step, and the step where it is in the middle rows alone.
-static BENT: Gain = Gain::new("bent", |look| look.xt_m + 0.1 * look.xt_m.signum());
+static BENT: Gain = Gain::new("bent", |shot| shot.xt_m + 0.1 * shot.xt_m.signum());
 static STEP: Gain =
-    Gain::new("step", |look| if look.yt_m.abs() < 0.15 { look.xt_m.signum() } else { 0.0 });
+    Gain::new("step", |shot| if shot.yt_m.abs() < 0.15 { shot.xt_m.signum() } else { 0.0 });
 /// Stripes that no effect of the tests has.
-static STRIPES: Gain = Gain::new("stripes", |look| (9.0 * look.xt_m).sin().signum());
+static STRIPES: Gain = Gain::new("stripes", |shot| (9.0 * shot.xt_m).sin().signum());
 
 impl Effect for Gain {
     fn name(&self) -> &'static str {
@@ -102,11 +102,11 @@ impl Effect for Gain {
     fn shows(&self) -> &'static str {
         ""
     }
-    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![0.3], vec![-0.3]]
     }
-    fn gain(&self, values: &[f64], _: &Stage, look: &Shot) -> f64 {
-        10f64.powf(0.1 * values.first().unwrap() * (self.db)(look))
+    fn gain(&self, values: &[f64], _: &Stage, shot: &Shot) -> f64 {
+        10f64.powf(0.1 * values.first().unwrap() * (self.db)(shot))
     }
 }
 
@@ -143,15 +143,15 @@ fn diagnosed_of(
     let bvh = Bvh::new(&mesh);
     let regions = vec![0; mesh.facets.len()];
     let stage = stage(&radar, &bvh, &regions);
-    let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
+    let shots = trace_shots(&stage, &radar, &chirps(&radar)).unwrap();
     let noise_w = watts_from_dbm(-100.0);
     let receiver = Receiver { looks: 4.0, noise_w, ..Receiver::LINEAR };
     let declared = Declared { threshold_w: watts_from_dbm(-77.0), range_sd_m: RANGE_SD_M };
     let model = Model { laws: vec![law()], receiver, effects };
-    let prediction = model.predict(&stage, &looks);
-    let seen = |(look, arrived): (usize, &Option<crate::effects::Arrived>)| {
+    let prediction = model.predict(&stage, &shots);
+    let seen = |(shot, arrived): (usize, &Option<crate::effects::Arrived>)| {
         let Some(arrived) = arrived else { return Observation::default() };
-        let key = Key { seed, chirp: look as u64, sub_ray: 0, purpose: Purpose::Speckle };
+        let key = Key { seed, chirp: shot as u64, sub_ray: 0, purpose: Purpose::Speckle };
         let mut draws = key.draws();
         let power_w = (arrived.power_w + noise_w) * draws.gamma(receiver.looks);
         let range_m = arrived.range_m + RANGE_SD_M * draws.gaussian();
@@ -163,14 +163,14 @@ fn diagnosed_of(
     let observations: Vec<Observation> = prediction.arrived.iter().enumerate().map(seen).collect();
     let mut start = law();
     start.set_parameter("specular.m", 0.08);
-    let (looks, observations, laws) = (&looks[..], &observations[..], &[start][..]);
+    let (shots, observations, laws) = (&shots[..], &observations[..], &[start][..]);
     let subject = Subject {
         stage: &stage,
         laws,
         at_work: &[],
         receiver,
         declared,
-        looks,
+        shots,
         observations,
         strays: &[],
         pose: &[],
@@ -178,7 +178,7 @@ fn diagnosed_of(
     let started = std::time::Instant::now();
     let report = Diagnosis { seed, ..Diagnosis::default() }.run(&subject, library).unwrap();
     let detected = observations.iter().filter(|o| o.power_w.is_some()).count();
-    eprintln!("{} looks, {detected} detected, {:?}", looks.len(), started.elapsed());
+    eprintln!("{} shots, {detected} detected, {:?}", shots.len(), started.elapsed());
     report
 }
 
@@ -229,7 +229,7 @@ fn a_missing_effect_is_named_and_its_number_found() {
         let error = &report.error;
         assert!((error.after.rmse_db / error.after.noise_floor_db - 1.0).abs() < 0.045);
         assert!(error.after.log_score > error.before.log_score);
-        // 2400 looks of 2 dB would tell a tenth of the effect that is there, of which the laws take a part;
+        // 2400 shots of 2 dB would tell a tenth of the effect that is there, of which the laws take a part;
         // what was missed is the next smaller size.
         let powers = &report.controls.injection_recovery;
         let power = powers.iter().find(|power| power.name == effect.name).unwrap();
@@ -269,10 +269,10 @@ fn a_target_that_has_moved_far_is_found_by_its_ranges() {
     let values: Vec<f64> = library[1].knobs().iter().map(|knob| found[knob.name].value).collect();
     let chirps = chirps(&Radar::default());
     for index in (chirps.rays.len() / 2..chirps.rays.len() * 4 / 5).step_by(40) {
-        let look = looks::missed(&chirps, &chirps.progress(), index).unwrap();
+        let shot = shots::missed(&chirps, &chirps.progress(), index).unwrap();
         let mut off_m = DVec3::ZERO;
         for (knob, (value, expected)) in values.iter().zip(&path).enumerate() {
-            let (axis, share) = library[1].shifts(knob, &look).unwrap();
+            let (axis, share) = library[1].shifts(knob, &shot).unwrap();
             off_m[axis] += share * (value - expected);
         }
         assert!(off_m.length() < 0.003, "{index}: {off_m}");
@@ -313,18 +313,18 @@ fn places_are_on_the_target() {
     let bvh = Bvh::new(&mesh);
     let regions = vec![0; mesh.facets.len()];
     let stage = stage(&radar, &bvh, &regions);
-    let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
+    let shots = trace_shots(&stage, &radar, &chirps(&radar)).unwrap();
     let (plate_z_m, on_sphere_z_m) = (0.0, 0.1 + 0.35);
     let round = Place::Round { x_m: 0.1, y_m: 0.0, radius_m: 0.1 };
-    let (centre, extent) = round.on_target_m(&looks).unwrap();
+    let (centre, extent) = round.on_target_m(&shots).unwrap();
     assert!(extent.is_none() && (centre.z - on_sphere_z_m).abs() < 0.01, "{centre}");
     // Left of the sphere there is the plate alone, to x = −0.45 m.
     let beyond = Place::Beyond { off_m: 0.3, direction_deg: 180.0 };
-    let (centre, extent) = beyond.on_target_m(&looks).unwrap();
+    let (centre, extent) = beyond.on_target_m(&shots).unwrap();
     let extent = extent.unwrap();
     assert!((centre.z - plate_z_m).abs() < 1e-6 && extent.z < 1e-6, "{centre} {extent}");
     assert!((centre.x - 0.5 * extent.x + 0.45).abs() < 0.02 && extent.y > 0.8, "{centre} {extent}");
-    assert_eq!(Place::Beyond { off_m: 2.0, direction_deg: 0.0 }.on_target_m(&looks), None);
+    assert_eq!(Place::Beyond { off_m: 2.0, direction_deg: 0.0 }.on_target_m(&shots), None);
 }
 
 #[test]
@@ -333,71 +333,71 @@ fn a_scan_with_too_little_says_so() {
     let bvh = Bvh::new(&mesh);
     let regions = vec![0; mesh.facets.len()];
     let stage = stage(&radar, &bvh, &regions);
-    let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
+    let shots = trace_shots(&stage, &radar, &chirps(&radar)).unwrap();
     let receiver = Receiver { looks: 4.0, noise_w: 0.0, ..Receiver::LINEAR };
     let declared = Declared { threshold_w: 1e-11, range_sd_m: RANGE_SD_M };
-    let observations = vec![Observation::default(); looks.len()];
+    let observations = vec![Observation::default(); shots.len()];
     let subject = Subject {
         stage: &stage,
         laws: &[law()],
         at_work: &[],
         receiver,
         declared,
-        looks: &looks,
+        shots: &shots,
         observations: &observations,
         strays: &[],
         pose: &[],
     };
     let refused = |powers_w: &dyn Fn(usize) -> f64| {
-        let seen = |look| Observation { power_w: Some(powers_w(look)), range_m: None };
-        let observations: Vec<Observation> = (0..looks.len()).map(seen).collect();
+        let seen = |shot| Observation { power_w: Some(powers_w(shot)), range_m: None };
+        let observations: Vec<Observation> = (0..shots.len()).map(seen).collect();
         let subject = Subject { observations: &observations, ..subject };
         Diagnosis::default().run(&subject, &LIBRARY).unwrap_err()
     };
     let silent = Diagnosis::default().run(&subject, &LIBRARY).unwrap_err();
     assert!(matches!(silent, DiagnoseError::TooFew { detected: 0 }), "{silent}");
     // Every other power is below the threshold, or as of another target.
-    let below = refused(&|look| if look % 2 == 0 { 1e-10 } else { 1e-12 });
+    let below = refused(&|shot| if shot % 2 == 0 { 1e-10 } else { 1e-12 });
     assert!(matches!(below, DiagnoseError::Threshold { below, .. } if below > 500), "{below}");
-    let unlike = refused(&|look| if look % 2 == 0 { 2e-11 } else { 1e-5 });
+    let unlike = refused(&|shot| if shot % 2 == 0 { 2e-11 } else { 1e-5 });
     assert!(matches!(unlike, DiagnoseError::Unlike { .. }), "{unlike}");
     // Fifteen decibels up or down by chance are nothing that any of the effects does.
-    let far = refused(&|look| if (look * 7919) % 13 < 6 { 2e-11 } else { 6e-10 });
+    let far = refused(&|shot| if (shot * 7919) % 13 < 6 { 2e-11 } else { 6e-10 });
     assert!(matches!(far, DiagnoseError::FarOff { .. }), "{far}");
 }
 
 #[test]
-fn a_cloud_finds_its_looks() {
+fn a_cloud_finds_its_shots() {
     use crate::measure::cloud::{Cloud, CloudPoint};
     let (radar, mesh) = (Radar::default(), target());
     let bvh = Bvh::new(&mesh);
     let regions = vec![0; mesh.facets.len()];
     let stage = stage(&radar, &bvh, &regions);
-    let looks = looks(&stage, &radar, &chirps(&radar)).unwrap();
-    let missed = (0..(SIDE * SIDE) as u32).find(|c| looks.iter().all(|l| l.chirp != *c)).unwrap();
-    let point = |look: &Shot, chirp: u32, off_m: f64| {
-        let range_m = look.hit.range_m + off_m;
-        let point = Point::from(look.ray.origin.xyz + range_m * look.ray.direction.xyz());
+    let shots = trace_shots(&stage, &radar, &chirps(&radar)).unwrap();
+    let missed = (0..(SIDE * SIDE) as u32).find(|c| shots.iter().all(|l| l.chirp != *c)).unwrap();
+    let point = |shot: &Shot, chirp: u32, off_m: f64| {
+        let range_m = shot.hit.range_m + off_m;
+        let point = Point::from(shot.ray.origin.xyz + range_m * shot.ray.direction.xyz());
         CloudPoint { chirp: Some(chirp), point, range_m: None, power_dbm: -60.0 }
     };
-    // All on their looks but one half a metre behind its look, and one of a chirp that meets nothing.
+    // All on their shots but one half a metre behind its shot, and one of a chirp that meets nothing.
     let mut points: Vec<CloudPoint> =
-        looks[20..28].iter().map(|look| point(look, look.chirp, 1e-3)).collect();
-    points.push(point(&looks[8], looks[8].chirp, 0.5));
+        shots[20..28].iter().map(|shot| point(shot, shot.chirp, 1e-3)).collect();
+    points.push(point(&shots[8], shots[8].chirp, 0.5));
     let numbered = Cloud::new(points.clone()).unwrap();
-    points.push(point(&looks[9], missed, 0.0));
+    points.push(point(&shots[9], missed, 0.0));
     let cloud = Cloud::new(points.clone()).unwrap();
-    let found = matched(&cloud, &chirps(&radar), &looks).unwrap();
+    let found = match_cloud(&cloud, &chirps(&radar), &shots).unwrap();
     let [behind, beside] = &found.strays[..] else { panic!("{:?}", found.strays) };
-    assert_eq!(behind.look, Some(looks[8]));
-    assert!((behind.range_m - looks[8].hit.range_m - 0.5).abs() < 1e-9);
-    assert_eq!(beside.look.map(|look| look.chirp), Some(missed));
+    assert_eq!(behind.shot, Some(shots[8]));
+    assert!((behind.range_m - shots[8].hit.range_m - 0.5).abs() < 1e-9);
+    assert_eq!(beside.shot.map(|shot| shot.chirp), Some(missed));
     assert_eq!(found.observations.iter().filter(|o| o.power_w.is_some()).count(), 8);
     // Without their numbers, points find their chirps by their directions.
     points.pop();
     points.iter_mut().for_each(|point| point.chirp = None);
     let cloud = Cloud::new(points.clone()).unwrap();
-    let by_direction = matched(&cloud, &chirps(&radar), &looks).unwrap();
+    let by_direction = match_cloud(&cloud, &chirps(&radar), &shots).unwrap();
     assert_eq!(by_direction.observations, found.observations);
     // With numbers that are not theirs they are refused.
     for off in [1, -1] {
@@ -405,7 +405,7 @@ fn a_cloud_finds_its_looks() {
         for point in &mut points {
             point.chirp = point.chirp.and_then(|chirp| chirp.checked_add_signed(off));
         }
-        let refused = matched(&Cloud::new(points).unwrap(), &chirps(&radar), &looks);
+        let refused = match_cloud(&Cloud::new(points).unwrap(), &chirps(&radar), &shots);
         let Err(DiagnoseError::Misnumbered { off: found }) = refused else { panic!("{refused:?}") };
         assert_eq!(found, i64::from(off));
     }
@@ -415,18 +415,18 @@ fn a_cloud_finds_its_looks() {
     passes.rays.extend_from_slice(&once.rays);
     passes.number.extend(once.number.iter().map(|number| number + (SIDE * SIDE) as u32));
     passes.time_s.extend_from_slice(&once.time_s);
-    let looks_twice = super::looks::looks(&stage, &radar, &passes).unwrap();
+    let shots_twice = super::shots::trace_shots(&stage, &radar, &passes).unwrap();
     for first in [0, (SIDE * SIDE) as u32] {
         let of_pass = numbered.points()[..8]
             .iter()
             .map(|point| CloudPoint { chirp: point.chirp.map(|chirp| chirp + first), ..*point });
         let cloud = Cloud::new(of_pass.collect()).unwrap();
-        let found = matched(&cloud, &passes, &looks_twice).unwrap();
+        let found = match_cloud(&cloud, &passes, &shots_twice).unwrap();
         assert_eq!(found.observations.iter().filter(|o| o.power_w.is_some()).count(), 8);
     }
     // As are the numbers of rows.
     let given = |points: Vec<CloudPoint>| {
-        matched(&Cloud::new(points).unwrap(), &chirps(&radar), &looks).unwrap_err()
+        match_cloud(&Cloud::new(points).unwrap(), &chirps(&radar), &shots).unwrap_err()
     };
     let on_target = &numbered.points()[..8];
     let rows =
@@ -449,10 +449,10 @@ fn a_cloud_finds_its_looks() {
     assert!(matches!(twice, DiagnoseError::Repeated { second: 8, points: 16 }), "{twice}");
     // A cloud of something else is refused.
     points.iter_mut().for_each(|p| p.point = Point::from(p.point.xyz + DVec3::new(0.0, 0.0, 3.0)));
-    let elsewhere = matched(&Cloud::new(points).unwrap(), &chirps(&radar), &looks);
+    let elsewhere = match_cloud(&Cloud::new(points).unwrap(), &chirps(&radar), &shots);
     assert!(matches!(elsewhere, Err(DiagnoseError::Elsewhere { matched: 0, points: 9 })));
     assert!((found.observations[20].power_w.unwrap() - 1e-9).abs() < 1e-20);
-    assert!((found.observations[20].range_m.unwrap() - looks[20].hit.range_m - 1e-3).abs() < 1e-9);
+    assert!((found.observations[20].range_m.unwrap() - shots[20].hit.range_m - 1e-3).abs() < 1e-9);
 }
 
 #[test]
@@ -463,7 +463,7 @@ fn a_wide_spot_sees_past_the_edge() {
     let (bvh, regions) = (Bvh::new(&mesh), vec![0; mesh.facets.len()]);
     let stage = stage(&radar, &bvh, &regions);
     let chirps = chirps(&radar);
-    let looks = looks(&stage, &radar, &chirps).unwrap();
+    let shots = trace_shots(&stage, &radar, &chirps).unwrap();
     // Every chirp within 8 cm of the plate answers, at the plate's range.
     let cloud = |by_m: f64| {
         let point = |(chirp, ray): (&u32, &Ray<_>)| {
@@ -481,16 +481,16 @@ fn a_wide_spot_sees_past_the_edge() {
         Cloud::new(chirps.number.iter().zip(&chirps.rays).filter_map(point).collect()).unwrap()
     };
     let seen = cloud(0.0);
-    let found = matched(&seen, &chirps, &looks).unwrap();
+    let found = match_cloud(&seen, &chirps, &shots).unwrap();
     assert!(found.strays.len() * 3 > seen.points().len(), "{}", found.strays.len());
     // Twice as often, and half a metre behind, they are not of it.
-    let stray = |point: &&CloudPoint| looks.iter().all(|look| Some(look.chirp) != point.chirp);
+    let stray = |point: &&CloudPoint| shots.iter().all(|shot| Some(shot.chirp) != point.chirp);
     let strays: Vec<CloudPoint> = seen.points().iter().filter(stray).copied().collect();
     let mut twice = [seen.points(), &strays, &strays].concat();
     twice.iter_mut().for_each(|point| point.chirp = None);
     let twice = Cloud::new(twice).unwrap();
-    let twice = matched(&twice, &chirps, &looks).unwrap_err();
+    let twice = match_cloud(&twice, &chirps, &shots).unwrap_err();
     assert!(matches!(twice, DiagnoseError::Repeated { .. }), "{twice}");
-    let behind = matched(&cloud(0.5), &chirps, &looks).unwrap_err();
+    let behind = match_cloud(&cloud(0.5), &chirps, &shots).unwrap_err();
     assert!(matches!(behind, DiagnoseError::Elsewhere { matched: 0, .. }), "{behind}");
 }

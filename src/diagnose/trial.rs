@@ -1,5 +1,5 @@
-//! One round's fits of every effect that is not there yet, from what a sample of the looks promises to
-//! a fit of all looks for the best few.
+//! One round's fits of every effect that is not there yet, from what a sample of the shots promises to
+//! a fit of all shots for the best few.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -29,7 +29,7 @@ const SHARE_OF_START: f64 = 0.7;
 const SHARE_OF_WORD: f64 = 0.3;
 /// Effects that promise less than this share of the best are not fitted at all.
 const SHARE_TO_SCOUT: f64 = 0.05;
-/// Effects of each round that are fitted to all looks and predict held-out patches: at most so many,
+/// Effects of each round that are fitted to all shots and predict held-out patches: at most so many,
 /// and none that gains less than this share of the best.
 const SHORTLIST: usize = 5;
 /// A refit that keeps less of its promise does not count among them.
@@ -54,7 +54,7 @@ pub(super) struct Trial<'a> {
 }
 
 impl Selection<'_> {
-    /// Every effect that is not there yet, best first. Those worth it are fitted to all looks, the
+    /// Every effect that is not there yet, best first. Those worth it are fitted to all shots, the
     /// rest to a sample.
     pub fn trials<'a>(
         &self,
@@ -81,10 +81,10 @@ impl Selection<'_> {
             }
         }
         sort(&mut trials);
-        // Measured by what the refits keep: a sample may promise what all looks do not.
+        // Measured by what the refits keep: a sample may promise what all shots do not.
         let (mut best, mut kept) = (0.5 * self.settings.least_gain_of(1, 1) / SHARE_OF_BEST, 0);
         // An effect of the scatter needs the lesser gain.
-        let hopeless = SHARE_OF_HOPE * largest.least_gain(true, self.problem.looks.len());
+        let hopeless = SHARE_OF_HOPE * largest.least_gain(true, self.problem.shots.len());
         for trial in &mut trials {
             let promised = trial.candidate.gain;
             if kept == SHORTLIST || promised < hopeless.max(SHARE_OF_BEST * best) {
@@ -103,7 +103,7 @@ impl Selection<'_> {
         trials
     }
 
-    /// One effect, fitted to all looks whatever it promises.
+    /// One effect, fitted to all shots whatever it promises.
     pub fn tried<'a>(&self, state: &State<'a>, effect: &'a dyn Effect) -> Option<Trial<'a>> {
         let problem = self.sample.problem(&self.problem);
         let screen = Screen::new(problem, &state.space, &state.fitted.at);
@@ -123,7 +123,7 @@ impl Selection<'_> {
         round: usize,
     ) -> Option<Trial<'a>> {
         let space = state.space.with(effect);
-        let values = effect.starts(self.problem.stage, self.problem.looks);
+        let values = effect.starts(self.problem.stage, self.problem.shots);
         let mut starts: Vec<(f64, DVector<f64>)> = values
             .iter()
             .map(|values| {
@@ -252,7 +252,7 @@ impl Selection<'_> {
         }
     }
 
-    /// Fits a trial to all looks.
+    /// Fits a trial to all shots.
     fn refit(&self, state: &State, trial: &mut Trial) {
         let held = state.space.costly(&state.fitted.at);
         let ln_p = |at: &DVector<f64>| sum(&self.problem.terms(&trial.space, at));

@@ -27,7 +27,7 @@ use super::output::write_all;
 use super::staging::{materials, model, notices};
 use crate::brdf::Brdf;
 use crate::diagnose::{
-    Declared, DiagnoseError, Diagnosis, MeshPose, Report, Subject, looks, matched,
+    Declared, DiagnoseError, Diagnosis, MeshPose, Report, Subject, match_cloud, trace_shots,
 };
 use crate::effects::{Effect, Receiver, Stage, middle};
 use crate::error::Error;
@@ -80,7 +80,7 @@ pub(super) struct Args {
     /// something found the scene, too, as SCENE-after.toml beside it
     #[arg(long, conflicts_with = "curve")]
     add: bool,
-    /// The material that takes refitted law and effects in [default: all of the scene with enough looks]
+    /// The material that takes refitted law and effects in [default: all of the scene with enough chirps]
     #[arg(long, value_name = "NAME", conflicts_with = "curve")]
     material: Option<String>,
     /// Seed of folds and of everything random
@@ -293,9 +293,9 @@ fn diagnosed(
         grain_of_region: &grain_of_region,
         middle: glam::DVec3::ZERO,
     };
-    let looks = looks(&stage, radar, &scene.chirps)?;
-    stage.middle = middle(&looks);
-    let matched = matched(cloud, &scene.chirps, &looks)?;
+    let shots = trace_shots(&stage, radar, &scene.chirps)?;
+    stage.middle = middle(&shots);
+    let matched = match_cloud(cloud, &scene.chirps, &shots)?;
     let (receiver, declared) = receiver(radar);
     let pose: Vec<MeshPose> = scene.file.mesh.iter().map(pose).collect();
     let subject = Subject {
@@ -304,7 +304,7 @@ fn diagnosed(
         at_work,
         receiver,
         declared,
-        looks: &looks,
+        shots: &shots,
         observations: &matched.observations,
         strays: &matched.strays,
         pose: &pose,

@@ -12,7 +12,7 @@ use crate::cli::console::Console;
 use crate::cli::database::Database;
 use crate::cli::inputs::activity;
 use crate::cli::output::{Written, write_all};
-use crate::diagnose::{LEAST_LOOKS, Report};
+use crate::diagnose::{LEAST_SHOTS, Report};
 use crate::effects::Level;
 use crate::error::Error;
 use crate::formats::FormatError;
@@ -87,7 +87,7 @@ impl Publication<'_> {
         }
         if !homeless.is_empty() {
             console.notice(&format!(
-                "kept in the report alone, as no material has the {LEAST_LOOKS} chirps on the target that take {}: {}",
+                "kept in the report alone, as no material has the {LEAST_SHOTS} chirps on the target that take {}: {}",
                 if homeless.len() == 1 { "it" } else { "them" },
                 listed(&homeless)
             ));

@@ -6,7 +6,7 @@ use crate::brdf::Brdf;
 use crate::cli::curves::source;
 use crate::cli::materials::{Found, find};
 use crate::cli::staging::Used;
-use crate::diagnose::{LEAST_LOOKS, Report};
+use crate::diagnose::{LEAST_SHOTS, Report};
 use crate::effects::Level;
 use crate::error::Error;
 use crate::formats::EffectEntry;
@@ -68,20 +68,20 @@ impl<'a> Cast<'a> {
         numbers.filter_map(|number| self.taker(report, number)).collect()
     }
 
-    /// Each region has a law of its own; the one that most looks went into stands for the material.
+    /// Each region has a law of its own; the one that most shots of the scan meet stands for the material.
     fn taker(&self, report: &Report, number: usize) -> Option<Taker> {
         let law = report.laws.get(self.region(report, number)?)?.clone();
         Some(Taker { number, law })
     }
 
-    /// The region of a material that most looks went into, if those are enough.
+    /// The region of a material that most shots of the scan meet, if those are enough.
     fn region(&self, report: &Report, number: usize) -> Option<usize> {
-        let looks =
+        let shots =
             |region: usize| report.rows.iter().filter(|r| usize::from(r.region) == region).count();
         let regions = self.of_region.iter().enumerate();
         let regions = regions.filter(|(_, of)| usize::from(**of) == number);
-        let (looks, region) = regions.map(|(region, _)| (looks(region), region)).max()?;
-        (looks >= LEAST_LOOKS).then_some(region)
+        let (shots, region) = regions.map(|(region, _)| (shots(region), region)).max()?;
+        (shots >= LEAST_SHOTS).then_some(region)
     }
 
     /// The current revisions of all materials that were looked at with what was tried on them and not

@@ -28,11 +28,11 @@ pub struct Observation {
     pub range_m: Option<f64>,
 }
 
-/// A detection that is no look's: its chirp meets no target, or one at another range.
+/// A detection that is no shot's: its chirp meets no target, or one at another range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stray {
     /// The chirp; of no range where it misses, and none where the scan has no such chirp.
-    pub look: Option<Shot>,
+    pub shot: Option<Shot>,
     /// Range of the detection, m.
     pub range_m: f64,
 }
@@ -40,17 +40,17 @@ pub struct Stray {
 impl Stray {
     /// Whether it lies on the target where the effects of a model place it.
     pub(super) fn is_on_target(&self, model: &Model, stage: &Stage) -> bool {
-        let ranges_m = self.look.map_or(Vec::new(), |look| model.ranges_m(stage, &look));
+        let ranges_m = self.shot.map_or(Vec::new(), |shot| model.ranges_m(stage, &shot));
         ranges_m.iter().any(|range_m| (range_m - self.range_m).abs() <= GATE_M)
     }
 }
 
-/// A cloud sorted by the looks of its scan.
+/// A cloud sorted by the shots of its scan.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Matched {
-    /// One for each look.
+pub struct CloudMatch {
+    /// One for each shot.
     pub observations: Vec<Observation>,
-    /// Detections that are no look's.
+    /// Detections that are no shot's.
     pub strays: Vec<Stray>,
 }
 
@@ -61,15 +61,19 @@ const GATE_M: f64 = 0.1;
 /// Nearer than this to a chirp's ray a detection is that chirp's, m: less than from one chirp to the next.
 const ON_RAY_M: f64 = 0.01;
 
-/// One look, along the axis of the beam, for every chirp that meets the target.
+/// One shot, along the axis of the beam, for every chirp that meets the target.
 ///
 /// # Errors
 /// When no chirp does.
-pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Shot>, DiagnoseError> {
+pub fn trace_shots(
+    stage: &Stage,
+    radar: &Radar,
+    chirps: &Chirps,
+) -> Result<Vec<Shot>, DiagnoseError> {
     let footprints = trace(radar, chirps, stage.bvh, 1, &|_| {})?;
     let places: Vec<_> = chirps.target_points_m(&radar.frames()).collect();
     let progress = chirps.progress();
-    let look = |index: usize| {
+    let shot = |index: usize| {
         let hit = (*footprints.hits.get(index)?)?;
         let ray = *chirps.rays.get(index)?;
         let region = stage.region_of_facet.get(hit.facet as usize).copied().unwrap_or(0);
@@ -90,10 +94,10 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Shot>,
             ..missed(chirps, &progress, index)?
         })
     };
-    Ok((0..chirps.rays.len()).into_par_iter().filter_map(look).collect())
+    Ok((0..chirps.rays.len()).into_par_iter().filter_map(shot).collect())
 }
 
-/// Sorts a cloud by the looks of its scan, by chirp numbers or, without them, by directions. A detection
+/// Sorts a cloud by the shots of its scan, by chirp numbers or, without them, by directions. A detection
 /// further than 0.1 m from where its chirp meets the target, or beside its ray, is a stray, and its chirp then counts as
 /// one that saw nothing.
 ///
@@ -101,7 +105,11 @@ pub fn looks(stage: &Stage, radar: &Radar, chirps: &Chirps) -> Result<Vec<Shot>,
 /// When points have no chirp number and no direction from a common origin, when they lie on the rays of
 /// other chirps than their numbers say, when more than a quarter are second ones of their chirps, or is
 /// neither on the target nor past its edge by a wide spot.
-pub fn matched(cloud: &Cloud, chirps: &Chirps, looks: &[Shot]) -> Result<Matched, DiagnoseError> {
+pub fn match_cloud(
+    cloud: &Cloud,
+    chirps: &Chirps,
+    shots: &[Shot],
+) -> Result<CloudMatch, DiagnoseError> {
     let is_numbered = cloud.points().iter().all(|point| point.chirp.is_some());
     let directions = Directions::new(chirps);
     let directions = directions.as_ref();
@@ -110,7 +118,7 @@ pub fn matched(cloud: &Cloud, chirps: &Chirps, looks: &[Shot]) -> Result<Matched
     }
     let off = directions.filter(|_| is_numbered).and_then(|by| by.number_off(chirps, cloud));
     off.map_or(Ok(()), |off| Err(DiagnoseError::Misnumbered { off }))?;
-    let given = sorted(cloud, chirps, looks, directions.filter(|_| !is_numbered));
+    let given = sorted(cloud, chirps, shots, directions.filter(|_| !is_numbered));
     if given.is_of_target(cloud) {
         return Ok(given.matched);
     }
@@ -120,7 +128,7 @@ pub fn matched(cloud: &Cloud, chirps: &Chirps, looks: &[Shot]) -> Result<Matched
     }
     // Rows that somebody counted are no chirps of the scan; a cloud that is only out of place keeps its own.
     let is_strange = is_numbered && !is_moved(cloud, chirps);
-    let placed = directions.filter(|_| is_strange).map(|by| sorted(cloud, chirps, looks, Some(by)));
+    let placed = directions.filter(|_| is_strange).map(|by| sorted(cloud, chirps, shots, Some(by)));
     match placed.filter(|placed| placed.is_of_target(cloud)) {
         Some(placed) => Err(DiagnoseError::Strange { placed: placed.on_target, matched, points }),
         None => Err(DiagnoseError::Elsewhere { matched, points }),
@@ -139,9 +147,9 @@ fn is_moved(cloud: &Cloud, chirps: &Chirps) -> bool {
     alike as f64 >= (1.0 - MOST_STRAYS) * cloud.points().len() as f64
 }
 
-/// A cloud sorted by looks, and how well that went.
+/// A cloud sorted by shots, and how well that went.
 struct Sorted {
-    matched: Matched,
+    matched: CloudMatch,
     /// Detections on the target, one of a chirp.
     on_target: usize,
     /// Further ones of chirps that have one.
@@ -160,20 +168,20 @@ impl Sorted {
 fn sorted(
     cloud: &Cloud,
     chirps: &Chirps,
-    looks: &[Shot],
+    shots: &[Shot],
     by_direction: Option<&Directions>,
 ) -> Sorted {
     let index_of_chirp: HashMap<u32, usize> =
-        looks.iter().enumerate().map(|(index, look)| (look.chirp, index)).collect();
+        shots.iter().enumerate().map(|(index, shot)| (shot.chirp, index)).collect();
     let index_of_sent: HashMap<u32, usize> = chirps.number.iter().copied().zip(0..).collect();
     let progress = chirps.progress();
-    let mut observations = vec![Observation::default(); looks.len()];
+    let mut observations = vec![Observation::default(); shots.len()];
     let (mut strays, mut on_target, mut second) = (Vec::new(), 0, 0);
-    let places: Vec<DVec3> = looks.iter().map(|look| look.hit.point.xyz).collect();
+    let places: Vec<DVec3> = shots.iter().map(|shot| shot.hit.point.xyz).collect();
     let met = Nearest::new(&places);
-    let is_by_target = |point: &CloudPoint, look: &Shot| {
+    let is_by_target = |point: &CloudPoint, shot: &Shot| {
         let nearest_m = met.as_ref().map_or(f64::INFINITY, |met| met.find(point.point.xyz).1);
-        nearest_m <= GATE_M && beside(point, &look.ray).length() <= ON_RAY_M
+        nearest_m <= GATE_M && beside(point, &shot.ray).length() <= ON_RAY_M
     };
     let mut past_the_edge = HashSet::new();
     for point in cloud.points() {
@@ -182,22 +190,22 @@ fn sorted(
             None => point.chirp,
         };
         let index = chirp.and_then(|chirp| index_of_chirp.get(&chirp).copied());
-        let seen = index.and_then(|index| Some((looks.get(index)?, observations.get_mut(index)?)));
+        let seen = index.and_then(|index| Some((shots.get(index)?, observations.get_mut(index)?)));
         match seen {
             None => {
                 let sent = chirp.and_then(|chirp| index_of_sent.get(&chirp).copied());
-                let look = sent.and_then(|index| missed(chirps, &progress, index));
-                let range_m = look.map_or(0.0, |look| range_m(point, &look));
-                if let Some(look) = look.filter(|look| is_by_target(point, look)) {
-                    let is_first = past_the_edge.insert(look.chirp);
+                let shot = sent.and_then(|index| missed(chirps, &progress, index));
+                let range_m = shot.map_or(0.0, |shot| range_m(point, &shot));
+                if let Some(shot) = shot.filter(|shot| is_by_target(point, shot)) {
+                    let is_first = past_the_edge.insert(shot.chirp);
                     on_target += usize::from(is_first);
                     second += usize::from(!is_first);
                 }
-                strays.push(Stray { look, range_m });
+                strays.push(Stray { shot, range_m });
             }
-            Some((look, observation)) => {
-                let range_m = range_m(point, look);
-                match (off_m(point, look) <= GATE_M, observation.power_w) {
+            Some((shot, observation)) => {
+                let range_m = range_m(point, shot);
+                match (off_m(point, shot) <= GATE_M, observation.power_w) {
                     (true, None) => {
                         on_target += 1;
                         let power_w = Some(watts_from_dbm(point.power_dbm));
@@ -205,16 +213,16 @@ fn sorted(
                     }
                     (is_near, _) => {
                         second += usize::from(is_near);
-                        strays.push(Stray { look: Some(*look), range_m });
+                        strays.push(Stray { shot: Some(*shot), range_m });
                     }
                 }
             }
         }
     }
-    Sorted { matched: Matched { observations, strays }, on_target, second }
+    Sorted { matched: CloudMatch { observations, strays }, on_target, second }
 }
 
-/// The look of a chirp that meets nothing.
+/// The shot of a chirp that meets nothing.
 pub(super) fn missed(chirps: &Chirps, progress: &[f64], index: usize) -> Option<Shot> {
     let ray = *chirps.rays.get(index)?;
     let hit = Hit { facet: u32::MAX, range_m: 0.0, point: ray.origin, cos_theta: 1.0 };
@@ -282,8 +290,8 @@ impl Directions {
     }
 }
 
-fn range_m(point: &CloudPoint, look: &Shot) -> f64 {
-    point.range_m.unwrap_or_else(|| look.ray.origin.distance_m(point.point))
+fn range_m(point: &CloudPoint, shot: &Shot) -> f64 {
+    point.range_m.unwrap_or_else(|| shot.ray.origin.distance_m(point.point))
 }
 
 /// Where a point lies beside a ray, m.
@@ -294,6 +302,6 @@ fn beside(point: &CloudPoint, ray: &Ray<Global>) -> DVec3 {
 }
 
 /// How far a point lies from where its chirp meets the target: along the ray and beside it, m.
-fn off_m(point: &CloudPoint, look: &Shot) -> f64 {
-    (range_m(point, look) - look.hit.range_m).abs() + beside(point, &look.ray).length()
+fn off_m(point: &CloudPoint, shot: &Shot) -> f64 {
+    (range_m(point, shot) - shot.hit.range_m).abs() + beside(point, &shot.ray).length()
 }
