@@ -11,7 +11,7 @@ use super::likelihood::Term;
 use super::looks::Observation;
 use super::refit::{Problem, Slope, Space, sum};
 use super::score::DB;
-use crate::effects::{Shot, Traced};
+use crate::effects::{PredictionCache, Shot};
 
 /// Looks that a screening needs; more only take time.
 const ENOUGH: usize = 2500;
@@ -26,7 +26,7 @@ const MOST_SCALE: f64 = 5.0;
 pub(super) struct Sample {
     looks: Vec<Shot>,
     observations: Vec<Observation>,
-    traced: Traced,
+    traced: PredictionCache,
     /// Looks that each of them stands for.
     pub weight: f64,
 }
@@ -38,7 +38,7 @@ impl Sample {
         let looks: Vec<Shot> = problem.looks.iter().step_by(every).copied().collect();
         let observations = problem.observations.iter().step_by(every).copied().collect();
         let weight = problem.looks.len() as f64 / looks.len().max(1) as f64;
-        Sample { looks, observations, traced: Traced::default(), weight }
+        Sample { looks, observations, traced: PredictionCache::default(), weight }
     }
 
     /// The problem of these looks alone.
