@@ -27,13 +27,6 @@ pub(super) fn path(slug: &str) -> String {
 /// The folder of the materials' files.
 pub(super) const FOLDER: &str = "api/v1/materials/";
 
-/// The JSON Schemas that come with a publication.
-pub(super) const SCHEMAS: [(&str, &str); 3] = [
-    ("schema/material.json", include_str!("schema/material.json")),
-    ("schema/index.json", include_str!("schema/index.json")),
-    ("schema/changes.json", include_str!("schema/changes.json")),
-];
-
 /// `api/v1/materials/<slug>.json`.
 #[derive(Serialize)]
 pub(super) struct Record<'a> {

@@ -18,6 +18,7 @@ mod nearest;
 mod publish;
 mod records;
 mod references;
+mod schema;
 mod stage;
 mod tables;
 mod verify;

@@ -9,7 +9,7 @@ pub(super) use linked::licence_record;
 
 use super::api::Index;
 use super::tables::Written;
-use super::{About, CatalogueError, Folder, api};
+use super::{About, CatalogueError, Folder, schema};
 
 /// What Zenodo reads.
 pub(super) const ZENODO: &str = ".zenodo.json";
@@ -37,7 +37,7 @@ pub(super) fn write(
     index: &Index,
     tables: &[Written],
 ) -> Result<bool, CatalogueError> {
-    for (path, schema) in api::SCHEMAS {
+    for (path, schema) in schema::files() {
         folder.write(path, schema.as_bytes())?;
     }
     let is_reused = changes::write(folder, index)?;
