@@ -2,8 +2,10 @@
 
 use glam::DVec3;
 
-use super::meeting::met;
-use super::{Arrived, Effect, Model, Prediction, Receiver, Shot, Stage, library, middle};
+use super::intersection::shot_along;
+use super::{
+    Effect, EffectParameter, MeanEcho, Model, Prediction, Receiver, Shot, Stage, library, middle,
+};
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
 use crate::frames::{Point, Pose, Ray};
 use crate::geometry::Mesh;
@@ -36,13 +38,13 @@ pub(super) fn paint(lobe: CookTorrance) -> Brdf {
     })
 }
 
-/// A target 8 m in front of a radar that looks along −z, and the looks that meet it.
+/// A target 8 m in front of a radar whose axis points along −z, and the shots that hit it.
 pub(super) struct Bench {
     bvh: Bvh<'static>,
     radar: Radar,
     regions: Vec<u16>,
     law: Brdf,
-    pub looks: Vec<Shot>,
+    pub shots: Vec<Shot>,
 }
 
 const GRAIN: [DVec3; 1] = [DVec3::Y];
@@ -64,10 +66,10 @@ impl Bench {
     pub(super) fn of(mesh: Mesh) -> Bench {
         let mesh: &'static Mesh = Box::leak(Box::new(mesh));
         let regions = vec![0; mesh.facets.len()];
-        let (bvh, radar, looks) = (Bvh::new(mesh), Radar::default(), Vec::new());
-        let mut bench = Bench { bvh, radar, regions, law: paint(lobe()), looks };
-        let looks = (0..SIDE * SIDE).filter_map(|chirp| look(&bench.stage(), chirp)).collect();
-        bench.looks = looks;
+        let (bvh, radar, shots) = (Bvh::new(mesh), Radar::default(), Vec::new());
+        let mut bench = Bench { bvh, radar, regions, law: paint(lobe()), shots };
+        let shots = (0..SIDE * SIDE).filter_map(|chirp| shot(&bench.stage(), chirp)).collect();
+        bench.shots = shots;
         bench
     }
 
@@ -78,35 +80,35 @@ impl Bench {
             bvh: &self.bvh,
             region_of_facet: &self.regions,
             grain_of_region: &GRAIN,
-            middle: middle(&self.looks),
+            middle: middle(&self.shots),
         }
     }
 
     pub(super) fn predict(&self, effects: Vec<(&dyn Effect, Vec<f64>)>) -> Prediction {
         let receiver = Receiver { looks: 4.0, noise_w: 1e-13, ..Receiver::LINEAR };
         Model { laws: vec![self.law.clone()], receiver, effects }
-            .predict(&self.stage(), &self.looks)
+            .predict(&self.stage(), &self.shots)
     }
 
-    /// A look where an effect places it.
-    pub(super) fn moved(&self, effect: &dyn Effect, values: &[f64], look: &Shot) -> Option<Shot> {
+    /// A shot where an effect places it.
+    pub(super) fn moved(&self, effect: &dyn Effect, values: &[f64], shot: &Shot) -> Option<Shot> {
         let effects = vec![(effect, values.to_vec())];
         let receiver = Receiver::LINEAR;
-        Model { laws: Vec::new(), receiver, effects }.placed(&self.stage(), *look)
+        Model { laws: Vec::new(), receiver, effects }.placed(&self.stage(), *shot)
     }
 
     /// What arrives without any effect.
-    pub(super) fn bare(&self) -> Vec<Arrived> {
+    pub(super) fn bare(&self) -> Vec<MeanEcho> {
         self.predict(Vec::new()).arrived.into_iter().flatten().collect()
     }
 
     /// What arrives with one.
-    pub(super) fn with(&self, effect: &dyn Effect, values: &[f64]) -> Vec<Arrived> {
+    pub(super) fn with(&self, effect: &dyn Effect, values: &[f64]) -> Vec<MeanEcho> {
         self.predict(vec![(effect, values.to_vec())]).arrived.into_iter().flatten().collect()
     }
 }
 
-fn look(stage: &Stage, chirp: u32) -> Option<Shot> {
+fn shot(stage: &Stage, chirp: u32) -> Option<Shot> {
     let at = |step: u32| HALF_M * (2.0 * f64::from(step) / f64::from(SIDE - 1) - 1.0);
     let (xt_m, yt_m) = (at(chirp % SIDE), at(chirp / SIDE));
     let origin = Point::new(0.0, 0.0, 8.0);
@@ -130,7 +132,7 @@ fn look(stage: &Stage, chirp: u32) -> Option<Shot> {
         yt_m,
         edge_m,
     };
-    met(stage, &blank, ray)
+    shot_along(stage, &blank, ray)
 }
 
 /// Two walls that face each other at a right angle, open towards the radar.
@@ -148,7 +150,7 @@ pub(super) fn dihedral() -> Mesh {
 }
 
 fn absent(effect: &dyn Effect) -> Vec<f64> {
-    effect.knobs().iter().map(|knob| knob.absent).collect()
+    effect.parameters().iter().map(|parameter| parameter.absent).collect()
 }
 
 fn benches() -> [Bench; 3] {
@@ -170,7 +172,7 @@ fn at_absent_values_no_effect_changes_anything() {
 
 fn is_sound(prediction: &Prediction) -> bool {
     let arrived = prediction.arrived.iter().flatten().all(|arrived| {
-        let Arrived { power_w, range_m, .. } = *arrived;
+        let MeanEcho { power_w, range_m, .. } = *arrived;
         power_w.is_finite() && power_w >= 0.0 && range_m.is_finite() && range_m > 0.0
     });
     let Receiver { looks, noise_w, tilt_sd_rad, ceiling } = prediction.receiver;
@@ -184,19 +186,20 @@ fn is_sound(prediction: &Prediction) -> bool {
 fn every_value_within_the_ranges_gives_finite_numbers() {
     for bench in benches() {
         for effect in library() {
-            let starts = effect.starts(&bench.stage(), &bench.looks);
+            let starts = effect.starts(&bench.stage(), &bench.shots);
             let start = starts.first().cloned().unwrap_or_else(|| absent(effect));
-            for (at, knob) in effect.knobs().iter().enumerate() {
-                for value in [knob.min, knob.max, (knob.min + knob.max) / 2.0] {
+            for (at, parameter) in effect.parameters().iter().enumerate() {
+                for value in [parameter.min, parameter.max, (parameter.min + parameter.max) / 2.0] {
                     let mut values = start.clone();
                     values[at] = value;
                     let found = bench.predict(vec![(effect, values.clone())]);
                     assert!(is_sound(&found), "{} at {values:?}", effect.name());
                 }
             }
-            let ends: [fn(&super::Knob) -> f64; 2] = [|knob| knob.min, |knob| knob.max];
+            let ends: [fn(&EffectParameter) -> f64; 2] =
+                [|parameter| parameter.min, |parameter| parameter.max];
             for end in ends {
-                let values = effect.knobs().iter().map(end).collect();
+                let values = effect.parameters().iter().map(end).collect();
                 assert!(is_sound(&bench.predict(vec![(effect, values)])), "{}", effect.name());
             }
         }
@@ -210,17 +213,26 @@ fn searches_begin_within_the_ranges_and_where_there_is_an_effect() {
     let bench = Bench { law, ..Bench::of(dihedral()) };
     let bare = bench.predict(Vec::new());
     for effect in library() {
-        let starts = effect.starts(&bench.stage(), &bench.looks);
+        let starts = effect.starts(&bench.stage(), &bench.shots);
         assert!(!starts.is_empty(), "{}", effect.name());
         let mut felt = false;
         for values in starts {
-            assert_eq!(values.len(), effect.knobs().len(), "{}", effect.name());
-            for (value, knob) in values.iter().zip(effect.knobs()) {
-                assert!((knob.min..=knob.max).contains(value), "{} {}", effect.name(), knob.name);
+            assert_eq!(values.len(), effect.parameters().len(), "{}", effect.name());
+            for (value, parameter) in values.iter().zip(effect.parameters()) {
+                assert!(
+                    (parameter.min..=parameter.max).contains(value),
+                    "{} {}",
+                    effect.name(),
+                    parameter.name
+                );
             }
             // A search may begin from nothing, where a step must be felt.
-            let is_absent = values.iter().zip(effect.knobs()).all(|(v, knob)| *v == knob.absent);
-            let steps = effect.knobs().iter().map(|knob| if is_absent { knob.step } else { 0.0 });
+            let is_absent =
+                values.iter().zip(effect.parameters()).all(|(v, parameter)| *v == parameter.absent);
+            let steps = effect
+                .parameters()
+                .iter()
+                .map(|parameter| if is_absent { parameter.step } else { 0.0 });
             let there = values.iter().zip(steps).map(|(value, step)| value + step).collect();
             felt |= bench.predict(vec![(effect, there)]) != bare;
         }
@@ -229,13 +241,18 @@ fn searches_begin_within_the_ranges_and_where_there_is_an_effect() {
 }
 
 #[test]
-fn names_and_knobs_are_told_apart() {
+fn names_and_parameters_are_unique() {
     let names = library().map(|effect| effect.name());
     for (position, effect) in library().into_iter().enumerate() {
         assert_eq!(names.iter().position(|name| *name == effect.name()), Some(position));
-        for knob in effect.knobs() {
-            assert!((knob.min..=knob.max).contains(&knob.absent) && knob.step > 0.0);
-            assert_eq!(effect.knobs().iter().filter(|other| other.name == knob.name).count(), 1);
+        for parameter in effect.parameters() {
+            assert!(
+                (parameter.min..=parameter.max).contains(&parameter.absent) && parameter.step > 0.0
+            );
+            assert_eq!(
+                effect.parameters().iter().filter(|other| other.name == parameter.name).count(),
+                1
+            );
         }
     }
 }
@@ -243,20 +260,20 @@ fn names_and_knobs_are_told_apart() {
 #[test]
 fn what_is_said_to_shift_the_target_does_nothing_else() {
     let bench = Bench::plate();
-    let (stage, look) = (bench.stage(), Shot { progress: 0.3, ..bench.looks[7] });
+    let (stage, shot) = (bench.stage(), Shot { progress: 0.3, ..bench.shots[7] });
     let mut shifts = 0;
     for effect in library() {
-        let knobs = effect.knobs();
-        let values: Vec<f64> = knobs.iter().map(|knob| 3.0 * knob.step).collect();
-        for (number, knob) in knobs.iter().enumerate() {
-            let Some((axis, per_unit)) = effect.shifts(number, &look) else { continue };
+        let parameters = effect.parameters();
+        let values: Vec<f64> = parameters.iter().map(|parameter| 3.0 * parameter.step).collect();
+        for (number, parameter) in parameters.iter().enumerate() {
+            let Some((axis, per_unit)) = effect.shifts(number, &shot) else { continue };
             let mut more = values.clone();
-            more[number] += knob.step;
+            more[number] += parameter.step;
             let [before, after] = [values.clone(), more]
-                .map(|values| effect.motion(&values, &stage, &look).unwrap() * look.hit.point);
+                .map(|values| effect.motion(&values, &stage, &shot).unwrap() * shot.hit.point);
             let mut way_m = after.xyz - before.xyz;
-            way_m[axis] -= per_unit * knob.step;
-            assert!(way_m.length() < 1e-12, "{} {}: {way_m}", effect.name(), knob.name);
+            way_m[axis] -= per_unit * parameter.step;
+            assert!(way_m.length() < 1e-12, "{} {}: {way_m}", effect.name(), parameter.name);
             shifts += 1;
         }
     }

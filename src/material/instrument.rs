@@ -2,9 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::check::{Check, MaterialError, value};
+use super::error::{MaterialError, value};
+use super::number_check::NumberCheck;
 
-/// What a curve was measured with. What nobody stated is none.
+/// What a curve was measured with. A number that is not known is `None`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Instrument {
     /// Key within the material.
@@ -109,7 +110,7 @@ impl Scale {
 impl Instrument {
     pub(super) fn validate(&self) -> Result<(), MaterialError> {
         let place = format!("instrument `{}`", self.key);
-        let check = Check::new(&place);
+        let check = NumberCheck::new(&place);
         check.positive("the centre frequency", [self.centre_frequency_hz])?;
         check.positive("the bandwidth", self.bandwidth_hz)?;
         check.positive("the stand-off", self.stand_off_m)?;

@@ -15,7 +15,8 @@ use super::surface::LocalFrame;
 use super::{Observer, RenderError, Setup};
 use crate::brdf::Scattering;
 use crate::effects::{
-    Arrived, Level, Model, Receiver, Shot, Stage, Traced, middle, tilted_cos_theta,
+    Conflict, Level, MeanEcho, Model, PredictionCache, Receiver, Setting, Shot, Stage, middle,
+    tilted_cos_theta,
 };
 use crate::frames::{Direction, Global, Point, Pose, Ray, Surface};
 use crate::radar::Link;
@@ -140,7 +141,7 @@ impl<'a> Acting<'a> {
     pub fn arrive(
         &self,
         footprints: &Footprints,
-        sums: Vec<Option<Arrived>>,
+        sums: Vec<Option<MeanEcho>>,
     ) -> Vec<Option<Change>> {
         let first = |chirp: usize| {
             let hits = footprints.hits.iter().zip(0..).skip(chirp * footprints.rays_per_chirp);
@@ -149,14 +150,15 @@ impl<'a> Acting<'a> {
             let facing = footprints.facings.get::<usize>(index).copied().flatten();
             Some(self.seen(chirp, footprints.rays_per_chirp, hit, facing))
         };
-        let chirps: Vec<(usize, Shot, Arrived)> = sums
+        let chirps: Vec<(usize, Shot, MeanEcho)> = sums
             .iter()
             .enumerate()
             .filter_map(|(chirp, sum)| Some((chirp, first(chirp)?, (*sum)?)))
             .collect();
         let looks: Vec<Shot> = chirps.iter().map(|(_, look, _)| *look).collect();
-        let mut after: Vec<Option<Arrived>> = chirps.iter().map(|(_, _, sum)| Some(*sum)).collect();
-        self.model.arrive(&self.stage(), &looks, &Traced::default(), &mut after);
+        let mut after: Vec<Option<MeanEcho>> =
+            chirps.iter().map(|(_, _, sum)| Some(*sum)).collect();
+        self.model.arrive(&self.stage(), &looks, &PredictionCache::default(), &mut after);
         let mut changes = vec![None; sums.len()];
         for ((chirp, _, before), after) in chirps.into_iter().zip(after.into_iter().flatten()) {
             changes[chirp] = (before != after).then_some(Change { before, after });
@@ -235,8 +237,8 @@ impl<'a> Acting<'a> {
 /// What the effects make of a whole echo.
 #[derive(Clone, Copy)]
 pub(super) struct Change {
-    before: Arrived,
-    after: Arrived,
+    before: MeanEcho,
+    after: MeanEcho,
 }
 
 impl Change {
@@ -264,40 +266,26 @@ fn tilted(look: &Shot, [along, across]: [f64; 2]) -> Option<Shot> {
     Some(Shot { hit: Hit { cos_theta, ..look.hit }, ..*look })
 }
 
-/// Refuses what would be counted twice, and what an effect cannot say.
+/// Refuses what would be counted twice, and effects at another antenna.
 pub(super) fn check(setup: &Setup, rays: usize, observer: Observer) -> Result<(), RenderError> {
     let Some(model) = setup.effects else { return Ok(()) };
-    let (radar, bounces) = (setup.radar, setup.bounce.is_some());
     for (effect, _) in &model.effects {
-        let effect = effect.name();
-        let (problem, way_out) = match effect {
-            _ if observer != Observer::Radar => (
-                "acts on the radar's own echoes, and nothing says what it does at another antenna",
-                "remove [[receiver]], or the effect",
-            ),
-            "finite-spot" if rays > 1 => (
-                "averages over the spot, and so do several rays",
-                "set spot.rays = 1, or remove the effect",
-            ),
-            "multi-bounce" if bounces => (
-                "brings echoes by way of a second surface, and so does [bounce]",
-                "remove one of the two",
-            ),
-            "pose" | "motion" if bounces => (
-                "moves the target, and [bounce] follows paths on it where the scene has it",
-                "remove [bounce], or move the mesh by its translation_m and rotation_deg",
-            ),
-            "noise-floor" if radar.receiver.is_some() => (
-                "adds thermal noise, and [radar.receiver] makes all of its own",
-                "raise radar.receiver.noise_figure_db instead",
-            ),
-            "speckle" if radar.receiver.is_some() => (
-                "sets the looks of speckle, and [radar.receiver] averages whole beat signals",
-                "set radar.speckle.looks instead",
-            ),
-            _ => continue,
-        };
-        return Err(RenderError::Effect { effect, problem, way_out });
+        let effect = effect.about();
+        if observer != Observer::Radar {
+            return Err(RenderError::Effect {
+                effect: effect.name,
+                problem: "acts on the radar's own echoes, and nothing says what it does at another antenna",
+                way_out: "remove [[receiver]], or the effect",
+            });
+        }
+        let conflict = effect.conflicts.iter().find(|conflict| match conflict.with {
+            Setting::SeveralRays => rays > 1,
+            Setting::Bounce => setup.bounce.is_some(),
+            Setting::RangeReceiver => setup.radar.receiver.is_some(),
+        });
+        if let Some(&Conflict { problem, way_out, .. }) = conflict {
+            return Err(RenderError::Effect { effect: effect.name, problem, way_out });
+        }
     }
     Ok(())
 }

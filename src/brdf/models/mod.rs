@@ -1,0 +1,229 @@
+//! Every scattering model that can be stored, one file each, and the type that is any of them.
+
+#[cfg(test)]
+pub(super) mod tests;
+mod weighted;
+
+use serde::{Deserialize, Serialize};
+
+use super::backscatter::Term;
+use super::kind::Kind;
+use super::parameter::{Parameter, ParameterError, Visitor};
+use super::scattering::{Scattering, ScatteringModel};
+use crate::frames::{Direction, Surface};
+
+pub use cook_torrance::Shadowing;
+pub use kirchhoff::Correlation;
+pub use layered::Layer;
+pub use tabulated::TabulatedError;
+
+/// Levels of models in models that can be stored; deeper ones could not be read everywhere.
+pub const MOST_LEVELS: usize = 8;
+
+/// Models within one that can be stored, itself included.
+pub const MOST_MODELS: usize = 64;
+
+/// Declares the file of every model, and the type [`Brdf`] that is any of them.
+macro_rules! models {
+    ($($file:ident::$model:ident $(<$part:ty>)?),+ $(,)?) => {
+        $(
+            mod $file;
+            pub use $file::$model;
+        )+
+
+        /// Every model that can be stored in a database or a material file, which the key `model` names.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(tag = "model", rename_all = "kebab-case")]
+        pub enum Brdf {
+            $(
+                #[allow(missing_docs)]
+                $model($model $(<$part>)?),
+            )+
+        }
+
+        impl Brdf {
+            /// What is known of every kind of model.
+            pub const KINDS: &[Kind] = &[$($file::KIND),+];
+
+            // These two are called for every ray: static calls, since dynamic ones take a third longer.
+
+            fn f_above_horizon_per_sr(
+                &self,
+                i: Direction<Surface>,
+                o: Direction<Surface>,
+            ) -> f64 {
+                match self {
+                    $(Brdf::$model(model) => model.f_per_sr(i, o),)+
+                }
+            }
+
+            fn f_and_specular_share_above_horizon(
+                &self,
+                i: Direction<Surface>,
+                o: Direction<Surface>,
+            ) -> (f64, f64) {
+                match self {
+                    $(Brdf::$model(model) => model.f_and_specular_share(i, o),)+
+                }
+            }
+
+            // All else forwards by these.
+
+            fn model(&self) -> &dyn ScatteringModel {
+                match self {
+                    $(Brdf::$model(model) => model,)+
+                }
+            }
+
+            fn model_mut(&mut self) -> &mut dyn ScatteringModel {
+                match self {
+                    $(Brdf::$model(model) => model,)+
+                }
+            }
+        }
+    };
+}
+
+// Another model is a file and a line of this list. `cargo fmt` does not follow modules in a macro:
+// `rustfmt src/brdf/models/*.rs` does them.
+models! {
+    lambert::Lambert,
+    blinn_phong::BlinnPhong,
+    cook_torrance::CookTorrance,
+    tabulated::Tabulated,
+    mixture::Mixture<Brdf>,
+    sum::Sum<Brdf>,
+    fresnel::Fresnel,
+    layered::Layered,
+    kirchhoff::Kirchhoff,
+    kirchhoff_go::KirchhoffGo,
+    directive::Directive,
+}
+
+impl Scattering for Brdf {
+    /// Zero below the horizon, where a model by itself is not defined.
+    fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        if is_below_horizon(i, o) { 0.0 } else { self.f_above_horizon_per_sr(i, o) }
+    }
+
+    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        if is_below_horizon(i, o) {
+            return (0.0, 0.0);
+        }
+        self.f_and_specular_share_above_horizon(i, o)
+    }
+
+    fn backscatter(&self) -> Option<Vec<Term>> {
+        self.model().backscatter()
+    }
+}
+
+fn is_below_horizon(i: Direction<Surface>, o: Direction<Surface>) -> bool {
+    i.cos_theta() <= 0.0 || o.cos_theta() <= 0.0
+}
+
+impl ScatteringModel for Brdf {
+    fn visit_parameters(&mut self, prefix: &str, visitor: &mut Visitor) {
+        self.model_mut().visit_parameters(prefix, visitor);
+    }
+
+    fn is_smooth(&self) -> bool {
+        self.model().is_smooth()
+    }
+
+    fn permittivity(&self) -> Option<[f64; 2]> {
+        self.model().permittivity()
+    }
+
+    fn f_lambda(&self) -> Option<f64> {
+        self.model().f_lambda()
+    }
+
+    fn has_curve(&self) -> bool {
+        self.model().has_curve()
+    }
+}
+
+impl Brdf {
+    /// Every free number of the model with its unit and range, in a fixed order.
+    ///
+    /// Paths name the place in a mixture: `k`, `specular.m`, `diffuse.alpha`.
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let mut found = Vec::new();
+        self.clone().visit_parameters("", &mut |parameter, _| found.push(parameter));
+        found
+    }
+
+    /// Sets one parameter by its path; `false` when the model has none of that path.
+    pub fn set_parameter(&mut self, path: &str, value: f64) -> bool {
+        let mut known = false;
+        self.visit_parameters("", &mut |parameter, slot| {
+            if parameter.path == path {
+                *slot = value;
+                known = true;
+            }
+        });
+        known
+    }
+
+    /// Checks every parameter against its range.
+    pub fn validate(&self) -> Result<(), ParameterError> {
+        self.parameters().iter().try_for_each(Parameter::validate)
+    }
+
+    /// Checks how deep parts stand in parts, at most [`MOST_LEVELS`], and how many models there are in all, at
+    /// most [`MOST_MODELS`].
+    ///
+    /// # Errors
+    /// When there are more, in words for a sentence.
+    pub fn check_size(&self) -> Result<(), String> {
+        let mut models = 0;
+        let mut level = vec![self];
+        for depth in 1.. {
+            models += level.len();
+            if models > MOST_MODELS {
+                return Err(format!("it has more than {MOST_MODELS} models in it"));
+            }
+            if depth > MOST_LEVELS {
+                return Err(format!("parts stand in parts more than {MOST_LEVELS} deep"));
+            }
+            level = level.into_iter().flat_map(Brdf::parts).collect();
+            if level.is_empty() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The models that this one is made of; none but for a mixture and a sum.
+    fn parts(&self) -> Vec<&Brdf> {
+        match self {
+            Brdf::Mixture(mixture) => mixture.weighted().map(|(_, part)| part).collect(),
+            Brdf::Sum(sum) => sum.parts.iter().collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The sum of a quantity of the models without parts that this one is made of, each by its weight.
+    pub fn sum_over_parts(&self, of: &dyn Fn(&Brdf) -> f64) -> f64 {
+        match self {
+            Brdf::Mixture(mixture) => {
+                mixture.weighted().map(|(weight, part)| weight * part.sum_over_parts(of)).sum()
+            }
+            Brdf::Sum(sum) => sum.parts.iter().map(|part| part.sum_over_parts(of)).sum(),
+            model => of(model),
+        }
+    }
+
+    /// The two levels that monostatic data determine of the paper's five-parameter mixture, up to the
+    /// calibration: S = (1 − k)·f_λ and R = k·r_s. `None` for other models.
+    pub fn identified_products(&self) -> Option<[f64; 2]> {
+        let Brdf::Mixture(Mixture { k, diffuse, specular }) = self else { return None };
+        match (&**specular, &**diffuse) {
+            (Brdf::CookTorrance(specular), Brdf::BlinnPhong(diffuse)) => {
+                Some([(1.0 - k) * specular.f_lambda, k * diffuse.r_s])
+            }
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,412 @@
+//! A spot of finite size: the power of a chirp is the mean over rays through a Gaussian footprint, its
+//! range their mean by power. Rays that miss the target bring nothing.
+
+use std::sync::{Arc, LazyLock};
+
+use rayon::prelude::*;
+
+use crate::brdf::{Brdf, Scattering, Term};
+use crate::effects::cache::Cache;
+use crate::effects::echo::MeanEcho;
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
+use crate::effects::intersection::{Facet, HitSurface, surface_at};
+use crate::effects::shot::{Shot, Stage};
+use crate::effects::spread::sunflower;
+use crate::frames::{Direction, Global, Ray, Surface};
+use crate::trace::{Hit, closest};
+
+/// The effect `finite-spot`.
+pub(crate) struct FiniteSpot;
+
+/// Rays that stand for a spot. On a ball a highlight may be a tenth of it.
+const RAYS: usize = 64;
+/// The widest spot, m.
+const MOST_M: f64 = 0.2;
+/// How far they reach, in standard deviations of the spot's intensity.
+const REACH_SD: f64 = 3.0;
+/// Largest factor, and one over it the smallest, by which other effects may change the power of a shot.
+/// Beyond it they have moved the shot to another surface, and the spot keeps the power of the old one.
+const MOST_GAIN: f64 = 100.0;
+
+/// Terms of laws whose sums are kept: more than the regions of most scenes have.
+const MOST_TERMS: usize = 48;
+
+/// Where one ray of a spot hits the target.
+#[derive(Clone, Copy)]
+struct SpotRay {
+    range_m: f64,
+    to_radar: Direction<Surface>,
+    /// Power, W, where f is 1/sr, by its share of the spot.
+    watts_per_f: f64,
+    region: u16,
+}
+
+impl SpotRay {
+    fn new(stage: &Stage, surface: HitSurface, hit: &Hit, share: f64) -> SpotRay {
+        let HitSurface { region, to_radar, .. } = surface;
+        let Hit { range_m, cos_theta, .. } = *hit;
+        let watts_per_f = share * stage.link.power_w(range_m, cos_theta, 1.0);
+        SpotRay { range_m, to_radar, watts_per_f, region }
+    }
+
+    /// Its power, W, from one region with an f of a direction, 1/sr.
+    fn power_w(&self, region: u16, f: impl Fn(Direction<Surface>) -> f64) -> f64 {
+        if self.region == region { self.watts_per_f * f(self.to_radar) } else { 0.0 }
+    }
+}
+
+/// The ray of a shot and those of its spot, as far as they hit the target as the scene has it.
+type Spot = (SpotRay, Vec<SpotRay>);
+
+/// The spots of all shots.
+struct Spots {
+    all: Vec<Option<Spot>>,
+    /// Their answers to terms of level 1: a law's levels change more often than its shape.
+    sums: Cache<(u16, Term), Vec<Sums>, MOST_TERMS>,
+}
+
+/// What a spot sends back from one region by one term of its law.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    /// Power of the ray along the axis and of all rays of the spot, W.
+    centre_w: f64,
+    power_w: f64,
+    /// Moments of what adds to the range, W·m and W·m².
+    first: f64,
+    second: f64,
+}
+
+impl Sums {
+    /// Of a region's rays, for f of a direction, 1/sr.
+    fn of((centre, spot): &Spot, region: u16, f: impl Fn(Direction<Surface>) -> f64) -> Sums {
+        let mut sums = Sums { centre_w: centre.power_w(region, &f), ..Sums::default() };
+        for ray in spot {
+            let (power_w, longer_m) = (ray.power_w(region, &f), ray.range_m - centre.range_m);
+            sums.power_w += power_w;
+            sums.first += power_w * longer_m;
+            sums.second += power_w * longer_m * longer_m;
+        }
+        sums
+    }
+
+    /// With `more` at a level added.
+    fn and(self, level: f64, more: &Sums) -> Sums {
+        Sums {
+            centre_w: self.centre_w + level * more.centre_w,
+            power_w: self.power_w + level * more.power_w,
+            first: self.first + level * more.first,
+            second: self.second + level * more.second,
+        }
+    }
+
+    /// The mean over a whole spot by the base law; `None` where nothing comes back.
+    fn averaged(&self) -> Option<SpotMean> {
+        let Sums { centre_w, power_w, first, second } = *self;
+        if centre_w <= 0.0 || power_w <= 0.0 {
+            return None;
+        }
+        let (mean_w, longer_m) = (power_w, first / power_w);
+        let spread_m = (second / power_w - longer_m * longer_m).max(0.0).sqrt();
+        Some(SpotMean { centre_w, mean_w, longer_m, spread_m })
+    }
+}
+
+impl Spots {
+    /// The level, 1/sr, of each term of the laws and how the spots answer to it. A law that is no sum of terms
+    /// is one of level 1.
+    fn answers(&self, laws: &[Brdf]) -> Vec<(f64, Arc<Vec<Sums>>)> {
+        let mut answers = Vec::new();
+        for (region, law) in (0..).zip(laws) {
+            let Some(terms) = law.backscatter() else {
+                let sums = self.sums(region, |to_radar| law.f_per_sr(to_radar, to_radar));
+                answers.push((1.0, Arc::new(sums)));
+                continue;
+            };
+            for term in terms {
+                let shape = Term { level_per_sr: 1.0, ..term };
+                let sums = self.sums.get_or_make((region, shape), || {
+                    self.sums(region, |to_radar| shape.per_sr(to_radar.cos_theta()))
+                });
+                answers.push((term.level_per_sr, sums));
+            }
+        }
+        answers
+    }
+
+    /// The sums of every spot over the rays of a region, for f of a direction, 1/sr.
+    fn sums(&self, region: u16, f: impl Fn(Direction<Surface>) -> f64 + Sync) -> Vec<Sums> {
+        let spots = self.all.par_iter();
+        spots
+            .map(|spot| spot.as_ref().map_or(Sums::default(), |spot| Sums::of(spot, region, &f)))
+            .collect()
+    }
+}
+
+/// The spots of all shots, each of a diameter on the target, m.
+fn spots(stage: &Stage, shots: &[Shot], diameter_m: f64) -> Vec<Option<Spot>> {
+    let axes: Vec<Ray<Global>> = shots.iter().map(|shot| shot.ray).collect();
+    let centres = closest(stage.bvh, &axes);
+    let rays: Vec<[Ray<Global>; RAYS]> = axes
+        .par_iter()
+        .zip(&centres)
+        .map(|(axis, centre)| spot_rays(axis, centre.map_or(0.0, |hit| diameter_m / hit.range_m)))
+        .collect();
+    let hits = closest(stage.bvh, rays.as_flattened());
+    // Where facets are few, spots hit most of them many times.
+    let facets = stage.bvh.mesh().facets.len();
+    let facets = if facets < shots.len() * RAYS { 0..facets } else { 0..0 };
+    let facets: Vec<Facet> =
+        facets.into_par_iter().with_min_len(1024).map(|facet| Facet::of(stage, facet)).collect();
+    (&axes, &centres, &rays)
+        .into_par_iter()
+        .zip(hits.par_chunks(RAYS))
+        .map(|((axis, centre, rays), hits)| {
+            let centre = spot_ray(stage, &facets, axis, centre, 1.0)?;
+            let mut spot = Vec::with_capacity(RAYS);
+            for ((ray, hit), place) in rays.iter().zip(hits).zip(PLACES.iter()) {
+                spot.extend(spot_ray(stage, &facets, ray, hit, place.share));
+            }
+            Some((centre, spot))
+        })
+        .collect()
+}
+
+/// One ray of a spot with its share of the power, where it hits; `facets` may be empty.
+fn spot_ray(
+    stage: &Stage,
+    facets: &[Facet],
+    ray: &Ray<Global>,
+    hit: &Option<Hit>,
+    share: f64,
+) -> Option<SpotRay> {
+    let hit = hit.as_ref()?;
+    let surface = match facets.get(hit.facet as usize) {
+        Some(facet) => facet.surface(ray),
+        None => surface_at(stage, ray, hit),
+    };
+    Some(SpotRay::new(stage, surface, hit, share))
+}
+
+/// The rays of a spot whose diameter is seen at an angle, rad.
+fn spot_rays(axis: &Ray<Global>, diameter_rad: f64) -> [Ray<Global>; RAYS] {
+    let forward = axis.direction.xyz();
+    let (u, v) = forward.any_orthonormal_pair();
+    PLACES.map(|Place { along, across, .. }| {
+        let aside = diameter_rad * (along * u + across * v);
+        Ray { direction: Direction::new(forward + aside).unwrap_or(axis.direction), ..*axis }
+    })
+}
+
+/// Where a ray of a spot passes, in diameters from its middle, and its share of the power.
+#[derive(Clone, Copy, Default)]
+struct Place {
+    along: f64,
+    across: f64,
+    share: f64,
+}
+
+/// The rays of a spot: evenly on a disc and weighted by its intensity, as a highlight two spots away may
+/// outshine what lies in the middle.
+static PLACES: LazyLock<[Place; RAYS]> = LazyLock::new(|| {
+    // The intensity exp(−4 ln 2·r²/D²) has this standard deviation along each direction.
+    let sd = 1.0 / (8.0 * std::f64::consts::LN_2).sqrt();
+    let mut places = sunflower(RAYS).map(|(area, angle_rad)| {
+        let off_sd = REACH_SD * area.sqrt();
+        let (along, across) = (sd * off_sd * angle_rad.cos(), sd * off_sd * angle_rad.sin());
+        Place { along, across, share: (-0.5 * off_sd * off_sd).exp() }
+    });
+    let places = [(); RAYS].map(|()| places.next().unwrap_or_default());
+    let sum: f64 = places.iter().map(|place| place.share).sum();
+    let squares = places.iter().map(|p| p.share * (p.along.powi(2) + p.across.powi(2)));
+    // The intensity beyond their reach is made up for in the width.
+    let wider = (2.0 * sd * sd * sum / squares.sum::<f64>()).sqrt();
+    places.map(|Place { along, across, share }| Place {
+        along: wider * along,
+        across: wider * across,
+        share: share / sum,
+    })
+});
+
+/// The mean over a spot by the base law, on the target as the scene has it: other effects act on top of
+/// it.
+struct SpotMean {
+    /// Power of the ray along the axis and the mean over the spot, W.
+    centre_w: f64,
+    mean_w: f64,
+    /// What adds to the range, and its spread, m.
+    longer_m: f64,
+    spread_m: f64,
+}
+
+const ABOUT: About = About {
+    name: "finite-spot",
+    level: Level::Instrument,
+    description: "The beam has a width, here its diameter at half the intensity on the target, and averages \
+         over what lies in it: curvature, edges, borders between materials.",
+    signature: "Echoes are too weak beside edges, and the lobe is broader where the surface is curved; flat \
+         places far from edges are right. A rougher surface or an error of the angle broadens the lobe \
+         on flat places too.",
+    parameters: &[EffectParameter::new("diameter_m", "m", [0.0, MOST_M], 0.0, 0.008)],
+    conflicts: &[Conflict {
+        with: Setting::SeveralRays,
+        problem: "averages over the spot, and so do several rays",
+        way_out: "set spot.rays = 1, or remove the effect",
+    }],
+};
+
+impl Effect for FiniteSpot {
+    fn about(&self) -> &About {
+        &ABOUT
+    }
+
+    fn starts(&self, stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
+        let nominal_m = stage.radar.spot_diameter_m;
+        [0.1, 0.3, 0.75, 1.5].map(|share| vec![(share * nominal_m).clamp(1e-3, MOST_M)]).to_vec()
+    }
+
+    /// To where the intensity is 19 dB down.
+    fn reach_off_axis_m(&self, values: &[f64]) -> f64 {
+        1.25 * values.first().copied().unwrap_or_default()
+    }
+
+    fn survey_key(&self, values: &[f64]) -> Option<Vec<f64>> {
+        values.first().filter(|diameter_m| **diameter_m > 0.0).map(|_| values.to_vec())
+    }
+
+    fn survey(&self, values: &[f64], stage: &Stage, shots: &[Shot]) -> Survey {
+        let diameter_m = values.first().copied().unwrap_or(0.0);
+        Box::new(Spots { all: spots(stage, shots, diameter_m), sums: Cache::default() })
+    }
+
+    fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
+        let Some(spots) = survey.downcast_ref::<Spots>() else { return Box::new(()) };
+        let answers = spots.answers(laws);
+        let shots = (0..spots.all.len()).into_par_iter();
+        let means = shots.map(|shot| {
+            let mut sums = Sums::default();
+            for (level, of) in &answers {
+                sums = sums.and(*level, &of[shot]);
+            }
+            sums.averaged()
+        });
+        Box::new(means.collect::<Vec<_>>())
+    }
+
+    fn arrive(&self, _: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
+        let all = shaded.downcast_ref::<Vec<Option<SpotMean>>>().into_iter().flatten();
+        for (averaged, one) in all.zip(arrived) {
+            if let (Some(one), Some(averaged)) = (one, averaged) {
+                let gain = one.power_w / averaged.centre_w;
+                one.power_w = averaged.mean_w * gain.clamp(1.0 / MOST_GAIN, MOST_GAIN);
+                one.range_m += averaged.longer_m;
+                one.spread_m = one.spread_m.hypot(averaged.spread_m);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::{CookTorrance, Lambert};
+    use crate::effects::intersection::shot_along;
+    use crate::effects::testing::{Bench, db, lobe, paint};
+    use crate::effects::{Model, Receiver};
+    use crate::scene::solids;
+
+    #[test]
+    fn a_plane_stays_as_it_is() {
+        let bench = Bench::of(solids::plate(2.0, 2.0));
+        for (bare, with) in bench.bare().iter().zip(bench.with(&FiniteSpot, &[0.016])) {
+            // Over the spot the angle still changes by 2 mrad, on a lobe of 0.2.
+            assert!(db(with.power_w / bare.power_w).abs() < 0.01);
+            assert!((with.range_m - bare.range_m).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn what_is_kept_of_spots_is_what_their_laws_say() {
+        let ray = |region: u16, theta_rad: f64| SpotRay {
+            range_m: 8.0 + 0.01 * theta_rad,
+            to_radar: Direction::from_angles(theta_rad, 0.3),
+            watts_per_f: 1e-9,
+            region,
+        };
+        let over_a_border = (ray(0, 0.1), vec![ray(0, 0.2), ray(1, 0.3), ray(1, 0.05)]);
+        let all = vec![Some(over_a_border), None, Some((ray(1, 0.2), vec![ray(1, 0.25)]))];
+        let spots = Spots { all: all.clone(), sums: Cache::default() };
+        let law = |f_lambda: f64, m: f64| paint(CookTorrance { f_lambda, m, ..lobe() });
+        let tabled = Brdf::Lambert(Lambert { albedo: 0.5 });
+        let first = [law(0.2, 0.2), law(0.1, 0.3)];
+        let other_level = [law(0.4, 0.2), law(0.1, 0.3)];
+        let other_shape = [law(0.2, 0.25), tabled];
+        for laws in [&first, &other_level, &other_shape, &first] {
+            let answers = spots.answers(laws);
+            for (shot, spot) in all.iter().enumerate() {
+                let add =
+                    |sums: Sums, (level, of): &(f64, Arc<Vec<Sums>>)| sums.and(*level, &of[shot]);
+                let kept = answers.iter().fold(Sums::default(), add);
+                let Some(spot) = spot else {
+                    assert!(kept.power_w == 0.0);
+                    continue;
+                };
+                let fresh = (0..).zip(laws).fold(Sums::default(), |sums, (region, law)| {
+                    sums.and(1.0, &Sums::of(spot, region, |v| law.f_per_sr(v, v)))
+                });
+                for (kept, fresh) in [
+                    (kept.centre_w, fresh.centre_w),
+                    (kept.power_w, fresh.power_w),
+                    (kept.first, fresh.first),
+                    (kept.second, fresh.second),
+                ] {
+                    assert!((kept - fresh).abs() <= 1e-12 * fresh.abs(), "{kept} {fresh}");
+                }
+            }
+        }
+    }
+
+    /// The mean over a fine grid of rays through a spot, W.
+    fn finely_w(bench: &Bench, shot: &Shot, diameter_m: f64) -> f64 {
+        const HALF: i32 = 40;
+        let (stage, law) = (bench.stage(), paint(lobe()));
+        let model = Model { laws: vec![law], receiver: Receiver::LINEAR, effects: Vec::new() };
+        let forward = shot.ray.direction.xyz();
+        let (u, v) = forward.any_orthonormal_pair();
+        let sd_rad = diameter_m / shot.hit.range_m / (8.0 * std::f64::consts::LN_2).sqrt();
+        let [mut power_w, mut weights] = [0.0; 2];
+        for (i, j) in (-HALF..=HALF).flat_map(|i| (-HALF..=HALF).map(move |j| (i, j))) {
+            let [x, y] = [i, j].map(|k| 4.0 * f64::from(k) / f64::from(HALF));
+            let weight = (-0.5 * (x * x + y * y)).exp();
+            let direction = Direction::new(forward + sd_rad * (x * u + y * v)).unwrap();
+            let beside = shot_along(&stage, shot, Ray { direction, ..shot.ray });
+            weights += weight;
+            power_w += beside.map_or(0.0, |shot| weight * model.arrived(&stage, &shot).power_w);
+        }
+        power_w / weights
+    }
+
+    #[test]
+    fn a_spot_on_a_ball_is_that_of_a_fine_grid() {
+        let bench = Bench::sphere();
+        for diameter_m in [0.02, 0.05, 0.1] {
+            let spots = bench.with(&FiniteSpot, &[diameter_m]);
+            let off_db: Vec<f64> = std::iter::zip(&bench.shots, spots)
+                .step_by(3)
+                .map(|(shot, spot)| db(spot.power_w / finely_w(&bench, shot, diameter_m)))
+                .collect();
+            let rms = (off_db.iter().map(|x| x * x).sum::<f64>() / off_db.len() as f64).sqrt();
+            let most = off_db.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+            assert!(rms < 0.2 && most < 0.5, "{diameter_m} m: {rms:.3} dB, at most {most:.3}");
+        }
+    }
+
+    #[test]
+    fn half_a_spot_beside_the_edge_is_half_the_power() {
+        let bench = Bench::of(solids::plate(0.5, 2.0));
+        let edge = bench.shots.iter().position(|shot| shot.xt_m > 0.2499);
+        let edge = edge.expect("the last column of shots is on the edge");
+        let ratio = bench.with(&FiniteSpot, &[0.016])[edge].power_w / bench.bare()[edge].power_w;
+        // A few rays lie on the edge itself.
+        assert!((ratio - 0.5).abs() < 0.1, "{ratio}");
+    }
+}

@@ -1,0 +1,238 @@
+//! Echoes by way of a second surface: radar → first hit → second hit → radar.
+//!
+//! The power that leaves the first hit in a direction falls on the second one and is scattered to the radar,
+//! unless something hides it: P₂ = coupling·∫ Φ·f₁(i, ω)·cos θ_ω · f₂·cos θ_o·A_eq/R₂² dω, over fixed
+//! directions, spread by the cosine and by a wide and a narrow lobe, each weighed by their joint density (the
+//! balance heuristic: Veach & Guibas, SIGGRAPH 1995). Its range is half the whole way, and what is
+//! reported is the mean by power.
+
+use std::f64::consts::PI;
+
+use rayon::prelude::*;
+
+use crate::brdf::{Brdf, Distribution, Scattering};
+use crate::effects::echo::MeanEcho;
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
+use crate::effects::intersection::{Axes, shot_along};
+use crate::effects::shot::{Shot, Stage};
+use crate::effects::spread::sunflower;
+use crate::frames::{Direction, Point, Ray, Surface};
+use crate::units::ratio_from_db;
+
+/// The effect `multi-bounce`.
+pub(crate) struct MultiBounce;
+
+/// A coupling that counts as none, dB.
+const NONE_DB: f64 = -60.0;
+/// Directions of each kind.
+const DIRECTIONS: usize = 24;
+/// Roughnesses of the lobes that directions are spread over, whatever the law's: rays can then be traced
+/// once for all laws.
+const LOBES: [f64; 2] = [0.25, 0.08];
+/// The cosine and the lobes.
+const KINDS: usize = 1 + LOBES.len();
+/// A ray starts this far from its surface, m, so that the surface does not block it.
+const CLEARANCE_M: f64 = 1e-6;
+
+/// Onward directions at a surface, with the density of each, 1/sr.
+fn onward(i: Direction<Surface>) -> impl Iterator<Item = (Direction<Surface>, f64)> {
+    let by_cosine = sunflower(DIRECTIONS)
+        .map(|(share, azimuth_rad)| Direction::from_angles(share.sqrt().asin(), azimuth_rad));
+    let by_lobes = LOBES.into_iter().flat_map(move |m| by_lobe(i, m));
+    by_cosine.chain(by_lobes).filter(|o| o.cos_theta() > 1e-6).map(move |o| {
+        let lobes: f64 = LOBES.iter().map(|m| lobe_density(i, o, *m)).sum();
+        (o, (o.cos_theta() / PI + lobes) / KINDS as f64)
+    })
+}
+
+/// Reflections of i on facets of roughness m by Beckmann's law.
+fn by_lobe(i: Direction<Surface>, m: f64) -> impl Iterator<Item = Direction<Surface>> {
+    sunflower(DIRECTIONS).filter_map(move |(share, azimuth_rad)| {
+        let tan = m * (-(1.0 - share).ln()).sqrt();
+        let h = Direction::<Surface>::from_angles(tan.atan(), azimuth_rad).xyz();
+        Direction::new(2.0 * i.xyz().dot(h) * h - i.xyz())
+    })
+}
+
+/// Density at o of reflections of i on facets by Beckmann's law, 1/sr.
+fn lobe_density(i: Direction<Surface>, o: Direction<Surface>, m: f64) -> f64 {
+    let Some(h) = Direction::<Surface>::new(i.xyz() + o.xyz()) else { return 0.0 };
+    let per_sr = Distribution::Beckmann.d_per_sr(h.cos_theta(), m) * h.cos_theta();
+    per_sr / (4.0 * i.xyz().dot(h.xyz()).max(1e-9))
+}
+
+/// A path by way of a second surface, apart from the laws of the two surfaces.
+#[derive(Clone, Copy)]
+struct Detour {
+    /// Regions of the two surfaces.
+    regions: [u16; 2],
+    /// Into and out of each of them.
+    first: [Direction<Surface>; 2],
+    second: [Direction<Surface>; 2],
+    /// Power received, W, where both f are 1/sr, as one of all directions.
+    watts_per_f2: f64,
+    /// Half the whole way, m.
+    range_m: f64,
+}
+
+impl Detour {
+    fn power_w(&self, laws: &[Brdf]) -> f64 {
+        let mut power_w = self.watts_per_f2;
+        for (region, [i, o]) in std::iter::zip(self.regions, [self.first, self.second]) {
+            power_w *= laws.get(usize::from(region)).map_or(0.0, |law| law.f_per_sr(i, o));
+        }
+        power_w
+    }
+}
+
+/// The path of a ray from the first surface to a second one that the radar sees.
+fn detour(
+    stage: &Stage,
+    shot: &Shot,
+    axes: &Axes,
+    o: Direction<Surface>,
+    density_per_sr: f64,
+) -> Option<Detour> {
+    let onward = axes.world(o.xyz());
+    let start = shot.hit.point.xyz + CLEARANCE_M * shot.normal;
+    let ray = Ray { origin: Point::from(start), direction: Direction::new(onward)? };
+    let second = shot_along(stage, shot, ray)?;
+    let radar = shot.ray.origin;
+    let back = second.hit.point.towards(radar)?;
+    let cos_exit = second.normal.dot(back.xyz());
+    let back_m = second.hit.point.distance_m(radar);
+    let sight = Ray { origin: radar, direction: -back };
+    let hidden = stage.bvh.closest(&sight).is_some_and(|hit| hit.range_m < back_m - 1e-5);
+    if cos_exit <= 0.0 || hidden {
+        return None;
+    }
+    let there = Axes::of(stage, &second);
+    let way_m = shot.hit.point.distance_m(second.hit.point) + back_m;
+    let sent_w = stage.link.flux_w(shot.hit.cos_theta) * o.cos_theta() / density_per_sr;
+    let share = stage.link.received_per_w(back_m, cos_exit, 1.0) / (KINDS * DIRECTIONS) as f64;
+    Some(Detour {
+        regions: [shot.region, second.region],
+        first: [axes.local(-shot.ray.direction.xyz()), o],
+        second: [there.local(-onward), there.local(back.xyz())],
+        watts_per_f2: sent_w * share,
+        range_m: (shot.hit.range_m + way_m) / 2.0,
+    })
+}
+
+/// All paths of a chirp by way of second surfaces, on the target as the scene has it.
+fn detours(stage: &Stage, shot: &Shot) -> Vec<Detour> {
+    let Some(shot) = &shot_along(stage, shot, shot.ray) else { return Vec::new() };
+    let axes = Axes::of(stage, shot);
+    let i = axes.local(-shot.ray.direction.xyz());
+    onward(i).filter_map(|(o, density)| detour(stage, shot, &axes, o, density)).collect()
+}
+
+/// Power, W, and range, m, of all that a chirp returns by way of a second surface.
+fn returned(laws: &[Brdf], detours: &[Detour]) -> Option<MeanEcho> {
+    let detours = detours.iter();
+    detours.map(|one| MeanEcho::at_once(one.power_w(laws), one.range_m)).reduce(MeanEcho::with)
+}
+
+const ABOUT: About = About {
+    name: "multi-bounce",
+    level: Level::Scene,
+    description: "Part of the wave goes on from the first surface to a second one and returns from there; 0 dB \
+         is as much as the law of the material makes of it.",
+    signature: "Places that face another surface, as in corners and under arms, are too bright and too far \
+         away. A foreign patch is bright without a longer range, and a wrong pose is off in range \
+         without being bright; convex targets never show this.",
+    parameters: &[EffectParameter::new("coupling_db", "dB", [NONE_DB, 30.0], NONE_DB, 1.0)],
+    conflicts: &[Conflict {
+        with: Setting::Bounce,
+        problem: "brings echoes by way of a second surface, and so does [bounce]",
+        way_out: "remove one of the two",
+    }],
+};
+
+impl Effect for MultiBounce {
+    fn about(&self) -> &About {
+        &ABOUT
+    }
+
+    fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
+        vec![vec![-10.0], vec![0.0], vec![10.0]]
+    }
+
+    fn survey_key(&self, values: &[f64]) -> Option<Vec<f64>> {
+        values.first().filter(|coupling_db| **coupling_db > NONE_DB).map(|_| Vec::new())
+    }
+
+    fn survey(&self, _: &[f64], stage: &Stage, shots: &[Shot]) -> Survey {
+        let all: Vec<Vec<Detour>> = shots.par_iter().map(|shot| detours(stage, shot)).collect();
+        Box::new(all)
+    }
+
+    fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
+        let all = survey.downcast_ref::<Vec<Vec<Detour>>>().map_or(&[][..], Vec::as_slice);
+        let returned = all.par_iter().map(|detours| returned(laws, detours));
+        Box::new(returned.collect::<Vec<Option<MeanEcho>>>())
+    }
+
+    fn arrive(&self, values: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
+        let coupling = ratio_from_db(values.first().copied().unwrap_or(NONE_DB));
+        let returned = shaded.downcast_ref::<Vec<Option<MeanEcho>>>().into_iter().flatten();
+        for (detour, one) in returned.zip(arrived) {
+            if let (Some(one), Some(detour)) = (one, detour) {
+                *one = one.with(MeanEcho { power_w: coupling * detour.power_w, ..*detour });
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::Lambert;
+    use crate::effects::testing::{Bench, dihedral};
+    use crate::effects::{Model, Receiver};
+
+    #[test]
+    fn it_adds_power_and_way_in_a_corner_and_nothing_on_a_ball() {
+        let corner = Bench::of(dihedral());
+        let (bare, with) = (corner.bare(), corner.with(&MultiBounce, &[0.0]));
+        let mut raised = 0;
+        for (bare, with) in bare.iter().zip(&with) {
+            assert!(with.power_w >= bare.power_w && with.range_m >= bare.range_m - 1e-9);
+            raised += usize::from(with.power_w > 1.05 * bare.power_w);
+        }
+        assert!(raised > bare.len() / 2, "{raised} of {}", bare.len());
+        let ball = Bench::sphere();
+        assert_eq!(ball.with(&MultiBounce, &[0.0]), ball.bare());
+    }
+
+    /// ∫ cos θ dω over the hemisphere is π.
+    #[test]
+    fn the_directions_integrate_over_the_hemisphere() {
+        for theta_rad in [0.0, 0.5, 1.0] {
+            let i = Direction::from_angles(theta_rad, 0.3);
+            let sum: f64 = onward(i).map(|(o, density)| o.cos_theta() / density).sum();
+            let found = sum / (KINDS * DIRECTIONS) as f64 / PI;
+            // A third of the directions see the whole, so that a few per cent are left.
+            assert!((found - 1.0).abs() < 0.1, "{theta_rad}: {found}");
+        }
+    }
+
+    /// Each bounce takes one factor of the albedo, and what leaves one wall of a right angle hits the
+    /// other by less than half.
+    #[test]
+    fn the_power_of_a_lambertian_corner_follows_its_albedo() {
+        let corner = Bench::of(dihedral());
+        let share = |albedo: f64| {
+            let laws = vec![Brdf::Lambert(Lambert { albedo })];
+            let receiver = Receiver { looks: 4.0, noise_w: 0.0, ..Receiver::LINEAR };
+            let total = |effects| -> f64 {
+                let model = Model { laws: laws.clone(), receiver, effects };
+                let found = model.predict(&corner.stage(), &corner.shots);
+                found.arrived.iter().flatten().map(|one| one.power_w).sum()
+            };
+            total(vec![(&MultiBounce as &dyn Effect, vec![0.0])]) / total(Vec::new()) - 1.0
+        };
+        assert!((share(0.8) / share(0.4) - 2.0).abs() < 1e-9);
+        assert!(share(0.8) > 0.02 && share(0.8) < 0.4, "{}", share(0.8));
+    }
+}
