@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use crate::store::StoreError;
+use crate::store::{Store, StoreError};
 
 /// Why a catalogue could not be published or taken over. Nothing has changed then.
 #[derive(Debug, Error)]
@@ -157,4 +157,11 @@ pub enum CatalogueError {
         /// What the template engine says.
         reason: String,
     },
+}
+
+impl CatalogueError {
+    /// That a database is damaged.
+    pub(super) fn damaged(store: &Store, problem: String) -> CatalogueError {
+        CatalogueError::Damaged { database: store.path().to_owned(), problem }
+    }
 }

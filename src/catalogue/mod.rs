@@ -7,6 +7,7 @@
 mod about;
 mod api;
 mod bibtex;
+mod contents;
 mod diff;
 mod error;
 pub mod exchange;
@@ -27,13 +28,14 @@ mod units;
 mod verify;
 
 pub use about::{About, AboutError};
+pub use contents::named_licences;
 pub use diff::{CurveChange, Diff, Field, Levels};
 pub use error::CatalogueError;
 pub use folder::{Folder, Sum};
 pub use import::{Import, Imported, Outcome, Taken};
 pub use near::{Distance, Probe, Rank};
 pub use nearest::Nearest;
-pub use publish::{Published, named_licences, publish};
+pub use publish::{Published, publish};
 pub use references::{Citable, Credit, Reference, references};
 pub use tables::HAS_PARQUET;
 pub use verify::{

@@ -13,10 +13,10 @@ use serde_json::Value;
 
 use super::about::About;
 use super::api::{Entry, Index, LARGEST_MATERIAL_BYTES, Record, SCHEMA_VERSION};
+use super::contents::rebuilt;
 use super::error::CatalogueError;
 use super::folder::{Sum, files, hashed};
 use super::layout::{ABOUT, DATABASE, INDEX, MATERIALS, SUMS, material_path};
-use super::publish::rebuilt;
 use super::tables::HAS_PARQUET;
 use crate::fit::again::{lacks_report, problems};
 use crate::material::Fit;
