@@ -167,12 +167,28 @@ fn effect_section(effect: &Value) -> String {
         text("is"),
         text("shows")
     );
-    for parameter in effect["parameters"].as_array().unwrap() {
-        let [min, max, absent] = ["min", "max", "absent"].map(|key| parameter[key].to_string());
-        let [name, unit] = ["name", "unit"].map(|key| parameter[key].as_str().unwrap());
-        section += &format!("| `{name}` | {unit} | {min} | {max} | {absent} |\n");
+    let parameters = effect["parameters"].as_array().unwrap();
+    for group in parameters.chunk_by(|a, b| cells(a) == cells(b)) {
+        section += &format!("| {} | {} |\n", names(group), cells(&group[0]).join(" | "));
     }
     section
+}
+
+/// Unit, range and default of a parameter.
+fn cells(parameter: &Value) -> [String; 4] {
+    let number = |key: &str| parameter[key].to_string();
+    let unit = parameter["unit"].as_str().unwrap_or_default().to_owned();
+    [unit, number("min"), number("max"), number("absent")]
+}
+
+/// Names of neighbouring parameters that are alike; of many the first and the last.
+fn names(group: &[Value]) -> String {
+    let names: Vec<String> =
+        group.iter().map(|p| format!("`{}`", p["name"].as_str().unwrap_or_default())).collect();
+    match names.as_slice() {
+        [first, _, _, .., last] => format!("{first} … {last}"),
+        few => few.join(", "),
+    }
 }
 
 #[test]
