@@ -2,17 +2,12 @@
 
 mod compare;
 
-use super::{Fit, FitError, Method};
+use super::error::FitError;
+use super::models::{model, model_names};
+use super::settings::{Fit, Method};
 use crate::brdf::Brdf;
 use crate::material::{self, FitReport, Material};
 use crate::measure::curve::Curve;
-
-/// How far ln likelihoods, or half sums of squares, of two searches for one optimum may differ: where
-/// they stopped, and rounding, relative. One standard deviation of a number is half a unit.
-const SAME_OBJECTIVE: f64 = 0.01;
-const ROUNDING: f64 = 1e-6;
-/// How far numbers may, in the standard deviations of the new fit.
-const SAME_NUMBER_SD: f64 = 0.1;
 
 /// What a fit that this program found has as its estimator.
 const METHODS: [&str; 4] = ["censored", "mse", "tls", "tls-tail"];
@@ -75,7 +70,7 @@ fn starts(material: &Material, fit: &material::Fit) -> Vec<Brdf> {
     let paths = |model: &Brdf| model.parameters().into_iter().map(|p| p.path).collect::<Vec<_>>();
     let same = paths(&fit.model);
     let others = material.fits.iter().map(|other| other.model.clone());
-    let named = super::model_names().filter_map(super::model);
+    let named = model_names().filter_map(model);
     named.chain(others).filter(|start| paths(start) == same).collect()
 }
 
@@ -107,7 +102,6 @@ fn differences_from(
 
 #[cfg(test)]
 mod tests {
-    use super::super::model;
     use super::super::twin::{Twin, mixture};
     use super::*;
     use crate::material::builtin;

@@ -8,9 +8,9 @@ use nalgebra::DVector;
 use serde::Serialize;
 
 use super::coordinates::{Coordinates, frequencies};
-use super::minimise::{Local, Minimise, Minimum};
+use super::error::FitError;
+use super::minimise::{Local, Minimise, Minimum, Stop};
 use super::search::drawn_start;
-use super::{FitError, Stop};
 use crate::brdf::{Brdf, Scattering};
 use crate::frames::{Direction, Surface};
 use crate::units::db_from_ratio;

@@ -7,7 +7,7 @@
 
 use nalgebra::DVector;
 
-use super::FitError;
+use super::error::FitError;
 use crate::brdf::{Brdf, Mixture, Parameter};
 
 /// Name of the specular level S = (1 − k)·f_λ.

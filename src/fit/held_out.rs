@@ -6,8 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::DVector;
 
 use super::likelihood::Likelihood;
-use super::result::residuals_db;
-use super::{FitResult, Method};
+use super::result::{FitResult, residuals_db};
+use super::settings::Method;
 use crate::material::HeldOut;
 use crate::measure::curve::{Curve, Row};
 use crate::radar::random::{Key, Purpose};
@@ -173,8 +173,9 @@ fn fold_hash(fold_of_row: impl Iterator<Item = usize>) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::models::model;
+    use super::super::settings::Fit;
     use super::super::twin::{Twin, mixture};
-    use super::super::{Fit, model};
     use super::*;
 
     fn placed(mut curve: Curve) -> Curve {

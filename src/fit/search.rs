@@ -7,8 +7,8 @@ use super::interval::{End, Profile};
 use super::least_squares::{Deviations, Squares};
 use super::likelihood::{Curvature, Likelihood};
 use super::minimise::{Local, Minimise, Minimum, Stop};
+use super::settings::{Fit, Method};
 use super::uncertainty::{Uncertainty, observed_information};
-use super::{Fit, Method};
 use crate::measure::curve::Row;
 use crate::radar::random::{Key, Purpose};
 

@@ -1,7 +1,8 @@
 //! A fit as a material keeps it, and the band that can be drawn from what was kept.
 
 use super::interval::DEVIATE_95;
-use super::{Band, FitResult, Method};
+use super::result::{Band, Estimate, FitResult};
+use super::settings::Method;
 use crate::brdf::{Brdf, Scattering};
 use crate::material::{self, Covariance, FitReport, Given};
 
@@ -58,7 +59,7 @@ impl FitResult {
     }
 
     fn report(&self) -> FitReport {
-        let estimate = |e: &super::Estimate| material::Estimate {
+        let estimate = |e: &Estimate| material::Estimate {
             name: e.name.clone(),
             value: e.value,
             sd: e.sd,
@@ -159,7 +160,7 @@ fn slope(model: &Brdf, estimate: &material::Estimate, theta_rad: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Fit;
+    use super::super::settings::Fit;
     use super::super::twin::{Twin, mixture};
     use super::*;
 

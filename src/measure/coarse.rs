@@ -3,10 +3,11 @@
 
 use glam::DVec3;
 
+use super::error::RegistrationError;
 use super::icp::{Gap, Motion, NormalEquations, bulk_sd_m, point_to_point, rigid};
 use super::nearest::Nearest;
 use super::placed::Seen;
-use super::register::{Metric, Registration, RegistrationError};
+use super::settings::{Metric, Registration};
 use super::view::{View, median};
 use crate::frames::{Global, Point, Pose};
 

@@ -1,7 +1,7 @@
 //! How far a simulated scan is from a measured one: pixel by pixel, and along a line (paper, Figs. 10
 //! to 15).
 
-use super::cloud::Cloud;
+use super::cloud::{Cloud, CloudPoint};
 use crate::frames::Point;
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
@@ -39,7 +39,7 @@ pub struct Line {
 pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
     let frames = radar.frames();
     let (origin, target_from_global) = (frames.origin(), frames.global_from_target.inverse());
-    let echo = |(number, point): (usize, &super::CloudPoint)| {
+    let echo = |(number, point): (usize, &CloudPoint)| {
         let in_target = target_from_global * point.point;
         Echo {
             chirp: point.chirp.unwrap_or(number as u32),
@@ -103,7 +103,6 @@ pub fn along(scan: &Scan, line: Line) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::CloudPoint;
 
     fn raster(values: [f32; 4]) -> Raster {
         let channels = vec![Channel { name: "power_dbm".to_owned(), values: values.to_vec() }];

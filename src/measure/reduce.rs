@@ -12,13 +12,13 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use thiserror::Error;
 
 use super::cloud::{Cloud, CloudPoint};
 use super::curve::{Curve, Row};
+use super::error::ReductionError;
 use super::incidence::{Incidence, Sighting};
 use super::nearest::Nearest;
-use super::register::{Registered, RegistrationError};
+use super::register::Registered;
 use super::sights::sights;
 use crate::frames::{Global, Point, Pose, Ray, Target as TargetFrame};
 use crate::radar::scan::PATTERN_RANGE_M;
@@ -69,68 +69,6 @@ pub struct LeftOut {
     /// Detections and silent chirps of which the pose does not tell which facet they met; for an exact
     /// mesh alone.
     pub unsure_of_facet: usize,
-}
-
-/// Why there is no curve.
-#[derive(Debug, Error, PartialEq)]
-pub enum ReductionError {
-    /// The pose is not one to build on.
-    #[error("the registration has not converged; a curve needs a pose, so allow more steps")]
-    NotConverged,
-    /// No such region.
-    #[error("there is no region {region}; the target has {regions}")]
-    UnknownRegion {
-        /// What was asked for.
-        region: u16,
-        /// Number of regions.
-        regions: usize,
-    },
-    /// Cloud, radar and scan do not belong together.
-    #[error(transparent)]
-    Cloud(#[from] RegistrationError),
-    /// Nothing was left.
-    #[error(
-        "no detection became a row: {missed} miss the target, {off_surface} lie off its surface, \
-         {other_region} are of other regions and {near_edge} near an edge; choose another region or a \
-         smaller edge margin"
-    )]
-    NoRows {
-        /// See [`LeftOut`].
-        missed: usize,
-        /// See [`LeftOut`].
-        off_surface: usize,
-        /// See [`LeftOut`].
-        other_region: usize,
-        /// See [`LeftOut`].
-        near_edge: usize,
-    },
-    /// The radar of the scene could not have detected this.
-    #[error(
-        "{below} of {points} powers lie below the scene's threshold of {threshold_dbm} dBm, the weakest \
-         at {weakest_dbm:.1} dBm; give the scene the radar.threshold_dbm of the measurement, or check \
-         the unit of the power"
-    )]
-    BelowThreshold {
-        /// Detections below it.
-        below: usize,
-        /// All detections.
-        points: usize,
-        /// The threshold, dBm.
-        threshold_dbm: f64,
-        /// The weakest power, dBm.
-        weakest_dbm: f64,
-    },
-    /// Several detections of one chirp.
-    #[error(
-        "{shared} of {points} points share a chirp with another point; keep one detection per chirp, \
-         or give the scene the scan of the measurement"
-    )]
-    SharedChirps {
-        /// Points beyond the first of their chirp.
-        shared: usize,
-        /// All points.
-        points: usize,
-    },
 }
 
 /// A hundredth of the points may contradict the scene before the cloud is refused.
@@ -455,7 +393,7 @@ fn unheard(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::register::Registration;
+    use crate::measure::settings::Registration;
     use crate::measure::synthetic::{Measured, f_per_sr, mannequin};
     use crate::units::db_from_ratio;
 

@@ -8,13 +8,14 @@
 
 use glam::DVec3;
 use nalgebra::{Matrix6, Vector6};
-use thiserror::Error;
 
 use super::cloud::Cloud;
 use super::coarse::{self, Aligned};
-use super::icp::{Gap, Kernel, Motion, NormalEquations, bulk_sd_m, rigid};
+use super::error::RegistrationError;
+use super::icp::{Gap, Motion, NormalEquations, bulk_sd_m, rigid};
+use super::settings::{Metric, Registration, Start};
 use super::sights::sights;
-use super::start::{self, Start};
+use super::start;
 use super::uncertainty::{Uncertainty, uncertainty};
 use super::view::{RayGap, View};
 use crate::frames::{Global, Point, Pose};
@@ -31,83 +32,6 @@ const HAND_OVER_M: f64 = 1e-3;
 const LEAST_SD_M: f64 = 1e-9;
 /// Errors wider than a range cell of 27 GHz, c/2B, are of the fit and not of the radar, m.
 const RANGE_CELL_M: f64 = 5.55e-3;
-
-/// What is made small.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Metric {
-    /// Distances to the nearest virtual point: the paper's.
-    PointToPoint,
-    /// Distances to the plane of the nearest virtual point.
-    PointToPlane,
-    /// Point to plane first, then gaps along the measured rays.
-    #[default]
-    AlongRay,
-}
-
-/// How to register.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Registration {
-    /// What is made small.
-    pub metric: Metric,
-    /// How much outliers count.
-    pub kernel: Kernel,
-    /// The rough pose.
-    pub start: Start,
-    /// Farthest neighbours at the rough pose, m, above 0.
-    pub reach_m: f64,
-    /// Most virtual scans, 1 or more.
-    pub max_scans: usize,
-    /// Most alignment steps per virtual scan, and along the rays, 1 or more.
-    pub max_steps: usize,
-    /// The pose has stopped changing when a step moves the target by less, m, above 0.
-    pub still_m: f64,
-    /// Most measured points that the coarse loop looks at.
-    pub coarse_points: usize,
-    /// Fewer points are refused.
-    pub least_points: usize,
-    /// A smaller share of points on the surface is refused, 0 to 1.
-    pub least_inliers: f64,
-    /// A pose farther from the rough one has diverged, m.
-    pub farthest_m: f64,
-    /// A pose turned farther from the rough one has diverged, rad.
-    pub farthest_rad: f64,
-    /// Keep a pose given by hand when the points do not speak against it, at 5 %: it may be known
-    /// better than they tell, and on flat facets a tenth of a millimetre moves angles by degrees.
-    pub keep_given: bool,
-}
-
-impl Default for Registration {
-    fn default() -> Self {
-        Registration {
-            metric: Metric::default(),
-            kernel: Kernel::default(),
-            start: Start::default(),
-            reach_m: 0.12,
-            max_scans: 30,
-            max_steps: 40,
-            still_m: 1e-5,
-            coarse_points: 2500,
-            least_points: 50,
-            least_inliers: 0.5,
-            farthest_m: 0.25,
-            farthest_rad: 0.5,
-            keep_given: true,
-        }
-    }
-}
-
-impl Registration {
-    /// The paper's: point to point, all points, every pair counts alike.
-    pub fn paper() -> Registration {
-        Registration {
-            metric: Metric::PointToPoint,
-            kernel: Kernel::Square,
-            coarse_points: usize::MAX,
-            max_scans: 100,
-            ..Default::default()
-        }
-    }
-}
 
 /// Why a registration ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -152,86 +76,6 @@ pub struct Registered {
     pub converged: bool,
     /// What a person should know of the pose.
     pub verdicts: Vec<String>,
-}
-
-/// Why there is no pose.
-#[derive(Debug, Error, PartialEq)]
-pub enum RegistrationError {
-    /// Too few points.
-    #[error("the cloud has {points} points, a pose needs {least}; measure with more chirps")]
-    TooFew {
-        /// Points of the cloud.
-        points: usize,
-        /// Least number.
-        least: usize,
-    },
-    /// A point where its ray starts.
-    #[error("point {point} lies where the radar's rays start; check the frame of the cloud")]
-    AtTheRadar {
-        /// Point, from 0.
-        point: usize,
-    },
-    /// Ranges contradict positions.
-    #[error(
-        "the ranges of the cloud differ from the distances of its points from the radar by {:.0} mm; \
-         check its frame, its unit and the radar's place", 1e3 * typical_m
-    )]
-    RangesDisagree {
-        /// Typical difference, m.
-        typical_m: f64,
-    },
-    /// Chirp numbers contradict positions.
-    #[error(
-        "{off} of {numbered} points lie beside the ray of their chirp; check the frame of the cloud \
-         and the radar's scan"
-    )]
-    ChirpsDisagree {
-        /// Points off their ray or of an unknown chirp.
-        off: usize,
-        /// Points with a chirp number.
-        numbered: usize,
-    },
-    /// The virtual scan sees nothing.
-    #[error(
-        "no chirp of the scan hits the mesh at the rough pose; give a rough pose within the field of \
-         view, and check that the cloud lies there, too"
-    )]
-    NothingInView,
-    /// The clouds do not overlap.
-    #[error(
-        "{near} of {points} points are within {:.0} mm of the mesh at the rough pose: no overlap; \
-         give a better rough pose, or check frame and unit", 1e3 * reach_m
-    )]
-    NoOverlap {
-        /// Points with a neighbour.
-        near: usize,
-        /// Points looked at.
-        points: usize,
-        /// Farthest neighbour, m.
-        reach_m: f64,
-    },
-    /// The pose ran away.
-    #[error(
-        "the pose moved {:.0} mm and {:.1}° from the rough one: it diverged; give a better rough pose",
-        1e3 * shift_m, turn_rad.to_degrees()
-    )]
-    Diverged {
-        /// Shift of the target, m.
-        shift_m: f64,
-        /// Turn, rad.
-        turn_rad: f64,
-    },
-    /// The surface does not explain the points.
-    #[error(
-        "only {inliers} of {points} points lie on the registered surface; is this the mesh that was \
-         measured, and the rough pose near?"
-    )]
-    NoFit {
-        /// Points on the surface.
-        inliers: usize,
-        /// All points.
-        points: usize,
-    },
 }
 
 impl Registration {

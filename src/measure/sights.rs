@@ -6,8 +6,8 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::cloud::{Cloud, CloudPoint};
+use super::error::RegistrationError;
 use super::icp::bulk_sd_m;
-use super::register::RegistrationError;
 use crate::frames::{Global, Point, Ray};
 use crate::radar::{Chirps, Radar};
 

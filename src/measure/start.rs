@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::coarse;
-use super::register::{Registration, RegistrationError};
+use super::error::RegistrationError;
+use super::settings::{Registration, Start};
 use super::view::{View, median_point};
 use crate::frames::{Global, Pose};
 
@@ -13,24 +14,6 @@ use crate::frames::{Global, Pose};
 const YAWS: usize = 12;
 /// Along the rays a gap counts no more than this, m.
 const WORST_M: f64 = 0.05;
-
-/// The rough pose.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Start {
-    /// By hand: what moves the mesh, as the scene places it, near to the cloud. The default is to
-    /// leave it where it is.
-    Given(Pose<Global, Global>),
-    /// Twelve yaws about the vertical, from the scene's place and from the middle of the mesh on the
-    /// middle of the cloud, each aligned coarsely; the one that fits best. The mesh must stand
-    /// upright. A symmetric target may be found turned round.
-    Automatic,
-}
-
-impl Default for Start {
-    fn default() -> Self {
-        Start::Given(Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO))
-    }
-}
 
 pub(super) fn rough(
     view: &View,

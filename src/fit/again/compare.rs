@@ -1,14 +1,20 @@
 //! What a stored fit says against what a new one finds: the model that is rendered, the numbers and how
 //! well they are known, and the sentences. How far apart they may be follows from the new fit alone.
 
-use super::{ROUNDING, SAME_NUMBER_SD, SAME_OBJECTIVE};
 use crate::brdf::{Brdf, Scattering};
 use crate::fit::coordinates::{DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
 use crate::fit::interval::DEVIATE_95;
-use crate::fit::{Estimate, Finding, FitResult};
+use crate::fit::result::{Estimate, FitResult};
+use crate::fit::verdict::Finding;
 use crate::material::{self, FitReport, Goodness, HeldOut};
 use crate::measure::curve::Curve;
 
+/// How far ln likelihoods, or half sums of squares, of two searches for one optimum may differ: where
+/// they stopped, and rounding, relative. One standard deviation of a number is half a unit.
+const SAME_OBJECTIVE: f64 = 0.01;
+const ROUNDING: f64 = 1e-6;
+/// How far numbers may, in the standard deviations of the new fit.
+const SAME_NUMBER_SD: f64 = 0.1;
 /// How far standard deviations of two searches for one optimum may differ, relative.
 const SAME_SD: f64 = 0.05;
 /// How far sums over the rows may, relative and in dB.
