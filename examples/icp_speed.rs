@@ -77,7 +77,7 @@ fn measured(scene: &Scene) -> Answer<Cloud> {
             chirp: Some(*chirp),
             point,
             range_m: Some(range_m),
-            power_dbm: -60.0,
+            power_w: 1e-9,
         });
     }
     Ok(Cloud::new(points)?)

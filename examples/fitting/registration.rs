@@ -11,7 +11,7 @@ use matdb::measure::{Cloud, CloudPoint, Registered, Registration, Start};
 use matdb::radar::Link;
 use matdb::radar::random::{Draws, Key, Purpose};
 use matdb::scene::Scene;
-use matdb::units::dbm_from_watts;
+use matdb::units::watts_from_dbm;
 use rayon::prelude::*;
 
 use crate::Failure;
@@ -112,12 +112,12 @@ fn measured(scene: &Scene, draws: &mut Draws) -> Result<Cloud, Failure> {
     {
         let Some(hit) = seen.map(|seen| seen.hit) else { continue };
         let f_per_sr = paint.retro_per_sr(hit.theta_rad());
-        let power_dbm = dbm_from_watts(link.power_w(hit.range_m, hit.cos_theta, f_per_sr));
+        let power_w = link.power_w(hit.range_m, hit.cos_theta, f_per_sr);
         let range_m = hit.range_m + RANGE_SD_M * normal(draws);
         let point = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
-        if power_dbm >= radar.threshold_dbm {
+        if power_w >= watts_from_dbm(radar.threshold_dbm) {
             let chirp = Some(*number);
-            points.push(CloudPoint { chirp, point, range_m: Some(range_m), power_dbm });
+            points.push(CloudPoint { chirp, point, range_m: Some(range_m), power_w });
         }
     }
     Ok(Cloud::new(points)?)

@@ -15,7 +15,7 @@ use crate::error::Error;
 use crate::files::write_all;
 use crate::formats::figure::{Plot, Series, Style};
 use crate::material::{Material, Session, SessionPose};
-use crate::measure::{Curve, Metric, Reduced, Reduction, Registered, Registration, Row};
+use crate::measure::{Curve, Metric, Reduced, Reduction, Registered, Registration};
 use crate::scene::Scene;
 use crate::setup::find_material;
 use crate::store::Store;
@@ -295,7 +295,7 @@ fn record(args: &Args, registered: &Registered, reduced: &Reduced) -> Value {
         "verdicts": registered.verdicts,
         "curve": {
             "detected": reduced.curve.detected().count(),
-            "censored": reduced.curve.rows.len() - reduced.curve.detected().count(),
+            "censored": reduced.curve.observations.len() - reduced.curve.detected().count(),
             "left_out": {
                 "missed": left_out.missed,
                 "off_surface": left_out.off_surface,
@@ -337,7 +337,7 @@ fn text(args: &Args, registered: &Registered, reduced: &Reduced) -> String {
         shift_mm.y,
         shift_mm.z,
         grouped(detected),
-        grouped(curve.rows.len() - detected),
+        grouped(curve.observations.len() - detected),
         angles_deg(curve).fold(f64::INFINITY, f64::min),
         angles_deg(curve).fold(0.0, f64::max),
         grouped(left_out.near_edge + left_out.silent_near_edge),
@@ -348,13 +348,16 @@ fn text(args: &Args, registered: &Registered, reduced: &Reduced) -> String {
 }
 
 fn angles_deg(curve: &Curve) -> impl Iterator<Item = f64> + '_ {
-    curve.rows.iter().map(|row| row.theta_rad.to_degrees())
+    curve.observations.iter().map(|row| row.theta_i_rad.to_degrees())
 }
 
 fn plot<'a>(title: &'a str, curve: &Curve) -> Plot<'a> {
     let points = |censored: bool| {
-        let rows = curve.rows.iter().filter(|row| row.censored == censored);
-        rows.map(|row: &Row| (row.theta_rad.to_degrees(), db_from_ratio(row.sigma0))).collect()
+        let rows = curve.observations.iter().filter(|row| row.is_censored() == censored);
+        rows.filter_map(|row| {
+            Some((row.theta_i_rad.to_degrees(), db_from_ratio(row.level_sigma0()?)))
+        })
+        .collect()
     };
     let series = |name: &str, censored| Series {
         name: name.to_owned(),

@@ -135,7 +135,7 @@ mod tests {
         let mut material = builtin::get("ptfe").unwrap().unwrap();
         let source = material.sources[0].key.clone();
         let stored = found.stored("pieces", "scan", &source);
-        let observations = curve.observations();
+        let observations = curve.observations.clone();
         let (name, instrument, session) = ("scan".to_owned(), None, None);
         material.curves = vec![material::Curve { name, source, instrument, session, observations }];
         assert_ne!(differences(&stored, &curve), Ok(Vec::new()), "the end is no start");
@@ -162,7 +162,7 @@ mod tests {
             source,
             instrument: None,
             session: None,
-            observations: curve.observations(),
+            observations: curve.observations,
         });
         material
     }

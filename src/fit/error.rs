@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use crate::brdf::ParameterError;
+use crate::measure::curve::ObservationError;
 use crate::units::shown;
 
 /// A fit that cannot be tried.
@@ -29,6 +30,9 @@ pub enum FitError {
         /// Numbers to find.
         unknowns: usize,
     },
+    /// A row that is not backscatter.
+    #[error(transparent)]
+    Observation(#[from] ObservationError),
     /// A row without a meaning.
     #[error("row {row} (from 0) has {name} = {}, {wanted}; correct or remove it", shown(*value))]
     Row {

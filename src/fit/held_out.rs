@@ -8,8 +8,8 @@ use nalgebra::DVector;
 use super::likelihood::Likelihood;
 use super::result::{FitResult, residuals_db};
 use super::settings::Method;
-use crate::material::HeldOut;
-use crate::measure::curve::{Curve, Row};
+use crate::material::{HeldOut, Observation};
+use crate::measure::curve::Curve;
 use crate::radar::random::{Key, Purpose};
 
 /// Parts that take turns at being held out.
@@ -28,7 +28,7 @@ impl FitResult {
     /// `None` where there are fewer blocks than parts, where a part leaves too few detections for the fit,
     /// or where a fit does not converge.
     pub fn hold_out(&self, curve: &Curve) -> Option<HeldOut> {
-        let Blocks { of, block_of_row, block_m } = Blocks::new(&curve.rows);
+        let Blocks { of, block_of_row, block_m } = Blocks::new(&curve.observations);
         let blocks = block_of_row.iter().max().map_or(0, |most| most + 1);
         if blocks < FOLDS {
             return None;
@@ -40,11 +40,11 @@ impl FitResult {
         for fold in 0..FOLDS {
             let is_held = |row: usize| fold_of_block[block_of_row[row]] == fold;
             let [held, kept] = [true, false].map(|wanted| -> Vec<usize> {
-                (0..curve.rows.len()).filter(|&row| is_held(row) == wanted).collect()
+                (0..curve.observations.len()).filter(|&row| is_held(row) == wanted).collect()
             });
-            let of = |places: &[usize]| places.iter().map(|&row| curve.rows[row]).collect();
+            let of = |places: &[usize]| places.iter().map(|&row| curve.observations[row]).collect();
             let at = self.fitted_to(of(&kept))?;
-            let unseen: Vec<Row> = of(&held);
+            let unseen: Vec<Observation> = of(&held);
             for (row, ln_p) in held.iter().zip(self.ln_p(&at, &unseen)) {
                 scores[block_of_row[*row]] += ln_p;
             }
@@ -67,15 +67,15 @@ impl FitResult {
     }
 
     /// Where the search ends on these rows, from where it ended on all.
-    fn fitted_to(&self, rows: Vec<Row>) -> Option<DVector<f64>> {
-        let detected = rows.iter().filter(|row| !row.censored).count();
+    fn fitted_to(&self, rows: Vec<Observation>) -> Option<DVector<f64>> {
+        let detected = rows.iter().filter(|row| !row.is_censored()).count();
         let best = (detected > self.coordinates.len())
             .then(|| self.fit.nearest_optimum(&self.coordinates, &rows, &self.at))?;
         best.converged().then_some(best.at)
     }
 
     /// ln p of each row; nothing for least squares.
-    fn ln_p(&self, at: &DVector<f64>, rows: &[Row]) -> Vec<f64> {
+    fn ln_p(&self, at: &DVector<f64>, rows: &[Observation]) -> Vec<f64> {
         match self.fit.method {
             Method::Censored => Likelihood::new(&self.coordinates, rows, self.noise_w).ln_p(at),
             Method::Mse { .. } | Method::Tls { .. } => Vec::new(),
@@ -94,7 +94,7 @@ struct Blocks {
 }
 
 impl Blocks {
-    fn new(rows: &[Row]) -> Blocks {
+    fn new(rows: &[Observation]) -> Blocks {
         let places: Option<Vec<[f64; 2]>> = rows.iter().map(|row| row.target_m).collect();
         places.and_then(|places| Blocks::squares(&places)).unwrap_or_else(|| Blocks::in_time(rows))
     }
@@ -112,10 +112,10 @@ impl Blocks {
         })
     }
 
-    fn in_time(rows: &[Row]) -> Blocks {
+    fn in_time(rows: &[Observation]) -> Blocks {
         let mut in_time: Vec<usize> = (0..rows.len()).collect();
         in_time.sort_by_key(|&row| rows[row].chirp);
-        let angles = || in_time.iter().map(|&row| rows[row].theta_rad);
+        let angles = || in_time.iter().map(|&row| rows[row].theta_i_rad);
         let is_sweep = angles().is_sorted() || angles().rev().is_sorted();
         let blocks = if is_sweep { rows.len() } else { RUNS.min(rows.len()) };
         let mut block_of_row = vec![0; rows.len()];
@@ -179,7 +179,7 @@ mod tests {
     use super::*;
 
     fn placed(mut curve: Curve) -> Curve {
-        for (index, row) in curve.rows.iter_mut().enumerate() {
+        for (index, row) in curve.observations.iter_mut().enumerate() {
             row.target_m = Some([(index % 40) as f64 * 0.01, (index / 40) as f64 * 0.01]);
         }
         curve
@@ -214,9 +214,9 @@ mod tests {
     #[test]
     fn of_a_sweep_single_points_are_held_out_and_no_range_of_angles() {
         let mut curve = Twin { rows: 400, ..Twin::default() }.curve(7);
-        curve.rows.sort_by(|a, b| a.theta_rad.total_cmp(&b.theta_rad));
-        for (chirp, row) in (0u32..).zip(&mut curve.rows) {
-            row.chirp = chirp;
+        curve.observations.sort_by(|a, b| a.theta_i_rad.total_cmp(&b.theta_i_rad));
+        for (chirp, row) in (0u32..).zip(&mut curve.observations) {
+            row.chirp = Some(chirp);
         }
         let fit = Fit { starts: 1, looks: Some(1.0), ..Fit::default() };
         let found = fit.run(&mixture(0.1, 3.0, 0.02, 0.004), &curve).unwrap();
@@ -228,13 +228,13 @@ mod tests {
     #[test]
     fn a_few_places_are_no_squares_and_fewer_blocks_than_parts_no_score() {
         let mut curve = Twin { rows: 100, ..Twin::default() }.curve(7);
-        for (index, row) in curve.rows.iter_mut().enumerate() {
+        for (index, row) in curve.observations.iter_mut().enumerate() {
             row.target_m = Some([(index % 2) as f64, 0.0]);
         }
         let fit = Fit { starts: 1, looks: Some(1.0), ..Fit::default() };
         let found = fit.run(&model("lambert").unwrap(), &curve).unwrap();
         assert_eq!(found.hold_out(&curve).unwrap().blocks_of, "runs");
-        curve.rows.truncate(4);
+        curve.observations.truncate(4);
         assert_eq!(found.hold_out(&curve), None);
     }
 

@@ -17,7 +17,7 @@ use super::coordinates::Coordinates;
 use super::minimise::Local;
 use super::sensitivity::derivatives;
 use super::table::{Place, Table};
-use crate::measure::curve::Row;
+use crate::material::Observation;
 use crate::units::db_from_ratio;
 
 const DB_PER_NEPER: f64 = 10.0 / std::f64::consts::LN_10;
@@ -52,9 +52,12 @@ struct Level {
 
 impl<'a> Squares<'a> {
     /// Prepares the rows.
-    pub fn new(coordinates: &'a Coordinates, rows: &[Row], deviations: Deviations) -> Squares<'a> {
-        let level = |row: &Row| (!row.censored).then(|| Level::new(row));
-        Squares { coordinates, deviations, levels: rows.iter().map(level).collect() }
+    pub fn new(
+        coordinates: &'a Coordinates,
+        rows: &[Observation],
+        deviations: Deviations,
+    ) -> Squares<'a> {
+        Squares { coordinates, deviations, levels: rows.iter().map(Level::new).collect() }
     }
 
     /// ½Σ of squared residuals of detected rows, scaled by the deviations.
@@ -83,9 +86,11 @@ impl<'a> Squares<'a> {
 }
 
 impl Level {
-    fn new(row: &Row) -> Level {
-        let (place, bends) = Place::bending(row.theta_rad);
-        Level { theta_rad: row.theta_rad, level_db: db_from_ratio(row.sigma0), place, bends }
+    /// `None` for a censored row.
+    fn new(row: &Observation) -> Option<Level> {
+        let level_db = db_from_ratio(row.sigma0.filter(|_| !row.is_censored())?);
+        let (place, bends) = Place::bending(row.theta_i_rad);
+        Some(Level { theta_rad: row.theta_i_rad, level_db, place, bends })
     }
 }
 
@@ -185,7 +190,7 @@ mod tests {
         let curve = Twin { rows: 200, ..Twin::default() }.curve(1);
         for deviations in [TLS, Deviations { theta_sd_rad: 0.0, ..TLS }] {
             let at = coordinates.start();
-            let squares = Squares::new(&coordinates, &curve.rows, deviations);
+            let squares = Squares::new(&coordinates, &curve.observations, deviations);
             let cost = |at: &DVector<f64>| squares.local(at);
             for index in 0..at.len() {
                 let value = |step: f64| {
@@ -207,14 +212,15 @@ mod tests {
     #[test]
     fn the_nearest_point_is_nearer_than_its_neighbours() {
         let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002));
-        for row in (Twin { rows: 100, ..Twin::default() }).curve(3).rows {
-            let found = nearest(&table, &Level::new(&row), TLS);
+        for row in (Twin { rows: 100, ..Twin::default() }).curve(3).observations {
+            let Some(level) = Level::new(&row) else { continue };
+            let found = nearest(&table, &level, TLS);
             let cost = found.residual.powi(2) + found.offset.powi(2);
             for step in -400..=400 {
                 let offset = f64::from(step) / 100.0;
-                let theta_rad = row.theta_rad + offset * TLS.theta_sd_rad;
+                let theta_rad = level.theta_rad + offset * TLS.theta_sd_rad;
                 let level_db = DB_PER_NEPER * table.at(&Place::new(theta_rad));
-                let gap = (level_db - db_from_ratio(row.sigma0)) / TLS.level_sd_db;
+                let gap = (level_db - level.level_db) / TLS.level_sd_db;
                 // A second valley between the candidates could be deeper by a little.
                 assert!(cost <= gap * gap + offset * offset + 1e-3, "{row:?} {offset}");
             }

@@ -16,7 +16,7 @@ use super::gamma_law::{GammaLaw, LnProbability};
 use super::minimise::Local;
 use super::sensitivity::derivatives;
 use super::table::{Place, Table};
-use crate::measure::curve::Row;
+use crate::material::Observation;
 
 /// Rows that one task sums, fixed so that the sum is the same on any number of threads.
 const CHUNK: usize = 256;
@@ -56,17 +56,9 @@ struct Tables {
 
 impl<'a> Likelihood<'a> {
     /// Prepares the rows; `noise_w` is the mean thermal power in each.
-    pub fn new(coordinates: &'a Coordinates, rows: &[Row], noise_w: f64) -> Likelihood<'a> {
-        let chirp = |row: &Row| Chirp {
-            ln_sigma0: row.sigma0.ln(),
-            noise: noise_w * row.sigma0 / row.power_w,
-            censored: row.censored,
-            nodes: true_angles(row.theta_rad, row.theta_sd_rad)
-                .into_iter()
-                .map(|(t, weight)| (Place::new(t), weight.ln()))
-                .collect(),
-        };
-        Likelihood { coordinates, chirps: rows.iter().map(chirp).collect() }
+    pub fn new(coordinates: &'a Coordinates, rows: &[Observation], noise_w: f64) -> Likelihood<'a> {
+        let chirps = rows.iter().map(|row| Chirp::new(row, noise_w)).collect();
+        Likelihood { coordinates, chirps }
     }
 
     /// −ln likelihood, its gradient and a curvature.
@@ -137,6 +129,18 @@ impl Scratch {
 }
 
 impl Chirp {
+    /// Prepares a row that has a σ⁰ or a limit.
+    fn new(row: &Observation, noise_w: f64) -> Chirp {
+        let sigma0 = row.level_sigma0().unwrap_or(f64::NAN);
+        let angles = true_angles(row.theta_i_rad, row.theta_sd_rad.unwrap_or(0.0));
+        Chirp {
+            ln_sigma0: sigma0.ln(),
+            noise: noise_w * sigma0 / row.power_w.unwrap_or(sigma0),
+            censored: row.is_censored(),
+            nodes: angles.into_iter().map(|(t, weight)| (Place::new(t), weight.ln())).collect(),
+        }
+    }
+
     fn ln_mean(&self, table: &Table, place: &Place) -> f64 {
         let ln_sigma0 = table.at(place);
         if self.noise > 0.0 { (ln_sigma0.exp() + self.noise).ln() } else { ln_sigma0 }
@@ -204,7 +208,7 @@ mod tests {
         let coordinates = Coordinates::new(&start, &[], &[], None).unwrap();
         for noise_w in [0.0, 1e-11] {
             let curve = Twin { rows: 200, ..Twin::default() }.curve(1);
-            let likelihood = Likelihood::new(&coordinates, &curve.rows, noise_w);
+            let likelihood = Likelihood::new(&coordinates, &curve.observations, noise_w);
             let at = coordinates.start();
             let local = likelihood.local(Curvature::Scores, &at);
             for index in 0..at.len() {
@@ -225,7 +229,7 @@ mod tests {
         let twin = Twin { rows: 2000, threshold_dbm: -300.0, ..Twin::default() };
         let curve = twin.curve(2);
         let coordinates = Coordinates::new(&twin.model, &[], &[], Some(twin.looks)).unwrap();
-        let likelihood = Likelihood::new(&coordinates, &curve.rows, 0.0);
+        let likelihood = Likelihood::new(&coordinates, &curve.observations, 0.0);
         let mut shares: Vec<f64> =
             likelihood.ln_below(&coordinates.start()).into_iter().map(f64::exp).collect();
         shares.sort_by(f64::total_cmp);

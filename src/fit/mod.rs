@@ -42,12 +42,12 @@ mod twin;
 pub(crate) mod uncertainty;
 mod verdict;
 
+pub use crate::material::{Estimate, Goodness};
 pub use error::FitError;
-pub use goodness::Goodness;
 pub(crate) use goodness::normal_share;
 pub use minimise::Stop;
 pub use models::{model, model_names};
-pub use result::{Band, Estimate, FitResult};
+pub use result::{Band, FitResult};
 pub use settings::{Fit, Method};
 pub use stored::stored_band;
 pub use verdict::Finding;

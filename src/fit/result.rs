@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::coordinates::{Coordinates, DIFFUSE_LEVEL, SPECULAR_LEVEL};
-use super::goodness::{Goodness, normal_share, shares};
+use super::goodness::{goodness_of, normal_share, shares};
 use super::interval::{DEVIATE_95, End};
 use super::likelihood::Likelihood;
 use super::minimise::Stop;
@@ -15,24 +15,10 @@ use super::table::{Place, Table};
 use super::verdict::Finding;
 use crate::brdf::{Brdf, ParameterError, Scattering};
 use crate::formats::words::significant;
-use crate::material::HeldOut;
-use crate::measure::curve::{Curve, Row};
+use crate::material::{Estimate, Goodness, HeldOut, Observation};
+use crate::measure::curve::Curve;
 use crate::radar::speckle::standard_deviation_db;
 use crate::units::db_from_ratio;
-
-/// One fitted number.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Estimate {
-    /// The parameter's path; `S` for (1 − k)·f_λ and `R` for k·r_s; `looks`.
-    pub name: String,
-    /// Its value, in the parameter's unit.
-    pub value: f64,
-    /// Standard deviation; `None` where the data do not tell the number by itself.
-    pub sd: Option<f64>,
-    /// 95 % interval: by profile likelihood for the default method, by the standard deviation on the
-    /// scale of the search for least squares. `None` as for `sd`.
-    pub interval_95: Option<[f64; 2]>,
-}
 
 /// A 95 % band of the fitted mean σ⁰.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -103,7 +89,7 @@ const SPLIT_DEG: f64 = 6.0;
 
 impl FitResult {
     pub(super) fn new(fit: &Fit, coordinates: Coordinates, curve: &Curve) -> FitResult {
-        let found = fit.search(&coordinates, &curve.rows);
+        let found = fit.search(&coordinates, &curve.observations);
         let at = found.best.at.clone();
         let model = coordinates.model(&at);
         let law = fit.method == Method::Censored;
@@ -115,14 +101,14 @@ impl FitResult {
             looks: law.then(|| coordinates.looks(&at)),
             noise_w: fit.noise_w.filter(|_| law).unwrap_or(0.0),
             objective: -found.best.local.value,
-            goodness: goodness(fit, &coordinates, &at, &curve.rows),
+            goodness: goodness(fit, &coordinates, &at, &curve.observations),
             held_out: None,
             converged: found.best.converged(),
             stop: found.best.stop,
             iterations: found.best.iterations,
             agreeing_starts: found.agreeing,
             verdict: Vec::new(),
-            data_hash: data_hash(&curve.rows),
+            data_hash: data_hash(&curve.observations),
             version: env!("CARGO_PKG_VERSION"),
             fit: fit.clone(),
             covariance_searched: found.uncertainty.covariance.clone(),
@@ -130,7 +116,7 @@ impl FitResult {
             coordinates,
             at,
         };
-        result.verdict = result.judge(&found, &curve.rows);
+        result.verdict = result.judge(&found, &curve.observations);
         result
     }
 
@@ -154,7 +140,7 @@ impl FitResult {
         self.estimates.iter().find(|estimate| estimate.name == name)
     }
 
-    fn judge(&self, found: &Found, rows: &[Row]) -> Vec<Finding> {
+    fn judge(&self, found: &Found, rows: &[Observation]) -> Vec<Finding> {
         let range = self.model.validate();
         // Out of range k is what the levels make of it, and nobody chose it.
         let gauge = self.gauge_k.filter(|_| range.is_ok());
@@ -175,7 +161,7 @@ impl FitResult {
             findings.retain(|finding| !of_levels(finding));
             findings.push(Finding::OutOfRange { problem, held });
         }
-        let limit = KOLMOGOROV_1_PERCENT / (self.goodness.rows.max(1) as f64).sqrt();
+        let limit = KOLMOGOROV_1_PERCENT / f64::from(self.goodness.rows.max(1)).sqrt();
         let ks_distance = self.goodness.ks_distance;
         if self.fit.method == Method::Censored && ks_distance > limit {
             findings.push(Finding::PoorFit { ks_distance, limit });
@@ -183,14 +169,14 @@ impl FitResult {
         findings
     }
 
-    fn judge_rows(&self, rows: &[Row]) -> Vec<Finding> {
+    fn judge_rows(&self, rows: &[Observation]) -> Vec<Finding> {
         let mut findings = Vec::new();
         let split_deg = match self.fit.method {
             Method::Mse { split_rad } => split_rad.to_degrees(),
             _ => SPLIT_DEG,
         };
-        let detected = || rows.iter().filter(|row| !row.censored);
-        let near = detected().filter(|row| row.theta_rad.to_degrees() < split_deg).count();
+        let detected = || rows.iter().filter(|row| !row.is_censored());
+        let near = detected().filter(|row| row.theta_i_rad.to_degrees() < split_deg).count();
         let mixture = matches!(self.model, Brdf::Mixture(_));
         if mixture && near == 0 {
             findings.push(Finding::NoSpecularRows { below_deg: split_deg });
@@ -293,42 +279,56 @@ pub(super) fn residuals_db(
     fit: &Fit,
     coordinates: &Coordinates,
     at: &DVector<f64>,
-    rows: &[Row],
+    rows: &[Observation],
 ) -> Vec<f64> {
     let table = Table::new(&coordinates.model(at));
     let noise_w = fit.noise_w.unwrap_or(0.0);
-    let residual_db = |row: &Row| {
-        let noise = noise_w * row.sigma0 / row.power_w;
-        let model = table.at(&Place::new(row.theta_rad)).exp() + noise;
-        db_from_ratio(row.sigma0) - db_from_ratio(model)
-    };
-    rows.iter().filter(|r| !r.censored).map(residual_db).collect()
+    let detected = rows.iter().filter(|row| !row.is_censored());
+    detected
+        .filter_map(|row| {
+            let sigma0 = row.sigma0?;
+            let noise = noise_w * sigma0 / row.power_w.unwrap_or(sigma0);
+            let model = table.at(&Place::new(row.theta_i_rad)).exp() + noise;
+            Some(db_from_ratio(sigma0) - db_from_ratio(model))
+        })
+        .collect()
 }
 
-fn goodness(fit: &Fit, coordinates: &Coordinates, at: &DVector<f64>, rows: &[Row]) -> Goodness {
+fn goodness(
+    fit: &Fit,
+    coordinates: &Coordinates,
+    at: &DVector<f64>,
+    rows: &[Observation],
+) -> Goodness {
     let residuals_db = residuals_db(fit, coordinates, at, rows);
     if fit.method == Method::Censored {
         let noise_w = fit.noise_w.unwrap_or(0.0);
         let below = Likelihood::new(coordinates, rows, noise_w).ln_below(at);
-        let censored: Vec<bool> = rows.iter().map(|row| row.censored).collect();
+        let censored: Vec<bool> = rows.iter().map(Observation::is_censored).collect();
         let speckle_db = standard_deviation_db(coordinates.looks(at));
-        return Goodness::new(&residuals_db, shares(&below, &censored, fit.seed), Some(speckle_db));
+        return goodness_of(&residuals_db, shares(&below, &censored, fit.seed), Some(speckle_db));
     }
     let squares: f64 = residuals_db.iter().map(|r| r * r).sum();
     let rms_db = (squares / residuals_db.len().max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
     let shares = residuals_db.iter().map(|r| normal_share(r / rms_db)).collect();
-    Goodness::new(&residuals_db, shares, None)
+    goodness_of(&residuals_db, shares, None)
 }
 
-fn data_hash(rows: &[Row]) -> String {
+fn data_hash(rows: &[Observation]) -> String {
     let mut hasher = blake3::Hasher::new();
-    for row in rows {
-        let numbers = [row.theta_rad, row.theta_sd_rad, row.power_w, row.sigma0, row.range_m];
-        for number in numbers {
+    for (row, index) in rows.iter().zip(0u32..) {
+        let sigma0 = row.level_sigma0().unwrap_or(f64::NAN);
+        for number in [
+            row.theta_i_rad,
+            row.theta_sd_rad.unwrap_or(0.0),
+            row.power_w.unwrap_or(sigma0),
+            sigma0,
+            row.range_m.unwrap_or(0.0),
+        ] {
             hasher.update(&number.to_le_bytes());
         }
-        hasher.update(&row.chirp.to_le_bytes());
-        hasher.update(&[u8::from(row.censored)]);
+        hasher.update(&row.chirp.unwrap_or(index).to_le_bytes());
+        hasher.update(&[u8::from(row.is_censored())]);
     }
     hasher.finalize().to_hex().to_string()
 }
@@ -442,7 +442,7 @@ mod tests {
         assert!((found.looks.unwrap() / 8.0 - 1.0).abs() < 0.15, "{:?}", found.looks);
         assert!((found.goodness.z_variance - 1.0).abs() < 0.15, "{:?}", found.goodness);
         let mut blind = curve;
-        blind.rows.iter_mut().for_each(|row| row.theta_sd_rad = 0.0);
+        blind.observations.iter_mut().for_each(|row| row.theta_sd_rad = Some(0.0));
         let blind = quick().run(&start(), &blind).unwrap();
         assert!(blind.looks.unwrap() < 5.0, "{:?}", blind.looks);
     }
@@ -452,11 +452,11 @@ mod tests {
         let noise_w = 2e-11;
         let twin = Twin { threshold_dbm: -300.0, looks: 4.0, rows: 1500, ..Twin::default() };
         let mut curve = twin.curve(8);
-        for row in &mut curve.rows {
+        for row in &mut curve.observations {
             // Noise of as many looks on its own, so that the sum is Gamma only nearly.
-            let sigma0_per_w = row.sigma0 / row.power_w;
-            row.power_w += noise_w;
-            row.sigma0 = row.power_w * sigma0_per_w;
+            let (sigma0, power_w) = (row.sigma0.unwrap(), row.power_w.unwrap());
+            row.power_w = Some(power_w + noise_w);
+            row.sigma0 = Some((power_w + noise_w) * (sigma0 / power_w));
         }
         let with = Fit { noise_w: Some(noise_w), ..quick() }.run(&start(), &curve).unwrap();
         let without = quick().run(&start(), &curve).unwrap();
@@ -526,17 +526,20 @@ mod tests {
         let curve = Twin { rows: 40, ..Twin::default() }.curve(1);
         let refused = |curve: &Curve| quick().run(&start(), curve).unwrap_err();
         assert_eq!(refused(&Curve::default()), FitError::Empty);
-        let few = Curve { rows: curve.detected().take(3).copied().collect() };
+        let few = Curve { observations: curve.detected().take(3).copied().collect() };
         assert_eq!(refused(&few), FitError::TooFewRows { detected: 3, unknowns: 5 });
         let mut censored = curve.clone();
-        censored.rows.iter_mut().for_each(|row| row.censored = true);
+        for row in &mut censored.observations {
+            *row = Observation::backscatter(row.theta_i_rad, None, row.level_sigma0());
+        }
         assert_eq!(refused(&censored), FitError::AllCensored { rows: 40 });
         for (bad, name) in [(f64::NAN, "nan"), (-1.0, "negative"), (f64::INFINITY, "infinite")] {
             let mut broken = curve.clone();
-            broken.rows[7].sigma0 = bad;
+            let row = &mut broken.observations[7];
+            *row = Observation::backscatter(row.theta_i_rad, Some(bad), None);
             assert!(matches!(refused(&broken), FitError::Row { row: 7, .. }), "{name}");
             broken = curve.clone();
-            broken.rows[7].theta_rad = bad;
+            broken.observations[7].theta_i_rad = bad;
             assert!(matches!(refused(&broken), FitError::Row { row: 7, .. }), "{name}");
         }
         let table = Brdf::Tabulated(Tabulated::new(&[(0.0, 1.0), (1.0, 0.1)]).unwrap());

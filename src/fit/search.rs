@@ -9,7 +9,7 @@ use super::likelihood::{Curvature, Likelihood};
 use super::minimise::{Local, Minimise, Minimum, Stop};
 use super::settings::{Fit, Method};
 use super::uncertainty::{Uncertainty, observed_information};
-use crate::measure::curve::Row;
+use crate::material::Observation;
 use crate::radar::random::{Key, Purpose};
 
 /// Most steps of one search.
@@ -35,7 +35,7 @@ pub(super) struct Found {
 
 impl Fit {
     /// Searches with this fit's method.
-    pub(super) fn search(&self, coordinates: &Coordinates, rows: &[Row]) -> Found {
+    pub(super) fn search(&self, coordinates: &Coordinates, rows: &[Observation]) -> Found {
         match self.method {
             Method::Censored => self.search_likelihood(coordinates, rows),
             Method::Tls { .. } | Method::Mse { .. } => {
@@ -50,7 +50,7 @@ impl Fit {
     pub(super) fn nearest_optimum(
         &self,
         coordinates: &Coordinates,
-        rows: &[Row],
+        rows: &[Observation],
         start: &DVector<f64>,
     ) -> Minimum {
         match self.method {
@@ -69,7 +69,7 @@ impl Fit {
         }
     }
 
-    fn search_likelihood(&self, coordinates: &Coordinates, rows: &[Row]) -> Found {
+    fn search_likelihood(&self, coordinates: &Coordinates, rows: &[Observation]) -> Found {
         let likelihood = Likelihood::new(coordinates, rows, self.noise_w.unwrap_or(0.0));
         let cost = |at: &DVector<f64>| likelihood.local(Curvature::Scores, at);
         let far = |at: &DVector<f64>| likelihood.local(Curvature::FromAfar, at);
@@ -144,8 +144,13 @@ fn search_freely(
 }
 
 /// Information of least squares: the curvature over the residuals' own variance.
-fn squares_found(coordinates: &Coordinates, rows: &[Row], best: Minimum, agreeing: usize) -> Found {
-    let detected = rows.iter().filter(|row| !row.censored).count();
+fn squares_found(
+    coordinates: &Coordinates,
+    rows: &[Observation],
+    best: Minimum,
+    agreeing: usize,
+) -> Found {
+    let detected = rows.iter().filter(|row| !row.is_censored()).count();
     let spare = (detected - coordinates.len().min(detected)).max(1) as f64;
     let variance = (2.0 * best.local.value / spare).max(f64::MIN_POSITIVE);
     let information = &best.local.curvature / variance;
@@ -156,7 +161,7 @@ fn squares_found(coordinates: &Coordinates, rows: &[Row], best: Minimum, agreein
 /// Specular coordinates below the split, then diffuse ones above it; all at once without pieces.
 fn pieces(
     coordinates: &Coordinates,
-    rows: &[Row],
+    rows: &[Observation],
     split_rad: f64,
     start: &DVector<f64>,
 ) -> Minimum {
@@ -165,7 +170,8 @@ fn pieces(
         return piece(coordinates, rows, &all, start);
     };
     let specular: Vec<bool> = diffuse.iter().map(|is_diffuse| !is_diffuse).collect();
-    let (near, far): (Vec<Row>, Vec<Row>) = rows.iter().partition(|row| row.theta_rad < split_rad);
+    let (near, far): (Vec<Observation>, Vec<Observation>) =
+        rows.iter().partition(|row| row.theta_i_rad < split_rad);
     let first = piece(coordinates, &near, &specular, start);
     let second = piece(coordinates, &far, &diffuse, &first.at);
     Minimum {
@@ -177,7 +183,12 @@ fn pieces(
 }
 
 /// Least squares of some coordinates on some rows; a piece without rows stays at its start.
-fn piece(coordinates: &Coordinates, rows: &[Row], moves: &[bool], start: &DVector<f64>) -> Minimum {
+fn piece(
+    coordinates: &Coordinates,
+    rows: &[Observation],
+    moves: &[bool],
+    start: &DVector<f64>,
+) -> Minimum {
     const DB: Deviations = Deviations { theta_sd_rad: 0.0, level_sd_db: 1.0 };
     let (mut lower, mut upper) = (coordinates.lower(), coordinates.upper());
     let start = start.zip_zip_map(&lower, &upper, |u, low, high| u.max(low).min(high));

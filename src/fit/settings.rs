@@ -35,7 +35,7 @@ pub struct Fit {
     pub method: Method,
     /// Parameters held at a value, by path.
     pub fixed: Vec<(String, f64)>,
-    /// Narrower ranges, by the name that [`Estimate::name`](super::result::Estimate::name) gives, in the parameter's unit.
+    /// Narrower ranges, by the name that [`Estimate::name`](crate::material::Estimate::name) gives, in the parameter's unit.
     pub bounds: Vec<(String, [f64; 2])>,
     /// Looks L of the speckle, from 0.1 to 1e4; estimated where none. Least squares needs none.
     pub looks: Option<f64>,

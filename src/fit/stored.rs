@@ -1,10 +1,10 @@
 //! A fit as a material keeps it, and the band that can be drawn from what was kept.
 
 use super::interval::DEVIATE_95;
-use super::result::{Band, Estimate, FitResult};
+use super::result::{Band, FitResult};
 use super::settings::Method;
 use crate::brdf::{Brdf, Scattering};
-use crate::material::{self, Covariance, FitReport, Given};
+use crate::material::{self, Covariance, Estimate, FitReport, Given};
 
 /// Relative step of a difference quotient.
 const STEP: f64 = 1e-4;
@@ -59,12 +59,6 @@ impl FitResult {
     }
 
     fn report(&self) -> FitReport {
-        let estimate = |e: &Estimate| material::Estimate {
-            name: e.name.clone(),
-            value: e.value,
-            sd: e.sd,
-            interval_95: e.interval_95,
-        };
         let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         FitReport {
             method: self.method_name().to_owned(),
@@ -72,11 +66,11 @@ impl FitResult {
             looks: self.looks,
             noise_w: self.noise_w,
             gauge: self.gauge_k.map(|k| format!("k = {k} was chosen; S and R are found")),
-            estimates: self.estimates.iter().map(estimate).collect(),
+            estimates: self.estimates.clone(),
             covariance: self.covariance.clone(),
             singular_values: self.singular_values.clone(),
             objective: self.objective,
-            goodness: self.stored_goodness(),
+            goodness: self.goodness,
             held_out: self.held_out.clone(),
             converged: self.converged,
             stop: self.stop.as_str().to_owned(),
@@ -106,26 +100,13 @@ impl FitResult {
         let all = self.fit.fixed.iter().cloned().chain(bounds).chain(settings).chain(looks);
         all.map(|(name, value)| Given { name, value }).collect()
     }
-
-    fn stored_goodness(&self) -> material::Goodness {
-        let g = &self.goodness;
-        material::Goodness {
-            rms_db: g.rms_db,
-            mean_db: g.mean_db,
-            speckle_db: g.speckle_db,
-            z_mean: g.z_mean,
-            z_variance: g.z_variance,
-            ks_distance: g.ks_distance,
-            rows: u32::try_from(g.rows).unwrap_or(u32::MAX),
-        }
-    }
 }
 
 /// The 95 % band of a stored fit at an angle (rad), by the delta method on ln σ⁰; `None` for a fit
 /// without a report. The derivatives are difference quotients of the stored model.
 pub fn stored_band(fit: &material::Fit, theta_rad: f64) -> Option<Band> {
     let report = fit.report.as_ref()?;
-    let slope = |e: &material::Estimate| e.sd.map_or(0.0, |_| slope(&fit.model, e, theta_rad));
+    let slope = |e: &Estimate| e.sd.map_or(0.0, |_| slope(&fit.model, e, theta_rad));
     let slopes: Vec<f64> = report.estimates.iter().map(slope).collect();
     let terms = report.covariance.iter().zip(&slopes).flat_map(|(row, a)| {
         row.iter().zip(&slopes).map(move |(covariance, b)| a * b * covariance)
@@ -136,7 +117,7 @@ pub fn stored_band(fit: &material::Fit, theta_rad: f64) -> Option<Band> {
 }
 
 /// d ln σ⁰ / d estimate; 0 where the estimate is no number of the model, as the looks are.
-fn slope(model: &Brdf, estimate: &material::Estimate, theta_rad: f64) -> f64 {
+fn slope(model: &Brdf, estimate: &Estimate, theta_rad: f64) -> f64 {
     // S is proportional to f_λ and R to r_s while k stays.
     let path = match estimate.name.as_str() {
         "S" => "specular.f_lambda",

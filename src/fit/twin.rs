@@ -5,7 +5,8 @@
 //! mesh that smooths a rough surface.
 
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Scattering, Shadowing};
-use crate::measure::curve::{Curve, Row};
+use crate::material::Observation;
+use crate::measure::curve::Curve;
 use crate::radar::random::{Key, Purpose};
 use crate::radar::{Link, Radar};
 use crate::units::watts_from_dbm;
@@ -53,10 +54,10 @@ impl Default for Twin {
 impl Twin {
     /// A curve of this truth.
     pub fn curve(&self, seed: u64) -> Curve {
-        Curve { rows: (0..self.rows as u32).map(|chirp| self.row(seed, chirp)).collect() }
+        Curve { observations: (0..self.rows as u32).map(|chirp| self.row(seed, chirp)).collect() }
     }
 
-    fn row(&self, seed: u64, chirp: u32) -> Row {
+    fn row(&self, seed: u64, chirp: u32) -> Observation {
         let key = Key { seed, chirp: u64::from(chirp), sub_ray: 0, purpose: Purpose::Speckle };
         let mut draws = key.draws();
         let [from, to] = self.theta_deg;
@@ -71,15 +72,13 @@ impl Twin {
         let power_w = received_w.max(threshold_w);
         let censored = received_w < threshold_w;
         let sigma0 = power_w / ratio;
-        Row {
-            theta_rad,
-            theta_sd_rad,
-            power_w,
-            sigma0,
-            range_m: RANGE_M,
-            chirp,
-            censored,
-            target_m: None,
+        let (level, limit) = if censored { (None, Some(sigma0)) } else { (Some(sigma0), None) };
+        Observation {
+            theta_sd_rad: Some(theta_sd_rad),
+            power_w: Some(power_w),
+            range_m: Some(RANGE_M),
+            chirp: Some(chirp),
+            ..Observation::backscatter(theta_rad, level, limit)
         }
     }
 }

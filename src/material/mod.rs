@@ -20,7 +20,7 @@ mod texts;
 use std::io;
 
 use nalgebra::DMatrix;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::ser::{CompactFormatter, Formatter, Serializer};
 
 use crate::brdf::{Brdf, Tabulated};
@@ -147,7 +147,7 @@ pub struct Observation {
 }
 
 /// What an observation says of the true value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Censor {
     /// It was measured.
@@ -192,7 +192,8 @@ pub struct Fit {
 }
 
 /// Covariance of some of a model's parameters.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Covariance {
     /// Paths of the parameters.
     pub parameters: Vec<String>,
@@ -327,6 +328,16 @@ impl Observation {
             chirp: None,
             target_m: None,
         }
+    }
+
+    /// The measured σ⁰, or the limit of a censored point; none where the point has neither.
+    pub fn level_sigma0(&self) -> Option<f64> {
+        if self.is_censored() { self.threshold_sigma0 } else { self.sigma0 }
+    }
+
+    /// Whether the true σ⁰ is known only to lie below or above the limit.
+    pub fn is_censored(&self) -> bool {
+        self.censor != Censor::None
     }
 
     /// Whether source and receiver were in the same direction.

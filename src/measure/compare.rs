@@ -7,6 +7,7 @@ use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
 use crate::radar::{Chirps, Radar};
 use crate::render::{Echo, Scan};
+use crate::units::dbm_from_watts;
 
 /// Agreement of two power images on one grid.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -47,7 +48,7 @@ pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
             range_m: point.range_m.unwrap_or(origin.distance_m(point.point)),
             xt_m: in_target.xyz.x,
             yt_m: in_target.xyz.y,
-            power_dbm: point.power_dbm,
+            power_dbm: dbm_from_watts(point.power_w),
             truth: None,
         }
     };
@@ -103,6 +104,7 @@ pub fn along(scan: &Scan, line: Line) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::watts_from_dbm;
 
     fn raster(values: [f32; 4]) -> Raster {
         let channels = vec![Channel { name: "power_dbm".to_owned(), values: values.to_vec() }];
@@ -134,14 +136,20 @@ mod tests {
             chirp: None,
             point: Point::new(x, y, 0.0),
             range_m: None,
-            power_dbm,
+            power_w: watts_from_dbm(power_dbm),
         };
         let points =
             vec![point(0.1, 1.105, -40.0), point(-0.1, 1.095, -50.0), point(0.0, 1.2, -60.0)];
         let cloud = Cloud::new(points).unwrap();
         let scan = measured_scan(&radar, &Chirps::default(), &cloud);
         let line = along(&scan, Line { y_m: 1.1, width_m: 0.02 });
-        assert_eq!(line, [(-0.1, -50.0), (0.1, -40.0)]);
+        let expected = [(-0.1, -50.0), (0.1, -40.0)];
+        assert_eq!(line.len(), expected.len());
+        for ((x_m, power_dbm), (expected_m, expected_dbm)) in std::iter::zip(line, expected) {
+            assert_eq!(x_m, expected_m);
+            // A level that was converted to watts and back.
+            assert!(f64::abs(power_dbm - expected_dbm) < 1e-12, "{power_dbm}");
+        }
         assert!((scan.echoes[2].yt_m - 0.1).abs() < 1e-12);
         assert!((scan.echoes[2].range_m - 8.0f64.hypot(0.1)).abs() < 1e-12);
     }

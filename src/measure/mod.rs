@@ -28,7 +28,7 @@ mod view;
 
 pub use cloud::{Cloud, CloudError, CloudPoint};
 pub use cloud_file::{CloudFormat, CloudReading, PowerUnit};
-pub use curve::{Curve, Row};
+pub use curve::Curve;
 pub use error::{ReductionError, RegistrationError};
 pub use incidence::{Incidence, Sighting};
 pub use reduce::{LeftOut, Reduced, Reduction};

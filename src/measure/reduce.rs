@@ -14,17 +14,18 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::cloud::{Cloud, CloudPoint};
-use super::curve::{Curve, Row};
+use super::curve::Curve;
 use super::error::ReductionError;
 use super::incidence::{Incidence, Sighting};
 use super::nearest::Nearest;
 use super::register::Registered;
 use super::sights::sights;
 use crate::frames::{Global, Point, Pose, Ray, Target as TargetFrame};
+use crate::material::Observation;
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Chirps, Footprint, Link, Radar};
 use crate::scene::Target;
-use crate::units::watts_from_dbm;
+use crate::units::{dbm_from_watts, watts_from_dbm};
 
 /// How to reduce a registered cloud to a curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -76,7 +77,7 @@ const TOLERATED: usize = 100;
 
 /// Why a detection is no row.
 enum Fate {
-    Row(Row),
+    Row(Observation),
     Missed,
     OffSurface,
     OtherRegion,
@@ -151,7 +152,7 @@ impl Reduction {
                  name the part that was kept with a region"
             ));
         }
-        Ok(Reduced { curve: Curve { rows }, left_out, notices })
+        Ok(Reduced { curve: Curve { observations: rows }, left_out, notices })
     }
 
     fn bench<'a>(
@@ -206,8 +207,7 @@ impl Bench<'_> {
         if !self.is_sure(ray, &sighting) {
             return Fate::Unsure;
         }
-        let power_w = watts_from_dbm(point.power_dbm);
-        Fate::Row(self.row(ray, &sighting, range_m, power_w, chirp, false))
+        Fate::Row(self.row(ray, &sighting, range_m, point.power_w, chirp, false))
     }
 
     fn row(
@@ -218,20 +218,19 @@ impl Bench<'_> {
         power_w: f64,
         chirp: u32,
         censored: bool,
-    ) -> Row {
+    ) -> Observation {
         let Sighting { hit, theta_sd_rad, .. } = *sighting;
         let sigma0 = sigma0(&self.link, range_m, hit.cos_theta, power_w);
         let at = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
         let at = (self.target_from_global * at).xyz;
-        Row {
-            theta_rad: hit.theta_rad(),
-            theta_sd_rad,
-            power_w,
-            sigma0,
-            range_m,
-            chirp,
-            censored,
+        let (level, limit) = if censored { (None, Some(sigma0)) } else { (Some(sigma0), None) };
+        Observation {
+            theta_sd_rad: Some(theta_sd_rad),
+            power_w: Some(power_w),
+            range_m: Some(range_m),
+            chirp: Some(chirp),
             target_m: Some([at.x, at.y]),
+            ..Observation::backscatter(hit.theta_rad(), level, limit)
         }
     }
 }
@@ -242,7 +241,7 @@ fn detected(
     sights: &[Ray<Global>],
     told: &Told,
     left_out: &mut LeftOut,
-) -> Vec<Row> {
+) -> Vec<Observation> {
     let fates: Vec<Fate> = cloud
         .points()
         .par_iter()
@@ -265,7 +264,7 @@ fn detected(
 }
 
 /// Rows of the chirps that should have hit and gave nothing.
-fn silent(bench: &Bench, chirps: &Chirps, told: &Told, left_out: &mut LeftOut) -> Vec<Row> {
+fn silent(bench: &Bench, chirps: &Chirps, told: &Told, left_out: &mut LeftOut) -> Vec<Observation> {
     let fates: Vec<Option<Fate>> = told
         .silent
         .par_iter()
@@ -359,13 +358,14 @@ fn check_threshold(radar: &Radar, cloud: &Cloud) -> Result<(), ReductionError> {
     // Rounding in a file.
     const ROUNDING_DB: f64 = 0.05;
     let threshold_dbm = radar.threshold_dbm;
-    let powers = || cloud.points().iter().map(|point| point.power_dbm);
-    let below = powers().filter(|power_dbm| *power_dbm < threshold_dbm - ROUNDING_DB).count();
+    let least_w = watts_from_dbm(threshold_dbm - ROUNDING_DB);
+    let below = cloud.points().iter().filter(|point| point.power_w < least_w).count();
     let points = cloud.points().len();
     if below * TOLERATED <= points {
         return Ok(());
     }
-    let weakest_dbm = powers().fold(f64::INFINITY, f64::min);
+    let weakest_w = cloud.points().iter().map(|point| point.power_w).fold(f64::INFINITY, f64::min);
+    let weakest_dbm = dbm_from_watts(weakest_w);
     Err(ReductionError::BelowThreshold { below, points, threshold_dbm, weakest_dbm })
 }
 
@@ -422,8 +422,9 @@ mod tests {
             .curve
             .detected()
             .map(|row| {
-                let law = 4.0 * PI * f_per_sr(row.theta_rad) * row.theta_rad.cos().powi(2);
-                db_from_ratio(row.sigma0 / law).abs()
+                let theta_rad = row.theta_i_rad;
+                let law = 4.0 * PI * f_per_sr(theta_rad) * theta_rad.cos().powi(2);
+                db_from_ratio(row.sigma0.unwrap() / law).abs()
             })
             .collect();
         assert!(off_db.len() > 5000, "{}", off_db.len());
@@ -438,11 +439,13 @@ mod tests {
         let measured = mannequin(2e-3, 1);
         let reduced = reduce(&measured, Reduction::default()).unwrap();
         let link = Link::new(&measured.radar);
-        let censored: Vec<&Row> = reduced.curve.rows.iter().filter(|row| row.censored).collect();
+        let rows = &reduced.curve.observations;
+        let censored: Vec<&Observation> = rows.iter().filter(|row| row.is_censored()).collect();
         assert!(censored.len() > 50, "{}", censored.len());
         let rightly = censored.iter().filter(|row| {
-            let theta_rad = row.theta_rad;
-            link.power_w(row.range_m, theta_rad.cos(), f_per_sr(theta_rad)) < 1.05 * row.power_w
+            let (theta_rad, range_m) = (row.theta_i_rad, row.range_m.unwrap());
+            let power_w = link.power_w(range_m, theta_rad.cos(), f_per_sr(theta_rad));
+            power_w < 1.05 * row.power_w.unwrap()
         });
         // A pose that is off by a hundredth of a degree moves few of them across.
         assert!(rightly.count() as f64 > 0.98 * censored.len() as f64);
@@ -456,12 +459,11 @@ mod tests {
         let bare = Measured { cloud: Cloud::new(points).unwrap(), ..measured.clone() };
         let [told, bare] =
             [&measured, &bare].map(|measured| reduce(measured, Reduction::default()).unwrap());
-        assert_eq!(told.curve.rows.len(), bare.curve.rows.len());
-        let same = std::iter::zip(&told.curve.rows, &bare.curve.rows)
-            .filter(|(a, b)| a.chirp == b.chirp)
-            .count();
+        let (told, bare) = (told.curve.observations, bare.curve.observations);
+        assert_eq!(told.len(), bare.len());
+        let same = std::iter::zip(&told, &bare).filter(|(a, b)| a.chirp == b.chirp).count();
         // Ellipses of the scan cross: a few chirps look at one place.
-        assert!(same as f64 > 0.99 * told.curve.rows.len() as f64);
+        assert!(same as f64 > 0.99 * told.len() as f64);
     }
 
     #[test]
@@ -472,7 +474,7 @@ mod tests {
         assert_eq!(every.left_out.near_edge, 0);
         let upper = reduce(&measured, Reduction { region: Some(1), ..all }).unwrap();
         let lower = reduce(&measured, Reduction { region: Some(0), ..all }).unwrap();
-        let rows = |reduced: &Reduced| reduced.curve.rows.len();
+        let rows = |reduced: &Reduced| reduced.curve.observations.len();
         assert_eq!(rows(&upper) + rows(&lower), rows(&every));
         assert!(rows(&upper) > 100 && rows(&lower) > 100);
         let inner = reduce(&measured, Reduction::default()).unwrap();
@@ -491,7 +493,8 @@ mod tests {
         assert!(left as f64 > 0.95 * alarms as f64, "{left} of {alarms}");
         let numbers: HashSet<u32> =
             measured.cloud.points().iter().filter_map(|point| point.chirp).collect();
-        assert!(reduced.curve.rows.iter().all(|r| !r.censored || !numbers.contains(&r.chirp)));
+        let mut silent = reduced.curve.observations.iter().filter(|row| row.is_censored());
+        assert!(silent.all(|row| !numbers.contains(&row.chirp.unwrap())));
     }
 
     #[test]

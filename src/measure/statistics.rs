@@ -95,11 +95,8 @@ struct Point {
 
 impl Point {
     fn new((o, place): (&Observation, usize)) -> Option<Point> {
-        let is_censored = o.censor == Censor::Left;
-        let level = if is_censored { o.threshold_sigma0 } else { o.sigma0 };
-        let order = (o.chirp, place);
-        let theta_rad = o.theta_i_rad;
-        o.is_retro().then_some(Point { theta_rad, level: level?, is_censored, order })
+        let (theta_rad, level, is_censored) = (o.theta_i_rad, o.level_sigma0()?, o.is_censored());
+        o.is_retro().then_some(Point { theta_rad, level, is_censored, order: (o.chirp, place) })
     }
 
     fn degree(&self) -> u32 {

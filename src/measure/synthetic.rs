@@ -11,7 +11,7 @@ use crate::geometry::Mesh;
 use crate::radar::random::{Draws, Key, Purpose};
 use crate::radar::{Chirps, Link, Radar};
 use crate::scene::mannequin;
-use crate::units::dbm_from_watts;
+use crate::units::watts_from_dbm;
 
 /// A mesh where it stood, and its cloud.
 #[derive(Clone)]
@@ -39,16 +39,16 @@ impl Measured {
         let here = Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO);
         let seen = Traced::new(&mesh).scan(&here, &Aims::new(&mesh, &chirps.rays));
         let link = Link::new(&radar);
+        let threshold_w = watts_from_dbm(radar.threshold_dbm);
         let mut draws = draws(seed, 0);
         let point = |((seen, ray), number): ((_, &Ray<Global>), &u32)| {
             let hit = Option::<super::placed::Seen>::map(seen, |seen| seen.hit)?;
             let f_per_sr = f_per_sr(hit.theta_rad());
-            let power_dbm = dbm_from_watts(link.power_w(hit.range_m, hit.cos_theta, f_per_sr));
+            let power_w = link.power_w(hit.range_m, hit.cos_theta, f_per_sr);
             let range_m = hit.range_m + range_sd_m * normal(&mut draws);
             let point = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
-            let echo =
-                CloudPoint { chirp: Some(*number), point, range_m: Some(range_m), power_dbm };
-            (power_dbm >= radar.threshold_dbm).then_some(echo)
+            let echo = CloudPoint { chirp: Some(*number), point, range_m: Some(range_m), power_w };
+            (power_w >= threshold_w).then_some(echo)
         };
         let points: Vec<CloudPoint> =
             seen.into_iter().zip(&chirps.rays).zip(&chirps.number).filter_map(point).collect();

@@ -4,9 +4,9 @@
 use crate::brdf::{Brdf, Scattering};
 use crate::fit::coordinates::{DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
 use crate::fit::interval::DEVIATE_95;
-use crate::fit::result::{Estimate, FitResult};
+use crate::fit::result::FitResult;
 use crate::fit::verdict::Finding;
-use crate::material::{self, FitReport, Goodness, HeldOut};
+use crate::material::{self, Estimate, FitReport, Goodness, HeldOut};
 use crate::measure::curve::Curve;
 
 /// How far ln likelihoods, or half sums of squares, of two searches for one optimum may differ: where
@@ -63,7 +63,7 @@ fn estimates(report: &FitReport, found: &FitResult) -> Vec<String> {
     pairs.flat_map(|(stored, new)| estimate(stored, new)).collect()
 }
 
-fn estimate(stored: &material::Estimate, new: &Estimate) -> Vec<String> {
+fn estimate(stored: &Estimate, new: &Estimate) -> Vec<String> {
     let mut differences = Vec::new();
     let name = &stored.name;
     let (Some(old_sd), Some(sd)) = (stored.sd, new.sd) else {
@@ -131,7 +131,7 @@ fn value(model: &Brdf, name: &str) -> Option<f64> {
 
 /// The curve of the model where the data are: numbers that they do not tell one by one must still give it.
 fn level(stored: &material::Fit, found: &FitResult, curve: &Curve) -> Option<String> {
-    let angles = || curve.detected().map(|row| row.theta_rad);
+    let angles = || curve.detected().map(|row| row.theta_i_rad);
     let [low, high] = [angles().fold(f64::INFINITY, f64::min), angles().fold(0.0, f64::max)];
     // As many directions as numbers, each as far off as a number may be.
     let directions = (found.estimates.len() as f64).sqrt();
