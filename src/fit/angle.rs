@@ -29,11 +29,11 @@ pub(super) fn true_angles(theta_rad: f64, sd_rad: f64) -> Vec<(f64, f64)> {
     let apart = (sd_rad / 3.0).min(APART_RAD + APART_SHARE * low);
     let count = ((reach / apart).ceil() as usize).clamp(1, MOST_NODES);
     let width = reach / count as f64;
-    let node = |index| {
+    let mut nodes = Vec::with_capacity(count);
+    for index in 0..count {
         let t = low + (index as f64 + 0.5) * width;
-        (t, rice(t / sd_rad, theta_rad / sd_rad))
-    };
-    let nodes: Vec<(f64, f64)> = (0..count).map(node).collect();
+        nodes.push((t, rice(t / sd_rad, theta_rad / sd_rad)));
+    }
     let sum: f64 = nodes.iter().map(|(_, weight)| weight).sum();
     nodes.into_iter().map(|(t, weight)| (t, weight / sum)).collect()
 }
@@ -58,11 +58,15 @@ fn bessel_i0_scaled(x: f64) -> f64 {
         -0.016_476_33,
         0.003_923_77,
     ];
-    let series = |terms: &[f64], y: f64| terms.iter().rev().fold(0.0, |sum, term| sum * y + term);
     if x < 3.75 {
-        return (-x).exp() * series(&SMALL, (x / 3.75).powi(2));
+        return (-x).exp() * polynomial(&SMALL, (x / 3.75).powi(2));
     }
-    series(&LARGE, 3.75 / x) / x.sqrt()
+    polynomial(&LARGE, 3.75 / x) / x.sqrt()
+}
+
+/// Σ term_n·yⁿ by Horner's scheme.
+fn polynomial(terms: &[f64], y: f64) -> f64 {
+    terms.iter().rev().fold(0.0, |sum, term| sum * y + term)
 }
 
 #[cfg(test)]

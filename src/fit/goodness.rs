@@ -4,20 +4,67 @@
 //! standard normal if the law is right (Dunn & Smyth 1996, DOI 10.1080/10618600.1996.10474708). Least
 //! squares has no law of its own: there z is the residual over the residuals' own deviation.
 
-use statrs::function::erf::erfc;
-use statrs::function::erf::erfc_inv;
+use nalgebra::DVector;
+use statrs::function::erf::{erfc, erfc_inv};
 
-use crate::material::Goodness;
+use super::coordinates::Coordinates;
+use super::likelihood::Likelihood;
+use super::settings::{Fit, Method};
+use super::table::{Place, Table};
+use crate::material::{Goodness, Observation};
 use crate::radar::random::{Key, Purpose};
+use crate::radar::speckle::standard_deviation_db;
+use crate::units::db_from_ratio;
+
+/// Detected σ⁰ over the model, dB.
+pub(super) fn residuals_db(
+    fit: &Fit,
+    coordinates: &Coordinates,
+    at: &DVector<f64>,
+    rows: &[Observation],
+) -> Vec<f64> {
+    let table = Table::new(&coordinates.model(at));
+    let noise_w = fit.noise_w.unwrap_or(0.0);
+    let detected = rows.iter().filter(|row| !row.is_censored());
+    detected
+        .filter_map(|row| {
+            let sigma0 = row.sigma0?;
+            let noise = noise_w * sigma0 / row.power_w.unwrap_or(sigma0);
+            let model = table.at(&Place::new(row.theta_i_rad)).exp() + noise;
+            Some(db_from_ratio(sigma0) - db_from_ratio(model))
+        })
+        .collect()
+}
+
+pub(super) fn goodness(
+    fit: &Fit,
+    coordinates: &Coordinates,
+    at: &DVector<f64>,
+    rows: &[Observation],
+) -> Goodness {
+    let residuals_db = residuals_db(fit, coordinates, at, rows);
+    if fit.method == Method::Censored {
+        let noise_w = fit.noise_w.unwrap_or(0.0);
+        let below = Likelihood::new(coordinates, rows, noise_w).ln_below(at);
+        let censored: Vec<bool> = rows.iter().map(Observation::is_censored).collect();
+        let speckle_db = standard_deviation_db(coordinates.looks(at));
+        return goodness_of(&residuals_db, shares(&below, &censored, fit.seed), Some(speckle_db));
+    }
+    let squares: f64 = residuals_db.iter().map(|r| r * r).sum();
+    let rms_db = (squares / residuals_db.len().max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
+    let shares = residuals_db.iter().map(|r| normal_share(r / rms_db)).collect();
+    goodness_of(&residuals_db, shares, None)
+}
 
 /// Probabilities u of rows from the ln of what lies below each; censored rows are drawn.
-pub(super) fn shares(ln_below: &[f64], censored: &[bool], seed: u64) -> Vec<f64> {
-    let share = |(index, (&ln_below, &censored)): (usize, (&f64, &bool))| {
+fn shares(ln_below: &[f64], censored: &[bool], seed: u64) -> Vec<f64> {
+    let mut shares = Vec::with_capacity(ln_below.len());
+    for (index, (ln_below, &is_censored)) in ln_below.iter().zip(censored).enumerate() {
         let key = Key { seed, chirp: index as u64, sub_ray: 0, purpose: Purpose::Fit };
-        let part = if censored { key.draws().uniform() } else { 1.0 };
-        part * ln_below.exp()
-    };
-    ln_below.iter().zip(censored).enumerate().map(share).collect()
+        let part = if is_censored { key.draws().uniform() } else { 1.0 };
+        shares.push(part * ln_below.exp());
+    }
+    shares
 }
 
 /// Φ(z): the probability of a normal number below z.
@@ -26,11 +73,7 @@ pub(crate) fn normal_share(z: f64) -> f64 {
 }
 
 /// Sums up residuals in dB and probabilities u; `speckle_db` is the standard deviation that speckle alone leaves.
-pub(super) fn goodness_of(
-    residuals_db: &[f64],
-    mut shares: Vec<f64>,
-    speckle_db: Option<f64>,
-) -> Goodness {
+fn goodness_of(residuals_db: &[f64], mut shares: Vec<f64>, speckle_db: Option<f64>) -> Goodness {
     const SQRT_2: f64 = std::f64::consts::SQRT_2;
     // z = Φ⁻¹(u), away from the infinite ends.
     let z: Vec<f64> =

@@ -1,27 +1,29 @@
-//! How a fit does on rows that it has not seen. Neighbouring chirps meet nearly the same place, so that
-//! whole blocks of them are held out, in turns, and the error of the score is that of blocks.
+//! Cross-validation: how well a fit predicts rows that it has not seen. Neighbouring chirps illuminate nearly the same
+//! place, so that whole blocks of them are held out, one fold after another, and the standard error of the score is that
+//! of blocks.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::DVector;
 
+use super::goodness::residuals_db;
 use super::likelihood::Likelihood;
-use super::result::{FitResult, residuals_db};
+use super::result::FitResult;
 use super::settings::Method;
 use crate::material::{HeldOut, Observation};
 use crate::measure::curve::Curve;
 use crate::radar::random::{Key, Purpose};
 
-/// Parts that take turns at being held out.
+/// Parts that are held out one after another.
 const FOLDS: usize = 5;
 /// Blocks along the longer side of what was scanned, and how many must hold something.
 const ACROSS: f64 = 8.0;
 const LEAST_SQUARES: usize = 2 * FOLDS;
-/// Blocks of consecutive chirps where nobody knows where they lie.
+/// Blocks of consecutive chirps where the places on the target are not known.
 const RUNS: usize = 20;
 
 impl FitResult {
-    /// Fits the curve again without each fifth of its blocks, and tries every fit on what it lacked. Blocks
+    /// Fits the curve again without each fifth of its blocks, and evaluates every fit on that fifth. Blocks
     /// are squares on the target where the rows say where they lie; runs of consecutive chirps of a scan;
     /// single rows of a sweep of the angle, of which a run would be a whole range of angles.
     ///
@@ -38,25 +40,27 @@ impl FitResult {
         let fold_of_block = deal(&sizes, FOLDS, self.fit.seed);
         let (mut scores, mut squares_db) = (vec![0.0; blocks], Vec::new());
         for fold in 0..FOLDS {
-            let is_held = |row: usize| fold_of_block[block_of_row[row]] == fold;
-            let [held, kept] = [true, false].map(|wanted| -> Vec<usize> {
-                (0..curve.observations.len()).filter(|&row| is_held(row) == wanted).collect()
-            });
-            let of = |places: &[usize]| places.iter().map(|&row| curve.observations[row]).collect();
-            let at = self.fitted_to(of(&kept))?;
-            let unseen: Vec<Observation> = of(&held);
-            for (row, ln_p) in held.iter().zip(self.ln_p(&at, &unseen)) {
-                scores[block_of_row[*row]] += ln_p;
+            let (mut kept, mut unseen, mut block_of_unseen) = (Vec::new(), Vec::new(), Vec::new());
+            for (row, &block) in curve.observations.iter().zip(&block_of_row) {
+                if fold_of_block[block] == fold {
+                    unseen.push(*row);
+                    block_of_unseen.push(block);
+                } else {
+                    kept.push(*row);
+                }
+            }
+            let at = self.fitted_to(kept)?;
+            for (block, ln_p) in block_of_unseen.into_iter().zip(self.ln_p(&at, &unseen)) {
+                scores[block] += ln_p;
             }
             let residuals_db = residuals_db(&self.fit, &self.coordinates, &at, &unseen);
             squares_db.extend(residuals_db.into_iter().map(|residual| residual.powi(2)));
         }
         let [score, score_sd] = mean(&scores, &sizes);
         let has_law = self.fit.method == Method::Censored;
-        let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         Some(HeldOut {
-            folds: count(FOLDS),
-            blocks: count(blocks),
+            folds: FOLDS as u32,
+            blocks: u32::try_from(blocks).unwrap_or(u32::MAX),
             blocks_of: of.to_owned(),
             block_m,
             score: has_law.then_some(score),
@@ -101,10 +105,11 @@ impl Blocks {
 
     fn squares(places: &[[f64; 2]]) -> Option<Blocks> {
         let side_m = extent_m(places) / ACROSS;
-        let square = |at: &[f64; 2]| at.map(|x| (x / side_m).floor() as i64);
-        let squares: BTreeSet<[i64; 2]> = places.iter().map(square).collect();
-        let numbers: BTreeMap<[i64; 2], usize> = squares.into_iter().zip(0..).collect();
-        let block_of_row = places.iter().map(|at| numbers[&square(at)]).collect();
+        let squares: Vec<[i64; 2]> =
+            places.iter().map(|at| at.map(|x| (x / side_m).floor() as i64)).collect();
+        let different: BTreeSet<[i64; 2]> = squares.iter().copied().collect();
+        let numbers: BTreeMap<[i64; 2], usize> = different.into_iter().zip(0..).collect();
+        let block_of_row = squares.iter().map(|square| numbers[square]).collect();
         (side_m > 0.0 && numbers.len() >= LEAST_SQUARES).then_some(Blocks {
             of: "squares",
             block_of_row,
@@ -115,8 +120,8 @@ impl Blocks {
     fn in_time(rows: &[Observation]) -> Blocks {
         let mut in_time: Vec<usize> = (0..rows.len()).collect();
         in_time.sort_by_key(|&row| rows[row].chirp);
-        let angles = || in_time.iter().map(|&row| rows[row].theta_i_rad);
-        let is_sweep = angles().is_sorted() || angles().rev().is_sorted();
+        let angles_rad: Vec<f64> = in_time.iter().map(|&row| rows[row].theta_i_rad).collect();
+        let is_sweep = angles_rad.is_sorted() || angles_rad.iter().rev().is_sorted();
         let blocks = if is_sweep { rows.len() } else { RUNS.min(rows.len()) };
         let mut block_of_row = vec![0; rows.len()];
         for (place, &row) in in_time.iter().enumerate() {
@@ -128,22 +133,24 @@ impl Blocks {
 
 /// The longer side of what places cover, m.
 fn extent_m(places: &[[f64; 2]]) -> f64 {
-    let side = |axis: usize| {
-        let along = || places.iter().map(|at| at[axis]);
-        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
-    };
-    side(0).max(side(1))
+    let (mut min, mut max) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for at in places {
+        for axis in 0..2 {
+            min[axis] = min[axis].min(at[axis]);
+            max[axis] = max[axis].max(at[axis]);
+        }
+    }
+    (max[0] - min[0]).max(max[1] - min[1])
 }
 
 /// Deals blocks of these sizes to folds, in an order drawn from the seed, each to the emptiest: the fold
 /// of every block.
 pub(crate) fn deal(sizes: &[usize], folds: usize, seed: u64) -> Vec<usize> {
-    let drawn = |block: usize| {
+    let mut order = Vec::with_capacity(sizes.len());
+    for block in 0..sizes.len() {
         let key = Key { seed, chirp: block as u64, sub_ray: 1, purpose: Purpose::Fit };
-        key.draws().uniform()
-    };
-    let mut order: Vec<(f64, usize)> =
-        (0..sizes.len()).map(|block| (drawn(block), block)).collect();
+        order.push((key.draws().uniform(), block));
+    }
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (mut filled, mut fold_of_block) = (vec![0; folds], vec![0; sizes.len()]);
     for (_, block) in order {

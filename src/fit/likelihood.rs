@@ -100,13 +100,7 @@ impl<'a> Likelihood<'a> {
     pub fn ln_below(&self, at: &DVector<f64>) -> Vec<f64> {
         let table = Table::new(&self.coordinates.model(at));
         let law = GammaLaw::new(self.coordinates.looks(at));
-        let below = |chirp: &Chirp| {
-            let terms = chirp.nodes.iter().map(|(place, ln_weight)| {
-                ln_weight + law.below(chirp.ln_sigma0, chirp.ln_mean(&table, place)).value
-            });
-            ln_sum(&terms.collect::<Vec<_>>())
-        };
-        self.chirps.iter().map(below).collect()
+        self.chirps.iter().map(|chirp| chirp.ln_below(&table, &law)).collect()
     }
 }
 
@@ -146,6 +140,16 @@ impl Chirp {
         if self.noise > 0.0 { (ln_sigma0.exp() + self.noise).ln() } else { ln_sigma0 }
     }
 
+    /// ln of the probability of a lower power, averaged over the true angle.
+    fn ln_below(&self, table: &Table, law: &GammaLaw) -> f64 {
+        let mut terms = Vec::with_capacity(self.nodes.len());
+        for (place, ln_weight) in &self.nodes {
+            let ln_mean = self.ln_mean(table, place);
+            terms.push(ln_weight + law.below(self.ln_sigma0, ln_mean).value);
+        }
+        ln_sum(&terms)
+    }
+
     /// ln p of the chirp; its derivatives are left in `scratch.score`.
     fn score(&self, tables: &Tables, scratch: &mut Scratch) -> f64 {
         let Scratch { terms, laws, score, gradient, bend } = scratch;
@@ -153,9 +157,10 @@ impl Chirp {
         laws.clear();
         for (place, ln_weight) in &self.nodes {
             let ln_mean = self.ln_mean(&tables.ln_sigma0, place);
-            let law = match self.censored {
-                true => tables.law.below(self.ln_sigma0, ln_mean),
-                false => tables.law.detected(self.ln_sigma0, ln_mean),
+            let law = if self.censored {
+                tables.law.below(self.ln_sigma0, ln_mean)
+            } else {
+                tables.law.detected(self.ln_sigma0, ln_mean)
             };
             terms.push(ln_weight + law.value);
             // The share of σ⁰ in the mean, the rest being noise.

@@ -26,6 +26,7 @@ pub(crate) mod gamma_law;
 mod goodness;
 pub(crate) mod held_out;
 mod interval;
+mod judge;
 mod least_squares;
 mod likelihood;
 pub(crate) mod minimise;
@@ -36,6 +37,7 @@ mod search;
 mod sensitivity;
 mod settings;
 mod stored;
+mod summary;
 mod table;
 #[cfg(test)]
 mod twin;

@@ -56,14 +56,14 @@ impl Fit {
         match self.method {
             Method::Censored => {
                 let likelihood = Likelihood::new(coordinates, rows, self.noise_w.unwrap_or(0.0));
-                let cost = |at: &DVector<f64>| likelihood.local(Curvature::Scores, at);
-                search_freely(&likelihood_search(), coordinates, start, cost)
+                search_freely(&likelihood_search(), coordinates, start, |at| {
+                    likelihood.local(Curvature::Scores, at)
+                })
             }
             Method::Tls { theta_sd_rad, level_sd_db } => {
                 let deviations = Deviations { theta_sd_rad, level_sd_db };
                 let squares = Squares::new(coordinates, rows, deviations);
-                let cost = |at: &DVector<f64>| squares.local(at);
-                search_freely(&squares_search(), coordinates, start, cost)
+                search_freely(&squares_search(), coordinates, start, |at| squares.local(at))
             }
             Method::Mse { split_rad } => pieces(coordinates, rows, split_rad, start),
         }
@@ -72,24 +72,24 @@ impl Fit {
     fn search_likelihood(&self, coordinates: &Coordinates, rows: &[Observation]) -> Found {
         let likelihood = Likelihood::new(coordinates, rows, self.noise_w.unwrap_or(0.0));
         let cost = |at: &DVector<f64>| likelihood.local(Curvature::Scores, at);
-        let far = |at: &DVector<f64>| likelihood.local(Curvature::FromAfar, at);
         let approach = Minimise { iterations: APPROACH, tolerance: NEAR, patience: usize::MAX };
         let search = likelihood_search();
         // With free looks a far start is explained by wild speckle before it is improved.
         let (best, agreeing) = self.best(coordinates, |start| {
             let [lower, upper] = coordinates.holding_looks(start);
-            let near = approach.run(start, [&lower, &upper], far);
+            let near = approach
+                .run(start, [&lower, &upper], |at| likelihood.local(Curvature::FromAfar, at));
             search_freely(&search, coordinates, &near.at, cost)
         });
         let information = observed_information(coordinates, &best.at, &best.local, cost);
         let uncertainty = Uncertainty::new(coordinates, &best.at, &information);
         let search = Minimise { tolerance: 1e3 * LIKELIHOOD_TOLERANCE, ..search };
         let profile = Profile { coordinates, best: &best, uncertainty: &uncertainty, search, cost };
-        let interval = |index: usize| {
+        let mut profiles = Vec::new();
+        for index in 0..coordinates.len() {
             let wanted = best.converged() && uncertainty.is_identified(index);
-            wanted.then(|| profile.interval(index)).flatten()
-        };
-        let profiles = (0..coordinates.len()).map(interval).collect();
+            profiles.push(if wanted { profile.interval(index) } else { None });
+        }
         Found { best, agreeing, uncertainty, profiles }
     }
 
@@ -109,8 +109,7 @@ impl Fit {
                 best = found;
             }
         }
-        let near = |cost: &&f64| **cost - best.local.value <= SAME;
-        let agreeing = costs.iter().filter(near).count();
+        let agreeing = costs.iter().filter(|cost| **cost - best.local.value <= SAME).count();
         (best, agreeing)
     }
 }
@@ -119,11 +118,11 @@ impl Fit {
 pub(super) fn drawn_start(coordinates: &Coordinates, seed: u64, number: usize) -> DVector<f64> {
     let key = Key { seed, chirp: number as u64, sub_ray: 1, purpose: Purpose::Fit };
     let mut draws = key.draws();
-    let start = coordinates.start();
-    let moved = |(u, c): (&f64, &super::coordinates::Coordinate)| {
-        u + c.spread() * (2.0 * draws.uniform() - 1.0)
-    };
-    DVector::from_iterator(start.len(), start.iter().zip(&coordinates.list).map(moved))
+    let mut start = coordinates.start();
+    for (u, coordinate) in start.iter_mut().zip(&coordinates.list) {
+        *u += coordinate.spread() * (2.0 * draws.uniform() - 1.0);
+    }
+    start
 }
 
 fn likelihood_search() -> Minimise {
@@ -196,8 +195,7 @@ fn piece(
         (lower[index], upper[index]) = (start[index], start[index]);
     }
     let squares = Squares::new(coordinates, rows, DB);
-    let cost = |at: &DVector<f64>| squares.local(at);
-    let mut found = squares_search().run(&start, [&lower, &upper], cost);
+    let mut found = squares_search().run(&start, [&lower, &upper], |at| squares.local(at));
     let mask = DVector::from_iterator(moves.len(), moves.iter().map(|&m| f64::from(u8::from(m))));
     let mask: DMatrix<f64> = &mask * mask.transpose();
     found.local.curvature.component_mul_assign(&mask);

@@ -47,19 +47,25 @@ impl FitResult {
             .filter(|(_, e)| e.sd.is_some() && parameters.iter().any(|p| p.path == e.name))
             .map(|(index, _)| index)
             .collect();
-        let entry = |a: usize, b: usize| self.covariance.get(a)?.get(b).copied();
-        let both = |a: usize, b: usize| Some((entry(a, b)? + entry(b, a)?) / 2.0);
-        let row = |&a: &usize| known.iter().map(|&b| both(a, b)).collect::<Option<Vec<f64>>>();
-        let matrix = known.iter().map(row).collect::<Option<_>>()?;
-        let name = |&index: &usize| Some(self.estimates.get(index)?.name.clone());
-        let parameters = known.iter().map(name).collect::<Option<_>>()?;
+        // Symmetric to the last bit.
+        let mut matrix = Vec::new();
+        for &a in &known {
+            let mut row = Vec::new();
+            for &b in &known {
+                let (above, below) =
+                    (self.covariance.get(a)?.get(b)?, self.covariance.get(b)?.get(a)?);
+                row.push((above + below) / 2.0);
+            }
+            matrix.push(row);
+        }
+        let parameters =
+            known.iter().filter_map(|&k| Some(self.estimates.get(k)?.name.clone())).collect();
         let covariance = Covariance { parameters, matrix };
         // What rounding has spoilt is left out here; the report has it as it was found.
         (!known.is_empty() && covariance.is_sound()).then_some(covariance)
     }
 
     fn report(&self) -> FitReport {
-        let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         FitReport {
             method: self.method_name().to_owned(),
             given: self.given(),
@@ -102,12 +108,20 @@ impl FitResult {
     }
 }
 
+/// A count as files and the database keep it.
+fn count(number: usize) -> u32 {
+    u32::try_from(number).unwrap_or(u32::MAX)
+}
+
 /// The 95 % band of a stored fit at an angle (rad), by the delta method on ln σ⁰; `None` for a fit
 /// without a report. The derivatives are difference quotients of the stored model.
 pub fn stored_band(fit: &material::Fit, theta_rad: f64) -> Option<Band> {
     let report = fit.report.as_ref()?;
-    let slope = |e: &Estimate| e.sd.map_or(0.0, |_| slope(&fit.model, e, theta_rad));
-    let slopes: Vec<f64> = report.estimates.iter().map(slope).collect();
+    let slopes: Vec<f64> = report
+        .estimates
+        .iter()
+        .map(|e| if e.sd.is_some() { slope(&fit.model, e, theta_rad) } else { 0.0 })
+        .collect();
     let terms = report.covariance.iter().zip(&slopes).flat_map(|(row, a)| {
         row.iter().zip(&slopes).map(move |(covariance, b)| a * b * covariance)
     });
@@ -116,7 +130,7 @@ pub fn stored_band(fit: &material::Fit, theta_rad: f64) -> Option<Band> {
     Some(Band { low: mid / factor, mid, high: mid * factor })
 }
 
-/// d ln σ⁰ / d estimate; 0 where the estimate is no number of the model, as the looks are.
+/// d ln σ⁰ / d estimate; 0 for an estimate that is not a parameter of the model, such as the looks.
 fn slope(model: &Brdf, estimate: &Estimate, theta_rad: f64) -> f64 {
     // S is proportional to f_λ and R to r_s while k stays.
     let path = match estimate.name.as_str() {
@@ -130,12 +144,12 @@ fn slope(model: &Brdf, estimate: &Estimate, theta_rad: f64) -> f64 {
     let scale = if path == estimate.name { 1.0 } else { estimate.value / parameter.value };
     let step = STEP * parameter.value.abs().max(STEP * (parameter.max - parameter.min));
     let ends = [-step, step].map(|d| (parameter.value + d).clamp(parameter.min, parameter.max));
-    let level = |value: f64| {
+    let [below, above] = ends.map(|value| {
         let mut moved = model.clone();
         moved.set_parameter(path, value);
         moved.sigma0(theta_rad).ln()
-    };
-    let slope = (level(ends[1]) - level(ends[0])) / ((ends[1] - ends[0]) * scale);
+    });
+    let slope = (above - below) / ((ends[1] - ends[0]) * scale);
     if slope.is_finite() { slope } else { 0.0 }
 }
 

@@ -29,8 +29,8 @@ pub(super) struct Uncertainty {
     pub loose: Vec<usize>,
 }
 
-/// Standard deviations by the curvature of −ln p alone; none for an unknown that does not bend it, or of which the
-/// data know no more than a combination with others.
+/// Standard deviations from the curvature of −ln p; none for an unknown without curvature, and for one that the data
+/// determine only in combination with others.
 pub(crate) fn deviations(curvature: &DMatrix<f64>) -> Vec<Option<f64>> {
     /// Beyond this an unknown is a difference of others within rounding.
     const MOST_INFLATION: f64 = 1e6;
@@ -73,8 +73,11 @@ impl Uncertainty {
             loose: Vec::new(),
         };
         found.read(&free, &scale, scaled);
-        let is_loose = |i: &usize| found.deviation(*i) > ends[*i][1] - ends[*i][0];
-        found.loose = free.iter().copied().filter(is_loose).collect();
+        for i in free {
+            if found.deviation(i) > ends[i][1] - ends[i][0] {
+                found.loose.push(i);
+            }
+        }
         found
     }
 
@@ -131,13 +134,13 @@ pub(super) fn observed_information(
     let mut information = DMatrix::zeros(at.len(), at.len());
     for index in 0..at.len() {
         let step = (0.1 / local.curvature[(index, index)].sqrt()).clamp(1e-5, 0.1);
-        let moved = |step: f64| {
+        let [high, low] = [step, -step].map(|step| {
             let mut there = at.clone();
             there[index] = (at[index] + step).max(lower[index]).min(upper[index]);
-            (there[index], cost(&there).gradient)
-        };
-        let ((high, above), (low, below)) = (moved(step), moved(-step));
-        information.set_column(index, &((above - below) / (high - low)));
+            there
+        });
+        let change = cost(&high).gradient - cost(&low).gradient;
+        information.set_column(index, &(change / (high[index] - low[index])));
     }
     0.5 * (&information + information.transpose())
 }

@@ -4,7 +4,9 @@
 //! measurement does not know it.
 
 use std::collections::HashMap;
+use std::ops::RangeInclusive;
 
+use glam::DVec3;
 use thiserror::Error;
 
 use crate::formats::FormatError;
@@ -13,10 +15,8 @@ use crate::units::{dbm_from_watts, rounded, shown, watts_from_dbm};
 
 /// Larger than any target of this radar, m: beyond, the unit is wrong.
 const LARGEST_M: f64 = 100.0;
-/// No receiver takes more, dBm.
-const STRONGEST_DBM: f64 = 60.0;
-/// Far below the thermal noise of a hertz, dBm.
-const WEAKEST_DBM: f64 = -300.0;
+/// Powers that can have been received, dBm: from far below the thermal noise of a hertz to more than any receiver takes.
+pub(super) const POSSIBLE_DBM: RangeInclusive<f64> = -300.0..=60.0;
 
 /// One detection.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,8 +78,8 @@ pub enum CloudError {
     },
     /// A power that cannot have been received.
     #[error(
-        "point {point} has {} dBm, which is not from {WEAKEST_DBM} to {STRONGEST_DBM}; check \
-         the unit of the power", shown(rounded(*power_dbm))
+        "point {point} has {} dBm, which is not from {} to {}; check the unit of the power",
+        shown(rounded(*power_dbm)), POSSIBLE_DBM.start(), POSSIBLE_DBM.end()
     )]
     NoSuchPower {
         /// Point, from 0.
@@ -173,15 +173,17 @@ fn check_finite(points: &[CloudPoint]) -> Result<(), CloudError> {
 }
 
 fn check_size(points: &[CloudPoint]) -> Result<(), CloudError> {
-    let places = || points.iter().map(|point| point.point.xyz);
-    let min = places().fold(glam::DVec3::INFINITY, glam::DVec3::min);
-    let max = places().fold(glam::DVec3::NEG_INFINITY, glam::DVec3::max);
+    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for point in points {
+        min = min.min(point.point.xyz);
+        max = max.max(point.point.xyz);
+    }
     let size_m = min.distance(max);
     if size_m > LARGEST_M { Err(CloudError::TooLarge { size_m }) } else { Ok(()) }
 }
 
 fn check_powers(points: &[CloudPoint]) -> Result<(), CloudError> {
-    let possible_w = watts_from_dbm(WEAKEST_DBM)..=watts_from_dbm(STRONGEST_DBM);
+    let possible_w = watts_from_dbm(*POSSIBLE_DBM.start())..=watts_from_dbm(*POSSIBLE_DBM.end());
     for (number, &CloudPoint { power_w, .. }) in points.iter().enumerate() {
         if power_w < 0.0 {
             return Err(CloudError::NotPositive { point: number, power_w });

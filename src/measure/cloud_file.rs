@@ -11,7 +11,7 @@
 
 use glam::DVec3;
 
-use super::cloud::{Cloud, CloudError, CloudPoint};
+use super::cloud::{Cloud, CloudError, CloudPoint, POSSIBLE_DBM};
 use crate::formats::FormatError;
 use crate::formats::csv;
 use crate::formats::ply::{self, read_table};
@@ -187,13 +187,20 @@ impl CloudReading {
 impl Detections {
     /// The power of the next point, W.
     fn power_w(&mut self, value: f64, unit: PowerUnit) -> Result<f64, CloudError> {
+        let point = self.points.len();
         match unit {
+            PowerUnit::Dbm if !value.is_finite() => {
+                Err(CloudError::NotFinite { what: "the power", point })
+            }
+            PowerUnit::Dbm if !POSSIBLE_DBM.contains(&value) => {
+                Err(CloudError::NoSuchPower { point, power_dbm: value })
+            }
             PowerUnit::Dbm => {
                 self.levels_dbm.push(value);
                 Ok(watts_from_dbm(value))
             }
             PowerUnit::Watt if value <= 0.0 => {
-                Err(CloudError::NotPositive { point: self.points.len(), power_w: value })
+                Err(CloudError::NotPositive { point, power_w: value })
             }
             PowerUnit::Watt => Ok(value),
         }

@@ -89,6 +89,7 @@ fn align_to(
     Ok((moved, settings.max_steps))
 }
 
+/// Pairs each measured point with the nearest of the virtual ones, moved by `moved`, within `reach_m`.
 fn pairs(
     points: &[DVec3],
     tree: &Nearest,
@@ -97,22 +98,35 @@ fn pairs(
     reach_m: f64,
 ) -> Vec<Pair> {
     let back = moved.inverse();
-    let pair = |measured: &DVec3| {
-        let (number, distance_m) = tree.find((back * Point::from(*measured)).xyz);
-        let seen = seen.get(number)?;
-        let model = (*moved * seen.hit.point).xyz;
-        let normal = moved.rotation() * seen.normal;
-        (distance_m <= reach_m).then_some(Pair { model, measured: *measured, normal })
-    };
-    let mut pairs: Vec<Pair> = points.iter().filter_map(pair).collect();
+    let mut pairs = Vec::new();
+    for &measured in points {
+        let (number, distance_m) = tree.find((back * Point::from(measured)).xyz);
+        if let Some(seen) = seen.get(number).filter(|_| distance_m <= reach_m) {
+            let model = (*moved * seen.hit.point).xyz;
+            pairs.push(Pair { model, measured, normal: moved.rotation() * seen.normal });
+        }
+    }
+    // Beyond the edge of what the virtual scan saw, pairs lie far off sideways.
     let typical_m = median(pairs.iter().map(Pair::sideways_m));
     pairs.retain(|pair| pair.sideways_m() <= BEYOND_THE_EDGE * typical_m);
     pairs
 }
 
 impl Pair {
+    /// Distance of the two points.
+    fn apart_m(&self) -> f64 {
+        self.model.distance(self.measured)
+    }
+
+    /// Distance of the two points within the surface of the model.
     fn sideways_m(&self) -> f64 {
         (self.measured - self.model).reject_from_normalized(self.normal).length()
+    }
+
+    /// The gap along the normal of the model.
+    fn gap(&self) -> Gap {
+        let size_m = self.normal.dot(self.measured - self.model);
+        Gap { at: self.model, gradient: self.normal, size_m }
     }
 }
 
@@ -122,18 +136,13 @@ fn closing(view: &View, settings: &Registration, pairs: &[Pair]) -> Pose<Global,
     const LEAST_SD_M: f64 = 1e-9;
     if settings.metric == Metric::PointToPoint {
         let ends: Vec<(DVec3, DVec3)> = pairs.iter().map(|p| (p.model, p.measured)).collect();
-        let apart_m = |(a, b): &(DVec3, DVec3)| a.distance(*b);
-        let sd_m = bulk_sd_m(ends.iter().map(apart_m)).max(LEAST_SD_M);
+        let sd_m = bulk_sd_m(pairs.iter().map(Pair::apart_m)).max(LEAST_SD_M);
         let weights: Vec<f64> =
-            ends.iter().map(|ends| settings.kernel.weight(apart_m(ends) / sd_m)).collect();
+            pairs.iter().map(|pair| settings.kernel.weight(pair.apart_m() / sd_m)).collect();
         let still = Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO);
         return point_to_point(&ends, &weights).unwrap_or(still);
     }
-    let gap = |pair: &Pair| {
-        let size_m = pair.normal.dot(pair.measured - pair.model);
-        Gap { at: pair.model, gradient: pair.normal, size_m }
-    };
-    let gaps: Vec<Gap> = pairs.iter().map(gap).collect();
+    let gaps: Vec<Gap> = pairs.iter().map(Pair::gap).collect();
     let sd_m = bulk_sd_m(gaps.iter().map(|gap| gap.size_m)).max(LEAST_SD_M);
     let weighted = gaps.iter().map(|gap| (*gap, settings.kernel.weight(gap.size_m / sd_m)));
     NormalEquations::new(weighted, view.pivot, view.length_m).solve().about(view.pivot)

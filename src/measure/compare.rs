@@ -1,7 +1,7 @@
 //! How far a simulated scan is from a measured one: pixel by pixel, and along a line (paper, Figs. 10
 //! to 15).
 
-use super::cloud::{Cloud, CloudPoint};
+use super::cloud::Cloud;
 use crate::frames::Point;
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
@@ -40,9 +40,10 @@ pub struct Line {
 pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
     let frames = radar.frames();
     let (origin, target_from_global) = (frames.origin(), frames.global_from_target.inverse());
-    let echo = |(number, point): (usize, &CloudPoint)| {
+    let mut echoes = Vec::with_capacity(cloud.points().len());
+    for (number, point) in cloud.points().iter().enumerate() {
         let in_target = target_from_global * point.point;
-        Echo {
+        echoes.push(Echo {
             chirp: point.chirp.unwrap_or(number as u32),
             point: point.point,
             range_m: point.range_m.unwrap_or(origin.distance_m(point.point)),
@@ -50,12 +51,12 @@ pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
             yt_m: in_target.xyz.y,
             power_dbm: dbm_from_watts(point.power_w),
             truth: None,
-        }
-    };
+        });
+    }
     Scan {
         chirps: chirps.rays.len(),
         hits: cloud.points().len(),
-        echoes: cloud.points().iter().enumerate().map(echo).collect(),
+        echoes,
         threshold_dbm: f64::NEG_INFINITY,
         noise_dbm: None,
     }
@@ -65,27 +66,34 @@ pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
 /// agreement. Both images must be on the same grid, as [`power_image`](crate::render::power_image)
 /// draws them for one scene.
 pub fn difference(measured: &Raster, simulated: &Raster) -> (Raster, Agreement) {
-    let power = |raster: &Raster| raster.channel("power_dbm").unwrap_or_default().to_vec();
-    let pairs: Vec<(f32, f32)> = std::iter::zip(power(measured), power(simulated)).collect();
-    let values: Vec<f32> = pairs.iter().map(|(m, s)| s - m).collect();
-    let only = |here: fn(&(f32, f32)) -> f32, there: fn(&(f32, f32)) -> f32| {
-        pairs.iter().filter(|pair| here(pair).is_finite() && !there(pair).is_finite()).count()
-    };
+    let [measured_dbm, simulated_dbm] = [measured, simulated].map(power_dbm);
+    let values: Vec<f32> =
+        std::iter::zip(measured_dbm, simulated_dbm).map(|(m, s)| s - m).collect();
     let both: Vec<f64> = values.iter().filter(|v| v.is_finite()).map(|&v| f64::from(v)).collect();
-    let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / both.len() as f64;
     let mut sizes: Vec<f64> = both.iter().map(|d| d.abs()).collect();
     sizes.sort_by(f64::total_cmp);
+    let count = both.len() as f64;
     let agreement = Agreement {
         both: both.len(),
-        only_measured: only(|pair| pair.0, |pair| pair.1),
-        only_simulated: only(|pair| pair.1, |pair| pair.0),
-        bias_db: mean(&mut both.iter().copied()),
-        rmse_db: mean(&mut both.iter().map(|d| d * d)).sqrt(),
+        only_measured: count_of_first(measured_dbm, simulated_dbm),
+        only_simulated: count_of_first(simulated_dbm, measured_dbm),
+        bias_db: both.iter().sum::<f64>() / count,
+        rmse_db: (both.iter().map(|d| d * d).sum::<f64>() / count).sqrt(),
         median_size_db: sizes.get(sizes.len() / 2).copied().unwrap_or(f64::NAN),
     };
     let channel = Channel { name: "difference_db".to_owned(), values };
     let raster = Raster { channels: vec![channel], ..measured.clone() };
     (raster, agreement)
+}
+
+fn power_dbm(raster: &Raster) -> &[f32] {
+    raster.channel("power_dbm").unwrap_or_default()
+}
+
+/// Pixels that have power in the first image alone.
+fn count_of_first(first_dbm: &[f32], second_dbm: &[f32]) -> usize {
+    let pixels = std::iter::zip(first_dbm, second_dbm);
+    pixels.filter(|(first, second)| first.is_finite() && !second.is_finite()).count()
 }
 
 /// (x, dBm) of the detections within a line, x in the global frame, m, from left to right.
@@ -104,6 +112,7 @@ pub fn along(scan: &Scan, line: Line) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::cloud::CloudPoint;
     use crate::units::watts_from_dbm;
 
     fn raster(values: [f32; 4]) -> Raster {

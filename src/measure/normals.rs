@@ -25,11 +25,12 @@ pub fn tilt_variance_rad2(mesh: &Mesh) -> Vec<f64> {
     let own: Vec<f64> = std::iter::zip(&normals, &neighbours)
         .map(|(&normal, near)| facet_variance_rad2(normal, near, &normals))
         .collect();
-    let averaged = |(facet, near): (usize, &Vec<u32>)| {
-        let sum: f64 = own[facet] + near.iter().map(|&n| own[n as usize]).sum::<f64>();
-        sum / (1 + near.len()) as f64
-    };
-    neighbours.iter().enumerate().map(averaged).collect()
+    std::iter::zip(&own, &neighbours)
+        .map(|(own_rad2, near)| {
+            let sum = own_rad2 + near.iter().map(|&n| own[n as usize]).sum::<f64>();
+            sum / (1 + near.len()) as f64
+        })
+        .collect()
 }
 
 fn facet_variance_rad2(normal: DVec3, near: &[u32], normals: &[DVec3]) -> f64 {
@@ -37,11 +38,14 @@ fn facet_variance_rad2(normal: DVec3, near: &[u32], normals: &[DVec3]) -> f64 {
         return 0.0;
     }
     let count = near.len() as f64;
-    let near = || near.iter().map(|&n| normals[n as usize]);
-    let mean = near().sum::<DVec3>().normalize_or_zero();
-    let noise = normal.angle_between(mean).powi(2) / (2.0 * (1.0 + 1.0 / count));
-    let bend = near().map(|other| normal.angle_between(other).powi(2)).sum::<f64>() / count;
-    noise + bend / 24.0
+    let (mut sum, mut bend) = (DVec3::ZERO, 0.0);
+    for &facet in near {
+        let other = normals[facet as usize];
+        sum += other;
+        bend += normal.angle_between(other).powi(2);
+    }
+    let noise = normal.angle_between(sum.normalize_or_zero()).powi(2) / (2.0 * (1.0 + 1.0 / count));
+    noise + bend / count / 24.0
 }
 
 /// Facets across each edge, without those beyond a crease. Vertices at one place are one vertex:

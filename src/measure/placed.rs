@@ -65,9 +65,11 @@ impl<'a> Traced<'a> {
 
     /// Middle of the mesh's bounding box, m.
     pub fn middle(&self) -> DVec3 {
-        let vertices = || self.mesh.vertices.iter().copied();
-        let min = vertices().fold(DVec3::INFINITY, DVec3::min);
-        let max = vertices().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for vertex in &self.mesh.vertices {
+            min = min.min(*vertex);
+            max = max.max(*vertex);
+        }
         0.5 * (min + max)
     }
 
@@ -81,8 +83,12 @@ impl<'a> Traced<'a> {
     pub fn scan(&self, pose: &Pose<Global, Global>, aims: &Aims) -> Vec<Option<Seen>> {
         const RAYS_PER_TASK: usize = 256;
         let hits = aims.closest(&self.bvh, &pose.inverse());
-        let seen = |(ray, hit): (&Ray<Global>, Option<Hit>)| Some(self.seen(pose, ray, hit?));
-        aims.rays.par_iter().zip(hits).with_min_len(RAYS_PER_TASK).map(seen).collect()
+        aims.rays
+            .par_iter()
+            .zip(hits)
+            .with_min_len(RAYS_PER_TASK)
+            .map(|(ray, hit)| Some(self.seen(pose, ray, hit?)))
+            .collect()
     }
 
     /// A hit of the mesh where it is stored, there where the pose has it.

@@ -4,8 +4,8 @@
 //! 4π·f·cos²θ. With [`Footprint::Projected`] the instrument's model is P_r = P_t·A_eq·g/R² · f·cos θ,
 //! and so the quotient is multiplied by cos θ.
 //!
-//! A chirp whose ray meets the registered target and that has no detection is a row too: its echo
-//! stayed below the threshold. A chirp with a detection elsewhere, such as a false alarm, is none.
+//! A chirp whose ray hits the registered target and that has no detection is a row too: its echo
+//! stayed below the threshold. A chirp with a detection elsewhere, such as a false alarm, is not a row.
 
 use std::collections::HashSet;
 use std::f64::consts::PI;
@@ -125,34 +125,41 @@ impl Reduction {
         if !registered.converged {
             return Err(ReductionError::NotConverged);
         }
-        let regions = target.region_of_facet.iter().max().map_or(0, |most| usize::from(*most) + 1);
-        let regions = regions.max(target.regions.len());
-        if let Some(region) = self.region.filter(|region| usize::from(*region) >= regions) {
-            return Err(ReductionError::UnknownRegion { region, regions });
-        }
+        self.check_region(target)?;
         check_threshold(radar, cloud)?;
         let sights = sights(cloud, radar, chirps)?;
         let bench = self.bench(target, radar, registered);
-        let told = Told::new(radar, chirps, cloud, &sights);
-        told.check_shared()?;
+        let assignment = Assignment::new(radar, chirps, cloud, &sights);
+        assignment.check_shared()?;
         let mut left_out = LeftOut::default();
-        let mut rows = detected(&bench, cloud, &sights, &told, &mut left_out);
+        let mut rows = detected(&bench, cloud, &sights, &assignment, &mut left_out);
         if rows.is_empty() {
             let LeftOut { missed, off_surface, other_region, near_edge, .. } = left_out;
             return Err(ReductionError::NoRows { missed, off_surface, other_region, near_edge });
         }
         let detections = rows.len();
-        rows.extend(silent(&bench, chirps, &told, &mut left_out));
-        let mut notices = told.notices;
+        rows.extend(silent(&bench, chirps, &assignment, &mut left_out));
+        let mut notices = assignment.notices;
         let silent = rows.len() - detections;
         if silent > detections {
             notices.push(format!(
-                "{silent} chirps that meet the target gave nothing, {detections} did: if the cloud was \
-                 cropped or thinned out, chirps are missing and not silent, and a fit will be wrong; \
-                 name the part that was kept with a region"
+                "{silent} chirps that hit the target have no detection, {detections} have one: if the cloud \
+                 was cropped or thinned out, these chirps are missing and not silent, and a fit will be \
+                 wrong; name the part that was kept with a region"
             ));
         }
         Ok(Reduced { curve: Curve { observations: rows }, left_out, notices })
+    }
+
+    fn check_region(&self, target: &Target) -> Result<(), ReductionError> {
+        let regions = target.region_of_facet.iter().max().map_or(0, |most| usize::from(*most) + 1);
+        let regions = regions.max(target.regions.len());
+        match self.region {
+            Some(region) if usize::from(region) >= regions => {
+                Err(ReductionError::UnknownRegion { region, regions })
+            }
+            _ => Ok(()),
+        }
     }
 
     fn bench<'a>(
@@ -164,11 +171,9 @@ impl Reduction {
         // A perfect fit must not refuse its own points.
         const LEAST_RMS_M: f64 = 1e-3;
         const GATE_SD: f64 = 5.0;
+        let smooth = Incidence::new(target, registered, self.extra_sd_rad);
         Bench {
-            incidence: match self.exact_mesh {
-                false => Incidence::new(target, registered, self.extra_sd_rad),
-                true => Incidence::new(target, registered, self.extra_sd_rad).of_facets(),
-            },
+            incidence: if self.exact_mesh { smooth.of_facets() } else { smooth },
             link: Link::new(radar),
             target_from_global: radar.frames().global_from_target.inverse(),
             region: self.region,
@@ -239,14 +244,14 @@ fn detected(
     bench: &Bench,
     cloud: &Cloud,
     sights: &[Ray<Global>],
-    told: &Told,
+    assignment: &Assignment,
     left_out: &mut LeftOut,
 ) -> Vec<Observation> {
     let fates: Vec<Fate> = cloud
         .points()
         .par_iter()
         .zip(sights)
-        .zip(&told.chirp_of_point)
+        .zip(&assignment.chirp_of_point)
         .map(|((point, ray), chirp)| bench.judge(point, ray, *chirp))
         .collect();
     let mut rows = Vec::new();
@@ -264,8 +269,13 @@ fn detected(
 }
 
 /// Rows of the chirps that should have hit and gave nothing.
-fn silent(bench: &Bench, chirps: &Chirps, told: &Told, left_out: &mut LeftOut) -> Vec<Observation> {
-    let fates: Vec<Option<Fate>> = told
+fn silent(
+    bench: &Bench,
+    chirps: &Chirps,
+    assignment: &Assignment,
+    left_out: &mut LeftOut,
+) -> Vec<Observation> {
+    let fates: Vec<Option<Fate>> = assignment
         .silent
         .par_iter()
         .map(|&index| {
@@ -292,44 +302,57 @@ fn silent(bench: &Bench, chirps: &Chirps, told: &Told, left_out: &mut LeftOut) -
     rows
 }
 
-/// Which chirp gave which point, and which gave none.
-struct Told {
+/// Which chirp each point belongs to, and which chirps have no point.
+struct Assignment {
     chirp_of_point: Vec<u32>,
-    /// Places in the scan.
+    /// Indices in the scan of the chirps without a point.
     silent: Vec<usize>,
     notices: Vec<String>,
 }
 
-impl Told {
-    /// Points without a number belong to the chirp whose ray they lie on; a chirp is silent when no
-    /// point has its number and none without a number lies on its ray.
-    fn new(radar: &Radar, chirps: &Chirps, cloud: &Cloud, sights: &[Ray<Global>]) -> Told {
-        // An eighth of a spot: far below the distance of two chirps of a scan.
-        let near_rad = radar.spot_diameter_m / 8.0 / PATTERN_RANGE_M;
+/// The directions of a scan's rays, in the order of its chirps.
+struct Directions {
+    directions: Vec<DVec3>,
+    tree: Option<Nearest>,
+    /// Largest angle between a ray and a point on it, rad.
+    near_rad: f64,
+}
+
+impl Directions {
+    fn new(radar: &Radar, chirps: &Chirps) -> Directions {
         let directions: Vec<DVec3> = chirps.rays.iter().map(|ray| ray.direction.xyz()).collect();
         let tree = Nearest::new(&directions);
-        let on_ray = |ray: &Ray<Global>| {
-            let (index, off_rad) = tree.as_ref()?.find(ray.direction.xyz());
-            (off_rad <= near_rad).then(|| chirps.number.get(index).copied()).flatten()
-        };
+        // An eighth of a spot: far below the distance of two chirps of a scan.
+        Directions { directions, tree, near_rad: radar.spot_diameter_m / 8.0 / PATTERN_RANGE_M }
+    }
+
+    /// The chirp whose ray runs along `ray`.
+    fn chirp_along(&self, chirps: &Chirps, ray: &Ray<Global>) -> Option<u32> {
+        let (index, off_rad) = self.tree.as_ref()?.find(ray.direction.xyz());
+        if off_rad <= self.near_rad { chirps.number.get(index).copied() } else { None }
+    }
+}
+
+impl Assignment {
+    /// Points without a number belong to the chirp whose ray they lie on; a chirp is silent when no
+    /// point has its number and no point without a number lies on its ray.
+    fn new(radar: &Radar, chirps: &Chirps, cloud: &Cloud, sights: &[Ray<Global>]) -> Assignment {
+        let directions = Directions::new(radar, chirps);
         let mut unmatched = 0;
-        let chirp_of_point: Vec<u32> = std::iter::zip(cloud.points(), sights)
-            .zip(0..)
-            .map(|((point, ray), place)| {
-                point.chirp.or_else(|| on_ray(ray)).unwrap_or_else(|| {
-                    unmatched += 1;
-                    place
-                })
-            })
-            .collect();
-        // More strays than false alarms explain: then silence cannot be told.
+        let mut chirp_of_point = Vec::with_capacity(sights.len());
+        for ((point, ray), place) in std::iter::zip(cloud.points(), sights).zip(0..) {
+            let chirp = point.chirp.or_else(|| directions.chirp_along(chirps, ray));
+            unmatched += usize::from(chirp.is_none());
+            chirp_of_point.push(chirp.unwrap_or(place));
+        }
+        // More strays than false alarms explain: then silent chirps cannot be recognised.
         let lost = unmatched * 10 > cloud.points().len();
         let silent =
-            if lost { Vec::new() } else { unheard(chirps, cloud, sights, &directions, near_rad) };
+            if lost { Vec::new() } else { silent_chirps(chirps, cloud, sights, &directions) };
         let mut notices = Vec::new();
         if unmatched > 0 {
             let effect = if lost {
-                "; no chirp is taken for silent, so that a fit takes the cut at the threshold for \
+                "; no chirp is taken for silent, so that a fit attributes the cut at the threshold to \
                  the material: give the scene the scan of the measurement"
             } else {
                 ""
@@ -339,17 +362,17 @@ impl Told {
                  the cloud{effect}"
             ));
         }
-        Told { chirp_of_point, silent, notices }
+        Assignment { chirp_of_point, silent, notices }
     }
 
     fn check_shared(&self) -> Result<(), ReductionError> {
         let points = self.chirp_of_point.len();
         let chirps: HashSet<u32> = self.chirp_of_point.iter().copied().collect();
         let shared = points - chirps.len();
-        match shared * TOLERATED > points {
-            true => Err(ReductionError::SharedChirps { shared, points }),
-            false => Ok(()),
+        if shared * TOLERATED > points {
+            return Err(ReductionError::SharedChirps { shared, points });
         }
+        Ok(())
     }
 }
 
@@ -369,12 +392,12 @@ fn check_threshold(radar: &Radar, cloud: &Cloud) -> Result<(), ReductionError> {
     Err(ReductionError::BelowThreshold { below, points, threshold_dbm, weakest_dbm })
 }
 
-fn unheard(
+/// Indices of the chirps of which no point has the number and no unnumbered point lies on the ray.
+fn silent_chirps(
     chirps: &Chirps,
     cloud: &Cloud,
     sights: &[Ray<Global>],
-    directions: &[DVec3],
-    near_rad: f64,
+    scan: &Directions,
 ) -> Vec<usize> {
     let numbers: HashSet<u32> = cloud.points().iter().filter_map(|point| point.chirp).collect();
     let unnumbered: Vec<DVec3> = std::iter::zip(cloud.points(), sights)
@@ -382,12 +405,16 @@ fn unheard(
         .map(|(_, ray)| ray.direction.xyz())
         .collect();
     let tree = Nearest::new(&unnumbered);
-    let heard = |direction: &DVec3| tree.as_ref().is_some_and(|t| t.find(*direction).1 <= near_rad);
-    std::iter::zip(&chirps.number, directions)
-        .enumerate()
-        .filter(|(_, (number, direction))| !numbers.contains(number) && !heard(direction))
-        .map(|(index, _)| index)
-        .collect()
+    let mut silent = Vec::new();
+    for (index, (number, direction)) in std::iter::zip(&chirps.number, &scan.directions).enumerate()
+    {
+        let has_point = numbers.contains(number)
+            || tree.as_ref().is_some_and(|tree| tree.find(*direction).1 <= scan.near_rad);
+        if !has_point {
+            silent.push(index);
+        }
+    }
+    silent
 }
 
 #[cfg(test)]

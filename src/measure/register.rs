@@ -141,17 +141,18 @@ impl Registration {
         let Motion { shift_m, turn_rad } = Motion::of(&(*pose * rough.inverse()), view.pivot);
         let (shift_m, turn_rad) = (shift_m.length(), turn_rad.length());
         // Written so that a NaN is far, too.
-        match shift_m <= self.farthest_m && turn_rad <= self.farthest_rad {
-            true => Ok(()),
-            false => Err(RegistrationError::Diverged { shift_m, turn_rad }),
+        if shift_m <= self.farthest_m && turn_rad <= self.farthest_rad {
+            Ok(())
+        } else {
+            Err(RegistrationError::Diverged { shift_m, turn_rad })
         }
     }
 
     fn judge(&self, view: &View, aligned: &Aligned) -> Result<Registered, RegistrationError> {
         let gaps = view.ray_gaps(&aligned.pose, RAY_REACH_M);
         let sd_m = bulk_sd_m(gaps.iter().flatten().map(|g| g.gap.size_m)).max(LEAST_SD_M);
-        let inside = |gap: &RayGap| gap.gap.size_m.abs() <= OUTLIER_SD * sd_m;
-        let inliers: Vec<RayGap> = gaps.into_iter().flatten().filter(inside).collect();
+        let mut inliers: Vec<RayGap> = gaps.into_iter().flatten().collect();
+        inliers.retain(|gap| gap.gap.size_m.abs() <= OUTLIER_SD * sd_m);
         let points = view.points.len();
         if (inliers.len() as f64) < self.least_inliers * points as f64 || inliers.len() < 6 {
             return Err(RegistrationError::NoFit { inliers: inliers.len(), points });
@@ -220,16 +221,22 @@ impl Registered {
     /// direction, m.
     pub fn shift_sd_m(&self, point: Point<Global>) -> f64 {
         let arm_m = point.distance_m(self.pivot);
-        let trace = |from: usize| (from..from + 3).map(|i| self.covariance[i][i]).sum::<f64>();
-        (trace(0) + arm_m * arm_m * trace(3)).sqrt()
+        let [x, y, z, turn_x, turn_y, turn_z] = std::array::from_fn(|i| self.covariance[i][i]);
+        let (shift_m2, turn_rad2): (f64, f64) = (x + y + z, turn_x + turn_y + turn_z);
+        (shift_m2 + arm_m * arm_m * turn_rad2).sqrt()
     }
 
     /// Variance of the tilt of a surface of unit normal `normal`, mean of its two tilts, rad².
     pub fn tilt_variance_rad2(&self, normal: DVec3) -> f64 {
-        let turn = |i: usize, j: usize| self.covariance[3 + i][3 + j];
+        // Of the turn's covariance C: (tr C − nᵀCn)/2.
         let n = normal.to_array();
-        let trace: f64 = (0..3).map(|i| turn(i, i)).sum();
-        let about_normal: f64 = (0..9).map(|ij| n[ij / 3] * n[ij % 3] * turn(ij / 3, ij % 3)).sum();
+        let (mut trace, mut about_normal) = (0.0, 0.0);
+        for (i, row) in self.covariance[3..].iter().enumerate() {
+            trace += row[3 + i];
+            for (j, entry) in row[3..].iter().enumerate() {
+                about_normal += n[i] * n[j] * entry;
+            }
+        }
         (0.5 * (trace - about_normal)).max(0.0)
     }
 }

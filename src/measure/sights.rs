@@ -15,6 +15,22 @@ use crate::radar::{Chirps, Radar};
 /// corner is more.
 const RANGE_MISMATCH_M: f64 = 0.02;
 
+/// The rays of a scan by the numbers of their chirps.
+struct ScanRays<'c> {
+    of_chirp: HashMap<u32, &'c Ray<Global>>,
+}
+
+impl<'c> ScanRays<'c> {
+    fn new(chirps: &'c Chirps) -> ScanRays<'c> {
+        ScanRays { of_chirp: std::iter::zip(chirps.number.iter().copied(), &chirps.rays).collect() }
+    }
+
+    /// The ray of a point's chirp; none for a point without a number and for a chirp that was not sent.
+    fn of(&self, point: &CloudPoint) -> Option<&'c Ray<Global>> {
+        self.of_chirp.get(&point.chirp?).copied()
+    }
+}
+
 /// One ray per point, from where its chirp started; from the main reflector's centre where the chirp
 /// is not known.
 ///
@@ -26,20 +42,17 @@ pub fn sights(
     radar: &Radar,
     chirps: &Chirps,
 ) -> Result<Vec<Ray<Global>>, RegistrationError> {
-    let ray_of_chirp: HashMap<u32, &Ray<Global>> =
-        std::iter::zip(chirps.number.iter().copied(), &chirps.rays).collect();
-    let chirp_ray = |point: &CloudPoint| ray_of_chirp.get(&point.chirp?).copied();
+    let rays = ScanRays::new(chirps);
     let centre = radar.frames().origin();
-    let sight = |(number, point): (usize, &CloudPoint)| {
-        let origin = chirp_ray(point).map_or(centre, |ray| ray.origin);
+    let mut sights = Vec::with_capacity(cloud.points().len());
+    for (number, point) in cloud.points().iter().enumerate() {
+        let origin = rays.of(point).map_or(centre, |ray| ray.origin);
         let direction = origin.towards(point.point);
         let direction = direction.ok_or(RegistrationError::AtTheRadar { point: number })?;
-        Ok(Ray { origin, direction })
-    };
-    let sights: Vec<Ray<Global>> =
-        cloud.points().iter().enumerate().map(sight).collect::<Result<_, _>>()?;
+        sights.push(Ray { origin, direction });
+    }
     check_ranges(cloud, &sights)?;
-    check_chirps(cloud, radar, chirp_ray)?;
+    check_chirps(cloud, radar, &rays)?;
     Ok(sights)
 }
 
@@ -47,26 +60,25 @@ fn check_ranges(cloud: &Cloud, sights: &[Ray<Global>]) -> Result<(), Registratio
     let off_m = std::iter::zip(cloud.points(), sights)
         .filter_map(|(point, ray)| Some(ray.origin.distance_m(point.point) - point.range_m?));
     let typical_m = bulk_sd_m(off_m);
-    match typical_m > RANGE_MISMATCH_M {
-        true => Err(RegistrationError::RangesDisagree { typical_m }),
-        false => Ok(()),
+    if typical_m > RANGE_MISMATCH_M {
+        return Err(RegistrationError::RangesDisagree { typical_m });
     }
+    Ok(())
 }
 
-/// Each point must lie within half a spot of its chirp's ray.
-fn check_chirps<'c>(
-    cloud: &Cloud,
-    radar: &Radar,
-    chirp_ray: impl Fn(&CloudPoint) -> Option<&'c Ray<Global>>,
-) -> Result<(), RegistrationError> {
-    let numbered = cloud.points().iter().filter(|point| point.chirp.is_some()).count();
-    let beside_m = |point: &CloudPoint| Some(distance_m(chirp_ray(point)?, point.point));
+/// Most points must lie within half a spot of their chirps' rays.
+fn check_chirps(cloud: &Cloud, radar: &Radar, rays: &ScanRays) -> Result<(), RegistrationError> {
     let near_m = 0.5 * radar.spot_diameter_m;
-    let near = cloud.points().iter().filter_map(beside_m).filter(|m| *m <= near_m).count();
-    match 2 * near < numbered {
-        true => Err(RegistrationError::ChirpsDisagree { off: numbered - near, numbered }),
-        false => Ok(()),
+    let (mut numbered, mut near) = (0, 0);
+    for point in cloud.points().iter().filter(|point| point.chirp.is_some()) {
+        numbered += 1;
+        near +=
+            usize::from(rays.of(point).is_some_and(|ray| distance_m(ray, point.point) <= near_m));
     }
+    if 2 * near < numbered {
+        return Err(RegistrationError::ChirpsDisagree { off: numbered - near, numbered });
+    }
+    Ok(())
 }
 
 /// Distance of a point from a ray's line, m.

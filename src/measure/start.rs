@@ -51,9 +51,8 @@ fn improved(
     let placed = onto_the_cloud(view, guess)?;
     let pose = coarse::align(view, &quick, placed, settings.still_m).ok()?.pose;
     let gaps = view.ray_gaps(&pose, WORST_M);
-    let error_m =
-        |gap: &Option<_>| gap.map_or(WORST_M, |gap: super::view::RayGap| gap.range_error_m.abs());
-    Some((gaps.iter().map(error_m).sum::<f64>() / gaps.len().max(1) as f64, pose))
+    let errors_m = gaps.iter().map(|gap| gap.map_or(WORST_M, |gap| gap.range_error_m.abs()));
+    Some((errors_m.sum::<f64>() / gaps.len().max(1) as f64, pose))
 }
 
 /// Shifts a guess until what the scan sees of the mesh has its middle where the cloud has.

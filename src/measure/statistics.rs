@@ -46,14 +46,15 @@ pub fn by_angle(observations: &[Observation]) -> Vec<AngleStatistics> {
     if observations.iter().any(|o| o.is_retro() && o.censor == Censor::Right) {
         return Vec::new();
     }
-    let mut points: Vec<Point> = observations.iter().zip(0..).filter_map(Point::new).collect();
+    let mut points = points(observations.iter());
     points.sort_by(|a, b| a.theta_rad.total_cmp(&b.theta_rad));
     let angles = points.chunk_by(|a, b| b.theta_rad - a.theta_rad < SAME_ANGLE_RAD);
     let degrees = points.chunk_by(|a, b| a.degree() == b.degree());
     let are_scattered = angles.clone().count() * 2 > points.len();
-    match are_scattered && degrees.clone().count() * POINTS_PER_BIN <= points.len() {
-        true => degrees.zip(0..).filter_map(|(bin, number)| of_degree(bin, number)).collect(),
-        false => angles.zip(0..).filter_map(|(bin, number)| of_angle(bin, number)).collect(),
+    if are_scattered && degrees.clone().count() * POINTS_PER_BIN <= points.len() {
+        degrees.zip(0..).filter_map(|(bin, number)| of_degree(bin, number)).collect()
+    } else {
+        angles.zip(0..).filter_map(|(bin, number)| of_angle(bin, number)).collect()
     }
 }
 
@@ -73,7 +74,7 @@ pub fn median<'a>(observations: impl Iterator<Item = &'a Observation> + Clone) -
     if observations.clone().any(|o| o.is_retro() && o.censor == Censor::Right) {
         return Median::NotTold;
     }
-    let points: Vec<Point> = observations.zip(0..).filter_map(Point::new).collect();
+    let points = points(observations);
     let spread = Sample::new(&points).spread(&vec![1; points.len()]);
     match (spread.quantile(0.5), spread.threshold()) {
         (Some(sigma0), _) => Median::At(sigma0),
@@ -93,8 +94,13 @@ struct Point {
     order: (Option<u32>, usize),
 }
 
+/// The points of backscatter that have a level or a limit.
+fn points<'a>(observations: impl Iterator<Item = &'a Observation>) -> Vec<Point> {
+    observations.enumerate().filter_map(|(place, o)| Point::new(o, place)).collect()
+}
+
 impl Point {
-    fn new((o, place): (&Observation, usize)) -> Option<Point> {
+    fn new(o: &Observation, place: usize) -> Option<Point> {
         let (theta_rad, level, is_censored) = (o.theta_i_rad, o.level_sigma0()?, o.is_censored());
         o.is_retro().then_some(Point { theta_rad, level, is_censored, order: (o.chirp, place) })
     }
@@ -120,11 +126,11 @@ fn statistics(bin: &[Point], theta_rad: [f64; 2], number: u64) -> AngleStatistic
     points.sort_by_key(|point| point.order);
     let sample = Sample::new(&points);
     let spread = sample.spread(&vec![1; points.len()]);
-    let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+    let censored = points.iter().filter(|point| point.is_censored).count();
     AngleStatistics {
         theta_rad,
-        points: count(points.len()),
-        censored_points: count(points.iter().filter(|point| point.is_censored).count()),
+        points: u32::try_from(points.len()).unwrap_or(u32::MAX),
+        censored_points: u32::try_from(censored).unwrap_or(u32::MAX),
         threshold_sigma0: spread.threshold(),
         mean: spread.mean(),
         quantiles: [0.05, 0.5, 0.95].map(|share| spread.quantile(share)),
@@ -177,33 +183,39 @@ impl<'a> Sample<'a> {
         Spread { detected, below }
     }
 
-    /// 95 % interval of the mean. Neighbours in time meet nearly the same place, so that they are
-    /// drawn together.
+    /// 95 % interval of the mean, from resamples of blocks: neighbours in time illuminate nearly the same
+    /// place, so that they are drawn together.
     fn interval(&self, number: u64) -> [f64; 2] {
+        let (mut least, mut greatest) = (Vec::new(), Vec::new());
+        for resample in 0..RESAMPLES {
+            let purpose = Purpose::Bootstrap;
+            let key = Key { seed: SEED, chirp: number, sub_ray: resample, purpose };
+            let [low, high] = self.spread(&self.drawn(&key)).mean();
+            least.push(low);
+            greatest.push(high);
+        }
+        [end(&mut least, 0.025), end(&mut greatest, 0.975)]
+    }
+
+    /// How often each point is in a resample: blocks of ∛n neighbours from drawn starts.
+    fn drawn(&self, key: &Key) -> Vec<u32> {
         let n = self.points.len();
         let block = (n as f64).cbrt().ceil() as usize;
-        let (mut least, mut greatest): (Vec<f64>, Vec<f64>) = (0..RESAMPLES)
-            .map(|resample| {
-                let purpose = Purpose::Bootstrap;
-                let mut draws =
-                    Key { seed: SEED, chirp: number, sub_ray: resample, purpose }.draws();
-                let mut times = vec![0; n];
-                for _ in 0..n.div_ceil(block) {
-                    let start = (draws.uniform() * n as f64) as usize;
-                    for step in 0..block {
-                        if let Some(count) = times.get_mut((start + step) % n) {
-                            *count += 1;
-                        }
-                    }
+        let mut draws = key.draws();
+        let mut times = vec![0; n];
+        for _ in 0..n.div_ceil(block) {
+            let start = (draws.uniform() * n as f64) as usize;
+            for step in 0..block {
+                if let Some(count) = times.get_mut((start + step) % n) {
+                    *count += 1;
                 }
-                let [least, greatest] = self.spread(&times).mean();
-                (least, greatest)
-            })
-            .unzip();
-        [end(&mut least, 0.025), end(&mut greatest, 0.975)]
+            }
+        }
+        times
     }
 }
 
+/// The value below which this share of the values lies.
 fn end(values: &mut [f64], share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let place = (share * (values.len() as f64 - 1.0)).round() as usize;
@@ -219,10 +231,9 @@ struct Spread {
 
 impl Spread {
     fn mean(&self) -> [f64; 2] {
-        let sum =
-            |list: &[(f64, f64)]| list.iter().map(|(level, share)| level * share).sum::<f64>();
-        let least = sum(&self.detected);
-        [least, least + sum(&self.below)]
+        let [least, undetected] = [&self.detected, &self.below]
+            .map(|levels| levels.iter().map(|(level, share)| level * share).sum::<f64>());
+        [least, least + undetected]
     }
 
     fn threshold(&self) -> Option<f64> {

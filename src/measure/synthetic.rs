@@ -4,9 +4,9 @@ use glam::DVec3;
 
 use super::cloud::{Cloud, CloudPoint};
 use super::icp::Motion;
-use super::placed::{Aims, Traced};
+use super::placed::{Aims, Seen, Traced};
 use super::register::Registered;
-use crate::frames::{Global, Point, Pose, Ray};
+use crate::frames::{Global, Point, Pose};
 use crate::geometry::Mesh;
 use crate::radar::random::{Draws, Key, Purpose};
 use crate::radar::{Chirps, Link, Radar};
@@ -41,17 +41,17 @@ impl Measured {
         let link = Link::new(&radar);
         let threshold_w = watts_from_dbm(radar.threshold_dbm);
         let mut draws = draws(seed, 0);
-        let point = |((seen, ray), number): ((_, &Ray<Global>), &u32)| {
-            let hit = Option::<super::placed::Seen>::map(seen, |seen| seen.hit)?;
-            let f_per_sr = f_per_sr(hit.theta_rad());
-            let power_w = link.power_w(hit.range_m, hit.cos_theta, f_per_sr);
+        let mut points = Vec::new();
+        for ((seen, ray), number) in seen.into_iter().zip(&chirps.rays).zip(&chirps.number) {
+            let Some(Seen { hit, .. }) = seen else { continue };
+            let power_w = link.power_w(hit.range_m, hit.cos_theta, f_per_sr(hit.theta_rad()));
             let range_m = hit.range_m + range_sd_m * normal(&mut draws);
             let point = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
-            let echo = CloudPoint { chirp: Some(*number), point, range_m: Some(range_m), power_w };
-            (power_w >= threshold_w).then_some(echo)
-        };
-        let points: Vec<CloudPoint> =
-            seen.into_iter().zip(&chirps.rays).zip(&chirps.number).filter_map(point).collect();
+            if power_w >= threshold_w {
+                let (chirp, range_m) = (Some(*number), Some(range_m));
+                points.push(CloudPoint { chirp, point, range_m, power_w });
+            }
+        }
         let cloud = Cloud::new(points).unwrap();
         Measured { mesh, radar, chirps, cloud }
     }

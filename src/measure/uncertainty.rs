@@ -32,32 +32,34 @@ pub struct Uncertainty {
     pub unknown: Vec<String>,
 }
 
-/// The covariance from the gaps that were used, at their least.
+/// The covariance of the pose from the gaps that were used, where their squares are least.
 pub(super) fn uncertainty(gaps: &[Gap], pivot: DVec3, length_m: f64) -> Uncertainty {
+    /// A thousandth of one point's information: rounding of a plane's zero is far below.
+    const LEAST_INFORMATION: f64 = 1e-3;
     let equations = NormalEquations::new(gaps.iter().map(|gap| (*gap, 1.0)), pivot, length_m);
     let freedom = gaps.len().saturating_sub(6).max(1) as f64;
     let variance_m2 = gaps.iter().map(|gap| gap.size_m * gap.size_m).sum::<f64>() / freedom;
     let eigen = SymmetricEigen::new(equations.information);
     let widened = widening(gaps, pivot, length_m, variance_m2, &eigen);
+    // The variance along each direction; where the points do not tell it, the size of the target.
     let mut scaled = Matrix6::zeros();
     let mut unknown = Vec::new();
-    // A thousandth of a point's information: rounding of a plane's zero is far below.
-    let least = 1e-3;
     for (value, axis) in std::iter::zip(eigen.eigenvalues.iter(), eigen.eigenvectors.column_iter())
     {
-        let told_m2 = variance_m2 * widened / value.max(0.0);
-        let blind = *value < least;
-        // What is not told may be anything up to the size of the target.
+        let estimated_m2 = variance_m2 * widened / value.max(0.0);
+        let blind = *value < LEAST_INFORMATION;
         let variance_m2 =
-            if blind { length_m * length_m } else { told_m2.min(length_m * length_m) };
-        if blind || told_m2.sqrt() > UNKNOWN_SD_M {
+            if blind { length_m * length_m } else { estimated_m2.min(length_m * length_m) };
+        if blind || estimated_m2.sqrt() > UNKNOWN_SD_M {
             unknown.push(in_words(&axis.into_owned(), variance_m2.sqrt()));
         }
         scaled += axis * axis.transpose() * variance_m2;
     }
-    let unit = |axis: usize| if axis < 3 { 1.0 } else { 1.0 / length_m };
+    // Turns were scaled by the length.
+    let per_m = 1.0 / length_m;
+    let unit = [1.0, 1.0, 1.0, per_m, per_m, per_m];
     let covariance =
-        std::array::from_fn(|i| std::array::from_fn(|j| scaled[(i, j)] * unit(i) * unit(j)));
+        std::array::from_fn(|i| std::array::from_fn(|j| scaled[(i, j)] * unit[i] * unit[j]));
     Uncertainty { covariance, widened, unknown }
 }
 
@@ -80,15 +82,14 @@ fn widening(
     }
     let correction = cells.len() as f64 / (cells.len() - 6) as f64;
     let best = eigen.eigenvalues.max();
-    let told = |value: f64| value > 1e-9 * best;
-    let ratios: Vec<f64> =
-        std::iter::zip(eigen.eigenvalues.iter(), eigen.eigenvectors.column_iter())
-            .filter(|(value, _)| told(**value))
-            .map(|(value, axis)| {
-                let shared: f64 = cells.values().map(|pull| axis.dot(pull).powi(2)).sum();
-                correction * shared / (variance_m2 * value)
-            })
-            .collect();
+    let mut ratios = Vec::new();
+    for (value, axis) in std::iter::zip(eigen.eigenvalues.iter(), eigen.eigenvectors.column_iter())
+    {
+        if *value > 1e-9 * best {
+            let shared: f64 = cells.values().map(|pull| axis.dot(pull).powi(2)).sum();
+            ratios.push(correction * shared / (variance_m2 * value));
+        }
+    }
     let mean = ratios.iter().sum::<f64>() / ratios.len().max(1) as f64;
     mean.max(1.0)
 }

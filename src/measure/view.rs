@@ -48,19 +48,11 @@ impl<'a> View<'a> {
     /// the gap is wider than `reach_m`. Sizes and gradients are divided by how steep the surface is.
     pub fn ray_gaps(&self, pose: &Pose<Global, Global>, reach_m: f64) -> Vec<Option<RayGap>> {
         let seen = self.traced.scan(pose, &self.sights);
-        let gap = |((seen, ray), point): ((&Option<Seen>, &Ray<Global>), &DVec3)| {
-            let Seen { hit, normal } = (*seen)?;
-            let range_error_m = (*point - ray.origin.xyz).dot(ray.direction.xyz()) - hit.range_m;
-            if hit.cos_theta < FLATTEST_COS || range_error_m.abs() > reach_m {
-                return None;
-            }
-            let tan2 = 1.0 / (hit.cos_theta * hit.cos_theta) - 1.0;
-            let steep = (1.0 + SIDEWAYS_SHARE * SIDEWAYS_SHARE * tan2).sqrt();
-            let gradient = normal / normal.dot(ray.direction.xyz()) / steep;
-            let gap = Gap { at: hit.point.xyz, gradient, size_m: range_error_m / steep };
-            Some(RayGap { gap, range_error_m })
-        };
-        seen.iter().zip(self.sights.rays()).zip(&self.points).map(gap).collect()
+        seen.iter()
+            .zip(self.sights.rays())
+            .zip(&self.points)
+            .map(|((seen, ray), point)| RayGap::new((*seen)?, ray, *point, reach_m))
+            .collect()
     }
 }
 
@@ -70,6 +62,22 @@ pub(super) struct RayGap {
     pub gap: Gap,
     /// Measured minus modelled range, m.
     pub range_error_m: f64,
+}
+
+impl RayGap {
+    /// The gap of a measured point on its ray; `None` where the surface is too flat or the gap wider than `reach_m`.
+    fn new(seen: Seen, ray: &Ray<Global>, point: DVec3, reach_m: f64) -> Option<RayGap> {
+        let Seen { hit, normal } = seen;
+        let range_error_m = (point - ray.origin.xyz).dot(ray.direction.xyz()) - hit.range_m;
+        if hit.cos_theta < FLATTEST_COS || range_error_m.abs() > reach_m {
+            return None;
+        }
+        let tan2 = 1.0 / (hit.cos_theta * hit.cos_theta) - 1.0;
+        let steep = (1.0 + SIDEWAYS_SHARE * SIDEWAYS_SHARE * tan2).sqrt();
+        let gradient = normal / normal.dot(ray.direction.xyz()) / steep;
+        let gap = Gap { at: hit.point.xyz, gradient, size_m: range_error_m / steep };
+        Some(RayGap { gap, range_error_m })
+    }
 }
 
 /// The median; 0 for none.
@@ -84,6 +92,6 @@ pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
 
 /// Median of each coordinate: a few points far off do not move it.
 pub(crate) fn median_point(points: &[DVec3]) -> DVec3 {
-    let axis = |axis: usize| median(points.iter().map(|point| point[axis]));
-    DVec3::new(axis(0), axis(1), axis(2))
+    let medians = std::array::from_fn(|axis| median(points.iter().map(|point| point[axis])));
+    DVec3::from_array(medians)
 }
