@@ -26,7 +26,8 @@ use matdb::geometry::{Mesh, Raster};
 use matdb::material::builtin;
 use matdb::measure::icp::Motion;
 use matdb::measure::{
-    Cloud, CloudPoint, Curve, Metric, Reduced, Reduction, Registered, Registration, Start,
+    Cloud, CloudPoint, Curve, Metric, Reduction, ReductionResult, Registration, RegistrationResult,
+    Start,
 };
 use matdb::radar::random::{Key, Purpose};
 use matdb::radar::{Link, Radar};
@@ -326,8 +327,8 @@ fn png(raster: &Raster) -> Vec<u8> {
 
 /// A cloud and a rough pose to a pose.
 fn register(given: Given<'_>) -> Vec<Way<'_>> {
-    let found = |registered: &Registered| {
-        let Registered { points, scans, iterations, .. } = registered;
+    let found = |registered: &RegistrationResult| {
+        let RegistrationResult { points, scans, iterations, .. } = registered;
         format!("{points} points, {scans} virtual scans, {iterations} steps")
     };
     let cloud = cloud(given);
@@ -342,7 +343,7 @@ fn register(given: Given<'_>) -> Vec<Way<'_>> {
     vec![by("along the rays", Metric::AlongRay), by("point to plane", Metric::PointToPlane)]
 }
 
-fn registered(given: Given, settings: &Registration, cloud: &Cloud) -> Registered {
+fn registered(given: Given, settings: &Registration, cloud: &Cloud) -> RegistrationResult {
     let Given { scene, .. } = given;
     settings.run(&scene.target.mesh, scene.radar(), &scene.chirps, cloud).expect("a pose")
 }
@@ -369,7 +370,7 @@ fn curve(given: Given<'_>) -> Vec<Way<'_>> {
     })]
 }
 
-fn reduced(given: Given, cloud: &Cloud, registered: &Registered) -> Reduced {
+fn reduced(given: Given, cloud: &Cloud, registered: &RegistrationResult) -> ReductionResult {
     let Given { scene, .. } = given;
     let reduction = Reduction { exact_mesh: true, ..Reduction::default() };
     let (radar, chirps) = (scene.radar(), &scene.chirps);
@@ -381,7 +382,7 @@ fn reduced(given: Given, cloud: &Cloud, registered: &Registered) -> Reduced {
 fn fit(given: Given<'_>) -> Vec<Way<'_>> {
     let cloud = cloud(given);
     let registered = registered(given, &Registration::default(), &cloud);
-    let Reduced { mut curve, .. } = reduced(given, &cloud, &registered);
+    let ReductionResult { mut curve, .. } = reduced(given, &cloud, &registered);
     // Every n-th, so that all angles are there.
     let step = (curve.observations.len() / FITTED).max(1);
     curve.observations = curve.observations.into_iter().step_by(step).take(FITTED).collect();

@@ -6,8 +6,8 @@ use glam::DVec3;
 use matdb::brdf::Scattering;
 use matdb::frames::{Global, Point, Pose};
 use matdb::measure::icp::Motion;
-use matdb::measure::placed::{Aims, Traced};
-use matdb::measure::{Cloud, CloudPoint, Registered, Registration, Start};
+use matdb::measure::tracer::{RaySet, Tracer};
+use matdb::measure::{Cloud, CloudPoint, Registration, RegistrationResult, Start};
 use matdb::radar::Link;
 use matdb::radar::random::{Draws, Key, Purpose};
 use matdb::scene::Scene;
@@ -25,7 +25,7 @@ const NEAR_DEG: f64 = 0.05;
 struct Run {
     shift_mm: f64,
     turn_deg: f64,
-    found: Registered,
+    found: RegistrationResult,
 }
 
 /// A scene that comes with the program.
@@ -105,8 +105,8 @@ fn measured(scene: &Scene, draws: &mut Draws) -> Result<Cloud, Failure> {
     let radar = scene.radar();
     let link = Link::new(radar);
     let here = Pose::<Global, Global>::from_euler_xyz(DVec3::ZERO, DVec3::ZERO);
-    let seen = Traced::new(&scene.target.mesh)
-        .scan(&here, &Aims::new(&scene.target.mesh, &scene.chirps.rays));
+    let seen = Tracer::new(&scene.target.mesh)
+        .scan(&here, &RaySet::new(&scene.target.mesh, &scene.chirps.rays));
     let mut points = Vec::new();
     for ((seen, ray), number) in seen.into_iter().zip(&scene.chirps.rays).zip(&scene.chirps.number)
     {

@@ -66,13 +66,12 @@ impl Case {
         let power_w = received_w.max(threshold_w);
         let censored = received_w < threshold_w;
         let sigma0 = power_w / watts_per_sigma0;
-        let (level, limit) = if censored { (None, Some(sigma0)) } else { (Some(sigma0), None) };
         Observation {
             theta_sd_rad: Some(theta_sd_rad),
             power_w: Some(power_w),
             range_m: Some(RANGE_M),
             chirp: Some(chirp),
-            ..Observation::backscatter(theta_rad, level, limit)
+            ..Observation::of_level(theta_rad, sigma0, censored)
         }
     }
 }

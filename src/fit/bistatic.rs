@@ -1,8 +1,8 @@
-//! Scattering measured in any pair of directions → the parameters of a model, by least squares in dB.
+//! Fits a model to scattering that was measured in any pairs of directions, by least squares in dB.
 //!
 //! Goniophotometers measure f(i, o) with a steady error and without a threshold: the cost is
-//! Σ (10·lg f_model(i, o) − 10·lg f)². It has none of what a radar needs: no speckle, no missing
-//! detections, no angle error. What is left over a perfect repeat is the model's own error.
+//! Σ (10·lg f_model(i, o) − 10·lg f)². Unlike the fit of a radar's curve it models no speckle, no
+//! missing detections and no angle error. The residual beyond the repeatability is the error of the model.
 
 use nalgebra::DVector;
 use serde::Serialize;
@@ -56,7 +56,7 @@ pub struct BistaticResult {
     pub agreeing_starts: usize,
 }
 
-/// dB of what a model calls nothing.
+/// Level of a model that scatters nothing, dB.
 const NOTHING_DB: f64 = -200.0;
 const SEARCH: Minimise = Minimise { iterations: 300, tolerance: 1e-6, patience: usize::MAX };
 /// Step of the derivatives in the search.

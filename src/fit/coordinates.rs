@@ -18,7 +18,7 @@ pub(crate) const DIFFUSE_LEVEL: &str = "R";
 pub(crate) const LOOKS: &str = "looks";
 /// Levels that have a meaning: a billionth is 60 dB below the weakest detection.
 const LEVEL_RANGE: (f64, f64) = (1e-9, 1.0);
-/// Looks from far spikier than developed speckle to none to speak of.
+/// Looks from far stronger than fully developed speckle to practically none.
 const LOOKS_RANGE: (f64, f64) = (0.1, 1e4);
 
 /// How a number is searched.

@@ -6,7 +6,7 @@ use crate::brdf::ParameterError;
 use crate::measure::curve::ObservationError;
 use crate::units::shown;
 
-/// A fit that cannot be tried.
+/// Why a curve cannot be fitted.
 #[derive(Debug, Error, PartialEq)]
 pub enum FitError {
     /// No rows.
@@ -33,10 +33,10 @@ pub enum FitError {
     /// A row that is not backscatter.
     #[error(transparent)]
     Observation(#[from] ObservationError),
-    /// A row without a meaning.
+    /// A row with a number that is out of range.
     #[error("row {row} (from 0) has {name} = {}, {wanted}; correct or remove it", shown(*value))]
     Row {
-        /// Which.
+        /// Its number from 0.
         row: usize,
         /// Its field.
         name: &'static str,
@@ -53,7 +53,7 @@ pub enum FitError {
         /// The name.
         name: String,
     },
-    /// Bounds outside the range or upside down.
+    /// Bounds outside the range, or the greater one first.
     #[error(
         "bounds of {name} are {} and {}; give the smaller first, both from {} to {}",
         shown(*min), shown(*max), shown(range[0]), shown(range[1])

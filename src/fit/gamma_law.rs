@@ -1,4 +1,4 @@
-//! The law of a speckled power of mean 1 and L looks, Gamma(L, 1/L), and of its staying below a limit.
+//! The law of a speckled power of mean 1 and L looks, Gamma(L, 1/L), and the probability that it stays below a limit.
 //!
 //! ln P(L, x), P the regularised lower incomplete gamma function, keeps its digits in the far tail:
 //! below x = L + 1 the series ln P = L·ln x − x − ln Γ(L) + ln Σ, above it ln(1 − Q) with Q by

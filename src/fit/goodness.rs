@@ -56,7 +56,7 @@ pub(super) fn goodness(
     goodness_of(&residuals_db, shares, None)
 }
 
-/// Probabilities u of rows from the ln of what lies below each; censored rows are drawn.
+/// Probabilities u of rows from ln of the probability below each; those of censored rows are drawn.
 fn shares(ln_below: &[f64], censored: &[bool], seed: u64) -> Vec<f64> {
     let mut shares = Vec::with_capacity(ln_below.len());
     for (index, (ln_below, &is_censored)) in ln_below.iter().zip(censored).enumerate() {

@@ -24,7 +24,7 @@ const RUNS: usize = 20;
 
 impl FitResult {
     /// Fits the curve again without each fifth of its blocks, and evaluates every fit on that fifth. Blocks
-    /// are squares on the target where the rows say where they lie; runs of consecutive chirps of a scan;
+    /// are squares on the target where the rows have places; runs of consecutive chirps of a scan;
     /// single rows of a sweep of the angle, of which a run would be a whole range of angles.
     ///
     /// `None` where there are fewer blocks than parts, where a part leaves too few detections for the fit,
@@ -70,7 +70,7 @@ impl FitResult {
         })
     }
 
-    /// Where the search ends on these rows, from where it ended on all.
+    /// The optimum for these rows alone, searched from the optimum for all rows.
     fn fitted_to(&self, rows: Vec<Observation>) -> Option<DVector<f64>> {
         let detected = rows.iter().filter(|row| !row.is_censored()).count();
         let best = (detected > self.coordinates.len())

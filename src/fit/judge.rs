@@ -2,7 +2,7 @@
 
 use super::coordinates::{DIFFUSE_LEVEL, SPECULAR_LEVEL};
 use super::result::FitResult;
-use super::search::Found;
+use super::search::SearchResult;
 use super::settings::Method;
 use super::uncertainty::Uncertainty;
 use super::verdict::Finding;
@@ -18,7 +18,11 @@ const KOLMOGOROV_1_PERCENT: f64 = 1.63;
 const SPLIT_DEG: f64 = 6.0;
 
 /// The findings on a fit to `rows`.
-pub(super) fn judge(result: &FitResult, found: &Found, rows: &[Observation]) -> Vec<Finding> {
+pub(super) fn judge(
+    result: &FitResult,
+    found: &SearchResult,
+    rows: &[Observation],
+) -> Vec<Finding> {
     let range = result.model.validate();
     let mut findings = Vec::new();
     // Out of range k follows from the levels and was not chosen.
@@ -80,7 +84,7 @@ fn judge_rows(result: &FitResult, rows: &[Observation]) -> Vec<Finding> {
 }
 
 /// Which numbers the data do not determine, or only with others.
-fn judge_numbers(result: &FitResult, found: &Found) -> Vec<Finding> {
+fn judge_numbers(result: &FitResult, found: &SearchResult) -> Vec<Finding> {
     let estimates = &result.estimates;
     let uncertainty = &found.uncertainty;
     let mut findings = Vec::new();

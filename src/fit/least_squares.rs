@@ -1,7 +1,7 @@
 //! Least squares in decibels: the paper's fits, kept for comparison.
 //!
-//! They see detections only and take speckle for a symmetric error, so that a curve cut at a
-//! threshold flattens their tail, and its level comes out 10/ln 10·(ln L − ψ(L)) dB low.
+//! They use detections only and treat speckle as a symmetric error, so that a curve cut at a
+//! threshold flattens their tail, and their level is 10/ln 10·(ln L − ψ(L)) dB too low.
 //!
 //! - Piecewise MSE: the specular coordinates on θ below a split, frozen, then the diffuse ones on the
 //!   rest. A model that is not a mixture has no pieces: all rows, all coordinates.
@@ -131,10 +131,10 @@ impl Nearest {
     }
 }
 
-/// Most candidates for δ on either side of 0, and how far apart, in standard deviations.
+/// Most candidates for δ on either side of 0, and their distance, in standard deviations.
 const CANDIDATES: i32 = 12;
 const APART: f64 = 1.0 / 3.0;
-/// Newton steps, which converge after a handful; the offset that is no longer worth one, in standard
+/// Most Newton steps, of which a handful suffices, and the change of the offset that ends them, in standard
 /// deviations.
 const STEPS: usize = 30;
 const NEAR: f64 = 1e-8;

@@ -2,8 +2,8 @@
 //!
 //! A detected power y has the density g(y; L, μ) of Gamma(L, μ/L), a chirp without a detection the
 //! probability G(T; L, μ) of staying below the threshold T. μ = σ⁰(t) + thermal noise, t the true
-//! angle. Each chirp has one unknown but fixed t, so what is averaged over t is the likelihood,
-//! p(y) = Σ_q w_q·g(y; L, μ(t_q)), not the mean: averaging μ would smear the lobe but give each
+//! angle. Each chirp has one unknown but fixed t, so the likelihood is averaged over t,
+//! p(y) = Σ_q w_q·g(y; L, μ(t_q)), not the mean: averaging μ would smear the lobe but leave each
 //! chirp the scatter of speckle alone. The curvature is the sum of the scores' outer products (Berndt,
 //! Hall, Hall & Hausman 1974).
 
@@ -21,13 +21,13 @@ use crate::material::Observation;
 /// Rows that one task sums, fixed so that the sum is the same on any number of threads.
 const CHUNK: usize = 256;
 
-/// Which curvature a search follows. The looks belong to the scores' only.
+/// Which curvature a search uses. Only that of the scores has entries for the looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Curvature {
     /// d²(−ln g)/d(ln μ)² = L·y/μ along each chirp's mean gradient: long steps from afar, where the
     /// scores' products would have tiny ones.
     FromAfar,
-    /// The scores' outer products, which account for what the unknown angles cost.
+    /// The scores' outer products, which account for the information lost to the unknown angles.
     Scores,
 }
 

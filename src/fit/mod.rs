@@ -1,10 +1,10 @@
-//! A curve → the parameters of a scattering model, and what the curve cannot tell apart.
+//! Fits the parameters of a scattering model to a curve, and reports which of them the curve does not determine.
 //!
 //! A detected power of chirp i follows Gamma(L, μ_i/L), L looks of speckle on the mean
 //! μ_i = σ⁰(t_i) + noise; a chirp without a detection says that this power stayed below a threshold. The
 //! default [`Method::Censored`] maximises the likelihood of both, averaged over the true angle
-//! t_i. The paper's least squares in decibels are there for comparison: they cannot see the missing
-//! chirps, and speckle in decibels is not of zero mean.
+//! t_i. The paper's least squares in decibels are there for comparison: they ignore the missing
+//! chirps, and the mean of speckle in decibels is not zero.
 //!
 //! ```
 //! use matdb::brdf::{Brdf, Lambert};

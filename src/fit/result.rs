@@ -1,4 +1,4 @@
-//! What a fit found, how well it knows it, and how to find it again.
+//! The result of a fit: the model, its numbers with their uncertainty, and what is needed to repeat the fit.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -29,7 +29,7 @@ pub struct Band {
 pub struct FitResult {
     /// The settings.
     pub fit: Fit,
-    /// The fitted model, in the gauge that [`gauge_k`](Self::gauge_k) says.
+    /// The fitted model, with the k of [`gauge_k`](Self::gauge_k).
     pub model: Brdf,
     /// k as chosen where only the products S and R were found; `None` for other models.
     pub gauge_k: Option<f64>,
@@ -76,7 +76,7 @@ pub struct FitResult {
 impl FitResult {
     /// The fitted mean σ⁰ at an angle with its 95 % band, by the delta method on ln σ⁰.
     ///
-    /// Directions that the data do not see and numbers at a bound add nothing to it.
+    /// Directions that the data do not determine and numbers at a bound do not widen it.
     pub fn band(&self, theta_rad: f64) -> Band {
         let place = Place::new(theta_rad);
         let here = Table::new(&self.model);

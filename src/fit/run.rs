@@ -1,4 +1,4 @@
-//! A fit from its settings: checks what is given, then searches.
+//! Runs a fit: checks its settings and its rows, then searches.
 
 use super::coordinates::{Coordinates, LOOKS};
 use super::error::FitError;
@@ -14,7 +14,7 @@ impl Fit {
     ///
     /// # Errors
     /// A setting, a start or a row without a meaning, a curve without detections or with fewer than
-    /// unknowns. Whatever else the data cannot tell is in the [verdict](FitResult::verdict).
+    /// unknowns. What else the data do not determine is in the [verdict](FitResult::verdict).
     pub fn run(&self, start: &Brdf, curve: &Curve) -> Result<FitResult, FitError> {
         self.validate()?;
         check_rows(&curve.observations)?;
@@ -27,12 +27,16 @@ impl Fit {
         if coordinates.list.iter().all(|c| c.name == LOOKS) {
             return Err(FitError::NothingFree);
         }
-        match curve.detected().count() {
-            0 => Err(FitError::AllCensored { rows: curve.observations.len() }),
-            // As many as unknowns are met exactly, and nothing is left to judge the errors by.
-            detected if detected <= unknowns => Err(FitError::TooFewRows { detected, unknowns }),
-            _ => Ok(summarise(self, coordinates, curve)),
+        let detected = curve.detected().count();
+        if detected == 0 {
+            return Err(FitError::AllCensored { rows: curve.observations.len() });
         }
+        // As many detections as unknowns are fitted exactly and leave no residual to estimate the errors from.
+        if detected <= unknowns {
+            return Err(FitError::TooFewRows { detected, unknowns });
+        }
+        let found = self.search(&coordinates, &curve.observations);
+        Ok(summarise(self, coordinates, &found, curve))
     }
 }
 

@@ -14,18 +14,18 @@ use crate::radar::random::{Key, Purpose};
 
 /// Most steps of one search.
 const ITERATIONS: usize = 200;
-/// ln likelihood that is no longer worth a step: a thousandth of what moves an interval.
+/// The search ends when a step promises less ln likelihood: a thousandth of what moves an interval.
 const LIKELIHOOD_TOLERANCE: f64 = 1e-6;
-/// Steps of the approach with held looks, and the ln likelihood that ends it.
+/// Most steps of the approach with fixed looks, and the promised ln likelihood that ends it.
 const APPROACH: usize = 40;
 const NEAR: f64 = 1.0;
-/// Cost that is no longer worth a step in least squares, whose parameters are compared with other programs'.
+/// Least squares ends when a step promises to lower the cost by less; its parameters are compared with other programs.
 const SQUARES_TOLERANCE: f64 = 1e-8;
 /// Loss of cost that still counts as the same optimum.
 const SAME: f64 = 0.01;
 
 /// What a search found.
-pub(super) struct Found {
+pub(super) struct SearchResult {
     pub best: Minimum,
     pub agreeing: usize,
     pub uncertainty: Uncertainty,
@@ -35,7 +35,7 @@ pub(super) struct Found {
 
 impl Fit {
     /// Searches with this fit's method.
-    pub(super) fn search(&self, coordinates: &Coordinates, rows: &[Observation]) -> Found {
+    pub(super) fn search(&self, coordinates: &Coordinates, rows: &[Observation]) -> SearchResult {
         match self.method {
             Method::Censored => self.search_likelihood(coordinates, rows),
             Method::Tls { .. } | Method::Mse { .. } => {
@@ -69,12 +69,12 @@ impl Fit {
         }
     }
 
-    fn search_likelihood(&self, coordinates: &Coordinates, rows: &[Observation]) -> Found {
+    fn search_likelihood(&self, coordinates: &Coordinates, rows: &[Observation]) -> SearchResult {
         let likelihood = Likelihood::new(coordinates, rows, self.noise_w.unwrap_or(0.0));
         let cost = |at: &DVector<f64>| likelihood.local(Curvature::Scores, at);
         let approach = Minimise { iterations: APPROACH, tolerance: NEAR, patience: usize::MAX };
         let search = likelihood_search();
-        // With free looks a far start is explained by wild speckle before it is improved.
+        // With free looks the search would explain a far start by strong speckle instead of improving it.
         let (best, agreeing) = self.best(coordinates, |start| {
             let [lower, upper] = coordinates.holding_looks(start);
             let near = approach
@@ -90,10 +90,10 @@ impl Fit {
             let wanted = best.converged() && uncertainty.is_identified(index);
             profiles.push(if wanted { profile.interval(index) } else { None });
         }
-        Found { best, agreeing, uncertainty, profiles }
+        SearchResult { best, agreeing, uncertainty, profiles }
     }
 
-    /// The least of all starts, and how many came as far.
+    /// The lowest cost of all starts, and how many starts reached it.
     fn best(
         &self,
         coordinates: &Coordinates,
@@ -148,13 +148,13 @@ fn squares_found(
     rows: &[Observation],
     best: Minimum,
     agreeing: usize,
-) -> Found {
+) -> SearchResult {
     let detected = rows.iter().filter(|row| !row.is_censored()).count();
     let spare = (detected - coordinates.len().min(detected)).max(1) as f64;
     let variance = (2.0 * best.local.value / spare).max(f64::MIN_POSITIVE);
     let information = &best.local.curvature / variance;
     let uncertainty = Uncertainty::new(coordinates, &best.at, &information);
-    Found { best, agreeing, uncertainty, profiles: Vec::new() }
+    SearchResult { best, agreeing, uncertainty, profiles: Vec::new() }
 }
 
 /// Specular coordinates below the split, then diffuse ones above it; all at once without pieces.

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::FitError;
 
-/// How a curve is turned into parameters.
+/// Estimator of the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
@@ -31,13 +31,13 @@ pub enum Method {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Fit {
-    /// How.
+    /// The estimator.
     pub method: Method,
-    /// Parameters held at a value, by path.
+    /// Parameters fixed at a value, by path.
     pub fixed: Vec<(String, f64)>,
     /// Narrower ranges, by the name that [`Estimate::name`](crate::material::Estimate::name) gives, in the parameter's unit.
     pub bounds: Vec<(String, [f64; 2])>,
-    /// Looks L of the speckle, from 0.1 to 1e4; estimated where none. Least squares needs none.
+    /// Looks L of the speckle, from 0.1 to 1e4; `None` to estimate them. Least squares does not use them.
     pub looks: Option<f64>,
     /// Mean thermal power in each chirp, W, 0 or more; none for a receiver without noise. Least squares
     /// does not use it.

@@ -1,4 +1,4 @@
-//! A fit as a material keeps it, and the band that can be drawn from what was kept.
+//! A fit as a material stores it, and the 95 % band of a stored fit.
 
 use super::interval::DEVIATE_95;
 use super::result::{Band, FitResult};
@@ -61,7 +61,7 @@ impl FitResult {
         let parameters =
             known.iter().filter_map(|&k| Some(self.estimates.get(k)?.name.clone())).collect();
         let covariance = Covariance { parameters, matrix };
-        // What rounding has spoilt is left out here; the report has it as it was found.
+        // A matrix that rounding has made indefinite is left out; the report keeps it as found.
         (!known.is_empty() && covariance.is_sound()).then_some(covariance)
     }
 

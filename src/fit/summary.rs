@@ -5,22 +5,26 @@ use super::goodness::goodness;
 use super::interval::DEVIATE_95;
 use super::judge::judge;
 use super::result::FitResult;
-use super::search::Found;
+use super::search::SearchResult;
 use super::settings::{Fit, Method};
 use crate::brdf::Brdf;
 use crate::material::{Estimate, Observation};
 use crate::measure::curve::Curve;
 
-/// Searches and reports what was found.
-pub(super) fn summarise(fit: &Fit, coordinates: Coordinates, curve: &Curve) -> FitResult {
-    let found = fit.search(&coordinates, &curve.observations);
+/// The result of a fit to `curve` whose search found this.
+pub(super) fn summarise(
+    fit: &Fit,
+    coordinates: Coordinates,
+    found: &SearchResult,
+    curve: &Curve,
+) -> FitResult {
     let at = found.best.at.clone();
     let model = coordinates.model(&at);
     let law = fit.method == Method::Censored;
     let mut result = FitResult {
         gauge_k: coordinates.gauge().map(|_| chosen_k(&model)),
-        estimates: estimates(&coordinates, &found),
-        covariance: covariance(&coordinates, &found),
+        estimates: estimates(&coordinates, found),
+        covariance: covariance(&coordinates, found),
         singular_values: found.uncertainty.singular_values.clone(),
         looks: law.then(|| coordinates.looks(&at)),
         noise_w: fit.noise_w.filter(|_| law).unwrap_or(0.0),
@@ -40,7 +44,7 @@ pub(super) fn summarise(fit: &Fit, coordinates: Coordinates, curve: &Curve) -> F
         coordinates,
         at,
     };
-    result.verdict = judge(&result, &found, &curve.observations);
+    result.verdict = judge(&result, found, &curve.observations);
     result
 }
 
@@ -49,13 +53,13 @@ fn chosen_k(model: &Brdf) -> f64 {
     parameters.iter().find(|p| p.path == "k").map_or(f64::NAN, |p| p.value)
 }
 
-fn estimates(coordinates: &Coordinates, found: &Found) -> Vec<Estimate> {
+fn estimates(coordinates: &Coordinates, found: &SearchResult) -> Vec<Estimate> {
     let searched = coordinates.list.iter().zip(found.best.at.iter()).enumerate();
     searched.map(|(index, (coordinate, u))| estimate(found, index, coordinate, *u)).collect()
 }
 
 /// One number with its deviation and interval, from the scale of the search to that of the parameter.
-fn estimate(found: &Found, index: usize, coordinate: &Coordinate, u: f64) -> Estimate {
+fn estimate(found: &SearchResult, index: usize, coordinate: &Coordinate, u: f64) -> Estimate {
     let known = found.best.converged() && found.uncertainty.is_identified(index);
     let deviation = found.uncertainty.deviation(index);
     let interval = match found.profiles.get(index) {
@@ -71,7 +75,7 @@ fn estimate(found: &Found, index: usize, coordinate: &Coordinate, u: f64) -> Est
 }
 
 /// Covariance of the numbers; rows and columns of those that the data do not identify are 0.
-fn covariance(coordinates: &Coordinates, found: &Found) -> Vec<Vec<f64>> {
+fn covariance(coordinates: &Coordinates, found: &SearchResult) -> Vec<Vec<f64>> {
     let at = &found.best.at;
     let mut scales = vec![0.0; at.len()];
     for (index, coordinate) in coordinates.list.iter().enumerate() {

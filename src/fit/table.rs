@@ -16,7 +16,7 @@ const INTERVALS: usize = 1024;
 const BETA: f64 = 6.0;
 /// Last knot, rad; at π/2 itself ln σ⁰ is −∞.
 const THETA_END_RAD: f64 = 0.999 * FRAC_PI_2;
-/// ln σ⁰ of what is too weak to tell from nothing.
+/// ln σ⁰ that stands for 0.
 const LN_NOTHING: f64 = -600.0;
 
 /// The angle of every knot, rad.
@@ -95,7 +95,7 @@ impl Place {
         let stretch_per_rad = *STRETCH_PER_RAD;
         let stretched = theta_rad.abs().min(THETA_END_RAD) * stretch_per_rad;
         let root = (stretched * stretched + 1.0).sqrt();
-        // asinh without its care for what is small: x matters to a part of a cell.
+        // asinh without its precision for small arguments: x is needed to a fraction of a cell.
         let x = (stretched + root).ln() * (INTERVALS as f64 / BETA);
         let cell = (x as usize).min(INTERVALS - 2);
         let t = x - cell as f64;

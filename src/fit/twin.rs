@@ -13,7 +13,7 @@ use crate::units::watts_from_dbm;
 
 const RANGE_M: f64 = 8.0;
 
-/// The paper's five parameters from those that backscatter sees, with k = 0.1.
+/// The paper's mixture from the four parameters that backscatter determines, with k = 0.1.
 pub(super) fn mixture(m: f64, alpha: f64, s: f64, r: f64) -> Brdf {
     let specular = CookTorrance {
         f_lambda: s / 0.9,
@@ -27,7 +27,7 @@ pub(super) fn mixture(m: f64, alpha: f64, s: f64, r: f64) -> Brdf {
     Brdf::Mixture(Mixture { k: 0.1, diffuse: Box::new(diffuse), specular })
 }
 
-/// A truth and how it is looked at.
+/// A true model and how it is measured.
 #[derive(Clone, Debug)]
 pub(super) struct Twin {
     pub model: Brdf,
@@ -72,13 +72,12 @@ impl Twin {
         let power_w = received_w.max(threshold_w);
         let censored = received_w < threshold_w;
         let sigma0 = power_w / ratio;
-        let (level, limit) = if censored { (None, Some(sigma0)) } else { (Some(sigma0), None) };
         Observation {
             theta_sd_rad: Some(theta_sd_rad),
             power_w: Some(power_w),
             range_m: Some(RANGE_M),
             chirp: Some(chirp),
-            ..Observation::backscatter(theta_rad, level, limit)
+            ..Observation::of_level(theta_rad, sigma0, censored)
         }
     }
 }

@@ -1,23 +1,23 @@
-//! What the data know of each coordinate: covariance from the information, and what it cannot tell.
+//! Covariance of the coordinates from the information, and what the data do not determine.
 //!
 //! The information, scaled to a unit diagonal, has the singular values that the result reports. A
 //! direction whose singular value is a millionth of the largest, or less, is one that the data
-//! do not see: its coordinates have no standard deviation, only their combination across it.
+//! do not determine: its coordinates have no standard deviation, only combinations across that direction have one.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::coordinates::Coordinates;
 use super::minimise::Local;
 
-/// Relative singular value of a direction that the data do not see.
+/// Relative singular value of a direction that the data do not determine.
 const UNSEEN: f64 = 1e-6;
 /// Share of a unit vector above which a coordinate takes part in a direction.
 const TAKES_PART: f64 = 0.1;
 
-/// Covariance in the search and what is not known.
+/// Covariance of the coordinates, and what the data do not determine.
 #[derive(Clone, Debug)]
 pub(super) struct Uncertainty {
-    /// In the search; zero for coordinates held by a bound and along unseen directions.
+    /// In the search; zero for coordinates held by a bound and along directions that the data do not determine.
     pub covariance: DMatrix<f64>,
     /// Of the scaled information, largest first.
     pub singular_values: Vec<f64>,
@@ -51,7 +51,7 @@ pub(crate) fn deviations(curvature: &DMatrix<f64>) -> Vec<Option<f64>> {
 }
 
 impl Uncertainty {
-    /// Reads the information at a point of the search.
+    /// Inverts the information at a point of the search.
     pub fn new(coordinates: &Coordinates, at: &DVector<f64>, information: &DMatrix<f64>) -> Self {
         let ends: Vec<[f64; 2]> = coordinates.list.iter().map(|c| c.ends()).collect();
         let bounded: Vec<bool> = (ends.iter().zip(at.iter()))
@@ -86,7 +86,7 @@ impl Uncertainty {
             return;
         }
         if scaled.iter().any(|entry| !entry.is_finite()) {
-            // Rounding has eaten the information: nothing is known of any of them.
+            // Overflow: nothing is known of any of them.
             self.together.extend(free.iter().map(|&index| vec![index]));
             return;
         }

@@ -1,7 +1,7 @@
 //! A measured cloud: one point and one power per detection, in the global frame.
 //!
-//! Nothing else that a file may know, such as the facet a simulated ray has hit, is kept: a
-//! measurement does not know it.
+//! Other columns of a file, such as the facet that a simulated ray hit, are not read: a measurement
+//! has none of them.
 
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
@@ -21,7 +21,7 @@ pub(super) const POSSIBLE_DBM: RangeInclusive<f64> = -300.0..=60.0;
 /// One detection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CloudPoint {
-    /// Chirp number, when the file tells it.
+    /// Chirp number, if the file has it.
     pub chirp: Option<u32>,
     /// Where the radar puts the echo.
     pub point: Point<Global>,
@@ -35,7 +35,7 @@ pub struct CloudPoint {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cloud {
     points: Vec<CloudPoint>,
-    /// What a person should know of it.
+    /// Notices for the user.
     pub notices: Vec<String>,
 }
 
@@ -111,17 +111,17 @@ pub enum CloudError {
     /// The header of a cloud file lacks a column.
     #[error("the file has no column {column}; it has: {found}")]
     MissingColumn {
-        /// What is needed.
+        /// The column that is missing.
         column: &'static str,
-        /// What is there.
+        /// The columns of the file.
         found: String,
     },
-    /// A chirp number that is none.
+    /// A chirp number that is not a whole number from 0.
     #[error("point {point} has the chirp number {value}; give a whole number, 0 or greater")]
     BadChirp {
         /// Point, from 0.
         point: usize,
-        /// What stands there.
+        /// The number in the file.
         value: f64,
     },
 }

@@ -6,21 +6,20 @@ use glam::DVec3;
 use super::error::RegistrationError;
 use super::icp::{Gap, Motion, NormalEquations, bulk_sd_m, point_to_point, rigid};
 use super::nearest::Nearest;
-use super::placed::Seen;
 use super::settings::{Metric, Registration};
+use super::tracer::Intersection;
 use super::view::{View, median};
 use crate::frames::{Global, Point, Pose};
 
 /// Each virtual scan pairs points within half the reach of the one before, down to this, m.
 const LEAST_REACH_M: f64 = 0.02;
-/// A pair further off sideways than so many typical pairs is beyond the edge of what the virtual
-/// scan saw.
+/// Pairs farther apart sideways than this many times the median lie beyond the edge of the virtual scan.
 const BEYOND_THE_EDGE: f64 = 4.0;
-/// A smaller share of points near the mesh is no overlap.
+/// With a smaller share of points near the mesh, the clouds do not overlap.
 const LEAST_OVERLAP: f64 = 0.2;
 
 /// Where a coarse alignment ended.
-pub(super) struct Aligned {
+pub(super) struct Alignment {
     pub pose: Pose<Global, Global>,
     pub scans: usize,
     pub steps: usize,
@@ -40,12 +39,12 @@ pub(super) fn align(
     settings: &Registration,
     start: Pose<Global, Global>,
     still_m: f64,
-) -> Result<Aligned, RegistrationError> {
-    let mut aligned = Aligned { pose: start, scans: 0, steps: 0, still: false };
+) -> Result<Alignment, RegistrationError> {
+    let mut aligned = Alignment { pose: start, scans: 0, steps: 0, still: false };
     let mut reach_m = settings.reach_m;
     while aligned.scans < settings.max_scans && !aligned.still {
-        let seen: Vec<Seen> =
-            view.traced.scan(&aligned.pose, &view.chirps).into_iter().flatten().collect();
+        let seen: Vec<Intersection> =
+            view.tracer.scan(&aligned.pose, &view.chirps).into_iter().flatten().collect();
         let (moved, steps) = align_to(view, settings, &seen, reach_m)?;
         aligned.pose = rigid(&(moved * aligned.pose));
         aligned.scans += 1;
@@ -66,7 +65,7 @@ pub(super) fn change_m(view: &View, moved: &Pose<Global, Global>) -> f64 {
 fn align_to(
     view: &View,
     settings: &Registration,
-    seen: &[Seen],
+    seen: &[Intersection],
     reach_m: f64,
 ) -> Result<(Pose<Global, Global>, usize), RegistrationError> {
     let places: Vec<DVec3> = seen.iter().map(|seen| seen.hit.point.xyz).collect();
@@ -93,7 +92,7 @@ fn align_to(
 fn pairs(
     points: &[DVec3],
     tree: &Nearest,
-    seen: &[Seen],
+    seen: &[Intersection],
     moved: &Pose<Global, Global>,
     reach_m: f64,
 ) -> Vec<Pair> {

@@ -20,7 +20,7 @@ pub struct Agreement {
     pub only_simulated: usize,
     /// Mean of simulated less measured over the pixels of both, dB; NaN without any.
     pub bias_db: f64,
-    /// Root mean square of the same, dB.
+    /// Root mean square of that difference, dB.
     pub rmse_db: f64,
     /// Median of its size, dB.
     pub median_size_db: f64,
@@ -97,7 +97,7 @@ fn count_of_first(first_dbm: &[f32], second_dbm: &[f32]) -> usize {
 }
 
 /// (x, dBm) of the detections within a line, x in the global frame, m, from left to right.
-pub fn along(scan: &Scan, line: Line) -> Vec<(f64, f64)> {
+pub fn power_along(scan: &Scan, line: Line) -> Vec<(f64, f64)> {
     let within =
         |point: Point<crate::frames::Global>| (point.xyz.y - line.y_m).abs() <= 0.5 * line.width_m;
     let mut points: Vec<(f64, f64)> = scan
@@ -151,7 +151,7 @@ mod tests {
             vec![point(0.1, 1.105, -40.0), point(-0.1, 1.095, -50.0), point(0.0, 1.2, -60.0)];
         let cloud = Cloud::new(points).unwrap();
         let scan = measured_scan(&radar, &Chirps::default(), &cloud);
-        let line = along(&scan, Line { y_m: 1.1, width_m: 0.02 });
+        let line = power_along(&scan, Line { y_m: 1.1, width_m: 0.02 });
         let expected = [(-0.1, -50.0), (0.1, -40.0)];
         assert_eq!(line.len(), expected.len());
         for ((x_m, power_dbm), (expected_m, expected_dbm)) in std::iter::zip(line, expected) {

@@ -36,7 +36,7 @@ pub struct Curve {
 /// Why an observation does not belong in a backscatter curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ObservationError {
-    /// Source and receiver looked along different directions.
+    /// Source and receiver were in different directions.
     #[error("point {point} (from 1) is bistatic; only backscatter is fitted, so leave it out")]
     Bistatic {
         /// Its number from 1.
@@ -138,17 +138,16 @@ pub(crate) fn backscatter_level(index: usize, o: &Observation) -> Result<f64, Ob
     o.level_sigma0().ok_or(ObservationError::Empty { point })
 }
 
-/// An observation with a value for everything that a curve file tells but the place on the target.
+/// An observation with the defaults of [`Curve::read`] for what it leaves out.
 fn complete(index: usize, o: &Observation) -> Result<Observation, ObservationError> {
     let sigma0 = backscatter_level(index, o)?;
-    let (level, limit) = if o.is_censored() { (None, Some(sigma0)) } else { (Some(sigma0), None) };
     Ok(Observation {
         theta_sd_rad: o.theta_sd_rad.or(Some(0.0)),
         power_w: o.power_w.or(Some(sigma0)),
         range_m: o.range_m.or(Some(0.0)),
         chirp: o.chirp.or(Some(index as u32)),
         target_m: o.target_m,
-        ..Observation::backscatter(o.theta_i_rad, level, limit)
+        ..Observation::of_level(o.theta_i_rad, sigma0, o.is_censored())
     })
 }
 

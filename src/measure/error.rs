@@ -1,8 +1,8 @@
-//! Why a cloud has no pose, and why it has no curve.
+//! Why the registration or the reduction of a cloud fails.
 
 use thiserror::Error;
 
-/// Why there is no pose.
+/// Why a registration fails.
 #[derive(Debug, Error, PartialEq)]
 pub enum RegistrationError {
     /// Too few points.
@@ -30,7 +30,7 @@ pub enum RegistrationError {
     },
     /// Chirp numbers contradict positions.
     #[error(
-        "{off} of {numbered} points lie beside the ray of their chirp; check the frame of the cloud \
+        "{off} of {numbered} points do not lie on the ray of their chirp; check the frame of the cloud \
          and the radar's scan"
     )]
     ChirpsDisagree {
@@ -53,7 +53,7 @@ pub enum RegistrationError {
     NoOverlap {
         /// Points with a neighbour.
         near: usize,
-        /// Points looked at.
+        /// Points that were paired.
         points: usize,
         /// Farthest neighbour, m.
         reach_m: f64,
@@ -82,16 +82,16 @@ pub enum RegistrationError {
     },
 }
 
-/// Why there is no curve.
+/// Why a reduction fails.
 #[derive(Debug, Error, PartialEq)]
 pub enum ReductionError {
-    /// The pose is not one to build on.
+    /// The registration has not converged.
     #[error("the registration has not converged; a curve needs a pose, so allow more steps")]
     NotConverged,
     /// No such region.
     #[error("there is no region {region}; the target has {regions}")]
     UnknownRegion {
-        /// What was asked for.
+        /// The region of the settings.
         region: u16,
         /// Number of regions.
         regions: usize,
@@ -99,20 +99,20 @@ pub enum ReductionError {
     /// Cloud, radar and scan do not belong together.
     #[error(transparent)]
     Cloud(#[from] RegistrationError),
-    /// Nothing was left.
+    /// No detection became a row.
     #[error(
         "no detection became a row: {missed} miss the target, {off_surface} lie off its surface, \
          {other_region} are of other regions and {near_edge} near an edge; choose another region or a \
          smaller edge margin"
     )]
     NoRows {
-        /// See [`LeftOut`](super::LeftOut).
+        /// See [`Exclusions`](super::Exclusions).
         missed: usize,
-        /// See [`LeftOut`](super::LeftOut).
+        /// See [`Exclusions`](super::Exclusions).
         off_surface: usize,
-        /// See [`LeftOut`](super::LeftOut).
+        /// See [`Exclusions`](super::Exclusions).
         other_region: usize,
-        /// See [`LeftOut`](super::LeftOut).
+        /// See [`Exclusions`](super::Exclusions).
         near_edge: usize,
     },
     /// The radar of the scene could not have detected this.

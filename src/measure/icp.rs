@@ -124,7 +124,7 @@ impl NormalEquations {
         NormalEquations { information, pull_m, length_m }
     }
 
-    /// The motion that closes the gaps best; along directions that no gap feels it stays put.
+    /// The motion that closes the gaps best, without any along directions that no gap constrains.
     pub fn solve(&self) -> Motion {
         // The decomposition would not end.
         if !self.information.iter().chain(self.pull_m.iter()).all(|sum| sum.is_finite()) {

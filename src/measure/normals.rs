@@ -1,4 +1,4 @@
-//! How well a mesh's facets know the normal of the surface they stand for.
+//! How far the normals of a mesh's facets deviate from those of the surface that it approximates.
 //!
 //! Two errors, both as the variance of one of the two tilts of a facet's normal. *Noise*: the vertices
 //! of a scanned mesh are off, so that a facet leans against its neighbours. Between a normal with
@@ -67,7 +67,7 @@ fn smooth_neighbours(mesh: &Mesh, normals: &[DVec3]) -> Vec<Vec<u32>> {
         }
     }
     let mut neighbours = vec![Vec::new(); mesh.facets.len()];
-    // Three facets at one edge are no surface.
+    // Where three facets share an edge, none is the continuation of another.
     for pair in facets_of_edge.values().filter(|facets| facets.len() == 2) {
         let (a, b) = (pair[0] as usize, pair[1] as usize);
         if normals[a].dot(normals[b]) >= CREASE_COS {

@@ -1,4 +1,4 @@
-//! Powers to σ⁰: equation (8) solved for what belongs to the material.
+//! Powers to σ⁰: equation (8) solved for the material's share.
 //!
 //! σ⁰(θ) = P_r · 4πR²/(P_t · A_eq · g), with the system gain g. A curve's σ⁰ is by definition (10),
 //! 4π·f·cos²θ. With [`Footprint::Projected`] the instrument's model is P_r = P_t·A_eq·g/R² · f·cos θ,
@@ -18,8 +18,8 @@ use super::curve::Curve;
 use super::error::ReductionError;
 use super::incidence::{Incidence, Sighting};
 use super::nearest::Nearest;
-use super::register::Registered;
-use super::sights::sights;
+use super::point_rays::rays_to_points;
+use super::register::RegistrationResult;
 use crate::frames::{Global, Point, Pose, Ray, Target as TargetFrame};
 use crate::material::Observation;
 use crate::radar::scan::PATTERN_RANGE_M;
@@ -27,7 +27,7 @@ use crate::radar::{Chirps, Footprint, Link, Radar};
 use crate::scene::Target;
 use crate::units::{dbm_from_watts, watts_from_dbm};
 
-/// How to reduce a registered cloud to a curve.
+/// Settings of the reduction of a registered cloud to a curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reduction {
     /// Only this region of the target; `None` for all.
@@ -38,25 +38,25 @@ pub struct Reduction {
     pub edge_margin_m: Option<f64>,
     /// A further standard deviation of each tilt of the normal, rad.
     pub extra_sd_rad: f64,
-    /// The target is the facets of the mesh, as in a simulation, and not a surface that they stand
-    /// for: their normals have no error.
+    /// The target is the facets of the mesh, as in a simulation, and not a smooth surface that they
+    /// approximate: their normals have no error.
     pub exact_mesh: bool,
 }
 
-/// A curve and what did not enter it.
+/// A curve and what was left out of it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reduced {
+pub struct ReductionResult {
     /// Rows of the detections in the cloud's order, then of the silent chirps in the scan's.
     pub curve: Curve,
     /// What did not become a row.
-    pub left_out: LeftOut,
-    /// What a person should know of the curve.
+    pub left_out: Exclusions,
+    /// Notices for the user.
     pub notices: Vec<String>,
 }
 
 /// Detections and silent chirps that did not become rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LeftOut {
+pub struct Exclusions {
     /// Detections whose ray misses the target.
     pub missed: usize,
     /// Detections farther from the surface than five times the registration's range error.
@@ -65,17 +65,17 @@ pub struct LeftOut {
     pub other_region: usize,
     /// Detections near a silhouette, a step or another region.
     pub near_edge: usize,
-    /// Silent chirps near such.
+    /// Silent chirps near one of these.
     pub silent_near_edge: usize,
-    /// Detections and silent chirps of which the pose does not tell which facet they met; for an exact
-    /// mesh alone.
+    /// Detections and silent chirps whose facet is uncertain within the errors of the pose; for an exact
+    /// mesh only.
     pub unsure_of_facet: usize,
 }
 
 /// A hundredth of the points may contradict the scene before the cloud is refused.
 const TOLERATED: usize = 100;
 
-/// Why a detection is no row.
+/// What becomes of a detection or a silent chirp: a row, or why not.
 enum Fate {
     Row(Observation),
     Missed,
@@ -85,8 +85,8 @@ enum Fate {
     Unsure,
 }
 
-/// What all rows need.
-struct Bench<'a> {
+/// Turns chirps into rows.
+struct Reducer<'a> {
     incidence: Incidence<'a>,
     link: Link,
     target_from_global: Pose<TargetFrame, Global>,
@@ -120,25 +120,25 @@ impl Reduction {
         radar: &Radar,
         chirps: &Chirps,
         cloud: &Cloud,
-        registered: &Registered,
-    ) -> Result<Reduced, ReductionError> {
+        registered: &RegistrationResult,
+    ) -> Result<ReductionResult, ReductionError> {
         if !registered.converged {
             return Err(ReductionError::NotConverged);
         }
         self.check_region(target)?;
         check_threshold(radar, cloud)?;
-        let sights = sights(cloud, radar, chirps)?;
-        let bench = self.bench(target, radar, registered);
-        let assignment = Assignment::new(radar, chirps, cloud, &sights);
+        let point_rays = rays_to_points(cloud, radar, chirps)?;
+        let reducer = self.reducer(target, radar, registered);
+        let assignment = Assignment::new(radar, chirps, cloud, &point_rays);
         assignment.check_shared()?;
-        let mut left_out = LeftOut::default();
-        let mut rows = detected(&bench, cloud, &sights, &assignment, &mut left_out);
+        let mut left_out = Exclusions::default();
+        let mut rows = detected(&reducer, cloud, &point_rays, &assignment, &mut left_out);
         if rows.is_empty() {
-            let LeftOut { missed, off_surface, other_region, near_edge, .. } = left_out;
+            let Exclusions { missed, off_surface, other_region, near_edge, .. } = left_out;
             return Err(ReductionError::NoRows { missed, off_surface, other_region, near_edge });
         }
         let detections = rows.len();
-        rows.extend(silent(&bench, chirps, &assignment, &mut left_out));
+        rows.extend(silent(&reducer, chirps, &assignment, &mut left_out));
         let mut notices = assignment.notices;
         let silent = rows.len() - detections;
         if silent > detections {
@@ -148,7 +148,7 @@ impl Reduction {
                  wrong; name the part that was kept with a region"
             ));
         }
-        Ok(Reduced { curve: Curve { observations: rows }, left_out, notices })
+        Ok(ReductionResult { curve: Curve { observations: rows }, left_out, notices })
     }
 
     fn check_region(&self, target: &Target) -> Result<(), ReductionError> {
@@ -162,17 +162,17 @@ impl Reduction {
         }
     }
 
-    fn bench<'a>(
+    fn reducer<'a>(
         &self,
         target: &'a Target,
         radar: &Radar,
-        registered: &'a Registered,
-    ) -> Bench<'a> {
+        registered: &'a RegistrationResult,
+    ) -> Reducer<'a> {
         // A perfect fit must not refuse its own points.
         const LEAST_RMS_M: f64 = 1e-3;
         const GATE_SD: f64 = 5.0;
         let smooth = Incidence::new(target, registered, self.extra_sd_rad);
-        Bench {
+        Reducer {
             incidence: if self.exact_mesh { smooth.of_facets() } else { smooth },
             link: Link::new(radar),
             target_from_global: radar.frames().global_from_target.inverse(),
@@ -185,7 +185,7 @@ impl Reduction {
     }
 }
 
-impl Bench<'_> {
+impl Reducer<'_> {
     fn wants(&self, sighting: &Sighting) -> bool {
         self.region.is_none_or(|region| region == sighting.region)
     }
@@ -196,7 +196,7 @@ impl Bench<'_> {
     }
 
     fn judge(&self, point: &CloudPoint, ray: &Ray<Global>, chirp: u32) -> Fate {
-        let Some(sighting) = self.incidence.look(ray) else {
+        let Some(sighting) = self.incidence.sight(ray) else {
             return Fate::Missed;
         };
         let range_m = ray.origin.distance_m(point.point);
@@ -228,31 +228,30 @@ impl Bench<'_> {
         let sigma0 = sigma0(&self.link, range_m, hit.cos_theta, power_w);
         let at = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
         let at = (self.target_from_global * at).xyz;
-        let (level, limit) = if censored { (None, Some(sigma0)) } else { (Some(sigma0), None) };
         Observation {
             theta_sd_rad: Some(theta_sd_rad),
             power_w: Some(power_w),
             range_m: Some(range_m),
             chirp: Some(chirp),
             target_m: Some([at.x, at.y]),
-            ..Observation::backscatter(hit.theta_rad(), level, limit)
+            ..Observation::of_level(hit.theta_rad(), sigma0, censored)
         }
     }
 }
 
 fn detected(
-    bench: &Bench,
+    reducer: &Reducer,
     cloud: &Cloud,
-    sights: &[Ray<Global>],
+    point_rays: &[Ray<Global>],
     assignment: &Assignment,
-    left_out: &mut LeftOut,
+    left_out: &mut Exclusions,
 ) -> Vec<Observation> {
     let fates: Vec<Fate> = cloud
         .points()
         .par_iter()
-        .zip(sights)
+        .zip(point_rays)
         .zip(&assignment.chirp_of_point)
-        .map(|((point, ray), chirp)| bench.judge(point, ray, *chirp))
+        .map(|((point, ray), chirp)| reducer.judge(point, ray, *chirp))
         .collect();
     let mut rows = Vec::new();
     for fate in fates {
@@ -268,27 +267,28 @@ fn detected(
     rows
 }
 
-/// Rows of the chirps that should have hit and gave nothing.
+/// Rows of the chirps that hit the target and have no detection.
 fn silent(
-    bench: &Bench,
+    reducer: &Reducer,
     chirps: &Chirps,
     assignment: &Assignment,
-    left_out: &mut LeftOut,
+    left_out: &mut Exclusions,
 ) -> Vec<Observation> {
     let fates: Vec<Option<Fate>> = assignment
         .silent
         .par_iter()
         .map(|&index| {
             let (ray, chirp) = (chirps.rays.get(index)?, *chirps.number.get(index)?);
-            let sighting = bench.incidence.look(ray).filter(|sighting| bench.wants(sighting))?;
-            if !bench.incidence.is_clear(ray, &sighting, bench.margin_m) {
+            let sighting =
+                reducer.incidence.sight(ray).filter(|sighting| reducer.wants(sighting))?;
+            if !reducer.incidence.is_clear(ray, &sighting, reducer.margin_m) {
                 return Some(Fate::NearEdge);
             }
-            if !bench.is_sure(ray, &sighting) {
+            if !reducer.is_sure(ray, &sighting) {
                 return Some(Fate::Unsure);
             }
             let range_m = sighting.hit.range_m;
-            Some(Fate::Row(bench.row(ray, &sighting, range_m, bench.threshold_w, chirp, true)))
+            Some(Fate::Row(reducer.row(ray, &sighting, range_m, reducer.threshold_w, chirp, true)))
         })
         .collect();
     let mut rows = Vec::new();
@@ -336,11 +336,16 @@ impl Directions {
 impl Assignment {
     /// Points without a number belong to the chirp whose ray they lie on; a chirp is silent when no
     /// point has its number and no point without a number lies on its ray.
-    fn new(radar: &Radar, chirps: &Chirps, cloud: &Cloud, sights: &[Ray<Global>]) -> Assignment {
+    fn new(
+        radar: &Radar,
+        chirps: &Chirps,
+        cloud: &Cloud,
+        point_rays: &[Ray<Global>],
+    ) -> Assignment {
         let directions = Directions::new(radar, chirps);
         let mut unmatched = 0;
-        let mut chirp_of_point = Vec::with_capacity(sights.len());
-        for ((point, ray), place) in std::iter::zip(cloud.points(), sights).zip(0..) {
+        let mut chirp_of_point = Vec::with_capacity(point_rays.len());
+        for ((point, ray), place) in std::iter::zip(cloud.points(), point_rays).zip(0..) {
             let chirp = point.chirp.or_else(|| directions.chirp_along(chirps, ray));
             unmatched += usize::from(chirp.is_none());
             chirp_of_point.push(chirp.unwrap_or(place));
@@ -348,7 +353,7 @@ impl Assignment {
         // More strays than false alarms explain: then silent chirps cannot be recognised.
         let lost = unmatched * 10 > cloud.points().len();
         let silent =
-            if lost { Vec::new() } else { silent_chirps(chirps, cloud, sights, &directions) };
+            if lost { Vec::new() } else { silent_chirps(chirps, cloud, point_rays, &directions) };
         let mut notices = Vec::new();
         if unmatched > 0 {
             let effect = if lost {
@@ -396,11 +401,11 @@ fn check_threshold(radar: &Radar, cloud: &Cloud) -> Result<(), ReductionError> {
 fn silent_chirps(
     chirps: &Chirps,
     cloud: &Cloud,
-    sights: &[Ray<Global>],
+    point_rays: &[Ray<Global>],
     scan: &Directions,
 ) -> Vec<usize> {
     let numbers: HashSet<u32> = cloud.points().iter().filter_map(|point| point.chirp).collect();
-    let unnumbered: Vec<DVec3> = std::iter::zip(cloud.points(), sights)
+    let unnumbered: Vec<DVec3> = std::iter::zip(cloud.points(), point_rays)
         .filter(|(point, _)| point.chirp.is_none())
         .map(|(_, ray)| ray.direction.xyz())
         .collect();
@@ -436,7 +441,7 @@ mod tests {
         u16::from(measured.mesh.vertices[facet[0] as usize].y > 1.1)
     }
 
-    fn reduce(measured: &Measured, settings: Reduction) -> Result<Reduced, ReductionError> {
+    fn reduce(measured: &Measured, settings: Reduction) -> Result<ReductionResult, ReductionError> {
         let Measured { mesh, radar, chirps, cloud } = measured;
         let registered = Registration::default().run(mesh, radar, chirps, cloud).unwrap();
         settings.run(&target(measured), radar, chirps, cloud, &registered)
@@ -501,7 +506,7 @@ mod tests {
         assert_eq!(every.left_out.near_edge, 0);
         let upper = reduce(&measured, Reduction { region: Some(1), ..all }).unwrap();
         let lower = reduce(&measured, Reduction { region: Some(0), ..all }).unwrap();
-        let rows = |reduced: &Reduced| reduced.curve.observations.len();
+        let rows = |reduced: &ReductionResult| reduced.curve.observations.len();
         assert_eq!(rows(&upper) + rows(&lower), rows(&every));
         assert!(rows(&upper) > 100 && rows(&lower) > 100);
         let inner = reduce(&measured, Reduction::default()).unwrap();

@@ -10,11 +10,11 @@ use glam::DVec3;
 use nalgebra::{Matrix6, Vector6};
 
 use super::cloud::Cloud;
-use super::coarse::{self, Aligned};
+use super::coarse::{self, Alignment};
 use super::error::RegistrationError;
 use super::icp::{Gap, Motion, NormalEquations, bulk_sd_m, rigid};
+use super::point_rays::rays_to_points;
 use super::settings::{Metric, Registration, Start};
-use super::sights::sights;
 use super::start;
 use super::uncertainty::{Uncertainty, uncertainty};
 use super::view::{RayGap, View};
@@ -24,7 +24,7 @@ use crate::radar::{Chirps, Radar};
 
 /// Widest gap along a ray after the coarse loop, m.
 const RAY_REACH_M: f64 = 0.05;
-/// Gaps beyond so many standard deviations are not of the surface.
+/// Points with wider gaps, in standard deviations, are not on the surface.
 const OUTLIER_SD: f64 = 4.0;
 /// The coarse loop hands over when a virtual scan moves the target by less, m.
 const HAND_OVER_M: f64 = 1e-3;
@@ -44,14 +44,14 @@ pub enum Stop {
 
 /// A registered mesh.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Registered {
+pub struct RegistrationResult {
     /// Moves the mesh, as the scene places it, to where the cloud says it was: a vertex v of the
     /// scene's mesh belongs at pose·v of the global frame.
     pub pose: Pose<Global, Global>,
     /// Covariance of the pose: the true one is x ↦ c + t + R(ω)(x − c) after `pose`, with c the
     /// `pivot`, in the order t_x, t_y, t_z (m), ω_x, ω_y, ω_z (rad). From the gaps along the rays
     /// under errors of range that neighbours within 5 cm may share; for the other metrics, which
-    /// use the points less well, a bound from below. A direction that the target does not tell has
+    /// use the points less well, a lower bound. A direction that the points do not determine has
     /// the target's size as its standard deviation, see `verdicts`.
     pub covariance: [[f64; 6]; 6],
     /// Median of the measured points by axis.
@@ -74,7 +74,7 @@ pub struct Registered {
     pub stop: Stop,
     /// Whether the pose stopped changing.
     pub converged: bool,
-    /// What a person should know of the pose.
+    /// Notices for the user.
     pub verdicts: Vec<String>,
 }
 
@@ -83,21 +83,21 @@ impl Registration {
     /// with the rays of `chirps`.
     ///
     /// # Errors
-    /// When there is no pose worth a number.
+    /// When the points give no usable pose.
     pub fn run(
         &self,
         mesh: &Mesh,
         radar: &Radar,
         chirps: &Chirps,
         cloud: &Cloud,
-    ) -> Result<Registered, RegistrationError> {
+    ) -> Result<RegistrationResult, RegistrationError> {
         let points = cloud.points().len();
         if points < self.least_points {
             return Err(RegistrationError::TooFew { points, least: self.least_points });
         }
-        let sights = sights(cloud, radar, chirps)?;
-        let view = View::new(mesh, &chirps.rays, cloud, &sights);
-        let rough = start::rough(&view, self)?;
+        let point_rays = rays_to_points(cloud, radar, chirps)?;
+        let view = View::new(mesh, &chirps.rays, cloud, &point_rays);
+        let rough = start::rough_pose(&view, self)?;
         let along_ray = self.metric == Metric::AlongRay;
         let still_m = if along_ray { HAND_OVER_M } else { self.still_m };
         let mut aligned = coarse::align(&view, self, rough, still_m)?;
@@ -114,7 +114,7 @@ impl Registration {
     }
 
     /// The second loop: Gauss and Newton on the gaps along the measured rays.
-    fn close_along_rays(&self, view: &View, aligned: &mut Aligned) {
+    fn close_along_rays(&self, view: &View, aligned: &mut Alignment) {
         aligned.still = false;
         for _ in 0..self.max_steps {
             let gaps: Vec<Gap> =
@@ -148,7 +148,11 @@ impl Registration {
         }
     }
 
-    fn judge(&self, view: &View, aligned: &Aligned) -> Result<Registered, RegistrationError> {
+    fn judge(
+        &self,
+        view: &View,
+        aligned: &Alignment,
+    ) -> Result<RegistrationResult, RegistrationError> {
         let gaps = view.ray_gaps(&aligned.pose, RAY_REACH_M);
         let sd_m = bulk_sd_m(gaps.iter().flatten().map(|g| g.gap.size_m)).max(LEAST_SD_M);
         let mut inliers: Vec<RayGap> = gaps.into_iter().flatten().collect();
@@ -161,7 +165,7 @@ impl Registration {
         let rms_m = (squares_m2 / inliers.len() as f64).sqrt();
         let used: Vec<Gap> = inliers.iter().map(|gap| gap.gap).collect();
         let known = uncertainty(&used, view.pivot, view.length_m);
-        Ok(Registered {
+        Ok(RegistrationResult {
             pose: aligned.pose,
             covariance: known.covariance,
             pivot: view.pivot.into(),
@@ -179,7 +183,7 @@ impl Registration {
     }
 }
 
-fn verdicts(aligned: &Aligned, known: Uncertainty, rms_m: f64) -> Vec<String> {
+fn verdicts(aligned: &Alignment, known: Uncertainty, rms_m: f64) -> Vec<String> {
     let mut verdicts = known.unknown;
     if !aligned.still {
         verdicts.push("the pose still changed at the last step; allow more".to_owned());
@@ -194,9 +198,9 @@ fn verdicts(aligned: &Aligned, known: Uncertainty, rms_m: f64) -> Vec<String> {
     verdicts
 }
 
-impl Registered {
+impl RegistrationResult {
     /// The given pose in place of the found one, when it is within chance of it.
-    fn or_given(mut self, given: &Pose<Global, Global>) -> Registered {
+    fn or_given(mut self, given: &Pose<Global, Global>) -> RegistrationResult {
         // χ² with six degrees of freedom is above this in 5 %.
         const CHANCE: f64 = 12.592;
         let Motion { shift_m, turn_rad } =
@@ -250,7 +254,7 @@ mod tests {
     const NEAR_M: f64 = 0.5e-3;
     const NEAR_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
 
-    fn register(settings: Registration, seed: u64) -> (Measured, Registered) {
+    fn register(settings: Registration, seed: u64) -> (Measured, RegistrationResult) {
         let measured = mannequin(2e-3, seed);
         let start = Start::Given(pushed(&measured, 0.03, 5f64.to_radians(), seed));
         let found = Registration { start, ..settings }

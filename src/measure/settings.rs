@@ -1,11 +1,11 @@
-//! Settings of a registration.
+//! How a cloud is registered: the metric, the rough pose and the limits.
 
 use glam::DVec3;
 
 use super::icp::Kernel;
 use crate::frames::{Global, Pose};
 
-/// What is made small.
+/// The distances that a registration minimises.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Metric {
     /// Distances to the nearest virtual point: the paper's.
@@ -17,12 +17,12 @@ pub enum Metric {
     AlongRay,
 }
 
-/// How to register.
+/// Settings of a registration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Registration {
-    /// What is made small.
+    /// The distances to minimise.
     pub metric: Metric,
-    /// How much outliers count.
+    /// Weight of outliers.
     pub kernel: Kernel,
     /// The rough pose.
     pub start: Start,
@@ -34,7 +34,7 @@ pub struct Registration {
     pub max_steps: usize,
     /// The pose has stopped changing when a step moves the target by less, m, above 0.
     pub still_m: f64,
-    /// Most measured points that the coarse loop looks at.
+    /// Most measured points that the coarse loop uses.
     pub coarse_points: usize,
     /// Fewer points are refused.
     pub least_points: usize,
@@ -45,7 +45,7 @@ pub struct Registration {
     /// A pose turned farther from the rough one has diverged, rad.
     pub farthest_rad: f64,
     /// Keep a pose given by hand when the points do not speak against it, at 5 %: it may be known
-    /// better than they tell, and on flat facets a tenth of a millimetre moves angles by degrees.
+    /// better than from the points, and on flat facets a tenth of a millimetre moves angles by degrees.
     pub keep_given: bool,
 }
 
@@ -90,7 +90,7 @@ pub enum Start {
     Given(Pose<Global, Global>),
     /// Twelve yaws about the vertical, from the scene's place and from the middle of the mesh on the
     /// middle of the cloud, each aligned coarsely; the one that fits best. The mesh must stand
-    /// upright. A symmetric target may be found turned round.
+    /// upright. A symmetric target may be found rotated.
     Automatic,
 }
 

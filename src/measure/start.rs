@@ -15,7 +15,7 @@ const YAWS: usize = 12;
 /// Along the rays a gap counts no more than this, m.
 const WORST_M: f64 = 0.05;
 
-pub(super) fn rough(
+pub(super) fn rough_pose(
     view: &View,
     settings: &Registration,
 ) -> Result<Pose<Global, Global>, RegistrationError> {
@@ -30,7 +30,7 @@ pub(super) fn rough(
 
 /// Every yaw at every place.
 fn guesses<'v>(view: &'v View) -> impl Iterator<Item = Pose<Global, Global>> + 'v {
-    let middle = view.traced.middle();
+    let middle = view.tracer.middle();
     let yaws = (0..YAWS).map(|step| TAU * step as f64 / YAWS as f64);
     yaws.flat_map(move |yaw_rad| {
         let turn = Pose::<Global, Global>::from_euler_xyz(DVec3::Y * yaw_rad, DVec3::ZERO);
@@ -60,7 +60,7 @@ fn onto_the_cloud(view: &View, mut pose: Pose<Global, Global>) -> Option<Pose<Gl
     // What comes into view changes the middle; it settles soon.
     const SHIFTS: usize = 3;
     for _ in 0..SHIFTS {
-        let seen = view.traced.scan(&pose, &view.chirps).into_iter().flatten();
+        let seen = view.tracer.scan(&pose, &view.chirps).into_iter().flatten();
         let places: Vec<DVec3> = seen.map(|seen| seen.hit.point.xyz).collect();
         if places.is_empty() {
             return None;

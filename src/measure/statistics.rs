@@ -1,7 +1,7 @@
-//! Statistics of a curve by angle, in linear power, that respect what lies below the threshold.
+//! Statistics of a curve by angle, in linear power, with censored points.
 //!
-//! A point below its threshold shares its weight among whatever lies lower (the estimate of Kaplan
-//! and Meier, 1958, turned round as for left-censored data in Helsel, "Statistics for Censored
+//! A point below its threshold shares its weight among all lower detections (the estimate of Kaplan
+//! and Meier, 1958, mirrored for left-censored data as in Helsel, "Statistics for Censored
 //! Environmental Data", 2012). Weight below which there is no detection lies anywhere from 0 to the
 //! threshold: the mean has a least and a greatest value, and a quantile in it is only a bound.
 
@@ -19,7 +19,7 @@ pub struct AngleStatistics {
     pub points: u32,
     /// Number of points below their threshold.
     pub censored_points: u32,
-    /// What the weight that no detection lies below is less than, σ⁰; none where there is none.
+    /// The highest threshold below which there is no detection, σ⁰; none where a detection is lowest.
     pub threshold_sigma0: Option<f64>,
     /// Least and greatest mean σ⁰ that the points allow; equal where none is censored.
     pub mean: [f64; 2],
@@ -65,21 +65,21 @@ pub enum Median {
     At(f64),
     /// It is below this.
     Below(f64),
-    /// There is no point, or one above the instrument's range.
-    NotTold,
+    /// Without points, or with one above the instrument's range.
+    Unknown,
 }
 
 /// The median of points taken together, as [`by_angle`] gives it for each angle.
 pub fn median<'a>(observations: impl Iterator<Item = &'a Observation> + Clone) -> Median {
     if observations.clone().any(|o| o.is_retro() && o.censor == Censor::Right) {
-        return Median::NotTold;
+        return Median::Unknown;
     }
     let points = points(observations);
     let spread = Sample::new(&points).spread(&vec![1; points.len()]);
     match (spread.quantile(0.5), spread.threshold()) {
         (Some(sigma0), _) => Median::At(sigma0),
         (None, Some(threshold)) => Median::Below(threshold),
-        (None, None) => Median::NotTold,
+        (None, None) => Median::Unknown,
     }
 }
 
@@ -154,7 +154,7 @@ impl<'a> Sample<'a> {
         Sample { points, descending: by_level.into_iter().map(|(place, _)| place).collect() }
     }
 
-    /// Shares of the levels when each point is there so many times.
+    /// Shares of the levels when point i occurs `times[i]` times.
     fn spread(&self, times: &[u32]) -> Spread {
         let mut left: f64 = times.iter().map(|&n| f64::from(n)).sum();
         let mut weight = 1.0;
@@ -170,7 +170,7 @@ impl<'a> Sample<'a> {
             if point.is_censored {
                 below.push((point.level, n));
             } else {
-                // Whoever was censored before has this one among those that lie lower.
+                // Earlier censored points share their weight with this one.
                 below.clear();
                 let share = weight * n / left;
                 detected.push((point.level, share));

@@ -16,9 +16,9 @@ use super::icp::{Gap, NormalEquations, jacobian};
 
 /// Side of a cell, three spots of the paper's radar, m.
 const CELL_M: f64 = 0.05;
-/// Fewer cells do not tell how errors are shared.
+/// With fewer cells the shared errors cannot be estimated.
 const LEAST_CELLS: usize = 30;
-/// A direction known worse than this is not known, m.
+/// A direction with a larger standard deviation is reported as not determined, m.
 const UNKNOWN_SD_M: f64 = 5e-3;
 
 /// What is known of a pose.
@@ -28,7 +28,7 @@ pub struct Uncertainty {
     pub covariance: [[f64; 6]; 6],
     /// By what the variance was widened for shared errors, 1 or more.
     pub widened: f64,
-    /// Directions in which the target does not tell its pose, in words.
+    /// Directions in which the points do not determine the pose, in words.
     pub unknown: Vec<String>,
 }
 
@@ -41,7 +41,7 @@ pub(super) fn uncertainty(gaps: &[Gap], pivot: DVec3, length_m: f64) -> Uncertai
     let variance_m2 = gaps.iter().map(|gap| gap.size_m * gap.size_m).sum::<f64>() / freedom;
     let eigen = SymmetricEigen::new(equations.information);
     let widened = widening(gaps, pivot, length_m, variance_m2, &eigen);
-    // The variance along each direction; where the points do not tell it, the size of the target.
+    // The variance along each direction; where the points do not determine it, the size of the target squared.
     let mut scaled = Matrix6::zeros();
     let mut unknown = Vec::new();
     for (value, axis) in std::iter::zip(eigen.eigenvalues.iter(), eigen.eigenvectors.column_iter())
@@ -108,7 +108,7 @@ fn in_words(axis: &Vector6<f64>, sd_m: f64) -> String {
     let large = std::iter::zip(axis.iter(), NAMES).filter(|(part, _)| part.abs() > 0.33);
     let names: Vec<&str> = large.map(|(_, name)| name).collect();
     format!(
-        "the target does not tell {}: standard deviation {:.0} mm",
+        "the points do not determine {}: standard deviation {:.0} mm",
         names.join(" with "),
         1e3 * sd_m
     )

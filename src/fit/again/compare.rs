@@ -127,7 +127,8 @@ fn value(model: &Brdf, name: &str) -> Option<f64> {
     }
 }
 
-/// The curve of the model where the data are: numbers that they do not tell one by one must still give it.
+/// Compares σ⁰ of the two models at the angles of the detections: numbers that the data determine only together
+/// must still give the same curve.
 fn level(stored: &material::Fit, found: &FitResult, curve: &Curve) -> Option<String> {
     const NEPER_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
     let (mut low_rad, mut high_rad) = (f64::INFINITY, 0.0f64);

@@ -37,27 +37,27 @@ impl<'c> ScanRays<'c> {
 /// # Errors
 /// When ranges or chirp numbers contradict the positions: the cloud is of another frame, unit, scan
 /// or radar.
-pub fn sights(
+pub fn rays_to_points(
     cloud: &Cloud,
     radar: &Radar,
     chirps: &Chirps,
 ) -> Result<Vec<Ray<Global>>, RegistrationError> {
     let rays = ScanRays::new(chirps);
     let centre = radar.frames().origin();
-    let mut sights = Vec::with_capacity(cloud.points().len());
+    let mut point_rays = Vec::with_capacity(cloud.points().len());
     for (number, point) in cloud.points().iter().enumerate() {
         let origin = rays.of(point).map_or(centre, |ray| ray.origin);
         let direction = origin.towards(point.point);
         let direction = direction.ok_or(RegistrationError::AtTheRadar { point: number })?;
-        sights.push(Ray { origin, direction });
+        point_rays.push(Ray { origin, direction });
     }
-    check_ranges(cloud, &sights)?;
+    check_ranges(cloud, &point_rays)?;
     check_chirps(cloud, radar, &rays)?;
-    Ok(sights)
+    Ok(point_rays)
 }
 
-fn check_ranges(cloud: &Cloud, sights: &[Ray<Global>]) -> Result<(), RegistrationError> {
-    let off_m = std::iter::zip(cloud.points(), sights)
+fn check_ranges(cloud: &Cloud, point_rays: &[Ray<Global>]) -> Result<(), RegistrationError> {
+    let off_m = std::iter::zip(cloud.points(), point_rays)
         .filter_map(|(point, ray)| Some(ray.origin.distance_m(point.point) - point.range_m?));
     let typical_m = bulk_sd_m(off_m);
     if typical_m > RANGE_MISMATCH_M {
