@@ -26,7 +26,8 @@ use matdb::geometry::{Mesh, Raster};
 use matdb::material::builtin;
 use matdb::measure::icp::Motion;
 use matdb::measure::{
-    Cloud, CloudPoint, Curve, Metric, Reduced, Reduction, Registered, Registration, Start,
+    Cloud, CloudPoint, Curve, Metric, Reduction, ReductionResult, Registration, RegistrationResult,
+    Start,
 };
 use matdb::radar::random::{Key, Purpose};
 use matdb::radar::{Link, Radar};
@@ -326,8 +327,8 @@ fn png(raster: &Raster) -> Vec<u8> {
 
 /// A cloud and a rough pose to a pose.
 fn register(given: Given<'_>) -> Vec<Way<'_>> {
-    let found = |registered: &Registered| {
-        let Registered { points, scans, iterations, .. } = registered;
+    let found = |registered: &RegistrationResult| {
+        let RegistrationResult { points, scans, iterations, .. } = registered;
         format!("{points} points, {scans} virtual scans, {iterations} steps")
     };
     let cloud = cloud(given);
@@ -342,7 +343,7 @@ fn register(given: Given<'_>) -> Vec<Way<'_>> {
     vec![by("along the rays", Metric::AlongRay), by("point to plane", Metric::PointToPlane)]
 }
 
-fn registered(given: Given, settings: &Registration, cloud: &Cloud) -> Registered {
+fn registered(given: Given, settings: &Registration, cloud: &Cloud) -> RegistrationResult {
     let Given { scene, .. } = given;
     settings.run(&scene.target.mesh, scene.radar(), &scene.chirps, cloud).expect("a pose")
 }
@@ -353,7 +354,7 @@ fn cloud(given: Given) -> Cloud {
         chirp: Some(echo.chirp),
         point: echo.point,
         range_m: Some(echo.range_m),
-        power_dbm: echo.power_dbm,
+        power_w: watts_from_dbm(echo.power_dbm),
     };
     Cloud::new(given.scan.detections().map(point).collect()).expect("a cloud")
 }
@@ -364,12 +365,12 @@ fn curve(given: Given<'_>) -> Vec<Way<'_>> {
     let registered = registered(given, &Registration::default(), &cloud);
     let run = move || reduced(given, &cloud, &registered);
     vec![Way::new("reduction", run, move |reduced| {
-        let (points, rows) = (given.scan.detections().count(), reduced.curve.rows.len());
+        let (points, rows) = (given.scan.detections().count(), reduced.curve.observations.len());
         format!("{points} points, {rows} rows")
     })]
 }
 
-fn reduced(given: Given, cloud: &Cloud, registered: &Registered) -> Reduced {
+fn reduced(given: Given, cloud: &Cloud, registered: &RegistrationResult) -> ReductionResult {
     let Given { scene, .. } = given;
     let reduction = Reduction { exact_mesh: true, ..Reduction::default() };
     let (radar, chirps) = (scene.radar(), &scene.chirps);
@@ -381,10 +382,10 @@ fn reduced(given: Given, cloud: &Cloud, registered: &Registered) -> Reduced {
 fn fit(given: Given<'_>) -> Vec<Way<'_>> {
     let cloud = cloud(given);
     let registered = registered(given, &Registration::default(), &cloud);
-    let Reduced { mut curve, .. } = reduced(given, &cloud, &registered);
+    let ReductionResult { mut curve, .. } = reduced(given, &cloud, &registered);
     // Every n-th, so that all angles are there.
-    let step = (curve.rows.len() / FITTED).max(1);
-    curve.rows = curve.rows.into_iter().step_by(step).take(FITTED).collect();
+    let step = (curve.observations.len() / FITTED).max(1);
+    curve.observations = curve.observations.into_iter().step_by(step).take(FITTED).collect();
     let squares = |theta_sd_rad| Fit {
         method: Method::Tls { theta_sd_rad, level_sd_db: 2.0 },
         starts: 1,
@@ -396,7 +397,7 @@ fn fit(given: Given<'_>) -> Vec<Way<'_>> {
     let best = fitted(&squares(0.0), &guess(), &curve).model;
     let by = |name, settings: Fit| {
         let curve = curve.clone();
-        let size = curve.rows.len();
+        let size = curve.observations.len();
         let done = move |found: &FitResult| format!("{size} points, {} steps", found.iterations);
         Way::new(name, move || fitted(&settings, &guess(), &curve), done)
     };
@@ -405,7 +406,7 @@ fn fit(given: Given<'_>) -> Vec<Way<'_>> {
         by("orthogonal distance", squares(1f64.to_radians())),
         by("Gamma law", gamma),
     ];
-    let (size, again) = (curve.rows.len(), squares(0.0));
+    let (size, again) = (curve.observations.len(), squares(0.0));
     let refits = move || {
         let converged =
             |number: &u64| again.run(&best, &drawn(&curve, *number)).is_ok_and(|fit| fit.converged);
@@ -420,9 +421,9 @@ fn fit(given: Given<'_>) -> Vec<Way<'_>> {
 /// As many rows as the curve has, drawn with replacement.
 fn drawn(curve: &Curve, number: u64) -> Curve {
     let mut draws = Key { seed: number, chirp: 0, sub_ray: 0, purpose: Purpose::Bootstrap }.draws();
-    let count = curve.rows.len();
-    let row = |_| curve.rows[(count as f64 * draws.uniform()) as usize];
-    Curve { rows: (0..count).map(row).collect() }
+    let count = curve.observations.len();
+    let row = |_| curve.observations[(count as f64 * draws.uniform()) as usize];
+    Curve { observations: (0..count).map(row).collect() }
 }
 
 /// Where a fit starts.

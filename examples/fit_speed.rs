@@ -42,7 +42,8 @@ fn drawn(curve: &Curve, number: u64) -> Curve {
         let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         (mixed ^ (mixed >> 31)) as usize
     };
-    Curve { rows: curve.rows.iter().map(|_| curve.rows[next() % curve.rows.len()]).collect() }
+    let rows = &curve.observations;
+    Curve { observations: rows.iter().map(|_| rows[next() % rows.len()]).collect() }
 }
 
 /// Milliseconds of all refits, each from what the curve itself gave, and how many of them converged.

@@ -12,7 +12,7 @@ use std::path::Path;
 use glam::DVec3;
 use matdb::frames::{Global, Point, Pose};
 use matdb::measure::icp::Motion;
-use matdb::measure::placed::{Aims, Traced};
+use matdb::measure::tracer::{RaySet, Tracer};
 use matdb::measure::{Cloud, CloudPoint, Registration, Start};
 use matdb::radar::random::{Key, Purpose};
 use matdb::scene::{Scene, SceneFile};
@@ -65,8 +65,8 @@ fn scene() -> Answer<Scene> {
 /// Every hit with noise in range; its power plays no part.
 fn measured(scene: &Scene) -> Answer<Cloud> {
     let here = Pose::<Global, Global>::from_euler_xyz(DVec3::ZERO, DVec3::ZERO);
-    let seen = Traced::new(&scene.target.mesh)
-        .scan(&here, &Aims::new(&scene.target.mesh, &scene.chirps.rays));
+    let seen = Tracer::new(&scene.target.mesh)
+        .scan(&here, &RaySet::new(&scene.target.mesh, &scene.chirps.rays));
     let mut draws = Key { seed: 5, chirp: 0, sub_ray: 0, purpose: Purpose::Range }.draws();
     let mut points = Vec::new();
     for ((seen, ray), chirp) in seen.into_iter().zip(&scene.chirps.rays).zip(&scene.chirps.number) {
@@ -77,7 +77,7 @@ fn measured(scene: &Scene) -> Answer<Cloud> {
             chirp: Some(*chirp),
             point,
             range_m: Some(range_m),
-            power_dbm: -60.0,
+            power_w: 1e-9,
         });
     }
     Ok(Cloud::new(points)?)
@@ -96,8 +96,8 @@ fn write_clouds(
         let _ = writeln!(measured, "{x} {y} {z}");
     }
     let mut seen_text = String::new();
-    let seen = Traced::new(&scene.target.mesh)
-        .scan(rough, &Aims::new(&scene.target.mesh, &scene.chirps.rays));
+    let seen = Tracer::new(&scene.target.mesh)
+        .scan(rough, &RaySet::new(&scene.target.mesh, &scene.chirps.rays));
     for seen in seen.into_iter().flatten() {
         let ([x, y, z], [u, v, w]) = (seen.hit.point.xyz.to_array(), seen.normal.to_array());
         let _ = writeln!(seen_text, "{x} {y} {z} {u} {v} {w}");

@@ -6,12 +6,12 @@ use glam::DVec3;
 use matdb::brdf::Scattering;
 use matdb::frames::{Global, Point, Pose};
 use matdb::measure::icp::Motion;
-use matdb::measure::placed::{Aims, Traced};
-use matdb::measure::{Cloud, CloudPoint, Registered, Registration, Start};
+use matdb::measure::tracer::{RaySet, Tracer};
+use matdb::measure::{Cloud, CloudPoint, Registration, RegistrationResult, Start};
 use matdb::radar::Link;
 use matdb::radar::random::{Draws, Key, Purpose};
 use matdb::scene::Scene;
-use matdb::units::dbm_from_watts;
+use matdb::units::watts_from_dbm;
 use rayon::prelude::*;
 
 use crate::Failure;
@@ -25,7 +25,7 @@ const NEAR_DEG: f64 = 0.05;
 struct Run {
     shift_mm: f64,
     turn_deg: f64,
-    found: Registered,
+    found: RegistrationResult,
 }
 
 /// A scene that comes with the program.
@@ -105,19 +105,19 @@ fn measured(scene: &Scene, draws: &mut Draws) -> Result<Cloud, Failure> {
     let radar = scene.radar();
     let link = Link::new(radar);
     let here = Pose::<Global, Global>::from_euler_xyz(DVec3::ZERO, DVec3::ZERO);
-    let seen = Traced::new(&scene.target.mesh)
-        .scan(&here, &Aims::new(&scene.target.mesh, &scene.chirps.rays));
+    let seen = Tracer::new(&scene.target.mesh)
+        .scan(&here, &RaySet::new(&scene.target.mesh, &scene.chirps.rays));
     let mut points = Vec::new();
     for ((seen, ray), number) in seen.into_iter().zip(&scene.chirps.rays).zip(&scene.chirps.number)
     {
         let Some(hit) = seen.map(|seen| seen.hit) else { continue };
         let f_per_sr = paint.retro_per_sr(hit.theta_rad());
-        let power_dbm = dbm_from_watts(link.power_w(hit.range_m, hit.cos_theta, f_per_sr));
+        let power_w = link.power_w(hit.range_m, hit.cos_theta, f_per_sr);
         let range_m = hit.range_m + RANGE_SD_M * normal(draws);
         let point = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
-        if power_dbm >= radar.threshold_dbm {
+        if power_w >= watts_from_dbm(radar.threshold_dbm) {
             let chirp = Some(*number);
-            points.push(CloudPoint { chirp, point, range_m: Some(range_m), power_dbm });
+            points.push(CloudPoint { chirp, point, range_m: Some(range_m), power_w });
         }
     }
     Ok(Cloud::new(points)?)

@@ -147,8 +147,8 @@ fn trip(scene: &Scene, seed: u64) -> Result<Trip, Failure> {
     let before = rendered(scene, &quiet, mesh, &start(), seed)?;
     Ok(Trip {
         shift_mm: 1e3 * Motion::of(&registered.pose, middle).shift_m.length(),
-        rows: reduced.curve.rows.len(),
-        silent: reduced.curve.rows.len() - reduced.curve.detected().count(),
+        rows: reduced.curve.observations.len(),
+        silent: reduced.curve.observations.len() - reduced.curve.detected().count(),
         errors_db: [&before, &again, &unmoved, &exact].map(|image| rms_db(&seen, image)),
         between_db: rms_db(&unmoved, &exact),
         found,
@@ -157,7 +157,8 @@ fn trip(scene: &Scene, seed: u64) -> Result<Trip, Failure> {
 
 fn point(echo: &Echo) -> CloudPoint {
     let Echo { chirp, point, range_m, power_dbm, .. } = *echo;
-    CloudPoint { chirp: Some(chirp), point, range_m: Some(range_m), power_dbm }
+    let power_w = watts_from_dbm(power_dbm);
+    CloudPoint { chirp: Some(chirp), point, range_m: Some(range_m), power_w }
 }
 
 fn moved(mesh: &Mesh, pose: &Pose<Global, Global>) -> Mesh {

@@ -3,7 +3,8 @@
 use std::f64::consts::{PI, SQRT_2};
 
 use matdb::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Scattering, Shadowing};
-use matdb::measure::curve::{Curve, Row};
+use matdb::material::Observation;
+use matdb::measure::curve::Curve;
 use matdb::radar::random::{Key, Purpose};
 use matdb::radar::{Link, Radar};
 use matdb::units::watts_from_dbm;
@@ -49,10 +50,10 @@ impl Case {
     /// No two cases and seeds share a draw.
     pub fn curve(&self, seed: u64) -> Curve {
         let seed = seed + 1_000_000 * self.looks as u64 + 100_000 * self.theta_sd_deg as u64;
-        Curve { rows: (0..CHIRPS).map(|chirp| self.row(&truth(), seed, chirp)).collect() }
+        Curve { observations: (0..CHIRPS).map(|chirp| self.row(&truth(), seed, chirp)).collect() }
     }
 
-    fn row(&self, truth: &Brdf, seed: u64, chirp: u32) -> Row {
+    fn row(&self, truth: &Brdf, seed: u64, chirp: u32) -> Observation {
         let key = Key { seed, chirp: chirp.into(), sub_ray: 0, purpose: Purpose::Speckle };
         let mut draws = key.draws();
         let theta_sd_rad = self.theta_sd_deg.to_radians();
@@ -65,15 +66,12 @@ impl Case {
         let power_w = received_w.max(threshold_w);
         let censored = received_w < threshold_w;
         let sigma0 = power_w / watts_per_sigma0;
-        Row {
-            theta_rad,
-            theta_sd_rad,
-            power_w,
-            sigma0,
-            range_m: RANGE_M,
-            chirp,
-            censored,
-            target_m: None,
+        Observation {
+            theta_sd_rad: Some(theta_sd_rad),
+            power_w: Some(power_w),
+            range_m: Some(RANGE_M),
+            chirp: Some(chirp),
+            ..Observation::of_level(theta_rad, sigma0, censored)
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A backscatter curve: read, written and read again it has the same rows.
+//! A backscatter curve: read, written and read again it has as many rows.
 
 #![no_main]
 
@@ -8,6 +8,6 @@ use matdb::measure::Curve;
 fuzz_target!(|bytes: &[u8]| {
     if let Ok(curve) = Curve::read(bytes) {
         let again = Curve::read(&curve.write()).unwrap();
-        assert_eq!(again.rows.len(), curve.rows.len());
+        assert_eq!(again.observations.len(), curve.observations.len());
     }
 });

@@ -13,6 +13,6 @@ fuzz_target!(|bytes: &[u8]| {
         _ => CloudFormat::Xyz,
     };
     if let Ok(cloud) = CloudReading::default().read(format, rest) {
-        assert!(cloud.points().iter().all(|p| p.point.xyz.is_finite() && p.power_dbm.is_finite()));
+        assert!(cloud.points().iter().all(|p| p.point.xyz.is_finite() && p.power_w.is_finite()));
     }
 });

@@ -13,7 +13,7 @@ use crate::files::write_all;
 use crate::formats::figure::{Figure, Plot, Scale, Series, Style, beside};
 use crate::frames::Point;
 use crate::geometry::Raster;
-use crate::measure::compare::{Agreement, Line, along, difference, measured_scan};
+use crate::measure::compare::{Agreement, Line, difference, measured_scan, power_along};
 use crate::render::{Observer, Scan, shade, trace_placed};
 use crate::scene::Scene;
 use crate::setup::ReadyScene;
@@ -156,9 +156,9 @@ fn line_scan<'a>(title: &'a str, line: Line, measured: &Scan, simulated: &Scan) 
     let series = |name: &str, scan: &Scan| Series {
         name: format!("{name}, y = {} ± {} m", line.y_m, 0.5 * line.width_m),
         style: Style::Points,
-        points: along(scan, line),
+        points: power_along(scan, line),
     };
-    let empty = along(measured, line).is_empty() && along(simulated, line).is_empty();
+    let empty = power_along(measured, line).is_empty() && power_along(simulated, line).is_empty();
     Plot {
         title,
         subtitle: if empty { "line scan: no detection lies on it" } else { "line scan" },

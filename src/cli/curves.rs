@@ -182,7 +182,7 @@ pub(super) fn put(
         source: source.clone(),
         instrument: circumstances.instrument(material),
         session: None,
-        observations: curve.observations(),
+        observations: curve.observations.clone(),
     };
     match door::missing(material, &curve).as_slice() {
         [] => material.curves.push(curve),

@@ -15,7 +15,7 @@ use crate::error::Error;
 use crate::files::write_all;
 use crate::formats::figure::{Plot, Series, Style};
 use crate::material::{Material, Session, SessionPose};
-use crate::measure::{Curve, Metric, Reduced, Reduction, Registered, Registration, Row};
+use crate::measure::{Curve, Metric, Reduction, ReductionResult, Registration, RegistrationResult};
 use crate::scene::Scene;
 use crate::setup::find_material;
 use crate::store::Store;
@@ -168,7 +168,7 @@ fn target(args: &Args, store: Option<&Store>) -> Result<Option<Material>, Error>
 /// The material with the curve in it.
 fn prepared(
     args: &Args,
-    (curve, registered): (&Curve, &Registered),
+    (curve, registered): (&Curve, &RegistrationResult),
     store: Option<&Store>,
 ) -> Result<Option<(Material, Put)>, Error> {
     let (Some(kind), Some(title)) = (args.kind, &args.source) else { return Ok(None) };
@@ -181,7 +181,7 @@ fn prepared(
 }
 
 /// What is known of the measurement beside its points.
-fn session(args: &Args, date: &str, registered: &Registered) -> Result<Session, Error> {
+fn session(args: &Args, date: &str, registered: &RegistrationResult) -> Result<Session, Error> {
     let hash = activity("measure", &[&args.cloud.cloud])?.inputs.into_iter().next();
     let pose = &registered.pose;
     let rotation_rows = [0, 1, 2].map(|row| pose.rotation().row(row).to_array());
@@ -216,7 +216,7 @@ fn hold_session(material: &mut Material, curve: &str, session: Session) -> Resul
 /// Stores the curve when it is asked for; its name and the revision that holds it.
 fn save(
     args: &Args,
-    measured: (&Curve, &Registered),
+    measured: (&Curve, &RegistrationResult),
     db: &Database,
 ) -> Result<Option<(String, u32)>, Error> {
     if args.save.is_none() {
@@ -268,7 +268,7 @@ fn region(name: &str, scene: &Scene) -> Result<u16, Error> {
 }
 
 /// What `pose.json` holds and `--json` prints.
-fn record(args: &Args, registered: &Registered, reduced: &Reduced) -> Value {
+fn record(args: &Args, registered: &RegistrationResult, reduced: &ReductionResult) -> Value {
     let pose = &registered.pose;
     let rows: Vec<[f64; 3]> = (0..3).map(|row| pose.rotation().row(row).to_array()).collect();
     let left_out = reduced.left_out;
@@ -295,7 +295,7 @@ fn record(args: &Args, registered: &Registered, reduced: &Reduced) -> Value {
         "verdicts": registered.verdicts,
         "curve": {
             "detected": reduced.curve.detected().count(),
-            "censored": reduced.curve.rows.len() - reduced.curve.detected().count(),
+            "censored": reduced.curve.observations.len() - reduced.curve.detected().count(),
             "left_out": {
                 "missed": left_out.missed,
                 "off_surface": left_out.off_surface,
@@ -308,7 +308,7 @@ fn record(args: &Args, registered: &Registered, reduced: &Reduced) -> Value {
     })
 }
 
-fn text(args: &Args, registered: &Registered, reduced: &Reduced) -> String {
+fn text(args: &Args, registered: &RegistrationResult, reduced: &ReductionResult) -> String {
     let middle = registered.pivot;
     let shift_mm = 1e3 * (middle.xyz - (registered.pose.inverse() * middle).xyz);
     let sd = |axis: usize| registered.covariance[axis][axis].sqrt();
@@ -337,7 +337,7 @@ fn text(args: &Args, registered: &Registered, reduced: &Reduced) -> String {
         shift_mm.y,
         shift_mm.z,
         grouped(detected),
-        grouped(curve.rows.len() - detected),
+        grouped(curve.observations.len() - detected),
         angles_deg(curve).fold(f64::INFINITY, f64::min),
         angles_deg(curve).fold(0.0, f64::max),
         grouped(left_out.near_edge + left_out.silent_near_edge),
@@ -348,13 +348,16 @@ fn text(args: &Args, registered: &Registered, reduced: &Reduced) -> String {
 }
 
 fn angles_deg(curve: &Curve) -> impl Iterator<Item = f64> + '_ {
-    curve.rows.iter().map(|row| row.theta_rad.to_degrees())
+    curve.observations.iter().map(|row| row.theta_i_rad.to_degrees())
 }
 
 fn plot<'a>(title: &'a str, curve: &Curve) -> Plot<'a> {
     let points = |censored: bool| {
-        let rows = curve.rows.iter().filter(|row| row.censored == censored);
-        rows.map(|row: &Row| (row.theta_rad.to_degrees(), db_from_ratio(row.sigma0))).collect()
+        let rows = curve.observations.iter().filter(|row| row.is_censored() == censored);
+        rows.filter_map(|row| {
+            Some((row.theta_i_rad.to_degrees(), db_from_ratio(row.level_sigma0()?)))
+        })
+        .collect()
     };
     let series = |name: &str, censored| Series {
         name: name.to_owned(),

@@ -159,7 +159,7 @@ fn asked(args: &Args, store: Option<&Store>) -> Result<Asked, Error> {
     if let Some(path) = &args.curve {
         let bytes = read_small(path)?;
         let refused = |error| Error::CurveFile { file: path.clone(), error };
-        let observations = Curve::read(&bytes).map_err(refused)?.observations();
+        let observations = Curve::read(&bytes).map_err(refused)?.observations;
         return Ok(Asked { observations, frequency_hz: stated_hz, own: None });
     }
     let name = args.material.as_deref().unwrap_or_default();

@@ -17,7 +17,6 @@ use crate::measure::nearest::Nearest;
 use crate::radar::{Chirps, Radar};
 use crate::render::{LocalFrame, trace};
 use crate::trace::Hit;
-use crate::units::watts_from_dbm;
 
 /// What one chirp that should hit the target has seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -208,7 +207,7 @@ fn sorted(
                 match (off_m(point, shot) <= GATE_M, observation.power_w) {
                     (true, None) => {
                         on_target += 1;
-                        let power_w = Some(watts_from_dbm(point.power_dbm));
+                        let power_w = Some(point.power_w);
                         *observation = Observation { power_w, range_m: Some(range_m) };
                     }
                     (is_near, _) => {

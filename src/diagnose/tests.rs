@@ -374,7 +374,7 @@ fn a_cloud_finds_its_shots() {
     let point = |shot: &Shot, chirp: u32, off_m: f64| {
         let range_m = shot.hit.range_m + off_m;
         let point = Point::from(shot.ray.origin.xyz + range_m * shot.ray.direction.xyz());
-        CloudPoint { chirp: Some(chirp), point, range_m: None, power_dbm: -60.0 }
+        CloudPoint { chirp: Some(chirp), point, range_m: None, power_w: 1e-9 }
     };
     // All on their shots but one half a metre behind its shot, and one of a chirp that meets nothing.
     let mut points: Vec<CloudPoint> =
@@ -471,7 +471,7 @@ fn a_wide_spot_sees_past_the_edge() {
                 chirp: Some(*chirp),
                 point,
                 range_m: None,
-                power_dbm: -60.0,
+                power_w: 1e-9,
             })
         };
         Cloud::new(chirps.number.iter().zip(&chirps.rays).filter_map(point).collect()).unwrap()

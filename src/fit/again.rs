@@ -1,54 +1,53 @@
-//! A stored fit once more: whether its curve and its settings still give it.
+//! Repeats a stored fit and says whether its curve and its settings still give it.
 
 mod compare;
 
-use super::{Fit, FitError, Method};
+use super::error::FitError;
+use super::models::{model, model_names};
+use super::settings::{Fit, Method};
 use crate::brdf::Brdf;
-use crate::material::{self, FitReport, Material};
+use crate::material::{self, FitReport, Given, Material};
 use crate::measure::curve::Curve;
 
-/// How far ln likelihoods, or half sums of squares, of two searches for one optimum may differ: where
-/// they stopped, and rounding, relative. One standard deviation of a number is half a unit.
-const SAME_OBJECTIVE: f64 = 0.01;
-const ROUNDING: f64 = 1e-6;
-/// How far numbers may, in the standard deviations of the new fit.
-const SAME_NUMBER_SD: f64 = 0.1;
-
-/// What a fit that this program found has as its estimator.
+/// Estimators of fits that this program made.
 const METHODS: [&str; 4] = ["censored", "mse", "tls", "tls-tail"];
 
 /// The settings that a fit was made with; `None` where its report does not say them.
 pub fn settings(report: &FitReport) -> Option<Fit> {
-    let given = |name: &str| report.given.iter().find(|g| g.name == name).map(|g| g.value);
     let method = match report.method.as_str() {
         "censored" => Method::Censored,
-        "mse" => Method::Mse { split_rad: given("method.split_rad")? },
+        "mse" => Method::Mse { split_rad: given(report, "method.split_rad")? },
         "tls" | "tls-tail" => Method::Tls {
-            theta_sd_rad: given("method.theta_sd_rad")?,
-            level_sd_db: given("method.level_sd_db")?,
+            theta_sd_rad: given(report, "method.theta_sd_rad")?,
+            level_sd_db: given(report, "method.level_sd_db")?,
         },
         _ => return None,
     };
-    let is_setting = |name: &str| name == "looks" || name.starts_with("method.");
-    let is_bound = |name: &str| name.ends_with(".min") || name.ends_with(".max");
-    let held = report.given.iter().filter(|g| !is_setting(&g.name) && !is_bound(&g.name));
-    let fixed = held.map(|g| (g.name.clone(), g.value)).collect();
-    let bounds = report.given.iter().filter_map(|g| {
-        let name = g.name.strip_suffix(".min")?;
-        Some((name.to_owned(), [g.value, given(&format!("{name}.max"))?]))
-    });
+    let (mut fixed, mut bounds) = (Vec::new(), Vec::new());
+    for Given { name, value } in &report.given {
+        if let Some(path) = name.strip_suffix(".min") {
+            let max = given(report, &format!("{path}.max"));
+            bounds.extend(max.map(|max| (path.to_owned(), [*value, max])));
+        } else if !name.ends_with(".max") && !name.starts_with("method.") && name != "looks" {
+            fixed.push((name.clone(), *value));
+        }
+    }
     Some(Fit {
         method,
         fixed,
-        bounds: bounds.collect(),
-        looks: given("looks"),
+        bounds,
+        looks: given(report, "looks"),
         noise_w: Some(report.noise_w).filter(|noise_w| *noise_w > 0.0),
         starts: report.starts as usize,
         seed: report.seed,
     })
 }
 
-/// Whether a fit says that this program found it, and the report of that is not there any more.
+fn given(report: &FitReport, name: &str) -> Option<f64> {
+    report.given.iter().find(|given| given.name == name).map(|given| given.value)
+}
+
+/// Whether a fit says that this program made it but has no report.
 pub fn lacks_report(fit: &material::Fit) -> bool {
     fit.curve.is_some() && fit.report.is_none() && METHODS.contains(&fit.estimator.as_str())
 }
@@ -63,20 +62,28 @@ pub fn problems(material: &Material, fit: &material::Fit) -> Option<Vec<String>>
         Err(error) => return Some(vec![error.to_string()]),
     };
     let found = differences(fit, &curve).unwrap_or_else(|error| vec![error.to_string()]);
-    let is_found_from =
-        |start: &Brdf| differences_from(fit, start, &curve).is_ok_and(|found| found.is_empty());
-    let is_found = found.is_empty() || starts(material, fit).iter().any(is_found_from);
-    Some(if is_found { Vec::new() } else { found })
+    if found.is_empty() {
+        return Some(found);
+    }
+    for start in starts(material, fit) {
+        if differences_from(fit, &start, &curve).is_ok_and(|found| found.is_empty()) {
+            return Some(Vec::new());
+        }
+    }
+    Some(found)
 }
 
-/// Where the search may have begun. A report does not say it, and where the data hardly tell the numbers,
-/// or pieces are fitted one after the other, the end depends on it.
+/// Models from which the search may have started. A report does not say it, and the result depends on it where the data
+/// hardly determine the numbers, or where pieces are fitted one after the other.
 fn starts(material: &Material, fit: &material::Fit) -> Vec<Brdf> {
-    let paths = |model: &Brdf| model.parameters().into_iter().map(|p| p.path).collect::<Vec<_>>();
     let same = paths(&fit.model);
     let others = material.fits.iter().map(|other| other.model.clone());
-    let named = super::model_names().filter_map(super::model);
+    let named = model_names().filter_map(model);
     named.chain(others).filter(|start| paths(start) == same).collect()
+}
+
+fn paths(model: &Brdf) -> Vec<String> {
+    model.parameters().into_iter().map(|parameter| parameter.path).collect()
 }
 
 /// Fits the curve of a stored fit again, from what was found, and says what differs, a sentence each.
@@ -107,7 +114,6 @@ fn differences_from(
 
 #[cfg(test)]
 mod tests {
-    use super::super::model;
     use super::super::twin::{Twin, mixture};
     use super::*;
     use crate::material::builtin;
@@ -141,7 +147,7 @@ mod tests {
         let mut material = builtin::get("ptfe").unwrap().unwrap();
         let source = material.sources[0].key.clone();
         let stored = found.stored("pieces", "scan", &source);
-        let observations = curve.observations();
+        let observations = curve.observations.clone();
         let (name, instrument, session) = ("scan".to_owned(), None, None);
         material.curves = vec![material::Curve { name, source, instrument, session, observations }];
         assert_ne!(differences(&stored, &curve), Ok(Vec::new()), "the end is no start");
@@ -168,7 +174,7 @@ mod tests {
             source,
             instrument: None,
             session: None,
-            observations: curve.observations(),
+            observations: curve.observations,
         });
         material
     }

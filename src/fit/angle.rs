@@ -1,9 +1,9 @@
-//! Where the true angle of incidence can be, when the normal is known only to within two tilts.
+//! Distribution of the true angle of incidence, given a measured one and the errors of the normal's two tilts.
 //!
 //! With independent tilt errors of standard deviation s in both directions and a measured angle θ,
 //! the true tilt is (θ + a, b), a and b normal, and the true angle t = √((θ + a)² + b²) follows Rice's
 //! law, p(t) = t/s²·exp(−(t² + θ²)/2s²)·I₀(tθ/s²): one integral instead of two. Near normal
-//! incidence this is far from a bell around θ: of θ = 0 it makes 1.25·s on average.
+//! incidence this is far from a bell around θ: at θ = 0 the mean of t is 1.25·s.
 //!
 //! The nodes must resolve Rice's law and what it is multiplied by. On the flank of a specular lobe
 //! ln σ⁰ falls by 70 nepers per rad (m = 0.07), and L looks of speckle scatter by about 1/√L nepers: for
@@ -12,14 +12,14 @@
 
 /// Nodes are a third of s apart, but near normal incidence no more than this, rad: 0.3°.
 const APART_RAD: f64 = 5.236e-3;
-/// And further off by so much of the smallest angle that is looked at.
+/// Away from normal incidence this share of the smallest angle is added.
 const APART_SHARE: f64 = 1.0 / 40.0;
-/// Most nodes for each chirp, which errors of up to 3.6° need.
+/// Most nodes for each chirp; errors of up to 3.6° need no more.
 const MOST_NODES: usize = 96;
-/// How many s are looked at on either side.
+/// Nodes reach this many s to either side of the measured angle.
 const REACH: f64 = 4.0;
 
-/// True angles, rad, and their weights, which sum to 1. The angle as it is where it is exact.
+/// True angles, rad, and their weights, which sum to 1; the measured angle alone where it is exact.
 pub(super) fn true_angles(theta_rad: f64, sd_rad: f64) -> Vec<(f64, f64)> {
     if sd_rad <= 0.0 {
         return vec![(theta_rad, 1.0)];
@@ -29,11 +29,11 @@ pub(super) fn true_angles(theta_rad: f64, sd_rad: f64) -> Vec<(f64, f64)> {
     let apart = (sd_rad / 3.0).min(APART_RAD + APART_SHARE * low);
     let count = ((reach / apart).ceil() as usize).clamp(1, MOST_NODES);
     let width = reach / count as f64;
-    let node = |index| {
+    let mut nodes = Vec::with_capacity(count);
+    for index in 0..count {
         let t = low + (index as f64 + 0.5) * width;
-        (t, rice(t / sd_rad, theta_rad / sd_rad))
-    };
-    let nodes: Vec<(f64, f64)> = (0..count).map(node).collect();
+        nodes.push((t, rice(t / sd_rad, theta_rad / sd_rad)));
+    }
     let sum: f64 = nodes.iter().map(|(_, weight)| weight).sum();
     nodes.into_iter().map(|(t, weight)| (t, weight / sum)).collect()
 }
@@ -58,11 +58,15 @@ fn bessel_i0_scaled(x: f64) -> f64 {
         -0.016_476_33,
         0.003_923_77,
     ];
-    let series = |terms: &[f64], y: f64| terms.iter().rev().fold(0.0, |sum, term| sum * y + term);
     if x < 3.75 {
-        return (-x).exp() * series(&SMALL, (x / 3.75).powi(2));
+        return (-x).exp() * polynomial(&SMALL, (x / 3.75).powi(2));
     }
-    series(&LARGE, 3.75 / x) / x.sqrt()
+    polynomial(&LARGE, 3.75 / x) / x.sqrt()
+}
+
+/// Σ term_n·yⁿ by Horner's scheme.
+fn polynomial(terms: &[f64], y: f64) -> f64 {
+    terms.iter().rev().fold(0.0, |sum, term| sum * y + term)
 }
 
 #[cfg(test)]

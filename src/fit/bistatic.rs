@@ -1,16 +1,16 @@
-//! Scattering measured in any pair of directions → the parameters of a model, by least squares in dB.
+//! Fits a model to scattering that was measured in any pairs of directions, by least squares in dB.
 //!
 //! Goniophotometers measure f(i, o) with a steady error and without a threshold: the cost is
-//! Σ (10·lg f_model(i, o) − 10·lg f)². It has none of what a radar needs: no speckle, no missing
-//! detections, no angle error. What is left over a perfect repeat is the model's own error.
+//! Σ (10·lg f_model(i, o) − 10·lg f)². Unlike the fit of a radar's curve it models no speckle, no
+//! missing detections and no angle error. The residual beyond the repeatability is the error of the model.
 
 use nalgebra::DVector;
 use serde::Serialize;
 
 use super::coordinates::{Coordinates, frequencies};
-use super::minimise::{Local, Minimise, Minimum};
+use super::error::FitError;
+use super::minimise::{Local, Minimise, Stop};
 use super::search::drawn_start;
-use super::{FitError, Stop};
 use crate::brdf::{Brdf, Scattering};
 use crate::frames::{Direction, Surface};
 use crate::units::db_from_ratio;
@@ -56,7 +56,7 @@ pub struct BistaticResult {
     pub agreeing_starts: usize,
 }
 
-/// dB of what a model calls nothing.
+/// Level of a model that scatters nothing, dB.
 const NOTHING_DB: f64 = -200.0;
 const SEARCH: Minimise = Minimise { iterations: 300, tolerance: 1e-6, patience: usize::MAX };
 /// Step of the derivatives in the search.
@@ -71,25 +71,26 @@ impl Bistatic {
         let coordinates = Coordinates::new(start, &frequencies(start), &[], Some(1.0))?;
         self.validate(samples, coordinates.len())?;
         let bounds = [coordinates.lower(), coordinates.upper()];
-        let cost = |at: &DVector<f64>| local(&coordinates, samples, at);
-        let search = |number: usize| {
+        // The rms of every start with where it ended, the given start first.
+        let mut found = Vec::new();
+        for number in 0..self.starts {
             let start = match number {
                 0 => coordinates.start(),
                 _ => drawn_start(&coordinates, self.seed, number),
             };
-            SEARCH.run(&start, [&bounds[0], &bounds[1]], cost)
-        };
-        let found: Vec<Minimum> = (0..self.starts).map(search).collect();
-        let rms_db = |found: &Minimum| (2.0 * found.local.value / samples.len() as f64).sqrt();
-        let Some(best) = found.iter().min_by(|a, b| rms_db(a).total_cmp(&rms_db(b))) else {
+            let end =
+                SEARCH.run(&start, [&bounds[0], &bounds[1]], |at| local(&coordinates, samples, at));
+            found.push(((2.0 * end.local.value / samples.len() as f64).sqrt(), end));
+        }
+        let Some((rms_db, best)) = found.iter().min_by(|(a, _), (b, _)| a.total_cmp(b)) else {
             return Err(FitError::Empty);
         };
         Ok(BistaticResult {
             model: coordinates.model(&best.at),
-            rms_db: rms_db(best),
+            rms_db: *rms_db,
             converged: best.converged(),
             stop: best.stop,
-            agreeing_starts: found.iter().filter(|f| rms_db(f) <= 1.01 * rms_db(best)).count(),
+            agreeing_starts: found.iter().filter(|(rms, _)| *rms <= 1.01 * rms_db).count(),
         })
     }
 
@@ -108,43 +109,44 @@ impl Bistatic {
         if detected < unknowns {
             return Err(FitError::TooFewRows { detected, unknowns });
         }
-        let good = |sample: &Sample| sample.f_per_sr.is_finite() && sample.f_per_sr > 0.0;
-        match samples.iter().position(|sample| !good(sample)) {
-            None => Ok(()),
-            Some(row) => {
-                let (value, wanted) = (samples[row].f_per_sr, "not above 0");
-                Err(FitError::Row { row, name: "f_per_sr", value, wanted })
+        for (row, &Sample { f_per_sr: value, .. }) in samples.iter().enumerate() {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(FitError::Row { row, name: "f_per_sr", value, wanted: "not above 0" });
             }
         }
+        Ok(())
     }
 }
 
 /// ½Σ of squared residuals in dB.
 fn local(coordinates: &Coordinates, samples: &[Sample], at: &DVector<f64>) -> Local {
-    let levels_db = |at: &DVector<f64>| -> Vec<f64> {
-        let model = coordinates.model(at);
-        let level = |sample: &Sample| db_from_ratio(model.f_per_sr(sample.i, sample.o));
-        samples.iter().map(|sample| level(sample).max(NOTHING_DB)).collect()
-    };
     let upper = coordinates.upper();
-    let here = levels_db(at);
-    let moved: Vec<(f64, Vec<f64>)> = (0..at.len())
-        .map(|index| {
-            let step = if at[index] + STEP > upper[index] { -STEP } else { STEP };
-            let mut there = at.clone();
-            there[index] += step;
-            (step, levels_db(&there))
-        })
-        .collect();
+    let here = levels_db(&coordinates.model(at), samples);
+    // The levels after a step of each coordinate, for one-sided differences.
+    let mut moved: Vec<(f64, Vec<f64>)> = Vec::new();
+    for index in 0..at.len() {
+        let step = if at[index] + STEP > upper[index] { -STEP } else { STEP };
+        let mut there = at.clone();
+        there[index] += step;
+        moved.push((step, levels_db(&coordinates.model(&there), samples)));
+    }
     let mut sum = Local::zero(at.len());
     for (row, (sample, level_db)) in samples.iter().zip(&here).enumerate() {
         let residual = level_db - db_from_ratio(sample.f_per_sr);
-        let slope = |(step, there): &(f64, Vec<f64>)| (there[row] - level_db) / step;
-        let jacobian: Vec<f64> = moved.iter().map(slope).collect();
+        let jacobian: Vec<f64> =
+            moved.iter().map(|(step, there)| (there[row] - level_db) / step).collect();
         sum.value += 0.5 * residual * residual;
         sum.add(residual, 1.0, &jacobian);
     }
     sum
+}
+
+/// Levels of a model in the directions of the samples, dB.
+fn levels_db(model: &Brdf, samples: &[Sample]) -> Vec<f64> {
+    samples
+        .iter()
+        .map(|sample| db_from_ratio(model.f_per_sr(sample.i, sample.o)).max(NOTHING_DB))
+        .collect()
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! What a fit turns: the coordinates of a model that backscatter can tell, on scales that suit a search.
+//! The coordinates of a search: the numbers of a model that backscatter determines, on scales that suit a search.
 //!
 //! Of the paper's mixture (12), (13), (15), backscatter sees m, α and the two levels
 //! S = (1 − k)·f_λ and R = k·r_s, so that these are the coordinates, and the gauge says how k is
@@ -7,7 +7,7 @@
 
 use nalgebra::DVector;
 
-use super::FitError;
+use super::error::FitError;
 use crate::brdf::{Brdf, Mixture, Parameter};
 
 /// Name of the specular level S = (1 − k)·f_λ.
@@ -18,7 +18,7 @@ pub(crate) const DIFFUSE_LEVEL: &str = "R";
 pub(crate) const LOOKS: &str = "looks";
 /// Levels that have a meaning: a billionth is 60 dB below the weakest detection.
 const LEVEL_RANGE: (f64, f64) = (1e-9, 1.0);
-/// Looks from far spikier than developed speckle to none to speak of.
+/// Looks from far stronger than fully developed speckle to practically none.
 const LOOKS_RANGE: (f64, f64) = (0.1, 1e4);
 
 /// How a number is searched.
@@ -71,7 +71,7 @@ impl Scale {
     }
 }
 
-/// One number that a fit turns.
+/// One number that a fit searches.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Coordinate {
     /// The parameter's path, `S`, `R` or `looks`.
@@ -93,6 +93,11 @@ impl Coordinate {
     /// The value at a point of the search, kept in its range.
     pub fn value(&self, searched: f64) -> f64 {
         self.scale.value(searched).clamp(self.min, self.max)
+    }
+
+    /// Whether the coordinate is of the diffuse part of a mixture.
+    fn is_diffuse(&self) -> bool {
+        self.name.starts_with("diffuse.") || self.name == DIFFUSE_LEVEL
     }
 
     /// dv/du.
@@ -121,7 +126,7 @@ impl Coordinate {
     }
 }
 
-/// All that a fit turns, and the model that holds the rest.
+/// All numbers that a fit searches, and the model with its other numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Coordinates {
     /// In the order of the search.
@@ -132,11 +137,13 @@ pub(crate) struct Coordinates {
     looks: f64,
 }
 
-/// The frequencies in a law: they are the radar's, and nothing that a surface could tell.
+/// The frequencies in a law: they belong to the radar, so that a fit must not search them.
 pub(crate) fn frequencies(law: &Brdf) -> Vec<(String, f64)> {
-    let is_frequency = |path: &str| path.rsplit('.').next() == Some("frequency_hz");
-    let parameters = law.parameters().into_iter().filter(|p| is_frequency(&p.path));
-    parameters.map(|parameter| (parameter.path, parameter.value)).collect()
+    law.parameters()
+        .into_iter()
+        .filter(|parameter| parameter.path.rsplit('.').next() == Some("frequency_hz"))
+        .map(|parameter| (parameter.path, parameter.value))
+        .collect()
 }
 
 impl Coordinates {
@@ -156,12 +163,11 @@ impl Coordinates {
             }
         }
         base.validate()?;
-        let is_fixed = |path: &str| fixed.iter().any(|(name, _)| name == path);
-        let gauge = gauge(&base, &is_fixed);
+        let gauge = gauge(&base, fixed);
         let mut list: Vec<Coordinate> = base
             .parameters()
             .into_iter()
-            .filter(|parameter| !is_fixed(&parameter.path))
+            .filter(|parameter| !is_fixed(fixed, &parameter.path))
             .filter_map(|parameter| coordinate(&base, gauge, &parameter))
             .collect();
         if looks.is_none() {
@@ -234,25 +240,29 @@ impl Coordinates {
         model
     }
 
-    /// How the numbers that backscatter cannot tell were chosen; `None` where the model has no such gauge.
+    /// The chosen k, where backscatter does not determine it; `None` for a model without such a gauge.
     pub fn gauge(&self) -> Option<f64> {
         self.gauge
     }
 
     /// Whether the model is a mixture, and which of its coordinates are of its diffuse part.
     pub fn is_diffuse(&self) -> Option<Vec<bool>> {
-        let diffuse = |c: &Coordinate| c.name.starts_with("diffuse.") || c.name == DIFFUSE_LEVEL;
-        matches!(self.base, Brdf::Mixture(_)).then(|| self.list.iter().map(diffuse).collect())
+        matches!(self.base, Brdf::Mixture(_))
+            .then(|| self.list.iter().map(Coordinate::is_diffuse).collect())
     }
 }
 
 /// k, where only the products of the paper's mixture can be found: neither level is fixed.
-fn gauge(base: &Brdf, is_fixed: &impl Fn(&str) -> bool) -> Option<f64> {
+fn gauge(base: &Brdf, fixed: &[(String, f64)]) -> Option<f64> {
     let Brdf::Mixture(Mixture { k, .. }) = base else { return None };
     let inside = *k > 0.0 && *k < 1.0;
-    let free = !is_fixed("specular.f_lambda") && !is_fixed("diffuse.r_s");
-    let usable = base.identified_products().is_some() && free && (inside || !is_fixed("k"));
+    let free = !is_fixed(fixed, "specular.f_lambda") && !is_fixed(fixed, "diffuse.r_s");
+    let usable = base.identified_products().is_some() && free && (inside || !is_fixed(fixed, "k"));
     usable.then_some(if inside { *k } else { 0.5 })
+}
+
+fn is_fixed(fixed: &[(String, f64)], path: &str) -> bool {
+    fixed.iter().any(|(name, _)| name == path)
 }
 
 fn coordinate(base: &Brdf, gauge: Option<f64>, parameter: &Parameter) -> Option<Coordinate> {

@@ -1,4 +1,4 @@
-//! The law of a speckled power of mean 1 and L looks, Gamma(L, 1/L), and of its staying below a limit.
+//! The law of a speckled power of mean 1 and L looks, Gamma(L, 1/L), and the probability that it stays below a limit.
 //!
 //! ln P(L, x), P the regularised lower incomplete gamma function, keeps its digits in the far tail:
 //! below x = L + 1 the series ln P = L·ln x − x − ln Γ(L) + ln Σ, above it ln(1 − Q) with Q by
@@ -31,6 +31,11 @@ pub(crate) fn ln_lower_gamma(a: f64, x: f64) -> f64 {
     (-(ln_front.exp() * upper_fraction(a, x)).min(1.0)).ln_1p()
 }
 
+/// Keeps a divisor away from 0.
+fn guarded(z: f64) -> f64 {
+    if z.abs() < f64::MIN_POSITIVE { f64::MIN_POSITIVE } else { z }
+}
+
 /// Γ(a, x)·eˣ/xᵃ by Lentz's continued fraction.
 fn upper_fraction(a: f64, x: f64) -> f64 {
     let mut b = x + 1.0 - a;
@@ -41,7 +46,6 @@ fn upper_fraction(a: f64, x: f64) -> f64 {
         let n = n as f64;
         let an = -n * (n - a);
         b += 2.0;
-        let guarded = |z: f64| if z.abs() < f64::MIN_POSITIVE { f64::MIN_POSITIVE } else { z };
         d = 1.0 / guarded(an * d + b);
         c = guarded(b + an / c);
         value *= d * c;
@@ -88,13 +92,13 @@ impl GammaLaw {
     /// The law of L looks, L > 0.
     pub fn new(looks: f64) -> GammaLaw {
         let narrowness = looks.sqrt().max(1.0);
-        let ln_ratio = |knot: usize| (FIRST + STEP * knot as f64) / narrowness;
+        let ln_ratios = (0..KNOTS).map(|knot| (FIRST + STEP * knot as f64) / narrowness);
         GammaLaw {
             looks,
             narrowness,
             ln_constant: looks * looks.ln() - ln_gamma(looks),
             constant_slope: looks * (looks.ln() + 1.0 - digamma(looks)),
-            below: (0..KNOTS).map(|knot| below(looks, ln_ratio(knot))).collect(),
+            below: ln_ratios.map(|ln_ratio| below(looks, ln_ratio)).collect(),
         }
     }
 
@@ -130,13 +134,16 @@ impl GammaLaw {
     }
 }
 
+/// ln of the probability of a power below the limit, and its derivatives; `ln_ratio` is ln(limit/mean).
 fn below(looks: f64, ln_ratio: f64) -> LnProbability {
-    let at = |looks: f64| ln_lower_gamma(looks, looks * ln_ratio.exp());
-    let value = at(looks);
     let x = looks * ln_ratio.exp();
+    let value = ln_lower_gamma(looks, x);
     // d P/d ln x = xᴸe⁻ˣ/Γ(L).
     let ln_density = looks * x.ln() - x - ln_gamma(looks);
-    let [more, less] = [LOOKS_STEP, -LOOKS_STEP].map(|step| at(looks * step.exp()));
+    let [more, less] = [LOOKS_STEP, -LOOKS_STEP].map(|step| {
+        let looks = looks * step.exp();
+        ln_lower_gamma(looks, looks * ln_ratio.exp())
+    });
     let by_ln_mean = -(ln_density - value).exp();
     LnProbability {
         value,

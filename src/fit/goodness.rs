@@ -4,41 +4,67 @@
 //! standard normal if the law is right (Dunn & Smyth 1996, DOI 10.1080/10618600.1996.10474708). Least
 //! squares has no law of its own: there z is the residual over the residuals' own deviation.
 
-use serde::Serialize;
-use statrs::function::erf::erfc;
-use statrs::function::erf::erfc_inv;
+use nalgebra::DVector;
+use statrs::function::erf::{erfc, erfc_inv};
 
+use super::coordinates::Coordinates;
+use super::likelihood::Likelihood;
+use super::settings::{Fit, Method};
+use super::table::{Place, Table};
+use crate::material::{Goodness, Observation};
 use crate::radar::random::{Key, Purpose};
+use crate::radar::speckle::standard_deviation_db;
+use crate::units::db_from_ratio;
 
-/// How well a fit explains its rows.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Goodness {
-    /// Root mean square of detected σ⁰ over the model, dB.
-    pub rms_db: f64,
-    /// Mean of the same, dB. Speckle of few looks makes it negative where the model is right.
-    pub mean_db: f64,
-    /// Standard deviation that speckle of the fit's looks leaves to a perfect model, dB, where no
-    /// angle is wrong; `None` for least squares.
-    pub speckle_db: Option<f64>,
-    /// Mean of z, 0 if the law is right.
-    pub z_mean: f64,
-    /// Variance of z, 1 if the law is right.
-    pub z_variance: f64,
-    /// Largest distance of u from a uniform law (Kolmogorov). 1.36/√rows is passed once in 20 times by
-    /// a right law without fitted parameters, more seldom with.
-    pub ks_distance: f64,
-    /// Rows that z was made of.
-    pub rows: usize,
+/// Detected σ⁰ over the model, dB.
+pub(super) fn residuals_db(
+    fit: &Fit,
+    coordinates: &Coordinates,
+    at: &DVector<f64>,
+    rows: &[Observation],
+) -> Vec<f64> {
+    let table = Table::new(&coordinates.model(at));
+    let noise_w = fit.noise_w.unwrap_or(0.0);
+    let detected = rows.iter().filter(|row| !row.is_censored());
+    detected
+        .filter_map(|row| {
+            let sigma0 = row.sigma0?;
+            let noise = noise_w * sigma0 / row.power_w.unwrap_or(sigma0);
+            let model = table.at(&Place::new(row.theta_i_rad)).exp() + noise;
+            Some(db_from_ratio(sigma0) - db_from_ratio(model))
+        })
+        .collect()
 }
 
-/// Probabilities u of rows from the ln of what lies below each; censored rows are drawn.
-pub(super) fn shares(ln_below: &[f64], censored: &[bool], seed: u64) -> Vec<f64> {
-    let share = |(index, (&ln_below, &censored)): (usize, (&f64, &bool))| {
+pub(super) fn goodness(
+    fit: &Fit,
+    coordinates: &Coordinates,
+    at: &DVector<f64>,
+    rows: &[Observation],
+) -> Goodness {
+    let residuals_db = residuals_db(fit, coordinates, at, rows);
+    if fit.method == Method::Censored {
+        let noise_w = fit.noise_w.unwrap_or(0.0);
+        let below = Likelihood::new(coordinates, rows, noise_w).ln_below(at);
+        let censored: Vec<bool> = rows.iter().map(Observation::is_censored).collect();
+        let speckle_db = standard_deviation_db(coordinates.looks(at));
+        return goodness_of(&residuals_db, shares(&below, &censored, fit.seed), Some(speckle_db));
+    }
+    let squares: f64 = residuals_db.iter().map(|r| r * r).sum();
+    let rms_db = (squares / residuals_db.len().max(1) as f64).sqrt().max(f64::MIN_POSITIVE);
+    let shares = residuals_db.iter().map(|r| normal_share(r / rms_db)).collect();
+    goodness_of(&residuals_db, shares, None)
+}
+
+/// Probabilities u of rows from ln of the probability below each; those of censored rows are drawn.
+fn shares(ln_below: &[f64], censored: &[bool], seed: u64) -> Vec<f64> {
+    let mut shares = Vec::with_capacity(ln_below.len());
+    for (index, (ln_below, &is_censored)) in ln_below.iter().zip(censored).enumerate() {
         let key = Key { seed, chirp: index as u64, sub_ray: 0, purpose: Purpose::Fit };
-        let part = if censored { key.draws().uniform() } else { 1.0 };
-        part * ln_below.exp()
-    };
-    ln_below.iter().zip(censored).enumerate().map(share).collect()
+        let part = if is_censored { key.draws().uniform() } else { 1.0 };
+        shares.push(part * ln_below.exp());
+    }
+    shares
 }
 
 /// Φ(z): the probability of a normal number below z.
@@ -46,25 +72,28 @@ pub(crate) fn normal_share(z: f64) -> f64 {
     0.5 * erfc(-z / std::f64::consts::SQRT_2)
 }
 
-impl Goodness {
-    /// Sums up residuals in dB and probabilities u.
-    pub(super) fn new(residuals_db: &[f64], mut shares: Vec<f64>, speckle_db: Option<f64>) -> Self {
-        let deviate =
-            |u: &f64| -std::f64::consts::SQRT_2 * erfc_inv(2.0 * u.clamp(1e-15, 1.0 - 1e-15));
-        let z: Vec<f64> = shares.iter().map(deviate).collect();
-        let z_mean = mean(z.iter().copied());
-        shares.sort_by(f64::total_cmp);
-        let count = shares.len() as f64;
-        let gap = |(i, u): (usize, &f64)| (u - i as f64 / count).max((i as f64 + 1.0) / count - u);
-        Goodness {
-            rms_db: mean(residuals_db.iter().map(|r| r * r)).sqrt(),
-            mean_db: mean(residuals_db.iter().copied()),
-            speckle_db,
-            z_mean,
-            z_variance: mean(z.iter().map(|z| (z - z_mean).powi(2))),
-            ks_distance: shares.iter().enumerate().map(gap).fold(0.0, f64::max),
-            rows: shares.len(),
-        }
+/// Sums up residuals in dB and probabilities u; `speckle_db` is the standard deviation that speckle alone leaves.
+fn goodness_of(residuals_db: &[f64], mut shares: Vec<f64>, speckle_db: Option<f64>) -> Goodness {
+    const SQRT_2: f64 = std::f64::consts::SQRT_2;
+    // z = Φ⁻¹(u), away from the infinite ends.
+    let z: Vec<f64> =
+        shares.iter().map(|u| -SQRT_2 * erfc_inv(2.0 * u.clamp(1e-15, 1.0 - 1e-15))).collect();
+    let z_mean = mean(z.iter().copied());
+    // Kolmogorov's distance of u from a uniform law.
+    shares.sort_by(f64::total_cmp);
+    let count = shares.len() as f64;
+    let mut ks_distance = 0.0f64;
+    for (i, u) in shares.iter().enumerate() {
+        ks_distance = ks_distance.max(u - i as f64 / count).max((i as f64 + 1.0) / count - u);
+    }
+    Goodness {
+        rms_db: mean(residuals_db.iter().map(|r| r * r)).sqrt(),
+        mean_db: mean(residuals_db.iter().copied()),
+        speckle_db,
+        z_mean,
+        z_variance: mean(z.iter().map(|z| (z - z_mean).powi(2))),
+        ks_distance,
+        rows: u32::try_from(shares.len()).unwrap_or(u32::MAX),
     }
 }
 
@@ -81,7 +110,7 @@ mod tests {
     fn a_uniform_law_is_found_uniform() {
         let ln_below: Vec<f64> = (0..2000).map(|i| ((f64::from(i) + 0.5) / 2000.0).ln()).collect();
         let shares = shares(&ln_below, &[false; 2000], 1);
-        let goodness = Goodness::new(&[1.0, -1.0], shares, None);
+        let goodness = goodness_of(&[1.0, -1.0], shares, None);
         assert!(goodness.z_mean.abs() < 1e-6 && (goodness.z_variance - 1.0).abs() < 5e-3);
         assert!(goodness.ks_distance < 1e-3 && goodness.rms_db == 1.0 && goodness.mean_db == 0.0);
     }
@@ -92,7 +121,7 @@ mod tests {
         let censored: Vec<bool> = (0..4000).map(|i| i % 2 == 0).collect();
         let u = |i: usize| if censored[i] { 0.5 } else { 0.5 + i as f64 / 8000.0 };
         let ln_below: Vec<f64> = (0..4000).map(|i| u(i).ln()).collect();
-        let goodness = Goodness::new(&[], shares(&ln_below, &censored, 7), None);
+        let goodness = goodness_of(&[], shares(&ln_below, &censored, 7), None);
         assert!(goodness.ks_distance < 1.95 / 4000f64.sqrt(), "{goodness:?}");
     }
 

@@ -1,34 +1,36 @@
-//! How a fit does on rows that it has not seen. Neighbouring chirps meet nearly the same place, so that
-//! whole blocks of them are held out, in turns, and the error of the score is that of blocks.
+//! Cross-validation: how well a fit predicts rows that it has not seen. Neighbouring chirps illuminate nearly the same
+//! place, so that whole blocks of them are held out, one fold after another, and the standard error of the score is that
+//! of blocks.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::DVector;
 
+use super::goodness::residuals_db;
 use super::likelihood::Likelihood;
-use super::result::residuals_db;
-use super::{FitResult, Method};
-use crate::material::HeldOut;
-use crate::measure::curve::{Curve, Row};
+use super::result::FitResult;
+use super::settings::Method;
+use crate::material::{HeldOut, Observation};
+use crate::measure::curve::Curve;
 use crate::radar::random::{Key, Purpose};
 
-/// Parts that take turns at being held out.
+/// Parts that are held out one after another.
 const FOLDS: usize = 5;
 /// Blocks along the longer side of what was scanned, and how many must hold something.
 const ACROSS: f64 = 8.0;
 const LEAST_SQUARES: usize = 2 * FOLDS;
-/// Blocks of consecutive chirps where nobody knows where they lie.
+/// Blocks of consecutive chirps where the places on the target are not known.
 const RUNS: usize = 20;
 
 impl FitResult {
-    /// Fits the curve again without each fifth of its blocks, and tries every fit on what it lacked. Blocks
-    /// are squares on the target where the rows say where they lie; runs of consecutive chirps of a scan;
+    /// Fits the curve again without each fifth of its blocks, and evaluates every fit on that fifth. Blocks
+    /// are squares on the target where the rows have places; runs of consecutive chirps of a scan;
     /// single rows of a sweep of the angle, of which a run would be a whole range of angles.
     ///
     /// `None` where there are fewer blocks than parts, where a part leaves too few detections for the fit,
     /// or where a fit does not converge.
     pub fn hold_out(&self, curve: &Curve) -> Option<HeldOut> {
-        let Blocks { of, block_of_row, block_m } = Blocks::new(&curve.rows);
+        let Blocks { of, block_of_row, block_m } = Blocks::new(&curve.observations);
         let blocks = block_of_row.iter().max().map_or(0, |most| most + 1);
         if blocks < FOLDS {
             return None;
@@ -38,25 +40,27 @@ impl FitResult {
         let fold_of_block = deal(&sizes, FOLDS, self.fit.seed);
         let (mut scores, mut squares_db) = (vec![0.0; blocks], Vec::new());
         for fold in 0..FOLDS {
-            let is_held = |row: usize| fold_of_block[block_of_row[row]] == fold;
-            let [held, kept] = [true, false].map(|wanted| -> Vec<usize> {
-                (0..curve.rows.len()).filter(|&row| is_held(row) == wanted).collect()
-            });
-            let of = |places: &[usize]| places.iter().map(|&row| curve.rows[row]).collect();
-            let at = self.fitted_to(of(&kept))?;
-            let unseen: Vec<Row> = of(&held);
-            for (row, ln_p) in held.iter().zip(self.ln_p(&at, &unseen)) {
-                scores[block_of_row[*row]] += ln_p;
+            let (mut kept, mut unseen, mut block_of_unseen) = (Vec::new(), Vec::new(), Vec::new());
+            for (row, &block) in curve.observations.iter().zip(&block_of_row) {
+                if fold_of_block[block] == fold {
+                    unseen.push(*row);
+                    block_of_unseen.push(block);
+                } else {
+                    kept.push(*row);
+                }
+            }
+            let at = self.fitted_to(kept)?;
+            for (block, ln_p) in block_of_unseen.into_iter().zip(self.ln_p(&at, &unseen)) {
+                scores[block] += ln_p;
             }
             let residuals_db = residuals_db(&self.fit, &self.coordinates, &at, &unseen);
             squares_db.extend(residuals_db.into_iter().map(|residual| residual.powi(2)));
         }
         let [score, score_sd] = mean(&scores, &sizes);
         let has_law = self.fit.method == Method::Censored;
-        let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         Some(HeldOut {
-            folds: count(FOLDS),
-            blocks: count(blocks),
+            folds: FOLDS as u32,
+            blocks: u32::try_from(blocks).unwrap_or(u32::MAX),
             blocks_of: of.to_owned(),
             block_m,
             score: has_law.then_some(score),
@@ -66,16 +70,16 @@ impl FitResult {
         })
     }
 
-    /// Where the search ends on these rows, from where it ended on all.
-    fn fitted_to(&self, rows: Vec<Row>) -> Option<DVector<f64>> {
-        let detected = rows.iter().filter(|row| !row.censored).count();
+    /// The optimum for these rows alone, searched from the optimum for all rows.
+    fn fitted_to(&self, rows: Vec<Observation>) -> Option<DVector<f64>> {
+        let detected = rows.iter().filter(|row| !row.is_censored()).count();
         let best = (detected > self.coordinates.len())
             .then(|| self.fit.nearest_optimum(&self.coordinates, &rows, &self.at))?;
         best.converged().then_some(best.at)
     }
 
     /// ln p of each row; nothing for least squares.
-    fn ln_p(&self, at: &DVector<f64>, rows: &[Row]) -> Vec<f64> {
+    fn ln_p(&self, at: &DVector<f64>, rows: &[Observation]) -> Vec<f64> {
         match self.fit.method {
             Method::Censored => Likelihood::new(&self.coordinates, rows, self.noise_w).ln_p(at),
             Method::Mse { .. } | Method::Tls { .. } => Vec::new(),
@@ -94,17 +98,18 @@ struct Blocks {
 }
 
 impl Blocks {
-    fn new(rows: &[Row]) -> Blocks {
+    fn new(rows: &[Observation]) -> Blocks {
         let places: Option<Vec<[f64; 2]>> = rows.iter().map(|row| row.target_m).collect();
         places.and_then(|places| Blocks::squares(&places)).unwrap_or_else(|| Blocks::in_time(rows))
     }
 
     fn squares(places: &[[f64; 2]]) -> Option<Blocks> {
         let side_m = extent_m(places) / ACROSS;
-        let square = |at: &[f64; 2]| at.map(|x| (x / side_m).floor() as i64);
-        let squares: BTreeSet<[i64; 2]> = places.iter().map(square).collect();
-        let numbers: BTreeMap<[i64; 2], usize> = squares.into_iter().zip(0..).collect();
-        let block_of_row = places.iter().map(|at| numbers[&square(at)]).collect();
+        let squares: Vec<[i64; 2]> =
+            places.iter().map(|at| at.map(|x| (x / side_m).floor() as i64)).collect();
+        let different: BTreeSet<[i64; 2]> = squares.iter().copied().collect();
+        let numbers: BTreeMap<[i64; 2], usize> = different.into_iter().zip(0..).collect();
+        let block_of_row = squares.iter().map(|square| numbers[square]).collect();
         (side_m > 0.0 && numbers.len() >= LEAST_SQUARES).then_some(Blocks {
             of: "squares",
             block_of_row,
@@ -112,11 +117,11 @@ impl Blocks {
         })
     }
 
-    fn in_time(rows: &[Row]) -> Blocks {
+    fn in_time(rows: &[Observation]) -> Blocks {
         let mut in_time: Vec<usize> = (0..rows.len()).collect();
         in_time.sort_by_key(|&row| rows[row].chirp);
-        let angles = || in_time.iter().map(|&row| rows[row].theta_rad);
-        let is_sweep = angles().is_sorted() || angles().rev().is_sorted();
+        let angles_rad: Vec<f64> = in_time.iter().map(|&row| rows[row].theta_i_rad).collect();
+        let is_sweep = angles_rad.is_sorted() || angles_rad.iter().rev().is_sorted();
         let blocks = if is_sweep { rows.len() } else { RUNS.min(rows.len()) };
         let mut block_of_row = vec![0; rows.len()];
         for (place, &row) in in_time.iter().enumerate() {
@@ -128,22 +133,24 @@ impl Blocks {
 
 /// The longer side of what places cover, m.
 fn extent_m(places: &[[f64; 2]]) -> f64 {
-    let side = |axis: usize| {
-        let along = || places.iter().map(|at| at[axis]);
-        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
-    };
-    side(0).max(side(1))
+    let (mut min, mut max) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for at in places {
+        for axis in 0..2 {
+            min[axis] = min[axis].min(at[axis]);
+            max[axis] = max[axis].max(at[axis]);
+        }
+    }
+    (max[0] - min[0]).max(max[1] - min[1])
 }
 
 /// Deals blocks of these sizes to folds, in an order drawn from the seed, each to the emptiest: the fold
 /// of every block.
 pub(crate) fn deal(sizes: &[usize], folds: usize, seed: u64) -> Vec<usize> {
-    let drawn = |block: usize| {
+    let mut order = Vec::with_capacity(sizes.len());
+    for block in 0..sizes.len() {
         let key = Key { seed, chirp: block as u64, sub_ray: 1, purpose: Purpose::Fit };
-        key.draws().uniform()
-    };
-    let mut order: Vec<(f64, usize)> =
-        (0..sizes.len()).map(|block| (drawn(block), block)).collect();
+        order.push((key.draws().uniform(), block));
+    }
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (mut filled, mut fold_of_block) = (vec![0; folds], vec![0; sizes.len()]);
     for (_, block) in order {
@@ -173,12 +180,13 @@ fn fold_hash(fold_of_row: impl Iterator<Item = usize>) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::models::model;
+    use super::super::settings::Fit;
     use super::super::twin::{Twin, mixture};
-    use super::super::{Fit, model};
     use super::*;
 
     fn placed(mut curve: Curve) -> Curve {
-        for (index, row) in curve.rows.iter_mut().enumerate() {
+        for (index, row) in curve.observations.iter_mut().enumerate() {
             row.target_m = Some([(index % 40) as f64 * 0.01, (index / 40) as f64 * 0.01]);
         }
         curve
@@ -213,9 +221,9 @@ mod tests {
     #[test]
     fn of_a_sweep_single_points_are_held_out_and_no_range_of_angles() {
         let mut curve = Twin { rows: 400, ..Twin::default() }.curve(7);
-        curve.rows.sort_by(|a, b| a.theta_rad.total_cmp(&b.theta_rad));
-        for (chirp, row) in (0u32..).zip(&mut curve.rows) {
-            row.chirp = chirp;
+        curve.observations.sort_by(|a, b| a.theta_i_rad.total_cmp(&b.theta_i_rad));
+        for (chirp, row) in (0u32..).zip(&mut curve.observations) {
+            row.chirp = Some(chirp);
         }
         let fit = Fit { starts: 1, looks: Some(1.0), ..Fit::default() };
         let found = fit.run(&mixture(0.1, 3.0, 0.02, 0.004), &curve).unwrap();
@@ -227,13 +235,13 @@ mod tests {
     #[test]
     fn a_few_places_are_no_squares_and_fewer_blocks_than_parts_no_score() {
         let mut curve = Twin { rows: 100, ..Twin::default() }.curve(7);
-        for (index, row) in curve.rows.iter_mut().enumerate() {
+        for (index, row) in curve.observations.iter_mut().enumerate() {
             row.target_m = Some([(index % 2) as f64, 0.0]);
         }
         let fit = Fit { starts: 1, looks: Some(1.0), ..Fit::default() };
         let found = fit.run(&model("lambert").unwrap(), &curve).unwrap();
         assert_eq!(found.hold_out(&curve).unwrap().blocks_of, "runs");
-        curve.rows.truncate(4);
+        curve.observations.truncate(4);
         assert_eq!(found.hold_out(&curve), None);
     }
 

@@ -1,4 +1,4 @@
-//! Profile intervals: the values of one coordinate that the data do not refuse.
+//! Profile intervals: the values of one coordinate that the data do not reject.
 //!
 //! With one coordinate held and the others at their best, twice the loss of ln likelihood stays below
 //! χ²₁(0.95) = 1.96² (Wilks 1938, DOI 10.1214/aoms/1177732360). Its root is nearly linear in the
@@ -12,7 +12,7 @@ use super::uncertainty::Uncertainty;
 
 /// Normal deviate of a 95 % interval.
 pub(super) const DEVIATE_95: f64 = 1.959_964;
-/// How well the end's deviate is met, and how many searches it may take.
+/// Largest error of the deviate at an end, and the most searches for it.
 const NEAR: f64 = 0.02;
 const SEARCHES: usize = 8;
 
@@ -21,7 +21,7 @@ const SEARCHES: usize = 8;
 pub(super) struct End {
     /// Where it is.
     pub at: f64,
-    /// The range ended before the data refused.
+    /// The range of the coordinate ends before the data reject it.
     pub open: bool,
 }
 
@@ -70,7 +70,7 @@ impl<F: Fn(&DVector<f64>) -> Local> Profile<'_, F> {
         None
     }
 
-    /// Root of twice the loss when a coordinate is moved and the others follow.
+    /// Root of twice the loss of ln likelihood when one coordinate is moved and the others are fitted again.
     fn deviate(&self, index: usize, offset: f64) -> Option<f64> {
         let covariance = &self.uncertainty.covariance;
         let follow = covariance.column(index) / covariance[(index, index)];

@@ -1,7 +1,7 @@
 //! Least squares in decibels: the paper's fits, kept for comparison.
 //!
-//! They see detections only and take speckle for a symmetric error, so that a curve cut at a
-//! threshold flattens their tail, and its level comes out 10/ln 10·(ln L − ψ(L)) dB low.
+//! They use detections only and treat speckle as a symmetric error, so that a curve cut at a
+//! threshold flattens their tail, and their level is 10/ln 10·(ln L − ψ(L)) dB too low.
 //!
 //! - Piecewise MSE: the specular coordinates on θ below a split, frozen, then the diffuse ones on the
 //!   rest. A model that is not a mixture has no pieces: all rows, all coordinates.
@@ -17,7 +17,7 @@ use super::coordinates::Coordinates;
 use super::minimise::Local;
 use super::sensitivity::derivatives;
 use super::table::{Place, Table};
-use crate::measure::curve::Row;
+use crate::material::Observation;
 use crate::units::db_from_ratio;
 
 const DB_PER_NEPER: f64 = 10.0 / std::f64::consts::LN_10;
@@ -52,44 +52,66 @@ struct Level {
 
 impl<'a> Squares<'a> {
     /// Prepares the rows.
-    pub fn new(coordinates: &'a Coordinates, rows: &[Row], deviations: Deviations) -> Squares<'a> {
-        let level = |row: &Row| (!row.censored).then(|| Level::new(row));
-        Squares { coordinates, deviations, levels: rows.iter().map(level).collect() }
+    pub fn new(
+        coordinates: &'a Coordinates,
+        rows: &[Observation],
+        deviations: Deviations,
+    ) -> Squares<'a> {
+        Squares { coordinates, deviations, levels: rows.iter().map(Level::new).collect() }
     }
 
     /// ½Σ of squared residuals of detected rows, scaled by the deviations.
     pub fn local(&self, at: &DVector<f64>) -> Local {
         let table = Table::new(&self.coordinates.model(at));
         let by_coordinate = derivatives(self.coordinates, at, &table);
-        let sum_of = |levels: &[Option<Level>]| {
-            let mut sum = Local::zero(at.len());
-            let mut jacobian = vec![0.0; at.len()];
-            for level in levels.iter().flatten() {
-                let nearest = nearest(&table, level, self.deviations);
-                let stretch = nearest.gain.hypot(1.0);
-                for (slot, table) in jacobian.iter_mut().zip(&by_coordinate) {
-                    let slope = table.as_ref().map_or(0.0, |table| table.at(&nearest.place));
-                    *slot = DB_PER_NEPER * slope / self.deviations.level_sd_db / stretch;
-                }
-                // Unlike r²(1 + g²)/2 this is not moved by a small error of δ.
-                sum.value += 0.5 * (nearest.residual.powi(2) + nearest.offset.powi(2));
-                sum.add(nearest.residual * stretch, 1.0, &jacobian);
-            }
-            sum
-        };
-        let parts: Vec<Local> = self.levels.par_chunks(CHUNK).map(sum_of).collect();
+        let parts: Vec<Local> = self
+            .levels
+            .par_chunks(CHUNK)
+            .map(|levels| self.sum_of(levels, &table, &by_coordinate))
+            .collect();
         parts.into_iter().fold(Local::zero(at.len()), Local::merge)
+    }
+
+    fn sum_of(
+        &self,
+        levels: &[Option<Level>],
+        table: &Table,
+        by_coordinate: &[Option<Table>],
+    ) -> Local {
+        let unknowns = by_coordinate.len();
+        let (mut sum, mut jacobian) = (Local::zero(unknowns), vec![0.0; unknowns]);
+        for level in levels.iter().flatten() {
+            let nearest = Gap { table, level, deviations: self.deviations }.nearest();
+            let stretch = nearest.gain.hypot(1.0);
+            for (slot, table) in jacobian.iter_mut().zip(by_coordinate) {
+                let slope = table.as_ref().map_or(0.0, |table| table.at(&nearest.place));
+                *slot = DB_PER_NEPER * slope / self.deviations.level_sd_db / stretch;
+            }
+            // Unlike r²(1 + g²)/2 this is not moved by a small error of δ.
+            sum.value += 0.5 * nearest.cost();
+            sum.add(nearest.residual * stretch, 1.0, &jacobian);
+        }
+        sum
     }
 }
 
 impl Level {
-    fn new(row: &Row) -> Level {
-        let (place, bends) = Place::bending(row.theta_rad);
-        Level { theta_rad: row.theta_rad, level_db: db_from_ratio(row.sigma0), place, bends }
+    /// `None` for a censored row.
+    fn new(row: &Observation) -> Option<Level> {
+        let level_db = db_from_ratio(row.sigma0.filter(|_| !row.is_censored())?);
+        let (place, bends) = Place::bending(row.theta_i_rad);
+        Some(Level { theta_rad: row.theta_i_rad, level_db, place, bends })
     }
 }
 
-/// The point of the curve that a row is nearest to.
+/// A row and the curve of a model.
+struct Gap<'a> {
+    table: &'a Table,
+    level: &'a Level,
+    deviations: Deviations,
+}
+
+/// A point of the curve, as a row sees it.
 struct Nearest {
     place: Place,
     /// δ/s_θ.
@@ -102,73 +124,90 @@ struct Nearest {
     bend: f64,
 }
 
-/// Most candidates for δ on either side of 0, and how far apart, in standard deviations.
+impl Nearest {
+    /// Squared distance of the row from this point.
+    fn cost(&self) -> f64 {
+        self.residual.powi(2) + self.offset.powi(2)
+    }
+}
+
+/// Most candidates for δ on either side of 0, and their distance, in standard deviations.
 const CANDIDATES: i32 = 12;
 const APART: f64 = 1.0 / 3.0;
-/// Newton steps, which converge after a handful; the offset that is no longer worth one, in standard
+/// Most Newton steps, of which a handful suffices, and the change of the offset that ends them, in standard
 /// deviations.
 const STEPS: usize = 30;
 const NEAR: f64 = 1e-8;
 
-fn nearest(table: &Table, level: &Level, deviations: Deviations) -> Nearest {
-    let Deviations { theta_sd_rad, level_sd_db } = deviations;
-    let there = |offset: f64, place: Place, bends: &[f64; 4]| {
-        let residual = (DB_PER_NEPER * table.at(&place) - level.level_db) / level_sd_db;
-        let scale = DB_PER_NEPER * theta_sd_rad / level_sd_db;
-        let gain = scale * table.slope_per_rad(&place);
-        let bend = scale * theta_sd_rad * table.weighted(&place, bends);
-        Nearest { place, offset, residual, gain, bend }
-    };
-    let mut best = there(0.0, level.place, &level.bends);
-    if theta_sd_rad <= 0.0 {
-        return best;
-    }
-    let at = |offset: f64| {
-        let (place, bends) = Place::bending(level.theta_rad + offset * theta_sd_rad);
-        there(offset, place, &bends)
-    };
-    let cost = |offset: f64| at(offset).residual.powi(2) + offset * offset;
-    let offset = |candidate: i32| APART * f64::from(candidate);
-    let mut least = best.residual.powi(2);
-    // An offset beyond the residual costs more by itself than none does.
-    let beyond = (best.residual.abs() / APART).min(f64::from(CANDIDATES)) as i32 + 2;
-    let costs: Vec<f64> = (-beyond..=beyond).map(|c| cost(offset(c))).collect();
-    // Every valley is followed to its floor: the deepest candidate need not lead to the deepest one.
-    for (candidate, around) in (1 - beyond..).zip(costs.windows(3)) {
-        if around[1] <= around[0] && around[1] <= around[2] {
-            let found = descend(&at, offset(candidate), around[1]);
-            let there = found.residual.powi(2) + found.offset.powi(2);
-            if there <= least {
-                (best, least) = (found, there);
+impl Gap<'_> {
+    /// The point of the curve that the row is nearest to.
+    fn nearest(&self) -> Nearest {
+        let mut best = self.there(0.0, self.level.place, &self.level.bends);
+        if self.deviations.theta_sd_rad <= 0.0 {
+            return best;
+        }
+        let mut least = best.residual.powi(2);
+        // An offset beyond the residual costs more by itself than none does.
+        let beyond = (best.residual.abs() / APART).min(f64::from(CANDIDATES)) as i32 + 2;
+        let costs: Vec<f64> = (-beyond..=beyond).map(|c| self.at(offset(c)).cost()).collect();
+        // Every valley is followed to its floor: the deepest candidate need not lead to the deepest one.
+        for (candidate, around) in (1 - beyond..).zip(costs.windows(3)) {
+            if around[1] <= around[0] && around[1] <= around[2] {
+                let found = self.descend(offset(candidate), around[1]);
+                let there = found.cost();
+                if there <= least {
+                    (best, least) = (found, there);
+                }
             }
         }
+        best
     }
-    best
+
+    /// The floor of the valley around an offset of known cost, by damped Newton steps.
+    fn descend(&self, offset: f64, cost: f64) -> Nearest {
+        let (mut best, mut least, mut length) = (self.at(offset), cost, 1.0f64);
+        for _ in 0..STEPS {
+            // Halves of the first two derivatives of the cost by the offset; where the second one is negative,
+            // without the term that makes it so.
+            let slope = best.residual * best.gain + best.offset;
+            let stiff = 1.0 + best.gain.powi(2);
+            let bend = stiff + best.residual * best.bend;
+            let newton = -slope / if bend > 0.0 { bend } else { stiff };
+            if newton.abs() < NEAR || length < 1e-6 {
+                break;
+            }
+            let next = self.at(best.offset + length * newton);
+            let there = next.cost();
+            if there < least {
+                (best, least) = (next, there);
+                length = (2.0 * length).min(1.0);
+            } else {
+                length *= 0.5;
+            }
+        }
+        best
+    }
+
+    /// The point at an offset of the angle, in standard deviations.
+    fn at(&self, offset: f64) -> Nearest {
+        let theta_rad = self.level.theta_rad + offset * self.deviations.theta_sd_rad;
+        let (place, bends) = Place::bending(theta_rad);
+        self.there(offset, place, &bends)
+    }
+
+    fn there(&self, offset: f64, place: Place, bends: &[f64; 4]) -> Nearest {
+        let Deviations { theta_sd_rad, level_sd_db } = self.deviations;
+        let residual = (DB_PER_NEPER * self.table.at(&place) - self.level.level_db) / level_sd_db;
+        let scale = DB_PER_NEPER * theta_sd_rad / level_sd_db;
+        let gain = scale * self.table.slope_per_rad(&place);
+        let bend = scale * theta_sd_rad * self.table.weighted(&place, bends);
+        Nearest { place, offset, residual, gain, bend }
+    }
 }
 
-/// The floor of the valley around an offset of known cost.
-fn descend(at: &impl Fn(f64) -> Nearest, offset: f64, cost: f64) -> Nearest {
-    let (mut best, mut least, mut length) = (at(offset), cost, 1.0f64);
-    for _ in 0..STEPS {
-        // Halves of the first two derivatives of the cost by the offset; of the second one without what may
-        // be negative where it is.
-        let slope = best.residual * best.gain + best.offset;
-        let stiff = 1.0 + best.gain.powi(2);
-        let bend = stiff + best.residual * best.bend;
-        let newton = -slope / if bend > 0.0 { bend } else { stiff };
-        if newton.abs() < NEAR || length < 1e-6 {
-            break;
-        }
-        let next = at(best.offset + length * newton);
-        let there = next.residual.powi(2) + next.offset.powi(2);
-        if there < least {
-            (best, least) = (next, there);
-            length = (2.0 * length).min(1.0);
-        } else {
-            length *= 0.5;
-        }
-    }
-    best
+/// The offset of a candidate, in standard deviations.
+fn offset(candidate: i32) -> f64 {
+    APART * f64::from(candidate)
 }
 
 #[cfg(test)]
@@ -185,7 +224,7 @@ mod tests {
         let curve = Twin { rows: 200, ..Twin::default() }.curve(1);
         for deviations in [TLS, Deviations { theta_sd_rad: 0.0, ..TLS }] {
             let at = coordinates.start();
-            let squares = Squares::new(&coordinates, &curve.rows, deviations);
+            let squares = Squares::new(&coordinates, &curve.observations, deviations);
             let cost = |at: &DVector<f64>| squares.local(at);
             for index in 0..at.len() {
                 let value = |step: f64| {
@@ -207,16 +246,16 @@ mod tests {
     #[test]
     fn the_nearest_point_is_nearer_than_its_neighbours() {
         let table = Table::new(&mixture(0.05, 6.0, 0.05, 0.002));
-        for row in (Twin { rows: 100, ..Twin::default() }).curve(3).rows {
-            let found = nearest(&table, &Level::new(&row), TLS);
-            let cost = found.residual.powi(2) + found.offset.powi(2);
+        for row in (Twin { rows: 100, ..Twin::default() }).curve(3).observations {
+            let Some(level) = Level::new(&row) else { continue };
+            let cost = Gap { table: &table, level: &level, deviations: TLS }.nearest().cost();
             for step in -400..=400 {
                 let offset = f64::from(step) / 100.0;
-                let theta_rad = row.theta_rad + offset * TLS.theta_sd_rad;
+                let theta_rad = level.theta_rad + offset * TLS.theta_sd_rad;
                 let level_db = DB_PER_NEPER * table.at(&Place::new(theta_rad));
-                let gap = (level_db - db_from_ratio(row.sigma0)) / TLS.level_sd_db;
+                let gap = (level_db - level.level_db) / TLS.level_sd_db;
                 // A second valley between the candidates could be deeper by a little.
-                assert!(cost <= gap * gap + offset * offset + 1e-3, "{row:?} {offset}");
+                assert!(cost <= gap * gap + offset * offset + 1e-3, "{level:?} {offset}");
             }
         }
     }

@@ -2,8 +2,8 @@
 //!
 //! A detected power y has the density g(y; L, μ) of Gamma(L, μ/L), a chirp without a detection the
 //! probability G(T; L, μ) of staying below the threshold T. μ = σ⁰(t) + thermal noise, t the true
-//! angle. Each chirp has one unknown but fixed t, so what is averaged over t is the likelihood,
-//! p(y) = Σ_q w_q·g(y; L, μ(t_q)), not the mean: averaging μ would smear the lobe but give each
+//! angle. Each chirp has one unknown but fixed t, so the likelihood is averaged over t,
+//! p(y) = Σ_q w_q·g(y; L, μ(t_q)), not the mean: averaging μ would smear the lobe but leave each
 //! chirp the scatter of speckle alone. The curvature is the sum of the scores' outer products (Berndt,
 //! Hall, Hall & Hausman 1974).
 
@@ -16,18 +16,18 @@ use super::gamma_law::{GammaLaw, LnProbability};
 use super::minimise::Local;
 use super::sensitivity::derivatives;
 use super::table::{Place, Table};
-use crate::measure::curve::Row;
+use crate::material::Observation;
 
 /// Rows that one task sums, fixed so that the sum is the same on any number of threads.
 const CHUNK: usize = 256;
 
-/// Which curvature a search follows. The looks belong to the scores' only.
+/// Which curvature a search uses. Only that of the scores has entries for the looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Curvature {
     /// d²(−ln g)/d(ln μ)² = L·y/μ along each chirp's mean gradient: long steps from afar, where the
     /// scores' products would have tiny ones.
     FromAfar,
-    /// The scores' outer products, which account for what the unknown angles cost.
+    /// The scores' outer products, which account for the information lost to the unknown angles.
     Scores,
 }
 
@@ -56,17 +56,9 @@ struct Tables {
 
 impl<'a> Likelihood<'a> {
     /// Prepares the rows; `noise_w` is the mean thermal power in each.
-    pub fn new(coordinates: &'a Coordinates, rows: &[Row], noise_w: f64) -> Likelihood<'a> {
-        let chirp = |row: &Row| Chirp {
-            ln_sigma0: row.sigma0.ln(),
-            noise: noise_w * row.sigma0 / row.power_w,
-            censored: row.censored,
-            nodes: true_angles(row.theta_rad, row.theta_sd_rad)
-                .into_iter()
-                .map(|(t, weight)| (Place::new(t), weight.ln()))
-                .collect(),
-        };
-        Likelihood { coordinates, chirps: rows.iter().map(chirp).collect() }
+    pub fn new(coordinates: &'a Coordinates, rows: &[Observation], noise_w: f64) -> Likelihood<'a> {
+        let chirps = rows.iter().map(|row| Chirp::new(row, noise_w)).collect();
+        Likelihood { coordinates, chirps }
     }
 
     /// −ln likelihood, its gradient and a curvature.
@@ -108,13 +100,7 @@ impl<'a> Likelihood<'a> {
     pub fn ln_below(&self, at: &DVector<f64>) -> Vec<f64> {
         let table = Table::new(&self.coordinates.model(at));
         let law = GammaLaw::new(self.coordinates.looks(at));
-        let below = |chirp: &Chirp| {
-            let terms = chirp.nodes.iter().map(|(place, ln_weight)| {
-                ln_weight + law.below(chirp.ln_sigma0, chirp.ln_mean(&table, place)).value
-            });
-            ln_sum(&terms.collect::<Vec<_>>())
-        };
-        self.chirps.iter().map(below).collect()
+        self.chirps.iter().map(|chirp| chirp.ln_below(&table, &law)).collect()
     }
 }
 
@@ -137,9 +123,31 @@ impl Scratch {
 }
 
 impl Chirp {
+    /// Prepares a row that has a σ⁰ or a limit.
+    fn new(row: &Observation, noise_w: f64) -> Chirp {
+        let sigma0 = row.level_sigma0().unwrap_or(f64::NAN);
+        let angles = true_angles(row.theta_i_rad, row.theta_sd_rad.unwrap_or(0.0));
+        Chirp {
+            ln_sigma0: sigma0.ln(),
+            noise: noise_w * sigma0 / row.power_w.unwrap_or(sigma0),
+            censored: row.is_censored(),
+            nodes: angles.into_iter().map(|(t, weight)| (Place::new(t), weight.ln())).collect(),
+        }
+    }
+
     fn ln_mean(&self, table: &Table, place: &Place) -> f64 {
         let ln_sigma0 = table.at(place);
         if self.noise > 0.0 { (ln_sigma0.exp() + self.noise).ln() } else { ln_sigma0 }
+    }
+
+    /// ln of the probability of a lower power, averaged over the true angle.
+    fn ln_below(&self, table: &Table, law: &GammaLaw) -> f64 {
+        let mut terms = Vec::with_capacity(self.nodes.len());
+        for (place, ln_weight) in &self.nodes {
+            let ln_mean = self.ln_mean(table, place);
+            terms.push(ln_weight + law.below(self.ln_sigma0, ln_mean).value);
+        }
+        ln_sum(&terms)
     }
 
     /// ln p of the chirp; its derivatives are left in `scratch.score`.
@@ -149,9 +157,10 @@ impl Chirp {
         laws.clear();
         for (place, ln_weight) in &self.nodes {
             let ln_mean = self.ln_mean(&tables.ln_sigma0, place);
-            let law = match self.censored {
-                true => tables.law.below(self.ln_sigma0, ln_mean),
-                false => tables.law.detected(self.ln_sigma0, ln_mean),
+            let law = if self.censored {
+                tables.law.below(self.ln_sigma0, ln_mean)
+            } else {
+                tables.law.detected(self.ln_sigma0, ln_mean)
             };
             terms.push(ln_weight + law.value);
             // The share of σ⁰ in the mean, the rest being noise.
@@ -204,7 +213,7 @@ mod tests {
         let coordinates = Coordinates::new(&start, &[], &[], None).unwrap();
         for noise_w in [0.0, 1e-11] {
             let curve = Twin { rows: 200, ..Twin::default() }.curve(1);
-            let likelihood = Likelihood::new(&coordinates, &curve.rows, noise_w);
+            let likelihood = Likelihood::new(&coordinates, &curve.observations, noise_w);
             let at = coordinates.start();
             let local = likelihood.local(Curvature::Scores, &at);
             for index in 0..at.len() {
@@ -225,7 +234,7 @@ mod tests {
         let twin = Twin { rows: 2000, threshold_dbm: -300.0, ..Twin::default() };
         let curve = twin.curve(2);
         let coordinates = Coordinates::new(&twin.model, &[], &[], Some(twin.looks)).unwrap();
-        let likelihood = Likelihood::new(&coordinates, &curve.rows, 0.0);
+        let likelihood = Likelihood::new(&coordinates, &curve.observations, 0.0);
         let mut shares: Vec<f64> =
             likelihood.ln_below(&coordinates.start()).into_iter().map(f64::exp).collect();
         shares.sort_by(f64::total_cmp);

@@ -82,8 +82,7 @@ pub(crate) struct Minimise {
     pub iterations: usize,
     /// Promised improvement that is no longer worth a step, in the unit of the cost.
     pub tolerance: f64,
-    /// Steps in a row without an improvement after which no more are tried, each six times as damped as the one
-    /// before.
+    /// Failed steps in a row after which the search ends; each is damped six times more than the one before.
     pub patience: usize,
 }
 
@@ -100,8 +99,8 @@ pub(crate) struct Minimum {
     pub stop: Stop,
 }
 
-/// How far an unknown is thought to go. One that promises less than the tolerance so far is held: where the cost is flat,
-/// a step would be without measure, and all others would fail with it.
+/// Longest change of an unknown that is considered. An unknown whose change by this much improves the cost by less
+/// than the tolerance is held: where the cost is flat, its step would be without limit and spoil those of the others.
 const REACH: f64 = 10.0;
 
 /// Smallest, first and largest damping λ, and how it falls and rises.
@@ -120,8 +119,8 @@ impl Minimise {
         self.run_with(start, bounds, |_| f64::NEG_INFINITY, cost)
     }
 
-    /// The same where the cost alone, or a number below it, is much cheaper to have: a step
-    /// that makes it worse ends there.
+    /// As [`run`](Self::run), with a cheap lower bound of the cost: a step whose `value` is not below the
+    /// cost so far is refused without computing the cost there.
     pub fn run_with(
         &self,
         start: &DVector<f64>,
@@ -168,7 +167,7 @@ impl Minimise {
         Minimum { at, local, iterations, stop }
     }
 
-    /// The full step from a point, on the unknowns that no bound holds.
+    /// Where the full Newton step from a point leads, on the unknowns that no bound holds.
     pub fn newton(
         &self,
         at: &DVector<f64>,
@@ -184,7 +183,7 @@ impl Minimise {
         -0.5 * local.gradient.dot(&newton) < self.tolerance
     }
 
-    /// Unknowns that no bound holds, which are those inside and those that want to go inside, and that matter.
+    /// Unknowns that a step may move: inside their bounds or drawn inwards, and not flat.
     fn free(
         &self,
         at: &DVector<f64>,
@@ -192,14 +191,17 @@ impl Minimise {
         lower: &DVector<f64>,
         upper: &DVector<f64>,
     ) -> Vec<usize> {
-        let is_free = |&i: &usize| {
+        let mut free = Vec::new();
+        for i in 0..at.len() {
             let (slope, bend) = (local.gradient[i], local.curvature[(i, i)]);
             let held_below = at[i] <= lower[i] && slope >= 0.0;
             let held_above = at[i] >= upper[i] && slope <= 0.0;
             let is_flat = slope.abs() * REACH + 0.5 * bend * REACH * REACH < self.tolerance;
-            lower[i] < upper[i] && !held_below && !held_above && !is_flat
-        };
-        (0..at.len()).filter(is_free).collect()
+            if lower[i] < upper[i] && !held_below && !held_above && !is_flat {
+                free.push(i);
+            }
+        }
+        free
     }
 }
 

@@ -7,25 +7,25 @@ use super::interval::{End, Profile};
 use super::least_squares::{Deviations, Squares};
 use super::likelihood::{Curvature, Likelihood};
 use super::minimise::{Local, Minimise, Minimum, Stop};
+use super::settings::{Fit, Method};
 use super::uncertainty::{Uncertainty, observed_information};
-use super::{Fit, Method};
-use crate::measure::curve::Row;
+use crate::material::Observation;
 use crate::radar::random::{Key, Purpose};
 
 /// Most steps of one search.
 const ITERATIONS: usize = 200;
-/// ln likelihood that is no longer worth a step: a thousandth of what moves an interval.
+/// The search ends when a step promises less ln likelihood: a thousandth of what moves an interval.
 const LIKELIHOOD_TOLERANCE: f64 = 1e-6;
-/// Steps of the approach with held looks, and the ln likelihood that ends it.
+/// Most steps of the approach with fixed looks, and the promised ln likelihood that ends it.
 const APPROACH: usize = 40;
 const NEAR: f64 = 1.0;
-/// Cost that is no longer worth a step in least squares, whose parameters are compared with other programs'.
+/// Least squares ends when a step promises to lower the cost by less; its parameters are compared with other programs.
 const SQUARES_TOLERANCE: f64 = 1e-8;
 /// Loss of cost that still counts as the same optimum.
 const SAME: f64 = 0.01;
 
 /// What a search found.
-pub(super) struct Found {
+pub(super) struct SearchResult {
     pub best: Minimum,
     pub agreeing: usize,
     pub uncertainty: Uncertainty,
@@ -35,7 +35,7 @@ pub(super) struct Found {
 
 impl Fit {
     /// Searches with this fit's method.
-    pub(super) fn search(&self, coordinates: &Coordinates, rows: &[Row]) -> Found {
+    pub(super) fn search(&self, coordinates: &Coordinates, rows: &[Observation]) -> SearchResult {
         match self.method {
             Method::Censored => self.search_likelihood(coordinates, rows),
             Method::Tls { .. } | Method::Mse { .. } => {
@@ -50,50 +50,50 @@ impl Fit {
     pub(super) fn nearest_optimum(
         &self,
         coordinates: &Coordinates,
-        rows: &[Row],
+        rows: &[Observation],
         start: &DVector<f64>,
     ) -> Minimum {
         match self.method {
             Method::Censored => {
                 let likelihood = Likelihood::new(coordinates, rows, self.noise_w.unwrap_or(0.0));
-                let cost = |at: &DVector<f64>| likelihood.local(Curvature::Scores, at);
-                search_freely(&likelihood_search(), coordinates, start, cost)
+                search_freely(&likelihood_search(), coordinates, start, |at| {
+                    likelihood.local(Curvature::Scores, at)
+                })
             }
             Method::Tls { theta_sd_rad, level_sd_db } => {
                 let deviations = Deviations { theta_sd_rad, level_sd_db };
                 let squares = Squares::new(coordinates, rows, deviations);
-                let cost = |at: &DVector<f64>| squares.local(at);
-                search_freely(&squares_search(), coordinates, start, cost)
+                search_freely(&squares_search(), coordinates, start, |at| squares.local(at))
             }
             Method::Mse { split_rad } => pieces(coordinates, rows, split_rad, start),
         }
     }
 
-    fn search_likelihood(&self, coordinates: &Coordinates, rows: &[Row]) -> Found {
+    fn search_likelihood(&self, coordinates: &Coordinates, rows: &[Observation]) -> SearchResult {
         let likelihood = Likelihood::new(coordinates, rows, self.noise_w.unwrap_or(0.0));
         let cost = |at: &DVector<f64>| likelihood.local(Curvature::Scores, at);
-        let far = |at: &DVector<f64>| likelihood.local(Curvature::FromAfar, at);
         let approach = Minimise { iterations: APPROACH, tolerance: NEAR, patience: usize::MAX };
         let search = likelihood_search();
-        // With free looks a far start is explained by wild speckle before it is improved.
+        // With free looks the search would explain a far start by strong speckle instead of improving it.
         let (best, agreeing) = self.best(coordinates, |start| {
             let [lower, upper] = coordinates.holding_looks(start);
-            let near = approach.run(start, [&lower, &upper], far);
+            let near = approach
+                .run(start, [&lower, &upper], |at| likelihood.local(Curvature::FromAfar, at));
             search_freely(&search, coordinates, &near.at, cost)
         });
         let information = observed_information(coordinates, &best.at, &best.local, cost);
         let uncertainty = Uncertainty::new(coordinates, &best.at, &information);
         let search = Minimise { tolerance: 1e3 * LIKELIHOOD_TOLERANCE, ..search };
         let profile = Profile { coordinates, best: &best, uncertainty: &uncertainty, search, cost };
-        let interval = |index: usize| {
+        let mut profiles = Vec::new();
+        for index in 0..coordinates.len() {
             let wanted = best.converged() && uncertainty.is_identified(index);
-            wanted.then(|| profile.interval(index)).flatten()
-        };
-        let profiles = (0..coordinates.len()).map(interval).collect();
-        Found { best, agreeing, uncertainty, profiles }
+            profiles.push(if wanted { profile.interval(index) } else { None });
+        }
+        SearchResult { best, agreeing, uncertainty, profiles }
     }
 
-    /// The least of all starts, and how many came as far.
+    /// The lowest cost of all starts, and how many starts reached it.
     fn best(
         &self,
         coordinates: &Coordinates,
@@ -109,8 +109,7 @@ impl Fit {
                 best = found;
             }
         }
-        let near = |cost: &&f64| **cost - best.local.value <= SAME;
-        let agreeing = costs.iter().filter(near).count();
+        let agreeing = costs.iter().filter(|cost| **cost - best.local.value <= SAME).count();
         (best, agreeing)
     }
 }
@@ -119,11 +118,11 @@ impl Fit {
 pub(super) fn drawn_start(coordinates: &Coordinates, seed: u64, number: usize) -> DVector<f64> {
     let key = Key { seed, chirp: number as u64, sub_ray: 1, purpose: Purpose::Fit };
     let mut draws = key.draws();
-    let start = coordinates.start();
-    let moved = |(u, c): (&f64, &super::coordinates::Coordinate)| {
-        u + c.spread() * (2.0 * draws.uniform() - 1.0)
-    };
-    DVector::from_iterator(start.len(), start.iter().zip(&coordinates.list).map(moved))
+    let mut start = coordinates.start();
+    for (u, coordinate) in start.iter_mut().zip(&coordinates.list) {
+        *u += coordinate.spread() * (2.0 * draws.uniform() - 1.0);
+    }
+    start
 }
 
 fn likelihood_search() -> Minimise {
@@ -144,19 +143,24 @@ fn search_freely(
 }
 
 /// Information of least squares: the curvature over the residuals' own variance.
-fn squares_found(coordinates: &Coordinates, rows: &[Row], best: Minimum, agreeing: usize) -> Found {
-    let detected = rows.iter().filter(|row| !row.censored).count();
+fn squares_found(
+    coordinates: &Coordinates,
+    rows: &[Observation],
+    best: Minimum,
+    agreeing: usize,
+) -> SearchResult {
+    let detected = rows.iter().filter(|row| !row.is_censored()).count();
     let spare = (detected - coordinates.len().min(detected)).max(1) as f64;
     let variance = (2.0 * best.local.value / spare).max(f64::MIN_POSITIVE);
     let information = &best.local.curvature / variance;
     let uncertainty = Uncertainty::new(coordinates, &best.at, &information);
-    Found { best, agreeing, uncertainty, profiles: Vec::new() }
+    SearchResult { best, agreeing, uncertainty, profiles: Vec::new() }
 }
 
 /// Specular coordinates below the split, then diffuse ones above it; all at once without pieces.
 fn pieces(
     coordinates: &Coordinates,
-    rows: &[Row],
+    rows: &[Observation],
     split_rad: f64,
     start: &DVector<f64>,
 ) -> Minimum {
@@ -165,7 +169,8 @@ fn pieces(
         return piece(coordinates, rows, &all, start);
     };
     let specular: Vec<bool> = diffuse.iter().map(|is_diffuse| !is_diffuse).collect();
-    let (near, far): (Vec<Row>, Vec<Row>) = rows.iter().partition(|row| row.theta_rad < split_rad);
+    let (near, far): (Vec<Observation>, Vec<Observation>) =
+        rows.iter().partition(|row| row.theta_i_rad < split_rad);
     let first = piece(coordinates, &near, &specular, start);
     let second = piece(coordinates, &far, &diffuse, &first.at);
     Minimum {
@@ -177,7 +182,12 @@ fn pieces(
 }
 
 /// Least squares of some coordinates on some rows; a piece without rows stays at its start.
-fn piece(coordinates: &Coordinates, rows: &[Row], moves: &[bool], start: &DVector<f64>) -> Minimum {
+fn piece(
+    coordinates: &Coordinates,
+    rows: &[Observation],
+    moves: &[bool],
+    start: &DVector<f64>,
+) -> Minimum {
     const DB: Deviations = Deviations { theta_sd_rad: 0.0, level_sd_db: 1.0 };
     let (mut lower, mut upper) = (coordinates.lower(), coordinates.upper());
     let start = start.zip_zip_map(&lower, &upper, |u, low, high| u.max(low).min(high));
@@ -185,8 +195,7 @@ fn piece(coordinates: &Coordinates, rows: &[Row], moves: &[bool], start: &DVecto
         (lower[index], upper[index]) = (start[index], start[index]);
     }
     let squares = Squares::new(coordinates, rows, DB);
-    let cost = |at: &DVector<f64>| squares.local(at);
-    let mut found = squares_search().run(&start, [&lower, &upper], cost);
+    let mut found = squares_search().run(&start, [&lower, &upper], |at| squares.local(at));
     let mask = DVector::from_iterator(moves.len(), moves.iter().map(|&m| f64::from(u8::from(m))));
     let mask: DMatrix<f64> = &mask * mask.transpose();
     found.local.curvature.component_mul_assign(&mask);

@@ -1,4 +1,4 @@
-//! How ln σ⁰ answers to each coordinate.
+//! Derivatives of ln σ⁰ by each coordinate.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -17,15 +17,16 @@ pub(super) fn derivatives(
     here: &Table,
 ) -> Vec<Option<Table>> {
     let upper = coordinates.upper();
-    let derivative = |index: usize| {
-        let step = if at[index] + STEP > upper[index] { -STEP } else { STEP };
-        let mut there = at.clone();
-        there[index] += step;
-        Table::new(&coordinates.model(&there)).difference(here, step)
-    };
-    let is_looks = |index: usize| coordinates.list.get(index).is_some_and(|c| c.name == LOOKS);
     (0..at.len())
         .into_par_iter()
-        .map(|index| (!is_looks(index)).then(|| derivative(index)))
+        .map(|index| {
+            if coordinates.list.get(index).is_some_and(|c| c.name == LOOKS) {
+                return None;
+            }
+            let step = if at[index] + STEP > upper[index] { -STEP } else { STEP };
+            let mut there = at.clone();
+            there[index] += step;
+            Some(Table::new(&coordinates.model(&there)).difference(here, step))
+        })
         .collect()
 }

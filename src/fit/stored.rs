@@ -1,9 +1,10 @@
-//! A fit as a material keeps it, and the band that can be drawn from what was kept.
+//! A fit as a material stores it, and the 95 % band of a stored fit.
 
 use super::interval::DEVIATE_95;
-use super::{Band, FitResult, Method};
+use super::result::{Band, FitResult};
+use super::settings::Method;
 use crate::brdf::{Brdf, Scattering};
-use crate::material::{self, Covariance, FitReport, Given};
+use crate::material::{self, Covariance, Estimate, FitReport, Given};
 
 /// Relative step of a difference quotient.
 const STEP: f64 = 1e-4;
@@ -46,36 +47,36 @@ impl FitResult {
             .filter(|(_, e)| e.sd.is_some() && parameters.iter().any(|p| p.path == e.name))
             .map(|(index, _)| index)
             .collect();
-        let entry = |a: usize, b: usize| self.covariance.get(a)?.get(b).copied();
-        let both = |a: usize, b: usize| Some((entry(a, b)? + entry(b, a)?) / 2.0);
-        let row = |&a: &usize| known.iter().map(|&b| both(a, b)).collect::<Option<Vec<f64>>>();
-        let matrix = known.iter().map(row).collect::<Option<_>>()?;
-        let name = |&index: &usize| Some(self.estimates.get(index)?.name.clone());
-        let parameters = known.iter().map(name).collect::<Option<_>>()?;
+        // Symmetric to the last bit.
+        let mut matrix = Vec::new();
+        for &a in &known {
+            let mut row = Vec::new();
+            for &b in &known {
+                let (above, below) =
+                    (self.covariance.get(a)?.get(b)?, self.covariance.get(b)?.get(a)?);
+                row.push((above + below) / 2.0);
+            }
+            matrix.push(row);
+        }
+        let parameters =
+            known.iter().filter_map(|&k| Some(self.estimates.get(k)?.name.clone())).collect();
         let covariance = Covariance { parameters, matrix };
-        // What rounding has spoilt is left out here; the report has it as it was found.
+        // A matrix that rounding has made indefinite is left out; the report keeps it as found.
         (!known.is_empty() && covariance.is_sound()).then_some(covariance)
     }
 
     fn report(&self) -> FitReport {
-        let estimate = |e: &super::Estimate| material::Estimate {
-            name: e.name.clone(),
-            value: e.value,
-            sd: e.sd,
-            interval_95: e.interval_95,
-        };
-        let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
         FitReport {
             method: self.method_name().to_owned(),
             given: self.given(),
             looks: self.looks,
             noise_w: self.noise_w,
             gauge: self.gauge_k.map(|k| format!("k = {k} was chosen; S and R are found")),
-            estimates: self.estimates.iter().map(estimate).collect(),
+            estimates: self.estimates.clone(),
             covariance: self.covariance.clone(),
             singular_values: self.singular_values.clone(),
             objective: self.objective,
-            goodness: self.stored_goodness(),
+            goodness: self.goodness,
             held_out: self.held_out.clone(),
             converged: self.converged,
             stop: self.stop.as_str().to_owned(),
@@ -105,27 +106,22 @@ impl FitResult {
         let all = self.fit.fixed.iter().cloned().chain(bounds).chain(settings).chain(looks);
         all.map(|(name, value)| Given { name, value }).collect()
     }
+}
 
-    fn stored_goodness(&self) -> material::Goodness {
-        let g = &self.goodness;
-        material::Goodness {
-            rms_db: g.rms_db,
-            mean_db: g.mean_db,
-            speckle_db: g.speckle_db,
-            z_mean: g.z_mean,
-            z_variance: g.z_variance,
-            ks_distance: g.ks_distance,
-            rows: u32::try_from(g.rows).unwrap_or(u32::MAX),
-        }
-    }
+/// A count as files and the database keep it.
+fn count(number: usize) -> u32 {
+    u32::try_from(number).unwrap_or(u32::MAX)
 }
 
 /// The 95 % band of a stored fit at an angle (rad), by the delta method on ln σ⁰; `None` for a fit
 /// without a report. The derivatives are difference quotients of the stored model.
 pub fn stored_band(fit: &material::Fit, theta_rad: f64) -> Option<Band> {
     let report = fit.report.as_ref()?;
-    let slope = |e: &material::Estimate| e.sd.map_or(0.0, |_| slope(&fit.model, e, theta_rad));
-    let slopes: Vec<f64> = report.estimates.iter().map(slope).collect();
+    let slopes: Vec<f64> = report
+        .estimates
+        .iter()
+        .map(|e| if e.sd.is_some() { slope(&fit.model, e, theta_rad) } else { 0.0 })
+        .collect();
     let terms = report.covariance.iter().zip(&slopes).flat_map(|(row, a)| {
         row.iter().zip(&slopes).map(move |(covariance, b)| a * b * covariance)
     });
@@ -134,8 +130,8 @@ pub fn stored_band(fit: &material::Fit, theta_rad: f64) -> Option<Band> {
     Some(Band { low: mid / factor, mid, high: mid * factor })
 }
 
-/// d ln σ⁰ / d estimate; 0 where the estimate is no number of the model, as the looks are.
-fn slope(model: &Brdf, estimate: &material::Estimate, theta_rad: f64) -> f64 {
+/// d ln σ⁰ / d estimate; 0 for an estimate that is not a parameter of the model, such as the looks.
+fn slope(model: &Brdf, estimate: &Estimate, theta_rad: f64) -> f64 {
     // S is proportional to f_λ and R to r_s while k stays.
     let path = match estimate.name.as_str() {
         "S" => "specular.f_lambda",
@@ -148,18 +144,18 @@ fn slope(model: &Brdf, estimate: &material::Estimate, theta_rad: f64) -> f64 {
     let scale = if path == estimate.name { 1.0 } else { estimate.value / parameter.value };
     let step = STEP * parameter.value.abs().max(STEP * (parameter.max - parameter.min));
     let ends = [-step, step].map(|d| (parameter.value + d).clamp(parameter.min, parameter.max));
-    let level = |value: f64| {
+    let [below, above] = ends.map(|value| {
         let mut moved = model.clone();
         moved.set_parameter(path, value);
         moved.sigma0(theta_rad).ln()
-    };
-    let slope = (level(ends[1]) - level(ends[0])) / ((ends[1] - ends[0]) * scale);
+    });
+    let slope = (above - below) / ((ends[1] - ends[0]) * scale);
     if slope.is_finite() { slope } else { 0.0 }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::Fit;
+    use super::super::settings::Fit;
     use super::super::twin::{Twin, mixture};
     use super::*;
 

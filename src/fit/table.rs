@@ -16,14 +16,14 @@ const INTERVALS: usize = 1024;
 const BETA: f64 = 6.0;
 /// Last knot, rad; at π/2 itself ln σ⁰ is −∞.
 const THETA_END_RAD: f64 = 0.999 * FRAC_PI_2;
-/// ln σ⁰ of what is too weak to tell from nothing.
+/// ln σ⁰ that stands for 0.
 const LN_NOTHING: f64 = -600.0;
 
 /// The angle of every knot, rad.
 static THETA_RAD: LazyLock<Vec<f64>> = LazyLock::new(|| {
-    let knot =
-        |index| THETA_END_RAD * (BETA * index as f64 / INTERVALS as f64).sinh() / BETA.sinh();
-    (0..=INTERVALS).map(knot).collect()
+    (0..=INTERVALS)
+        .map(|knot| THETA_END_RAD * (BETA * knot as f64 / INTERVALS as f64).sinh() / BETA.sinh())
+        .collect()
 });
 
 /// How fast sinh's argument grows with θ, 1/rad.
@@ -53,11 +53,8 @@ impl Table {
     }
 
     fn from_fn(value: impl Fn(f64) -> f64) -> Table {
-        let knot = |&theta_rad: &f64| {
-            let value = value(theta_rad);
-            if value.is_nan() { LN_NOTHING } else { value }
-        };
-        Table { knots: THETA_RAD.iter().map(knot).collect() }
+        let values = THETA_RAD.iter().map(|theta_rad| value(*theta_rad));
+        Table { knots: values.map(|v| if v.is_nan() { LN_NOTHING } else { v }).collect() }
     }
 
     /// (self − other)/width at every knot: a derivative by a parameter.
@@ -76,10 +73,13 @@ impl Table {
         self.weighted(place, &place.slopes_per_rad)
     }
 
+    fn knot(&self, index: u16) -> f64 {
+        self.knots.get(usize::from(index)).copied().unwrap_or(LN_NOTHING)
+    }
+
     /// The sum of the knots around a place with these weights.
     pub fn weighted(&self, place: &Place, weights: &[f64; 4]) -> f64 {
-        let knot = |index: u16| self.knots.get(usize::from(index)).copied().unwrap_or(LN_NOTHING);
-        let [a, b, c, d] = place.knots.map(knot);
+        let [a, b, c, d] = place.knots.map(|knot| self.knot(knot));
         weights[0] * a + weights[1] * b + weights[2] * c + weights[3] * d
     }
 }
@@ -90,20 +90,23 @@ impl Place {
         Place::bending(theta_rad).0
     }
 
-    /// The same with the weights of the second derivative by θ, 1/rad².
+    /// The place of an angle, and the weights of the second derivative by θ, 1/rad².
     pub fn bending(theta_rad: f64) -> (Place, [f64; 4]) {
         let stretch_per_rad = *STRETCH_PER_RAD;
         let stretched = theta_rad.abs().min(THETA_END_RAD) * stretch_per_rad;
         let root = (stretched * stretched + 1.0).sqrt();
-        // asinh without its care for what is small: x matters to a part of a cell.
+        // asinh without its precision for small arguments: x is needed to a fraction of a cell.
         let x = (stretched + root).ln() * (INTERVALS as f64 / BETA);
         let cell = (x as usize).min(INTERVALS - 2);
         let t = x - cell as f64;
         let (weights, slopes) = lagrange(t);
         let dx_dtheta = INTERVALS as f64 / BETA * stretch_per_rad / root;
         let d2x_dtheta2 = -dx_dtheta * stretch_per_rad * stretched / (root * root);
-        let bends = [1.0 - t, 3.0 * t - 2.0, 1.0 - 3.0 * t, t];
-        let bend = |knot: usize| bends[knot] * dx_dtheta * dx_dtheta + slopes[knot] * d2x_dtheta2;
+        // By θ: the second derivative by x times x′², and the first times x″.
+        let mut bends = [1.0 - t, 3.0 * t - 2.0, 1.0 - 3.0 * t, t];
+        for (bend, slope) in bends.iter_mut().zip(slopes) {
+            *bend = *bend * dx_dtheta * dx_dtheta + slope * d2x_dtheta2;
+        }
         let turned = if theta_rad < 0.0 { -dx_dtheta } else { dx_dtheta };
         let below = if cell == 0 { 1 } else { cell - 1 };
         let place = Place {
@@ -111,7 +114,7 @@ impl Place {
             weights,
             slopes_per_rad: slopes.map(|slope| slope * turned),
         };
-        (place, [bend(0), bend(1), bend(2), bend(3)])
+        (place, bends)
     }
 }
 

@@ -5,14 +5,15 @@
 //! mesh that smooths a rough surface.
 
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Scattering, Shadowing};
-use crate::measure::curve::{Curve, Row};
+use crate::material::Observation;
+use crate::measure::curve::Curve;
 use crate::radar::random::{Key, Purpose};
 use crate::radar::{Link, Radar};
 use crate::units::watts_from_dbm;
 
 const RANGE_M: f64 = 8.0;
 
-/// The paper's five parameters from those that backscatter sees, with k = 0.1.
+/// The paper's mixture from the four parameters that backscatter determines, with k = 0.1.
 pub(super) fn mixture(m: f64, alpha: f64, s: f64, r: f64) -> Brdf {
     let specular = CookTorrance {
         f_lambda: s / 0.9,
@@ -26,7 +27,7 @@ pub(super) fn mixture(m: f64, alpha: f64, s: f64, r: f64) -> Brdf {
     Brdf::Mixture(Mixture { k: 0.1, diffuse: Box::new(diffuse), specular })
 }
 
-/// A truth and how it is looked at.
+/// A true model and how it is measured.
 #[derive(Clone, Debug)]
 pub(super) struct Twin {
     pub model: Brdf,
@@ -53,10 +54,10 @@ impl Default for Twin {
 impl Twin {
     /// A curve of this truth.
     pub fn curve(&self, seed: u64) -> Curve {
-        Curve { rows: (0..self.rows as u32).map(|chirp| self.row(seed, chirp)).collect() }
+        Curve { observations: (0..self.rows as u32).map(|chirp| self.row(seed, chirp)).collect() }
     }
 
-    fn row(&self, seed: u64, chirp: u32) -> Row {
+    fn row(&self, seed: u64, chirp: u32) -> Observation {
         let key = Key { seed, chirp: u64::from(chirp), sub_ray: 0, purpose: Purpose::Speckle };
         let mut draws = key.draws();
         let [from, to] = self.theta_deg;
@@ -71,15 +72,12 @@ impl Twin {
         let power_w = received_w.max(threshold_w);
         let censored = received_w < threshold_w;
         let sigma0 = power_w / ratio;
-        Row {
-            theta_rad,
-            theta_sd_rad,
-            power_w,
-            sigma0,
-            range_m: RANGE_M,
-            chirp,
-            censored,
-            target_m: None,
+        Observation {
+            theta_sd_rad: Some(theta_sd_rad),
+            power_w: Some(power_w),
+            range_m: Some(RANGE_M),
+            chirp: Some(chirp),
+            ..Observation::of_level(theta_rad, sigma0, censored)
         }
     }
 }

@@ -1,23 +1,23 @@
-//! What the data know of each coordinate: covariance from the information, and what it cannot tell.
+//! Covariance of the coordinates from the information, and what the data do not determine.
 //!
 //! The information, scaled to a unit diagonal, has the singular values that the result reports. A
 //! direction whose singular value is a millionth of the largest, or less, is one that the data
-//! do not see: its coordinates have no standard deviation, only their combination across it.
+//! do not determine: its coordinates have no standard deviation, only combinations across that direction have one.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::coordinates::Coordinates;
 use super::minimise::Local;
 
-/// Relative singular value of a direction that the data do not see.
+/// Relative singular value of a direction that the data do not determine.
 const UNSEEN: f64 = 1e-6;
 /// Share of a unit vector above which a coordinate takes part in a direction.
 const TAKES_PART: f64 = 0.1;
 
-/// Covariance in the search and what is not known.
+/// Covariance of the coordinates, and what the data do not determine.
 #[derive(Clone, Debug)]
 pub(super) struct Uncertainty {
-    /// In the search; zero for coordinates held by a bound and along unseen directions.
+    /// In the search; zero for coordinates held by a bound and along directions that the data do not determine.
     pub covariance: DMatrix<f64>,
     /// Of the scaled information, largest first.
     pub singular_values: Vec<f64>,
@@ -29,8 +29,8 @@ pub(super) struct Uncertainty {
     pub loose: Vec<usize>,
 }
 
-/// Standard deviations by the curvature of −ln p alone; none for an unknown that does not bend it, or of which the
-/// data know no more than a combination with others.
+/// Standard deviations from the curvature of −ln p; none for an unknown without curvature, and for one that the data
+/// determine only in combination with others.
 pub(crate) fn deviations(curvature: &DMatrix<f64>) -> Vec<Option<f64>> {
     /// Beyond this an unknown is a difference of others within rounding.
     const MOST_INFLATION: f64 = 1e6;
@@ -51,7 +51,7 @@ pub(crate) fn deviations(curvature: &DMatrix<f64>) -> Vec<Option<f64>> {
 }
 
 impl Uncertainty {
-    /// Reads the information at a point of the search.
+    /// Inverts the information at a point of the search.
     pub fn new(coordinates: &Coordinates, at: &DVector<f64>, information: &DMatrix<f64>) -> Self {
         let ends: Vec<[f64; 2]> = coordinates.list.iter().map(|c| c.ends()).collect();
         let bounded: Vec<bool> = (ends.iter().zip(at.iter()))
@@ -73,8 +73,11 @@ impl Uncertainty {
             loose: Vec::new(),
         };
         found.read(&free, &scale, scaled);
-        let is_loose = |i: &usize| found.deviation(*i) > ends[*i][1] - ends[*i][0];
-        found.loose = free.iter().copied().filter(is_loose).collect();
+        for i in free {
+            if found.deviation(i) > ends[i][1] - ends[i][0] {
+                found.loose.push(i);
+            }
+        }
         found
     }
 
@@ -83,7 +86,7 @@ impl Uncertainty {
             return;
         }
         if scaled.iter().any(|entry| !entry.is_finite()) {
-            // Rounding has eaten the information: nothing is known of any of them.
+            // Overflow: nothing is known of any of them.
             self.together.extend(free.iter().map(|&index| vec![index]));
             return;
         }
@@ -131,13 +134,13 @@ pub(super) fn observed_information(
     let mut information = DMatrix::zeros(at.len(), at.len());
     for index in 0..at.len() {
         let step = (0.1 / local.curvature[(index, index)].sqrt()).clamp(1e-5, 0.1);
-        let moved = |step: f64| {
+        let [high, low] = [step, -step].map(|step| {
             let mut there = at.clone();
             there[index] = (at[index] + step).max(lower[index]).min(upper[index]);
-            (there[index], cost(&there).gradient)
-        };
-        let ((high, above), (low, below)) = (moved(step), moved(-step));
-        information.set_column(index, &((above - below) / (high - low)));
+            there
+        });
+        let change = cost(&high).gradient - cost(&low).gradient;
+        information.set_column(index, &(change / (high[index] - low[index])));
     }
     0.5 * (&information + information.transpose())
 }

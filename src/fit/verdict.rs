@@ -160,16 +160,10 @@ impl fmt::Display for Finding {
             }
             Finding::OutOfRange { problem, held } => {
                 write!(f, "no parameters in their ranges give this level: {problem}; ")?;
-                match held.is_empty() {
-                    true => write!(f, "check the calibration of the radar"),
-                    false => {
-                        write!(
-                            f,
-                            "let go of {}, or check the calibration of the radar",
-                            listed(held)
-                        )
-                    }
+                if !held.is_empty() {
+                    write!(f, "let go of {}, or ", listed(held))?;
                 }
+                write!(f, "check the calibration of the radar")
             }
             Finding::PoorFit { ks_distance, limit } => write!(
                 f,

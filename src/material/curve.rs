@@ -133,6 +133,22 @@ impl Observation {
         }
     }
 
+    /// A point of backscatter with the σ⁰ that was measured or, where it is censored, the limit that it stayed below.
+    pub fn of_level(theta_rad: f64, sigma0: f64, is_censored: bool) -> Self {
+        let (level, limit) = if is_censored { (None, Some(sigma0)) } else { (Some(sigma0), None) };
+        Observation::backscatter(theta_rad, level, limit)
+    }
+
+    /// The measured σ⁰, or the limit of a censored point; none where the point has neither.
+    pub fn level_sigma0(&self) -> Option<f64> {
+        if self.is_censored() { self.threshold_sigma0 } else { self.sigma0 }
+    }
+
+    /// Whether the true σ⁰ is known only to lie below or above the limit.
+    pub fn is_censored(&self) -> bool {
+        self.censor != Censor::None
+    }
+
     /// Whether source and receiver were in the same direction.
     pub fn is_retro(&self) -> bool {
         self.theta_i_rad == self.theta_r_rad && self.delta_phi_rad == 0.0

@@ -1,7 +1,7 @@
 //! A scattering model with numbers in it, and where each of them comes from.
 
 use nalgebra::DMatrix;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::report::{Estimate, FitReport};
 use crate::brdf::{Brdf, Parameter};
@@ -29,7 +29,8 @@ pub struct Fit {
 }
 
 /// Covariance of some of a model's parameters.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Covariance {
     /// Paths of the parameters.
     pub parameters: Vec<String>,

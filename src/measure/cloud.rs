@@ -1,43 +1,41 @@
 //! A measured cloud: one point and one power per detection, in the global frame.
 //!
-//! Nothing else that a file may know, such as the facet a simulated ray has hit, is kept: a
-//! measurement does not know it.
+//! Other columns of a file, such as the facet that a simulated ray hit, are not read: a measurement
+//! has none of them.
 
 use std::collections::HashMap;
+use std::ops::RangeInclusive;
 
+use glam::DVec3;
 use thiserror::Error;
 
 use crate::formats::FormatError;
 use crate::frames::{Global, Point};
+use crate::units::{dbm_from_watts, rounded, shown, watts_from_dbm};
 
 /// Larger than any target of this radar, m: beyond, the unit is wrong.
 const LARGEST_M: f64 = 100.0;
-/// No receiver takes more, dBm.
-const STRONGEST_DBM: f64 = 60.0;
-/// Far below the thermal noise of a hertz, dBm.
-const WEAKEST_DBM: f64 = -300.0;
-/// 10 mW: every received power in watts is below, and hardly one of many levels in dBm lies between
-/// it and zero.
-const STRONGEST_W: f64 = 0.01;
+/// Powers that can have been received, dBm: from far below the thermal noise of a hertz to more than any receiver takes.
+pub(super) const POSSIBLE_DBM: RangeInclusive<f64> = -300.0..=60.0;
 
 /// One detection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CloudPoint {
-    /// Chirp number, when the file tells it.
+    /// Chirp number, if the file has it.
     pub chirp: Option<u32>,
     /// Where the radar puts the echo.
     pub point: Point<Global>,
     /// Range R as the file gives it, m.
     pub range_m: Option<f64>,
-    /// Received power, dBm.
-    pub power_dbm: f64,
+    /// Received power, W.
+    pub power_w: f64,
 }
 
 /// A measured cloud that passed [`Cloud::new`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cloud {
     points: Vec<CloudPoint>,
-    /// What a person should know of it.
+    /// Notices for the user.
     pub notices: Vec<String>,
 }
 
@@ -67,7 +65,7 @@ pub enum CloudError {
         /// Diagonal of the bounding box, m.
         size_m: f64,
     },
-    /// Powers in watts that were announced as dBm.
+    /// Powers in watts that a file states as dBm.
     #[error(
         "all {points} powers lie between 0 and {largest:e}: these are watts, not dBm; \
          state the unit of the power, and leave out points of 0 W"
@@ -80,13 +78,13 @@ pub enum CloudError {
     },
     /// A power that cannot have been received.
     #[error(
-        "point {point} has {power_dbm} dBm, which is not from {WEAKEST_DBM} to {STRONGEST_DBM}; check \
-         the unit of the power"
+        "point {point} has {} dBm, which is not from {} to {}; check the unit of the power",
+        shown(rounded(*power_dbm)), POSSIBLE_DBM.start(), POSSIBLE_DBM.end()
     )]
     NoSuchPower {
         /// Point, from 0.
         point: usize,
-        /// Its power.
+        /// Its power, dBm.
         power_dbm: f64,
     },
     /// A power in watts that is not positive.
@@ -94,7 +92,7 @@ pub enum CloudError {
     NotPositive {
         /// Point, from 0.
         point: usize,
-        /// Its power.
+        /// Its power, W.
         power_w: f64,
     },
     /// Two detections of one chirp.
@@ -113,17 +111,17 @@ pub enum CloudError {
     /// The header of a cloud file lacks a column.
     #[error("the file has no column {column}; it has: {found}")]
     MissingColumn {
-        /// What is needed.
+        /// The column that is missing.
         column: &'static str,
-        /// What is there.
+        /// The columns of the file.
         found: String,
     },
-    /// A chirp number that is none.
+    /// A chirp number that is not a whole number from 0.
     #[error("point {point} has the chirp number {value}; give a whole number, 0 or greater")]
     BadChirp {
         /// Point, from 0.
         point: usize,
-        /// What stands there.
+        /// The number in the file.
         value: f64,
     },
 }
@@ -165,7 +163,7 @@ fn check_finite(points: &[CloudPoint]) -> Result<(), CloudError> {
         let checks = [
             ("the position", point.point.xyz.is_finite()),
             ("the range", point.range_m.is_none_or(f64::is_finite)),
-            ("the power", point.power_dbm.is_finite()),
+            ("the power", point.power_w.is_finite()),
         ];
         if let Some((what, _)) = checks.into_iter().find(|(_, finite)| !finite) {
             return Err(CloudError::NotFinite { what, point: number });
@@ -175,26 +173,27 @@ fn check_finite(points: &[CloudPoint]) -> Result<(), CloudError> {
 }
 
 fn check_size(points: &[CloudPoint]) -> Result<(), CloudError> {
-    let places = || points.iter().map(|point| point.point.xyz);
-    let min = places().fold(glam::DVec3::INFINITY, glam::DVec3::min);
-    let max = places().fold(glam::DVec3::NEG_INFINITY, glam::DVec3::max);
+    let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for point in points {
+        min = min.min(point.point.xyz);
+        max = max.max(point.point.xyz);
+    }
     let size_m = min.distance(max);
     if size_m > LARGEST_M { Err(CloudError::TooLarge { size_m }) } else { Ok(()) }
 }
 
 fn check_powers(points: &[CloudPoint]) -> Result<(), CloudError> {
-    let powers = || points.iter().map(|point| point.power_dbm);
-    let largest = powers().fold(f64::NEG_INFINITY, f64::max);
-    if powers().all(|power| power >= 0.0) && largest <= STRONGEST_W {
-        return Err(CloudError::Watts { points: points.len(), largest });
-    }
-    let outside = |power: f64| !(WEAKEST_DBM..=STRONGEST_DBM).contains(&power);
-    match points.iter().enumerate().find(|(_, point)| outside(point.power_dbm)) {
-        Some((point, &CloudPoint { power_dbm, .. })) => {
-            Err(CloudError::NoSuchPower { point, power_dbm })
+    let possible_w = watts_from_dbm(*POSSIBLE_DBM.start())..=watts_from_dbm(*POSSIBLE_DBM.end());
+    for (number, &CloudPoint { power_w, .. }) in points.iter().enumerate() {
+        if power_w < 0.0 {
+            return Err(CloudError::NotPositive { point: number, power_w });
         }
-        None => Ok(()),
+        if !possible_w.contains(&power_w) {
+            let power_dbm = dbm_from_watts(power_w);
+            return Err(CloudError::NoSuchPower { point: number, power_dbm });
+        }
     }
+    Ok(())
 }
 
 fn check_chirps(points: &[CloudPoint]) -> Result<(), CloudError> {
@@ -215,7 +214,8 @@ mod tests {
 
     fn point(chirp: u32, x_m: f64, power_dbm: f64) -> CloudPoint {
         let point = Point::new(x_m, 1.0, 0.0);
-        CloudPoint { chirp: Some(chirp), point, range_m: None, power_dbm }
+        let power_w = watts_from_dbm(power_dbm);
+        CloudPoint { chirp: Some(chirp), point, range_m: None, power_w }
     }
 
     fn refused(points: Vec<CloudPoint>) -> CloudError {
@@ -223,13 +223,11 @@ mod tests {
     }
 
     #[test]
-    fn watts_given_as_dbm_are_told() {
-        let error = refused(vec![point(0, 0.0, 2e-11), point(1, 0.1, 3e-7)]);
-        assert_eq!(error, CloudError::Watts { points: 2, largest: 3e-7 });
-        assert!(error.to_string().contains("these are watts, not dBm"), "{error}");
-        let error = refused(vec![point(0, 0.0, 0.0), point(1, 0.1, 3e-7)]);
-        assert!(matches!(error, CloudError::Watts { .. }), "{error}");
-        assert!(Cloud::new(vec![point(0, 0.0, -60.0), point(1, 0.1, 3e-7)]).is_ok());
+    fn levels_given_as_watts_are_refused() {
+        let point = CloudPoint { power_w: -60.0, ..point(0, 0.0, -60.0) };
+        assert_eq!(refused(vec![point]), CloudError::NotPositive { point: 0, power_w: -60.0 });
+        let none = CloudPoint { power_w: 0.0, ..point };
+        assert!(matches!(refused(vec![none]), CloudError::NoSuchPower { point: 0, .. }));
     }
 
     #[test]
@@ -242,7 +240,8 @@ mod tests {
         let far = refused(vec![point(0, 0.0, -60.0), point(1, 250.0, -60.0)]);
         assert!(far.to_string().contains("millimetres"), "{far}");
         let strong = refused(vec![point(0, 0.0, 75.0)]);
-        assert_eq!(strong, CloudError::NoSuchPower { point: 0, power_dbm: 75.0 });
+        assert!(strong.to_string().contains("point 0 has 75 dBm"), "{strong}");
+        assert!(Cloud::new(vec![point(0, 0.0, -300.0), point(1, 0.0, 60.0)]).is_ok());
         let twice = refused(vec![point(3, 0.0, -60.0), point(4, 0.0, -60.0), point(3, 0.1, -60.0)]);
         assert_eq!(twice, CloudError::DuplicateChirp { chirp: 3, first: 0, second: 2 });
     }

@@ -11,12 +11,12 @@
 
 use glam::DVec3;
 
-use super::cloud::{Cloud, CloudError, CloudPoint};
+use super::cloud::{Cloud, CloudError, CloudPoint, POSSIBLE_DBM};
 use crate::formats::FormatError;
 use crate::formats::csv;
 use crate::formats::ply::{self, read_table};
 use crate::frames::{Global, Point, Pose, Target};
-use crate::units::dbm_from_watts;
+use crate::units::watts_from_dbm;
 
 /// The formats of cloud files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +44,7 @@ pub enum PowerUnit {
 /// ```
 /// use matdb::measure::{CloudFormat, CloudReading};
 /// let cloud = CloudReading::default().read(CloudFormat::Xyz, b"0.1 1.2 0.0 -62.5\n")?;
-/// assert_eq!(cloud.points()[0].power_dbm, -62.5);
+/// assert!((cloud.points()[0].power_w - 5.62e-10).abs() < 0.01e-10);
 /// # Ok::<(), matdb::measure::CloudError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,38 +77,48 @@ impl CloudFormat {
     }
 }
 
+/// Points of a file, and the levels of those whose power it states in dBm.
+#[derive(Default)]
+struct Detections {
+    points: Vec<CloudPoint>,
+    levels_dbm: Vec<f64>,
+}
+
 impl CloudReading {
     /// Reads a whole file.
     ///
     /// # Errors
-    /// When the bytes break the format or the cloud cannot be used, see [`Cloud::new`].
+    /// When the bytes break the format, the powers betray a wrong unit, or the cloud cannot be used, see
+    /// [`Cloud::new`].
     pub fn read(&self, format: CloudFormat, bytes: &[u8]) -> Result<Cloud, CloudError> {
-        let points = match format {
+        let detections = match format {
             CloudFormat::Ply => self.read_ply(bytes),
             CloudFormat::Csv => self.read_csv(bytes),
             CloudFormat::Xyz => self.read_xyz(bytes),
         }?;
-        Cloud::new(points)
+        detections.cloud()
     }
 
-    fn read_ply(&self, bytes: &[u8]) -> Result<Vec<CloudPoint>, CloudError> {
+    fn read_ply(&self, bytes: &[u8]) -> Result<Detections, CloudError> {
         let table = read_table(bytes)?;
         let [xs, ys, zs] = ["x", "y", "z"].map(|name| column(&table, name));
         let (xs, ys, zs) = (xs?, ys?, zs?);
         let (powers, unit) = self.power_column(&table)?;
         let chirps = table.column("chirp");
         let ranges_m = table.column("range_m");
-        let at = |column: &[f64], row: usize| column.get(row).copied().unwrap_or(f64::NAN);
-        let point = |row: usize| -> Result<CloudPoint, CloudError> {
-            let place = DVec3::new(at(xs, row), at(ys, row), at(zs, row)) * self.metres_per_unit;
-            Ok(CloudPoint {
-                chirp: chirps.map(|chirps| chirp_number(row, at(chirps, row))).transpose()?,
-                point: self.global(place),
-                range_m: ranges_m.map(|ranges_m| at(ranges_m, row)),
-                power_dbm: power_dbm(row, at(powers, row), unit)?,
-            })
-        };
-        (0..table.rows()).map(point).collect()
+        let mut detections = Detections::default();
+        for row in 0..table.rows() {
+            let place = DVec3::new(cell(xs, row), cell(ys, row), cell(zs, row));
+            let chirp = chirps.map(|chirps| chirp_number(row, cell(chirps, row))).transpose()?;
+            let power_w = detections.power_w(cell(powers, row), unit)?;
+            detections.points.push(CloudPoint {
+                chirp,
+                point: self.global(place * self.metres_per_unit),
+                range_m: ranges_m.map(|ranges_m| cell(ranges_m, row)),
+                power_w,
+            });
+        }
+        Ok(detections)
     }
 
     fn power_column<'t>(
@@ -123,48 +133,47 @@ impl CloudReading {
             .ok_or_else(|| missing(table, "power_dbm, power_w or power"))
     }
 
-    fn read_csv(&self, bytes: &[u8]) -> Result<Vec<CloudPoint>, CloudError> {
+    fn read_csv(&self, bytes: &[u8]) -> Result<Detections, CloudError> {
         let optional = ["chirp", "range_m", "power_dbm", "power_w"];
         let table = csv::Table::read(bytes, &["x_m", "y_m", "z_m"], &optional)?;
-        let point = |row: usize| -> Result<CloudPoint, CloudError> {
+        let mut detections = Detections::default();
+        for row in 0..table.len() {
             let [x, y, z] = ["x_m", "y_m", "z_m"].map(|name| table.required_number(row, name));
-            let numbered = table.cell(row, "chirp").is_some();
-            let chirp = numbered.then(|| table.whole_number(row, "chirp")).transpose()?;
-            let level = match table.number(row, "power_w")? {
-                Some(power_w) => power_dbm(row, power_w, PowerUnit::Watt)?,
-                None => table.required_number(row, "power_dbm")?,
+            let is_numbered = table.cell(row, "chirp").is_some();
+            let chirp = is_numbered.then(|| table.whole_number(row, "chirp")).transpose()?;
+            let power_w = match table.number(row, "power_w")? {
+                Some(power_w) => detections.power_w(power_w, PowerUnit::Watt)?,
+                None => {
+                    let level_dbm = table.required_number(row, "power_dbm")?;
+                    detections.power_w(level_dbm, PowerUnit::Dbm)?
+                }
             };
             let point = self.global(DVec3::new(x?, y?, z?));
             let range_m = table.number(row, "range_m")?;
-            Ok(CloudPoint { chirp, point, range_m, power_dbm: level })
-        };
-        (0..table.len()).map(point).collect()
+            detections.points.push(CloudPoint { chirp, point, range_m, power_w });
+        }
+        Ok(detections)
     }
 
-    fn read_xyz(&self, bytes: &[u8]) -> Result<Vec<CloudPoint>, CloudError> {
+    fn read_xyz(&self, bytes: &[u8]) -> Result<Detections, CloudError> {
         let text = std::str::from_utf8(bytes).map_err(|error| {
             let place = format!("byte {}", error.valid_up_to());
             FormatError::at(place, "the text is not UTF-8", "save the file as UTF-8")
         })?;
-        let lines = text.lines().enumerate().filter(|(_, line)| {
-            let line = line.trim_start();
-            !line.is_empty() && !line.starts_with('#')
-        });
-        let point =
-            |(row, (line, text)): (usize, (usize, &str))| -> Result<CloudPoint, CloudError> {
-                let [x, y, z, power] = four_numbers(text).ok_or_else(|| {
-                    let place = format!("line {}", line + 1);
-                    FormatError::at(place, "these are not four finite numbers", "give x y z power")
-                })?;
-                let place = DVec3::new(x, y, z) * self.metres_per_unit;
-                Ok(CloudPoint {
-                    chirp: None,
-                    point: self.global(place),
-                    range_m: None,
-                    power_dbm: power_dbm(row, power, self.power)?,
-                })
-            };
-        lines.enumerate().map(point).collect()
+        let mut detections = Detections::default();
+        for (line, text) in text.lines().map(str::trim_start).enumerate() {
+            if text.is_empty() || text.starts_with('#') {
+                continue;
+            }
+            let [x, y, z, power] = four_numbers(text).ok_or_else(|| {
+                let place = format!("line {}", line + 1);
+                FormatError::at(place, "these are not four finite numbers", "give x y z power")
+            })?;
+            let point = self.global(DVec3::new(x, y, z) * self.metres_per_unit);
+            let power_w = detections.power_w(power, self.power)?;
+            detections.points.push(CloudPoint { chirp: None, point, range_m: None, power_w });
+        }
+        Ok(detections)
     }
 
     fn global(&self, place: DVec3) -> Point<Global> {
@@ -173,6 +182,48 @@ impl CloudReading {
             None => place.into(),
         }
     }
+}
+
+impl Detections {
+    /// The power of the next point, W.
+    fn power_w(&mut self, value: f64, unit: PowerUnit) -> Result<f64, CloudError> {
+        let point = self.points.len();
+        match unit {
+            PowerUnit::Dbm if !value.is_finite() => {
+                Err(CloudError::NotFinite { what: "the power", point })
+            }
+            PowerUnit::Dbm if !POSSIBLE_DBM.contains(&value) => {
+                Err(CloudError::NoSuchPower { point, power_dbm: value })
+            }
+            PowerUnit::Dbm => {
+                self.levels_dbm.push(value);
+                Ok(watts_from_dbm(value))
+            }
+            PowerUnit::Watt if value <= 0.0 => {
+                Err(CloudError::NotPositive { point, power_w: value })
+            }
+            PowerUnit::Watt => Ok(value),
+        }
+    }
+
+    /// The cloud, unless its levels in dBm can only be watts.
+    fn cloud(self) -> Result<Cloud, CloudError> {
+        /// 10 mW: every received power in watts is below, and hardly one of many levels in dBm lies between
+        /// it and zero.
+        const STRONGEST_W: f64 = 0.01;
+        let cloud = Cloud::new(self.points)?;
+        let points = cloud.points().len();
+        let largest = self.levels_dbm.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let are_dbm = self.levels_dbm.len() < points
+            || largest > STRONGEST_W
+            || self.levels_dbm.iter().any(|level_dbm| *level_dbm < 0.0);
+        if are_dbm { Ok(cloud) } else { Err(CloudError::Watts { points, largest }) }
+    }
+}
+
+/// A cell of a column; NaN behind its end.
+fn cell(column: &[f64], row: usize) -> f64 {
+    column.get(row).copied().unwrap_or(f64::NAN)
 }
 
 fn four_numbers(line: &str) -> Option<[f64; 4]> {
@@ -194,14 +245,6 @@ fn missing(table: &ply::Table, column: &'static str) -> CloudError {
 fn chirp_number(point: usize, value: f64) -> Result<u32, CloudError> {
     let whole = value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value);
     if whole { Ok(value as u32) } else { Err(CloudError::BadChirp { point, value }) }
-}
-
-fn power_dbm(point: usize, value: f64, unit: PowerUnit) -> Result<f64, CloudError> {
-    match unit {
-        PowerUnit::Dbm => Ok(value),
-        PowerUnit::Watt if value <= 0.0 => Err(CloudError::NotPositive { point, power_w: value }),
-        PowerUnit::Watt => Ok(dbm_from_watts(value)),
-    }
 }
 
 #[cfg(test)]
@@ -227,7 +270,7 @@ mod tests {
             chirp: Some(7),
             point: Point::new(0.1, 1.2, 0.3),
             range_m: Some(8.5),
-            power_dbm: -60.0,
+            power_w: watts_from_dbm(-60.0),
         };
         assert_eq!(cloud.points(), [expected]);
         assert!(cloud.notices.is_empty());
@@ -249,9 +292,14 @@ mod tests {
         let bytes = ply("x y z power", "0 0 0 1e-9\n1 0 0 1e-6");
         let watts = CloudReading { power: PowerUnit::Watt, ..METRES };
         let cloud = watts.read(CloudFormat::Ply, &bytes).unwrap();
-        assert!((cloud.points()[1].power_dbm + 30.0).abs() < 1e-12);
+        assert_eq!(cloud.points()[1].power_w, 1e-6);
         let error = METRES.read(CloudFormat::Ply, &bytes).unwrap_err();
         assert!(matches!(error, CloudError::Watts { points: 2, .. }), "{error}");
+        assert!(error.to_string().contains("these are watts, not dBm"), "{error}");
+        assert_eq!(error, CloudError::Watts { points: 2, largest: 1e-6 });
+        let with_zero = METRES.read(CloudFormat::Xyz, b"0 0 0 0\n1 0 0 1e-6").unwrap_err();
+        assert!(matches!(with_zero, CloudError::Watts { .. }), "{with_zero}");
+        assert!(METRES.read(CloudFormat::Xyz, b"0 0 0 -60\n1 0 0 1e-6").is_ok());
         let negative = watts.read(CloudFormat::Xyz, b"0 0 0 -60").unwrap_err();
         assert_eq!(negative, CloudError::NotPositive { point: 0, power_w: -60.0 });
     }

@@ -3,23 +3,23 @@
 
 use glam::DVec3;
 
+use super::error::RegistrationError;
 use super::icp::{Gap, Motion, NormalEquations, bulk_sd_m, point_to_point, rigid};
 use super::nearest::Nearest;
-use super::placed::Seen;
-use super::register::{Metric, Registration, RegistrationError};
+use super::settings::{Metric, Registration};
+use super::tracer::Intersection;
 use super::view::{View, median};
 use crate::frames::{Global, Point, Pose};
 
 /// Each virtual scan pairs points within half the reach of the one before, down to this, m.
 const LEAST_REACH_M: f64 = 0.02;
-/// A pair further off sideways than so many typical pairs is beyond the edge of what the virtual
-/// scan saw.
+/// Pairs farther apart sideways than this many times the median lie beyond the edge of the virtual scan.
 const BEYOND_THE_EDGE: f64 = 4.0;
-/// A smaller share of points near the mesh is no overlap.
+/// With a smaller share of points near the mesh, the clouds do not overlap.
 const LEAST_OVERLAP: f64 = 0.2;
 
 /// Where a coarse alignment ended.
-pub(super) struct Aligned {
+pub(super) struct Alignment {
     pub pose: Pose<Global, Global>,
     pub scans: usize,
     pub steps: usize,
@@ -39,12 +39,12 @@ pub(super) fn align(
     settings: &Registration,
     start: Pose<Global, Global>,
     still_m: f64,
-) -> Result<Aligned, RegistrationError> {
-    let mut aligned = Aligned { pose: start, scans: 0, steps: 0, still: false };
+) -> Result<Alignment, RegistrationError> {
+    let mut aligned = Alignment { pose: start, scans: 0, steps: 0, still: false };
     let mut reach_m = settings.reach_m;
     while aligned.scans < settings.max_scans && !aligned.still {
-        let seen: Vec<Seen> =
-            view.traced.scan(&aligned.pose, &view.chirps).into_iter().flatten().collect();
+        let seen: Vec<Intersection> =
+            view.tracer.scan(&aligned.pose, &view.chirps).into_iter().flatten().collect();
         let (moved, steps) = align_to(view, settings, &seen, reach_m)?;
         aligned.pose = rigid(&(moved * aligned.pose));
         aligned.scans += 1;
@@ -65,7 +65,7 @@ pub(super) fn change_m(view: &View, moved: &Pose<Global, Global>) -> f64 {
 fn align_to(
     view: &View,
     settings: &Registration,
-    seen: &[Seen],
+    seen: &[Intersection],
     reach_m: f64,
 ) -> Result<(Pose<Global, Global>, usize), RegistrationError> {
     let places: Vec<DVec3> = seen.iter().map(|seen| seen.hit.point.xyz).collect();
@@ -88,30 +88,44 @@ fn align_to(
     Ok((moved, settings.max_steps))
 }
 
+/// Pairs each measured point with the nearest of the virtual ones, moved by `moved`, within `reach_m`.
 fn pairs(
     points: &[DVec3],
     tree: &Nearest,
-    seen: &[Seen],
+    seen: &[Intersection],
     moved: &Pose<Global, Global>,
     reach_m: f64,
 ) -> Vec<Pair> {
     let back = moved.inverse();
-    let pair = |measured: &DVec3| {
-        let (number, distance_m) = tree.find((back * Point::from(*measured)).xyz);
-        let seen = seen.get(number)?;
-        let model = (*moved * seen.hit.point).xyz;
-        let normal = moved.rotation() * seen.normal;
-        (distance_m <= reach_m).then_some(Pair { model, measured: *measured, normal })
-    };
-    let mut pairs: Vec<Pair> = points.iter().filter_map(pair).collect();
+    let mut pairs = Vec::new();
+    for &measured in points {
+        let (number, distance_m) = tree.find((back * Point::from(measured)).xyz);
+        if let Some(seen) = seen.get(number).filter(|_| distance_m <= reach_m) {
+            let model = (*moved * seen.hit.point).xyz;
+            pairs.push(Pair { model, measured, normal: moved.rotation() * seen.normal });
+        }
+    }
+    // Beyond the edge of what the virtual scan saw, pairs lie far off sideways.
     let typical_m = median(pairs.iter().map(Pair::sideways_m));
     pairs.retain(|pair| pair.sideways_m() <= BEYOND_THE_EDGE * typical_m);
     pairs
 }
 
 impl Pair {
+    /// Distance of the two points.
+    fn apart_m(&self) -> f64 {
+        self.model.distance(self.measured)
+    }
+
+    /// Distance of the two points within the surface of the model.
     fn sideways_m(&self) -> f64 {
         (self.measured - self.model).reject_from_normalized(self.normal).length()
+    }
+
+    /// The gap along the normal of the model.
+    fn gap(&self) -> Gap {
+        let size_m = self.normal.dot(self.measured - self.model);
+        Gap { at: self.model, gradient: self.normal, size_m }
     }
 }
 
@@ -121,18 +135,13 @@ fn closing(view: &View, settings: &Registration, pairs: &[Pair]) -> Pose<Global,
     const LEAST_SD_M: f64 = 1e-9;
     if settings.metric == Metric::PointToPoint {
         let ends: Vec<(DVec3, DVec3)> = pairs.iter().map(|p| (p.model, p.measured)).collect();
-        let apart_m = |(a, b): &(DVec3, DVec3)| a.distance(*b);
-        let sd_m = bulk_sd_m(ends.iter().map(apart_m)).max(LEAST_SD_M);
+        let sd_m = bulk_sd_m(pairs.iter().map(Pair::apart_m)).max(LEAST_SD_M);
         let weights: Vec<f64> =
-            ends.iter().map(|ends| settings.kernel.weight(apart_m(ends) / sd_m)).collect();
+            pairs.iter().map(|pair| settings.kernel.weight(pair.apart_m() / sd_m)).collect();
         let still = Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO);
         return point_to_point(&ends, &weights).unwrap_or(still);
     }
-    let gap = |pair: &Pair| {
-        let size_m = pair.normal.dot(pair.measured - pair.model);
-        Gap { at: pair.model, gradient: pair.normal, size_m }
-    };
-    let gaps: Vec<Gap> = pairs.iter().map(gap).collect();
+    let gaps: Vec<Gap> = pairs.iter().map(Pair::gap).collect();
     let sd_m = bulk_sd_m(gaps.iter().map(|gap| gap.size_m)).max(LEAST_SD_M);
     let weighted = gaps.iter().map(|gap| (*gap, settings.kernel.weight(gap.size_m / sd_m)));
     NormalEquations::new(weighted, view.pivot, view.length_m).solve().about(view.pivot)

@@ -7,6 +7,7 @@ use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
 use crate::radar::{Chirps, Radar};
 use crate::render::{Echo, Scan};
+use crate::units::dbm_from_watts;
 
 /// Agreement of two power images on one grid.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -19,7 +20,7 @@ pub struct Agreement {
     pub only_simulated: usize,
     /// Mean of simulated less measured over the pixels of both, dB; NaN without any.
     pub bias_db: f64,
-    /// Root mean square of the same, dB.
+    /// Root mean square of that difference, dB.
     pub rmse_db: f64,
     /// Median of its size, dB.
     pub median_size_db: f64,
@@ -39,22 +40,23 @@ pub struct Line {
 pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
     let frames = radar.frames();
     let (origin, target_from_global) = (frames.origin(), frames.global_from_target.inverse());
-    let echo = |(number, point): (usize, &super::CloudPoint)| {
+    let mut echoes = Vec::with_capacity(cloud.points().len());
+    for (number, point) in cloud.points().iter().enumerate() {
         let in_target = target_from_global * point.point;
-        Echo {
+        echoes.push(Echo {
             chirp: point.chirp.unwrap_or(number as u32),
             point: point.point,
             range_m: point.range_m.unwrap_or(origin.distance_m(point.point)),
             xt_m: in_target.xyz.x,
             yt_m: in_target.xyz.y,
-            power_dbm: point.power_dbm,
+            power_dbm: dbm_from_watts(point.power_w),
             truth: None,
-        }
-    };
+        });
+    }
     Scan {
         chirps: chirps.rays.len(),
         hits: cloud.points().len(),
-        echoes: cloud.points().iter().enumerate().map(echo).collect(),
+        echoes,
         threshold_dbm: f64::NEG_INFINITY,
         noise_dbm: None,
     }
@@ -64,22 +66,19 @@ pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
 /// agreement. Both images must be on the same grid, as [`power_image`](crate::render::power_image)
 /// draws them for one scene.
 pub fn difference(measured: &Raster, simulated: &Raster) -> (Raster, Agreement) {
-    let power = |raster: &Raster| raster.channel("power_dbm").unwrap_or_default().to_vec();
-    let pairs: Vec<(f32, f32)> = std::iter::zip(power(measured), power(simulated)).collect();
-    let values: Vec<f32> = pairs.iter().map(|(m, s)| s - m).collect();
-    let only = |here: fn(&(f32, f32)) -> f32, there: fn(&(f32, f32)) -> f32| {
-        pairs.iter().filter(|pair| here(pair).is_finite() && !there(pair).is_finite()).count()
-    };
+    let [measured_dbm, simulated_dbm] = [measured, simulated].map(power_dbm);
+    let values: Vec<f32> =
+        std::iter::zip(measured_dbm, simulated_dbm).map(|(m, s)| s - m).collect();
     let both: Vec<f64> = values.iter().filter(|v| v.is_finite()).map(|&v| f64::from(v)).collect();
-    let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / both.len() as f64;
     let mut sizes: Vec<f64> = both.iter().map(|d| d.abs()).collect();
     sizes.sort_by(f64::total_cmp);
+    let count = both.len() as f64;
     let agreement = Agreement {
         both: both.len(),
-        only_measured: only(|pair| pair.0, |pair| pair.1),
-        only_simulated: only(|pair| pair.1, |pair| pair.0),
-        bias_db: mean(&mut both.iter().copied()),
-        rmse_db: mean(&mut both.iter().map(|d| d * d)).sqrt(),
+        only_measured: count_of_first(measured_dbm, simulated_dbm),
+        only_simulated: count_of_first(simulated_dbm, measured_dbm),
+        bias_db: both.iter().sum::<f64>() / count,
+        rmse_db: (both.iter().map(|d| d * d).sum::<f64>() / count).sqrt(),
         median_size_db: sizes.get(sizes.len() / 2).copied().unwrap_or(f64::NAN),
     };
     let channel = Channel { name: "difference_db".to_owned(), values };
@@ -87,8 +86,18 @@ pub fn difference(measured: &Raster, simulated: &Raster) -> (Raster, Agreement) 
     (raster, agreement)
 }
 
+fn power_dbm(raster: &Raster) -> &[f32] {
+    raster.channel("power_dbm").unwrap_or_default()
+}
+
+/// Pixels that have power in the first image alone.
+fn count_of_first(first_dbm: &[f32], second_dbm: &[f32]) -> usize {
+    let pixels = std::iter::zip(first_dbm, second_dbm);
+    pixels.filter(|(first, second)| first.is_finite() && !second.is_finite()).count()
+}
+
 /// (x, dBm) of the detections within a line, x in the global frame, m, from left to right.
-pub fn along(scan: &Scan, line: Line) -> Vec<(f64, f64)> {
+pub fn power_along(scan: &Scan, line: Line) -> Vec<(f64, f64)> {
     let within =
         |point: Point<crate::frames::Global>| (point.xyz.y - line.y_m).abs() <= 0.5 * line.width_m;
     let mut points: Vec<(f64, f64)> = scan
@@ -103,7 +112,8 @@ pub fn along(scan: &Scan, line: Line) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::CloudPoint;
+    use crate::measure::cloud::CloudPoint;
+    use crate::units::watts_from_dbm;
 
     fn raster(values: [f32; 4]) -> Raster {
         let channels = vec![Channel { name: "power_dbm".to_owned(), values: values.to_vec() }];
@@ -135,14 +145,20 @@ mod tests {
             chirp: None,
             point: Point::new(x, y, 0.0),
             range_m: None,
-            power_dbm,
+            power_w: watts_from_dbm(power_dbm),
         };
         let points =
             vec![point(0.1, 1.105, -40.0), point(-0.1, 1.095, -50.0), point(0.0, 1.2, -60.0)];
         let cloud = Cloud::new(points).unwrap();
         let scan = measured_scan(&radar, &Chirps::default(), &cloud);
-        let line = along(&scan, Line { y_m: 1.1, width_m: 0.02 });
-        assert_eq!(line, [(-0.1, -50.0), (0.1, -40.0)]);
+        let line = power_along(&scan, Line { y_m: 1.1, width_m: 0.02 });
+        let expected = [(-0.1, -50.0), (0.1, -40.0)];
+        assert_eq!(line.len(), expected.len());
+        for ((x_m, power_dbm), (expected_m, expected_dbm)) in std::iter::zip(line, expected) {
+            assert_eq!(x_m, expected_m);
+            // A level that was converted to watts and back.
+            assert!(f64::abs(power_dbm - expected_dbm) < 1e-12, "{power_dbm}");
+        }
         assert!((scan.echoes[2].yt_m - 0.1).abs() < 1e-12);
         assert!((scan.echoes[2].range_m - 8.0f64.hypot(0.1)).abs() < 1e-12);
     }

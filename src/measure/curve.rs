@@ -1,4 +1,4 @@
-//! A backscatter curve: one row per chirp that met, or should have met, a material.
+//! A backscatter curve: one observation per chirp that hit, or should have hit, a material.
 //!
 //! As CSV: `theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored,xt_m,yt_m`. σ⁰ is that of
 //! equation (10), 4π·f·cos²θ, so that a curve belongs to the material and not to the radar. A chirp
@@ -25,39 +25,18 @@ pub const COLUMNS: [&str; 9] = [
     "yt_m",
 ];
 
-/// One chirp's evidence of how a material scatters.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Row {
-    /// Angle of incidence θ, rad, from 0 to π/2.
-    pub theta_rad: f64,
-    /// Standard deviation of each of the two tilts of the normal against the ray, rad. Not that of
-    /// θ itself, which cannot be negative.
-    pub theta_sd_rad: f64,
-    /// Received power, W; for a censored row the least that would have been detected.
-    pub power_w: f64,
-    /// σ⁰ of that power, a pure number.
-    pub sigma0: f64,
-    /// Range R, m.
-    pub range_m: f64,
-    /// Chirp number.
-    pub chirp: u32,
-    /// Nothing was detected: power and σ⁰ are upper limits.
-    pub censored: bool,
-    /// Place on the target, (x_t, y_t) of the frame `St`, m, where it is known.
-    pub target_m: Option<[f64; 2]>,
-}
-
-/// A backscatter curve, rows in any order.
+/// A backscatter curve: observations in any order, each with a σ⁰ or the limit that it stayed below.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Curve {
-    /// One row per chirp.
-    pub rows: Vec<Row>,
+    /// One per chirp. Those that [`Curve::read`] and [`Curve::from_observations`] give leave out nothing but
+    /// the place on the target.
+    pub observations: Vec<Observation>,
 }
 
-/// A point of a material's curve that is no row of a backscatter curve.
+/// Why an observation does not belong in a backscatter curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ObservationError {
-    /// Source and receiver looked along different directions.
+    /// Source and receiver were in different directions.
     #[error("point {point} (from 1) is bistatic; only backscatter is fitted, so leave it out")]
     Bistatic {
         /// Its number from 1.
@@ -65,7 +44,7 @@ pub enum ObservationError {
     },
     /// The true value lies above a threshold.
     #[error(
-        "point {point} (from 1) is above the instrument's range, which no row says; leave it out"
+        "point {point} (from 1) is above the instrument's range, which a fit does not use; leave it out"
     )]
     AboveRange {
         /// Its number from 1.
@@ -83,30 +62,26 @@ impl Curve {
     /// The curve of a material's observations. What an observation leaves out is as in [`Curve::read`].
     ///
     /// # Errors
-    /// The first observation that a row cannot say.
+    /// The first observation that is not in a backscatter curve.
     pub fn from_observations(observations: &[Observation]) -> Result<Curve, ObservationError> {
-        let rows = observations.iter().enumerate().map(|(row, o)| from_observation(row, o));
-        Ok(Curve { rows: rows.collect::<Result<_, _>>()? })
+        let completed = observations.iter().enumerate().map(|(index, o)| complete(index, o));
+        Ok(Curve { observations: completed.collect::<Result<_, _>>()? })
     }
 
-    /// The curve as a material keeps it.
-    pub fn observations(&self) -> Vec<Observation> {
-        self.rows.iter().map(Row::observation).collect()
-    }
-
-    /// Whether no row has a power of its own, but σ⁰ in its place.
+    /// Whether no observation has a power of its own, but σ⁰ in its place.
     pub fn lacks_power(&self) -> bool {
-        self.rows.iter().all(|row| row.power_w == row.sigma0)
+        self.observations.iter().all(|o| o.power_w.is_none() || o.power_w == o.level_sigma0())
     }
 
     /// Reads a curve file ([`points`]). Without a column a row is uncensored, its angle exact, its range 0, its
     /// power σ⁰ in watts, its chirp its number from 0.
     ///
     /// # Errors
-    /// The first cell that cannot be used, with its line and column, and rows that are no backscatter.
+    /// The first cell that cannot be used, with its line and column, and rows that are not backscatter.
     pub fn read(bytes: &[u8]) -> Result<Curve, FormatError> {
-        let row = |(index, (line, point)): (usize, (usize, Observation))| {
-            from_observation(index, &point).map_err(|error| {
+        let mut observations = Vec::new();
+        for (index, (line, point)) in points(bytes)?.iter().enumerate() {
+            observations.push(complete(index, point).map_err(|error| {
                 let problem = match error {
                     ObservationError::Bistatic { .. } => "the row is bistatic",
                     ObservationError::AboveRange { .. } => {
@@ -115,75 +90,64 @@ impl Curve {
                     ObservationError::Empty { .. } => "the row has no value and no threshold",
                 };
                 FormatError::at(format!("line {line}"), problem, "leave it out here")
-            })
-        };
-        let rows = points(bytes)?.into_iter().enumerate().map(row).collect::<Result<_, _>>()?;
-        Ok(Curve { rows })
+            })?);
+        }
+        Ok(Curve { observations })
     }
 
     /// The curve as a file's bytes.
     pub fn write(&self) -> Vec<u8> {
         let mut text = COLUMNS.join(",") + "\n";
-        for row in &self.rows {
-            let [xt_m, yt_m] = row.target_m.map_or_else(Default::default, |place| {
+        for (index, o) in self.observations.iter().enumerate() {
+            let sigma0 = o.level_sigma0().unwrap_or(f64::NAN);
+            let [xt_m, yt_m] = o.target_m.map_or_else(Default::default, |place| {
                 place.map(|metres| format!("{:.5}", metres + 0.0))
             });
             text += &format!(
                 "{:.4},{:.4},{:.3},{:.3},{:.5},{},{},{xt_m},{yt_m}\n",
-                row.theta_rad.to_degrees(),
-                row.theta_sd_rad.to_degrees(),
-                dbm_from_watts(row.power_w),
-                db_from_ratio(row.sigma0),
-                row.range_m,
-                row.chirp,
-                u8::from(row.censored),
+                o.theta_i_rad.to_degrees(),
+                o.theta_sd_rad.unwrap_or(0.0).to_degrees(),
+                dbm_from_watts(o.power_w.unwrap_or(sigma0)),
+                db_from_ratio(sigma0),
+                o.range_m.unwrap_or(0.0),
+                o.chirp.unwrap_or(index as u32),
+                u8::from(o.is_censored()),
             );
         }
         text.into_bytes()
     }
 
-    /// Rows with a detection.
-    pub fn detected(&self) -> impl Iterator<Item = &Row> {
-        self.rows.iter().filter(|row| !row.censored)
+    /// Observations with a detection.
+    pub fn detected(&self) -> impl Iterator<Item = &Observation> {
+        self.observations.iter().filter(|o| !o.is_censored())
     }
 }
 
-impl Row {
-    fn observation(&self) -> Observation {
-        let Row { theta_rad, theta_sd_rad, power_w, sigma0, range_m, chirp, censored, target_m } =
-            *self;
-        let (level, limit) = ((!censored).then_some(sigma0), censored.then_some(sigma0));
-        Observation {
-            theta_sd_rad: Some(theta_sd_rad),
-            power_w: Some(power_w),
-            range_m: Some(range_m),
-            chirp: Some(chirp),
-            target_m,
-            ..Observation::backscatter(theta_rad, level, limit)
-        }
-    }
-}
-
-fn from_observation(index: usize, o: &Observation) -> Result<Row, ObservationError> {
+/// σ⁰, or its limit, of an observation that belongs in a backscatter curve; `index` from 0.
+///
+/// # Errors
+/// Why the observation does not belong in one.
+pub(crate) fn backscatter_level(index: usize, o: &Observation) -> Result<f64, ObservationError> {
     let point = index + 1;
     if !o.is_retro() {
         return Err(ObservationError::Bistatic { point });
     }
-    let level = match o.censor {
-        Censor::Right => return Err(ObservationError::AboveRange { point }),
-        Censor::Left => o.threshold_sigma0,
-        Censor::None => o.sigma0,
-    };
-    let Some(sigma0) = level else { return Err(ObservationError::Empty { point }) };
-    Ok(Row {
-        theta_rad: o.theta_i_rad,
-        theta_sd_rad: o.theta_sd_rad.unwrap_or(0.0),
-        power_w: o.power_w.unwrap_or(sigma0),
-        sigma0,
-        range_m: o.range_m.unwrap_or(0.0),
-        chirp: o.chirp.unwrap_or(index as u32),
-        censored: o.censor == Censor::Left,
+    if o.censor == Censor::Right {
+        return Err(ObservationError::AboveRange { point });
+    }
+    o.level_sigma0().ok_or(ObservationError::Empty { point })
+}
+
+/// An observation with the defaults of [`Curve::read`] for what it leaves out.
+fn complete(index: usize, o: &Observation) -> Result<Observation, ObservationError> {
+    let sigma0 = backscatter_level(index, o)?;
+    Ok(Observation {
+        theta_sd_rad: o.theta_sd_rad.or(Some(0.0)),
+        power_w: o.power_w.or(Some(sigma0)),
+        range_m: o.range_m.or(Some(0.0)),
+        chirp: o.chirp.or(Some(index as u32)),
         target_m: o.target_m,
+        ..Observation::of_level(o.theta_i_rad, sigma0, o.is_censored())
     })
 }
 
@@ -198,7 +162,7 @@ mod tests {
                     60.0000,0.3000,-77.000,-30.000,8.10000,18,1,,\n";
         let curve = Curve::read(text.as_bytes()).unwrap();
         assert_eq!(curve.detected().count(), 1);
-        assert!((curve.rows[0].theta_rad - 12.5f64.to_radians()).abs() < 1e-15);
+        assert!((curve.observations[0].theta_i_rad - 12.5f64.to_radians()).abs() < 1e-15);
         assert_eq!(String::from_utf8(curve.write()).unwrap(), text);
     }
 
@@ -208,8 +172,11 @@ mod tests {
             b"# my-paint\ntheta_deg,sigma0_db,censor,threshold_db,theta_r_deg,delta_phi_deg\n\
                      10,-3,none,-30,10,0\n60,,left,-30,60,0\n";
         let curve = Curve::read(text).unwrap();
-        assert_eq!(curve.rows.iter().map(|row| row.censored).collect::<Vec<_>>(), [false, true]);
-        assert!((curve.rows[1].sigma0 - 1e-3).abs() < 1e-15);
+        assert_eq!(
+            curve.observations.iter().map(Observation::is_censored).collect::<Vec<_>>(),
+            [false, true]
+        );
+        assert!((curve.observations[1].threshold_sigma0.unwrap() - 1e-3).abs() < 1e-15);
         for (row, said) in
             [("10,-3,,,11,0", "bistatic"), ("10,,right,-3,,", "above the instrument")]
         {
@@ -226,8 +193,8 @@ mod tests {
         let text = b"theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored\n\
                      12.5,0.3,-55.25,-9.1,8.0,17,0\n60,0.3,-77,-30,8.1,18,1\n";
         let curve = Curve::read(text).unwrap();
-        let kept = curve.observations();
-        assert_eq!((kept[1].sigma0, kept[1].threshold_sigma0), (None, Some(curve.rows[1].sigma0)));
+        let kept = curve.observations.clone();
+        assert_eq!((kept[1].sigma0, kept[1].level_sigma0()), (None, Some(1e-3)));
         assert_eq!(Curve::from_observations(&kept), Ok(curve));
         let bistatic = Observation { delta_phi_rad: 1.0, ..kept[0] };
         let refused = Curve::from_observations(&[kept[0], bistatic]);
@@ -240,8 +207,9 @@ mod tests {
     #[test]
     fn two_columns_are_enough() {
         let curve = Curve::read(b"theta_deg,sigma0_db\n0,-3\n45,-20\n").unwrap();
-        assert_eq!(curve.rows[1].chirp, 1);
-        assert!(!curve.rows[1].censored && curve.rows[1].theta_sd_rad == 0.0);
+        assert_eq!(curve.observations[1].chirp, Some(1));
+        let second = &curve.observations[1];
+        assert!(!second.is_censored() && second.theta_sd_rad == Some(0.0));
     }
 
     #[test]

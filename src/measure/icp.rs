@@ -124,7 +124,7 @@ impl NormalEquations {
         NormalEquations { information, pull_m, length_m }
     }
 
-    /// The motion that closes the gaps best; along directions that no gap feels it stays put.
+    /// The motion that closes the gaps best, without any along directions that no gap constrains.
     pub fn solve(&self) -> Motion {
         // The decomposition would not end.
         if !self.information.iter().chain(self.pull_m.iter()).all(|sum| sum.is_finite()) {
@@ -156,15 +156,19 @@ pub(super) fn jacobian(gap: &Gap, pivot: DVec3, length_m: f64) -> Vector6<f64> {
 /// The rigid map that brings the first points of weighted pairs nearest to the second; `None` when
 /// no weight is above 0 or a point is not finite.
 pub fn point_to_point(pairs: &[(DVec3, DVec3)], weights: &[f64]) -> Option<Pose<Global, Global>> {
-    let weighted = || std::iter::zip(pairs, weights);
     let total: f64 = weights.iter().sum();
     if total.is_nan() || total <= 0.0 {
         return None;
     }
-    let from = weighted().map(|((from, _), w)| *from * *w).sum::<DVec3>() / total;
-    let to = weighted().map(|((_, to), w)| *to * *w).sum::<DVec3>() / total;
+    // Both centres, and the covariance of the pairs about them.
+    let (mut from, mut to) = (DVec3::ZERO, DVec3::ZERO);
+    for ((a, b), w) in std::iter::zip(pairs, weights) {
+        from += *a * *w;
+        to += *b * *w;
+    }
+    let (from, to) = (from / total, to / total);
     let mut covariance = Matrix3::zeros();
-    for ((a, b), w) in weighted() {
+    for ((a, b), w) in std::iter::zip(pairs, weights) {
         let [a, b] = [*a - from, *b - to].map(|v| nalgebra::Vector3::new(v.x, v.y, v.z));
         covariance += a * b.transpose() * *w;
     }
@@ -173,6 +177,7 @@ pub fn point_to_point(pairs: &[(DVec3, DVec3)], weights: &[f64]) -> Option<Pose<
         return None;
     }
     let svd = covariance.svd(true, true);
+    // The rotation V·diag(1, 1, ±1)·Uᵀ, without a mirror.
     let (u, v) = (svd.u?, svd.v_t?.transpose());
     let mirror = (v * u.transpose()).determinant().signum();
     let proper = v * Matrix3::from_diagonal(&nalgebra::Vector3::new(1.0, 1.0, mirror));

@@ -43,23 +43,26 @@ pub fn is_table(bytes: &[u8]) -> bool {
 }
 
 fn read_row(table: &Table, row: usize) -> Result<InPlane, FormatError> {
-    let within = |column: &'static str, [min, max]: [f64; 2]| {
-        let value = table.required_number(row, column)?;
-        match ((min..=max).contains(&value), table.cell(row, column)) {
-            (false, Some(cell)) => Err(cell.refuse(&format!("give a value from {min} to {max}"))),
-            _ => Ok(value),
-        }
-    };
-    let sd_db = match table.cell(row, "sd_db") {
-        Some(_) => Some(within("sd_db", [1e-6, 100.0])?),
-        None => None,
-    };
+    let sd_db = table.number_within(row, "sd_db", (1e-6, 100.0))?;
+    let theta_i_deg = required_within(table, row, "theta_i_deg", (0.0, GRAZING_DEG))?;
+    let theta_s_deg = required_within(table, row, "theta_s_deg", (-GRAZING_DEG, GRAZING_DEG))?;
     Ok(InPlane {
-        theta_i_rad: within("theta_i_deg", [0.0, GRAZING_DEG])?.to_radians(),
-        theta_s_rad: within("theta_s_deg", [-GRAZING_DEG, GRAZING_DEG])?.to_radians(),
-        f_per_sr: within("brdf_per_sr", [1e-30, 1e30])?,
+        theta_i_rad: theta_i_deg.to_radians(),
+        theta_s_rad: theta_s_deg.to_radians(),
+        f_per_sr: required_within(table, row, "brdf_per_sr", (1e-30, 1e30))?,
         sd_db,
     })
+}
+
+/// A number from the least to the greatest that must be there.
+fn required_within(
+    table: &Table,
+    row: usize,
+    column: &str,
+    range: (f64, f64),
+) -> Result<f64, FormatError> {
+    table.required_number(row, column)?;
+    Ok(table.number_within(row, column, range)?.unwrap_or_default())
 }
 
 /// Reads the plane of incidence of a `.bsdf` table at its first sample rotation; zeros, which stand
@@ -74,32 +77,15 @@ pub fn read_bsdf(bytes: &[u8]) -> Result<Vec<InPlane>, FormatError> {
         .enumerate()
         .map(|(index, line)| (index + 1, line.trim()))
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-    let mut header = Header::default();
-    loop {
-        let Some((number, line)) = lines.next() else { return Err(missing("DataBegin")) };
-        let words: Vec<&str> = line.split_whitespace().collect();
-        let axis = match words.first().copied() {
-            Some("DataBegin") => break,
-            Some("AngleOfIncidence") => &mut header.incidences_deg,
-            Some("ScatterAzimuth") => &mut header.azimuths_deg,
-            Some("ScatterRadial") => &mut header.radials_deg,
-            _ => continue,
-        };
-        let Some((below, values)) = lines.next() else { return Err(missing("DataBegin")) };
-        *axis = numbers(below, values)?;
-        if words.get(1).and_then(|count| count.parse().ok()) != Some(axis.len()) {
-            let problem = format!("`{line}` is followed by {} angles", axis.len());
-            return Err(FormatError::at(format!("line {number}"), problem, "mend the count"));
-        }
-    }
-    header.check()?;
+    let header = Header::read(&mut lines)?;
     let mut found = Vec::new();
+    // A block for each angle of incidence: the total, then a row for each azimuth.
     for &incidence_deg in &header.incidences_deg {
         match lines.next() {
             Some((_, line)) if line.starts_with("TIS") => {}
             Some((number, _)) => {
                 let place = format!("line {number}");
-                return Err(FormatError::at(place, "`TIS` was expected", "mend the table"));
+                return Err(FormatError::at(place, "`TIS` was expected", "correct the table"));
             }
             None => return Err(missing("TIS")),
         }
@@ -111,12 +97,13 @@ pub fn read_bsdf(bytes: &[u8]) -> Result<Vec<InPlane>, FormatError> {
                 180.0 => 1.0,
                 _ => continue,
             };
-            let values = header.radials_deg.iter().zip(row);
-            found.extend(values.filter_map(|(radial_deg, f_per_sr)| {
-                let is_double = towards > 0.0 && *radial_deg == 0.0;
-                in_plane(incidence_deg, incidence_deg + towards * radial_deg, f_per_sr)
-                    .filter(|_| !is_double)
-            }));
+            for (&radial_deg, f_per_sr) in header.radials_deg.iter().zip(row) {
+                // The mirror direction stands in both rows of the plane.
+                if towards < 0.0 || radial_deg != 0.0 {
+                    let theta_s_deg = incidence_deg + towards * radial_deg;
+                    found.extend(in_plane(incidence_deg, theta_s_deg, f_per_sr));
+                }
+            }
         }
     }
     Ok(found)
@@ -140,6 +127,34 @@ struct Header {
 }
 
 impl Header {
+    /// Reads up to the line `DataBegin`.
+    fn read<'t>(lines: &mut impl Iterator<Item = (usize, &'t str)>) -> Result<Header, FormatError> {
+        let mut header = Header::default();
+        loop {
+            let Some((number, line)) = lines.next() else { return Err(missing("DataBegin")) };
+            let words: Vec<&str> = line.split_whitespace().collect();
+            let axis = match words.first().copied() {
+                Some("DataBegin") => break,
+                Some("AngleOfIncidence") => &mut header.incidences_deg,
+                Some("ScatterAzimuth") => &mut header.azimuths_deg,
+                Some("ScatterRadial") => &mut header.radials_deg,
+                _ => continue,
+            };
+            let Some((below, values)) = lines.next() else { return Err(missing("DataBegin")) };
+            *axis = numbers(below, values)?;
+            if words.get(1).and_then(|count| count.parse().ok()) != Some(axis.len()) {
+                let problem = format!("`{line}` is followed by {} angles", axis.len());
+                return Err(FormatError::at(
+                    format!("line {number}"),
+                    problem,
+                    "correct the count",
+                ));
+            }
+        }
+        header.check()?;
+        Ok(header)
+    }
+
     fn check(&self) -> Result<(), FormatError> {
         let axes = [
             ("AngleOfIncidence", &self.incidences_deg),
@@ -158,13 +173,11 @@ impl Header {
 
     fn row(&self, line: usize, text: &str) -> Result<Vec<f64>, FormatError> {
         let row = numbers(line, text)?;
-        match row.len() == self.radials_deg.len() {
-            true => Ok(row),
-            false => {
-                let problem = format!("{} values for {} angles", row.len(), self.radials_deg.len());
-                Err(FormatError::at(format!("line {line}"), problem, "mend the line"))
-            }
+        if row.len() != self.radials_deg.len() {
+            let problem = format!("{} values for {} angles", row.len(), self.radials_deg.len());
+            return Err(FormatError::at(format!("line {line}"), problem, "correct the line"));
         }
+        Ok(row)
     }
 }
 
@@ -173,11 +186,16 @@ fn missing(what: &str) -> FormatError {
 }
 
 fn numbers(line: usize, text: &str) -> Result<Vec<f64>, FormatError> {
-    let number = |word: &str| word.parse().ok().filter(|value: &f64| value.is_finite());
-    let all: Option<Vec<f64>> = text.split_whitespace().map(number).collect();
-    all.ok_or_else(|| {
-        FormatError::at(format!("line {line}"), "a word is no finite number", "mend the line")
-    })
+    let mut numbers = Vec::new();
+    for word in text.split_whitespace() {
+        let number: f64 = word.parse().unwrap_or(f64::NAN);
+        if !number.is_finite() {
+            let problem = format!("`{word}` is not a finite number");
+            return Err(FormatError::at(format!("line {line}"), problem, "correct the line"));
+        }
+        numbers.push(number);
+    }
+    Ok(numbers)
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Where and how steeply a ray meets the registered target, and how well that is known.
+//! The point and the angle of incidence at which a ray hits the registered target, and their uncertainty.
 //!
 //! The standard deviation of a tilt of the normal against the ray has three parts: the turn of the
 //! pose, the normal noise of the mesh ([`super::normals`]), and what the caller adds. What a shifted
@@ -8,13 +8,13 @@
 use glam::DVec3;
 
 use super::normals::tilt_variance_rad2;
-use super::placed::{Seen, Traced};
-use super::register::Registered;
+use super::register::RegistrationResult;
+use super::tracer::{Intersection, Tracer};
 use crate::frames::{Global, Point, Ray};
 use crate::scene::Target;
 use crate::trace::Hit;
 
-/// Where a ray meets the registered target.
+/// The intersection of a ray with the registered target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sighting {
     /// The hit, in the global frame.
@@ -25,11 +25,11 @@ pub struct Sighting {
     pub theta_sd_rad: f64,
 }
 
-/// A registered target, ready to be looked at.
+/// A registered target, ready for intersection with rays.
 pub struct Incidence<'a> {
-    traced: Traced<'a>,
+    tracer: Tracer<'a>,
     target: &'a Target,
-    registered: &'a Registered,
+    registered: &'a RegistrationResult,
     facet_tilt_rad2: Vec<f64>,
     extra_sd_rad: f64,
 }
@@ -37,20 +37,24 @@ pub struct Incidence<'a> {
 impl<'a> Incidence<'a> {
     /// `extra_sd_rad`: a further standard deviation of each tilt, rad, 0 or more, for what neither
     /// the pose nor the mesh knows.
-    pub fn new(target: &'a Target, registered: &'a Registered, extra_sd_rad: f64) -> Incidence<'a> {
-        let traced = Traced::new(&target.mesh);
+    pub fn new(
+        target: &'a Target,
+        registered: &'a RegistrationResult,
+        extra_sd_rad: f64,
+    ) -> Incidence<'a> {
+        let tracer = Tracer::new(&target.mesh);
         let facet_tilt_rad2 = tilt_variance_rad2(&target.mesh);
-        Incidence { traced, target, registered, facet_tilt_rad2, extra_sd_rad }
+        Incidence { tracer, target, registered, facet_tilt_rad2, extra_sd_rad }
     }
 
-    /// The same for a target that is its facets and not a surface that they stand for.
+    /// For a target that is its facets and not a smooth surface that they approximate: their normals have no error.
     pub fn of_facets(self) -> Incidence<'a> {
         Incidence { facet_tilt_rad2: vec![0.0; self.target.mesh.facets.len()], ..self }
     }
 
-    /// Where a ray meets the target; `None` where it misses.
-    pub fn look(&self, ray: &Ray<Global>) -> Option<Sighting> {
-        let Seen { hit, normal } = self.traced.look(&self.registered.pose, ray)?;
+    /// The intersection of a ray with the target; `None` where it misses.
+    pub fn sight(&self, ray: &Ray<Global>) -> Option<Sighting> {
+        let Intersection { hit, normal } = self.tracer.intersect(&self.registered.pose, ray)?;
         let variance_rad2 = self.registered.tilt_variance_rad2(normal)
             + self.facet_tilt_rad2.get(hit.facet as usize)?
             + self.extra_sd_rad * self.extra_sd_rad;
@@ -71,8 +75,9 @@ impl<'a> Incidence<'a> {
         let tangent = (1.0 / (cos_theta * cos_theta) - 1.0).max(0.0).sqrt();
         let step_m = 2.0 * margin_m * tangent.max(1.0);
         around(ray, point, margin_m).all(|beside| {
-            let seen = beside.and_then(|beside| self.traced.look(&self.registered.pose, &beside));
-            seen.is_some_and(|Seen { hit, .. }| {
+            let seen =
+                beside.and_then(|beside| self.tracer.intersect(&self.registered.pose, &beside));
+            seen.is_some_and(|Intersection { hit, .. }| {
                 self.region(&hit) == Some(sighting.region)
                     && (hit.range_m - range_m).abs() <= step_m
             })
@@ -86,9 +91,10 @@ impl<'a> Incidence<'a> {
         const ONE_PLANE: f64 = 1e-6;
         let point = sighting.hit.point;
         let aside_m = SURE_SD * self.registered.shift_sd_m(point);
-        let Some(here) = self.traced.look(&self.registered.pose, ray) else { return false };
+        let Some(here) = self.tracer.intersect(&self.registered.pose, ray) else { return false };
         around(ray, point, aside_m).all(|beside| {
-            let there = beside.and_then(|beside| self.traced.look(&self.registered.pose, &beside));
+            let there =
+                beside.and_then(|beside| self.tracer.intersect(&self.registered.pose, &beside));
             there.is_some_and(|there| there.normal.dot(here.normal) > 1.0 - ONE_PLANE)
         })
     }
@@ -123,8 +129,8 @@ mod tests {
     use crate::scene::solids;
 
     /// A pose that is known exactly.
-    fn exact() -> Registered {
-        Registered {
+    fn exact() -> RegistrationResult {
+        RegistrationResult {
             pose: Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO),
             covariance: [[0.0; 6]; 6],
             pivot: Point::new(0.0, 0.0, 0.0),
@@ -161,7 +167,7 @@ mod tests {
         for step in 0..400 {
             let aim =
                 ray(0.12 * (f64::from(step) * 0.71).sin(), 0.12 * (f64::from(step) * 0.37).cos());
-            let sighting = incidence.look(&aim).unwrap();
+            let sighting = incidence.sight(&aim).unwrap();
             let normal = target.mesh.area_normal(sighting.hit.facet as usize);
             let off_rad = normal.angle_between(sighting.hit.point.xyz);
             error2 += 0.5 * off_rad * off_rad;
@@ -176,7 +182,7 @@ mod tests {
     fn what_the_caller_adds_is_added() {
         let target = target(solids::plate(1.0, 1.0));
         let registered = exact();
-        let sighting = Incidence::new(&target, &registered, 0.01).look(&ray(0.1, 0.2)).unwrap();
+        let sighting = Incidence::new(&target, &registered, 0.01).sight(&ray(0.1, 0.2)).unwrap();
         assert!((sighting.theta_sd_rad - 0.01).abs() < 1e-12);
     }
 
@@ -191,7 +197,7 @@ mod tests {
         let registered = exact();
         let clear = |target: &Target, x_m: f64| {
             let incidence = Incidence::new(target, &registered, 0.0);
-            let sighting = incidence.look(&ray(x_m, 0.03)).unwrap();
+            let sighting = incidence.sight(&ray(x_m, 0.03)).unwrap();
             incidence.is_clear(&ray(x_m, 0.03), &sighting, MARGIN_M)
         };
         // Away from everything; at the outer edge; at the step to the plate behind.

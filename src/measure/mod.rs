@@ -1,23 +1,25 @@
-//! A measured cloud → pose → angles of incidence → a curve that belongs to a material.
+//! From a measured cloud to a curve of a material: pose, angles of incidence, σ⁰.
 //!
 //! [`Cloud`] is what the radar measured. [`Registration`] finds where the mesh stood, [`Incidence`]
-//! tells where and how steeply each beam met it, and [`Reduction`] turns powers into σ⁰.
+//! gives the point and the angle at which each ray hits it, and [`Reduction`] converts powers to σ⁰.
 
 pub mod cloud;
 pub mod cloud_file;
 mod coarse;
 pub mod compare;
 pub mod curve;
+mod error;
 pub mod icp;
 pub mod in_plane;
 pub mod incidence;
 pub mod nearest;
 pub mod normals;
-pub mod placed;
+pub mod tracer;
 pub mod reduce;
 pub mod register;
-mod sights;
-pub mod start;
+mod settings;
+mod point_rays;
+mod start;
 pub mod statistics;
 #[cfg(test)]
 mod synthetic;
@@ -26,10 +28,11 @@ mod view;
 
 pub use cloud::{Cloud, CloudError, CloudPoint};
 pub use cloud_file::{CloudFormat, CloudReading, PowerUnit};
-pub use curve::{Curve, Row};
+pub use curve::Curve;
+pub use error::{ReductionError, RegistrationError};
 pub use incidence::{Incidence, Sighting};
-pub use reduce::{LeftOut, Reduced, Reduction, ReductionError};
-pub use register::{Metric, Registered, Registration, RegistrationError, Stop};
-pub use start::Start;
+pub use reduce::{Exclusions, Reduction, ReductionResult};
+pub use register::{RegistrationResult, Stop};
+pub use settings::{Metric, Registration, Start};
 pub use statistics::AngleStatistics;
 pub(crate) use view::median_point;

@@ -1,4 +1,4 @@
-//! How well a mesh's facets know the normal of the surface they stand for.
+//! How far the normals of a mesh's facets deviate from those of the surface that it approximates.
 //!
 //! Two errors, both as the variance of one of the two tilts of a facet's normal. *Noise*: the vertices
 //! of a scanned mesh are off, so that a facet leans against its neighbours. Between a normal with
@@ -25,11 +25,12 @@ pub fn tilt_variance_rad2(mesh: &Mesh) -> Vec<f64> {
     let own: Vec<f64> = std::iter::zip(&normals, &neighbours)
         .map(|(&normal, near)| facet_variance_rad2(normal, near, &normals))
         .collect();
-    let averaged = |(facet, near): (usize, &Vec<u32>)| {
-        let sum: f64 = own[facet] + near.iter().map(|&n| own[n as usize]).sum::<f64>();
-        sum / (1 + near.len()) as f64
-    };
-    neighbours.iter().enumerate().map(averaged).collect()
+    std::iter::zip(&own, &neighbours)
+        .map(|(own_rad2, near)| {
+            let sum = own_rad2 + near.iter().map(|&n| own[n as usize]).sum::<f64>();
+            sum / (1 + near.len()) as f64
+        })
+        .collect()
 }
 
 fn facet_variance_rad2(normal: DVec3, near: &[u32], normals: &[DVec3]) -> f64 {
@@ -37,11 +38,14 @@ fn facet_variance_rad2(normal: DVec3, near: &[u32], normals: &[DVec3]) -> f64 {
         return 0.0;
     }
     let count = near.len() as f64;
-    let near = || near.iter().map(|&n| normals[n as usize]);
-    let mean = near().sum::<DVec3>().normalize_or_zero();
-    let noise = normal.angle_between(mean).powi(2) / (2.0 * (1.0 + 1.0 / count));
-    let bend = near().map(|other| normal.angle_between(other).powi(2)).sum::<f64>() / count;
-    noise + bend / 24.0
+    let (mut sum, mut bend) = (DVec3::ZERO, 0.0);
+    for &facet in near {
+        let other = normals[facet as usize];
+        sum += other;
+        bend += normal.angle_between(other).powi(2);
+    }
+    let noise = normal.angle_between(sum.normalize_or_zero()).powi(2) / (2.0 * (1.0 + 1.0 / count));
+    noise + bend / count / 24.0
 }
 
 /// Facets across each edge, without those beyond a crease. Vertices at one place are one vertex:
@@ -63,7 +67,7 @@ fn smooth_neighbours(mesh: &Mesh, normals: &[DVec3]) -> Vec<Vec<u32>> {
         }
     }
     let mut neighbours = vec![Vec::new(); mesh.facets.len()];
-    // Three facets at one edge are no surface.
+    // Where three facets share an edge, none is the continuation of another.
     for pair in facets_of_edge.values().filter(|facets| facets.len() == 2) {
         let (a, b) = (pair[0] as usize, pair[1] as usize);
         if normals[a].dot(normals[b]) >= CREASE_COS {

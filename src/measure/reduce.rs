@@ -1,32 +1,33 @@
-//! Powers to σ⁰: equation (8) solved for what belongs to the material.
+//! Powers to σ⁰: equation (8) solved for the material's share.
 //!
 //! σ⁰(θ) = P_r · 4πR²/(P_t · A_eq · g), with the system gain g. A curve's σ⁰ is by definition (10),
 //! 4π·f·cos²θ. With [`Footprint::Projected`] the instrument's model is P_r = P_t·A_eq·g/R² · f·cos θ,
 //! and so the quotient is multiplied by cos θ.
 //!
-//! A chirp whose ray meets the registered target and that has no detection is a row too: its echo
-//! stayed below the threshold. A chirp with a detection elsewhere, such as a false alarm, is none.
+//! A chirp whose ray hits the registered target and that has no detection is a row too: its echo
+//! stayed below the threshold. A chirp with a detection elsewhere, such as a false alarm, is not a row.
 
 use std::collections::HashSet;
 use std::f64::consts::PI;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use thiserror::Error;
 
 use super::cloud::{Cloud, CloudPoint};
-use super::curve::{Curve, Row};
+use super::curve::Curve;
+use super::error::ReductionError;
 use super::incidence::{Incidence, Sighting};
 use super::nearest::Nearest;
-use super::register::{Registered, RegistrationError};
-use super::sights::sights;
+use super::point_rays::rays_to_points;
+use super::register::RegistrationResult;
 use crate::frames::{Global, Point, Pose, Ray, Target as TargetFrame};
+use crate::material::Observation;
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Chirps, Footprint, Link, Radar};
 use crate::scene::Target;
-use crate::units::watts_from_dbm;
+use crate::units::{dbm_from_watts, watts_from_dbm};
 
-/// How to reduce a registered cloud to a curve.
+/// Settings of the reduction of a registered cloud to a curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reduction {
     /// Only this region of the target; `None` for all.
@@ -37,25 +38,25 @@ pub struct Reduction {
     pub edge_margin_m: Option<f64>,
     /// A further standard deviation of each tilt of the normal, rad.
     pub extra_sd_rad: f64,
-    /// The target is the facets of the mesh, as in a simulation, and not a surface that they stand
-    /// for: their normals have no error.
+    /// The target is the facets of the mesh, as in a simulation, and not a smooth surface that they
+    /// approximate: their normals have no error.
     pub exact_mesh: bool,
 }
 
-/// A curve and what did not enter it.
+/// A curve and what was left out of it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reduced {
+pub struct ReductionResult {
     /// Rows of the detections in the cloud's order, then of the silent chirps in the scan's.
     pub curve: Curve,
     /// What did not become a row.
-    pub left_out: LeftOut,
-    /// What a person should know of the curve.
+    pub left_out: Exclusions,
+    /// Notices for the user.
     pub notices: Vec<String>,
 }
 
 /// Detections and silent chirps that did not become rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LeftOut {
+pub struct Exclusions {
     /// Detections whose ray misses the target.
     pub missed: usize,
     /// Detections farther from the surface than five times the registration's range error.
@@ -64,81 +65,19 @@ pub struct LeftOut {
     pub other_region: usize,
     /// Detections near a silhouette, a step or another region.
     pub near_edge: usize,
-    /// Silent chirps near such.
+    /// Silent chirps near one of these.
     pub silent_near_edge: usize,
-    /// Detections and silent chirps of which the pose does not tell which facet they met; for an exact
-    /// mesh alone.
+    /// Detections and silent chirps whose facet is uncertain within the errors of the pose; for an exact
+    /// mesh only.
     pub unsure_of_facet: usize,
-}
-
-/// Why there is no curve.
-#[derive(Debug, Error, PartialEq)]
-pub enum ReductionError {
-    /// The pose is not one to build on.
-    #[error("the registration has not converged; a curve needs a pose, so allow more steps")]
-    NotConverged,
-    /// No such region.
-    #[error("there is no region {region}; the target has {regions}")]
-    UnknownRegion {
-        /// What was asked for.
-        region: u16,
-        /// Number of regions.
-        regions: usize,
-    },
-    /// Cloud, radar and scan do not belong together.
-    #[error(transparent)]
-    Cloud(#[from] RegistrationError),
-    /// Nothing was left.
-    #[error(
-        "no detection became a row: {missed} miss the target, {off_surface} lie off its surface, \
-         {other_region} are of other regions and {near_edge} near an edge; choose another region or a \
-         smaller edge margin"
-    )]
-    NoRows {
-        /// See [`LeftOut`].
-        missed: usize,
-        /// See [`LeftOut`].
-        off_surface: usize,
-        /// See [`LeftOut`].
-        other_region: usize,
-        /// See [`LeftOut`].
-        near_edge: usize,
-    },
-    /// The radar of the scene could not have detected this.
-    #[error(
-        "{below} of {points} powers lie below the scene's threshold of {threshold_dbm} dBm, the weakest \
-         at {weakest_dbm:.1} dBm; give the scene the radar.threshold_dbm of the measurement, or check \
-         the unit of the power"
-    )]
-    BelowThreshold {
-        /// Detections below it.
-        below: usize,
-        /// All detections.
-        points: usize,
-        /// The threshold, dBm.
-        threshold_dbm: f64,
-        /// The weakest power, dBm.
-        weakest_dbm: f64,
-    },
-    /// Several detections of one chirp.
-    #[error(
-        "{shared} of {points} points share a chirp with another point; keep one detection per chirp, \
-         or give the scene the scan of the measurement"
-    )]
-    SharedChirps {
-        /// Points beyond the first of their chirp.
-        shared: usize,
-        /// All points.
-        points: usize,
-    },
 }
 
 /// A hundredth of the points may contradict the scene before the cloud is refused.
 const TOLERATED: usize = 100;
 
-/// Why a detection is no row.
+/// What becomes of a detection or a silent chirp: a row, or why not.
 enum Fate {
-    Row(Row),
+    Row(Observation),
     Missed,
     OffSurface,
     OtherRegion,
@@ -146,8 +85,8 @@ enum Fate {
     Unsure,
 }
 
-/// What all rows need.
-struct Bench<'a> {
+/// Turns chirps into rows.
+struct Reducer<'a> {
     incidence: Incidence<'a>,
     link: Link,
     target_from_global: Pose<TargetFrame, Global>,
@@ -181,55 +120,60 @@ impl Reduction {
         radar: &Radar,
         chirps: &Chirps,
         cloud: &Cloud,
-        registered: &Registered,
-    ) -> Result<Reduced, ReductionError> {
+        registered: &RegistrationResult,
+    ) -> Result<ReductionResult, ReductionError> {
         if !registered.converged {
             return Err(ReductionError::NotConverged);
         }
-        let regions = target.region_of_facet.iter().max().map_or(0, |most| usize::from(*most) + 1);
-        let regions = regions.max(target.regions.len());
-        if let Some(region) = self.region.filter(|region| usize::from(*region) >= regions) {
-            return Err(ReductionError::UnknownRegion { region, regions });
-        }
+        self.check_region(target)?;
         check_threshold(radar, cloud)?;
-        let sights = sights(cloud, radar, chirps)?;
-        let bench = self.bench(target, radar, registered);
-        let told = Told::new(radar, chirps, cloud, &sights);
-        told.check_shared()?;
-        let mut left_out = LeftOut::default();
-        let mut rows = detected(&bench, cloud, &sights, &told, &mut left_out);
+        let point_rays = rays_to_points(cloud, radar, chirps)?;
+        let reducer = self.reducer(target, radar, registered);
+        let assignment = Assignment::new(radar, chirps, cloud, &point_rays);
+        assignment.check_shared()?;
+        let mut left_out = Exclusions::default();
+        let mut rows = detected(&reducer, cloud, &point_rays, &assignment, &mut left_out);
         if rows.is_empty() {
-            let LeftOut { missed, off_surface, other_region, near_edge, .. } = left_out;
+            let Exclusions { missed, off_surface, other_region, near_edge, .. } = left_out;
             return Err(ReductionError::NoRows { missed, off_surface, other_region, near_edge });
         }
         let detections = rows.len();
-        rows.extend(silent(&bench, chirps, &told, &mut left_out));
-        let mut notices = told.notices;
+        rows.extend(silent(&reducer, chirps, &assignment, &mut left_out));
+        let mut notices = assignment.notices;
         let silent = rows.len() - detections;
         if silent > detections {
             notices.push(format!(
-                "{silent} chirps that meet the target gave nothing, {detections} did: if the cloud was \
-                 cropped or thinned out, chirps are missing and not silent, and a fit will be wrong; \
-                 name the part that was kept with a region"
+                "{silent} chirps that hit the target have no detection, {detections} have one: if the cloud \
+                 was cropped or thinned out, these chirps are missing and not silent, and a fit will be \
+                 wrong; name the part that was kept with a region"
             ));
         }
-        Ok(Reduced { curve: Curve { rows }, left_out, notices })
+        Ok(ReductionResult { curve: Curve { observations: rows }, left_out, notices })
     }
 
-    fn bench<'a>(
+    fn check_region(&self, target: &Target) -> Result<(), ReductionError> {
+        let regions = target.region_of_facet.iter().max().map_or(0, |most| usize::from(*most) + 1);
+        let regions = regions.max(target.regions.len());
+        match self.region {
+            Some(region) if usize::from(region) >= regions => {
+                Err(ReductionError::UnknownRegion { region, regions })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn reducer<'a>(
         &self,
         target: &'a Target,
         radar: &Radar,
-        registered: &'a Registered,
-    ) -> Bench<'a> {
+        registered: &'a RegistrationResult,
+    ) -> Reducer<'a> {
         // A perfect fit must not refuse its own points.
         const LEAST_RMS_M: f64 = 1e-3;
         const GATE_SD: f64 = 5.0;
-        Bench {
-            incidence: match self.exact_mesh {
-                false => Incidence::new(target, registered, self.extra_sd_rad),
-                true => Incidence::new(target, registered, self.extra_sd_rad).of_facets(),
-            },
+        let smooth = Incidence::new(target, registered, self.extra_sd_rad);
+        Reducer {
+            incidence: if self.exact_mesh { smooth.of_facets() } else { smooth },
             link: Link::new(radar),
             target_from_global: radar.frames().global_from_target.inverse(),
             region: self.region,
@@ -241,7 +185,7 @@ impl Reduction {
     }
 }
 
-impl Bench<'_> {
+impl Reducer<'_> {
     fn wants(&self, sighting: &Sighting) -> bool {
         self.region.is_none_or(|region| region == sighting.region)
     }
@@ -252,7 +196,7 @@ impl Bench<'_> {
     }
 
     fn judge(&self, point: &CloudPoint, ray: &Ray<Global>, chirp: u32) -> Fate {
-        let Some(sighting) = self.incidence.look(ray) else {
+        let Some(sighting) = self.incidence.sight(ray) else {
             return Fate::Missed;
         };
         let range_m = ray.origin.distance_m(point.point);
@@ -268,8 +212,7 @@ impl Bench<'_> {
         if !self.is_sure(ray, &sighting) {
             return Fate::Unsure;
         }
-        let power_w = watts_from_dbm(point.power_dbm);
-        Fate::Row(self.row(ray, &sighting, range_m, power_w, chirp, false))
+        Fate::Row(self.row(ray, &sighting, range_m, point.power_w, chirp, false))
     }
 
     fn row(
@@ -280,37 +223,35 @@ impl Bench<'_> {
         power_w: f64,
         chirp: u32,
         censored: bool,
-    ) -> Row {
+    ) -> Observation {
         let Sighting { hit, theta_sd_rad, .. } = *sighting;
         let sigma0 = sigma0(&self.link, range_m, hit.cos_theta, power_w);
         let at = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
         let at = (self.target_from_global * at).xyz;
-        Row {
-            theta_rad: hit.theta_rad(),
-            theta_sd_rad,
-            power_w,
-            sigma0,
-            range_m,
-            chirp,
-            censored,
+        Observation {
+            theta_sd_rad: Some(theta_sd_rad),
+            power_w: Some(power_w),
+            range_m: Some(range_m),
+            chirp: Some(chirp),
             target_m: Some([at.x, at.y]),
+            ..Observation::of_level(hit.theta_rad(), sigma0, censored)
         }
     }
 }
 
 fn detected(
-    bench: &Bench,
+    reducer: &Reducer,
     cloud: &Cloud,
-    sights: &[Ray<Global>],
-    told: &Told,
-    left_out: &mut LeftOut,
-) -> Vec<Row> {
+    point_rays: &[Ray<Global>],
+    assignment: &Assignment,
+    left_out: &mut Exclusions,
+) -> Vec<Observation> {
     let fates: Vec<Fate> = cloud
         .points()
         .par_iter()
-        .zip(sights)
-        .zip(&told.chirp_of_point)
-        .map(|((point, ray), chirp)| bench.judge(point, ray, *chirp))
+        .zip(point_rays)
+        .zip(&assignment.chirp_of_point)
+        .map(|((point, ray), chirp)| reducer.judge(point, ray, *chirp))
         .collect();
     let mut rows = Vec::new();
     for fate in fates {
@@ -326,22 +267,28 @@ fn detected(
     rows
 }
 
-/// Rows of the chirps that should have hit and gave nothing.
-fn silent(bench: &Bench, chirps: &Chirps, told: &Told, left_out: &mut LeftOut) -> Vec<Row> {
-    let fates: Vec<Option<Fate>> = told
+/// Rows of the chirps that hit the target and have no detection.
+fn silent(
+    reducer: &Reducer,
+    chirps: &Chirps,
+    assignment: &Assignment,
+    left_out: &mut Exclusions,
+) -> Vec<Observation> {
+    let fates: Vec<Option<Fate>> = assignment
         .silent
         .par_iter()
         .map(|&index| {
             let (ray, chirp) = (chirps.rays.get(index)?, *chirps.number.get(index)?);
-            let sighting = bench.incidence.look(ray).filter(|sighting| bench.wants(sighting))?;
-            if !bench.incidence.is_clear(ray, &sighting, bench.margin_m) {
+            let sighting =
+                reducer.incidence.sight(ray).filter(|sighting| reducer.wants(sighting))?;
+            if !reducer.incidence.is_clear(ray, &sighting, reducer.margin_m) {
                 return Some(Fate::NearEdge);
             }
-            if !bench.is_sure(ray, &sighting) {
+            if !reducer.is_sure(ray, &sighting) {
                 return Some(Fate::Unsure);
             }
             let range_m = sighting.hit.range_m;
-            Some(Fate::Row(bench.row(ray, &sighting, range_m, bench.threshold_w, chirp, true)))
+            Some(Fate::Row(reducer.row(ray, &sighting, range_m, reducer.threshold_w, chirp, true)))
         })
         .collect();
     let mut rows = Vec::new();
@@ -355,44 +302,62 @@ fn silent(bench: &Bench, chirps: &Chirps, told: &Told, left_out: &mut LeftOut) -
     rows
 }
 
-/// Which chirp gave which point, and which gave none.
-struct Told {
+/// Which chirp each point belongs to, and which chirps have no point.
+struct Assignment {
     chirp_of_point: Vec<u32>,
-    /// Places in the scan.
+    /// Indices in the scan of the chirps without a point.
     silent: Vec<usize>,
     notices: Vec<String>,
 }
 
-impl Told {
-    /// Points without a number belong to the chirp whose ray they lie on; a chirp is silent when no
-    /// point has its number and none without a number lies on its ray.
-    fn new(radar: &Radar, chirps: &Chirps, cloud: &Cloud, sights: &[Ray<Global>]) -> Told {
-        // An eighth of a spot: far below the distance of two chirps of a scan.
-        let near_rad = radar.spot_diameter_m / 8.0 / PATTERN_RANGE_M;
+/// The directions of a scan's rays, in the order of its chirps.
+struct Directions {
+    directions: Vec<DVec3>,
+    tree: Option<Nearest>,
+    /// Largest angle between a ray and a point on it, rad.
+    near_rad: f64,
+}
+
+impl Directions {
+    fn new(radar: &Radar, chirps: &Chirps) -> Directions {
         let directions: Vec<DVec3> = chirps.rays.iter().map(|ray| ray.direction.xyz()).collect();
         let tree = Nearest::new(&directions);
-        let on_ray = |ray: &Ray<Global>| {
-            let (index, off_rad) = tree.as_ref()?.find(ray.direction.xyz());
-            (off_rad <= near_rad).then(|| chirps.number.get(index).copied()).flatten()
-        };
+        // An eighth of a spot: far below the distance of two chirps of a scan.
+        Directions { directions, tree, near_rad: radar.spot_diameter_m / 8.0 / PATTERN_RANGE_M }
+    }
+
+    /// The chirp whose ray runs along `ray`.
+    fn chirp_along(&self, chirps: &Chirps, ray: &Ray<Global>) -> Option<u32> {
+        let (index, off_rad) = self.tree.as_ref()?.find(ray.direction.xyz());
+        if off_rad <= self.near_rad { chirps.number.get(index).copied() } else { None }
+    }
+}
+
+impl Assignment {
+    /// Points without a number belong to the chirp whose ray they lie on; a chirp is silent when no
+    /// point has its number and no point without a number lies on its ray.
+    fn new(
+        radar: &Radar,
+        chirps: &Chirps,
+        cloud: &Cloud,
+        point_rays: &[Ray<Global>],
+    ) -> Assignment {
+        let directions = Directions::new(radar, chirps);
         let mut unmatched = 0;
-        let chirp_of_point: Vec<u32> = std::iter::zip(cloud.points(), sights)
-            .zip(0..)
-            .map(|((point, ray), place)| {
-                point.chirp.or_else(|| on_ray(ray)).unwrap_or_else(|| {
-                    unmatched += 1;
-                    place
-                })
-            })
-            .collect();
-        // More strays than false alarms explain: then silence cannot be told.
+        let mut chirp_of_point = Vec::with_capacity(point_rays.len());
+        for ((point, ray), place) in std::iter::zip(cloud.points(), point_rays).zip(0..) {
+            let chirp = point.chirp.or_else(|| directions.chirp_along(chirps, ray));
+            unmatched += usize::from(chirp.is_none());
+            chirp_of_point.push(chirp.unwrap_or(place));
+        }
+        // More strays than false alarms explain: then silent chirps cannot be recognised.
         let lost = unmatched * 10 > cloud.points().len();
         let silent =
-            if lost { Vec::new() } else { unheard(chirps, cloud, sights, &directions, near_rad) };
+            if lost { Vec::new() } else { silent_chirps(chirps, cloud, point_rays, &directions) };
         let mut notices = Vec::new();
         if unmatched > 0 {
             let effect = if lost {
-                "; no chirp is taken for silent, so that a fit takes the cut at the threshold for \
+                "; no chirp is taken for silent, so that a fit attributes the cut at the threshold to \
                  the material: give the scene the scan of the measurement"
             } else {
                 ""
@@ -402,17 +367,17 @@ impl Told {
                  the cloud{effect}"
             ));
         }
-        Told { chirp_of_point, silent, notices }
+        Assignment { chirp_of_point, silent, notices }
     }
 
     fn check_shared(&self) -> Result<(), ReductionError> {
         let points = self.chirp_of_point.len();
         let chirps: HashSet<u32> = self.chirp_of_point.iter().copied().collect();
         let shared = points - chirps.len();
-        match shared * TOLERATED > points {
-            true => Err(ReductionError::SharedChirps { shared, points }),
-            false => Ok(()),
+        if shared * TOLERATED > points {
+            return Err(ReductionError::SharedChirps { shared, points });
         }
+        Ok(())
     }
 }
 
@@ -421,41 +386,46 @@ fn check_threshold(radar: &Radar, cloud: &Cloud) -> Result<(), ReductionError> {
     // Rounding in a file.
     const ROUNDING_DB: f64 = 0.05;
     let threshold_dbm = radar.threshold_dbm;
-    let powers = || cloud.points().iter().map(|point| point.power_dbm);
-    let below = powers().filter(|power_dbm| *power_dbm < threshold_dbm - ROUNDING_DB).count();
+    let least_w = watts_from_dbm(threshold_dbm - ROUNDING_DB);
+    let below = cloud.points().iter().filter(|point| point.power_w < least_w).count();
     let points = cloud.points().len();
     if below * TOLERATED <= points {
         return Ok(());
     }
-    let weakest_dbm = powers().fold(f64::INFINITY, f64::min);
+    let weakest_w = cloud.points().iter().map(|point| point.power_w).fold(f64::INFINITY, f64::min);
+    let weakest_dbm = dbm_from_watts(weakest_w);
     Err(ReductionError::BelowThreshold { below, points, threshold_dbm, weakest_dbm })
 }
 
-fn unheard(
+/// Indices of the chirps of which no point has the number and no unnumbered point lies on the ray.
+fn silent_chirps(
     chirps: &Chirps,
     cloud: &Cloud,
-    sights: &[Ray<Global>],
-    directions: &[DVec3],
-    near_rad: f64,
+    point_rays: &[Ray<Global>],
+    scan: &Directions,
 ) -> Vec<usize> {
     let numbers: HashSet<u32> = cloud.points().iter().filter_map(|point| point.chirp).collect();
-    let unnumbered: Vec<DVec3> = std::iter::zip(cloud.points(), sights)
+    let unnumbered: Vec<DVec3> = std::iter::zip(cloud.points(), point_rays)
         .filter(|(point, _)| point.chirp.is_none())
         .map(|(_, ray)| ray.direction.xyz())
         .collect();
     let tree = Nearest::new(&unnumbered);
-    let heard = |direction: &DVec3| tree.as_ref().is_some_and(|t| t.find(*direction).1 <= near_rad);
-    std::iter::zip(&chirps.number, directions)
-        .enumerate()
-        .filter(|(_, (number, direction))| !numbers.contains(number) && !heard(direction))
-        .map(|(index, _)| index)
-        .collect()
+    let mut silent = Vec::new();
+    for (index, (number, direction)) in std::iter::zip(&chirps.number, &scan.directions).enumerate()
+    {
+        let has_point = numbers.contains(number)
+            || tree.as_ref().is_some_and(|tree| tree.find(*direction).1 <= scan.near_rad);
+        if !has_point {
+            silent.push(index);
+        }
+    }
+    silent
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::register::Registration;
+    use crate::measure::settings::Registration;
     use crate::measure::synthetic::{Measured, f_per_sr, mannequin};
     use crate::units::db_from_ratio;
 
@@ -471,7 +441,7 @@ mod tests {
         u16::from(measured.mesh.vertices[facet[0] as usize].y > 1.1)
     }
 
-    fn reduce(measured: &Measured, settings: Reduction) -> Result<Reduced, ReductionError> {
+    fn reduce(measured: &Measured, settings: Reduction) -> Result<ReductionResult, ReductionError> {
         let Measured { mesh, radar, chirps, cloud } = measured;
         let registered = Registration::default().run(mesh, radar, chirps, cloud).unwrap();
         settings.run(&target(measured), radar, chirps, cloud, &registered)
@@ -484,8 +454,9 @@ mod tests {
             .curve
             .detected()
             .map(|row| {
-                let law = 4.0 * PI * f_per_sr(row.theta_rad) * row.theta_rad.cos().powi(2);
-                db_from_ratio(row.sigma0 / law).abs()
+                let theta_rad = row.theta_i_rad;
+                let law = 4.0 * PI * f_per_sr(theta_rad) * theta_rad.cos().powi(2);
+                db_from_ratio(row.sigma0.unwrap() / law).abs()
             })
             .collect();
         assert!(off_db.len() > 5000, "{}", off_db.len());
@@ -500,11 +471,13 @@ mod tests {
         let measured = mannequin(2e-3, 1);
         let reduced = reduce(&measured, Reduction::default()).unwrap();
         let link = Link::new(&measured.radar);
-        let censored: Vec<&Row> = reduced.curve.rows.iter().filter(|row| row.censored).collect();
+        let rows = &reduced.curve.observations;
+        let censored: Vec<&Observation> = rows.iter().filter(|row| row.is_censored()).collect();
         assert!(censored.len() > 50, "{}", censored.len());
         let rightly = censored.iter().filter(|row| {
-            let theta_rad = row.theta_rad;
-            link.power_w(row.range_m, theta_rad.cos(), f_per_sr(theta_rad)) < 1.05 * row.power_w
+            let (theta_rad, range_m) = (row.theta_i_rad, row.range_m.unwrap());
+            let power_w = link.power_w(range_m, theta_rad.cos(), f_per_sr(theta_rad));
+            power_w < 1.05 * row.power_w.unwrap()
         });
         // A pose that is off by a hundredth of a degree moves few of them across.
         assert!(rightly.count() as f64 > 0.98 * censored.len() as f64);
@@ -518,12 +491,11 @@ mod tests {
         let bare = Measured { cloud: Cloud::new(points).unwrap(), ..measured.clone() };
         let [told, bare] =
             [&measured, &bare].map(|measured| reduce(measured, Reduction::default()).unwrap());
-        assert_eq!(told.curve.rows.len(), bare.curve.rows.len());
-        let same = std::iter::zip(&told.curve.rows, &bare.curve.rows)
-            .filter(|(a, b)| a.chirp == b.chirp)
-            .count();
+        let (told, bare) = (told.curve.observations, bare.curve.observations);
+        assert_eq!(told.len(), bare.len());
+        let same = std::iter::zip(&told, &bare).filter(|(a, b)| a.chirp == b.chirp).count();
         // Ellipses of the scan cross: a few chirps look at one place.
-        assert!(same as f64 > 0.99 * told.curve.rows.len() as f64);
+        assert!(same as f64 > 0.99 * told.len() as f64);
     }
 
     #[test]
@@ -534,7 +506,7 @@ mod tests {
         assert_eq!(every.left_out.near_edge, 0);
         let upper = reduce(&measured, Reduction { region: Some(1), ..all }).unwrap();
         let lower = reduce(&measured, Reduction { region: Some(0), ..all }).unwrap();
-        let rows = |reduced: &Reduced| reduced.curve.rows.len();
+        let rows = |reduced: &ReductionResult| reduced.curve.observations.len();
         assert_eq!(rows(&upper) + rows(&lower), rows(&every));
         assert!(rows(&upper) > 100 && rows(&lower) > 100);
         let inner = reduce(&measured, Reduction::default()).unwrap();
@@ -553,7 +525,8 @@ mod tests {
         assert!(left as f64 > 0.95 * alarms as f64, "{left} of {alarms}");
         let numbers: HashSet<u32> =
             measured.cloud.points().iter().filter_map(|point| point.chirp).collect();
-        assert!(reduced.curve.rows.iter().all(|r| !r.censored || !numbers.contains(&r.chirp)));
+        let mut silent = reduced.curve.observations.iter().filter(|row| row.is_censored());
+        assert!(silent.all(|row| !numbers.contains(&row.chirp.unwrap())));
     }
 
     #[test]

@@ -8,13 +8,14 @@
 
 use glam::DVec3;
 use nalgebra::{Matrix6, Vector6};
-use thiserror::Error;
 
 use super::cloud::Cloud;
-use super::coarse::{self, Aligned};
-use super::icp::{Gap, Kernel, Motion, NormalEquations, bulk_sd_m, rigid};
-use super::sights::sights;
-use super::start::{self, Start};
+use super::coarse::{self, Alignment};
+use super::error::RegistrationError;
+use super::icp::{Gap, Motion, NormalEquations, bulk_sd_m, rigid};
+use super::point_rays::rays_to_points;
+use super::settings::{Metric, Registration, Start};
+use super::start;
 use super::uncertainty::{Uncertainty, uncertainty};
 use super::view::{RayGap, View};
 use crate::frames::{Global, Point, Pose};
@@ -23,7 +24,7 @@ use crate::radar::{Chirps, Radar};
 
 /// Widest gap along a ray after the coarse loop, m.
 const RAY_REACH_M: f64 = 0.05;
-/// Gaps beyond so many standard deviations are not of the surface.
+/// Points with wider gaps, in standard deviations, are not on the surface.
 const OUTLIER_SD: f64 = 4.0;
 /// The coarse loop hands over when a virtual scan moves the target by less, m.
 const HAND_OVER_M: f64 = 1e-3;
@@ -31,83 +32,6 @@ const HAND_OVER_M: f64 = 1e-3;
 const LEAST_SD_M: f64 = 1e-9;
 /// Errors wider than a range cell of 27 GHz, c/2B, are of the fit and not of the radar, m.
 const RANGE_CELL_M: f64 = 5.55e-3;
-
-/// What is made small.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Metric {
-    /// Distances to the nearest virtual point: the paper's.
-    PointToPoint,
-    /// Distances to the plane of the nearest virtual point.
-    PointToPlane,
-    /// Point to plane first, then gaps along the measured rays.
-    #[default]
-    AlongRay,
-}
-
-/// How to register.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Registration {
-    /// What is made small.
-    pub metric: Metric,
-    /// How much outliers count.
-    pub kernel: Kernel,
-    /// The rough pose.
-    pub start: Start,
-    /// Farthest neighbours at the rough pose, m, above 0.
-    pub reach_m: f64,
-    /// Most virtual scans, 1 or more.
-    pub max_scans: usize,
-    /// Most alignment steps per virtual scan, and along the rays, 1 or more.
-    pub max_steps: usize,
-    /// The pose has stopped changing when a step moves the target by less, m, above 0.
-    pub still_m: f64,
-    /// Most measured points that the coarse loop looks at.
-    pub coarse_points: usize,
-    /// Fewer points are refused.
-    pub least_points: usize,
-    /// A smaller share of points on the surface is refused, 0 to 1.
-    pub least_inliers: f64,
-    /// A pose farther from the rough one has diverged, m.
-    pub farthest_m: f64,
-    /// A pose turned farther from the rough one has diverged, rad.
-    pub farthest_rad: f64,
-    /// Keep a pose given by hand when the points do not speak against it, at 5 %: it may be known
-    /// better than they tell, and on flat facets a tenth of a millimetre moves angles by degrees.
-    pub keep_given: bool,
-}
-
-impl Default for Registration {
-    fn default() -> Self {
-        Registration {
-            metric: Metric::default(),
-            kernel: Kernel::default(),
-            start: Start::default(),
-            reach_m: 0.12,
-            max_scans: 30,
-            max_steps: 40,
-            still_m: 1e-5,
-            coarse_points: 2500,
-            least_points: 50,
-            least_inliers: 0.5,
-            farthest_m: 0.25,
-            farthest_rad: 0.5,
-            keep_given: true,
-        }
-    }
-}
-
-impl Registration {
-    /// The paper's: point to point, all points, every pair counts alike.
-    pub fn paper() -> Registration {
-        Registration {
-            metric: Metric::PointToPoint,
-            kernel: Kernel::Square,
-            coarse_points: usize::MAX,
-            max_scans: 100,
-            ..Default::default()
-        }
-    }
-}
 
 /// Why a registration ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,14 +44,14 @@ pub enum Stop {
 
 /// A registered mesh.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Registered {
+pub struct RegistrationResult {
     /// Moves the mesh, as the scene places it, to where the cloud says it was: a vertex v of the
     /// scene's mesh belongs at pose·v of the global frame.
     pub pose: Pose<Global, Global>,
     /// Covariance of the pose: the true one is x ↦ c + t + R(ω)(x − c) after `pose`, with c the
     /// `pivot`, in the order t_x, t_y, t_z (m), ω_x, ω_y, ω_z (rad). From the gaps along the rays
     /// under errors of range that neighbours within 5 cm may share; for the other metrics, which
-    /// use the points less well, a bound from below. A direction that the target does not tell has
+    /// use the points less well, a lower bound. A direction that the points do not determine has
     /// the target's size as its standard deviation, see `verdicts`.
     pub covariance: [[f64; 6]; 6],
     /// Median of the measured points by axis.
@@ -150,88 +74,8 @@ pub struct Registered {
     pub stop: Stop,
     /// Whether the pose stopped changing.
     pub converged: bool,
-    /// What a person should know of the pose.
+    /// Notices for the user.
     pub verdicts: Vec<String>,
-}
-
-/// Why there is no pose.
-#[derive(Debug, Error, PartialEq)]
-pub enum RegistrationError {
-    /// Too few points.
-    #[error("the cloud has {points} points, a pose needs {least}; measure with more chirps")]
-    TooFew {
-        /// Points of the cloud.
-        points: usize,
-        /// Least number.
-        least: usize,
-    },
-    /// A point where its ray starts.
-    #[error("point {point} lies where the radar's rays start; check the frame of the cloud")]
-    AtTheRadar {
-        /// Point, from 0.
-        point: usize,
-    },
-    /// Ranges contradict positions.
-    #[error(
-        "the ranges of the cloud differ from the distances of its points from the radar by {:.0} mm; \
-         check its frame, its unit and the radar's place", 1e3 * typical_m
-    )]
-    RangesDisagree {
-        /// Typical difference, m.
-        typical_m: f64,
-    },
-    /// Chirp numbers contradict positions.
-    #[error(
-        "{off} of {numbered} points lie beside the ray of their chirp; check the frame of the cloud \
-         and the radar's scan"
-    )]
-    ChirpsDisagree {
-        /// Points off their ray or of an unknown chirp.
-        off: usize,
-        /// Points with a chirp number.
-        numbered: usize,
-    },
-    /// The virtual scan sees nothing.
-    #[error(
-        "no chirp of the scan hits the mesh at the rough pose; give a rough pose within the field of \
-         view, and check that the cloud lies there, too"
-    )]
-    NothingInView,
-    /// The clouds do not overlap.
-    #[error(
-        "{near} of {points} points are within {:.0} mm of the mesh at the rough pose: no overlap; \
-         give a better rough pose, or check frame and unit", 1e3 * reach_m
-    )]
-    NoOverlap {
-        /// Points with a neighbour.
-        near: usize,
-        /// Points looked at.
-        points: usize,
-        /// Farthest neighbour, m.
-        reach_m: f64,
-    },
-    /// The pose ran away.
-    #[error(
-        "the pose moved {:.0} mm and {:.1}° from the rough one: it diverged; give a better rough pose",
-        1e3 * shift_m, turn_rad.to_degrees()
-    )]
-    Diverged {
-        /// Shift of the target, m.
-        shift_m: f64,
-        /// Turn, rad.
-        turn_rad: f64,
-    },
-    /// The surface does not explain the points.
-    #[error(
-        "only {inliers} of {points} points lie on the registered surface; is this the mesh that was \
-         measured, and the rough pose near?"
-    )]
-    NoFit {
-        /// Points on the surface.
-        inliers: usize,
-        /// All points.
-        points: usize,
-    },
 }
 
 impl Registration {
@@ -239,21 +83,21 @@ impl Registration {
     /// with the rays of `chirps`.
     ///
     /// # Errors
-    /// When there is no pose worth a number.
+    /// When the points give no usable pose.
     pub fn run(
         &self,
         mesh: &Mesh,
         radar: &Radar,
         chirps: &Chirps,
         cloud: &Cloud,
-    ) -> Result<Registered, RegistrationError> {
+    ) -> Result<RegistrationResult, RegistrationError> {
         let points = cloud.points().len();
         if points < self.least_points {
             return Err(RegistrationError::TooFew { points, least: self.least_points });
         }
-        let sights = sights(cloud, radar, chirps)?;
-        let view = View::new(mesh, &chirps.rays, cloud, &sights);
-        let rough = start::rough(&view, self)?;
+        let point_rays = rays_to_points(cloud, radar, chirps)?;
+        let view = View::new(mesh, &chirps.rays, cloud, &point_rays);
+        let rough = start::rough_pose(&view, self)?;
         let along_ray = self.metric == Metric::AlongRay;
         let still_m = if along_ray { HAND_OVER_M } else { self.still_m };
         let mut aligned = coarse::align(&view, self, rough, still_m)?;
@@ -270,7 +114,7 @@ impl Registration {
     }
 
     /// The second loop: Gauss and Newton on the gaps along the measured rays.
-    fn close_along_rays(&self, view: &View, aligned: &mut Aligned) {
+    fn close_along_rays(&self, view: &View, aligned: &mut Alignment) {
         aligned.still = false;
         for _ in 0..self.max_steps {
             let gaps: Vec<Gap> =
@@ -297,17 +141,22 @@ impl Registration {
         let Motion { shift_m, turn_rad } = Motion::of(&(*pose * rough.inverse()), view.pivot);
         let (shift_m, turn_rad) = (shift_m.length(), turn_rad.length());
         // Written so that a NaN is far, too.
-        match shift_m <= self.farthest_m && turn_rad <= self.farthest_rad {
-            true => Ok(()),
-            false => Err(RegistrationError::Diverged { shift_m, turn_rad }),
+        if shift_m <= self.farthest_m && turn_rad <= self.farthest_rad {
+            Ok(())
+        } else {
+            Err(RegistrationError::Diverged { shift_m, turn_rad })
         }
     }
 
-    fn judge(&self, view: &View, aligned: &Aligned) -> Result<Registered, RegistrationError> {
+    fn judge(
+        &self,
+        view: &View,
+        aligned: &Alignment,
+    ) -> Result<RegistrationResult, RegistrationError> {
         let gaps = view.ray_gaps(&aligned.pose, RAY_REACH_M);
         let sd_m = bulk_sd_m(gaps.iter().flatten().map(|g| g.gap.size_m)).max(LEAST_SD_M);
-        let inside = |gap: &RayGap| gap.gap.size_m.abs() <= OUTLIER_SD * sd_m;
-        let inliers: Vec<RayGap> = gaps.into_iter().flatten().filter(inside).collect();
+        let mut inliers: Vec<RayGap> = gaps.into_iter().flatten().collect();
+        inliers.retain(|gap| gap.gap.size_m.abs() <= OUTLIER_SD * sd_m);
         let points = view.points.len();
         if (inliers.len() as f64) < self.least_inliers * points as f64 || inliers.len() < 6 {
             return Err(RegistrationError::NoFit { inliers: inliers.len(), points });
@@ -316,7 +165,7 @@ impl Registration {
         let rms_m = (squares_m2 / inliers.len() as f64).sqrt();
         let used: Vec<Gap> = inliers.iter().map(|gap| gap.gap).collect();
         let known = uncertainty(&used, view.pivot, view.length_m);
-        Ok(Registered {
+        Ok(RegistrationResult {
             pose: aligned.pose,
             covariance: known.covariance,
             pivot: view.pivot.into(),
@@ -334,7 +183,7 @@ impl Registration {
     }
 }
 
-fn verdicts(aligned: &Aligned, known: Uncertainty, rms_m: f64) -> Vec<String> {
+fn verdicts(aligned: &Alignment, known: Uncertainty, rms_m: f64) -> Vec<String> {
     let mut verdicts = known.unknown;
     if !aligned.still {
         verdicts.push("the pose still changed at the last step; allow more".to_owned());
@@ -349,9 +198,9 @@ fn verdicts(aligned: &Aligned, known: Uncertainty, rms_m: f64) -> Vec<String> {
     verdicts
 }
 
-impl Registered {
+impl RegistrationResult {
     /// The given pose in place of the found one, when it is within chance of it.
-    fn or_given(mut self, given: &Pose<Global, Global>) -> Registered {
+    fn or_given(mut self, given: &Pose<Global, Global>) -> RegistrationResult {
         // χ² with six degrees of freedom is above this in 5 %.
         const CHANCE: f64 = 12.592;
         let Motion { shift_m, turn_rad } =
@@ -376,16 +225,22 @@ impl Registered {
     /// direction, m.
     pub fn shift_sd_m(&self, point: Point<Global>) -> f64 {
         let arm_m = point.distance_m(self.pivot);
-        let trace = |from: usize| (from..from + 3).map(|i| self.covariance[i][i]).sum::<f64>();
-        (trace(0) + arm_m * arm_m * trace(3)).sqrt()
+        let [x, y, z, turn_x, turn_y, turn_z] = std::array::from_fn(|i| self.covariance[i][i]);
+        let (shift_m2, turn_rad2): (f64, f64) = (x + y + z, turn_x + turn_y + turn_z);
+        (shift_m2 + arm_m * arm_m * turn_rad2).sqrt()
     }
 
     /// Variance of the tilt of a surface of unit normal `normal`, mean of its two tilts, rad².
     pub fn tilt_variance_rad2(&self, normal: DVec3) -> f64 {
-        let turn = |i: usize, j: usize| self.covariance[3 + i][3 + j];
+        // Of the turn's covariance C: (tr C − nᵀCn)/2.
         let n = normal.to_array();
-        let trace: f64 = (0..3).map(|i| turn(i, i)).sum();
-        let about_normal: f64 = (0..9).map(|ij| n[ij / 3] * n[ij % 3] * turn(ij / 3, ij % 3)).sum();
+        let (mut trace, mut about_normal) = (0.0, 0.0);
+        for (i, row) in self.covariance[3..].iter().enumerate() {
+            trace += row[3 + i];
+            for (j, entry) in row[3..].iter().enumerate() {
+                about_normal += n[i] * n[j] * entry;
+            }
+        }
         (0.5 * (trace - about_normal)).max(0.0)
     }
 }
@@ -399,7 +254,7 @@ mod tests {
     const NEAR_M: f64 = 0.5e-3;
     const NEAR_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
 
-    fn register(settings: Registration, seed: u64) -> (Measured, Registered) {
+    fn register(settings: Registration, seed: u64) -> (Measured, RegistrationResult) {
         let measured = mannequin(2e-3, seed);
         let start = Start::Given(pushed(&measured, 0.03, 5f64.to_radians(), seed));
         let found = Registration { start, ..settings }

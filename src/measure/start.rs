@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::coarse;
-use super::register::{Registration, RegistrationError};
+use super::error::RegistrationError;
+use super::settings::{Registration, Start};
 use super::view::{View, median_point};
 use crate::frames::{Global, Pose};
 
@@ -14,25 +15,7 @@ const YAWS: usize = 12;
 /// Along the rays a gap counts no more than this, m.
 const WORST_M: f64 = 0.05;
 
-/// The rough pose.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Start {
-    /// By hand: what moves the mesh, as the scene places it, near to the cloud. The default is to
-    /// leave it where it is.
-    Given(Pose<Global, Global>),
-    /// Twelve yaws about the vertical, from the scene's place and from the middle of the mesh on the
-    /// middle of the cloud, each aligned coarsely; the one that fits best. The mesh must stand
-    /// upright. A symmetric target may be found turned round.
-    Automatic,
-}
-
-impl Default for Start {
-    fn default() -> Self {
-        Start::Given(Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO))
-    }
-}
-
-pub(super) fn rough(
+pub(super) fn rough_pose(
     view: &View,
     settings: &Registration,
 ) -> Result<Pose<Global, Global>, RegistrationError> {
@@ -47,7 +30,7 @@ pub(super) fn rough(
 
 /// Every yaw at every place.
 fn guesses<'v>(view: &'v View) -> impl Iterator<Item = Pose<Global, Global>> + 'v {
-    let middle = view.traced.middle();
+    let middle = view.tracer.middle();
     let yaws = (0..YAWS).map(|step| TAU * step as f64 / YAWS as f64);
     yaws.flat_map(move |yaw_rad| {
         let turn = Pose::<Global, Global>::from_euler_xyz(DVec3::Y * yaw_rad, DVec3::ZERO);
@@ -68,9 +51,8 @@ fn improved(
     let placed = onto_the_cloud(view, guess)?;
     let pose = coarse::align(view, &quick, placed, settings.still_m).ok()?.pose;
     let gaps = view.ray_gaps(&pose, WORST_M);
-    let error_m =
-        |gap: &Option<_>| gap.map_or(WORST_M, |gap: super::view::RayGap| gap.range_error_m.abs());
-    Some((gaps.iter().map(error_m).sum::<f64>() / gaps.len().max(1) as f64, pose))
+    let errors_m = gaps.iter().map(|gap| gap.map_or(WORST_M, |gap| gap.range_error_m.abs()));
+    Some((errors_m.sum::<f64>() / gaps.len().max(1) as f64, pose))
 }
 
 /// Shifts a guess until what the scan sees of the mesh has its middle where the cloud has.
@@ -78,7 +60,7 @@ fn onto_the_cloud(view: &View, mut pose: Pose<Global, Global>) -> Option<Pose<Gl
     // What comes into view changes the middle; it settles soon.
     const SHIFTS: usize = 3;
     for _ in 0..SHIFTS {
-        let seen = view.traced.scan(&pose, &view.chirps).into_iter().flatten();
+        let seen = view.tracer.scan(&pose, &view.chirps).into_iter().flatten();
         let places: Vec<DVec3> = seen.map(|seen| seen.hit.point.xyz).collect();
         if places.is_empty() {
             return None;

@@ -1,7 +1,7 @@
-//! Statistics of a curve by angle, in linear power, that respect what lies below the threshold.
+//! Statistics of a curve by angle, in linear power, with censored points.
 //!
-//! A point below its threshold shares its weight among whatever lies lower (the estimate of Kaplan
-//! and Meier, 1958, turned round as for left-censored data in Helsel, "Statistics for Censored
+//! A point below its threshold shares its weight among all lower detections (the estimate of Kaplan
+//! and Meier, 1958, mirrored for left-censored data as in Helsel, "Statistics for Censored
 //! Environmental Data", 2012). Weight below which there is no detection lies anywhere from 0 to the
 //! threshold: the mean has a least and a greatest value, and a quantile in it is only a bound.
 
@@ -19,7 +19,7 @@ pub struct AngleStatistics {
     pub points: u32,
     /// Number of points below their threshold.
     pub censored_points: u32,
-    /// What the weight that no detection lies below is less than, σ⁰; none where there is none.
+    /// The highest threshold below which there is no detection, σ⁰; none where a detection is lowest.
     pub threshold_sigma0: Option<f64>,
     /// Least and greatest mean σ⁰ that the points allow; equal where none is censored.
     pub mean: [f64; 2],
@@ -46,14 +46,15 @@ pub fn by_angle(observations: &[Observation]) -> Vec<AngleStatistics> {
     if observations.iter().any(|o| o.is_retro() && o.censor == Censor::Right) {
         return Vec::new();
     }
-    let mut points: Vec<Point> = observations.iter().zip(0..).filter_map(Point::new).collect();
+    let mut points = points(observations.iter());
     points.sort_by(|a, b| a.theta_rad.total_cmp(&b.theta_rad));
     let angles = points.chunk_by(|a, b| b.theta_rad - a.theta_rad < SAME_ANGLE_RAD);
     let degrees = points.chunk_by(|a, b| a.degree() == b.degree());
     let are_scattered = angles.clone().count() * 2 > points.len();
-    match are_scattered && degrees.clone().count() * POINTS_PER_BIN <= points.len() {
-        true => degrees.zip(0..).filter_map(|(bin, number)| of_degree(bin, number)).collect(),
-        false => angles.zip(0..).filter_map(|(bin, number)| of_angle(bin, number)).collect(),
+    if are_scattered && degrees.clone().count() * POINTS_PER_BIN <= points.len() {
+        degrees.zip(0..).filter_map(|(bin, number)| of_degree(bin, number)).collect()
+    } else {
+        angles.zip(0..).filter_map(|(bin, number)| of_angle(bin, number)).collect()
     }
 }
 
@@ -64,21 +65,21 @@ pub enum Median {
     At(f64),
     /// It is below this.
     Below(f64),
-    /// There is no point, or one above the instrument's range.
-    NotTold,
+    /// Without points, or with one above the instrument's range.
+    Unknown,
 }
 
 /// The median of points taken together, as [`by_angle`] gives it for each angle.
 pub fn median<'a>(observations: impl Iterator<Item = &'a Observation> + Clone) -> Median {
     if observations.clone().any(|o| o.is_retro() && o.censor == Censor::Right) {
-        return Median::NotTold;
+        return Median::Unknown;
     }
-    let points: Vec<Point> = observations.zip(0..).filter_map(Point::new).collect();
+    let points = points(observations);
     let spread = Sample::new(&points).spread(&vec![1; points.len()]);
     match (spread.quantile(0.5), spread.threshold()) {
         (Some(sigma0), _) => Median::At(sigma0),
         (None, Some(threshold)) => Median::Below(threshold),
-        (None, None) => Median::NotTold,
+        (None, None) => Median::Unknown,
     }
 }
 
@@ -93,13 +94,15 @@ struct Point {
     order: (Option<u32>, usize),
 }
 
+/// The points of backscatter that have a level or a limit.
+fn points<'a>(observations: impl Iterator<Item = &'a Observation>) -> Vec<Point> {
+    observations.enumerate().filter_map(|(place, o)| Point::new(o, place)).collect()
+}
+
 impl Point {
-    fn new((o, place): (&Observation, usize)) -> Option<Point> {
-        let is_censored = o.censor == Censor::Left;
-        let level = if is_censored { o.threshold_sigma0 } else { o.sigma0 };
-        let order = (o.chirp, place);
-        let theta_rad = o.theta_i_rad;
-        o.is_retro().then_some(Point { theta_rad, level: level?, is_censored, order })
+    fn new(o: &Observation, place: usize) -> Option<Point> {
+        let (theta_rad, level, is_censored) = (o.theta_i_rad, o.level_sigma0()?, o.is_censored());
+        o.is_retro().then_some(Point { theta_rad, level, is_censored, order: (o.chirp, place) })
     }
 
     fn degree(&self) -> u32 {
@@ -123,11 +126,11 @@ fn statistics(bin: &[Point], theta_rad: [f64; 2], number: u64) -> AngleStatistic
     points.sort_by_key(|point| point.order);
     let sample = Sample::new(&points);
     let spread = sample.spread(&vec![1; points.len()]);
-    let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+    let censored = points.iter().filter(|point| point.is_censored).count();
     AngleStatistics {
         theta_rad,
-        points: count(points.len()),
-        censored_points: count(points.iter().filter(|point| point.is_censored).count()),
+        points: u32::try_from(points.len()).unwrap_or(u32::MAX),
+        censored_points: u32::try_from(censored).unwrap_or(u32::MAX),
         threshold_sigma0: spread.threshold(),
         mean: spread.mean(),
         quantiles: [0.05, 0.5, 0.95].map(|share| spread.quantile(share)),
@@ -151,7 +154,7 @@ impl<'a> Sample<'a> {
         Sample { points, descending: by_level.into_iter().map(|(place, _)| place).collect() }
     }
 
-    /// Shares of the levels when each point is there so many times.
+    /// Shares of the levels when point i occurs `times[i]` times.
     fn spread(&self, times: &[u32]) -> Spread {
         let mut left: f64 = times.iter().map(|&n| f64::from(n)).sum();
         let mut weight = 1.0;
@@ -167,7 +170,7 @@ impl<'a> Sample<'a> {
             if point.is_censored {
                 below.push((point.level, n));
             } else {
-                // Whoever was censored before has this one among those that lie lower.
+                // Earlier censored points share their weight with this one.
                 below.clear();
                 let share = weight * n / left;
                 detected.push((point.level, share));
@@ -180,33 +183,39 @@ impl<'a> Sample<'a> {
         Spread { detected, below }
     }
 
-    /// 95 % interval of the mean. Neighbours in time meet nearly the same place, so that they are
-    /// drawn together.
+    /// 95 % interval of the mean, from resamples of blocks: neighbours in time illuminate nearly the same
+    /// place, so that they are drawn together.
     fn interval(&self, number: u64) -> [f64; 2] {
+        let (mut least, mut greatest) = (Vec::new(), Vec::new());
+        for resample in 0..RESAMPLES {
+            let purpose = Purpose::Bootstrap;
+            let key = Key { seed: SEED, chirp: number, sub_ray: resample, purpose };
+            let [low, high] = self.spread(&self.drawn(&key)).mean();
+            least.push(low);
+            greatest.push(high);
+        }
+        [end(&mut least, 0.025), end(&mut greatest, 0.975)]
+    }
+
+    /// How often each point is in a resample: blocks of ∛n neighbours from drawn starts.
+    fn drawn(&self, key: &Key) -> Vec<u32> {
         let n = self.points.len();
         let block = (n as f64).cbrt().ceil() as usize;
-        let (mut least, mut greatest): (Vec<f64>, Vec<f64>) = (0..RESAMPLES)
-            .map(|resample| {
-                let purpose = Purpose::Bootstrap;
-                let mut draws =
-                    Key { seed: SEED, chirp: number, sub_ray: resample, purpose }.draws();
-                let mut times = vec![0; n];
-                for _ in 0..n.div_ceil(block) {
-                    let start = (draws.uniform() * n as f64) as usize;
-                    for step in 0..block {
-                        if let Some(count) = times.get_mut((start + step) % n) {
-                            *count += 1;
-                        }
-                    }
+        let mut draws = key.draws();
+        let mut times = vec![0; n];
+        for _ in 0..n.div_ceil(block) {
+            let start = (draws.uniform() * n as f64) as usize;
+            for step in 0..block {
+                if let Some(count) = times.get_mut((start + step) % n) {
+                    *count += 1;
                 }
-                let [least, greatest] = self.spread(&times).mean();
-                (least, greatest)
-            })
-            .unzip();
-        [end(&mut least, 0.025), end(&mut greatest, 0.975)]
+            }
+        }
+        times
     }
 }
 
+/// The value below which this share of the values lies.
 fn end(values: &mut [f64], share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let place = (share * (values.len() as f64 - 1.0)).round() as usize;
@@ -222,10 +231,9 @@ struct Spread {
 
 impl Spread {
     fn mean(&self) -> [f64; 2] {
-        let sum =
-            |list: &[(f64, f64)]| list.iter().map(|(level, share)| level * share).sum::<f64>();
-        let least = sum(&self.detected);
-        [least, least + sum(&self.below)]
+        let [least, undetected] = [&self.detected, &self.below]
+            .map(|levels| levels.iter().map(|(level, share)| level * share).sum::<f64>());
+        [least, least + undetected]
     }
 
     fn threshold(&self) -> Option<f64> {

@@ -4,14 +4,14 @@ use glam::DVec3;
 
 use super::cloud::{Cloud, CloudPoint};
 use super::icp::Motion;
-use super::placed::{Aims, Traced};
-use super::register::Registered;
-use crate::frames::{Global, Point, Pose, Ray};
+use super::register::RegistrationResult;
+use super::tracer::{Intersection, RaySet, Tracer};
+use crate::frames::{Global, Point, Pose};
 use crate::geometry::Mesh;
 use crate::radar::random::{Draws, Key, Purpose};
 use crate::radar::{Chirps, Link, Radar};
 use crate::scene::mannequin;
-use crate::units::dbm_from_watts;
+use crate::units::watts_from_dbm;
 
 /// A mesh where it stood, and its cloud.
 #[derive(Clone)]
@@ -37,21 +37,21 @@ impl Measured {
         let radar = Radar::default();
         let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
         let here = Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO);
-        let seen = Traced::new(&mesh).scan(&here, &Aims::new(&mesh, &chirps.rays));
+        let seen = Tracer::new(&mesh).scan(&here, &RaySet::new(&mesh, &chirps.rays));
         let link = Link::new(&radar);
+        let threshold_w = watts_from_dbm(radar.threshold_dbm);
         let mut draws = draws(seed, 0);
-        let point = |((seen, ray), number): ((_, &Ray<Global>), &u32)| {
-            let hit = Option::<super::placed::Seen>::map(seen, |seen| seen.hit)?;
-            let f_per_sr = f_per_sr(hit.theta_rad());
-            let power_dbm = dbm_from_watts(link.power_w(hit.range_m, hit.cos_theta, f_per_sr));
+        let mut points = Vec::new();
+        for ((seen, ray), number) in seen.into_iter().zip(&chirps.rays).zip(&chirps.number) {
+            let Some(Intersection { hit, .. }) = seen else { continue };
+            let power_w = link.power_w(hit.range_m, hit.cos_theta, f_per_sr(hit.theta_rad()));
             let range_m = hit.range_m + range_sd_m * normal(&mut draws);
             let point = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
-            let echo =
-                CloudPoint { chirp: Some(*number), point, range_m: Some(range_m), power_dbm };
-            (power_dbm >= radar.threshold_dbm).then_some(echo)
-        };
-        let points: Vec<CloudPoint> =
-            seen.into_iter().zip(&chirps.rays).zip(&chirps.number).filter_map(point).collect();
+            if power_w >= threshold_w {
+                let (chirp, range_m) = (Some(*number), Some(range_m));
+                points.push(CloudPoint { chirp, point, range_m, power_w });
+            }
+        }
         let cloud = Cloud::new(points).unwrap();
         Measured { mesh, radar, chirps, cloud }
     }
@@ -103,7 +103,7 @@ pub fn pushed(measured: &Measured, off_m: f64, off_rad: f64, seed: u64) -> Pose<
 }
 
 /// Error of a pose whose truth is to stay: shift of the middle of the cloud (m) and turn (rad).
-pub fn apart(found: &Registered) -> (f64, f64) {
+pub fn apart(found: &RegistrationResult) -> (f64, f64) {
     let error = Motion::of(&found.pose, found.pivot.xyz);
     (error.shift_m.length(), error.turn_rad.length())
 }

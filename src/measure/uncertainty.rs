@@ -16,9 +16,9 @@ use super::icp::{Gap, NormalEquations, jacobian};
 
 /// Side of a cell, three spots of the paper's radar, m.
 const CELL_M: f64 = 0.05;
-/// Fewer cells do not tell how errors are shared.
+/// With fewer cells the shared errors cannot be estimated.
 const LEAST_CELLS: usize = 30;
-/// A direction known worse than this is not known, m.
+/// A direction with a larger standard deviation is reported as not determined, m.
 const UNKNOWN_SD_M: f64 = 5e-3;
 
 /// What is known of a pose.
@@ -28,36 +28,38 @@ pub struct Uncertainty {
     pub covariance: [[f64; 6]; 6],
     /// By what the variance was widened for shared errors, 1 or more.
     pub widened: f64,
-    /// Directions in which the target does not tell its pose, in words.
+    /// Directions in which the points do not determine the pose, in words.
     pub unknown: Vec<String>,
 }
 
-/// The covariance from the gaps that were used, at their least.
+/// The covariance of the pose from the gaps that were used, where their squares are least.
 pub(super) fn uncertainty(gaps: &[Gap], pivot: DVec3, length_m: f64) -> Uncertainty {
+    /// A thousandth of one point's information: rounding of a plane's zero is far below.
+    const LEAST_INFORMATION: f64 = 1e-3;
     let equations = NormalEquations::new(gaps.iter().map(|gap| (*gap, 1.0)), pivot, length_m);
     let freedom = gaps.len().saturating_sub(6).max(1) as f64;
     let variance_m2 = gaps.iter().map(|gap| gap.size_m * gap.size_m).sum::<f64>() / freedom;
     let eigen = SymmetricEigen::new(equations.information);
     let widened = widening(gaps, pivot, length_m, variance_m2, &eigen);
+    // The variance along each direction; where the points do not determine it, the size of the target squared.
     let mut scaled = Matrix6::zeros();
     let mut unknown = Vec::new();
-    // A thousandth of a point's information: rounding of a plane's zero is far below.
-    let least = 1e-3;
     for (value, axis) in std::iter::zip(eigen.eigenvalues.iter(), eigen.eigenvectors.column_iter())
     {
-        let told_m2 = variance_m2 * widened / value.max(0.0);
-        let blind = *value < least;
-        // What is not told may be anything up to the size of the target.
+        let estimated_m2 = variance_m2 * widened / value.max(0.0);
+        let blind = *value < LEAST_INFORMATION;
         let variance_m2 =
-            if blind { length_m * length_m } else { told_m2.min(length_m * length_m) };
-        if blind || told_m2.sqrt() > UNKNOWN_SD_M {
+            if blind { length_m * length_m } else { estimated_m2.min(length_m * length_m) };
+        if blind || estimated_m2.sqrt() > UNKNOWN_SD_M {
             unknown.push(in_words(&axis.into_owned(), variance_m2.sqrt()));
         }
         scaled += axis * axis.transpose() * variance_m2;
     }
-    let unit = |axis: usize| if axis < 3 { 1.0 } else { 1.0 / length_m };
+    // Turns were scaled by the length.
+    let per_m = 1.0 / length_m;
+    let unit = [1.0, 1.0, 1.0, per_m, per_m, per_m];
     let covariance =
-        std::array::from_fn(|i| std::array::from_fn(|j| scaled[(i, j)] * unit(i) * unit(j)));
+        std::array::from_fn(|i| std::array::from_fn(|j| scaled[(i, j)] * unit[i] * unit[j]));
     Uncertainty { covariance, widened, unknown }
 }
 
@@ -80,15 +82,14 @@ fn widening(
     }
     let correction = cells.len() as f64 / (cells.len() - 6) as f64;
     let best = eigen.eigenvalues.max();
-    let told = |value: f64| value > 1e-9 * best;
-    let ratios: Vec<f64> =
-        std::iter::zip(eigen.eigenvalues.iter(), eigen.eigenvectors.column_iter())
-            .filter(|(value, _)| told(**value))
-            .map(|(value, axis)| {
-                let shared: f64 = cells.values().map(|pull| axis.dot(pull).powi(2)).sum();
-                correction * shared / (variance_m2 * value)
-            })
-            .collect();
+    let mut ratios = Vec::new();
+    for (value, axis) in std::iter::zip(eigen.eigenvalues.iter(), eigen.eigenvectors.column_iter())
+    {
+        if *value > 1e-9 * best {
+            let shared: f64 = cells.values().map(|pull| axis.dot(pull).powi(2)).sum();
+            ratios.push(correction * shared / (variance_m2 * value));
+        }
+    }
     let mean = ratios.iter().sum::<f64>() / ratios.len().max(1) as f64;
     mean.max(1.0)
 }
@@ -107,7 +108,7 @@ fn in_words(axis: &Vector6<f64>, sd_m: f64) -> String {
     let large = std::iter::zip(axis.iter(), NAMES).filter(|(part, _)| part.abs() > 0.33);
     let names: Vec<&str> = large.map(|(_, name)| name).collect();
     format!(
-        "the target does not tell {}: standard deviation {:.0} mm",
+        "the points do not determine {}: standard deviation {:.0} mm",
         names.join(" with "),
         1e3 * sd_m
     )

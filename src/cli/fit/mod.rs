@@ -274,7 +274,7 @@ fn is_held(path: &str, fixed: &[(String, f64)]) -> bool {
 }
 
 fn draw(path: &Path, subject: &Subject, fit: &crate::material::Fit) -> Result<Vec<String>, Error> {
-    let points = points(&subject.curve_name, &subject.curve.observations());
+    let points = points(&subject.curve_name, &subject.curve.observations);
     let series = layers(std::slice::from_ref(fit), points);
     let subtitle = format!("{}, with its 95 % band", fit.name);
     one_file(path, &plot(&subject.label, &subtitle, series))

@@ -14,7 +14,7 @@ pub(super) fn result(
     saved: Option<&Saved>,
     files: &[String],
 ) -> String {
-    let rows = subject.curve.rows.len();
+    let rows = subject.curve.observations.len();
     let censored = rows - subject.curve.detected().count();
     let mut text = format!(
         "{}: {} rows, {} of them below the threshold\n",

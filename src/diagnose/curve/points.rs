@@ -91,22 +91,23 @@ impl Points {
     pub fn backscatter(curve: &Curve, noise_db: Option<f64>) -> Points {
         const GRAZING_RAD: f64 = 1.569;
         let mut points: Vec<Point> = curve
-            .rows
+            .observations
             .iter()
-            .filter(|row| row.theta_rad < GRAZING_RAD)
-            .map(|row| {
-                let i = Direction::from_angles(row.theta_rad, PI);
+            .filter(|row| row.theta_i_rad < GRAZING_RAD)
+            .filter_map(|row| {
+                let theta_rad = row.theta_i_rad;
+                let i = Direction::from_angles(theta_rad, PI);
                 let offset_db = db_from_ratio(4.0 * PI * i.cos_theta().powi(2));
-                Point {
+                Some(Point {
                     i,
                     o: i,
-                    theta_i_rad: row.theta_rad,
-                    theta_s_rad: -row.theta_rad,
-                    f_db: db_from_ratio(row.sigma0) - offset_db,
-                    censored: row.censored,
+                    theta_i_rad: theta_rad,
+                    theta_s_rad: -theta_rad,
+                    f_db: db_from_ratio(row.level_sigma0()?) - offset_db,
+                    censored: row.is_censored(),
                     offset_db,
                     scan: 0,
-                }
+                })
             })
             .collect();
         points.sort_by(|a, b| a.theta_i_rad.total_cmp(&b.theta_i_rad));

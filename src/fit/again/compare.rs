@@ -1,14 +1,20 @@
-//! What a stored fit says against what a new one finds: the model that is rendered, the numbers and how
-//! well they are known, and the sentences. How far apart they may be follows from the new fit alone.
+//! Compares a stored fit with a new one: the model that is rendered, the numbers and their uncertainty, and the
+//! sentences. The tolerances follow from the new fit alone.
 
-use super::{ROUNDING, SAME_NUMBER_SD, SAME_OBJECTIVE};
 use crate::brdf::{Brdf, Scattering};
 use crate::fit::coordinates::{DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
 use crate::fit::interval::DEVIATE_95;
-use crate::fit::{Estimate, Finding, FitResult};
-use crate::material::{self, FitReport, Goodness, HeldOut};
+use crate::fit::result::FitResult;
+use crate::fit::verdict::Finding;
+use crate::material::{self, Estimate, FitReport, Goodness, HeldOut};
 use crate::measure::curve::Curve;
 
+/// How far ln likelihoods, or half sums of squares, of two searches for one optimum may differ: where
+/// they stopped, and rounding, relative. One standard deviation of a number is half a unit.
+const SAME_OBJECTIVE: f64 = 0.01;
+const ROUNDING: f64 = 1e-6;
+/// How far numbers may, in the standard deviations of the new fit.
+const SAME_NUMBER_SD: f64 = 0.1;
 /// How far standard deviations of two searches for one optimum may differ, relative.
 const SAME_SD: f64 = 0.05;
 /// How far sums over the rows may, relative and in dB.
@@ -47,9 +53,8 @@ pub(super) fn compare(stored: &material::Fit, found: &FitResult, curve: &Curve) 
 
 /// The numbers of the report, their deviations and intervals.
 fn estimates(report: &FitReport, found: &FitResult) -> Vec<String> {
-    let names = |name: &String| found.estimate(name).is_some();
     if report.estimates.len() != found.estimates.len()
-        || !report.estimates.iter().all(|stored| names(&stored.name))
+        || report.estimates.iter().any(|stored| found.estimate(&stored.name).is_none())
     {
         return vec!["its report lists other numbers than a new fit finds".to_owned()];
     }
@@ -57,13 +62,13 @@ fn estimates(report: &FitReport, found: &FitResult) -> Vec<String> {
     pairs.flat_map(|(stored, new)| estimate(stored, new)).collect()
 }
 
-fn estimate(stored: &material::Estimate, new: &Estimate) -> Vec<String> {
+fn estimate(stored: &Estimate, new: &Estimate) -> Vec<String> {
     let mut differences = Vec::new();
     let name = &stored.name;
     let (Some(old_sd), Some(sd)) = (stored.sd, new.sd) else {
         if stored.sd.is_some() != new.sd.is_some() {
             differences.push(format!(
-                "whether the data tell {name} by itself is stored otherwise than a new fit finds"
+                "{name} has a deviation either as stored or in a new fit, but not in both"
             ));
         }
         return differences;
@@ -74,11 +79,10 @@ fn estimate(stored: &material::Estimate, new: &Estimate) -> Vec<String> {
             "the deviation of {name} is stored as {old_sd:.4e}, and a new fit gives {sd:.4e}"
         ));
     }
-    let width = |[low, high]: [f64; 2]| (high - low) / (2.0 * DEVIATE_95);
     let same = match (stored.interval_95, new.interval_95) {
-        (Some(old), Some(new)) => {
-            let step = SAME_NUMBER_SD * sd.max(width(new));
-            std::iter::zip(old, new).all(|(old, new)| is_near(old, new, step))
+        (Some(old), Some([low, high])) => {
+            let step = SAME_NUMBER_SD * sd.max((high - low) / (2.0 * DEVIATE_95));
+            std::iter::zip(old, [low, high]).all(|(old, new)| is_near(old, new, step))
         }
         (old, new) => old.is_none() && new.is_none(),
     };
@@ -106,7 +110,7 @@ fn model(stored: &material::Fit, found: &FitResult, curve: &Curve) -> Vec<String
     }
     for (path, held) in &found.fit.fixed {
         if value(&stored.model, path) != Some(*held) {
-            differences.push(format!("its model has not the {path} that was held"));
+            differences.push(format!("its model has another {path} than the fixed one"));
         }
     }
     if differences.is_empty() {
@@ -123,70 +127,82 @@ fn value(model: &Brdf, name: &str) -> Option<f64> {
     }
 }
 
-/// The curve of the model where the data are: numbers that they do not tell one by one must still give it.
+/// Compares σ⁰ of the two models at the angles of the detections: numbers that the data determine only together
+/// must still give the same curve.
 fn level(stored: &material::Fit, found: &FitResult, curve: &Curve) -> Option<String> {
-    let angles = || curve.detected().map(|row| row.theta_rad);
-    let [low, high] = [angles().fold(f64::INFINITY, f64::min), angles().fold(0.0, f64::max)];
+    const NEPER_PER_DB: f64 = std::f64::consts::LN_10 / 10.0;
+    let (mut low_rad, mut high_rad) = (f64::INFINITY, 0.0f64);
+    for row in curve.detected() {
+        low_rad = low_rad.min(row.theta_i_rad);
+        high_rad = high_rad.max(row.theta_i_rad);
+    }
     // As many directions as numbers, each as far off as a number may be.
     let directions = (found.estimates.len() as f64).sqrt();
-    let differs = |&theta_rad: &f64| {
+    for angle in 0..=ANGLES {
+        let theta_rad = low_rad + (high_rad - low_rad) * f64::from(angle) / f64::from(ANGLES);
         let band = found.band(theta_rad);
         let sd = (band.high / band.mid).ln() / DEVIATE_95;
-        let step =
-            SAME_NUMBER_SD * directions * sd + SAME_LEVEL_DB * std::f64::consts::LN_10 / 10.0;
-        !is_near(stored.model.sigma0(theta_rad).ln(), band.mid.ln(), step)
-    };
-    let grid = (0..=ANGLES).map(|step| low + (high - low) * f64::from(step) / f64::from(ANGLES));
-    let theta_deg = grid.into_iter().find(differs)?.to_degrees();
-    Some(format!("its model has another level at {theta_deg:.1}° than that of a new fit"))
+        let step = SAME_NUMBER_SD * directions * sd + SAME_LEVEL_DB * NEPER_PER_DB;
+        if !is_near(stored.model.sigma0(theta_rad).ln(), band.mid.ln(), step) {
+            let theta_deg = theta_rad.to_degrees();
+            return Some(format!(
+                "its model has another level at {theta_deg:.1}° than that of a new fit"
+            ));
+        }
+    }
+    None
 }
 
 /// Both covariances: of all numbers found, and of the parameters.
 fn covariances(stored: &material::Fit, new: &material::Fit, found: &FitResult) -> Option<String> {
     let sds: Vec<f64> = found.estimates.iter().map(|e| e.sd.unwrap_or(0.0)).collect();
-    let whole = |fit: &material::Fit| fit.report.as_ref().map(|r| r.covariance.clone());
-    let sd_of = |path: &String| found.estimate(path).and_then(|e| e.sd).unwrap_or(0.0);
     let parameters = match (&stored.covariance, &new.covariance) {
         (Some(old), Some(new)) => {
-            let sds: Vec<f64> = new.parameters.iter().map(sd_of).collect();
+            let estimates = new.parameters.iter().map(|path| found.estimate(path));
+            let sds: Vec<f64> = estimates.map(|e| e.and_then(|e| e.sd).unwrap_or(0.0)).collect();
             old.parameters == new.parameters && is_same_matrix(&old.matrix, &new.matrix, &sds)
         }
         (old, new) => old.is_none() && new.is_none(),
     };
-    let report = std::iter::zip(whole(stored), whole(new))
-        .all(|(old, new)| is_same_matrix(&old, &new, &sds));
+    let report = match (&stored.report, &new.report) {
+        (Some(old), Some(new)) => is_same_matrix(&old.covariance, &new.covariance, &sds),
+        _ => true,
+    };
     (!parameters || !report)
         .then(|| "its covariance is not the one that a new fit gives".to_owned())
 }
 
 fn is_same_matrix(old: &[Vec<f64>], new: &[Vec<f64>], sds: &[f64]) -> bool {
-    let size = sds.len();
-    let is_square = |m: &[Vec<f64>]| m.len() == size && m.iter().all(|row| row.len() == size);
-    is_square(old)
-        && is_square(new)
+    is_square(old, sds.len())
+        && is_square(new, sds.len())
         && std::iter::zip(old, new).zip(sds).all(|((old, new), row_sd)| {
             let mut cells = std::iter::zip(old, new).zip(sds);
             cells.all(|((old, new), sd)| is_near(*old, *new, 2.0 * SAME_SD * row_sd * sd))
         })
 }
 
-/// What was held out, if anything was.
+fn is_square(matrix: &[Vec<f64>], size: usize) -> bool {
+    matrix.len() == size && matrix.iter().all(|row| row.len() == size)
+}
+
+/// The score on points that took no part in the fit, if there is one.
 fn held_out(old: &HeldOut, found: &FitResult, curve: &Curve) -> Option<String> {
-    let is_same = found.hold_out(curve).is_some_and(|new| {
-        let score = |held: &HeldOut| held.score.zip(held.score_sd);
-        let same_score = match (score(old), score(&new)) {
-            (Some((old, old_sd)), Some((new, sd))) => {
-                is_near(old, new, SAME_NUMBER_SD * sd) && is_near(old_sd, sd, SAME_SD * sd)
-            }
-            (old, new) => old.is_none() && new.is_none(),
-        };
-        same_score
-            && is_near(old.rms_db, new.rms_db, SAME_LEVEL_DB)
-            && (old.folds, old.blocks, &old.blocks_of, old.block_m, &old.fold_hash)
-                == (new.folds, new.blocks, &new.blocks_of, new.block_m, &new.fold_hash)
-    });
+    let is_same = found.hold_out(curve).is_some_and(|new| is_same_score(old, &new));
     (!is_same)
         .then(|| "its score on held-out points is not the one that a new fit gives".to_owned())
+}
+
+fn is_same_score(old: &HeldOut, new: &HeldOut) -> bool {
+    let score = match (old.score.zip(old.score_sd), new.score.zip(new.score_sd)) {
+        (Some((old, old_sd)), Some((new, sd))) => {
+            is_near(old, new, SAME_NUMBER_SD * sd) && is_near(old_sd, sd, SAME_SD * sd)
+        }
+        (old, new) => old.is_none() && new.is_none(),
+    };
+    score
+        && is_near(old.rms_db, new.rms_db, SAME_LEVEL_DB)
+        && (old.folds, old.blocks, &old.blocks_of, old.block_m, &old.fold_hash)
+            == (new.folds, new.blocks, &new.blocks_of, new.block_m, &new.fold_hash)
 }
 
 /// What was set, and whether the search came to an end.
@@ -197,9 +213,9 @@ fn settings(
     estimator: &str,
 ) -> Vec<String> {
     let scale = new.singular_values.first().copied().unwrap_or(1.0);
-    let values = || std::iter::zip(&old.singular_values, &new.singular_values);
     let same_values = old.singular_values.len() == new.singular_values.len()
-        && values().all(|(old, new)| is_near(*old, *new, SAME_SD * scale));
+        && std::iter::zip(&old.singular_values, &new.singular_values)
+            .all(|(old, new)| is_near(*old, *new, SAME_SD * scale));
     let looks_sd = new.estimate(LOOKS).and_then(|e| e.sd);
     let same_looks = match (old.looks, new.looks) {
         (Some(old), Some(new)) => {
@@ -219,8 +235,12 @@ fn settings(
     wrong.map(|(what, _)| format!("its {what}: the report and a new fit differ")).collect()
 }
 
+/// How far a level of this size may differ, dB.
+fn step_db(size_db: f64) -> f64 {
+    SAME_SUM * size_db.abs() + SAME_LEVEL_DB
+}
+
 fn goodness(old: &Goodness, new: &Goodness) -> Vec<String> {
-    let step_db = |size_db: f64| SAME_SUM * size_db.abs() + SAME_LEVEL_DB;
     // Residuals of a curve without noise are steps of the search, and follow no law.
     let step = SAME_SUM + SAME_LEVEL_DB / new.rms_db.max(f64::MIN_POSITIVE);
     let speckle = match (old.speckle_db, new.speckle_db) {
@@ -242,26 +262,29 @@ fn goodness(old: &Goodness, new: &Goodness) -> Vec<String> {
 
 /// The sentences. How many starts agree depends on where the search began, and is not compared.
 fn verdict(stored: &[String], found: &[Finding]) -> Vec<String> {
-    let is_of_starts = |sentence: &String| sentence.contains("starts reached the best fit");
-    let is_borderline = |finding: &Finding| match finding {
+    let mut differences = Vec::new();
+    for sentence in stored.iter().filter(|s| !s.contains("starts reached the best fit")) {
+        if !found.iter().any(|finding| is_same_sentence(sentence, &finding.to_string())) {
+            differences.push(format!("its verdict says what a new fit does not: {sentence}"));
+        }
+    }
+    for finding in found.iter().filter(|finding| !is_borderline(finding)) {
+        let said = finding.to_string();
+        if !stored.iter().any(|sentence| is_same_sentence(sentence, &said)) {
+            differences.push(format!("its verdict does not say: {said}"));
+        }
+    }
+    differences
+}
+
+/// Whether a finding is so near to its limit that another search may miss it.
+fn is_borderline(finding: &Finding) -> bool {
+    match finding {
         Finding::StartsDisagree { .. } => true,
         Finding::PoorFit { ks_distance, limit } => *ks_distance < (1.0 + BORDERLINE) * limit,
         Finding::HardToTellApart { correlation, .. } => correlation.abs() < 0.96,
         _ => false,
-    };
-    let has =
-        |finding: &Finding, sentence: &String| is_same_sentence(sentence, &finding.to_string());
-    let extra = stored
-        .iter()
-        .filter(|sentence| !is_of_starts(sentence))
-        .filter(|sentence| !found.iter().any(|finding| has(finding, sentence)));
-    let lost = found
-        .iter()
-        .filter(|finding| !is_borderline(finding))
-        .filter(|finding| !stored.iter().any(|sentence| has(finding, sentence)));
-    let extra =
-        extra.map(|sentence| format!("its verdict says what a new fit does not: {sentence}"));
-    extra.chain(lost.map(|finding| format!("its verdict does not say: {finding}"))).collect()
+    }
 }
 
 /// Whether two sentences are the same but for the last digits of their numbers.
@@ -292,7 +315,7 @@ fn parts(sentence: &str) -> Vec<String> {
     parts
 }
 
-/// False for what is no number, too.
+/// Whether two numbers differ by no more than `step` and rounding; false for NaN.
 fn is_near(a: f64, b: f64, step: f64) -> bool {
     (a - b).abs() <= step + ROUNDING * b.abs()
 }

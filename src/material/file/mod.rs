@@ -127,14 +127,7 @@ struct FitFile {
     scattering: Brdf,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     parameter_source: BTreeMap<String, String>,
-    covariance: Option<CovarianceFile>,
-}
-
-#[derive(Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-struct CovarianceFile {
-    parameters: Vec<String>,
-    matrix: Vec<Vec<f64>>,
+    covariance: Option<Covariance>,
 }
 
 fn stated() -> String {
@@ -248,9 +241,7 @@ impl From<Fit> for FitFile {
             source: fit.source,
             scattering: fit.model,
             parameter_source: fit.parameter_sources.into_iter().collect(),
-            covariance: fit
-                .covariance
-                .map(|Covariance { parameters, matrix }| CovarianceFile { parameters, matrix }),
+            covariance: fit.covariance,
         }
     }
 }
@@ -264,9 +255,7 @@ impl From<FitFile> for Fit {
             curve: entry.curve,
             source: entry.source,
             parameter_sources: entry.parameter_source.into_iter().collect(),
-            covariance: entry
-                .covariance
-                .map(|CovarianceFile { parameters, matrix }| Covariance { parameters, matrix }),
+            covariance: entry.covariance,
             report: None,
         }
     }

@@ -1,7 +1,7 @@
-//! A mesh at a pose, as rays see it.
+//! Intersections of rays with a mesh at any pose.
 //!
-//! The mesh itself never moves: rays are carried back into its frame, and hits forward. Of what a tracer
-//! makes of its facets nothing is lost with a new pose.
+//! The mesh itself never moves: rays are transformed into its frame, and hits out of it, so that the hierarchy over its
+//! facets is built once for all poses.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -10,35 +10,35 @@ use crate::frames::{Global, Pose, Ray};
 use crate::geometry::Mesh;
 use crate::trace::{Bvh, Fan, Hit};
 
-/// Of more facets than this for each ray a hierarchy is built: a registration scans dozens of poses, and without
-/// one each of them reads all facets.
+/// With more facets per ray a hierarchy is built: a registration scans dozens of poses, and without a hierarchy
+/// every scan reads all facets.
 const FACETS_PER_RAY: usize = 20;
 
-/// A mesh that can be looked at from any side.
-pub struct Traced<'a> {
+/// A mesh that is intersected with rays, at one pose after another.
+pub struct Tracer<'a> {
     mesh: &'a Mesh,
     bvh: Bvh<'a>,
 }
 
-/// Rays that a mesh is looked at with, at one pose after another; those of one origin are sorted once.
-pub struct Aims<'a> {
+/// Rays that are intersected with a mesh, at one pose after another; those of one origin are sorted once.
+pub struct RaySet<'a> {
     rays: &'a [Ray<Global>],
     fan: Option<Fan<'a>>,
 }
 
-impl<'a> Aims<'a> {
-    /// For looking at a mesh with these rays.
-    pub fn new(mesh: &Mesh, rays: &'a [Ray<Global>]) -> Aims<'a> {
+impl<'a> RaySet<'a> {
+    /// Prepares rays for the intersection with `mesh`.
+    pub fn new(mesh: &Mesh, rays: &'a [Ray<Global>]) -> RaySet<'a> {
         let is_flat = mesh.facets.len() <= FACETS_PER_RAY * rays.len();
-        Aims { rays, fan: if is_flat { Fan::new(rays).ok() } else { None } }
+        RaySet { rays, fan: if is_flat { Fan::new(rays).ok() } else { None } }
     }
 
-    /// The rays, in the order of what they see.
+    /// The rays, in the order of [`Tracer::scan`].
     pub fn rays(&self) -> &'a [Ray<Global>] {
         self.rays
     }
 
-    /// What the rays meet when they are carried by a pose.
+    /// The closest hits of the rays, moved by `pose`.
     fn closest(&self, bvh: &Bvh, pose: &Pose<Global, Global>) -> Vec<Option<Hit>> {
         let there: Vec<Ray<Global>> = self.rays.iter().map(|ray| carried(pose, ray)).collect();
         match self.fan.as_ref().and_then(|fan| fan.carried(&there, pose)) {
@@ -48,49 +48,59 @@ impl<'a> Aims<'a> {
     }
 }
 
-/// Where a ray meets the mesh at a pose.
+/// The intersection of a ray with the mesh at a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub struct Intersection {
     /// The hit; its point is where the mesh is at the pose.
     pub hit: Hit,
-    /// Unit normal of the facet, turned to the radar.
+    /// Unit normal of the facet, on the radar's side.
     pub normal: DVec3,
 }
 
-impl<'a> Traced<'a> {
-    /// A hierarchy over it is built when rays need one.
-    pub fn new(mesh: &'a Mesh) -> Traced<'a> {
-        Traced { mesh, bvh: Bvh::new(mesh) }
+impl<'a> Tracer<'a> {
+    /// A hierarchy over the mesh is built when rays first need one.
+    pub fn new(mesh: &'a Mesh) -> Tracer<'a> {
+        Tracer { mesh, bvh: Bvh::new(mesh) }
     }
 
     /// Middle of the mesh's bounding box, m.
     pub fn middle(&self) -> DVec3 {
-        let vertices = || self.mesh.vertices.iter().copied();
-        let min = vertices().fold(DVec3::INFINITY, DVec3::min);
-        let max = vertices().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for vertex in &self.mesh.vertices {
+            min = min.min(*vertex);
+            max = max.max(*vertex);
+        }
         0.5 * (min + max)
     }
 
-    /// Where one ray meets the mesh moved by `pose`.
-    pub fn look(&self, pose: &Pose<Global, Global>, ray: &Ray<Global>) -> Option<Seen> {
+    /// The closest intersection of a ray with the mesh moved by `pose`.
+    pub fn intersect(
+        &self,
+        pose: &Pose<Global, Global>,
+        ray: &Ray<Global>,
+    ) -> Option<Intersection> {
         let hit = self.bvh.closest(&carried(&pose.inverse(), ray))?;
-        Some(self.seen(pose, ray, hit))
+        Some(self.moved(pose, ray, hit))
     }
 
-    /// Where each of many rays meets the mesh moved by `pose`, in their order.
-    pub fn scan(&self, pose: &Pose<Global, Global>, aims: &Aims) -> Vec<Option<Seen>> {
+    /// The closest intersections of rays with the mesh moved by `pose`, in their order.
+    pub fn scan(&self, pose: &Pose<Global, Global>, aims: &RaySet) -> Vec<Option<Intersection>> {
         const RAYS_PER_TASK: usize = 256;
         let hits = aims.closest(&self.bvh, &pose.inverse());
-        let seen = |(ray, hit): (&Ray<Global>, Option<Hit>)| Some(self.seen(pose, ray, hit?));
-        aims.rays.par_iter().zip(hits).with_min_len(RAYS_PER_TASK).map(seen).collect()
+        aims.rays
+            .par_iter()
+            .zip(hits)
+            .with_min_len(RAYS_PER_TASK)
+            .map(|(ray, hit)| Some(self.moved(pose, ray, hit?)))
+            .collect()
     }
 
-    /// A hit of the mesh where it is stored, there where the pose has it.
-    fn seen(&self, pose: &Pose<Global, Global>, ray: &Ray<Global>, hit: Hit) -> Seen {
+    /// A hit of the mesh in its own frame, moved by `pose`.
+    fn moved(&self, pose: &Pose<Global, Global>, ray: &Ray<Global>, hit: Hit) -> Intersection {
         let normal =
             pose.rotation() * self.mesh.area_normal(hit.facet as usize).normalize_or_zero();
         let turned = if normal.dot(ray.direction.xyz()) > 0.0 { -normal } else { normal };
-        Seen { hit: Hit { point: *pose * hit.point, ..hit }, normal: turned }
+        Intersection { hit: Hit { point: *pose * hit.point, ..hit }, normal: turned }
     }
 }
 
@@ -112,9 +122,9 @@ mod tests {
         moved.vertices.iter_mut().for_each(|v| *v = (pose * Point::from(*v)).xyz);
         let origin = Point::new(0.0, 0.0, 8.0);
         let ray = Ray { origin, direction: origin.towards(Point::new(0.2, 0.3, 0.0)).unwrap() };
-        let (there, here) = (Traced::new(&mesh), Traced::new(&moved));
-        let seen = there.look(&pose, &ray).unwrap();
-        let same = here.look(&Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO), &ray).unwrap();
+        let (there, here) = (Tracer::new(&mesh), Tracer::new(&moved));
+        let seen = there.intersect(&pose, &ray).unwrap();
+        let same = here.intersect(&Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO), &ray).unwrap();
         assert_eq!(seen.hit.facet, same.hit.facet);
         assert!(seen.hit.point.distance_m(same.hit.point) < 1e-12);
         assert!(seen.normal.distance(same.normal) < 1e-12);
@@ -132,11 +142,11 @@ mod tests {
                 |ray: usize| Point::new(0.3 * (ray as f64).sin(), 0.3 * (ray as f64).cos(), 0.0);
             let towards = |ray| Ray { origin, direction: origin.towards(aim(ray)).unwrap() };
             let rays: Vec<Ray<Global>> = (0..count).map(towards).collect();
-            let traced = Traced::new(&mesh);
-            let seen = traced.scan(&pose, &Aims::new(&mesh, &rays));
-            assert_eq!(traced.bvh.is_built(), count == 3);
+            let tracer = Tracer::new(&mesh);
+            let seen = tracer.scan(&pose, &RaySet::new(&mesh, &rays));
+            assert_eq!(tracer.bvh.is_built(), count == 3);
             for (ray, seen) in rays.iter().zip(seen) {
-                let (seen, alone) = (seen.unwrap(), traced.look(&pose, ray).unwrap());
+                let (seen, alone) = (seen.unwrap(), tracer.intersect(&pose, ray).unwrap());
                 assert!(seen.hit.point.distance_m(alone.hit.point) < 1e-12);
             }
         }

@@ -1,0 +1,135 @@
+//! What a fit cannot promise: findings from its rows, its numbers and their uncertainty.
+
+use super::coordinates::{DIFFUSE_LEVEL, SPECULAR_LEVEL};
+use super::result::FitResult;
+use super::search::SearchResult;
+use super::settings::Method;
+use super::uncertainty::Uncertainty;
+use super::verdict::Finding;
+use crate::brdf::{Brdf, ParameterError};
+use crate::formats::words::significant;
+use crate::material::{Estimate, Observation};
+
+/// Correlation from which two numbers are said to be hard to tell apart.
+const CORRELATED: f64 = 0.95;
+/// Kolmogorov's distance times √rows that chance exceeds once in a hundred times.
+const KOLMOGOROV_1_PERCENT: f64 = 1.63;
+/// The split where the method has none, degrees.
+const SPLIT_DEG: f64 = 6.0;
+
+/// The findings on a fit to `rows`.
+pub(super) fn judge(
+    result: &FitResult,
+    found: &SearchResult,
+    rows: &[Observation],
+) -> Vec<Finding> {
+    let range = result.model.validate();
+    let mut findings = Vec::new();
+    // Out of range k follows from the levels and was not chosen.
+    if let Some(k) = result.gauge_k.filter(|_| range.is_ok()) {
+        findings.push(Finding::Gauge { k });
+    }
+    if !result.converged {
+        findings.push(Finding::NotConverged { stop: result.stop });
+    }
+    let (agreeing, starts) = (result.agreeing_starts, result.fit.starts);
+    if 2 * agreeing < starts {
+        findings.push(Finding::StartsDisagree { agreeing, starts });
+    }
+    findings.extend(judge_rows(result, rows));
+    findings.extend(judge_numbers(result, found));
+    if let Err(ParameterError { path, value, .. }) = range {
+        let value = significant(value, 4);
+        let held = result.fit.fixed.iter().map(|(path, _)| path.clone()).collect();
+        findings.retain(|finding| !is_level_at_bound(finding));
+        findings.push(Finding::OutOfRange { problem: format!("{path} would be {value}"), held });
+    }
+    let limit = KOLMOGOROV_1_PERCENT / f64::from(result.goodness.rows.max(1)).sqrt();
+    let ks_distance = result.goodness.ks_distance;
+    if result.fit.method == Method::Censored && ks_distance > limit {
+        findings.push(Finding::PoorFit { ks_distance, limit });
+    }
+    findings
+}
+
+/// Whether a level of a mixture stopped at its bound: where the model is out of range, that says the same.
+fn is_level_at_bound(finding: &Finding) -> bool {
+    match finding {
+        Finding::AtBound { name, .. } => [SPECULAR_LEVEL, DIFFUSE_LEVEL].contains(&name.as_str()),
+        _ => false,
+    }
+}
+
+/// Which angles lack a detection, and which rows the method does not use.
+fn judge_rows(result: &FitResult, rows: &[Observation]) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let split_deg = match result.fit.method {
+        Method::Mse { split_rad } => split_rad.to_degrees(),
+        _ => SPLIT_DEG,
+    };
+    let detected: Vec<&Observation> = rows.iter().filter(|row| !row.is_censored()).collect();
+    let near = detected.iter().filter(|row| row.theta_i_rad.to_degrees() < split_deg).count();
+    let is_mixture = matches!(result.model, Brdf::Mixture(_));
+    if is_mixture && near == 0 {
+        findings.push(Finding::NoSpecularRows { below_deg: split_deg });
+    }
+    if is_mixture && near == detected.len() {
+        findings.push(Finding::NoDiffuseRows { above_deg: split_deg });
+    }
+    let censored = rows.len() - detected.len();
+    if result.fit.method != Method::Censored && censored > 0 {
+        findings.push(Finding::CensoredIgnored { censored, rows: rows.len() });
+    }
+    findings
+}
+
+/// Which numbers the data do not determine, or only with others.
+fn judge_numbers(result: &FitResult, found: &SearchResult) -> Vec<Finding> {
+    let estimates = &result.estimates;
+    let uncertainty = &found.uncertainty;
+    let mut findings = Vec::new();
+    for group in &uncertainty.together {
+        findings.push(match group.as_slice() {
+            [one] => Finding::Unconstrained { name: name(estimates, *one) },
+            _ => Finding::OnlyTogether {
+                names: group.iter().map(|&index| name(estimates, index)).collect(),
+            },
+        });
+    }
+    for &index in &uncertainty.loose {
+        findings.push(Finding::Unconstrained { name: name(estimates, index) });
+    }
+    for (estimate, _) in estimates.iter().zip(&uncertainty.bounded).filter(|(_, held)| **held) {
+        findings.push(Finding::AtBound { name: estimate.name.clone(), value: estimate.value });
+    }
+    findings.extend(judge_correlations(estimates, uncertainty));
+    for (index, profile) in found.profiles.iter().enumerate() {
+        for end in profile.iter().flatten().filter(|end| end.open) {
+            let coordinate = result.coordinates.list.get(index);
+            let value = coordinate.map_or(f64::NAN, |coordinate| coordinate.value(end.at));
+            findings.push(Finding::OpenInterval { name: name(estimates, index), value });
+        }
+    }
+    findings
+}
+
+fn judge_correlations(estimates: &[Estimate], uncertainty: &Uncertainty) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    let known: Vec<usize> =
+        (0..estimates.len()).filter(|&index| uncertainty.is_identified(index)).collect();
+    for (place, &a) in known.iter().enumerate() {
+        for &b in &known[place + 1..] {
+            let scale = uncertainty.deviation(a) * uncertainty.deviation(b);
+            let correlation = uncertainty.covariance[(a, b)] / scale;
+            if correlation.abs() > CORRELATED {
+                let names = [name(estimates, a), name(estimates, b)];
+                findings.push(Finding::HardToTellApart { names, correlation });
+            }
+        }
+    }
+    findings
+}
+
+fn name(estimates: &[Estimate], index: usize) -> String {
+    estimates.get(index).map_or("", |estimate| &estimate.name).to_owned()
+}

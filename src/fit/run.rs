@@ -1,0 +1,295 @@
+//! Runs a fit: checks its settings and its rows, then searches.
+
+use super::coordinates::{Coordinates, LOOKS};
+use super::error::FitError;
+use super::result::FitResult;
+use super::settings::{Fit, Method};
+use super::summary::summarise;
+use crate::brdf::Brdf;
+use crate::material::Observation;
+use crate::measure::curve::{Curve, backscatter_level};
+
+impl Fit {
+    /// Fits a model to a curve, starting at the model as given.
+    ///
+    /// # Errors
+    /// A setting, a start or a row without a meaning, a curve without detections or with fewer than
+    /// unknowns. What else the data do not determine is in the [verdict](FitResult::verdict).
+    pub fn run(&self, start: &Brdf, curve: &Curve) -> Result<FitResult, FitError> {
+        self.validate()?;
+        check_rows(&curve.observations)?;
+        let looks = match self.method {
+            Method::Censored => self.looks,
+            Method::Mse { .. } | Method::Tls { .. } => Some(self.looks.unwrap_or(1.0)),
+        };
+        let coordinates = Coordinates::new(start, &self.fixed, &self.bounds, looks)?;
+        let unknowns = coordinates.len();
+        if coordinates.list.iter().all(|c| c.name == LOOKS) {
+            return Err(FitError::NothingFree);
+        }
+        let detected = curve.detected().count();
+        if detected == 0 {
+            return Err(FitError::AllCensored { rows: curve.observations.len() });
+        }
+        // As many detections as unknowns are fitted exactly and leave no residual to estimate the errors from.
+        if detected <= unknowns {
+            return Err(FitError::TooFewRows { detected, unknowns });
+        }
+        let found = self.search(&coordinates, &curve.observations);
+        Ok(summarise(self, coordinates, &found, curve))
+    }
+}
+
+fn check_rows(rows: &[Observation]) -> Result<(), FitError> {
+    if rows.is_empty() {
+        return Err(FitError::Empty);
+    }
+    rows.iter().enumerate().try_for_each(|(index, row)| check_row(index, row))
+}
+
+/// Refuses a row that is not backscatter or has a number without a meaning; `row` counts from 0.
+fn check_row(row: usize, observation: &Observation) -> Result<(), FitError> {
+    const QUARTER_RAD: f64 = std::f64::consts::FRAC_PI_2;
+    let theta_sd_rad = observation.theta_sd_rad.unwrap_or(0.0);
+    for (name, value) in [("theta_rad", observation.theta_i_rad), ("theta_sd_rad", theta_sd_rad)] {
+        if !(0.0..=QUARTER_RAD).contains(&value) {
+            return Err(FitError::Row { row, name, value, wanted: "not from 0 to π/2" });
+        }
+    }
+    let sigma0 = backscatter_level(row, observation)?;
+    for (name, value) in [("sigma0", sigma0), ("power_w", observation.power_w.unwrap_or(sigma0))] {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(FitError::Row { row, name, value, wanted: "not above 0" });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::{BlinnPhong, Lambert, Scattering, Tabulated};
+    use crate::fit::coordinates::{DIFFUSE_LEVEL, SPECULAR_LEVEL};
+    use crate::fit::result::Band;
+    use crate::fit::twin::{Twin, mixture};
+    use crate::fit::verdict::Finding;
+    use crate::units::db_from_ratio;
+
+    fn start() -> Brdf {
+        mixture(0.1, 3.0, 0.02, 0.004)
+    }
+
+    fn value(result: &FitResult, name: &str) -> f64 {
+        result.estimate(name).unwrap().value
+    }
+
+    fn quick() -> Fit {
+        Fit { starts: 1, ..Fit::default() }
+    }
+
+    /// Error of the fitted curve at 55°, dB.
+    fn error_at_55_db(result: &FitResult, truth: &Brdf) -> f64 {
+        let theta_rad = 55f64.to_radians();
+        db_from_ratio(result.model.sigma0(theta_rad) / truth.sigma0(theta_rad))
+    }
+
+    #[test]
+    fn the_default_keeps_a_tail_that_least_squares_flattens() {
+        let twin = Twin { rows: 3000, ..Twin::default() };
+        let curve = twin.curve(11);
+        assert!(curve.detected().count() < 2600, "{}", curve.detected().count());
+        let default = quick().run(&start(), &curve).unwrap();
+        assert!(default.converged, "{default:?}");
+        let alpha = default.estimate("diffuse.alpha").unwrap();
+        let [low, high] = alpha.interval_95.unwrap();
+        assert!((alpha.value - 6.0).abs() < 3.0 * alpha.sd.unwrap(), "{alpha:?}");
+        assert!(high - low < 3.0 && low < high, "{alpha:?}");
+        assert!(error_at_55_db(&default, &twin.model).abs() < 1.0);
+        for method in [
+            Method::Mse { split_rad: 6f64.to_radians() },
+            Method::Tls { theta_sd_rad: 2f64.to_radians(), level_sd_db: 5.6 },
+        ] {
+            let squares = Fit { method, ..quick() }.run(&start(), &curve).unwrap();
+            assert!(value(&squares, "diffuse.alpha") < 4.5, "{squares:?}");
+            assert!(squares.verdict.iter().any(|f| matches!(f, Finding::CensoredIgnored { .. })));
+        }
+    }
+
+    #[test]
+    fn the_orthogonal_distance_converges_where_angles_are_vague() {
+        for seed in 0..3 {
+            let curve = Twin { theta_sd_deg: 3.0, ..Twin::default() }.curve(seed);
+            let method = Method::Tls { theta_sd_rad: 3f64.to_radians(), level_sd_db: 5.57 };
+            let found = Fit { method, ..quick() }.run(&start(), &curve).unwrap();
+            assert!(found.converged, "{:?} after {}", found.stop, found.iterations);
+        }
+    }
+
+    #[test]
+    fn intervals_cover_the_truth_about_as_often_as_they_say() {
+        const SEEDS: u64 = 20;
+        let twin = Twin { rows: 800, ..Twin::default() };
+        let truth = [("S", 0.05), ("R", 0.0016), ("diffuse.alpha", 6.0), ("specular.m", 0.07)];
+        let mut covered = [0; 4];
+        let mut z_alpha = 0.0;
+        for seed in 100..100 + SEEDS {
+            let found = quick().run(&start(), &twin.curve(seed)).unwrap();
+            for (count, (name, truth)) in covered.iter_mut().zip(truth) {
+                let estimate = found.estimate(name).unwrap();
+                let [low, high] = estimate.interval_95.unwrap();
+                *count += usize::from((low..=high).contains(&truth));
+                if name == "diffuse.alpha" {
+                    z_alpha += (estimate.value - truth) / estimate.sd.unwrap() / SEEDS as f64;
+                }
+            }
+        }
+        // 15 of 20 or fewer happens to a true 95 % once in 400 times; the mean of 20 z is 0 ± 0.22.
+        assert!(covered.iter().all(|&count| count > 15), "{covered:?}");
+        assert!(z_alpha.abs() < 0.9, "{z_alpha}");
+    }
+
+    #[test]
+    fn a_product_is_found_and_its_factors_are_not() {
+        let found = quick().run(&start(), &Twin::default().curve(5)).unwrap();
+        assert!(found.verdict.contains(&Finding::Gauge { k: 0.1 }));
+        assert!(found.estimate("k").is_none() && found.estimate("specular.f_lambda").is_none());
+        // The same model inside a sum has no gauge of its own: the singular values must say it.
+        let sum = Brdf::Sum(crate::brdf::Sum { parts: vec![start()] });
+        let found = quick().run(&sum, &Twin::default().curve(5)).unwrap();
+        let together = found.verdict.iter().find_map(|finding| match finding {
+            Finding::OnlyTogether { names } => Some(names.clone()),
+            _ => None,
+        });
+        let together = together.expect("k, f_lambda and r_s are one family");
+        assert!(together.contains(&"0.k".to_owned()), "{together:?}");
+        assert!(found.estimate("0.k").unwrap().sd.is_none());
+        assert!(found.estimate("0.diffuse.alpha").unwrap().sd.is_some());
+    }
+
+    #[test]
+    fn the_likelihood_averages_each_chirp_and_not_the_mean() {
+        // Eight looks and 3° of tilt: on the flank of the lobe the angle moves a power far more than
+        // speckle does. A fit with exact angles must call that speckle.
+        let twin = Twin { looks: 8.0, theta_sd_deg: 3.0, rows: 2000, ..Twin::default() };
+        let curve = twin.curve(21);
+        let found = quick().run(&start(), &curve).unwrap();
+        assert!((found.looks.unwrap() / 8.0 - 1.0).abs() < 0.15, "{:?}", found.looks);
+        assert!((found.goodness.z_variance - 1.0).abs() < 0.15, "{:?}", found.goodness);
+        let mut blind = curve;
+        blind.observations.iter_mut().for_each(|row| row.theta_sd_rad = Some(0.0));
+        let blind = quick().run(&start(), &blind).unwrap();
+        assert!(blind.looks.unwrap() < 5.0, "{:?}", blind.looks);
+    }
+
+    #[test]
+    fn thermal_noise_is_told_from_the_tail() {
+        let noise_w = 2e-11;
+        let twin = Twin { threshold_dbm: -300.0, looks: 4.0, rows: 1500, ..Twin::default() };
+        let mut curve = twin.curve(8);
+        for row in &mut curve.observations {
+            // Noise of as many looks on its own, so that the sum is Gamma only nearly.
+            let (sigma0, power_w) = (row.sigma0.unwrap(), row.power_w.unwrap());
+            row.power_w = Some(power_w + noise_w);
+            row.sigma0 = Some((power_w + noise_w) * (sigma0 / power_w));
+        }
+        let with = Fit { noise_w: Some(noise_w), ..quick() }.run(&start(), &curve).unwrap();
+        let without = quick().run(&start(), &curve).unwrap();
+        let error = |result: &FitResult| (value(result, "diffuse.alpha") - 6.0).abs();
+        assert!(error(&with) < 0.7 && error(&without) > 2.0 * error(&with), "{with:?}");
+    }
+
+    #[test]
+    fn the_verdict_says_what_is_missing() {
+        let far = Twin { theta_deg: [10.0, 60.0], theta_sd_deg: 0.5, ..Twin::default() };
+        let found = quick().run(&start(), &far.curve(1)).unwrap();
+        assert!(found.verdict.iter().any(|f| matches!(f, Finding::NoSpecularRows { .. })));
+        let near = Twin { theta_deg: [0.0, 5.0], ..Twin::default() };
+        let found = quick().run(&start(), &near.curve(1)).unwrap();
+        assert!(found.verdict.iter().any(|f| matches!(f, Finding::NoDiffuseRows { .. })));
+        let alpha = found.estimate("diffuse.alpha").unwrap();
+        let vague = alpha.interval_95.is_none_or(|[low, high]| high - low > 10.0);
+        assert!(vague, "{alpha:?} {:?}", found.verdict);
+    }
+
+    #[test]
+    fn another_law_of_slopes_is_called_a_poor_fit() {
+        let twin = Twin { looks: 8.0, theta_sd_deg: 0.0, ..Twin::default() };
+        let lambert = Brdf::Lambert(Lambert { albedo: 0.1 });
+        let found = quick().run(&lambert, &twin.curve(1)).unwrap();
+        assert!(found.verdict.iter().any(|f| matches!(f, Finding::PoorFit { .. })), "{found:?}");
+        let right = quick().run(&start(), &twin.curve(1)).unwrap();
+        assert!(!right.verdict.iter().any(|f| matches!(f, Finding::PoorFit { .. })), "{right:?}");
+    }
+
+    #[test]
+    fn any_model_with_a_free_number_fits_and_the_band_holds_the_truth() {
+        let truth = Brdf::BlinnPhong(BlinnPhong { r_s: 0.01, alpha: 4.0 });
+        let twin = Twin { model: truth.clone(), rows: 600, ..Twin::default() };
+        let start = Brdf::BlinnPhong(BlinnPhong { r_s: 0.1, alpha: 20.0 });
+        let found = quick().run(&start, &twin.curve(3)).unwrap();
+        for theta_deg in [0.0f64, 20.0, 45.0, 60.0] {
+            let Band { low, mid, high } = found.band(theta_deg.to_radians());
+            assert!(low < mid && mid < high && high / low < 2.0, "{theta_deg}: {found:?}");
+            let ratio = truth.sigma0(theta_deg.to_radians()) / mid;
+            // A band is 1.96 deviations wide; truth within twice that.
+            assert!(ratio.ln().abs() < 2.0 * (high / mid).ln(), "{theta_deg}: {ratio} {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_bound_that_stops_a_number_is_said() {
+        let bounds = vec![("diffuse.alpha".to_owned(), [0.0, 3.0])];
+        let found = Fit { bounds, ..quick() }.run(&start(), &Twin::default().curve(1)).unwrap();
+        let at_bound = |f: &Finding| matches!(f, Finding::AtBound { name, value } if name == "diffuse.alpha" && *value == 3.0);
+        assert!(found.verdict.iter().any(at_bound), "{:?}", found.verdict);
+        assert!(found.estimate("diffuse.alpha").unwrap().sd.is_none());
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_result_on_any_number_of_threads() {
+        let curve = Twin { rows: 600, ..Twin::default() }.curve(4);
+        let fit = Fit { starts: 2, seed: 9, ..Fit::default() };
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let three = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        let run = || serde_json::to_string(&fit.run(&start(), &curve).unwrap()).unwrap();
+        assert_eq!(one.install(run), three.install(run));
+    }
+
+    #[test]
+    fn data_that_cannot_be_fitted_are_refused() {
+        let curve = Twin { rows: 40, ..Twin::default() }.curve(1);
+        let refused = |curve: &Curve| quick().run(&start(), curve).unwrap_err();
+        assert_eq!(refused(&Curve::default()), FitError::Empty);
+        let few = Curve { observations: curve.detected().take(3).copied().collect() };
+        assert_eq!(refused(&few), FitError::TooFewRows { detected: 3, unknowns: 5 });
+        let mut censored = curve.clone();
+        for row in &mut censored.observations {
+            *row = Observation::backscatter(row.theta_i_rad, None, row.level_sigma0());
+        }
+        assert_eq!(refused(&censored), FitError::AllCensored { rows: 40 });
+        for (bad, name) in [(f64::NAN, "nan"), (-1.0, "negative"), (f64::INFINITY, "infinite")] {
+            let mut broken = curve.clone();
+            let row = &mut broken.observations[7];
+            *row = Observation::backscatter(row.theta_i_rad, Some(bad), None);
+            assert!(matches!(refused(&broken), FitError::Row { row: 7, .. }), "{name}");
+            broken = curve.clone();
+            broken.observations[7].theta_i_rad = bad;
+            assert!(matches!(refused(&broken), FitError::Row { row: 7, .. }), "{name}");
+        }
+        let table = Brdf::Tabulated(Tabulated::new(&[(0.0, 1.0), (1.0, 0.1)]).unwrap());
+        assert_eq!(quick().run(&table, &curve).unwrap_err(), FitError::NothingFree);
+        let settings = Fit { looks: Some(0.0), ..quick() }.run(&start(), &curve).unwrap_err();
+        assert!(settings.to_string().contains("fit.looks = 0"), "{settings}");
+    }
+
+    #[test]
+    fn looks_are_estimated_beside_the_model() {
+        let twin = Twin { looks: 4.0, ..Twin::default() };
+        let found = quick().run(&start(), &twin.curve(2)).unwrap();
+        let looks = found.estimate(LOOKS).unwrap();
+        assert!((looks.value - 4.0).abs() < 4.0 * looks.sd.unwrap(), "{looks:?}");
+        let [s, r] = found.model.identified_products().unwrap();
+        assert!((s / value(&found, SPECULAR_LEVEL) - 1.0).abs() < 1e-9);
+        assert!((r / value(&found, DIFFUSE_LEVEL) - 1.0).abs() < 1e-9);
+    }
+}
