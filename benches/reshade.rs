@@ -15,7 +15,7 @@ use clock::{quartiles, timed};
 use glam::DVec3;
 use matdb::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
 use matdb::diagnose;
-use matdb::effects::{self, Effect, Model, Receiver, Stage, Traced};
+use matdb::effects::{self, Effect, Model, PredictionCache, Receiver, Stage};
 use matdb::radar::{Chirps, Link, Radar};
 use matdb::scene::mannequin;
 use matdb::trace::{Bvh, Tracer};
@@ -48,7 +48,7 @@ fn main() {
     for threads in [1, 2] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         let quartiles = pool.install(|| {
-            let kept = Traced::default();
+            let kept = PredictionCache::default();
             let mut times = [(); 4].map(|()| Vec::new());
             for turn in 0..TURNS {
                 let change = turn as f64 / TURNS as f64;
@@ -95,7 +95,7 @@ fn model(m: f64, drift: &dyn Effect, drift_db: f64) -> Model<'_> {
         diffuse: Box::new(Brdf::BlinnPhong(BlinnPhong { r_s: 0.02, alpha: 4.0 })),
         specular: Box::new(Brdf::CookTorrance(lobe)),
     });
-    let values = drift.knobs().iter().map(|knob| knob.absent);
+    let values = drift.parameters().iter().map(|knob| knob.absent);
     let values = values.enumerate().map(|(k, absent)| if k == 0 { drift_db } else { absent });
     Model {
         laws: vec![paint],

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use matdb::diagnose::curve::terms;
-use matdb::effects::{Knob, library};
+use matdb::effects::{EffectParameter, library};
 use serde_json::{Value, json};
 use support::{entries, matdb, read_cloud, refused};
 
@@ -336,25 +336,29 @@ fn the_library_is_listed_and_every_entry_is_complete() {
     let records = records.as_array().unwrap();
     assert!(list.lines().all(|line| line.chars().count() <= 100), "{list}");
     let (of_clouds, of_curves) = list.split_once("Of a curve").unwrap();
-    let check =
-        |list: &str, record: &Value, of: &str, name: &str, says: [&str; 2], knobs: &[Knob]| {
-            assert!(list.lines().any(|line| line.starts_with(&format!("{name} "))), "{name}");
-            let entry = run(&["effects", name]);
-            assert!(says.iter().all(|text| entry.contains(text)), "{entry}");
-            for knob in knobs {
-                assert!(entry.contains(knob.name), "{name}: {}", knob.name);
-            }
-            assert_eq!((&record["name"], &record["applies_to"]), (&name.into(), &json!([of])));
-            assert_eq!(record["parameters"].as_array().unwrap().len(), knobs.len());
-        };
+    let check = |list: &str,
+                 record: &Value,
+                 of: &str,
+                 name: &str,
+                 says: [&str; 2],
+                 knobs: &[EffectParameter]| {
+        assert!(list.lines().any(|line| line.starts_with(&format!("{name} "))), "{name}");
+        let entry = run(&["effects", name]);
+        assert!(says.iter().all(|text| entry.contains(text)), "{entry}");
+        for knob in knobs {
+            assert!(entry.contains(knob.name), "{name}: {}", knob.name);
+        }
+        assert_eq!((&record["name"], &record["applies_to"]), (&name.into(), &json!([of])));
+        assert_eq!(record["parameters"].as_array().unwrap().len(), knobs.len());
+    };
     let mut rest = records.iter();
     for (effect, record) in library().iter().zip(rest.by_ref()) {
-        let says = [effect.is(), effect.shows()];
-        check(of_clouds, record, "cloud", effect.name(), says, effect.knobs());
+        let says = [effect.description(), effect.signature()];
+        check(of_clouds, record, "cloud", effect.name(), says, effect.parameters());
     }
     for (term, record) in terms().iter().zip(rest.by_ref()) {
-        let says = [term.is(), term.shows()];
-        check(of_curves, record, "curve", term.name(), says, term.knobs());
+        let says = [term.description(), term.signature()];
+        check(of_curves, record, "curve", term.name(), says, term.parameters());
     }
     let unknown = rest.next().unwrap();
     assert_eq!(unknown["name"], "unknown");

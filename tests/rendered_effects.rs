@@ -11,8 +11,8 @@ use glam::{DMat3, DVec3};
 use matdb::brdf::Brdf;
 use matdb::diagnose;
 use matdb::effects::{
-    Effect, Knob, Level, Model, Receiver, SceneEffects, Shot, Stage, entry, find, library, middle,
-    resolve,
+    Effect, EffectParameter, Level, Model, Receiver, SceneEffects, Shot, Stage, entry, find,
+    library, middle, resolve,
 };
 use matdb::formats::EffectEntry;
 use matdb::material::builtin;
@@ -172,9 +172,9 @@ fn every_effect_changes_every_echo_as_its_model_predicts() {
         let mut felt = 0;
         for start in starts {
             // A search may begin from nothing; a step from there is an effect.
-            let knobs = effect.knobs();
+            let knobs = effect.parameters();
             let is_absent = start.iter().zip(knobs).all(|(value, knob)| *value == knob.absent);
-            let step = |knob: &Knob| if is_absent { knob.step } else { 0.0 };
+            let step = |knob: &EffectParameter| if is_absent { knob.step } else { 0.0 };
             let values: Vec<f64> = start.iter().zip(knobs).map(|(v, k)| v + step(k)).collect();
             let case = format!("{} at {values:?}", effect.name());
             let effects = one(effect.name(), &values);
@@ -347,7 +347,7 @@ fn absent(names: &[&str]) -> String {
             _ => "effect",
         };
         let EffectEntry { parameters, .. } =
-            entry(effect, &effect.knobs().iter().map(|k| k.absent).collect::<Vec<_>>());
+            entry(effect, &effect.parameters().iter().map(|k| k.absent).collect::<Vec<_>>());
         let lines: String = parameters.iter().map(|(k, v)| format!("{k} = {v:?}\n")).collect();
         format!("[[{head}]]\nname = \"{name}\"\n{lines}")
     };

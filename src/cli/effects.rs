@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::console::Console;
 use super::summary::table;
 use crate::diagnose::curve::{Term, term, terms};
-use crate::effects::{Effect, Knob, Level, find, library};
+use crate::effects::{Effect, EffectParameter, Level, find, library};
 use crate::error::Error;
 use crate::formats::text::nearest;
 use crate::units::shown;
@@ -31,7 +31,7 @@ struct Record {
     level: Option<Level>,
     is: &'static str,
     shows: &'static str,
-    parameters: &'static [Knob],
+    parameters: &'static [EffectParameter],
 }
 
 const UNKNOWN: Record = Record {
@@ -53,9 +53,9 @@ impl Record {
             name: effect.name(),
             applies_to: &["cloud"],
             level: Some(effect.level()),
-            is: effect.is(),
-            shows: effect.shows(),
-            parameters: effect.knobs(),
+            is: effect.description(),
+            shows: effect.signature(),
+            parameters: effect.parameters(),
         }
     }
 
@@ -64,9 +64,9 @@ impl Record {
             name: term.name(),
             applies_to: &["curve"],
             level: Some(term.level()),
-            is: term.is(),
-            shows: term.shows(),
-            parameters: term.knobs(),
+            is: term.description(),
+            shows: term.signature(),
+            parameters: term.parameters(),
         }
     }
 }

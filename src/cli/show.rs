@@ -130,11 +130,13 @@ fn effects(material: &Material) -> String {
         let from = source.as_ref().map_or(String::new(), |source| format!(", from {source}"));
         text += &format!("\neffect {name}{from}\n");
         if let Some(effect) = crate::effects::find(name) {
-            text += &format!("    {}\n", effect.is());
+            text += &format!("    {}\n", effect.description());
         }
         let unit = |parameter: &str| {
-            let knob =
-                crate::effects::find(name)?.knobs().iter().find(|knob| knob.name == parameter)?;
+            let knob = crate::effects::find(name)?
+                .parameters()
+                .iter()
+                .find(|knob| knob.name == parameter)?;
             Some(knob.unit.to_owned())
         };
         let row = |(parameter, value): (&String, &f64)| {

@@ -16,7 +16,7 @@ use super::screen::Screen;
 use super::select::{SCOUT, Selection, State, larger, sizes_db};
 use super::shots::Observation;
 use super::{Control, Controls, Diagnosis, Power};
-use crate::effects::{Effect, Prediction, Traced};
+use crate::effects::{Effect, Prediction, PredictionCache};
 use crate::radar::random::{Key, Purpose};
 
 /// All controls, beside the base model.
@@ -37,11 +37,11 @@ fn placebo(selection: &Selection, base: &State, numbers: usize) -> Option<Contro
     let placebo = Placebo::new(numbers, selection.settings.seed);
     let mut space = base.space.clone();
     space.effects.push(&placebo);
-    let zero = vec![0.0; placebo.knobs().len()];
+    let zero = vec![0.0; placebo.parameters().len()];
     let start = Space::joined(&base.fitted.at, &placebo, &zero);
     let (fitted, [held_out_gain, held_out_se]) = selection.fitted(base, &space, &start);
     Some(Control {
-        numbers: placebo.knobs().len(),
+        numbers: placebo.parameters().len(),
         over: "random waves over the target plane".to_owned(),
         gain: fitted.ln_likelihood - base.fitted.ln_likelihood,
         held_out_gain,
@@ -80,7 +80,7 @@ fn powers(selection: &Selection, base: &State, effects: &[&dyn Effect]) -> Vec<P
     let folds = &Folds::new(problem.shots, block_m, folds, seed);
     let power = |effect: &&dyn Effect| {
         // What was traced for one effect is of no use to another.
-        let traced = &Traced::default();
+        let traced = &PredictionCache::default();
         let problem = Problem { traced, ..problem };
         Bench { problem, folds, selection, base }.power(*effect)
     };
@@ -171,7 +171,7 @@ impl Bench<'_> {
     }
 
     fn least_gain(&self, effect: &dyn Effect) -> f64 {
-        self.selection.settings.least_gain_of(effect.knobs().len(), 1)
+        self.selection.settings.least_gain_of(effect.parameters().len(), 1)
     }
 
     /// Looks for an effect, as if from so many starts, in data drawn with it. The search begins where the effect
@@ -191,7 +191,7 @@ impl Bench<'_> {
         let [now, then] = predicted.map(|(space, at)| problem.predict(space, at));
         let is_large = larger(sizes_db(&problem, &now, &then)) >= settings.least_size_db;
         let size_db = larger(sizes_db(&problem, &now, &truth));
-        if gain < settings.least_gain_of(effect.knobs().len(), tried) || !is_large {
+        if gain < settings.least_gain_of(effect.parameters().len(), tried) || !is_large {
             return Search { is_found: false, size_db };
         }
         let selection = Selection { problem, sample, folds: self.folds, settings, hear };
@@ -245,13 +245,15 @@ const STEPS: [f64; 4] = [0.0, 2.0, 5.0, 10.0];
 const FAR_STEPS: f64 = 30.0;
 
 fn is_far(effect: &dyn Effect, values: &[f64]) -> bool {
-    let first = effect.knobs().iter().zip(values).next();
+    let first = effect.parameters().iter().zip(values).next();
     first.is_some_and(|(knob, value)| (value - knob.absent).abs() > FAR_STEPS * knob.step)
 }
 
 /// The effect at a start, and ever further from where it is absent, within its bounds.
 fn stronger(effect: &dyn Effect, start: &[f64]) -> Vec<Vec<f64>> {
-    let Some((knob, value)) = effect.knobs().iter().zip(start).next() else { return Vec::new() };
+    let Some((knob, value)) = effect.parameters().iter().zip(start).next() else {
+        return Vec::new();
+    };
     let away = knob.step.copysign(value - knob.absent);
     let at = |steps: f64| {
         let mut at = start.to_vec();
@@ -264,7 +266,7 @@ fn stronger(effect: &dyn Effect, start: &[f64]) -> Vec<Vec<f64>> {
 /// The most times as strong that an effect can be within its bounds; 0 where the start itself is beyond them.
 fn most_scale(effect: &dyn Effect, values: &[f64]) -> f64 {
     let once = scaled(effect, values, 1.0);
-    let most = effect.knobs().iter().zip(once).enumerate().map(|(index, (knob, value))| {
+    let most = effect.parameters().iter().zip(once).enumerate().map(|(index, (knob, value))| {
         let change = value - knob.absent;
         match (index == 0 || values[index] == knob.absent, change) {
             _ if value < knob.min || value > knob.max => 0.0,
@@ -279,8 +281,9 @@ fn most_scale(effect: &dyn Effect, values: &[f64]) -> f64 {
 /// So many times as strong. The first number is the strength and the others a shape, or, where a start is
 /// nothing at all, a felt change of every number stands for it.
 fn scaled(effect: &dyn Effect, values: &[f64], scale: f64) -> Vec<f64> {
-    let is_nothing = effect.knobs().iter().zip(values).all(|(knob, value)| knob.absent == *value);
-    let knobs = effect.knobs().iter().zip(values).enumerate();
+    let is_nothing =
+        effect.parameters().iter().zip(values).all(|(knob, value)| knob.absent == *value);
+    let knobs = effect.parameters().iter().zip(values).enumerate();
     let scaled = knobs.map(|(index, (knob, value))| match (is_nothing, index) {
         (true, _) => knob.absent + scale * knob.step,
         (false, 0) => knob.absent + scale * (value - knob.absent),

@@ -6,7 +6,7 @@
 //! ones. A share of one in ten thousand of all chirps may be anything, so that a
 //! silhouette that the mesh misses costs a bounded amount.
 
-use crate::effects::{Arrived, Prediction};
+use crate::effects::{MeanEcho, Prediction};
 use crate::fit::gamma_law::{GammaLaw, LnProbability};
 
 use super::shots::Observation;
@@ -37,7 +37,7 @@ pub struct Declared {
 
 impl Declared {
     /// Measured less expected range, m; `None` where there is none of use.
-    pub(super) fn range_off_m(&self, arrived: &Arrived, seen: &Observation) -> Option<f64> {
+    pub(super) fn range_off_m(&self, arrived: &MeanEcho, seen: &Observation) -> Option<f64> {
         let range_m = seen.range_m.filter(|_| self.range_sd_m > 0.0 && arrived.range_m > 0.0)?;
         Some(range_m - arrived.range_m)
     }
@@ -159,7 +159,7 @@ impl<'a> Likelihood<'a> {
 
     /// ln p of a range, its slope and its curvature by the predicted range; `None` where there is no
     /// range, or one that is not to be used.
-    fn range(&self, arrived: &Arrived, seen: &Observation) -> Option<[f64; 3]> {
+    fn range(&self, arrived: &MeanEcho, seen: &Observation) -> Option<[f64; 3]> {
         let sd_m = self.declared.range_sd_m;
         let x = self.declared.range_off_m(arrived, seen)? / sd_m;
         let spread = arrived.spread_m / sd_m;

@@ -46,7 +46,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Knob, Prediction, Receiver, Shot, Stage, Traced};
+use crate::effects::{Effect, EffectParameter, Prediction, PredictionCache, Receiver, Shot, Stage};
 use crate::fit::FitError;
 use crate::render::RenderError;
 use crate::units::dbm_from_watts;
@@ -341,7 +341,7 @@ impl Diagnosis {
         let Subject { shots, observations, strays, .. } = *subject;
         let folds = Folds::new(shots, self.block_m, self.folds, self.seed);
         check(subject, &folds)?;
-        let traced = &Traced::default();
+        let traced = &PredictionCache::default();
         let problem = Problem { stage, shots, observations, declared, receiver, traced };
         let sample = &Sample::new(&problem);
         let selection = Selection { problem, sample, folds: &folds, settings: self, hear };
@@ -526,8 +526,8 @@ fn values(
     let effects = space.effects.iter().zip(space.effect_values(at)).zip(added);
     let found = effects.map(|((effect, values), added)| {
         let place = effect.place(&values);
-        let knobs = effect.knobs().iter().zip(values).zip(sds.by_ref());
-        let value = |((knob, value), sd): ((&Knob, f64), &f64)| {
+        let knobs = effect.parameters().iter().zip(values).zip(sds.by_ref());
+        let value = |((knob, value), sd): ((&EffectParameter, f64), &f64)| {
             (knob.name, Value { value, sd: finite(sd * knob.step), unit: knob.unit })
         };
         let parameters = Parameters::new(knobs.map(value).collect(), place, problem.shots);

@@ -2,14 +2,14 @@
 //!
 //! What it gains is what as many free numbers gain by following noise, or whatever else is missing.
 
-use crate::effects::{Effect, Knob, Level, Shot, Stage};
+use crate::effects::{Effect, EffectParameter, Level, Shot, Stage};
 use crate::radar::random::{Key, Purpose};
 
 /// Most numbers of a placebo.
 const MOST: usize = 6;
-const KNOB: Knob =
-    Knob { name: "wave_db", unit: "dB", min: -10.0, max: 10.0, absent: 0.0, step: 0.2 };
-static KNOBS: [Knob; MOST] = [KNOB; MOST];
+const KNOB: EffectParameter =
+    EffectParameter { name: "wave_db", unit: "dB", min: -10.0, max: 10.0, absent: 0.0, step: 0.2 };
+static KNOBS: [EffectParameter; MOST] = [KNOB; MOST];
 /// Shortest and longest wave, m.
 const WAVES_M: [f64; 2] = [0.2, 1.0];
 
@@ -43,15 +43,15 @@ impl Effect for Placebo {
         Level::Instrument
     }
 
-    fn knobs(&self) -> &'static [Knob] {
+    fn parameters(&self) -> &'static [EffectParameter] {
         KNOBS.get(..self.waves.len()).unwrap_or(&KNOBS)
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "A control: random waves that stand for no physics."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "What as many free numbers gain by chance."
     }
 

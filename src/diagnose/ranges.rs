@@ -33,7 +33,7 @@ pub(super) fn placed(
     within: f64,
 ) -> DVector<f64> {
     let mut at = start.clone();
-    let first = at.len() - effect.knobs().len();
+    let first = at.len() - effect.parameters().len();
     let [lower, upper] = space.bounds();
     for _ in 0..ROUNDS {
         let Some(step) = step(problem, space, effect, [start, &at], within) else {
@@ -99,7 +99,7 @@ fn slope(
 ) -> f64 {
     let motion = |values: &[f64]| effect.motion(values, problem.stage, shot).unwrap_or(Pose::NONE);
     let mut moved = values.to_vec();
-    moved[number] += STEP * effect.knobs()[number].step;
+    moved[number] += STEP * effect.parameters()[number].step;
     let motion: Pose<Global, Global> = motion(&moved) * motion(values).inverse();
     let way_m = (motion * shot.hit.point).xyz - shot.hit.point.xyz;
     -way_m.dot(shot.normal) / (STEP * shot.hit.cos_theta.max(0.05))

@@ -16,7 +16,7 @@ use super::likelihood::{Declared, Likelihood, Term};
 use super::select::SEARCH;
 use super::shots::Observation;
 use crate::brdf::Brdf;
-use crate::effects::{Effect, Model, Prediction, Receiver, Shot, Stage, Traced, rank};
+use crate::effects::{Effect, Model, Prediction, PredictionCache, Receiver, Shot, Stage, rank};
 use crate::fit::FitError;
 use crate::fit::coordinates::{Coordinates, frequencies};
 use crate::fit::minimise::{Local, Minimise, Stop};
@@ -49,7 +49,7 @@ pub(super) struct Problem<'a> {
     pub declared: Declared,
     pub receiver: Receiver,
     /// Of these shots.
-    pub traced: &'a Traced,
+    pub traced: &'a PredictionCache,
 }
 
 /// What is turned.
@@ -102,8 +102,8 @@ impl<'a> Space<'a> {
     pub fn without(&self, at: &DVector<f64>, index: usize) -> (Space<'a>, DVector<f64>) {
         let mut space = self.clone();
         let before: usize =
-            self.effects.iter().take(index).map(|effect| effect.knobs().len()).sum();
-        let gone = space.effects.remove(index).knobs().len();
+            self.effects.iter().take(index).map(|effect| effect.parameters().len()).sum();
+        let gone = space.effects.remove(index).parameters().len();
         let first = self.base_len() + before;
         (space, at.clone().remove_rows(first, gone))
     }
@@ -142,7 +142,7 @@ impl<'a> Space<'a> {
     fn moving(&self) -> impl Iterator<Item = usize> {
         let mut first = self.base_len();
         self.effects.iter().flat_map(move |effect| {
-            let next = first + effect.knobs().len();
+            let next = first + effect.parameters().len();
             let unknowns = if effect.moves() { first..next } else { next..next };
             first = next;
             unknowns
@@ -153,10 +153,10 @@ impl<'a> Space<'a> {
     fn knob(&self, index: usize) -> Option<(&'a dyn Effect, usize)> {
         let mut number = index.checked_sub(self.base_len())?;
         for effect in &self.effects {
-            if number < effect.knobs().len() {
+            if number < effect.parameters().len() {
                 return Some((*effect, number));
             }
-            number -= effect.knobs().len();
+            number -= effect.parameters().len();
         }
         None
     }
@@ -204,9 +204,9 @@ impl<'a> Space<'a> {
 
     /// A point with the numbers of one more effect.
     pub fn joined(at: &DVector<f64>, effect: &dyn Effect, values: &[f64]) -> DVector<f64> {
-        let knobs = effect.knobs().iter().zip(values);
+        let knobs = effect.parameters().iter().zip(values);
         let more = knobs.map(|(knob, value)| value.clamp(knob.min, knob.max) / knob.step);
-        DVector::from_iterator(at.len() + effect.knobs().len(), at.iter().copied().chain(more))
+        DVector::from_iterator(at.len() + effect.parameters().len(), at.iter().copied().chain(more))
     }
 
     /// Name and value of every unknown of the laws, with its slope in the search.
@@ -223,7 +223,8 @@ impl<'a> Space<'a> {
     pub fn effect_values(&self, at: &DVector<f64>) -> Vec<Vec<f64>> {
         let mut rest = at.iter().skip(self.base_len());
         let values = |effect: &&dyn Effect| {
-            let knobs = effect.knobs().iter().zip(rest.by_ref().take(effect.knobs().len()));
+            let knobs =
+                effect.parameters().iter().zip(rest.by_ref().take(effect.parameters().len()));
             knobs.map(|(knob, u)| (u * knob.step).clamp(knob.min, knob.max)).collect()
         };
         self.effects.iter().map(values).collect()
@@ -248,7 +249,7 @@ impl<'a> Space<'a> {
 
     /// Least and largest value of every unknown.
     pub fn bounds(&self) -> [DVector<f64>; 2] {
-        let knobs = || self.effects.iter().flat_map(|effect| effect.knobs());
+        let knobs = || self.effects.iter().flat_map(|effect| effect.parameters());
         let laws = |end: fn(&Coordinates) -> DVector<f64>| {
             self.turned.iter().flat_map(move |(_, c)| end(c).iter().copied().collect::<Vec<_>>())
         };
@@ -413,7 +414,7 @@ impl Problem<'_> {
             let (effect, knob) = space.knob(index)?;
             let shift = move |shot| effect.shifts(knob, shot);
             let (axis, _) = shift(self.shots.first()?)?;
-            Some((axis, shift, effect.knobs()[knob].step))
+            Some((axis, shift, effect.parameters()[knob].step))
         };
         let is_free = |index: &usize| bounds[0][*index] < bounds[1][*index];
         let free = || (0..at.len()).filter(is_free);

@@ -22,7 +22,7 @@ use super::folds::Folds;
 use super::likelihood::{Declared, Likelihood};
 use super::score::DB;
 use super::shots::Observation;
-use crate::effects::{Arrived, Prediction, Shot};
+use crate::effects::{MeanEcho, Prediction, Shot};
 use crate::radar::random::{Key, Purpose};
 
 /// Bins of a covariate, with as many shots each.
@@ -242,7 +242,7 @@ pub(super) fn outliers(
 ) -> Option<Unexplained> {
     let count = z.len().max(1) as f64;
     let wild = wild(z);
-    let off = |(seen, arrived): (&Observation, &Option<Arrived>)| {
+    let off = |(seen, arrived): (&Observation, &Option<MeanEcho>)| {
         let arrived = arrived.as_ref()?;
         let sd_m = declared.range_sd_m.hypot(arrived.spread_m);
         (declared.range_off_m(arrived, seen)?.abs() > OUTLYING * sd_m).then_some(())

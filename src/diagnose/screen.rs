@@ -11,7 +11,7 @@ use super::likelihood::Term;
 use super::refit::{Problem, Slope, Space, sum};
 use super::score::DB;
 use super::shots::Observation;
-use crate::effects::{Shot, Traced};
+use crate::effects::{PredictionCache, Shot};
 
 /// Shots that a screening needs; more only take time.
 const ENOUGH: usize = 2500;
@@ -26,7 +26,7 @@ const MOST_SCALE: f64 = 5.0;
 pub(super) struct Sample {
     shots: Vec<Shot>,
     observations: Vec<Observation>,
-    traced: Traced,
+    traced: PredictionCache,
     /// Shots that each of them stands for.
     pub weight: f64,
 }
@@ -38,7 +38,7 @@ impl Sample {
         let shots: Vec<Shot> = problem.shots.iter().step_by(every).copied().collect();
         let observations = problem.observations.iter().step_by(every).copied().collect();
         let weight = problem.shots.len() as f64 / shots.len().max(1) as f64;
-        Sample { shots, observations, traced: Traced::default(), weight }
+        Sample { shots, observations, traced: PredictionCache::default(), weight }
     }
 
     /// The problem of these shots alone.

@@ -24,7 +24,7 @@ use super::screen::{Sample, Screen};
 use super::support::{Claim, Largest, Left};
 use super::trial::Trial;
 use super::{Diagnosis, Evidence};
-use crate::effects::{Effect, Knob, Prediction, Receiver};
+use crate::effects::{Effect, EffectParameter, Prediction, Receiver};
 use crate::fit::minimise::Minimise;
 
 /// Steps of a fit, and of one on the sample that only shows whether an effect is worth it.
@@ -290,7 +290,7 @@ impl Selection<'_> {
                     let loss = state.fitted.ln_likelihood - without.fitted.ln_likelihood;
                     let [gain, se] = self.difference(&state.held_out, &without.held_out);
                     let sizes_db = self.sizes_db(&without, &state.space, &state.fitted.at);
-                    let numbers = state.space.effects[index].knobs().len();
+                    let numbers = state.space.effects[index].parameters().len();
                     let is_needed = self.is_supported(&Claim {
                         gain: loss,
                         least: self.settings.least_gain_of(numbers, 1),
@@ -332,7 +332,8 @@ impl Selection<'_> {
         let mut beats_placebos = |index: usize| {
             let Some(Trial { effect, candidate, .. }) = trials.get_mut(index) else { return false };
             let new = || Screen::new(self.problem, &state.space, &state.fitted.at);
-            let placebo = self.placebo_gain(state, screen.get_or_init(new), effect.knobs().len());
+            let placebo =
+                self.placebo_gain(state, screen.get_or_init(new), effect.parameters().len());
             candidate.placebo_gain = Some(placebo);
             candidate.gain > placebo
         };
@@ -437,7 +438,7 @@ impl Selection<'_> {
         let placebo = Placebo::new(numbers, self.settings.seed);
         let mut space = state.space.clone();
         space.effects.push(&placebo);
-        let knobs = placebo.knobs();
+        let knobs = placebo.parameters();
         let only = |k: usize| {
             let values: Vec<f64> = knobs
                 .iter()
@@ -513,8 +514,8 @@ pub(super) fn numbers(space: &Space, at: &DVector<f64>) -> usize {
     let Some((effect, values)) = space.effects.last().zip(space.effect_values(at).pop()) else {
         return 0;
     };
-    let knobs = effect.knobs().iter().zip(values);
-    let is_used = |(knob, value): &(&Knob, f64)| (value - knob.absent).abs() > knob.step;
+    let knobs = effect.parameters().iter().zip(values);
+    let is_used = |(knob, value): &(&EffectParameter, f64)| (value - knob.absent).abs() > knob.step;
     knobs.filter(|number| effect.moves() || is_used(number)).count()
 }
 

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::*;
 use crate::brdf::{BlinnPhong, CookTorrance, Distribution, Mixture, Shadowing};
-use crate::effects::{Knob, Level, Model, Place, find};
+use crate::effects::{EffectParameter, Level, Model, Place, find};
 use crate::frames::{Point, Ray};
 use crate::geometry::Mesh;
 use crate::radar::random::{Key, Purpose};
@@ -63,14 +63,20 @@ fn chirps(radar: &Radar) -> crate::radar::Chirps {
 /// What a law of gain over the shots is called and how it is fitted.
 struct Gain {
     name: &'static str,
-    knobs: [Knob; 1],
+    knobs: [EffectParameter; 1],
     db: fn(&Shot) -> f64,
 }
 
 impl Gain {
     const fn new(name: &'static str, db: fn(&Shot) -> f64) -> Gain {
-        let knob =
-            Knob { name: "edge_db", unit: "dB", min: -8.0, max: 8.0, absent: 0.0, step: 0.3 };
+        let knob = EffectParameter {
+            name: "edge_db",
+            unit: "dB",
+            min: -8.0,
+            max: 8.0,
+            absent: 0.0,
+            step: 0.3,
+        };
         Gain { name, knobs: [knob], db }
     }
 }
@@ -92,14 +98,14 @@ impl Effect for Gain {
     fn level(&self) -> Level {
         Level::Instrument
     }
-    fn knobs(&self) -> &'static [Knob] {
+    fn parameters(&self) -> &'static [EffectParameter] {
         // The gains are statics, whose knobs all are alike.
         &BOWL.knobs
     }
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         ""
     }
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         ""
     }
     fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
@@ -149,7 +155,7 @@ fn diagnosed_of(
     let declared = Declared { threshold_w: watts_from_dbm(-77.0), range_sd_m: RANGE_SD_M };
     let model = Model { laws: vec![law()], receiver, effects };
     let prediction = model.predict(&stage, &shots);
-    let seen = |(shot, arrived): (usize, &Option<crate::effects::Arrived>)| {
+    let seen = |(shot, arrived): (usize, &Option<crate::effects::MeanEcho>)| {
         let Some(arrived) = arrived else { return Observation::default() };
         let key = Key { seed, chirp: shot as u64, sub_ray: 0, purpose: Purpose::Speckle };
         let mut draws = key.draws();
@@ -251,9 +257,9 @@ fn two_missing_effects_are_both_found() {
 #[test]
 fn a_target_that_has_moved_far_is_found_by_its_ranges() {
     let library = ["pose", "motion"].map(|name| find(name).unwrap());
-    let mut path = vec![0.0; library[1].knobs().len()];
+    let mut path = vec![0.0; library[1].parameters().len()];
     let way_m = [("z1_m", 0.03), ("x2_m", -0.02), ("y3_m", 0.01)];
-    for (knob, value) in library[1].knobs().iter().zip(&mut path) {
+    for (knob, value) in library[1].parameters().iter().zip(&mut path) {
         *value = way_m.iter().find(|(name, _)| *name == knob.name).map_or(0.0, |(_, m)| *m);
     }
     let report = diagnosed_of(&library, vec![(library[1], path.clone())], 5);
@@ -266,7 +272,8 @@ fn a_target_that_has_moved_far_is_found_by_its_ranges() {
         assert!((value - m).abs() < 4.0 * sd && sd < 0.02, "{name}: {:?}", found[name]);
     }
     // Along the plate the target's place is seen by the sphere, which the scan passes in between.
-    let values: Vec<f64> = library[1].knobs().iter().map(|knob| found[knob.name].value).collect();
+    let values: Vec<f64> =
+        library[1].parameters().iter().map(|knob| found[knob.name].value).collect();
     let chirps = chirps(&Radar::default());
     for index in (chirps.rays.len() / 2..chirps.rays.len() * 4 / 5).step_by(40) {
         let shot = shots::missed(&chirps, &chirps.progress(), index).unwrap();

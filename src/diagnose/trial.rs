@@ -9,7 +9,7 @@ use super::refit::{Fitted, Space, sum};
 use super::screen::Screen;
 use super::select::{Candidate, SCOUT, SEARCH, Selection, State, larger};
 use super::support::Largest;
-use crate::effects::{Effect, Knob};
+use crate::effects::{Effect, EffectParameter};
 
 /// Starts of an effect that are followed.
 const STARTS: usize = 2;
@@ -162,7 +162,7 @@ impl Selection<'_> {
         let candidate = Candidate {
             round,
             name: effect.name(),
-            numbers: effect.knobs().len(),
+            numbers: effect.parameters().len(),
             gain,
             sampled: true,
             placebo_gain: None,
@@ -189,8 +189,8 @@ impl Selection<'_> {
         if start.0 > 0.0 {
             climb(effect, start, SHAPE_STEPS.len(), |at| weight * screen.promise(space, at));
         }
-        let Some(knob) = effect.knobs().first() else { return };
-        let (first, promise) = (start.1.len() - effect.knobs().len(), start.0);
+        let Some(knob) = effect.parameters().first() else { return };
+        let (first, promise) = (start.1.len() - effect.parameters().len(), start.0);
         let gain = |at: &DVector<f64>| weight * screen.gain(space, at);
         let scaled = |scale: f64| {
             let mut scaled = start.1.clone();
@@ -257,7 +257,7 @@ impl Selection<'_> {
         let held = state.space.costly(&state.fitted.at);
         let ln_p = |at: &DVector<f64>| sum(&self.problem.terms(&trial.space, at));
         // What suits the sample may suit the whole worse than no effect at all.
-        let absent: Vec<f64> = trial.effect.knobs().iter().map(|knob| knob.absent).collect();
+        let absent: Vec<f64> = trial.effect.parameters().iter().map(|knob| knob.absent).collect();
         let without = Space::joined(&state.fitted.at, trial.effect, &absent);
         let is_worse = ln_p(&trial.fitted.at) < ln_p(&without);
         let start = if is_worse { without } else { trial.fitted.at.clone() };
@@ -301,9 +301,9 @@ fn climb(
     rounds: usize,
     worth_of: impl Fn(&DVector<f64>) -> f64,
 ) {
-    let first = start.len().saturating_sub(effect.knobs().len());
-    let shapes = effect.knobs().iter().enumerate().skip(1);
-    let is_shape = |(_, knob): &(usize, &Knob)| knob.absent != knob.max;
+    let first = start.len().saturating_sub(effect.parameters().len());
+    let shapes = effect.parameters().iter().enumerate().skip(1);
+    let is_shape = |(_, knob): &(usize, &EffectParameter)| knob.absent != knob.max;
     for (index, knob) in shapes.filter(is_shape).collect::<Vec<_>>().repeat(rounds) {
         for steps in SHAPE_STEPS.iter().flat_map(|s| [*s, -*s]) {
             let mut moved = start.clone();

@@ -1,6 +1,6 @@
 //! Normals that differ from the mesh's from chirp to chirp: two Gaussian tilts of one spread.
 
-use super::{Effect, Knob, Level, Receiver, Shot, Stage};
+use super::{Effect, EffectParameter, Level, Receiver, Shot, Stage};
 
 /// The effect `angle-error`.
 pub(super) struct AngleError;
@@ -14,17 +14,18 @@ impl Effect for AngleError {
         Level::Scene
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        const KNOBS: [Knob; 1] = [Knob::new("sd_deg", "deg", [0.0, 20.0], 0.0, 1.0)];
-        &KNOBS
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const PARAMETERS: [EffectParameter; 1] =
+            [EffectParameter::new("sd_deg", "deg", [0.0, 20.0], 0.0, 1.0)];
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "The true normal under each spot is tilted at random from the mesh's, by this standard \
          deviation in each of two directions: a coarse mesh, or a surface that waves."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "The lobe looks broader and its peak lower, and the scatter of powers is wide where the curve \
          is steep. A rougher surface broadens the lobe without the scatter; speckle widens the \
          scatter alike at every angle."

@@ -1,16 +1,16 @@
 //! Facet slopes that differ along and across a grain: m·√q along it and m/√q across.
 
 use super::lobes::rescaled;
-use super::{Effect, Knob, Level, Shot, Stage};
+use super::{Effect, EffectParameter, Level, Shot, Stage};
 use crate::brdf::{Brdf, CookTorrance, Scattering};
 use crate::frames::Direction;
 
 /// The effect `anisotropy`.
 pub(super) struct Anisotropy;
 
-const KNOBS: [Knob; 2] = [
-    Knob::new("ratio", "1", [0.1, 10.0], 1.0, 0.1),
-    Knob::new("turn_deg", "deg", [-90.0, 90.0], 0.0, 10.0),
+const PARAMETERS: [EffectParameter; 2] = [
+    EffectParameter::new("ratio", "1", [0.1, 10.0], 1.0, 0.1),
+    EffectParameter::new("turn_deg", "deg", [-90.0, 90.0], 0.0, 10.0),
 ];
 
 /// Roughness that a lobe can have.
@@ -37,16 +37,16 @@ impl Effect for Anisotropy {
         Level::Material
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        &KNOBS
+    fn parameters(&self) -> &'static [EffectParameter] {
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "The surface is woven, brushed or machined: rougher along one direction than across it, by \
          this ratio of the slopes; the direction is turned by so much from the grain of its region."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "At one angle of incidence the residual goes up and down twice in a full turn of the azimuth \
          about the normal. Spread over all azimuths it looks like a lobe of another width or an error \
          of the angle, which have no direction; a tilted pose has one, but goes up and down once."

@@ -4,7 +4,7 @@
 //! One that does so at once holds the speckle down, too, each look by itself or the mean of all; a gain
 //! control slower than a chirp lets all of it pass.
 
-use super::{Ceiling, Effect, Knob, Level, Receiver, Shot, Stage};
+use super::{Ceiling, Effect, EffectParameter, Level, Receiver, Shot, Stage};
 use crate::units::watts_from_dbm;
 
 /// The effect `compression`.
@@ -22,21 +22,21 @@ impl Effect for Compression {
         Level::Instrument
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        const KNOBS: [Knob; 4] = [
-            Knob::new("saturation_dbm", "dB[mW]", [-90.0, NONE_DBM], NONE_DBM, 2.0),
-            Knob::new("at_once", "1", [0.0, 1.0], 1.0, 0.2),
-            Knob::new("knee", "1", [1.0, 4.0], 1.0, 0.2),
-            Knob::new("averaged", "1", [0.0, 1.0], 1.0, 0.2),
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const PARAMETERS: [EffectParameter; 4] = [
+            EffectParameter::new("saturation_dbm", "dB[mW]", [-90.0, NONE_DBM], NONE_DBM, 2.0),
+            EffectParameter::new("at_once", "1", [0.0, 1.0], 1.0, 0.2),
+            EffectParameter::new("knee", "1", [1.0, 4.0], 1.0, 0.2),
+            EffectParameter::new("averaged", "1", [0.0, 1.0], 1.0, 0.2),
         ];
-        &KNOBS
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "The receiver saturates: strong echoes come out weaker than they are, with a soft ceiling."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "The residual falls with the predicted power, only at the strongest echoes and at any angle \
          or place that is as strong. A rougher lobe or an error of the angle lowers the peak too, but \
          raises the flanks beside it."

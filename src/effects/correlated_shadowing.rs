@@ -1,7 +1,7 @@
 //! Shadowing and masking as one event: in backscatter G1 where the law has G1².
 
 use super::lobes::rescaled;
-use super::{Effect, Knob, Level, Shot, Stage};
+use super::{Effect, EffectParameter, Level, Shot, Stage};
 use crate::brdf::{Brdf, CookTorrance, Scattering, Shadowing};
 use crate::frames::Direction;
 
@@ -17,17 +17,18 @@ impl Effect for CorrelatedShadowing {
         Level::Material
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        const KNOBS: [Knob; 1] = [Knob::new("share", "1", [0.0, 1.0], 0.0, 0.25)];
-        &KNOBS
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const PARAMETERS: [EffectParameter; 1] =
+            [EffectParameter::new("share", "1", [0.0, 1.0], 0.0, 0.25)];
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "The facets that the wave cannot reach are those that the radar cannot see, so that \
          shadowing counts once and not twice: 1 is once, 0 the law as it is."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "The specular part is too strong at large angles, the more the rougher the surface; nothing \
          happens on smooth ones. Return from below the surface has one level in σ⁰ instead of a \
          factor that grows with angle, and needs no rough lobe."

@@ -1,16 +1,16 @@
 //! A layer over part of the target, such as clothing: −loss/cos θ dB beyond a line across the field of
 //! view, which is a plane through the radar.
 
-use super::{Effect, Knob, Level, Place, Shot, Stage};
+use super::{Effect, EffectParameter, Level, Place, Shot, Stage};
 use crate::units::ratio_from_db;
 
 /// The effect `covering-layer`.
 pub(super) struct CoveringLayer;
 
-const KNOBS: [Knob; 3] = [
-    Knob::new("loss_db", "dB", [0.0, 30.0], 0.0, 0.5),
-    Knob::new("boundary_m", "m", [-3.0, 3.0], 0.0, 0.02),
-    Knob::new("direction_deg", "deg", [-360.0, 360.0], 90.0, 5.0),
+const PARAMETERS: [EffectParameter; 3] = [
+    EffectParameter::new("loss_db", "dB", [0.0, 30.0], 0.0, 0.5),
+    EffectParameter::new("boundary_m", "m", [-3.0, 3.0], 0.0, 0.02),
+    EffectParameter::new("direction_deg", "deg", [-360.0, 360.0], 90.0, 5.0),
 ];
 
 /// A flat layer seen along itself is as deep as it is wide.
@@ -38,18 +38,18 @@ impl Effect for CoveringLayer {
         Level::Scene
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        &KNOBS
+    fn parameters(&self) -> &'static [EffectParameter] {
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "Part of the target is covered, as by clothing, which the wave crosses twice: a loss that \
          grows with the way through the layer, as 1/cos θ, on the far side of a straight line across \
          the field of view. The line lies so far from the field's centre, in a direction counted \
          from x_t towards y_t, and the layer beyond it."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "The power drops at a line and stays low on one side, more so at large angles. A foreign \
          patch has a closed outline and the same offset at all angles; a gain over the field and a \
          drift change without an edge. A layer over everything cannot be told from the calibration."

@@ -1,7 +1,7 @@
 //! The effects that a scene, its radar and its materials declare, each where it acts.
 
 use super::entry::{Chosen, rank};
-use super::{Effect, Knob, Level, Model, Receiver, Shot, Stage};
+use super::{Effect, EffectParameter, Level, Model, Receiver, Shot, Stage};
 use crate::brdf::Brdf;
 use crate::radar::Radar;
 use crate::units::watts_from_dbm;
@@ -74,16 +74,16 @@ impl Effect for OnRegions {
         self.effect.level()
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        self.effect.knobs()
+    fn parameters(&self) -> &'static [EffectParameter] {
+        self.effect.parameters()
     }
 
-    fn is(&self) -> &'static str {
-        self.effect.is()
+    fn description(&self) -> &'static str {
+        self.effect.description()
     }
 
-    fn shows(&self) -> &'static str {
-        self.effect.shows()
+    fn signature(&self) -> &'static str {
+        self.effect.signature()
     }
 
     fn starts(&self, stage: &Stage, looks: &[Shot]) -> Vec<Vec<f64>> {

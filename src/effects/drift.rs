@@ -3,17 +3,17 @@
 
 use std::f64::consts::TAU;
 
-use super::{Effect, Knob, Level, Shot, Stage};
+use super::{Effect, EffectParameter, Level, Shot, Stage};
 use crate::units::ratio_from_db;
 
 /// The effect `drift`.
 pub(super) struct Drift;
 
-const KNOBS: [Knob; 4] = [
-    Knob::new("slope_db", "dB", [-20.0, 20.0], 0.0, 0.3),
-    Knob::new("wave_sin_db", "dB", [-10.0, 10.0], 0.0, 0.3),
-    Knob::new("wave_cos_db", "dB", [-10.0, 10.0], 0.0, 0.3),
-    Knob::new("waves_per_scan", "1", [0.3, 5.0], 1.0, 0.1),
+const PARAMETERS: [EffectParameter; 4] = [
+    EffectParameter::new("slope_db", "dB", [-20.0, 20.0], 0.0, 0.3),
+    EffectParameter::new("wave_sin_db", "dB", [-10.0, 10.0], 0.0, 0.3),
+    EffectParameter::new("wave_cos_db", "dB", [-10.0, 10.0], 0.0, 0.3),
+    EffectParameter::new("waves_per_scan", "1", [0.3, 5.0], 1.0, 0.1),
 ];
 
 impl Effect for Drift {
@@ -25,16 +25,16 @@ impl Effect for Drift {
         Level::Instrument
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        &KNOBS
+    fn parameters(&self) -> &'static [EffectParameter] {
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "The transmitted power or the receiver's gain changes slowly while the scan runs: a slope and \
          one slow wave, in dB."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "The residual follows the number of the chirp. Where the scan goes slowly from one edge of \
          the field to the other, time and height rise together, as in a gain over the field; but that \
          is even about the centre, and places that the mirror passes twice show only drift. Ranges \
@@ -45,7 +45,7 @@ impl Effect for Drift {
         [0.5, 1.0, 1.5, 2.0, 3.0].map(|waves| vec![0.3, 0.3, 0.3, waves]).to_vec()
     }
 
-    fn goes_with_time(&self) -> bool {
+    fn depends_on_time(&self) -> bool {
         true
     }
 

@@ -2,12 +2,12 @@
 
 use thiserror::Error;
 
-use super::{Effect, Knob, Level, find, library};
+use super::{Effect, EffectParameter, Level, find, library};
 use crate::formats::EffectEntry;
 use crate::formats::text::nearest;
 use crate::units::shown;
 
-/// Effects with the values of their knobs.
+/// Effects with the values of their parameters.
 pub type Chosen = Vec<(&'static dyn Effect, Vec<f64>)>;
 
 /// Why an entry means no effect.
@@ -76,7 +76,7 @@ impl Level {
 }
 
 /// The effects that entries mean, in the order in which they act; parameters that are not given have
-/// their [absent](Knob::absent) values.
+/// their [absent](EffectParameter::absent) values.
 ///
 /// # Errors
 /// When an entry names no effect or parameter of the library, a number is beyond its range, an effect
@@ -117,8 +117,8 @@ pub fn resolve(entries: &[EffectEntry], level: Level) -> Result<Chosen, EffectEr
 /// assert_eq!(resolve(&[written], Level::Instrument).unwrap()[0].1, [2.0, 0.0, 0.0, 1.0]);
 /// ```
 pub fn entry(effect: &dyn Effect, values: &[f64]) -> EffectEntry {
-    let number = |(knob, value): (&Knob, &f64)| (knob.name.to_owned(), *value);
-    let parameters = std::iter::zip(effect.knobs(), values).map(number).collect();
+    let values = std::iter::zip(effect.parameters(), values);
+    let parameters = values.map(|(parameter, value)| (parameter.name.to_owned(), *value)).collect();
     EffectEntry { name: effect.name().to_owned(), source: None, parameters }
 }
 
@@ -127,23 +127,26 @@ pub(crate) fn rank(name: &str) -> usize {
     library().iter().take_while(|effect| effect.name() != name).count()
 }
 
+/// The value of every parameter of an effect: as the entry gives it, or absent.
 fn values(effect: &dyn Effect, entry: &EffectEntry) -> Result<Vec<f64>, EffectError> {
-    let (name, knobs) = (effect.name(), effect.knobs());
-    let is_known = |parameter: &&String| knobs.iter().any(|knob| knob.name == **parameter);
-    if let Some(parameter) = entry.parameters.keys().find(|parameter| !is_known(parameter)) {
-        let known: Vec<&str> = knobs.iter().map(|knob| knob.name).collect();
-        let way_out = suggestion(parameter, &known, "its parameters are");
-        return Err(EffectError::Parameter { effect: name, parameter: parameter.clone(), way_out });
+    let known: Vec<&str> = effect.parameters().iter().map(|parameter| parameter.name).collect();
+    if let Some(name) = entry.parameters.keys().find(|name| !known.contains(&name.as_str())) {
+        return Err(EffectError::Parameter {
+            effect: effect.name(),
+            parameter: name.clone(),
+            way_out: suggestion(name, &known, "its parameters are"),
+        });
     }
-    let value = |knob: &Knob| {
-        let Knob { name: parameter, min, max, absent, .. } = *knob;
+    let mut values = Vec::with_capacity(known.len());
+    for &EffectParameter { name: parameter, min, max, absent, .. } in effect.parameters() {
         let value = entry.parameters.get(parameter).copied().unwrap_or(absent);
-        match (min..=max).contains(&value) {
-            true => Ok(value),
-            false => Err(EffectError::OutOfRange { effect: name, parameter, value, min, max }),
+        if !(min..=max).contains(&value) {
+            let effect = effect.name();
+            return Err(EffectError::OutOfRange { effect, parameter, value, min, max });
         }
-    };
-    knobs.iter().map(value).collect()
+        values.push(value);
+    }
+    Ok(values)
 }
 
 fn unknown(name: &str) -> EffectError {
@@ -175,7 +178,7 @@ mod tests {
     fn every_effect_comes_back_from_what_is_written_of_it() {
         for effect in library() {
             let values: Vec<f64> =
-                effect.knobs().iter().map(|k| k.min + 0.3 * (k.max - k.min)).collect();
+                effect.parameters().iter().map(|k| k.min + 0.3 * (k.max - k.min)).collect();
             let found = resolve(&[entry(effect, &values)], effect.level()).unwrap();
             assert_eq!((found[0].0.name(), &found[0].1), (effect.name(), &values));
         }

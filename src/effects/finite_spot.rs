@@ -5,10 +5,10 @@ use std::sync::{Arc, LazyLock};
 
 use rayon::prelude::*;
 
-use super::meeting::{Facet, Facing, facing};
+use super::intersection::{Facet, Facing, facing};
 use super::model::Kept;
 use super::spread::sunflower;
-use super::{Arrived, Effect, Knob, Level, Shot, Stage, Survey};
+use super::{Effect, EffectParameter, Level, MeanEcho, Shot, Stage, Survey};
 use crate::brdf::{Brdf, Scattering, Term};
 use crate::frames::{Direction, Global, Ray, Surface};
 use crate::trace::{Hit, closest};
@@ -229,17 +229,18 @@ impl Effect for FiniteSpot {
         Level::Instrument
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        const KNOBS: [Knob; 1] = [Knob::new("diameter_m", "m", [0.0, MOST_M], 0.0, 0.008)];
-        &KNOBS
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const PARAMETERS: [EffectParameter; 1] =
+            [EffectParameter::new("diameter_m", "m", [0.0, MOST_M], 0.0, 0.008)];
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "The beam has a width, here its diameter at half the intensity on the target, and averages \
          over what lies in it: curvature, edges, borders between materials."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "Echoes are too weak beside edges, and the lobe is broader where the surface is curved; flat \
          places far from edges are right. A rougher surface or an error of the angle broadens the lobe \
          on flat places too."
@@ -274,7 +275,7 @@ impl Effect for FiniteSpot {
         Box::new((0..spots.all.len()).into_par_iter().map(averaged).collect::<Vec<_>>())
     }
 
-    fn arrive(&self, _: &[f64], shaded: &Survey, arrived: &mut [Option<Arrived>]) {
+    fn arrive(&self, _: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
         let all = shaded.downcast_ref::<Vec<Option<Averaged>>>().into_iter().flatten();
         for (averaged, one) in all.zip(arrived) {
             if let (Some(one), Some(averaged)) = (one, averaged) {
@@ -291,7 +292,7 @@ impl Effect for FiniteSpot {
 mod tests {
     use super::*;
     use crate::brdf::{CookTorrance, Lambert};
-    use crate::effects::meeting::met;
+    use crate::effects::intersection::met;
     use crate::effects::testing::{Bench, db, lobe, paint};
     use crate::effects::{Model, Receiver};
     use crate::scene::solids;

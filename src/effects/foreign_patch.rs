@@ -1,7 +1,7 @@
 //! A round place with another material: so many dB within a radius along the surface.
 
 use super::covering_layer::share_of_spot;
-use super::{Effect, Knob, Level, Place, Shot, Stage};
+use super::{Effect, EffectParameter, Level, Place, Shot, Stage};
 use crate::frames::{Direction, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::units::ratio_from_db;
@@ -9,12 +9,12 @@ use crate::units::ratio_from_db;
 /// The effect `foreign-patch`.
 pub(super) struct ForeignPatch;
 
-const KNOBS: [Knob; 5] = [
-    Knob::new("level_db", "dB", [-30.0, 30.0], 0.0, 0.5),
-    Knob::new("centre_x_m", "m", [-3.0, 3.0], 0.0, 0.01),
-    Knob::new("centre_y_m", "m", [-3.0, 3.0], 0.0, 0.01),
-    Knob::new("radius_m", "m", [0.005, 1.0], 0.05, 0.01),
-    Knob::new("fade_m", "m", [0.0, 0.1], 0.016, 0.004),
+const PARAMETERS: [EffectParameter; 5] = [
+    EffectParameter::new("level_db", "dB", [-30.0, 30.0], 0.0, 0.5),
+    EffectParameter::new("centre_x_m", "m", [-3.0, 3.0], 0.0, 0.01),
+    EffectParameter::new("centre_y_m", "m", [-3.0, 3.0], 0.0, 0.01),
+    EffectParameter::new("radius_m", "m", [0.005, 1.0], 0.05, 0.01),
+    EffectParameter::new("fade_m", "m", [0.0, 0.1], 0.016, 0.004),
 ];
 
 /// Sides of the cells where a search begins, m, and most of them along an edge of the target.
@@ -61,17 +61,17 @@ impl Effect for ForeignPatch {
         Level::Scene
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        &KNOBS
+    fn parameters(&self) -> &'static [EffectParameter] {
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "A round place on the target is of another material, that returns more or less by so many \
          dB. Its centre is on the surface where the field of view has these x_t and y_t; its radius is the \
          straight way from there, over the edge of which it fades as under a spot of that diameter."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "The residual has one compact spot on the surface, at any angle, with a sharp outline. A \
          covering layer ends at a straight line and its loss grows with the angle; multiple bounces \
          brighten places too, but concave ones, and with longer ranges."
@@ -93,7 +93,7 @@ impl Effect for ForeignPatch {
                     [left + (column as f64 + 0.5) * width, low + (row as f64 + 0.5) * height];
                 let radius_m = (0.5 * side_m).clamp(0.02, 0.3);
                 if looks.iter().any(|l| (l.xt_m - x).hypot(l.yt_m - y) < radius_m) {
-                    let fade_m = KNOBS[4].absent;
+                    let fade_m = PARAMETERS[4].absent;
                     starts.extend(
                         LEVELS_DB.map(|db| vec![db, inside(x), inside(y), radius_m, fade_m]),
                     );

@@ -1,12 +1,12 @@
 //! Gain that changes with the distance ρ from the centre of the field of view: edge_db·(ρ/0.5 m)² dB.
 
-use super::{Effect, Knob, Level, Shot, Stage};
+use super::{Effect, EffectParameter, Level, Shot, Stage};
 use crate::units::ratio_from_db;
 
 /// The effect `fov-gain`.
 pub(super) struct FovGain;
 
-/// Distance at which the gain is the knob's, m.
+/// Distance at which the gain is the parameter's, m.
 const EDGE_M: f64 = 0.5;
 
 impl Effect for FovGain {
@@ -18,17 +18,18 @@ impl Effect for FovGain {
         Level::Instrument
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        const KNOBS: [Knob; 1] = [Knob::new("edge_db", "dB", [-30.0, 30.0], 0.0, 0.5)];
-        &KNOBS
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const PARAMETERS: [EffectParameter; 1] =
+            [EffectParameter::new("edge_db", "dB", [-30.0, 30.0], 0.0, 0.5)];
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "The antenna's gain is not the same over the field of view: it changes with the square of \
          the distance from the centre."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "The residual grows or falls in rings about the centre of the field of view, whatever is \
          looked at. On a convex target that stands in the middle, angle and distance from the centre \
          rise together and the exponent of the diffuse lobe hides it: a second target off the centre \

@@ -10,14 +10,14 @@
 //! 4. what the receiver makes of it ([`Effect::receive`]): compression, speckle, noise, tilts that vary
 //!    at random.
 //!
-//! Parameters at their [`absent`](Knob::absent) values are no effect at all, exactly. [`library`] has
+//! Parameters at their [`absent`](EffectParameter::absent) values are no effect at all, exactly. [`library`] has
 //! them all; another one is a file and a line of its list.
 
 mod ceiling;
 mod declared;
 mod entry;
 mod lobes;
-mod meeting;
+mod intersection;
 mod model;
 mod place;
 mod spread;
@@ -36,7 +36,7 @@ pub use ceiling::{Ceiling, Passed, Saturating};
 pub use declared::SceneEffects;
 pub(crate) use entry::rank;
 pub use entry::{Chosen, EffectError, entry, resolve};
-pub use model::{Model, Prediction, Tilts, Traced};
+pub use model::{Model, Prediction, PredictionCache, Tilts};
 pub use place::Place;
 pub use tilt::tilted_cos_theta;
 
@@ -184,7 +184,7 @@ impl Level {
 
 /// One number of an effect.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Knob {
+pub struct EffectParameter {
     /// Its name, with its unit.
     pub name: &'static str,
     /// UCUM code of the unit; 1 for a pure number.
@@ -200,21 +200,21 @@ pub struct Knob {
     pub step: f64,
 }
 
-impl Knob {
+impl EffectParameter {
     const fn new(
         name: &'static str,
         unit: &'static str,
         [min, max]: [f64; 2],
         absent: f64,
         step: f64,
-    ) -> Knob {
-        Knob { name, unit, min, max, absent, step }
+    ) -> EffectParameter {
+        EffectParameter { name, unit, min, max, absent, step }
     }
 }
 
 /// A physical effect that the base model lacks.
 ///
-/// `values` are those of [`knobs`](Effect::knobs), in their order and within their ranges.
+/// `values` are those of [`parameters`](Effect::parameters), in their order and within their ranges.
 pub trait Effect: Sync {
     /// Its name, as reports and scenes write it.
     fn name(&self) -> &'static str;
@@ -223,16 +223,16 @@ pub trait Effect: Sync {
     fn level(&self) -> Level;
 
     /// Its numbers.
-    fn knobs(&self) -> &'static [Knob];
+    fn parameters(&self) -> &'static [EffectParameter];
 
     /// What it is, in a sentence for a person.
-    fn is(&self) -> &'static str;
+    fn description(&self) -> &'static str;
 
     /// What it does to the data and how to tell it from its neighbours, for a person.
-    fn shows(&self) -> &'static str;
+    fn signature(&self) -> &'static str;
 
     /// What its values come to, for a person, where they are too many to be read one by one.
-    fn told(&self, _values: &[f64]) -> Option<String> {
+    fn summary(&self, _values: &[f64]) -> Option<String> {
         None
     }
 
@@ -241,7 +241,7 @@ pub trait Effect: Sync {
     fn starts(&self, stage: &Stage, looks: &[Shot]) -> Vec<Vec<f64>>;
 
     /// Whether it goes with the time of a chirp.
-    fn goes_with_time(&self) -> bool {
+    fn depends_on_time(&self) -> bool {
         false
     }
 
@@ -252,7 +252,7 @@ pub trait Effect: Sync {
 
     /// The global axis along which a number of its values does nothing but shift the target, after all that its
     /// others do, and by how many m per unit under a look; `None` for numbers that do anything else.
-    fn shifts(&self, _knob: usize, _look: &Shot) -> Option<(usize, f64)> {
+    fn shifts(&self, _parameter: usize, _look: &Shot) -> Option<(usize, f64)> {
         None
     }
 
@@ -309,7 +309,7 @@ pub trait Effect: Sync {
     }
 
     /// Changes the mean powers, W, and ranges, m, of all looks together by a shaded survey, after all gains.
-    fn arrive(&self, _values: &[f64], _shaded: &Survey, _arrived: &mut [Option<Arrived>]) {}
+    fn arrive(&self, _values: &[f64], _shaded: &Survey, _arrived: &mut [Option<MeanEcho>]) {}
 
     /// Changes the receiver's law.
     fn receive(&self, _values: &[f64], receiver: Receiver) -> Receiver {
@@ -322,7 +322,7 @@ pub type Survey = Box<dyn Any + Send + Sync>;
 
 /// What arrives of one look in the mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Arrived {
+pub struct MeanEcho {
     /// Mean power, W.
     pub power_w: f64,
     /// Range, the mean by power, m.
@@ -332,14 +332,14 @@ pub struct Arrived {
     pub spread_m: f64,
 }
 
-impl Arrived {
+impl MeanEcho {
     /// What arrives from one place.
-    pub fn at_once(power_w: f64, range_m: f64) -> Arrived {
-        Arrived { power_w, range_m, spread_m: 0.0 }
+    pub fn at_once(power_w: f64, range_m: f64) -> MeanEcho {
+        MeanEcho { power_w, range_m, spread_m: 0.0 }
     }
 
     /// With something else; nothing changes where neither brings any power.
-    pub fn with(self, other: Arrived) -> Arrived {
+    pub fn with(self, other: MeanEcho) -> MeanEcho {
         let power_w = self.power_w + other.power_w;
         if power_w <= 0.0 {
             return self;
@@ -349,7 +349,7 @@ impl Arrived {
         let within_m2 = (1.0 - share) * self.spread_m.powi(2) + share * other.spread_m.powi(2);
         let between_m2 = share * (1.0 - share) * apart_m * apart_m;
         let range_m = self.range_m + share * apart_m;
-        Arrived { power_w, range_m, spread_m: (within_m2 + between_m2).sqrt() }
+        MeanEcho { power_w, range_m, spread_m: (within_m2 + between_m2).sqrt() }
     }
 }
 

@@ -6,10 +6,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::meeting::{moved, seen_from};
+use super::intersection::{moved, seen_from};
 use super::pose::Pose as PoseEffect;
 use super::tilt::{NODES, nodes, tilted_cos_theta};
-use super::{Arrived, Effect, Receiver, Saturating, Shot, Stage, Survey};
+use super::{Effect, MeanEcho, Receiver, Saturating, Shot, Stage, Survey};
 use crate::brdf::{Brdf, Retro, Scattering};
 use crate::frames::{Direction, Global, Pose, Ray, Surface};
 use crate::radar::scan::PATTERN_RANGE_M;
@@ -30,7 +30,7 @@ pub struct Model<'a> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prediction {
     /// Mean power and range of every look, without thermal noise; `None` where the ray misses.
-    pub arrived: Vec<Option<Arrived>>,
+    pub arrived: Vec<Option<MeanEcho>>,
     /// Of every look, where tilts vary at random from chirp to chirp; empty where none do.
     pub tilts: Vec<Tilts>,
     /// The law about the mean.
@@ -45,7 +45,7 @@ pub type Tilts = [(f64, f64); NODES];
 /// What was traced and worked out for one list of looks, for as long as what it depends on comes again:
 /// a search turns one number at a time, and few numbers move a ray or change a law.
 #[derive(Default)]
-pub struct Traced {
+pub struct PredictionCache {
     /// Large, and on one number each.
     surveys: Kept<Key, Survey, 4>,
     shaded: Kept<(Key, Vec<Brdf>), Survey>,
@@ -145,7 +145,7 @@ impl Prediction {
 impl Model<'_> {
     /// The same with the target shifted along an axis, m, after all that its effects do with it.
     pub(crate) fn shifted(mut self, axis: usize, by_m: f64) -> Self {
-        let mut pose = vec![0.0; PoseEffect.knobs().len()];
+        let mut pose = vec![0.0; PoseEffect.parameters().len()];
         pose[axis] = by_m;
         self.effects.push((&PoseEffect, pose));
         self
@@ -153,11 +153,16 @@ impl Model<'_> {
 
     /// What arrives of every look.
     pub fn predict(&self, stage: &Stage, looks: &[Shot]) -> Prediction {
-        self.predict_with(stage, looks, &Traced::default())
+        self.predict_with(stage, looks, &PredictionCache::default())
     }
 
     /// The same with what may have been traced for these very looks before.
-    pub fn predict_with(&self, stage: &Stage, looks: &[Shot], traced: &Traced) -> Prediction {
+    pub fn predict_with(
+        &self,
+        stage: &Stage,
+        looks: &[Shot],
+        traced: &PredictionCache,
+    ) -> Prediction {
         let keys = |matters: fn(&dyn Effect) -> bool| -> Vec<Key> {
             let matters = self.effects.iter().filter(|(effect, _)| matters(*effect));
             matters.map(|(effect, values)| (effect.name(), values.clone())).collect()
@@ -177,13 +182,13 @@ impl Model<'_> {
         let arrive = |((placed, f_per_sr), gain): ((&Option<Placed>, &f64), &f64)| {
             let (look, _) = placed.as_ref()?;
             let power_w = gain * self.scattered_w(stage, look, *f_per_sr);
-            Some(Arrived::at_once(power_w, look.hit.range_m))
+            Some(MeanEcho::at_once(power_w, look.hit.range_m))
         };
         let looked = placed.par_iter().zip(&*f_per_sr).zip(&*gains);
-        let mut arrived: Vec<Option<Arrived>> = looked.map(arrive).collect();
+        let mut arrived: Vec<Option<MeanEcho>> = looked.map(arrive).collect();
         let receiver = self.received();
         let tilted =
-            |(placed, arrived): (&Option<Placed>, &Option<Arrived>)| match (placed, arrived) {
+            |(placed, arrived): (&Option<Placed>, &Option<MeanEcho>)| match (placed, arrived) {
                 (Some((look, _)), Some(arrived)) => {
                     self.tilts(stage, look, arrived.power_w, &receiver)
                 }
@@ -261,8 +266,8 @@ impl Model<'_> {
     }
 
     /// What arrives of one look by itself.
-    pub(crate) fn arrived(&self, stage: &Stage, look: &Shot) -> Arrived {
-        Arrived::at_once(self.power_w(stage, look), look.hit.range_m)
+    pub(crate) fn arrived(&self, stage: &Stage, look: &Shot) -> MeanEcho {
+        MeanEcho::at_once(self.power_w(stage, look), look.hit.range_m)
     }
 
     /// What the effects make of all that arrives together.
@@ -270,8 +275,8 @@ impl Model<'_> {
         &self,
         stage: &Stage,
         looks: &[Shot],
-        traced: &Traced,
-        arrived: &mut [Option<Arrived>],
+        traced: &PredictionCache,
+        arrived: &mut [Option<MeanEcho>],
     ) {
         for (effect, values) in &self.effects {
             let Some(depends) = effect.surveyed(values) else { continue };

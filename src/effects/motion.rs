@@ -6,8 +6,8 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
 
-use super::meeting::motion;
-use super::{Effect, Knob, Level, Shot, Stage};
+use super::intersection::motion;
+use super::{Effect, EffectParameter, Level, Shot, Stage};
 use crate::frames::{Global, Pose};
 
 /// The effect `motion`.
@@ -16,7 +16,7 @@ pub(super) struct Motion;
 /// Cosines of a path, the constant among them, and all its terms: up to about two and a half cycles a scan.
 const COSINES: usize = 8;
 const TERMS: usize = COSINES + 2;
-const KNOBS: [Knob; 3 * TERMS] = [
+const PARAMETERS: [EffectParameter; 3 * TERMS] = [
     along("x0_m"),
     along("y0_m"),
     along("z0_m"),
@@ -49,8 +49,8 @@ const KNOBS: [Knob; 3 * TERMS] = [
     along("z9_m"),
 ];
 
-const fn along(axis: &'static str) -> Knob {
-    Knob::new(axis, "m", [-0.1, 0.1], 0.0, 2e-3)
+const fn along(axis: &'static str) -> EffectParameter {
+    EffectParameter::new(axis, "m", [-0.1, 0.1], 0.0, 2e-3)
 }
 
 /// The terms of a path where a share of the scan is over; all are 1 at its beginning.
@@ -92,23 +92,23 @@ impl Effect for Motion {
         Level::Scene
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        &KNOBS
+    fn parameters(&self) -> &'static [EffectParameter] {
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "The target moves slowly while the scan runs, as a person who sways or breathes: along each axis of the \
          scene by the sum of ten terms that all are 1 as the scan begins, with p for the share of it that is over. 0 to 7 are \
          cos(kπp), 8 and 9 what these leave of a line and of a parabola."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "The ranges are off by an amount that changes smoothly along the scan, and places that the \
          mirror passes twice disagree. A wrong pose is off alike from the first chirp to the last; a \
          drift of the gain leaves the ranges as they are."
     }
 
-    fn told(&self, values: &[f64]) -> Option<String> {
+    fn summary(&self, values: &[f64]) -> Option<String> {
         const STEPS: u32 = 500;
         let way_m = || (0..=STEPS).map(|step| shift_m(values, f64::from(step) / f64::from(STEPS)));
         let span_m = way_m().reduce(DVec3::max)? - way_m().reduce(DVec3::min)?;
@@ -120,10 +120,10 @@ impl Effect for Motion {
 
     /// At rest: ranges say at once where to.
     fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
-        vec![vec![0.0; KNOBS.len()]]
+        vec![vec![0.0; PARAMETERS.len()]]
     }
 
-    fn goes_with_time(&self) -> bool {
+    fn depends_on_time(&self) -> bool {
         true
     }
 
@@ -131,8 +131,8 @@ impl Effect for Motion {
         true
     }
 
-    fn shifts(&self, knob: usize, look: &Shot) -> Option<(usize, f64)> {
-        Some((knob % 3, *terms(look.progress).get(knob / 3)?))
+    fn shifts(&self, parameter: usize, look: &Shot) -> Option<(usize, f64)> {
+        Some((parameter % 3, *terms(look.progress).get(parameter / 3)?))
     }
 
     fn motion(&self, values: &[f64], _: &Stage, look: &Shot) -> Option<Pose<Global, Global>> {
@@ -182,7 +182,7 @@ mod tests {
     #[test]
     fn the_range_follows_the_path() {
         let bench = Bench::plate();
-        let mut values = [0.0; KNOBS.len()];
+        let mut values = [0.0; PARAMETERS.len()];
         values[8] = 4e-3;
         for (progress, expected_m) in [(0.0, 4e-3), (0.25, 0.0), (0.5, -4e-3), (1.0, 4e-3)] {
             let look = Shot { progress, ..bench.looks[7] };
@@ -190,7 +190,7 @@ mod tests {
             let nearer_m = (look.hit.range_m - found.hit.range_m) * look.hit.cos_theta;
             assert!((nearer_m - expected_m).abs() < 1e-9, "{progress}: {nearer_m}");
         }
-        let told = Motion.told(&values).unwrap();
+        let told = Motion.summary(&values).unwrap();
         assert!(told.ends_with("0.0 mm along x, 0.0 mm along y and 8.0 mm along z"), "{told}");
     }
 }

@@ -10,9 +10,9 @@ use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
-use super::meeting::{Axes, met};
+use super::intersection::{Axes, met};
 use super::spread::sunflower;
-use super::{Arrived, Effect, Knob, Level, Shot, Stage, Survey};
+use super::{Effect, EffectParameter, Level, MeanEcho, Shot, Stage, Survey};
 use crate::brdf::{Brdf, Distribution, Scattering};
 use crate::frames::{Direction, Point, Ray, Surface};
 use crate::units::ratio_from_db;
@@ -124,9 +124,9 @@ fn detours(stage: &Stage, look: &Shot) -> Vec<Detour> {
 }
 
 /// Power, W, and range, m, of all that a chirp returns by way of a second surface.
-fn returned(laws: &[Brdf], detours: &[Detour]) -> Option<Arrived> {
+fn returned(laws: &[Brdf], detours: &[Detour]) -> Option<MeanEcho> {
     let detours = detours.iter();
-    detours.map(|one| Arrived::at_once(one.power_w(laws), one.range_m)).reduce(Arrived::with)
+    detours.map(|one| MeanEcho::at_once(one.power_w(laws), one.range_m)).reduce(MeanEcho::with)
 }
 
 impl Effect for MultiBounce {
@@ -138,17 +138,18 @@ impl Effect for MultiBounce {
         Level::Scene
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        const KNOBS: [Knob; 1] = [Knob::new("coupling_db", "dB", [NONE_DB, 30.0], NONE_DB, 1.0)];
-        &KNOBS
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const PARAMETERS: [EffectParameter; 1] =
+            [EffectParameter::new("coupling_db", "dB", [NONE_DB, 30.0], NONE_DB, 1.0)];
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "Part of the wave goes on from the first surface to a second one and returns from there; 0 dB \
          is as much as the law of the material makes of it."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "Places that face another surface, as in corners and under arms, are too bright and too far \
          away. A foreign patch is bright without a longer range, and a wrong pose is off in range \
          without being bright; convex targets never show this."
@@ -170,15 +171,15 @@ impl Effect for MultiBounce {
     fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
         let all = survey.downcast_ref::<Vec<Vec<Detour>>>().map_or(&[][..], Vec::as_slice);
         let one = |detours: &Vec<Detour>| returned(laws, detours);
-        Box::new(all.par_iter().map(one).collect::<Vec<Option<Arrived>>>())
+        Box::new(all.par_iter().map(one).collect::<Vec<Option<MeanEcho>>>())
     }
 
-    fn arrive(&self, values: &[f64], shaded: &Survey, arrived: &mut [Option<Arrived>]) {
+    fn arrive(&self, values: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
         let coupling = ratio_from_db(values.first().copied().unwrap_or(NONE_DB));
-        let returned = shaded.downcast_ref::<Vec<Option<Arrived>>>().into_iter().flatten();
+        let returned = shaded.downcast_ref::<Vec<Option<MeanEcho>>>().into_iter().flatten();
         for (detour, one) in returned.zip(arrived) {
             if let (Some(one), Some(detour)) = (one, detour) {
-                *one = one.with(Arrived { power_w: coupling * detour.power_w, ..*detour });
+                *one = one.with(MeanEcho { power_w: coupling * detour.power_w, ..*detour });
             }
         }
     }

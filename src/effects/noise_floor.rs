@@ -1,6 +1,6 @@
 //! Thermal noise beyond what the radar declares: N + N_extra.
 
-use super::{Effect, Knob, Level, Receiver, Shot, Stage};
+use super::{Effect, EffectParameter, Level, Receiver, Shot, Stage};
 use crate::units::watts_from_dbm;
 
 /// The effect `noise-floor`.
@@ -18,18 +18,18 @@ impl Effect for NoiseFloor {
         Level::Instrument
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        const KNOBS: [Knob; 1] =
-            [Knob::new("level_dbm", "dB[mW]", [NONE_DBM, -30.0], NONE_DBM, 1.0)];
-        &KNOBS
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const PARAMETERS: [EffectParameter; 1] =
+            [EffectParameter::new("level_dbm", "dB[mW]", [NONE_DBM, -30.0], NONE_DBM, 1.0)];
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "The receiver has more thermal noise than declared: this much power is added to every echo \
          and to what is declared."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "Echoes near the threshold come out too strong, whatever their angle and range, and more of \
          them than expected are detected. Return from below the surface flattens the curve as well, \
          but at one σ⁰ and not at one power, and also far above the threshold."

@@ -3,8 +3,8 @@
 
 use glam::{DMat3, DVec3};
 
-use super::meeting::motion;
-use super::{Effect, Knob, Level, Shot, Stage};
+use super::intersection::motion;
+use super::{Effect, EffectParameter, Level, Shot, Stage};
 use crate::frames::{Global, Pose as FramePose};
 
 /// From where the scene has the target to where it stands.
@@ -15,13 +15,13 @@ pub(super) struct Pose;
 
 const SHIFT_M: [f64; 2] = [-0.2, 0.2];
 const TURN_DEG: [f64; 2] = [-20.0, 20.0];
-const KNOBS: [Knob; 6] = [
-    Knob::new("translation_x_m", "m", SHIFT_M, 0.0, 2e-3),
-    Knob::new("translation_y_m", "m", SHIFT_M, 0.0, 2e-3),
-    Knob::new("translation_z_m", "m", SHIFT_M, 0.0, 2e-3),
-    Knob::new("rotation_x_deg", "deg", TURN_DEG, 0.0, 0.5),
-    Knob::new("rotation_y_deg", "deg", TURN_DEG, 0.0, 0.5),
-    Knob::new("rotation_z_deg", "deg", TURN_DEG, 0.0, 0.5),
+const PARAMETERS: [EffectParameter; 6] = [
+    EffectParameter::new("translation_x_m", "m", SHIFT_M, 0.0, 2e-3),
+    EffectParameter::new("translation_y_m", "m", SHIFT_M, 0.0, 2e-3),
+    EffectParameter::new("translation_z_m", "m", SHIFT_M, 0.0, 2e-3),
+    EffectParameter::new("rotation_x_deg", "deg", TURN_DEG, 0.0, 0.5),
+    EffectParameter::new("rotation_y_deg", "deg", TURN_DEG, 0.0, 0.5),
+    EffectParameter::new("rotation_z_deg", "deg", TURN_DEG, 0.0, 0.5),
 ];
 
 fn rotation(turn_deg: DVec3) -> DMat3 {
@@ -38,16 +38,16 @@ impl Effect for Pose {
         Level::Scene
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        &KNOBS
+    fn parameters(&self) -> &'static [EffectParameter] {
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "The target stands elsewhere than the scene says: shifted along the global axes and turned \
          about the middle of what the scan has hit."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "The ranges are off, smoothly over the surface, and so are the powers where the angle is \
          wrong: too strong on one side of the brightest place and too weak on the other. Edges have \
          hits where none should be. Motion does the same, but changes along the scan."
@@ -55,15 +55,15 @@ impl Effect for Pose {
 
     /// Nowhere else: ranges say at once where to.
     fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
-        vec![vec![0.0; KNOBS.len()]]
+        vec![vec![0.0; PARAMETERS.len()]]
     }
 
     fn moves(&self) -> bool {
         true
     }
 
-    fn shifts(&self, knob: usize, _: &Shot) -> Option<(usize, f64)> {
-        (knob < 3).then_some((knob, 1.0))
+    fn shifts(&self, parameter: usize, _: &Shot) -> Option<(usize, f64)> {
+        (parameter < 3).then_some((parameter, 1.0))
     }
 
     fn motion(&self, values: &[f64], stage: &Stage, _: &Shot) -> Option<Motion> {

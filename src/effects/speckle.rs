@@ -1,6 +1,6 @@
 //! Fewer looks of speckle than the radar declares.
 
-use super::{Effect, Knob, Level, Receiver, Shot, Stage};
+use super::{Effect, EffectParameter, Level, Receiver, Shot, Stage};
 
 /// The effect `speckle`.
 pub(super) struct Speckle;
@@ -17,17 +17,18 @@ impl Effect for Speckle {
         Level::Instrument
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        const KNOBS: [Knob; 1] = [Knob::new("looks", "1", [0.3, ALL], ALL, 0.5)];
-        &KNOBS
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const PARAMETERS: [EffectParameter; 1] =
+            [EffectParameter::new("looks", "1", [0.3, ALL], ALL, 0.5)];
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "The echo of a rough surface fluctuates like an average of this many independent looks, fewer \
          than the radar is said to average."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "The powers scatter more than they should, alike at every angle, place and power, and their \
          mean in watts stays right. An error of the angle scatters only where the curve is steep; a \
          higher noise floor only the weak echoes."

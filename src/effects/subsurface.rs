@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-use super::{Effect, Knob, Level, Shot, Stage};
+use super::{Effect, EffectParameter, Level, Shot, Stage};
 use crate::brdf::Brdf;
 
 /// The effect `subsurface`.
@@ -23,20 +23,20 @@ impl Effect for Subsurface {
         Level::Material
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        const KNOBS: [Knob; 2] = [
-            Knob::new("sigma_v", "1", [0.0, 1.0], 0.0, 5e-4),
-            Knob::new("cosine_power", "1", [0.0, 4.0], 0.0, 0.5),
+    fn parameters(&self) -> &'static [EffectParameter] {
+        const PARAMETERS: [EffectParameter; 2] = [
+            EffectParameter::new("sigma_v", "1", [0.0, 1.0], 0.0, 5e-4),
+            EffectParameter::new("cosine_power", "1", [0.0, 4.0], 0.0, 0.5),
         ];
-        &KNOBS
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "Part of the wave enters the material, scatters inside and comes back with the same strength \
          at every angle, or falling with a power of its cosine, added to what the surface returns."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "The curve of power over angle flattens at large angles, at a level that is well above the \
          threshold. A noise floor flattens it in watts, whatever the range, and only near the \
          threshold; too small an exponent of the diffuse lobe lifts all angles smoothly."

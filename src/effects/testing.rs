@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::meeting::met;
-use super::{Arrived, Effect, Model, Prediction, Receiver, Shot, Stage, library, middle};
+use super::intersection::met;
+use super::{Effect, MeanEcho, Model, Prediction, Receiver, Shot, Stage, library, middle};
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
 use crate::frames::{Point, Pose, Ray};
 use crate::geometry::Mesh;
@@ -96,12 +96,12 @@ impl Bench {
     }
 
     /// What arrives without any effect.
-    pub(super) fn bare(&self) -> Vec<Arrived> {
+    pub(super) fn bare(&self) -> Vec<MeanEcho> {
         self.predict(Vec::new()).arrived.into_iter().flatten().collect()
     }
 
     /// What arrives with one.
-    pub(super) fn with(&self, effect: &dyn Effect, values: &[f64]) -> Vec<Arrived> {
+    pub(super) fn with(&self, effect: &dyn Effect, values: &[f64]) -> Vec<MeanEcho> {
         self.predict(vec![(effect, values.to_vec())]).arrived.into_iter().flatten().collect()
     }
 }
@@ -148,7 +148,7 @@ pub(super) fn dihedral() -> Mesh {
 }
 
 fn absent(effect: &dyn Effect) -> Vec<f64> {
-    effect.knobs().iter().map(|knob| knob.absent).collect()
+    effect.parameters().iter().map(|parameter| parameter.absent).collect()
 }
 
 fn benches() -> [Bench; 3] {
@@ -170,7 +170,7 @@ fn at_absent_values_no_effect_changes_anything() {
 
 fn is_sound(prediction: &Prediction) -> bool {
     let arrived = prediction.arrived.iter().flatten().all(|arrived| {
-        let Arrived { power_w, range_m, .. } = *arrived;
+        let MeanEcho { power_w, range_m, .. } = *arrived;
         power_w.is_finite() && power_w >= 0.0 && range_m.is_finite() && range_m > 0.0
     });
     let Receiver { looks, noise_w, tilt_sd_rad, ceiling } = prediction.receiver;
@@ -186,17 +186,18 @@ fn every_value_within_the_ranges_gives_finite_numbers() {
         for effect in library() {
             let starts = effect.starts(&bench.stage(), &bench.looks);
             let start = starts.first().cloned().unwrap_or_else(|| absent(effect));
-            for (at, knob) in effect.knobs().iter().enumerate() {
-                for value in [knob.min, knob.max, (knob.min + knob.max) / 2.0] {
+            for (at, parameter) in effect.parameters().iter().enumerate() {
+                for value in [parameter.min, parameter.max, (parameter.min + parameter.max) / 2.0] {
                     let mut values = start.clone();
                     values[at] = value;
                     let found = bench.predict(vec![(effect, values.clone())]);
                     assert!(is_sound(&found), "{} at {values:?}", effect.name());
                 }
             }
-            let ends: [fn(&super::Knob) -> f64; 2] = [|knob| knob.min, |knob| knob.max];
+            let ends: [fn(&super::EffectParameter) -> f64; 2] =
+                [|parameter| parameter.min, |parameter| parameter.max];
             for end in ends {
-                let values = effect.knobs().iter().map(end).collect();
+                let values = effect.parameters().iter().map(end).collect();
                 assert!(is_sound(&bench.predict(vec![(effect, values)])), "{}", effect.name());
             }
         }
@@ -214,13 +215,22 @@ fn searches_begin_within_the_ranges_and_where_there_is_an_effect() {
         assert!(!starts.is_empty(), "{}", effect.name());
         let mut felt = false;
         for values in starts {
-            assert_eq!(values.len(), effect.knobs().len(), "{}", effect.name());
-            for (value, knob) in values.iter().zip(effect.knobs()) {
-                assert!((knob.min..=knob.max).contains(value), "{} {}", effect.name(), knob.name);
+            assert_eq!(values.len(), effect.parameters().len(), "{}", effect.name());
+            for (value, parameter) in values.iter().zip(effect.parameters()) {
+                assert!(
+                    (parameter.min..=parameter.max).contains(value),
+                    "{} {}",
+                    effect.name(),
+                    parameter.name
+                );
             }
             // A search may begin from nothing, where a step must be felt.
-            let is_absent = values.iter().zip(effect.knobs()).all(|(v, knob)| *v == knob.absent);
-            let steps = effect.knobs().iter().map(|knob| if is_absent { knob.step } else { 0.0 });
+            let is_absent =
+                values.iter().zip(effect.parameters()).all(|(v, parameter)| *v == parameter.absent);
+            let steps = effect
+                .parameters()
+                .iter()
+                .map(|parameter| if is_absent { parameter.step } else { 0.0 });
             let there = values.iter().zip(steps).map(|(value, step)| value + step).collect();
             felt |= bench.predict(vec![(effect, there)]) != bare;
         }
@@ -229,13 +239,18 @@ fn searches_begin_within_the_ranges_and_where_there_is_an_effect() {
 }
 
 #[test]
-fn names_and_knobs_are_told_apart() {
+fn names_and_parameters_are_unique() {
     let names = library().map(|effect| effect.name());
     for (position, effect) in library().into_iter().enumerate() {
         assert_eq!(names.iter().position(|name| *name == effect.name()), Some(position));
-        for knob in effect.knobs() {
-            assert!((knob.min..=knob.max).contains(&knob.absent) && knob.step > 0.0);
-            assert_eq!(effect.knobs().iter().filter(|other| other.name == knob.name).count(), 1);
+        for parameter in effect.parameters() {
+            assert!(
+                (parameter.min..=parameter.max).contains(&parameter.absent) && parameter.step > 0.0
+            );
+            assert_eq!(
+                effect.parameters().iter().filter(|other| other.name == parameter.name).count(),
+                1
+            );
         }
     }
 }
@@ -246,17 +261,17 @@ fn what_is_said_to_shift_the_target_does_nothing_else() {
     let (stage, look) = (bench.stage(), Shot { progress: 0.3, ..bench.looks[7] });
     let mut shifts = 0;
     for effect in library() {
-        let knobs = effect.knobs();
-        let values: Vec<f64> = knobs.iter().map(|knob| 3.0 * knob.step).collect();
-        for (number, knob) in knobs.iter().enumerate() {
+        let parameters = effect.parameters();
+        let values: Vec<f64> = parameters.iter().map(|parameter| 3.0 * parameter.step).collect();
+        for (number, parameter) in parameters.iter().enumerate() {
             let Some((axis, per_unit)) = effect.shifts(number, &look) else { continue };
             let mut more = values.clone();
-            more[number] += knob.step;
+            more[number] += parameter.step;
             let [before, after] = [values.clone(), more]
                 .map(|values| effect.motion(&values, &stage, &look).unwrap() * look.hit.point);
             let mut way_m = after.xyz - before.xyz;
-            way_m[axis] -= per_unit * knob.step;
-            assert!(way_m.length() < 1e-12, "{} {}: {way_m}", effect.name(), knob.name);
+            way_m[axis] -= per_unit * parameter.step;
+            assert!(way_m.length() < 1e-12, "{} {}: {way_m}", effect.name(), parameter.name);
             shifts += 1;
         }
     }

@@ -9,19 +9,19 @@
 //! average, so that the ripple in θ shows.
 
 use super::lobes::first_lobe;
-use super::{Effect, Knob, Level, Shot, Stage};
+use super::{Effect, EffectParameter, Level, Shot, Stage};
 use crate::brdf::{Brdf, Fresnel, Layer, Layered, Scattering};
 use crate::frames::Direction;
 
 /// The effect `thin-film`.
 pub(super) struct ThinFilm;
 
-const KNOBS: [Knob; 5] = [
-    Knob::new("coverage", "1", [0.0, 1.0], 0.0, 0.1),
-    Knob::new("thickness_m", "m", [0.0, 8e-3], 3e-4, 2e-5),
-    Knob::new("index", "1", [1.0, 4.0], 1.6, 0.05),
-    Knob::new("from_below", "1", [0.0, 1.0], 1.0, 0.2),
-    Knob::new("substrate_ratio", "1", [0.5, 5.0], 1.0, 0.1),
+const PARAMETERS: [EffectParameter; 5] = [
+    EffectParameter::new("coverage", "1", [0.0, 1.0], 0.0, 0.1),
+    EffectParameter::new("thickness_m", "m", [0.0, 8e-3], 3e-4, 2e-5),
+    EffectParameter::new("index", "1", [1.0, 4.0], 1.6, 0.05),
+    EffectParameter::new("from_below", "1", [0.0, 1.0], 1.0, 0.2),
+    EffectParameter::new("substrate_ratio", "1", [0.5, 5.0], 1.0, 0.1),
 ];
 
 /// Reflectance at normal incidence of a substrate whose law has no f_λ: an index of 2.
@@ -65,16 +65,16 @@ impl Effect for ThinFilm {
         Level::Material
     }
 
-    fn knobs(&self) -> &'static [Knob] {
-        &KNOBS
+    fn parameters(&self) -> &'static [EffectParameter] {
+        &PARAMETERS
     }
 
-    fn is(&self) -> &'static str {
+    fn description(&self) -> &'static str {
         "A coating of this thickness and refractive index covers a share of the surface; what it \
          reflects at its two sides interferes, and raises or lowers the echo by the angle."
     }
 
-    fn shows(&self) -> &'static str {
+    fn signature(&self) -> &'static str {
         "The residual swings with the angle, with no other covariate; a diffuse return from below swings \
          against the specular part. A film much thinner than a wavelength only shifts the levels, \
          which the base law absorbs; another frequency moves the swings, which tells it from a wrong \

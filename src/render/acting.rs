@@ -15,7 +15,7 @@ use super::surface::LocalFrame;
 use super::{Observer, RenderError, Setup};
 use crate::brdf::Scattering;
 use crate::effects::{
-    Arrived, Level, Model, Receiver, Shot, Stage, Traced, middle, tilted_cos_theta,
+    Level, MeanEcho, Model, PredictionCache, Receiver, Shot, Stage, middle, tilted_cos_theta,
 };
 use crate::frames::{Direction, Global, Point, Pose, Ray, Surface};
 use crate::radar::Link;
@@ -140,7 +140,7 @@ impl<'a> Acting<'a> {
     pub fn arrive(
         &self,
         footprints: &Footprints,
-        sums: Vec<Option<Arrived>>,
+        sums: Vec<Option<MeanEcho>>,
     ) -> Vec<Option<Change>> {
         let first = |chirp: usize| {
             let hits = footprints.hits.iter().zip(0..).skip(chirp * footprints.rays_per_chirp);
@@ -149,14 +149,15 @@ impl<'a> Acting<'a> {
             let facing = footprints.facings.get::<usize>(index).copied().flatten();
             Some(self.seen(chirp, footprints.rays_per_chirp, hit, facing))
         };
-        let chirps: Vec<(usize, Shot, Arrived)> = sums
+        let chirps: Vec<(usize, Shot, MeanEcho)> = sums
             .iter()
             .enumerate()
             .filter_map(|(chirp, sum)| Some((chirp, first(chirp)?, (*sum)?)))
             .collect();
         let looks: Vec<Shot> = chirps.iter().map(|(_, look, _)| *look).collect();
-        let mut after: Vec<Option<Arrived>> = chirps.iter().map(|(_, _, sum)| Some(*sum)).collect();
-        self.model.arrive(&self.stage(), &looks, &Traced::default(), &mut after);
+        let mut after: Vec<Option<MeanEcho>> =
+            chirps.iter().map(|(_, _, sum)| Some(*sum)).collect();
+        self.model.arrive(&self.stage(), &looks, &PredictionCache::default(), &mut after);
         let mut changes = vec![None; sums.len()];
         for ((chirp, _, before), after) in chirps.into_iter().zip(after.into_iter().flatten()) {
             changes[chirp] = (before != after).then_some(Change { before, after });
@@ -235,8 +236,8 @@ impl<'a> Acting<'a> {
 /// What the effects make of a whole echo.
 #[derive(Clone, Copy)]
 pub(super) struct Change {
-    before: Arrived,
-    after: Arrived,
+    before: MeanEcho,
+    after: MeanEcho,
 }
 
 impl Change {

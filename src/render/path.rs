@@ -17,7 +17,7 @@ use super::detect::sum;
 use super::spot::Footprints;
 use super::surface::{LocalFrame, Surface};
 use super::{Observer, Setup};
-use crate::effects::Arrived;
+use crate::effects::MeanEcho;
 use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
 use crate::radar::random::{Key, Purpose};
 use crate::radar::{Beam, Detection, Link};
@@ -101,7 +101,7 @@ impl<'a> Paths<'a> {
         let arrived = |(chirp, hits): (usize, &[Option<Hit>])| {
             let paths = self.of_chirp(chirp, hits);
             let Detection { power_w, range_m } = sum(&paths);
-            (!paths.is_empty()).then_some(Arrived::at_once(power_w, range_m))
+            (!paths.is_empty()).then_some(MeanEcho::at_once(power_w, range_m))
         };
         acting.arrive(self.footprints, self.footprints.chirps().enumerate().map(arrived).collect())
     }

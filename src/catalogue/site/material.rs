@@ -155,14 +155,15 @@ fn source(source: &Source) -> SourceView<'_> {
 fn effects(material: &Material) -> Vec<EffectView> {
     let view = |entry: &crate::formats::EffectEntry| {
         let effect = effects::find(&entry.name);
-        let unit = |name: &str| effect?.knobs().iter().find(|k| k.name == name).map(|k| k.unit);
+        let unit =
+            |name: &str| effect?.parameters().iter().find(|k| k.name == name).map(|k| k.unit);
         let row = |(name, value): (&String, &f64)| {
             [name.clone(), digits(*value), unit(name).unwrap_or_default().to_owned()]
         };
         EffectView {
             name: entry.name.clone(),
             source: entry.source.as_ref().map(|key| (key.clone(), place_of(material, key))),
-            is: effect.map(|effect| effect.is()),
+            is: effect.map(|effect| effect.description()),
             parameters: entry.parameters.iter().map(row).collect(),
         }
     };

@@ -62,7 +62,7 @@ impl Choice {
                 Some(Reason::Declared)
             } else if !asked.iter().any(|other| is_named(*other)) {
                 Some(Reason::NotAsked)
-            } else if !told.times && effect.goes_with_time() {
+            } else if !told.times && effect.depends_on_time() {
                 Some(Reason::NoTimes)
             } else if !told.ranges && effect.moves() {
                 Some(Reason::NoRanges)

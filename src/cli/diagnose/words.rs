@@ -108,8 +108,9 @@ pub(super) fn numbers(parameters: &Parameters) -> Vec<[String; 2]> {
 /// What the numbers of an effect come to, where they are too many to be read.
 pub(super) fn told(found: &Found) -> Option<String> {
     let effect = find(found.name)?;
-    let values = effect.knobs().iter().map(|knob| Some(found.parameters.get(knob.name)?.value));
-    effect.told(&values.collect::<Option<Vec<f64>>>()?)
+    let values =
+        effect.parameters().iter().map(|knob| Some(found.parameters.get(knob.name)?.value));
+    effect.summary(&values.collect::<Option<Vec<f64>>>()?)
 }
 
 /// Where something unknown is strongest; nothing where there is no such place.

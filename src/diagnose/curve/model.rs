@@ -89,11 +89,12 @@ impl Model {
     }
 
     pub fn unknowns(&self) -> usize {
-        self.coordinates.len() + self.terms.iter().map(|term| term.knobs().len()).sum::<usize>()
+        self.coordinates.len()
+            + self.terms.iter().map(|term| term.parameters().len()).sum::<usize>()
     }
 
     fn bounds(&self) -> [DVector<f64>; 2] {
-        let knobs = || self.terms.iter().flat_map(|term| term.knobs());
+        let knobs = || self.terms.iter().flat_map(|term| term.parameters());
         let join = |law: DVector<f64>, ends: Vec<f64>| {
             DVector::from_iterator(law.len() + ends.len(), law.iter().copied().chain(ends))
         };
@@ -111,7 +112,7 @@ impl Model {
         let values = self
             .terms
             .iter()
-            .map(|term| term.knobs().iter().zip(&mut rest).map(|(k, u)| u * k.step).collect());
+            .map(|term| term.parameters().iter().zip(&mut rest).map(|(k, u)| u * k.step).collect());
         (law, values.collect())
     }
 

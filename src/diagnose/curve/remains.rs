@@ -168,12 +168,12 @@ pub(super) fn values(
     let mut rest = deviations.iter().skip(coordinates.len());
     let mut found = Vec::new();
     for (added, values) in added.into_iter().zip(values) {
-        let number = |(knob, value): (&crate::effects::Knob, f64)| {
+        let number = |(knob, value): (&crate::effects::EffectParameter, f64)| {
             let sd = rest.next().copied().flatten().map(|sd| sd * knob.step);
             (knob.name, Value { value, sd, unit: knob.unit })
         };
         let parameters: BTreeMap<_, _> =
-            added.term.knobs().iter().zip(values).map(number).collect();
+            added.term.parameters().iter().zip(values).map(number).collect();
         found.push(CurveFound {
             name: added.term.name(),
             level: added.term.level(),

@@ -147,7 +147,7 @@ impl Selection<'_> {
         let all = vec![true; points.points.len()];
         let model = state.model.with(term);
         let joined = |values: Vec<f64>| {
-            let steps = term.knobs().iter().zip(values).map(|(knob, value)| value / knob.step);
+            let steps = term.parameters().iter().zip(values).map(|(knob, value)| value / knob.step);
             let law = state.fitted.at.iter().copied();
             DVector::from_vec(law.chain(steps).collect())
         };
@@ -159,7 +159,7 @@ impl Selection<'_> {
         let mut starts: Vec<(f64, DVector<f64>)> =
             term.starts().into_iter().map(joined).map(|at| (misfit(&at), at)).collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let absent = joined(term.knobs().iter().map(|knob| knob.absent).collect());
+        let absent = joined(term.parameters().iter().map(|knob| knob.absent).collect());
         let fits = starts.iter().take(FOLLOWED).map(|(_, at)| model.fit(points, &all, at));
         let fitted = fits
             .max_by(|a, b| a.log_p.total_cmp(&b.log_p))
@@ -172,7 +172,7 @@ impl Selection<'_> {
         let ranked = Ranked {
             round,
             name: term.name(),
-            numbers: term.knobs().len(),
+            numbers: term.parameters().len(),
             gain: fitted.log_p - state.fitted.log_p,
             held_out: None,
             size_db: (squares / before.len().max(1) as f64).sqrt(),

@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::points::Point;
 use crate::brdf::{Brdf, CookTorrance, Distribution, Scattering, Shadowing};
-use crate::effects::{Knob, Level};
+use crate::effects::{EffectParameter, Level};
 use crate::frames::{Direction, Surface};
 
 /// Something that a law lacks.
@@ -18,13 +18,13 @@ pub trait Term: Sync {
     fn level(&self) -> Level;
 
     /// Its numbers.
-    fn knobs(&self) -> &'static [Knob];
+    fn parameters(&self) -> &'static [EffectParameter];
 
     /// What it is, in a sentence for a person.
-    fn is(&self) -> &'static str;
+    fn description(&self) -> &'static str;
 
     /// What it does to a curve, and what tells it from its neighbours.
-    fn shows(&self) -> &'static str;
+    fn signature(&self) -> &'static str;
 
     /// Where a search begins.
     fn starts(&self) -> Vec<Vec<f64>>;
@@ -60,8 +60,8 @@ const fn knob(
     [min, max]: [f64; 2],
     absent: f64,
     step: f64,
-) -> Knob {
-    Knob { name, unit, min, max, absent, step }
+) -> EffectParameter {
+    EffectParameter { name, unit, min, max, absent, step }
 }
 
 /// Every pair of two lists.
@@ -80,16 +80,16 @@ macro_rules! described {
             Level::$level
         }
 
-        fn knobs(&self) -> &'static [Knob] {
-            const KNOBS: &[Knob] = &[$($knob),+];
+        fn parameters(&self) -> &'static [EffectParameter] {
+            const KNOBS: &[EffectParameter] = &[$($knob),+];
             KNOBS
         }
 
-        fn is(&self) -> &'static str {
+        fn description(&self) -> &'static str {
             $is
         }
 
-        fn shows(&self) -> &'static str {
+        fn signature(&self) -> &'static str {
             $shows
         }
     };
@@ -414,11 +414,12 @@ mod tests {
                 };
                 points.iter().map(one).fold(0.0, f64::max)
             };
-            let absent: Vec<f64> = term.knobs().iter().map(|knob| knob.absent).collect();
+            let absent: Vec<f64> = term.parameters().iter().map(|knob| knob.absent).collect();
             assert!(change(&absent) < 1e-12, "{}", term.name());
             for start in term.starts() {
-                let inside = |(knob, value): (&Knob, &f64)| (knob.min..=knob.max).contains(value);
-                assert!(term.knobs().iter().zip(&start).all(inside), "{}", term.name());
+                let inside =
+                    |(knob, value): (&EffectParameter, &f64)| (knob.min..=knob.max).contains(value);
+                assert!(term.parameters().iter().zip(&start).all(inside), "{}", term.name());
                 assert!(change(&start) > 1e-6, "{} {start:?}", term.name());
             }
         }

@@ -76,7 +76,7 @@ fn what_is_put_in_is_found_with_its_numbers() {
             }
             continue;
         }
-        let knobs = term(name).unwrap().knobs();
+        let knobs = term(name).unwrap().parameters();
         for (knob, truth) in knobs.iter().zip(numbers) {
             let found = &report.effects[0].parameters[knob.name];
             let off = (found.value - truth) / found.sd.unwrap();

@@ -7,7 +7,7 @@ use crate::cli::diagnose::words::{
 };
 use crate::diagnose::curve::{CurveEvidence, CurveFound, term};
 use crate::diagnose::{Evidence, Found};
-use crate::effects::{Knob, Level, Place, find};
+use crate::effects::{EffectParameter, Level, Place, find};
 
 /// An effect as the page shows it: what it is, its numbers, why it was added, what it could be instead.
 struct Article<'a> {
@@ -15,7 +15,7 @@ struct Article<'a> {
     level: Level,
     /// What it is, and how it shows; nothing where no library has it.
     words: Option<[&'static str; 2]>,
-    knobs: &'static [Knob],
+    knobs: &'static [EffectParameter],
     numbers: Vec<[String; 2]>,
     /// A word on its place.
     place: String,
@@ -29,7 +29,7 @@ struct Article<'a> {
 /// An effect of a cloud.
 pub(super) fn of_cloud(found: &Found) -> String {
     let effect = find(found.name);
-    let shows = |name: &'static str| (name, find(name).map_or("", |effect| effect.shows()));
+    let shows = |name: &'static str| (name, find(name).map_or("", |effect| effect.signature()));
     let place = match found.place {
         Some(Place::Beyond { .. }) => quiet(
             "centre_m is the middle and extent_m the size of the box around the part of the target that it covers, \
@@ -45,8 +45,8 @@ pub(super) fn of_cloud(found: &Found) -> String {
     Article {
         name: found.name,
         level: found.level,
-        words: effect.map(|effect| [effect.is(), effect.shows()]),
-        knobs: effect.map_or(&[], |effect| effect.knobs()),
+        words: effect.map(|effect| [effect.description(), effect.signature()]),
+        knobs: effect.map_or(&[], |effect| effect.parameters()),
         numbers: of_effect(&found.parameters),
         place,
         evidence: vec![
@@ -71,13 +71,13 @@ pub(super) fn of_cloud(found: &Found) -> String {
 /// An effect of a curve.
 pub(super) fn of_curve(found: &CurveFound) -> String {
     let effect = term(found.name);
-    let shows = |name: &'static str| (name, term(name).map_or("", |term| term.shows()));
+    let shows = |name: &'static str| (name, term(name).map_or("", |term| term.signature()));
     let CurveEvidence { gain, held_out_gain, held_out_se, size_db } = &found.evidence;
     Article {
         name: found.name,
         level: found.level,
-        words: effect.map(|effect| [effect.is(), effect.shows()]),
-        knobs: effect.map_or(&[], |effect| effect.knobs()),
+        words: effect.map(|effect| [effect.description(), effect.signature()]),
+        knobs: effect.map_or(&[], |effect| effect.parameters()),
         numbers: of_term(found),
         place: String::new(),
         evidence: vec![
