@@ -8,7 +8,8 @@
 
 use std::ops::RangeInclusive;
 
-use super::{Brdf, Scattering, Tabulated};
+use super::models::{Brdf, Tabulated};
+use super::scattering::{Scattering, ScatteringModel};
 use crate::units::db_from_ratio;
 
 /// Degrees of incidence, from 0.
@@ -35,7 +36,7 @@ impl Outline {
     pub fn new(model: &Brdf) -> Option<Outline> {
         let looks = match model {
             Brdf::Tabulated(curve) => looks_at_curve(curve),
-            model if has_curve(model) => return None,
+            model if model.has_curve() => return None,
             model => looks(|theta_rad| db_from_ratio(model.sigma0(theta_rad))),
         };
         let mut outline = Outline([[SILENT; 2]; DEGREES]);
@@ -105,16 +106,6 @@ fn looks_at_curve(curve: &Tabulated) -> Vec<Look> {
     looks
 }
 
-/// Whether a measured curve is a part of the model.
-fn has_curve(model: &Brdf) -> bool {
-    match model {
-        Brdf::Tabulated(_) => true,
-        Brdf::Mixture(mixture) => has_curve(&mixture.diffuse) || has_curve(&mixture.specular),
-        Brdf::Sum(sum) => sum.parts.iter().any(has_curve),
-        _ => false,
-    }
-}
-
 fn codes(looks: &[Look]) -> [u8; 2] {
     let steps = looks.windows(2).map(|pair| match pair {
         [a, b] => (a.1 - b.1).abs(),
@@ -160,8 +151,8 @@ mod tests {
 
     #[test]
     fn every_model_stays_within_its_outline_and_a_flat_one_fills_it() {
-        for model in crate::brdf::tests::every_model() {
-            if has_curve(&model) && !matches!(model, Brdf::Tabulated(_)) {
+        for model in crate::brdf::models::tests::every_model() {
+            if model.has_curve() && !matches!(model, Brdf::Tabulated(_)) {
                 assert_eq!(Outline::new(&model), None);
                 continue;
             }

@@ -45,9 +45,9 @@ impl Parameter {
 }
 
 /// Called for every parameter, with the slot that holds its value.
-pub(super) type Visitor<'a> = dyn FnMut(Parameter, &mut f64) + 'a;
+pub type Visitor<'a> = dyn FnMut(Parameter, &mut f64) + 'a;
 
-/// Shows one pure number of a model to the visitor.
+/// Calls the visitor for one pure number of a model.
 pub(super) fn visit_number(
     visitor: &mut Visitor,
     prefix: &str,
@@ -57,4 +57,17 @@ pub(super) fn visit_number(
 ) {
     let path = format!("{prefix}{name}");
     visitor(Parameter { path, unit: "1", min, max, value: *slot }, slot);
+}
+
+/// Calls the visitor for one number of a model with a unit (UCUM).
+pub(super) fn visit_quantity(
+    visitor: &mut Visitor,
+    prefix: &str,
+    name: &str,
+    unit: &'static str,
+    (min, max): (f64, f64),
+    slot: &mut f64,
+) {
+    let path = format!("{prefix}{name}");
+    visitor(Parameter { path, unit, min, max, value: *slot }, slot);
 }

@@ -7,20 +7,33 @@
 use nalgebra::Complex;
 
 use super::backscatter::{Facets, Term};
-use super::parameter::{Parameter, Visitor, visit_number};
-use super::{Distribution, half_vector};
+use super::kind::Key;
+use super::parameter::{Visitor, visit_number};
+use super::scattering::half_vector;
+use super::slopes::Distribution;
 use crate::frames::{Direction, Surface};
+use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Widest values that metals reach: aluminium at 300 GHz has ε′ ≈ −2·10⁴ and ε″ ≈ 2·10⁶.
 const EPS_REAL_RANGE: (f64, f64) = (-1e9, 1e9);
 const EPS_IMAG_RANGE: (f64, f64) = (0.0, 1e9);
+
+/// ε′ and ε″ in JSON.
+pub(super) const EPS_REAL: Key = Key::new(
+    "eps_real",
+    r#"{"type": "number", "description": "relative permittivity, real part"}"#,
+);
+pub(super) const EPS_IMAG: Key = Key::new(
+    "eps_imag",
+    r#"{"type": "number", "description": "imaginary part, 0 or more, for exp(+jwt)"}"#,
+);
 
 /// ε = ε′ − jε″.
 pub(super) fn permittivity(eps_real: f64, eps_imag: f64) -> Complex<f64> {
     Complex::new(eps_real, -eps_imag)
 }
 
-/// Shows ε′ and ε″ to the visitor.
+/// Calls the visitor for ε′ and ε″.
 pub(super) fn visit_permittivity(
     visitor: &mut Visitor,
     prefix: &str,
@@ -29,18 +42,6 @@ pub(super) fn visit_permittivity(
 ) {
     visit_number(visitor, prefix, "eps_real", EPS_REAL_RANGE, eps_real);
     visit_number(visitor, prefix, "eps_imag", EPS_IMAG_RANGE, eps_imag);
-}
-
-/// Shows a number with a unit (UCUM) to the visitor.
-pub(super) fn visit_quantity(
-    visitor: &mut Visitor,
-    prefix: &str,
-    (name, unit): (&str, &'static str),
-    (min, max): (f64, f64),
-    slot: &mut f64,
-) {
-    let path = format!("{prefix}{name}");
-    visitor(Parameter { path, unit, min, max, value: *slot }, slot);
 }
 
 /// The electric field's direction: across the plane of incidence (s) or in it (p).
@@ -96,6 +97,16 @@ pub(super) fn default_lobe_rad() -> f64 {
     0.02
 }
 
+/// Frequency of a model that gives none.
+pub(super) fn default_frequency_hz() -> f64 {
+    300e9
+}
+
+/// k₀ = 2π·f/c, rad/m.
+pub(super) fn wavenumber_rad_per_m(frequency_hz: f64) -> f64 {
+    std::f64::consts::TAU * frequency_hz / SPEED_OF_LIGHT_M_PER_S
+}
+
 /// f of a mirror seen with a finite angular width: R·D(h)·G/(4·cos θ_i·cos θ_o), 1/sr.
 ///
 /// `reflectance` maps cos of the angle between the directions and h to R. D is Beckmann's with
@@ -116,7 +127,7 @@ pub(super) fn mirror_lobe_per_sr(
     reflectance(mirror_cosine(i, o)) * d_per_sr * g / (4.0 * i.cos_theta() * o.cos_theta())
 }
 
-/// The same in backscatter, for the reflectance at normal incidence.
+/// [`mirror_lobe_per_sr`] in backscatter, for the reflectance at normal incidence.
 pub(super) fn mirror_lobe(lobe_rad: f64, reflectance: f64) -> Term {
     let distribution = Distribution::Beckmann;
     Term::mirrors(reflectance, Facets { m: lobe_rad, distribution, shadowed: 2 })

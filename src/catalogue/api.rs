@@ -22,13 +22,6 @@ pub(super) const SCHEMA_VERSION: u32 = 1;
 /// Largest file of a single material, bytes: about 800 000 points. Nobody writes or reads a larger one.
 pub(super) const LARGEST_MATERIAL_BYTES: u64 = 256 << 20;
 
-/// The JSON Schemas that come with a publication.
-pub(super) const SCHEMAS: [(&str, &str); 3] = [
-    ("schema/material.json", include_str!("schema/material.json")),
-    ("schema/index.json", include_str!("schema/index.json")),
-    ("schema/changes.json", include_str!("schema/changes.json")),
-];
-
 /// `api/v1/materials/<slug>.json`.
 #[derive(Serialize)]
 pub(super) struct Record<'a> {

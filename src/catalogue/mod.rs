@@ -19,6 +19,7 @@ mod nearest;
 mod publish;
 mod records;
 mod references;
+mod schema;
 mod site;
 mod stage;
 mod tables;

@@ -8,9 +8,8 @@
 //! ratio, since backscatter alone does not tell f_λ. R is that of a film as flat as the surface is on
 //! average, so that the ripple in θ shows.
 
-use super::lobes::first_lobe;
 use super::{Effect, EffectParameter, Level, Shot, Stage};
-use crate::brdf::{Brdf, Fresnel, Layer, Layered, Scattering};
+use crate::brdf::{Brdf, Fresnel, Layer, Layered, Scattering, ScatteringModel};
 use crate::frames::Direction;
 
 /// The effect `thin-film`.
@@ -37,7 +36,7 @@ const LEAST_INDEX: f64 = 1.05;
 /// ε of the substrate under a law, whose index is `ratio` times the one that f_λ asks for.
 fn substrate(law: &Brdf, ratio: f64) -> f64 {
     let [least, most] = F_LAMBDA_RANGE;
-    let f_lambda = first_lobe(law).map_or(USUAL_F_LAMBDA, |lobe| lobe.f_lambda);
+    let f_lambda = law.f_lambda().unwrap_or(USUAL_F_LAMBDA);
     let root = f_lambda.clamp(least, most).sqrt();
     (ratio * (1.0 + root) / (1.0 - root)).max(LEAST_INDEX).powi(2)
 }

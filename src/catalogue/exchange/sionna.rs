@@ -15,7 +15,7 @@ use std::f64::consts::{PI, TAU};
 use super::error::ExchangeError;
 use super::exported::Exported;
 use super::subject::{Subject, one_line};
-use crate::brdf::{Brdf, CookTorrance, Directive, Fresnel, Scattering};
+use crate::brdf::{Brdf, Directive, Fresnel, Scattering, ScatteringModel};
 use crate::frames::Direction;
 use crate::units::{db_from_ratio, ratio_from_db};
 
@@ -109,7 +109,7 @@ enum Scattered {
 impl Scattered {
     fn of(model: &Brdf) -> Scattered {
         match model {
-            Brdf::Fresnel(_) | Brdf::Layered(_) => Scattered::Nothing,
+            model if model.is_smooth() => Scattered::Nothing,
             Brdf::Mixture(mixture) if mixture.k > 0.0 => Scattered::DiffusePart,
             _ => Scattered::All,
         }
@@ -174,11 +174,11 @@ impl Substance {
             let origin = format!("the permittivity is `{key}` at {ghz:.3} GHz{}", below_one(real));
             return Some(substance([real, entry.imaginary], entry.frequency_hz, origin));
         }
-        if let Some(eps) = own_permittivity(model) {
+        if let Some(eps) = model.permittivity() {
             let origin = format!("the permittivity is the model's{}", below_one(eps[0]));
             return Some(substance(eps, middle_hz, origin));
         }
-        let reflectivity = reflectivity(model).filter(|share| *share < 1.0 - 1e-9)?;
+        let reflectivity = model.f_lambda().filter(|share| *share < 1.0 - 1e-9)?;
         let root = reflectivity.sqrt();
         let index = (1.0 + root) / (1.0 - root);
         let why = known.err().unwrap_or("no permittivity of the surface is known");
@@ -188,30 +188,6 @@ impl Substance {
             index * index
         );
         Some(substance([index * index, 0.0], middle_hz, origin))
-    }
-}
-
-fn own_permittivity(model: &Brdf) -> Option<[f64; 2]> {
-    match model {
-        Brdf::Fresnel(m) => Some([m.eps_real, m.eps_imag]),
-        Brdf::Kirchhoff(m) => Some([m.eps_real, m.eps_imag]),
-        Brdf::KirchhoffGo(m) => Some([m.eps_real, m.eps_imag]),
-        Brdf::Layered(m) => {
-            let [real, imag] = [m.eps_real, m.eps_imag];
-            Some(m.layers.first().map_or([real, imag], |layer| [layer.eps_real, layer.eps_imag]))
-        }
-        Brdf::Mixture(m) => own_permittivity(&m.specular).or(own_permittivity(&m.diffuse)),
-        _ => None,
-    }
-}
-
-/// Normal reflectance of the facets of a model.
-fn reflectivity(model: &Brdf) -> Option<f64> {
-    match model {
-        Brdf::CookTorrance(CookTorrance { f_lambda, .. }) => Some(*f_lambda),
-        Brdf::Mixture(m) => reflectivity(&m.specular).or(reflectivity(&m.diffuse)),
-        Brdf::Sum(m) => m.parts.iter().find_map(reflectivity),
-        _ => None,
     }
 }
 

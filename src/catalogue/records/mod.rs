@@ -9,10 +9,11 @@ mod linked;
 pub(super) use linked::licence_record;
 
 use super::about::About;
-use super::api::{Index, SCHEMAS};
+use super::api::Index;
 use super::error::CatalogueError;
 use super::folder::Folder;
 use super::layout::ZENODO;
+use super::schema;
 use super::tables::Written;
 use context::Context;
 
@@ -24,7 +25,7 @@ pub(super) fn write(
     index: &Index,
     tables: &[Written],
 ) -> Result<bool, CatalogueError> {
-    for (path, schema) in SCHEMAS {
+    for (path, schema) in schema::files() {
         folder.write(path, schema.as_bytes())?;
     }
     let is_reused = changes::write(folder, index)?;

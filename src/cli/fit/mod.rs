@@ -26,9 +26,7 @@ use crate::units::watts_from_dbm;
 use save::{Saved, Target};
 use subject::Subject;
 
-/// Fit a scattering model to a curve, and say what the curve cannot tell
-#[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:
+const EXAMPLES_AND_METHODS: &str = "Examples:
   matdb fit curve.csv                           the paper's five parameters, censored likelihood
   matdb fit curve.csv --model mixture-ggx -o fit.svg
   matdb fit curve.csv --method tls-tail --alpha 3
@@ -42,8 +40,16 @@ use subject::Subject;
 
 Methods: censored (speckle and missing chirps by their laws), tls (orthogonal distance in dB),
 tls-tail (the same with alpha given), mse (least squares in two pieces).
-Models: a material's name, or blinn-phong, cook-torrance, cook-torrance-ggx, directive, fresnel,
-kirchhoff, kirchhoff-go, lambert, mixture, mixture-ggx.")]
+";
+
+fn after_help() -> String {
+    let models = model_names().collect::<Vec<_>>().join(", ");
+    format!("{EXAMPLES_AND_METHODS}Models: a material's name, or {models}.")
+}
+
+/// Fit a scattering model to a curve, and say what the curve cannot tell
+#[derive(Debug, clap::Args)]
+#[command(after_help = after_help())]
 pub(super) struct Args {
     /// A curve's CSV file, or NAME or NAME@REVISION of a material with a curve
     #[arg(value_name = "MATERIAL|CURVE.csv")]

@@ -110,15 +110,10 @@ fn half(point: &Point) -> [f64; 2] {
 
 /// What the Cook–Torrance lobes of a law give, each times a factor, 1/sr.
 fn lobes_per_sr(law: &Brdf, point: &Point, factor: &dyn Fn(&CookTorrance) -> f64) -> f64 {
-    match law {
-        Brdf::CookTorrance(lobe) => factor(lobe) * law.f_per_sr(point.i, point.o),
-        Brdf::Mixture(mixture) => {
-            mixture.k * lobes_per_sr(&mixture.diffuse, point, factor)
-                + (1.0 - mixture.k) * lobes_per_sr(&mixture.specular, point, factor)
-        }
-        Brdf::Sum(sum) => sum.parts.iter().map(|part| lobes_per_sr(part, point, factor)).sum(),
+    law.sum_over_parts(&|part| match part {
+        Brdf::CookTorrance(lobe) => factor(lobe) * part.f_per_sr(point.i, point.o),
         _ => 0.0,
-    }
+    })
 }
 
 struct DiffuseLobe;

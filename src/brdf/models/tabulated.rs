@@ -10,9 +10,23 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{Scattering, half_vector};
+use crate::brdf::kind::{Key, Kind};
+use crate::brdf::parameter::Visitor;
+use crate::brdf::scattering::{Scattering, ScatteringModel, half_vector};
 use crate::frames::{Direction, Surface};
 use crate::units::{db_from_ratio, ratio_from_db};
+
+pub(super) const KIND: Kind = Kind {
+    name: "tabulated",
+    keys: &[
+        Key::new("theta_deg", NUMBERS),
+        Key::new("sigma0_db", NUMBERS),
+        Key::number("silent_from_deg").optional(),
+    ],
+    starts: &[],
+};
+
+const NUMBERS: &str = r#"{"type": "array", "items": {"type": "number"}}"#;
 
 /// A monostatic curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -138,6 +152,15 @@ impl Scattering for Tabulated {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         let cos = half_vector(i, o).cos_theta().min(1.0);
         ratio_from_db(self.sigma0_db(cos.acos())) / (4.0 * std::f64::consts::PI * cos * cos)
+    }
+}
+
+impl ScatteringModel for Tabulated {
+    /// It has none.
+    fn visit_parameters(&mut self, _prefix: &str, _visitor: &mut Visitor) {}
+
+    fn has_curve(&self) -> bool {
+        true
     }
 }
 

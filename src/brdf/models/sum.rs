@@ -1,48 +1,75 @@
 //! f = Σ f_p: echoes of independent origin add in power.
 //!
-//! Nothing weighs the parts, so that each must carry its own level, and the energy of the sum is the
-//! sum of the energies: parts that reflect more than 1 together are the caller's to avoid.
+//! The parts have no weights: each carries its own level. The energy of the sum is the sum of the
+//! energies, so the caller must avoid parts that together reflect more than 1.
 
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
-use super::backscatter::{Term, together};
-use super::parameter::Visitor;
-use super::{Brdf, Scattering, f_and_specular_share};
+use super::weighted;
+use crate::brdf::backscatter::Term;
+use crate::brdf::kind::{Key, Kind};
+use crate::brdf::parameter::Visitor;
+use crate::brdf::scattering::{Scattering, ScatteringModel};
 use crate::frames::{Direction, Surface};
+
+pub(super) const KIND: Kind = Kind {
+    name: "sum",
+    keys: &[Key::new("parts", r##"{"type": "array", "items": {"$ref": "#/$defs/model"}}"##)],
+    starts: &[],
+};
 
 /// Several models at once, at least one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Sum {
+#[serde(deny_unknown_fields, bound(deserialize = "P: Deserialize<'de>"))]
+pub struct Sum<P> {
     /// The models, addressed by position from 0: `0.m`, `1.albedo`.
     #[serde(deserialize_with = "at_least_one")]
-    pub parts: Vec<Brdf>,
+    pub parts: Vec<P>,
 }
 
-impl Sum {
-    pub(super) fn visit(&mut self, prefix: &str, visitor: &mut Visitor) {
-        for (position, part) in self.parts.iter_mut().enumerate() {
-            part.visit(&format!("{prefix}{position}."), visitor);
-        }
+impl<P> Sum<P> {
+    /// Its parts with their weights, which all are 1.
+    pub fn weighted(&self) -> impl Iterator<Item = (f64, &P)> {
+        self.parts.iter().map(|part| (1.0, part))
     }
 }
 
-impl Scattering for Sum {
+impl<P: ScatteringModel> Scattering for Sum<P> {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         self.parts.iter().map(|part| part.f_per_sr(i, o)).sum()
     }
 
     fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
-        f_and_specular_share(self.parts.iter().map(|part| (1.0, part)), i, o)
+        weighted::f_and_specular_share(self.weighted(), i, o)
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {
-        together(self.parts.iter().map(|part| (1.0, part)))
+        weighted::backscatter(self.weighted())
     }
 }
 
-fn at_least_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Brdf>, D::Error> {
-    let parts = Vec::<Brdf>::deserialize(deserializer)?;
+impl<P: ScatteringModel> ScatteringModel for Sum<P> {
+    fn visit_parameters(&mut self, prefix: &str, visitor: &mut Visitor) {
+        for (position, part) in self.parts.iter_mut().enumerate() {
+            part.visit_parameters(&format!("{prefix}{position}."), visitor);
+        }
+    }
+
+    fn f_lambda(&self) -> Option<f64> {
+        self.parts.iter().find_map(P::f_lambda)
+    }
+
+    fn has_curve(&self) -> bool {
+        self.parts.iter().any(P::has_curve)
+    }
+}
+
+fn at_least_one<'de, P, D>(deserializer: D) -> Result<Vec<P>, D::Error>
+where
+    P: Deserialize<'de>,
+    D: Deserializer<'de>,
+{
+    let parts = Vec::<P>::deserialize(deserializer)?;
     if parts.is_empty() {
         return Err(D::Error::custom("a sum has no part; give it at least one"));
     }
@@ -52,7 +79,7 @@ fn at_least_one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Brdf>,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::{BlinnPhong, Lambert};
+    use crate::brdf::{BlinnPhong, Brdf, Lambert};
 
     #[test]
     fn levels_add_and_paths_count_the_parts() {

@@ -12,14 +12,32 @@
 //! tan²θ·(cos²φ/m² + sin²φ/m_across²), m² in front of D becomes m·m_across, and G1 takes the roughness
 //! in the azimuth of its direction, m²cos²φ + m_across²sin²φ (Heitz, JCGT 3-2 (2014) 48, §5.3–5.4).
 
-use std::f64::consts::PI;
-
 use serde::{Deserialize, Serialize};
 
-use super::backscatter::{Facets, Term};
-use super::parameter::{Visitor, visit_number};
-use super::{Scattering, half_vector};
+use crate::brdf::backscatter::{Facets, Term};
+use crate::brdf::kind::{Key, Kind};
+use crate::brdf::parameter::{Visitor, visit_number};
+use crate::brdf::scattering::{Scattering, ScatteringModel, half_vector};
+use crate::brdf::slopes::Distribution;
 use crate::frames::{Direction, Surface};
+
+pub(super) const KIND: Kind = Kind {
+    name: "cook-torrance",
+    keys: &[
+        Key::number("f_lambda"),
+        Key::number("m"),
+        Key::number("m_across").optional(),
+        Key::new("distribution", r#"{"enum": ["beckmann", "ggx"]}"#),
+        Key::new("shadowing", r#"{"enum": ["separable", "correlated"]}"#),
+    ],
+    starts: &[
+        ("cook-torrance", r#"{"model": "cook-torrance", "f_lambda": 0.05, "m": 0.1}"#),
+        (
+            "cook-torrance-ggx",
+            r#"{"model": "cook-torrance", "distribution": "ggx", "f_lambda": 0.05, "m": 0.1}"#,
+        ),
+    ],
+};
 
 /// The paper's specular term.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,17 +58,6 @@ pub struct CookTorrance {
     pub shadowing: Shadowing,
 }
 
-/// Law of the facet slopes, D(h).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Distribution {
-    /// Gaussian slopes: D = exp(−tan²θ/m²) / (π m² cos⁴θ).
-    #[default]
-    Beckmann,
-    /// Longer tails: D = m² / (π cos⁴θ (m² + tan²θ)²).
-    Ggx,
-}
-
 /// How the shadowing of i and the masking of o combine into G(i, o).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -63,14 +70,6 @@ pub enum Shadowing {
 }
 
 impl CookTorrance {
-    pub(super) fn visit(&mut self, prefix: &str, visitor: &mut Visitor) {
-        visit_number(visitor, prefix, "f_lambda", (0.0, 1.0), &mut self.f_lambda);
-        visit_number(visitor, prefix, "m", (0.001, 2.0), &mut self.m);
-        if let Some(m_across) = &mut self.m_across {
-            visit_number(visitor, prefix, "m_across", (0.001, 2.0), m_across);
-        }
-    }
-
     /// D(h), facet normals per steradian.
     fn d_per_sr(&self, h: Direction<Surface>) -> f64 {
         let Some(m_across) = self.m_across else {
@@ -112,6 +111,10 @@ impl Scattering for CookTorrance {
         f * d * self.shadowing(i, o) / (4.0 * i.cos_theta() * o.cos_theta())
     }
 
+    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        (self.f_per_sr(i, o), 1.0)
+    }
+
     fn backscatter(&self) -> Option<Vec<Term>> {
         let shadowed = match self.shadowing {
             Shadowing::Separable => 2,
@@ -122,52 +125,17 @@ impl Scattering for CookTorrance {
     }
 }
 
-impl Distribution {
-    /// D(h), facet normals per steradian, normalised so that ∫ D cos θ_h dω_h = 1.
-    pub fn d_per_sr(self, cos_theta: f64, m: f64) -> f64 {
-        if cos_theta <= 0.0 {
-            return 0.0;
-        }
-        let cos2 = cos_theta * cos_theta;
-        let (m2, tan2) = (m * m, (1.0 - cos2).max(0.0) / cos2);
-        match self {
-            Distribution::Beckmann => (-tan2 / m2).exp() / (PI * m2 * cos2 * cos2),
-            Distribution::Ggx => m2 / (PI * cos2 * cos2 * (m2 + tan2).powi(2)),
+impl ScatteringModel for CookTorrance {
+    fn visit_parameters(&mut self, prefix: &str, visitor: &mut Visitor) {
+        visit_number(visitor, prefix, "f_lambda", (0.0, 1.0), &mut self.f_lambda);
+        visit_number(visitor, prefix, "m", (0.001, 2.0), &mut self.m);
+        if let Some(m_across) = &mut self.m_across {
+            visit_number(visitor, prefix, "m_across", (0.001, 2.0), m_across);
         }
     }
 
-    /// D(h) with a roughness along x and one along y, normalised alike.
-    pub fn d_anisotropic_per_sr(self, h: Direction<Surface>, [m_x, m_y]: [f64; 2]) -> f64 {
-        if h.cos_theta() <= 0.0 {
-            return 0.0;
-        }
-        let h = h.xyz();
-        let slope2 = ((h.x / m_x).powi(2) + (h.y / m_y).powi(2)) / (h.z * h.z);
-        let law = match self {
-            Distribution::Beckmann => (-slope2).exp(),
-            Distribution::Ggx => (1.0 + slope2).powi(-2),
-        };
-        law / (PI * m_x * m_y * h.z.powi(4))
-    }
-
-    /// Smith's G1: the share of facets that a direction sees, 0 to 1.
-    ///
-    /// Beckmann uses Walter's rational approximation (relative error below 0.35 %).
-    pub fn g1(self, cos_theta: f64, m: f64) -> f64 {
-        if cos_theta <= 0.0 {
-            return 0.0;
-        }
-        let tan = (1.0 - cos_theta * cos_theta).max(0.0).sqrt() / cos_theta;
-        match self {
-            Distribution::Beckmann => {
-                let a = 1.0 / (m * tan);
-                if a >= 1.6 {
-                    return 1.0;
-                }
-                (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a)
-            }
-            Distribution::Ggx => 2.0 / (1.0 + (1.0 + (m * tan).powi(2)).sqrt()),
-        }
+    fn f_lambda(&self) -> Option<f64> {
+        Some(self.f_lambda)
     }
 }
 
@@ -188,6 +156,8 @@ fn azimuth_between_rad(i: Direction<Surface>, o: Direction<Surface>) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     fn paint(distribution: Distribution, shadowing: Shadowing) -> CookTorrance {

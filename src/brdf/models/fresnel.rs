@@ -12,14 +12,21 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Scattering;
-use super::backscatter::Term;
-use super::parameter::Visitor;
-use super::permittivity::{
-    LOBE_RANGE_RAD, default_lobe_rad, fresnel_reflectance, mirror_lobe, mirror_lobe_per_sr,
-    permittivity, visit_permittivity, visit_quantity,
+use crate::brdf::backscatter::Term;
+use crate::brdf::kind::{Key, Kind};
+use crate::brdf::parameter::{Visitor, visit_quantity};
+use crate::brdf::permittivity::{
+    EPS_IMAG, EPS_REAL, LOBE_RANGE_RAD, default_lobe_rad, fresnel_reflectance, mirror_lobe,
+    mirror_lobe_per_sr, permittivity, visit_permittivity,
 };
+use crate::brdf::scattering::{Scattering, ScatteringModel};
 use crate::frames::{Direction, Surface};
+
+pub(super) const KIND: Kind = Kind {
+    name: "fresnel",
+    keys: &[EPS_REAL, EPS_IMAG, Key::number("lobe_rad")],
+    starts: &[("fresnel", r#"{"model": "fresnel", "eps_real": 3}"#)],
+};
 
 /// A smooth dielectric or metal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,12 +43,6 @@ pub struct Fresnel {
 }
 
 impl Fresnel {
-    pub(super) fn visit(&mut self, prefix: &str, visitor: &mut Visitor) {
-        visit_permittivity(visitor, prefix, &mut self.eps_real, &mut self.eps_imag);
-        let slot = &mut self.lobe_rad;
-        visit_quantity(visitor, prefix, ("lobe_rad", "rad"), LOBE_RANGE_RAD, slot);
-    }
-
     /// Share of unpolarised power reflected at an angle from the normal, 0 to 1.
     pub fn reflectance(&self, theta_rad: f64) -> f64 {
         fresnel_reflectance(permittivity(self.eps_real, self.eps_imag), theta_rad.cos())
@@ -54,15 +55,35 @@ impl Scattering for Fresnel {
         mirror_lobe_per_sr(i, o, self.lobe_rad, |cos| fresnel_reflectance(eps, cos))
     }
 
+    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        (self.f_per_sr(i, o), 1.0)
+    }
+
     fn backscatter(&self) -> Option<Vec<Term>> {
         Some(vec![mirror_lobe(self.lobe_rad, self.reflectance(0.0))])
     }
 }
 
+impl ScatteringModel for Fresnel {
+    fn visit_parameters(&mut self, prefix: &str, visitor: &mut Visitor) {
+        visit_permittivity(visitor, prefix, &mut self.eps_real, &mut self.eps_imag);
+        let slot = &mut self.lobe_rad;
+        visit_quantity(visitor, prefix, "lobe_rad", "rad", LOBE_RANGE_RAD, slot);
+    }
+
+    fn is_smooth(&self) -> bool {
+        true
+    }
+
+    fn permittivity(&self) -> Option<[f64; 2]> {
+        Some([self.eps_real, self.eps_imag])
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::permittivity::{Polarisation, interface, normal_wavenumber};
     use super::*;
+    use crate::brdf::permittivity::{Polarisation, interface, normal_wavenumber};
     use crate::units::db_from_ratio;
     use nalgebra::Complex;
 

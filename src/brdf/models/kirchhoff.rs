@@ -25,14 +25,32 @@ use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
-use super::Scattering;
-use super::layered::{default_frequency_hz, wavenumber_rad_per_m};
-use super::parameter::Visitor;
-use super::permittivity::{
-    LOBE_RANGE_RAD, default_lobe_rad, fresnel_reflectance, mirror_cosine, mirror_lobe_per_sr,
-    permittivity, visit_permittivity, visit_quantity,
+use crate::brdf::kind::{Key, Kind};
+use crate::brdf::parameter::{Visitor, visit_quantity};
+use crate::brdf::permittivity::{
+    EPS_IMAG, EPS_REAL, LOBE_RANGE_RAD, default_frequency_hz, default_lobe_rad,
+    fresnel_reflectance, mirror_cosine, mirror_lobe_per_sr, permittivity, visit_permittivity,
+    wavenumber_rad_per_m,
 };
+use crate::brdf::scattering::{Scattering, ScatteringModel};
 use crate::frames::{Direction, Surface};
+
+pub(super) const KIND: Kind = Kind {
+    name: "kirchhoff",
+    keys: &[
+        Key::number("rms_height_m"),
+        Key::number("correlation_length_m"),
+        Key::new("correlation", r#"{"enum": ["gaussian", "exponential"]}"#),
+        EPS_REAL,
+        EPS_IMAG,
+        Key::number("frequency_hz"),
+        Key::number("lobe_rad"),
+    ],
+    starts: &[(
+        "kirchhoff",
+        r#"{"model": "kirchhoff", "rms_height_m": 5e-5, "correlation_length_m": 5e-4, "eps_real": 3}"#,
+    )],
+};
 
 /// A rough surface by its statistics.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,15 +93,6 @@ const LENGTH_RANGE_M: (f64, f64) = (1e-5, 0.1);
 const FREQUENCY_RANGE_HZ: (f64, f64) = (1e10, 1e12);
 
 impl Kirchhoff {
-    pub(super) fn visit(&mut self, prefix: &str, visitor: &mut Visitor) {
-        let mut quantity = |of, range, slot| visit_quantity(visitor, prefix, of, range, slot);
-        quantity(("rms_height_m", "m"), HEIGHT_RANGE_M, &mut self.rms_height_m);
-        quantity(("correlation_length_m", "m"), LENGTH_RANGE_M, &mut self.correlation_length_m);
-        quantity(("frequency_hz", "Hz"), FREQUENCY_RANGE_HZ, &mut self.frequency_hz);
-        quantity(("lobe_rad", "rad"), LOBE_RANGE_RAD, &mut self.lobe_rad);
-        visit_permittivity(visitor, prefix, &mut self.eps_real, &mut self.eps_imag);
-    }
-
     fn eps(&self) -> Complex<f64> {
         permittivity(self.eps_real, self.eps_imag)
     }
@@ -111,6 +120,28 @@ impl Kirchhoff {
 impl Scattering for Kirchhoff {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         self.incoherent_per_sr(i, o) + self.coherent_per_sr(i, o)
+    }
+
+    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        (self.f_per_sr(i, o), 1.0)
+    }
+}
+
+impl ScatteringModel for Kirchhoff {
+    fn visit_parameters(&mut self, prefix: &str, visitor: &mut Visitor) {
+        for (name, unit, range, slot) in [
+            ("rms_height_m", "m", HEIGHT_RANGE_M, &mut self.rms_height_m),
+            ("correlation_length_m", "m", LENGTH_RANGE_M, &mut self.correlation_length_m),
+            ("frequency_hz", "Hz", FREQUENCY_RANGE_HZ, &mut self.frequency_hz),
+            ("lobe_rad", "rad", LOBE_RANGE_RAD, &mut self.lobe_rad),
+        ] {
+            visit_quantity(visitor, prefix, name, unit, range, slot);
+        }
+        visit_permittivity(visitor, prefix, &mut self.eps_real, &mut self.eps_imag);
+    }
+
+    fn permittivity(&self) -> Option<[f64; 2]> {
+        Some([self.eps_real, self.eps_imag])
     }
 }
 

@@ -14,14 +14,43 @@
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 
-use super::Scattering;
-use super::backscatter::Term;
-use super::parameter::Visitor;
-use super::permittivity::{
-    LOBE_RANGE_RAD, Polarisation, default_lobe_rad, interface, mirror_lobe, mirror_lobe_per_sr,
-    normal_wavenumber, permittivity, unpolarised, visit_permittivity, visit_quantity,
+use crate::brdf::backscatter::Term;
+use crate::brdf::kind::{Key, Kind};
+use crate::brdf::parameter::{Visitor, visit_quantity};
+use crate::brdf::permittivity::{
+    EPS_IMAG, EPS_REAL, LOBE_RANGE_RAD, Polarisation, default_frequency_hz, default_lobe_rad,
+    interface, mirror_lobe, mirror_lobe_per_sr, normal_wavenumber, permittivity, unpolarised,
+    visit_permittivity, wavenumber_rad_per_m,
 };
+use crate::brdf::scattering::{Scattering, ScatteringModel};
 use crate::frames::{Direction, Surface};
+
+pub(super) const KIND: Kind = Kind {
+    name: "layered",
+    keys: &[
+        Key::new("layers", LAYERS_SCHEMA),
+        EPS_REAL,
+        EPS_IMAG,
+        Key::number("frequency_hz"),
+        Key::number("lobe_rad"),
+    ],
+    starts: &[],
+};
+
+/// As deep as it stands in the schema of a material.
+const LAYERS_SCHEMA: &str = r#"{
+              "type": "array",
+              "items": {
+                "type": "object",
+                "additionalProperties": false,
+                "required": ["thickness_m", "eps_real", "eps_imag"],
+                "properties": {
+                  "thickness_m": {"type": "number"},
+                  "eps_real": {"type": "number", "description": "relative permittivity, real part"},
+                  "eps_imag": {"type": "number", "description": "imaginary part, 0 or more, for exp(+jwt)"}
+                }
+              }
+            }"#;
 
 /// Layers on a substrate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,35 +84,10 @@ pub struct Layer {
     pub eps_imag: f64,
 }
 
-pub(super) const FREQUENCY_RANGE_HZ: (f64, f64) = (1e10, 1e13);
+const FREQUENCY_RANGE_HZ: (f64, f64) = (1e10, 1e13);
 const THICKNESS_RANGE_M: (f64, f64) = (0.0, 0.1);
 
-pub(super) fn default_frequency_hz() -> f64 {
-    300e9
-}
-
-/// k₀ = 2π·f/c, rad/m.
-pub(super) fn wavenumber_rad_per_m(frequency_hz: f64) -> f64 {
-    std::f64::consts::TAU * frequency_hz / SPEED_OF_LIGHT_M_PER_S
-}
-
-const SPEED_OF_LIGHT_M_PER_S: f64 = 299_792_458.0;
-
 impl Layered {
-    pub(super) fn visit(&mut self, prefix: &str, visitor: &mut Visitor) {
-        for (position, layer) in self.layers.iter_mut().enumerate() {
-            let prefix = format!("{prefix}layers.{position}.");
-            let slot = &mut layer.thickness_m;
-            visit_quantity(visitor, &prefix, ("thickness_m", "m"), THICKNESS_RANGE_M, slot);
-            visit_permittivity(visitor, &prefix, &mut layer.eps_real, &mut layer.eps_imag);
-        }
-        visit_permittivity(visitor, prefix, &mut self.eps_real, &mut self.eps_imag);
-        let slot = &mut self.frequency_hz;
-        visit_quantity(visitor, prefix, ("frequency_hz", "Hz"), FREQUENCY_RANGE_HZ, slot);
-        let slot = &mut self.lobe_rad;
-        visit_quantity(visitor, prefix, ("lobe_rad", "rad"), LOBE_RANGE_RAD, slot);
-    }
-
     /// Share of unpolarised power reflected at an angle from the normal, 0 to 1.
     pub fn reflectance(&self, theta_rad: f64) -> f64 {
         self.reflectance_at(theta_rad.cos())
@@ -123,8 +127,37 @@ impl Scattering for Layered {
         mirror_lobe_per_sr(i, o, self.lobe_rad, |cos| self.reflectance_at(cos))
     }
 
+    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        (self.f_per_sr(i, o), 1.0)
+    }
+
     fn backscatter(&self) -> Option<Vec<Term>> {
         Some(vec![mirror_lobe(self.lobe_rad, self.reflectance_at(1.0))])
+    }
+}
+
+impl ScatteringModel for Layered {
+    fn visit_parameters(&mut self, prefix: &str, visitor: &mut Visitor) {
+        for (position, layer) in self.layers.iter_mut().enumerate() {
+            let prefix = format!("{prefix}layers.{position}.");
+            let slot = &mut layer.thickness_m;
+            visit_quantity(visitor, &prefix, "thickness_m", "m", THICKNESS_RANGE_M, slot);
+            visit_permittivity(visitor, &prefix, &mut layer.eps_real, &mut layer.eps_imag);
+        }
+        visit_permittivity(visitor, prefix, &mut self.eps_real, &mut self.eps_imag);
+        let slot = &mut self.frequency_hz;
+        visit_quantity(visitor, prefix, "frequency_hz", "Hz", FREQUENCY_RANGE_HZ, slot);
+        let slot = &mut self.lobe_rad;
+        visit_quantity(visitor, prefix, "lobe_rad", "rad", LOBE_RANGE_RAD, slot);
+    }
+
+    fn is_smooth(&self) -> bool {
+        true
+    }
+
+    fn permittivity(&self) -> Option<[f64; 2]> {
+        let substrate = [self.eps_real, self.eps_imag];
+        Some(self.layers.first().map_or(substrate, |layer| [layer.eps_real, layer.eps_imag]))
     }
 }
 
@@ -132,6 +165,7 @@ impl Scattering for Layered {
 mod tests {
     use super::*;
     use crate::brdf::Fresnel;
+    use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
     const GLASS: f64 = 5.79;
     const ANGLES_RAD: [f64; 5] = [0.0, 0.3, 0.8, 1.2, 1.5];
@@ -181,7 +215,7 @@ mod tests {
     fn the_recursion_is_the_product_of_matrices() {
         let model = coated(&[(130e-6, 2.6, 0.1), (400e-6, 1.5, 0.02), (50e-6, 9.0, 1.0)]);
         for cos in ANGLES_RAD.map(f64::cos) {
-            for polarisation in super::super::permittivity::BOTH {
+            for polarisation in crate::brdf::permittivity::BOTH {
                 let found = model.amplitude(polarisation, cos).norm();
                 let expected = by_matrices(&model, polarisation, cos).norm();
                 assert!((found - expected).abs() < 1e-12, "{polarisation:?} {cos}");
@@ -228,7 +262,7 @@ mod tests {
             for theta_rad in ANGLES_RAD {
                 let lossless = Layered { eps_imag: 0.0, ..coated(&layers) };
                 for model in [lossless, coated(&layers)] {
-                    for polarisation in super::super::permittivity::BOTH {
+                    for polarisation in crate::brdf::permittivity::BOTH {
                         let r = model.amplitude(polarisation, theta_rad.cos()).norm_sqr();
                         assert!(r <= 1.0 + 1e-12, "{thickness_m} {theta_rad}: {r}");
                     }

@@ -8,10 +8,17 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use super::backscatter::Term;
-use super::parameter::{Visitor, visit_number};
-use super::{Scattering, half_vector};
+use crate::brdf::backscatter::Term;
+use crate::brdf::kind::{Key, Kind};
+use crate::brdf::parameter::{Visitor, visit_number};
+use crate::brdf::scattering::{Scattering, ScatteringModel, half_vector};
 use crate::frames::{Direction, Surface};
+
+pub(super) const KIND: Kind = Kind {
+    name: "blinn-phong",
+    keys: &[Key::number("r_s"), Key::number("alpha")],
+    starts: &[("blinn-phong", r#"{"model": "blinn-phong", "r_s": 0.05, "alpha": 3}"#)],
+};
 
 /// The paper's diffuse term.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,13 +30,6 @@ pub struct BlinnPhong {
     pub alpha: f64,
 }
 
-impl BlinnPhong {
-    pub(super) fn visit(&mut self, prefix: &str, visitor: &mut Visitor) {
-        visit_number(visitor, prefix, "r_s", (0.0, 1.0), &mut self.r_s);
-        visit_number(visitor, prefix, "alpha", (0.0, 1000.0), &mut self.alpha);
-    }
-}
-
 impl Scattering for BlinnPhong {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         let n_h = half_vector(i, o).cos_theta();
@@ -38,6 +38,13 @@ impl Scattering for BlinnPhong {
 
     fn backscatter(&self) -> Option<Vec<Term>> {
         Some(vec![Term::diffuse(self.r_s * (self.alpha + 2.0) / TAU, self.alpha)])
+    }
+}
+
+impl ScatteringModel for BlinnPhong {
+    fn visit_parameters(&mut self, prefix: &str, visitor: &mut Visitor) {
+        visit_number(visitor, prefix, "r_s", (0.0, 1.0), &mut self.r_s);
+        visit_number(visitor, prefix, "alpha", (0.0, 1000.0), &mut self.alpha);
     }
 }
 

@@ -5,10 +5,17 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Scattering;
-use super::backscatter::Term;
-use super::parameter::{Visitor, visit_number};
+use crate::brdf::backscatter::Term;
+use crate::brdf::kind::{Key, Kind};
+use crate::brdf::parameter::{Visitor, visit_number};
+use crate::brdf::scattering::{Scattering, ScatteringModel};
 use crate::frames::{Direction, Surface};
+
+pub(super) const KIND: Kind = Kind {
+    name: "lambert",
+    keys: &[Key::number("albedo")],
+    starts: &[("lambert", r#"{"model": "lambert", "albedo": 0.1}"#)],
+};
 
 /// A perfectly diffuse surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -18,12 +25,6 @@ pub struct Lambert {
     pub albedo: f64,
 }
 
-impl Lambert {
-    pub(super) fn visit(&mut self, prefix: &str, visitor: &mut Visitor) {
-        visit_number(visitor, prefix, "albedo", (0.0, 1.0), &mut self.albedo);
-    }
-}
-
 impl Scattering for Lambert {
     fn f_per_sr(&self, _i: Direction<Surface>, _o: Direction<Surface>) -> f64 {
         self.albedo / std::f64::consts::PI
@@ -31,5 +32,11 @@ impl Scattering for Lambert {
 
     fn backscatter(&self) -> Option<Vec<Term>> {
         Some(vec![Term::diffuse(self.albedo / std::f64::consts::PI, 0.0)])
+    }
+}
+
+impl ScatteringModel for Lambert {
+    fn visit_parameters(&mut self, prefix: &str, visitor: &mut Visitor) {
+        visit_number(visitor, prefix, "albedo", (0.0, 1.0), &mut self.albedo);
     }
 }

@@ -10,11 +10,21 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::backscatter::{Facets, Term};
-use super::parameter::{Visitor, visit_number};
-use super::permittivity::{fresnel_reflectance, mirror_cosine, permittivity, visit_permittivity};
-use super::{Distribution, Scattering, half_vector};
+use crate::brdf::backscatter::{Facets, Term};
+use crate::brdf::kind::{Key, Kind};
+use crate::brdf::parameter::{Visitor, visit_number};
+use crate::brdf::permittivity::{
+    EPS_IMAG, EPS_REAL, fresnel_reflectance, mirror_cosine, permittivity, visit_permittivity,
+};
+use crate::brdf::scattering::{Scattering, ScatteringModel, half_vector};
+use crate::brdf::slopes::Distribution;
 use crate::frames::{Direction, Surface};
+
+pub(super) const KIND: Kind = Kind {
+    name: "kirchhoff-go",
+    keys: &[Key::number("rms_slope"), EPS_REAL, EPS_IMAG],
+    starts: &[("kirchhoff-go", r#"{"model": "kirchhoff-go", "rms_slope": 0.2, "eps_real": 3}"#)],
+};
 
 /// Facets with Gaussian slopes, each a mirror.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,13 +39,6 @@ pub struct KirchhoffGo {
     pub eps_imag: f64,
 }
 
-impl KirchhoffGo {
-    pub(super) fn visit(&mut self, prefix: &str, visitor: &mut Visitor) {
-        visit_number(visitor, prefix, "rms_slope", (0.001, 1.0), &mut self.rms_slope);
-        visit_permittivity(visitor, prefix, &mut self.eps_real, &mut self.eps_imag);
-    }
-}
-
 impl Scattering for KirchhoffGo {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         let m = std::f64::consts::SQRT_2 * self.rms_slope;
@@ -45,11 +48,26 @@ impl Scattering for KirchhoffGo {
         reflectance * d_per_sr / (4.0 * i.cos_theta() * o.cos_theta())
     }
 
+    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        (self.f_per_sr(i, o), 1.0)
+    }
+
     fn backscatter(&self) -> Option<Vec<Term>> {
         let m = std::f64::consts::SQRT_2 * self.rms_slope;
         let facets = Facets { m, distribution: Distribution::Beckmann, shadowed: 0 };
         let eps = permittivity(self.eps_real, self.eps_imag);
         Some(vec![Term::mirrors(fresnel_reflectance(eps, 1.0), facets)])
+    }
+}
+
+impl ScatteringModel for KirchhoffGo {
+    fn visit_parameters(&mut self, prefix: &str, visitor: &mut Visitor) {
+        visit_number(visitor, prefix, "rms_slope", (0.001, 1.0), &mut self.rms_slope);
+        visit_permittivity(visitor, prefix, &mut self.eps_real, &mut self.eps_imag);
+    }
+
+    fn permittivity(&self) -> Option<[f64; 2]> {
+        Some([self.eps_real, self.eps_imag])
     }
 }
 

@@ -17,9 +17,24 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use serde::{Deserialize, Serialize};
 
-use super::Scattering;
-use super::parameter::{Visitor, visit_number};
+use crate::brdf::kind::{Key, Kind};
+use crate::brdf::parameter::{Visitor, visit_number};
+use crate::brdf::scattering::{Scattering, ScatteringModel};
 use crate::frames::{Direction, Surface};
+
+pub(super) const KIND: Kind = Kind {
+    name: "directive",
+    keys: &[
+        Key::number("s"),
+        Key::number("alpha_r"),
+        Key::number("lambda"),
+        Key::number("alpha_i"),
+    ],
+    starts: &[(
+        "directive",
+        r#"{"model": "directive", "s": 0.3, "alpha_r": 4, "lambda": 0.5, "alpha_i": 4}"#,
+    )],
+};
 
 /// Diffuse scattering in a lobe about the mirror direction and one about the way back.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,13 +59,6 @@ fn one() -> f64 {
 const ALPHA_RANGE: (f64, f64) = (1.0, 200.0);
 
 impl Directive {
-    pub(super) fn visit(&mut self, prefix: &str, visitor: &mut Visitor) {
-        visit_number(visitor, prefix, "s", (0.0, 1.0), &mut self.s);
-        visit_number(visitor, prefix, "alpha_r", ALPHA_RANGE, &mut self.alpha_r);
-        visit_number(visitor, prefix, "lambda", (0.0, 1.0), &mut self.lambda);
-        visit_number(visitor, prefix, "alpha_i", ALPHA_RANGE, &mut self.alpha_i);
-    }
-
     /// L, 1 at most.
     fn lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         let lobe = |cos_psi: f64, alpha: f64| ((1.0 + cos_psi) / 2.0).clamp(0.0, 1.0).powf(alpha);
@@ -74,6 +82,15 @@ impl Scattering for Directive {
         let there = self.norm_sr(i.cos_theta()) * o.cos_theta();
         let back = self.norm_sr(o.cos_theta()) * i.cos_theta();
         self.s * self.s * self.lobes(i, o) / there.max(back)
+    }
+}
+
+impl ScatteringModel for Directive {
+    fn visit_parameters(&mut self, prefix: &str, visitor: &mut Visitor) {
+        visit_number(visitor, prefix, "s", (0.0, 1.0), &mut self.s);
+        visit_number(visitor, prefix, "alpha_r", ALPHA_RANGE, &mut self.alpha_r);
+        visit_number(visitor, prefix, "lambda", (0.0, 1.0), &mut self.lambda);
+        visit_number(visitor, prefix, "alpha_i", ALPHA_RANGE, &mut self.alpha_i);
     }
 }
 

@@ -1,0 +1,89 @@
+//! Equation (12): f = k·f_d + (1 − k)·f_s.
+//!
+//! A monostatic measurement does not determine k apart from the levels of the two parts: it determines
+//! only the products k·r_s and (1 − k)·f_λ.
+
+use serde::{Deserialize, Serialize};
+
+use super::weighted;
+use crate::brdf::backscatter::Term;
+use crate::brdf::kind::{Key, Kind};
+use crate::brdf::parameter::{Visitor, visit_number};
+use crate::brdf::scattering::{Scattering, ScatteringModel};
+use crate::frames::{Direction, Surface};
+
+pub(super) const KIND: Kind = Kind {
+    name: "mixture",
+    keys: &[
+        Key::number("k"),
+        Key::new("diffuse", weighted::PART_SCHEMA),
+        Key::new("specular", weighted::PART_SCHEMA),
+    ],
+    starts: &[
+        (
+            "mixture",
+            r#"{"model": "mixture", "k": 0.1,
+            "specular": {"model": "cook-torrance", "f_lambda": 0.05, "m": 0.1},
+            "diffuse": {"model": "blinn-phong", "r_s": 0.04, "alpha": 3}}"#,
+        ),
+        (
+            "mixture-ggx",
+            r#"{"model": "mixture", "k": 0.1,
+            "specular": {"model": "cook-torrance", "distribution": "ggx", "f_lambda": 0.05, "m": 0.1},
+            "diffuse": {"model": "blinn-phong", "r_s": 0.04, "alpha": 3}}"#,
+        ),
+    ],
+};
+
+/// A diffuse and a specular part.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Mixture<P> {
+    /// Share of the diffuse part k, 0 to 1.
+    pub k: f64,
+    /// f_d.
+    pub diffuse: Box<P>,
+    /// f_s.
+    pub specular: Box<P>,
+}
+
+impl<P> Mixture<P> {
+    /// Its parts with their weights.
+    pub fn weighted(&self) -> impl Iterator<Item = (f64, &P)> {
+        [(self.k, &*self.diffuse), (1.0 - self.k, &*self.specular)].into_iter()
+    }
+}
+
+impl<P: ScatteringModel> Scattering for Mixture<P> {
+    fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        self.k * self.diffuse.f_per_sr(i, o) + (1.0 - self.k) * self.specular.f_per_sr(i, o)
+    }
+
+    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        weighted::f_and_specular_share(self.weighted(), i, o)
+    }
+
+    fn backscatter(&self) -> Option<Vec<Term>> {
+        weighted::backscatter(self.weighted())
+    }
+}
+
+impl<P: ScatteringModel> ScatteringModel for Mixture<P> {
+    fn visit_parameters(&mut self, prefix: &str, visitor: &mut Visitor) {
+        visit_number(visitor, prefix, "k", (0.0, 1.0), &mut self.k);
+        self.diffuse.visit_parameters(&format!("{prefix}diffuse."), visitor);
+        self.specular.visit_parameters(&format!("{prefix}specular."), visitor);
+    }
+
+    fn permittivity(&self) -> Option<[f64; 2]> {
+        self.specular.permittivity().or_else(|| self.diffuse.permittivity())
+    }
+
+    fn f_lambda(&self) -> Option<f64> {
+        self.specular.f_lambda().or_else(|| self.diffuse.f_lambda())
+    }
+
+    fn has_curve(&self) -> bool {
+        self.diffuse.has_curve() || self.specular.has_curve()
+    }
+}

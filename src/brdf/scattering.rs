@@ -1,0 +1,88 @@
+//! What every scattering model answers, and what models with parameters answer besides.
+
+use super::backscatter::Term;
+use super::parameter::Visitor;
+use crate::frames::{Direction, Surface};
+
+/// Anything that scatters. A closure `Fn(i, o) -> f` is one, so a caller's own model needs no type.
+///
+/// ```
+/// use matdb::brdf::Scattering;
+/// use matdb::frames::{Direction, Surface};
+/// let mine = |i: Direction<Surface>, o: Direction<Surface>| 0.1 * i.cos_theta() * o.cos_theta();
+/// assert!((mine.retro_per_sr(0.0) - 0.1).abs() < 1e-15);
+/// ```
+pub trait Scattering: Sync {
+    /// f(i, o), 1/sr: reflected radiance per incident irradiance, equation (9). Both directions lie above
+    /// the horizon.
+    fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64;
+
+    /// f(i, o), 1/sr, and the share of it, 0 to 1, that facets reflect like mirrors, rough or not; the
+    /// rest is diffuse. A model without facets, such as a closure or a measured curve, counts as diffuse.
+    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        (self.f_per_sr(i, o), 0.0)
+    }
+
+    /// The second of [`f_and_specular_share`](Scattering::f_and_specular_share).
+    fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        self.f_and_specular_share(i, o).1
+    }
+
+    /// f in exact backscatter as a sum of closed forms; `None` for a model whose f depends on the azimuth,
+    /// or that has no such sum.
+    fn backscatter(&self) -> Option<Vec<Term>> {
+        None
+    }
+
+    /// f in exact backscatter at incidence `theta_rad`, 1/sr.
+    fn retro_per_sr(&self, theta_rad: f64) -> f64 {
+        let i = Direction::from_angles(theta_rad, 0.0);
+        self.f_per_sr(i, i)
+    }
+
+    /// Equation (10): differential scattering coefficient σ⁰(θ) = 4π·f(θ)·cos²θ, a pure number.
+    fn sigma0(&self, theta_rad: f64) -> f64 {
+        4.0 * std::f64::consts::PI * self.retro_per_sr(theta_rad) * theta_rad.cos().powi(2)
+    }
+}
+
+impl<F> Scattering for F
+where
+    F: Fn(Direction<Surface>, Direction<Surface>) -> f64 + Sync,
+{
+    fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        self(i, o)
+    }
+}
+
+/// A model with parameters that can be stored; what is special about a kind of model is overridden in its
+/// file.
+pub trait ScatteringModel: Scattering {
+    /// Calls the visitor for every parameter, in a fixed order; `prefix` begins the path of each.
+    fn visit_parameters(&mut self, prefix: &str, visitor: &mut Visitor);
+
+    /// Whether the surface is smooth: all that it reflects is the lobe of a mirror.
+    fn is_smooth(&self) -> bool {
+        false
+    }
+
+    /// ε′ and ε″ of the outermost medium, where they are parameters.
+    fn permittivity(&self) -> Option<[f64; 2]> {
+        None
+    }
+
+    /// Reflectivity f_λ of the facets at normal incidence, 0 to 1, where it is a parameter.
+    fn f_lambda(&self) -> Option<f64> {
+        None
+    }
+
+    /// Whether it is a measured curve or has one as a part.
+    fn has_curve(&self) -> bool {
+        false
+    }
+}
+
+/// h = (i + o)/|i + o|, the normal of a facet that would mirror i into o.
+pub(super) fn half_vector(i: Direction<Surface>, o: Direction<Surface>) -> Direction<Surface> {
+    Direction::new(i.xyz() + o.xyz()).unwrap_or(i)
+}
