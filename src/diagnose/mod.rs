@@ -530,7 +530,7 @@ fn values(
         let value = |((knob, value), sd): ((&EffectParameter, f64), &f64)| {
             (knob.name, Value { value, sd: finite(sd * knob.step), unit: knob.unit })
         };
-        let parameters = Parameters::new(knobs.map(value).collect(), place, problem.shots);
+        let parameters = Parameters::new(*effect, knobs.map(value).collect(), place, problem.shots);
         let select::Added { class, evidence, .. } = added;
         Found { name: effect.name(), level: effect.level(), class, parameters, place, evidence }
     });

@@ -2,7 +2,7 @@
 //!
 //! What it gains is what as many free numbers gain by following noise, or whatever else is missing.
 
-use crate::effects::{Effect, EffectParameter, Level, Shot, Stage};
+use crate::effects::{About, Effect, EffectParameter, Level, Shot, Stage};
 use crate::radar::random::{Key, Purpose};
 
 /// Most numbers of a placebo.
@@ -17,7 +17,17 @@ const WAVES_M: [f64; 2] = [0.2, 1.0];
 pub(super) struct Placebo {
     /// Phase, rad, and its slopes by x_t and y_t, rad/m.
     waves: Vec<[f64; 3]>,
+    about: About,
 }
+
+const ABOUT: About = About {
+    name: "placebo",
+    level: Level::Instrument,
+    description: "A control: random waves that stand for no physics.",
+    signature: "What as many free numbers gain by chance.",
+    parameters: &KNOBS,
+    conflicts: &[],
+};
 
 impl Placebo {
     /// With up to six numbers.
@@ -30,29 +40,15 @@ impl Placebo {
             let rate = std::f64::consts::TAU / length_m;
             [phase, rate * turn.cos(), rate * turn.sin()]
         };
-        Placebo { waves: (0..numbers.clamp(1, MOST)).map(wave).collect() }
+        let waves: Vec<[f64; 3]> = (0..numbers.clamp(1, MOST)).map(wave).collect();
+        let parameters = KNOBS.get(..waves.len()).unwrap_or(&KNOBS);
+        Placebo { waves, about: About { parameters, ..ABOUT } }
     }
 }
 
 impl Effect for Placebo {
-    fn name(&self) -> &'static str {
-        "placebo"
-    }
-
-    fn level(&self) -> Level {
-        Level::Instrument
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        KNOBS.get(..self.waves.len()).unwrap_or(&KNOBS)
-    }
-
-    fn description(&self) -> &'static str {
-        "A control: random waves that stand for no physics."
-    }
-
-    fn signature(&self) -> &'static str {
-        "What as many free numbers gain by chance."
+    fn about(&self) -> &About {
+        &self.about
     }
 
     fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {

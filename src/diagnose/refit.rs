@@ -130,7 +130,7 @@ impl<'a> Space<'a> {
         let mut costly = Vec::new();
         for (effect, values) in self.effects.iter().zip(self.effect_values(at)) {
             let next = first + values.len();
-            if effect.moves() || effect.surveyed(&values).is_some_and(|on| !on.is_empty()) {
+            if effect.moves() || effect.survey_key(&values).is_some_and(|on| !on.is_empty()) {
                 costly.extend(first..next);
             }
             first = next;

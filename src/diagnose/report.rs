@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::{Candidate, Errors, Unexplained};
 use crate::brdf::Brdf;
-use crate::effects::{Level, Place, Shot};
+use crate::effects::{Effect, Level, Place, Shot};
 
 /// The answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -67,17 +67,18 @@ pub struct Parameters {
 
 impl Parameters {
     pub(super) fn new(
+        effect: &dyn Effect,
         numbers: BTreeMap<&'static str, Value>,
         place: Option<Place>,
         shots: &[Shot],
     ) -> Parameters {
         let mut triples = BTreeMap::new();
-        for (name, unit) in [("translation_m", "m"), ("rotation_deg", "deg")] {
-            let (stem, end) = name.split_once('_').unwrap_or((name, ""));
-            let axis = |axis: &str| numbers.get(format!("{stem}_{axis}_{end}").as_str());
-            if let (Some(x), Some(y), Some(z)) = (axis("x"), axis("y"), axis("z")) {
+        for (name, axes) in effect.vectors() {
+            let [x, y, z] = axes.map(|axis| numbers.get(effect.parameters()[axis].name));
+            if let (Some(x), Some(y), Some(z)) = (x, y, z) {
                 let sd = x.sd.zip(y.sd).zip(z.sd).map(|((x, y), z)| [x, y, z]);
-                triples.insert(name, Triple { value: [x.value, y.value, z.value], sd, unit });
+                let value = [x.value, y.value, z.value];
+                triples.insert(*name, Triple { value, sd, unit: x.unit });
             }
         }
         if let Some((centre, extent)) = place.and_then(|place| place.on_target_m(shots)) {

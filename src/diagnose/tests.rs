@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::*;
 use crate::brdf::{BlinnPhong, CookTorrance, Distribution, Mixture, Shadowing};
-use crate::effects::{EffectParameter, Level, Model, Place, find};
+use crate::effects::{About, EffectParameter, Level, Model, Place, find};
 use crate::frames::{Point, Ray};
 use crate::geometry::Mesh;
 use crate::radar::random::{Key, Purpose};
@@ -60,24 +60,26 @@ fn chirps(radar: &Radar) -> crate::radar::Chirps {
     }
 }
 
-/// What a law of gain over the shots is called and how it is fitted.
+/// A law of gain over the shots.
 struct Gain {
-    name: &'static str,
-    knobs: [EffectParameter; 1],
+    about: About,
     db: fn(&Shot) -> f64,
 }
 
+const EDGE: EffectParameter =
+    EffectParameter { name: "edge_db", unit: "dB", min: -8.0, max: 8.0, absent: 0.0, step: 0.3 };
+
 impl Gain {
     const fn new(name: &'static str, db: fn(&Shot) -> f64) -> Gain {
-        let knob = EffectParameter {
-            name: "edge_db",
-            unit: "dB",
-            min: -8.0,
-            max: 8.0,
-            absent: 0.0,
-            step: 0.3,
+        let about = About {
+            name,
+            level: Level::Instrument,
+            description: "",
+            signature: "",
+            parameters: &[EDGE],
+            conflicts: &[],
         };
-        Gain { name, knobs: [knob], db }
+        Gain { about, db }
     }
 }
 
@@ -92,21 +94,8 @@ static STEP: Gain =
 static STRIPES: Gain = Gain::new("stripes", |shot| (9.0 * shot.xt_m).sin().signum());
 
 impl Effect for Gain {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-    fn level(&self) -> Level {
-        Level::Instrument
-    }
-    fn parameters(&self) -> &'static [EffectParameter] {
-        // The gains are statics, whose knobs all are alike.
-        &BOWL.knobs
-    }
-    fn description(&self) -> &'static str {
-        ""
-    }
-    fn signature(&self) -> &'static str {
-        ""
+    fn about(&self) -> &About {
+        &self.about
     }
     fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![0.3], vec![-0.3]]
@@ -228,7 +217,7 @@ fn a_missing_effect_is_named_and_its_number_found() {
         let report = diagnosed(&[(effect, value)], 11);
         assert_eq!(report.verdict, Verdict::Explained, "{report:#?}");
         let names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
-        assert_eq!(names, [effect.name]);
+        assert_eq!(names, [effect.name()]);
         let found = &report.effects[0].parameters["edge_db"];
         let sd = found.sd.unwrap();
         assert!((found.value - value).abs() < 4.0 * sd && sd < 0.5, "{found:?}");
@@ -238,7 +227,7 @@ fn a_missing_effect_is_named_and_its_number_found() {
         // 2400 shots of 2 dB would tell a tenth of the effect that is there, of which the laws take a part;
         // what was missed is the next smaller size.
         let powers = &report.controls.injection_recovery;
-        let power = powers.iter().find(|power| power.name == effect.name).unwrap();
+        let power = powers.iter().find(|power| power.name == effect.name()).unwrap();
         let least_db = power.least_db.unwrap();
         assert!((0.1..1.0).contains(&least_db), "{power:?}");
         assert!(power.missed_db.is_none_or(|db| db < least_db && db > 0.2 * least_db), "{power:?}");

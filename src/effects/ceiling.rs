@@ -62,17 +62,19 @@ impl Ceiling {
         }
         let speckle = Speckle::new(looks.powf(self.averaged));
         let count = ((LAST - FIRST) / STEP) as usize;
-        let knot = |k: usize| self.knot(&speckle, FIRST + STEP * k as f64);
-        Saturating { ln_saturation, knots: (0..=count).map(knot).collect() }
+        let ln_means = (0..=count).map(|k| FIRST + STEP * k as f64);
+        let knots = ln_means.map(|ln_mean| self.knot(&speckle, ln_mean)).collect();
+        Saturating { ln_saturation, knots }
     }
 
     /// ln(M/P_sat) and β at ln(P̄/P_sat).
     fn knot(&self, speckle: &Speckle, ln_mean: f64) -> [f64; 2] {
         let mean = ln_mean.exp();
         let slow = self.held(mean);
-        let (held, slope) = match speckle.nodes.is_empty() {
-            true => (slow, (slow / mean).powf(self.knee)),
-            false => self.held_speckle(speckle, mean),
+        let (held, slope) = if speckle.nodes.is_empty() {
+            (slow, (slow / mean).powf(self.knee))
+        } else {
+            self.held_speckle(speckle, mean)
         };
         let at_once = self.at_once;
         let ln_held = at_once * held.ln() + (1.0 - at_once) * slow.ln();

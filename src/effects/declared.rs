@@ -1,10 +1,12 @@
 //! The effects that a scene, its radar and its materials declare, each where it acts.
 
-use super::entry::{Chosen, rank};
-use super::{Effect, EffectParameter, Level, Model, Receiver, Shot, Stage};
+use super::effect::{About, Effect};
+use super::entry::Chosen;
+use super::library::rank;
+use super::model::Model;
+use super::receiver::Receiver;
+use super::shot::{Shot, Stage};
 use crate::brdf::Brdf;
-use crate::radar::Radar;
-use crate::units::watts_from_dbm;
 
 /// All effects of a scene.
 #[derive(Clone, Default)]
@@ -14,15 +16,16 @@ pub struct SceneEffects {
 }
 
 impl SceneEffects {
-    /// Adds effects that act on every look.
+    /// Adds effects that act on every shot.
     pub fn add(&mut self, effects: Chosen) {
         self.everywhere.extend(effects);
     }
 
     /// Adds the effects of a material, which act where `is_of_it` of the region is true.
     pub fn add_to_regions(&mut self, effects: Chosen, is_of_it: &[bool]) {
-        let on = |(effect, values)| (OnRegions { effect, is_of_it: is_of_it.to_vec() }, values);
-        self.on_regions.extend(effects.into_iter().map(on));
+        for (effect, values) in effects {
+            self.on_regions.push((OnRegions { effect, is_of_it: is_of_it.to_vec() }, values));
+        }
     }
 
     /// Whether there are none.
@@ -40,18 +43,6 @@ impl SceneEffects {
     }
 }
 
-impl Receiver {
-    /// The law that a radar declares: its speckle, infinitely many looks where it has none, and the
-    /// thermal noise of its `[radar.noise]`.
-    pub fn declared(radar: &Radar) -> Receiver {
-        Receiver {
-            looks: radar.speckle.map_or(f64::INFINITY, |speckle| speckle.looks),
-            noise_w: radar.noise.map_or(0.0, |noise| watts_from_dbm(noise.level_dbm)),
-            ..Receiver::LINEAR
-        }
-    }
-}
-
 /// An effect of a material: it changes how the regions of that material scatter, and nothing else.
 #[derive(Clone)]
 struct OnRegions {
@@ -60,34 +51,18 @@ struct OnRegions {
 }
 
 impl OnRegions {
-    fn acts_on(&self, look: &Shot) -> bool {
-        self.is_of_it.get(usize::from(look.region)).copied().unwrap_or(false)
+    fn acts_on(&self, shot: &Shot) -> bool {
+        self.is_of_it.get(usize::from(shot.region)).copied().unwrap_or(false)
     }
 }
 
 impl Effect for OnRegions {
-    fn name(&self) -> &'static str {
-        self.effect.name()
+    fn about(&self) -> &About {
+        self.effect.about()
     }
 
-    fn level(&self) -> Level {
-        self.effect.level()
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        self.effect.parameters()
-    }
-
-    fn description(&self) -> &'static str {
-        self.effect.description()
-    }
-
-    fn signature(&self) -> &'static str {
-        self.effect.signature()
-    }
-
-    fn starts(&self, stage: &Stage, looks: &[Shot]) -> Vec<Vec<f64>> {
-        self.effect.starts(stage, looks)
+    fn starts(&self, stage: &Stage, shots: &[Shot]) -> Vec<Vec<f64>> {
+        self.effect.starts(stage, shots)
     }
 
     fn scatter(
@@ -95,31 +70,32 @@ impl Effect for OnRegions {
         values: &[f64],
         stage: &Stage,
         law: &Brdf,
-        look: &Shot,
+        shot: &Shot,
         f_per_sr: f64,
     ) -> f64 {
-        match self.acts_on(look) {
-            true => self.effect.scatter(values, stage, law, look, f_per_sr),
-            false => f_per_sr,
+        if self.acts_on(shot) {
+            self.effect.scatter(values, stage, law, shot, f_per_sr)
+        } else {
+            f_per_sr
         }
     }
 
-    fn gain(&self, values: &[f64], stage: &Stage, look: &Shot) -> f64 {
-        if self.acts_on(look) { self.effect.gain(values, stage, look) } else { 1.0 }
+    fn gain(&self, values: &[f64], stage: &Stage, shot: &Shot) -> f64 {
+        if self.acts_on(shot) { self.effect.gain(values, stage, shot) } else { 1.0 }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::library;
     use crate::effects::testing::Bench;
+    use crate::effects::{Level, library};
 
     #[test]
     fn a_materials_effect_acts_on_its_own_regions_as_it_would_everywhere() {
         let bench = Bench::sphere();
         for effect in library().into_iter().filter(|e| e.level() == Level::Material) {
-            let values = effect.starts(&bench.stage(), &bench.looks).remove(0);
+            let values = effect.starts(&bench.stage(), &bench.shots).remove(0);
             for (is_of_it, expected) in [(true, bench.with(effect, &values)), (false, bench.bare())]
             {
                 let on = OnRegions { effect, is_of_it: vec![is_of_it] };

@@ -2,7 +2,8 @@
 
 use thiserror::Error;
 
-use super::{Effect, EffectParameter, Level, find, library};
+use super::effect::{Effect, EffectParameter, Level};
+use super::library::{find, library, rank};
 use crate::formats::EffectEntry;
 use crate::formats::text::nearest;
 use crate::units::shown;
@@ -120,11 +121,6 @@ pub fn entry(effect: &dyn Effect, values: &[f64]) -> EffectEntry {
     let values = std::iter::zip(effect.parameters(), values);
     let parameters = values.map(|(parameter, value)| (parameter.name.to_owned(), *value)).collect();
     EffectEntry { name: effect.name().to_owned(), source: None, parameters }
-}
-
-/// Place of an effect in the order in which effects act.
-pub(crate) fn rank(name: &str) -> usize {
-    library().iter().take_while(|effect| effect.name() != name).count()
 }
 
 /// The value of every parameter of an effect: as the entry gives it, or absent.

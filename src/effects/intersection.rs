@@ -1,9 +1,8 @@
-//! Where another ray meets the target, or the same ray a target that has moved, and what the base law
-//! makes of it.
+//! Intersections of a shot with the target along another ray, or with a target that has moved.
 
 use glam::{DMat3, DVec3};
 
-use super::{Shot, Stage};
+use super::shot::{Shot, Stage};
 use crate::frames::{Direction, Global, Pose, Ray, Surface};
 use crate::trace::Hit;
 
@@ -20,9 +19,9 @@ impl Axes {
         Axes(DMat3::from_cols(along, normal.cross(along), normal))
     }
 
-    /// Of a look.
-    pub(super) fn of(stage: &Stage, look: &Shot) -> Axes {
-        Axes::new(look.normal, grain(stage, look.region))
+    /// At the surface of a shot.
+    pub(super) fn of(stage: &Stage, shot: &Shot) -> Axes {
+        Axes::new(shot.normal, grain(stage, shot.region))
     }
 
     fn normal(&self) -> DVec3 {
@@ -45,18 +44,14 @@ fn grain(stage: &Stage, region: u16) -> DVec3 {
     stage.grain_of_region.get(usize::from(region)).copied().unwrap_or(DVec3::Y)
 }
 
-/// The look, had its chirp taken another ray.
-pub(super) fn met(stage: &Stage, look: &Shot, ray: Ray<Global>) -> Option<Shot> {
-    stage.bvh.closest(&ray).map(|hit| at(stage, look, ray, hit))
+/// The shot along another ray, at the closest hit of that ray; `None` where the ray misses.
+pub(super) fn shot_along(stage: &Stage, shot: &Shot, ray: Ray<Global>) -> Option<Shot> {
+    let hit = stage.bvh.closest(&ray)?;
+    Some(surface_at(stage, &ray, &hit).shot(shot, ray, hit))
 }
 
-/// The same for the closest hit of that ray.
-pub(super) fn at(stage: &Stage, look: &Shot, ray: Ray<Global>, hit: Hit) -> Shot {
-    facing(stage, &ray, &hit).look(look, ray, hit)
-}
-
-/// The surface that a ray meets.
-pub(super) struct Facing {
+/// The surface where a ray hits it.
+pub(super) struct HitSurface {
     /// Towards the ray's origin.
     normal: DVec3,
     pub region: u16,
@@ -64,9 +59,9 @@ pub(super) struct Facing {
     pub to_radar: Direction<Surface>,
 }
 
-/// A facet, whichever side of it a ray meets.
+/// A facet, whose two sides are alike.
 pub(super) struct Facet {
-    /// At its outward normal; none where rounding leaves it none.
+    /// At its outward normal; `None` where rounding leaves no normal.
     axes: Option<Axes>,
     grain: DVec3,
     region: u16,
@@ -80,28 +75,29 @@ impl Facet {
         Facet { axes, grain, region }
     }
 
-    /// Its surface, towards where a ray comes from.
-    pub(super) fn facing(&self, ray: &Ray<Global>) -> Facing {
+    /// The side of it from which a ray comes.
+    pub(super) fn surface(&self, ray: &Ray<Global>) -> HitSurface {
         let back = -ray.direction.xyz();
         let axes = match self.axes {
             None => Axes::new(back, self.grain),
             Some(axes) if axes.normal().dot(back) < 0.0 => Axes::new(-axes.normal(), self.grain),
             Some(axes) => axes,
         };
-        Facing { normal: axes.normal(), region: self.region, to_radar: axes.local(back) }
+        HitSurface { normal: axes.normal(), region: self.region, to_radar: axes.local(back) }
     }
 }
 
 /// The surface at the closest hit of a ray.
-pub(super) fn facing(stage: &Stage, ray: &Ray<Global>, hit: &Hit) -> Facing {
-    Facet::of(stage, hit.facet as usize).facing(ray)
+pub(super) fn surface_at(stage: &Stage, ray: &Ray<Global>, hit: &Hit) -> HitSurface {
+    Facet::of(stage, hit.facet as usize).surface(ray)
 }
 
-impl Facing {
-    fn look(&self, look: &Shot, ray: Ray<Global>, hit: Hit) -> Shot {
+impl HitSurface {
+    /// A shot whose ray hits here.
+    fn shot(&self, shot: &Shot, ray: Ray<Global>, hit: Hit) -> Shot {
         let to_radar = self.to_radar.xyz();
         let azimuth_rad = to_radar.y.atan2(to_radar.x);
-        Shot { ray, hit, normal: self.normal, azimuth_rad, region: self.region, ..*look }
+        Shot { ray, hit, normal: self.normal, azimuth_rad, region: self.region, ..*shot }
     }
 }
 
@@ -110,23 +106,24 @@ pub(super) fn motion(rotation: DMat3, pivot: DVec3, shift_m: DVec3) -> Pose<Glob
     Pose::new(rotation, pivot + shift_m - rotation * pivot)
 }
 
-/// The ray as a target sees it that stands still where the scene has it.
+/// The ray in the frame of a target that has moved: what it hits there, the true ray hits on the moved target.
 pub(super) fn seen_from(target: &Pose<Global, Global>, ray: &Ray<Global>) -> Ray<Global> {
     let back = target.inverse();
     Ray { origin: back * ray.origin, direction: back * ray.direction }
 }
 
-/// The look at a target that has moved, for the closest hit of its ray as seen from there, and the direction of
-/// the radar from its surface.
+/// The shot at a target that has moved, from the closest hit of its ray as [`seen_from`] the target, and the
+/// direction of the radar from its surface.
 pub(super) fn moved(
     stage: &Stage,
-    look: &Shot,
+    shot: &Shot,
     target: Pose<Global, Global>,
-    (ray, hit): (Ray<Global>, Hit),
+    ray: Ray<Global>,
+    hit: Hit,
 ) -> (Shot, Direction<Surface>) {
-    let facing = facing(stage, &ray, &hit);
-    let there = facing.look(look, ray, hit);
+    let surface = surface_at(stage, &ray, &hit);
+    let there = surface.shot(shot, ray, hit);
     let hit = Hit { point: target * there.hit.point, ..there.hit };
     let normal = target.rotation() * there.normal;
-    (Shot { ray: look.ray, hit, normal, target, ..there }, facing.to_radar)
+    (Shot { ray: shot.ray, hit, normal, target, ..there }, surface.to_radar)
 }

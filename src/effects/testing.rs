@@ -2,8 +2,10 @@
 
 use glam::DVec3;
 
-use super::intersection::met;
-use super::{Effect, MeanEcho, Model, Prediction, Receiver, Shot, Stage, library, middle};
+use super::intersection::shot_along;
+use super::{
+    Effect, EffectParameter, MeanEcho, Model, Prediction, Receiver, Shot, Stage, library, middle,
+};
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
 use crate::frames::{Point, Pose, Ray};
 use crate::geometry::Mesh;
@@ -36,13 +38,13 @@ pub(super) fn paint(lobe: CookTorrance) -> Brdf {
     })
 }
 
-/// A target 8 m in front of a radar that looks along −z, and the looks that meet it.
+/// A target 8 m in front of a radar that shots along −z, and the shots that meet it.
 pub(super) struct Bench {
     bvh: Bvh<'static>,
     radar: Radar,
     regions: Vec<u16>,
     law: Brdf,
-    pub looks: Vec<Shot>,
+    pub shots: Vec<Shot>,
 }
 
 const GRAIN: [DVec3; 1] = [DVec3::Y];
@@ -64,10 +66,10 @@ impl Bench {
     pub(super) fn of(mesh: Mesh) -> Bench {
         let mesh: &'static Mesh = Box::leak(Box::new(mesh));
         let regions = vec![0; mesh.facets.len()];
-        let (bvh, radar, looks) = (Bvh::new(mesh), Radar::default(), Vec::new());
-        let mut bench = Bench { bvh, radar, regions, law: paint(lobe()), looks };
-        let looks = (0..SIDE * SIDE).filter_map(|chirp| look(&bench.stage(), chirp)).collect();
-        bench.looks = looks;
+        let (bvh, radar, shots) = (Bvh::new(mesh), Radar::default(), Vec::new());
+        let mut bench = Bench { bvh, radar, regions, law: paint(lobe()), shots };
+        let shots = (0..SIDE * SIDE).filter_map(|chirp| shot(&bench.stage(), chirp)).collect();
+        bench.shots = shots;
         bench
     }
 
@@ -78,21 +80,21 @@ impl Bench {
             bvh: &self.bvh,
             region_of_facet: &self.regions,
             grain_of_region: &GRAIN,
-            middle: middle(&self.looks),
+            middle: middle(&self.shots),
         }
     }
 
     pub(super) fn predict(&self, effects: Vec<(&dyn Effect, Vec<f64>)>) -> Prediction {
         let receiver = Receiver { looks: 4.0, noise_w: 1e-13, ..Receiver::LINEAR };
         Model { laws: vec![self.law.clone()], receiver, effects }
-            .predict(&self.stage(), &self.looks)
+            .predict(&self.stage(), &self.shots)
     }
 
-    /// A look where an effect places it.
-    pub(super) fn moved(&self, effect: &dyn Effect, values: &[f64], look: &Shot) -> Option<Shot> {
+    /// A shot where an effect places it.
+    pub(super) fn moved(&self, effect: &dyn Effect, values: &[f64], shot: &Shot) -> Option<Shot> {
         let effects = vec![(effect, values.to_vec())];
         let receiver = Receiver::LINEAR;
-        Model { laws: Vec::new(), receiver, effects }.placed(&self.stage(), *look)
+        Model { laws: Vec::new(), receiver, effects }.placed(&self.stage(), *shot)
     }
 
     /// What arrives without any effect.
@@ -106,7 +108,7 @@ impl Bench {
     }
 }
 
-fn look(stage: &Stage, chirp: u32) -> Option<Shot> {
+fn shot(stage: &Stage, chirp: u32) -> Option<Shot> {
     let at = |step: u32| HALF_M * (2.0 * f64::from(step) / f64::from(SIDE - 1) - 1.0);
     let (xt_m, yt_m) = (at(chirp % SIDE), at(chirp / SIDE));
     let origin = Point::new(0.0, 0.0, 8.0);
@@ -130,7 +132,7 @@ fn look(stage: &Stage, chirp: u32) -> Option<Shot> {
         yt_m,
         edge_m,
     };
-    met(stage, &blank, ray)
+    shot_along(stage, &blank, ray)
 }
 
 /// Two walls that face each other at a right angle, open towards the radar.
@@ -184,7 +186,7 @@ fn is_sound(prediction: &Prediction) -> bool {
 fn every_value_within_the_ranges_gives_finite_numbers() {
     for bench in benches() {
         for effect in library() {
-            let starts = effect.starts(&bench.stage(), &bench.looks);
+            let starts = effect.starts(&bench.stage(), &bench.shots);
             let start = starts.first().cloned().unwrap_or_else(|| absent(effect));
             for (at, parameter) in effect.parameters().iter().enumerate() {
                 for value in [parameter.min, parameter.max, (parameter.min + parameter.max) / 2.0] {
@@ -194,7 +196,7 @@ fn every_value_within_the_ranges_gives_finite_numbers() {
                     assert!(is_sound(&found), "{} at {values:?}", effect.name());
                 }
             }
-            let ends: [fn(&super::EffectParameter) -> f64; 2] =
+            let ends: [fn(&EffectParameter) -> f64; 2] =
                 [|parameter| parameter.min, |parameter| parameter.max];
             for end in ends {
                 let values = effect.parameters().iter().map(end).collect();
@@ -211,7 +213,7 @@ fn searches_begin_within_the_ranges_and_where_there_is_an_effect() {
     let bench = Bench { law, ..Bench::of(dihedral()) };
     let bare = bench.predict(Vec::new());
     for effect in library() {
-        let starts = effect.starts(&bench.stage(), &bench.looks);
+        let starts = effect.starts(&bench.stage(), &bench.shots);
         assert!(!starts.is_empty(), "{}", effect.name());
         let mut felt = false;
         for values in starts {
@@ -258,17 +260,17 @@ fn names_and_parameters_are_unique() {
 #[test]
 fn what_is_said_to_shift_the_target_does_nothing_else() {
     let bench = Bench::plate();
-    let (stage, look) = (bench.stage(), Shot { progress: 0.3, ..bench.looks[7] });
+    let (stage, shot) = (bench.stage(), Shot { progress: 0.3, ..bench.shots[7] });
     let mut shifts = 0;
     for effect in library() {
         let parameters = effect.parameters();
         let values: Vec<f64> = parameters.iter().map(|parameter| 3.0 * parameter.step).collect();
         for (number, parameter) in parameters.iter().enumerate() {
-            let Some((axis, per_unit)) = effect.shifts(number, &look) else { continue };
+            let Some((axis, per_unit)) = effect.shifts(number, &shot) else { continue };
             let mut more = values.clone();
             more[number] += parameter.step;
             let [before, after] = [values.clone(), more]
-                .map(|values| effect.motion(&values, &stage, &look).unwrap() * look.hit.point);
+                .map(|values| effect.motion(&values, &stage, &shot).unwrap() * shot.hit.point);
             let mut way_m = after.xyz - before.xyz;
             way_m[axis] -= per_unit * parameter.step;
             assert!(way_m.length() < 1e-12, "{} {}: {way_m}", effect.name(), parameter.name);

@@ -15,7 +15,8 @@ use super::surface::LocalFrame;
 use super::{Observer, RenderError, Setup};
 use crate::brdf::Scattering;
 use crate::effects::{
-    Level, MeanEcho, Model, PredictionCache, Receiver, Shot, Stage, middle, tilted_cos_theta,
+    Conflict, Level, MeanEcho, Model, PredictionCache, Receiver, Setting, Shot, Stage, middle,
+    tilted_cos_theta,
 };
 use crate::frames::{Direction, Global, Point, Pose, Ray, Surface};
 use crate::radar::Link;
@@ -265,40 +266,26 @@ fn tilted(look: &Shot, [along, across]: [f64; 2]) -> Option<Shot> {
     Some(Shot { hit: Hit { cos_theta, ..look.hit }, ..*look })
 }
 
-/// Refuses what would be counted twice, and what an effect cannot say.
+/// Refuses what would be counted twice, and effects at another antenna.
 pub(super) fn check(setup: &Setup, rays: usize, observer: Observer) -> Result<(), RenderError> {
     let Some(model) = setup.effects else { return Ok(()) };
-    let (radar, bounces) = (setup.radar, setup.bounce.is_some());
     for (effect, _) in &model.effects {
-        let effect = effect.name();
-        let (problem, way_out) = match effect {
-            _ if observer != Observer::Radar => (
-                "acts on the radar's own echoes, and nothing says what it does at another antenna",
-                "remove [[receiver]], or the effect",
-            ),
-            "finite-spot" if rays > 1 => (
-                "averages over the spot, and so do several rays",
-                "set spot.rays = 1, or remove the effect",
-            ),
-            "multi-bounce" if bounces => (
-                "brings echoes by way of a second surface, and so does [bounce]",
-                "remove one of the two",
-            ),
-            "pose" | "motion" if bounces => (
-                "moves the target, and [bounce] follows paths on it where the scene has it",
-                "remove [bounce], or move the mesh by its translation_m and rotation_deg",
-            ),
-            "noise-floor" if radar.receiver.is_some() => (
-                "adds thermal noise, and [radar.receiver] makes all of its own",
-                "raise radar.receiver.noise_figure_db instead",
-            ),
-            "speckle" if radar.receiver.is_some() => (
-                "sets the looks of speckle, and [radar.receiver] averages whole beat signals",
-                "set radar.speckle.looks instead",
-            ),
-            _ => continue,
-        };
-        return Err(RenderError::Effect { effect, problem, way_out });
+        let effect = effect.about();
+        if observer != Observer::Radar {
+            return Err(RenderError::Effect {
+                effect: effect.name,
+                problem: "acts on the radar's own echoes, and nothing says what it does at another antenna",
+                way_out: "remove [[receiver]], or the effect",
+            });
+        }
+        let conflict = effect.conflicts.iter().find(|conflict| match conflict.with {
+            Setting::SeveralRays => rays > 1,
+            Setting::Bounce => setup.bounce.is_some(),
+            Setting::RangeReceiver => setup.radar.receiver.is_some(),
+        });
+        if let Some(&Conflict { problem, way_out, .. }) = conflict {
+            return Err(RenderError::Effect { effect: effect.name, problem, way_out });
+        }
     }
     Ok(())
 }

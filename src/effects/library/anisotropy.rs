@@ -1,17 +1,13 @@
 //! Facet slopes that differ along and across a grain: m·√q along it and m/√q across.
 
-use super::lobes::rescaled;
-use super::{Effect, EffectParameter, Level, Shot, Stage};
 use crate::brdf::{Brdf, CookTorrance, Scattering};
+use crate::effects::effect::{About, Effect, EffectParameter, Level};
+use crate::effects::lobes::rescaled;
+use crate::effects::shot::{Shot, Stage};
 use crate::frames::Direction;
 
 /// The effect `anisotropy`.
-pub(super) struct Anisotropy;
-
-const PARAMETERS: [EffectParameter; 2] = [
-    EffectParameter::new("ratio", "1", [0.1, 10.0], 1.0, 0.1),
-    EffectParameter::new("turn_deg", "deg", [-90.0, 90.0], 0.0, 10.0),
-];
+pub(crate) struct Anisotropy;
 
 /// Roughness that a lobe can have.
 const M_RANGE: [f64; 2] = [1e-3, 2.0];
@@ -28,44 +24,39 @@ fn stretched(lobe: &CookTorrance, ratio: f64) -> CookTorrance {
     }
 }
 
-impl Effect for Anisotropy {
-    fn name(&self) -> &'static str {
-        "anisotropy"
-    }
-
-    fn level(&self) -> Level {
-        Level::Material
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        &PARAMETERS
-    }
-
-    fn description(&self) -> &'static str {
-        "The surface is woven, brushed or machined: rougher along one direction than across it, by \
-         this ratio of the slopes; the direction is turned by so much from the grain of its region."
-    }
-
-    fn signature(&self) -> &'static str {
-        "At one angle of incidence the residual goes up and down twice in a full turn of the azimuth \
+const ABOUT: About = About {
+    name: "anisotropy",
+    level: Level::Material,
+    description: "The surface is woven, brushed or machined: rougher along one direction than across it, by \
+         this ratio of the slopes; the direction is turned by so much from the grain of its region.",
+    signature: "At one angle of incidence the residual goes up and down twice in a full turn of the azimuth \
          about the normal. Spread over all azimuths it looks like a lobe of another width or an error \
-         of the angle, which have no direction; a tilted pose has one, but goes up and down once."
+         of the angle, which have no direction; a tilted pose has one, but goes up and down once.",
+    parameters: &[
+        EffectParameter::new("ratio", "1", [0.1, 10.0], 1.0, 0.1),
+        EffectParameter::new("turn_deg", "deg", [-90.0, 90.0], 0.0, 10.0),
+    ],
+    conflicts: &[],
+};
+
+impl Effect for Anisotropy {
+    fn about(&self) -> &About {
+        &ABOUT
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         [[1.2, 0.0], [1.2, 45.0], [1.2, -45.0], [1.0 / 1.2, 0.0]].map(|v| v.to_vec()).to_vec()
     }
 
-    fn scatter(&self, values: &[f64], _: &Stage, law: &Brdf, look: &Shot, f_per_sr: f64) -> f64 {
+    fn scatter(&self, values: &[f64], _: &Stage, law: &Brdf, shot: &Shot, f_per_sr: f64) -> f64 {
         let &[ratio, turn_deg] = values else { return f_per_sr };
         if ratio == 1.0 {
             return f_per_sr;
         }
-        let theta_rad = look.hit.theta_rad();
-        let retro = Direction::from_angles(theta_rad, look.azimuth_rad);
-        let turned = Direction::from_angles(theta_rad, look.azimuth_rad - turn_deg.to_radians());
-        let lobe = |lobe: &CookTorrance| stretched(lobe, ratio).f_per_sr(turned, turned);
-        rescaled(law, retro, f_per_sr, &lobe)
+        let theta_rad = shot.hit.theta_rad();
+        let retro = Direction::from_angles(theta_rad, shot.azimuth_rad);
+        let turned = Direction::from_angles(theta_rad, shot.azimuth_rad - turn_deg.to_radians());
+        rescaled(law, retro, f_per_sr, &|lobe| stretched(lobe, ratio).f_per_sr(turned, turned))
     }
 }
 
@@ -80,10 +71,10 @@ mod tests {
         let bench = Bench::plate();
         let law = Brdf::CookTorrance(lobe());
         let found = |azimuth_rad: f64, turn_deg: f64| {
-            let mut look = Shot { azimuth_rad, ..bench.looks[0] };
-            look.hit.cos_theta = 0.3f64.cos();
+            let mut shot = Shot { azimuth_rad, ..bench.shots[0] };
+            shot.hit.cos_theta = 0.3f64.cos();
             let f = law.retro_per_sr(0.3);
-            Anisotropy.scatter(&[1.5, turn_deg], &bench.stage(), &law, &look, f) / f
+            Anisotropy.scatter(&[1.5, turn_deg], &bench.stage(), &law, &shot, f) / f
         };
         assert!(found(0.0, 0.0) > 1.5);
         assert!(found(FRAC_PI_2, 0.0) < 0.7);

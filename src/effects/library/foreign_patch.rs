@@ -1,13 +1,15 @@
 //! A round place with another material: so many dB within a radius along the surface.
 
 use super::covering_layer::share_of_spot;
-use super::{Effect, EffectParameter, Level, Place, Shot, Stage};
+use crate::effects::effect::{About, Effect, EffectParameter, Level};
+use crate::effects::place::Place;
+use crate::effects::shot::{Shot, Stage};
 use crate::frames::{Direction, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::units::ratio_from_db;
 
 /// The effect `foreign-patch`.
-pub(super) struct ForeignPatch;
+pub(crate) struct ForeignPatch;
 
 const PARAMETERS: [EffectParameter; 5] = [
     EffectParameter::new("level_db", "dB", [-30.0, 30.0], 0.0, 0.5),
@@ -26,24 +28,29 @@ const LEVELS_DB: [f64; 2] = [1.0, -1.0];
 /// Where the fading has ended, in its widths: no more than 10⁻⁵ of the level is left there.
 const FADED: f64 = 3.0;
 
-/// Distance of a look from the centre on the target, m; infinite where it is more than `far_m`, which costs
+/// Distance of a shot from the centre on the target, m; infinite where it is more than `far_m`, which costs
 /// no ray.
-fn apart_m(stage: &Stage, look: &Shot, [x_m, y_m]: [f64; 2], far_m: f64) -> f64 {
+fn apart_m(stage: &Stage, shot: &Shot, [x_m, y_m]: [f64; 2], far_m: f64) -> f64 {
     let axes = stage.radar.frames().global_from_target.rotation();
-    let aside = (x_m - look.xt_m) * axes.x_axis + (y_m - look.yt_m) * axes.y_axis;
+    let aside = (x_m - shot.xt_m) * axes.x_axis + (y_m - shot.yt_m) * axes.y_axis;
     // Beside the ray of the centre by as much at least.
-    let forward = look.ray.direction.xyz();
+    let forward = shot.ray.direction.xyz();
     let beside_m =
-        aside.reject_from_normalized(forward).length() * look.hit.range_m / PATTERN_RANGE_M;
+        aside.reject_from_normalized(forward).length() * shot.hit.range_m / PATTERN_RANGE_M;
     let towards = Direction::new(PATTERN_RANGE_M * forward + aside);
     let Some(direction) = towards.filter(|_| beside_m <= far_m) else { return f64::INFINITY };
     // The centre belongs to the target, wherever that has moved.
-    let ray = Ray { origin: look.ray.origin, direction };
+    let ray = Ray { origin: shot.ray.origin, direction };
     let centre = match stage.bvh.closest(&ray) {
         Some(hit) => hit.point.xyz,
-        None => ray.origin.xyz + look.hit.range_m * direction.xyz(),
+        None => ray.origin.xyz + shot.hit.range_m * direction.xyz(),
     };
-    (look.target.inverse() * look.hit.point).xyz.distance(centre)
+    (shot.target.inverse() * shot.hit.point).xyz.distance(centre)
+}
+
+/// Number of cells of a side along a length, both in m.
+fn cells(length_m: f64, side_m: f64) -> usize {
+    ((length_m / side_m).ceil() as usize).clamp(1, MOST_CELLS)
 }
 
 /// Least and largest of some numbers; zeros when there are none.
@@ -52,51 +59,40 @@ fn span(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
     [least.unwrap_or(0.0), most.unwrap_or(0.0)]
 }
 
-impl Effect for ForeignPatch {
-    fn name(&self) -> &'static str {
-        "foreign-patch"
-    }
-
-    fn level(&self) -> Level {
-        Level::Scene
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        &PARAMETERS
-    }
-
-    fn description(&self) -> &'static str {
-        "A round place on the target is of another material, that returns more or less by so many \
+const ABOUT: About = About {
+    name: "foreign-patch",
+    level: Level::Scene,
+    description: "A round place on the target is of another material, that returns more or less by so many \
          dB. Its centre is on the surface where the field of view has these x_t and y_t; its radius is the \
-         straight way from there, over the edge of which it fades as under a spot of that diameter."
-    }
-
-    fn signature(&self) -> &'static str {
-        "The residual has one compact spot on the surface, at any angle, with a sharp outline. A \
+         straight way from there, over the edge of which it fades as under a spot of that diameter.",
+    signature: "The residual has one compact spot on the surface, at any angle, with a sharp outline. A \
          covering layer ends at a straight line and its loss grows with the angle; multiple bounces \
-         brighten places too, but concave ones, and with longer ranges."
+         brighten places too, but concave ones, and with longer ranges.",
+    parameters: &PARAMETERS,
+    conflicts: &[],
+};
+
+impl Effect for ForeignPatch {
+    fn about(&self) -> &About {
+        &ABOUT
     }
 
-    /// The cells of two grids over the target that hold a look, brighter and darker.
-    fn starts(&self, _stage: &Stage, looks: &[Shot]) -> Vec<Vec<f64>> {
-        let [left, right] = span(looks.iter().map(|look| look.xt_m));
-        let [low, high] = span(looks.iter().map(|look| look.yt_m));
-        let inside = |centre_m: f64| centre_m.clamp(-3.0, 3.0);
+    /// The cells of two grids over the target that hold a shot, brighter and darker.
+    fn starts(&self, _stage: &Stage, shots: &[Shot]) -> Vec<Vec<f64>> {
+        let [left, right] = span(shots.iter().map(|shot| shot.xt_m));
+        let [low, high] = span(shots.iter().map(|shot| shot.yt_m));
         let mut starts = Vec::new();
         for side_m in SIDES_M {
-            let count = |length_m: f64| ((length_m / side_m).ceil() as usize).clamp(1, MOST_CELLS);
-            let (columns, rows) = (count(right - left), count(high - low));
+            let (columns, rows) = (cells(right - left, side_m), cells(high - low, side_m));
             let (width, height) = ((right - left) / columns as f64, (high - low) / rows as f64);
-            let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
-            for (column, row) in cells {
+            for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |c| (row, c))) {
                 let [x, y] =
                     [left + (column as f64 + 0.5) * width, low + (row as f64 + 0.5) * height];
                 let radius_m = (0.5 * side_m).clamp(0.02, 0.3);
-                if looks.iter().any(|l| (l.xt_m - x).hypot(l.yt_m - y) < radius_m) {
+                if shots.iter().any(|l| (l.xt_m - x).hypot(l.yt_m - y) < radius_m) {
+                    let [x, y] = [x, y].map(|centre_m| centre_m.clamp(-3.0, 3.0));
                     let fade_m = PARAMETERS[4].absent;
-                    starts.extend(
-                        LEVELS_DB.map(|db| vec![db, inside(x), inside(y), radius_m, fade_m]),
-                    );
+                    starts.extend(LEVELS_DB.map(|db| vec![db, x, y, radius_m, fade_m]));
                 }
             }
         }
@@ -108,12 +104,12 @@ impl Effect for ForeignPatch {
         Some(Place::Round { x_m, y_m, radius_m })
     }
 
-    fn gain(&self, values: &[f64], stage: &Stage, look: &Shot) -> f64 {
+    fn gain(&self, values: &[f64], stage: &Stage, shot: &Shot) -> f64 {
         let &[level_db, x_m, y_m, radius_m, fade_m] = values else { return 1.0 };
         if level_db == 0.0 {
             return 1.0;
         }
-        let apart_m = apart_m(stage, look, [x_m, y_m], radius_m + FADED * fade_m);
+        let apart_m = apart_m(stage, shot, [x_m, y_m], radius_m + FADED * fade_m);
         let share = share_of_spot(radius_m - apart_m, fade_m);
         1.0 + share * (ratio_from_db(level_db) - 1.0)
     }
@@ -130,8 +126,8 @@ mod tests {
         let (bare, with) =
             (bench.bare(), bench.with(&ForeignPatch, &[4.0, 0.05, -0.1, 0.06, 0.016]));
         let mut seen = [0; 2];
-        for ((look, bare), with) in bench.looks.iter().zip(&bare).zip(&with) {
-            let apart_m = (look.xt_m - 0.05).hypot(look.yt_m + 0.1);
+        for ((shot, bare), with) in bench.shots.iter().zip(&bare).zip(&with) {
+            let apart_m = (shot.xt_m - 0.05).hypot(shot.yt_m + 0.1);
             let change_db = db(with.power_w / bare.power_w);
             // The plate is seen within 3° of its normal; three spots from the edge all is settled.
             if apart_m < 0.02 {
@@ -148,7 +144,7 @@ mod tests {
     #[test]
     fn searches_begin_on_the_target() {
         let bench = Bench::plate();
-        let starts = ForeignPatch.starts(&bench.stage(), &bench.looks);
+        let starts = ForeignPatch.starts(&bench.stage(), &bench.shots);
         for sign in [1.0, -1.0] {
             assert!(starts.iter().filter(|start| start[0] * sign > 0.0).count() >= 12);
         }

@@ -10,15 +10,17 @@ use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
-use super::intersection::{Axes, met};
-use super::spread::sunflower;
-use super::{Effect, EffectParameter, Level, MeanEcho, Shot, Stage, Survey};
 use crate::brdf::{Brdf, Distribution, Scattering};
+use crate::effects::echo::MeanEcho;
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
+use crate::effects::intersection::{Axes, shot_along};
+use crate::effects::shot::{Shot, Stage};
+use crate::effects::spread::sunflower;
 use crate::frames::{Direction, Point, Ray, Surface};
 use crate::units::ratio_from_db;
 
 /// The effect `multi-bounce`.
-pub(super) struct MultiBounce;
+pub(crate) struct MultiBounce;
 
 /// A coupling that counts as none, dB.
 const NONE_DB: f64 = -60.0;
@@ -36,17 +38,19 @@ const CLEARANCE_M: f64 = 1e-6;
 fn onward(i: Direction<Surface>) -> impl Iterator<Item = (Direction<Surface>, f64)> {
     let by_cosine = sunflower(DIRECTIONS)
         .map(|(share, azimuth_rad)| Direction::from_angles(share.sqrt().asin(), azimuth_rad));
-    let by_lobe = move |m: f64| {
-        sunflower(DIRECTIONS).filter_map(move |(share, azimuth_rad)| {
-            let tan = m * (-(1.0 - share).ln()).sqrt();
-            let h = Direction::<Surface>::from_angles(tan.atan(), azimuth_rad).xyz();
-            Direction::new(2.0 * i.xyz().dot(h) * h - i.xyz())
-        })
-    };
-    let all = by_cosine.chain(LOBES.into_iter().flat_map(by_lobe));
-    all.filter(|o| o.cos_theta() > 1e-6).map(move |o| {
+    let by_lobes = LOBES.into_iter().flat_map(move |m| by_lobe(i, m));
+    by_cosine.chain(by_lobes).filter(|o| o.cos_theta() > 1e-6).map(move |o| {
         let lobes: f64 = LOBES.iter().map(|m| lobe_density(i, o, *m)).sum();
         (o, (o.cos_theta() / PI + lobes) / KINDS as f64)
+    })
+}
+
+/// Reflections of i on facets of roughness m by Beckmann's law.
+fn by_lobe(i: Direction<Surface>, m: f64) -> impl Iterator<Item = Direction<Surface>> {
+    sunflower(DIRECTIONS).filter_map(move |(share, azimuth_rad)| {
+        let tan = m * (-(1.0 - share).ln()).sqrt();
+        let h = Direction::<Surface>::from_angles(tan.atan(), azimuth_rad).xyz();
+        Direction::new(2.0 * i.xyz().dot(h) * h - i.xyz())
     })
 }
 
@@ -57,7 +61,7 @@ fn lobe_density(i: Direction<Surface>, o: Direction<Surface>, m: f64) -> f64 {
     per_sr / (4.0 * i.xyz().dot(h.xyz()).max(1e-9))
 }
 
-/// A way by a second surface: what its laws have to be asked, and all that they do not change.
+/// A path by way of a second surface, apart from the laws of the two surfaces.
 #[derive(Clone, Copy)]
 struct Detour {
     /// Regions of the two surfaces.
@@ -73,27 +77,27 @@ struct Detour {
 
 impl Detour {
     fn power_w(&self, laws: &[Brdf]) -> f64 {
-        let f_per_sr = |region: u16, [i, o]: [Direction<Surface>; 2]| {
-            laws.get(usize::from(region)).map_or(0.0, |law| law.f_per_sr(i, o))
-        };
-        let [first, second] = self.regions;
-        self.watts_per_f2 * f_per_sr(first, self.first) * f_per_sr(second, self.second)
+        let mut power_w = self.watts_per_f2;
+        for (region, [i, o]) in std::iter::zip(self.regions, [self.first, self.second]) {
+            power_w *= laws.get(usize::from(region)).map_or(0.0, |law| law.f_per_sr(i, o));
+        }
+        power_w
     }
 }
 
-/// Where a ray from the first surface meets a second one that the radar sees.
+/// The path of a ray from the first surface to a second one that the radar sees.
 fn detour(
     stage: &Stage,
-    look: &Shot,
+    shot: &Shot,
     axes: &Axes,
     o: Direction<Surface>,
     density_per_sr: f64,
 ) -> Option<Detour> {
     let onward = axes.world(o.xyz());
-    let start = look.hit.point.xyz + CLEARANCE_M * look.normal;
+    let start = shot.hit.point.xyz + CLEARANCE_M * shot.normal;
     let ray = Ray { origin: Point::from(start), direction: Direction::new(onward)? };
-    let second = met(stage, look, ray)?;
-    let radar = look.ray.origin;
+    let second = shot_along(stage, shot, ray)?;
+    let radar = shot.ray.origin;
     let back = second.hit.point.towards(radar)?;
     let cos_exit = second.normal.dot(back.xyz());
     let back_m = second.hit.point.distance_m(radar);
@@ -103,24 +107,24 @@ fn detour(
         return None;
     }
     let there = Axes::of(stage, &second);
-    let way_m = look.hit.point.distance_m(second.hit.point) + back_m;
-    let sent_w = stage.link.flux_w(look.hit.cos_theta) * o.cos_theta() / density_per_sr;
+    let way_m = shot.hit.point.distance_m(second.hit.point) + back_m;
+    let sent_w = stage.link.flux_w(shot.hit.cos_theta) * o.cos_theta() / density_per_sr;
     let share = stage.link.received_per_w(back_m, cos_exit, 1.0) / (KINDS * DIRECTIONS) as f64;
     Some(Detour {
-        regions: [look.region, second.region],
-        first: [axes.local(-look.ray.direction.xyz()), o],
+        regions: [shot.region, second.region],
+        first: [axes.local(-shot.ray.direction.xyz()), o],
         second: [there.local(-onward), there.local(back.xyz())],
         watts_per_f2: sent_w * share,
-        range_m: (look.hit.range_m + way_m) / 2.0,
+        range_m: (shot.hit.range_m + way_m) / 2.0,
     })
 }
 
-/// All ways of a chirp by second surfaces of the target as the scene has it.
-fn detours(stage: &Stage, look: &Shot) -> Vec<Detour> {
-    let Some(look) = &met(stage, look, look.ray) else { return Vec::new() };
-    let axes = Axes::of(stage, look);
-    let i = axes.local(-look.ray.direction.xyz());
-    onward(i).filter_map(|(o, density)| detour(stage, look, &axes, o, density)).collect()
+/// All paths of a chirp by way of second surfaces, on the target as the scene has it.
+fn detours(stage: &Stage, shot: &Shot) -> Vec<Detour> {
+    let Some(shot) = &shot_along(stage, shot, shot.ray) else { return Vec::new() };
+    let axes = Axes::of(stage, shot);
+    let i = axes.local(-shot.ray.direction.xyz());
+    onward(i).filter_map(|(o, density)| detour(stage, shot, &axes, o, density)).collect()
 }
 
 /// Power, W, and range, m, of all that a chirp returns by way of a second surface.
@@ -129,49 +133,44 @@ fn returned(laws: &[Brdf], detours: &[Detour]) -> Option<MeanEcho> {
     detours.map(|one| MeanEcho::at_once(one.power_w(laws), one.range_m)).reduce(MeanEcho::with)
 }
 
-impl Effect for MultiBounce {
-    fn name(&self) -> &'static str {
-        "multi-bounce"
-    }
-
-    fn level(&self) -> Level {
-        Level::Scene
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        const PARAMETERS: [EffectParameter; 1] =
-            [EffectParameter::new("coupling_db", "dB", [NONE_DB, 30.0], NONE_DB, 1.0)];
-        &PARAMETERS
-    }
-
-    fn description(&self) -> &'static str {
-        "Part of the wave goes on from the first surface to a second one and returns from there; 0 dB \
-         is as much as the law of the material makes of it."
-    }
-
-    fn signature(&self) -> &'static str {
-        "Places that face another surface, as in corners and under arms, are too bright and too far \
+const ABOUT: About = About {
+    name: "multi-bounce",
+    level: Level::Scene,
+    description: "Part of the wave goes on from the first surface to a second one and returns from there; 0 dB \
+         is as much as the law of the material makes of it.",
+    signature: "Places that face another surface, as in corners and under arms, are too bright and too far \
          away. A foreign patch is bright without a longer range, and a wrong pose is off in range \
-         without being bright; convex targets never show this."
+         without being bright; convex targets never show this.",
+    parameters: &[EffectParameter::new("coupling_db", "dB", [NONE_DB, 30.0], NONE_DB, 1.0)],
+    conflicts: &[Conflict {
+        with: Setting::Bounce,
+        problem: "brings echoes by way of a second surface, and so does [bounce]",
+        way_out: "remove one of the two",
+    }],
+};
+
+impl Effect for MultiBounce {
+    fn about(&self) -> &About {
+        &ABOUT
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![-10.0], vec![0.0], vec![10.0]]
     }
 
-    fn surveyed(&self, values: &[f64]) -> Option<Vec<f64>> {
+    fn survey_key(&self, values: &[f64]) -> Option<Vec<f64>> {
         values.first().filter(|coupling_db| **coupling_db > NONE_DB).map(|_| Vec::new())
     }
 
-    fn survey(&self, _: &[f64], stage: &Stage, looks: &[Shot]) -> Survey {
-        let all: Vec<Vec<Detour>> = looks.par_iter().map(|look| detours(stage, look)).collect();
+    fn survey(&self, _: &[f64], stage: &Stage, shots: &[Shot]) -> Survey {
+        let all: Vec<Vec<Detour>> = shots.par_iter().map(|shot| detours(stage, shot)).collect();
         Box::new(all)
     }
 
     fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
         let all = survey.downcast_ref::<Vec<Vec<Detour>>>().map_or(&[][..], Vec::as_slice);
-        let one = |detours: &Vec<Detour>| returned(laws, detours);
-        Box::new(all.par_iter().map(one).collect::<Vec<Option<MeanEcho>>>())
+        let returned = all.par_iter().map(|detours| returned(laws, detours));
+        Box::new(returned.collect::<Vec<Option<MeanEcho>>>())
     }
 
     fn arrive(&self, values: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
@@ -228,7 +227,7 @@ mod tests {
             let receiver = Receiver { looks: 4.0, noise_w: 0.0, ..Receiver::LINEAR };
             let total = |effects| -> f64 {
                 let model = Model { laws: laws.clone(), receiver, effects };
-                let found = model.predict(&corner.stage(), &corner.looks);
+                let found = model.predict(&corner.stage(), &corner.shots);
                 found.arrived.iter().flatten().map(|one| one.power_w).sum()
             };
             total(vec![(&MultiBounce as &dyn Effect, vec![0.0])]) / total(Vec::new()) - 1.0

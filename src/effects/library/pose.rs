@@ -1,17 +1,18 @@
-//! A target that does not stand where the scene says: turned about the middle of the looks, by roll,
+//! A target that does not stand where the scene says: turned about the middle of the shots, by roll,
 //! pitch and yaw about the fixed axes x, y, z, and then shifted.
 
 use glam::{DMat3, DVec3};
 
-use super::intersection::motion;
-use super::{Effect, EffectParameter, Level, Shot, Stage};
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting};
+use crate::effects::intersection::motion;
+use crate::effects::shot::{Shot, Stage};
 use crate::frames::{Global, Pose as FramePose};
 
 /// From where the scene has the target to where it stands.
 type Motion = FramePose<Global, Global>;
 
 /// The effect `pose`.
-pub(super) struct Pose;
+pub(crate) struct Pose;
 
 const SHIFT_M: [f64; 2] = [-0.2, 0.2];
 const TURN_DEG: [f64; 2] = [-20.0, 20.0];
@@ -29,32 +30,29 @@ fn rotation(turn_deg: DVec3) -> DMat3 {
     Motion::from_euler_xyz(turn_rad, DVec3::ZERO).rotation()
 }
 
-impl Effect for Pose {
-    fn name(&self) -> &'static str {
-        "pose"
-    }
-
-    fn level(&self) -> Level {
-        Level::Scene
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        &PARAMETERS
-    }
-
-    fn description(&self) -> &'static str {
-        "The target stands elsewhere than the scene says: shifted along the global axes and turned \
-         about the middle of what the scan has hit."
-    }
-
-    fn signature(&self) -> &'static str {
-        "The ranges are off, smoothly over the surface, and so are the powers where the angle is \
+const ABOUT: About = About {
+    name: "pose",
+    level: Level::Scene,
+    description: "The target stands elsewhere than the scene says: shifted along the global axes and turned \
+         about the middle of what the scan has hit.",
+    signature: "The ranges are off, smoothly over the surface, and so are the powers where the angle is \
          wrong: too strong on one side of the brightest place and too weak on the other. Edges have \
-         hits where none should be. Motion does the same, but changes along the scan."
+         hits where none should be. Motion does the same, but changes along the scan.",
+    parameters: &PARAMETERS,
+    conflicts: &[Conflict {
+        with: Setting::Bounce,
+        problem: "moves the target, and [bounce] follows paths on it where the scene has it",
+        way_out: "remove [bounce], or move the mesh by its translation_m and rotation_deg",
+    }],
+};
+
+impl Effect for Pose {
+    fn about(&self) -> &About {
+        &ABOUT
     }
 
     /// Nowhere else: ranges say at once where to.
-    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![0.0; PARAMETERS.len()]]
     }
 
@@ -64,6 +62,10 @@ impl Effect for Pose {
 
     fn shifts(&self, parameter: usize, _: &Shot) -> Option<(usize, f64)> {
         (parameter < 3).then_some((parameter, 1.0))
+    }
+
+    fn vectors(&self) -> &'static [(&'static str, [usize; 3])] {
+        &[("translation_m", [0, 1, 2]), ("rotation_deg", [3, 4, 5])]
     }
 
     fn motion(&self, values: &[f64], stage: &Stage, _: &Shot) -> Option<Motion> {
@@ -82,10 +84,10 @@ mod tests {
     #[test]
     fn a_shift_towards_the_radar_shortens_the_range() {
         let bench = Bench::plate();
-        for look in &bench.looks {
-            let found = bench.moved(&Pose, &[0.0, 0.0, 0.01, 0.0, 0.0, 0.0], look).unwrap();
-            let shorter_m = look.hit.range_m - found.hit.range_m;
-            assert!((shorter_m * look.hit.cos_theta - 0.01).abs() < 1e-9);
+        for shot in &bench.shots {
+            let found = bench.moved(&Pose, &[0.0, 0.0, 0.01, 0.0, 0.0, 0.0], shot).unwrap();
+            let shorter_m = shot.hit.range_m - found.hit.range_m;
+            assert!((shorter_m * shot.hit.cos_theta - 0.01).abs() < 1e-9);
             assert!((found.hit.point.xyz.z - 0.01).abs() < 1e-9);
         }
     }
@@ -93,12 +95,12 @@ mod tests {
     #[test]
     fn a_turn_leaves_the_middle_and_tilts_the_normal() {
         let bench = Bench::plate();
-        let look =
-            bench.looks.iter().min_by(|a, b| a.hit.range_m.total_cmp(&b.hit.range_m)).unwrap();
-        let found = bench.moved(&Pose, &[0.0, 0.0, 0.0, 5.0, 0.0, 0.0], look).unwrap();
+        let shot =
+            bench.shots.iter().min_by(|a, b| a.hit.range_m.total_cmp(&b.hit.range_m)).unwrap();
+        let found = bench.moved(&Pose, &[0.0, 0.0, 0.0, 5.0, 0.0, 0.0], shot).unwrap();
         // The plate turns about its middle, half a row of rays away at most.
-        assert!((found.hit.range_m - look.hit.range_m).abs() < 2e-3);
-        let tilt_deg = found.normal.dot(look.normal).acos().to_degrees();
+        assert!((found.hit.range_m - shot.hit.range_m).abs() < 2e-3);
+        let tilt_deg = found.normal.dot(shot.normal).acos().to_degrees();
         assert!((tilt_deg - 5.0).abs() < 1e-6);
         assert!((found.normal.dot(-found.ray.direction.xyz()) - found.hit.cos_theta).abs() < 1e-12);
     }
@@ -106,7 +108,7 @@ mod tests {
     #[test]
     fn what_has_moved_out_of_the_way_is_missed() {
         let bench = Bench::plate();
-        let edge = bench.looks.iter().max_by(|a, b| a.xt_m.total_cmp(&b.xt_m)).unwrap();
+        let edge = bench.shots.iter().max_by(|a, b| a.xt_m.total_cmp(&b.xt_m)).unwrap();
         assert!(bench.moved(&Pose, &[-0.2, 0.0, 0.0, 0.0, 0.0, 0.0], edge).is_none());
     }
 }

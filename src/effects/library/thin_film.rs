@@ -8,20 +8,13 @@
 //! ratio, since backscatter alone does not tell f_λ. R is that of a film as flat as the surface is on
 //! average, so that the ripple in θ shows.
 
-use super::{Effect, EffectParameter, Level, Shot, Stage};
 use crate::brdf::{Brdf, Fresnel, Layer, Layered, Scattering, ScatteringModel};
+use crate::effects::effect::{About, Effect, EffectParameter, Level};
+use crate::effects::shot::{Shot, Stage};
 use crate::frames::Direction;
 
 /// The effect `thin-film`.
-pub(super) struct ThinFilm;
-
-const PARAMETERS: [EffectParameter; 5] = [
-    EffectParameter::new("coverage", "1", [0.0, 1.0], 0.0, 0.1),
-    EffectParameter::new("thickness_m", "m", [0.0, 8e-3], 3e-4, 2e-5),
-    EffectParameter::new("index", "1", [1.0, 4.0], 1.6, 0.05),
-    EffectParameter::new("from_below", "1", [0.0, 1.0], 1.0, 0.2),
-    EffectParameter::new("substrate_ratio", "1", [0.5, 5.0], 1.0, 0.1),
-];
+pub(crate) struct ThinFilm;
 
 /// Reflectance at normal incidence of a substrate whose law has no f_λ: an index of 2.
 const USUAL_F_LAMBDA: f64 = 0.11;
@@ -55,46 +48,47 @@ fn reflectances(
     [coated.reflectance(theta_rad), bare.reflectance(theta_rad)]
 }
 
-impl Effect for ThinFilm {
-    fn name(&self) -> &'static str {
-        "thin-film"
-    }
-
-    fn level(&self) -> Level {
-        Level::Material
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        &PARAMETERS
-    }
-
-    fn description(&self) -> &'static str {
-        "A coating of this thickness and refractive index covers a share of the surface; what it \
-         reflects at its two sides interferes, and raises or lowers the echo by the angle."
-    }
-
-    fn signature(&self) -> &'static str {
-        "The residual swings with the angle, with no other covariate; a diffuse return from below swings \
+const ABOUT: About = About {
+    name: "thin-film",
+    level: Level::Material,
+    description: "A coating of this thickness and refractive index covers a share of the surface; what it \
+         reflects at its two sides interferes, and raises or lowers the echo by the angle.",
+    signature: "The residual swings with the angle, with no other covariate; a diffuse return from below swings \
          against the specular part. A film much thinner than a wavelength only shifts the levels, \
          which the base law absorbs; another frequency moves the swings, which tells it from a wrong \
-         shape of the lobe."
+         shape of the lobe.",
+    parameters: &[
+        EffectParameter::new("coverage", "1", [0.0, 1.0], 0.0, 0.1),
+        EffectParameter::new("thickness_m", "m", [0.0, 8e-3], 3e-4, 2e-5),
+        EffectParameter::new("index", "1", [1.0, 4.0], 1.6, 0.05),
+        EffectParameter::new("from_below", "1", [0.0, 1.0], 1.0, 0.2),
+        EffectParameter::new("substrate_ratio", "1", [0.5, 5.0], 1.0, 0.1),
+    ],
+    conflicts: &[],
+};
+
+impl Effect for ThinFilm {
+    fn about(&self) -> &About {
+        &ABOUT
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         // A ripple is found only from within half a fringe.
         let thin_m = [1e-4, 2e-4, 3e-4, 4.5e-4, 6e-4, 8e-4].into_iter();
-        let thicknesses_m: Vec<f64> =
-            thin_m.chain((4..=28).map(|quarter| 0.25e-3 * f64::from(quarter))).collect();
-        let start = |thicknesses_m: &[f64], [coverage, index, from_below, ratio]: [f64; 4]| {
-            let film = |&thickness_m: &f64| vec![coverage, thickness_m, index, from_below, ratio];
-            thicknesses_m.iter().map(film).collect::<Vec<_>>()
-        };
-        let thick_m: Vec<f64> = (2..=12).map(|quarter| 0.25e-3 * f64::from(quarter)).collect();
-        // Without a mirror part of its own the fitted f_λ is lower than the substrate's. A foam hardly
-        // bends the wave, so that its fringes go otherwise with θ.
-        let solid = [[0.3, 1.6, 1.0, 1.0], [0.3, 1.6, 0.0, 1.6]];
-        let solid = solid.into_iter().flat_map(|film| start(&thicknesses_m, film));
-        solid.chain(start(&thick_m, [1.0, 1.1, 0.0, 1.6])).collect()
+        let thick_m = (4..=28).map(|quarter| 0.25e-3 * f64::from(quarter));
+        let thicknesses_m: Vec<f64> = thin_m.chain(thick_m).collect();
+        // Without a mirror part of its own the fitted f_λ is lower than the substrate's.
+        let mut starts = Vec::new();
+        for [coverage, index, from_below, ratio] in [[0.3, 1.6, 1.0, 1.0], [0.3, 1.6, 0.0, 1.6]] {
+            for &thickness_m in &thicknesses_m {
+                starts.push(vec![coverage, thickness_m, index, from_below, ratio]);
+            }
+        }
+        // A foam hardly bends the wave, so that its fringes depend otherwise on θ.
+        for quarter in 2..=12 {
+            starts.push(vec![1.0, 0.25e-3 * f64::from(quarter), 1.1, 0.0, 1.6]);
+        }
+        starts
     }
 
     fn scatter(
@@ -102,7 +96,7 @@ impl Effect for ThinFilm {
         values: &[f64],
         stage: &Stage,
         law: &Brdf,
-        look: &Shot,
+        shot: &Shot,
         f_per_sr: f64,
     ) -> f64 {
         let &[coverage, thickness_m, index, from_below, substrate_ratio] = values else {
@@ -111,7 +105,7 @@ impl Effect for ThinFilm {
         if coverage == 0.0 {
             return f_per_sr;
         }
-        let theta_rad = look.hit.theta_rad();
+        let theta_rad = shot.hit.theta_rad();
         let frequency_hz = stage.radar.centre_frequency_ghz * 1e9;
         let [film, bare] = reflectances(
             [thickness_m, index],
@@ -119,7 +113,7 @@ impl Effect for ThinFilm {
             frequency_hz,
             theta_rad,
         );
-        let retro = Direction::from_angles(theta_rad, look.azimuth_rad);
+        let retro = Direction::from_angles(theta_rad, shot.azimuth_rad);
         let share = law.specular_share(retro, retro);
         let specular = film / bare.max(1e-9);
         let crossed = ((1.0 - film) / (1.0 - bare).max(1e-9)).powi(2);
@@ -141,9 +135,9 @@ mod tests {
 
     fn factor_of(values: [f64; 5], law: &Brdf, theta_rad: f64) -> f64 {
         let bench = Bench::plate();
-        let mut look = bench.looks[0];
-        look.hit.cos_theta = theta_rad.cos();
-        ThinFilm.scatter(&values, &bench.stage(), law, &look, 1.0)
+        let mut shot = bench.shots[0];
+        shot.hit.cos_theta = theta_rad.cos();
+        ThinFilm.scatter(&values, &bench.stage(), law, &shot, 1.0)
     }
 
     #[test]

@@ -1,41 +1,38 @@
 //! Fewer looks of speckle than the radar declares.
 
-use super::{Effect, EffectParameter, Level, Receiver, Shot, Stage};
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting};
+use crate::effects::receiver::Receiver;
+use crate::effects::shot::{Shot, Stage};
 
 /// The effect `speckle`.
-pub(super) struct Speckle;
+pub(crate) struct Speckle;
 
 /// So many looks leave no speckle, and none are fewer than the declared.
 const ALL: f64 = 1e6;
 
-impl Effect for Speckle {
-    fn name(&self) -> &'static str {
-        "speckle"
-    }
-
-    fn level(&self) -> Level {
-        Level::Instrument
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        const PARAMETERS: [EffectParameter; 1] =
-            [EffectParameter::new("looks", "1", [0.3, ALL], ALL, 0.5)];
-        &PARAMETERS
-    }
-
-    fn description(&self) -> &'static str {
-        "The echo of a rough surface fluctuates like an average of this many independent looks, fewer \
-         than the radar is said to average."
-    }
-
-    fn signature(&self) -> &'static str {
-        "The powers scatter more than they should, alike at every angle, place and power, and their \
+const ABOUT: About = About {
+    name: "speckle",
+    level: Level::Instrument,
+    description: "The echo of a rough surface fluctuates like an average of this many independent looks, fewer \
+         than the radar is said to average.",
+    signature: "The powers scatter more than they should, alike at every angle, place and power, and their \
          mean in watts stays right. An error of the angle scatters only where the curve is steep; a \
-         higher noise floor only the weak echoes."
+         higher noise floor only the weak echoes.",
+    parameters: &[EffectParameter::new("looks", "1", [0.3, ALL], ALL, 0.5)],
+    conflicts: &[Conflict {
+        with: Setting::RangeReceiver,
+        problem: "sets the looks of speckle, and [radar.receiver] averages whole beat signals",
+        way_out: "set radar.speckle.looks instead",
+    }],
+};
+
+impl Effect for Speckle {
+    fn about(&self) -> &About {
+        &ABOUT
     }
 
     /// As shares of the declared looks, or absolute where the radar declares no speckle.
-    fn starts(&self, stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
+    fn starts(&self, stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         let declared = stage.radar.speckle.map(|speckle| speckle.looks);
         match declared {
             Some(looks) => {

@@ -1,41 +1,38 @@
 //! Thermal noise beyond what the radar declares: N + N_extra.
 
-use super::{Effect, EffectParameter, Level, Receiver, Shot, Stage};
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting};
+use crate::effects::receiver::Receiver;
+use crate::effects::shot::{Shot, Stage};
 use crate::units::watts_from_dbm;
 
 /// The effect `noise-floor`.
-pub(super) struct NoiseFloor;
+pub(crate) struct NoiseFloor;
 
 /// A level below anything thermal, dBm: no noise.
 const NONE_DBM: f64 = -200.0;
 
-impl Effect for NoiseFloor {
-    fn name(&self) -> &'static str {
-        "noise-floor"
-    }
-
-    fn level(&self) -> Level {
-        Level::Instrument
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        const PARAMETERS: [EffectParameter; 1] =
-            [EffectParameter::new("level_dbm", "dB[mW]", [NONE_DBM, -30.0], NONE_DBM, 1.0)];
-        &PARAMETERS
-    }
-
-    fn description(&self) -> &'static str {
-        "The receiver has more thermal noise than declared: this much power is added to every echo \
-         and to what is declared."
-    }
-
-    fn signature(&self) -> &'static str {
-        "Echoes near the threshold come out too strong, whatever their angle and range, and more of \
+const ABOUT: About = About {
+    name: "noise-floor",
+    level: Level::Instrument,
+    description: "The receiver has more thermal noise than declared: this much power is added to every echo \
+         and to what is declared.",
+    signature: "Echoes near the threshold come out too strong, whatever their angle and range, and more of \
          them than expected are detected. Return from below the surface flattens the curve as well, \
-         but at one σ⁰ and not at one power, and also far above the threshold."
+         but at one σ⁰ and not at one power, and also far above the threshold.",
+    parameters: &[EffectParameter::new("level_dbm", "dB[mW]", [NONE_DBM, -30.0], NONE_DBM, 1.0)],
+    conflicts: &[Conflict {
+        with: Setting::RangeReceiver,
+        problem: "adds thermal noise, and [radar.receiver] makes all of its own",
+        way_out: "raise radar.receiver.noise_figure_db instead",
+    }],
+};
+
+impl Effect for NoiseFloor {
+    fn about(&self) -> &About {
+        &ABOUT
     }
 
-    fn starts(&self, stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
+    fn starts(&self, stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         let [least, most] = [NONE_DBM + 1.0, -30.0];
         let below_db = [13.0, 8.0, 4.0];
         below_db.map(|b| vec![(stage.radar.threshold_dbm - b).clamp(least, most)]).to_vec()

@@ -4,52 +4,49 @@
 //! One that does so at once holds the speckle down, too, each look by itself or the mean of all; a gain
 //! control slower than a chirp lets all of it pass.
 
-use super::{Ceiling, Effect, EffectParameter, Level, Receiver, Shot, Stage};
+use crate::effects::ceiling::Ceiling;
+use crate::effects::effect::{About, Effect, EffectParameter, Level};
+use crate::effects::receiver::Receiver;
+use crate::effects::shot::{Shot, Stage};
 use crate::units::watts_from_dbm;
 
 /// The effect `compression`.
-pub(super) struct Compression;
+pub(crate) struct Compression;
 
 /// A ceiling that no echo comes near, dBm.
 const NONE_DBM: f64 = 60.0;
 
-impl Effect for Compression {
-    fn name(&self) -> &'static str {
-        "compression"
-    }
-
-    fn level(&self) -> Level {
-        Level::Instrument
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        const PARAMETERS: [EffectParameter; 4] = [
-            EffectParameter::new("saturation_dbm", "dB[mW]", [-90.0, NONE_DBM], NONE_DBM, 2.0),
-            EffectParameter::new("at_once", "1", [0.0, 1.0], 1.0, 0.2),
-            EffectParameter::new("knee", "1", [1.0, 4.0], 1.0, 0.2),
-            EffectParameter::new("averaged", "1", [0.0, 1.0], 1.0, 0.2),
-        ];
-        &PARAMETERS
-    }
-
-    fn description(&self) -> &'static str {
-        "The receiver saturates: strong echoes come out weaker than they are, with a soft ceiling."
-    }
-
-    fn signature(&self) -> &'static str {
-        "The residual falls with the predicted power, only at the strongest echoes and at any angle \
+const ABOUT: About = About {
+    name: "compression",
+    level: Level::Instrument,
+    description: "The receiver saturates: strong echoes come out weaker than they are, with a soft ceiling.",
+    signature: "The residual falls with the predicted power, only at the strongest echoes and at any angle \
          or place that is as strong. A rougher lobe or an error of the angle lowers the peak too, but \
-         raises the flanks beside it."
+         raises the flanks beside it.",
+    parameters: &[
+        EffectParameter::new("saturation_dbm", "dB[mW]", [-90.0, NONE_DBM], NONE_DBM, 2.0),
+        EffectParameter::new("at_once", "1", [0.0, 1.0], 1.0, 0.2),
+        EffectParameter::new("knee", "1", [1.0, 4.0], 1.0, 0.2),
+        EffectParameter::new("averaged", "1", [0.0, 1.0], 1.0, 0.2),
+    ],
+    conflicts: &[],
+};
+
+impl Effect for Compression {
+    fn about(&self) -> &About {
+        &ABOUT
     }
 
-    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         // Powers that a ceiling leaves no room for are outliers, which show no way to the right one.
-        let levels_dbm = (-27..=-7).map(|level| 3.0 * f64::from(level));
-        let ways = [[1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
-        let start = |saturation_dbm: f64| {
-            ways.map(|[at_once, averaged]| vec![saturation_dbm, at_once, 1.5, averaged])
-        };
-        levels_dbm.flat_map(start).collect()
+        let mut starts = Vec::new();
+        for level in -27..=-7 {
+            let saturation_dbm = 3.0 * f64::from(level);
+            for [at_once, averaged] in [[1.0, 1.0], [1.0, 0.0], [0.0, 1.0]] {
+                starts.push(vec![saturation_dbm, at_once, 1.5, averaged]);
+            }
+        }
+        starts
     }
 
     fn receive(&self, values: &[f64], receiver: Receiver) -> Receiver {

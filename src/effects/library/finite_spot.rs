@@ -1,20 +1,22 @@
 //! A spot of finite size: the power of a chirp is the mean over rays through a Gaussian footprint, its
-//! range their mean by power. Rays beside the target bring nothing.
+//! range their mean by power. Rays that miss the target bring nothing.
 
 use std::sync::{Arc, LazyLock};
 
 use rayon::prelude::*;
 
-use super::intersection::{Facet, Facing, facing};
-use super::model::Kept;
-use super::spread::sunflower;
-use super::{Effect, EffectParameter, Level, MeanEcho, Shot, Stage, Survey};
 use crate::brdf::{Brdf, Scattering, Term};
+use crate::effects::cache::Cache;
+use crate::effects::echo::MeanEcho;
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
+use crate::effects::intersection::{Facet, HitSurface, surface_at};
+use crate::effects::shot::{Shot, Stage};
+use crate::effects::spread::sunflower;
 use crate::frames::{Direction, Global, Ray, Surface};
 use crate::trace::{Hit, closest};
 
 /// The effect `finite-spot`.
-pub(super) struct FiniteSpot;
+pub(crate) struct FiniteSpot;
 
 /// Rays that stand for a spot. On a ball a highlight may be a tenth of it.
 const RAYS: usize = 64;
@@ -22,16 +24,16 @@ const RAYS: usize = 64;
 const MOST_M: f64 = 0.2;
 /// How far they reach, in standard deviations of the spot's intensity.
 const REACH_SD: f64 = 3.0;
-/// What other effects make of a look's power at most, and one over that at least: beyond it they have
-/// moved the look to another surface, and the spot sees what it saw.
+/// Largest factor, and one over it the smallest, by which other effects may change the power of a shot.
+/// Beyond it they have moved the shot to another surface, and the spot keeps the power of the old one.
 const MOST_GAIN: f64 = 100.0;
 
 /// Terms of laws whose sums are kept: more than the regions of most scenes have.
 const MOST_TERMS: usize = 48;
 
-/// Where one ray of a spot meets the target.
+/// Where one ray of a spot hits the target.
 #[derive(Clone, Copy)]
-struct Beside {
+struct SpotRay {
     range_m: f64,
     to_radar: Direction<Surface>,
     /// Power, W, where f is 1/sr, by its share of the spot.
@@ -39,26 +41,28 @@ struct Beside {
     region: u16,
 }
 
-impl Beside {
-    fn of(stage: &Stage, facing: Facing, hit: &Hit, share: f64) -> Beside {
-        let Facing { region, to_radar, .. } = facing;
+impl SpotRay {
+    fn new(stage: &Stage, surface: HitSurface, hit: &Hit, share: f64) -> SpotRay {
+        let HitSurface { region, to_radar, .. } = surface;
         let Hit { range_m, cos_theta, .. } = *hit;
         let watts_per_f = share * stage.link.power_w(range_m, cos_theta, 1.0);
-        Beside { range_m, to_radar, watts_per_f, region }
+        SpotRay { range_m, to_radar, watts_per_f, region }
+    }
+
+    /// Its power, W, from one region with an f of a direction, 1/sr.
+    fn power_w(&self, region: u16, f: impl Fn(Direction<Surface>) -> f64) -> f64 {
+        if self.region == region { self.watts_per_f * f(self.to_radar) } else { 0.0 }
     }
 }
 
-/// The rays of a spot and what they hit.
-type Round<'a> = (&'a [Ray<Global>; RAYS], &'a [Option<Hit>]);
+/// The ray of a shot and those of its spot, as far as they hit the target as the scene has it.
+type Spot = (SpotRay, Vec<SpotRay>);
 
-/// The ray of a look and those of its spot, as far as they meet the target as the scene has it.
-type Spot = (Beside, Vec<Beside>);
-
-/// What the spots of all looks meet.
+/// The spots of all shots.
 struct Spots {
     all: Vec<Option<Spot>>,
-    /// What terms of level 1 make of them: a law's levels change more often than its shape.
-    sums: Kept<(u16, Term), Vec<Sums>, MOST_TERMS>,
+    /// Their answers to terms of level 1: a law's levels change more often than its shape.
+    sums: Cache<(u16, Term), Vec<Sums>, MOST_TERMS>,
 }
 
 /// What a spot sends back from one region by one term of its law.
@@ -74,14 +78,10 @@ struct Sums {
 
 impl Sums {
     /// Of a region's rays, for f of a direction, 1/sr.
-    fn of((centre, beside): &Spot, region: u16, f: impl Fn(Direction<Surface>) -> f64) -> Sums {
-        let power_w = |ray: &Beside| match ray.region == region {
-            true => ray.watts_per_f * f(ray.to_radar),
-            false => 0.0,
-        };
-        let mut sums = Sums { centre_w: power_w(centre), ..Sums::default() };
-        for ray in beside {
-            let (power_w, longer_m) = (power_w(ray), ray.range_m - centre.range_m);
+    fn of((centre, spot): &Spot, region: u16, f: impl Fn(Direction<Surface>) -> f64) -> Sums {
+        let mut sums = Sums { centre_w: centre.power_w(region, &f), ..Sums::default() };
+        for ray in spot {
+            let (power_w, longer_m) = (ray.power_w(region, &f), ray.range_m - centre.range_m);
             sums.power_w += power_w;
             sums.first += power_w * longer_m;
             sums.second += power_w * longer_m * longer_m;
@@ -89,6 +89,7 @@ impl Sums {
         sums
     }
 
+    /// With `more` at a level added.
     fn and(self, level: f64, more: &Sums) -> Sums {
         Sums {
             centre_w: self.centre_w + level * more.centre_w,
@@ -98,79 +99,96 @@ impl Sums {
         }
     }
 
-    /// What the base law makes of a whole spot; none where nothing comes back.
-    fn averaged(&self) -> Option<Averaged> {
+    /// The mean over a whole spot by the base law; `None` where nothing comes back.
+    fn averaged(&self) -> Option<SpotMean> {
         let Sums { centre_w, power_w, first, second } = *self;
         if centre_w <= 0.0 || power_w <= 0.0 {
             return None;
         }
         let (mean_w, longer_m) = (power_w, first / power_w);
         let spread_m = (second / power_w - longer_m * longer_m).max(0.0).sqrt();
-        Some(Averaged { centre_w, mean_w, longer_m, spread_m })
+        Some(SpotMean { centre_w, mean_w, longer_m, spread_m })
     }
 }
 
 impl Spots {
-    /// By what level, 1/sr, and how the spots answer to each term of the laws; a law that is no sum of such is one
-    /// of level 1.
+    /// The level, 1/sr, of each term of the laws and how the spots answer to it. A law that is no sum of terms
+    /// is one of level 1.
     fn answers(&self, laws: &[Brdf]) -> Vec<(f64, Arc<Vec<Sums>>)> {
         let mut answers = Vec::new();
         for (region, law) in (0..).zip(laws) {
-            let by = |f: &(dyn Fn(Direction<Surface>) -> f64 + Sync)| -> Vec<Sums> {
-                let of = |spot: &Option<Spot>| {
-                    spot.as_ref().map_or(Sums::default(), |spot| Sums::of(spot, region, f))
-                };
-                self.all.par_iter().map(of).collect()
+            let Some(terms) = law.backscatter() else {
+                let sums = self.sums(region, |to_radar| law.f_per_sr(to_radar, to_radar));
+                answers.push((1.0, Arc::new(sums)));
+                continue;
             };
-            match law.backscatter() {
-                Some(terms) => answers.extend(terms.into_iter().map(|term| {
-                    let shape = Term { level_per_sr: 1.0, ..term };
-                    let sums = || by(&|to_radar| shape.per_sr(to_radar.cos_theta()));
-                    (term.level_per_sr, self.sums.of((region, shape), sums))
-                })),
-                None => {
-                    answers.push((1.0, Arc::new(by(&|to_radar| law.f_per_sr(to_radar, to_radar)))))
-                }
+            for term in terms {
+                let shape = Term { level_per_sr: 1.0, ..term };
+                let sums = self.sums.get_or_make((region, shape), || {
+                    self.sums(region, |to_radar| shape.per_sr(to_radar.cos_theta()))
+                });
+                answers.push((term.level_per_sr, sums));
             }
         }
         answers
     }
+
+    /// The sums of every spot over the rays of a region, for f of a direction, 1/sr.
+    fn sums(&self, region: u16, f: impl Fn(Direction<Surface>) -> f64 + Sync) -> Vec<Sums> {
+        let spots = self.all.par_iter();
+        spots
+            .map(|spot| spot.as_ref().map_or(Sums::default(), |spot| Sums::of(spot, region, &f)))
+            .collect()
+    }
 }
 
-fn spots(stage: &Stage, looks: &[Shot], diameter_m: f64) -> Vec<Option<Spot>> {
-    let axes: Vec<Ray<Global>> = looks.iter().map(|look| look.ray).collect();
+/// The spots of all shots, each of a diameter on the target, m.
+fn spots(stage: &Stage, shots: &[Shot], diameter_m: f64) -> Vec<Option<Spot>> {
+    let axes: Vec<Ray<Global>> = shots.iter().map(|shot| shot.ray).collect();
     let centres = closest(stage.bvh, &axes);
-    let round = |(look, centre): (&Shot, &Option<Hit>)| {
-        round(&look.ray, centre.map_or(0.0, |hit| diameter_m / hit.range_m))
-    };
-    let rays: Vec<[Ray<Global>; RAYS]> = looks.par_iter().zip(&centres).map(round).collect();
+    let rays: Vec<[Ray<Global>; RAYS]> = axes
+        .par_iter()
+        .zip(&centres)
+        .map(|(axis, centre)| spot_rays(axis, centre.map_or(0.0, |hit| diameter_m / hit.range_m)))
+        .collect();
     let hits = closest(stage.bvh, rays.as_flattened());
-    // Where facets are few, spots meet most of them many times.
+    // Where facets are few, spots hit most of them many times.
     let facets = stage.bvh.mesh().facets.len();
-    let facets = if facets < looks.len() * RAYS { 0..facets } else { 0..0 };
+    let facets = if facets < shots.len() * RAYS { 0..facets } else { 0..0 };
     let facets: Vec<Facet> =
         facets.into_par_iter().with_min_len(1024).map(|facet| Facet::of(stage, facet)).collect();
-    let spot = |(look, (centre, (rays, hits))): (&Shot, (&Option<Hit>, Round))| {
-        let met = |ray: &Ray<Global>, hit: &Option<Hit>, share: f64| {
-            let hit = hit.as_ref()?;
-            let facing = match facets.get(hit.facet as usize) {
-                Some(facet) => facet.facing(ray),
-                None => facing(stage, ray, hit),
-            };
-            Some(Beside::of(stage, facing, hit, share))
-        };
-        let centre = met(&look.ray, centre, 1.0)?;
-        let mut beside = Vec::with_capacity(RAYS);
-        let rays = rays.iter().zip(hits).zip(PLACES.iter());
-        beside.extend(rays.filter_map(|((ray, hit), place)| met(ray, hit, place.share)));
-        Some((centre, beside))
+    (&axes, &centres, &rays)
+        .into_par_iter()
+        .zip(hits.par_chunks(RAYS))
+        .map(|((axis, centre, rays), hits)| {
+            let centre = spot_ray(stage, &facets, axis, centre, 1.0)?;
+            let mut spot = Vec::with_capacity(RAYS);
+            for ((ray, hit), place) in rays.iter().zip(hits).zip(PLACES.iter()) {
+                spot.extend(spot_ray(stage, &facets, ray, hit, place.share));
+            }
+            Some((centre, spot))
+        })
+        .collect()
+}
+
+/// One ray of a spot with its share of the power, where it hits; `facets` may be empty.
+fn spot_ray(
+    stage: &Stage,
+    facets: &[Facet],
+    ray: &Ray<Global>,
+    hit: &Option<Hit>,
+    share: f64,
+) -> Option<SpotRay> {
+    let hit = hit.as_ref()?;
+    let surface = match facets.get(hit.facet as usize) {
+        Some(facet) => facet.surface(ray),
+        None => surface_at(stage, ray, hit),
     };
-    let rounds = rays.par_iter().zip(hits.par_chunks(RAYS));
-    looks.par_iter().zip(centres.par_iter().zip(rounds)).map(spot).collect()
+    Some(SpotRay::new(stage, surface, hit, share))
 }
 
 /// The rays of a spot whose diameter is seen at an angle, rad.
-fn round(axis: &Ray<Global>, diameter_rad: f64) -> [Ray<Global>; RAYS] {
+fn spot_rays(axis: &Ray<Global>, diameter_rad: f64) -> [Ray<Global>; RAYS] {
     let forward = axis.direction.xyz();
     let (u, v) = forward.any_orthonormal_pair();
     PLACES.map(|Place { along, across, .. }| {
@@ -199,9 +217,9 @@ static PLACES: LazyLock<[Place; RAYS]> = LazyLock::new(|| {
     });
     let places = [(); RAYS].map(|()| places.next().unwrap_or_default());
     let sum: f64 = places.iter().map(|place| place.share).sum();
-    let second = |place: &Place| place.share * (place.along.powi(2) + place.across.powi(2));
-    // What lies beyond their reach is made up for in the width.
-    let wider = (2.0 * sd * sd * sum / places.iter().map(second).sum::<f64>()).sqrt();
+    let squares = places.iter().map(|p| p.share * (p.along.powi(2) + p.across.powi(2)));
+    // The intensity beyond their reach is made up for in the width.
+    let wider = (2.0 * sd * sd * sum / squares.sum::<f64>()).sqrt();
     places.map(|Place { along, across, share }| Place {
         along: wider * along,
         across: wider * across,
@@ -209,9 +227,9 @@ static PLACES: LazyLock<[Place; RAYS]> = LazyLock::new(|| {
     })
 });
 
-/// What the base law makes of a spot on the target as the scene has it, so that other effects stay as
-/// they are.
-struct Averaged {
+/// The mean over a spot by the base law, on the target as the scene has it: other effects act on top of
+/// it.
+struct SpotMean {
     /// Power of the ray along the axis and the mean over the spot, W.
     centre_w: f64,
     mean_w: f64,
@@ -220,63 +238,62 @@ struct Averaged {
     spread_m: f64,
 }
 
-impl Effect for FiniteSpot {
-    fn name(&self) -> &'static str {
-        "finite-spot"
-    }
-
-    fn level(&self) -> Level {
-        Level::Instrument
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        const PARAMETERS: [EffectParameter; 1] =
-            [EffectParameter::new("diameter_m", "m", [0.0, MOST_M], 0.0, 0.008)];
-        &PARAMETERS
-    }
-
-    fn description(&self) -> &'static str {
-        "The beam has a width, here its diameter at half the intensity on the target, and averages \
-         over what lies in it: curvature, edges, borders between materials."
-    }
-
-    fn signature(&self) -> &'static str {
-        "Echoes are too weak beside edges, and the lobe is broader where the surface is curved; flat \
+const ABOUT: About = About {
+    name: "finite-spot",
+    level: Level::Instrument,
+    description: "The beam has a width, here its diameter at half the intensity on the target, and averages \
+         over what lies in it: curvature, edges, borders between materials.",
+    signature: "Echoes are too weak beside edges, and the lobe is broader where the surface is curved; flat \
          places far from edges are right. A rougher surface or an error of the angle broadens the lobe \
-         on flat places too."
+         on flat places too.",
+    parameters: &[EffectParameter::new("diameter_m", "m", [0.0, MOST_M], 0.0, 0.008)],
+    conflicts: &[Conflict {
+        with: Setting::SeveralRays,
+        problem: "averages over the spot, and so do several rays",
+        way_out: "set spot.rays = 1, or remove the effect",
+    }],
+};
+
+impl Effect for FiniteSpot {
+    fn about(&self) -> &About {
+        &ABOUT
     }
 
-    fn starts(&self, stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
+    fn starts(&self, stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         let nominal_m = stage.radar.spot_diameter_m;
         [0.1, 0.3, 0.75, 1.5].map(|share| vec![(share * nominal_m).clamp(1e-3, MOST_M)]).to_vec()
     }
 
     /// To where the intensity is 19 dB down.
-    fn sees_beside_m(&self, values: &[f64]) -> f64 {
+    fn reach_off_axis_m(&self, values: &[f64]) -> f64 {
         1.25 * values.first().copied().unwrap_or_default()
     }
 
-    fn surveyed(&self, values: &[f64]) -> Option<Vec<f64>> {
+    fn survey_key(&self, values: &[f64]) -> Option<Vec<f64>> {
         values.first().filter(|diameter_m| **diameter_m > 0.0).map(|_| values.to_vec())
     }
 
-    fn survey(&self, values: &[f64], stage: &Stage, looks: &[Shot]) -> Survey {
+    fn survey(&self, values: &[f64], stage: &Stage, shots: &[Shot]) -> Survey {
         let diameter_m = values.first().copied().unwrap_or(0.0);
-        Box::new(Spots { all: spots(stage, looks, diameter_m), sums: Kept::default() })
+        Box::new(Spots { all: spots(stage, shots, diameter_m), sums: Cache::default() })
     }
 
     fn shade(&self, survey: &Survey, laws: &[Brdf]) -> Survey {
         let Some(spots) = survey.downcast_ref::<Spots>() else { return Box::new(()) };
         let answers = spots.answers(laws);
-        let averaged = |look: usize| {
-            let add = |sums: Sums, (level, of): &(f64, Arc<Vec<Sums>>)| sums.and(*level, &of[look]);
-            answers.iter().fold(Sums::default(), add).averaged()
-        };
-        Box::new((0..spots.all.len()).into_par_iter().map(averaged).collect::<Vec<_>>())
+        let shots = (0..spots.all.len()).into_par_iter();
+        let means = shots.map(|shot| {
+            let mut sums = Sums::default();
+            for (level, of) in &answers {
+                sums = sums.and(*level, &of[shot]);
+            }
+            sums.averaged()
+        });
+        Box::new(means.collect::<Vec<_>>())
     }
 
     fn arrive(&self, _: &[f64], shaded: &Survey, arrived: &mut [Option<MeanEcho>]) {
-        let all = shaded.downcast_ref::<Vec<Option<Averaged>>>().into_iter().flatten();
+        let all = shaded.downcast_ref::<Vec<Option<SpotMean>>>().into_iter().flatten();
         for (averaged, one) in all.zip(arrived) {
             if let (Some(one), Some(averaged)) = (one, averaged) {
                 let gain = one.power_w / averaged.centre_w;
@@ -292,7 +309,7 @@ impl Effect for FiniteSpot {
 mod tests {
     use super::*;
     use crate::brdf::{CookTorrance, Lambert};
-    use crate::effects::intersection::met;
+    use crate::effects::intersection::shot_along;
     use crate::effects::testing::{Bench, db, lobe, paint};
     use crate::effects::{Model, Receiver};
     use crate::scene::solids;
@@ -309,7 +326,7 @@ mod tests {
 
     #[test]
     fn what_is_kept_of_spots_is_what_their_laws_say() {
-        let ray = |region: u16, theta_rad: f64| Beside {
+        let ray = |region: u16, theta_rad: f64| SpotRay {
             range_m: 8.0 + 0.01 * theta_rad,
             to_radar: Direction::from_angles(theta_rad, 0.3),
             watts_per_f: 1e-9,
@@ -317,7 +334,7 @@ mod tests {
         };
         let over_a_border = (ray(0, 0.1), vec![ray(0, 0.2), ray(1, 0.3), ray(1, 0.05)]);
         let all = vec![Some(over_a_border), None, Some((ray(1, 0.2), vec![ray(1, 0.25)]))];
-        let spots = Spots { all: all.clone(), sums: Kept::default() };
+        let spots = Spots { all: all.clone(), sums: Cache::default() };
         let law = |f_lambda: f64, m: f64| paint(CookTorrance { f_lambda, m, ..lobe() });
         let tabled = Brdf::Lambert(Lambert { albedo: 0.5 });
         let first = [law(0.2, 0.2), law(0.1, 0.3)];
@@ -325,9 +342,9 @@ mod tests {
         let other_shape = [law(0.2, 0.25), tabled];
         for laws in [&first, &other_level, &other_shape, &first] {
             let answers = spots.answers(laws);
-            for (look, spot) in all.iter().enumerate() {
+            for (shot, spot) in all.iter().enumerate() {
                 let add =
-                    |sums: Sums, (level, of): &(f64, Arc<Vec<Sums>>)| sums.and(*level, &of[look]);
+                    |sums: Sums, (level, of): &(f64, Arc<Vec<Sums>>)| sums.and(*level, &of[shot]);
                 let kept = answers.iter().fold(Sums::default(), add);
                 let Some(spot) = spot else {
                     assert!(kept.power_w == 0.0);
@@ -349,21 +366,21 @@ mod tests {
     }
 
     /// The mean over a fine grid of rays through a spot, W.
-    fn finely_w(bench: &Bench, look: &Shot, diameter_m: f64) -> f64 {
+    fn finely_w(bench: &Bench, shot: &Shot, diameter_m: f64) -> f64 {
         const HALF: i32 = 40;
         let (stage, law) = (bench.stage(), paint(lobe()));
         let model = Model { laws: vec![law], receiver: Receiver::LINEAR, effects: Vec::new() };
-        let forward = look.ray.direction.xyz();
+        let forward = shot.ray.direction.xyz();
         let (u, v) = forward.any_orthonormal_pair();
-        let sd_rad = diameter_m / look.hit.range_m / (8.0 * std::f64::consts::LN_2).sqrt();
+        let sd_rad = diameter_m / shot.hit.range_m / (8.0 * std::f64::consts::LN_2).sqrt();
         let [mut power_w, mut weights] = [0.0; 2];
         for (i, j) in (-HALF..=HALF).flat_map(|i| (-HALF..=HALF).map(move |j| (i, j))) {
             let [x, y] = [i, j].map(|k| 4.0 * f64::from(k) / f64::from(HALF));
             let weight = (-0.5 * (x * x + y * y)).exp();
             let direction = Direction::new(forward + sd_rad * (x * u + y * v)).unwrap();
-            let beside = met(&stage, look, Ray { direction, ..look.ray });
+            let beside = shot_along(&stage, shot, Ray { direction, ..shot.ray });
             weights += weight;
-            power_w += beside.map_or(0.0, |look| weight * model.arrived(&stage, &look).power_w);
+            power_w += beside.map_or(0.0, |shot| weight * model.arrived(&stage, &shot).power_w);
         }
         power_w / weights
     }
@@ -373,9 +390,9 @@ mod tests {
         let bench = Bench::sphere();
         for diameter_m in [0.02, 0.05, 0.1] {
             let spots = bench.with(&FiniteSpot, &[diameter_m]);
-            let off_db: Vec<f64> = std::iter::zip(&bench.looks, spots)
+            let off_db: Vec<f64> = std::iter::zip(&bench.shots, spots)
                 .step_by(3)
-                .map(|(look, spot)| db(spot.power_w / finely_w(&bench, look, diameter_m)))
+                .map(|(shot, spot)| db(spot.power_w / finely_w(&bench, shot, diameter_m)))
                 .collect();
             let rms = (off_db.iter().map(|x| x * x).sum::<f64>() / off_db.len() as f64).sqrt();
             let most = off_db.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
@@ -386,8 +403,8 @@ mod tests {
     #[test]
     fn half_a_spot_beside_the_edge_is_half_the_power() {
         let bench = Bench::of(solids::plate(0.5, 2.0));
-        let edge = bench.looks.iter().position(|look| look.xt_m > 0.2499);
-        let edge = edge.expect("the last column of looks is on the edge");
+        let edge = bench.shots.iter().position(|shot| shot.xt_m > 0.2499);
+        let edge = edge.expect("the last column of shots is on the edge");
         let ratio = bench.with(&FiniteSpot, &[0.016])[edge].power_w / bench.bare()[edge].power_w;
         // A few rays lie on the edge itself.
         assert!((ratio - 0.5).abs() < 0.1, "{ratio}");

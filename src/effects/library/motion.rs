@@ -6,12 +6,13 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
 
-use super::intersection::motion;
-use super::{Effect, EffectParameter, Level, Shot, Stage};
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting};
+use crate::effects::intersection::motion;
+use crate::effects::shot::{Shot, Stage};
 use crate::frames::{Global, Pose};
 
 /// The effect `motion`.
-pub(super) struct Motion;
+pub(crate) struct Motion;
 
 /// Cosines of a path, the constant among them, and all its terms: up to about two and a half cycles a scan.
 const COSINES: usize = 8;
@@ -62,19 +63,20 @@ fn terms(progress: f64) -> [f64; TERMS] {
     }
     let along = 1.0 - 2.0 * progress;
     let begin = [1.0; COSINES];
-    let line = left(along, 1, &cosines) / left(1.0, 1, &begin);
-    let parabola = left(0.5 * along * along - 1.0 / 6.0, 2, &cosines) / left(1.0 / 3.0, 2, &begin);
+    let line = without_cosines(along, 1, &cosines) / without_cosines(1.0, 1, &begin);
+    let parabola = without_cosines(0.5 * along * along - 1.0 / 6.0, 2, &cosines)
+        / without_cosines(1.0 / 3.0, 2, &begin);
     let mut terms = [line; TERMS];
     terms[..COSINES].copy_from_slice(&cosines);
     terms[COSINES + 1] = parabola;
     terms
 }
 
-/// What is left of a function beside its cosines, of which that with k half waves has the coefficient
-/// 8/(πk)², for k = first, first + 2, ...
-fn left(function: f64, first: usize, cosines: &[f64; COSINES]) -> f64 {
-    let part = |k: usize| 8.0 / (PI * k as f64).powi(2) * cosines[k];
-    function - (first..COSINES).step_by(2).map(part).sum::<f64>()
+/// A function without its cosines, of which that with k half waves has the coefficient 8/(πk)², for
+/// k = first, first + 2, ...
+fn without_cosines(function: f64, first: usize, cosines: &[f64; COSINES]) -> f64 {
+    let parts = (first..COSINES).step_by(2).map(|k| 8.0 / (PI * k as f64).powi(2) * cosines[k]);
+    function - parts.sum::<f64>()
 }
 
 /// How far a target has moved, m.
@@ -83,35 +85,32 @@ fn shift_m(values: &[f64], progress: f64) -> DVec3 {
     axes.map(|(values, share)| share * DVec3::from_slice(values)).sum()
 }
 
-impl Effect for Motion {
-    fn name(&self) -> &'static str {
-        "motion"
-    }
-
-    fn level(&self) -> Level {
-        Level::Scene
-    }
-
-    fn parameters(&self) -> &'static [EffectParameter] {
-        &PARAMETERS
-    }
-
-    fn description(&self) -> &'static str {
-        "The target moves slowly while the scan runs, as a person who sways or breathes: along each axis of the \
+const ABOUT: About = About {
+    name: "motion",
+    level: Level::Scene,
+    description: "The target moves slowly while the scan runs, as a person who sways or breathes: along each axis of the \
          scene by the sum of ten terms that all are 1 as the scan begins, with p for the share of it that is over. 0 to 7 are \
-         cos(kπp), 8 and 9 what these leave of a line and of a parabola."
-    }
-
-    fn signature(&self) -> &'static str {
-        "The ranges are off by an amount that changes smoothly along the scan, and places that the \
+         cos(kπp), 8 and 9 what these leave of a line and of a parabola.",
+    signature: "The ranges are off by an amount that changes smoothly along the scan, and places that the \
          mirror passes twice disagree. A wrong pose is off alike from the first chirp to the last; a \
-         drift of the gain leaves the ranges as they are."
+         drift of the gain leaves the ranges as they are.",
+    parameters: &PARAMETERS,
+    conflicts: &[Conflict {
+        with: Setting::Bounce,
+        problem: "moves the target, and [bounce] follows paths on it where the scene has it",
+        way_out: "remove [bounce], or move the mesh by its translation_m and rotation_deg",
+    }],
+};
+
+impl Effect for Motion {
+    fn about(&self) -> &About {
+        &ABOUT
     }
 
     fn summary(&self, values: &[f64]) -> Option<String> {
         const STEPS: u32 = 500;
-        let way_m = || (0..=STEPS).map(|step| shift_m(values, f64::from(step) / f64::from(STEPS)));
-        let span_m = way_m().reduce(DVec3::max)? - way_m().reduce(DVec3::min)?;
+        let path_m = (0..=STEPS).map(|step| shift_m(values, f64::from(step) / f64::from(STEPS)));
+        let span_m = path_m.clone().reduce(DVec3::max)? - path_m.reduce(DVec3::min)?;
         let [x_mm, y_mm, z_mm] = (1e3 * span_m).to_array();
         Some(format!(
             "a path that spans {x_mm:.1} mm along x, {y_mm:.1} mm along y and {z_mm:.1} mm along z"
@@ -119,7 +118,7 @@ impl Effect for Motion {
     }
 
     /// At rest: ranges say at once where to.
-    fn starts(&self, _stage: &Stage, _looks: &[Shot]) -> Vec<Vec<f64>> {
+    fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![0.0; PARAMETERS.len()]]
     }
 
@@ -131,13 +130,13 @@ impl Effect for Motion {
         true
     }
 
-    fn shifts(&self, parameter: usize, look: &Shot) -> Option<(usize, f64)> {
-        Some((parameter % 3, *terms(look.progress).get(parameter / 3)?))
+    fn shifts(&self, parameter: usize, shot: &Shot) -> Option<(usize, f64)> {
+        Some((parameter % 3, *terms(shot.progress).get(parameter / 3)?))
     }
 
-    fn motion(&self, values: &[f64], _: &Stage, look: &Shot) -> Option<Pose<Global, Global>> {
+    fn motion(&self, values: &[f64], _: &Stage, shot: &Shot) -> Option<Pose<Global, Global>> {
         let moves = values.iter().any(|&value| value != 0.0);
-        let shift_m = shift_m(values, look.progress);
+        let shift_m = shift_m(values, shot.progress);
         moves.then(|| motion(DMat3::IDENTITY, DVec3::ZERO, shift_m))
     }
 }
@@ -185,9 +184,9 @@ mod tests {
         let mut values = [0.0; PARAMETERS.len()];
         values[8] = 4e-3;
         for (progress, expected_m) in [(0.0, 4e-3), (0.25, 0.0), (0.5, -4e-3), (1.0, 4e-3)] {
-            let look = Shot { progress, ..bench.looks[7] };
-            let found = bench.moved(&Motion, &values, &look).unwrap();
-            let nearer_m = (look.hit.range_m - found.hit.range_m) * look.hit.cos_theta;
+            let shot = Shot { progress, ..bench.shots[7] };
+            let found = bench.moved(&Motion, &values, &shot).unwrap();
+            let nearer_m = (shot.hit.range_m - found.hit.range_m) * shot.hit.cos_theta;
             assert!((nearer_m - expected_m).abs() < 1e-9, "{progress}: {nearer_m}");
         }
         let told = Motion.summary(&values).unwrap();

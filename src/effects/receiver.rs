@@ -1,0 +1,39 @@
+//! The law of a receiver: how what it reports scatters about the mean.
+
+use super::ceiling::{Ceiling, Saturating};
+use crate::radar::Radar;
+use crate::units::watts_from_dbm;
+
+/// The law of what is received about its mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Receiver {
+    /// Looks L of the speckle.
+    pub looks: f64,
+    /// Mean thermal power, W.
+    pub noise_w: f64,
+    /// Standard deviation of each of the two tilts of a normal that differ from chirp to chirp, rad.
+    pub tilt_sd_rad: f64,
+    /// What it cannot pass.
+    pub ceiling: Ceiling,
+}
+
+impl Receiver {
+    /// No speckle, no noise, no tilt, no ceiling.
+    pub const LINEAR: Receiver =
+        Receiver { looks: f64::INFINITY, noise_w: 0.0, tilt_sd_rad: 0.0, ceiling: Ceiling::NONE };
+
+    /// Its ceiling over its speckle.
+    pub fn saturating(&self) -> Saturating {
+        self.ceiling.over(self.looks)
+    }
+
+    /// The law that a radar declares: its speckle, infinitely many looks where it has none, and the
+    /// thermal noise of its `[radar.noise]`.
+    pub fn declared(radar: &Radar) -> Receiver {
+        Receiver {
+            looks: radar.speckle.map_or(f64::INFINITY, |speckle| speckle.looks),
+            noise_w: radar.noise.map_or(0.0, |noise| watts_from_dbm(noise.level_dbm)),
+            ..Receiver::LINEAR
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! What a scene knows of a chirp, and of all chirps together.
+
+use glam::DVec3;
+
+use crate::frames::{Global, Pose, Ray};
+use crate::radar::{Link, Radar};
+use crate::trace::{Bvh, Hit};
+
+/// One chirp that meets the target, as far as the scene knows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shot {
+    /// Chirp number.
+    pub chirp: u32,
+    /// Time of the chirp, s.
+    pub time_s: f64,
+    /// Share of the scan that is over, 0 to 1, by the chirp's place in it.
+    pub progress: f64,
+    /// The ray.
+    pub ray: Ray<Global>,
+    /// Where it meets the target.
+    pub hit: Hit,
+    /// Unit normal there, towards the radar.
+    pub normal: DVec3,
+    /// Where effects have moved the target from where the scene has it.
+    pub target: Pose<Global, Global>,
+    /// Azimuth of the radar about the normal, from the grain of the region, rad.
+    pub azimuth_rad: f64,
+    /// Region of the facet.
+    pub region: u16,
+    /// x of the target frame where the ray passes 8 m, m.
+    pub xt_m: f64,
+    /// y of the same, m.
+    pub yt_m: f64,
+    /// Distance in the target plane to the nearest edge in depth, m, at most three spots.
+    pub edge_m: f64,
+}
+
+/// What all shots of a scan share.
+#[derive(Clone, Copy)]
+pub struct Stage<'a> {
+    /// The instrument.
+    pub radar: &'a Radar,
+    /// Its power balance.
+    pub link: Link,
+    /// The target as the scene places it.
+    pub bvh: &'a Bvh<'a>,
+    /// Region of every facet.
+    pub region_of_facet: &'a [u16],
+    /// Direction of the grain of every region, global frame.
+    pub grain_of_region: &'a [DVec3],
+    /// What a pose turns about, m, global frame: the [`middle`] of all shots of the scan, whichever
+    /// of them are predicted.
+    pub middle: DVec3,
+}
+
+/// Middle of the points where shots meet the target, m, global frame; the origin without shots.
+pub fn middle(shots: &[Shot]) -> DVec3 {
+    let sum: DVec3 = shots.iter().map(|shot| shot.hit.point.xyz).sum();
+    sum / shots.len().max(1) as f64
+}
