@@ -352,7 +352,7 @@ fn views_show_people_decibels_and_degrees() {
     assert_eq!(count("SELECT count(*) FROM v_materials WHERE status = 'superseded'"), 2);
     assert_eq!(count("SELECT count(*) FROM v_materials WHERE frequency_min_ghz = 290"), 2);
     let parameters = sample("paint").fits[0].model.parameters().len() as i64;
-    let told = attributed("paint").fits[0].told().len() as i64;
+    let told = attributed("paint").fits[0].numbers().len() as i64;
     assert!(told > parameters, "S and R stand beside the parameters");
     assert_eq!(count("SELECT count(*) FROM v_fits WHERE is_rendered"), 2 * told);
 }

@@ -1,13 +1,21 @@
 //! The materials that come with the program, as reviewable text in `materials/`.
 
-use super::Material;
 use super::file::{FileError, parse};
+use super::material::Material;
 
 /// One built-in material's files.
 struct Entry {
     slug: &'static str,
     toml: &'static str,
     csv: &'static [(&'static str, &'static str)],
+}
+
+impl Entry {
+    /// The bytes of one of its curves.
+    fn csv(&self, file: &str) -> Result<Vec<u8>, String> {
+        let found = self.csv.iter().find(|(name, _)| *name == file);
+        found.map(|(_, text)| text.as_bytes().to_vec()).ok_or("it is not embedded".to_owned())
+    }
 }
 
 macro_rules! entries {
@@ -85,11 +93,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 /// ```
 pub fn get(name: &str) -> Option<Result<Material, FileError>> {
     let entry = ENTRIES.iter().find(|entry| entry.slug == name)?;
-    let read_csv = |wanted: &str| {
-        let found = entry.csv.iter().find(|(name, _)| *name == wanted);
-        found.map(|(_, text)| text.as_bytes().to_vec()).ok_or("it is not embedded".to_owned())
-    };
-    Some(parse(&format!("{name}/material.toml"), entry.toml, read_csv))
+    Some(parse(&format!("{name}/material.toml"), entry.toml, |file| entry.csv(file)))
 }
 
 #[cfg(test)]

@@ -2,69 +2,13 @@
 
 use std::collections::HashSet;
 
-use thiserror::Error;
-
-use super::{Censor, Covariance, Curve, Fit, Instrument, Material, Observation, Session, Source};
-use crate::brdf::{ParameterError, TabulatedError};
+use super::curve::{Censor, Curve, Observation};
+use super::error::{MaterialError, dangling, value};
+use super::fit::{Covariance, Fit};
+use super::instrument::Instrument;
+use super::material::Material;
+use super::provenance::{Session, Source};
 use crate::formats::EffectEntry;
-
-/// Why a material cannot be kept.
-#[derive(Debug, Error, PartialEq)]
-pub enum MaterialError {
-    /// A parameter outside its range.
-    #[error("fit `{fit}`: {error}")]
-    Parameter {
-        /// Name of the fit.
-        fit: String,
-        /// What is wrong.
-        error: ParameterError,
-    },
-    /// A curve that cannot be rendered, though it is asked for.
-    #[error("curve `{curve}` cannot be rendered: {error}")]
-    Curve {
-        /// Name of the curve.
-        curve: String,
-        /// What is wrong.
-        error: TabulatedError,
-    },
-    /// A key or name that refers to nothing.
-    #[error("{place} refers to {what} `{name}`, which is not defined; {}", define(known))]
-    Dangling {
-        /// Where the reference stands.
-        place: String,
-        /// What it should name.
-        what: &'static str,
-        /// The name.
-        name: String,
-        /// What there is.
-        known: Vec<String>,
-    },
-    /// The same name twice.
-    #[error("{what} `{name}` is defined twice; rename one")]
-    Twice {
-        /// What is named.
-        what: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// A value that has no meaning.
-    #[error("{place}: {problem}; {way_out}")]
-    Value {
-        /// Where.
-        place: String,
-        /// What is wrong.
-        problem: String,
-        /// What to do.
-        way_out: String,
-    },
-}
-
-fn define(known: &[String]) -> String {
-    match known {
-        [] => "define it, or leave the reference out".to_owned(),
-        _ => format!("define it or name one of: {}", known.join(", ")),
-    }
-}
 
 impl Material {
     /// Checks names, references, ranges and values.
@@ -108,14 +52,11 @@ impl Material {
     }
 
     fn check_limits(&self) -> Result<(), MaterialError> {
-        let ascending = |[low, high]: [f64; 2], least: f64, most: f64| {
-            low >= least && high <= most && low <= high
-        };
-        if !ascending(self.frequency_hz, f64::MIN_POSITIVE, f64::MAX) {
+        if !is_range_within(self.frequency_hz, f64::MIN_POSITIVE, f64::MAX) {
             let problem = "must be two positive frequencies, the lower first";
             return Err(value("frequency_ghz", problem, "mend the range"));
         }
-        if !ascending(self.theta_rad, 0.0, std::f64::consts::FRAC_PI_2) {
+        if !is_range_within(self.theta_rad, 0.0, std::f64::consts::FRAC_PI_2) {
             let problem = "must be two angles from 0 to 90, the smaller first";
             return Err(value("theta_deg", problem, "mend the range"));
         }
@@ -220,7 +161,7 @@ impl Material {
         self.check_own_source(place, Some(key))
     }
 
-    /// The same where a source may be left out.
+    /// As `check_source`, where a source may be left out.
     fn check_own_source(&self, place: &str, key: Option<&String>) -> Result<(), MaterialError> {
         refers(place, "a source", key, self.sources.iter().map(|s| &s.key))
     }
@@ -235,8 +176,8 @@ impl Observation {
         if !self.delta_phi_rad.is_finite() {
             return Err(value(place, "the azimuth is not finite", "mend the angle"));
         }
-        let positive = |x: f64| x > 0.0 && x.is_finite();
-        if [self.sigma0, self.threshold_sigma0].into_iter().flatten().any(|x| !positive(x)) {
+        let mut levels = [self.sigma0, self.threshold_sigma0].into_iter().flatten();
+        if levels.any(|level| !(level > 0.0 && level.is_finite())) {
             return Err(value(place, "σ⁰ is not a positive number", "give a finite level in dB"));
         }
         self.check_circumstances(place)?;
@@ -301,6 +242,12 @@ impl Covariance {
     }
 }
 
+/// Whether a range ascends within limits.
+fn is_range_within([low, high]: [f64; 2], least: f64, most: f64) -> bool {
+    low >= least && high <= most && low <= high
+}
+
+/// Refuses a name that is empty or given twice.
 fn unique<'a>(
     what: &'static str,
     names: impl Iterator<Item = &'a str>,
@@ -324,99 +271,10 @@ fn refers<'a>(
     name: Option<&String>,
     known: impl Iterator<Item = &'a String> + Clone,
 ) -> Result<(), MaterialError> {
-    match name.filter(|name| !known.clone().any(|key| key == *name)) {
-        None => Ok(()),
-        Some(stranger) => {
-            let mut names: Vec<String> = known.cloned().collect();
-            names.dedup();
-            Err(dangling(place, what, stranger, names))
-        }
-    }
-}
-
-/// Ranges of the numbers of one place.
-#[derive(Clone, Copy)]
-pub(super) struct Check<'a> {
-    place: &'a str,
-}
-
-impl<'a> Check<'a> {
-    pub fn new(place: &'a str) -> Check<'a> {
-        Check { place }
-    }
-
-    pub fn positive(
-        self,
-        what: &str,
-        numbers: impl IntoIterator<Item = f64>,
-    ) -> Result<(), MaterialError> {
-        self.all(what, "is not positive", numbers, |x| x > 0.0)
-    }
-
-    pub fn not_negative(
-        self,
-        what: &str,
-        numbers: impl IntoIterator<Item = f64>,
-    ) -> Result<(), MaterialError> {
-        self.all(what, "is negative or no number", numbers, |x| x >= 0.0)
-    }
-
-    pub fn at_least(
-        self,
-        what: &str,
-        least: f64,
-        numbers: impl IntoIterator<Item = f64>,
-    ) -> Result<(), MaterialError> {
-        self.all(what, &format!("is below {least}"), numbers, |x| x >= least)
-    }
-
-    pub fn finite(
-        self,
-        what: &str,
-        numbers: impl IntoIterator<Item = f64>,
-    ) -> Result<(), MaterialError> {
-        self.all(what, "is not finite", numbers, |_| true)
-    }
-
-    pub fn quarter_turn(
-        self,
-        what: &str,
-        numbers: impl IntoIterator<Item = f64>,
-    ) -> Result<(), MaterialError> {
-        let quarter = 0.0..=std::f64::consts::FRAC_PI_2;
-        self.all(what, "is not within 0–90°", numbers, |x| quarter.contains(&x))
-    }
-
-    fn all(
-        self,
-        what: &str,
-        problem: &str,
-        numbers: impl IntoIterator<Item = f64>,
-        good: impl Fn(f64) -> bool,
-    ) -> Result<(), MaterialError> {
-        match numbers.into_iter().find(|x| !(x.is_finite() && good(*x))) {
-            None => Ok(()),
-            Some(_) => {
-                let problem = format!("{what} {problem}");
-                Err(value(self.place, &problem, "mend it or leave it out"))
-            }
-        }
-    }
-}
-
-pub(super) fn value(place: &str, problem: &str, way_out: &str) -> MaterialError {
-    MaterialError::Value {
-        place: place.to_owned(),
-        problem: problem.to_owned(),
-        way_out: way_out.to_owned(),
-    }
-}
-
-pub(super) fn dangling(
-    place: &str,
-    what: &'static str,
-    name: &str,
-    known: Vec<String>,
-) -> MaterialError {
-    MaterialError::Dangling { place: place.to_owned(), what, name: name.to_owned(), known }
+    let Some(stranger) = name.filter(|name| !known.clone().any(|key| key == *name)) else {
+        return Ok(());
+    };
+    let mut names: Vec<String> = known.cloned().collect();
+    names.dedup();
+    Err(dangling(place, what, stranger, names))
 }

@@ -5,7 +5,8 @@
 
 use serde::Serialize;
 
-use super::check::{Check, MaterialError, value};
+use super::error::{MaterialError, value};
+use super::number_check::NumberCheck;
 
 /// One layer of a material; they are listed from the outermost inwards.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -69,13 +70,13 @@ impl Layer {
             let way_out = "give thickness_mm; only the last layer can be a half space";
             return Err(value(place, "has no thickness", way_out));
         }
-        Check::new(place).positive("the thickness", self.thickness_m)
+        NumberCheck::new(place).positive("the thickness", self.thickness_m)
     }
 }
 
 impl Permittivity {
     pub(super) fn validate(&self, place: &str) -> Result<(), MaterialError> {
-        let check = Check::new(place);
+        let check = NumberCheck::new(place);
         check.positive("the frequency", [self.frequency_hz])?;
         check.positive("the temperature above absolute zero", self.temperature_k)?;
         check.finite("the real part", [self.real])?;
@@ -97,7 +98,7 @@ impl Permittivity {
 
 impl Roughness {
     pub(super) fn validate(&self) -> Result<(), MaterialError> {
-        let check = Check::new("roughness");
+        let check = NumberCheck::new("roughness");
         check.not_negative("the rms height", [self.rms_height_m])?;
         check.positive("the correlation length", self.correlation_length_m)
     }

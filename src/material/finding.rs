@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::check::{Check, MaterialError, value};
+use super::error::{MaterialError, value};
+use super::number_check::NumberCheck;
 
 /// One thing that a diagnosis tried. What it did not find is worth as much as what it found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -74,7 +75,7 @@ impl FindingVerdict {
 
 impl Finding {
     pub(super) fn validate(&self, place: &str) -> Result<(), MaterialError> {
-        let check = Check::new(place);
+        let check = NumberCheck::new(place);
         if self.effect.trim().is_empty() {
             return Err(value(place, "names no effect", "say what was tried in `effect`"));
         }
@@ -83,9 +84,9 @@ impl Finding {
         check.not_negative("the deviation of the score", self.score_difference_sd)?;
         check.not_negative("the size", self.size_db)?;
         check.not_negative("the error", self.rms_before_db.into_iter().chain(self.rms_after_db))?;
-        match self.p.is_none_or(|p| (0.0..=1.0).contains(&p)) {
-            true => Ok(()),
-            false => Err(value(place, "p is not between 0 and 1", "mend it or leave it out")),
+        if self.p.is_some_and(|p| !(0.0..=1.0).contains(&p)) {
+            return Err(value(place, "p is not between 0 and 1", "mend it or leave it out"));
         }
+        Ok(())
     }
 }

@@ -1,4 +1,4 @@
-//! The forms of licences, DOIs, ORCIDs and addresses, as others will look them up.
+//! The forms of licences, DOIs, ORCIDs, addresses, hashes and days.
 
 use crate::formats::text::nearest;
 
@@ -47,8 +47,8 @@ const LICENCES: [&str; 32] = [
 /// assert!(licence_doubt("CC-BY").unwrap().contains("did you mean `CC-BY-4.0`?"));
 /// ```
 pub fn licence_doubt(text: &str) -> Option<String> {
-    let is_known = |name: &str| name.contains("LicenseRef-") || LICENCES.contains(&name);
-    let stranger = licence_names(text).find(|name| !is_known(name))?;
+    let stranger = licence_names(text)
+        .find(|name| !name.contains("LicenseRef-") && !LICENCES.contains(name))?;
     // A name without its version is nearest to its latest.
     let begun = LICENCES.iter().rev().find(|known| {
         known.strip_prefix(stranger).is_some_and(|rest| {
@@ -151,6 +151,35 @@ pub fn is_address(text: &str) -> bool {
     })
 }
 
+/// Whether a text is 64 lower-case hexadecimal digits.
+pub(super) fn is_hash(text: &str) -> bool {
+    text.len() == 64 && text.chars().all(|c| c.is_ascii_digit() || ('a'..='f').contains(&c))
+}
+
+/// Whether a text is a day of the Gregorian calendar as ISO 8601 writes it.
+pub(super) fn is_date(text: &str) -> bool {
+    let dashes = text.get(4..5) == Some("-") && text.get(7..8) == Some("-");
+    let [Some(year), Some(month), Some(day)] =
+        [0..4, 5..7, 8..10].map(|digits| text.get(digits).and_then(whole_number))
+    else {
+        return false;
+    };
+    let is_leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
+    let days = match month {
+        2 if is_leap => 29,
+        2 => 28,
+        4 | 6 | 9 | 11 => 30,
+        1..=12 => 31,
+        _ => 0,
+    };
+    text.len() == 10 && dashes && (1..=days).contains(&day)
+}
+
+/// The number that a text of digits alone is.
+fn whole_number(digits: &str) -> Option<u32> {
+    digits.chars().all(|c| c.is_ascii_digit()).then(|| digits.parse().ok())?
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -172,6 +201,18 @@ mod tests {
             "https://a\nb",
         ] {
             assert!(!is_address(bad), "{bad}");
+        }
+    }
+
+    #[test]
+    fn only_days_of_the_calendar_are_dates() {
+        for day in ["2026-03-14", "2024-02-29", "2000-02-29", "1999-12-31"] {
+            assert!(is_date(day), "{day}");
+        }
+        for text in
+            ["2026-02-29", "1900-02-29", "2026-13-01", "2026-1-1", "14.3.2026", "2026-03-14T00", ""]
+        {
+            assert!(!is_date(text), "{text}");
         }
     }
 }

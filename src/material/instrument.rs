@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::check::{Check, MaterialError, value};
+use super::error::{MaterialError, value};
+use super::number_check::NumberCheck;
 
 /// What a curve was measured with. What nobody stated is none.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -109,7 +110,7 @@ impl Scale {
 impl Instrument {
     pub(super) fn validate(&self) -> Result<(), MaterialError> {
         let place = format!("instrument `{}`", self.key);
-        let check = Check::new(&place);
+        let check = NumberCheck::new(&place);
         check.positive("the centre frequency", [self.centre_frequency_hz])?;
         check.positive("the bandwidth", self.bandwidth_hz)?;
         check.positive("the stand-off", self.stand_off_m)?;

@@ -2,8 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::check::{Check, MaterialError, value};
-use super::texts::turns_the_line;
+use super::bidirectional::turns_the_line;
+use super::error::{MaterialError, value};
+use super::form::{is_date, is_hash};
+use super::number_check::NumberCheck;
 
 /// Where numbers come from.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -224,8 +226,8 @@ impl Origin {
 
     /// Whether nothing tells the catalogue from others: it names nobody and has no title of its own.
     pub fn is_anonymous(&self) -> bool {
-        let is_own = |title: &String| title != USUAL_TITLE;
-        self.authors.is_empty() && !self.title.as_ref().is_some_and(is_own)
+        let has_own_title = self.title.as_ref().is_some_and(|title| title != USUAL_TITLE);
+        self.authors.is_empty() && !has_own_title
     }
 
     /// Its title, or that it has none.
@@ -271,7 +273,7 @@ impl Source {
 impl Session {
     pub(super) fn validate(&self) -> Result<(), MaterialError> {
         let place = format!("session `{}`", self.key);
-        let check = Check::new(&place);
+        let check = NumberCheck::new(&place);
         if !is_date(&self.date) {
             let problem = format!("`{}` is not a date", self.date.escape_debug());
             return Err(value(&place, &problem, "write it as 2026-03-14"));
@@ -290,10 +292,10 @@ impl Session {
         check.not_negative("the residual of the registration", self.registration_rms_m)?;
         check.quarter_turn("the deviation of the normals", self.normal_sd_rad)?;
         check.quarter_turn("the spread over the footprint", self.footprint_sd_rad)?;
-        match self.pose.is_none_or(|pose| pose.is_rigid()) {
-            true => Ok(()),
-            false => Err(value(&place, "the pose is no rotation with a shift", "mend its rows")),
+        if self.pose.is_some_and(|pose| !pose.is_rigid()) {
+            return Err(value(&place, "the pose is no rotation with a shift", "mend its rows"));
         }
+        Ok(())
     }
 }
 
@@ -305,48 +307,5 @@ impl SessionPose {
         let unit = [x, y, z].iter().all(|row| (row.length() - 1.0).abs() < ROUNDING);
         let right_handed = (x.cross(y) - z).length() < ROUNDING;
         unit && right_handed && self.translation_m.iter().all(|shift_m| shift_m.is_finite())
-    }
-}
-
-/// Whether a text is 64 lower-case hexadecimal digits.
-pub(super) fn is_hash(text: &str) -> bool {
-    text.len() == 64 && text.chars().all(|c| c.is_ascii_digit() || ('a'..='f').contains(&c))
-}
-
-/// Whether a text is a day of the Gregorian calendar as ISO 8601 writes it.
-fn is_date(text: &str) -> bool {
-    let number = |from: usize, to: usize| {
-        let digits = text.get(from..to).filter(|d| d.chars().all(|c| c.is_ascii_digit()))?;
-        digits.parse::<u32>().ok()
-    };
-    let dashes = text.get(4..5) == Some("-") && text.get(7..8) == Some("-");
-    let (Some(year), Some(month), Some(day)) = (number(0, 4), number(5, 7), number(8, 10)) else {
-        return false;
-    };
-    let is_leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
-    let days = match month {
-        2 if is_leap => 29,
-        2 => 28,
-        4 | 6 | 9 | 11 => 30,
-        1..=12 => 31,
-        _ => 0,
-    };
-    text.len() == 10 && dashes && (1..=days).contains(&day)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_days_of_the_calendar_are_dates() {
-        for day in ["2026-03-14", "2024-02-29", "2000-02-29", "1999-12-31"] {
-            assert!(is_date(day), "{day}");
-        }
-        for text in
-            ["2026-02-29", "1900-02-29", "2026-13-01", "2026-1-1", "14.3.2026", "2026-03-14T00", ""]
-        {
-            assert!(!is_date(text), "{text}");
-        }
     }
 }

@@ -1,6 +1,7 @@
 //! How far a material answers for what scenes render of it.
 
-use super::{Censor, Curve, Material};
+use super::curve::{Censor, Curve};
+use super::material::Material;
 
 /// Angles at which a material answers: those that it claims and, of a curve that is rendered, no farther
 /// than its points go.
@@ -46,18 +47,20 @@ impl Reach {
     /// thresholds: that of the nearest of them.
     pub fn below_sigma0(&self, theta_rad: f64) -> Option<f64> {
         let points = self.points.as_ref()?;
-        let away = |(at_rad, _): &&(f64, f64)| (at_rad - theta_rad).abs();
-        let nearest = points.silent.iter().min_by(|a, b| away(a).total_cmp(&away(b)))?;
+        let nearest = points
+            .silent
+            .iter()
+            .min_by(|a, b| (a.0 - theta_rad).abs().total_cmp(&(b.0 - theta_rad).abs()))?;
         (outside(points.silent_rad()?, theta_rad) <= 0.0).then_some(nearest.1)
     }
 }
 
 impl Points {
     fn of(curve: &Curve) -> Option<Points> {
-        let retro = || curve.observations.iter().filter(|o| o.is_retro());
-        let seen = || retro().filter(|o| o.sigma0.is_some()).map(|o| o.theta_i_rad);
-        let seen_rad = [seen().reduce(f64::min)?, seen().reduce(f64::max)?];
-        let mut silent: Vec<(f64, f64)> = retro()
+        let retro = curve.observations.iter().filter(|o| o.is_retro());
+        let seen = retro.clone().filter(|o| o.sigma0.is_some()).map(|o| o.theta_i_rad);
+        let seen_rad = [seen.clone().reduce(f64::min)?, seen.reduce(f64::max)?];
+        let mut silent: Vec<(f64, f64)> = retro
             .filter(|o| o.censor == Censor::Left && o.theta_i_rad > seen_rad[1])
             .filter_map(|o| Some((o.theta_i_rad, o.threshold_sigma0?)))
             .collect();
@@ -77,10 +80,15 @@ impl Material {
         let curve = self.curves.iter().find(|curve| curve.name == self.render);
         Reach::new(self.theta_rad, curve)
     }
+
+    /// How far a frequency, Hz, lies outside [`frequency_hz`](Material::frequency_hz), Hz; 0 within.
+    pub fn frequency_outside_hz(&self, frequency_hz: f64) -> f64 {
+        outside(self.frequency_hz, frequency_hz)
+    }
 }
 
 /// Distance of a number from a range, 0 within.
-pub(super) fn outside([low, high]: [f64; 2], x: f64) -> f64 {
+fn outside([low, high]: [f64; 2], x: f64) -> f64 {
     (low - x).max(x - high).max(0.0)
 }
 

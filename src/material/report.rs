@@ -1,11 +1,9 @@
-//! What a fit says of itself, kept beside its values so that a reader can tell how far to trust them.
+//! The record of a fit, stored with its values so that a reader knows how far to trust them.
 
 use serde::{Deserialize, Serialize};
 
-use super::check::value;
-use super::provenance::is_hash;
-use super::{Fit, MaterialError};
-use crate::brdf::Parameter;
+use super::error::{MaterialError, value};
+use super::form::is_hash;
 
 /// The record of one fit to one curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -20,7 +18,7 @@ pub struct FitReport {
     pub looks: Option<f64>,
     /// Mean thermal power that the fit allowed for, W, 0 or more.
     pub noise_w: f64,
-    /// How numbers that the data cannot tell were chosen; none where there was no choice.
+    /// How numbers that the data do not determine were chosen; none where there was no choice.
     pub gauge: Option<String>,
     /// The numbers found.
     pub estimates: Vec<Estimate>,
@@ -32,7 +30,7 @@ pub struct FitReport {
     pub objective: f64,
     /// How well the curve is explained.
     pub goodness: Goodness,
-    /// How well points are told that took no part in the fit; none where that was not tried.
+    /// How well points are predicted that took no part in the fit; none where that was not tried.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<HeldOut>,
     /// Whether the search ended at an optimum.
@@ -55,7 +53,7 @@ pub struct FitReport {
     pub version: String,
 }
 
-/// How well points are told by fits that they took no part in.
+/// How well points are predicted by fits that they took no part in.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeldOut {
@@ -95,79 +93,10 @@ pub struct Estimate {
     pub name: String,
     /// Its value, in its own unit.
     pub value: f64,
-    /// Standard deviation, 0 or more; none where the data do not tell the number by itself.
+    /// Standard deviation, 0 or more; none where the data do not determine the number by itself.
     pub sd: Option<f64>,
     /// 95 % interval; none as for `sd`.
     pub interval_95: Option<[f64; 2]>,
-}
-
-/// What a fit says of one of its numbers.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Told {
-    /// As [`Estimate::name`].
-    pub name: String,
-    /// Its value, in `unit`.
-    pub value: f64,
-    /// UCUM code.
-    pub unit: &'static str,
-    /// As [`Estimate::sd`].
-    pub sd: Option<f64>,
-    /// As [`Estimate::interval_95`].
-    pub interval_95: Option<[f64; 2]>,
-    /// What the value comes of.
-    pub chosen_by: ChosenBy,
-    /// Whether the search stopped at an end of its range.
-    pub is_at_bound: bool,
-}
-
-/// What a number of a fit comes of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ChosenBy {
-    /// It was searched for in the data.
-    Data,
-    /// It was set beforehand.
-    Hand,
-    /// Another would do as well: the data tell it only inside a product.
-    Convention,
-}
-
-impl ChosenBy {
-    /// The word that the database uses.
-    pub fn as_str(self) -> &'static str {
-        match self {
-            ChosenBy::Data => "data",
-            ChosenBy::Hand => "hand",
-            ChosenBy::Convention => "convention",
-        }
-    }
-}
-
-impl Told {
-    /// Whether the data tell the number by itself.
-    pub fn is_identified(&self) -> bool {
-        self.sd.is_some() && !self.is_at_bound
-    }
-}
-
-impl Fit {
-    /// What its report says of each number: every parameter of the model, then what was found beside them;
-    /// nothing without a report.
-    pub fn told(&self) -> Vec<Told> {
-        let Some(report) = &self.report else { return Vec::new() };
-        let parameters = self.model.parameters();
-        let is_parameter = |name: &str| parameters.iter().any(|p| p.path == name);
-        let others = report.estimates.iter().filter(|estimate| !is_parameter(&estimate.name));
-        let others = others.map(|estimate| Told {
-            name: estimate.name.clone(),
-            value: estimate.value,
-            unit: "1",
-            sd: estimate.sd,
-            interval_95: estimate.interval_95,
-            chosen_by: ChosenBy::Data,
-            is_at_bound: false,
-        });
-        parameters.iter().map(|parameter| report.told(parameter)).chain(others).collect()
-    }
 }
 
 /// How well a fit explains its curve.
@@ -206,12 +135,19 @@ impl HeldOut {
     }
 }
 
+impl Estimate {
+    fn numbers(&self) -> impl Iterator<Item = f64> {
+        let interval = self.interval_95.into_iter().flatten();
+        [Some(self.value), self.sd].into_iter().flatten().chain(interval)
+    }
+}
+
 impl FitReport {
     /// Parameters that backscatter sees only inside S = (1 − k)·f_λ and R = k·r_s: where
     /// [`gauge`](FitReport::gauge) says that there was a choice, their values are a convention.
     pub const BY_CONVENTION: [&str; 3] = ["diffuse.r_s", "k", "specular.f_lambda"];
 
-    /// Whether the value of a parameter is a convention, and nothing that the data tell.
+    /// Whether the value of a parameter is a convention, and not determined by the data.
     pub fn is_by_convention(&self, path: &str) -> bool {
         self.gauge.is_some()
             && Self::BY_CONVENTION.contains(&path)
@@ -223,70 +159,51 @@ impl FitReport {
         self.estimates.iter().find(|estimate| estimate.name == name)
     }
 
-    fn told(&self, parameter: &Parameter) -> Told {
-        let Parameter { path, value, min, max, .. } = parameter;
-        let estimate = self.estimate(path);
-        // Ranges may have been narrowed by hand.
-        let narrowed = |end: &str| {
-            let name = format!("{path}.{end}");
-            self.given.iter().any(|given| given.name == name && given.value == *value)
-        };
-        Told {
-            name: path.clone(),
-            value: *value,
-            unit: parameter.unit,
-            sd: estimate.and_then(|estimate| estimate.sd),
-            interval_95: estimate.and_then(|estimate| estimate.interval_95),
-            chosen_by: match estimate {
-                Some(_) => ChosenBy::Data,
-                None if self.is_by_convention(path) => ChosenBy::Convention,
-                None => ChosenBy::Hand,
-            },
-            is_at_bound: estimate.is_some()
-                && ([min, max].contains(&value) || narrowed("min") || narrowed("max")),
+    pub(super) fn validate(&self, place: &str) -> Result<(), MaterialError> {
+        match self.problem() {
+            None => Ok(()),
+            Some(problem) => {
+                Err(value(&format!("{place}, report"), problem, "fit the curve again"))
+            }
         }
     }
 
-    pub(super) fn validate(&self, place: &str) -> Result<(), MaterialError> {
-        let place = format!("{place}, report");
-        let refuse = |problem: &str| Err(value(&place, problem, "fit the curve again"));
+    /// What of it has no meaning.
+    fn problem(&self) -> Option<&'static str> {
         if self.numbers().any(|number| !number.is_finite()) {
-            return refuse("a number is not finite");
+            return Some("a number is not finite");
         }
         let not_negative = [self.noise_w, self.looks.unwrap_or(0.0)];
         let deviations = self.estimates.iter().filter_map(|estimate| estimate.sd);
         let held_out = self.held_out.iter().flat_map(|h| [h.score_sd, Some(h.rms_db), h.block_m]);
         let deviations = deviations.chain(held_out.flatten());
         if not_negative.into_iter().chain(deviations).any(|number| number < 0.0) {
-            return refuse("the looks, the noise, a deviation or an error is negative");
+            return Some("the looks, the noise, a deviation or an error is negative");
         }
         if self.estimates.iter().filter_map(|e| e.interval_95).any(|[low, high]| low > high) {
-            return refuse("an interval ends before it begins");
+            return Some("an interval ends before it begins");
         }
         let n = self.estimates.len();
         if self.covariance.len() != n || self.covariance.iter().any(|row| row.len() != n) {
-            return refuse("the covariance has another size than the list of estimates");
+            return Some("the covariance has another size than the list of estimates");
         }
         let fold_hash = self.held_out.as_ref().map(|held| &held.fold_hash);
         if ![&self.data_hash].into_iter().chain(fold_hash).all(|hash| is_hash(hash)) {
-            return refuse("the hash of the data or of the folds is not 64 hexadecimal digits");
+            return Some("the hash of the data or of the folds is not 64 hexadecimal digits");
         }
-        Ok(())
+        None
     }
 
     fn numbers(&self) -> impl Iterator<Item = f64> {
         let Goodness { rms_db, mean_db, speckle_db, z_mean, z_variance, ks_distance, .. } =
             self.goodness;
-        let estimate = |e: &Estimate| {
-            [Some(e.value), e.sd].into_iter().flatten().chain(e.interval_95.into_iter().flatten())
-        };
         [rms_db, mean_db, z_mean, z_variance, ks_distance, self.noise_w, self.objective]
             .into_iter()
             .chain(speckle_db)
             .chain(self.held_out.iter().flat_map(HeldOut::numbers))
             .chain(self.looks)
             .chain(self.given.iter().map(|given| given.value))
-            .chain(self.estimates.iter().flat_map(estimate))
+            .chain(self.estimates.iter().flat_map(Estimate::numbers))
             .chain(self.covariance.iter().flatten().copied())
             .chain(self.singular_values.iter().copied())
     }

@@ -33,8 +33,8 @@ impl fmt::Display for Slug {
 impl FromStr for Slug {
     type Err = String;
     fn from_str(text: &str) -> Result<Slug, String> {
-        let good = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
-        if (1..=64).contains(&text.len()) && text.chars().all(good) && !text.starts_with('-') {
+        let has_good_characters = text.chars().all(|c| matches!(c, 'a'..='z' | '0'..='9' | '-'));
+        if (1..=64).contains(&text.len()) && has_good_characters && !text.starts_with('-') {
             return Ok(Slug(text.to_owned()));
         }
         let shown: String = text.chars().take(64).flat_map(char::escape_debug).collect();

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Slug;
-use super::check::{MaterialError, value};
+use super::error::{MaterialError, value};
+use super::slug::Slug;
 
 /// Whether an entry may still be used, and why not.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

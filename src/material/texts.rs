@@ -1,7 +1,9 @@
 //! Every text of a material with its place, and how long one may be.
 
-use super::check::{MaterialError, value};
-use super::{FitReport, Material};
+use super::bidirectional::turns_the_line;
+use super::error::{MaterialError, value};
+use super::material::Material;
+use super::report::FitReport;
 
 /// Longest text, bytes: some twenty pages. Whoever reads a material holds all its texts at once.
 pub const LONGEST_TEXT_BYTES: usize = 64 << 10;
@@ -77,9 +79,10 @@ impl Material {
             take("note of a session", note);
         });
         for fit in &self.fits {
-            let place = |what: &str| format!("fit `{:.40}`: {what}", fit.name);
-            take(&place("estimator"), &fit.estimator);
-            fit.report.iter().for_each(|report| report.texts(&place("report"), take));
+            take(&format!("fit `{:.40}`: estimator", fit.name), &fit.estimator);
+            if let Some(report) = &fit.report {
+                report.texts(&format!("fit `{:.40}`: report", fit.name), take);
+            }
         }
         for finding in &self.findings {
             finding.confusable_with.iter().for_each(|other| take("confusable_with", other));
@@ -132,17 +135,6 @@ impl FitReport {
     }
 }
 
-/// Whether a text turns the direction of what is written after it, so that a line reads as it does not
-/// stand (Unicode's bidirectional embeddings, overrides and isolates).
-pub fn turns_the_line(text: &str) -> bool {
-    text.contains(is_turning)
-}
-
-/// Whether a character is one of those of [`turns_the_line`].
-pub fn is_turning(c: char) -> bool {
-    matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -178,11 +170,5 @@ mod tests {
             assert!(said.contains(place) && said.contains("64 KiB are the most"), "{said}");
             assert!(said.contains("shorten it") && said.len() < 300, "{said}");
         }
-    }
-
-    #[test]
-    fn arabic_is_no_trick() {
-        assert!(!turns_the_line("طلاء"));
-        assert!(turns_the_line("paint\u{202e}txt.exe") && turns_the_line("\u{2067}a"));
     }
 }

@@ -368,7 +368,7 @@ impl Rows<'_> {
 
     /// What the fit says of each number.
     fn estimates(&self, fit: &Fit) -> Result<()> {
-        numbered(&fit.told(), |position, told| {
+        numbered(&fit.numbers(), |position, told| {
             self.insert(
                 "INSERT INTO fit_estimate
                  (revision_id, fit, position, name, value, unit, sd, low_95, high_95, chosen_by, at_bound,

@@ -8,7 +8,7 @@ use super::residuals;
 use super::words::grouped;
 use crate::brdf::Parameter;
 use crate::formats::words::digits;
-use crate::material::{ChosenBy, Fit, FitReport, HeldOut, Material, SourceKind, Told};
+use crate::material::{ChosenBy, Fit, FitNumber, FitReport, HeldOut, Material, SourceKind};
 use crate::units::dbm_from_watts;
 
 /// Parameters that backscatter sees only inside a product, and the product's name.
@@ -72,7 +72,7 @@ struct ReportView {
 
 /// A fit as its page shows it; `number` is its place.
 pub(super) fn view(material: &Material, number: usize, fit: &Fit) -> FitView {
-    let told = fit.told();
+    let told = fit.numbers();
     let parameters: Vec<ParameterView> =
         fit.model.parameters().iter().map(|p| parameter(material, fit, &told, p)).collect();
     FitView {
@@ -125,7 +125,7 @@ fn model_name(fit: &Fit) -> String {
 fn parameter(
     material: &Material,
     fit: &Fit,
-    told: &[Told],
+    told: &[FitNumber],
     parameter: &Parameter,
 ) -> ParameterView {
     let path = &parameter.path;
@@ -157,19 +157,24 @@ fn interval([low, high]: [f64; 2]) -> String {
 }
 
 /// Whether the data tell a parameter.
-fn in_words(fit: &Fit, path: &str, told: Option<&Told>, stored_sd: Option<f64>) -> (String, bool) {
+fn in_words(
+    fit: &Fit,
+    path: &str,
+    told: Option<&FitNumber>,
+    stored_sd: Option<f64>,
+) -> (String, bool) {
     let product = PRODUCTS.iter().find(|(known, _)| *known == path);
     let product = product.filter(|_| fit.model.identified_products().is_some());
     let convention = |name: &str| format!("only inside {name}; this value is a convention");
     match (told, product) {
         (Some(told), _) if told.is_identified() => ("yes".to_owned(), true),
-        (Some(Told { chosen_by: ChosenBy::Data, sd: Some(_), .. }), _) => {
+        (Some(FitNumber { chosen_by: ChosenBy::Data, sd: Some(_), .. }), _) => {
             ("told, but it ended at the end of its range".to_owned(), false)
         }
-        (Some(Told { chosen_by: ChosenBy::Data, .. }), _) => {
+        (Some(FitNumber { chosen_by: ChosenBy::Data, .. }), _) => {
             ("no: the data leave it open".to_owned(), false)
         }
-        (Some(Told { chosen_by: ChosenBy::Hand, .. }), _) => {
+        (Some(FitNumber { chosen_by: ChosenBy::Hand, .. }), _) => {
             ("no: held at this value".to_owned(), false)
         }
         (None, _) if fit.curve.is_none() => ("no fit: stated".to_owned(), false),

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{celsius, kelvin};
-use crate::material::{Layer, Permittivity, Roughness};
+use super::temperature::{celsius, kelvin};
+use crate::material::composition::{Layer, Permittivity, Roughness};
 
 #[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]

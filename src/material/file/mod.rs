@@ -6,6 +6,7 @@
 mod composition;
 mod points;
 mod provenance;
+mod temperature;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -13,10 +14,16 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{
-    Covariance, Curve, Finding, Fit, Instrument, Layer, Material, MaterialError, Permittivity,
-    Roughness, Session, Slug, Source, Status,
-};
+use super::composition::{Layer, Permittivity, Roughness};
+use super::curve::Curve;
+use super::error::MaterialError;
+use super::finding::Finding;
+use super::fit::{Covariance, Fit};
+use super::instrument::Instrument;
+use super::material::Material;
+use super::provenance::{Session, Source};
+use super::slug::Slug;
+use super::status::Status;
 use crate::brdf::Brdf;
 use crate::formats::text::{from_toml, to_toml};
 use crate::formats::{EffectEntry, FormatError};
@@ -130,17 +137,6 @@ struct CovarianceFile {
     matrix: Vec<Vec<f64>>,
 }
 
-/// 0 °C, K.
-const FREEZING_K: f64 = 273.15;
-
-fn kelvin(temperature_c: f64) -> f64 {
-    temperature_c + FREEZING_K
-}
-
-fn celsius(temperature_k: f64) -> f64 {
-    temperature_k - FREEZING_K
-}
-
 fn stated() -> String {
     Fit::STATED.to_owned()
 }
@@ -153,24 +149,12 @@ pub fn parse(
     text: &str,
     read_csv: impl Fn(&str) -> Result<Vec<u8>, String>,
 ) -> Result<Material, FileError> {
-    let format = |error| FileError::Format { file: file.to_owned(), error };
-    let toml: MaterialFile = from_toml(text).map_err(format)?;
-    let curve = |entry: CurveFile| {
-        let bytes = read_csv(&entry.file).map_err(|reason| FileError::Curve {
-            file: file.to_owned(),
-            curve: entry.name.clone(),
-            csv: entry.file.clone(),
-            reason,
-        })?;
-        let beside = Path::new(file).with_file_name(&entry.file);
-        let observations = points(&bytes)
-            .map_err(|error| FileError::Format { file: beside.display().to_string(), error })?
-            .into_iter()
-            .map(|(_, point)| point)
-            .collect();
-        let CurveFile { name, source, instrument, session, .. } = entry;
-        Ok(Curve { name, source, instrument, session, observations })
-    };
+    let toml: MaterialFile =
+        from_toml(text).map_err(|error| FileError::Format { file: file.to_owned(), error })?;
+    let mut curves = Vec::with_capacity(toml.curve.len());
+    for entry in toml.curve {
+        curves.push(read_curve(file, entry, &read_csv)?);
+    }
     let material = Material {
         slug: toml.slug,
         name: toml.name,
@@ -183,7 +167,7 @@ pub fn parse(
         render: toml.render,
         sources: toml.source.into_iter().map(Source::from).collect(),
         instruments: toml.instrument.into_iter().map(Instrument::from).collect(),
-        curves: toml.curve.into_iter().map(curve).collect::<Result<_, FileError>>()?,
+        curves,
         fits: toml.fit.into_iter().map(Fit::from).collect(),
         effects: toml.effect,
         status: toml.status,
@@ -195,9 +179,31 @@ pub fn parse(
         sessions: toml.session.into_iter().map(Session::from).collect(),
         findings: toml.finding,
     };
-    let refuse = |error| FileError::Material { file: file.to_owned(), error };
-    material.validate().map_err(refuse)?;
-    Ok(material)
+    match material.validate() {
+        Ok(()) => Ok(material),
+        Err(error) => Err(FileError::Material { file: file.to_owned(), error }),
+    }
+}
+
+/// A curve of a material file, with the points of its CSV.
+fn read_curve(
+    file: &str,
+    entry: CurveFile,
+    read_csv: impl Fn(&str) -> Result<Vec<u8>, String>,
+) -> Result<Curve, FileError> {
+    let bytes = read_csv(&entry.file).map_err(|reason| FileError::Curve {
+        file: file.to_owned(),
+        curve: entry.name.clone(),
+        csv: entry.file.clone(),
+        reason,
+    })?;
+    let points = points(&bytes).map_err(|error| {
+        let csv = Path::new(file).with_file_name(&entry.file);
+        FileError::Format { file: csv.display().to_string(), error }
+    })?;
+    let observations = points.into_iter().map(|(_, point)| point).collect();
+    let CurveFile { name, source, instrument, session, .. } = entry;
+    Ok(Curve { name, source, instrument, session, observations })
 }
 
 /// Writes a material file. Curves stay out of it, since they stand in files of their own, and so do the

@@ -2,7 +2,7 @@
 
 use crate::formats::FormatError;
 use crate::formats::csv::{Table, without_head};
-use crate::material::{Censor, Observation};
+use crate::material::curve::{Censor, Observation};
 use crate::units::{ratio_from_db, watts_from_dbm};
 
 const REQUIRED: [&str; 2] = ["theta_deg", "sigma0_db"];
@@ -48,15 +48,20 @@ pub fn points(bytes: &[u8]) -> Result<Vec<(usize, Observation)>, FormatError> {
 
 /// Refuses a table of several curves, as that of a published page may be.
 fn one_curve(table: &Table) -> Result<(), FormatError> {
-    let name = |row: usize| table.cell(row, "curve").map(|cell| cell.text.to_owned());
-    match (1..table.len()).find(|&row| name(row) != name(0)) {
-        None => Ok(()),
-        Some(row) => Err(FormatError::at(
-            format!("line {}, column curve", table.line(row)),
-            "another curve begins here",
-            "keep the rows of one",
-        )),
+    for row in 1..table.len() {
+        if curve_name(table, row) != curve_name(table, 0) {
+            return Err(FormatError::at(
+                format!("line {}, column curve", table.line(row)),
+                "another curve begins here",
+                "keep the rows of one",
+            ));
+        }
     }
+    Ok(())
+}
+
+fn curve_name<'a>(table: &'a Table, row: usize) -> Option<&'a str> {
+    table.cell(row, "curve").map(|cell| cell.text)
 }
 
 fn point(table: &Table, row: usize) -> Result<Observation, FormatError> {

@@ -2,10 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{celsius, kelvin};
-use crate::material::{
-    Citation, Geometry, Instrument, Making, Scale, Session, SessionPose, Source, SourceKind,
-};
+use super::temperature::{celsius, kelvin};
+use crate::material::instrument::{Geometry, Instrument, Scale};
+use crate::material::provenance::{Citation, Making, Session, SessionPose, Source, SourceKind};
 use crate::units::{db_from_ratio, dbm_from_watts, ratio_from_db, watts_from_dbm};
 
 #[derive(Deserialize, Serialize)]

@@ -1,0 +1,140 @@
+//! One revision of a material, and what follows from it as a whole.
+
+use std::io;
+
+use serde::Serialize;
+use serde_json::ser::{CompactFormatter, Formatter, Serializer};
+
+use super::composition::{Layer, Permittivity, Roughness};
+use super::curve::Curve;
+use super::error::{MaterialError, dangling};
+use super::finding::Finding;
+use super::fit::Fit;
+use super::instrument::Instrument;
+use super::provenance::{Session, Source, SourceKind};
+use super::slug::Slug;
+use super::status::Status;
+use crate::brdf::Brdf;
+use crate::formats::EffectEntry;
+
+/// One revision of a material.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Material {
+    /// Short name that commands and scenes use.
+    pub slug: Slug,
+    /// Full name.
+    pub name: String,
+    /// Kind of stuff: `metal`, `polymer`, `paint`, `tissue`, `textile`, `glass` …
+    pub class: String,
+    /// What it is and what is not known of it.
+    pub description: String,
+    /// SPDX identifier of the licence under which this entry may be passed on.
+    pub licence: String,
+    /// Free words to find it by.
+    pub tags: Vec<String>,
+    /// Lowest and highest frequency for which the numbers are claimed, Hz.
+    pub frequency_hz: [f64; 2],
+    /// Smallest and largest angle of incidence for which they are claimed, rad.
+    pub theta_rad: [f64; 2],
+    /// Which fit or curve a scene renders.
+    pub render: String,
+    /// Where numbers come from; everything below refers to these by key.
+    pub sources: Vec<Source>,
+    /// What curves were measured with.
+    pub instruments: Vec<Instrument>,
+    /// Scattering curves.
+    pub curves: Vec<Curve>,
+    /// Scattering models with their parameters.
+    pub fits: Vec<Fit>,
+    /// Physical effects beyond the scattering model, each once.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<EffectEntry>,
+    /// Whether it may still be used.
+    #[serde(skip_serializing_if = "Status::is_active")]
+    pub status: Status,
+    /// How the surface was made: rolled, sanded with grit 120, sprayed …
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub finish: Option<String>,
+    /// What is not known, a sentence each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unknown: Vec<String>,
+    /// How rough the outer surface is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub roughness: Option<Roughness>,
+    /// What it is made of, the outermost layer first.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<Layer>,
+    /// Permittivities of its substances.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub permittivities: Vec<Permittivity>,
+    /// Sittings in which its curves were measured.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sessions: Vec<Session>,
+    /// What diagnoses tried to explain it with.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub findings: Vec<Finding>,
+}
+
+impl Material {
+    /// The scattering that a scene renders.
+    ///
+    /// # Errors
+    /// When `render` names nothing, or a curve that cannot be interpolated.
+    pub fn scattering(&self) -> Result<Brdf, MaterialError> {
+        if let Some(fit) = self.fits.iter().find(|f| f.name == self.render) {
+            return Ok(fit.model.clone());
+        }
+        let Some(curve) = self.curves.iter().find(|c| c.name == self.render) else {
+            return Err(dangling("render", "a fit or curve", &self.render, self.renderable()));
+        };
+        curve.tabulated().map(Brdf::Tabulated)
+    }
+
+    /// The source of the numbers that a scene renders.
+    pub fn render_kind(&self) -> Option<SourceKind> {
+        let fits = self.fits.iter().map(|f| (&f.name, &f.source));
+        let curves = self.curves.iter().map(|c| (&c.name, &c.source));
+        let key = fits.chain(curves).find(|(name, _)| **name == self.render)?.1;
+        self.sources.iter().find(|s| s.key == *key).map(|s| s.kind)
+    }
+
+    /// What to say of a model that belongs to a curve instead of its source's kind, since nobody measured the
+    /// model itself; `None` without a curve.
+    pub fn kind_words(&self, fit: &Fit) -> Option<String> {
+        let curve = self.curves.iter().find(|curve| Some(&curve.name) == fit.curve.as_ref())?;
+        let source = self.sources.iter().find(|source| source.key == curve.source)?;
+        Some(source.kind.words_beside(fit.is_fitted()))
+    }
+
+    /// The [`kind_words`](Material::kind_words) of what scenes render; `None` of a curve, and of a model without
+    /// one.
+    pub fn rendered_words(&self) -> Option<String> {
+        self.kind_words(self.fits.iter().find(|fit| fit.name == self.render)?)
+    }
+
+    /// Hash of everything in the material: equal exactly when nothing differs.
+    ///
+    /// Databases keep it: a field added later must serialise to nothing while it is empty, or what
+    /// was stored before no longer matches its hash.
+    pub fn content_hash(&self) -> String {
+        let mut json = Vec::new();
+        // Serialising a tree of plain structs into memory has no way to fail.
+        let _ = self.serialize(&mut Serializer::with_formatter(&mut json, OneZero));
+        blake3::hash(&json).to_hex().to_string()
+    }
+
+    /// Names of its fits and curves.
+    pub(super) fn renderable(&self) -> Vec<String> {
+        let fits = self.fits.iter().map(|f| f.name.clone());
+        fits.chain(self.curves.iter().map(|c| c.name.clone())).collect()
+    }
+}
+
+/// Writes −0 as 0: the two are equal, so they must hash alike.
+struct OneZero;
+
+impl Formatter for OneZero {
+    fn write_f64<W: ?Sized + io::Write>(&mut self, writer: &mut W, value: f64) -> io::Result<()> {
+        CompactFormatter.write_f64(writer, value + 0.0)
+    }
+}
