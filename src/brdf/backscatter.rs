@@ -1,8 +1,8 @@
-//! Laws in exact backscatter as sums of one closed form, for those who cannot call a model, such as a
-//! graphics processor, or who ask it millions of times.
+//! Laws in exact backscatter as sums of one closed form, for a caller that cannot call a model, such as a
+//! graphics processor, or that needs f millions of times.
 //!
-//! With i = o the half vector is the direction itself and every facet that answers is met at normal
-//! incidence, so that of a law without a grain only θ is left:
+//! With i = o the half vector is the direction itself, and the wave falls on every facet that answers at
+//! normal incidence. The f of a law without a grain then depends on θ alone:
 //! f(θ) = Σ level·cosᵃθ·P(tan²θ/m²)·G1(θ)ˢ, where P is exp(−x) for Beckmann's slopes and (1 + x)⁻² for
 //! GGX's, and a diffuse term has neither P nor G1.
 
@@ -33,6 +33,7 @@ pub struct Facets {
 }
 
 impl Term {
+    /// level·cosᵃθ.
     pub(super) fn diffuse(level_per_sr: f64, cosines: f64) -> Term {
         Term { level_per_sr, cosines, facets: None }
     }
@@ -43,7 +44,7 @@ impl Term {
         Term { level_per_sr, cosines: -6.0, facets: Some(facets) }
     }
 
-    /// Its part of f, 1/sr; nothing from where the light grazes.
+    /// Its part of f, 1/sr; zero at grazing incidence.
     pub(crate) fn per_sr(&self, cos_theta: f64) -> f64 {
         if cos_theta <= GRAZING {
             return 0.0;

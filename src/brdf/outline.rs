@@ -1,9 +1,9 @@
-//! A model in outline: the least and the greatest σ⁰ in each degree of incidence, in steps of half a
-//! decibel outwards. Enough to say that a model is farther from a curve than another without computing
-//! it, in 180 bytes.
+//! A model in outline: the least and the greatest σ⁰ in each degree of incidence, rounded outwards to
+//! half a decibel. These 180 bytes suffice to say that one model is farther from a curve than another,
+//! without computing either.
 //!
-//! A model is looked at every quarter of a degree, a measured curve at each of its points, too. Between
-//! two looks a smooth model leaves their levels by less than a quarter of the step between neighbours (a
+//! A model is sampled every quarter of a degree, a measured curve also at each of its points. Between
+//! two samples a smooth model leaves their levels by less than a quarter of the step between neighbours (a
 //! parabola through them by an eighth), and a curve does not leave them at all.
 
 use std::ops::RangeInclusive;
@@ -14,10 +14,10 @@ use crate::units::db_from_ratio;
 
 /// Degrees of incidence, from 0.
 pub const DEGREES: usize = 90;
-const LOOKS_PER_DEGREE: usize = 4;
+const SAMPLES_PER_DEGREE: usize = 4;
 /// Levels are kept in these steps, dB.
 const STEP_DB: f64 = 0.5;
-/// The lowest level that is told from silence below it, dB.
+/// The lowest level that is distinguished from silence, dB.
 const LOWEST_DB: f64 = -90.0;
 /// Of a greatest level: nothing comes back at all. Of a least one: anything lower, or nothing.
 const SILENT: u8 = 0;
@@ -28,26 +28,26 @@ const HIGHER: u8 = u8::MAX;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outline([[u8; 2]; DEGREES]);
 
-/// A level at an angle of incidence, rad and dB.
-type Look = (f64, f64);
+/// An angle of incidence, rad, and the level there, dB.
+type Sample = (f64, f64);
 
 impl Outline {
-    /// Of a model; `None` of a sum with a measured curve in it, which need not be smooth between looks.
+    /// Of a model; `None` of a sum with a measured curve in it, which need not be smooth between samples.
     pub fn new(model: &Brdf) -> Option<Outline> {
-        let looks = match model {
-            Brdf::Tabulated(curve) => looks_at_curve(curve),
+        let samples = match model {
+            Brdf::Tabulated(curve) => samples_of_curve(curve),
             model if model.has_curve() => return None,
-            model => looks(|theta_rad| db_from_ratio(model.sigma0(theta_rad))),
+            model => samples(|theta_rad| db_from_ratio(model.sigma0(theta_rad))),
         };
         let mut outline = Outline([[SILENT; 2]; DEGREES]);
         for (degree, ends) in outline.0.iter_mut().enumerate() {
             // A neighbour more on either side: an angle may be rounded into the next degree.
-            let margin = 1.0 / LOOKS_PER_DEGREE as f64;
+            let margin = 1.0 / SAMPLES_PER_DEGREE as f64;
             let [from, to] = [degree as f64 - margin, degree as f64 + 1.0 + margin]
                 .map(|theta_deg| theta_deg.to_radians());
-            let start = looks.partition_point(|look| look.0 < from - ROUNDING_RAD);
-            let end = looks.partition_point(|look| look.0 <= to + ROUNDING_RAD);
-            *ends = looks.get(start..end).map_or([SILENT, HIGHER], codes);
+            let start = samples.partition_point(|sample| sample.0 < from - ROUNDING_RAD);
+            let end = samples.partition_point(|sample| sample.0 <= to + ROUNDING_RAD);
+            *ends = samples.get(start..end).map_or([SILENT, HIGHER], codes);
         }
         Some(outline)
     }
@@ -58,9 +58,10 @@ impl Outline {
         let Some(cells) = self.0.get(degrees) else {
             return Some([f64::NEG_INFINITY, f64::INFINITY]);
         };
-        let ends = |[low, high]: [u8; 2], cell: &[u8; 2]| [low.min(cell[0]), high.max(cell[1])];
-        let [low, high] = cells.iter().fold([HIGHER, SILENT], ends);
-        let level_db = |code: u8| LOWEST_DB + STEP_DB * (f64::from(code) - 1.0);
+        let [mut low, mut high] = [HIGHER, SILENT];
+        for cell in cells {
+            [low, high] = [low.min(cell[0]), high.max(cell[1])];
+        }
         let low_db = if low == SILENT { f64::NEG_INFINITY } else { level_db(low) };
         match high {
             SILENT => None,
@@ -90,44 +91,54 @@ impl Outline {
     }
 }
 
+/// The level of a code, dB.
+fn level_db(code: u8) -> f64 {
+    LOWEST_DB + STEP_DB * (f64::from(code) - 1.0)
+}
+
 /// Angles nearer than this are one.
 const ROUNDING_RAD: f64 = 1e-12;
 
-fn looks(level_db: impl Fn(f64) -> f64) -> Vec<Look> {
-    let theta_rad = |look: usize| (look as f64 / LOOKS_PER_DEGREE as f64).to_radians();
-    let angles = (0..=DEGREES * LOOKS_PER_DEGREE).map(theta_rad);
+fn samples(level_db: impl Fn(f64) -> f64) -> Vec<Sample> {
+    let angles = (0..=DEGREES * SAMPLES_PER_DEGREE)
+        .map(|sample| (sample as f64 / SAMPLES_PER_DEGREE as f64).to_radians());
     angles.map(|theta_rad| (theta_rad, level_db(theta_rad))).collect()
 }
 
-fn looks_at_curve(curve: &Tabulated) -> Vec<Look> {
-    let mut looks = looks(|theta_rad| curve.sigma0_db(theta_rad));
-    looks.extend(curve.points());
-    looks.sort_by(|a, b| a.0.total_cmp(&b.0));
-    looks
+fn samples_of_curve(curve: &Tabulated) -> Vec<Sample> {
+    let mut samples = samples(|theta_rad| curve.sigma0_db(theta_rad));
+    samples.extend(curve.points());
+    samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+    samples
 }
 
-fn codes(looks: &[Look]) -> [u8; 2] {
-    let steps = looks.windows(2).map(|pair| match pair {
+/// Codes of the least and the greatest level of neighbouring samples and of what lies between them.
+fn codes(samples: &[Sample]) -> [u8; 2] {
+    let (mut low_db, mut high_db) = (f64::INFINITY, f64::NEG_INFINITY);
+    for &(_, level_db) in samples {
+        // A level that is not a number could be anything.
+        if level_db.is_nan() {
+            return [SILENT, HIGHER];
+        }
+        (low_db, high_db) = (low_db.min(level_db), high_db.max(level_db));
+    }
+    // The largest finite step between neighbours bounds how far the model leaves their levels.
+    let steps_db = samples.windows(2).map(|pair| match pair {
         [a, b] => (a.1 - b.1).abs(),
         _ => 0.0,
     });
-    let beyond = 0.25 * steps.filter(|step| step.is_finite()).fold(0.0, f64::max);
-    let levels = || looks.iter().map(|look| look.1);
-    let (low, high) = (
-        levels().fold(f64::INFINITY, f64::min) - beyond,
-        levels().fold(f64::NEG_INFINITY, f64::max) + beyond,
-    );
-    // What is no number could be anything.
-    if levels().any(f64::is_nan) {
-        return [SILENT, HIGHER];
+    let beyond_db = 0.25 * steps_db.filter(|step_db| step_db.is_finite()).fold(0.0, f64::max);
+    let (low_db, high_db) = (low_db - beyond_db, high_db + beyond_db);
+    if high_db == f64::NEG_INFINITY {
+        return [SILENT, SILENT];
     }
-    let steps = |level_db: f64| (level_db - LOWEST_DB) / STEP_DB + 1.0;
     // Float to integer saturates.
-    let low = steps(low).floor() as u8;
-    match high == f64::NEG_INFINITY {
-        true => [SILENT, SILENT],
-        false => [low, (steps(high).ceil() as u8).max(1)],
-    }
+    [code(low_db).floor() as u8, (code(high_db).ceil() as u8).max(1)]
+}
+
+/// The inverse of [`level_db`], as a real number.
+fn code(level_db: f64) -> f64 {
+    (level_db - LOWEST_DB) / STEP_DB + 1.0
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! What every scattering model answers, and what models with parameters answer besides.
+//! The interface of scattering models.
 
 use super::backscatter::Term;
 use super::parameter::Visitor;

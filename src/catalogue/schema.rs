@@ -47,8 +47,9 @@ fn list(key: &str, open: &str, items: &[String], close: &str) -> String {
     if line.len() < WIDTH && !line.contains('\n') {
         return line;
     }
-    let items = items.join(&format!(",\n{indent}  "));
-    format!("{indent}\"{key}\": {open}\n{indent}  {items}\n{indent}{close}")
+    let inner = format!("\n{indent}  ");
+    let items: Vec<String> = items.iter().map(|item| item.replace('\n', &inner)).collect();
+    format!("{indent}\"{key}\": {open}{inner}{}\n{indent}{close}", items.join(&format!(",{inner}")))
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@
 //! At 300 GHz (k = 6.28 rad/mm) painted or anodised metal has s = 0.5–5 µm and coarse grit 36–280 µm
 //! (Grossman 2017, IEEE Trans. THz Sci. Technol. 7(5)); cast or blasted 5–50 µm is assumed; l is 0.1–3 mm.
 //! The theory wants k·l > 6 and a radius of curvature beyond λ (for Gaussian correlation l² > 2.8·s·λ); exponential correlation has no
-//! curvature, and its results are a habit of the field. There is no shadowing: a metal
+//! curvature, and its results are a convention of the field. There is no shadowing: a metal
 //! with s = 0.3 mm, l = 2 mm reflects at most what it receives up to 60°, but at 75° 1.04 (Gaussian) to
 //! 1.40 (exponential) times that. Rough exponential surfaces lose up to half at normal incidence.
 
@@ -157,16 +157,23 @@ impl Correlation {
         if g <= 0.0 {
             return 0.0;
         }
-        let term_ln = |n: u32| {
-            let n_real = f64::from(n);
-            n_real * g.ln() - g - ln_factorial(n) + self.spectrum_ln(n_real, across)
-        };
-        let peak = first_fall(|n| term_ln(n + 1) <= term_ln(n));
-        let peak_ln = term_ln(peak);
-        let shares = |n: u32| Some(term_ln(n) - peak_ln).filter(|share| *share > LEAST_TERM_LN);
-        let above: f64 = (peak..u32::MAX).map_while(shares).map(f64::exp).sum();
-        let below: f64 = (1..peak).rev().map_while(shares).map(f64::exp).sum();
-        peak_ln.exp() * (above + below)
+        let peak = first_fall(|n| self.term_ln(n + 1, g, across) <= self.term_ln(n, g, across));
+        let peak_ln = self.term_ln(peak, g, across);
+        peak_ln.exp()
+            * (self.shares(peak..u32::MAX, peak_ln, g, across)
+                + self.shares((1..peak).rev(), peak_ln, g, across))
+    }
+
+    /// Sum of the terms n, relative to the peak, up to the first that is too small to count.
+    fn shares(self, n: impl Iterator<Item = u32>, peak_ln: f64, g: f64, across: f64) -> f64 {
+        let shares_ln = n.map(|n| self.term_ln(n, g, across) - peak_ln);
+        shares_ln.take_while(|share_ln| *share_ln > LEAST_TERM_LN).map(f64::exp).sum()
+    }
+
+    /// ln of the term n of the series.
+    fn term_ln(self, n: u32, g: f64, across: f64) -> f64 {
+        let n_real = f64::from(n);
+        n_real * g.ln() - g - ln_factorial(n) + self.spectrum_ln(n_real, across)
     }
 
     /// ln(W_n/l²).

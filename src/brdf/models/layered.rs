@@ -37,20 +37,19 @@ pub(super) const KIND: Kind = Kind {
     starts: &[],
 };
 
-/// As deep as it stands in the schema of a material.
 const LAYERS_SCHEMA: &str = r#"{
-              "type": "array",
-              "items": {
-                "type": "object",
-                "additionalProperties": false,
-                "required": ["thickness_m", "eps_real", "eps_imag"],
-                "properties": {
-                  "thickness_m": {"type": "number"},
-                  "eps_real": {"type": "number", "description": "relative permittivity, real part"},
-                  "eps_imag": {"type": "number", "description": "imaginary part, 0 or more, for exp(+jwt)"}
-                }
-              }
-            }"#;
+  "type": "array",
+  "items": {
+    "type": "object",
+    "additionalProperties": false,
+    "required": ["thickness_m", "eps_real", "eps_imag"],
+    "properties": {
+      "thickness_m": {"type": "number"},
+      "eps_real": {"type": "number", "description": "relative permittivity, real part"},
+      "eps_imag": {"type": "number", "description": "imaginary part, 0 or more, for exp(+jwt)"}
+    }
+  }
+}"#;
 
 /// Layers on a substrate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -99,13 +98,12 @@ impl Layered {
 
     /// r from the substrate up.
     fn amplitude(&self, polarisation: Polarisation, cos_theta: f64) -> Complex<f64> {
-        let medium = |eps| (eps, normal_wavenumber(eps, cos_theta));
         let k0_rad_per_m = wavenumber_rad_per_m(self.frequency_hz);
-        let mut below = medium(permittivity(self.eps_real, self.eps_imag));
+        let mut below = medium(self.eps_real, self.eps_imag, cos_theta);
         let mut r = Complex::from(0.0);
         let mut there_and_back = Complex::from(1.0);
         for layer in self.layers.iter().rev() {
-            let above = medium(permittivity(layer.eps_real, layer.eps_imag));
+            let above = medium(layer.eps_real, layer.eps_imag, cos_theta);
             r = step_up(interface(polarisation, above, below), r * there_and_back);
             let delta = above.1 * (k0_rad_per_m * layer.thickness_m);
             there_and_back = (Complex::new(0.0, -2.0) * delta).exp();
@@ -114,6 +112,12 @@ impl Layered {
         let outside = (Complex::from(1.0), Complex::from(cos_theta));
         step_up(interface(polarisation, outside, below), r * there_and_back)
     }
+}
+
+/// ε of a medium and the normal wavenumber in it.
+fn medium(eps_real: f64, eps_imag: f64, cos_theta: f64) -> (Complex<f64>, Complex<f64>) {
+    let eps = permittivity(eps_real, eps_imag);
+    (eps, normal_wavenumber(eps, cos_theta))
 }
 
 /// Reflection above a boundary from that of the boundary and that of all below it.

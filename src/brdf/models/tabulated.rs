@@ -215,24 +215,20 @@ impl Columns {
 /// Slopes at the points that keep the cubic monotone between them.
 fn monotone_slopes(x: &[f64], y: &[f64]) -> Vec<f64> {
     let secant: Vec<f64> = (1..x.len()).map(|i| (y[i] - y[i - 1]) / (x[i] - x[i - 1])).collect();
-    let inner = |i: usize| {
+    let mut slopes = vec![secant[0]];
+    for i in 1..secant.len() {
         let (before, after) = (secant[i - 1], secant[i]);
         if before * after <= 0.0 {
-            return 0.0;
+            slopes.push(0.0);
+            continue;
         }
         // Fritsch and Butland's weighted harmonic mean for unequal steps.
         let (left, right) = (x[i] - x[i - 1], x[i + 1] - x[i]);
         let (w1, w2) = (2.0 * right + left, right + 2.0 * left);
-        (w1 + w2) / (w1 / before + w2 / after)
-    };
-    let last = x.len() - 1;
-    (0..=last)
-        .map(|i| match i {
-            0 => secant[0],
-            i if i == last => secant[last - 1],
-            i => inner(i),
-        })
-        .collect()
+        slopes.push((w1 + w2) / (w1 / before + w2 / after));
+    }
+    slopes.push(secant[secant.len() - 1]);
+    slopes
 }
 
 #[cfg(test)]
