@@ -1,20 +1,20 @@
-//! A receiver that saturates: what of an echo and of its speckle it passes.
+//! A receiver that saturates: how much of an echo and of its speckle it passes.
 //!
 //! It acts on a power u as h(u) = u·(1 + (u/P_sat)^p)^(−1/p). Acting at once, on the mean of ℓ of the
 //! L looks at a time, it turns a mean P̄ into M = E h(u), u of the Gamma law of ℓ looks about P̄, and
 //! the relative deviation 1/√L of the speckle into β/√L, β = √ℓ·sd h(u)/M. A gain control slower than
 //! a chirp acts on the mean alone: M = h(P̄), β = 1. What is received as P then leaves as M·(P/P̄)^β,
-//! which has that mean and that deviation to first order, and can be read backwards.
+//! which has that mean and that deviation to first order, and can be inverted.
 
 /// Looks that fluctuate too little to matter.
 const STEADY: f64 = 1e4;
 /// Nodes of an integral over the speckle, and how many of its standard deviations these reach.
 const NODES: usize = 40;
 const REACH: f64 = 8.0;
-/// A receiver that passed nothing of a fluctuation could not be read backwards.
+/// Least β: a receiver that passes nothing of a fluctuation cannot be inverted.
 const LEAST_PASSED: f64 = 0.01;
 
-/// What the powers of a receiver cannot pass.
+/// The saturation of a receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ceiling {
     /// Power P_sat above which most is lost, W; infinite for a receiver that is linear.
@@ -40,21 +40,21 @@ const FIRST: f64 = -14.0;
 const LAST: f64 = 12.0;
 const STEP: f64 = 0.05;
 
-/// What becomes of a mean and of the speckle about it.
+/// A mean power and the speckle about it behind the receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passed {
     /// ln M.
     pub ln_mean: f64,
-    /// How much of a small relative deviation from the mean is left, β, above 0.
+    /// Factor β, above 0, on a small relative deviation from the mean.
     pub slope: f64,
 }
 
 impl Ceiling {
-    /// None.
+    /// No saturation.
     pub const NONE: Ceiling =
         Ceiling { saturation_w: f64::INFINITY, knee: 1.0, at_once: 1.0, averaged: 1.0 };
 
-    /// Over speckle of so many looks.
+    /// For speckle of this many looks.
     pub fn over(self, looks: f64) -> Saturating {
         let ln_saturation = self.saturation_w.ln();
         if ln_saturation == f64::INFINITY {
@@ -98,7 +98,7 @@ impl Ceiling {
 }
 
 impl Saturating {
-    /// What becomes of a mean power, by its ln.
+    /// The mean behind the receiver and β, from the ln of the mean power.
     pub fn of(&self, ln_mean: f64) -> Passed {
         let below = ln_mean - self.ln_saturation - FIRST;
         let (true, [_, .., last]) = (below > 0.0, &self.knots[..]) else {
@@ -111,7 +111,7 @@ impl Saturating {
         Passed { ln_mean: self.ln_saturation + ln_held, slope }
     }
 
-    /// What a power, W, of a mean, W, leaves as, W.
+    /// The power behind the receiver, W, of a received power, W, about a mean, W.
     pub fn passed_w(&self, mean_w: f64, power_w: f64) -> f64 {
         if self.knots.is_empty() || mean_w <= 0.0 || power_w <= 0.0 {
             return power_w;
@@ -225,7 +225,7 @@ mod tests {
                 let ceiling = Ceiling { saturation_w: 1e-7, knee, at_once: 1.0, averaged };
                 let passed = ceiling.over(LOOKS).of(mean_w.ln());
                 let [mean, deviation] = drawn(&ceiling, mean_w);
-                // A fifth of a percent is what 200 000 draws tell.
+                // 200 000 draws determine it to a fifth of a percent.
                 assert!((passed.ln_mean.exp() / mean - 1.0).abs() < 2e-3, "{ceiling:?} {mean_w}");
                 let expected = (deviation * LOOKS.sqrt()).max(LEAST_PASSED);
                 assert!((passed.slope / expected - 1.0).abs() < 0.02, "{ceiling:?} {mean_w}");

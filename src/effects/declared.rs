@@ -1,4 +1,4 @@
-//! The effects that a scene, its radar and its materials declare, each where it acts.
+//! The effects that a scene, its radar and its materials declare.
 
 use super::effect::{About, Effect};
 use super::entry::Chosen;

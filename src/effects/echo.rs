@@ -1,24 +1,24 @@
-//! What arrives of a chirp.
+//! The mean echo of a chirp.
 
-/// What arrives of one shot in the mean.
+/// The echo of one shot in the mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeanEcho {
     /// Mean power, W.
     pub power_w: f64,
     /// Range, the mean by power, m.
     pub range_m: f64,
-    /// Standard deviation by power of the ranges of what arrives together, m: speckle weighs it anew from
-    /// chirp to chirp, so that the range may lie so far from the mean.
+    /// Standard deviation, weighted by power, of the ranges of all that arrives, m. Speckle weighs these ranges
+    /// differently in each chirp, so the measured range may lie this far from the mean.
     pub spread_m: f64,
 }
 
 impl MeanEcho {
-    /// What arrives from one place.
+    /// An echo from one range.
     pub fn at_once(power_w: f64, range_m: f64) -> MeanEcho {
         MeanEcho { power_w, range_m, spread_m: 0.0 }
     }
 
-    /// With something else; nothing changes where neither brings any power.
+    /// Both echoes together; unchanged where neither has any power.
     pub fn with(self, other: MeanEcho) -> MeanEcho {
         let power_w = self.power_w + other.power_w;
         if power_w <= 0.0 {

@@ -174,7 +174,7 @@ pub enum Setting {
     RangeReceiver,
 }
 
-/// Where an effect belongs, and is stored once it is found.
+/// Where an effect belongs, and is stored after a diagnosis has found it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Level {
@@ -182,7 +182,7 @@ pub enum Level {
     Instrument,
     /// A material.
     Material,
-    /// What stands where.
+    /// The scene: what is where.
     Scene,
 }
 
@@ -211,7 +211,7 @@ pub struct EffectParameter {
     /// The value at which the effect is absent; for a number that only shapes an effect, such as a
     /// place, where a search begins.
     pub absent: f64,
-    /// A change that is felt: the step of a difference quotient and the first step of a search.
+    /// A change that the data show: the step of a difference quotient and the first step of a search.
     pub step: f64,
 }
 

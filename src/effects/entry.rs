@@ -1,4 +1,4 @@
-//! Between effects and how files write them.
+//! Effects as files write them.
 
 use thiserror::Error;
 
@@ -11,7 +11,7 @@ use crate::units::shown;
 /// Effects with the values of their parameters.
 pub type Chosen = Vec<(&'static dyn Effect, Vec<f64>)>;
 
-/// Why an entry means no effect.
+/// Why an entry is refused.
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum EffectError {
     /// No such effect.

@@ -19,7 +19,7 @@ use crate::frames::{Direction, Global, Pose, Ray, Surface};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::trace::{Hit, closest};
 
-/// The base law and the effects that were added to it, each with its values.
+/// A base law and the effects added to it, each with its values.
 #[derive(Clone)]
 pub struct Model<'a> {
     /// Scattering of each region.
@@ -37,9 +37,9 @@ pub struct Prediction {
     pub arrived: Vec<Option<MeanEcho>>,
     /// Of every shot, where tilts vary at random from chirp to chirp; empty where none do.
     pub tilts: Vec<Tilts>,
-    /// The law about the mean.
+    /// How powers are distributed about the mean.
     pub receiver: Receiver,
-    /// What the receiver passes.
+    /// The saturation of the receiver.
     pub saturating: Saturating,
 }
 

@@ -1,10 +1,10 @@
-//! The law of a receiver: how what it reports scatters about the mean.
+//! The receiver: noise, speckle and saturation.
 
 use super::ceiling::{Ceiling, Saturating};
 use crate::radar::Radar;
 use crate::units::watts_from_dbm;
 
-/// The law of what is received about its mean.
+/// How received powers are distributed about their mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Receiver {
     /// Looks L of the speckle.
@@ -13,7 +13,7 @@ pub struct Receiver {
     pub noise_w: f64,
     /// Standard deviation of each of the two tilts of a normal that differ from chirp to chirp, rad.
     pub tilt_sd_rad: f64,
-    /// What it cannot pass.
+    /// Where it saturates.
     pub ceiling: Ceiling,
 }
 
@@ -22,7 +22,7 @@ impl Receiver {
     pub const LINEAR: Receiver =
         Receiver { looks: f64::INFINITY, noise_w: 0.0, tilt_sd_rad: 0.0, ceiling: Ceiling::NONE };
 
-    /// Its ceiling over its speckle.
+    /// Its ceiling, averaged over its speckle.
     pub fn saturating(&self) -> Saturating {
         self.ceiling.over(self.looks)
     }

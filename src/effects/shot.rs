@@ -6,7 +6,7 @@ use crate::frames::{Global, Pose, Ray};
 use crate::radar::{Link, Radar};
 use crate::trace::{Bvh, Hit};
 
-/// One chirp that meets the target, as far as the scene knows it.
+/// One chirp that hits the target, as far as the scene knows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shot {
     /// Chirp number.
@@ -17,7 +17,7 @@ pub struct Shot {
     pub progress: f64,
     /// The ray.
     pub ray: Ray<Global>,
-    /// Where it meets the target.
+    /// Its intersection with the target.
     pub hit: Hit,
     /// Unit normal there, towards the radar.
     pub normal: DVec3,
@@ -27,15 +27,15 @@ pub struct Shot {
     pub azimuth_rad: f64,
     /// Region of the facet.
     pub region: u16,
-    /// x of the target frame where the ray passes 8 m, m.
+    /// x in the target frame of the point of the ray at 8 m, m.
     pub xt_m: f64,
-    /// y of the same, m.
+    /// y in the target frame of the point of the ray at 8 m, m.
     pub yt_m: f64,
     /// Distance in the target plane to the nearest edge in depth, m, at most three spots.
     pub edge_m: f64,
 }
 
-/// What all shots of a scan share.
+/// What all shots of a scan share: the instrument and the target as the scene places it.
 #[derive(Clone, Copy)]
 pub struct Stage<'a> {
     /// The instrument.
@@ -48,12 +48,12 @@ pub struct Stage<'a> {
     pub region_of_facet: &'a [u16],
     /// Direction of the grain of every region, global frame.
     pub grain_of_region: &'a [DVec3],
-    /// What a pose turns about, m, global frame: the [`middle`] of all shots of the scan, whichever
-    /// of them are predicted.
+    /// The pivot of a pose, m, global frame: the [`middle`] of all shots of the scan, whichever of them are
+    /// predicted.
     pub middle: DVec3,
 }
 
-/// Middle of the points where shots meet the target, m, global frame; the origin without shots.
+/// Mean of the points where shots hit the target, m, global frame; the origin without shots.
 pub fn middle(shots: &[Shot]) -> DVec3 {
     let sum: DVec3 = shots.iter().map(|shot| shot.hit.point.xyz).sum();
     sum / shots.len().max(1) as f64

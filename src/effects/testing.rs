@@ -38,7 +38,7 @@ pub(super) fn paint(lobe: CookTorrance) -> Brdf {
     })
 }
 
-/// A target 8 m in front of a radar that shots along −z, and the shots that meet it.
+/// A target 8 m in front of a radar whose axis points along −z, and the shots that hit it.
 pub(super) struct Bench {
     bvh: Bvh<'static>,
     radar: Radar,

@@ -14,13 +14,13 @@ const ALONG: [(f64, f64); NODES] = [
     (1.355_626_179_974_266, 0.222_075_922_005_613),
     (2.856_970_013_872_806, 0.011_257_411_327_721),
 ];
-/// Place across it.
+/// Place across the plane of incidence, in standard deviations.
 const ACROSS: f64 = 1.0;
-/// Beyond this a tilted facet shows the radar its back.
+/// Least cos θ: below it a tilted facet faces away from the radar.
 const LEAST_COS_THETA: f64 = 1e-6;
 
 /// Cosine of the angle of incidence θ under tilts of these tangents along the plane of incidence and
-/// across it; `None` where the facet then shows its back.
+/// across it; `None` where the facet then faces away.
 pub fn tilted_cos_theta(theta_rad: f64, [along, across]: [f64; 2]) -> Option<f64> {
     let length = (1.0 + along * along + across * across).sqrt();
     let cos_theta = (theta_rad.cos() + along * theta_rad.sin()) / length;

@@ -1,7 +1,7 @@
 //! Characters that turn the direction of a line.
 
-/// Whether a text turns the direction of what is written after it, so that a line reads as it does not
-/// stand (Unicode's bidirectional embeddings, overrides and isolates).
+/// Whether a text turns the direction of what is written after it, so that a line shows its characters in
+/// another order (Unicode's bidirectional embeddings, overrides and isolates).
 pub fn turns_the_line(text: &str) -> bool {
     text.contains(is_turning)
 }

@@ -15,7 +15,7 @@ pub struct Layer {
     pub name: String,
     /// Thickness, m, above 0; none for a half space, which only the last layer can be.
     pub thickness_m: Option<f64>,
-    /// Key of its permittivity; none where nobody knows it.
+    /// Key of its permittivity; `None` where it is not known.
     pub permittivity: Option<String>,
     /// Key of the source of its thickness; none where the entry itself states it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -53,7 +53,7 @@ pub struct Permittivity {
 pub struct Roughness {
     /// Root mean square of heights, m, 0 or more.
     pub rms_height_m: f64,
-    /// Length over which heights are correlated, m, above 0; none where nobody measured it.
+    /// Length over which heights are correlated, m, above 0; `None` where it was not measured.
     pub correlation_length_m: Option<f64>,
     /// How it was found: profilometer, sampling length, filter, or the standard of a finish.
     pub method: Option<String>,

@@ -12,7 +12,7 @@ pub struct Curve {
     pub name: String,
     /// Key of its source.
     pub source: String,
-    /// Key of the instrument; none for a curve that nobody measured.
+    /// Key of the instrument; `None` for a curve that was not measured.
     pub instrument: Option<String>,
     /// Key of the session in which it was measured.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -48,7 +48,7 @@ pub struct Observation {
     /// Number of the chirp.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chirp: Option<u32>,
-    /// Place on the target, (x_t, y_t) of the frame `St`, m; of a silent chirp where its ray meets the mesh.
+    /// Place on the target, (x_t, y_t) of the frame `St`, m; of a silent chirp where its ray hits the mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target_m: Option<[f64; 2]>,
 }

@@ -1,15 +1,15 @@
-//! What a diagnosis tried to explain a material with, found or not.
+//! Effects that a diagnosis tried on a material, found or not.
 
 use serde::{Deserialize, Serialize};
 
 use super::error::{MaterialError, value};
 use super::number_check::NumberCheck;
 
-/// One thing that a diagnosis tried. What it did not find is worth as much as what it found.
+/// One thing that a diagnosis tried, whether it was found or not.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Finding {
-    /// The effect, or what structure that no effect explains goes with.
+    /// The effect, or the covariate of a structure that no effect explains.
     pub effect: String,
     /// What came of it.
     pub verdict: FindingVerdict,
@@ -40,7 +40,7 @@ pub struct Finding {
     /// Root mean square error on held-out data without what was found, dB, 0 or more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_before_db: Option<f64>,
-    /// The same with it.
+    /// Root mean square error on held-out data with what was found, dB, 0 or more.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_after_db: Option<f64>,
     /// Effects that predict these data as well.

@@ -79,7 +79,7 @@ impl ChosenBy {
 }
 
 impl Fit {
-    /// The [`estimator`](Fit::estimator) of values that nobody fitted.
+    /// The [`estimator`](Fit::estimator) of values that were not fitted.
     pub const STATED: &str = "stated";
 
     /// Whether its values come of its curve.

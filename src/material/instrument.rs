@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::error::{MaterialError, value};
 use super::number_check::NumberCheck;
 
-/// What a curve was measured with. What nobody stated is none.
+/// What a curve was measured with. A number that is not known is `None`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Instrument {
     /// Key within the material.

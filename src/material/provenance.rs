@@ -65,7 +65,7 @@ pub enum SourceKind {
     Literature,
     /// A physical model computed it from other numbers.
     Modelled,
-    /// Chosen so that something plausible can be rendered; nobody measured it.
+    /// Chosen to render something plausible; not measured.
     Synthetic,
 }
 
@@ -80,7 +80,7 @@ impl SourceKind {
         }
     }
 
-    /// What is said of a model beside a curve of this kind, to which it was fitted or not.
+    /// What to say of a model that belongs to a curve of this kind, fitted to it or not.
     pub fn words_beside(self, is_fitted: bool) -> String {
         let how = if is_fitted { "fitted to" } else { "stated beside" };
         format!("{how} {} data", self.as_str())
@@ -162,7 +162,7 @@ pub struct Activity {
     pub origin: Option<Origin>,
 }
 
-/// Title of a catalogue to which nobody has given one.
+/// Title of a catalogue that was given none.
 pub const USUAL_TITLE: &str = "Materials for 300 GHz imaging radar";
 
 /// Somebody else's catalogue that a revision was taken from, and what it was there.
@@ -216,7 +216,7 @@ impl Origin {
         parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
     }
 
-    /// A sentence on the first of its names that does not read as it stands.
+    /// A sentence on the first of its names that hides its true order of characters.
     pub fn misleading_name(&self) -> Option<String> {
         let names = self.authors.iter().chain(&self.title).chain(&self.version);
         names.into_iter().any(|name| turns_the_line(name)).then(|| {
@@ -224,7 +224,7 @@ impl Origin {
         })
     }
 
-    /// Whether nothing tells the catalogue from others: it names nobody and has no title of its own.
+    /// Whether nothing identifies the catalogue: it names no author and has no title of its own.
     pub fn is_anonymous(&self) -> bool {
         let has_own_title = self.title.as_ref().is_some_and(|title| title != USUAL_TITLE);
         self.authors.is_empty() && !has_own_title

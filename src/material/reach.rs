@@ -1,4 +1,4 @@
-//! How far a material answers for what scenes render of it.
+//! The angles and frequencies for which a material is claimed to hold.
 
 use super::curve::{Censor, Curve};
 use super::material::Material;

@@ -105,9 +105,9 @@ pub struct Estimate {
 pub struct Goodness {
     /// Root mean square of detections over the model, dB.
     pub rms_db: f64,
-    /// Mean of the same, dB.
+    /// Mean of detections over the model, dB.
     pub mean_db: f64,
-    /// What speckle alone leaves to a perfect model, dB; none for least squares.
+    /// The rms that speckle alone leaves to a perfect model, dB; none for least squares.
     pub speckle_db: Option<f64>,
     /// Mean of the normal residuals, 0 if the law is right.
     pub z_mean: f64,

@@ -49,7 +49,7 @@ impl Material {
         self.findings.iter().for_each(|finding| take("effect of a finding", &finding.effect));
     }
 
-    /// A sentence on the first name that does not read as it stands.
+    /// A sentence on the first name that hides its true order of characters.
     pub fn misleading_name(&self) -> Option<String> {
         let mut found = None;
         self.names(&mut |place, name| {

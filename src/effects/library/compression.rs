@@ -1,8 +1,8 @@
 //! A receiver that saturates: P becomes P/(1 + (P/P_sat)^p)^(1/p), with the knee p (Rapp, Proc. 2nd
 //! Eur. Conf. Satell. Commun. (1991) 179, for powers).
 //!
-//! One that does so at once holds the speckle down, too, each look by itself or the mean of all; a gain
-//! control slower than a chirp lets all of it pass.
+//! A receiver that saturates at once also compresses the speckle, each look by itself or the mean of all; a
+//! gain control slower than a chirp passes all of it.
 
 use crate::effects::ceiling::Ceiling;
 use crate::effects::effect::{About, Effect, EffectParameter, Level};
@@ -13,7 +13,7 @@ use crate::units::watts_from_dbm;
 /// The effect `compression`.
 pub(crate) struct Compression;
 
-/// A ceiling that no echo comes near, dBm.
+/// A saturation that no echo reaches, dBm.
 const NONE_DBM: f64 = 60.0;
 
 const ABOUT: About = About {
@@ -38,7 +38,7 @@ impl Effect for Compression {
     }
 
     fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
-        // Powers that a ceiling leaves no room for are outliers, which show no way to the right one.
+        // Powers above a ceiling are outliers, which do not lead a search to the right ceiling.
         let mut starts = Vec::new();
         for level in -27..=-7 {
             let saturation_dbm = 3.0 * f64::from(level);

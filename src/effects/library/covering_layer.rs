@@ -9,7 +9,7 @@ use crate::units::ratio_from_db;
 /// The effect `covering-layer`.
 pub(crate) struct CoveringLayer;
 
-/// A flat layer seen along itself is as deep as it is wide.
+/// Least cos θ: a flat layer seen edge-on is as deep as it is wide.
 const LEAST_COS_THETA: f64 = 0.02;
 
 /// Share of a Gaussian spot beyond an edge that its centre has passed by `beyond_m`; the normal

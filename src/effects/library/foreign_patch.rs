@@ -1,4 +1,4 @@
-//! A round place with another material: so many dB within a radius along the surface.
+//! A round place of another material: a change in dB within a radius along the surface.
 
 use super::covering_layer::share_of_spot;
 use crate::effects::effect::{About, Effect, EffectParameter, Level};
@@ -25,7 +25,7 @@ const MOST_CELLS: usize = 20;
 /// Levels where it begins, dB.
 const LEVELS_DB: [f64; 2] = [1.0, -1.0];
 
-/// Where the fading has ended, in its widths: no more than 10⁻⁵ of the level is left there.
+/// Distance, in widths of the fade, beyond which at most 10⁻⁵ of the level remains.
 const FADED: f64 = 3.0;
 
 /// Distance of a shot from the centre on the target, m; infinite where it is more than `far_m`, which costs
@@ -33,7 +33,7 @@ const FADED: f64 = 3.0;
 fn apart_m(stage: &Stage, shot: &Shot, [x_m, y_m]: [f64; 2], far_m: f64) -> f64 {
     let axes = stage.radar.frames().global_from_target.rotation();
     let aside = (x_m - shot.xt_m) * axes.x_axis + (y_m - shot.yt_m) * axes.y_axis;
-    // Beside the ray of the centre by as much at least.
+    // The shot is at least this far from the ray of the centre.
     let forward = shot.ray.direction.xyz();
     let beside_m =
         aside.reject_from_normalized(forward).length() * shot.hit.range_m / PATTERN_RANGE_M;

@@ -7,7 +7,7 @@ use crate::units::ratio_from_db;
 /// The effect `fov-gain`.
 pub(crate) struct FovGain;
 
-/// Distance at which the gain is the parameter's, m.
+/// Distance from the centre at which the gain is `edge_db`, m.
 const EDGE_M: f64 = 0.5;
 
 const ABOUT: About = About {

@@ -1,6 +1,6 @@
 //! A target that moves during the scan: along each axis a shift Σ a_k·φ_k(p) with p the share of the scan that is
-//! over. φ_0 to φ_7 are cos(kπp); φ_8 and φ_9 what such cosines leave of a line and of a parabola,
-//! so that paths whose ends slope converge as 1/k⁴ and not as 1/k² (Lanczos, Discourse on Fourier Series, 1966).
+//! over. φ_0 to φ_7 are cos(kπp). φ_8 and φ_9 are a line and a parabola without their part in such cosines,
+//! so that paths with a slope at their ends converge as 1/k⁴ and not as 1/k² (Lanczos, Discourse on Fourier Series, 1966).
 
 use std::f64::consts::PI;
 
@@ -117,7 +117,7 @@ impl Effect for Motion {
         ))
     }
 
-    /// At rest: ranges say at once where to.
+    /// At rest: the ranges lead a search from there.
     fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![0.0; PARAMETERS.len()]]
     }

@@ -1,7 +1,7 @@
 //! Echoes by way of a second surface: radar → first hit → second hit → radar.
 //!
-//! What leaves the first hit into a direction falls on the second and is scattered to the radar, if
-//! nothing hides it there: P₂ = coupling·∫ Φ·f₁(i, ω)·cos θ_ω · f₂·cos θ_o·A_eq/R₂² dω, over fixed
+//! The power that leaves the first hit in a direction falls on the second one and is scattered to the radar,
+//! unless something hides it: P₂ = coupling·∫ Φ·f₁(i, ω)·cos θ_ω · f₂·cos θ_o·A_eq/R₂² dω, over fixed
 //! directions, spread by the cosine and by a wide and a narrow lobe, each weighed by their joint density (the
 //! balance heuristic: Veach & Guibas, SIGGRAPH 1995). Its range is half the whole way, and what is
 //! reported is the mean by power.
@@ -31,7 +31,7 @@ const DIRECTIONS: usize = 24;
 const LOBES: [f64; 2] = [0.25, 0.08];
 /// The cosine and the lobes.
 const KINDS: usize = 1 + LOBES.len();
-/// A ray leaves so far from its surface, m, and this much is no obstacle.
+/// A ray starts this far from its surface, m, so that the surface does not block it.
 const CLEARANCE_M: f64 = 1e-6;
 
 /// Onward directions at a surface, with the density of each, 1/sr.
@@ -217,7 +217,7 @@ mod tests {
         }
     }
 
-    /// Each bounce takes one factor of the albedo, and what leaves one wall of a right angle meets the
+    /// Each bounce takes one factor of the albedo, and what leaves one wall of a right angle hits the
     /// other by less than half.
     #[test]
     fn the_power_of_a_lambertian_corner_follows_its_albedo() {

@@ -51,7 +51,7 @@ impl Effect for Pose {
         &ABOUT
     }
 
-    /// Nowhere else: ranges say at once where to.
+    /// At the pose of the scene: the ranges lead a search from there.
     fn starts(&self, _stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         vec![vec![0.0; PARAMETERS.len()]]
     }

@@ -7,7 +7,7 @@ use crate::effects::shot::{Shot, Stage};
 /// The effect `speckle`.
 pub(crate) struct Speckle;
 
-/// So many looks leave no speckle, and none are fewer than the declared.
+/// A number of looks that leaves no speckle.
 const ALL: f64 = 1e6;
 
 const ABOUT: About = About {

@@ -4,8 +4,8 @@
 //! frequency, and R₀ that of the bare substrate, the specular part of f is multiplied by
 //! 1 − c + c·R/R₀. So is the part of the diffuse return that comes from the rough surface itself; the
 //! part from below crosses the film twice and is multiplied by 1 − c + c·((1 − R)/(1 − R₀))².
-//! The substrate is lossless. Its index is the one that f_λ asks for, n = (1 + √f_λ)/(1 − √f_λ), times a
-//! ratio, since backscatter alone does not tell f_λ. R is that of a film as flat as the surface is on
+//! The substrate is lossless. Its index is the one that gives f_λ, n = (1 + √f_λ)/(1 − √f_λ), times a
+//! ratio, since backscatter alone does not determine f_λ. R is that of a film as flat as the surface is on
 //! average, so that the ripple in θ shows.
 
 use crate::brdf::{Brdf, Fresnel, Layer, Layered, Scattering, ScatteringModel};
@@ -26,7 +26,7 @@ const MOST_THETA_RAD: f64 = 1.55;
 /// Less than any solid has.
 const LEAST_INDEX: f64 = 1.05;
 
-/// ε of the substrate under a law, whose index is `ratio` times the one that f_λ asks for.
+/// ε of the substrate under a law, whose index is `ratio` times the one that gives f_λ.
 fn substrate(law: &Brdf, ratio: f64) -> f64 {
     let [least, most] = F_LAMBDA_RANGE;
     let f_lambda = law.f_lambda().unwrap_or(USUAL_F_LAMBDA);

@@ -1,6 +1,6 @@
 //! `material.toml`: a material as people write and review it, in degrees, gigahertz and dB.
 //!
-//! Curves stand beside it as CSV with the columns `theta_deg,sigma0_db,censor,threshold_db`; the
+//! Curves are CSV files in the same folder, with the columns `theta_deg,sigma0_db,censor,threshold_db`; the
 //! last two may be left out, and others may be added ([`points`]).
 
 mod composition;
