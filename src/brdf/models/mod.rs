@@ -45,6 +45,30 @@ macro_rules! models {
             /// What is known of every kind of model.
             pub const KINDS: &[Kind] = &[$($file::KIND),+];
 
+            // These two are called for every ray: static calls, since dynamic ones take a third longer.
+
+            fn f_above_horizon_per_sr(
+                &self,
+                i: Direction<Surface>,
+                o: Direction<Surface>,
+            ) -> f64 {
+                match self {
+                    $(Brdf::$model(model) => model.f_per_sr(i, o),)+
+                }
+            }
+
+            fn f_and_specular_share_above_horizon(
+                &self,
+                i: Direction<Surface>,
+                o: Direction<Surface>,
+            ) -> (f64, f64) {
+                match self {
+                    $(Brdf::$model(model) => model.f_and_specular_share(i, o),)+
+                }
+            }
+
+            // All else forwards by these.
+
             fn model(&self) -> &dyn ScatteringModel {
                 match self {
                     $(Brdf::$model(model) => model,)+
@@ -79,14 +103,14 @@ models! {
 impl Scattering for Brdf {
     /// Zero below the horizon, where a model by itself is not to be asked.
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        if is_below_horizon(i, o) { 0.0 } else { self.model().f_per_sr(i, o) }
+        if is_below_horizon(i, o) { 0.0 } else { self.f_above_horizon_per_sr(i, o) }
     }
 
     fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
         if is_below_horizon(i, o) {
             return (0.0, 0.0);
         }
-        self.model().f_and_specular_share(i, o)
+        self.f_and_specular_share_above_horizon(i, o)
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {
