@@ -3,7 +3,7 @@
 use super::interval::DEVIATE_95;
 use super::{Band, FitResult, Method};
 use crate::brdf::{Brdf, Scattering};
-use crate::material::{self, Covariance, FitReport, Given};
+use crate::material::{self, Covariance, FitReport, FixedNumber};
 
 /// Relative step of a difference quotient.
 const STEP: f64 = 1e-4;
@@ -89,7 +89,7 @@ impl FitResult {
         }
     }
 
-    fn given(&self) -> Vec<Given> {
+    fn given(&self) -> Vec<FixedNumber> {
         let settings = match self.fit.method {
             Method::Mse { split_rad } => vec![("method.split_rad", split_rad)],
             Method::Tls { theta_sd_rad, level_sd_db } => {
@@ -103,7 +103,7 @@ impl FitResult {
             [(format!("{name}.min"), *min), (format!("{name}.max"), *max)]
         });
         let all = self.fit.fixed.iter().cloned().chain(bounds).chain(settings).chain(looks);
-        all.map(|(name, value)| Given { name, value }).collect()
+        all.map(|(name, value)| FixedNumber { name, value }).collect()
     }
 
     fn stored_goodness(&self) -> material::Goodness {
