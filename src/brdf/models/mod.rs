@@ -23,7 +23,7 @@ pub const MOST_LEVELS: usize = 8;
 /// Models within one that can be stored, itself included.
 pub const MOST_MODELS: usize = 64;
 
-/// Declares the file of every model and makes of them the type [`Brdf`].
+/// Declares the file of every model, and the type [`Brdf`] that is any of them.
 macro_rules! models {
     ($($file:ident::$model:ident $(<$part:ty>)?),+ $(,)?) => {
         $(
@@ -31,7 +31,7 @@ macro_rules! models {
             pub use $file::$model;
         )+
 
-        /// Every model that can be stored in a database or a material file, told apart by `model`.
+        /// Every model that can be stored in a database or a material file, which the key `model` names.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "model", rename_all = "kebab-case")]
         pub enum Brdf {
@@ -101,7 +101,7 @@ models! {
 }
 
 impl Scattering for Brdf {
-    /// Zero below the horizon, where a model by itself is not to be asked.
+    /// Zero below the horizon, where a model by itself is not defined.
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         if is_below_horizon(i, o) { 0.0 } else { self.f_above_horizon_per_sr(i, o) }
     }
