@@ -29,7 +29,7 @@ pub struct Ceiling {
 
 /// A ceiling for the speckle of one receiver.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Saturating {
+pub struct SaturationCurve {
     ln_saturation: f64,
     /// ln(M/P_sat) and β over ln(P̄/P_sat) from [`FIRST`] by [`STEP`]; none for a receiver that is linear.
     knots: Vec<[f64; 2]>,
@@ -42,7 +42,7 @@ const STEP: f64 = 0.05;
 
 /// A mean power and the speckle about it behind the receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Passed {
+pub struct Output {
     /// ln M.
     pub ln_mean: f64,
     /// Factor β, above 0, on a small relative deviation from the mean.
@@ -55,16 +55,16 @@ impl Ceiling {
         Ceiling { saturation_w: f64::INFINITY, knee: 1.0, at_once: 1.0, averaged: 1.0 };
 
     /// For speckle of this many looks.
-    pub fn over(self, looks: f64) -> Saturating {
+    pub fn over(self, looks: f64) -> SaturationCurve {
         let ln_saturation = self.saturation_w.ln();
         if ln_saturation == f64::INFINITY {
-            return Saturating { ln_saturation, knots: Vec::new() };
+            return SaturationCurve { ln_saturation, knots: Vec::new() };
         }
         let speckle = Speckle::new(looks.powf(self.averaged));
         let count = ((LAST - FIRST) / STEP) as usize;
         let ln_means = (0..=count).map(|k| FIRST + STEP * k as f64);
         let knots = ln_means.map(|ln_mean| self.knot(&speckle, ln_mean)).collect();
-        Saturating { ln_saturation, knots }
+        SaturationCurve { ln_saturation, knots }
     }
 
     /// ln(M/P_sat) and β at ln(P̄/P_sat).
@@ -97,18 +97,18 @@ impl Ceiling {
     }
 }
 
-impl Saturating {
+impl SaturationCurve {
     /// The mean behind the receiver and β, from the ln of the mean power.
-    pub fn of(&self, ln_mean: f64) -> Passed {
+    pub fn of(&self, ln_mean: f64) -> Output {
         let below = ln_mean - self.ln_saturation - FIRST;
         let (true, [_, .., last]) = (below > 0.0, &self.knots[..]) else {
-            return Passed { ln_mean, slope: 1.0 };
+            return Output { ln_mean, slope: 1.0 };
         };
         let cell = (below / STEP) as usize;
         let [a, b] = [cell, cell + 1].map(|k| self.knots.get(k).unwrap_or(last));
         let t = (below / STEP - cell as f64).min(1.0);
         let [ln_held, slope] = [0, 1].map(|k| (1.0 - t) * a[k] + t * b[k]);
-        Passed { ln_mean: self.ln_saturation + ln_held, slope }
+        Output { ln_mean: self.ln_saturation + ln_held, slope }
     }
 
     /// The power behind the receiver, W, of a received power, W, about a mean, W.
@@ -116,7 +116,7 @@ impl Saturating {
         if self.knots.is_empty() || mean_w <= 0.0 || power_w <= 0.0 {
             return power_w;
         }
-        let Passed { ln_mean, slope } = self.of(mean_w.ln());
+        let Output { ln_mean, slope } = self.of(mean_w.ln());
         (ln_mean + slope * (power_w / mean_w).ln()).exp()
     }
 

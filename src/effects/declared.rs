@@ -1,7 +1,7 @@
 //! The effects that a scene, its radar and its materials declare.
 
 use super::effect::{About, Effect};
-use super::entry::Chosen;
+use super::entry::EffectList;
 use super::library::rank;
 use super::model::Model;
 use super::receiver::Receiver;
@@ -11,18 +11,18 @@ use crate::brdf::Brdf;
 /// All effects of a scene.
 #[derive(Clone, Default)]
 pub struct SceneEffects {
-    everywhere: Chosen,
+    everywhere: EffectList,
     on_regions: Vec<(OnRegions, Vec<f64>)>,
 }
 
 impl SceneEffects {
     /// Adds effects that act on every shot.
-    pub fn add(&mut self, effects: Chosen) {
+    pub fn add(&mut self, effects: EffectList) {
         self.everywhere.extend(effects);
     }
 
     /// Adds the effects of a material, which act where `is_of_it` of the region is true.
-    pub fn add_to_regions(&mut self, effects: Chosen, is_of_it: &[bool]) {
+    pub fn add_to_regions(&mut self, effects: EffectList, is_of_it: &[bool]) {
         for (effect, values) in effects {
             self.on_regions.push((OnRegions { effect, is_of_it: is_of_it.to_vec() }, values));
         }

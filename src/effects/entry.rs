@@ -9,7 +9,7 @@ use crate::formats::text::nearest;
 use crate::units::shown;
 
 /// Effects with the values of their parameters.
-pub type Chosen = Vec<(&'static dyn Effect, Vec<f64>)>;
+pub type EffectList = Vec<(&'static dyn Effect, Vec<f64>)>;
 
 /// Why an entry is refused.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -92,8 +92,8 @@ impl Level {
 /// assert_eq!(found[0].1, [2.0, 0.0, 0.0, 1.0]);
 /// assert!(resolve(&[drift], Level::Scene).is_err());
 /// ```
-pub fn resolve(entries: &[EffectEntry], level: Level) -> Result<Chosen, EffectError> {
-    let mut chosen: Chosen = Vec::new();
+pub fn resolve(entries: &[EffectEntry], level: Level) -> Result<EffectList, EffectError> {
+    let mut chosen: EffectList = Vec::new();
     for entry in entries {
         let effect = find(&entry.name).ok_or_else(|| unknown(&entry.name))?;
         let name = effect.name();

@@ -31,11 +31,11 @@ mod spread;
 mod testing;
 mod tilt;
 
-pub use ceiling::{Ceiling, Passed, Saturating};
+pub use ceiling::{Ceiling, Output, SaturationCurve};
 pub use declared::SceneEffects;
 pub use echo::MeanEcho;
 pub use effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
-pub use entry::{Chosen, EffectError, entry, resolve};
+pub use entry::{EffectError, EffectList, entry, resolve};
 pub(crate) use library::rank;
 pub use library::{find, library};
 pub use model::{Model, Prediction, PredictionCache, Tilts};

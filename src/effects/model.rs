@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::cache::Cache;
-use super::ceiling::Saturating;
+use super::ceiling::SaturationCurve;
 use super::echo::MeanEcho;
 use super::effect::{Effect, Survey};
 use super::intersection::{moved, seen_from};
@@ -40,7 +40,7 @@ pub struct Prediction {
     /// How powers are distributed about the mean.
     pub receiver: Receiver,
     /// The saturation of the receiver.
-    pub saturating: Saturating,
+    pub saturating: SaturationCurve,
 }
 
 /// Factor on the power of a shot for every tilt of its normal, and the tilt's probability.

@@ -1,6 +1,6 @@
 //! The receiver: noise, speckle and saturation.
 
-use super::ceiling::{Ceiling, Saturating};
+use super::ceiling::{Ceiling, SaturationCurve};
 use crate::radar::Radar;
 use crate::units::watts_from_dbm;
 
@@ -23,7 +23,7 @@ impl Receiver {
         Receiver { looks: f64::INFINITY, noise_w: 0.0, tilt_sd_rad: 0.0, ceiling: Ceiling::NONE };
 
     /// Its ceiling, averaged over its speckle.
-    pub fn saturating(&self) -> Saturating {
+    pub fn saturating(&self) -> SaturationCurve {
         self.ceiling.over(self.looks)
     }
 

@@ -4,7 +4,7 @@ use super::interval::DEVIATE_95;
 use super::result::{Band, FitResult};
 use super::settings::Method;
 use crate::brdf::{Brdf, Scattering};
-use crate::material::{self, Covariance, Estimate, FitReport, Given};
+use crate::material::{self, Covariance, Estimate, FitReport, FixedNumber};
 
 /// Relative step of a difference quotient.
 const STEP: f64 = 1e-4;
@@ -90,7 +90,7 @@ impl FitResult {
         }
     }
 
-    fn given(&self) -> Vec<Given> {
+    fn given(&self) -> Vec<FixedNumber> {
         let settings = match self.fit.method {
             Method::Mse { split_rad } => vec![("method.split_rad", split_rad)],
             Method::Tls { theta_sd_rad, level_sd_db } => {
@@ -104,7 +104,7 @@ impl FitResult {
             [(format!("{name}.min"), *min), (format!("{name}.max"), *max)]
         });
         let all = self.fit.fixed.iter().cloned().chain(bounds).chain(settings).chain(looks);
-        all.map(|(name, value)| Given { name, value }).collect()
+        all.map(|(name, value)| FixedNumber { name, value }).collect()
     }
 }
 

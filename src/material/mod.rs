@@ -36,7 +36,7 @@ pub use provenance::{
     USUAL_TITLE,
 };
 pub use reach::Reach;
-pub use report::{Estimate, FitReport, Given, Goodness, HeldOut};
+pub use report::{Estimate, FitReport, FixedNumber, Goodness, HeldOut};
 pub use slug::Slug;
 pub use status::Status;
 pub use texts::LONGEST_TEXT_BYTES;

@@ -13,7 +13,7 @@ pub struct FitReport {
     pub method: String,
     /// Numbers that were set and not found: held parameters by their path, narrower ranges as their
     /// path and `.min` or `.max`, settings as `method.…`, `looks`.
-    pub given: Vec<Given>,
+    pub given: Vec<FixedNumber>,
     /// Looks L of the speckle, given or found; none for least squares.
     pub looks: Option<f64>,
     /// Mean thermal power that the fit allowed for, W, 0 or more.
@@ -78,7 +78,7 @@ pub struct HeldOut {
 /// A number that was set and not found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Given {
+pub struct FixedNumber {
     /// As [`FitReport::given`] says.
     pub name: String,
     /// Its value, in its own unit.
@@ -222,7 +222,7 @@ mod tests {
         };
         FitReport {
             method: "censored".to_owned(),
-            given: vec![Given { name: "looks".to_owned(), value: 1.0 }],
+            given: vec![FixedNumber { name: "looks".to_owned(), value: 1.0 }],
             looks: Some(1.0),
             noise_w: 0.0,
             gauge: None,

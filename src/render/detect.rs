@@ -9,7 +9,7 @@ use num_complex::Complex;
 use super::acting::Acting;
 use super::path::Path;
 use super::{Beats, Observer, RenderError, Setup};
-use crate::effects::{Receiver, Saturating};
+use crate::effects::{Receiver, SaturationCurve};
 use crate::radar::noise::measured_w;
 use crate::radar::random::{Draws, Key, Purpose};
 use crate::radar::{Chirp, Detection, RangeProcessor, Return, Speckle};
@@ -21,7 +21,7 @@ pub(super) struct Detector {
     observer: u64,
     kind: Kind,
     threshold_w: f64,
-    saturating: Saturating,
+    saturating: SaturationCurve,
 }
 
 enum Kind {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::materials::{MaterialRevision, find_material, status_warning};
 use crate::brdf::Brdf;
-use crate::effects::{Chosen, Level, Model, Receiver, SceneEffects, resolve};
+use crate::effects::{EffectList, Level, Model, Receiver, SceneEffects, resolve};
 use crate::error::Error;
 use crate::formats::EffectEntry;
 use crate::geometry::Raster;
@@ -26,7 +26,7 @@ pub struct SceneMaterial {
     /// The law that is rendered.
     pub scattering: Brdf,
     /// The effects that the material declares.
-    pub effects: Chosen,
+    pub effects: EffectList,
 }
 
 /// A scene file with everything that it names: meshes, scan, materials, laws and effects.
@@ -204,7 +204,7 @@ pub fn resolve_effects(
     entries: &[EffectEntry],
     level: Level,
     place: String,
-) -> Result<Chosen, Error> {
+) -> Result<EffectList, Error> {
     resolve(entries, level).map_err(|error| Error::Effect { place, error })
 }
 
