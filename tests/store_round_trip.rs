@@ -7,9 +7,9 @@ use matdb::brdf::{
 use matdb::formats::EffectEntry;
 use matdb::material::{
     Activity, Censor, Citation, Covariance, Curve, Estimate, Finding, FindingVerdict, Fit,
-    FitReport, Geometry, Given, Goodness, HeldOut, Input, Instrument, Layer, Making, Material,
-    Observation, Origin, Permittivity, Roughness, Scale, Session, SessionPose, Slug, Source,
-    SourceKind, Status, builtin,
+    FitReport, FixedNumber, Geometry, Goodness, HeldOut, Input, Instrument, Layer, Making,
+    Material, Observation, Origin, Permittivity, Roughness, Scale, Session, SessionPose, Slug,
+    Source, SourceKind, Status, builtin,
 };
 use matdb::measure::statistics::by_angle;
 use matdb::store::{Added, Store};
@@ -253,7 +253,7 @@ prop_compose! {
             name: name.clone(), value: *value, sd: *sd, interval_95: sd.map(interval),
         }).collect();
         let row = |_| named.iter().map(|(_, value, _)| *value).collect();
-        let given = named.iter().map(|(name, value, _)| Given { name: name.clone(), value: *value });
+        let given = named.iter().map(|(name, value, _)| FixedNumber { name: name.clone(), value: *value });
         let [iterations, starts, agreeing_starts, rows] = counts;
         FitReport {
             method, given: given.collect(), looks, noise_w, gauge,

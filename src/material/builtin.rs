@@ -1,7 +1,7 @@
 //! The materials that come with the program, as reviewable text in `materials/`.
 
 use super::file::{FileError, parse};
-use super::material::Material;
+use super::revision::Material;
 
 /// One built-in material's files.
 struct Entry {

@@ -6,8 +6,8 @@ use super::curve::{Censor, Curve, Observation};
 use super::error::{MaterialError, dangling, value};
 use super::fit::{Covariance, Fit};
 use super::instrument::Instrument;
-use super::material::Material;
 use super::provenance::{Session, Source};
+use super::revision::Material;
 use crate::formats::EffectEntry;
 
 impl Material {

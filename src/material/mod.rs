@@ -14,11 +14,11 @@ mod finding;
 mod fit;
 pub mod form;
 mod instrument;
-mod material;
 mod number_check;
 mod provenance;
 mod reach;
 mod report;
+mod revision;
 mod slug;
 mod status;
 mod texts;
@@ -30,13 +30,13 @@ pub use error::MaterialError;
 pub use finding::{Finding, FindingVerdict};
 pub use fit::{ChosenBy, Covariance, Fit, FitNumber};
 pub use instrument::{Geometry, Instrument, Scale};
-pub use material::Material;
 pub use provenance::{
     Activity, Citation, Input, Making, Origin, Session, SessionPose, Source, SourceKind,
     USUAL_TITLE,
 };
 pub use reach::Reach;
 pub use report::{Estimate, FitReport, FixedNumber, Goodness, HeldOut};
+pub use revision::Material;
 pub use slug::Slug;
 pub use status::Status;
 pub use texts::LONGEST_TEXT_BYTES;

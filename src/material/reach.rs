@@ -1,7 +1,7 @@
 //! The angles and frequencies for which a material is claimed to hold.
 
 use super::curve::{Censor, Curve};
-use super::material::Material;
+use super::revision::Material;
 
 /// Angles at which a material answers: those that it claims and, of a curve that is rendered, no farther
 /// than its points go.

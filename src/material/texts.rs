@@ -2,8 +2,8 @@
 
 use super::bidirectional::turns_the_line;
 use super::error::{MaterialError, value};
-use super::material::Material;
 use super::report::FitReport;
+use super::revision::Material;
 
 /// Longest text, bytes: some twenty pages. Whoever reads a material holds all its texts at once.
 pub const LONGEST_TEXT_BYTES: usize = 64 << 10;

@@ -6,8 +6,8 @@ use std::process::Command;
 
 use matdb::formats::EffectEntry;
 use matdb::material::{
-    Censor, Citation, Covariance, Curve, Estimate, Finding, FindingVerdict, FitReport, Geometry,
-    Given, Goodness, HeldOut, Instrument, Layer, Making, Material, Observation, Permittivity,
+    Censor, Citation, Covariance, Curve, Estimate, Finding, FindingVerdict, FitReport, FixedNumber,
+    Geometry, Goodness, HeldOut, Instrument, Layer, Making, Material, Observation, Permittivity,
     Roughness, Scale, Session, SessionPose, Status, file,
 };
 use matdb::store::Store;
@@ -236,7 +236,7 @@ fn report() -> FitReport {
     };
     FitReport {
         method: "censored".to_owned(),
-        given: vec![Given { name: "diffuse.alpha".to_owned(), value: 3.0 }],
+        given: vec![FixedNumber { name: "diffuse.alpha".to_owned(), value: 3.0 }],
         looks: Some(1.5),
         noise_w: 1e-12,
         gauge: Some("k = 0.1 was chosen".to_owned()),

@@ -60,7 +60,7 @@ fn one_curve(table: &Table) -> Result<(), FormatError> {
     Ok(())
 }
 
-fn curve_name<'a>(table: &'a Table, row: usize) -> Option<&'a str> {
+fn curve_name(table: &Table, row: usize) -> Option<&str> {
     table.cell(row, "curve").map(|cell| cell.text)
 }
 
