@@ -6,7 +6,7 @@ use super::error::FitError;
 use super::models::{model, model_names};
 use super::settings::{Fit, Method};
 use crate::brdf::Brdf;
-use crate::material::{self, FitReport, Given, Material};
+use crate::material::{self, FitReport, FixedNumber, Material};
 use crate::measure::curve::Curve;
 
 /// Estimators of fits that this program made.
@@ -24,7 +24,7 @@ pub fn settings(report: &FitReport) -> Option<Fit> {
         _ => return None,
     };
     let (mut fixed, mut bounds) = (Vec::new(), Vec::new());
-    for Given { name, value } in &report.given {
+    for FixedNumber { name, value } in &report.given {
         if let Some(path) = name.strip_suffix(".min") {
             let max = given(report, &format!("{path}.max"));
             bounds.extend(max.map(|max| (path.to_owned(), [*value, max])));
