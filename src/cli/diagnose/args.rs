@@ -17,7 +17,7 @@ use crate::cli::cloud::CloudArgs;
 
 Writes report.html (all of it, for a person), report.json, residuals.csv (one line per chirp) and
 pictures (.svg and .png), and after.toml, the scene with what was found. Too few data: report.html and report.json say so, and the status is not 0.")]
-pub(in crate::cli) struct Args {
+pub struct Args {
     #[command(flatten)]
     pub cloud: Option<CloudArgs>,
     /// The scene that was measured: its mesh, materials, radar and scan
