@@ -14,6 +14,7 @@ use crate::fit::FitError;
 use crate::formats::FormatError;
 use crate::formats::exr::ExrError;
 use crate::formats::figure::FigureError;
+use crate::formats::html::PageError;
 use crate::material::MaterialError;
 use crate::material::file::FileError;
 use crate::measure::curve::ObservationError;
@@ -75,6 +76,9 @@ pub enum Error {
     /// A figure could not be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),
+    /// A page could not be made.
+    #[error(transparent)]
+    Page(#[from] PageError),
     /// An image could not be encoded.
     #[error(transparent)]
     Exr(#[from] ExrError),

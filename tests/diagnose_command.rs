@@ -176,7 +176,7 @@ fn page(path: &Path) -> String {
         assert!(!html.contains(outside), "{outside}");
     }
     assert!(!html.contains("<b>") && html.contains("&lt;script&gt;alert(1)"));
-    assert!(html.contains("&lt;b&gt;skin&lt;/b&gt;"));
+    assert!(html.contains("&lt;b&gt;skin&lt;&#x2f;b&gt;"));
     balanced(&html);
     html
 }

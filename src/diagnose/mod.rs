@@ -11,6 +11,7 @@
 //!
 //! | step | file |
 //! |---|---|
+//! | from a scene and its cloud to a report | `scan.rs` |
 //! | every chirp against the target, the cloud against the chirps | `shots.rs` |
 //! | probability of what was seen | `likelihood.rs` |
 //! | base and effects together | `refit.rs` |
@@ -34,6 +35,7 @@ mod ranges;
 mod refit;
 mod report;
 mod residual;
+mod scan;
 mod score;
 mod screen;
 mod select;
@@ -59,6 +61,7 @@ pub use report::{
     Report, Row, Triple, Value, Verdict,
 };
 pub use residual::Unexplained;
+pub use scan::{MeasuredScene, declared_receiver};
 pub use score::Errors;
 pub use select::Candidate;
 pub use shots::{CloudMatch, Observation, Stray, match_cloud, trace_shots};

@@ -1,6 +1,5 @@
 //! The files of a rendering, as bytes: three for each antenna, and the record.
 
-use super::record::Record;
 use crate::cli::summary::grouped;
 use crate::error::Error;
 use crate::formats::exr::{self, Attribute, Packing};
@@ -8,6 +7,7 @@ use crate::formats::figure::{Figure, Scale};
 use crate::formats::ply;
 use crate::geometry::Raster;
 use crate::render::{Echo, cloud_table};
+use crate::report::ScanRecord;
 use crate::scene::Scene;
 use crate::setup::{ReadyScene, View};
 
@@ -21,7 +21,7 @@ pub(super) fn encode(
     ready: &ReadyScene,
     views: &[View],
     images: &[Raster],
-    record: &Record,
+    record: &ScanRecord,
 ) -> Result<Vec<(String, Vec<u8>)>, Error> {
     let scene = &ready.scene;
     let regions: Vec<&str> = scene.target.regions.iter().map(|r| r.name.as_str()).collect();

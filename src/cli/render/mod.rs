@@ -2,7 +2,6 @@
 
 mod beat;
 mod files;
-mod record;
 mod report;
 mod stages;
 mod tracer;
@@ -16,9 +15,9 @@ use crate::files::write_all;
 use crate::formats::exr::Packing;
 use crate::geometry::Raster;
 use crate::render::{RenderError, Setup, trace_placed};
+use crate::report::ScanRecord;
 use crate::setup::ReadyScene;
 use crate::trace::GpuError;
-use record::Record;
 use stages::Stages;
 use tracer::{Rays, gpu, tracer};
 
@@ -77,7 +76,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     stages.end("image", console);
 
     let packing = if args.uncompressed { Packing::Uncompressed } else { Packing::Zip16 };
-    let record = Record::new(&ready, assembly.model(), &views, &images, args.all);
+    let record = ScanRecord::new(&ready, assembly.model(), &views, &images, args.all);
     let mut files = files::encode(args.all, packing, &ready, &views, &images, &record)?;
     if let Some(shape) = beat {
         files.extend(beat::encode(&args.scene, shape, &setup, &footprints, &views)?);

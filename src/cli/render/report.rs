@@ -5,16 +5,16 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::files::NAMES;
-use super::record::{Counts, ReceiverRecord, Record};
 use super::stages::Stages;
 use crate::cli::console::Console;
 use crate::cli::summary::{grouped, table};
 use crate::error::Error;
+use crate::report::{Counts, ReceiverRecord, ScanRecord};
 
 /// Prints the summary of a rendering that was written to `folder`.
 pub(super) fn print(
     folder: &Path,
-    record: &Record,
+    record: &ScanRecord,
     stages: &Stages,
     console: &Console,
 ) -> Result<(), Error> {
@@ -22,7 +22,7 @@ pub(super) fn print(
     console.result(&text(folder, record, stages), &value(folder, record, stages))
 }
 
-fn text(folder: &Path, record: &Record, stages: &Stages) -> String {
+fn text(folder: &Path, record: &ScanRecord, stages: &Stages) -> String {
     let materials = record.material_origins();
     let regions = table(
         &["region", "material", "facets", "hits", "detections", "strongest dBm"],
@@ -68,7 +68,7 @@ fn counted(counts: Counts) -> String {
     )
 }
 
-fn value(folder: &Path, record: &Record, stages: &Stages) -> Value {
+fn value(folder: &Path, record: &ScanRecord, stages: &Stages) -> Value {
     let timings: Map<String, Value> =
         stages.ended().map(|(stage, ms)| (stage.to_owned(), json!(ms))).collect();
     json!({

@@ -1,0 +1,277 @@
+//! Everything that a diagnosis leaves behind: the report, the scene with what was found, and files or stored
+//! revisions of the materials that receive it.
+
+use super::provenance::activity;
+use super::recipients::{Adoption, Recipient, pinned_name, replaced_name};
+use super::request::{CheckedRequest, material_file};
+use super::scene_after::{AFTER, MARK, name_beside, relocate_files, scene_with_found};
+use crate::diagnose::{LEAST_SHOTS, Report};
+use crate::effects::Level;
+use crate::error::Error;
+use crate::formats::words::listed;
+use crate::material::{Activity, Material, file};
+use crate::report::{CloudAnswer, CloudReport, NextSteps, shell_word};
+use crate::scene::SceneFile;
+use crate::store::{Added, Store};
+
+/// First line of a material's file.
+const FOUND: &str = "# A material with what `matdb diagnose` found in it.\n";
+
+/// Name and bytes of a file.
+type File = (String, Vec<u8>);
+
+/// A diagnosis with everything that its files are made of.
+pub struct Publication<'a> {
+    checked: &'a CheckedRequest<'a>,
+    adoption: Adoption<'a>,
+    recipients: Vec<Recipient>,
+    report: CloudReport<'a>,
+    next: NextSteps,
+}
+
+/// What was published.
+#[derive(Default)]
+pub struct Published {
+    /// Files for the folder of the report, `report.html` first.
+    pub files: Vec<(String, Vec<u8>)>,
+    /// Materials that were stored, with their revisions.
+    pub stored: Vec<String>,
+    /// The revisions that were current before these, where they are new.
+    pub replaced: Vec<String>,
+}
+
+impl<'a> Publication<'a> {
+    /// Draws the pictures of a diagnosis; `notices` are those of the request, `program` and `command` what a
+    /// person types.
+    pub fn new(
+        checked: &'a CheckedRequest<'a>,
+        report: &'a Report,
+        notices: &'a [String],
+        [program, command]: [String; 2],
+    ) -> Publication<'a> {
+        let CheckedRequest { request, ready, recipient, choice, .. } = checked;
+        let adoption = Adoption { ready, report, wanted: *recipient };
+        let answer = CloudAnswer {
+            report,
+            scene: &ready.scene,
+            scene_path: request.scene,
+            cloud_path: request.cloud,
+            notices,
+            not_tried: &choice.not_tried,
+            seed: request.seed,
+        };
+        let beside = request.scene.with_file_name(name_beside(request.scene));
+        let next = NextSteps {
+            program,
+            command,
+            scene_after: shell_word(&request.folder.join(AFTER)),
+            scene_beside: shell_word(&beside),
+            ..NextSteps::default()
+        };
+        let recipients = adoption.recipients();
+        Publication { checked, adoption, recipients, report: CloudReport::new(answer), next }
+    }
+
+    /// The report.
+    pub fn report(&self) -> &CloudReport<'a> {
+        &self.report
+    }
+
+    /// The files of a diagnosis of which nothing is stored.
+    ///
+    /// # Errors
+    /// A picture, page or material that cannot be written.
+    pub fn files(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
+        let mut files = self.report.tables_and_pictures()?;
+        let (mut next, mut names) = (self.next.clone(), Vec::new());
+        let mut material_files = Vec::new();
+        for recipient in &self.recipients {
+            let title = self.title(&self.activity()?);
+            let material = self.adoption.make_material(recipient, &title)?;
+            let name = material_file(&self.adoption.ready.materials[recipient.number].name);
+            next.material_files.push(shell_word(&self.checked.request.folder.join(&name)));
+            files.push((name.clone(), (FOUND.to_owned() + &file::write(&material)?).into_bytes()));
+            names.push(material.slug.to_string());
+            material_files.push(name);
+        }
+        let names = self.adoption.region_names(&self.recipients, &names);
+        files.push((AFTER.to_owned(), self.scene_after(&names, &head(&material_files))?));
+        files.push(("report.html".to_owned(), self.report.page(&next)?));
+        files.sort_by_key(|(name, _)| name != "report.html");
+        Ok(files)
+    }
+
+    /// Stores what was found, or what was tried and not found, as new revisions of the materials. `write` receives
+    /// the files for the folder of the report and those to be put next to the scene; if it fails, nothing is stored.
+    ///
+    /// # Errors
+    /// What the database or `write` refuses.
+    pub fn store<Written>(
+        &self,
+        store: &mut Store,
+        write: impl FnOnce(&[File], &[File]) -> Result<Written, Error>,
+    ) -> Result<(Published, Written), Error> {
+        if self.adoption.report.effects.is_empty() {
+            self.store_not_found(store, write)
+        } else {
+            self.store_found(store, write)
+        }
+    }
+
+    fn store_found<Written>(
+        &self,
+        store: &mut Store,
+        write: impl FnOnce(&[File], &[File]) -> Result<Written, Error>,
+    ) -> Result<(Published, Written), Error> {
+        let mut files = self.report.tables_and_pictures()?;
+        let activity = self.activity()?;
+        let title = self.title(&activity);
+        let (mut materials, mut last) = (Vec::new(), Vec::new());
+        for recipient in &self.recipients {
+            materials.extend(self.adoption.revise(recipient, &title, store)?);
+            last.push(materials.len() - 1);
+        }
+        let mut published = Published::default();
+        store.record(activity);
+        let written = store.add_if(&materials, |added| {
+            for (material, added) in at_places(&materials, added, &last) {
+                published.stored.push(pinned_name(material, added));
+                published.replaced.extend(replaced_name(material, added));
+            }
+            let next = NextSteps {
+                is_stored: self.unstored().len() < self.adoption.report.effects.len(),
+                stored: published.stored.clone(),
+                ..self.next.clone()
+            };
+            let names = self.adoption.region_names(&self.recipients, &published.stored);
+            files.push((AFTER.to_owned(), self.scene_after(&names, MARK)?));
+            files.push(("report.html".to_owned(), self.report.page(&next)?));
+            files.sort_by_key(|(name, _)| name != "report.html");
+            let beside = self.scene_text(MARK, &self.scene_with(&names))?;
+            write(&files, &[(name_beside(self.checked.request.scene), beside)])
+        })?;
+        published.files = files;
+        Ok((published, written))
+    }
+
+    fn store_not_found<Written>(
+        &self,
+        store: &mut Store,
+        write: impl FnOnce(&[File], &[File]) -> Result<Written, Error>,
+    ) -> Result<(Published, Written), Error> {
+        let mut published = Published { files: self.files()?, ..Published::default() };
+        let activity = self.activity()?;
+        let title = self.title(&activity);
+        let (materials, last) = self.adoption.record_not_found(&title, store)?;
+        store.record(activity);
+        let written = store.add_if(&materials, |added| {
+            for (material, added) in at_places(&materials, added, &last) {
+                published.stored.push(pinned_name(material, added));
+            }
+            write(&published.files, &[])
+        })?;
+        Ok((published, written))
+    }
+
+    /// Effects of a material that no material receives.
+    pub fn unstored(&self) -> Vec<&'static str> {
+        let mut unstored = Vec::new();
+        for found in &self.adoption.report.effects {
+            if found.level == Level::Material && self.recipients.is_empty() {
+                unstored.push(found.name);
+            }
+        }
+        unstored
+    }
+
+    /// Sentences on pictures and numbers that are missing or uncertain, and on materials that stay as they were.
+    pub fn notices(&self) -> Vec<String> {
+        let mut notices = self.report.notices.clone();
+        if !self.adoption.report.base.converged {
+            notices.push("the final fit did not converge: take the numbers with care".to_owned());
+        }
+        let unstored = self.unstored();
+        if !unstored.is_empty() {
+            notices.push(format!(
+                "kept in the report alone, as no material has the {LEAST_SHOTS} chirps on the target that take {}: {}",
+                if unstored.len() == 1 { "it" } else { "them" },
+                listed(&unstored)
+            ));
+        }
+        notices.extend(self.unchanged());
+        notices
+    }
+
+    /// That materials keep what they had.
+    fn unchanged(&self) -> Option<String> {
+        let mut names = Vec::new();
+        for (number, material) in self.adoption.ready.materials.iter().enumerate() {
+            if self.recipients.iter().all(|recipient| recipient.number != number) {
+                names.push(material.name.as_str());
+            }
+        }
+        let is_notable = !self.adoption.report.effects.is_empty() && !names.is_empty();
+        is_notable.then(|| {
+            format!("as before, without a law or effects of their own: {}", names.join(", "))
+        })
+    }
+
+    fn scene_with(&self, materials: &[String]) -> SceneFile {
+        scene_with_found(&self.adoption.ready.scene, &self.adoption.report.effects, materials)
+    }
+
+    /// The scene with what was found, for the folder of the report.
+    fn scene_after(&self, materials: &[String], head: &str) -> Result<Vec<u8>, Error> {
+        let request = &self.checked.request;
+        let file = relocate_files(self.scene_with(materials), request.scene, request.folder)?;
+        self.scene_text(head, &file)
+    }
+
+    fn scene_text(&self, head: &str, file: &SceneFile) -> Result<Vec<u8>, Error> {
+        let text = file.write(&self.checked.scene_text).map_err(|error| Error::Usage {
+            problem: format!("{}: {error}", self.checked.request.scene.display()),
+            way_out: "leave the scene as it is while it is diagnosed".to_owned(),
+        })?;
+        Ok((head.to_owned() + &text).into_bytes())
+    }
+
+    /// The command and the files that it was given.
+    fn activity(&self) -> Result<Activity, Error> {
+        Ok(activity("diagnose", &self.checked.request.inputs())?)
+    }
+
+    /// Where the stored numbers come from: files of one name differ by what is in them.
+    fn title(&self, activity: &Activity) -> String {
+        let mut files = Vec::new();
+        for input in &activity.inputs {
+            let hash = input.hash.get(..12).unwrap_or_default();
+            files.push(format!("{} (BLAKE3 {hash})", input.name));
+        }
+        format!("Diagnosis of {}, seed {}", files.join(" with "), self.checked.request.seed)
+    }
+}
+
+/// The materials at these places with what adding them did.
+fn at_places<'a>(
+    materials: &'a [Material],
+    added: &'a [Added],
+    places: &'a [usize],
+) -> impl Iterator<Item = (&'a Material, Added)> {
+    places.iter().filter_map(|&place| Some((materials.get(place)?, *added.get(place)?)))
+}
+
+/// The first lines of a scene whose materials are in these files.
+fn head(material_files: &[String]) -> String {
+    if material_files.is_empty() {
+        return "# The scene as `matdb diagnose` leaves it; it renders as it stands.\n".to_owned();
+    }
+    let mut froms = Vec::new();
+    for name in material_files {
+        froms.push(format!("--from {}", shell_word(name.as_ref())));
+    }
+    format!(
+        "# The scene with what `matdb diagnose` found. To render it, add its materials first,\n\
+         # from the folder of this file:\n# matdb add {}\n",
+        froms.join(" ")
+    )
+}

@@ -1,0 +1,214 @@
+//! The diagnosis of a cloud as a user asks for it, checked before it runs.
+
+use std::path::{Path, PathBuf};
+
+use super::earlier::check_folder;
+use super::recipients::{check_fit_name, find_recipient};
+use super::scene_after::{AFTER, check_beside};
+use crate::diagnose::{DiagnoseError, MeasuredScene, Report, declared_receiver};
+use crate::effects::{Effect, library};
+use crate::error::Error;
+use crate::files::folder_of;
+use crate::measure::{Cloud, CloudError};
+use crate::radar::Pattern;
+use crate::report::{Choice, Measured, Reason};
+use crate::scene::{Scene, read_text};
+use crate::setup::ReadyScene;
+use crate::store::Store;
+
+/// Warning for a scene according to which every chirp would measure its power exactly.
+const NO_SPECKLE: &str = "the scene declares no speckle, so that any scatter of the powers is an effect to be found; a \
+                          measured cloud has some: state `looks` under [radar.speckle]";
+
+/// What to diagnose, and where the answer goes.
+#[derive(Clone, Copy)]
+pub struct CloudRequest<'a> {
+    /// The cloud's file.
+    pub cloud: &'a Path,
+    /// The scene that was measured.
+    pub scene: &'a Path,
+    /// Effects to try; all for an empty list.
+    pub effects: &'a [&'static dyn Effect],
+    /// The material that alone receives what is found; all of the scene for `None`.
+    pub material: Option<&'a str>,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Folder of the report.
+    pub folder: &'a Path,
+    /// Whether what is found will be stored.
+    pub add: bool,
+}
+
+/// A request whose scene is loaded and that nothing hinders.
+pub struct CheckedRequest<'a> {
+    /// What was asked.
+    pub request: CloudRequest<'a>,
+    /// The scene with its materials.
+    pub ready: ReadyScene,
+    /// Text of the scene file.
+    pub scene_text: String,
+    /// The material that alone receives what is found, as its place among those of the scene.
+    pub recipient: Option<usize>,
+    /// Effects to try, and the others.
+    pub choice: Choice,
+}
+
+impl<'a> CloudRequest<'a> {
+    /// The files that a user names.
+    pub fn inputs(&self) -> [&'a Path; 2] {
+        [self.cloud, self.scene]
+    }
+
+    /// Loads the scene, with materials from `store` or built in, and checks everything that could hinder the
+    /// answer, since a diagnosis takes a while.
+    ///
+    /// # Errors
+    /// A scene that cannot be loaded or declares what no diagnosis predicts; a folder with files of somebody else;
+    /// effects or a material that do not suit the scene.
+    pub fn check(self, store: Option<&Store>) -> Result<CheckedRequest<'a>, Error> {
+        let scene_text = read_text(self.scene)?;
+        let scene = Scene::load(self.scene)?;
+        check_predicted(&scene, self.scene)?;
+        let ready = ReadyScene::new(scene, self.scene, store)?;
+        self.check_output(&ready)?;
+        let recipient = self.material.map(|name| find_recipient(&ready, name)).transpose()?;
+        if self.add {
+            check_beside(self.scene)?;
+            check_fit_name(&ready)?;
+        }
+        let choice = self.choose_effects(&ready)?;
+        Ok(CheckedRequest { request: self, ready, scene_text, recipient, choice })
+    }
+
+    /// Checks that the answer will not replace what is read, or somebody's own scene or material.
+    fn check_output(&self, ready: &ReadyScene) -> Result<(), Error> {
+        let mut written = Vec::new();
+        for material in &ready.materials {
+            written.push(material_file(&material.name));
+        }
+        written.push(AFTER.to_owned());
+        let named = named_files(&ready.scene, self.scene);
+        let mut read = self.inputs().to_vec();
+        read.extend(named.iter().map(PathBuf::as_path));
+        check_folder(self.folder, &read, &written)
+    }
+
+    fn choose_effects(&self, ready: &ReadyScene) -> Result<Choice, Error> {
+        let model = ready.model();
+        let mut declared = Vec::new();
+        for (effect, _) in model.as_ref().map_or(&[][..], |model| &model.effects) {
+            declared.push(effect.name());
+        }
+        let scene = &ready.scene;
+        let (_, of_radar) = declared_receiver(scene.radar());
+        let measured =
+            Measured { times: scene.chirps.is_timed(), ranges: of_radar.range_sd_m > 0.0 };
+        let asked =
+            if self.effects.is_empty() { library().to_vec() } else { self.effects.to_vec() };
+        let choice = Choice::new(&asked, &declared, measured);
+        if !self.effects.is_empty() {
+            let untimed = choice.left_out(Reason::NoTimes).join(" and ");
+            if !untimed.is_empty() {
+                return Err(DiagnoseError::Untimed { effects: untimed }.into());
+            }
+            let unranged = choice.left_out(Reason::NoRanges).join(" and ");
+            if !unranged.is_empty() {
+                return Err(DiagnoseError::Unranged { effects: unranged }.into());
+            }
+        }
+        if choice.tried.is_empty() {
+            let names: Vec<&str> = self.effects.iter().map(|effect| effect.name()).collect();
+            return Err(Error::Usage {
+                problem: format!("the scene declares {} already", names.join(", ")),
+                way_out: "name other effects, or diagnose with the scene that lacks them"
+                    .to_owned(),
+            });
+        }
+        Ok(choice)
+    }
+}
+
+impl CheckedRequest<'_> {
+    /// Sentences on the scene and its materials that the report repeats.
+    pub fn notices(&self) -> Vec<String> {
+        let mut notices = self.ready.notices();
+        if self.ready.scene.radar().speckle.is_none() {
+            notices.push(NO_SPECKLE.to_owned());
+        }
+        notices
+    }
+
+    /// Diagnoses the cloud; `hear` receives in a few words what is being done.
+    ///
+    /// # Errors
+    /// When the data are too few to tell anything, or are not of this scene.
+    pub fn diagnose(
+        &self,
+        cloud: &Cloud,
+        hear: &(dyn Fn(&str) + Sync),
+    ) -> Result<Report, DiagnoseError> {
+        let model = self.ready.model();
+        let measured = MeasuredScene {
+            scene: &self.ready.scene,
+            cloud,
+            laws: &self.ready.laws(),
+            declared_effects: model.as_ref().map_or(&[][..], |model| &model.effects),
+        };
+        measured.diagnose(self.request.seed, &self.choice.tried, hear)
+    }
+}
+
+/// The reason why an error is an answer, too: the data or the scene do not allow a diagnosis.
+///
+/// # Errors
+/// Every other error, as it is.
+pub fn as_answer(error: Error) -> Result<DiagnoseError, Error> {
+    match error {
+        Error::Diagnose(error) => Ok(error),
+        // Nothing was detected.
+        Error::Cloud { error: CloudError::Empty, .. } => Ok(DiagnoseError::TooFew { detected: 0 }),
+        other => Err(other),
+    }
+}
+
+/// Name of the file of a material that a scene names so.
+pub(super) fn material_file(name: &str) -> String {
+    format!("material-{}.toml", name.replace('@', "-"))
+}
+
+/// Files that a scene names: meshes and a scan.
+fn named_files(scene: &Scene, path: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for mesh in &scene.file.mesh {
+        if !mesh.file.starts_with("builtin:") {
+            files.push(folder_of(path).join(&mesh.file));
+        }
+    }
+    if let Pattern::Rays(explicit) | Pattern::Angles(explicit) = &scene.radar().scan {
+        files.push(folder_of(path).join(&explicit.file));
+    }
+    files
+}
+
+/// Refuses what a scene declares and no diagnosis predicts: it would be found as an effect.
+fn check_predicted(scene: &Scene, path: &Path) -> Result<(), Error> {
+    let radar = scene.radar();
+    let (what, way_out) = if scene.file.spot.rays > 1 {
+        ("several rays in a spot", "set spot.rays = 1 and declare [[radar.effect]] `finite-spot`")
+    } else if scene.file.bounce.is_some() {
+        ("a second bounce", "replace [bounce] by [[effect]] `multi-bounce`")
+    } else if radar.speckle.is_some_and(|speckle| speckle.coherent_ratio > 0.0) {
+        (
+            "a coherent share of an echo",
+            "leave `coherent_ratio` under [radar.speckle] at 0 and state the `looks` that scatter as much",
+        )
+    } else if radar.receiver.is_some() {
+        ("a range receiver", "replace [radar.receiver] by [radar.noise] and [radar.speckle]")
+    } else if !scene.file.receiver.is_empty() {
+        ("other antennas", "remove [[receiver]]; a diagnosis is of the radar's own echoes")
+    } else {
+        return Ok(());
+    };
+    let problem = format!("{}: no diagnosis predicts {what}", path.display());
+    Err(Error::Usage { problem, way_out: way_out.to_owned() })
+}

@@ -1,0 +1,193 @@
+//! `matdb diagnose CLOUD --scene SCENE`.
+
+use std::ffi::OsString;
+use std::path::Path;
+
+use super::args::Args;
+use super::refusal::write_refusal;
+use crate::adopt::{
+    CheckedRequest, CloudRequest, Earlier, Publication, Published, as_answer, name_beside,
+};
+use crate::cli::cloud::CloudArgs;
+use crate::cli::console::Console;
+use crate::cli::database::{Database, USUAL};
+use crate::cli::effects::chosen;
+use crate::diagnose::{DiagnoseError, Report};
+use crate::error::Error;
+use crate::files::{Placement, folder_of, write_all};
+use crate::formats::words::listed;
+use crate::report::{CannotTell, shell_word};
+
+/// Diagnoses a cloud and writes the answer.
+pub(super) fn run(
+    cloud: &CloudArgs,
+    scene: &Path,
+    args: &Args,
+    db: &Database,
+    console: &Console,
+) -> Result<(), Error> {
+    let effects = if args.effects.is_empty() { Vec::new() } else { chosen(&args.effects)? };
+    let request = CloudRequest {
+        cloud: &cloud.cloud,
+        scene,
+        effects: &effects,
+        material: args.material.as_deref(),
+        seed: args.seed,
+        folder: &args.output,
+        add: args.add,
+    };
+    let checked = match request.check(db.read()?.as_ref()) {
+        Ok(checked) => checked,
+        Err(error) => return refuse(as_answer(error)?, &request, console),
+    };
+    let notices = checked.notices();
+    match diagnose(cloud, &checked, &notices, console) {
+        Ok(report) => publish(&checked, &report, &notices, db, console),
+        Err(error) => refuse(as_answer(error)?, &request, console),
+    }
+}
+
+/// Reads the cloud and diagnoses it, with a sign of life.
+fn diagnose(
+    cloud: &CloudArgs,
+    checked: &CheckedRequest,
+    notices: &[String],
+    console: &Console,
+) -> Result<Report, Error> {
+    for notice in checked.choice.notices() {
+        console.notice(&notice);
+    }
+    let cloud = cloud.read(checked.ready.scene.radar())?;
+    for notice in cloud.notices.iter().chain(notices) {
+        console.notice(notice);
+    }
+    let bar = console.spinner("diagnosing");
+    let report = checked.diagnose(&cloud, &|what| bar.set_message(format!("diagnosing: {what}")));
+    bar.finish_and_clear();
+    Ok(report?)
+}
+
+/// Writes everything, stores it if that was asked for, and says what matters.
+fn publish(
+    checked: &CheckedRequest,
+    report: &Report,
+    notices: &[String],
+    db: &Database,
+    console: &Console,
+) -> Result<(), Error> {
+    let request = &checked.request;
+    let command = command(db, std::env::args_os().skip(1).collect());
+    let publication = Publication::new(checked, report, notices, [program(db), command]);
+    let earlier = Earlier::in_folder(request.folder, &request.inputs());
+    let published = if request.add {
+        let mut store = db.write()?;
+        let (published, written) = publication.store(&mut store, |files, beside| {
+            let folders = [(request.folder, files), (folder_of(request.scene), beside)];
+            Placement::new(&folders).map_err(Error::from)
+        })?;
+        written.keep();
+        published
+    } else {
+        let files = publication.files()?;
+        write_all(request.folder, &files)?;
+        Published { files, ..Published::default() }
+    };
+    for notice in earlier.remove_all_but(&published.files) {
+        console.notice(&notice);
+    }
+    for notice in publication.notices() {
+        console.notice(&notice);
+    }
+    let names: Vec<String> = published.files.iter().map(|(name, _)| name.clone()).collect();
+    let mut text = publication.report().text(&names, request.folder);
+    if request.add {
+        text += &stored(&publication, &published, request, db.path());
+    }
+    console.result(&text, &publication.report().record())
+}
+
+/// Writes why nothing can be said; the error is the way out.
+fn refuse(error: DiagnoseError, request: &CloudRequest, console: &Console) -> Result<(), Error> {
+    let answer = CannotTell::of_cloud(&error);
+    let subject = format!("{} with {}", request.cloud.display(), request.scene.display());
+    write_refusal(&answer, &subject, request.folder, &request.inputs(), console)?;
+    Err(error.into())
+}
+
+/// A line on what was stored.
+fn stored(
+    publication: &Publication,
+    published: &Published,
+    request: &CloudRequest,
+    db: &Path,
+) -> String {
+    let (db, materials) = (db.display(), published.stored.join(", "));
+    let found = publication.report().record().report.effects.len();
+    if found == 0 && materials.is_empty() {
+        return "nothing was found, on too few chirps to be stored\n".to_owned();
+    }
+    if found == 0 {
+        return format!(
+            "stored in {materials} of {db} what was tried and not found; they scatter as before\n"
+        );
+    }
+    let scene = shell_word(&request.scene.with_file_name(name_beside(request.scene)));
+    let unstored = publication.unstored();
+    if !materials.is_empty() {
+        let others = other_scenes(&published.replaced);
+        format!("stored {materials} in {db}; {scene} renders what was found\n{others}")
+    } else if unstored.len() == found {
+        format!("nothing could be stored; {scene} is as the scene was\n")
+    } else if unstored.is_empty() {
+        format!("stored what was found in {scene}\n")
+    } else {
+        format!("stored what was found but {} in {scene}\n", listed(&unstored))
+    }
+}
+
+/// What changes for other scenes with materials whose revision is no longer the current one.
+fn other_scenes(replaced: &[String]) -> String {
+    if replaced.is_empty() {
+        return String::new();
+    }
+    let names: Vec<&str> = replaced.iter().filter_map(|name| name.split('@').next()).collect();
+    format!(
+        "scenes that name {} without a revision take the new one from now on; what they had is {}\n",
+        listed(&names),
+        listed(replaced)
+    )
+}
+
+/// The program with its database, where that is not the usual one.
+fn program(db: &Database) -> String {
+    if db.path() == Path::new(USUAL) {
+        "matdb".to_owned()
+    } else {
+        format!("matdb --db {}", shell_word(db.path()))
+    }
+}
+
+/// The program with these arguments, as a shell takes it, and with its database, which a variable may have named.
+fn command(db: &Database, arguments: Vec<OsString>) -> String {
+    let is_named = arguments.iter().any(|one| one.to_string_lossy().starts_with("--db"));
+    let mut command = if is_named { "matdb".to_owned() } else { program(db) };
+    for argument in arguments {
+        command += " ";
+        command += &shell_word(Path::new(&argument));
+    }
+    command
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_can_be_typed_again() {
+        let db = Database::new(Some(Path::new("a.sqlite")));
+        let typed_again =
+            |arguments: &[&str]| command(&db, arguments.iter().map(Into::into).collect());
+        assert_eq!(typed_again(&["a b", "-o"]), "matdb --db a.sqlite 'a b' -o");
+        assert_eq!(typed_again(&["--db=a.sqlite", "x"]), "matdb --db=a.sqlite x");
+    }
+}

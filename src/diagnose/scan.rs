@@ -1,0 +1,92 @@
+//! The diagnosis of a cloud against the scene that was measured.
+
+use super::{
+    Declared, DiagnoseError, Diagnosis, MeshPose, Report, Subject, match_cloud, trace_shots,
+};
+use crate::brdf::Brdf;
+use crate::effects::{Effect, Receiver, Stage, middle};
+use crate::measure::Cloud;
+use crate::radar::{Link, Radar};
+use crate::scene::Scene;
+use crate::trace::Bvh;
+use crate::units::watts_from_dbm;
+
+/// Looks of speckle that stand for a radar without any: a likelihood needs some spread.
+const MOST_LOOKS: f64 = 1e4;
+
+/// A scene and the cloud that was measured of it.
+#[derive(Clone, Copy)]
+pub struct MeasuredScene<'a> {
+    /// Radar, scan and target.
+    pub scene: &'a Scene,
+    /// The cloud, in the global frame.
+    pub cloud: &'a Cloud,
+    /// Scattering of each region, where the refit begins.
+    pub laws: &'a [Brdf],
+    /// Effects that the scene declares, at fixed values.
+    pub declared_effects: &'a [(&'a dyn Effect, Vec<f64>)],
+}
+
+impl MeasuredScene<'_> {
+    /// Diagnoses the cloud, trying these effects; `hear` receives in a few words what is being done.
+    ///
+    /// # Errors
+    /// When the data are too few to tell anything, or are not of this scene.
+    pub fn diagnose(
+        &self,
+        seed: u64,
+        effects: &[&dyn Effect],
+        hear: &(dyn Fn(&str) + Sync),
+    ) -> Result<Report, DiagnoseError> {
+        let MeasuredScene { scene, cloud, laws, declared_effects } = *self;
+        let radar = scene.radar();
+        // Every chirp against the target.
+        let bvh = Bvh::new(&scene.target.mesh);
+        let grain_of_region: Vec<_> = scene.target.regions.iter().map(|r| r.grain).collect();
+        let mut stage = Stage {
+            radar,
+            link: Link::new(radar),
+            bvh: &bvh,
+            region_of_facet: &scene.target.region_of_facet,
+            grain_of_region: &grain_of_region,
+            middle: glam::DVec3::ZERO,
+        };
+        let shots = trace_shots(&stage, radar, &scene.chirps)?;
+        stage.middle = middle(&shots);
+        // The cloud against the chirps.
+        let matched = match_cloud(cloud, &scene.chirps, &shots)?;
+        let (receiver, declared) = declared_receiver(radar);
+        let subject = Subject {
+            stage: &stage,
+            laws,
+            at_work: declared_effects,
+            receiver,
+            declared,
+            shots: &shots,
+            observations: &matched.observations,
+            strays: &matched.strays,
+            pose: &poses(scene),
+        };
+        Diagnosis { seed, ..Diagnosis::for_spot(radar.spot_diameter_m) }
+            .run_with(&subject, effects, hear)
+    }
+}
+
+/// The law of a radar's receiver, its threshold and its error of ranges, as declared.
+pub fn declared_receiver(radar: &Radar) -> (Receiver, Declared) {
+    let receiver = Receiver::declared(radar);
+    let receiver = Receiver { looks: receiver.looks.min(MOST_LOOKS), ..receiver };
+    let range_sd_m = radar.noise.map_or(0.0, |noise| noise.range_sd_m);
+    let threshold_w = watts_from_dbm(radar.threshold_dbm);
+    (receiver, Declared { threshold_w, range_sd_m })
+}
+
+/// Where the scene puts its meshes.
+fn poses(scene: &Scene) -> Vec<MeshPose> {
+    let mut poses = Vec::new();
+    for mesh in &scene.file.mesh {
+        let (rotation_deg, translation_m) = (mesh.rotation_deg, mesh.translation_m);
+        poses.push(MeshPose { mesh: mesh.name.clone(), rotation_deg, translation_m });
+    }
+    poses
+}

@@ -1,0 +1,157 @@
+//! Which effects a diagnosis tries, and why it leaves the others out.
+
+use serde::Serialize;
+
+use crate::diagnose::curve::{Term, terms};
+use crate::effects::{Effect, library};
+
+/// Why an effect is not tried.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reason {
+    /// Scene, radar or a material declares it.
+    Declared,
+    /// It depends on time, and the scan has no times.
+    NoTimes,
+    /// It moves the target, and the scene declares no error of ranges: the pose is trusted unless ranges speak
+    /// against it, and at edges powers alone would move any target.
+    NoRanges,
+    /// The user named other effects.
+    NotAsked,
+}
+
+impl Reason {
+    /// The reason in a clause.
+    pub fn words(self) -> &'static str {
+        match self {
+            Reason::Declared => "declared already, so at work in the model",
+            Reason::NoTimes => "the scan has no times",
+            Reason::NoRanges => "the scene states no `range_sd_m` under [radar.noise]",
+            Reason::NotAsked => "--effects names others",
+        }
+    }
+}
+
+/// An effect that is not tried.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NotTried {
+    /// Its name.
+    pub name: &'static str,
+    /// Why.
+    pub reason: Reason,
+}
+
+/// An effect that is not tried, as a page shows it.
+#[derive(Serialize)]
+pub(super) struct LeftOut {
+    name: &'static str,
+    because: &'static str,
+}
+
+/// Effects that are not tried, for a page.
+pub(super) fn left_out(not_tried: &[NotTried]) -> Vec<LeftOut> {
+    not_tried.iter().map(|one| LeftOut { name: one.name, because: one.reason.words() }).collect()
+}
+
+/// What a scan measures besides powers.
+#[derive(Clone, Copy, Debug)]
+pub struct Measured {
+    /// The time of every chirp.
+    pub times: bool,
+    /// Ranges with a known error.
+    pub ranges: bool,
+}
+
+/// The library of effects, sorted for one scan.
+pub struct Choice {
+    /// Effects to try.
+    pub tried: Vec<&'static dyn Effect>,
+    /// The others.
+    pub not_tried: Vec<NotTried>,
+}
+
+impl Choice {
+    /// Sorts the effects that were asked for; `declared` names those at work in the scene already.
+    pub fn new(asked: &[&'static dyn Effect], declared: &[&str], measured: Measured) -> Choice {
+        let mut choice = Choice { tried: Vec::new(), not_tried: Vec::new() };
+        for effect in library() {
+            let name = effect.name();
+            let is_asked = asked.iter().any(|other| other.name() == name);
+            if let Some(reason) = reason_against(effect, is_asked, declared, measured) {
+                choice.not_tried.push(NotTried { name, reason });
+            }
+        }
+        // The order of the tried effects is the one in which they were asked for.
+        for effect in asked {
+            if choice.not_tried.iter().all(|one| one.name != effect.name()) {
+                choice.tried.push(*effect);
+            }
+        }
+        choice
+    }
+
+    /// The effects that are left out for a reason.
+    pub fn left_out(&self, reason: Reason) -> Vec<&'static str> {
+        self.not_tried.iter().filter(|one| one.reason == reason).map(|one| one.name).collect()
+    }
+
+    /// A sentence for every reason other than the user's choice for which effects are left out.
+    pub fn notices(&self) -> Vec<String> {
+        let mut notices = Vec::new();
+        for reason in [Reason::Declared, Reason::NoTimes, Reason::NoRanges] {
+            let names = self.left_out(reason).join(", ");
+            if !names.is_empty() {
+                notices.push(format!("not tried ({}): {names}", reason.words()));
+            }
+        }
+        notices
+    }
+}
+
+fn reason_against(
+    effect: &dyn Effect,
+    is_asked: bool,
+    declared: &[&str],
+    measured: Measured,
+) -> Option<Reason> {
+    if declared.contains(&effect.name()) {
+        Some(Reason::Declared)
+    } else if !is_asked {
+        Some(Reason::NotAsked)
+    } else if !measured.times && effect.depends_on_time() {
+        Some(Reason::NoTimes)
+    } else if !measured.ranges && effect.moves() {
+        Some(Reason::NoRanges)
+    } else {
+        None
+    }
+}
+
+/// The effects of a curve that are not asked for.
+pub fn terms_not_asked(asked: &[&'static dyn Term]) -> Vec<NotTried> {
+    let mut others = Vec::new();
+    for term in terms() {
+        if asked.iter().all(|other| other.name() != term.name()) {
+            others.push(NotTried { name: term.name(), reason: Reason::NotAsked });
+        }
+    }
+    others
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::find;
+
+    #[test]
+    fn every_effect_is_tried_or_has_a_reason() {
+        let asked = ["fov-gain", "drift", "pose", "motion"].map(|name| find(name).unwrap());
+        let choice = Choice::new(&asked, &["pose"], Measured { times: true, ranges: false });
+        assert_eq!(choice.left_out(Reason::NoRanges), ["motion"]);
+        let choice = Choice::new(&asked, &["pose"], Measured { times: false, ranges: true });
+        assert_eq!(choice.tried[0].name(), "fov-gain");
+        assert_eq!(choice.left_out(Reason::Declared), ["pose"]);
+        assert_eq!(choice.left_out(Reason::NoTimes), ["motion", "drift"]);
+        assert_eq!(choice.tried.len() + choice.not_tried.len(), library().len());
+    }
+}

@@ -1,0 +1,80 @@
+//! The report on a cloud: page, record, table of residuals and pictures.
+
+mod answer;
+mod bars;
+mod maps;
+mod models;
+mod outline;
+mod page;
+mod pictures;
+mod places;
+mod quantiles;
+mod raster;
+#[cfg(test)]
+mod testing;
+mod text;
+mod trends;
+
+use std::path::Path;
+
+use super::json::{Record, json_file};
+use super::picture::Picture;
+use super::residuals;
+use crate::diagnose::Report;
+use crate::error::Error;
+use places::Peak;
+
+pub use answer::{CloudAnswer, NextSteps};
+
+/// A report on a cloud with its pictures drawn.
+pub struct CloudReport<'a> {
+    answer: CloudAnswer<'a>,
+    pictures: Vec<Picture>,
+    /// Where something unknown is strongest.
+    peaks: Vec<Peak>,
+    /// A sentence for each picture that could not be drawn.
+    pub notices: Vec<String>,
+}
+
+impl<'a> CloudReport<'a> {
+    /// Draws the pictures of a diagnosis.
+    pub fn new(answer: CloudAnswer<'a>) -> CloudReport<'a> {
+        let spot_m = answer.scene.radar().spot_diameter_m;
+        let (pictures, notices) = pictures::pictures(answer.report, spot_m);
+        let peaks = places::strongest(&answer.report.rows, spot_m);
+        CloudReport { answer, pictures, peaks, notices }
+    }
+
+    /// `report.json`, `residuals.csv`, and two files for every picture.
+    ///
+    /// # Errors
+    /// A picture that is too large to be drawn.
+    pub fn tables_and_pictures(&self) -> Result<Vec<(String, Vec<u8>)>, Error> {
+        let mut files = vec![
+            ("report.json".to_owned(), json_file(&self.record())?),
+            ("residuals.csv".to_owned(), residuals::of_cloud(&self.answer.report.rows)),
+        ];
+        for picture in &self.pictures {
+            files.extend(picture.files()?);
+        }
+        Ok(files)
+    }
+
+    /// The bytes of `report.html`.
+    ///
+    /// # Errors
+    /// A picture that cannot be drawn.
+    pub fn page(&self, next: &NextSteps) -> Result<Vec<u8>, Error> {
+        page::page(self.answer, &self.pictures, &self.peaks, next)
+    }
+
+    /// What `report.json` holds.
+    pub fn record(&self) -> Record<'_, Report> {
+        Record { report: self.answer.report, not_tried: self.answer.not_tried }
+    }
+
+    /// The diagnosis for the terminal; `files` are the names of those that were written to `folder`.
+    pub fn text(&self, files: &[String], folder: &Path) -> String {
+        text::text(self.answer.report, &self.peaks, files, folder)
+    }
+}

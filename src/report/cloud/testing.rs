@@ -1,0 +1,26 @@
+//! Rows for the tests of pictures.
+
+use crate::diagnose::Row;
+
+/// A shot with usual values.
+pub(super) fn row() -> Row {
+    Row {
+        chirp: 0,
+        observed_dbm: Some(-60.0),
+        before_dbm: -60.0,
+        after_dbm: -60.0,
+        z_before: 0.0,
+        z_after: 0.0,
+        fold: 0,
+        theta_deg: 10.0,
+        azimuth_deg: 0.0,
+        range_m: 8.0,
+        range_residual_m: Some(0.0),
+        xt_m: 0.0,
+        yt_m: 0.0,
+        edge_m: 0.048,
+        time_s: 0.0,
+        region: 0,
+        unknown_db: 0.0,
+    }
+}

@@ -1,0 +1,74 @@
+//! `report.html` of a curve.
+
+use serde::Serialize;
+
+use super::answer::CurveAnswer;
+use super::text::{advice, angle, noise_source, sentence};
+use crate::diagnose::curve::{CurveEvidence, CurveReport, CurveUnknown};
+use crate::error::Error;
+use crate::formats::words::capitalised;
+use crate::report::choice::{LeftOut, left_out};
+use crate::report::effect::{Article, of_curve};
+use crate::report::picture::{Figure, Picture};
+use crate::report::templates;
+use crate::report::words::{gone, heading, value, verdict};
+
+/// What the template takes.
+#[derive(Serialize)]
+struct Page<'a> {
+    title: String,
+    report: &'a CurveReport,
+    name: &'a str,
+    model: Option<&'a str>,
+    seed: u64,
+    heading: &'static str,
+    sentence: String,
+    effects: Vec<Article<'a, CurveEvidence>>,
+    noise_source: &'static str,
+    /// Share of the squared error above the noise that is gone, in words.
+    share: Option<String>,
+    picture: Figure<'a>,
+    unexplained: Vec<Remaining<'a>>,
+    not_tried: Vec<LeftOut>,
+    /// Numbers of the base law: name and value.
+    law: Vec<[String; 2]>,
+    advice: Option<String>,
+}
+
+/// Structure that remains, and the angle that it depends on.
+#[derive(Serialize)]
+struct Remaining<'a> {
+    angle: &'a str,
+    unknown: &'a CurveUnknown,
+}
+
+/// The page of a diagnosis.
+pub(super) fn page(answer: CurveAnswer, picture: &Picture) -> Result<Vec<u8>, Error> {
+    let CurveAnswer { report, name, model, seed, not_tried } = answer;
+    let mut unexplained = Vec::new();
+    for unknown in &report.unexplained {
+        unexplained.push(Remaining { angle: angle(unknown.covariate), unknown });
+    }
+    let mut law = Vec::new();
+    for number in &report.base.parameters {
+        law.push([number.name.clone(), value(&number.value)]);
+    }
+    let context = Page {
+        title: format!("{name}: {}", verdict(report.verdict)),
+        report,
+        name,
+        model,
+        seed,
+        heading: heading(report.verdict, report.effects.len()),
+        sentence: capitalised(&sentence(report)) + ".",
+        effects: report.effects.iter().map(of_curve).collect(),
+        noise_source: noise_source(report.error.noise_source),
+        share: report.error.explained_share.map(gone),
+        picture: picture.figure()?,
+        unexplained,
+        not_tried: left_out(not_tried),
+        law,
+        advice: advice(answer).map(|advice| capitalised(&advice) + "."),
+    };
+    templates::page("curve.html", &context)
+}

@@ -1,0 +1,52 @@
+//! The diagnosis of a curve as a user asks for it.
+
+use std::path::Path;
+
+use crate::brdf::Brdf;
+use crate::diagnose::curve::{CurveDiagnosis, CurveReport, Points, Term, base_law};
+use crate::error::Error;
+use crate::measure::{Curve, in_plane};
+
+/// What to diagnose.
+#[derive(Clone, Copy)]
+pub struct CurveRequest<'a> {
+    /// The curve's file: `.bsdf`, a table in the plane of incidence, or a backscatter curve.
+    pub path: &'a Path,
+    /// The law to compare the curve with, from which the refit begins; one GGX lobe over Lambert for `None`.
+    pub law: Option<&'a Brdf>,
+    /// Noise of the levels, dB; from repeats, the file or neighbouring angles for `None`.
+    pub noise_db: Option<f64>,
+    /// Effects to try.
+    pub effects: &'a [&'static dyn Term],
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+impl CurveRequest<'_> {
+    /// Diagnoses the curve; `bytes` is the content of its file.
+    ///
+    /// # Errors
+    /// [`Error::CurveFile`] for bytes that are not a curve, [`Error::CurveDiagnosis`] for a curve of which nothing
+    /// can be said.
+    pub fn diagnose(&self, bytes: &[u8]) -> Result<CurveReport, Error> {
+        let points = self.points(bytes)?;
+        let law = self.law.cloned().unwrap_or_else(base_law);
+        let diagnosis = CurveDiagnosis { seed: self.seed, ..CurveDiagnosis::default() };
+        diagnosis.run(&points, &law, self.effects).map_err(|error| Error::CurveDiagnosis {
+            curve: self.path.display().to_string(),
+            error,
+        })
+    }
+
+    fn points(&self, bytes: &[u8]) -> Result<Points, Error> {
+        let is_bsdf = self.path.extension().is_some_and(|end| end.eq_ignore_ascii_case("bsdf"));
+        let points = if is_bsdf {
+            in_plane::read_bsdf(bytes).map(|table| Points::in_plane(&table, self.noise_db))
+        } else if in_plane::is_table(bytes) {
+            in_plane::read_table(bytes).map(|table| Points::in_plane(&table, self.noise_db))
+        } else {
+            Curve::read(bytes).map(|curve| Points::backscatter(&curve, self.noise_db))
+        };
+        points.map_err(|error| Error::CurveFile { file: self.path.to_owned(), error })
+    }
+}

@@ -1,0 +1,142 @@
+//! The diagnosis of a curve in words, as the terminal shows it.
+
+use std::path::Path;
+
+use super::answer::CurveAnswer;
+use crate::diagnose::Verdict;
+use crate::diagnose::curve::{CurveFound, CurveReport, CurveUnknown, NoiseSource};
+use crate::effects::Level;
+use crate::formats::words::{listed, plus_minus};
+use crate::report::words::{gone, others, value, verdict};
+
+/// The verdict in a sentence.
+pub(super) fn sentence(report: &CurveReport) -> String {
+    let names: Vec<&str> = report.effects.iter().map(|found| found.name).collect();
+    let names = listed(&names);
+    match (report.verdict, report.effects.is_empty()) {
+        (Verdict::NoMissingEffect, _) => {
+            "the law explains the curve, and nothing that is tested for remains".to_owned()
+        }
+        (Verdict::Explained, _) => {
+            format!("the law lacks {names}; with that, what is left is noise")
+        }
+        (Verdict::Unexplained, false) => format!(
+            "the law lacks {names}, which the curve supports, and something unknown remains that no \
+             effect that was tried explains"
+        ),
+        (Verdict::Unexplained, true) => {
+            "the law does not explain the curve, and no effect that was tried does: what remains is \
+             unknown"
+                .to_owned()
+        }
+    }
+}
+
+/// How the noise is known.
+pub(super) fn noise_source(source: NoiseSource) -> &'static str {
+    match source {
+        NoiseSource::Declared => "declared",
+        NoiseSource::Repeats => "from repeats",
+        NoiseSource::File => "stated in the file",
+        NoiseSource::Neighbours => "estimated from neighbouring angles",
+    }
+}
+
+/// A covariate of the residuals in words.
+pub(super) fn angle(covariate: &str) -> &str {
+    match covariate {
+        "theta" | "theta_i" => "angle of incidence",
+        "theta_s" => "angle of the receiver",
+        "theta_s - theta_i" => "angle from the mirror direction",
+        "theta_s + theta_i" => "angle from backscatter",
+        other => other,
+    }
+}
+
+/// What to do before an instrument is blamed; `None` where none is.
+pub(super) fn advice(answer: CurveAnswer) -> Option<String> {
+    let mut blamed = Vec::new();
+    for found in &answer.report.effects {
+        if found.level == Level::Instrument {
+            blamed.push(found.name);
+        }
+    }
+    let what = match answer.model {
+        Some("mixture" | "mixture-ggx") => {
+            "measure another sample on the same bench: what belongs to the instrument stays"
+        }
+        _ => "try a law of the sample with two lobes: --model mixture",
+    };
+    (!blamed.is_empty()).then(|| format!("before {} is blamed, {what}", listed(&blamed)))
+}
+
+/// The diagnosis on the terminal; `folder` is where its files were written.
+pub(super) fn text(answer: CurveAnswer, folder: &Path) -> String {
+    let report = answer.report;
+    let mut text = format!("{}: {}\n", verdict(report.verdict), sentence(report));
+    for found in &report.effects {
+        text += &effect(found);
+    }
+    if let Some(advice) = advice(answer) {
+        text += &format!("  {advice}\n");
+    }
+    text += &error(report);
+    if report.unexplained.is_empty() {
+        text += "what remains: nothing that is tested for\n";
+    }
+    for unknown in &report.unexplained {
+        text += &remains(unknown);
+    }
+    text + &format!(
+        "wrote report.html, report.json, residuals.csv, curve.svg and curve.png to {}\n",
+        folder.display()
+    )
+}
+
+fn effect(found: &CurveFound) -> String {
+    let mut numbers = Vec::new();
+    for (name, number) in &found.parameters {
+        numbers.push(format!("{name} = {}", value(number)));
+    }
+    let mut text = format!(
+        "  {} ({}): {}\n    held-out gain in ln p {}, changes the levels by {:.2} dB\n",
+        found.name,
+        found.level.as_str(),
+        numbers.join(", "),
+        plus_minus(found.evidence.held_out_gain, found.evidence.held_out_se),
+        found.evidence.size_db
+    );
+    let others = others(&found.class, found.name);
+    if !others.is_empty() {
+        text += &format!("    this curve cannot tell it from {}\n", listed(&others));
+    }
+    text
+}
+
+fn error(report: &CurveReport) -> String {
+    let error = &report.error;
+    let mut text = format!("error on held-out angles: {:.2}", error.before.rmse_db);
+    if !report.effects.is_empty() {
+        text += &format!(" → {:.2}", error.after.rmse_db);
+    }
+    text += &format!(
+        " dB rms (noise {:.2} dB, {})",
+        error.noise_floor_db,
+        noise_source(error.noise_source)
+    );
+    if let Some(share) = error.explained_share.filter(|_| !report.effects.is_empty()) {
+        text += &format!("; {} of what lies above it is gone", gone(share));
+    }
+    text + "\n"
+}
+
+fn remains(unknown: &CurveUnknown) -> String {
+    let gain = match (unknown.held_out_gain, unknown.held_out_se, unknown.held_out_rmse_db) {
+        (Some(gain), Some(se), Some(rmse_db)) => format!(
+            " (a smooth curve over it gains {} in held-out ln p and leaves {rmse_db:.2} dB)",
+            plus_minus(gain, se)
+        ),
+        _ => String::new(),
+    };
+    format!("  unknown: {:.2} dB with {}{gain}\n", unknown.strength_db, angle(unknown.covariate))
+}

@@ -1,0 +1,20 @@
+//! The pages of a report. Each stands alone: no script, no other file, nothing from outside.
+
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::formats::html::Templates;
+
+const PAGES: [(&str, &str); 6] = [
+    ("base.html", include_str!("templates/base.html")),
+    ("style.css", include_str!("templates/style.css")),
+    ("parts.html", include_str!("templates/parts.html")),
+    ("cloud.html", include_str!("templates/cloud.html")),
+    ("curve.html", include_str!("templates/curve.html")),
+    ("cannot_tell.html", include_str!("templates/cannot_tell.html")),
+];
+
+/// The bytes of a page of this context.
+pub(super) fn page(name: &str, context: &impl Serialize) -> Result<Vec<u8>, Error> {
+    Ok(Templates::new(&PAGES)?.page(name, context)?.into_bytes())
+}
