@@ -1,12 +1,21 @@
-//! What goes back into the database: the law and the effects that a diagnosis found, with the sources and the
-//! command that they rest on.
+//! What goes back into the database: materials of files, measured curves, fits, and the law and the effects that a
+//! diagnosis found; each with its sources and with the command and the files that made it.
 
+pub mod admission;
+mod curve;
 mod findings;
+mod fit_storage;
+mod fit_subject;
+mod measurement;
 mod provenance;
 mod recipients;
 mod scene_after;
 
-pub use provenance::{activity, add_source, free_key, input};
+pub use curve::{AddedCurve, CurveOrigin, add_curve};
+pub use fit_storage::{FitStorage, StoredFit};
+pub use fit_subject::FitSubject;
+pub use measurement::MeasurementStorage;
+pub use provenance::{activity, add_source, input};
 pub use recipients::{
     Adoption, Recipient, check_fit_name, find_recipient, pinned_name, replaced_name,
 };

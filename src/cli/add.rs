@@ -9,8 +9,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::console::Console;
-use super::database::Database;
-use super::door;
+use crate::adopt::admission;
 use crate::adopt::input;
 use crate::catalogue::Diff;
 use crate::effects::Level;
@@ -18,6 +17,7 @@ use crate::error::Error;
 use crate::files::{FilesError, read_small};
 use crate::material::{Activity, Input, Material, builtin, file};
 use crate::scene::read_regular;
+use crate::setup::Database;
 use crate::setup::{resolve_effects, unknown_material};
 use crate::store::Added;
 
@@ -64,7 +64,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         return console.result(TEMPLATE, &json!({ "material_toml": TEMPLATE }));
     }
     let made = wanted(args, db, console)?;
-    let notes = made.iter().flat_map(|(material, _)| door::doubts(material));
+    let notes = made.iter().flat_map(|(material, _)| admission::doubts(material));
     notes.for_each(|doubt| console.notice(&doubt));
     for (material, _) in &made {
         let slug = &material.slug;
@@ -200,7 +200,7 @@ fn read(path: &Path) -> Result<(Material, Activity), Error> {
     };
     let material = file::parse(&path.display().to_string(), &text, read_csv)?;
     resolve_effects(&material.effects, Level::Material, format!("{}: [[effect]]", path.display()))?;
-    door::check(&material, path)?;
+    admission::check(&material, path)?;
     Ok((material, made(inputs.into_inner())))
 }
 

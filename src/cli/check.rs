@@ -3,12 +3,12 @@
 use serde::Serialize;
 
 use super::console::Console;
-use super::database::Database;
 use super::summary::counted;
 use crate::catalogue::{OTHER_UNITS, derived, without_report};
 use crate::error::Error;
 use crate::fit::again::{lacks_report, problems};
 use crate::material::builtin;
+use crate::setup::Database;
 use crate::store::{Again, Store, StoreError, Stored, Summary};
 
 /// Verify the whole database: pages, hashes, values, statistics of curves, and fits by fitting again

@@ -6,7 +6,6 @@ use serde_json::{Value, json};
 
 use super::cloud::{CloudArgs, pose};
 use super::console::Console;
-use super::database::Database;
 use super::summary::grouped;
 use crate::error::Error;
 use crate::files::write_all;
@@ -16,6 +15,7 @@ use crate::geometry::Raster;
 use crate::measure::compare::{Agreement, Line, difference, measured_scan, power_along};
 use crate::render::{Observer, Scan, shade, trace_placed};
 use crate::scene::Scene;
+use crate::setup::Database;
 use crate::setup::ReadyScene;
 
 /// Compare a measured cloud with the rendered scene: images side by side, a line scan, the error

@@ -1,10 +1,10 @@
 //! `matdb diff`.
 
 use super::console::Console;
-use super::database::Database;
 use super::summary::{counted, table};
 use crate::catalogue::{CurveChange, Diff, Field, Levels};
 use crate::error::Error;
+use crate::setup::Database;
 use crate::setup::find_material;
 
 /// Show what differs between two revisions or two materials

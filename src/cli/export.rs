@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use super::console::Console;
-use super::database::Database;
 use crate::catalogue::Credit;
 use crate::catalogue::exchange::{self, Exported, Subject};
 use crate::error::Error;
 use crate::files::{folder_of, write_all};
+use crate::setup::Database;
 use crate::setup::{MaterialRevision, find_material, later_status_warning, status_warning};
 
 /// Write a material in somebody else's format, and say what it cannot carry

@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use clap::ValueEnum;
 
 use super::console::Console;
-use super::database::Database;
 use super::summary::{grouped, table, with_status};
 use crate::error::Error;
 use crate::material::{Material, SourceKind};
+use crate::setup::Database;
 use crate::setup::builtin_not_added;
 use crate::store::{Filter, Store, Summary};
 

@@ -6,19 +6,15 @@ use serde_json::{Value, json};
 
 use super::cloud::{CloudArgs, start};
 use super::console::Console;
-use super::curves::{Circumstances, Kind, Put, UNSAID, put};
-use super::database::Database;
-use super::door;
+use super::curves::{Circumstances, Kind};
 use super::summary::grouped;
-use crate::adopt::{activity, free_key};
+use crate::adopt::{MeasurementStorage, admission};
 use crate::error::Error;
 use crate::files::write_all;
 use crate::formats::figure::{Plot, Series, Style};
-use crate::material::{Material, Session, SessionPose};
-use crate::measure::{Curve, Metric, Reduction, ReductionResult, Registration, RegistrationResult};
+use crate::measure::{Curve, Metric, Reduced, Reduction, Registered, Registration, Row};
 use crate::scene::Scene;
-use crate::setup::find_material;
-use crate::store::Store;
+use crate::setup::Database;
 use crate::units::db_from_ratio;
 
 /// Turn a measured cloud into a material's curve: register it to the scene, find the angles
@@ -91,8 +87,11 @@ enum MetricFlag {
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let scene = Scene::load(&args.scene)?;
-    // A registration takes a while: what hinders its storing is said before.
-    target(args, db.read()?.as_ref())?;
+    // A registration takes a while: what prevents the storing of its curve is reported before.
+    let storage = storage(args);
+    if let Some(storage) = &storage {
+        storage.check(db.read()?.as_ref())?;
+    }
     let cloud = args.cloud.read(scene.radar())?;
     let reduction = reduction(args, &scene)?;
     let (radar, chirps, target) = (scene.radar(), &scene.chirps, &scene.target);
@@ -103,15 +102,17 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 
     let record = record(args, &registered, &reduced);
     // Refused before anything is written, stored after it.
-    let measured = (&reduced.curve, &registered);
-    let doubts = prepared(args, measured, db.read()?.as_ref())?.map(|(m, _)| door::doubts(&m));
-    doubts.iter().flatten().for_each(|doubt| console.notice(doubt));
+    if let Some(storage) = &storage {
+        let (material, _) = storage.prepare(&reduced.curve, &registered, db.read()?.as_ref())?;
+        admission::doubts(&material).iter().for_each(|doubt| console.notice(doubt));
+    }
     let mut pose = serde_json::to_vec_pretty(&record)?;
     pose.push(b'\n');
     let svg = plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
     let files = [("pose.json", pose), ("curve.csv", reduced.curve.write()), ("curve.svg", svg)];
     write_all(&args.output, &files)?;
-    let stored = save(args, measured, db)?;
+    let stored =
+        storage.map(|storage| storage.save(&reduced.curve, &registered, db)).transpose()?;
     if stored.is_some() && args.date.is_none() {
         console.notice(
             "no session is stored with the curve: --date YYYY-MM-DD, the day of the measurement, keeps the \
@@ -145,88 +146,16 @@ fn mixed(args: &Args, scene: &Scene) -> Option<String> {
     })
 }
 
-/// The material that takes the curve in, as it is now.
-fn target(args: &Args, store: Option<&Store>) -> Result<Option<Material>, Error> {
-    let Some(name) = &args.save else { return Ok(None) };
-    if name.contains('@') {
-        return Err(Error::Usage {
-            problem: format!("`{name}` names a revision, and a revision never changes"),
-            way_out: "give the bare name; the curve becomes part of a new revision".to_owned(),
-        });
-    }
-    if args.kind.is_none() || args.source.is_none() {
-        return Err(Error::Usage {
-            problem: format!("nobody has said where {} comes from", args.cloud.cloud.display()),
-            way_out: UNSAID.to_owned(),
-        });
-    }
-    let material = find_material(store, name, "--save: ")?.material;
-    args.kind.map_or(Ok(()), |kind| args.circumstances.check(&material, kind.into()))?;
-    Ok(Some(material))
-}
-
-/// The material with the curve in it.
-fn prepared(
-    args: &Args,
-    (curve, registered): (&Curve, &RegistrationResult),
-    store: Option<&Store>,
-) -> Result<Option<(Material, Put)>, Error> {
-    let (Some(kind), Some(title)) = (args.kind, &args.source) else { return Ok(None) };
-    let Some(mut material) = target(args, store)? else { return Ok(None) };
-    let put = put(&mut material, &args.curve, curve, (kind.into(), title), &args.circumstances)?;
-    if let Some(date) = &args.date {
-        hold_session(&mut material, &put.curve, session(args, date, registered)?)?;
-    }
-    Ok(Some((material, put)))
-}
-
-/// What is known of the measurement beside its points.
-fn session(args: &Args, date: &str, registered: &RegistrationResult) -> Result<Session, Error> {
-    let hash = activity("measure", &[&args.cloud.cloud])?.inputs.into_iter().next();
-    let pose = &registered.pose;
-    let rotation_rows = [0, 1, 2].map(|row| pose.rotation().row(row).to_array());
-    Ok(Session {
-        key: String::new(),
-        date: date.to_owned(),
-        temperature_k: None,
-        relative_humidity: None,
-        cloud_hash: hash.map(|input| input.hash),
-        mesh_hash: None,
-        registration_rms_m: Some(registered.rms_m),
-        normal_sd_rad: None,
-        footprint_sd_rad: None,
-        pose: Some(SessionPose { rotation_rows, translation_m: pose.translation_m().to_array() }),
-        note: None,
+/// How the curve is to be stored, where it is.
+fn storage(args: &Args) -> Option<MeasurementStorage<'_>> {
+    Some(MeasurementStorage {
+        material: args.save.clone()?,
+        curve: args.curve.clone(),
+        origin: args.circumstances.origin(args.kind, args.source.as_ref()),
+        date: args.date.clone(),
+        cloud: &args.cloud.cloud,
+        scene: &args.scene,
     })
-}
-
-/// Ties a curve that has no session to this one, which gets a free key.
-fn hold_session(material: &mut Material, curve: &str, session: Session) -> Result<(), Error> {
-    let key = free_key(curve, material.sessions.iter().map(|session| &session.key));
-    let Some(curve) = material.curves.iter_mut().find(|known| known.name == curve) else {
-        return Ok(());
-    };
-    if curve.session.is_none() {
-        curve.session = Some(key.clone());
-        material.sessions.push(Session { key, ..session });
-    }
-    Ok(material.validate()?)
-}
-
-/// Stores the curve when it is asked for; its name and the revision that holds it.
-fn save(
-    args: &Args,
-    measured: (&Curve, &RegistrationResult),
-    db: &Database,
-) -> Result<Option<(String, u32)>, Error> {
-    if args.save.is_none() {
-        return Ok(None);
-    }
-    let mut store = db.write()?;
-    let Some((material, put)) = prepared(args, measured, Some(&store))? else { return Ok(None) };
-    store.record(activity("measure", &[&args.cloud.cloud, &args.scene])?);
-    let added = store.add([&material])?;
-    Ok(added.first().map(|added| (put.curve, added.revision())))
 }
 
 fn registration(args: &Args) -> Result<Registration, Error> {

@@ -6,12 +6,10 @@ mod cite;
 mod cloud;
 mod compare;
 mod completions;
-mod database;
 mod console;
 mod curves;
 mod diagnose;
 mod diff;
-mod door;
 mod effects;
 mod export;
 mod fit;
@@ -36,9 +34,9 @@ use std::path::PathBuf;
 use clap::{ArgAction, Parser, Subcommand};
 
 use crate::error::Error;
+use crate::setup::Database;
 use console::Console;
 pub use console::readable;
-use database::Database;
 
 /// A material database and renderer for 300 GHz imaging radar.
 #[derive(Debug, Parser)]

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::console::Console;
-use super::database::Database;
 use super::list::{Wanted, frequency};
 use super::summary::table;
 use crate::catalogue::{Distance, Nearest, Probe, Rank};
@@ -13,6 +12,7 @@ use crate::error::Error;
 use crate::files::read_small;
 use crate::material::{Observation, Slug};
 use crate::measure::Curve;
+use crate::setup::Database;
 use crate::setup::{MaterialRevision, find_material, store_of_not_added};
 use crate::store::Store;
 use crate::units::{range, rounded, shown};

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::console::Console;
-use super::database::Database;
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Scattering, Shadowing};
 use crate::error::Error;
 use crate::files::{folder_of, write_all};
 use crate::fit::stored_band;
 use crate::formats::figure::{Plot, Series, Style};
 use crate::material::{Censor, Fit, Material, Observation, Reach};
+use crate::setup::Database;
 use crate::setup::{MaterialRevision, find_material};
 use crate::units::db_from_ratio;
 

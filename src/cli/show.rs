@@ -5,13 +5,13 @@ mod about;
 use serde_json::json;
 
 use super::console::Console;
-use super::database::Database;
 use super::fit::words::report;
 use super::summary::{counted, table};
 use crate::brdf::Scattering;
 use crate::error::Error;
 use crate::formats::EffectEntry;
 use crate::material::{Fit, Material};
+use crate::setup::Database;
 use crate::setup::{MaterialRevision, find_material, later_status_warning};
 use crate::store::RevisionSummary;
 use crate::units::{db_from_ratio, range, rounded, shown};

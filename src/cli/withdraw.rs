@@ -3,10 +3,10 @@
 use serde_json::json;
 
 use super::console::Console;
-use super::database::Database;
 use crate::adopt::activity;
 use crate::error::Error;
 use crate::material::{Material, Slug, Status};
+use crate::setup::Database;
 use crate::setup::{find_material, unknown_material};
 use crate::store::Store;
 

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use super::unreadable;
+use crate::adopt::admission;
 use crate::adopt::input;
 use crate::catalogue::exchange::{Foreign, Given};
-use crate::cli::door;
 use crate::error::Error;
 use crate::files::read_small;
 use crate::material::{Input, Material, Slug, SourceKind};
@@ -139,6 +139,6 @@ pub(super) fn read(
 ) -> Result<(Material, Input), Error> {
     let bytes = read_small(path).map_err(unreadable)?;
     let material = format.read(&path.display().to_string(), &bytes, &args.given()?)?;
-    door::check(&material, path)?;
+    admission::check(&material, path)?;
     Ok((material, input(path, &bytes)))
 }

@@ -18,7 +18,6 @@ use std::path::{Path, PathBuf};
 
 use super::cloud::CloudArgs;
 use super::console::Console;
-use super::database::{Database, USUAL};
 use super::effects::chosen;
 use crate::adopt::{AFTER, Adoption, check_beside, check_fit_name, find_recipient, name_beside};
 use crate::brdf::Brdf;
@@ -33,6 +32,7 @@ use crate::radar::{Link, Pattern, Radar};
 use crate::scene::file::MeshEntry;
 use crate::scene::{Scene, read_text};
 use crate::setup::ReadyScene;
+use crate::setup::{Database, USUAL_DATABASE};
 use crate::trace::Bvh;
 use crate::units::watts_from_dbm;
 use cannot_tell::CannotTell;
@@ -339,7 +339,7 @@ fn context(asked: Asked, scene: &Scene, db: &Database) -> Context {
 
 /// The program with its database, where that is not the usual one.
 fn program(db: &Database) -> String {
-    match db.path() == Path::new(USUAL) {
+    match db.path() == Path::new(USUAL_DATABASE) {
         true => "matdb".to_owned(),
         false => format!("matdb --db {}", typed(db.path())),
     }

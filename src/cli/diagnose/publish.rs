@@ -11,13 +11,13 @@ use crate::adopt::{
     replaced_name, scene_with_found,
 };
 use crate::cli::console::Console;
-use crate::cli::database::Database;
 use crate::diagnose::LEAST_SHOTS;
 use crate::effects::Level;
 use crate::error::Error;
 use crate::files::{Placement, folder_of, write_all};
 use crate::formats::FormatError;
 use crate::material::{Activity, Input, file};
+use crate::setup::Database;
 
 /// First line of a material's file.
 const FOUND: &str = "# A material with what `matdb diagnose` found in it.\n";

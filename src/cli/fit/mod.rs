@@ -1,7 +1,5 @@
 //! `matdb fit`.
 
-mod save;
-mod subject;
 pub(super) mod words;
 
 use std::path::{Path, PathBuf};
@@ -11,20 +9,18 @@ use serde::Serialize;
 
 use super::console::Console;
 use super::curves::{Circumstances, Kind};
-use super::database::Database;
-use super::door;
 use super::plot::{ending, layers, one_file, plot, points};
+use crate::adopt::{FitStorage, FitSubject, StoredFit, admission};
 use crate::brdf::Brdf;
 use crate::error::Error;
 use crate::fit::coordinates::frequencies;
 use crate::fit::{Fit, FitResult, Method, model, model_names};
 use crate::formats::text::nearest;
 use crate::radar::speckle::standard_deviation_db;
+use crate::setup::Database;
 use crate::setup::find_material;
 use crate::store::Store;
 use crate::units::watts_from_dbm;
-use save::{Saved, Target};
-use subject::Subject;
 
 const EXAMPLES_AND_METHODS: &str = "Examples:
   matdb fit curve.csv                           the paper's five parameters, censored likelihood
@@ -128,33 +124,36 @@ struct Record<'a> {
     #[serde(flatten)]
     result: &'a FitResult,
     sentences: Vec<String>,
-    saved: Option<&'a Saved>,
+    saved: Option<&'a StoredFit>,
     files: Vec<String>,
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let store = db.read()?;
-    let subject = Subject::find(args, store.as_ref())?;
+    let subject = FitSubject::open(&args.what, args.curve.as_deref(), store.as_ref())?;
     let start = start(args, &subject, store.as_ref())?;
     let fit = settings(args, &subject, &start)?;
-    // A fit takes a while: what hinders its storing or drawing is said before.
+    // A fit takes a while: what prevents its storing or drawing is reported before.
     args.output.as_deref().map(ending).transpose()?;
-    let name = fit_name(args, &start);
-    let target = Target::find(args, &subject, &name, store.as_ref())?;
-    let doubts = target.filter(|_| subject.file.is_some()).map(|t| door::doubts(&t.material));
-    doubts.iter().flatten().for_each(|doubt| console.notice(doubt));
+    let fit_name = fit_name(args, &start);
+    let storage = args.save.as_ref().map(|material| storage(args, material, fit_name.clone()));
+    if let Some(storage) = &storage {
+        let material = storage.check(&subject, store.as_ref())?;
+        if subject.file.is_some() {
+            admission::doubts(&material).iter().for_each(|doubt| console.notice(doubt));
+        }
+    }
     drop(store);
-    let fail = |error| Error::Fit { curve: subject.label.clone(), error };
-    let mut found = fit.run(&start, &subject.curve).map_err(fail)?;
+    let mut found = fit
+        .run(&start, &subject.curve)
+        .map_err(|error| Error::Fit { curve: subject.label.clone(), error })?;
     let is_possible = found.model.validate().is_ok();
     if found.converged && is_possible {
         found.held_out = found.hold_out(&subject.curve);
     }
-    let saved = match (&args.save, found.converged && is_possible) {
-        (Some(_), true) => Some(save::save(args, &subject, &name, &found, db)),
-        _ => None,
-    };
-    let stored = found.stored(&name, &subject.curve_name, "");
+    let storage = storage.filter(|_| found.converged && is_possible);
+    let saved = storage.map(|storage| storage.save(&subject, &found, db));
+    let stored = found.stored(&fit_name, &subject.curve_name, "");
     let files = match (&args.output, found.converged) {
         (Some(path), true) => draw(path, &subject, &stored)?,
         _ => Vec::new(),
@@ -164,13 +163,24 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let sentences = found.verdict.iter().map(ToString::to_string).collect();
     console.result(&text, &Record { result: &found, sentences, saved: done, files })?;
     saved.transpose()?;
-    match found.converged {
-        true if is_possible || args.save.is_none() => Ok(()),
-        true => Err(Error::Usage {
+    if !found.converged {
+        return Err(Error::NotConverged { curve: subject.label, stop: found.stop.as_str() });
+    }
+    if !is_possible && args.save.is_some() {
+        return Err(Error::Usage {
             problem: format!("{}: nothing is stored, since the fit is out of range", subject.label),
             way_out: "the verdict says what to let go of".to_owned(),
-        }),
-        false => Err(Error::NotConverged { curve: subject.label, stop: found.stop.as_str() }),
+        });
+    }
+    Ok(())
+}
+
+fn storage(args: &Args, material: &Option<String>, fit_name: String) -> FitStorage {
+    FitStorage {
+        material: material.clone(),
+        fit_name,
+        keep_render: args.keep_render,
+        origin: args.circumstances.origin(args.kind, args.source.as_ref()),
     }
 }
 
@@ -187,7 +197,7 @@ fn model_word(model: &Brdf) -> String {
 }
 
 /// The model where the search begins.
-fn start(args: &Args, subject: &Subject, store: Option<&Store>) -> Result<Brdf, Error> {
+fn start(args: &Args, subject: &FitSubject, store: Option<&Store>) -> Result<Brdf, Error> {
     let default = || subject.rendered_model().or_else(|| model("mixture"));
     let Some(name) = &args.model else { return default().ok_or_else(|| no_model("mixture")) };
     if let Some(model) = model(name) {
@@ -210,7 +220,7 @@ fn no_model(name: &str) -> Error {
     Error::Usage { problem: format!("there is no model and no material `{name}`"), way_out }
 }
 
-fn settings(args: &Args, subject: &Subject, start: &Brdf) -> Result<Fit, Error> {
+fn settings(args: &Args, subject: &FitSubject, start: &Brdf) -> Result<Fit, Error> {
     if args.noise_dbm.is_some() && subject.curve.lacks_power() {
         return Err(Error::Usage {
             problem: format!("{} has no powers that noise could be compared with", subject.label),
@@ -273,8 +283,12 @@ fn is_held(path: &str, fixed: &[(String, f64)]) -> bool {
     fixed.iter().any(|(known, _)| known == path)
 }
 
-fn draw(path: &Path, subject: &Subject, fit: &crate::material::Fit) -> Result<Vec<String>, Error> {
-    let points = points(&subject.curve_name, &subject.curve.observations);
+fn draw(
+    path: &Path,
+    subject: &FitSubject,
+    fit: &crate::material::Fit,
+) -> Result<Vec<String>, Error> {
+    let points = points(&subject.curve_name, &subject.curve.observations());
     let series = layers(std::slice::from_ref(fit), points);
     let subtitle = format!("{}, with its 95 % band", fit.name);
     one_file(path, &plot(&subject.label, &subtitle, series))

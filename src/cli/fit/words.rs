@@ -1,7 +1,6 @@
 //! A fit in words.
 
-use super::save::Saved;
-use super::subject::Subject;
+use crate::adopt::{FitSubject, StoredFit};
 use crate::cli::summary::{grouped, table};
 use crate::formats::words::significant;
 use crate::material::{Fit, FitReport, Goodness, HeldOut};
@@ -9,9 +8,9 @@ use crate::units::dbm_from_watts;
 
 /// All that a person wants to know of a fit.
 pub(super) fn result(
-    subject: &Subject,
+    subject: &FitSubject,
     fit: &Fit,
-    saved: Option<&Saved>,
+    saved: Option<&StoredFit>,
     files: &[String],
 ) -> String {
     let rows = subject.curve.observations.len();
