@@ -39,7 +39,7 @@
 //! | [`store`] | the only SQL |
 //! | [`catalogue`] | a database as a catalogue for others: site, tables, records |
 //! | [`error`] | every error in one type |
-//! | [`setup`], [`adopt`] | from names to a scene ready to render; what goes back into the database |
+//! | [`setup`], [`report`], [`adopt`] | from names to a scene ready to render; what a person reads; what goes back into the database |
 //! | [`cli`] | one command per file |
 //!
 //! Inside are SI units, watts and radians; dB, dBm and degrees appear where people and files do, and
@@ -68,5 +68,6 @@ pub mod store;
 pub mod catalogue;
 pub mod error;
 pub mod setup;
+pub mod report;
 pub mod adopt;
 pub mod cli;

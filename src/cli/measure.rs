@@ -2,8 +2,6 @@
 
 use std::path::PathBuf;
 
-use serde_json::{Value, json};
-
 use super::cloud::{CloudArgs, start};
 use super::console::Console;
 use super::curves::{Circumstances, Kind};
@@ -11,11 +9,10 @@ use super::summary::grouped;
 use crate::adopt::{MeasurementStorage, admission};
 use crate::error::Error;
 use crate::files::write_all;
-use crate::formats::figure::{Plot, Series, Style};
-use crate::measure::{Curve, Metric, Reduced, Reduction, Registered, Registration, Row};
+use crate::measure::{Curve, Metric, Reduced, Reduction, Registered, Registration};
+use crate::report::{measured_curve_plot, pose_record};
 use crate::scene::Scene;
 use crate::setup::Database;
-use crate::units::db_from_ratio;
 
 /// Turn a measured cloud into a material's curve: register it to the scene, find the angles
 #[derive(Debug, clap::Args)]
@@ -100,7 +97,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     bar.finish_and_clear();
     let reduced = reduction.run(target, radar, chirps, &cloud, &registered)?;
 
-    let record = record(args, &registered, &reduced);
+    let record = pose_record(&args.cloud.cloud, &args.scene, &registered, &reduced);
     // Refused before anything is written, stored after it.
     if let Some(storage) = &storage {
         let (material, _) = storage.prepare(&reduced.curve, &registered, db.read()?.as_ref())?;
@@ -108,7 +105,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     }
     let mut pose = serde_json::to_vec_pretty(&record)?;
     pose.push(b'\n');
-    let svg = plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
+    let svg = measured_curve_plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
     let files = [("pose.json", pose), ("curve.csv", reduced.curve.write()), ("curve.svg", svg)];
     write_all(&args.output, &files)?;
     let stored =
@@ -196,48 +193,7 @@ fn region(name: &str, scene: &Scene) -> Result<u16, Error> {
     })
 }
 
-/// What `pose.json` holds and `--json` prints.
-fn record(args: &Args, registered: &RegistrationResult, reduced: &ReductionResult) -> Value {
-    let pose = &registered.pose;
-    let rows: Vec<[f64; 3]> = (0..3).map(|row| pose.rotation().row(row).to_array()).collect();
-    let left_out = reduced.left_out;
-    json!({
-        "schema": 1,
-        "cloud": args.cloud.cloud.display().to_string(),
-        "scene": args.scene.display().to_string(),
-        "meaning": "a vertex v of the scene's mesh was at rotation*v + translation, global frame, m",
-        "pose": { "rotation_rows": rows, "translation_m": pose.translation_m().to_array() },
-        "covariance": {
-            "order": ["tx_m", "ty_m", "tz_m", "wx_rad", "wy_rad", "wz_rad"],
-            "about_m": registered.pivot.xyz.to_array(),
-            "matrix": registered.covariance,
-            "widened_for_shared_errors": registered.widened,
-        },
-        "rms_m": registered.rms_m,
-        "points": registered.points,
-        "inliers": registered.inliers,
-        "virtual_scans": registered.scans,
-        "iterations": registered.iterations,
-        "given_pose_kept": registered.kept,
-        "converged": registered.converged,
-        "stop": format!("{:?}", registered.stop).to_lowercase(),
-        "verdicts": registered.verdicts,
-        "curve": {
-            "detected": reduced.curve.detected().count(),
-            "censored": reduced.curve.observations.len() - reduced.curve.detected().count(),
-            "left_out": {
-                "missed": left_out.missed,
-                "off_surface": left_out.off_surface,
-                "other_region": left_out.other_region,
-                "near_edge": left_out.near_edge,
-                "silent_near_edge": left_out.silent_near_edge,
-                "unsure_of_facet": left_out.unsure_of_facet,
-            },
-        },
-    })
-}
-
-fn text(args: &Args, registered: &RegistrationResult, reduced: &ReductionResult) -> String {
+fn text(args: &Args, registered: &Registered, reduced: &Reduced) -> String {
     let middle = registered.pivot;
     let shift_mm = 1e3 * (middle.xyz - (registered.pose.inverse() * middle).xyz);
     let sd = |axis: usize| registered.covariance[axis][axis].sqrt();
@@ -266,7 +222,7 @@ fn text(args: &Args, registered: &RegistrationResult, reduced: &ReductionResult)
         shift_mm.y,
         shift_mm.z,
         grouped(detected),
-        grouped(curve.observations.len() - detected),
+        grouped(curve.rows.len() - detected),
         angles_deg(curve).fold(f64::INFINITY, f64::min),
         angles_deg(curve).fold(0.0, f64::max),
         grouped(left_out.near_edge + left_out.silent_near_edge),
@@ -277,30 +233,5 @@ fn text(args: &Args, registered: &RegistrationResult, reduced: &ReductionResult)
 }
 
 fn angles_deg(curve: &Curve) -> impl Iterator<Item = f64> + '_ {
-    curve.observations.iter().map(|row| row.theta_i_rad.to_degrees())
-}
-
-fn plot<'a>(title: &'a str, curve: &Curve) -> Plot<'a> {
-    let points = |censored: bool| {
-        let rows = curve.observations.iter().filter(|row| row.is_censored() == censored);
-        rows.filter_map(|row| {
-            Some((row.theta_i_rad.to_degrees(), db_from_ratio(row.level_sigma0()?)))
-        })
-        .collect()
-    };
-    let series = |name: &str, censored| Series {
-        name: name.to_owned(),
-        style: Style::Points,
-        points: points(censored),
-    };
-    Plot {
-        title,
-        subtitle: "measured cloud, reduced by equation (8)",
-        x_label: "incidence, °",
-        y_label: "σ⁰, dB",
-        x_range: Some((0.0, 90.0)),
-        y_range: None,
-        equal: false,
-        series: vec![series("not detected, below", true), series("detected", false)],
-    }
+    curve.rows.iter().map(|row| row.theta_rad.to_degrees())
 }

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::console::Console;
 use super::curves::{Circumstances, Kind};
-use super::plot::{ending, layers, one_file, plot, points};
+use super::plot::write_plot;
 use crate::adopt::{FitStorage, FitSubject, StoredFit, admission};
 use crate::brdf::Brdf;
 use crate::error::Error;
@@ -17,6 +17,7 @@ use crate::fit::coordinates::frequencies;
 use crate::fit::{Fit, FitResult, Method, model, model_names};
 use crate::formats::text::nearest;
 use crate::radar::speckle::standard_deviation_db;
+use crate::report::{FigureFormat, curve_points, fit_layers, incidence_plot};
 use crate::setup::Database;
 use crate::setup::find_material;
 use crate::store::Store;
@@ -134,7 +135,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let start = start(args, &subject, store.as_ref())?;
     let fit = settings(args, &subject, &start)?;
     // A fit takes a while: what prevents its storing or drawing is reported before.
-    args.output.as_deref().map(ending).transpose()?;
+    args.output.as_deref().map(FigureFormat::of).transpose()?;
     let fit_name = fit_name(args, &start);
     let storage = args.save.as_ref().map(|material| storage(args, material, fit_name.clone()));
     if let Some(storage) = &storage {
@@ -288,8 +289,8 @@ fn draw(
     subject: &FitSubject,
     fit: &crate::material::Fit,
 ) -> Result<Vec<String>, Error> {
-    let points = points(&subject.curve_name, &subject.curve.observations());
-    let series = layers(std::slice::from_ref(fit), points);
+    let points = curve_points(&subject.curve_name, &subject.curve.observations());
+    let series = fit_layers(std::slice::from_ref(fit), points);
     let subtitle = format!("{}, with its 95 % band", fit.name);
-    one_file(path, &plot(&subject.label, &subtitle, series))
+    write_plot(path, &incidence_plot(&subject.label, &subtitle, series))
 }
