@@ -6,17 +6,21 @@ mod curve;
 mod findings;
 mod fit_storage;
 mod fit_subject;
+mod material_files;
 mod measurement;
 mod provenance;
 mod recipients;
 mod scene_after;
+mod withdrawal;
 
 pub use curve::{AddedCurve, CurveOrigin, add_curve};
 pub use fit_storage::{FitStorage, StoredFit};
 pub use fit_subject::FitSubject;
+pub use material_files::{AddedMaterial, NewMaterials, foreign_format};
 pub use measurement::MeasurementStorage;
 pub use provenance::{activity, add_source, input};
 pub use recipients::{
     Adoption, Recipient, check_fit_name, find_recipient, pinned_name, replaced_name,
 };
 pub use scene_after::{AFTER, MARK, check_beside, name_beside, relocate_files, scene_with_found};
+pub use withdrawal::Withdrawal;
