@@ -178,7 +178,7 @@ pub fn add_curve(
         source: source.clone(),
         instrument: origin.add_instrument(material),
         session: None,
-        observations: curve.observations(),
+        observations: curve.observations.clone(),
     };
     let gaps = admission::missing(material, &curve);
     if !gaps.is_empty() {

@@ -101,8 +101,8 @@ impl FitSubject {
 
     /// Root mean square of the rows' angle deviations, rad.
     pub fn theta_sd_rad(&self) -> f64 {
-        let rows = &self.curve.rows;
-        let squares: f64 = rows.iter().map(|row| row.theta_sd_rad.powi(2)).sum();
+        let rows = &self.curve.observations;
+        let squares: f64 = rows.iter().map(|row| row.theta_sd_rad.unwrap_or(0.0).powi(2)).sum();
         (squares / rows.len().max(1) as f64).sqrt()
     }
 }

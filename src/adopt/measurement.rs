@@ -6,7 +6,7 @@ use super::curve::{AddedCurve, CurveOrigin, add_curve, usage};
 use super::provenance::{activity, free_key};
 use crate::error::Error;
 use crate::material::{Material, Session, SessionPose};
-use crate::measure::{Curve, Registered};
+use crate::measure::{Curve, RegistrationResult};
 use crate::setup::{Database, find_material};
 use crate::store::Store;
 
@@ -53,7 +53,7 @@ impl MeasurementStorage<'_> {
     pub fn prepare(
         &self,
         curve: &Curve,
-        registered: &Registered,
+        registered: &RegistrationResult,
         store: Option<&Store>,
     ) -> Result<(Material, AddedCurve), Error> {
         let mut material = self.check(store)?;
@@ -72,7 +72,7 @@ impl MeasurementStorage<'_> {
     pub fn save(
         &self,
         curve: &Curve,
-        registered: &Registered,
+        registered: &RegistrationResult,
         database: &Database,
     ) -> Result<(String, u32), Error> {
         let mut store = database.write()?;
@@ -84,7 +84,7 @@ impl MeasurementStorage<'_> {
 }
 
 /// What is known of a measurement besides its points.
-fn session(date: &str, cloud: &Path, registered: &Registered) -> Result<Session, Error> {
+fn session(date: &str, cloud: &Path, registered: &RegistrationResult) -> Result<Session, Error> {
     let hash = activity("measure", &[cloud])?.inputs.into_iter().next();
     let pose = &registered.pose;
     let rotation_rows = [0, 1, 2].map(|row| pose.rotation().row(row).to_array());

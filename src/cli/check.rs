@@ -101,11 +101,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         0 => Ok(()),
         count => Err(Error::Usage {
             problem: format!("{} wrong in {file}", counted(count, "thing")),
-            way_out: match args.repair {
-                true => {
-                    "add the damaged materials again, or restore the file from a copy".to_owned()
-                }
-                false => "`matdb check --repair` mends what can be".to_owned(),
+            way_out: if args.repair {
+                "add the damaged materials again, or restore the file from a copy".to_owned()
+            } else {
+                "`matdb check --repair` mends what can be".to_owned()
             },
         }),
     }

@@ -78,9 +78,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         let names: Vec<&str> = material.curves.iter().map(|curve| curve.name.as_str()).collect();
         return Err(Error::Usage {
             problem: format!("`{}` has no curve `{name}`", args.material),
-            way_out: match names.is_empty() {
-                true => "leave --curve out: its model is written".to_owned(),
-                false => format!("there are: {}", names.join(", ")),
+            way_out: if names.is_empty() {
+                "leave --curve out: its model is written".to_owned()
+            } else {
+                format!("there are: {}", names.join(", "))
             },
         });
     }

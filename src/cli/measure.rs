@@ -9,7 +9,7 @@ use super::summary::grouped;
 use crate::adopt::{MeasurementStorage, admission};
 use crate::error::Error;
 use crate::files::write_all;
-use crate::measure::{Curve, Metric, Reduced, Reduction, Registered, Registration};
+use crate::measure::{Curve, Metric, Reduction, ReductionResult, Registration, RegistrationResult};
 use crate::report::{measured_curve_plot, pose_record};
 use crate::scene::Scene;
 use crate::setup::Database;
@@ -185,27 +185,27 @@ fn reduction(args: &Args, scene: &Scene) -> Result<Reduction, Error> {
 }
 
 fn region(name: &str, scene: &Scene) -> Result<u16, Error> {
-    let names = || scene.target.regions.iter().map(|region| region.name.as_str());
-    let found = names().position(|region| region == name);
+    let regions = scene.target.regions.iter();
+    let names: Vec<&str> = regions.map(|region| region.name.as_str()).collect();
+    let found = names.iter().position(|region| *region == name);
     found.map(|number| number as u16).ok_or_else(|| Error::Usage {
         problem: format!("the scene has no region `{name}`"),
-        way_out: format!("its regions are: {}", names().collect::<Vec<_>>().join(", ")),
+        way_out: format!("its regions are: {}", names.join(", ")),
     })
 }
 
-fn text(args: &Args, registered: &Registered, reduced: &Reduced) -> String {
+fn text(args: &Args, registered: &RegistrationResult, reduced: &ReductionResult) -> String {
     let middle = registered.pivot;
     let shift_mm = 1e3 * (middle.xyz - (registered.pose.inverse() * middle).xyz);
-    let sd = |axis: usize| registered.covariance[axis][axis].sqrt();
-    let (shift_sd_m, turn_sd_rad) =
-        ((0..3).map(sd).fold(0.0, f64::max), (3..6).map(sd).fold(0.0, f64::max));
+    let sd: [f64; 6] = std::array::from_fn(|axis| registered.covariance[axis][axis].sqrt());
+    let [shift_sd_m, turn_sd_rad] =
+        [&sd[..3], &sd[3..]].map(|sd| sd.iter().copied().fold(0.0, f64::max));
     let (curve, left_out) = (&reduced.curve, reduced.left_out);
     let detected = curve.detected().count();
-    let kept = match registered.kept {
-        true => {
-            "the points agree with the given pose, which is kept; --refine uses the found one\n"
-        }
-        false => "",
+    let kept = if registered.kept {
+        "the points agree with the given pose, which is kept; --refine uses the found one\n"
+    } else {
+        ""
     };
     format!(
         "{kept}pose: {} of {} points on the surface, rms {:.2} mm, known to {:.2} mm and {:.3}° (1 sd)\n\
@@ -222,7 +222,7 @@ fn text(args: &Args, registered: &Registered, reduced: &Reduced) -> String {
         shift_mm.y,
         shift_mm.z,
         grouped(detected),
-        grouped(curve.rows.len() - detected),
+        grouped(curve.observations.len() - detected),
         angles_deg(curve).fold(f64::INFINITY, f64::min),
         angles_deg(curve).fold(0.0, f64::max),
         grouped(left_out.near_edge + left_out.silent_near_edge),
@@ -233,5 +233,5 @@ fn text(args: &Args, registered: &Registered, reduced: &Reduced) -> String {
 }
 
 fn angles_deg(curve: &Curve) -> impl Iterator<Item = f64> + '_ {
-    curve.rows.iter().map(|row| row.theta_rad.to_degrees())
+    curve.observations.iter().map(|row| row.theta_i_rad.to_degrees())
 }

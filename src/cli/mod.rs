@@ -31,7 +31,7 @@ mod withdraw;
 
 use std::path::PathBuf;
 
-use clap::{ArgAction, Parser, Subcommand};
+use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 
 use crate::error::Error;
 use crate::setup::Database;
@@ -129,6 +129,6 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Verify(args) => verify::run(args, &console),
         Command::Import(args) => import::run(args, db, &console),
         Command::Export(args) => export::run(args, db, &console),
-        Command::Completions(args) => completions::run(args),
+        Command::Completions(args) => completions::run(args, Cli::command()),
     }
 }

@@ -64,7 +64,7 @@ fn search(args: &Args, store: Option<&Store>) -> Result<NeighbourSearch, Error> 
     };
     let curve = Curve::read(&read_small(path)?)
         .map_err(|error| Error::CurveFile { file: path.clone(), error })?;
-    Ok(NeighbourSearch { observations: curve.observations(), frequency_hz, own: None })
+    Ok(NeighbourSearch { observations: curve.observations, frequency_hz, own: None })
 }
 
 fn text(record: &NeighbourReport, args: &Args) -> String {

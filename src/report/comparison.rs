@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::formats::figure::{Figure, Plot, Scale, Series, Style, beside};
 use crate::geometry::Raster;
 use crate::measure::Cloud;
-use crate::measure::compare::{Agreement, Line, along, difference, measured_scan};
+use crate::measure::compare::{Agreement, Line, difference, measured_scan, power_along};
 use crate::render::{Observer, Scan, shade, trace_placed};
 use crate::setup::ReadyScene;
 
@@ -74,7 +74,7 @@ impl Comparison {
                 Series {
                     name: format!("{name}, y = {} ± {} m", line.y_m, 0.5 * line.width_m),
                     style: Style::Points,
-                    points: along(scan, line),
+                    points: power_along(scan, line),
                 }
             });
         let is_empty = series.iter().all(|series| series.points.is_empty());

@@ -5,15 +5,15 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use crate::formats::figure::{Plot, Series, Style};
-use crate::measure::{Curve, Reduced, Registered};
+use crate::measure::{Curve, ReductionResult, RegistrationResult};
 use crate::units::db_from_ratio;
 
 /// What `pose.json` holds: pose with covariance, how the registration ended, and what became of the points.
 pub fn pose_record(
     cloud: &Path,
     scene: &Path,
-    registered: &Registered,
-    reduced: &Reduced,
+    registered: &RegistrationResult,
+    reduced: &ReductionResult,
 ) -> Value {
     let pose = &registered.pose;
     let rows: Vec<[f64; 3]> = (0..3).map(|row| pose.rotation().row(row).to_array()).collect();
@@ -42,7 +42,7 @@ pub fn pose_record(
         "verdicts": registered.verdicts,
         "curve": {
             "detected": detected,
-            "censored": reduced.curve.rows.len() - detected,
+            "censored": reduced.curve.observations.len() - detected,
             "left_out": {
                 "missed": left_out.missed,
                 "off_surface": left_out.off_surface,
@@ -58,9 +58,10 @@ pub fn pose_record(
 /// The curve as points: detections, and thresholds of what was not detected.
 pub fn measured_curve_plot<'a>(title: &'a str, curve: &Curve) -> Plot<'a> {
     let (mut detected, mut silent) = (Vec::new(), Vec::new());
-    for row in &curve.rows {
-        let points = if row.censored { &mut silent } else { &mut detected };
-        points.push((row.theta_rad.to_degrees(), db_from_ratio(row.sigma0)));
+    for row in &curve.observations {
+        let Some(sigma0) = row.level_sigma0() else { continue };
+        let points = if row.is_censored() { &mut silent } else { &mut detected };
+        points.push((row.theta_i_rad.to_degrees(), db_from_ratio(sigma0)));
     }
     let series = [("not detected, below", silent), ("detected", detected)];
     Plot {

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use crate::adopt::foreign_format;
 use crate::catalogue::exchange::Given;
+use crate::cli::list::Kind;
 use crate::error::Error;
 use crate::material::{Slug, SourceKind};
 use crate::units::watts_from_dbm;
@@ -56,15 +57,6 @@ pub(super) struct Beside {
     threshold: Option<f64>,
 }
 
-/// How numbers came to be, as a flag says it.
-#[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
-enum Kind {
-    Measured,
-    Literature,
-    Modelled,
-    Synthetic,
-}
-
 impl Beside {
     /// Refuses flags that would be dropped in silence, and one name for several files.
     pub fn check(&self, from: &[PathBuf]) -> Result<(), Error> {
@@ -111,16 +103,5 @@ impl Beside {
             frequency_hz,
             threshold_w,
         })
-    }
-}
-
-impl From<Kind> for SourceKind {
-    fn from(kind: Kind) -> SourceKind {
-        match kind {
-            Kind::Measured => SourceKind::Measured,
-            Kind::Literature => SourceKind::Literature,
-            Kind::Modelled => SourceKind::Modelled,
-            Kind::Synthetic => SourceKind::Synthetic,
-        }
     }
 }

@@ -199,8 +199,10 @@ fn model_word(model: &Brdf) -> String {
 
 /// The model where the search begins.
 fn start(args: &Args, subject: &FitSubject, store: Option<&Store>) -> Result<Brdf, Error> {
-    let default = || subject.rendered_model().or_else(|| model("mixture"));
-    let Some(name) = &args.model else { return default().ok_or_else(|| no_model("mixture")) };
+    let Some(name) = &args.model else {
+        let default = subject.rendered_model().or_else(|| model("mixture"));
+        return default.ok_or_else(|| no_model("mixture"));
+    };
     if let Some(model) = model(name) {
         return Ok(model);
     }
@@ -245,18 +247,20 @@ fn settings(args: &Args, subject: &FitSubject, start: &Brdf) -> Result<Fit, Erro
 
 /// The held parameters, each checked to be one of the model's.
 fn fixed(args: &Args, start: &Brdf) -> Result<Vec<(String, f64)>, Error> {
-    let usage = |problem: String, way_out: String| Err(Error::Usage { problem, way_out });
     let paths: Vec<String> = start.parameters().into_iter().map(|p| p.path).collect();
     let alpha = paths.iter().find(|path| *path == "diffuse.alpha" || *path == "alpha");
     let mut fixed = Vec::new();
     match (args.alpha, alpha) {
         (Some(value), Some(path)) => fixed.push((path.clone(), value)),
         (Some(_), None) => {
-            return usage("this model has no alpha".to_owned(), "leave --alpha out".to_owned());
+            return Err(usage(
+                "this model has no alpha".to_owned(),
+                "leave --alpha out".to_owned(),
+            ));
         }
         (None, _) if args.method == MethodName::TlsTail => {
             let way_out = "give it with --alpha, or use --method tls to find it".to_owned();
-            return usage("tls-tail takes the tail's exponent as given".to_owned(), way_out);
+            return Err(usage("tls-tail takes the tail's exponent as given".to_owned(), way_out));
         }
         (None, _) => {}
     }
@@ -264,20 +268,24 @@ fn fixed(args: &Args, start: &Brdf) -> Result<Vec<(String, f64)>, Error> {
         let parts = text.split_once('=').map(|(path, value)| (path, value.trim().parse()));
         let Some((path, Ok(value))) = parts else {
             let way_out = "write it as --fix diffuse.alpha=3".to_owned();
-            return usage(format!("`{text}` is no parameter with a value"), way_out);
+            return Err(usage(format!("`{text}` is no parameter with a value"), way_out));
         };
         if !paths.iter().any(|known| known == path) {
             let way_out = format!("there are: {}", paths.join(", "));
-            return usage(format!("the model has no parameter `{path}`"), way_out);
+            return Err(usage(format!("the model has no parameter `{path}`"), way_out));
         }
         if is_held(path, &fixed) {
-            return usage(format!("`{path}` is held twice"), "hold it once".to_owned());
+            return Err(usage(format!("`{path}` is held twice"), "hold it once".to_owned()));
         }
         fixed.push((path.to_owned(), value));
     }
     let own = frequencies(start);
     fixed.extend(own.into_iter().filter(|(path, _)| !is_held(path, &fixed)).collect::<Vec<_>>());
     Ok(fixed)
+}
+
+fn usage(problem: String, way_out: String) -> Error {
+    Error::Usage { problem, way_out }
 }
 
 fn is_held(path: &str, fixed: &[(String, f64)]) -> bool {
@@ -289,7 +297,7 @@ fn draw(
     subject: &FitSubject,
     fit: &crate::material::Fit,
 ) -> Result<Vec<String>, Error> {
-    let points = curve_points(&subject.curve_name, &subject.curve.observations());
+    let points = curve_points(&subject.curve_name, &subject.curve.observations);
     let series = fit_layers(std::slice::from_ref(fit), points);
     let subtitle = format!("{}, with its 95 % band", fit.name);
     write_plot(path, &incidence_plot(&subject.label, &subtitle, series))
