@@ -6,12 +6,10 @@
 use std::path::PathBuf;
 
 use glam::DVec3;
-use matdb::brdf::Brdf;
 use matdb::frames::Pose;
-use matdb::material::builtin;
-use matdb::render::{Batch, Surface, Take};
-use matdb::scene::Scene;
-use matdb::trace::{Bvh, Gpu, Tracer};
+use matdb::render::{Batch, Take};
+use matdb::setup::ReadyScene;
+use matdb::trace::{Gpu, Tracer};
 use matdb::units::dbm_from_watts;
 
 type Answer<T> = Result<T, Box<dyn std::error::Error>>;
@@ -22,29 +20,24 @@ fn main() -> Answer<()> {
         PathBuf::from(arguments.next().ok_or("give a scene, such as scenes/mannequin.toml")?);
     let mut number = |usual: usize| arguments.next().map_or(Ok(usual), |text| text.parse());
     let (scans, rays_per_chirp) = (number(12)?, number(1)?);
-    let scene = Scene::load(&scene)?;
-    if scene.file.bounce.is_some()
-        || !(scene.file.effect.is_empty() && scene.radar().effect.is_empty())
-    {
+    let ready = ReadyScene::open(&scene, None)?;
+    let scene = &ready.scene;
+    if scene.file.bounce.is_some() || !ready.effects.is_empty() {
         return Err(
             "a batch has neither second bounces nor effects; take them out of the scene".into()
         );
     }
+    let assembly = ready.assemble();
+    let setup = assembly.setup();
 
-    let laws: Vec<Brdf> =
-        scene.target.regions.iter().map(|region| law(&region.material)).collect::<Answer<_>>()?;
-    let surfaces: Vec<Surface> = std::iter::zip(&laws, &scene.target.regions)
-        .map(|(scattering, region)| Surface { scattering, grain: region.grain })
-        .collect();
     let turn_deg = |scan: usize| 360.0 * scan as f64 / scans as f64;
     let take = |scan: usize| {
         let turn_rad = DVec3::new(0.0, turn_deg(scan).to_radians(), 0.0);
         let target = Pose::from_euler_xyz(turn_rad, DVec3::ZERO);
-        Take { target, surfaces: &surfaces, seed: scan as u64 }
+        Take { target, surfaces: setup.surfaces, seed: scan as u64 }
     };
     let takes: Vec<Take> = (0..scans).map(take).collect();
 
-    let bvh = Bvh::new(&scene.target.mesh);
     let gpu = match Gpu::new() {
         Ok(gpu) => Some(gpu),
         Err(reason) => {
@@ -52,13 +45,13 @@ fn main() -> Answer<()> {
             None
         }
     };
-    let held = gpu.as_ref().map(|gpu| gpu.hold(&bvh)).transpose()?;
+    let held = gpu.as_ref().map(|gpu| gpu.hold(setup.bvh)).transpose()?;
     let batch = Batch {
-        radar: scene.radar(),
-        chirps: &scene.chirps,
-        bvh: &bvh,
+        radar: setup.radar,
+        chirps: setup.chirps,
+        bvh: setup.bvh,
         tracer: held.as_ref().map_or(Tracer::Automatic, Tracer::Gpu),
-        region_of_facet: &scene.target.region_of_facet,
+        region_of_facet: setup.region_of_facet,
         rays_per_chirp,
     };
     if let Some(gpu) = &gpu {
@@ -75,10 +68,4 @@ fn main() -> Answer<()> {
     }
     eprintln!("{} of {} rays on the processor", found.rays_on_processor, found.rays);
     Ok(())
-}
-
-/// A built-in material's.
-fn law(name: &str) -> Answer<Brdf> {
-    let material = builtin::get(name).ok_or_else(|| format!("no material `{name}` is built in"))?;
-    Ok(material?.scattering()?)
 }

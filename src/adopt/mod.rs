@@ -1,19 +1,32 @@
-//! What goes back into the database: the law and the effects that a diagnosis found, with the sources and the
-//! command that they rest on.
+//! What goes back into the database: materials of files, measured curves, fits, and the law and the effects that a
+//! diagnosis found; each with its sources and with the command and the files that made it.
 
 mod earlier;
+pub mod admission;
+mod curve;
 mod findings;
+mod fit_storage;
+mod fit_subject;
+mod material_files;
+mod measurement;
 mod provenance;
 mod publication;
 mod recipients;
 mod request;
 mod scene_after;
+mod withdrawal;
 
+pub use curve::{AddedCurve, CurveOrigin, add_curve};
 pub use earlier::{Earlier, check_folder};
-pub use provenance::{activity, add_source, free_key, input};
+pub use fit_storage::{FitStorage, StoredFit};
+pub use fit_subject::FitSubject;
+pub use material_files::{AddedMaterial, NewMaterials, foreign_format};
+pub use measurement::MeasurementStorage;
+pub use provenance::{activity, add_source, input};
 pub use publication::{Publication, Published};
 pub use recipients::{
     Adoption, Recipient, check_fit_name, find_recipient, pinned_name, replaced_name,
 };
 pub use request::{CheckedRequest, CloudRequest, as_answer};
 pub use scene_after::{AFTER, MARK, check_beside, name_beside, relocate_files, scene_with_found};
+pub use withdrawal::Withdrawal;

@@ -60,7 +60,7 @@ pub fn add_source(
 }
 
 /// `key`, or the first of `key-2`, `key-3`, … that is not among `known`.
-pub fn free_key<'a>(key: &str, known: impl Iterator<Item = &'a String>) -> String {
+pub(super) fn free_key<'a>(key: &str, known: impl Iterator<Item = &'a String>) -> String {
     let known: Vec<&String> = known.collect();
     let mut free = key.to_owned();
     let mut number = 2;

@@ -2,23 +2,15 @@
 
 mod foreign;
 
-use std::cell::RefCell;
-use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde_json::json;
 
 use super::console::Console;
-use super::database::Database;
-use super::door;
-use crate::adopt::input;
-use crate::catalogue::Diff;
-use crate::effects::Level;
+use crate::adopt::NewMaterials;
 use crate::error::Error;
-use crate::files::{FilesError, read_small};
-use crate::material::{Activity, Input, Material, builtin, file};
-use crate::scene::read_regular;
-use crate::setup::{resolve_effects, unknown_material};
+use crate::material::builtin;
+use crate::setup::Database;
 use crate::store::Added;
 
 /// Put materials into the database, built-in ones by name or your own from files
@@ -63,154 +55,30 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     if args.template {
         return console.result(TEMPLATE, &json!({ "material_toml": TEMPLATE }));
     }
-    let made = wanted(args, db, console)?;
-    let notes = made.iter().flat_map(|(material, _)| door::doubts(material));
-    notes.for_each(|doubt| console.notice(&doubt));
-    for (material, _) in &made {
-        let slug = &material.slug;
-        let is_other = |own: Material| own.content_hash() != material.content_hash();
-        if builtin::get(slug.as_str()).and_then(Result::ok).is_some_and(is_other) {
-            console.notice(&format!(
-                "{slug}: a built-in material has this name, and `matdb add {slug}` would make it the next revision"
-            ));
-        }
+    args.foreign.check(&args.from)?;
+    let mut names = args.names.clone();
+    if args.all {
+        names.extend(builtin::names().map(str::to_owned));
     }
-    let mut store = db.write()?;
+    let new = NewMaterials::read(&names, &args.from, &args.foreign.given()?, db)?;
+    new.notices.iter().for_each(|notice| console.notice(notice));
     let (mut lines, mut records) = (String::new(), Vec::new());
-    for ((material, _), added) in std::iter::zip(&made, store.add_made(&made)?) {
-        let slug = &material.slug;
-        let (what, revision) = match added {
-            Added::New => ("added", 1),
-            Added::Revision(number) => ("revised", number),
-            Added::Unchanged(number) => ("unchanged", number),
-            Added::Repaired(number) => ("repaired", number),
+    for material in new.store(db)? {
+        let (slug, revision) = (&material.slug, material.added.revision());
+        let what = match material.added {
+            Added::New => "added",
+            Added::Revision(_) => "revised",
+            Added::Unchanged(_) => "unchanged",
+            Added::Repaired(_) => "repaired",
         };
         lines += &format!("{what} {slug}, revision {revision}, in {}\n", db.path().display());
-        let differs = match added {
-            // It is stored: what cannot be told now is not.
-            Added::Revision(number) => store.get(slug, Some(number - 1)).ok().flatten(),
-            Added::New | Added::Unchanged(_) | Added::Repaired(_) => None,
-        };
-        if let Some(before) = &differs
-            && let (Some(said), None) =
-                (before.material.status.sentence(), material.status.sentence())
-        {
-            console.notice(&format!("{slug}: it was {said}; this revision makes it active again"));
-        }
-        let differs = differs.map(|before| Diff::new(&before.material, material).line());
-        if let Some(line) = &differs {
+        material.notice.iter().for_each(|notice| console.notice(notice));
+        if let Some(line) = &material.differs {
             lines += &format!("  what differs: {line}\n");
         }
-        records.push(
-            json!({ "slug": slug, "result": what, "revision": revision, "differs": differs }),
-        );
+        records.push(json!({
+            "slug": slug, "result": what, "revision": revision, "differs": material.differs,
+        }));
     }
     console.result(&lines, &records)
-}
-
-/// Reads everything before anything is stored, so that one bad file changes nothing.
-fn wanted(
-    args: &Args,
-    db: &Database,
-    console: &Console,
-) -> Result<Vec<(Material, Activity)>, Error> {
-    let mut materials = Vec::new();
-    let all = builtin::names().map(str::to_owned).filter(|_| args.all);
-    for name in args.names.iter().cloned().chain(all) {
-        match builtin::get(&name) {
-            Some(material) => materials.push((material?, made(Vec::new()))),
-            None if name.contains('@') => {
-                return Err(Error::Usage {
-                    problem: format!("`{name}` names a revision"),
-                    way_out: "a built-in material is added by its bare name".to_owned(),
-                });
-            }
-            None => {
-                let store = db.read()?;
-                return Err(unknown_material(store.as_ref(), &name, "")?);
-            }
-        }
-    }
-    args.foreign.check(&args.from)?;
-    for path in &args.from {
-        for file in material_files(path)? {
-            materials.push(match foreign::format(&file) {
-                Some(format) => {
-                    let (material, input) = foreign::read(format, &file, &args.foreign)?;
-                    let unknown = material.unknown.iter();
-                    unknown.for_each(|what| console.notice(&format!("not known: {what}")));
-                    (material, made(vec![input]))
-                }
-                None => read(&file)?,
-            });
-        }
-    }
-    let mut seen = HashSet::new();
-    match materials.iter().find(|(material, _)| !seen.insert(&material.slug)) {
-        None => Ok(materials),
-        Some((Material { slug, .. }, _)) => Err(Error::Usage {
-            problem: format!("`{slug}` is named or found twice"),
-            way_out: "name it once, or give one of the files another slug".to_owned(),
-        }),
-    }
-}
-
-/// The material files that a path means.
-fn material_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
-    const NAME: &str = "material.toml";
-    if !path.is_dir() {
-        return Ok(vec![path.to_owned()]);
-    }
-    if path.join(NAME).exists() {
-        return Ok(vec![path.join(NAME)]);
-    }
-    let entries = std::fs::read_dir(path).map_err(|reason| FilesError::unreadable(path, reason))?;
-    let mut files: Vec<PathBuf> =
-        entries.flatten().map(|e| e.path().join(NAME)).filter(|f| f.exists()).collect();
-    files.sort();
-    if files.is_empty() {
-        return Err(Error::Usage {
-            problem: format!("{} holds no {NAME}, nor does any folder in it", path.display()),
-            way_out: "give the folder of a material, such as materials/ptfe".to_owned(),
-        });
-    }
-    Ok(files)
-}
-
-fn made(inputs: Vec<Input>) -> Activity {
-    Activity { command: "add".to_owned(), inputs, origin: None }
-}
-
-fn read(path: &Path) -> Result<(Material, Activity), Error> {
-    let bytes = read_small(path).map_err(unreadable)?;
-    let inputs = RefCell::new(vec![input(path, &bytes)]);
-    let text = String::from_utf8(bytes).map_err(|error| Error::Usage {
-        problem: format!(
-            "{}: byte {}: not UTF-8",
-            path.display(),
-            error.utf8_error().valid_up_to()
-        ),
-        way_out: "save the file as UTF-8".to_owned(),
-    })?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let read_csv = |name: &str| {
-        let bytes = read_regular(&folder.join(name)).map_err(|e| e.to_string())?;
-        inputs.borrow_mut().push(input(Path::new(name), &bytes));
-        Ok(bytes)
-    };
-    let material = file::parse(&path.display().to_string(), &text, read_csv)?;
-    resolve_effects(&material.effects, Level::Material, format!("{}: [[effect]]", path.display()))?;
-    door::check(&material, path)?;
-    Ok((material, made(inputs.into_inner())))
-}
-
-/// The error for a material's file, with the way out for one that is too large.
-fn unreadable(error: FilesError) -> FilesError {
-    match error.reason.kind() {
-        std::io::ErrorKind::FileTooLarge => FilesError {
-            way_out: "put points into a CSV file that a [[curve]] names, and shorten texts",
-            ..error
-        },
-        _ => error,
-    }
 }

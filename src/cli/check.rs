@@ -3,12 +3,12 @@
 use serde::Serialize;
 
 use super::console::Console;
-use super::database::Database;
 use super::summary::counted;
 use crate::catalogue::{OTHER_UNITS, derived, without_report};
 use crate::error::Error;
 use crate::fit::again::{lacks_report, problems};
 use crate::material::builtin;
+use crate::setup::Database;
 use crate::store::{Again, Store, StoreError, Stored, Summary};
 
 /// Verify the whole database: pages, hashes, values, statistics of curves, and fits by fitting again
@@ -101,11 +101,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         0 => Ok(()),
         count => Err(Error::Usage {
             problem: format!("{} wrong in {file}", counted(count, "thing")),
-            way_out: match args.repair {
-                true => {
-                    "add the damaged materials again, or restore the file from a copy".to_owned()
-                }
-                false => "`matdb check --repair` mends what can be".to_owned(),
+            way_out: if args.repair {
+                "add the damaged materials again, or restore the file from a copy".to_owned()
+            } else {
+                "`matdb check --repair` mends what can be".to_owned()
             },
         }),
     }

@@ -3,9 +3,9 @@
 use serde_json::json;
 
 use super::console::Console;
-use super::database::Database;
 use crate::catalogue::{Citable, Credit, references};
 use crate::error::Error;
+use crate::setup::Database;
 use crate::setup::{find_material, later_status_warning};
 
 /// Say how to cite a material, and which source each of its numbers rests on

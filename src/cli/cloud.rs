@@ -2,14 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::{DMat3, DVec3};
-use serde::Deserialize;
+use glam::DVec3;
 
 use crate::error::Error;
-use crate::files::FilesError;
 use crate::frames::{Global, Pose};
-use crate::measure::{Cloud, CloudFormat, CloudReading, PowerUnit, Start};
+use crate::measure::{Cloud, CloudReading, PowerUnit, Start};
 use crate::radar::Radar;
+use crate::setup::{read_cloud, read_pose};
 
 /// A cloud file and what it does not say of itself.
 #[derive(Debug, clap::Args)]
@@ -48,15 +47,6 @@ enum Frame {
 impl CloudArgs {
     /// Reads the cloud; `radar` says where its target frame lies.
     pub fn read(&self, radar: &Radar) -> Result<Cloud, Error> {
-        let path = &self.cloud;
-        let extension = path.extension().unwrap_or_default().to_string_lossy();
-        let Some(format) = CloudFormat::from_extension(&extension) else {
-            let problem = format!("`{}` does not end in .ply, .csv or .xyz", path.display());
-            return Err(Error::Usage {
-                problem,
-                way_out: "convert or rename the cloud".to_owned(),
-            });
-        };
         let reading = CloudReading {
             metres_per_unit: match self.unit {
                 LengthUnit::M => 1.0,
@@ -71,21 +61,8 @@ impl CloudArgs {
                 Frame::Target => Some(radar.frames().global_from_target),
             },
         };
-        let at = |error| Error::Cloud { file: path.clone(), error };
-        reading.read(format, &read(path)?).map_err(at)
+        read_cloud(&self.cloud, &reading)
     }
-}
-
-/// A pose as text: `auto`, a pose.json, or numbers.
-#[derive(Deserialize)]
-struct PoseFile {
-    pose: PoseRecord,
-}
-
-#[derive(Deserialize)]
-struct PoseRecord {
-    rotation_rows: [[f64; 3]; 3],
-    translation_m: [f64; 3],
 }
 
 /// Where a registration starts: `auto`, the `pose.json` of an earlier one, or X,Y,Z in m and, with
@@ -94,7 +71,7 @@ pub(super) fn start(text: Option<&str>) -> Result<Start, Error> {
     match text {
         None => Ok(Start::default()),
         Some("auto") => Ok(Start::Automatic),
-        Some(file) if file.ends_with(".json") => Ok(Start::Given(pose_file(Path::new(file))?)),
+        Some(file) if file.ends_with(".json") => Ok(Start::Given(read_pose(Path::new(file))?)),
         Some(numbers) => Ok(Start::Given(pose_numbers(numbers)?)),
     }
 }
@@ -112,43 +89,21 @@ pub(super) fn pose(text: Option<&str>) -> Result<Pose<Global, Global>, Error> {
 
 fn pose_numbers(text: &str) -> Result<Pose<Global, Global>, Error> {
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
-    let vector = |numbers: &[f64]| DVec3::new(numbers[0], numbers[1], numbers[2]);
-    match numbers.as_deref() {
-        Ok(all) if all.iter().any(|x| !x.is_finite() || x.abs() > 1e4) => {}
-        Ok(all @ [_, _, _]) => return Ok(Pose::from_euler_xyz(DVec3::ZERO, vector(all))),
-        Ok(all @ [_, _, _, _, _, _]) => {
-            let turns_rad = vector(&all[3..]) * (std::f64::consts::PI / 180.0);
-            return Ok(Pose::from_euler_xyz(turns_rad, vector(&all[..3])));
+    let numbers = numbers.unwrap_or_default();
+    if numbers.iter().all(|x: &f64| x.is_finite() && x.abs() <= 1e4) {
+        let turn_and_shift = match numbers[..] {
+            [x, y, z] => Some((DVec3::ZERO, DVec3::new(x, y, z))),
+            [x, y, z, rx, ry, rz] => Some((DVec3::new(rx, ry, rz), DVec3::new(x, y, z))),
+            _ => None,
+        };
+        if let Some((turn_deg, shift_m)) = turn_and_shift {
+            let turn_rad = turn_deg * (std::f64::consts::PI / 180.0);
+            return Ok(Pose::from_euler_xyz(turn_rad, shift_m));
         }
-        _ => {}
     }
     Err(Error::Usage {
         problem: format!("`{text}` is no pose"),
         way_out: "write --pose X,Y,Z or X,Y,Z,RX,RY,RZ (m, degrees), `auto`, or a pose.json"
             .to_owned(),
     })
-}
-
-fn pose_file(path: &Path) -> Result<Pose<Global, Global>, Error> {
-    /// Rounding of a file may turn a matrix by so much.
-    const ROUNDING: f64 = 1e-6;
-    let no_pose = |problem: String| Error::Usage {
-        problem: format!("{}: {problem}", path.display()),
-        way_out: "give a pose.json that `matdb measure` wrote".to_owned(),
-    };
-    let file: PoseFile =
-        serde_json::from_slice(&read(path)?).map_err(|error| no_pose(error.to_string()))?;
-    let PoseRecord { rotation_rows, translation_m } = file.pose;
-    let rotation = DMat3::from_cols_array_2d(&rotation_rows).transpose();
-    let error = rotation * rotation.transpose() - DMat3::IDENTITY;
-    let rigid = error.to_cols_array().iter().all(|x| x.abs() < ROUNDING)
-        && (rotation.determinant() - 1.0).abs() < ROUNDING;
-    match rigid && translation_m.iter().all(|x| x.abs() <= 1e4) {
-        true => Ok(Pose::new(rotation, DVec3::from_array(translation_m))),
-        false => Err(no_pose("it is no rotation with a shift within 10 km".to_owned())),
-    }
-}
-
-fn read(path: &Path) -> Result<Vec<u8>, Error> {
-    Ok(std::fs::read(path).map_err(|reason| FilesError::unreadable(path, reason))?)
 }

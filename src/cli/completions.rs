@@ -1,6 +1,5 @@
 //! `matdb completions`.
 
-use clap::CommandFactory;
 use clap_complete::Shell;
 
 use super::console::write_out;
@@ -15,8 +14,9 @@ pub(super) struct Args {
     shell: Shell,
 }
 
-pub(super) fn run(args: &Args) -> Result<(), Error> {
+/// `command` is the whole command line.
+pub(super) fn run(args: &Args, mut command: clap::Command) -> Result<(), Error> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut super::Cli::command(), "matdb", &mut script);
+    clap_complete::generate(args.shell, &mut command, "matdb", &mut script);
     write_out(&String::from_utf8_lossy(&script))
 }

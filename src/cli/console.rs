@@ -56,10 +56,8 @@ impl Console {
 
     /// A progress bar over `total` steps; invisible when standard error is no terminal.
     pub fn progress(&self, what: &'static str, total: usize) -> ProgressBar {
-        let target = match self.quiet {
-            true => ProgressDrawTarget::hidden(),
-            false => ProgressDrawTarget::stderr(),
-        };
+        let target =
+            if self.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let style = ProgressStyle::with_template("{msg} {bar:32} {human_pos}/{human_len} {eta}")
             .unwrap_or_else(|_| ProgressStyle::default_bar());
         ProgressBar::with_draw_target(Some(total as u64), target)
@@ -82,18 +80,21 @@ fn harmless(text: &str) -> String {
 /// assert!(matdb::cli::readable(&message).ends_with("aaa… (10002 letters)"));
 /// ```
 pub fn readable(text: &str) -> String {
+    harmless(text).split_inclusive(char::is_whitespace).map(shortened).collect()
+}
+
+/// A word with the white space behind it, cut where it is longer than any name or path is.
+fn shortened(word: &str) -> String {
     const LONGEST: usize = 1000;
     const SHOWN: usize = 80;
-    let text = harmless(text);
-    let word = |word: &str| match word.chars().count() {
+    match word.chars().count() {
         0..=LONGEST => word.to_owned(),
         letters => {
             let rest = &word[word.trim_end().len()..];
             let start: String = word.chars().take(SHOWN).collect();
             format!("{start}… ({} letters){rest}", letters - rest.chars().count())
         }
-    };
-    text.split_inclusive(char::is_whitespace).map(word).collect()
+    }
 }
 
 /// Writes to standard output; a reader that has left, as `head` does, is no error.

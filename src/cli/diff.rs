@@ -1,10 +1,10 @@
 //! `matdb diff`.
 
 use super::console::Console;
-use super::database::Database;
 use super::summary::{counted, table};
 use crate::catalogue::{CurveChange, Diff, Field, Levels};
 use crate::error::Error;
+use crate::setup::Database;
 use crate::setup::find_material;
 
 /// Show what differs between two revisions or two materials
@@ -32,12 +32,11 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let after = find_material(store.as_ref(), &args.after, "")?.material;
     let diff = Diff::new(&before, &after);
     let names = [&args.before, &args.after];
-    let text = match args.all {
-        true => text(&diff, diff.fields.iter(), names),
-        false => {
-            let told = diff.fields.iter().filter(|field| !is_of_report(&field.path));
-            text(&diff, told, names) + &left_out(&diff)
-        }
+    let text = if args.all {
+        text(&diff, diff.fields.iter(), names)
+    } else {
+        let fields = diff.fields.iter().filter(|field| !is_of_report(&field.path));
+        text(&diff, fields, names) + &left_out(&diff)
     };
     console.result(&text, &diff)
 }

@@ -94,27 +94,24 @@ pub(super) fn chosen(names: &[String]) -> Result<Vec<&'static dyn Effect>, Error
 
 /// Names without those that were given before.
 pub(super) fn each_once(names: &[String]) -> impl Iterator<Item = &String> {
-    let is_first = |index: usize| names.iter().take(index).all(|earlier| *earlier != names[index]);
-    names.iter().enumerate().filter(move |(index, _)| is_first(*index)).map(|(_, name)| name)
+    let numbered = names.iter().enumerate();
+    numbered.filter(|(index, name)| !names[..*index].contains(name)).map(|(_, name)| name)
 }
 
 fn known(name: &str) -> Result<&'static dyn Effect, Error> {
     find(name).ok_or_else(|| {
-        let refused = |problem: String, way_out: &str| {
-            let way_out = way_out.to_owned();
-            Error::Usage { problem, way_out }
-        };
         if name == UNKNOWN.name {
-            return refused(
-                "`unknown` is no effect to try".to_owned(),
-                "leave it out: what no effect explains is always looked for",
-            );
+            return Error::Usage {
+                problem: "`unknown` is no effect to try".to_owned(),
+                way_out: "leave it out: what no effect explains is always looked for".to_owned(),
+            };
         }
         if term(name).is_some() {
-            return refused(
-                format!("`{name}` is an effect of curves and not of clouds"),
-                "give the curve with --curve, or name effects of clouds: `matdb effects` lists them",
-            );
+            return Error::Usage {
+                problem: format!("`{name}` is an effect of curves and not of clouds"),
+                way_out: "give the curve with --curve, or name effects of clouds: `matdb effects` lists them"
+                    .to_owned(),
+            };
         }
         stranger(name, library().map(|effect| effect.name()).into_iter())
     })
@@ -130,21 +127,23 @@ fn stranger(name: &str, known: impl Iterator<Item = &'static str>) -> Error {
 }
 
 fn list(all: &[Record]) -> String {
-    let row = |record: &Record| {
-        let level = record.level.map_or("", Level::as_str).to_owned();
-        [record.name.to_owned(), level, short(record.shows)]
-    };
-    let of = |what: &str| {
-        let records = all.iter().filter(|record| record.applies_to == [what]);
-        table(&["effect", "level", "what it looks like"], records.map(row))
-    };
     format!(
         "Of a scan, `matdb diagnose CLOUD`:\n{}\nOf a curve, `matdb diagnose --curve FILE`:\n{}\n\
          `matdb effects NAME` says what one is, how it shows, and what its numbers are; `unknown` is\n\
          what none of them explains.\n",
-        of("cloud"),
-        of("curve")
+        list_of(all, "cloud"),
+        list_of(all, "curve")
     )
+}
+
+/// The effects that are looked for in a cloud, or in a curve, one a line.
+fn list_of(all: &[Record], what: &str) -> String {
+    let records = all.iter().filter(|record| record.applies_to == [what]);
+    let rows = records.map(|record| {
+        let level = record.level.map_or("", Level::as_str).to_owned();
+        [record.name.to_owned(), level, short(record.shows)]
+    });
+    table(&["effect", "level", "what it looks like"], rows)
 }
 
 /// The first sentence, or as many of its words as fit into a line of a hundred beside the longest name.

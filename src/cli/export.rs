@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use super::console::Console;
-use super::database::Database;
 use crate::catalogue::Credit;
 use crate::catalogue::exchange::{self, Exported, Subject};
 use crate::error::Error;
 use crate::files::{folder_of, write_all};
+use crate::setup::Database;
 use crate::setup::{MaterialRevision, find_material, later_status_warning, status_warning};
 
 /// Write a material in somebody else's format, and say what it cannot carry
@@ -78,9 +78,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         let names: Vec<&str> = material.curves.iter().map(|curve| curve.name.as_str()).collect();
         return Err(Error::Usage {
             problem: format!("`{}` has no curve `{name}`", args.material),
-            way_out: match names.is_empty() {
-                true => "leave --curve out: its model is written".to_owned(),
-                false => format!("there are: {}", names.join(", ")),
+            way_out: if names.is_empty() {
+                "leave --curve out: its model is written".to_owned()
+            } else {
+                format!("there are: {}", names.join(", "))
             },
         });
     }

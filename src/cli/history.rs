@@ -3,11 +3,11 @@
 use serde::Serialize;
 
 use super::console::Console;
-use super::database::Database;
 use super::summary::table;
 use crate::catalogue::Diff;
 use crate::error::Error;
 use crate::material::{Activity, Material, Origin};
+use crate::setup::Database;
 use crate::setup::{find_material, unknown_material};
 
 /// List the revisions of a material: when, by which command of which files, and what changed

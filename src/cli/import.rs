@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use super::console::Console;
-use super::database::Database;
 use super::summary::counted;
 use crate::adopt::activity;
 use crate::catalogue::{Import, Imported, Outcome, Taken};
 use crate::error::Error;
+use crate::setup::Database;
 
 /// Take over another laboratory's published catalogue; nothing of yours is overwritten
 #[derive(Debug, clap::Args)]

@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use clap::ValueEnum;
 
 use super::console::Console;
-use super::database::Database;
 use super::summary::{grouped, table, with_status};
 use crate::error::Error;
 use crate::material::{Material, SourceKind};
+use crate::setup::Database;
 use crate::setup::builtin_not_added;
 use crate::store::{Filter, Store, Summary};
 
@@ -59,26 +59,31 @@ pub(super) struct Wanted {
 }
 
 /// How numbers came to be, as flags say it.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Kind {
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub(super) enum Kind {
     Measured,
     Literature,
     Modelled,
     Synthetic,
 }
 
-impl Wanted {
-    pub fn filter(&self) -> Filter {
-        let kind = |kind| match kind {
+impl From<Kind> for SourceKind {
+    fn from(kind: Kind) -> SourceKind {
+        match kind {
             Kind::Measured => SourceKind::Measured,
             Kind::Literature => SourceKind::Literature,
             Kind::Modelled => SourceKind::Modelled,
             Kind::Synthetic => SourceKind::Synthetic,
-        };
+        }
+    }
+}
+
+impl Wanted {
+    pub fn filter(&self) -> Filter {
         Filter {
             frequency_hz: self.frequency.map(|ghz| ghz * 1e9),
             tag: self.tag.clone(),
-            kind: self.kind.map(kind),
+            kind: self.kind.map(SourceKind::from),
             class: self.class.clone(),
             fitted: (self.fitted || self.not_fitted).then_some(self.fitted),
             status: self.status.clone(),
@@ -100,11 +105,11 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let filter = args.filter.filter();
     let store = db.read()?;
     let limit = args.limit.or((!console.json).then_some(SHOWN));
-    let found = |store: &Store| match limit {
-        Some(most) => store.page(&filter, most),
-        None => store.find(&filter),
+    let materials = match (&store, limit) {
+        (None, _) => Vec::new(),
+        (Some(store), Some(most)) => store.page(&filter, most)?,
+        (Some(store), None) => store.find(&filter)?,
     };
-    let materials = store.as_ref().map_or(Ok(Vec::new()), found)?;
     if console.json {
         return console.result("", &materials);
     }
@@ -149,15 +154,11 @@ fn others(filter: &Filter, store: &Store, built_in: &[Material]) -> Result<Strin
     /// More tags than these are no help.
     const MOST_TAGS: usize = 100;
     let mut said = String::new();
-    let mut tell = |what: &str, asked: &str, there: BTreeSet<String>| {
-        let there = there.into_iter().collect::<Vec<_>>().join(", ");
-        said += &format!("; no {what} is called `{asked}`, there are: {there}");
-    };
     if let Some(class) = &filter.class {
         let built_in = built_in.iter().map(|material| material.class.clone());
         let there: BTreeSet<String> = store.classes()?.into_iter().chain(built_in).collect();
         if !there.contains(class) {
-            tell("class", class, there);
+            said += &none_of(class, "class", there);
         }
     }
     if let Some(tag) = &filter.tag {
@@ -165,10 +166,16 @@ fn others(filter: &Filter, store: &Store, built_in: &[Material]) -> Result<Strin
         let alone = Filter { tag: Some(tag.clone()), ..Filter::default() };
         if store.count(&alone, 1)? == 0 && !built_in.clone().any(|known| known == *tag) {
             let there = store.tags(MOST_TAGS)?.into_iter().chain(built_in);
-            tell("tag", tag, there.collect());
+            said += &none_of(tag, "tag", there.collect());
         }
     }
     Ok(said)
+}
+
+/// That no class or tag has a name, and which there are.
+fn none_of(asked: &str, what: &str, there: BTreeSet<String>) -> String {
+    let there = there.into_iter().collect::<Vec<_>>().join(", ");
+    format!("; no {what} is called `{asked}`, there are: {there}")
 }
 
 /// Names after a title, on lines that a narrow terminal holds.
@@ -189,11 +196,12 @@ fn wrapped(title: &str, names: &[&str]) -> String {
 
 /// How what scenes render of each material came to be.
 fn kinds(store: Option<&Store>, materials: &[Summary]) -> Result<Vec<String>, Error> {
-    let kind = |m: &Summary| {
-        let words = store.map_or(Ok(None), |store| store.rendered_words(&m.slug))?;
-        Ok(words.unwrap_or_else(|| m.render_kind.as_str().to_owned()))
-    };
-    materials.iter().map(kind).collect()
+    let mut kinds = Vec::new();
+    for material in materials {
+        let words = store.map_or(Ok(None), |store| store.rendered_words(&material.slug))?;
+        kinds.push(words.unwrap_or_else(|| material.render_kind.as_str().to_owned()));
+    }
+    Ok(kinds)
 }
 
 fn row((m, kind): (&Summary, String)) -> [String; 8] {

@@ -2,24 +2,17 @@
 
 use std::path::PathBuf;
 
-use serde_json::{Value, json};
-
 use super::cloud::{CloudArgs, start};
 use super::console::Console;
-use super::curves::{Circumstances, Kind, Put, UNSAID, put};
-use super::database::Database;
-use super::door;
+use super::curves::{Circumstances, Kind};
 use super::summary::grouped;
-use crate::adopt::{activity, free_key};
+use crate::adopt::{MeasurementStorage, admission};
 use crate::error::Error;
 use crate::files::write_all;
-use crate::formats::figure::{Plot, Series, Style};
-use crate::material::{Material, Session, SessionPose};
 use crate::measure::{Curve, Metric, Reduction, ReductionResult, Registration, RegistrationResult};
+use crate::report::{measured_curve_plot, pose_record};
 use crate::scene::Scene;
-use crate::setup::find_material;
-use crate::store::Store;
-use crate::units::db_from_ratio;
+use crate::setup::Database;
 
 /// Turn a measured cloud into a material's curve: register it to the scene, find the angles
 #[derive(Debug, clap::Args)]
@@ -91,8 +84,11 @@ enum MetricFlag {
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let scene = Scene::load(&args.scene)?;
-    // A registration takes a while: what hinders its storing is said before.
-    target(args, db.read()?.as_ref())?;
+    // A registration takes a while: what prevents the storing of its curve is reported before.
+    let storage = storage(args);
+    if let Some(storage) = &storage {
+        storage.check(db.read()?.as_ref())?;
+    }
     let cloud = args.cloud.read(scene.radar())?;
     let reduction = reduction(args, &scene)?;
     let (radar, chirps, target) = (scene.radar(), &scene.chirps, &scene.target);
@@ -101,17 +97,19 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     bar.finish_and_clear();
     let reduced = reduction.run(target, radar, chirps, &cloud, &registered)?;
 
-    let record = record(args, &registered, &reduced);
+    let record = pose_record(&args.cloud.cloud, &args.scene, &registered, &reduced);
     // Refused before anything is written, stored after it.
-    let measured = (&reduced.curve, &registered);
-    let doubts = prepared(args, measured, db.read()?.as_ref())?.map(|(m, _)| door::doubts(&m));
-    doubts.iter().flatten().for_each(|doubt| console.notice(doubt));
+    if let Some(storage) = &storage {
+        let (material, _) = storage.prepare(&reduced.curve, &registered, db.read()?.as_ref())?;
+        admission::doubts(&material).iter().for_each(|doubt| console.notice(doubt));
+    }
     let mut pose = serde_json::to_vec_pretty(&record)?;
     pose.push(b'\n');
-    let svg = plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
+    let svg = measured_curve_plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
     let files = [("pose.json", pose), ("curve.csv", reduced.curve.write()), ("curve.svg", svg)];
     write_all(&args.output, &files)?;
-    let stored = save(args, measured, db)?;
+    let stored =
+        storage.map(|storage| storage.save(&reduced.curve, &registered, db)).transpose()?;
     if stored.is_some() && args.date.is_none() {
         console.notice(
             "no session is stored with the curve: --date YYYY-MM-DD, the day of the measurement, keeps the \
@@ -145,88 +143,16 @@ fn mixed(args: &Args, scene: &Scene) -> Option<String> {
     })
 }
 
-/// The material that takes the curve in, as it is now.
-fn target(args: &Args, store: Option<&Store>) -> Result<Option<Material>, Error> {
-    let Some(name) = &args.save else { return Ok(None) };
-    if name.contains('@') {
-        return Err(Error::Usage {
-            problem: format!("`{name}` names a revision, and a revision never changes"),
-            way_out: "give the bare name; the curve becomes part of a new revision".to_owned(),
-        });
-    }
-    if args.kind.is_none() || args.source.is_none() {
-        return Err(Error::Usage {
-            problem: format!("nobody has said where {} comes from", args.cloud.cloud.display()),
-            way_out: UNSAID.to_owned(),
-        });
-    }
-    let material = find_material(store, name, "--save: ")?.material;
-    args.kind.map_or(Ok(()), |kind| args.circumstances.check(&material, kind.into()))?;
-    Ok(Some(material))
-}
-
-/// The material with the curve in it.
-fn prepared(
-    args: &Args,
-    (curve, registered): (&Curve, &RegistrationResult),
-    store: Option<&Store>,
-) -> Result<Option<(Material, Put)>, Error> {
-    let (Some(kind), Some(title)) = (args.kind, &args.source) else { return Ok(None) };
-    let Some(mut material) = target(args, store)? else { return Ok(None) };
-    let put = put(&mut material, &args.curve, curve, (kind.into(), title), &args.circumstances)?;
-    if let Some(date) = &args.date {
-        hold_session(&mut material, &put.curve, session(args, date, registered)?)?;
-    }
-    Ok(Some((material, put)))
-}
-
-/// What is known of the measurement beside its points.
-fn session(args: &Args, date: &str, registered: &RegistrationResult) -> Result<Session, Error> {
-    let hash = activity("measure", &[&args.cloud.cloud])?.inputs.into_iter().next();
-    let pose = &registered.pose;
-    let rotation_rows = [0, 1, 2].map(|row| pose.rotation().row(row).to_array());
-    Ok(Session {
-        key: String::new(),
-        date: date.to_owned(),
-        temperature_k: None,
-        relative_humidity: None,
-        cloud_hash: hash.map(|input| input.hash),
-        mesh_hash: None,
-        registration_rms_m: Some(registered.rms_m),
-        normal_sd_rad: None,
-        footprint_sd_rad: None,
-        pose: Some(SessionPose { rotation_rows, translation_m: pose.translation_m().to_array() }),
-        note: None,
+/// How the curve is to be stored, where it is.
+fn storage(args: &Args) -> Option<MeasurementStorage<'_>> {
+    Some(MeasurementStorage {
+        material: args.save.clone()?,
+        curve: args.curve.clone(),
+        origin: args.circumstances.origin(args.kind, args.source.as_ref()),
+        date: args.date.clone(),
+        cloud: &args.cloud.cloud,
+        scene: &args.scene,
     })
-}
-
-/// Ties a curve that has no session to this one, which gets a free key.
-fn hold_session(material: &mut Material, curve: &str, session: Session) -> Result<(), Error> {
-    let key = free_key(curve, material.sessions.iter().map(|session| &session.key));
-    let Some(curve) = material.curves.iter_mut().find(|known| known.name == curve) else {
-        return Ok(());
-    };
-    if curve.session.is_none() {
-        curve.session = Some(key.clone());
-        material.sessions.push(Session { key, ..session });
-    }
-    Ok(material.validate()?)
-}
-
-/// Stores the curve when it is asked for; its name and the revision that holds it.
-fn save(
-    args: &Args,
-    measured: (&Curve, &RegistrationResult),
-    db: &Database,
-) -> Result<Option<(String, u32)>, Error> {
-    if args.save.is_none() {
-        return Ok(None);
-    }
-    let mut store = db.write()?;
-    let Some((material, put)) = prepared(args, measured, Some(&store))? else { return Ok(None) };
-    store.record(activity("measure", &[&args.cloud.cloud, &args.scene])?);
-    let added = store.add([&material])?;
-    Ok(added.first().map(|added| (put.curve, added.revision())))
 }
 
 fn registration(args: &Args) -> Result<Registration, Error> {
@@ -259,68 +185,27 @@ fn reduction(args: &Args, scene: &Scene) -> Result<Reduction, Error> {
 }
 
 fn region(name: &str, scene: &Scene) -> Result<u16, Error> {
-    let names = || scene.target.regions.iter().map(|region| region.name.as_str());
-    let found = names().position(|region| region == name);
+    let regions = scene.target.regions.iter();
+    let names: Vec<&str> = regions.map(|region| region.name.as_str()).collect();
+    let found = names.iter().position(|region| *region == name);
     found.map(|number| number as u16).ok_or_else(|| Error::Usage {
         problem: format!("the scene has no region `{name}`"),
-        way_out: format!("its regions are: {}", names().collect::<Vec<_>>().join(", ")),
-    })
-}
-
-/// What `pose.json` holds and `--json` prints.
-fn record(args: &Args, registered: &RegistrationResult, reduced: &ReductionResult) -> Value {
-    let pose = &registered.pose;
-    let rows: Vec<[f64; 3]> = (0..3).map(|row| pose.rotation().row(row).to_array()).collect();
-    let left_out = reduced.left_out;
-    json!({
-        "schema": 1,
-        "cloud": args.cloud.cloud.display().to_string(),
-        "scene": args.scene.display().to_string(),
-        "meaning": "a vertex v of the scene's mesh was at rotation*v + translation, global frame, m",
-        "pose": { "rotation_rows": rows, "translation_m": pose.translation_m().to_array() },
-        "covariance": {
-            "order": ["tx_m", "ty_m", "tz_m", "wx_rad", "wy_rad", "wz_rad"],
-            "about_m": registered.pivot.xyz.to_array(),
-            "matrix": registered.covariance,
-            "widened_for_shared_errors": registered.widened,
-        },
-        "rms_m": registered.rms_m,
-        "points": registered.points,
-        "inliers": registered.inliers,
-        "virtual_scans": registered.scans,
-        "iterations": registered.iterations,
-        "given_pose_kept": registered.kept,
-        "converged": registered.converged,
-        "stop": format!("{:?}", registered.stop).to_lowercase(),
-        "verdicts": registered.verdicts,
-        "curve": {
-            "detected": reduced.curve.detected().count(),
-            "censored": reduced.curve.observations.len() - reduced.curve.detected().count(),
-            "left_out": {
-                "missed": left_out.missed,
-                "off_surface": left_out.off_surface,
-                "other_region": left_out.other_region,
-                "near_edge": left_out.near_edge,
-                "silent_near_edge": left_out.silent_near_edge,
-                "unsure_of_facet": left_out.unsure_of_facet,
-            },
-        },
+        way_out: format!("its regions are: {}", names.join(", ")),
     })
 }
 
 fn text(args: &Args, registered: &RegistrationResult, reduced: &ReductionResult) -> String {
     let middle = registered.pivot;
     let shift_mm = 1e3 * (middle.xyz - (registered.pose.inverse() * middle).xyz);
-    let sd = |axis: usize| registered.covariance[axis][axis].sqrt();
-    let (shift_sd_m, turn_sd_rad) =
-        ((0..3).map(sd).fold(0.0, f64::max), (3..6).map(sd).fold(0.0, f64::max));
+    let sd: [f64; 6] = std::array::from_fn(|axis| registered.covariance[axis][axis].sqrt());
+    let [shift_sd_m, turn_sd_rad] =
+        [&sd[..3], &sd[3..]].map(|sd| sd.iter().copied().fold(0.0, f64::max));
     let (curve, left_out) = (&reduced.curve, reduced.left_out);
     let detected = curve.detected().count();
-    let kept = match registered.kept {
-        true => {
-            "the points agree with the given pose, which is kept; --refine uses the found one\n"
-        }
-        false => "",
+    let kept = if registered.kept {
+        "the points agree with the given pose, which is kept; --refine uses the found one\n"
+    } else {
+        ""
     };
     format!(
         "{kept}pose: {} of {} points on the surface, rms {:.2} mm, known to {:.2} mm and {:.3}° (1 sd)\n\
@@ -349,29 +234,4 @@ fn text(args: &Args, registered: &RegistrationResult, reduced: &ReductionResult)
 
 fn angles_deg(curve: &Curve) -> impl Iterator<Item = f64> + '_ {
     curve.observations.iter().map(|row| row.theta_i_rad.to_degrees())
-}
-
-fn plot<'a>(title: &'a str, curve: &Curve) -> Plot<'a> {
-    let points = |censored: bool| {
-        let rows = curve.observations.iter().filter(|row| row.is_censored() == censored);
-        rows.filter_map(|row| {
-            Some((row.theta_i_rad.to_degrees(), db_from_ratio(row.level_sigma0()?)))
-        })
-        .collect()
-    };
-    let series = |name: &str, censored| Series {
-        name: name.to_owned(),
-        style: Style::Points,
-        points: points(censored),
-    };
-    Plot {
-        title,
-        subtitle: "measured cloud, reduced by equation (8)",
-        x_label: "incidence, °",
-        y_label: "σ⁰, dB",
-        x_range: Some((0.0, 90.0)),
-        y_range: None,
-        equal: false,
-        series: vec![series("not detected, below", true), series("detected", false)],
-    }
 }

@@ -6,12 +6,10 @@ mod cite;
 mod cloud;
 mod compare;
 mod completions;
-mod database;
 mod console;
 mod curves;
 mod diagnose;
 mod diff;
-mod door;
 mod effects;
 mod export;
 mod fit;
@@ -33,12 +31,12 @@ mod withdraw;
 
 use std::path::PathBuf;
 
-use clap::{ArgAction, Parser, Subcommand};
+use clap::{ArgAction, CommandFactory, Parser, Subcommand};
 
 use crate::error::Error;
+use crate::setup::Database;
 use console::Console;
 pub use console::readable;
-use database::Database;
 
 /// A material database and renderer for 300 GHz imaging radar.
 #[derive(Debug, Parser)]
@@ -131,6 +129,6 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Verify(args) => verify::run(args, &console),
         Command::Import(args) => import::run(args, db, &console),
         Command::Export(args) => export::run(args, db, &console),
-        Command::Completions(args) => completions::run(args),
+        Command::Completions(args) => completions::run(args, Cli::command()),
     }
 }

@@ -2,20 +2,17 @@
 
 use std::path::PathBuf;
 
-use serde::Serialize;
-
 use super::console::Console;
-use super::database::Database;
 use super::list::{Wanted, frequency};
 use super::summary::table;
-use crate::catalogue::{Distance, Nearest, Probe, Rank};
+use crate::catalogue::{Distance, Rank};
 use crate::error::Error;
 use crate::files::read_small;
-use crate::material::{Observation, Slug};
 use crate::measure::Curve;
-use crate::setup::{MaterialRevision, find_material, store_of_not_added};
+use crate::report::{Neighbour, NeighbourReport, NeighbourSearch};
+use crate::setup::Database;
 use crate::store::Store;
-use crate::units::{range, rounded, shown};
+use crate::units::{range, shown};
 
 /// Find the known materials that a measured curve is nearest to
 #[derive(Debug, clap::Args)]
@@ -50,140 +47,27 @@ pub(super) struct Args {
     filter: Wanted,
 }
 
-/// A material and how far it is.
-#[derive(Serialize)]
-struct Near {
-    slug: Slug,
-    name: String,
-    /// None for a built-in one that is not in the database.
-    revision: Option<u32>,
-    /// Of the data behind what scenes render.
-    kind: &'static str,
-    /// Of a model that goes with a curve, which nobody measured itself.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    kind_words: Option<String>,
-    status: String,
-    /// For which its numbers are claimed.
-    frequency_ghz: [f64; 2],
-    /// How far the curve's frequency lies outside of these, 0 within; none where nobody says it.
-    frequency_outside_ghz: Option<f64>,
-    #[serde(flatten)]
-    distance: Distance,
-}
-
-#[derive(Serialize)]
-struct Record {
-    /// At which the curve was measured; none where nobody says.
-    measured_at_ghz: Option<f64>,
-    angles: usize,
-    /// What chance alone makes of the distance to the true material, dB.
-    noise_db: Option<f64>,
-    /// Number of materials with too little in common.
-    left_out: usize,
-    materials: Vec<Near>,
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    let store = db.read()?;
+    let search = search(args, store.as_ref())?;
+    let rank = if args.shape { Rank::Shape } else { Rank::Level };
+    let report = search.run(store.as_ref(), &args.filter.filter(), rank, args.limit)?;
+    console.result(&text(&report, args), &report)
 }
 
 /// The curve that is asked about.
-struct Asked {
-    observations: Vec<Observation>,
-    frequency_hz: Option<f64>,
-    /// The material that the curve is of, if its current revision.
-    own: Option<Slug>,
+fn search(args: &Args, store: Option<&Store>) -> Result<NeighbourSearch, Error> {
+    let frequency_hz = args.measured_at.map(|ghz| ghz * 1e9);
+    let Some(path) = &args.curve else {
+        let name = args.material.as_deref().unwrap_or_default();
+        return NeighbourSearch::of_material(name, frequency_hz, store);
+    };
+    let curve = Curve::read(&read_small(path)?)
+        .map_err(|error| Error::CurveFile { file: path.clone(), error })?;
+    Ok(NeighbourSearch { observations: curve.observations, frequency_hz, own: None })
 }
 
-pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
-    let store = db.read()?;
-    let asked = asked(args, store.as_ref())?;
-    let Some(probe) = Probe::new(&asked.observations) else {
-        return Err(Error::Usage {
-            problem: "the curve has no backscatter that was detected, or a point above the \
-                      instrument's range"
-                .to_owned(),
-            way_out: "give a curve with detections below that range".to_owned(),
-        });
-    };
-    let missing = store_of_not_added(store.as_ref())?;
-    let mut record = Record {
-        measured_at_ghz: asked.frequency_hz.map(|hz| rounded(hz / 1e9)),
-        angles: probe.angles(),
-        noise_db: probe.noise_db(),
-        left_out: 0,
-        materials: Vec::new(),
-    };
-    let rank = if args.shape { Rank::Shape } else { Rank::Level };
-    for (store, is_stored) in [(store.as_ref(), true), (Some(&missing), false)] {
-        let Some(store) = store else { continue };
-        let Nearest { found, left_out } =
-            probe.nearest(store, &args.filter.filter(), rank, args.limit.saturating_add(1))?;
-        record.left_out += left_out;
-        // That a material is nearest to itself tells nobody anything.
-        for (slug, distance) in
-            found.into_iter().filter(|(slug, _)| asked.own.as_ref() != Some(slug))
-        {
-            record.materials.extend(near(store, &slug, &asked, is_stored, distance)?);
-        }
-    }
-    let far = |near: &Near| near.distance.rank_db(rank);
-    record.materials.sort_by(|a, b| far(a).total_cmp(&far(b)).then_with(|| a.slug.cmp(&b.slug)));
-    record.materials.truncate(args.limit);
-    console.result(&text(&record, args), &record)
-}
-
-fn near(
-    store: &Store,
-    slug: &Slug,
-    asked: &Asked,
-    is_stored: bool,
-    distance: Distance,
-) -> Result<Option<Near>, Error> {
-    let (Some(summary), Some(stored)) = (store.summary(slug)?, store.get(slug, None)?) else {
-        return Ok(None);
-    };
-    let material = stored.material;
-    let outside_ghz = |hz| rounded(material.frequency_outside_hz(hz) / 1e9);
-    Ok(Some(Near {
-        slug: summary.slug,
-        name: summary.name,
-        revision: is_stored.then_some(summary.revision),
-        kind: summary.render_kind.as_str(),
-        kind_words: material.rendered_words(),
-        status: summary.status,
-        frequency_ghz: material.frequency_hz.map(|hz| rounded(hz / 1e9)),
-        frequency_outside_ghz: asked.frequency_hz.map(outside_ghz),
-        distance,
-    }))
-}
-
-fn asked(args: &Args, store: Option<&Store>) -> Result<Asked, Error> {
-    let stated_hz = args.measured_at.map(|ghz| ghz * 1e9);
-    if let Some(path) = &args.curve {
-        let bytes = read_small(path)?;
-        let refused = |error| Error::CurveFile { file: path.clone(), error };
-        let observations = Curve::read(&bytes).map_err(refused)?.observations;
-        return Ok(Asked { observations, frequency_hz: stated_hz, own: None });
-    }
-    let name = args.material.as_deref().unwrap_or_default();
-    let MaterialRevision { material, revision } = find_material(store, name, "")?;
-    let current = store.map(|store| store.summary(&material.slug)).transpose()?.flatten();
-    let is_current = current.map(|current| current.revision) == revision;
-    let longest = material.curves.into_iter().rev().max_by_key(|curve| curve.observations.len());
-    let Some(curve) = longest else {
-        return Err(Error::Usage {
-            problem: format!("`{name}` has no curve"),
-            way_out: "give one with --curve FILE".to_owned(),
-        });
-    };
-    let its_own = |key: &String| material.instruments.iter().find(|own| own.key == *key);
-    let instrument = curve.instrument.as_ref().and_then(its_own);
-    let frequency_hz = stated_hz.or(instrument.map(|own| own.centre_frequency_hz));
-    Ok(Asked {
-        observations: curve.observations,
-        frequency_hz,
-        own: is_current.then_some(material.slug),
-    })
-}
-
-fn text(record: &Record, args: &Args) -> String {
+fn text(record: &NeighbourReport, args: &Args) -> String {
     let mut text = match record.materials.as_slice() {
         [] => "no material has enough angles in common with the curve\n".to_owned(),
         found => table(
@@ -218,7 +102,7 @@ fn text(record: &Record, args: &Args) -> String {
     text
 }
 
-fn row(near: &Near, angles: usize) -> [String; 9] {
+fn row(near: &Neighbour, angles: usize) -> [String; 9] {
     let Distance { rms_db, rms_shape_db, offset_db, common_angles, above_bound, silent, .. } =
         near.distance;
     let mut notes = Vec::new();

@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use super::console::Console;
-use super::database::Database;
 use super::summary::counted;
 use crate::catalogue::{About, HAS_PARQUET, named_licences, publish};
 use crate::error::Error;
 use crate::files::FilesError;
 use crate::material::form::licence_doubt;
+use crate::setup::Database;
 
 /// Publish the database as a catalogue: a static site and the data in open formats
 #[derive(Debug, clap::Args)]

@@ -3,10 +3,10 @@
 use serde_json::json;
 
 use super::console::Console;
-use super::database::Database;
 use super::summary::counted;
 use crate::error::Error;
 use crate::formats::text::nearest;
+use crate::setup::Database;
 use crate::store::{Removed, Store};
 
 /// Remove materials from the database, with all their revisions

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::console::Console;
-use super::database::Database;
 use super::summary::{table, with_status};
 use crate::error::Error;
+use crate::setup::Database;
 use crate::setup::store_of_not_added;
 use crate::store::{Hit, Store};
 

@@ -5,13 +5,13 @@ mod about;
 use serde_json::json;
 
 use super::console::Console;
-use super::database::Database;
 use super::fit::words::report;
 use super::summary::{counted, table};
 use crate::brdf::Scattering;
 use crate::error::Error;
 use crate::formats::EffectEntry;
 use crate::material::{Fit, Material};
+use crate::setup::Database;
 use crate::setup::{MaterialRevision, find_material, later_status_warning};
 use crate::store::RevisionSummary;
 use crate::units::{db_from_ratio, range, rounded, shown};
@@ -132,43 +132,45 @@ fn effects(material: &Material) -> String {
         if let Some(effect) = crate::effects::find(name) {
             text += &format!("    {}\n", effect.description());
         }
-        let unit = |parameter: &str| {
-            let knob = crate::effects::find(name)?
-                .parameters()
-                .iter()
-                .find(|knob| knob.name == parameter)?;
-            Some(knob.unit.to_owned())
-        };
-        let row = |(parameter, value): (&String, &f64)| {
-            [parameter.clone(), shown(*value), unit(parameter).unwrap_or_default()]
-        };
-        text += &table(&["parameter", "value", "unit"], parameters.iter().map(row));
+        let rows = parameters.iter().map(|(parameter, value)| {
+            [parameter.clone(), shown(*value), unit_of(name, parameter).unwrap_or_default()]
+        });
+        text += &table(&["parameter", "value", "unit"], rows);
     }
     text
 }
 
+/// The unit of a parameter of an effect, if this program knows both.
+fn unit_of(effect: &str, parameter: &str) -> Option<String> {
+    let known = crate::effects::find(effect)?.parameters();
+    Some(known.iter().find(|known| known.name == parameter)?.unit.to_owned())
+}
+
 fn parameters(fit: &Fit) -> String {
-    let source = |path: &str| {
-        if fit.report.as_ref().is_some_and(|report| report.is_by_convention(path)) {
-            return "a convention, not measured".to_owned();
-        }
-        let own = fit.parameter_sources.iter().find(|(p, _)| p == path);
-        own.map_or(fit.source.clone(), |(_, source)| source.clone())
-    };
-    let deviation = |path: &str| fit.covariance.as_ref()?.standard_deviation(path);
+    let covariance = fit.covariance.as_ref();
     table(
         &["parameter", "value", "unit", "± sd", "range", "source"],
         fit.model.parameters().iter().map(|p| {
+            let sd = covariance.and_then(|known| known.standard_deviation(&p.path));
             [
                 p.path.clone(),
                 shown(p.value),
                 p.unit.to_owned(),
-                deviation(&p.path).map_or("none given".to_owned(), |sd| format!("{sd:.2e}")),
+                sd.map_or("none given".to_owned(), |sd| format!("{sd:.2e}")),
                 format!("{} to {}", shown(p.min), shown(p.max)),
-                source(&p.path),
+                source_of(fit, &p.path),
             ]
         }),
     )
+}
+
+/// Where the value of a parameter comes from.
+fn source_of(fit: &Fit, path: &str) -> String {
+    if fit.report.as_ref().is_some_and(|report| report.is_by_convention(path)) {
+        return "a convention, not measured".to_owned();
+    }
+    let own = fit.parameter_sources.iter().find(|(known, _)| known == path);
+    own.map_or(fit.source.clone(), |(_, source)| source.clone())
 }
 
 fn curve_table(material: &Material) -> Result<String, Error> {
@@ -183,9 +185,10 @@ fn curve_table(material: &Material) -> Result<String, Error> {
             None => "nothing".to_owned(),
         };
         let outside_deg = rounded(reach.outside_rad(theta_rad).to_degrees());
-        let said = match outside_deg > 0.0 {
-            true => format!("{}° outside the range", shown(outside_deg)),
-            false => String::new(),
+        let said = if outside_deg > 0.0 {
+            format!("{}° outside the range", shown(outside_deg))
+        } else {
+            String::new()
         };
         [format!("{theta_deg:.0}°"), level, said]
     });

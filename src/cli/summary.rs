@@ -7,28 +7,33 @@ pub(super) fn table<const N: usize>(
     header: &[&str; N],
     rows: impl Iterator<Item = [String; N]>,
 ) -> String {
-    // A line break in a cell would pass for a row.
-    let on_one_line = |cell: String| cell.replace(char::is_control, " ");
     let mut lines = vec![header.map(str::to_owned)];
-    lines.extend(rows.map(|row| row.map(on_one_line)));
-    let widths: Vec<usize> = (0..N)
-        .map(|column| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0))
-        .collect();
-    let is_number = |text: &str| {
-        !text.is_empty() && text.chars().all(|c| c.is_ascii_digit() || " .-–%°".contains(c))
-    };
-    let right: Vec<bool> = (0..N)
-        .map(|column| lines.len() > 1 && lines[1..].iter().all(|line| is_number(&line[column])))
-        .collect();
-    let cell = |column: usize, text: &str| {
-        let padding = " ".repeat(widths[column] - text.chars().count());
-        if right[column] { padding + text } else { text.to_owned() + &padding }
-    };
-    let line = |cells: &[String; N]| {
-        let cells: Vec<String> = (0..N).map(|column| cell(column, &cells[column])).collect();
-        cells.join("  ").trim_end().to_owned() + "\n"
-    };
-    lines.iter().map(line).collect()
+    // A line break in a cell would pass for a row.
+    lines.extend(rows.map(|row| row.map(|cell| cell.replace(char::is_control, " "))));
+    let mut widths = [0; N];
+    let mut is_right = [lines.len() > 1; N];
+    for (number, cells) in lines.iter().enumerate() {
+        for (column, cell) in cells.iter().enumerate() {
+            widths[column] = widths[column].max(cell.chars().count());
+            is_right[column] &= number == 0 || is_number(cell);
+        }
+    }
+    let mut text = String::new();
+    for cells in &lines {
+        let mut line = Vec::new();
+        for (column, cell) in cells.iter().enumerate() {
+            let padding = " ".repeat(widths[column] - cell.chars().count());
+            line.push(if is_right[column] { padding + cell } else { cell.clone() + &padding });
+        }
+        text += line.join("  ").trim_end();
+        text.push('\n');
+    }
+    text
+}
+
+/// Whether a cell goes to the right.
+fn is_number(cell: &str) -> bool {
+    !cell.is_empty() && cell.chars().all(|c| c.is_ascii_digit() || " .-–%°".contains(c))
 }
 
 /// A cell of a table with the status of its material, which is left out while it is active.

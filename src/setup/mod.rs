@@ -15,10 +15,14 @@
 //! # Ok::<(), matdb::error::Error>(())
 //! ```
 
+mod cloud;
+mod database;
 mod materials;
 mod scene;
 mod view;
 
+pub use cloud::{read_cloud, read_pose};
+pub use database::{Database, USUAL_DATABASE};
 pub use materials::{
     MaterialRevision, builtin_not_added, find_material, later_status_warning, status_warning,
     store_of_not_added, unknown_material,

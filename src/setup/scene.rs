@@ -7,6 +7,7 @@ use crate::brdf::Brdf;
 use crate::effects::{EffectList, Level, Model, Receiver, SceneEffects, resolve};
 use crate::error::Error;
 use crate::formats::EffectEntry;
+use crate::frames::{Global, Point, Pose};
 use crate::geometry::Raster;
 use crate::material::Material;
 use crate::radar::Radar;
@@ -70,6 +71,25 @@ impl ReadyScene {
         let (materials, material_of_region) = find_materials(&scene, path, store)?;
         let effects = find_effects(&scene, path, &materials, &material_of_region)?;
         Ok(ReadyScene { scene, path: path.to_owned(), materials, material_of_region, effects })
+    }
+
+    /// As [`open`](Self::open), of a scene that renders the mean power of its radar, without receiver, speckle and
+    /// noise: a draw of speckle would add an error to that of a measurement, or hide it. `pose` moves the target.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_mean(
+        path: &Path,
+        pose: Pose<Global, Global>,
+        store: Option<&Store>,
+    ) -> Result<ReadyScene, Error> {
+        let mut scene = Scene::load(path)?;
+        let radar = &mut scene.file.radar;
+        (radar.receiver, radar.speckle, radar.noise) = (None, None, None);
+        for vertex in &mut scene.target.mesh.vertices {
+            *vertex = (pose * Point::from(*vertex)).xyz;
+        }
+        ReadyScene::new(scene, path, store)
     }
 
     /// The law of every region.

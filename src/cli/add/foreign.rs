@@ -1,17 +1,15 @@
 //! Files in other people's formats, and the flags that say what such a file does not.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use super::unreadable;
-use crate::adopt::input;
-use crate::catalogue::exchange::{Foreign, Given};
-use crate::cli::door;
+use crate::adopt::foreign_format;
+use crate::catalogue::exchange::Given;
+use crate::cli::list::Kind;
 use crate::error::Error;
-use crate::files::read_small;
-use crate::material::{Input, Material, Slug, SourceKind};
+use crate::material::{Slug, SourceKind};
 use crate::units::watts_from_dbm;
 
-/// What a person says beside a foreign file.
+/// What a foreign file does not say.
 #[derive(Debug, Default, PartialEq, clap::Args)]
 #[command(next_help_heading = "For a .csv, .brdf or .yml file")]
 pub(super) struct Beside {
@@ -59,19 +57,11 @@ pub(super) struct Beside {
     threshold: Option<f64>,
 }
 
-/// How numbers came to be, as a flag says it.
-#[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
-enum Kind {
-    Measured,
-    Literature,
-    Modelled,
-    Synthetic,
-}
-
 impl Beside {
     /// Refuses flags that would be dropped in silence, and one name for several files.
     pub fn check(&self, from: &[PathBuf]) -> Result<(), Error> {
-        let foreign = from.iter().filter(|path| !path.is_dir() && format(path).is_some()).count();
+        let foreign =
+            from.iter().filter(|path| !path.is_dir() && foreign_format(path).is_some()).count();
         let problem = match foreign {
             0 if *self != Beside::default() => {
                 "--name and its like say what a foreign file does not"
@@ -85,11 +75,12 @@ impl Beside {
         })
     }
 
-    fn given(&self) -> Result<Given, Error> {
+    /// The flags as plain values.
+    pub fn given(&self) -> Result<Given, Error> {
         let frequency_hz = self.frequency.map(|ghz| ghz * 1e9);
-        let is_possible = |hz: f64| hz > 0.0 && hz.is_finite();
         let threshold_w = self.threshold.map(watts_from_dbm);
-        if !frequency_hz.is_none_or(is_possible) || !threshold_w.is_none_or(is_possible) {
+        let numbers = [frequency_hz, threshold_w];
+        if numbers.into_iter().flatten().any(|number| !(number > 0.0 && number.is_finite())) {
             return Err(Error::Usage {
                 problem: "--frequency or --threshold cannot be".to_owned(),
                 way_out: "give a frequency in GHz such as 300, a threshold in dBm such as -77"
@@ -113,32 +104,4 @@ impl Beside {
             threshold_w,
         })
     }
-}
-
-impl From<Kind> for SourceKind {
-    fn from(kind: Kind) -> SourceKind {
-        match kind {
-            Kind::Measured => SourceKind::Measured,
-            Kind::Literature => SourceKind::Literature,
-            Kind::Modelled => SourceKind::Modelled,
-            Kind::Synthetic => SourceKind::Synthetic,
-        }
-    }
-}
-
-/// The foreign format that a file's ending stands for.
-pub(super) fn format(path: &Path) -> Option<Foreign> {
-    Foreign::from_extension(path.extension()?.to_str()?)
-}
-
-/// Reads a foreign file as a material, and says which file it was.
-pub(super) fn read(
-    format: Foreign,
-    path: &Path,
-    args: &Beside,
-) -> Result<(Material, Input), Error> {
-    let bytes = read_small(path).map_err(unreadable)?;
-    let material = format.read(&path.display().to_string(), &bytes, &args.given()?)?;
-    door::check(&material, path)?;
-    Ok((material, input(path, &bytes)))
 }

@@ -10,13 +10,13 @@ use crate::adopt::{
 };
 use crate::cli::cloud::CloudArgs;
 use crate::cli::console::Console;
-use crate::cli::database::{Database, USUAL};
 use crate::cli::effects::chosen;
 use crate::diagnose::{DiagnoseError, Report};
 use crate::error::Error;
 use crate::files::{Placement, folder_of, write_all};
 use crate::formats::words::listed;
 use crate::report::{CannotTell, shell_word};
+use crate::setup::{Database, USUAL_DATABASE};
 
 /// Diagnoses a cloud and writes the answer.
 pub(super) fn run(
@@ -160,7 +160,7 @@ fn other_scenes(replaced: &[String]) -> String {
 
 /// The program with its database, where that is not the usual one.
 fn program(db: &Database) -> String {
-    if db.path() == Path::new(USUAL) {
+    if db.path() == Path::new(USUAL_DATABASE) {
         "matdb".to_owned()
     } else {
         format!("matdb --db {}", shell_word(db.path()))

@@ -6,8 +6,8 @@ mod curve;
 mod refusal;
 
 use super::console::Console;
-use super::database::Database;
 use crate::error::Error;
+use crate::setup::Database;
 
 pub(super) use args::Args;
 

@@ -1,7 +1,5 @@
 //! `matdb fit`.
 
-mod save;
-mod subject;
 pub(super) mod words;
 
 use std::path::{Path, PathBuf};
@@ -11,20 +9,19 @@ use serde::Serialize;
 
 use super::console::Console;
 use super::curves::{Circumstances, Kind};
-use super::database::Database;
-use super::door;
-use super::plot::{ending, layers, one_file, plot, points};
+use super::plot::write_plot;
+use crate::adopt::{FitStorage, FitSubject, StoredFit, admission};
 use crate::brdf::Brdf;
 use crate::error::Error;
 use crate::fit::coordinates::frequencies;
 use crate::fit::{Fit, FitResult, Method, model, model_names};
 use crate::formats::text::nearest;
 use crate::radar::speckle::standard_deviation_db;
+use crate::report::{FigureFormat, curve_points, fit_layers, incidence_plot};
+use crate::setup::Database;
 use crate::setup::find_material;
 use crate::store::Store;
 use crate::units::watts_from_dbm;
-use save::{Saved, Target};
-use subject::Subject;
 
 const EXAMPLES_AND_METHODS: &str = "Examples:
   matdb fit curve.csv                           the paper's five parameters, censored likelihood
@@ -128,33 +125,36 @@ struct Record<'a> {
     #[serde(flatten)]
     result: &'a FitResult,
     sentences: Vec<String>,
-    saved: Option<&'a Saved>,
+    saved: Option<&'a StoredFit>,
     files: Vec<String>,
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let store = db.read()?;
-    let subject = Subject::find(args, store.as_ref())?;
+    let subject = FitSubject::open(&args.what, args.curve.as_deref(), store.as_ref())?;
     let start = start(args, &subject, store.as_ref())?;
     let fit = settings(args, &subject, &start)?;
-    // A fit takes a while: what hinders its storing or drawing is said before.
-    args.output.as_deref().map(ending).transpose()?;
-    let name = fit_name(args, &start);
-    let target = Target::find(args, &subject, &name, store.as_ref())?;
-    let doubts = target.filter(|_| subject.file.is_some()).map(|t| door::doubts(&t.material));
-    doubts.iter().flatten().for_each(|doubt| console.notice(doubt));
+    // A fit takes a while: what prevents its storing or drawing is reported before.
+    args.output.as_deref().map(FigureFormat::of).transpose()?;
+    let fit_name = fit_name(args, &start);
+    let storage = args.save.as_ref().map(|material| storage(args, material, fit_name.clone()));
+    if let Some(storage) = &storage {
+        let material = storage.check(&subject, store.as_ref())?;
+        if subject.file.is_some() {
+            admission::doubts(&material).iter().for_each(|doubt| console.notice(doubt));
+        }
+    }
     drop(store);
-    let fail = |error| Error::Fit { curve: subject.label.clone(), error };
-    let mut found = fit.run(&start, &subject.curve).map_err(fail)?;
+    let mut found = fit
+        .run(&start, &subject.curve)
+        .map_err(|error| Error::Fit { curve: subject.label.clone(), error })?;
     let is_possible = found.model.validate().is_ok();
     if found.converged && is_possible {
         found.held_out = found.hold_out(&subject.curve);
     }
-    let saved = match (&args.save, found.converged && is_possible) {
-        (Some(_), true) => Some(save::save(args, &subject, &name, &found, db)),
-        _ => None,
-    };
-    let stored = found.stored(&name, &subject.curve_name, "");
+    let storage = storage.filter(|_| found.converged && is_possible);
+    let saved = storage.map(|storage| storage.save(&subject, &found, db));
+    let stored = found.stored(&fit_name, &subject.curve_name, "");
     let files = match (&args.output, found.converged) {
         (Some(path), true) => draw(path, &subject, &stored)?,
         _ => Vec::new(),
@@ -164,13 +164,24 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let sentences = found.verdict.iter().map(ToString::to_string).collect();
     console.result(&text, &Record { result: &found, sentences, saved: done, files })?;
     saved.transpose()?;
-    match found.converged {
-        true if is_possible || args.save.is_none() => Ok(()),
-        true => Err(Error::Usage {
+    if !found.converged {
+        return Err(Error::NotConverged { curve: subject.label, stop: found.stop.as_str() });
+    }
+    if !is_possible && args.save.is_some() {
+        return Err(Error::Usage {
             problem: format!("{}: nothing is stored, since the fit is out of range", subject.label),
             way_out: "the verdict says what to let go of".to_owned(),
-        }),
-        false => Err(Error::NotConverged { curve: subject.label, stop: found.stop.as_str() }),
+        });
+    }
+    Ok(())
+}
+
+fn storage(args: &Args, material: &Option<String>, fit_name: String) -> FitStorage {
+    FitStorage {
+        material: material.clone(),
+        fit_name,
+        keep_render: args.keep_render,
+        origin: args.circumstances.origin(args.kind, args.source.as_ref()),
     }
 }
 
@@ -187,9 +198,11 @@ fn model_word(model: &Brdf) -> String {
 }
 
 /// The model where the search begins.
-fn start(args: &Args, subject: &Subject, store: Option<&Store>) -> Result<Brdf, Error> {
-    let default = || subject.rendered_model().or_else(|| model("mixture"));
-    let Some(name) = &args.model else { return default().ok_or_else(|| no_model("mixture")) };
+fn start(args: &Args, subject: &FitSubject, store: Option<&Store>) -> Result<Brdf, Error> {
+    let Some(name) = &args.model else {
+        let default = subject.rendered_model().or_else(|| model("mixture"));
+        return default.ok_or_else(|| no_model("mixture"));
+    };
     if let Some(model) = model(name) {
         return Ok(model);
     }
@@ -210,7 +223,7 @@ fn no_model(name: &str) -> Error {
     Error::Usage { problem: format!("there is no model and no material `{name}`"), way_out }
 }
 
-fn settings(args: &Args, subject: &Subject, start: &Brdf) -> Result<Fit, Error> {
+fn settings(args: &Args, subject: &FitSubject, start: &Brdf) -> Result<Fit, Error> {
     if args.noise_dbm.is_some() && subject.curve.lacks_power() {
         return Err(Error::Usage {
             problem: format!("{} has no powers that noise could be compared with", subject.label),
@@ -234,18 +247,20 @@ fn settings(args: &Args, subject: &Subject, start: &Brdf) -> Result<Fit, Error> 
 
 /// The held parameters, each checked to be one of the model's.
 fn fixed(args: &Args, start: &Brdf) -> Result<Vec<(String, f64)>, Error> {
-    let usage = |problem: String, way_out: String| Err(Error::Usage { problem, way_out });
     let paths: Vec<String> = start.parameters().into_iter().map(|p| p.path).collect();
     let alpha = paths.iter().find(|path| *path == "diffuse.alpha" || *path == "alpha");
     let mut fixed = Vec::new();
     match (args.alpha, alpha) {
         (Some(value), Some(path)) => fixed.push((path.clone(), value)),
         (Some(_), None) => {
-            return usage("this model has no alpha".to_owned(), "leave --alpha out".to_owned());
+            return Err(usage(
+                "this model has no alpha".to_owned(),
+                "leave --alpha out".to_owned(),
+            ));
         }
         (None, _) if args.method == MethodName::TlsTail => {
             let way_out = "give it with --alpha, or use --method tls to find it".to_owned();
-            return usage("tls-tail takes the tail's exponent as given".to_owned(), way_out);
+            return Err(usage("tls-tail takes the tail's exponent as given".to_owned(), way_out));
         }
         (None, _) => {}
     }
@@ -253,14 +268,14 @@ fn fixed(args: &Args, start: &Brdf) -> Result<Vec<(String, f64)>, Error> {
         let parts = text.split_once('=').map(|(path, value)| (path, value.trim().parse()));
         let Some((path, Ok(value))) = parts else {
             let way_out = "write it as --fix diffuse.alpha=3".to_owned();
-            return usage(format!("`{text}` is no parameter with a value"), way_out);
+            return Err(usage(format!("`{text}` is no parameter with a value"), way_out));
         };
         if !paths.iter().any(|known| known == path) {
             let way_out = format!("there are: {}", paths.join(", "));
-            return usage(format!("the model has no parameter `{path}`"), way_out);
+            return Err(usage(format!("the model has no parameter `{path}`"), way_out));
         }
         if is_held(path, &fixed) {
-            return usage(format!("`{path}` is held twice"), "hold it once".to_owned());
+            return Err(usage(format!("`{path}` is held twice"), "hold it once".to_owned()));
         }
         fixed.push((path.to_owned(), value));
     }
@@ -269,13 +284,21 @@ fn fixed(args: &Args, start: &Brdf) -> Result<Vec<(String, f64)>, Error> {
     Ok(fixed)
 }
 
+fn usage(problem: String, way_out: String) -> Error {
+    Error::Usage { problem, way_out }
+}
+
 fn is_held(path: &str, fixed: &[(String, f64)]) -> bool {
     fixed.iter().any(|(known, _)| known == path)
 }
 
-fn draw(path: &Path, subject: &Subject, fit: &crate::material::Fit) -> Result<Vec<String>, Error> {
-    let points = points(&subject.curve_name, &subject.curve.observations);
-    let series = layers(std::slice::from_ref(fit), points);
+fn draw(
+    path: &Path,
+    subject: &FitSubject,
+    fit: &crate::material::Fit,
+) -> Result<Vec<String>, Error> {
+    let points = curve_points(&subject.curve_name, &subject.curve.observations);
+    let series = fit_layers(std::slice::from_ref(fit), points);
     let subtitle = format!("{}, with its 95 % band", fit.name);
-    one_file(path, &plot(&subject.label, &subtitle, series))
+    write_plot(path, &incidence_plot(&subject.label, &subtitle, series))
 }

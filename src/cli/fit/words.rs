@@ -1,7 +1,6 @@
 //! A fit in words.
 
-use super::save::Saved;
-use super::subject::Subject;
+use crate::adopt::{FitSubject, StoredFit};
 use crate::cli::summary::{grouped, table};
 use crate::formats::words::significant;
 use crate::material::{Fit, FitReport, Goodness, HeldOut};
@@ -9,9 +8,9 @@ use crate::units::dbm_from_watts;
 
 /// All that a person wants to know of a fit.
 pub(super) fn result(
-    subject: &Subject,
+    subject: &FitSubject,
     fit: &Fit,
-    saved: Option<&Saved>,
+    saved: Option<&StoredFit>,
     files: &[String],
 ) -> String {
     let rows = subject.curve.observations.len();
@@ -24,10 +23,7 @@ pub(super) fn result(
     );
     text += &fit.report.as_ref().map_or(String::new(), report);
     if let Some(saved) = saved {
-        let open = match saved.curve_is_open {
-            true => ", since this fit leaves the curve open",
-            false => "",
-        };
+        let open = if saved.curve_is_open { ", since this fit leaves the curve open" } else { "" };
         text += &format!(
             "stored as fit {} of {}, revision {}, in {}; scenes render {}{open}\n",
             saved.fit, saved.material, saved.revision, saved.database, saved.render
@@ -40,7 +36,7 @@ pub(super) fn result(
 }
 
 /// What a fit says of itself.
-pub(in crate::cli) fn report(report: &FitReport) -> String {
+pub fn report(report: &FitReport) -> String {
     let end = if report.converged { "converged" } else { "did not converge" };
     let mut text = format!(
         "method {}: {end} ({}) after {} steps, {} of {} starts agree\n",
@@ -74,7 +70,7 @@ pub(in crate::cli) fn report(report: &FitReport) -> String {
 }
 
 fn estimates(report: &FitReport) -> String {
-    let unknown = || "not told".to_owned();
+    const UNKNOWN: &str = "not told";
     table(
         &["estimate", "value", "± sd", "95 % interval"],
         report.estimates.iter().map(|e| {
@@ -84,8 +80,8 @@ fn estimates(report: &FitReport) -> String {
             [
                 e.name.clone(),
                 significant(e.value, 4),
-                e.sd.map_or_else(unknown, |sd| significant(sd, 4)),
-                interval.unwrap_or_else(unknown),
+                e.sd.map_or(UNKNOWN.to_owned(), |sd| significant(sd, 4)),
+                interval.unwrap_or(UNKNOWN.to_owned()),
             ]
         }),
     )
@@ -93,9 +89,10 @@ fn estimates(report: &FitReport) -> String {
 
 fn level(report: &FitReport) -> String {
     let looks = report.looks.map_or("not used".to_owned(), |looks| significant(looks, 4));
-    let noise = match report.noise_w > 0.0 {
-        true => format!("{:.1} dBm", dbm_from_watts(report.noise_w)),
-        false => "none".to_owned(),
+    let noise = if report.noise_w > 0.0 {
+        format!("{:.1} dBm", dbm_from_watts(report.noise_w))
+    } else {
+        "none".to_owned()
     };
     format!("looks {looks}, noise floor {noise}\n")
 }

@@ -9,13 +9,13 @@ mod tracer;
 use std::path::PathBuf;
 
 use super::console::Console;
-use super::database::Database;
 use crate::error::Error;
 use crate::files::write_all;
 use crate::formats::exr::Packing;
 use crate::geometry::Raster;
 use crate::render::{RenderError, Setup, trace_placed};
 use crate::report::ScanRecord;
+use crate::setup::Database;
 use crate::setup::ReadyScene;
 use crate::trace::GpuError;
 use stages::Stages;

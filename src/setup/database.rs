@@ -1,26 +1,27 @@
-//! Which database a command works on.
+//! The database of a program that can do without one.
 
 use std::path::{Path, PathBuf};
 
 use crate::error::Error;
 use crate::store::Store;
 
-/// The database that is used when nobody names one.
-pub(super) const USUAL: &str = "matdb.sqlite";
+/// The database that is used when nobody names one, in the working directory.
+pub const USUAL_DATABASE: &str = "matdb.sqlite";
 
-/// The path of the database, and whether somebody asked for it.
-pub(super) struct Database {
+/// The path of the database, and whether somebody named it.
+pub struct Database {
     path: PathBuf,
     asked_for: bool,
 }
 
 impl Database {
-    /// The database that `--db` or `$MATDB` names, or the one in the working directory.
+    /// The database that was named, or the [usual](USUAL_DATABASE) one.
     pub fn new(asked: Option<&Path>) -> Database {
-        let path = asked.unwrap_or(Path::new(USUAL)).to_owned();
+        let path = asked.unwrap_or(Path::new(USUAL_DATABASE)).to_owned();
         Database { path, asked_for: asked.is_some() }
     }
 
+    /// The file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -29,6 +30,9 @@ impl Database {
     ///
     /// One that was asked for by name and is not there is an error: it may be a slip, and built-in
     /// materials must not silently stand in for somebody's own.
+    ///
+    /// # Errors
+    /// A named database that is not there, or a file that is not a database.
     pub fn read(&self) -> Result<Option<Store>, Error> {
         let store = Store::open_existing(&self.path)?;
         if store.is_none() && self.asked_for {
@@ -41,6 +45,9 @@ impl Database {
     }
 
     /// Opens it for writing and makes it when it is not there.
+    ///
+    /// # Errors
+    /// A file that is not a database or cannot be written.
     pub fn write(&self) -> Result<Store, Error> {
         Ok(Store::open(&self.path)?)
     }

@@ -1,0 +1,219 @@
+//! A curve into a material, with where it comes from.
+
+use super::admission;
+use super::provenance::{add_source, free_key};
+use crate::error::Error;
+use crate::material::form::is_licence;
+use crate::material::{Curve, Instrument, Material, SourceKind};
+use crate::measure;
+
+/// What is stated of a curve that is to be stored: where it comes from and what it was measured with.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CurveOrigin {
+    /// How the curve came to be.
+    pub kind: Option<SourceKind>,
+    /// Title of its source: who measured or made it, when and how.
+    pub title: Option<String>,
+    /// SPDX expression of the licence of its data.
+    pub licence: Option<String>,
+    /// Name or key of the instrument, one of the material's or a new one.
+    pub instrument: Option<String>,
+    /// Centre frequency of a new instrument, Hz.
+    pub frequency_hz: Option<f64>,
+    /// Least power that counts as a detection with a new instrument, W.
+    pub threshold_w: Option<f64>,
+}
+
+/// A curve in a material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AddedCurve {
+    /// Its name.
+    pub curve: String,
+    /// Key of its source.
+    pub source: String,
+}
+
+impl CurveOrigin {
+    /// Kind and title of the source.
+    ///
+    /// # Errors
+    /// One of them is not stated; `subject` names the curve.
+    pub(super) fn source(&self, subject: &str) -> Result<(SourceKind, &str), Error> {
+        match (self.kind, &self.title) {
+            (Some(kind), Some(title)) => Ok((kind, title)),
+            _ => Err(usage(
+                format!("nobody has said where {subject} comes from"),
+                "add --kind measured or --kind synthetic, and --source with who, when and how; a measured \
+                 curve needs --licence, --instrument, --frequency and --threshold, too",
+            )),
+        }
+    }
+
+    /// Checks what is stated before anything is computed for it.
+    ///
+    /// # Errors
+    /// A value that cannot be, an instrument of the material that has other values, or a measured curve of which
+    /// not enough is stated.
+    pub fn check(&self, material: &Material) -> Result<(), Error> {
+        if self.licence.as_ref().is_some_and(|licence| !is_licence(licence)) {
+            return Err(usage(
+                "--licence is no SPDX expression".to_owned(),
+                "write an SPDX identifier such as CC-BY-4.0, or LicenseRef-proprietary",
+            ));
+        }
+        let numbers = [self.frequency_hz, self.threshold_w];
+        if numbers.into_iter().flatten().any(|number| !(number > 0.0 && number.is_finite())) {
+            return Err(usage(
+                "--frequency or --threshold cannot be".to_owned(),
+                "give a frequency in GHz such as 300, a threshold in dBm such as -77",
+            ));
+        }
+        if self.known_instrument(material).is_some_and(|known| self.contradicts(known)) {
+            return Err(usage(
+                "the material's instrument of that name has another frequency or threshold"
+                    .to_owned(),
+                "leave --frequency and --threshold out, or name another --instrument",
+            ));
+        }
+        let missing = self.missing_flags(material);
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let what = match self.kind {
+            Some(SourceKind::Measured) => "a measured curve",
+            _ => "the instrument of a curve",
+        };
+        Err(usage(format!("{what} needs more"), &format!("add {}", missing.join(", "))))
+    }
+
+    /// Whether an instrument has another frequency or threshold than is stated.
+    fn contradicts(&self, known: &Instrument) -> bool {
+        self.frequency_hz.is_some_and(|hz| hz != known.centre_frequency_hz)
+            || self.threshold_w.is_some_and(|power_w| known.threshold_w != Some(power_w))
+    }
+
+    /// Flags that state what is missing.
+    fn missing_flags(&self, material: &Material) -> Vec<&'static str> {
+        let is_measured = self.kind == Some(SourceKind::Measured);
+        let is_known = self.known_instrument(material).is_some();
+        let is_stated =
+            self.instrument.is_some() || self.frequency_hz.is_some() || self.threshold_w.is_some();
+        let needs_instrument = (is_measured || is_stated) && !is_known;
+        let mut missing = Vec::new();
+        if is_measured && self.licence.is_none() {
+            missing.push("--licence CC-BY-4.0");
+        }
+        if needs_instrument && self.instrument.is_none() {
+            missing.push("--instrument \"name of the radar\"");
+        }
+        if needs_instrument && self.frequency_hz.is_none() {
+            missing.push("--frequency 300");
+        }
+        if is_measured && !is_known && self.threshold_w.is_none() {
+            missing.push("--threshold -77");
+        }
+        missing
+    }
+
+    /// The instrument of the material that is stated.
+    fn known_instrument<'a>(&self, material: &'a Material) -> Option<&'a Instrument> {
+        let name = self.instrument.as_ref()?;
+        material.instruments.iter().find(|known| known.key == *name || known.name == *name)
+    }
+
+    /// The key of the instrument, which is added when it is a new one.
+    fn add_instrument(&self, material: &mut Material) -> Option<String> {
+        if let Some(known) = self.known_instrument(material) {
+            return Some(known.key.clone());
+        }
+        let name = self.instrument.clone()?;
+        let centre_frequency_hz = self.frequency_hz?;
+        let key = free_key("radar", material.instruments.iter().map(|known| &known.key));
+        material.instruments.push(Instrument {
+            key: key.clone(),
+            name,
+            centre_frequency_hz,
+            threshold_w: self.threshold_w,
+            ..Instrument::default()
+        });
+        Some(key)
+    }
+}
+
+/// Adds a curve to a material, unless it has the same points already, maybe under another name.
+///
+/// # Errors
+/// What [`CurveOrigin::check`] refuses; the same points from another source; a curve or a fit of that name.
+pub fn add_curve(
+    material: &mut Material,
+    name: &str,
+    curve: &measure::Curve,
+    origin: &CurveOrigin,
+) -> Result<AddedCurve, Error> {
+    let (kind, title) = origin.source(&format!("the curve `{name}`"))?;
+    origin.check(material)?;
+    let source = add_source(material, kind, title, name, origin.licence.as_deref());
+    if let Some(known) = same_points(material, curve) {
+        if known.source == source {
+            return Ok(AddedCurve { curve: known.name.clone(), source });
+        }
+        let slug = &material.slug;
+        return Err(usage(
+            format!(
+                "`{slug}` has these points already, as the curve `{}` from {}",
+                known.name,
+                title_of(material, &known.source)
+            ),
+            &format!("`matdb fit {slug} --curve {} --save` fits that", known.name),
+        ));
+    }
+    if let Some(what) = owner_of_name(material, name) {
+        return Err(usage(
+            format!("`{}` has {what}", material.slug),
+            "give this curve another name with --curve",
+        ));
+    }
+    let curve = Curve {
+        name: name.to_owned(),
+        source: source.clone(),
+        instrument: origin.add_instrument(material),
+        session: None,
+        observations: curve.observations.clone(),
+    };
+    let gaps = admission::missing(material, &curve);
+    if !gaps.is_empty() {
+        return Err(usage(
+            format!("a measured curve needs more: {}", admission::clauses(&gaps)),
+            "name another --instrument, with --frequency and --threshold",
+        ));
+    }
+    material.curves.push(curve);
+    Ok(AddedCurve { curve: name.to_owned(), source })
+}
+
+/// The curve of a material that has these points.
+fn same_points<'a>(material: &'a Material, curve: &measure::Curve) -> Option<&'a Curve> {
+    material.curves.iter().find(|known| {
+        measure::Curve::from_observations(&known.observations).is_ok_and(|known| known == *curve)
+    })
+}
+
+/// The curve or the fit of a material that has this name, in words.
+fn owner_of_name(material: &Material, name: &str) -> Option<String> {
+    if let Some(known) = material.curves.iter().find(|known| known.name == name) {
+        let title = title_of(material, &known.source);
+        return Some(format!("another curve `{name}`, from {title}"));
+    }
+    let is_fit = material.fits.iter().any(|fit| fit.name == name);
+    is_fit.then(|| format!("a fit of the name `{name}`"))
+}
+
+/// The title of a source.
+fn title_of<'a>(material: &'a Material, key: &str) -> &'a str {
+    let source = material.sources.iter().find(|source| source.key == key);
+    source.map_or("nowhere", |source| &source.title)
+}
+
+pub(super) fn usage(problem: String, way_out: &str) -> Error {
+    Error::Usage { problem, way_out: way_out.to_owned() }
+}

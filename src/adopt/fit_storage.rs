@@ -1,0 +1,223 @@
+//! A fit into a material, as a new revision.
+
+use serde::Serialize;
+
+use super::curve::{AddedCurve, CurveOrigin, add_curve, usage};
+use super::fit_subject::FitSubject;
+use super::provenance::{activity, add_source};
+use super::recipients::replace_fit;
+use crate::error::Error;
+use crate::fit::{Finding, FitResult};
+use crate::material::{Curve, FitReport, Material, SourceKind};
+use crate::setup::{Database, MaterialRevision, find_material};
+use crate::store::Store;
+
+/// How a fit is to be stored.
+#[derive(Clone, Debug, Default)]
+pub struct FitStorage {
+    /// The material that gets it; `None` for the one whose curve was fitted.
+    pub material: Option<String>,
+    /// Name of the fit.
+    pub fit_name: String,
+    /// Whether scenes go on to render what they rendered before.
+    pub keep_render: bool,
+    /// Where the curve of a file comes from.
+    pub origin: CurveOrigin,
+}
+
+/// Where a fit was stored.
+#[derive(Clone, Debug, Serialize)]
+pub struct StoredFit {
+    /// The material.
+    pub material: String,
+    /// Its new revision.
+    pub revision: u32,
+    /// Name of the fit.
+    pub fit: String,
+    /// Name of the curve.
+    pub curve: String,
+    /// What scenes render of the material now.
+    pub render: String,
+    /// Whether the fit leaves the curve open somewhere, so that it is not rendered.
+    pub curve_is_open: bool,
+    /// The database.
+    pub database: String,
+}
+
+/// The material that gets a fit, with its curve and the key of the curve's source.
+struct Target {
+    material: Material,
+    curve: String,
+    source: String,
+}
+
+impl FitStorage {
+    /// Checks, before anything is fitted, that the fit can be stored; the material with the curve in it.
+    ///
+    /// # Errors
+    /// A material that is not known or is another one than the curve's; an origin of the curve that is missing,
+    /// stated twice or not enough; a curve that has been revised since; a name that something else has.
+    pub fn check(&self, subject: &FitSubject, store: Option<&Store>) -> Result<Material, Error> {
+        Ok(self.target(subject, store)?.material)
+    }
+
+    /// Stores a fit in `database`, with the curve of a file. A fit of the same name is replaced, and stays in the
+    /// earlier revisions.
+    ///
+    /// # Errors
+    /// As [`check`](Self::check); a database that cannot be written.
+    pub fn save(
+        &self,
+        subject: &FitSubject,
+        found: &FitResult,
+        database: &Database,
+    ) -> Result<StoredFit, Error> {
+        let mut store = database.write()?;
+        let files: Vec<_> = subject.file.as_deref().into_iter().collect();
+        store.record(activity("fit", &files)?);
+        let Target { mut material, curve, source } = self.target(subject, Some(&store))?;
+        let mut fit = found.stored(&self.fit_name, &curve, &source);
+        fit.parameter_sources = add_parameter_sources(&mut material, found);
+        replace_fit(&mut material, fit);
+        let is_open = found.verdict.iter().any(Finding::leaves_the_curve_open);
+        if !self.keep_render && !is_open {
+            material.render.clone_from(&self.fit_name);
+        }
+        let added = store.add([&material])?;
+        Ok(StoredFit {
+            material: material.slug.to_string(),
+            revision: added.first().map_or(1, |added| added.revision()),
+            fit: self.fit_name.clone(),
+            curve,
+            render: material.render,
+            curve_is_open: is_open,
+            database: database.path().display().to_string(),
+        })
+    }
+
+    fn target(&self, subject: &FitSubject, store: Option<&Store>) -> Result<Target, Error> {
+        let target = match &subject.found {
+            Some(found) => self.target_of_material(subject, found, store)?,
+            None => self.target_of_file(subject, store)?,
+        };
+        let (material, name) = (&target.material, &self.fit_name);
+        let what = if material.curves.iter().any(|curve| curve.name == *name) {
+            "a curve"
+        } else if material.fits.iter().any(|fit| fit.name == *name && fit.report.is_none()) {
+            "a fit that nobody fitted here"
+        } else {
+            return Ok(target);
+        };
+        Err(usage(
+            format!("`{}` has {what} of the name `{name}`", material.slug),
+            "give the fit another name with --fit-name",
+        ))
+    }
+
+    /// The current revision of the material whose curve was fitted.
+    fn target_of_material(
+        &self,
+        subject: &FitSubject,
+        found: &MaterialRevision,
+        store: Option<&Store>,
+    ) -> Result<Target, Error> {
+        let slug = &found.material.slug;
+        if self.material.as_ref().is_some_and(|name| name != slug.as_str()) {
+            return Err(usage(
+                format!("a fit of a curve of `{slug}` belongs to `{slug}`"),
+                "leave the name after --save out",
+            ));
+        }
+        if self.origin != CurveOrigin::default() {
+            return Err(usage(
+                format!("the curve of `{slug}` has a source already"),
+                "leave --kind, --source and what goes with them out",
+            ));
+        }
+        // The current revision: it may have been revised while the fit ran.
+        let material = find_material(store, slug.as_str(), "")?.material;
+        let [fitted, current] =
+            [&found.material, &material].map(|material| curve_of(material, &subject.curve_name));
+        match current.filter(|curve| fitted == Some(*curve)) {
+            Some(Curve { name, source, .. }) => {
+                let (curve, source) = (name.clone(), source.clone());
+                Ok(Target { material, curve, source })
+            }
+            None => Err(usage(
+                format!("the curve of {} is not that of the current revision", subject.wanted),
+                "fit the current one, or leave --save out",
+            )),
+        }
+    }
+
+    /// The material that is named, with the curve of the file in it.
+    fn target_of_file(&self, subject: &FitSubject, store: Option<&Store>) -> Result<Target, Error> {
+        let Some(name) = &self.material else {
+            return Err(usage(
+                format!("{} belongs to no material yet", subject.label),
+                "name the one to store it in, as in --save my-paint",
+            ));
+        };
+        if name.contains('@') {
+            return Err(usage(
+                format!("`{name}` names a revision, and a revision never changes"),
+                "give the bare name; the fit becomes a new revision",
+            ));
+        }
+        self.origin.source(&subject.label)?;
+        let mut material = match find_material(store, name, "--save: ") {
+            Err(Error::UnknownMaterial { asked_by, name, way_out }) => {
+                let way_out = how_to_add(subject, &name, &way_out);
+                return Err(Error::UnknownMaterial { asked_by, name, way_out });
+            }
+            found => found?.material,
+        };
+        let AddedCurve { curve, source } =
+            add_curve(&mut material, &subject.curve_name, &subject.curve, &self.origin)?;
+        Ok(Target { material, curve, source })
+    }
+}
+
+fn curve_of<'a>(material: &'a Material, name: &str) -> Option<&'a Curve> {
+    material.curves.iter().find(|curve| curve.name == name)
+}
+
+/// How the material that gets a curve is made of it; `way_out` may have a name that was meant instead.
+fn how_to_add(subject: &FitSubject, name: &str, way_out: &str) -> String {
+    let meant = if way_out.starts_with("did you mean") {
+        format!("{way_out} Else ")
+    } else {
+        String::new()
+    };
+    format!(
+        "{meant}`matdb add --from {} --name {name} --class CLASS …` makes one of the curve, and then \
+         `matdb fit {name} --save` stores the fit",
+        subject.wanted
+    )
+}
+
+/// Adds the sources of the parameters that no data gave: those that were fixed, and those that are a convention.
+/// Path and key of each.
+fn add_parameter_sources(material: &mut Material, found: &FitResult) -> Vec<(String, String)> {
+    const CHOSEN: &str = "Chosen, while the other parameters were fitted";
+    const CONVENTION: &str = "Convention: k is chosen, and f_lambda and r_s follow from it; the curve tells \
+                              S = (1 − k)·f_lambda and R = k·r_s";
+    let fixed: Vec<String> = found.fit.fixed.iter().map(|(path, _)| path.clone()).collect();
+    let mut by_convention = Vec::new();
+    if found.gauge_k.is_some() {
+        by_convention.extend(FitReport::BY_CONVENTION.map(str::to_owned));
+        by_convention.retain(|path| !fixed.contains(path));
+    }
+    let mut sources = Vec::new();
+    for (paths, title, key) in
+        [(fixed, CHOSEN, "chosen"), (by_convention, CONVENTION, "convention")]
+    {
+        if !paths.is_empty() {
+            let key = add_source(material, SourceKind::Synthetic, title, key, None);
+            sources.extend(paths.into_iter().map(|path| (path, key.clone())));
+        }
+    }
+    sources.sort();
+    sources.dedup_by(|a, b| a.0 == b.0);
+    sources
+}

@@ -1,0 +1,243 @@
+//! How a material scatters, as plots of σ⁰ over the angle of incidence, and what the parameters of a model do.
+
+use std::path::Path;
+
+use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Scattering, Shadowing};
+use crate::error::Error;
+use crate::fit::stored_band;
+use crate::formats::figure::{FigureError, Plot, Series, Style};
+use crate::material::{Censor, Fit, Material, Observation, Reach};
+use crate::units::db_from_ratio;
+
+/// Below this level, dB, nothing is said to come back.
+const FAINTEST_DB: f64 = -80.0;
+
+/// What an angle may lose in its conversion to degrees and back, rad.
+const ROUNDING_RAD: f64 = 1e-9;
+
+/// What the file of a figure holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FigureFormat {
+    /// Vectors.
+    Svg,
+    /// Pixels.
+    Png,
+}
+
+impl FigureFormat {
+    /// The format that the ending of a path stands for.
+    ///
+    /// # Errors
+    /// An ending other than .svg and .png.
+    pub fn of(path: &Path) -> Result<FigureFormat, Error> {
+        match path.extension().and_then(|extension| extension.to_str()) {
+            Some("svg") => Ok(FigureFormat::Svg),
+            Some("png") => Ok(FigureFormat::Png),
+            _ => Err(Error::Usage {
+                problem: format!("`{}` does not end in .svg or .png", path.display()),
+                way_out: "name the file so".to_owned(),
+            }),
+        }
+    }
+
+    /// The bytes of a plot.
+    ///
+    /// # Errors
+    /// A picture that is too large.
+    pub fn encode(self, plot: &Plot) -> Result<Vec<u8>, FigureError> {
+        match self {
+            FigureFormat::Svg => Ok(plot.svg()?.into_bytes()),
+            FigureFormat::Png => plot.png(),
+        }
+    }
+}
+
+/// A plot over the angle of incidence, degrees, of σ⁰, dB.
+pub fn incidence_plot<'a>(title: &'a str, subtitle: &'a str, series: Vec<Series>) -> Plot<'a> {
+    Plot {
+        title,
+        subtitle,
+        x_label: "incidence, °",
+        y_label: "σ⁰, dB",
+        x_range: Some((0.0, 90.0)),
+        y_range: None,
+        equal: false,
+        series,
+    }
+}
+
+/// The curves of a material, and all its fits; without fits the model that is rendered.
+///
+/// # Errors
+/// A material that renders nothing.
+pub fn material_plot(material: &Material) -> Result<Vec<Series>, Error> {
+    let mut points = Vec::new();
+    for curve in &material.curves {
+        points.extend(curve_points(&curve.name, &curve.observations));
+    }
+    let mut series = fit_layers(&material.fits, points);
+    if material.fits.is_empty() {
+        series.push(model_curve("rendered", &material.scattering()?));
+    }
+    Ok(series.into_iter().flat_map(|series| split_at_reach(material, series)).collect())
+}
+
+/// The model that a material renders, for several values of one parameter: `PARAMETER=V1,V2,…`.
+///
+/// # Errors
+/// A text that is not a sweep; a parameter that the model lacks; a value that it cannot have.
+pub fn sweep_plot(material: &Material, sweep: &str) -> Result<Vec<Series>, Error> {
+    let base = material.scattering()?;
+    let Some((path, values)) = sweep.split_once('=') else {
+        let way_out = "write it as --sweep specular.m=0.01,0.05,0.1";
+        return Err(usage(format!("`{sweep}` names no values"), way_out));
+    };
+    let mut series = Vec::new();
+    for text in values.split(',').map(str::trim) {
+        let Ok(value) = text.parse() else {
+            return Err(usage(format!("`{text}` is no number"), "separate numbers by commas"));
+        };
+        let mut model = base.clone();
+        if !model.set_parameter(path, value) {
+            let paths: Vec<String> = base.parameters().into_iter().map(|p| p.path).collect();
+            return Err(usage(
+                format!("`{}` has no parameter `{path}`", material.slug),
+                &format!("there are: {}", paths.join(", ")),
+            ));
+        }
+        if let Err(error) = model.validate() {
+            return Err(usage(error.to_string(), "leave it out of the sweep"));
+        }
+        series.extend(split_at_reach(material, model_curve(&format!("{path} = {text}"), &model)));
+    }
+    Ok(series)
+}
+
+/// Figures 16 to 19 of the paper as PNG and SVG, by name: one parameter varied, the others fixed. The paper prints
+/// the values of m only; the others are ours.
+///
+/// # Errors
+/// A picture that is too large.
+pub fn appendix_figures() -> Result<Vec<(String, Vec<u8>)>, Error> {
+    let base = Brdf::Mixture(Mixture {
+        k: 0.1,
+        diffuse: Box::new(Brdf::BlinnPhong(BlinnPhong { r_s: 0.016, alpha: 3.0 })),
+        specular: Box::new(Brdf::CookTorrance(CookTorrance {
+            f_lambda: 0.1,
+            m: 0.05,
+            m_across: None,
+            distribution: Distribution::Beckmann,
+            shadowing: Shadowing::Separable,
+        })),
+    });
+    let mut files = Vec::new();
+    for (number, part, name, values) in [
+        (16, "specular", "f_lambda", [0.001, 0.01, 0.1]),
+        (17, "specular", "m", [0.01, 0.05, 0.1]),
+        (18, "diffuse", "r_s", [0.001, 0.01, 0.1]),
+        (19, "diffuse", "alpha", [1.0, 3.0, 10.0]),
+    ] {
+        let mut series = Vec::new();
+        for value in values {
+            let mut model = base.clone();
+            model.set_parameter(&format!("{part}.{name}"), value);
+            series.push(model_curve(&format!("{name} = {value}"), &model));
+        }
+        let title = format!("Influence of {name}");
+        let plot = Plot { y_range: Some((-70.0, 30.0)), ..incidence_plot(&title, "", series) };
+        files.push((format!("figure-{number}.png"), plot.png()?));
+        files.push((format!("figure-{number}.svg"), plot.svg()?.into_bytes()));
+    }
+    Ok(files)
+}
+
+/// Bands of fits below points below curves of fits, so that each can be seen.
+pub fn fit_layers(fits: &[Fit], points: Vec<Series>) -> Vec<Series> {
+    let curves = fits.iter().map(|fit| model_curve(&fit.name, &fit.model));
+    fits.iter().filter_map(band).chain(points).chain(curves).collect()
+}
+
+/// The backscatter points of a curve: detections, and in series of their own the thresholds of what was not
+/// detected and of what was above the instrument's range.
+pub fn curve_points(name: &str, observations: &[Observation]) -> Vec<Series> {
+    let (mut seen, mut below, mut above) = (Vec::new(), Vec::new(), Vec::new());
+    for row in observations.iter().filter(|row| row.is_retro()) {
+        let (points, sigma0) = match (row.sigma0, row.threshold_sigma0, row.censor) {
+            (Some(sigma0), ..) => (&mut seen, sigma0),
+            (None, Some(threshold), Censor::Right) => (&mut above, threshold),
+            (None, Some(threshold), _) => (&mut below, threshold),
+            (None, None, _) => continue,
+        };
+        points.push((row.theta_i_rad.to_degrees(), db_from_ratio(sigma0)));
+    }
+    let mut series = vec![Series { name: name.to_owned(), style: Style::Points, points: seen }];
+    for (points, style, side) in [(below, Style::Below, "below"), (above, Style::Points, "above")] {
+        if !points.is_empty() {
+            let name = format!("{name}, {side} the threshold here");
+            series.push(Series { name, style, points });
+        }
+    }
+    series
+}
+
+/// A curve where the material claims its numbers, and the rest of it in dashes.
+fn split_at_reach(material: &Material, series: Series) -> Vec<Series> {
+    if series.style != Style::Curve {
+        return vec![series];
+    }
+    // Without fits the rendered curve is drawn, which interpolates between its points.
+    let reach = if material.fits.is_empty() {
+        material.reach()
+    } else {
+        Reach::new(material.theta_rad, None)
+    };
+    let is_beyond: Vec<bool> = series
+        .points
+        .iter()
+        .map(|(theta_deg, _)| reach.outside_rad(theta_deg.to_radians()) >= ROUNDING_RAD)
+        .collect();
+    let (mut within, mut beyond) = (Vec::new(), Vec::new());
+    for (place, &(theta_deg, level_db)) in series.points.iter().enumerate() {
+        // The ends belong to both, or a gap would show.
+        let around = &is_beyond[place.saturating_sub(1)..(place + 2).min(is_beyond.len())];
+        within.push((theta_deg, if is_beyond[place] { f64::NAN } else { level_db }));
+        beyond.push((theta_deg, if around.contains(&true) { level_db } else { f64::NAN }));
+    }
+    vec![
+        Series { name: series.name.clone(), style: Style::Beyond, points: beyond },
+        Series { name: series.name, style: Style::Curve, points: within },
+    ]
+}
+
+/// The 95 % band of a fit that has a report.
+fn band(fit: &Fit) -> Option<Series> {
+    let (mut low, mut high) = (Vec::new(), Vec::new());
+    for step in 0..900u32 {
+        let theta_deg = f64::from(step) / 10.0;
+        let Some(band) = stored_band(fit, theta_deg.to_radians()) else { continue };
+        let [low_db, high_db] = [band.low, band.high].map(db_from_ratio);
+        // Where nothing comes back there is no band either.
+        if high_db >= FAINTEST_DB {
+            low.push((theta_deg, low_db.max(FAINTEST_DB)));
+            high.push((theta_deg, high_db.max(FAINTEST_DB)));
+        }
+    }
+    let outline: Vec<(f64, f64)> = low.into_iter().chain(high.into_iter().rev()).collect();
+    let is_empty = outline.is_empty();
+    (!is_empty).then(|| Series { name: fit.name.clone(), style: Style::Band, points: outline })
+}
+
+/// σ⁰ in dB every tenth of a degree: the lobe of a smooth surface needs that many.
+fn model_curve(name: &str, model: &dyn Scattering) -> Series {
+    let mut points = Vec::new();
+    for step in 0..900u32 {
+        let theta_deg = f64::from(step) / 10.0;
+        let level_db = db_from_ratio(model.sigma0(theta_deg.to_radians()));
+        points.push((theta_deg, if level_db >= FAINTEST_DB { level_db } else { f64::NAN }));
+    }
+    Series { name: name.to_owned(), style: Style::Curve, points }
+}
+
+fn usage(problem: String, way_out: &str) -> Error {
+    Error::Usage { problem, way_out: way_out.to_owned() }
+}

@@ -1,0 +1,166 @@
+//! The known materials that a measured curve is nearest to, in a database and among those that are built in.
+
+use serde::Serialize;
+
+use crate::catalogue::{Distance, Nearest, Probe, Rank};
+use crate::error::Error;
+use crate::material::{Observation, Slug};
+use crate::setup::{MaterialRevision, find_material, store_of_not_added};
+use crate::store::{Filter, Store};
+use crate::units::rounded;
+
+/// A curve whose neighbours are wanted.
+#[derive(Clone, Debug)]
+pub struct NeighbourSearch {
+    /// Its points.
+    pub observations: Vec<Observation>,
+    /// Frequency at which it was measured, Hz; `None` where nobody says.
+    pub frequency_hz: Option<f64>,
+    /// The material that the curve is of, which is left out, if it is the current revision.
+    pub own: Option<Slug>,
+}
+
+/// A material and how far it is.
+#[derive(Clone, Debug, Serialize)]
+pub struct Neighbour {
+    /// Its short name.
+    pub slug: Slug,
+    /// Its full name.
+    pub name: String,
+    /// None for a built-in one that is not in the database.
+    pub revision: Option<u32>,
+    /// Of the data behind what scenes render.
+    pub kind: &'static str,
+    /// Of a model that goes with a curve, which nobody measured itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub kind_words: Option<String>,
+    /// Whether it may still be used: `active`, `superseded`, `withdrawn`.
+    pub status: String,
+    /// For which its numbers are claimed.
+    pub frequency_ghz: [f64; 2],
+    /// How far the curve's frequency lies outside of these, 0 within; none where nobody says it.
+    pub frequency_outside_ghz: Option<f64>,
+    /// How far it is.
+    #[serde(flatten)]
+    pub distance: Distance,
+}
+
+/// The neighbours of a curve, nearest first.
+#[derive(Clone, Debug, Serialize)]
+pub struct NeighbourReport {
+    /// At which the curve was measured; none where nobody says.
+    pub measured_at_ghz: Option<f64>,
+    /// Number of the curve's angles.
+    pub angles: usize,
+    /// The distance to the true material that chance alone makes, dB.
+    pub noise_db: Option<f64>,
+    /// Number of materials with too little in common.
+    pub left_out: usize,
+    /// The nearest materials.
+    pub materials: Vec<Neighbour>,
+}
+
+impl NeighbourSearch {
+    /// The longest curve of a material, `NAME` or `NAME@REVISION`; `measured_at_hz` is stated instead of the frequency
+    /// of its instrument.
+    ///
+    /// # Errors
+    /// A material that is not known, or has no curve.
+    pub fn of_material(
+        name: &str,
+        measured_at_hz: Option<f64>,
+        store: Option<&Store>,
+    ) -> Result<NeighbourSearch, Error> {
+        let MaterialRevision { material, revision } = find_material(store, name, "")?;
+        let current = store.map(|store| store.summary(&material.slug)).transpose()?.flatten();
+        let is_current = current.map(|current| current.revision) == revision;
+        let longest =
+            material.curves.into_iter().rev().max_by_key(|curve| curve.observations.len());
+        let Some(curve) = longest else {
+            return Err(Error::Usage {
+                problem: format!("`{name}` has no curve"),
+                way_out: "give one with --curve FILE".to_owned(),
+            });
+        };
+        let instrument =
+            material.instruments.iter().find(|own| Some(&own.key) == curve.instrument.as_ref());
+        Ok(NeighbourSearch {
+            observations: curve.observations,
+            frequency_hz: measured_at_hz.or(instrument.map(|own| own.centre_frequency_hz)),
+            own: is_current.then_some(material.slug),
+        })
+    }
+
+    /// The nearest materials of `store`, as far as `filter` lets them through, and of those that are built in; at most
+    /// `limit`.
+    ///
+    /// # Errors
+    /// A curve without backscatter that was detected; a database that cannot be read.
+    pub fn run(
+        &self,
+        store: Option<&Store>,
+        filter: &Filter,
+        rank: Rank,
+        limit: usize,
+    ) -> Result<NeighbourReport, Error> {
+        let Some(probe) = Probe::new(&self.observations) else {
+            return Err(Error::Usage {
+                problem: "the curve has no backscatter that was detected, or a point above the \
+                          instrument's range"
+                    .to_owned(),
+                way_out: "give a curve with detections below that range".to_owned(),
+            });
+        };
+        let built_in = store_of_not_added(store)?;
+        let mut report = NeighbourReport {
+            measured_at_ghz: self.frequency_hz.map(|hz| rounded(hz / 1e9)),
+            angles: probe.angles(),
+            noise_db: probe.noise_db(),
+            left_out: 0,
+            materials: Vec::new(),
+        };
+        for (store, is_stored) in [(store, true), (Some(&built_in), false)] {
+            let Some(store) = store else { continue };
+            // One more than wanted: the material itself is left out.
+            let Nearest { found, left_out } =
+                probe.nearest(store, filter, rank, limit.saturating_add(1))?;
+            report.left_out += left_out;
+            for (slug, distance) in found {
+                if self.own.as_ref() != Some(&slug) {
+                    report.materials.extend(self.neighbour(store, &slug, is_stored, distance)?);
+                }
+            }
+        }
+        report.materials.sort_by(|a, b| {
+            let distance = a.distance.rank_db(rank).total_cmp(&b.distance.rank_db(rank));
+            distance.then_with(|| a.slug.cmp(&b.slug))
+        });
+        report.materials.truncate(limit);
+        Ok(report)
+    }
+
+    fn neighbour(
+        &self,
+        store: &Store,
+        slug: &Slug,
+        is_stored: bool,
+        distance: Distance,
+    ) -> Result<Option<Neighbour>, Error> {
+        let (Some(summary), Some(stored)) = (store.summary(slug)?, store.get(slug, None)?) else {
+            return Ok(None);
+        };
+        let material = stored.material;
+        let outside_hz = self.frequency_hz.map(|hz| material.frequency_outside_hz(hz));
+        Ok(Some(Neighbour {
+            slug: summary.slug,
+            name: summary.name,
+            revision: is_stored.then_some(summary.revision),
+            kind: summary.render_kind.as_str(),
+            kind_words: material.rendered_words(),
+            status: summary.status,
+            frequency_ghz: material.frequency_hz.map(|hz| rounded(hz / 1e9)),
+            frequency_outside_ghz: outside_hz.map(|hz| rounded(hz / 1e9)),
+            distance,
+        }))
+    }
+}

@@ -1,0 +1,75 @@
+//! A measured cloud and the pose of its target, from files.
+
+use std::path::Path;
+
+use glam::{DMat3, DVec3};
+use serde::Deserialize;
+
+use crate::error::Error;
+use crate::files::FilesError;
+use crate::frames::{Global, Pose};
+use crate::measure::{Cloud, CloudFormat, CloudReading};
+
+/// Reads a measured cloud; the ending of its name says the format: .ply, .csv or .xyz.
+///
+/// # Errors
+/// Another ending; a file that cannot be read or is refused.
+pub fn read_cloud(path: &Path, reading: &CloudReading) -> Result<Cloud, Error> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    let Some(format) = CloudFormat::from_extension(&extension) else {
+        return Err(Error::Usage {
+            problem: format!("`{}` does not end in .ply, .csv or .xyz", path.display()),
+            way_out: "convert or rename the cloud".to_owned(),
+        });
+    };
+    let cloud = reading.read(format, &read(path)?);
+    cloud.map_err(|error| Error::Cloud { file: path.to_owned(), error })
+}
+
+/// Reads the pose of a `pose.json`, as `matdb measure` writes it.
+///
+/// # Errors
+/// A file that cannot be read, or has no pose.
+pub fn read_pose(path: &Path) -> Result<Pose<Global, Global>, Error> {
+    let file: PoseFile =
+        serde_json::from_slice(&read(path)?).map_err(|error| no_pose(path, &error.to_string()))?;
+    file.pose.pose().ok_or_else(|| no_pose(path, "it is no rotation with a shift within 10 km"))
+}
+
+/// Of a `pose.json`, the part that is read.
+#[derive(Deserialize)]
+struct PoseFile {
+    pose: PoseRecord,
+}
+
+#[derive(Deserialize)]
+struct PoseRecord {
+    rotation_rows: [[f64; 3]; 3],
+    translation_m: [f64; 3],
+}
+
+impl PoseRecord {
+    /// The pose; `None` where it is not a rotation with a shift within 10 km.
+    fn pose(&self) -> Option<Pose<Global, Global>> {
+        /// Rounding of a file may turn a matrix by so much.
+        const ROUNDING: f64 = 1e-6;
+        let rotation = DMat3::from_cols_array_2d(&self.rotation_rows).transpose();
+        let error = rotation * rotation.transpose() - DMat3::IDENTITY;
+        let is_rigid = error.to_cols_array().iter().all(|x| x.abs() < ROUNDING)
+            && (rotation.determinant() - 1.0).abs() < ROUNDING;
+        let is_near = self.translation_m.iter().all(|x| x.abs() <= 1e4);
+        let translation_m = DVec3::from_array(self.translation_m);
+        (is_rigid && is_near).then(|| Pose::new(rotation, translation_m))
+    }
+}
+
+fn no_pose(path: &Path, problem: &str) -> Error {
+    Error::Usage {
+        problem: format!("{}: {problem}", path.display()),
+        way_out: "give a pose.json that `matdb measure` wrote".to_owned(),
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, FilesError> {
+    std::fs::read(path).map_err(|reason| FilesError::unreadable(path, reason))
+}
