@@ -9,7 +9,8 @@ use serde::Serialize;
 use super::about::About;
 use super::error::CatalogueError;
 use super::layout::DATABASE;
-use super::verify::{about, database, is_newer, verify};
+use super::read::{about, is_newer};
+use super::verify::{database, verify};
 use crate::effects::{Level, resolve};
 use crate::material::{Activity, Material, Origin, Slug};
 use crate::store::{Added, RevisionSummary, Store, StoreError, Stored};
@@ -23,7 +24,7 @@ pub struct Import {
 
 /// What the import does with one material.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Taken {
+pub struct MaterialPlan {
     /// Its name in their catalogue.
     pub slug: Slug,
     /// Its name here.
@@ -62,11 +63,11 @@ pub enum Outcome {
 
 /// What was, or would be, imported.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Imported {
+pub struct ImportSummary {
     /// Whether this was a trial that writes nothing.
     pub dry_run: bool,
     /// Every material of their catalogue.
-    pub materials: Vec<Taken>,
+    pub materials: Vec<MaterialPlan>,
 }
 
 impl Import {
@@ -111,7 +112,7 @@ impl Import {
         &self,
         ours: Option<&Store>,
         prefix: Option<&str>,
-    ) -> Result<Vec<Taken>, CatalogueError> {
+    ) -> Result<Vec<MaterialPlan>, CatalogueError> {
         let mut plan = Vec::new();
         let mut names = BTreeSet::new();
         for summary in self.theirs.list()? {
@@ -137,7 +138,7 @@ impl Import {
         ours: Option<&Store>,
         slug: &Slug,
         name: Slug,
-    ) -> Result<Taken, CatalogueError> {
+    ) -> Result<MaterialPlan, CatalogueError> {
         let history = self.theirs.history(slug)?;
         let added = Outcome::Added { revisions: history.len() };
         let known = ours.map_or(Ok(None), |ours| ours.get(&name, None))?;
@@ -145,7 +146,7 @@ impl Import {
             (Some(ours), Some(known)) => self.beside(ours, known, slug, &name)?,
             _ => added,
         };
-        Ok(Taken { slug: slug.clone(), name, outcome })
+        Ok(MaterialPlan { slug: slug.clone(), name, outcome })
     }
 
     /// What the import does with a material where the database has one of the same name.
@@ -228,7 +229,7 @@ impl Import {
     pub fn take(
         &self,
         ours: &mut Store,
-        plan: &[Taken],
+        plan: &[MaterialPlan],
         by: &Activity,
     ) -> Result<(), CatalogueError> {
         let about = self.about()?;
@@ -257,8 +258,12 @@ impl Import {
     }
 
     /// Numbers of their revisions that are added, oldest first.
-    fn wanted(&self, ours: Option<&Store>, taken: &Taken) -> Result<Vec<u32>, CatalogueError> {
-        let Taken { slug, name, outcome } = taken;
+    fn wanted(
+        &self,
+        ours: Option<&Store>,
+        taken: &MaterialPlan,
+    ) -> Result<Vec<u32>, CatalogueError> {
+        let MaterialPlan { slug, name, outcome } = taken;
         match outcome {
             Outcome::Added { .. } => {
                 Ok(self.theirs.history(slug)?.into_iter().map(|line| line.revision).collect())
@@ -292,7 +297,7 @@ impl Import {
     }
 
     /// Refuses what `add` would refuse, too: unknown effects and misleading names.
-    fn check(&self, ours: Option<&Store>, taken: &Taken) -> Result<(), CatalogueError> {
+    fn check(&self, ours: Option<&Store>, taken: &MaterialPlan) -> Result<(), CatalogueError> {
         let about = self.about()?;
         for number in self.wanted(ours, taken)? {
             let stored = self.stored(&taken.slug, number)?;

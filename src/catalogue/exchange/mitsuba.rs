@@ -16,7 +16,7 @@ use std::f64::consts::{PI, SQRT_2};
 use num_complex::Complex;
 
 use super::error::ExchangeError;
-use super::exported::Exported;
+use super::export_files::Export;
 use super::subject::{Subject, one_line};
 use crate::brdf::{
     Brdf, CookTorrance, Distribution, Fresnel, Lambert, Mixture, Scattering, Shadowing,
@@ -24,7 +24,7 @@ use crate::brdf::{
 use crate::units::db_from_ratio;
 
 /// Writes the BSDF.
-pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeError> {
+pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeError> {
     const FORMAT: &str = "a Mitsuba BSDF";
     const WAY_OUT: &str = "render another fit or curve";
     let slug = &subject.material.slug;
@@ -61,7 +61,7 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
     }
     let id = format!("version=\"3.0.0\" id=\"{}\"", subject.material.slug);
     bsdf(&near, &id, 0, &mut text);
-    Ok(Exported { files: vec![(name.to_owned(), text.into_bytes())], lost })
+    Ok(Export { files: vec![(name.to_owned(), text.into_bytes())], lost })
 }
 
 /// The text as it may stand in a comment of XML; the second pass is for three in a row.

@@ -14,7 +14,7 @@
 //! imported file becomes a [`Material`] that states its source.
 
 mod error;
-mod exported;
+mod export_files;
 mod given;
 mod mitsuba;
 mod open_material;
@@ -31,7 +31,7 @@ mod universal_brdf_in;
 use crate::material::Material;
 
 pub use error::ExchangeError;
-pub use exported::Exported;
+pub use export_files::Export;
 pub use given::Given;
 pub use subject::Subject;
 
@@ -56,7 +56,7 @@ pub enum Format {
 ///
 /// # Errors
 /// When the material lacks what the format needs, or the program was built without the format.
-pub fn export(subject: &Subject, format: Format, name: &str) -> Result<Exported, ExchangeError> {
+pub fn export(subject: &Subject, format: Format, name: &str) -> Result<Export, ExchangeError> {
     match format {
         Format::Csv => Ok(plain_csv::write(subject, name)),
         #[cfg(feature = "parquet")]

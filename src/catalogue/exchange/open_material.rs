@@ -15,7 +15,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use serde_json::{Value, json};
 
 use super::error::ExchangeError;
-use super::exported::Exported;
+use super::export_files::Export;
 use super::subject::{Subject, one_line, sigma0_per_f};
 use crate::brdf::{Brdf, Scattering};
 use crate::frames::Direction;
@@ -38,7 +38,7 @@ const AZIMUTH_STEP_DEG: f64 = 15.0;
 const FAINTEST_PER_SR: f64 = 1e-9;
 
 /// Writes the material and its tables.
-pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeError> {
+pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeError> {
     let stem = name.strip_suffix(".xomp").unwrap_or(name);
     let [brdf_name, emp_name] = ["brdf", "emp"].map(|table| format!("{stem}_{table}.xompt"));
     let table = Table::new(subject)?;
@@ -73,7 +73,7 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
             files.push((emp_name, encoded(&emp)?));
         }
     }
-    Ok(Exported { files, lost })
+    Ok(Export { files, lost })
 }
 
 fn schema(name: &str) -> String {

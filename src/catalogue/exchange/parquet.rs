@@ -4,14 +4,14 @@
 //! Lost: everything but the curve.
 
 use super::error::ExchangeError;
-use super::exported::Exported;
+use super::export_files::Export;
 use super::plain_csv::describe;
 use super::subject::Subject;
 use crate::catalogue::tables::parquet_of;
 use crate::store::{Cell, Column, ColumnKind, Table};
 
 /// Writes the curve, or what the model says at every degree.
-pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeError> {
+pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeError> {
     let points = subject.points();
     let columns = vec![
         real("theta_i_rad"),
@@ -51,7 +51,7 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
         "the file holds {}; nothing else of the material has a column there",
         describe(&points)
     );
-    Ok(Exported { files: vec![(name.to_owned(), bytes)], lost })
+    Ok(Export { files: vec![(name.to_owned(), bytes)], lost })
 }
 
 fn real(name: &str) -> Column {

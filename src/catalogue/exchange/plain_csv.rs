@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use super::error::ExchangeError;
-use super::exported::Exported;
+use super::export_files::Export;
 use super::given::{
     CLASS, FREQUENCY, Given, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD, file_name, missing,
 };
@@ -23,7 +23,7 @@ use crate::units::{db_from_ratio, shown};
 pub(super) const RADAR: &str = "radar";
 
 /// Writes the curve, or what the model says at every degree.
-pub(super) fn write(subject: &Subject, name: &str) -> Exported {
+pub(super) fn write(subject: &Subject, name: &str) -> Export {
     let points = subject.points();
     let mut text: String = subject.about().iter().map(|line| format!("# {line}\n")).collect();
     text += &format!("# {}, at {} GHz\n", describe(&points), points.frequency_hz / 1e9);
@@ -43,7 +43,7 @@ pub(super) fn write(subject: &Subject, name: &str) -> Exported {
         "the file holds {}; nothing else of the material has a column there",
         describe(&points)
     );
-    Exported { files: vec![(name.to_owned(), text.into_bytes())], lost }
+    Export { files: vec![(name.to_owned(), text.into_bytes())], lost }
 }
 
 /// A level in dB; nothing where there is none.

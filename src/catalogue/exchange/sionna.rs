@@ -13,7 +13,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::error::ExchangeError;
-use super::exported::Exported;
+use super::export_files::Export;
 use super::subject::{Subject, one_line};
 use crate::brdf::{Brdf, Directive, Fresnel, Scattering, ScatteringModel};
 use crate::frames::Direction;
@@ -27,7 +27,7 @@ const EXPONENTS: [u32; 12] = [1, 2, 3, 4, 6, 8, 11, 16, 23, 32, 45, 64];
 const SHARES: [f64; 12] = [0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95];
 
 /// Writes the snippet.
-pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeError> {
+pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeError> {
     const FORMAT: &str = "a Sionna radio material";
     const WAY_OUT: &str = "render another fit or curve";
     let slug = &subject.material.slug;
@@ -65,7 +65,7 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
     };
     let lost = format!("{misses}; {}{slab}", substance.origin);
     let text = snippet(subject, &substance, &best, &lost);
-    Ok(Exported { files: vec![(name.to_owned(), text.into_bytes())], lost })
+    Ok(Export { files: vec![(name.to_owned(), text.into_bytes())], lost })
 }
 
 fn snippet(subject: &Subject, substance: &Substance, best: &Best, lost: &str) -> String {

@@ -15,7 +15,7 @@
 use serde_json::{Map, Value, json};
 
 use super::error::ExchangeError;
-use super::exported::Exported;
+use super::export_files::Export;
 use super::plain_csv::describe;
 use super::subject::{Points, Subject, cited, one_line, sigma0_per_f};
 use crate::material::{Censor, Observation, SourceKind};
@@ -28,7 +28,7 @@ pub(super) const THRESHOLD: &str = "threshold_brdf";
 const UNSTATED: &str = "not stated";
 
 /// Writes the curve, or what the model says at every degree.
-pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeError> {
+pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeError> {
     let points = subject.points();
     let file = json!({ "metadata": metadata(subject, &points), "data": data(&points) });
     let text = serde_json::to_string_pretty(&file);
@@ -38,7 +38,7 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
          a detection limit only in adhoc_variables",
         describe(&points)
     );
-    Ok(Exported { files: vec![(name.to_owned(), text.into_bytes())], lost })
+    Ok(Export { files: vec![(name.to_owned(), text.into_bytes())], lost })
 }
 
 fn metadata(subject: &Subject, points: &Points) -> Value {
