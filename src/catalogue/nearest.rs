@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::near::{Distance, Probe, Rank};
 use crate::material::Slug;
-use crate::store::{Filter, Outlined, Store, StoreError};
+use crate::store::{Filter, OutlineEntry, Store, StoreError};
 
 /// The materials that a curve is nearest to.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,7 +62,7 @@ impl Probe {
     }
 
     /// A lower bound of the distance to a material, dB; none where the two cannot be compared.
-    fn least_db(&self, line: &Outlined, rank: Rank) -> Option<f64> {
+    fn least_db(&self, line: &OutlineEntry, rank: Rank) -> Option<f64> {
         match (&line.model_hash, &line.outline) {
             (None, _) => None,
             (_, None) => Some(f64::NEG_INFINITY),
@@ -74,7 +74,7 @@ impl Probe {
     fn in_full(
         &self,
         store: &Store,
-        line: &Outlined,
+        line: &OutlineEntry,
         known: &mut HashMap<Likeness, Option<Distance>>,
     ) -> Result<Option<Distance>, StoreError> {
         let likeness = (line.model_hash, line.theta_rad.map(f64::to_bits));
