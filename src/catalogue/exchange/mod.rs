@@ -13,6 +13,7 @@
 //! An exported file depends on the material and its revision alone: the same material gives the same bytes. An
 //! imported file becomes a [`Material`] that states its source.
 
+mod dispersion;
 mod error;
 mod export_files;
 mod given;
