@@ -1,8 +1,8 @@
-//! `api/v1/`: every material as JSON, and an index of them. Units stand in the names of keys; the JSON
-//! Schemas in `schema/` say the rest.
+//! `api/v1/`: every material as JSON, and an index of them. The names of keys end in their units; the JSON
+//! Schemas in `schema/` describe the rest.
 //!
-//! A file says by `schema_version` how it is to be read. A key that is added later is left out while it
-//! says nothing; anything else that changes raises the version.
+//! `schema_version` says how to read a file. A key of a later program is left out where it has no value; any other
+//! change raises the version.
 
 use std::io;
 
@@ -19,7 +19,7 @@ use crate::store::{Stored, Summary};
 /// The version of the shape of every JSON file here.
 pub(super) const SCHEMA_VERSION: u32 = 1;
 
-/// Largest file of a single material, bytes: about 800 000 points. Nobody writes or reads a larger one.
+/// Largest file of a single material that is written or read, bytes: about 800 000 points.
 pub(super) const LARGEST_MATERIAL_BYTES: u64 = 256 << 20;
 
 /// `api/v1/materials/<slug>.json`.
@@ -60,15 +60,15 @@ pub(super) struct Entry {
     pub revision: u32,
     pub content_hash: String,
     pub added_at: String,
-    /// Of the data: of a model that was fitted to a curve, that of the curve's.
+    /// Kind of the rendered data; for a model that was fitted to a curve, the kind of the curve.
     pub render_kind: String,
-    /// What is said of a model that goes with a curve, which nobody measured itself.
+    /// Replaces the kind of a model that is stated with a curve, since nobody measured the model itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub render_words: Option<String>,
     pub curves: u32,
     pub observations: u32,
     pub fits: u32,
-    /// From the folder of the publication.
+    /// Path from the folder of the publication.
     pub path: String,
     /// Whether it may still be used.
     #[serde(default, skip_serializing_if = "Status::is_active")]
@@ -95,7 +95,7 @@ impl Entry {
         }
     }
 
-    /// Whether it says the same as that of the database; an older program knew nothing of the words.
+    /// Whether it equals the entry that the database gives; older programs did not write `render_words`.
     pub fn is_of(&self, database: &Entry) -> bool {
         let words = database.render_words.clone().filter(|_| self.render_words.is_some());
         *self == Entry { render_words: words, ..database.clone() }
@@ -107,13 +107,13 @@ impl Entry {
 pub(super) struct Index {
     pub schema_version: u32,
     pub title: String,
-    /// None of an empty catalogue that declares none.
+    /// None where the catalogue is empty and declares none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub licence: Option<String>,
     pub version: Option<String>,
     /// When the newest entry was added: UTC, ISO 8601; none in an empty catalogue.
     pub date: Option<String>,
-    /// Of the program that published; none of one that did not say so.
+    /// Version of the program that published; older programs did not write it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub program_version: Option<String>,
     pub materials: Vec<Entry>,
@@ -144,13 +144,13 @@ pub(super) fn write(folder: &mut Folder, stored: &Stored) -> Result<(), Catalogu
     folder.sums().get(&material_path(slug)).map_or(Ok(()), |sum| check_size(slug, sum.bytes))
 }
 
-/// Refuses a material that nobody who verifies would read.
+/// Refuses a material that is too large for `verify`.
 fn check_size(slug: &str, bytes: u64) -> Result<(), CatalogueError> {
     let limit = LARGEST_MATERIAL_BYTES;
-    match bytes > limit {
-        true => Err(CatalogueError::TooLarge { slug: slug.to_owned(), bytes, limit }),
-        false => Ok(()),
+    if bytes > limit {
+        return Err(CatalogueError::TooLarge { slug: slug.to_owned(), bytes, limit });
     }
+    Ok(())
 }
 
 /// Writes a value as one line of JSON.

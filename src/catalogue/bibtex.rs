@@ -1,15 +1,15 @@
-//! BibTeX.
+//! Entries in BibTeX.
 
-/// An entry by these authors with the fields that have a value. Of its key TeX reads letters, digits, `:` and `-`
-/// safely; whatever else is in it becomes `-`.
+/// An entry with these authors and the fields that have a value. Every character of the key that TeX could misread,
+/// all but letters, digits, `:` and `-`, becomes `-`.
 pub(super) fn entry<const N: usize>(
     kind: &str,
     key: &str,
     authors: &[String],
     fields: [(&str, Option<String>); N],
 ) -> String {
-    let plain = |c: char| if c.is_ascii_alphanumeric() || ":-".contains(c) { c } else { '-' };
-    let mut text = format!("@{kind}{{{}", key.chars().map(plain).collect::<String>());
+    let key = key.replace(|c: char| !c.is_ascii_alphanumeric() && !":-".contains(c), "-");
+    let mut text = format!("@{kind}{{{key}");
     if !authors.is_empty() {
         let names: Vec<String> = authors.iter().map(|author| name(author)).collect();
         text += &format!(",\n  author = {{{}}}", names.join(" and "));

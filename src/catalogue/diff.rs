@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::leaves::{Leaf, leaves};
 use super::units::ENDINGS;
-use crate::brdf::Scattering;
+use crate::brdf::{Brdf, Scattering};
 use crate::formats::words::{round_significant, significant};
 use crate::material::{Curve, Material, Observation};
 use crate::units::{db_from_ratio, dbm_from_watts, shown};
@@ -15,11 +15,11 @@ use crate::units::{db_from_ratio, dbm_from_watts, shown};
 /// What differs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Diff {
-    /// Fields, curves' points left out.
+    /// Fields, without the points of curves.
     pub fields: Vec<Field>,
     /// Curves that are not the same.
     pub curves: Vec<CurveChange>,
-    /// What scenes render, every degree of the common range; none where either renders nothing there.
+    /// Levels of the rendered models at every degree of the common range; none where either has none there.
     pub rendered: Option<Levels>,
 }
 
@@ -28,9 +28,9 @@ pub struct Diff {
 pub struct Field {
     /// Where it is: names from the outermost inwards, with a dot between.
     pub path: String,
-    /// What stood there, SI; none where it was not.
+    /// The value before, SI; none where there was none.
     pub before: Option<Value>,
-    /// What stands there.
+    /// The value after, SI; none where there is none.
     pub after: Option<Value>,
     /// UCUM code of `before` and `after` where they are numbers with one.
     pub unit: Option<String>,
@@ -82,56 +82,66 @@ impl Diff {
         const MOST: usize = 3;
         let mut said: Vec<String> = Vec::new();
         for change in &self.curves {
-            let what = match change.points {
-                [None, _] => "new".to_owned(),
-                [_, None] => "gone".to_owned(),
-                _ => match (change.levels, change.limits) {
-                    (Some(levels), None) => format!("{:.1} dB rms", levels.rms_db),
-                    (_, Some(limits)) if change.levels.is_none_or(|l| l.largest_db == 0.0) => {
-                        format!("limits {:.1} dB rms", limits.rms_db)
-                    }
-                    (Some(levels), _) => format!("{:.1} dB rms, other limits", levels.rms_db),
-                    (None, _) => "other points".to_owned(),
-                },
-            };
-            said.push(format!("curve {} {what}", change.curve));
+            said.push(format!("curve {} {}", change.curve, change.words()));
         }
         let mut parts: Vec<String> = self.fields.iter().map(|field| part(&field.place())).collect();
         parts.dedup();
-        let stays = |part: &String| {
-            let mut own = self.fields.iter().filter(|field| self::part(&field.place()) == *part);
-            part == STATUS || own.any(|field| field.after.is_some())
-        };
-        let (changed, gone): (Vec<String>, Vec<String>) = parts.into_iter().partition(stays);
+        let (changed, gone): (Vec<String>, Vec<String>) =
+            parts.into_iter().partition(|part| self.still_has(part));
         // What is lost matters most.
         said.splice(0..0, gone.iter().map(|part| format!("without {part}")));
         said.extend(changed);
         let more = said.len().saturating_sub(MOST);
         said.truncate(MOST);
-        match (said.is_empty(), more) {
-            (true, _) => "nothing".to_owned(),
-            (_, 0) => said.join(", "),
+        match more {
+            _ if said.is_empty() => "nothing".to_owned(),
+            0 => said.join(", "),
             _ => format!("{} and {more} more", said.join(", ")),
+        }
+    }
+
+    /// Whether the material after has anything in a part that differs.
+    fn still_has(&self, part: &str) -> bool {
+        let mut fields = self.fields.iter().filter(|field| self::part(&field.place()) == part);
+        part == STATUS || fields.any(|field| field.after.is_some())
+    }
+}
+
+impl CurveChange {
+    /// The change in a few words.
+    fn words(&self) -> String {
+        match (self.points, self.levels, self.limits) {
+            ([None, _], ..) => "new".to_owned(),
+            ([_, None], ..) => "gone".to_owned(),
+            (_, Some(levels), None) => format!("{:.1} dB rms", levels.rms_db),
+            (_, levels, Some(limits)) if levels.is_none_or(|l| l.largest_db == 0.0) => {
+                format!("limits {:.1} dB rms", limits.rms_db)
+            }
+            (_, Some(levels), _) => format!("{:.1} dB rms, other limits", levels.rms_db),
+            (_, None, _) => "other points".to_owned(),
         }
     }
 }
 
-/// What goes without saying while an entry is active.
+/// The part that is not stored while an entry is active.
 const STATUS: &str = "status";
 
-/// The first two names of a path, places in a list left out: what of a material it belongs to.
+/// The part of a material that a path belongs to: its first two names, without numbers of a list.
 fn part(path: &str) -> String {
-    let is_name = |piece: &&str| piece.parse::<usize>().is_err();
-    let pieces = if path.starts_with(STATUS) { 1 } else { 2 };
-    path.split('.').take(pieces).filter(is_name).collect::<Vec<_>>().join(" ")
+    let pieces = path.split('.').take(if path.starts_with(STATUS) { 1 } else { 2 });
+    let names: Vec<&str> = pieces.filter(|piece| piece.parse::<usize>().is_err()).collect();
+    names.join(" ")
 }
 
 impl Field {
-    /// Where it is, for people: without the unit in the name, which the values come with.
+    /// Where it is, for people: without the unit in the name, which stands after the values.
     pub fn place(&self) -> String {
-        let end = ENDINGS.iter().find(|(_, unit)| self.unit.as_deref() == Some(unit));
-        let short = |name| end.and_then(|(end, _)| str::strip_suffix(name, end)).unwrap_or(name);
-        self.path.split('.').map(short).collect::<Vec<_>>().join(".")
+        let Some((end, _)) = ENDINGS.iter().find(|(_, unit)| self.unit.as_deref() == Some(unit))
+        else {
+            return self.path.clone();
+        };
+        let names = self.path.split('.').map(|name| name.strip_suffix(end).unwrap_or(name));
+        names.collect::<Vec<_>>().join(".")
     }
 
     /// The value before, for people; `—` where there is none.
@@ -177,71 +187,93 @@ fn rounded(value: f64) -> f64 {
 }
 
 fn fields(before: &Material, after: &Material) -> Vec<Field> {
-    let is_point = |leaf: &Leaf| matches!(leaf.path.as_slice(), [list, _, what, ..] if list == "curves" && what == "observations");
-    let own = |material: &Material| -> Vec<(String, Value)> {
-        let leaves = leaves(material).into_iter().filter(|leaf| !is_point(leaf));
-        leaves.map(|leaf| (leaf.path.join("."), leaf.value)).collect()
-    };
-    let (old, new) = (own(before), own(after));
+    let (old, new) = (stated(before), stated(after));
     let [old_by, new_by] = [&old, &new]
         .map(|list| list.iter().map(|(path, value)| (path, value)).collect::<BTreeMap<_, _>>());
     let gone = old.iter().filter(|(path, _)| !new_by.contains_key(path));
     let units: BTreeMap<String, String> = units(before).chain(units(after)).collect();
-    let field = |path: &String| Field {
+    let changed = new.iter().filter(|(path, value)| old_by.get(path) != Some(&value));
+    let fields = changed.chain(gone).map(|(path, _)| Field {
         unit: unit(path, &units),
         path: path.clone(),
         before: old_by.get(path).map(|value| (*value).clone()),
         after: new_by.get(path).map(|value| (*value).clone()),
-    };
-    let changed = new.iter().filter(|(path, value)| old_by.get(path) != Some(&value));
-    changed.chain(gone).map(|(path, _)| field(path)).collect()
+    });
+    fields.collect()
+}
+
+/// All that a material states, by path, without the points of curves.
+fn stated(material: &Material) -> Vec<(String, Value)> {
+    let leaves = leaves(material).into_iter().filter(|leaf| !is_of_a_point(leaf));
+    leaves.map(|leaf| (leaf.path.join("."), leaf.value)).collect()
+}
+
+fn is_of_a_point(leaf: &Leaf) -> bool {
+    match leaf.path.as_slice() {
+        [list, _, what, ..] => list == "curves" && what == "observations",
+        _ => false,
+    }
 }
 
 /// Units of the models' parameters, by their paths in the material.
 fn units(material: &Material) -> impl Iterator<Item = (String, String)> {
     material.fits.iter().flat_map(|fit| {
-        let path = |path: &str| format!("fits.{}.model.{path}", fit.name);
-        fit.model.parameters().into_iter().map(move |p| (path(&p.path), p.unit.to_owned()))
+        let parameters = fit.model.parameters().into_iter();
+        parameters.map(|p| (format!("fits.{}.model.{}", fit.name, p.path), p.unit.to_owned()))
     })
 }
 
+/// The unit of a number: that of the model's parameter, or the one that its name ends in.
 fn unit(path: &str, units: &BTreeMap<String, String>) -> Option<String> {
-    let by_name = || {
-        // Of a range it is the list that has the unit in its name.
-        let name = path.rsplit('.').find(|name| name.parse::<usize>().is_err())?;
-        ENDINGS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, unit)| (*unit).to_owned())
-    };
-    units.get(path).cloned().or_else(by_name)
+    if let Some(unit) = units.get(path) {
+        return Some(unit.clone());
+    }
+    // The ends of a range have numbers as names; the range itself has the unit in its name.
+    let name = path.rsplit('.').find(|name| name.parse::<usize>().is_err())?;
+    ENDINGS.iter().find(|(end, _)| name.ends_with(end)).map(|(_, unit)| (*unit).to_owned())
 }
 
 fn curves(before: &Material, after: &Material) -> Vec<CurveChange> {
-    let find = |of: &Material, name: &str| of.curves.iter().find(|c| c.name == name).cloned();
     let mut names: Vec<&String> =
         before.curves.iter().chain(&after.curves).map(|c| &c.name).collect();
     names.sort();
     names.dedup();
-    let change = |name: &String| {
-        let [old, new] = [find(before, name), find(after, name)];
-        let points = |curve: &Option<Curve>| curve.as_ref().map(|c| c.observations.len());
-        let is_same = match (&old, &new) {
-            (Some(old), Some(new)) => old.observations == new.observations,
-            _ => false,
-        };
-        let changed = |of: fn(&Observation) -> Option<f64>| {
-            let (old, new) = (by_angle(old.as_ref()?, of), by_angle(new.as_ref()?, of));
-            let pairs = old.into_iter().filter_map(|(angle, level)| Some(new.get(&angle)? - level));
-            levels(&pairs.collect::<Vec<_>>())
-        };
-        let levels = changed(|point| point.sigma0);
-        let limits = changed(|point| point.threshold_sigma0).filter(|l| l.largest_db > 0.0);
-        let points = [points(&old), points(&new)];
-        (!is_same).then(|| CurveChange { curve: name.clone(), points, levels, limits })
-    };
-    names.into_iter().filter_map(change).collect()
+    let mut changes = Vec::new();
+    for name in names {
+        let [old, new] =
+            [before, after].map(|material| material.curves.iter().find(|c| c.name == *name));
+        changes.extend(curve_change(name, old, new));
+    }
+    changes
 }
 
-/// Mean in linear power of what `of` says of each angle's backscatter, dB; by the angle in units that
-/// rounding does not reach.
+/// How a curve differs; none where its points are the same.
+fn curve_change(name: &str, old: Option<&Curve>, new: Option<&Curve>) -> Option<CurveChange> {
+    if old.zip(new).is_some_and(|(old, new)| old.observations == new.observations) {
+        return None;
+    }
+    let limits = changed(old, new, |point| point.threshold_sigma0);
+    Some(CurveChange {
+        curve: name.to_owned(),
+        points: [old, new].map(|curve| curve.map(|curve| curve.observations.len())),
+        levels: changed(old, new, |point| point.sigma0),
+        limits: limits.filter(|limits| limits.largest_db > 0.0),
+    })
+}
+
+/// By how much `of` differs at the angles that two curves have in common.
+fn changed(
+    old: Option<&Curve>,
+    new: Option<&Curve>,
+    of: fn(&Observation) -> Option<f64>,
+) -> Option<Levels> {
+    let (old, new) = (by_angle(old?, of), by_angle(new?, of));
+    let pairs = old.into_iter().filter_map(|(angle, level)| Some(new.get(&angle)? - level));
+    levels(&pairs.collect::<Vec<_>>())
+}
+
+/// Mean of `of` over the backscatter at each angle, averaged in linear power, dB. The key is the angle in nrad, which
+/// rounding does not change.
 fn by_angle(curve: &Curve, of: fn(&Observation) -> Option<f64>) -> BTreeMap<u64, f64> {
     const PER_RAD: f64 = 1e9;
     let mut sums: BTreeMap<u64, (f64, f64)> = BTreeMap::new();
@@ -256,14 +288,15 @@ fn by_angle(curve: &Curve, of: fn(&Observation) -> Option<f64>) -> BTreeMap<u64,
 
 fn rendered(before: &Material, after: &Material) -> Option<Levels> {
     let (old, new) = (before.scattering().ok()?, after.scattering().ok()?);
-    let range = |end: fn(f64, f64) -> f64, place: usize| {
-        end(before.theta_rad[place], after.theta_rad[place]).to_degrees()
-    };
-    let (low, high) = (range(f64::max, 0).ceil() as u32, range(f64::min, 1).floor() as u32);
-    let level =
-        |model: &dyn Scattering, deg: u32| db_from_ratio(model.sigma0(f64::from(deg).to_radians()));
-    let differences = (low..=high).map(|deg| level(&new, deg) - level(&old, deg));
+    let low_rad = before.theta_rad[0].max(after.theta_rad[0]);
+    let high_rad = before.theta_rad[1].min(after.theta_rad[1]);
+    let degrees = low_rad.to_degrees().ceil() as u32..=high_rad.to_degrees().floor() as u32;
+    let differences = degrees.map(|deg| level_db(&new, deg) - level_db(&old, deg));
     levels(&differences.filter(|difference| difference.is_finite()).collect::<Vec<_>>())
+}
+
+fn level_db(model: &Brdf, deg: u32) -> f64 {
+    db_from_ratio(model.sigma0(f64::from(deg).to_radians()))
 }
 
 fn levels(differences_db: &[f64]) -> Option<Levels> {

@@ -1,7 +1,7 @@
 //! What can go wrong with a publication, in the words of its user.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
@@ -160,8 +160,13 @@ pub enum CatalogueError {
 }
 
 impl CatalogueError {
-    /// That a database is damaged.
+    /// A database that is damaged.
     pub(super) fn damaged(store: &Store, problem: String) -> CatalogueError {
         CatalogueError::Damaged { database: store.path().to_owned(), problem }
+    }
+
+    /// A file or folder that cannot be read or written.
+    pub(super) fn io(verb: &'static str, path: &Path, reason: io::Error) -> CatalogueError {
+        CatalogueError::Io { verb, path: path.to_owned(), reason }
     }
 }

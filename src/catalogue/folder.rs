@@ -1,5 +1,5 @@
-//! The only way in which files of a publication are written: into a folder beside the target, which
-//! takes the target's place when everything is there.
+//! Writing the files of a publication: into a folder next to the target, which replaces the target when everything is
+//! written.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
@@ -11,6 +11,7 @@ use tempfile::TempDir;
 
 use super::error::CatalogueError;
 use super::layout::{ABOUT, INDEX, KEPT, SUMS};
+use super::listing::files;
 use super::stage::{Stage, hindrance, parent};
 
 /// A file of a publication.
@@ -48,12 +49,13 @@ impl Place {
     }
 }
 
-/// The publication in whose folder a target lies, where it would be a stranger.
+/// The publication in whose folder a target lies.
 fn publication_around(target: &Path) -> Option<PathBuf> {
     let absolute = std::path::absolute(target).ok()?;
-    let is_publication =
-        |folder: &&Path| [SUMS, ABOUT].iter().all(|file| folder.join(file).is_file());
-    absolute.ancestors().skip(1).find(is_publication).map(Path::to_owned)
+    let mut around = absolute.ancestors().skip(1);
+    let publication =
+        around.find(|folder| [SUMS, ABOUT].iter().all(|file| folder.join(file).is_file()));
+    publication.map(Path::to_owned)
 }
 
 impl Folder {
@@ -62,16 +64,15 @@ impl Folder {
     /// # Errors
     /// When `target` holds anything but an earlier publication or lies in one, or nothing can be written beside it.
     pub fn new(target: &Path) -> Result<Folder, CatalogueError> {
-        let io = |verb, path: &Path| {
-            let path = path.to_owned();
-            move |reason| CatalogueError::Io { verb, path, reason }
-        };
         // A link stays, and what it leads to is replaced.
         let resolved = match target.symlink_metadata() {
-            Ok(_) => fs::canonicalize(target).map_err(io("read", target))?,
+            Ok(_) => fs::canonicalize(target)
+                .map_err(|reason| CatalogueError::io("read", target, reason))?,
             Err(_) => target.to_owned(),
         };
-        if let Some(stranger) = stranger(&resolved).map_err(io("read", target))? {
+        let stranger =
+            stranger(&resolved).map_err(|reason| CatalogueError::io("read", target, reason))?;
+        if let Some(stranger) = stranger {
             return Err(CatalogueError::Occupied { folder: target.to_owned(), stranger });
         }
         if let Some(problem) = hindrance(&resolved) {
@@ -80,7 +81,8 @@ impl Folder {
         if let Some(publication) = publication_around(&resolved) {
             return Err(CatalogueError::Within { folder: target.to_owned(), publication });
         }
-        let stage = Stage::new(&resolved).map_err(io("create", parent(&resolved)))?;
+        let stage = Stage::new(&resolved)
+            .map_err(|reason| CatalogueError::io("create", parent(&resolved), reason))?;
         Ok(Folder { target: resolved, place: Place::Staged(stage), sums: BTreeMap::new() })
     }
 
@@ -92,11 +94,9 @@ impl Folder {
         published: &Path,
         sums: BTreeMap<String, Sum>,
     ) -> Result<Folder, CatalogueError> {
-        let failed = |reason| {
-            let path = std::env::temp_dir();
-            CatalogueError::Io { verb: "write", path, reason }
-        };
-        let place = Place::Hashed(tempfile::tempdir().map_err(failed)?);
+        let folder = tempfile::tempdir()
+            .map_err(|reason| CatalogueError::io("write", &std::env::temp_dir(), reason))?;
+        let place = Place::Hashed(folder);
         Ok(Folder { target: published.to_owned(), place, sums })
     }
 
@@ -187,7 +187,7 @@ impl Folder {
     }
 }
 
-/// What in a folder belongs to no publication, so that it may not be replaced.
+/// A file in a folder that belongs to no publication, so that the folder must not be replaced.
 fn stranger(target: &Path) -> io::Result<Option<String>> {
     if !target.exists() {
         return Ok(None);
@@ -206,36 +206,13 @@ fn stranger(target: &Path) -> io::Result<Option<String>> {
         }
         return Ok(None);
     }
-    let is_ours = |path: &str| path == SUMS || listed.contains(path);
-    Ok(files(target)?.into_iter().map(|(path, _)| path).find(|path| !is_ours(path)))
+    let mut paths = files(target)?.into_iter().map(|(path, _)| path);
+    Ok(paths.find(|path| path != SUMS && !listed.contains(path.as_str())))
 }
 
-/// Every file below a folder but what may stand there [besides](KEPT), sorted: its path relative to it,
-/// the parts joined by `/`, and whether it is a plain file. Links are not followed.
-pub(super) fn files(root: &Path) -> io::Result<Vec<(String, bool)>> {
-    let mut found = Vec::new();
-    let mut folders = vec![(root.to_owned(), String::new())];
-    while let Some((folder, prefix)) = folders.pop() {
-        for entry in fs::read_dir(folder)? {
-            let entry = entry?;
-            let path = format!("{prefix}{}", entry.file_name().to_string_lossy());
-            if KEPT.contains(&path.as_str()) {
-                continue;
-            }
-            let kind = entry.file_type()?;
-            match kind.is_dir() {
-                true => folders.push((entry.path(), format!("{path}/"))),
-                false => found.push((path, kind.is_file())),
-            }
-        }
-    }
-    found.sort();
-    Ok(found)
-}
-
-/// Hash and length of what is left to read.
+/// Hash and length of the rest of a file.
 pub(super) fn hashed(mut file: impl Read) -> io::Result<Sum> {
-    let mut sink = Hashed { out: io::sink(), hash: Sha256::new(), bytes: 0 };
+    let mut sink = HashingWriter { out: io::sink(), hash: Sha256::new(), bytes: 0 };
     io::copy(&mut file, &mut sink)?;
     Ok(sink.sum())
 }
@@ -251,27 +228,27 @@ fn write_hashed(
 }
 
 fn hash(out: impl Write, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<Sum> {
-    let mut out = Hashed { out, hash: Sha256::new(), bytes: 0 };
+    let mut out = HashingWriter { out, hash: Sha256::new(), bytes: 0 };
     write(&mut out)?;
     out.flush()?;
     Ok(out.sum())
 }
 
-/// What is written is hashed on the way.
-struct Hashed<W> {
+/// A writer that also hashes what it writes.
+struct HashingWriter<W> {
     out: W,
     hash: Sha256,
     bytes: u64,
 }
 
-impl<W> Hashed<W> {
+impl<W> HashingWriter<W> {
     fn sum(self) -> Sum {
         let sha256 = self.hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
         Sum { sha256, bytes: self.bytes }
     }
 }
 
-impl<W: Write> Write for Hashed<W> {
+impl<W: Write> Write for HashingWriter<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = self.out.write(bytes)?;
         self.hash.update(bytes.get(..written).unwrap_or(bytes));

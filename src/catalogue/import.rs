@@ -1,5 +1,5 @@
-//! Another laboratory's catalogue into one's own: what is not there is added with all its revisions, and
-//! what they have made since of what was taken before; nothing that is there changes.
+//! Import of another laboratory's catalogue. Materials that the database lacks are added with all their
+//! revisions; materials that were imported before get the revisions made since. Nothing that is stored changes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -9,21 +9,22 @@ use serde::Serialize;
 use super::about::About;
 use super::error::CatalogueError;
 use super::layout::DATABASE;
-use super::verify::{about, database, is_newer, verify};
+use super::read::{about, is_newer};
+use super::verify::{database, verify};
 use crate::effects::{Level, resolve};
 use crate::material::{Activity, Material, Origin, Slug};
 use crate::store::{Added, RevisionSummary, Store, StoreError, Stored};
 
-/// Somebody's catalogue that was [verified](super::verify) and may be taken over.
+/// Another laboratory's catalogue that was [verified](super::verify()) and may be imported.
 #[derive(Debug)]
 pub struct Import {
     path: PathBuf,
     theirs: Store,
 }
 
-/// What becomes of one material.
+/// What the import does with one material.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Taken {
+pub struct MaterialPlan {
     /// Its name in their catalogue.
     pub slug: Slug,
     /// Its name here.
@@ -42,45 +43,43 @@ pub enum Outcome {
         /// How many.
         revisions: usize,
     },
-    /// What is here was theirs once, and what they have made of it since is added as revisions.
+    /// The material was imported from this catalogue before; the revisions made there since are added.
     Continued {
         /// How many.
         revisions: usize,
         /// The revision here that they follow.
         after: u32,
     },
-    /// What they have is what is, or once was, here.
+    /// The database has, or had, the same content.
     Unchanged,
-    /// Something else of this name is here, and stays as it is.
+    /// The database has another material of this name, which stays as it is.
     Conflict {
-        /// [`Material::content_hash`] of what is here.
+        /// [`Material::content_hash`] of the material in the database.
         ours: String,
-        /// That of what they have.
+        /// [`Material::content_hash`] of the material in their catalogue.
         theirs: String,
     },
 }
 
 /// What was, or would be, imported.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Imported {
-    /// Whether nothing was written because nothing should be.
+pub struct ImportSummary {
+    /// Whether this was a trial that writes nothing.
     pub dry_run: bool,
     /// Every material of their catalogue.
-    pub materials: Vec<Taken>,
+    pub materials: Vec<MaterialPlan>,
 }
 
 impl Import {
     /// Opens a published folder or its database after a complete check.
     ///
     /// # Errors
-    /// When it is no catalogue, anything in it is wrong, or a newer program has made it.
+    /// When it is not a catalogue, anything in it is wrong, or a newer program made it.
     pub fn open(bundle: &Path) -> Result<Import, CatalogueError> {
-        let unsound =
-            |problem: String| CatalogueError::Unsound { bundle: bundle.to_owned(), problem };
         if bundle.is_dir() && is_newer(bundle) {
             return Err(CatalogueError::Newer { bundle: bundle.to_owned() });
         }
-        // No other copy of it could be read, either.
+        // A copy of a newer database could not be read either.
         if let Err(CatalogueError::Store(newer @ StoreError::Newer { .. })) =
             database(&database_of(bundle))
         {
@@ -92,7 +91,8 @@ impl Import {
                 0 => String::new(),
                 more => format!(" (and {more} more, which `matdb verify` lists)"),
             };
-            return Err(unsound(format!("{first}{others}")));
+            let (bundle, problem) = (bundle.to_owned(), format!("{first}{others}"));
+            return Err(CatalogueError::Unsound { bundle, problem });
         }
         Ok(Import { theirs: database(&database_of(bundle))?, path: bundle.to_owned() })
     }
@@ -102,8 +102,8 @@ impl Import {
         database_of(&self.path)
     }
 
-    /// What becomes of every material. Conflicts get the prefix, if there is one, and are looked at
-    /// again under that name.
+    /// What the import does with every material. A conflict gets the prefix, if there is one, and is decided again
+    /// under that name.
     ///
     /// # Errors
     /// When a database cannot be read, the prefix makes no name, or what would be added has effects that are not known
@@ -112,7 +112,7 @@ impl Import {
         &self,
         ours: Option<&Store>,
         prefix: Option<&str>,
-    ) -> Result<Vec<Taken>, CatalogueError> {
+    ) -> Result<Vec<MaterialPlan>, CatalogueError> {
         let mut plan = Vec::new();
         let mut names = BTreeSet::new();
         for summary in self.theirs.list()? {
@@ -138,7 +138,7 @@ impl Import {
         ours: Option<&Store>,
         slug: &Slug,
         name: Slug,
-    ) -> Result<Taken, CatalogueError> {
+    ) -> Result<MaterialPlan, CatalogueError> {
         let history = self.theirs.history(slug)?;
         let added = Outcome::Added { revisions: history.len() };
         let known = ours.map_or(Ok(None), |ours| ours.get(&name, None))?;
@@ -146,10 +146,10 @@ impl Import {
             (Some(ours), Some(known)) => self.beside(ours, known, slug, &name)?,
             _ => added,
         };
-        Ok(Taken { slug: slug.clone(), name, outcome })
+        Ok(MaterialPlan { slug: slug.clone(), name, outcome })
     }
 
-    /// What becomes of a material beside one of the same name.
+    /// What the import does with a material where the database has one of the same name.
     fn beside(
         &self,
         ours: &Store,
@@ -166,14 +166,14 @@ impl Import {
             }
         }
         let since = self.since(slug, name, &known.content_hash)?;
-        Ok(match !since.is_empty() && self.is_theirs(&known, slug, &since)? {
-            false => Outcome::Conflict { ours: known.content_hash, theirs },
-            true => Outcome::Continued { revisions: since.len(), after: known.revision },
-        })
+        if !since.is_empty() && self.is_theirs(&known, slug, &since)? {
+            return Ok(Outcome::Continued { revisions: since.len(), after: known.revision });
+        }
+        Ok(Outcome::Conflict { ours: known.content_hash, theirs })
     }
 
-    /// Whether the catalogue that made these newer revisions is the one from which what is here was
-    /// imported: nobody else may revise, or withdraw, what is here.
+    /// Whether the catalogue that made these newer revisions is the one that the stored material was imported
+    /// from: no other may revise or withdraw it.
     fn is_theirs(
         &self,
         known: &Stored,
@@ -229,7 +229,7 @@ impl Import {
     pub fn take(
         &self,
         ours: &mut Store,
-        plan: &[Taken],
+        plan: &[MaterialPlan],
         by: &Activity,
     ) -> Result<(), CatalogueError> {
         let about = self.about()?;
@@ -258,8 +258,12 @@ impl Import {
     }
 
     /// Numbers of their revisions that are added, oldest first.
-    fn wanted(&self, ours: Option<&Store>, taken: &Taken) -> Result<Vec<u32>, CatalogueError> {
-        let Taken { slug, name, outcome } = taken;
+    fn wanted(
+        &self,
+        ours: Option<&Store>,
+        taken: &MaterialPlan,
+    ) -> Result<Vec<u32>, CatalogueError> {
+        let MaterialPlan { slug, name, outcome } = taken;
         match outcome {
             Outcome::Added { .. } => {
                 Ok(self.theirs.history(slug)?.into_iter().map(|line| line.revision).collect())
@@ -281,26 +285,30 @@ impl Import {
         })
     }
 
-    /// What their catalogue says of itself; none of a database alone.
+    /// Title and people of their catalogue; none where it is a database alone.
     fn about(&self) -> Result<Option<About>, CatalogueError> {
-        match self.path.is_dir() {
-            true => about(&self.path)
-                .map(Some)
-                .map_err(|problem| CatalogueError::Unsound { bundle: self.path.clone(), problem }),
-            false => Ok(None),
+        if !self.path.is_dir() {
+            return Ok(None);
         }
+        let about = about(&self.path);
+        about
+            .map(Some)
+            .map_err(|problem| CatalogueError::Unsound { bundle: self.path.clone(), problem })
     }
 
-    /// Refuses what nobody could add here by themselves.
-    fn check(&self, ours: Option<&Store>, taken: &Taken) -> Result<(), CatalogueError> {
+    /// Refuses what `add` would refuse, too: unknown effects and misleading names.
+    fn check(&self, ours: Option<&Store>, taken: &MaterialPlan) -> Result<(), CatalogueError> {
         let about = self.about()?;
         for number in self.wanted(ours, taken)? {
             let stored = self.stored(&taken.slug, number)?;
-            let effects = resolve(&stored.material.effects, Level::Material);
-            let problem = effects.err().map(|error| error.to_string());
-            let misleading =
-                || stored.material.misleading_name().or(origin(&about, &stored).misleading_name());
-            if let Some(problem) = problem.or_else(misleading) {
+            let problem = match resolve(&stored.material.effects, Level::Material) {
+                Err(error) => Some(error.to_string()),
+                Ok(_) => {
+                    let name = stored.material.misleading_name();
+                    name.or_else(|| origin(&about, &stored).misleading_name())
+                }
+            };
+            if let Some(problem) = problem {
                 return Err(CatalogueError::Unsound {
                     bundle: self.path.clone(),
                     problem: format!("{}@{number}: {problem}", taken.slug),
@@ -312,7 +320,7 @@ impl Import {
 }
 
 impl Outcome {
-    /// What adding the first of the revisions does, if any is added.
+    /// The expected result of adding the first revision, if any is added.
     fn first(&self) -> Option<Added> {
         match self {
             Outcome::Added { .. } => Some(Added::New),
@@ -322,8 +330,8 @@ impl Outcome {
     }
 }
 
-/// Where a revision of theirs comes from: of what they have imported themselves the catalogue that published it
-/// first, whom it is to be credited to.
+/// Where a revision of theirs comes from. If they imported it themselves, this is the catalogue that published it
+/// first, which gets the credit.
 fn origin(about: &Option<About>, stored: &Stored) -> Origin {
     if let Some(first) = stored.activity.as_ref().and_then(|activity| activity.origin.clone()) {
         return first;

@@ -1,65 +1,86 @@
-//! Everything that a material says, one by one, each with the path to it: what comparing and citing go
-//! through, so that neither forgets a field.
+//! Every value that a material states, each with its path. Comparing and citing go through this list, so that
+//! neither forgets a field.
 
 use serde_json::Value;
 
 use crate::material::Material;
 
-/// One thing that a material says.
+/// One value that a material states.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Leaf {
-    /// Names of what it is in, outermost first, and its own.
+    /// Names from the outermost inwards, its own last.
     pub path: Vec<String>,
-    /// Its place in the material's list of such things, for what is in one.
+    /// Its place in the material's list that it is in; none outside of lists.
     pub item: Option<usize>,
     /// Number, text or flag, SI inside.
     pub value: Value,
 }
 
-/// All that a material says, in its order; an empty list and what is left out say nothing.
+/// All values that a material states, in its order. Empty lists and absent fields give none.
 pub(super) fn leaves(material: &Material) -> Vec<Leaf> {
     // A tree of plain structs has no way to fail.
     let whole = serde_json::to_value(material).unwrap_or_default();
-    let mut found = Vec::new();
-    collect(&whole, &mut Vec::new(), None, &mut found);
-    found
+    let mut collector = Collector { path: Vec::new(), found: Vec::new() };
+    collector.collect(&whole, None);
+    collector.found
 }
 
-fn collect(value: &Value, path: &mut Vec<String>, item: Option<usize>, found: &mut Vec<Leaf>) {
-    let outermost = path.len() == 1;
-    let mut below = |name: String, place: Option<usize>, value: &Value| {
-        path.push(name);
-        collect(value, path, item.or(place.filter(|_| outermost)), found);
-        path.pop();
-    };
-    match value {
-        Value::Null => {}
-        Value::Object(fields) => {
-            fields.iter().for_each(|(name, value)| below(name.clone(), None, value));
-        }
-        Value::Array(items) => {
-            let mut names: Vec<String> = Vec::new();
-            for (place, item) in items.iter().enumerate() {
-                let name = named(item).unwrap_or_else(|| place.to_string());
-                let is_taken = names.contains(&name);
-                names.push(if is_taken { format!("{name}#{place}") } else { name });
+/// A walk through a tree of values.
+struct Collector {
+    /// Names from the outermost inwards.
+    path: Vec<String>,
+    found: Vec<Leaf>,
+}
+
+impl Collector {
+    /// Collects what is in `value`, of which `item` is the place in one of the material's lists.
+    fn collect(&mut self, value: &Value, item: Option<usize>) {
+        match value {
+            Value::Null => {}
+            Value::Object(fields) => {
+                for (name, value) in fields {
+                    self.collect_below(name.clone(), value, item);
+                }
             }
-            for (place, (name, item)) in names.into_iter().zip(items).enumerate() {
-                below(name, Some(place), paired(item).unwrap_or(item));
+            Value::Array(values) => {
+                let is_outermost = self.path.len() == 1;
+                let mut names: Vec<String> = Vec::new();
+                for (place, value) in values.iter().enumerate() {
+                    let name = named(value).unwrap_or_else(|| place.to_string());
+                    let is_taken = names.contains(&name);
+                    names.push(if is_taken { format!("{name}#{place}") } else { name });
+                }
+                for (place, (name, value)) in names.into_iter().zip(values).enumerate() {
+                    let item = item.or(is_outermost.then_some(place));
+                    self.collect_below(name, paired(value).unwrap_or(value), item);
+                }
+            }
+            value => {
+                self.found.push(Leaf { path: self.path.clone(), item, value: value.clone() });
             }
         }
-        value => found.push(Leaf { path: path.clone(), item, value: value.clone() }),
+    }
+
+    fn collect_below(&mut self, name: String, value: &Value, item: Option<usize>) {
+        self.path.push(name);
+        self.collect(value, item);
+        self.path.pop();
     }
 }
 
-/// What tells an item from the others of its list.
+/// The name of an item, which tells it from the others of its list.
 fn named(item: &Value) -> Option<String> {
-    let text = |key: &str| item.get(key).and_then(Value::as_str).map(str::to_owned);
-    if let (Some(key), Some(hz)) = (text("key"), item.get("frequency_hz").and_then(Value::as_f64)) {
+    if let (Some(key), Some(hz)) =
+        (text(item, "key"), item.get("frequency_hz").and_then(Value::as_f64))
+    {
         return Some(format!("{key} at {} GHz", crate::units::shown(hz / 1e9)));
     }
-    let pair = || paired(item).and_then(|_| item.get(0)?.as_str().map(str::to_owned));
-    ["key", "name", "effect"].into_iter().find_map(text).or_else(pair)
+    let name = ["key", "name", "effect"].into_iter().find_map(|key| text(item, key));
+    name.or_else(|| paired(item).and_then(|_| item.get(0)?.as_str().map(str::to_owned)))
+}
+
+fn text(item: &Value, key: &str) -> Option<String> {
+    item.get(key).and_then(Value::as_str).map(str::to_owned)
 }
 
 /// The second of a pair of texts: a name and what it stands for.

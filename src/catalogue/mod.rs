@@ -7,6 +7,7 @@
 mod about;
 mod api;
 mod bibtex;
+mod check_store;
 mod contents;
 mod diff;
 mod error;
@@ -15,9 +16,14 @@ mod folder;
 mod import;
 mod layout;
 mod leaves;
+mod licence;
+mod listing;
 mod near;
 mod nearest;
+mod problem;
 mod publish;
+mod read;
+mod rebuild;
 mod records;
 mod references;
 mod schema;
@@ -28,16 +34,16 @@ mod units;
 mod verify;
 
 pub use about::{About, AboutError};
-pub use contents::named_licences;
+pub use check_store::{CheckCount, OTHER_UNITS, check_store, derived, without_report};
 pub use diff::{CurveChange, Diff, Field, Levels};
 pub use error::CatalogueError;
 pub use folder::{Folder, Sum};
-pub use import::{Import, Imported, Outcome, Taken};
+pub use import::{Import, ImportSummary, MaterialPlan, Outcome};
+pub use licence::named_licences;
 pub use near::{Distance, Probe, Rank};
 pub use nearest::Nearest;
-pub use publish::{Published, publish};
+pub use problem::Problem;
+pub use publish::{PublishSummary, publish};
 pub use references::{Citable, Credit, Reference, references};
 pub use tables::HAS_PARQUET;
-pub use verify::{
-    Checked, OTHER_UNITS, Problem, Verified, check_store, derived, verify, without_report,
-};
+pub use verify::{Verification, verify};

@@ -14,7 +14,7 @@ use crate::material::{Censor, Observation};
 use crate::measure::statistics::by_angle;
 use crate::units::db_from_ratio;
 
-/// Fewer common angles with an echo than this, or than half of the curve's angles, are no comparison.
+/// Least number of common angles with an echo; half of the curve's angles must be common, too.
 const LEAST_COMMON: usize = 3;
 /// Angles at which a material's mean over a bin is computed.
 const ANGLES_PER_BIN: usize = 8;
@@ -23,12 +23,12 @@ const ANGLES_PER_BIN: usize = 8;
 #[derive(Clone, Debug)]
 pub struct Probe {
     bins: Vec<Bin>,
-    /// Lowest level that the curve speaks of, dB: what a material without an echo is at most.
+    /// Lowest level of the curve, dB: an upper bound for a material without an echo.
     floor_db: f64,
     noise_db: Option<f64>,
 }
 
-/// What the curve says at one angle, or within one degree.
+/// The curve at one angle, or within one degree.
 #[derive(Clone, Debug)]
 struct Bin {
     theta_rad: Vec<f64>,
@@ -53,9 +53,9 @@ pub enum Rank {
 pub struct Distance {
     /// Root mean square difference, dB.
     pub rms_db: f64,
-    /// The same after the best common offset, for a curve whose level is not known, dB.
+    /// Root mean square difference after the best common offset, for a curve whose level is not known, dB.
     pub rms_shape_db: f64,
-    /// That offset: so much higher than the material the curve is, dB.
+    /// The best common offset: how much higher the curve is than the material, dB.
     pub offset_db: f64,
     /// Angles that are compared: those of the curve within the material's range.
     pub common_angles: usize,
@@ -63,7 +63,7 @@ pub struct Distance {
     pub angles_beyond: usize,
     /// Angles at which the curve has only a bound, and the material lies above it.
     pub above_bound: usize,
-    /// Angles at which the curve has an echo and the material none: the distance is at least what it says.
+    /// Angles at which the curve has an echo and the material none: the distance is then a lower bound.
     pub silent: usize,
 }
 
@@ -82,31 +82,15 @@ impl Probe {
     /// instrument's range.
     pub fn new(observations: &[Observation]) -> Option<Probe> {
         let retro: Vec<&Observation> = observations.iter().filter(|o| o.is_retro()).collect();
-        let statistics = by_angle(observations);
-        let within = |[low, high]: [f64; 2]| {
-            let is_one = high - low < 1e-6;
-            let holds = move |theta: f64| theta >= low && (theta < high || is_one && theta <= high);
-            retro.iter().filter(move |o| holds(o.theta_i_rad))
-        };
-        let bin = |row: &crate::measure::AngleStatistics| {
-            let mut theta_rad: Vec<f64> = within(row.theta_rad).map(|o| o.theta_i_rad).collect();
-            theta_rad.sort_by(f64::total_cmp);
-            let theta_rad = thinned(&theta_rad);
-            let degree = |theta: Option<&f64>| {
-                theta.map_or(0, |theta| (theta.to_degrees() as usize).min(DEGREES - 1))
-            };
-            let (first_degree, last_degree) = (degree(theta_rad.first()), degree(theta_rad.last()));
-            Bin { theta_rad, first_degree, last_degree, level_db: row.mean.map(db_from_ratio) }
-        };
-        let bins = statistics.iter().map(bin).filter(|bin| !bin.theta_rad.is_empty());
-        let bins: Vec<Bin> = bins.collect();
+        let (mut bins, mut repeats) = (Vec::new(), Vec::new());
+        for row in by_angle(observations) {
+            let points = within(&retro, row.theta_rad);
+            let detected = points.iter().filter(|o| o.censor == Censor::None);
+            repeats.push(detected.filter_map(|o| o.sigma0).collect());
+            bins.extend(Bin::new(&points, row.mean.map(db_from_ratio)));
+        }
         let levels = bins.iter().flat_map(|bin| bin.level_db).filter(|level| level.is_finite());
         let floor_db = levels.min_by(f64::total_cmp)?;
-        let detected = |row: &crate::measure::AngleStatistics| -> Vec<f64> {
-            let found = within(row.theta_rad).filter(|o| o.censor == Censor::None);
-            found.filter_map(|o| o.sigma0).collect()
-        };
-        let repeats: Vec<Vec<f64>> = statistics.iter().map(detected).collect();
         let has_echo = bins.iter().any(|bin| bin.level_db[0].is_finite());
         has_echo.then(|| Probe { bins, floor_db, noise_db: noise_db(&repeats) })
     }
@@ -116,8 +100,8 @@ impl Probe {
         self.bins.len()
     }
 
-    /// What chance alone makes of the distance to the true material, dB: from the scatter of repeats;
-    /// none where nothing was repeated.
+    /// Expected distance to the true material from noise alone, dB, by the scatter of repeats; none where nothing was
+    /// repeated.
     pub fn noise_db(&self) -> Option<f64> {
         self.noise_db
     }
@@ -127,26 +111,25 @@ impl Probe {
     pub fn distance(&self, scattering: &Brdf, [low, high]: [f64; 2]) -> Option<Distance> {
         let common = self.common([low, high])?;
         let mut silent = 0;
-        let mut level = |bin: &Bin| {
+        let mut pairs = Vec::with_capacity(common.len());
+        for bin in &common {
             let sum: f64 = bin.theta_rad.iter().map(|theta| scattering.sigma0(*theta)).sum();
-            let level_db = db_from_ratio(sum / bin.theta_rad.len().max(1) as f64);
-            if level_db.is_finite() {
-                return level_db;
+            let mut level_db = db_from_ratio(sum / bin.theta_rad.len().max(1) as f64);
+            if !level_db.is_finite() {
+                silent += usize::from(bin.level_db[0].is_finite());
+                level_db = self.floor_db;
             }
-            silent += usize::from(bin.level_db[0].is_finite());
-            self.floor_db
-        };
-        let pairs: Vec<Pair> =
-            common.iter().map(|bin| Pair { ends_db: bin.level_db, level_db: level(bin) }).collect();
+            pairs.push(Pair { ends_db: bin.level_db, level_db });
+        }
         let offset_db = best_offset(&pairs);
-        let is_above = |pair: &&Pair| pair.is_bound() && pair.difference_db(0.0) != 0.0;
+        let above_bound = pairs.iter().filter(|p| p.is_bound() && p.difference_db(0.0) != 0.0);
         Some(Distance {
             rms_db: rms_db(&pairs, 0.0),
             rms_shape_db: rms_db(&pairs, offset_db),
             offset_db,
             common_angles: common.len(),
             angles_beyond: self.bins.len() - common.len(),
-            above_bound: pairs.iter().filter(is_above).count(),
+            above_bound: above_bound.count(),
             silent,
         })
     }
@@ -182,13 +165,42 @@ impl Probe {
     /// The bins within these angles, rad; `None` when they are too few.
     fn common(&self, [low, high]: [f64; 2]) -> Option<Vec<&Bin>> {
         const ROUNDING: f64 = 1e-9;
-        let is_within = |theta: &f64| (low - ROUNDING..=high + ROUNDING).contains(theta);
-        let common: Vec<&Bin> =
-            self.bins.iter().filter(|bin| bin.theta_rad.iter().all(is_within)).collect();
+        let claimed = low - ROUNDING..=high + ROUNDING;
+        let common: Vec<&Bin> = self
+            .bins
+            .iter()
+            .filter(|bin| bin.theta_rad.iter().all(|theta| claimed.contains(theta)))
+            .collect();
         let echoes = common.iter().filter(|bin| bin.level_db[0].is_finite()).count();
         let enough = echoes >= LEAST_COMMON && common.len() * 2 >= self.bins.len();
         enough.then_some(common)
     }
+}
+
+impl Bin {
+    /// The bin of some points; none where there are no points.
+    fn new(points: &[&Observation], level_db: [f64; 2]) -> Option<Bin> {
+        let mut theta_rad: Vec<f64> = points.iter().map(|o| o.theta_i_rad).collect();
+        theta_rad.sort_by(f64::total_cmp);
+        let theta_rad = thinned(&theta_rad);
+        let (first_degree, last_degree) = (degree(*theta_rad.first()?), degree(*theta_rad.last()?));
+        Some(Bin { theta_rad, first_degree, last_degree, level_db })
+    }
+}
+
+/// The whole degree of incidence that an angle lies in.
+fn degree(theta_rad: f64) -> usize {
+    (theta_rad.to_degrees() as usize).min(DEGREES - 1)
+}
+
+/// The points at one angle, or within a range of angles without its upper end.
+fn within<'a>(points: &[&'a Observation], [low, high]: [f64; 2]) -> Vec<&'a Observation> {
+    let is_one_angle = high - low < 1e-6;
+    let within = points.iter().filter(|o| {
+        let theta = o.theta_i_rad;
+        theta >= low && (theta < high || is_one_angle && theta <= high)
+    });
+    within.copied().collect()
 }
 
 /// Sums over bins at which a curve and a material each lie within some range.
@@ -261,11 +273,11 @@ fn rms_db(pairs: &[Pair], offset_db: f64) -> f64 {
 
 /// The offset of the least sum of squares, which has one minimum: by bisection of its slope.
 fn best_offset(pairs: &[Pair]) -> f64 {
-    let slope = |offset: f64| -> f64 { pairs.iter().map(|p| p.difference_db(offset)).sum() };
     let (mut low, mut high) = (-400.0, 400.0);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if slope(middle) > 0.0 { low = middle } else { high = middle }
+        let slope: f64 = pairs.iter().map(|pair| pair.difference_db(middle)).sum();
+        if slope > 0.0 { low = middle } else { high = middle }
     }
     0.5 * (low + high)
 }
@@ -276,23 +288,23 @@ fn thinned(theta_rad: &[f64]) -> Vec<f64> {
     if n <= ANGLES_PER_BIN {
         return theta_rad.to_vec();
     }
-    let place = |k: usize| (2 * k + 1) * n / (2 * ANGLES_PER_BIN);
-    (0..ANGLES_PER_BIN).filter_map(|k| theta_rad.get(place(k)).copied()).collect()
+    let places = (0..ANGLES_PER_BIN).map(|k| (2 * k + 1) * n / (2 * ANGLES_PER_BIN));
+    places.filter_map(|place| theta_rad.get(place).copied()).collect()
 }
 
 /// From the scatter of repeats, relative to their means and pooled over all angles.
 fn noise_db(repeats: &[Vec<f64>]) -> Option<f64> {
     let db_per_share = 10.0 / std::f64::consts::LN_10;
     let (mut squares, mut freedom) = (0.0, 0.0);
-    let repeats = || repeats.iter().filter(|values| !values.is_empty());
-    for values in repeats() {
+    let repeats: Vec<&Vec<f64>> = repeats.iter().filter(|values| !values.is_empty()).collect();
+    for values in &repeats {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         squares += values.iter().map(|value| (value / mean - 1.0).powi(2)).sum::<f64>();
         freedom += values.len() as f64 - 1.0;
     }
     let share = (freedom > 0.0).then(|| squares / freedom)?;
-    let variances = repeats().map(|values| share / values.len() as f64);
-    Some(db_per_share * (variances.sum::<f64>() / repeats().count() as f64).sqrt())
+    let variances = repeats.iter().map(|values| share / values.len() as f64);
+    Some(db_per_share * (variances.sum::<f64>() / repeats.len() as f64).sqrt())
 }
 
 #[cfg(test)]

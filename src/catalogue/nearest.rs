@@ -1,8 +1,8 @@
 //! The nearest of many materials: in outline all of them, in full only those that may be among the best.
 //!
-//! The outline of a material says how near it is at most. Materials are looked at in that order, until
-//! the outline of the next one says that it is farther than the best that are wanted; equal models are
-//! looked at once. The answer is that of looking at every one.
+//! The outline of a material gives a lower bound of its distance. Materials are compared in the order of these
+//! bounds, until the next bound exceeds the worst distance that is still wanted; equal models are compared once.
+//! The result equals that of comparing every material.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::near::{Distance, Probe, Rank};
 use crate::material::Slug;
-use crate::store::{Filter, Outlined, Store, StoreError};
+use crate::store::{Filter, OutlineEntry, Store, StoreError};
 
 /// The materials that a curve is nearest to.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,16 +34,11 @@ impl Probe {
         most: usize,
     ) -> Result<Nearest, StoreError> {
         let lines = store.outlines(filter)?;
-        let at_least = |(place, line): (usize, &Outlined)| {
-            let least_db = match (&line.model_hash, &line.outline) {
-                (None, _) => None,
-                (_, None) => Some(f64::NEG_INFINITY),
-                (_, Some(outline)) => self.at_least(outline, line.theta_rad, rank),
-            };
-            Some((least_db?, place))
-        };
-        let mut candidates: Vec<(f64, usize)> =
-            lines.par_iter().enumerate().filter_map(at_least).collect();
+        let mut candidates: Vec<(f64, usize)> = lines
+            .par_iter()
+            .enumerate()
+            .filter_map(|(place, line)| Some((self.least_db(line, rank)?, place)))
+            .collect();
         let mut left_out = lines.len() - candidates.len();
         candidates.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut best = Best { rank, most, found: Vec::new() };
@@ -58,17 +53,28 @@ impl Probe {
                 None => left_out += 1,
             }
         }
-        let name = |(place, distance): (usize, Distance)| {
-            Some((lines.get(place)?.slug.parse::<Slug>().ok()?, distance))
-        };
-        Ok(Nearest { found: best.found.into_iter().filter_map(name).collect(), left_out })
+        let mut found = Vec::with_capacity(best.found.len());
+        for (place, distance) in best.found {
+            let slug = lines.get(place).and_then(|line| line.slug.parse::<Slug>().ok());
+            found.extend(slug.map(|slug| (slug, distance)));
+        }
+        Ok(Nearest { found, left_out })
     }
 
-    /// The distance to a material; to one that scatters like one before it, the same.
+    /// A lower bound of the distance to a material, dB; none where the two cannot be compared.
+    fn least_db(&self, line: &OutlineEntry, rank: Rank) -> Option<f64> {
+        match (&line.model_hash, &line.outline) {
+            (None, _) => None,
+            (_, None) => Some(f64::NEG_INFINITY),
+            (_, Some(outline)) => self.at_least(outline, line.theta_rad, rank),
+        }
+    }
+
+    /// The distance to a material, computed once for all materials of equal model and range.
     fn in_full(
         &self,
         store: &Store,
-        line: &Outlined,
+        line: &OutlineEntry,
         known: &mut HashMap<Likeness, Option<Distance>>,
     ) -> Result<Option<Distance>, StoreError> {
         let likeness = (line.model_hash, line.theta_rad.map(f64::to_bits));
@@ -104,11 +110,9 @@ impl Best {
     }
 
     fn take(&mut self, place: usize, distance: Distance) {
-        let far = |(place, distance): &(usize, Distance)| (distance.rank_db(self.rank), *place);
-        let new = far(&(place, distance));
-        let at = self.found.partition_point(|other| {
-            let other = far(other);
-            other.0.total_cmp(&new.0).then(other.1.cmp(&new.1)).is_lt()
+        let new_db = distance.rank_db(self.rank);
+        let at = self.found.partition_point(|(other, known)| {
+            known.rank_db(self.rank).total_cmp(&new_db).then(other.cmp(&place)).is_lt()
         });
         if at < self.most {
             self.found.insert(at, (place, distance));

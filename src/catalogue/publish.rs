@@ -1,4 +1,4 @@
-//! A database becomes a catalogue in a folder: checked before and after, all of it or nothing.
+//! Publishing a database as a catalogue.
 
 use std::path::Path;
 
@@ -7,13 +7,13 @@ use super::contents::write_contents;
 use super::error::CatalogueError;
 use super::folder::Folder;
 use super::layout::{DATABASE, ZENODO};
+use super::licence::undeclared;
 use super::verify::check_staged;
-use crate::material::form::{alternative_licences, licence_names};
 use crate::store::Store;
 
 /// What was published.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct Published {
+pub struct PublishSummary {
     /// Number of materials.
     pub materials: usize,
     /// Number of files.
@@ -28,17 +28,17 @@ pub struct Published {
 
 /// Writes every material of a database as a catalogue into a folder, all of it or nothing.
 ///
-/// An earlier publication there is replaced. `progress` hears of every material done.
+/// An earlier publication there is replaced. `progress` gets the number of materials done.
 ///
 /// # Errors
-/// When the database cannot be read or is damaged, its materials share no licence and `about` declares none, the folder holds
-/// anything else, or something cannot be written.
+/// When the database cannot be read or is damaged, its materials share no licence and `about` declares none, the
+/// folder holds anything else, or something cannot be written.
 pub fn publish(
     store: &Store,
     about: &About,
     target: &Path,
     progress: impl FnMut(usize),
-) -> Result<Published, CatalogueError> {
+) -> Result<PublishSummary, CatalogueError> {
     // A copy would be packed anew, and with it damage that shows in the original alone.
     check_sound(store)?;
     let mut folder = Folder::new(target)?;
@@ -47,7 +47,7 @@ pub fn publish(
     let copy = Store::open_existing(copy)?.map(|copy| copy.known_as(store));
     let store = copy.as_ref().unwrap_or(store);
     let (materials, is_version_reused) = write_contents(&mut folder, store, about, progress)?;
-    let published = Published {
+    let published = PublishSummary {
         materials,
         files: folder.sums().len() + 1,
         is_version_reused,
@@ -69,15 +69,4 @@ fn check_sound(store: &Store) -> Result<(), CatalogueError> {
         None => Ok(()),
         Some(problem) => Err(CatalogueError::damaged(store, problem)),
     }
-}
-
-/// Those of the materials' licences that the declared one does not name.
-fn undeclared(licences: &[String], about: &About) -> Vec<String> {
-    let Some(declared) = &about.licence else { return Vec::new() };
-    let is_named = |name: &str| licence_names(declared).any(|declared| declared == name);
-    let is_said = |licence: &&String| match alternative_licences(licence) {
-        Some(alternatives) => alternatives.into_iter().any(is_named),
-        None => licence_names(licence).all(is_named),
-    };
-    licences.iter().filter(|licence| !is_said(licence)).cloned().collect()
 }

@@ -1,26 +1,26 @@
-//! Which source every number of a material rests on, and how to cite the material and its sources: as
-//! text, as BibTeX and as CSL-JSON.
+//! The source of every number of a material, and how to cite the material and its sources: as text, as BibTeX and
+//! as CSL-JSON.
 
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::bibtex::entry;
 use super::leaves::{Leaf, leaves};
-use crate::material::{Citation, Curve, Fit, Material, Origin, Source, SourceKind, builtin};
+use crate::material::{Citation, Fit, Material, Origin, Source, SourceKind, builtin};
 use crate::store::Stored;
 
-/// A source and what rests on it.
+/// A source and the numbers that come from it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Reference {
-    /// The source; none for what the entry states of itself, such as the range that it claims.
+    /// The source; none for numbers that the entry states itself, such as its claimed range.
     pub source: Option<Source>,
     /// Paths of numbers: names from the outermost inwards, with a dot between. All points of a curve
     /// and all numbers of a report are one.
     pub numbers: Vec<String>,
 }
 
-/// Every source of a material with the numbers that rest on it, in the material's order; at the end what
-/// the entry states itself.
+/// Every source of a material with the numbers that come from it, in the material's order; at the end the numbers
+/// that the entry states itself.
 pub fn references(material: &Material) -> Vec<Reference> {
     let mut found: Vec<Reference> = material
         .sources
@@ -33,13 +33,10 @@ pub fn references(material: &Material) -> Vec<Reference> {
         if leaf.path.first().is_some_and(|list| list == "sources") {
             continue;
         }
-        let is_of = |reference: &&mut Reference| {
-            reference.source.as_ref().map(|source| source.key.as_str()) == key
-        };
-        let numbers = match found.iter_mut().find(is_of) {
-            Some(reference) => &mut reference.numbers,
-            None => &mut own.numbers,
-        };
+        let reference = found
+            .iter_mut()
+            .find(|reference| reference.source.as_ref().map(|source| source.key.as_str()) == key);
+        let numbers = &mut reference.unwrap_or(&mut own).numbers;
         let place = gathered(&leaf.path);
         if numbers.last() != Some(&place) {
             numbers.push(place);
@@ -55,7 +52,7 @@ fn source_of<'a>(material: &'a Material, leaf: &Leaf) -> Option<&'a str> {
         return material.roughness.as_ref().map(|roughness| roughness.source.as_str());
     }
     let place = leaf.item?;
-    let curve = |uses: &dyn Fn(&Curve) -> bool| material.curves.iter().find(|curve| uses(curve));
+    let mut curves = material.curves.iter();
     let source = match leaf.path.first()?.as_str() {
         "curves" => &material.curves.get(place)?.source,
         "fits" => return Some(fit_source(material.fits.get(place)?, &leaf.path)),
@@ -67,14 +64,14 @@ fn source_of<'a>(material: &'a Material, leaf: &Leaf) -> Option<&'a str> {
         "findings" => &material.findings.get(place)?.source,
         "layers" => material.layers.get(place)?.source.as_ref()?,
         "effects" => material.effects.get(place)?.source.as_ref()?,
-        // What was measured with it, or then, says so.
+        // The source is that of a curve that was measured with it, or in that session.
         "instruments" => {
             let key = &material.instruments.get(place)?.key;
-            &curve(&|curve| curve.instrument.as_ref() == Some(key))?.source
+            &curves.find(|curve| curve.instrument.as_ref() == Some(key))?.source
         }
         "sessions" => {
             let key = &material.sessions.get(place)?.key;
-            &curve(&|curve| curve.session.as_ref() == Some(key))?.source
+            &curves.find(|curve| curve.session.as_ref() == Some(key))?.source
         }
         _ => return None,
     };
@@ -83,16 +80,10 @@ fn source_of<'a>(material: &'a Material, leaf: &Leaf) -> Option<&'a str> {
 
 /// The source of a number of a fit: a parameter may have its own.
 fn fit_source<'a>(fit: &'a Fit, path: &[String]) -> &'a str {
-    let own = |parameter: &[String]| {
-        let parameter = parameter_path(parameter);
-        fit.parameter_sources.iter().find(|(path, _)| *path == parameter)
-    };
-    match path {
-        [_, _, part, parameter @ ..] if part == "model" => {
-            own(parameter).map_or(&fit.source, |(_, source)| source)
-        }
-        _ => &fit.source,
-    }
+    let [_, _, part, parameter @ ..] = path else { return &fit.source };
+    let parameter = parameter_path(parameter);
+    let own = fit.parameter_sources.iter().find(|(path, _)| part == "model" && *path == parameter);
+    own.map_or(&fit.source, |(_, source)| source)
 }
 
 /// The path of a model's parameter, which does not name the list of a sum's models.
@@ -115,9 +106,9 @@ fn gathered(path: &[String]) -> String {
             format!("fit {name}, {}", parameter_path(parameter))
         }
         path => {
-            let is_name = |name: &&String| name.parse::<usize>().is_err();
-            let names = path.iter().filter(is_name).map(String::as_str);
-            match names.collect::<Vec<_>>().as_slice() {
+            let names = path.iter().map(String::as_str);
+            let names: Vec<&str> = names.filter(|name| name.parse::<usize>().is_err()).collect();
+            match names.as_slice() {
                 [list, key, numbers @ ..] if !numbers.is_empty() => {
                     format!("{} {key}, {}", one_of(list), numbers.join(", "))
                 }
@@ -135,14 +126,14 @@ fn one_of(list: &str) -> &str {
     }
 }
 
-/// Whom a stored revision is to be credited to.
+/// Who gets the credit for a stored revision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Credit<'a> {
-    /// Those to whom the database belongs.
+    /// The owners of the database.
     Own,
-    /// Those of the catalogue that it was imported from.
+    /// The authors of the catalogue that it was imported from.
     Others(&'a Origin),
-    /// Those who make matdb, whatever it went through since.
+    /// The makers of matdb, wherever the revision was copied since.
     BuiltIn,
 }
 
@@ -168,7 +159,8 @@ impl<'a> Credit<'a> {
         }
     }
 
-    /// The year to cite a stored revision by: of what was imported that in which the others made it.
+    /// The year for the citation of a stored revision: when it was first added, for an imported one in the catalogue
+    /// that it came from.
     pub fn year(self, stored: &Stored) -> Option<u16> {
         let added_at = self.origin().map_or(&stored.added_at, |origin| &origin.added_at);
         added_at.get(..4)?.parse().ok()
@@ -184,12 +176,12 @@ pub struct Citable<'a> {
     pub revision: Option<u32>,
     /// Year in which it was added, four digits; none for a built-in one.
     pub year: Option<u16>,
-    /// Who has it made.
+    /// Who gets the credit.
     pub credit: Credit<'a>,
 }
 
 impl Citable<'_> {
-    /// A name that no other revision has: name, revision and the beginning of its hash.
+    /// A unique title: name, revision and the beginning of the content's hash.
     fn title(&self) -> String {
         let Material { slug, name, .. } = self.material;
         let hash = self.material.content_hash();
@@ -227,7 +219,7 @@ impl Citable<'_> {
         text
     }
 
-    /// Which entry of which catalogue it was, or that it comes with the program.
+    /// The entry and the catalogue that it was imported from, or that it is built in.
     fn taken_from(&self) -> Option<String> {
         let origin = match self.credit {
             Credit::Own => return None,
@@ -372,7 +364,7 @@ fn person(author: &str) -> Value {
     }
 }
 
-/// Without what is not known.
+/// The record without its empty fields.
 pub(super) fn pruned(mut record: Value) -> Value {
     if let Some(fields) = record.as_object_mut() {
         fields.retain(|_, value| !value.is_null());

@@ -157,7 +157,7 @@ fn written(folder: &Path) -> io::Result<()> {
 
 #[cfg(not(target_os = "linux"))]
 fn written(folder: &Path) -> io::Result<()> {
-    let files = super::folder::files(folder)?;
+    let files = super::listing::files(folder)?;
     files
         .iter()
         .try_for_each(|(path, _)| File::options().write(true).open(folder.join(path))?.sync_all())

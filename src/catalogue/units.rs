@@ -1,5 +1,5 @@
-//! The unit of every numeric column, as UCUM code, from the ending of its name. The table `unit` of the
-//! database says the same (`tests/publish_command.rs` compares).
+//! The unit of every numeric column, as UCUM code, by the ending of its name. The table `unit` of the database holds
+//! the same units (`tests/publish_command.rs` compares them).
 
 /// Endings of names and their units.
 pub(super) const ENDINGS: [(&str, &str); 8] = [
@@ -13,11 +13,11 @@ pub(super) const ENDINGS: [(&str, &str); 8] = [
     ("_s", "s"),
 ];
 
-/// Names that have a unit and no ending.
+/// Names that have a unit without an ending for it.
 const WHOLE: [(&str, &str); 1] = [("year", "a")];
 
-/// Columns whose unit another column of the same row tells.
-const TOLD: [(&str, &str, &str); 8] = [
+/// Columns whose unit is in another column of the same row.
+const BY_ROW: [(&str, &str, &str); 8] = [
     ("fit_parameter", "value", "the column `unit`"),
     ("fit_parameter", "sd", "the column `unit`"),
     ("fit_estimate", "value", "the column `unit`"),
@@ -28,10 +28,10 @@ const TOLD: [(&str, &str, &str); 8] = [
     ("effect_parameter", "value", "the ending of the column `name`"),
 ];
 
-/// UCUM code of a numeric column; `1` for a pure number. `Err` says where the unit stands when it
-/// differs from row to row.
+/// UCUM code of a numeric column; `1` for a pure number. `Err` names the place of the unit where it differs from
+/// row to row.
 pub(super) fn unit(table: &str, column: &str) -> Result<&'static str, &'static str> {
-    if let Some((.., place)) = TOLD.iter().find(|told| (told.0, told.1) == (table, column)) {
+    if let Some((.., place)) = BY_ROW.iter().find(|known| (known.0, known.1) == (table, column)) {
         return Err(place);
     }
     if let Some((_, unit)) = WHOLE.iter().find(|(name, _)| *name == column) {

@@ -1,70 +1,33 @@
-//! Whether a publication is what it says: every file as listed, every material as in the database, every
-//! fit as its curve gives it. Nothing outside the folder is asked.
+//! Verifying a publication: every file has its listed hash, every material is that of the database, and every fit
+//! follows from its curve. Nothing outside the folder is used.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt;
 use std::fs::{self, File};
 use std::io;
 use std::path::Path;
 
 use serde::Serialize;
-use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::about::About;
-use super::api::{Entry, Index, LARGEST_MATERIAL_BYTES, Record, SCHEMA_VERSION};
-use super::contents::rebuilt;
+use super::api::{Entry, Index, LARGEST_MATERIAL_BYTES, Record};
+use super::check_store::{CheckCount, Refit, check_each, check_store};
 use super::error::CatalogueError;
-use super::folder::{Sum, files, hashed};
-use super::layout::{ABOUT, DATABASE, INDEX, MATERIALS, SUMS, material_path};
-use super::tables::HAS_PARQUET;
-use crate::fit::again::{lacks_report, problems};
-use crate::material::Fit;
-use crate::store::{Again, RevisionSummary, Store, StoreError, Stored, Summary};
-
-/// Largest database or table that is read, bytes.
-pub const LARGEST_TABLE_BYTES: u64 = 64 << 30;
-/// Largest file of any other kind, bytes.
-pub const LARGEST_FILE_BYTES: u64 = 1 << 30;
-
-/// Something that is not as it should be.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Problem {
-    /// The file, or the material and its revision.
-    pub place: String,
-    /// What is wrong.
-    pub problem: String,
-}
-
-impl fmt::Display for Problem {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{}: {}", self.place, self.problem)
-    }
-}
-
-fn problem(place: impl Into<String>, problem: impl fmt::Display) -> Problem {
-    Problem { place: place.into(), problem: problem.to_string() }
-}
-
-/// How much was checked.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Checked {
-    /// Materials.
-    pub materials: usize,
-    /// Their revisions, whose hashes were recomputed.
-    pub revisions: usize,
-    /// Fits of current revisions that were made again.
-    pub fits: usize,
-}
+use super::folder::hashed;
+use super::layout::{DATABASE, INDEX, MATERIALS, SUMS, material_path};
+use super::listing::files;
+use super::problem::{Problem, problem};
+use super::read::{LARGEST_FILE_BYTES, LARGEST_TABLE_BYTES, read};
+use super::rebuild::check_rebuilt;
+use crate::store::{Store, Stored};
 
 /// What [`verify`] found.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Verified {
+pub struct Verification {
     /// Files of the publication.
     pub files: usize,
     /// What of its database was checked.
     #[serde(flatten)]
-    pub checked: Checked,
+    pub checked: CheckCount,
     /// What could not be checked, a sentence each.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
@@ -75,9 +38,9 @@ pub struct Verified {
 /// Checks a published folder, or a database by itself.
 ///
 /// # Errors
-/// When `bundle` is neither. Whatever is wrong inside is in [`Verified::problems`].
-pub fn verify(bundle: &Path) -> Result<Verified, CatalogueError> {
-    let mut verified = Verified::default();
+/// When `bundle` is neither. Whatever is wrong inside is in [`Verification::problems`].
+pub fn verify(bundle: &Path) -> Result<Verification, CatalogueError> {
+    let mut verified = Verification::default();
     let problems = &mut verified.problems;
     if bundle.is_file() {
         alone(bundle)?;
@@ -108,12 +71,6 @@ pub fn verify(bundle: &Path) -> Result<Verified, CatalogueError> {
     Ok(verified)
 }
 
-/// Checks a database: its pages and indexes are sound, every revision has the content that its hash
-/// says, what else is stored follows from that, and every fit of a current revision from its curve. `report` hears of everything that is wrong.
-pub fn check_store(store: &Store, report: &mut dyn FnMut(Problem)) -> Checked {
-    check_each(store, Refit::All, report, |_, _, _| ())
-}
-
 /// What is wrong with a publication before it takes its place: its files, read from the disk, against their hashes
 /// and against its database. Fits are not made again, and no file is: both have just been.
 pub(super) fn check_staged(bundle: &Path, store: &Store) -> Result<Vec<Problem>, CatalogueError> {
@@ -127,28 +84,17 @@ pub(super) fn check_staged(bundle: &Path, store: &Store) -> Result<Vec<Problem>,
     Ok(problems)
 }
 
-/// Which fits are made again.
-#[derive(Clone, Copy, PartialEq)]
-enum Refit {
-    None,
-    All,
-}
-
 /// Opens the database of a publication.
 pub(super) fn database(path: &Path) -> Result<Store, CatalogueError> {
-    let no_bundle = |problem: &str| CatalogueError::NoBundle {
-        path: path.to_owned(),
-        problem: problem.to_owned(),
-    };
     let size = fs::metadata(path).map_err(|reason| unreadable(path, reason))?.len();
     if size > LARGEST_TABLE_BYTES {
-        return Err(no_bundle("it is larger than any catalogue may be"));
+        return Err(no_bundle(path, "it is larger than any catalogue may be"));
     }
-    let store = Store::open_frozen(path)?.ok_or_else(|| no_bundle("it is empty"))?;
-    match store.has_own_schema()? {
-        true => Ok(store),
-        false => Err(no_bundle("its tables, indexes or views are not those that matdb makes")),
+    let store = Store::open_frozen(path)?.ok_or_else(|| no_bundle(path, "it is empty"))?;
+    if !store.has_own_schema()? {
+        return Err(no_bundle(path, "its tables, indexes or views are not those that matdb makes"));
     }
+    Ok(store)
 }
 
 /// Whether SQLite would read, roll back or remove the file together with the database.
@@ -174,6 +120,10 @@ fn alone(path: &Path) -> Result<(), CatalogueError> {
     Ok(())
 }
 
+fn no_bundle(path: &Path, problem: &str) -> CatalogueError {
+    CatalogueError::NoBundle { path: path.to_owned(), problem: problem.to_owned() }
+}
+
 fn unreadable(path: &Path, reason: io::Error) -> CatalogueError {
     CatalogueError::Io { verb: "read", path: path.to_owned(), reason }
 }
@@ -184,17 +134,15 @@ fn sums(
     problems: &mut Vec<Problem>,
 ) -> Result<BTreeMap<String, String>, CatalogueError> {
     let path = bundle.join(SUMS);
-    let no_bundle = |problem: &str| CatalogueError::NoBundle {
-        path: bundle.to_owned(),
-        problem: problem.to_owned(),
-    };
     match fs::symlink_metadata(&path) {
-        Ok(found) if !found.is_file() => return Err(no_bundle("its SHA256SUMS is no plain file")),
+        Ok(found) if !found.is_file() => {
+            return Err(no_bundle(bundle, "its SHA256SUMS is no plain file"));
+        }
         Ok(found) if found.len() > LARGEST_FILE_BYTES => {
-            return Err(no_bundle("its SHA256SUMS is larger than 1 GiB"));
+            return Err(no_bundle(bundle, "its SHA256SUMS is larger than 1 GiB"));
         }
         Ok(_) => {}
-        Err(_) => return Err(no_bundle("it has no SHA256SUMS")),
+        Err(_) => return Err(no_bundle(bundle, "it has no SHA256SUMS")),
     }
     let text = fs::read_to_string(&path).map_err(|reason| unreadable(&path, reason))?;
     let mut sums = BTreeMap::new();
@@ -217,8 +165,8 @@ fn sums(
 
 /// Whether a path stays within the folder that it is taken from.
 fn is_inside(path: &str) -> bool {
-    let is_name = |part: &str| !part.is_empty() && part != "." && part != "..";
-    path.split('/').all(is_name) && !path.contains(['\\', ':', '\0'])
+    path.split('/').all(|part| !["", ".", ".."].contains(&part))
+        && !path.contains(['\\', ':', '\0'])
 }
 
 fn check_files(
@@ -239,9 +187,11 @@ fn check_files(
             Some(sum) => problems.extend(check_file(bundle, path, sum)),
         }
     }
-    let is_there = |path: &String| found.binary_search_by(|(known, _)| known.cmp(path)).is_ok();
-    let missing = sums.keys().filter(|path| !is_there(path));
-    problems.extend(missing.map(|path| problem(path, "is missing")));
+    for path in sums.keys() {
+        if found.binary_search_by(|(known, _)| known.cmp(path)).is_err() {
+            problems.push(problem(path, "is missing"));
+        }
+    }
     Ok(())
 }
 
@@ -265,132 +215,6 @@ fn check_file(bundle: &Path, path: &str, sum: &str) -> Option<Problem> {
     }
 }
 
-/// Goes through a database; `each` sees every current revision with its line in the list.
-fn check_each(
-    store: &Store,
-    refit: Refit,
-    report: &mut dyn FnMut(Problem),
-    mut each: impl FnMut(&Summary, &Stored, &mut dyn FnMut(Problem)),
-) -> Checked {
-    let mut checked = Checked::default();
-    let opened = check_file_itself(store, report).and_then(|()| Ok((store.list()?, Again::new()?)));
-    let (summaries, mut again) = match opened {
-        Ok(opened) => opened,
-        Err(error) => {
-            report(problem("materials", error));
-            return checked;
-        }
-    };
-    for summary in &summaries {
-        checked.materials += 1;
-        let done =
-            check_material(store, &mut again, summary, refit, report, &mut checked, &mut each);
-        if let Err(error) = done {
-            report(problem(summary.slug.as_str(), error));
-        }
-    }
-    checked
-}
-
-fn check_file_itself(store: &Store, report: &mut dyn FnMut(Problem)) -> Result<(), StoreError> {
-    store.damage()?.into_iter().for_each(|what| report(problem(DATABASE, what)));
-    if !Again::new()?.has_own_units(store)? {
-        report(problem(DATABASE, OTHER_UNITS));
-    }
-    Ok(())
-}
-
-/// What is wrong with a database whose table of units was changed.
-pub const OTHER_UNITS: &str = "its units of columns are not those that matdb writes";
-
-/// What of a stored revision does not follow from its content: statistics of curves, numbers beside
-/// parameters, and whatever else the program writes twice.
-///
-/// # Errors
-/// When the database cannot be read.
-pub fn derived(
-    again: &mut Again,
-    store: &Store,
-    stored: &Stored,
-) -> Result<Vec<Problem>, StoreError> {
-    let place = format!("{}@{}", stored.material.slug, stored.revision);
-    let differences = again.differences(store, stored)?.into_iter();
-    Ok(differences
-        .map(|found| match found.curve {
-            Some(curve) => problem(
-                format!("{place}, curve {curve}"),
-                "its statistics are not those of its points",
-            ),
-            None => problem(
-                place.clone(),
-                format!("its rows of `{}` are not those that its content gives", found.table),
-            ),
-        })
-        .collect())
-}
-
-fn check_material(
-    store: &Store,
-    again: &mut Again,
-    summary: &Summary,
-    refit: Refit,
-    report: &mut dyn FnMut(Problem),
-    checked: &mut Checked,
-    each: &mut impl FnMut(&Summary, &Stored, &mut dyn FnMut(Problem)),
-) -> Result<(), StoreError> {
-    for RevisionSummary { revision, .. } in store.history(&summary.slug)? {
-        let place = || format!("{}@{revision}", summary.slug);
-        // Reading recomputes the hash.
-        let stored = match store.get(&summary.slug, Some(revision)) {
-            Ok(Some(stored)) => stored,
-            Ok(None) => {
-                report(problem(place(), "is not there"));
-                continue;
-            }
-            Err(StoreError::Corrupt { problem: what, .. }) => {
-                report(problem(place(), what));
-                continue;
-            }
-            Err(error) => return Err(error),
-        };
-        checked.revisions += 1;
-        if let Err(error) = stored.material.validate() {
-            report(problem(place(), error));
-            continue;
-        }
-        derived(again, store, &stored)?.into_iter().for_each(&mut *report);
-        if revision == summary.revision {
-            if refit == Refit::All {
-                checked.fits += check_fits(&stored, report);
-            }
-            each(summary, &stored, report);
-        }
-    }
-    Ok(())
-}
-
-fn check_fits(stored: &Stored, report: &mut dyn FnMut(Problem)) -> usize {
-    let material = &stored.material;
-    for fit in material.fits.iter().filter(|fit| lacks_report(fit)) {
-        let place = format!("{}@{}, fit `{}`", material.slug, stored.revision, fit.name);
-        report(problem(place, without_report(fit)));
-    }
-    let again = material.fits.iter().filter_map(|fit| Some((fit, problems(material, fit)?)));
-    again
-        .map(|(fit, wrong)| {
-            for what in wrong {
-                let place = format!("{}@{}, fit `{}`", material.slug, stored.revision, fit.name);
-                report(problem(place, what));
-            }
-        })
-        .count()
-}
-
-/// What is wrong with a fit whose report was taken away.
-pub fn without_report(fit: &Fit) -> String {
-    format!("was found by `{}`, but the report of that is not there", fit.estimator)
-}
-
 /// Checks that files and database say the same.
 fn check_content(
     bundle: &Path,
@@ -398,7 +222,7 @@ fn check_content(
     sums: &BTreeMap<String, String>,
     refit: Refit,
     problems: &mut Vec<Problem>,
-) -> Checked {
+) -> CheckCount {
     let mut entries = Vec::new();
     let checked =
         check_each(store, refit, &mut |found| problems.push(found), |summary, stored, report| {
@@ -413,117 +237,6 @@ fn check_content(
     let strangers = strangers.filter(|path| !known.contains(path.as_str()));
     problems.extend(strangers.map(|path| problem(path, "is of no material of the database")));
     checked
-}
-
-/// Publishes once more, without writing, and compares file by file; what was left out, a sentence each.
-fn check_rebuilt(
-    bundle: &Path,
-    store: &Store,
-    sums: &BTreeMap<String, String>,
-    problems: &mut Vec<Problem>,
-) -> Vec<String> {
-    let (scope, notes) = Scope::new(bundle, store, sums);
-    // Tables have other columns since.
-    if !scope.same_schema {
-        return notes;
-    }
-    let made = database_sum(bundle, sums).and_then(|database| {
-        let about = read::<About>(bundle, ABOUT).map_err(|what| problem(ABOUT, what))?;
-        rebuilt(store, &about, bundle, database).map_err(|error| problem(DATABASE, error))
-    });
-    let made = match made {
-        Ok(made) => made,
-        Err(what) => {
-            problems.push(what);
-            return Vec::new();
-        }
-    };
-    let paths: BTreeSet<&String> = sums.keys().chain(made.keys()).collect();
-    let mut wrong = paths.into_iter().filter(|path| scope.has(path)).filter_map(|path| {
-        match (sums.get(path), made.get(path)) {
-            (Some(sum), Some(made)) if *sum == made.sha256 => None,
-            (Some(_), Some(_)) => Some(problem(path, "is not what its database gives")),
-            (Some(_), None) => Some(problem(path, "is of no publication of its database")),
-            // An older version had fewer tables.
-            (None, _) if !scope.same_version => None,
-            (None, _) => Some(problem(path, "is missing: its database gives it")),
-        }
-    });
-    problems.extend(wrong.by_ref().take(MOST_NAMED));
-    let more = wrong.count();
-    if more > 0 {
-        problems.push(problem(".", format!("{more} more files are not what its database gives")));
-    }
-    notes
-}
-
-/// The database as its hash was found to be.
-fn database_sum(bundle: &Path, sums: &BTreeMap<String, String>) -> Result<Sum, Problem> {
-    let found = fs::metadata(bundle.join(DATABASE)).map_err(|reason| problem(DATABASE, reason))?;
-    let sha256 = sums.get(DATABASE).cloned().unwrap_or_default();
-    Ok(Sum { sha256, bytes: found.len() })
-}
-
-/// Files that are named one by one.
-const MOST_NAMED: usize = 10;
-
-/// Which files of a publication this program would write just so.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Scope {
-    same_version: bool,
-    same_schema: bool,
-    same_parquet: bool,
-}
-
-impl Scope {
-    /// The scope, and what is outside.
-    fn new(bundle: &Path, store: &Store, sums: &BTreeMap<String, String>) -> (Scope, Vec<String>) {
-        let version = read::<Index>(bundle, INDEX).ok().and_then(|index| index.program_version);
-        let has_parquet = sums.keys().any(|path| is_parquet(path));
-        let same_schema = !store.is_of_older_schema();
-        let scope = Scope {
-            same_version: same_schema && version.as_deref() == Some(env!("CARGO_PKG_VERSION")),
-            same_schema,
-            same_parquet: has_parquet == HAS_PARQUET,
-        };
-        let by = version.map_or("an older matdb".to_owned(), |version| format!("matdb {version}"));
-        let other_version = format!(
-            "{by} has published this and this is matdb {}: compared were the hashes of all files, the \
-             database in itself, its fits with their curves, {}; not compared were the pages, {}Parquet, \
-             the records (datapackage.json, CITATION.cff and others), tables/units.csv, and whether a \
-             table is missing",
-            env!("CARGO_PKG_VERSION"),
-            match same_schema {
-                true => "api/v1/ with the database, and those of tables/*.csv that are there",
-                false => "and api/v1/ with the database, whose schema is an older one",
-            },
-            if same_schema { "" } else { "tables/*.csv, " }
-        );
-        let other_tables = "this matdb was built with other formats of tables, so that Parquet and the \
-                            records that list it were not made again";
-        let notes = match scope {
-            Scope { same_version: false, .. } => vec![other_version],
-            Scope { same_parquet: false, .. } => vec![other_tables.to_owned()],
-            _ => Vec::new(),
-        };
-        (scope, notes)
-    }
-
-    fn has(self, path: &str) -> bool {
-        const LISTS: [&str; 3] = ["datapackage.json", "dataset.jsonld", "ro-crate-metadata.json"];
-        match self {
-            Scope { same_version: false, .. } => {
-                // The list of units has a line for every table that the program knows.
-                path.starts_with("tables/") && path.ends_with(".csv") && path != "tables/units.csv"
-            }
-            Scope { same_parquet: false, .. } => !is_parquet(path) && !LISTS.contains(&path),
-            _ => true,
-        }
-    }
-}
-
-fn is_parquet(path: &str) -> bool {
-    path.starts_with("tables/") && path.ends_with(".parquet")
 }
 
 fn check_record(bundle: &Path, stored: &Stored) -> Option<Problem> {
@@ -556,31 +269,6 @@ fn check_index(bundle: &Path, entries: &[Entry]) -> Option<Problem> {
         Ok(_) => Some(problem(INDEX, "lists something else than the database")),
         Err(what) => Some(problem(INDEX, what)),
     }
-}
-
-fn read<T: DeserializeOwned>(bundle: &Path, path: &str) -> Result<T, String> {
-    let place = bundle.join(path);
-    let limit = if path == INDEX { LARGEST_FILE_BYTES } else { LARGEST_MATERIAL_BYTES };
-    let size = fs::metadata(&place).map_err(|reason| reason.to_string())?.len();
-    if size > limit {
-        return Err("is too large to read".to_owned());
-    }
-    let bytes = fs::read(place).map_err(|reason| reason.to_string())?;
-    serde_json::from_slice(&bytes).map_err(|error| error.to_string())
-}
-
-/// What a publication says of itself.
-pub(super) fn about(bundle: &Path) -> Result<About, String> {
-    read(bundle, ABOUT).map_err(|what| format!("{ABOUT}: {what}"))
-}
-
-/// Whether a newer program has published this: its files may say what this one would not understand.
-pub(super) fn is_newer(bundle: &Path) -> bool {
-    #[derive(serde::Deserialize)]
-    struct Version {
-        schema_version: u32,
-    }
-    read::<Version>(bundle, INDEX).is_ok_and(|found| found.schema_version > SCHEMA_VERSION)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::console::Console;
 use crate::catalogue::Credit;
-use crate::catalogue::exchange::{self, Exported, Subject};
+use crate::catalogue::exchange::{self, Export, Subject};
 use crate::error::Error;
 use crate::files::{folder_of, write_all};
 use crate::setup::Database;
@@ -92,7 +92,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             way_out: "name one with -o, such as -o paint.brdf".to_owned(),
         });
     };
-    let Exported { files, lost } = exchange::export(&subject, args.format.into(), name)?;
+    let Export { files, lost } = exchange::export(&subject, args.format.into(), name)?;
     write_all(folder_of(&args.output), &files)?;
     let later = later_status_warning(store.as_ref(), &material.slug, revision)?;
     let notices = later.or_else(|| status_warning(&material));

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::console::Console;
 use super::summary::counted;
 use crate::adopt::activity;
-use crate::catalogue::{Import, Imported, Outcome, Taken};
+use crate::catalogue::{Import, ImportSummary, MaterialPlan, Outcome};
 use crate::error::Error;
 use crate::setup::Database;
 
@@ -36,13 +36,14 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let ours = if db.path().exists() { db.read()? } else { None };
     let materials = import.plan(ours.as_ref(), args.as_prefix.as_deref())?;
     drop(ours);
-    let is_new =
-        |taken: &Taken| matches!(taken.outcome, Outcome::Added { .. } | Outcome::Continued { .. });
+    let is_new = |taken: &MaterialPlan| {
+        matches!(taken.outcome, Outcome::Added { .. } | Outcome::Continued { .. })
+    };
     if !args.dry_run && materials.iter().any(is_new) {
         let mut store = db.write()?;
         import.take(&mut store, &materials, &activity("import", &[&import.database()])?)?;
     }
-    let imported = Imported { dry_run: args.dry_run, materials };
+    let imported = ImportSummary { dry_run: args.dry_run, materials };
     console.result(&text(&imported, db), &imported)
 }
 
@@ -57,11 +58,11 @@ fn publication(bundle: &Path) -> &Path {
     }
 }
 
-fn text(imported: &Imported, db: &Database) -> String {
+fn text(imported: &ImportSummary, db: &Database) -> String {
     let mut text = String::new();
     let add = if imported.dry_run { "would add" } else { "added" };
     let mut counts = [0; 4];
-    for Taken { slug, name, outcome } in &imported.materials {
+    for MaterialPlan { slug, name, outcome } in &imported.materials {
         let of = if slug == name { String::new() } else { format!(", their {slug}") };
         match outcome {
             Outcome::Added { revisions } => {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::console::Console;
 use super::summary::counted;
-use crate::catalogue::{Verified, verify};
+use crate::catalogue::{Verification, verify};
 use crate::error::Error;
 
 /// Check a published catalogue: hashes of files and materials, and every fit made again
@@ -21,7 +21,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     let verified = verify(&args.bundle)?;
-    let Verified { files, checked, notes, problems } = &verified;
+    let Verification { files, checked, notes, problems } = &verified;
     notes.iter().for_each(|note| console.notice(note));
     let mut text: String = problems.iter().map(|problem| format!("{problem}\n")).collect();
     if problems.is_empty() {

@@ -89,8 +89,8 @@ impl Table {
         (least, greatest): (f64, f64),
     ) -> Result<Option<f64>, FormatError> {
         let value = self.number(row, column)?;
-        match (value.is_none_or(|v| (least..=greatest).contains(&v)), self.cell(row, column)) {
-            (false, Some(cell)) => {
+        match self.cell(row, column) {
+            Some(cell) if value.is_some_and(|v| !(least..=greatest).contains(&v)) => {
                 Err(cell.refuse(&format!("give a value from {least} to {greatest}")))
             }
             _ => Ok(value),
@@ -100,11 +100,9 @@ impl Table {
     /// A whole number of 32 bits that must be there.
     pub fn whole_number(&self, row: usize, column: &str) -> Result<u32, FormatError> {
         let value = self.required_number(row, column)?;
-        match (
-            value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value),
-            self.cell(row, column),
-        ) {
-            (false, Some(cell)) => Err(cell.refuse("fill in a whole number, 0 or greater")),
+        let is_whole = value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value);
+        match self.cell(row, column) {
+            Some(cell) if !is_whole => Err(cell.refuse("fill in a whole number, 0 or greater")),
             _ => Ok(value as u32),
         }
     }
@@ -137,36 +135,34 @@ impl Cell<'_> {
     }
 }
 
+/// Refuses a header that lacks a required column, or holds an unknown one or one twice.
 fn check_header(
     columns: &[String],
     required: &[&str],
     optional: &[&str],
 ) -> Result<(), FormatError> {
-    let known: Vec<&str> = required.iter().chain(optional).copied().collect();
-    let refuse = |problem: String| {
-        Err(FormatError::at("line 1", problem, format!("the columns are {}", known.join(", "))))
-    };
     for (mark, name) in [(';', "semicolons"), ('\t', "tabs")] {
         if required.len() > 1 && matches!(columns, [only] if only.contains(mark)) {
-            let problem = format!("the cells are parted by {name}");
+            let problem = format!("the cells are separated by {name}");
             return Err(FormatError::at(
                 "line 1",
                 problem,
-                "part them by commas, and write numbers with a point, as in -3.5",
+                "separate them with commas, and write numbers with a point, as in -3.5",
             ));
         }
     }
-    if let Some(missing) = required.iter().find(|r| !columns.iter().any(|c| c == *r)) {
-        return refuse(format!("there is no column `{missing}`"));
-    }
-    if let Some(unknown) = columns.iter().find(|c| !known.contains(&c.as_str())) {
-        return refuse(format!("unknown column `{unknown}`"));
-    }
-    let repeated = |(i, c): &(usize, &String)| columns[..*i].contains(c);
-    if let Some((_, twice)) = columns.iter().enumerate().find(repeated) {
-        return refuse(format!("column `{twice}` is there twice"));
-    }
-    Ok(())
+    let known: Vec<&str> = required.iter().chain(optional).copied().collect();
+    let problem = if let Some(missing) = required.iter().find(|r| !columns.iter().any(|c| c == *r))
+    {
+        format!("there is no column `{missing}`")
+    } else if let Some(unknown) = columns.iter().find(|c| !known.contains(&c.as_str())) {
+        format!("unknown column `{unknown}`")
+    } else if let Some(at) = (1..columns.len()).find(|&at| columns[..at].contains(&columns[at])) {
+        format!("column `{}` is there twice", columns[at])
+    } else {
+        return Ok(());
+    };
+    Err(FormatError::at("line 1", problem, format!("the columns are {}", known.join(", "))))
 }
 
 fn malformed(error: csv::Error) -> FormatError {
@@ -181,14 +177,15 @@ fn malformed(error: csv::Error) -> FormatError {
     FormatError::at(format!("line {line}"), problem, "mend the line")
 }
 
-/// The bytes with the lines of comment at the head left empty, so that lines keep their numbers.
+/// The bytes with the comment lines at the head emptied, so that the other lines keep their numbers.
 pub fn without_head(bytes: &[u8]) -> Vec<u8> {
+    let mut kept = Vec::with_capacity(bytes.len());
     let mut is_head = true;
-    let line = |line: &[u8]| {
+    for line in bytes.split_inclusive(|byte| *byte == b'\n') {
         is_head &= line.starts_with(b"#") || line.trim_ascii().is_empty();
-        if is_head { b"\n".to_vec() } else { line.to_vec() }
-    };
-    bytes.split_inclusive(|byte| *byte == b'\n').flat_map(line).collect()
+        kept.extend_from_slice(if is_head { b"\n" } else { line });
+    }
+    kept
 }
 
 #[cfg(test)]
@@ -214,7 +211,7 @@ mod tests {
         assert!(message("sigma0_db\n1").contains("no column `theta_deg`"));
         let table = Table::read(b"theta_deg;sigma0_db\n1;-3,5\n", &["theta_deg", "sigma0_db"], &[]);
         let refused = table.unwrap_err().to_string();
-        assert!(refused.starts_with("line 1: the cells are parted by semicolons;"), "{refused}");
+        assert!(refused.starts_with("line 1: the cells are separated by semicolons;"), "{refused}");
         assert!(message("theta_deg,x\n1,2").contains("unknown column `x`"));
         assert!(message("theta_deg,theta_deg\n1,2").contains("twice"));
         assert!(message("theta_deg\n1\n2,3\n").starts_with("line 3: 2 cells"));

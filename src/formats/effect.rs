@@ -4,16 +4,17 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-/// One effect of a scene, a radar or a material. What names and numbers there are is known to
-/// [`effects`](crate::effects::resolve).
+/// One effect of a scene, a radar or a material. [`effects`](crate::effects::resolve) knows the names and
+/// the parameters.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EffectEntry {
     /// Its name.
     pub name: String,
-    /// Key of the source of its numbers, in a material; none where whoever wrote it states them.
+    /// Key of the source of its numbers, in a material; none where the author of the file states them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
-    /// Its numbers, each in the unit that ends its name; those left out are as if it were absent.
+    /// Its parameters, each in the unit that ends its name; one that is left out has the value at which the effect
+    /// does nothing.
     #[serde(flatten)]
     pub parameters: BTreeMap<String, f64>,
 }

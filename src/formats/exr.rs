@@ -1,6 +1,6 @@
-//! OpenEXR: a raster's channels as 32-bit floats, with where they lie and in which units.
+//! OpenEXR: a raster's channels as 32-bit floats, with their grid and their units.
 //!
-//! One layer, ZIP in blocks of 16 lines or as it is, NaN kept. The grid is in the attributes `pixelSizeM`,
+//! One layer, ZIP in blocks of 16 lines or uncompressed; NaN is kept. The grid is in the attributes `pixelSizeM`,
 //! `xMinM` and `yMinM` (double, m) and a channel's unit in `<channel>.unit`. The same raster
 //! gives the same bytes on every run and any number of threads.
 
@@ -63,12 +63,12 @@ impl From<Packing> for Compression {
 /// How many bytes of pixels one byte of a file may unfold to; deflate stays below 1032.
 const MAX_UNFOLDING: usize = 2048;
 
-/// Bytes of a file that go with a block: its place, its first line and its length.
-const BESIDE_BLOCK: usize = 16;
-/// Bytes that are set aside for a header; a longer one only makes the file grow.
-const FOR_HEADER: usize = 1 << 14;
+/// Bytes that a file holds per block besides its pixels: its offset, its first line and its length.
+const BLOCK_OVERHEAD: usize = 16;
+/// Bytes that are reserved for the header; with a longer one the buffer grows.
+const RESERVED_FOR_HEADER: usize = 1 << 14;
 
-/// The endings of channel names that tell a unit, and the unit.
+/// Endings of channel names, and their units.
 const UNITS: [(&str, &str); 9] = [
     ("_dbm", "dBm"),
     ("_db", "dB"),
@@ -81,12 +81,12 @@ const UNITS: [(&str, &str); 9] = [
     ("_s", "s"),
 ];
 
-/// What a caller adds to a file under a name of its own.
+/// The value of an attribute that a caller adds to a file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Attribute {
     /// Text, UTF-8.
     Text(String),
-    /// A number; its name should tell the unit.
+    /// A number; its name should end in the unit.
     Number(f64),
 }
 
@@ -128,7 +128,7 @@ pub fn write(raster: &Raster, attributes: &[(String, Attribute)]) -> Result<Vec<
     write_packed(raster, attributes, Packing::Zip16)
 }
 
-/// The same, packed as is said.
+/// As [`write()`], with a choice of the packing.
 ///
 /// # Errors
 /// As [`write()`].
@@ -143,24 +143,23 @@ pub fn write_packed(
         ..LayerAttributes::default()
     };
     let channels = checked_channels(raster)?;
-    let described =
-        |(name, _): &(Text, &[f32])| ChannelDescription::named(name.clone(), SampleType::F32);
+    let described = channels
+        .iter()
+        .map(|(name, _)| ChannelDescription::named(name.clone(), SampleType::F32))
+        .collect();
     let size = (raster.width, raster.height);
-    let header = Header {
-        own_attributes: layer_attributes,
-        ..Header::new(text(""), size, channels.iter().map(described).collect())
-    };
+    let header =
+        Header { own_attributes: layer_attributes, ..Header::new(text(""), size, described) };
     let blocks = BlockDescription::ScanLines;
     let header = header.with_encoding(packing.into(), blocks, LineOrder::Increasing);
-    let block = |number: usize| {
-        let lines = packing.lines() * number..raster.height.min(packing.lines() * (number + 1));
-        let rows = lines.flat_map(|y| channels.iter().map(move |(_, v)| &v[y * raster.width..]));
-        packing.pack(rows.map(|row| &row[..raster.width]))
-    };
-    let blocks = (0..raster.height.div_ceil(packing.lines())).into_par_iter().map(block);
-    let blocks: Vec<Vec<u8>> = blocks.collect();
-    let bytes = blocks.iter().map(|block| block.len() + BESIDE_BLOCK).sum::<usize>() + FOR_HEADER;
-    let mut file = Cursor::new(Vec::with_capacity(bytes));
+
+    // Blocks are packed in parallel and written in order.
+    let blocks: Vec<Vec<u8>> = (0..raster.height.div_ceil(packing.lines()))
+        .into_par_iter()
+        .map(|number| packed_block(&channels, size, packing, number))
+        .collect();
+    let bytes: usize = blocks.iter().map(|block| block.len() + BLOCK_OVERHEAD).sum();
+    let mut file = Cursor::new(Vec::with_capacity(bytes + RESERVED_FOR_HEADER));
     exr::block::write(&mut file, [header].into_iter().collect(), true, |_, writer| {
         for (number, compressed_pixels_le) in blocks.into_iter().enumerate() {
             let y_coordinate = (packing.lines() * number) as i32;
@@ -171,6 +170,18 @@ pub fn write_packed(
         Ok(())
     })?;
     Ok(with_sorted_header(file.into_inner()))
+}
+
+/// The pixels of one block: for each of its lines the rows of all channels.
+fn packed_block(
+    channels: &[(Text, &[f32])],
+    (width, height): (usize, usize),
+    packing: Packing,
+    number: usize,
+) -> Vec<u8> {
+    let lines = packing.lines() * number..height.min(packing.lines() * (number + 1));
+    let rows = lines.flat_map(|y| channels.iter().map(move |(_, values)| &values[y * width..]));
+    packing.pack(rows.map(|row| &row[..width]))
 }
 
 /// A block of ZIP: bytes at even places, then those at odd places, all as differences from the one
@@ -189,10 +200,7 @@ fn zipped<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone) -> Vec<u8> {
     let differences: Vec<u8> = apart.first().copied().into_iter().chain(steps).collect();
     // A higher level takes six times as long and saves 4 % of a power image.
     let deflated = compress_to_vec_zlib(&differences, CompressionLevel::BestSpeed as u8);
-    match deflated.len() < bytes {
-        true => deflated,
-        false => plain(rows),
-    }
+    if deflated.len() < bytes { deflated } else { plain(rows) }
 }
 
 fn plain<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone) -> Vec<u8> {

@@ -1,15 +1,15 @@
-//! Wavefront OBJ: vertices, polygons, and what they are called.
+//! Wavefront OBJ: vertices, polygons and their names.
 //!
-//! Read are `v`, `f`, `g`, `o` and `usemtl`; every other statement is passed over, `mtllib` too, so
-//! that no second file is ever opened. Corners may be written `1`, `1/2`, `1//3` or `1/2/3`, count
+//! The reader takes `v`, `f`, `g`, `o` and `usemtl` and skips every other statement, also `mtllib`, so
+//! that it never opens a second file. Corners may be written `1`, `1/2`, `1//3` or `1/2/3`, count
 //! from 1 or back from -1, and refer to vertices further down. A backslash continues a line.
 
 use std::borrow::Cow;
 
 use super::error::FormatError;
 use super::line::{excerpt, point};
+use crate::geometry::Mesh;
 use crate::geometry::mesh::LabelBuilder;
-use crate::geometry::{FacetLabels, Mesh};
 
 /// Reads the polygons of an OBJ file.
 ///
@@ -130,8 +130,9 @@ impl Reader {
             let problem = format!("there is no vertex {vertex}, only {vertices} are defined");
             return Err(malformed(line, problem));
         }
-        let has_names = |labels: &FacetLabels| labels.names.iter().any(|name| !name.is_empty());
-        mesh.labels = [materials.finish(), groups.finish()].into_iter().filter(has_names).collect();
+        let labels = [materials.finish(), groups.finish()].into_iter();
+        mesh.labels =
+            labels.filter(|label| label.names.iter().any(|name| !name.is_empty())).collect();
         Ok(mesh)
     }
 }
@@ -143,6 +144,7 @@ fn malformed(line: usize, problem: String) -> FormatError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::FacetLabels;
     use glam::DVec3;
 
     const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";

@@ -1,4 +1,4 @@
-//! STL, binary and ascii: a soup of triangles, welded here into a mesh.
+//! STL, binary and ascii: unconnected triangles, which become a mesh of shared vertices.
 //!
 //! Normals and attribute bytes are ignored: a facet's corners say the same, and more exactly.
 
@@ -21,7 +21,7 @@ const FACET_BYTES: usize = 50;
 ///
 /// # Errors
 ///
-/// Tells when a binary file's length and its count disagree; names the line at which an ascii file
+/// When a binary file's length and its count disagree; names the line at which an ascii file
 /// breaks the format or ends too early.
 pub fn read_mesh(bytes: &[u8]) -> Result<Mesh, FormatError> {
     match binary_facets(bytes) {
@@ -62,17 +62,21 @@ fn neither(bytes: &[u8]) -> FormatError {
 
 fn read_binary(facets: &[u8]) -> Mesh {
     let mut welder = Welder::default();
-    let corner = |bytes: &[u8; 12]| {
-        let [x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3] = *bytes;
-        [[x0, x1, x2, x3], [y0, y1, y2, y3], [z0, z1, z2, z3]].map(|b| f32::from_le_bytes(b).into())
-    };
     let facets = facets.as_chunks::<FACET_BYTES>().0.iter().map(|facet| {
         let (_normal, corners) = facet.split_at(12);
-        let mut vertices = corners.as_chunks().0.iter().map(|c| welder.vertex(corner(c).into()));
+        let mut vertices = corners.as_chunks().0.iter().map(|c| welder.vertex(corner(c)));
         std::array::from_fn(|_| vertices.next().unwrap_or_default())
     });
     let facets = facets.collect();
     Mesh { vertices: welder.vertices, facets, labels: Vec::new() }
+}
+
+/// A corner: x, y and z in single precision, least significant byte first.
+fn corner(bytes: &[u8; 12]) -> DVec3 {
+    let [x0, x1, x2, x3, y0, y1, y2, y3, z0, z1, z2, z3] = *bytes;
+    [[x0, x1, x2, x3], [y0, y1, y2, y3], [z0, z1, z2, z3]]
+        .map(|coordinate| f64::from(f32::from_le_bytes(coordinate)))
+        .into()
 }
 
 fn read_ascii(text: &str) -> Result<Mesh, FormatError> {
@@ -146,7 +150,7 @@ fn malformed(line: usize, problem: String) -> FormatError {
     FormatError::at(format!("line {line}"), problem, "copy or export the file again")
 }
 
-/// Numbers points, equal ones alike.
+/// Gives each point a number, and equal points the same one.
 #[derive(Default)]
 struct Welder {
     vertices: Vec<DVec3>,

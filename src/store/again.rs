@@ -1,15 +1,15 @@
-//! A revision written once more, beside what is stored: what follows from its content must follow from
-//! it still. The content itself has its hash.
+//! Writing a revision again, into a scratch database: every row that follows from its content must equal the stored
+//! one. The content itself is checked by its hash.
 
 use rusqlite::types::{Value, ValueRef};
 use rusqlite::{Connection, Result, Statement, params};
 
-use super::repair::unit_rows;
-use super::tables::{Table, tables};
-use super::{Store, StoreError, Stored, connect, write};
+use super::database::Store;
+use super::error::{InFile, StoreError};
+use super::record::Stored;
+use super::tables::{Table, follows_from_content, listed, quoted, tables, unit_rows};
+use super::{connect, write};
 
-/// Tables that say who made a revision, which follows from nothing.
-const MAKING: [&str; 4] = ["activity", "activity_input", "origin", "origin_author"];
 /// The table of which an older program wrote nothing.
 const STATISTICS: &str = "curve_statistic";
 /// What a sum may differ by on another machine, relative.
@@ -52,7 +52,7 @@ impl Again {
         store: &Store,
         stored: &Stored,
     ) -> std::result::Result<Vec<Difference>, StoreError> {
-        self.compare(&store.conn, stored).map_err(|error| StoreError::new(&store.path, error))
+        self.compare(&store.conn, stored).in_file(&store.path)
     }
 
     /// Whether the file has the units that the program would write.
@@ -60,8 +60,8 @@ impl Again {
     /// # Errors
     /// When the file cannot be read.
     pub fn has_own_units(&self, store: &Store) -> std::result::Result<bool, StoreError> {
-        let failed = |error| StoreError::new(&store.path, error);
-        Ok(unit_rows(&store.conn).map_err(failed)? == unit_rows(&self.scratch).map_err(failed)?)
+        Ok(unit_rows(&store.conn).in_file(&store.path)?
+            == unit_rows(&self.scratch).in_file(&store.path)?)
     }
 
     /// The database that revisions are written into, empty between two of them.
@@ -98,12 +98,6 @@ impl Again {
     }
 }
 
-/// Whether every row of a table follows from the content of a revision.
-pub(super) fn follows_from_content(table: &Table) -> bool {
-    table.columns.iter().any(|column| column.name == "revision_id")
-        && !MAKING.contains(&table.name.as_str())
-}
-
 /// Whether the revision must have statistics: a program that writes them has written it.
 fn has_statistics(conn: &Connection, revision_id: i64) -> Result<bool> {
     let sql = "SELECT EXISTS (SELECT 1 FROM activity WHERE revision_id = ?1)
@@ -113,21 +107,15 @@ fn has_statistics(conn: &Connection, revision_id: i64) -> Result<bool> {
 
 /// Everything but the number of the revision, that of a curve first.
 fn select(table: &Table) -> String {
-    let quoted = |name: &String| format!("\"{name}\"");
     let names = table.columns.iter().map(|column| &column.name);
     let mut names: Vec<&String> = names.filter(|name| *name != "revision_id").collect();
     names.sort_by_key(|name| *name != "curve");
-    let columns: Vec<String> = names.into_iter().map(quoted).collect();
-    let order: Vec<String> = table.key.iter().map(quoted).collect();
-    format!(
-        "SELECT {} FROM \"{}\" WHERE revision_id = ?1 ORDER BY {}",
-        columns.join(", "),
-        table.name,
-        order.join(", ")
-    )
+    let (columns, order) = (listed(names), listed(&table.key));
+    let table = quoted(&table.name);
+    format!("SELECT {columns} FROM {table} WHERE revision_id = ?1 ORDER BY {order}")
 }
 
-/// The texts of the first row that one has otherwise than the other.
+/// The texts of the first row that differs.
 fn first_difference(
     (old, old_id): (&mut Statement, i64),
     (new, new_id): (&mut Statement, i64),
@@ -146,11 +134,13 @@ fn first_difference(
             _ => false,
         };
         if let (false, Some(row)) = (same, old.or(new)) {
-            let text = |column| match row.get::<_, Value>(column) {
-                Ok(Value::Text(text)) => Some(text),
-                _ => None,
-            };
-            return Ok(Some((0..columns).filter_map(text).collect()));
+            let mut texts = Vec::new();
+            for column in 0..columns {
+                if let Ok(Value::Text(text)) = row.get(column) {
+                    texts.push(text);
+                }
+            }
+            return Ok(Some(texts));
         }
     }
 }

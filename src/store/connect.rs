@@ -3,7 +3,7 @@
 use std::fs;
 use std::io::{self, Read, Seek};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use rusqlite::backup::{Backup, StepResult};
 use rusqlite::config::DbConfig;
@@ -11,9 +11,10 @@ use rusqlite::functions::FunctionFlags;
 use rusqlite::{Connection, ErrorCode, OpenFlags, Transaction, TransactionBehavior};
 use rusqlite_migration::{M, Migrations};
 
-use super::error::directory_of;
+use super::error::{InFile, StoreError, directory_of};
 use super::find::outline;
-use super::{StoreError, write};
+use super::rows::rows;
+use super::write;
 
 /// "matd" in the file's header.
 const APPLICATION_ID: i64 = 0x6d61_7464;
@@ -71,18 +72,16 @@ pub(super) fn frozen(path: &Path) -> Result<Option<Connection>, StoreError> {
     if size_bytes(path)? == 0 {
         return Ok(None);
     }
-    let fail = |error| StoreError::new(path, error);
-    let conn = immutable(path).map_err(fail)?;
-    conn.pragma_update(None, "query_only", true).map_err(fail)?;
+    let conn = immutable(path).in_file(path)?;
+    conn.pragma_update(None, "query_only", true).in_file(path)?;
     modern(path, conn)
 }
 
 /// An empty database of the latest schema that is nowhere on the disk.
 pub(super) fn in_memory() -> Result<Connection, StoreError> {
     let path = Path::new(":memory:");
-    let fail = |error| StoreError::new(path, error);
-    let mut conn = Connection::open_in_memory().map_err(fail)?;
-    equip(&conn).map_err(fail)?;
+    let mut conn = Connection::open_in_memory().in_file(path)?;
+    equip(&conn).in_file(path)?;
     migrate(path, &mut conn)?;
     Ok(conn)
 }
@@ -103,22 +102,21 @@ fn patiently<T>(open: impl Fn() -> Result<T, StoreError>) -> Result<T, StoreErro
 
 fn open_writable(path: &Path) -> Result<Connection, StoreError> {
     // A stranger's file is never opened for writing.
-    let fail = |error| StoreError::new(path, error);
     if size_bytes(path)? > 0 {
         match quiet(path) {
             // A write of ours that was cut short, which SQLite takes back when it opens the file.
             Err(StoreError::Interrupted { .. }) if !names_another_file(path) => {
-                check_admissible(path, &immutable(path).map_err(fail)?)?;
+                check_admissible(path, &immutable(path).in_file(path)?)?;
             }
             conn => check_admissible(path, &conn?)?,
         }
     }
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
-    let mut conn = connect(path, flags).map_err(fail)?;
-    if conn.is_readonly("main").map_err(fail)? {
+    let mut conn = connect(path, flags).in_file(path)?;
+    if conn.is_readonly("main").in_file(path)? {
         return Err(StoreError::read_only(path));
     }
-    conn.pragma_update(None, "journal_mode", "wal").map_err(fail)?;
+    conn.pragma_update(None, "journal_mode", "wal").in_file(path)?;
     // Two writers that each read first would stand in the other's way.
     conn.set_transaction_behavior(TransactionBehavior::Immediate);
     migrate(path, &mut conn)?;
@@ -145,7 +143,7 @@ fn modern(path: &Path, conn: Connection) -> Result<Option<Connection>, StoreErro
 /// whenever we write.
 fn check_admissible(path: &Path, conn: &Connection) -> Result<(), StoreError> {
     schema_of(path, conn)?;
-    let strangers = strange_triggers(conn).map_err(|error| StoreError::new(path, error))?;
+    let strangers = strange_triggers(conn).in_file(path)?;
     match strangers.into_iter().next() {
         None => Ok(()),
         Some(name) => Err(StoreError::Trigger { file: path.to_owned(), name }),
@@ -156,7 +154,7 @@ fn check_admissible(path: &Path, conn: &Connection) -> Result<(), StoreError> {
 fn strange_triggers(conn: &Connection) -> rusqlite::Result<Vec<String>> {
     let sql = "SELECT name, sql FROM sqlite_schema WHERE type = 'trigger'";
     let triggers: Vec<(String, String)> =
-        super::read::rows(conn, sql, [], |row| Ok((row.get(0)?, row.get(1)?)))?;
+        rows(conn, sql, [], |row| Ok((row.get(0)?, row.get(1)?)))?;
     let strangers = triggers.into_iter().filter(|(_, sql)| !FRESH.contains(&format!("{sql};\n")));
     Ok(strangers.map(|(name, _)| name).collect())
 }
@@ -164,26 +162,21 @@ fn strange_triggers(conn: &Connection) -> rusqlite::Result<Vec<String>> {
 /// A copy of an older database in memory, brought up to date there. Who only reads changes no file,
 /// and may not even be allowed to.
 fn modern_copy(path: &Path, old: &Connection) -> Result<Connection, StoreError> {
-    let fail = |error| StoreError::new(path, error);
     check_admissible(path, old)?;
     let mut copy = in_memory_copy(path, old)?;
     migrate(path, &mut copy)?;
-    copy.pragma_update(None, "query_only", true).map_err(fail)?;
+    copy.pragma_update(None, "query_only", true).in_file(path)?;
     Ok(copy)
 }
 
 /// A copy of a database in memory.
 fn in_memory_copy(path: &Path, original: &Connection) -> Result<Connection, StoreError> {
-    let fail = |error| StoreError::new(path, error);
-    let mut copy = Connection::open_in_memory().map_err(fail)?;
-    let whole = |copy: &mut Connection| match Backup::new(original, copy)?.step(ALL_PAGES)? {
-        StepResult::Done => Ok(true),
-        _ => Ok::<_, rusqlite::Error>(false),
-    };
-    if !whole(&mut copy).map_err(fail)? {
+    let mut copy = Connection::open_in_memory().in_file(path)?;
+    let step = Backup::new(original, &mut copy).and_then(|backup| backup.step(ALL_PAGES));
+    if !matches!(step.in_file(path)?, StepResult::Done) {
         return Err(StoreError::Busy { file: path.to_owned() });
     }
-    equip(&copy).map_err(fail)?;
+    equip(&copy).in_file(path)?;
     Ok(copy)
 }
 
@@ -201,9 +194,8 @@ fn size_bytes(path: &Path) -> Result<u64, StoreError> {
 
 /// Opens an existing file, whosever it is, so that nothing in it can change.
 fn quiet(path: &Path) -> Result<Connection, StoreError> {
-    let fail = |error| StoreError::new(path, error);
-    let is_there = |ending| beside(path, ending).symlink_metadata().is_ok();
-    let (log_exists, journal_exists) = (is_there("-wal"), is_there("-journal"));
+    let [log_exists, journal_exists] =
+        ["-wal", "-journal"].map(|ending| beside(path, ending).symlink_metadata().is_ok());
     // A read-only connection leaves an empty log behind. A writable one clears that away, but would
     // also write a log that it finds into the database, and do what a journal says: that may be to
     // remove any file.
@@ -212,21 +204,21 @@ fn quiet(path: &Path) -> Result<Connection, StoreError> {
     } else {
         OpenFlags::SQLITE_OPEN_READ_WRITE
     };
-    let conn = connect(path, flags).map_err(fail)?;
-    if !log_exists && !journal_exists && conn.is_readonly("main").map_err(fail)? {
+    let conn = connect(path, flags).in_file(path)?;
+    if !log_exists && !journal_exists && conn.is_readonly("main").in_file(path)? {
         return unwritable(path);
     }
-    conn.pragma_update(None, "query_only", true).map_err(fail)?;
+    conn.pragma_update(None, "query_only", true).in_file(path)?;
     match conn.query_row("SELECT count(*) FROM sqlite_schema", [], |_| Ok(())) {
         // Where no log can be made nobody writes, so the file may be read as if it never changed.
         Err(error) if is_interrupted(&error) => {
             Err(StoreError::Interrupted { file: path.to_owned() })
         }
         Err(error) if !log_exists && !journal_exists && wants_a_log(&error) => {
-            immutable(path).map_err(fail)
+            immutable(path).in_file(path)
         }
         result => {
-            result.map_err(fail)?;
+            result.in_file(path)?;
             check_length(path, &conn)?;
             Ok(conn)
         }
@@ -236,16 +228,10 @@ fn quiet(path: &Path) -> Result<Connection, StoreError> {
 /// Opens a file that we may not write and beside which lies no log. One that is made for reading would
 /// stay there with the rights of the file, or as ours, and keep from writing whoever may.
 fn unwritable(path: &Path) -> Result<Connection, StoreError> {
-    let fail = |error| StoreError::new(path, error);
-    let now = || {
-        let reason = |reason| StoreError::Open { file: path.to_owned(), reason };
-        let found = fs::metadata(path).map_err(reason)?;
-        Ok((found.len(), found.modified().ok(), beside(path, "-wal").symlink_metadata().is_ok()))
-    };
     let nobody_writes = fs::metadata(path).is_ok_and(|found| found.permissions().readonly());
-    let before = now()?;
-    let conn = immutable(path).map_err(fail)?;
-    conn.pragma_update(None, "query_only", true).map_err(fail)?;
+    let before = state(path)?;
+    let conn = immutable(path).in_file(path)?;
+    conn.pragma_update(None, "query_only", true).in_file(path)?;
     // As where no log can be made.
     if nobody_writes || !may_add_to(directory_of(path)) {
         check_length(path, &conn)?;
@@ -253,12 +239,20 @@ fn unwritable(path: &Path) -> Result<Connection, StoreError> {
     }
     // Somebody else may write it meanwhile: what is read is a copy of one moment.
     let copy = check_length(path, &conn).and_then(|()| in_memory_copy(path, &conn));
-    if before != now()? {
+    if before != state(path)? {
         return Err(StoreError::Busy { file: path.to_owned() });
     }
     let copy = copy?;
-    copy.pragma_update(None, "query_only", true).map_err(fail)?;
+    copy.pragma_update(None, "query_only", true).in_file(path)?;
     Ok(copy)
+}
+
+/// Size and time of a file, and whether it has a log: a writer changes at least one of them.
+fn state(path: &Path) -> Result<(u64, Option<SystemTime>, bool), StoreError> {
+    let found =
+        fs::metadata(path).map_err(|reason| StoreError::Open { file: path.to_owned(), reason })?;
+    let has_log = beside(path, "-wal").symlink_metadata().is_ok();
+    Ok((found.len(), found.modified().ok(), has_log))
 }
 
 /// Whether we may make files in a folder; where nobody can say, perhaps.
@@ -276,18 +270,15 @@ fn may_add_to(_: &Path) -> bool {
 /// page for one that is filled with zeros.
 fn check_length(path: &Path, conn: &Connection) -> Result<(), StoreError> {
     let sql = "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size";
-    let said: i64 =
-        conn.query_row(sql, [], |row| row.get(0)).map_err(|error| StoreError::new(path, error))?;
+    let said: i64 = conn.query_row(sql, [], |row| row.get(0)).in_file(path)?;
     // What a writer has added may still be in the log alone; in this order the file has it if there is none.
     let has_log = beside(path, "-wal").symlink_metadata().is_ok_and(|found| found.len() > 0);
     let bytes = size_bytes(path)?;
-    match has_log || u64::try_from(said).is_ok_and(|said| said <= bytes) {
-        true => Ok(()),
-        false => Err(StoreError::Corrupt {
-            file: path.to_owned(),
-            problem: format!("it has {bytes} bytes and says that it has {said}, so it was cut off"),
-        }),
+    if has_log || u64::try_from(said).is_ok_and(|said| said <= bytes) {
+        return Ok(());
     }
+    let problem = format!("it has {bytes} bytes and says that it has {said}, so it was cut off");
+    Err(StoreError::Corrupt { file: path.to_owned(), problem })
 }
 
 /// A path in a form that SQLite takes for nothing but a path: a bare `file:a.sqlite` is an address to it, and
@@ -357,14 +348,16 @@ fn is_interrupted(error: &rusqlite::Error) -> bool {
 /// ours never do (sqlite.org/fileformat.html, "The Rollback Journal"). One that cannot be read counts.
 fn names_another_file(path: &Path) -> bool {
     const MAGIC: [u8; 8] = [0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7];
-    let end = || -> io::Result<[u8; 8]> {
-        let mut journal = fs::File::open(beside(path, "-journal"))?;
-        let mut end = [0; 8];
-        journal.seek(io::SeekFrom::End(-8))?;
-        journal.read_exact(&mut end)?;
-        Ok(end)
-    };
-    end().map_or(true, |end| end == MAGIC)
+    journal_end(path).map_or(true, |end| end == MAGIC)
+}
+
+/// The last eight bytes of the journal of a database.
+fn journal_end(path: &Path) -> io::Result<[u8; 8]> {
+    let mut journal = fs::File::open(beside(path, "-journal"))?;
+    let mut end = [0; 8];
+    journal.seek(io::SeekFrom::End(-8))?;
+    journal.read_exact(&mut end)?;
+    Ok(end)
 }
 
 fn beside(path: &Path, ending: &str) -> PathBuf {
@@ -379,7 +372,7 @@ fn schema_of(path: &Path, conn: &Connection) -> Result<usize, StoreError> {
                   FROM pragma_application_id, pragma_user_version";
     let (application_id, schema, tables): (i64, i64, i64) = conn
         .query_row(header, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))
-        .map_err(|error| StoreError::new(path, error))?;
+        .in_file(path)?;
     let (file, known) = (path.to_owned(), LATEST);
     match (application_id, usize::try_from(schema), tables) {
         (0, Ok(0), 0) => Ok(0),
@@ -408,14 +401,13 @@ fn migrate(path: &Path, conn: &mut Connection) -> Result<(), StoreError> {
 
 /// Gives a file without tables those of the latest schema, unless another program was quicker.
 fn make(path: &Path, conn: &mut Connection) -> Result<(), StoreError> {
-    let fail = |error| StoreError::new(path, error);
-    let tx = conn.transaction_with_behavior(TransactionBehavior::Immediate).map_err(fail)?;
+    let tx = conn.transaction_with_behavior(TransactionBehavior::Immediate).in_file(path)?;
     if schema_of(path, &tx)? == 0 {
-        tx.execute_batch(FRESH).map_err(fail)?;
-        tx.pragma_update(None, "application_id", APPLICATION_ID).map_err(fail)?;
-        tx.pragma_update(None, "user_version", LATEST as i64).map_err(fail)?;
+        tx.execute_batch(FRESH).in_file(path)?;
+        tx.pragma_update(None, "application_id", APPLICATION_ID).in_file(path)?;
+        tx.pragma_update(None, "user_version", LATEST as i64).in_file(path)?;
     }
-    tx.commit().map_err(fail)
+    tx.commit().in_file(path)
 }
 
 #[cfg(test)]

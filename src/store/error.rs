@@ -180,6 +180,18 @@ impl StoreError {
     }
 }
 
+/// Names the file in an error of SQLite.
+pub(super) trait InFile<T> {
+    /// The result, with an error that says what the user can do about the file.
+    fn in_file(self, path: &Path) -> Result<T, StoreError>;
+}
+
+impl<T> InFile<T> for rusqlite::Result<T> {
+    fn in_file(self, path: &Path) -> Result<T, StoreError> {
+        self.map_err(|error| StoreError::new(path, error))
+    }
+}
+
 /// What must be writable for a database to be: SQLite does not say which of its files is not.
 fn way_to_write(path: &Path) -> String {
     let beside = ["-wal", "-shm"].map(|ending| {

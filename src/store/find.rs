@@ -4,59 +4,19 @@ mod filter;
 pub(super) mod outline;
 mod words;
 
-use rusqlite::{Connection, OptionalExtension, Result, Row, Transaction, TransactionBehavior};
+use rusqlite::{Connection, OptionalExtension, Result, Transaction, TransactionBehavior};
 
-use super::read::{current_revision, damaged, rows};
-use super::{Store, StoreError, Summary};
-use crate::material::{Fit, Material, Slug, SourceKind};
+use super::database::Store;
+use super::error::{InFile, StoreError};
+use super::read::{current_revision, damaged};
+use super::record::Summary;
+use super::rows::rows;
+use crate::material::{Fit, Slug, SourceKind};
+use filter::summary;
 
-/// Which materials are wanted: those of which all holds that is said here.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Filter {
-    /// A frequency within the range for which the numbers are claimed, Hz.
-    pub frequency_hz: Option<f64>,
-    /// One of its tags.
-    pub tag: Option<String>,
-    /// How the numbers that a scene renders came to be.
-    pub kind: Option<SourceKind>,
-    /// Kind of stuff.
-    pub class: Option<String>,
-    /// Whether it has a model that was fitted to a curve.
-    pub fitted: Option<bool>,
-    /// `active`, `superseded` or `withdrawn`.
-    pub status: Option<String>,
-}
-
-impl Filter {
-    /// Whether it lets a material through that need not be stored: the same as [`Store::find`] says of the
-    /// current revision of one that is.
-    pub fn lets_through(&self, material: &Material) -> bool {
-        let Filter { frequency_hz, tag, kind, class, fitted, status } = self;
-        frequency_hz.is_none_or(|hz| material.frequency_outside_hz(hz) == 0.0)
-            && tag.as_ref().is_none_or(|tag| material.tags.contains(tag))
-            && kind.is_none_or(|kind| material.render_kind() == Some(kind))
-            && class.as_ref().is_none_or(|class| material.class == *class)
-            && fitted.is_none_or(|fitted| material.fits.iter().any(Fit::is_fitted) == fitted)
-            && status.as_ref().is_none_or(|status| material.status.as_str() == status)
-    }
-}
-
-/// A material that words were found in.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Hit {
-    /// Short name.
-    pub slug: Slug,
-    /// Full name.
-    pub name: String,
-    /// Current revision, from 1.
-    pub revision: u32,
-    /// Some words around those that were found, which stand in brackets.
-    pub snippet: String,
-    /// `active`, `superseded` or `withdrawn`.
-    pub status: String,
-    /// How well it fits (BM25), less is better; comparable only within one search, 0 where not ranked.
-    pub rank: f64,
-}
+pub use filter::Filter;
+pub use outline::OutlineEntry;
+pub use words::Hit;
 
 impl Store {
     /// The current revisions of the materials that a filter lets through, sorted by name.
@@ -64,7 +24,7 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn find(&self, filter: &Filter) -> Result<Vec<Summary>, StoreError> {
-        filter::all(&self.conn, filter).map_err(|error| StoreError::new(&self.path, error))
+        filter::all(&self.conn, filter).in_file(&self.path)
     }
 
     /// The first `most` of them, without reading the others.
@@ -72,7 +32,7 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn page(&self, filter: &Filter, most: u32) -> Result<Vec<Summary>, StoreError> {
-        filter::page(&self.conn, filter, most).map_err(|error| StoreError::new(&self.path, error))
+        filter::page(&self.conn, filter, most).in_file(&self.path)
     }
 
     /// How many there are, but no more than `most`, without counting the others.
@@ -81,7 +41,7 @@ impl Store {
     /// When the file cannot be read.
     pub fn count(&self, filter: &Filter, most: u32) -> Result<usize, StoreError> {
         let counted = filter::count(&self.conn, filter, most);
-        counted.map_err(|error| StoreError::new(&self.path, error))
+        counted.in_file(&self.path)
     }
 
     /// Every class that a current revision is of, sorted.
@@ -89,7 +49,7 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn classes(&self) -> Result<Vec<String>, StoreError> {
-        filter::classes(&self.conn).map_err(|error| StoreError::new(&self.path, error))
+        filter::classes(&self.conn).in_file(&self.path)
     }
 
     /// The first `most` tags that any material has, sorted.
@@ -97,7 +57,7 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn tags(&self, most: usize) -> Result<Vec<String>, StoreError> {
-        filter::tags(&self.conn, most).map_err(|error| StoreError::new(&self.path, error))
+        filter::tags(&self.conn, most).in_file(&self.path)
     }
 
     /// What a list says of one material; `None` when there is none of that name.
@@ -105,7 +65,7 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn summary(&self, slug: &Slug) -> Result<Option<Summary>, StoreError> {
-        one(&self.conn, slug).map_err(|error| StoreError::new(&self.path, error))
+        one(&self.conn, slug).in_file(&self.path)
     }
 
     /// What is said of the model that scenes render of a material where it goes with a curve
@@ -114,7 +74,7 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn rendered_words(&self, slug: &Slug) -> Result<Option<String>, StoreError> {
-        words_of(&self.conn, slug).map_err(|error| StoreError::new(&self.path, error))
+        words_of(&self.conn, slug).in_file(&self.path)
     }
 
     /// The `most` materials that all these words are found in, the best first; the last word may be the
@@ -127,7 +87,7 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn search(&self, words: &str, most: u32) -> Result<Vec<Hit>, StoreError> {
-        words::search(&self.conn, words, most).map_err(|error| StoreError::new(&self.path, error))
+        words::search(&self.conn, words, most).in_file(&self.path)
     }
 }
 
@@ -150,25 +110,11 @@ fn words_of(conn: &Connection, slug: &Slug) -> Result<Option<String>> {
                JOIN curve ON curve.revision_id = revision.id AND curve.name = fit.curve
                JOIN source ON source.revision_id = revision.id AND source.key = curve.source
                WHERE slug = ?1";
-    let words = |row: &Row| {
+    let found = conn.prepare_cached(sql)?.query_row([slug.as_str()], |row| {
         let (estimator, kind): (String, SourceKind) = (row.get(0)?, row.get(1)?);
         Ok(kind.words_beside(estimator != Fit::STATED))
-    };
-    conn.prepare_cached(sql)?.query_row([slug.as_str()], words).optional()
-}
-
-fn summary(row: &Row) -> Result<Summary> {
-    Ok(Summary {
-        slug: row.get(0)?,
-        name: row.get(1)?,
-        class: row.get(2)?,
-        revision: row.get(3)?,
-        render_kind: row.get(4)?,
-        status: row.get(5)?,
-        curves: row.get(6)?,
-        observations: row.get(7)?,
-        fits: row.get(8)?,
-    })
+    });
+    found.optional()
 }
 
 /// Materials whose line, words or outline are not those of their current revision.

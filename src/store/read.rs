@@ -5,23 +5,16 @@ mod provenance;
 pub(super) use provenance::statistics;
 
 use rusqlite::ffi;
-use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, Type, ValueRef};
+use rusqlite::types::Type;
 use rusqlite::{
-    Connection, Error, OptionalExtension, Params, Result, Row, Transaction, TransactionBehavior,
-    params,
+    Connection, Error, OptionalExtension, Result, Row, Transaction, TransactionBehavior, params,
 };
-use serde::Deserialize;
-use serde::de::DeserializeOwned;
-use serde::de::value::{Error as WordError, StrDeserializer};
 
-use super::find::stale;
-use super::{RevisionSummary, Stored};
+use super::record::{RevisionSummary, Stored};
+use super::rows::{json, optional_json, rows};
 use crate::brdf::Brdf;
 use crate::formats::EffectEntry;
-use crate::material::{
-    Censor, Covariance, Curve, FindingVerdict, Fit, Geometry, Making, Material, Observation,
-    Origin, Reach, Scale, Slug, SourceKind, Status,
-};
+use crate::material::{Covariance, Curve, Fit, Material, Observation, Origin, Reach, Slug, Status};
 
 /// Every revision of a material, oldest first.
 pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSummary>> {
@@ -313,66 +306,8 @@ fn effects(conn: &Connection, revision_id: i64) -> Result<Vec<EffectEntry>> {
     rows(conn, sql, [revision_id], |row| {
         let (name, source): (String, _) = (row.get(0)?, row.get(1)?);
         let sql = "SELECT name, value FROM effect_parameter WHERE revision_id = ?1 AND effect = ?2";
-        let number = |row: &Row| Ok((row.get(0)?, row.get(1)?));
-        let parameters = rows(conn, sql, params![revision_id, name], number)?.into_iter().collect();
-        Ok(EffectEntry { name, source, parameters })
+        let parameters: Vec<(String, f64)> =
+            rows(conn, sql, params![revision_id, name], |row| Ok((row.get(0)?, row.get(1)?)))?;
+        Ok(EffectEntry { name, source, parameters: parameters.into_iter().collect() })
     })
-}
-
-pub(super) fn rows<T>(
-    conn: &Connection,
-    sql: &str,
-    values: impl Params,
-    read: impl FnMut(&Row) -> Result<T>,
-) -> Result<Vec<T>> {
-    conn.prepare_cached(sql)?.query_map(values, read)?.collect()
-}
-
-fn json<T: DeserializeOwned>(row: &Row, column: usize) -> Result<T> {
-    parsed(&row.get::<_, String>(column)?, column)
-}
-
-fn optional_json<T: DeserializeOwned>(row: &Row, column: usize) -> Result<Option<T>> {
-    let text: Option<String> = row.get(column)?;
-    text.map(|text| parsed(&text, column)).transpose()
-}
-
-fn parsed<T: DeserializeOwned>(text: &str, column: usize) -> Result<T> {
-    serde_json::from_str(text)
-        .map_err(|error| Error::FromSqlConversionFailure(column, Type::Text, error.into()))
-}
-
-/// A value that files and the database write as one word.
-fn word<'de, T: Deserialize<'de>>(value: ValueRef<'de>) -> FromSqlResult<T> {
-    T::deserialize(StrDeserializer::<WordError>::new(value.as_str()?)).map_err(FromSqlError::other)
-}
-
-/// Words of files that the database keeps as they are.
-macro_rules! words {
-    ($($type:ty),+ $(,)?) => {
-        $(impl FromSql for $type {
-            fn column_result(value: ValueRef) -> FromSqlResult<$type> {
-                word(value)
-            }
-        })+
-    };
-}
-
-words!(Censor, FindingVerdict, Geometry, Making, Scale, Slug, SourceKind);
-
-/// What is wrong: damaged pages, references to nothing, and lines of lists that are not of their
-/// material.
-pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
-    let found = rows(conn, "PRAGMA integrity_check", [], |row| row.get::<_, String>(0))?;
-    let dangling = rows(conn, "PRAGMA foreign_key_check", [], |row| {
-        let (table, parent): (String, String) = (row.get(0)?, row.get(2)?);
-        Ok(format!("a row of `{table}` refers to a row of `{parent}` that is not there"))
-    })?;
-    let problems: Vec<String> =
-        found.into_iter().filter(|line| line != "ok").chain(dangling).collect();
-    if !problems.is_empty() {
-        return Ok(problems);
-    }
-    let not_so = |slug| format!("what lists and searches say of `{slug}` is not what is stored");
-    Ok(stale(conn)?.into_iter().map(not_so).collect())
 }

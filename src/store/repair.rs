@@ -1,11 +1,15 @@
 //! Mending a damaged file as far as what is lost follows from what is left, or from content that is at hand.
 
-use rusqlite::{Connection, Result, Row, Transaction, params};
+use rusqlite::{Connection, Result, Transaction, params};
 
 use super::again::Again;
-use super::read::{self, rows};
-use super::tables::{schema, tables};
-use super::{Store, StoreError, Stored, write};
+use super::damage::damage;
+use super::database::Store;
+use super::error::{InFile, StoreError};
+use super::record::Stored;
+use super::rows::rows;
+use super::tables::{schema, tables, unit_rows};
+use super::{read, write};
 use crate::material::{Material, Slug};
 
 impl Store {
@@ -20,12 +24,12 @@ impl Store {
     pub fn repair(&mut self, at_hand: &[Material]) -> std::result::Result<Vec<String>, StoreError> {
         let mut again = Again::new()?;
         let Store { conn, path, .. } = self;
-        repair(conn, &mut again, at_hand).map_err(|error| StoreError::new(path, error))
+        repair(conn, &mut again, at_hand).in_file(path)
     }
 }
 
 fn repair(conn: &mut Connection, again: &mut Again, at_hand: &[Material]) -> Result<Vec<String>> {
-    let is_sound_before = read::damage(conn)?.is_empty();
+    let is_sound_before = damage(conn)?.is_empty();
     let tx = conn.transaction()?;
     tx.pragma_update(None, "defer_foreign_keys", true)?;
     let mut mended = own_schema(&tx, again)?;
@@ -73,31 +77,25 @@ fn units(tx: &Transaction, again: &Again) -> Result<Vec<String>> {
     Ok(vec!["units of columns were written anew".to_owned()])
 }
 
-/// Column, UCUM code and meaning of every unit.
-pub(super) fn unit_rows(conn: &Connection) -> Result<Vec<[Option<String>; 3]>> {
-    let sql = "SELECT column_name, ucum, meaning FROM unit ORDER BY column_name";
-    rows(conn, sql, [], |row| Ok([row.get(0)?, row.get(1)?, row.get(2)?]))
-}
-
 /// Removes rows of revisions and materials that are not there any more, which nothing can reach.
 fn orphans(tx: &Transaction) -> Result<Vec<String>> {
     let mut removed = Vec::new();
-    let mut remove = |table: &str, condition: &str| -> Result<()> {
-        let count = tx.execute(&format!("DELETE FROM \"{table}\" WHERE {condition}"), [])?;
-        if count > 0 {
-            removed.push(format!("{count} of `{table}` belonged to nothing and were removed"));
-        }
-        Ok(())
-    };
-    remove("revision", "material_id NOT IN (SELECT id FROM material)")?;
+    removed.extend(remove(tx, "revision", "material_id NOT IN (SELECT id FROM material)")?);
     for table in tables(tx)? {
         if table.columns.iter().any(|column| column.name == "revision_id") {
-            remove(&table.name, "revision_id NOT IN (SELECT id FROM revision)")?;
+            let condition = "revision_id NOT IN (SELECT id FROM revision)";
+            removed.extend(remove(tx, &table.name, condition)?);
         }
     }
-    remove("entry", "material_id NOT IN (SELECT id FROM material)")?;
-    remove("search", "rowid NOT IN (SELECT id FROM material)")?;
+    removed.extend(remove(tx, "entry", "material_id NOT IN (SELECT id FROM material)")?);
+    removed.extend(remove(tx, "search", "rowid NOT IN (SELECT id FROM material)")?);
     Ok(removed)
+}
+
+/// Removes rows of a table; returns a sentence if there were any.
+fn remove(tx: &Transaction, table: &str, condition: &str) -> Result<Option<String>> {
+    let count = tx.execute(&format!("DELETE FROM \"{table}\" WHERE {condition}"), [])?;
+    Ok((count > 0).then(|| format!("{count} of `{table}` belonged to nothing and were removed")))
 }
 
 /// Gives materials that have lost their current revision the latest one that is there.
@@ -105,8 +103,8 @@ fn current_revisions(tx: &Transaction) -> Result<Vec<String>> {
     let sql = "SELECT material.id, slug, current_revision, max(number) FROM material
                JOIN revision ON material_id = material.id GROUP BY material.id
                HAVING sum(number = current_revision) = 0";
-    let lost = |row: &Row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?));
-    let lost: Vec<(i64, String, i64, i64)> = rows(tx, sql, [], lost)?;
+    let lost: Vec<(i64, String, i64, i64)> =
+        rows(tx, sql, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?)))?;
     let mut mended = Vec::new();
     for (id, slug, number, latest) in lost {
         let update = "UPDATE material SET current_revision = ?2 WHERE id = ?1";
@@ -127,8 +125,8 @@ fn revisions(
 ) -> Result<Vec<String>> {
     let sql = "SELECT revision.id, number, content_hash FROM revision
                JOIN material ON material.id = material_id WHERE slug = ?1 ORDER BY number";
-    let listed = |row: &Row| Ok((row.get(0)?, row.get(1)?, row.get(2)?));
-    let listed: Vec<(i64, u32, String)> = rows(tx, sql, [slug.as_str()], listed)?;
+    let listed: Vec<(i64, u32, String)> =
+        rows(tx, sql, [slug.as_str()], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
     let mut mended = Vec::new();
     for (id, number, hash) in listed {
         let stored = read::get_in(tx, slug, Some(number)).ok().flatten();
@@ -163,7 +161,7 @@ fn lists(tx: &Transaction, slugs: &[Slug]) -> Result<()> {
 mod tests {
     use super::*;
     use crate::material::builtin;
-    use crate::store::again::follows_from_content;
+    use crate::store::tables::follows_from_content;
 
     #[test]
     fn a_sound_database_has_nothing_to_mend_and_stays_as_it_is() {

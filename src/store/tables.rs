@@ -1,11 +1,11 @@
 //! The file as plain tables, whatever tables a schema has: what exports read.
 
-use std::path::Path;
-
 use rusqlite::types::ValueRef;
-use rusqlite::{Connection, Result, params};
+use rusqlite::{Connection, Result};
 
-use super::{Store, StoreError};
+use super::database::Store;
+use super::error::{InFile, StoreError};
+use super::rows::rows;
 
 /// A table as it stands in the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -73,7 +73,7 @@ impl Store {
     /// # Errors
     /// When the file cannot be read.
     pub fn tables(&self) -> Result<Vec<Table>, StoreError> {
-        tables(&self.conn).map_err(|error| StoreError::new(&self.path, error))
+        tables(&self.conn).in_file(&self.path)
     }
 
     /// Gives every row of a table to `take`, in the order of the table's key, one at a time.
@@ -85,85 +85,16 @@ impl Store {
         table: &Table,
         mut take: impl FnMut(&[Cell]) -> Result<(), E>,
     ) -> Result<(), E> {
-        let failed = |error| StoreError::new(&self.path, error);
         let sql = select(table);
-        let mut statement = self.conn.prepare(&sql).map_err(failed)?;
-        let mut rows = statement.query([]).map_err(failed)?;
-        while let Some(row) = rows.next().map_err(failed)? {
+        let mut statement = self.conn.prepare(&sql).in_file(&self.path)?;
+        let mut rows = statement.query([]).in_file(&self.path)?;
+        while let Some(row) = rows.next().in_file(&self.path)? {
             let cells: Result<Vec<Cell>> =
                 (0..table.columns.len()).map(|index| cell(row.get_ref(index)?)).collect();
-            take(&cells.map_err(failed)?)?;
+            take(&cells.in_file(&self.path)?)?;
         }
         Ok(())
     }
-
-    /// Writes a copy of the database, as of one moment, to a new file: packed, without a log beside
-    /// it, and byte for byte the same as long as nothing is changed here.
-    ///
-    /// # Errors
-    /// When `path` exists already or cannot be written.
-    pub fn copy_to(&self, path: &Path) -> Result<(), StoreError> {
-        let literal = super::connect::literal(path);
-        let text = literal.to_str().ok_or_else(|| StoreError::Open {
-            file: path.to_owned(),
-            reason: std::io::Error::other("its name is not UTF-8"),
-        })?;
-        copy(&self.conn, text).map_err(|error| match StoreError::new(path, error) {
-            // What is damaged is what was to be copied.
-            StoreError::Corrupt { problem, .. } => {
-                StoreError::Corrupt { file: self.path.clone(), problem }
-            }
-            other => other,
-        })
-    }
-
-    /// Whether tables, indexes and views are exactly those that this program makes. A file from
-    /// elsewhere could have others of the same names that answer what they like.
-    ///
-    /// # Errors
-    /// When the file cannot be read.
-    pub fn has_own_schema(&self) -> Result<bool, StoreError> {
-        let [own, there] = self.schemas()?;
-        Ok(own == there)
-    }
-
-    /// Every table, index, trigger or view that is not as this program makes it, a clause each: what is missing or
-    /// another one, and what somebody has added.
-    ///
-    /// # Errors
-    /// When the file cannot be read.
-    pub fn changed_schema(&self) -> Result<Vec<String>, StoreError> {
-        let [own, there] = self.schemas()?;
-        let mut changed = Vec::new();
-        for one in own.iter().filter(|one| !there.contains(one)) {
-            changed.push(format!("{} is not the one that matdb makes", named(one)));
-        }
-        for one in there.iter().filter(|one| !own.iter().any(|own| own[..2] == one[..2])) {
-            changed.push(format!("{} is none that matdb makes", named(one)));
-        }
-        Ok(changed)
-    }
-
-    /// What this program makes, and what is in the file.
-    fn schemas(&self) -> Result<[Vec<[Option<String>; 4]>; 2], StoreError> {
-        let failed = |error| StoreError::new(&self.path, error);
-        let own = super::connect::in_memory()?;
-        Ok([schema(&own).map_err(failed)?, schema(&self.conn).map_err(failed)?])
-    }
-}
-
-/// Kind and name of an object of a schema.
-fn named([kind, name, ..]: &[Option<String>; 4]) -> String {
-    format!("{} {}", kind.as_deref().unwrap_or_default(), name.as_deref().unwrap_or_default())
-}
-
-fn copy(conn: &Connection, path: &str) -> Result<()> {
-    let query_only: bool = conn.pragma_query_value(None, "query_only", |row| row.get(0))?;
-    // SQLite counts writing to the other file as writing.
-    conn.pragma_update(None, "query_only", false)?;
-    let done = conn.execute("VACUUM INTO ?1", params![path]);
-    conn.pragma_update(None, "query_only", query_only)?;
-    done.map(|_| ())
 }
 
 /// Kind, name, table and statement of everything in the file.
@@ -229,14 +160,34 @@ fn references(conn: &Connection, table: &str) -> Result<Vec<Reference>> {
 }
 
 fn select(table: &Table) -> String {
-    let quoted = |name: &String| format!("\"{}\"", name.replace('"', "\"\""));
-    let list = |names: Vec<String>| names.join(", ");
-    let columns = list(table.columns.iter().map(|column| quoted(&column.name)).collect());
-    let order = match table.key.is_empty() {
-        true => "rowid".to_owned(),
-        false => list(table.key.iter().map(quoted).collect()),
-    };
+    let columns = listed(table.columns.iter().map(|column| &column.name));
+    let order = if table.key.is_empty() { "rowid".to_owned() } else { listed(&table.key) };
     format!("SELECT {columns} FROM {} ORDER BY {order}", quoted(&table.name))
+}
+
+/// Names in a statement, in quotes and with commas between.
+pub(super) fn listed<'a>(names: impl IntoIterator<Item = &'a String>) -> String {
+    names.into_iter().map(|name| quoted(name)).collect::<Vec<_>>().join(", ")
+}
+
+/// A name in a statement.
+pub(super) fn quoted(name: &str) -> String {
+    format!("\"{}\"", name.replace('"', "\"\""))
+}
+
+/// Tables that record who made a revision, which does not follow from its content.
+const MAKING: [&str; 4] = ["activity", "activity_input", "origin", "origin_author"];
+
+/// Whether every row of a table follows from the content of a revision.
+pub(super) fn follows_from_content(table: &Table) -> bool {
+    table.columns.iter().any(|column| column.name == "revision_id")
+        && !MAKING.contains(&table.name.as_str())
+}
+
+/// Column, UCUM code and meaning of every unit.
+pub(super) fn unit_rows(conn: &Connection) -> Result<Vec<[Option<String>; 3]>> {
+    let sql = "SELECT column_name, ucum, meaning FROM unit ORDER BY column_name";
+    rows(conn, sql, [], |row| Ok([row.get(0)?, row.get(1)?, row.get(2)?]))
 }
 
 fn cell(value: ValueRef) -> Result<Cell> {
@@ -257,6 +208,8 @@ fn cell(value: ValueRef) -> Result<Cell> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
     use crate::material::builtin;
 

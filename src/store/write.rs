@@ -8,10 +8,11 @@ use rusqlite::{
 };
 use serde::Serialize;
 
-use super::again::follows_from_content;
-use super::find::outline;
-use super::tables::tables;
-use super::{Added, Outlined, Removed, read};
+use super::find::outline::{self, OutlineEntry};
+use super::read;
+use super::record::{Added, Removed};
+use super::rows::rows;
+use super::tables::{follows_from_content, tables};
 use crate::formats::EffectEntry;
 use crate::material::{Activity, Covariance, Curve, Fit, Material, Slug};
 use crate::measure::statistics::by_angle;
@@ -28,7 +29,7 @@ pub(super) struct Adding<'a> {
     /// Numbers of materials whose lines are still to be made.
     waiting: Vec<i64>,
     /// What they render.
-    outlines: Vec<Outlined>,
+    outlines: Vec<OutlineEntry>,
 }
 
 impl<'a> Adding<'a> {
@@ -112,7 +113,7 @@ impl<'a> Adding<'a> {
 /// Writes what the fits that an older program stored say of their numbers.
 pub(super) fn fill_estimates(tx: &Transaction) -> Result<()> {
     let sql = "SELECT DISTINCT revision_id FROM fit WHERE report IS NOT NULL";
-    let revisions: Vec<i64> = read::rows(tx, sql, [], |row| row.get(0))?;
+    let revisions: Vec<i64> = rows(tx, sql, [], |row| row.get(0))?;
     revisions.into_iter().try_for_each(|revision_id| match read::fits(tx, revision_id) {
         // What cannot be read must not keep the rest of the file from being read.
         Err(Error::FromSqlConversionFailure(..)) => Ok(()),

@@ -1,9 +1,9 @@
-//! What can go wrong between formats, in the words of its user.
+//! Errors of reading and writing foreign formats.
 
 use thiserror::Error;
 
 use crate::formats::FormatError;
-use crate::material::MaterialError;
+use crate::material::{MaterialError, Slug};
 
 /// Why a material could not be written in a format or read from one.
 #[derive(Debug, Error)]
@@ -24,7 +24,7 @@ pub enum ExchangeError {
         /// What is wrong.
         error: MaterialError,
     },
-    /// Neither the file nor the user says what must be known.
+    /// Neither the file nor the user states what an entry needs.
     #[error("{file} does not say all that an entry needs; add {}", missing.join(", "))]
     Missing {
         /// The file.
@@ -32,7 +32,7 @@ pub enum ExchangeError {
         /// The flags that say it, each with an example.
         missing: Vec<String>,
     },
-    /// The material has not what the format must have.
+    /// The material lacks what the format needs.
     #[error("`{slug}` cannot be written as {format}: {problem}; {way_out}")]
     Unfit {
         /// The material.
@@ -57,4 +57,31 @@ pub enum ExchangeError {
         /// What the writer says.
         problem: String,
     },
+}
+
+impl ExchangeError {
+    /// A file that does not follow its format.
+    pub(super) fn in_file(file: &str, error: FormatError) -> ExchangeError {
+        ExchangeError::Format { file: file.to_owned(), error }
+    }
+
+    /// A material that lacks what a format needs.
+    pub(super) fn unfit(
+        slug: &Slug,
+        format: &'static str,
+        problem: impl ToString,
+        way_out: &str,
+    ) -> ExchangeError {
+        ExchangeError::Unfit {
+            slug: slug.to_string(),
+            format,
+            problem: problem.to_string(),
+            way_out: way_out.to_owned(),
+        }
+    }
+
+    /// A record that the writer of a format refused.
+    pub(super) fn encoding(format: &'static str, problem: impl ToString) -> ExchangeError {
+        ExchangeError::Encoding { format, problem: problem.to_string() }
+    }
 }

@@ -1,43 +1,43 @@
-//! What a person says of a foreign file that does not say it itself.
+//! What a person states about a foreign file that does not state it itself.
 
 use super::error::ExchangeError;
 use crate::material::{Material, Slug, SourceKind};
 
-/// What a person says beside a foreign file; what is none must stand in the file.
+/// What a person states about a foreign file; what is none must be in the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Given {
     /// Short name of the material.
     pub slug: Option<Slug>,
-    /// Full name; the short one stands in.
+    /// Full name; by default the short one.
     pub name: Option<String>,
-    /// Kind of stuff.
+    /// Kind of material.
     pub class: Option<String>,
-    /// What it is, and what is not known of it; takes the place of what the file says.
+    /// What it is, and what is not known about it; replaces the description in the file.
     pub description: Option<String>,
-    /// Words that it is found by, besides those of the file.
+    /// Keywords, in addition to those of the file.
     pub tags: Vec<String>,
     /// SPDX identifier of the licence of the data.
     pub licence: Option<String>,
-    /// Citation or, for one's own numbers, how they were made.
+    /// Citation or, for own numbers, how they were made.
     pub source: Option<String>,
-    /// Who measured or wrote that, `Family, Given`.
+    /// Authors of the source, `Family, Given`.
     pub authors: Vec<String>,
-    /// Year of it, four digits.
+    /// Year of the source, four digits.
     pub year: Option<u16>,
-    /// Name of the curve; that of the file stands in.
+    /// Name of the curve; by default that of the file.
     pub curve: Option<String>,
     /// How the numbers came to be.
     pub kind: Option<SourceKind>,
     /// Name of the instrument.
     pub instrument: Option<String>,
-    /// Frequency of a curve, or at which optical constants are wanted, Hz.
+    /// Frequency of a curve, or the wanted frequency of optical constants, Hz.
     pub frequency_hz: Option<f64>,
     /// Least power that counts as a detection, W.
     pub threshold_w: Option<f64>,
 }
 
 impl Given {
-    /// Adds what any material may say and no foreign file does.
+    /// Adds the description, tags, authors and year, which no foreign file holds.
     pub(super) fn complete(&self, material: &mut Material) {
         material.description = self.description.clone().unwrap_or(material.description.clone());
         for tag in &self.tags {

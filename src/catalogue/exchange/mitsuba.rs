@@ -9,14 +9,14 @@
 //!
 //! Models without a counterpart (Blinn–Phong, curves, Kirchhoff, lobes, layers, sums, correlated
 //! shadowing) become the blend of `diffuse` and `roughconductor` whose backscatter is nearest to theirs
-//! in dB over the claimed angles; by how much it misses is said. Lost: effects, uncertainty, frequency.
+//! in dB over the claimed angles, and the export reports the difference. Lost: effects, uncertainty, frequency.
 
 use std::f64::consts::{PI, SQRT_2};
 
 use num_complex::Complex;
 
 use super::error::ExchangeError;
-use super::exported::Exported;
+use super::export_files::Export;
 use super::subject::{Subject, one_line};
 use crate::brdf::{
     Brdf, CookTorrance, Distribution, Fresnel, Lambert, Mixture, Scattering, Shadowing,
@@ -24,17 +24,16 @@ use crate::brdf::{
 use crate::units::db_from_ratio;
 
 /// Writes the BSDF.
-pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeError> {
-    let unfit = |problem: String| ExchangeError::Unfit {
-        slug: subject.material.slug.to_string(),
-        format: "a Mitsuba BSDF",
-        problem,
-        way_out: "render another fit or curve".to_owned(),
-    };
-    let model = subject.model().map_err(|error| unfit(error.to_string()))?;
+pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeError> {
+    const FORMAT: &str = "a Mitsuba BSDF";
+    const WAY_OUT: &str = "render another fit or curve";
+    let slug = &subject.material.slug;
+    let model =
+        subject.model().map_err(|error| ExchangeError::unfit(slug, FORMAT, error, WAY_OUT))?;
     let angles = subject.echoing_rad(&model);
     if angles.is_empty() {
-        return Err(unfit("nothing comes back at any claimed angle".to_owned()));
+        let problem = "nothing comes back at any claimed angle";
+        return Err(ExchangeError::unfit(slug, FORMAT, problem, WAY_OUT));
     }
     let near = counterpart(&model, &angles);
     let mut lost = vec!["the file holds what scenes render, as backscatter".to_owned()];
@@ -62,7 +61,7 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
     }
     let id = format!("version=\"3.0.0\" id=\"{}\"", subject.material.slug);
     bsdf(&near, &id, 0, &mut text);
-    Ok(Exported { files: vec![(name.to_owned(), text.into_bytes())], lost })
+    Ok(Export { files: vec![(name.to_owned(), text.into_bytes())], lost })
 }
 
 /// The text as it may stand in a comment of XML; the second pass is for three in a row.
@@ -70,52 +69,58 @@ fn comment(line: &str) -> String {
     line.replace("--", "- -").replace("--", "- -")
 }
 
+/// A parameter in Mitsuba's XML: its tag, name and value.
+type Value = (&'static str, &'static str, String);
+
+/// Writes the element of a model and those of its parts.
 fn bsdf(model: &Brdf, attributes: &str, depth: usize, text: &mut String) {
+    let (kind, values): (&str, Vec<Value>) = match model {
+        Brdf::Lambert(Lambert { albedo }) => {
+            ("diffuse", vec![("spectrum", "reflectance", albedo.to_string())])
+        }
+        Brdf::CookTorrance(facets) => ("roughconductor", facet_values(facets)),
+        Brdf::Fresnel(mirror) => ("roughconductor", mirror_values(mirror)),
+        // Mitsuba's weight is that of the second part.
+        Brdf::Mixture(mixture) => ("blendbsdf", vec![("float", "weight", mixture.k.to_string())]),
+        // `counterpart` returns no other model.
+        _ => return,
+    };
     let indent = "    ".repeat(depth);
     let space = if attributes.is_empty() { "" } else { " " };
-    let mut open = |kind: &str, values: &[(&str, &str, String)]| {
-        *text += &format!("{indent}<bsdf type=\"{kind}\"{space}{attributes}>\n");
-        for (tag, name, value) in values {
-            *text += &format!("{indent}    <{tag} name=\"{name}\" value=\"{value}\"/>\n");
-        }
-    };
-    match model {
-        Brdf::Lambert(Lambert { albedo }) => {
-            open("diffuse", &[("spectrum", "reflectance", albedo.to_string())]);
-        }
-        Brdf::CookTorrance(facets) => {
-            let mut values = vec![("string", "distribution", law(facets.distribution).to_owned())];
-            match facets.m_across {
-                None => values.push(("float", "alpha", facets.m.to_string())),
-                Some(m_across) => values.extend([
-                    ("float", "alpha_u", facets.m.to_string()),
-                    ("float", "alpha_v", m_across.to_string()),
-                ]),
-            }
-            match index(facets.f_lambda) {
-                Some(n) => values.extend(index_of(Complex::from(n))),
-                None => values.push(("string", "material", "none".to_owned())),
-            }
-            open("roughconductor", &values);
-        }
-        Brdf::Fresnel(mirror) => {
-            let mut values = vec![
-                ("string", "distribution", "beckmann".to_owned()),
-                ("float", "alpha", mirror.lobe_rad.to_string()),
-            ];
-            values.extend(index_of(Complex::new(mirror.eps_real, mirror.eps_imag).sqrt()));
-            open("roughconductor", &values);
-        }
-        Brdf::Mixture(Mixture { k, diffuse, specular }) => {
-            // Mitsuba's weight is that of the second.
-            open("blendbsdf", &[("float", "weight", k.to_string())]);
-            bsdf(specular, "", depth + 1, text);
-            bsdf(diffuse, "", depth + 1, text);
-        }
-        // `counterpart` makes no other.
-        _ => {}
+    *text += &format!("{indent}<bsdf type=\"{kind}\"{space}{attributes}>\n");
+    for (tag, name, value) in values {
+        *text += &format!("{indent}    <{tag} name=\"{name}\" value=\"{value}\"/>\n");
+    }
+    if let Brdf::Mixture(Mixture { diffuse, specular, .. }) = model {
+        bsdf(specular, "", depth + 1, text);
+        bsdf(diffuse, "", depth + 1, text);
     }
     *text += &format!("{indent}</bsdf>\n");
+}
+
+fn facet_values(facets: &CookTorrance) -> Vec<Value> {
+    let mut values = vec![("string", "distribution", law(facets.distribution).to_owned())];
+    match facets.m_across {
+        None => values.push(("float", "alpha", facets.m.to_string())),
+        Some(m_across) => values.extend([
+            ("float", "alpha_u", facets.m.to_string()),
+            ("float", "alpha_v", m_across.to_string()),
+        ]),
+    }
+    match index(facets.f_lambda) {
+        Some(n) => values.extend(index_values(Complex::from(n))),
+        None => values.push(("string", "material", "none".to_owned())),
+    }
+    values
+}
+
+fn mirror_values(mirror: &Fresnel) -> Vec<Value> {
+    let mut values = vec![
+        ("string", "distribution", "beckmann".to_owned()),
+        ("float", "alpha", mirror.lobe_rad.to_string()),
+    ];
+    values.extend(index_values(Complex::new(mirror.eps_real, mirror.eps_imag).sqrt()));
+    values
 }
 
 fn law(distribution: Distribution) -> &'static str {
@@ -131,7 +136,7 @@ fn index(reflectivity: f64) -> Option<f64> {
     (root < 1.0 - 1e-9).then(|| (1.0 + root) / (1.0 - root))
 }
 
-fn index_of(index: Complex<f64>) -> [(&'static str, &'static str, String); 2] {
+fn index_values(index: Complex<f64>) -> [Value; 2] {
     [("spectrum", "eta", index.re.to_string()), ("spectrum", "k", index.im.to_string())]
 }
 
@@ -171,19 +176,9 @@ fn nearest_blend(model: &Brdf, angles: &[f64]) -> Brdf {
                     step if step == share_steps => 0.0,
                     step => 10f64.powf(-5.0 * f64::from(step) / f64::from(share_steps - 1)),
                 };
-                let blend = |level: f64| {
-                    Brdf::Mixture(Mixture {
-                        k: 1.0 - facets_share,
-                        diffuse: Box::new(Brdf::Lambert(Lambert { albedo: level })),
-                        specular: Box::new(Brdf::CookTorrance(CookTorrance {
-                            f_lambda: level,
-                            ..facets
-                        })),
-                    })
-                };
-                let mean_db = miss(&blend(1.0), model, angles).mean_db;
+                let mean_db = miss(&blend(1.0, facets, facets_share), model, angles).mean_db;
                 let level = 10f64.powf(mean_db / 10.0).min(1.0);
-                let candidate = blend(level);
+                let candidate = blend(level, facets, facets_share);
                 let rms_db = miss(model, &candidate, angles).rms_db;
                 if best.as_ref().is_none_or(|(least, _)| rms_db < *least) {
                     best = Some((rms_db, candidate));
@@ -192,6 +187,15 @@ fn nearest_blend(model: &Brdf, angles: &[f64]) -> Brdf {
         }
     }
     best.map_or_else(|| model.clone(), |(_, blend)| blend)
+}
+
+/// A diffuse part and facets of one level, with this share of facets.
+fn blend(level: f64, facets: CookTorrance, facets_share: f64) -> Brdf {
+    Brdf::Mixture(Mixture {
+        k: 1.0 - facets_share,
+        diffuse: Box::new(Brdf::Lambert(Lambert { albedo: level })),
+        specular: Box::new(Brdf::CookTorrance(CookTorrance { f_lambda: level, ..facets })),
+    })
 }
 
 /// By how much a model's backscatter differs from another's.
@@ -213,19 +217,21 @@ fn miss(model: &Brdf, other: &Brdf, angles: &[f64]) -> Miss {
     Miss { mean_db: sum / count, rms_db: f64::sqrt(squares / count), worst_db }
 }
 
-/// The largest difference between Schlick's F and Fresnel's for the index that stands in, facets' angles
-/// to 60°, dB.
+/// The largest difference between Schlick's F and Fresnel's for the index that replaces it, at facets' angles to 60°,
+/// dB.
 fn schlick_miss_db(model: &Brdf) -> f64 {
     match model {
         Brdf::CookTorrance(facets) => {
             let Some(n) = index(facets.f_lambda) else { return 0.0 };
             let mirror = Fresnel { eps_real: n * n, eps_imag: 0.0, lobe_rad: 0.02 };
-            let at = |degree: u32| {
+            let mut worst_db = 0.0f64;
+            for degree in 0..=60 {
                 let psi = f64::from(degree) * PI / 180.0;
                 let f = facets.f_lambda + (1.0 - facets.f_lambda) * (1.0 - psi.cos()).powi(5);
-                db_from_ratio(mirror.reflectance(psi) / f).abs()
-            };
-            (0..=60).map(at).filter(|db| db.is_finite()).fold(0.0, f64::max)
+                let db = db_from_ratio(mirror.reflectance(psi) / f).abs();
+                worst_db = if db.is_finite() { worst_db.max(db) } else { worst_db };
+            }
+            worst_db
         }
         Brdf::Mixture(mixture) => {
             schlick_miss_db(&mixture.diffuse).max(schlick_miss_db(&mixture.specular))

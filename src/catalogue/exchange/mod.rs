@@ -1,4 +1,4 @@
-//! Other people's formats, one file each: what of a material they can carry, and what gets lost.
+//! Foreign formats, one file each: what of a material they can hold, and what is lost.
 //!
 //! | format | out | in |
 //! |---|---|---|
@@ -10,11 +10,12 @@
 //! | Sionna RT radio material | `sionna.rs` | |
 //! | refractiveindex.info page | | `optical_constants.rs` |
 //!
-//! What goes out is made of the material and its revision alone: the same material gives the same
-//! bytes. What comes in becomes a [`Material`] that says where it is from.
+//! An exported file depends on the material and its revision alone: the same material gives the same bytes. An
+//! imported file becomes a [`Material`] that states its source.
 
+mod dispersion;
 mod error;
-mod exported;
+mod export_files;
 mod given;
 mod mitsuba;
 mod open_material;
@@ -31,7 +32,7 @@ mod universal_brdf_in;
 use crate::material::Material;
 
 pub use error::ExchangeError;
-pub use exported::Exported;
+pub use export_files::Export;
 pub use given::Given;
 pub use subject::Subject;
 
@@ -55,8 +56,8 @@ pub enum Format {
 /// Writes a material in a format; `name` is that of the file, with its ending.
 ///
 /// # Errors
-/// When the material has not what the format must have, or the program was built without it.
-pub fn export(subject: &Subject, format: Format, name: &str) -> Result<Exported, ExchangeError> {
+/// When the material lacks what the format needs, or the program was built without the format.
+pub fn export(subject: &Subject, format: Format, name: &str) -> Result<Export, ExchangeError> {
     match format {
         Format::Csv => Ok(plain_csv::write(subject, name)),
         #[cfg(feature = "parquet")]
@@ -70,7 +71,7 @@ pub fn export(subject: &Subject, format: Format, name: &str) -> Result<Exported,
     }
 }
 
-/// What of a file's ending tells that it holds somebody else's format.
+/// A foreign format, by the ending of the file's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Foreign {
     /// `.yml`, `.yaml`: a page of refractiveindex.info's database.
@@ -92,11 +93,11 @@ impl Foreign {
         }
     }
 
-    /// Makes a material of a file's bytes and of what a person says beside it. `file` names it in
-    /// errors and sources.
+    /// Makes a material of a file's bytes and of what a person states in addition. `file` names it in errors and
+    /// sources.
     ///
     /// # Errors
-    /// When the bytes do not follow the format, or neither they nor `given` say what must be known.
+    /// When the bytes do not follow the format, or neither they nor `given` state what an entry needs.
     pub fn read(self, file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
         let mut material = match self {
             Foreign::OpticalConstants => optical_constants::read(file, bytes, given),
@@ -104,8 +105,9 @@ impl Foreign {
             Foreign::UniversalBrdf => universal_brdf_in::read(file, bytes, given),
         }?;
         given.complete(&mut material);
-        let refused = |error| ExchangeError::Material { file: file.to_owned(), error };
-        material.validate().map_err(refused)?;
-        Ok(material)
+        match material.validate() {
+            Ok(()) => Ok(material),
+            Err(error) => Err(ExchangeError::Material { file: file.to_owned(), error }),
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! ASAM OpenMATERIAL 3D: a material (`.xomp`) with look-up tables beside it (`_brdf.xompt`,
+//! ASAM OpenMATERIAL 3D: a material (`.xomp`) with look-up tables in files of their own (`_brdf.xompt`,
 //! `_emp.xompt`), JSON (specification 1.0.0; schemas of the tag v1.0.0 and of commit d8f359a, MPL-2.0).
 //!
 //! Wavelengths are in m, angles in rad, f in 1/sr. The standard leaves open what an exit azimuth of 0
@@ -15,7 +15,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use serde_json::{Value, json};
 
 use super::error::ExchangeError;
-use super::exported::Exported;
+use super::export_files::Export;
 use super::subject::{Subject, one_line, sigma0_per_f};
 use crate::brdf::{Brdf, Scattering};
 use crate::frames::Direction;
@@ -38,7 +38,7 @@ const AZIMUTH_STEP_DEG: f64 = 15.0;
 const FAINTEST_PER_SR: f64 = 1e-9;
 
 /// Writes the material and its tables.
-pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeError> {
+pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeError> {
     let stem = name.strip_suffix(".xomp").unwrap_or(name);
     let [brdf_name, emp_name] = ["brdf", "emp"].map(|table| format!("{stem}_{table}.xompt"));
     let table = Table::new(subject)?;
@@ -73,7 +73,7 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
             files.push((emp_name, encoded(&emp)?));
         }
     }
-    Ok(Exported { files, lost })
+    Ok(Export { files, lost })
 }
 
 fn schema(name: &str) -> String {
@@ -83,11 +83,9 @@ fn schema(name: &str) -> String {
 }
 
 fn encoded(json: &Value) -> Result<Vec<u8>, ExchangeError> {
-    let failed = |error: serde_json::Error| ExchangeError::Encoding {
-        format: FORMAT,
-        problem: error.to_string(),
-    };
-    Ok((serde_json::to_string(json).map_err(failed)? + "\n").into_bytes())
+    let text = serde_json::to_string(json);
+    let text = text.map_err(|error| ExchangeError::encoding(FORMAT, error))?;
+    Ok((text + "\n").into_bytes())
 }
 
 fn metadata(subject: &Subject, part: &str, what: Option<&str>) -> Value {
@@ -149,8 +147,7 @@ fn roughness(subject: &Subject) -> Option<Value> {
     }))
 }
 
-/// Rows of wavelength, temperature, humidity, permeability and permittivity, sorted; else why there are
-/// none.
+/// Rows of wavelength, temperature, humidity, permeability and permittivity, sorted; else why there are none.
 fn permittivities(subject: &Subject) -> Result<Vec<Value>, &'static str> {
     let mut entries: Vec<_> = subject
         .permittivities()?
@@ -158,18 +155,17 @@ fn permittivities(subject: &Subject) -> Result<Vec<Value>, &'static str> {
         .map(|entry| (SPEED_OF_LIGHT_M_PER_S / entry.frequency_hz, entry))
         .filter(|(wavelength_m, _)| is_wavelength(*wavelength_m))
         .collect();
-    let temperature = |k: Option<f64>| k.unwrap_or(0.0);
-    entries.sort_by(|(a, x), (b, y)| {
-        let warmer = temperature(x.temperature_k).total_cmp(&temperature(y.temperature_k));
-        a.total_cmp(b).then(warmer)
-    });
-    let row = |(wavelength_m, entry): &(f64, &crate::material::Permittivity)| {
-        json!([wavelength_m, entry.temperature_k, null, 1.0, 0.0, entry.real, entry.imaginary])
-    };
-    match entries.is_empty() {
-        true => Err("no permittivity of the surface is at a wavelength that the format has"),
-        false => Ok(entries.iter().map(row).collect()),
+    if entries.is_empty() {
+        return Err("no permittivity of the surface is at a wavelength that the format has");
     }
+    entries.sort_by(|(a, x), (b, y)| {
+        let [x_k, y_k] = [x, y].map(|entry| entry.temperature_k.unwrap_or(0.0));
+        a.total_cmp(b).then(x_k.total_cmp(&y_k))
+    });
+    let rows = entries.iter().map(|(wavelength_m, entry)| {
+        json!([wavelength_m, entry.temperature_k, null, 1.0, 0.0, entry.real, entry.imaginary])
+    });
+    Ok(rows.collect())
 }
 
 fn is_wavelength(wavelength_m: f64) -> bool {
@@ -186,38 +182,34 @@ struct Table {
 
 impl Table {
     fn new(subject: &Subject) -> Result<Table, ExchangeError> {
-        let unfit = |problem: String, way_out: &str| ExchangeError::Unfit {
-            slug: subject.material.slug.to_string(),
-            format: FORMAT,
-            problem,
-            way_out: way_out.to_owned(),
-        };
-        let model = subject
-            .model()
-            .map_err(|error| unfit(error.to_string(), "fit a model to it and render that"))?;
+        let slug = &subject.material.slug;
+        let model = subject.model().map_err(|error| {
+            ExchangeError::unfit(slug, FORMAT, error, "fit a model to it and render that")
+        })?;
         let table = match model {
             Brdf::Tabulated(_) => Table::of_curve(subject),
             model => Table::of_model(subject, &model),
         };
         if !is_wavelength(table.wavelength_m) {
             let problem = format!("a wavelength of {} m is beyond its tables", table.wavelength_m);
-            return Err(unfit(problem, "they hold 1 nm to 17.16 mm, 17.5 GHz and above"));
+            let way_out = "they hold 1 nm to 17.16 mm, 17.5 GHz and above";
+            return Err(ExchangeError::unfit(slug, FORMAT, problem, way_out));
         }
         Ok(table)
     }
 
-    /// Only what was measured.
+    /// The points of the curve and no other directions.
     fn of_curve(subject: &Subject) -> Table {
         let points = subject.points();
         let wavelength_m = points.wavelength_m();
-        let row = |o: &crate::material::Observation| {
-            let azimuth_rad = o.delta_phi_rad.rem_euclid(TAU);
-            let f_per_sr = o.sigma0? / sigma0_per_f(o);
+        let mut rows = Vec::with_capacity(points.observations.len());
+        for o in points.observations.iter() {
+            let Some(sigma0) = o.sigma0 else { continue };
+            let azimuth_rad = o.delta_phi_rad.rem_euclid(TAU).min(LARGEST_AZIMUTH_RAD);
             let [i_rad, r_rad] =
                 [o.theta_i_rad, o.theta_r_rad].map(|rad| rad.min(LARGEST_ZENITH_RAD));
-            Some([wavelength_m, i_rad, r_rad, azimuth_rad.min(LARGEST_AZIMUTH_RAD), f_per_sr])
-        };
-        let mut rows: Vec<[f64; 5]> = points.observations.iter().filter_map(row).collect();
+            rows.push([wavelength_m, i_rad, r_rad, azimuth_rad, sigma0 / sigma0_per_f(o)]);
+        }
         rows.sort_by(|a, b| {
             let columns = a.iter().zip(b).map(|(x, y)| x.total_cmp(y));
             columns.fold(Ordering::Equal, Ordering::then)
@@ -240,17 +232,14 @@ impl Table {
     fn of_model(subject: &Subject, model: &Brdf) -> Table {
         let wavelength_m = SPEED_OF_LIGHT_M_PER_S / subject.frequency_hz();
         let [low, high] = subject.material.theta_rad;
-        let steps = |to_deg: f64, step_deg: f64| {
-            let count = (to_deg / step_deg).round() as u32;
-            (0..=count).map(move |step| (f64::from(step) * step_deg).to_radians())
-        };
-        let claimed = |angle: &f64| (low - 1e-9..=high + 1e-9).contains(angle);
-        let zeniths: Vec<f64> = steps(85.0, ZENITH_STEP_DEG).filter(claimed).collect();
+        let claimed_rad = low - 1e-9..=high + 1e-9;
+        let zeniths = steps_rad(85.0, ZENITH_STEP_DEG).filter(|angle| claimed_rad.contains(angle));
+        let zeniths: Vec<f64> = zeniths.collect();
         let mut rows = Vec::new();
         for &i_rad in &zeniths {
             let i = Direction::from_angles(i_rad, 0.0);
             for &r_rad in &zeniths {
-                for azimuth_rad in steps(180.0, AZIMUTH_STEP_DEG) {
+                for azimuth_rad in steps_rad(180.0, AZIMUTH_STEP_DEG) {
                     let o = Direction::from_angles(r_rad, azimuth_rad);
                     rows.push([wavelength_m, i_rad, r_rad, azimuth_rad, model.f_per_sr(i, o)]);
                 }
@@ -270,19 +259,22 @@ impl Table {
     }
 }
 
-/// How far linear interpolation of f halfway between zenith angles misses the backscatter, dB.
+/// Angles from 0 to an end in equal steps, rad.
+fn steps_rad(end_deg: f64, step_deg: f64) -> impl Iterator<Item = f64> {
+    let count = (end_deg / step_deg).round() as u32;
+    (0..=count).map(move |step| (f64::from(step) * step_deg).to_radians())
+}
+
+/// The largest error of backscatter that is interpolated linearly in f halfway between zenith angles, dB.
 fn worst_between_db(model: &Brdf, zeniths: &[f64]) -> f64 {
-    let miss = |pair: &[f64]| match pair {
-        [a, b] => {
-            let between = (model.retro_per_sr(*a) + model.retro_per_sr(*b)) / 2.0;
-            let true_per_sr = model.retro_per_sr((a + b) / 2.0);
-            if true_per_sr < FAINTEST_PER_SR {
-                0.0
-            } else {
-                db_from_ratio(between / true_per_sr).abs()
-            }
+    let mut worst_db = 0.0f64;
+    for (a, b) in zeniths.iter().zip(zeniths.iter().skip(1)) {
+        let between_per_sr = (model.retro_per_sr(*a) + model.retro_per_sr(*b)) / 2.0;
+        let true_per_sr = model.retro_per_sr((a + b) / 2.0);
+        let error_db = db_from_ratio(between_per_sr / true_per_sr).abs();
+        if true_per_sr >= FAINTEST_PER_SR && error_db.is_finite() {
+            worst_db = worst_db.max(error_db);
         }
-        _ => 0.0,
-    };
-    zeniths.windows(2).map(miss).filter(|db| db.is_finite()).fold(0.0, f64::max)
+    }
+    worst_db
 }

@@ -8,9 +8,10 @@
 //! where it is tabulated apart from k. Lost: frequencies further away than a third, the conditions
 //! other than the temperature, HTML.
 
+use super::dispersion::{Formula, formula};
 use super::error::ExchangeError;
 use super::given::{CLASS, Given, LICENCE, NAME, file_name, missing};
-use super::page::{Block, Page, number, parse};
+use super::page::{Block, Page, parse};
 use crate::brdf::{Brdf, Fresnel};
 use crate::formats::FormatError;
 use crate::material::{
@@ -18,9 +19,11 @@ use crate::material::{
 };
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
-/// Frequency that is wanted when nobody says, Hz.
+/// Key of the source of n and k.
+const OPTICAL_CONSTANTS: &str = "optical-constants";
+/// Frequency that is wanted by default, Hz.
 const USUAL_HZ: f64 = 300e9;
-/// What is taken reaches this share of the wanted frequency to each side.
+/// Half width of the band of frequencies that are kept, over the wanted frequency.
 const REACH: f64 = 1.0 / 3.0;
 /// Width of the mirror's lobe: a spot of 16 mm at 1 mm wavelength, rad.
 const LOBE_RAD: f64 = 0.02;
@@ -33,14 +36,17 @@ struct Constants {
     k: f64,
 }
 
+impl Constants {
+    /// Real and imaginary part of ε = (n − jk)² = ε′ − jε″.
+    fn permittivity(&self) -> [f64; 2] {
+        [self.n * self.n - self.k * self.k, 2.0 * self.n * self.k]
+    }
+}
+
 /// Makes a material of a page.
 pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
-    let refused = |error| ExchangeError::Format { file: file.to_owned(), error };
-    let text = std::str::from_utf8(bytes).map_err(|error| {
-        let place = format!("byte {}", error.valid_up_to());
-        refused(FormatError::at(place, "not UTF-8", "save the file as UTF-8"))
-    })?;
-    let page = parse(text).map_err(refused)?;
+    let page = text(bytes).and_then(parse);
+    let page = page.map_err(|error| ExchangeError::in_file(file, error))?;
     let known = page.is_cc0.then(|| "CC0-1.0".to_owned());
     let licence = given.licence.clone().or(known);
     let flags = [
@@ -54,10 +60,18 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
         return Err(missing(file, &flags));
     };
     let wanted_hz = given.frequency_hz.unwrap_or(USUAL_HZ);
-    let (nearest, constants) =
-        constants(&page).and_then(|constants| around(constants, wanted_hz)).map_err(refused)?;
+    let (nearest, constants) = constants(&page)
+        .and_then(|constants| around(constants, wanted_hz))
+        .map_err(|error| ExchangeError::in_file(file, error))?;
     let entry = Entry { slug, class, licence, wanted_hz, nearest, constants };
     Ok(material(file, &page, given, entry))
+}
+
+fn text(bytes: &[u8]) -> Result<&str, FormatError> {
+    std::str::from_utf8(bytes).map_err(|error| {
+        let place = format!("byte {}", error.valid_up_to());
+        FormatError::at(place, "not UTF-8", "save the file as UTF-8")
+    })
 }
 
 /// The constants at every tabulated wavelength where both are known.
@@ -83,11 +97,14 @@ fn constants(page: &Page) -> Result<Vec<Constants>, FormatError> {
             "name a page with both, or write a material.toml with a [[permittivity]]",
         ));
     };
-    let both = |[wavelength_um, k]: [f64; 2]| {
-        let n = index.at(wavelength_um)?;
-        Some(Constants { frequency_hz: SPEED_OF_LIGHT_M_PER_S / (wavelength_um * 1e-6), n, k })
-    };
-    Ok(loss.into_iter().filter_map(both).collect())
+    let mut constants = Vec::new();
+    for [wavelength_um, k] in loss {
+        if let Some(n) = index.at(wavelength_um) {
+            let frequency_hz = SPEED_OF_LIGHT_M_PER_S / (wavelength_um * 1e-6);
+            constants.push(Constants { frequency_hz, n, k });
+        }
+    }
+    Ok(constants)
 }
 
 /// The constants within reach of a frequency, and the nearest of them.
@@ -168,97 +185,7 @@ fn column(block: &Block, column: usize, width: usize) -> Result<Vec<[f64; 2]>, F
     Ok(rows)
 }
 
-/// A dispersion formula of refractiveindex.info with its coefficients C1, C2 …
-struct Formula {
-    number: u32,
-    coefficients: Vec<f64>,
-    range_um: [f64; 2],
-}
-
-fn formula(block: &Block, kind: &str) -> Result<Formula, FormatError> {
-    let place = format!("line {}", block.line);
-    let number_of = kind.strip_prefix("formula ").and_then(|number| number.trim().parse().ok());
-    let Some(number_of @ 1..=9) = number_of else {
-        let problem = format!("data of the type {kind:?} are not known");
-        let way_out = "known are tabulated nk, tabulated n, tabulated k and formula 1 to 9";
-        return Err(FormatError::at(place, problem, way_out));
-    };
-    let numbers = |keys: [&str; 2]| -> Result<Vec<f64>, FormatError> {
-        let Some((line, text)) = keys.iter().find_map(|key| block.values.get(key)) else {
-            let problem = format!("`{kind}` has no `{}`", keys[0]);
-            return Err(FormatError::at(place.clone(), problem, format!("add `{}: …`", keys[0])));
-        };
-        text.split_whitespace().map(|word| number(word, *line)).collect()
-    };
-    let coefficients = numbers(["coefficients"; 2])?;
-    let range_um = <[f64; 2]>::try_from(numbers(["wavelength_range", "range"])?).map_err(|_| {
-        FormatError::at(place.clone(), "wavelength_range has not two numbers", "give both ends")
-    })?;
-    if coefficients.is_empty() {
-        return Err(FormatError::at(place, "there are no coefficients", "give at least one"));
-    }
-    Ok(Formula { number: number_of, coefficients, range_um })
-}
-
-impl Formula {
-    /// n at a wavelength in µm; none outside the formula's range or where it has no value.
-    ///
-    /// The nine formulas are those of refractiveindex.info's list of dispersion formulas: Sellmeier,
-    /// Sellmeier-2, polynomial, its own general one, Cauchy, gases, Herzberger, retro, exotic.
-    fn at(&self, wavelength_um: f64) -> Option<f64> {
-        let [low, high] = self.range_um;
-        if !(low..=high).contains(&wavelength_um) {
-            return None;
-        }
-        let (l, l2) = (wavelength_um, wavelength_um * wavelength_um);
-        let c = |number: usize| self.coefficients.get(number - 1).copied().unwrap_or(0.0);
-        // Σ over the pairs (C_first, C_first+1), (C_first+2, …) …
-        let pairs = |first: usize, term: &dyn Fn(f64, f64) -> f64| -> f64 {
-            let rest = self.coefficients.get(first - 1..).unwrap_or_default();
-            let pair = |pair: &[f64]| match pair {
-                [a, b] => term(*a, *b),
-                _ => 0.0,
-            };
-            rest.chunks(2).map(pair).sum()
-        };
-        let resonance = |first: usize| {
-            let numerator = c(first) * l.powf(c(first + 1));
-            // Absent terms have no pole either.
-            if numerator == 0.0 { 0.0 } else { numerator / (l2 - c(first + 2).powf(c(first + 3))) }
-        };
-        let n = match self.number {
-            1 => (1.0 + c(1) + pairs(2, &|a, b| a * l2 / (l2 - b * b))).sqrt(),
-            2 => (1.0 + c(1) + pairs(2, &|a, b| a * l2 / (l2 - b))).sqrt(),
-            3 => (c(1) + pairs(2, &|a, b| a * l.powf(b))).sqrt(),
-            4 => {
-                let general = c(1) + resonance(2) + resonance(6);
-                (general + pairs(10, &|a, b| a * l.powf(b))).sqrt()
-            }
-            5 => c(1) + pairs(2, &|a, b| a * l.powf(b)),
-            6 => 1.0 + c(1) + pairs(2, &|a, b| a / (b - 1.0 / l2)),
-            7 => {
-                let pole = 1.0 / (l2 - 0.028);
-                c(1) + c(2) * pole
-                    + c(3) * pole * pole
-                    + c(4) * l2
-                    + c(5) * l2.powi(2)
-                    + c(6) * l2.powi(3)
-            }
-            8 => {
-                let clausius = c(1) + c(2) * l2 / (l2 - c(3)) + c(4) * l2;
-                ((1.0 + 2.0 * clausius) / (1.0 - clausius)).sqrt()
-            }
-            _ => {
-                let off = l - c(5);
-                let pole = if c(2) == 0.0 { 0.0 } else { c(2) / (l2 - c(3)) };
-                let band = if c(4) == 0.0 { 0.0 } else { c(4) * off / (off * off + c(6)) };
-                (c(1) + pole + band).sqrt()
-            }
-        };
-        (n.is_finite() && n >= 0.0).then_some(n)
-    }
-}
-
+/// What the file and the person state about an entry.
 struct Entry {
     slug: Slug,
     class: String,
@@ -270,25 +197,27 @@ struct Entry {
 
 fn material(file: &str, page: &Page, given: &Given, entry: Entry) -> Material {
     let Entry { slug, class, licence, wanted_hz, nearest, constants } = entry;
-    let permittivity = |at: &Constants| Permittivity {
-        frequency_source: None,
-        key: slug.to_string(),
-        frequency_hz: at.frequency_hz,
-        temperature_k: page.temperature_k,
-        real: at.n * at.n - at.k * at.k,
-        imaginary: 2.0 * at.n * at.k,
-        real_sd: None,
-        imaginary_sd: None,
-        source: "optical-constants".to_owned(),
-    };
-    let Permittivity { real: eps_real, imaginary: eps_imag, .. } = permittivity(&nearest);
+    let [eps_real, eps_imag] = nearest.permittivity();
+    let permittivities = constants.iter().map(|at| {
+        let [real, imaginary] = at.permittivity();
+        Permittivity {
+            frequency_source: None,
+            key: slug.to_string(),
+            frequency_hz: at.frequency_hz,
+            temperature_k: page.temperature_k,
+            real,
+            imaginary,
+            real_sd: None,
+            imaginary_sd: None,
+            source: OPTICAL_CONSTANTS.to_owned(),
+        }
+    });
     let (wanted_ghz, near_ghz) = (wanted_hz / 1e9, nearest.frequency_hz / 1e9);
     let distance = format!(
         "The permittivity at {wanted_ghz} GHz itself: the nearest tabulated frequency is \
          {near_ghz:.6} GHz, {:.6} GHz away, and is rendered as it is.",
         (near_ghz - wanted_ghz).abs()
     );
-    let reference = |path: &str| (path.to_owned(), "optical-constants".to_owned());
     let comments = plain(&page.comments);
     Material {
         name: given.name.clone().unwrap_or_else(|| slug.to_string()),
@@ -299,7 +228,7 @@ fn material(file: &str, page: &Page, given: &Given, entry: Entry) -> Material {
         licence: licence.clone(),
         tags: vec!["optical constants".to_owned()],
         frequency_hz: [nearest.frequency_hz; 2],
-        // A mirror answers a radar at normal incidence; the lobe that stands for it claims no more.
+        // A mirror returns an echo only near normal incidence.
         theta_rad: [0.0, 5f64.to_radians()],
         render: "half-space".to_owned(),
         sources: vec![
@@ -320,8 +249,8 @@ fn material(file: &str, page: &Page, given: &Given, entry: Entry) -> Material {
             curve: None,
             source: "half-space".to_owned(),
             parameter_sources: vec![
-                reference("eps_imag"),
-                reference("eps_real"),
+                ("eps_imag".to_owned(), OPTICAL_CONSTANTS.to_owned()),
+                ("eps_real".to_owned(), OPTICAL_CONSTANTS.to_owned()),
                 ("lobe_rad".to_owned(), "chosen".to_owned()),
             ],
             covariance: None,
@@ -337,7 +266,7 @@ fn material(file: &str, page: &Page, given: &Given, entry: Entry) -> Material {
         ],
         roughness: None,
         layers: Vec::new(),
-        permittivities: constants.iter().map(permittivity).collect(),
+        permittivities: permittivities.collect(),
         sessions: Vec::new(),
         findings: Vec::new(),
         slug,
@@ -361,7 +290,7 @@ fn optical_source(file: &str, page: &Page, given: &Given, licence: String) -> So
             plain(&page.comments)
         )),
         making: Some(Making::Copied),
-        ..source("optical-constants", given.kind.unwrap_or(SourceKind::Literature), &title)
+        ..source(OPTICAL_CONSTANTS, given.kind.unwrap_or(SourceKind::Literature), &title)
     }
 }
 

@@ -68,16 +68,18 @@ pub(super) fn parse(text: &str) -> Result<Page<'_>, FormatError> {
     Ok(page)
 }
 
+/// Splits a line into its key and its value.
 fn key(content: &str, line: usize) -> Result<(&str, &str), FormatError> {
     let parts = content.split_once(':').map(|(key, rest)| (key.trim(), rest.trim()));
-    let is_key = |key: &str| {
-        !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || "_ ".contains(c))
-    };
     parts.filter(|(key, _)| is_key(key)).ok_or_else(|| {
         let problem = format!("{:?} is no `key: value`", shortened(content));
         let way_out = "give a data page of refractiveindex.info's database";
         FormatError::at(format!("line {line}"), problem, way_out)
     })
+}
+
+fn is_key(key: &str) -> bool {
+    !key.is_empty() && key.chars().all(|c| c.is_ascii_alphanumeric() || "_ ".contains(c))
 }
 
 fn add_text(page: &mut Page, section: &str, content: &str) {

@@ -4,17 +4,15 @@
 //! Lost: everything but the curve.
 
 use super::error::ExchangeError;
-use super::exported::Exported;
-use super::plain_csv::what;
+use super::export_files::Export;
+use super::plain_csv::describe;
 use super::subject::Subject;
 use crate::catalogue::tables::parquet_of;
 use crate::store::{Cell, Column, ColumnKind, Table};
 
 /// Writes the curve, or what the model says at every degree.
-pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeError> {
+pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeError> {
     let points = subject.points();
-    let real =
-        |name: &str| Column { name: name.to_owned(), kind: ColumnKind::Real, required: false };
     let columns = vec![
         real("theta_i_rad"),
         real("theta_r_rad"),
@@ -48,10 +46,14 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeE
     });
     let about = format!("{}\n{} GHz", subject.about().join("\n"), points.frequency_hz / 1e9);
     let bytes = parquet_of(&table, &about, rows)
-        .map_err(|problem| ExchangeError::Encoding { format: "Parquet", problem })?;
+        .map_err(|problem| ExchangeError::encoding("Parquet", problem))?;
     let lost = format!(
         "the file holds {}; nothing else of the material has a column there",
-        what(&points)
+        describe(&points)
     );
-    Ok(Exported { files: vec![(name.to_owned(), bytes)], lost })
+    Ok(Export { files: vec![(name.to_owned(), bytes)], lost })
+}
+
+fn real(name: &str) -> Column {
+    Column { name: name.to_owned(), kind: ColumnKind::Real, required: false }
 }

@@ -1,13 +1,13 @@
 //! One material's curve as CSV, the columns that a `material.toml` refers to: `theta_deg`, `sigma0_db`,
-//! `censor`, `threshold_db`, `theta_r_deg`, `delta_phi_deg`. Lines that start with `#` say what it is
-//! and from whom; on the way in those at the head are left alone.
+//! `censor`, `threshold_db`, `theta_r_deg`, `delta_phi_deg`. Lines that start with `#` describe the curve and its
+//! source; the reader skips those at the head.
 //!
 //! Lost: everything but the curve, and of its points the angle's deviation, power, range, chirp and place.
 
 use std::path::Path;
 
 use super::error::ExchangeError;
-use super::exported::Exported;
+use super::export_files::Export;
 use super::given::{
     CLASS, FREQUENCY, Given, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD, file_name, missing,
 };
@@ -23,28 +23,32 @@ use crate::units::{db_from_ratio, shown};
 pub(super) const RADAR: &str = "radar";
 
 /// Writes the curve, or what the model says at every degree.
-pub(super) fn write(subject: &Subject, name: &str) -> Exported {
+pub(super) fn write(subject: &Subject, name: &str) -> Export {
     let points = subject.points();
     let mut text: String = subject.about().iter().map(|line| format!("# {line}\n")).collect();
-    text += &format!("# {}, at {} GHz\n", what(&points), points.frequency_hz / 1e9);
+    text += &format!("# {}, at {} GHz\n", describe(&points), points.frequency_hz / 1e9);
     text += "theta_deg,sigma0_db,censor,threshold_db,theta_r_deg,delta_phi_deg\n";
-    let db = |level: Option<f64>| level.map(|l| digits(db_from_ratio(l))).unwrap_or_default();
     for point in points.observations.iter() {
         text += &format!(
             "{},{},{},{},{},{}\n",
             digits(point.theta_i_rad.to_degrees()),
-            db(point.sigma0),
+            level_db(point.sigma0),
             point.censor.as_str(),
-            db(point.threshold_sigma0),
+            level_db(point.threshold_sigma0),
             digits(point.theta_r_rad.to_degrees()),
             digits(point.delta_phi_rad.to_degrees()),
         );
     }
     let lost = format!(
         "the file holds {}; nothing else of the material has a column there",
-        what(&points)
+        describe(&points)
     );
-    Exported { files: vec![(name.to_owned(), text.into_bytes())], lost }
+    Export { files: vec![(name.to_owned(), text.into_bytes())], lost }
+}
+
+/// A level in dB; nothing where there is none.
+fn level_db(level: Option<f64>) -> String {
+    level.map(|ratio| digits(db_from_ratio(ratio))).unwrap_or_default()
 }
 
 /// Fifteen digits, as many as decimals that somebody wrote keep on their way through radians and ratios.
@@ -53,7 +57,7 @@ fn digits(value: f64) -> String {
 }
 
 /// Which numbers these are, in a clause.
-pub(super) fn what(points: &Points) -> String {
+pub(super) fn describe(points: &Points) -> String {
     match points.curve {
         Some(curve) if points.others.is_empty() => format!("the curve `{}`", curve.name),
         Some(curve) => format!("the curve `{}` and not {}", curve.name, points.others.join(", ")),
@@ -64,19 +68,19 @@ pub(super) fn what(points: &Points) -> String {
 
 /// Makes a material of a curve.
 pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
-    let refused = |error: FormatError| ExchangeError::Format { file: file.to_owned(), error };
-    let points = file::points(bytes).map_err(refused)?;
+    let points = file::points(bytes).map_err(|error| ExchangeError::in_file(file, error))?;
     let observations: Vec<Observation> = points.into_iter().map(|(_, point)| point).collect();
     if observations.is_empty() {
         let empty =
             FormatError::at("line 1", "no row follows the header", "add the curve's points");
-        return Err(refused(empty));
+        return Err(ExchangeError::in_file(file, empty));
     }
     let Given { slug, class, licence, source, kind, instrument, frequency_hz, .. } = given;
-    // Who has not said how the curve came to be may have measured it.
+    // A curve of unstated kind may be measured.
     let is_measured = kind.is_none_or(|kind| kind == SourceKind::Measured);
-    let in_rows = observations.iter().all(|row| row.threshold_sigma0.is_some());
-    let has_threshold = !is_measured || in_rows || given.threshold_w.is_some();
+    let has_threshold = !is_measured
+        || given.threshold_w.is_some()
+        || observations.iter().all(|row| row.threshold_sigma0.is_some());
     let flags = [
         (slug.is_some(), NAME),
         (class.is_some(), CLASS),
@@ -105,12 +109,12 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
         threshold_w: given.threshold_w,
         ..Instrument::default()
     });
-    let lone = Lone { slug, class, licence, title, kind, hz, instrument, observations };
-    Ok(of_curve(file, given, lone))
+    let single = SingleCurve { slug, class, licence, title, kind, hz, instrument, observations };
+    Ok(of_curve(file, given, single))
 }
 
-/// A curve and all that an entry must say of it.
-pub(super) struct Lone {
+/// A curve and all that an entry must state about it.
+pub(super) struct SingleCurve {
     pub slug: Slug,
     pub class: String,
     pub licence: String,
@@ -124,11 +128,13 @@ pub(super) struct Lone {
 }
 
 /// A material that is one curve.
-pub(super) fn of_curve(file: &str, given: &Given, lone: Lone) -> Material {
-    let Lone { slug, class, licence, title, kind, hz, instrument, observations } = lone;
+pub(super) fn of_curve(file: &str, given: &Given, single: SingleCurve) -> Material {
+    let SingleCurve { slug, class, licence, title, kind, hz, instrument, observations } = single;
     let stem = Path::new(file_name(file)).file_stem().unwrap_or_default().to_string_lossy();
     let name = given.curve.clone().unwrap_or(stem.into_owned());
-    let angles = || observations.iter().map(|point| point.theta_i_rad);
+    let angles_rad = observations.iter().map(|point| point.theta_i_rad);
+    let (least_rad, greatest_rad) =
+        (angles_rad.clone().fold(f64::INFINITY, f64::min), angles_rad.fold(0.0, f64::max));
     Material {
         name: given.name.clone().unwrap_or_else(|| slug.to_string()),
         class,
@@ -136,7 +142,7 @@ pub(super) fn of_curve(file: &str, given: &Given, lone: Lone) -> Material {
         licence: licence.clone(),
         tags: Vec::new(),
         frequency_hz: [hz, hz],
-        theta_rad: [angles().fold(f64::INFINITY, f64::min), angles().fold(0.0, f64::max)],
+        theta_rad: [least_rad, greatest_rad],
         render: name.clone(),
         sources: vec![Source {
             key: name.clone(),

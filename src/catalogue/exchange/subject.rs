@@ -1,5 +1,5 @@
-//! A material that is to be written in a foreign format: which of its numbers go out, and what every
-//! file must say of them.
+//! A material to be written in a foreign format: which of its numbers are exported, and the description that every
+//! file holds.
 
 use std::borrow::Cow;
 use std::f64::consts::PI;
@@ -11,7 +11,7 @@ use crate::material::{
 };
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
-/// Below this σ⁰ a model says only that nothing comes back.
+/// Below this σ⁰ a model has no echo.
 const FAINTEST: f64 = 1e-8;
 
 /// A material and the revision that it is.
@@ -25,15 +25,15 @@ pub struct Subject<'a> {
     pub added_at: Option<&'a str>,
     /// The catalogue that it was imported from.
     pub origin: Option<&'a Origin>,
-    /// Name of the curve that goes out; none: what a scene renders, or was fitted.
+    /// Name of the exported curve; none for the one that a scene renders or that was fitted.
     pub curve: Option<&'a str>,
 }
 
-/// The curve that goes out: a measured one, or what a model says at every degree.
+/// The exported curve: a stored one, or the levels of a model at every degree.
 pub(super) struct Points<'a> {
     /// The curve; none for a model.
     pub curve: Option<&'a Curve>,
-    /// Names of the curves that stay behind.
+    /// Names of the curves that are not exported.
     pub others: Vec<&'a str>,
     pub observations: Cow<'a, [Observation]>,
     pub source: Option<&'a Source>,
@@ -43,8 +43,7 @@ pub(super) struct Points<'a> {
 }
 
 impl<'a> Subject<'a> {
-    /// The curve that is asked for; else what a scene renders: the curve itself, or the one that was fitted;
-    /// else the first curve; else the model.
+    /// The curve that the user names; else the rendered or the fitted one; else the first curve; else the model.
     pub(super) fn points(&self) -> Points<'a> {
         let material = self.material;
         let named = |name: &str| material.curves.iter().find(|curve| curve.name == name);
@@ -85,9 +84,10 @@ impl<'a> Subject<'a> {
     }
 
     fn sampled(&self, model: &Brdf) -> Vec<Observation> {
-        let point =
-            |theta_rad| Observation::backscatter(theta_rad, Some(model.sigma0(theta_rad)), None);
-        self.echoing_rad(model).into_iter().map(point).collect()
+        let points = self.echoing_rad(model).into_iter().map(|theta_rad| {
+            Observation::backscatter(theta_rad, Some(model.sigma0(theta_rad)), None)
+        });
+        points.collect()
     }
 
     /// Those of the angles at which a model scatters back more than −80 dB, rad.
@@ -127,8 +127,9 @@ impl<'a> Subject<'a> {
 
     /// How the rendered numbers came to be.
     pub(super) fn kind(&self) -> String {
-        let kind = || self.material.render_kind().map_or("of unknown origin", SourceKind::as_str);
-        self.material.rendered_words().unwrap_or_else(|| kind().to_owned())
+        let kind = self.material.render_kind();
+        let kind = kind.map_or("of unknown origin", SourceKind::as_str);
+        self.material.rendered_words().unwrap_or_else(|| kind.to_owned())
     }
 
     /// `slug@revision`, or that it is built in.
@@ -145,7 +146,7 @@ impl<'a> Subject<'a> {
         self.material.sources.iter().map(cited).collect()
     }
 
-    /// What every file says of itself, line by line and with nothing that ends a line.
+    /// The description that every file holds, line by line, without characters that end a line.
     pub(super) fn about(&self) -> Vec<String> {
         let material = self.material;
         let [low_ghz, high_ghz] = material.frequency_hz.map(|hz| hz / 1e9);
@@ -183,12 +184,13 @@ pub(super) fn sigma0_per_f(observation: &Observation) -> f64 {
     4.0 * PI * observation.theta_i_rad.cos() * observation.theta_r_rad.cos()
 }
 
-/// The text without what ends a line or turns its direction, so that it cannot leave a comment.
+/// The text with blanks for characters that end a line or reverse its direction, so that it stays within a comment.
 pub(super) fn one_line(text: &str) -> String {
-    let turns = |c: char| {
-        c.is_control()
-            || matches!(c, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-            || matches!(c, '\u{fffe}' | '\u{ffff}')
-    };
-    text.chars().map(|c| if turns(c) { ' ' } else { c }).collect()
+    text.replace(ends_or_turns_a_line, " ")
+}
+
+fn ends_or_turns_a_line(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{2028}' | '\u{2029}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+        || matches!(c, '\u{fffe}' | '\u{ffff}')
 }

@@ -15,8 +15,8 @@
 use serde_json::{Map, Value, json};
 
 use super::error::ExchangeError;
-use super::exported::Exported;
-use super::plain_csv::what;
+use super::export_files::Export;
+use super::plain_csv::describe;
 use super::subject::{Points, Subject, cited, one_line, sigma0_per_f};
 use crate::material::{Censor, Observation, SourceKind};
 
@@ -28,20 +28,17 @@ pub(super) const THRESHOLD: &str = "threshold_brdf";
 const UNSTATED: &str = "not stated";
 
 /// Writes the curve, or what the model says at every degree.
-pub(super) fn write(subject: &Subject, name: &str) -> Result<Exported, ExchangeError> {
+pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeError> {
     let points = subject.points();
     let file = json!({ "metadata": metadata(subject, &points), "data": data(&points) });
-    let failed = |error: serde_json::Error| ExchangeError::Encoding {
-        format: "JSON",
-        problem: error.to_string(),
-    };
-    let text = serde_json::to_string_pretty(&file).map_err(failed)? + "\n";
+    let text = serde_json::to_string_pretty(&file);
+    let text = text.map_err(|error| ExchangeError::encoding("JSON", error))? + "\n";
     let lost = format!(
         "the file holds {}; fits, effects, permittivities and layers have no place in the format, and \
          a detection limit only in adhoc_variables",
-        what(&points)
+        describe(&points)
     );
-    Ok(Exported { files: vec![(name.to_owned(), text.into_bytes())], lost })
+    Ok(Export { files: vec![(name.to_owned(), text.into_bytes())], lost })
 }
 
 fn metadata(subject: &Subject, points: &Points) -> Value {
@@ -118,28 +115,16 @@ fn timestamp(subject: &Subject, points: &Points) -> String {
 }
 
 fn data(points: &Points) -> Value {
-    let observations = &points.observations;
-    let column = |value: &dyn Fn(&Observation) -> Value| -> Vec<Value> {
-        observations.iter().map(value).collect()
-    };
-    let f = |o: &Observation, sigma0: f64| sigma0 / sigma0_per_f(o);
-    let threshold = |o: &Observation| o.threshold_sigma0.map(|threshold| f(o, threshold));
-    let phi_deg = |o: &Observation| (o.delta_phi_rad.to_degrees() + 360.0) % 360.0;
-    let value = |o: &Observation| match (o.sigma0, o.censor) {
-        (Some(sigma0), _) => f(o, sigma0),
-        (None, Censor::Right) => threshold(o).unwrap_or(0.0),
-        (None, _) => 0.0,
-    };
     let wavelength_um = points.wavelength_m() * 1e6;
     let mut data = json!({
-        "wavelength_i": { "unit": "μm", "values": column(&|_| json!(wavelength_um)) },
-        "theta_i": { "unit": "rad", "values": column(&|o| json!(o.theta_i_rad)) },
-        "phi_i": { "unit": "deg", "values": column(&|_| json!(0.0)) },
-        "theta_r": { "unit": "rad", "values": column(&|o| json!(o.theta_r_rad)) },
-        "phi_r": { "unit": "deg", "values": column(&|o| json!(phi_deg(o))) },
+        "wavelength_i": { "unit": "μm", "values": column(points, |_| json!(wavelength_um)) },
+        "theta_i": { "unit": "rad", "values": column(points, |o| json!(o.theta_i_rad)) },
+        "phi_i": { "unit": "deg", "values": column(points, |_| json!(0.0)) },
+        "theta_r": { "unit": "rad", "values": column(points, |o| json!(o.theta_r_rad)) },
+        "phi_r": { "unit": "deg", "values": column(points, |o| json!(phi_deg(o))) },
         "BRDF": {
             "unit": "sr^-1",
-            "values": column(&|o| json!(value(o))),
+            "values": column(points, |o| json!(value_per_sr(o))),
             "comments": "where censor is left the true value lies between 0 and threshold_brdf, where \
                          it is right above the value given",
         },
@@ -147,22 +132,44 @@ fn data(points: &Points) -> Value {
             CENSOR: {
                 "description": "none: measured; left: below the detection limit; right: above the \
                                 instrument's range.",
-                "unit": "", "type": "string", "values": column(&|o| json!(o.censor.as_str())),
+                "unit": "", "type": "string", "values": column(points, |o| json!(o.censor.as_str())),
             },
             THRESHOLD: {
                 "description": "Detection limit that applied to the point, as a BRDF; null: not stated.",
-                "unit": "1/sr", "type": "number", "values": column(&|o| json!(threshold(o))),
+                "unit": "1/sr", "type": "number", "values": column(points, |o| json!(threshold_per_sr(o))),
             },
         },
     });
     if let (Some(share), Some(data)) = (relative_deviation(points), data.as_object_mut()) {
-        let deviation = |o: &Observation| match (o.sigma0, threshold(o)) {
-            (None, Some(threshold)) => threshold,
-            _ => share * value(o),
-        };
-        data.insert("uBRDF".to_owned(), deviations(&column(&|o| json!(deviation(o)))));
+        let values = column(points, |o| match (o.sigma0, threshold_per_sr(o)) {
+            (None, Some(threshold)) => json!(threshold),
+            _ => json!(share * value_per_sr(o)),
+        });
+        data.insert("uBRDF".to_owned(), deviations(&values));
     }
     data
+}
+
+/// A value for every point.
+fn column(points: &Points, value: impl Fn(&Observation) -> Value) -> Vec<Value> {
+    points.observations.iter().map(value).collect()
+}
+
+/// f of a point, 1/sr: the limit where it is above the instrument's range, 0 where it is below the threshold.
+fn value_per_sr(o: &Observation) -> f64 {
+    match (o.sigma0, o.censor) {
+        (Some(sigma0), _) => sigma0 / sigma0_per_f(o),
+        (None, Censor::Right) => threshold_per_sr(o).unwrap_or(0.0),
+        (None, _) => 0.0,
+    }
+}
+
+fn threshold_per_sr(o: &Observation) -> Option<f64> {
+    o.threshold_sigma0.map(|threshold| threshold / sigma0_per_f(o))
+}
+
+fn phi_deg(o: &Observation) -> f64 {
+    (o.delta_phi_rad.to_degrees() + 360.0) % 360.0
 }
 
 fn deviations(values: &[Value]) -> Value {

@@ -1,4 +1,4 @@
-//! Universal BRDF files (`.brdf`) as a curve: the way back of `universal_brdf.rs`.
+//! Reading universal BRDF files (`.brdf`), which `universal_brdf.rs` writes, as a curve.
 //!
 //! One wavelength and one state of polarisation are read. Lost: uncertainties, instrumentation,
 //! sample and environment of files that matdb did not write; postal addresses of all.
@@ -12,7 +12,7 @@ use super::given::{
     CLASS, FREQUENCY, Given, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD as DETECTED,
     missing,
 };
-use super::plain_csv::{Lone, RADAR, of_curve};
+use super::plain_csv::{RADAR, SingleCurve, of_curve};
 use super::universal_brdf::{CENSOR, OURS, THRESHOLD};
 use crate::formats::FormatError;
 use crate::material::{Censor, Instrument, Material, Observation, SourceKind};
@@ -20,14 +20,9 @@ use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Makes a material of a file.
 pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
-    let refused = |error: FormatError| ExchangeError::Format { file: file.to_owned(), error };
-    let json: Value = serde_json::from_slice(bytes).map_err(|error| {
-        let place = format!("line {}, column {}", error.line(), error.column());
-        refused(FormatError::at(place, "not JSON", "mend the file, or name another"))
-    })?;
-    let observations = observations(&json["data"]).map_err(refused)?;
-    let wavelength_m = wavelength_m(&json["data"]).map_err(refused)?;
-    let (metadata, text) = (&json["metadata"], |value: &Value| value.as_str().map(str::to_owned));
+    let (json, observations, wavelength_m) =
+        parse(bytes).map_err(|error| ExchangeError::in_file(file, error))?;
+    let metadata = &json["metadata"];
     let ours = &metadata["adhoc_section"][OURS];
     let hz =
         given.frequency_hz.or(wavelength_m.map(|wavelength| SPEED_OF_LIGHT_M_PER_S / wavelength));
@@ -58,19 +53,34 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
     else {
         return Err(missing(file, &flags));
     };
-    let number = |key: &str| ours["instrument"][key].as_f64();
+    let stated = &ours["instrument"];
     let instrument = name.map(|name| Instrument {
         key: RADAR.to_owned(),
         name,
         centre_frequency_hz: hz,
-        bandwidth_hz: number("bandwidth_hz"),
-        calibration_sd_factor: number("calibration_sd_factor"),
-        looks: number("looks"),
+        bandwidth_hz: stated["bandwidth_hz"].as_f64(),
+        calibration_sd_factor: stated["calibration_sd_factor"].as_f64(),
+        looks: stated["looks"].as_f64(),
         threshold_w,
         ..Instrument::default()
     });
-    let lone = Lone { slug, class, licence, title, kind, hz, instrument, observations };
-    Ok(of_curve(file, given, lone))
+    let single = SingleCurve { slug, class, licence, title, kind, hz, instrument, observations };
+    Ok(of_curve(file, given, single))
+}
+
+/// The file as JSON, with its points and its wavelength, m.
+fn parse(bytes: &[u8]) -> Result<(Value, Vec<Observation>, Option<f64>), FormatError> {
+    let json: Value = serde_json::from_slice(bytes).map_err(|error| {
+        let place = format!("line {}, column {}", error.line(), error.column());
+        FormatError::at(place, "not JSON", "mend the file, or name another")
+    })?;
+    let observations = observations(&json["data"])?;
+    let wavelength_m = wavelength_m(&json["data"])?;
+    Ok((json, observations, wavelength_m))
+}
+
+fn text(value: &Value) -> Option<String> {
+    value.as_str().map(str::to_owned)
 }
 
 fn kind(metadata: &Value, ours: &Value) -> Option<SourceKind> {
@@ -86,17 +96,8 @@ fn observations(data: &Value) -> Result<Vec<Observation>, FormatError> {
     for key in ["polarization_i", "polarization_r"] {
         one_state(data, key)?;
     }
-    let angle = |key: &str| {
-        let factor = match data[key]["unit"].as_str() {
-            Some("rad") => 1.0,
-            Some("deg" | "°") => PI / 180.0,
-            _ => return Err(refuse(key, "has no unit rad or deg", "state the unit")),
-        };
-        let radians = |degrees: f64| if factor == 1.0 { degrees } else { degrees.to_radians() };
-        Ok(numbers(data, key)?.into_iter().map(radians).collect::<Vec<f64>>())
-    };
-    let [theta_i, phi_i] = [angle("theta_i")?, angle("phi_i")?];
-    let [theta_r, phi_r] = [angle("theta_r")?, angle("phi_r")?];
+    let [theta_i, phi_i] = [angles_rad(data, "theta_i")?, angles_rad(data, "phi_i")?];
+    let [theta_r, phi_r] = [angles_rad(data, "theta_r")?, angles_rad(data, "phi_r")?];
     let brdf = numbers(data, "BRDF")?;
     let columns =
         [("theta_i", &theta_i), ("phi_i", &phi_i), ("theta_r", &theta_r), ("phi_r", &phi_r)];
@@ -104,10 +105,10 @@ fn observations(data: &Value) -> Result<Vec<Observation>, FormatError> {
         return Err(refuse(key, "has not as many values as BRDF", "give one for each"));
     }
     let censors = censors(data, brdf.len())?;
-    let rows =
-        theta_i.iter().zip(&phi_i).zip(theta_r.iter().zip(&phi_r)).zip(brdf.iter().zip(censors));
-    let point = |row: usize, theta_i_rad, theta_r_rad, delta: f64, value: f64, limit: Limit| {
-        let per_f = 4.0 * PI * f64::cos(theta_i_rad) * f64::cos(theta_r_rad);
+    let mut observations = Vec::with_capacity(brdf.len());
+    for (row, (&value, limit)) in brdf.iter().zip(censors).enumerate() {
+        let (theta_i_rad, theta_r_rad) = (theta_i[row], theta_r[row]);
+        let per_f = 4.0 * PI * theta_i_rad.cos() * theta_r_rad.cos();
         let sigma0 = per_f * value;
         let is_level = sigma0 > 0.0 && sigma0.is_finite();
         if limit.censor == Censor::None && !is_level {
@@ -117,21 +118,27 @@ fn observations(data: &Value) -> Result<Vec<Observation>, FormatError> {
         }
         let level = (limit.censor == Censor::None).then_some(sigma0);
         let threshold = limit.threshold.map(|threshold| per_f * threshold);
-        Ok(Observation {
+        observations.push(Observation {
             theta_r_rad,
-            delta_phi_rad: delta,
+            delta_phi_rad: phi_r[row] - phi_i[row],
             censor: limit.censor,
             ..Observation::backscatter(theta_i_rad, level, threshold)
-        })
-    };
-    rows.enumerate()
-        .map(|(row, (((ti, pi), (tr, pr)), (value, limit)))| {
-            point(row, *ti, *tr, pr - pi, *value, limit)
-        })
-        .collect()
+        });
+    }
+    Ok(observations)
 }
 
-/// What is known of a point apart from its value.
+/// A column of angles, rad.
+fn angles_rad(data: &Value, key: &str) -> Result<Vec<f64>, FormatError> {
+    let angles = numbers(data, key);
+    match data[key]["unit"].as_str() {
+        Some("rad") => angles,
+        Some("deg" | "°") => Ok(angles?.into_iter().map(f64::to_radians).collect()),
+        _ => Err(refuse(key, "has no unit rad or deg", "state the unit")),
+    }
+}
+
+/// Whether a point is censored, and its detection limit as f, 1/sr.
 #[derive(Clone, Copy)]
 struct Limit {
     censor: Censor,
@@ -139,13 +146,10 @@ struct Limit {
 }
 
 fn censors(data: &Value, len: usize) -> Result<Vec<Limit>, FormatError> {
-    let column = |key: &'static str| match data["adhoc_variables"][key]["values"].as_array() {
-        Some(values) if values.len() == len => Ok(Some(values)),
-        None => Ok(None),
-        Some(_) => Err(refuse(key, "has not as many values as BRDF", "give one for each")),
-    };
-    let (words, thresholds) = (column(CENSOR)?, column(THRESHOLD)?);
-    let limit = |row: usize| {
+    let (words, thresholds) =
+        (extra_column(data, CENSOR, len)?, extra_column(data, THRESHOLD, len)?);
+    let mut limits = Vec::with_capacity(len);
+    for row in 0..len {
         let censor = match words.and_then(|words| words.get(row)).map(Value::as_str) {
             None | Some(Some("none")) => Censor::None,
             Some(Some("left")) => Censor::Left,
@@ -153,9 +157,22 @@ fn censors(data: &Value, len: usize) -> Result<Vec<Limit>, FormatError> {
             Some(_) => return Err(refuse(CENSOR, "has another word", "write none, left or right")),
         };
         let threshold = thresholds.and_then(|thresholds| thresholds.get(row)?.as_f64());
-        Ok(Limit { censor, threshold })
-    };
-    (0..len).map(limit).collect()
+        limits.push(Limit { censor, threshold });
+    }
+    Ok(limits)
+}
+
+/// A column of `adhoc_variables`; none where the file does not have it.
+fn extra_column<'a>(
+    data: &'a Value,
+    key: &str,
+    len: usize,
+) -> Result<Option<&'a Vec<Value>>, FormatError> {
+    match data["adhoc_variables"][key]["values"].as_array() {
+        Some(values) if values.len() == len => Ok(Some(values)),
+        None => Ok(None),
+        Some(_) => Err(refuse(key, "has not as many values as BRDF", "give one for each")),
+    }
 }
 
 /// Wavelength, m; none where the file states none.
@@ -191,8 +208,8 @@ fn numbers(data: &Value, key: &str) -> Result<Vec<f64>, FormatError> {
     let Some(values) = data[key]["values"].as_array() else {
         return Err(refuse(key, "has no `values`", "give a universal BRDF file, schema 1.0"));
     };
-    let number = |value: &Value| value.as_f64().filter(|number| number.is_finite());
-    let found: Option<Vec<f64>> = values.iter().map(number).collect();
+    let found: Option<Vec<f64>> =
+        values.iter().map(|value| value.as_f64().filter(|number| number.is_finite())).collect();
     found.ok_or_else(|| refuse(key, "holds what is no number", "mend the value"))
 }
 

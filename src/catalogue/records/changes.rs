@@ -1,5 +1,5 @@
-//! What was added, changed and withdrawn from one publication to the next: `changes.json`, and
-//! `CHANGES.md` for people. A publication compares itself with the one that stands in its place.
+//! The materials that each publication added, changed and withdrew: `changes.json`, and `CHANGES.md` for people.
+//! A publication compares itself with the one that it replaces.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -29,7 +29,7 @@ struct Publication {
     date: Option<String>,
     added: Vec<Change>,
     changed: Vec<Change>,
-    /// What must not be used any more, or is no longer in the catalogue.
+    /// Materials that must not be used any more, or are no longer in the catalogue.
     withdrawn: Vec<Change>,
 }
 
@@ -53,14 +53,14 @@ struct State {
     content_hash: String,
 }
 
-/// Only what a later program must go on writing, so that this one can say that it is too old.
+/// The field that every later program writes, too, so that this program recognises a file that is too new.
 #[derive(Deserialize)]
 struct Version {
     schema_version: u32,
 }
 
-/// Continues the log of what stood in the folder before. Publishing the same again adds nothing to it.
-/// Whether other data had the same version there.
+/// Continues the log of the earlier publication in the folder; an equal publication adds nothing to it. Returns whether
+/// other data had the same version there.
 pub(super) fn write(folder: &mut Folder, index: &Index) -> Result<bool, CatalogueError> {
     let mut is_reused = false;
     let (before, mut publications) = match folder.before() {
@@ -102,10 +102,14 @@ impl State {
     }
 }
 
+fn is_withdrawn(entry: &Entry) -> bool {
+    matches!(entry.status, Status::Withdrawn { .. })
+}
+
+/// What a publication adds, changes and withdraws.
 fn publication(index: &Index, before: &[Entry]) -> Publication {
     let (mut added, mut changed, mut withdrawn) = (Vec::new(), Vec::new(), Vec::new());
     let mut gone: BTreeMap<&Slug, &Entry> = before.iter().map(|was| (&was.slug, was)).collect();
-    let is_withdrawn = |entry: &Entry| matches!(entry.status, Status::Withdrawn { .. });
     for entry in &index.materials {
         let (was, now) = (gone.remove(&entry.slug), State::of(entry));
         let before = was.map(State::of);
@@ -161,7 +165,7 @@ fn line(change: &Change) -> String {
     format!("- {}, {revision}{}\n", change.slug, harmless(&status))
 }
 
-/// Text that stays on its line.
+/// The text without what could end its line.
 fn harmless(text: &str) -> String {
     text.chars().filter(|c| !c.is_control()).collect()
 }

@@ -1,5 +1,5 @@
-//! How to cite a publication: `CITATION.cff` (Citation File Format 1.2.0) and, where Zenodo can be told the
-//! licence, `.zenodo.json`, which it reads in its place without saying so. Both come from the same record.
+//! How to cite a publication: `CITATION.cff` (Citation File Format 1.2.0) and, where Zenodo knows the licence,
+//! `.zenodo.json`, which Zenodo then reads instead. Both come from the same record.
 
 use serde_json::{Value, json};
 
@@ -7,7 +7,7 @@ use super::context::Context;
 use crate::catalogue::about::{Institute, Person};
 use crate::material::form::alternative_licences;
 
-/// The DOI's own address.
+/// The web address of a DOI.
 pub(super) fn doi_url(doi: &str) -> String {
     format!("https://doi.org/{doi}")
 }
@@ -16,7 +16,7 @@ pub(super) fn doi_url(doi: &str) -> String {
 pub(super) fn cff(context: &Context) -> String {
     let about = context.about;
     let licence = about.licence.as_deref();
-    // Of several the format knows only those of which one may be chosen, and only those of SPDX's list.
+    // The format takes several licences only as alternatives, and only those of SPDX's list.
     let alternatives = licence.and_then(alternative_licences).unwrap_or_default();
     let unsaid = licence.filter(|_| alternatives.is_empty());
     let message = format!(
@@ -24,25 +24,32 @@ pub(super) fn cff(context: &Context) -> String {
         unsaid.map_or(String::new(), |licence| format!(" Licence: {licence}."))
     );
     let mut text = format!("cff-version: 1.2.0\nmessage: {}\ntype: dataset\n", quoted(&message));
-    let mut line = |key: &str, value: Option<&str>| {
+    let only = if let [only] = alternatives.as_slice() { Some(*only) } else { None };
+    let fields = [
+        ("title", Some(about.title.as_str())),
+        ("abstract", Some(about.description.as_str())),
+        ("version", about.version.as_deref()),
+        ("date-released", context.day()),
+        ("license", only),
+        ("doi", about.doi.as_deref()),
+        ("url", about.url.as_deref()),
+    ];
+    for (key, value) in fields {
         if let Some(value) = value {
             text += &format!("{key}: {}\n", quoted(value));
         }
-    };
-    line("title", Some(&about.title));
-    line("abstract", Some(&about.description));
-    line("version", about.version.as_deref());
-    line("date-released", context.day());
-    if let [only] = alternatives.as_slice() {
-        line("license", Some(only));
     }
-    line("doi", about.doi.as_deref());
-    line("url", about.url.as_deref());
     if alternatives.len() > 1 {
         text += "license:\n";
         alternatives.iter().for_each(|licence| text += &format!("  - {}\n", quoted(licence)));
     }
-    text += "authors:\n";
+    text + "authors:\n" + &cff_authors(context)
+}
+
+/// The list of authors in `CITATION.cff`.
+fn cff_authors(context: &Context) -> String {
+    let about = context.about;
+    let mut text = String::new();
     if !about.has_authors() {
         text += &format!("  - name: {}\n", quoted(&context.anonymous_author()));
     }
@@ -75,23 +82,12 @@ pub(super) fn zenodo(context: &Context) -> Option<Value> {
     let about = context.about;
     let alternatives = alternative_licences(about.licence.as_deref()?)?;
     let [licence] = alternatives.as_slice() else { return None };
-    let person = |person: &Person| {
-        let mut creator = json!({ "name": format!("{}, {}", person.family, person.given) });
-        insert(&mut creator, "orcid", person.orcid.as_deref());
-        insert(&mut creator, "affiliation", person.affiliation.as_deref());
-        creator
-    };
-    let institutes = about.institutes.iter().map(|institute| json!({ "name": institute.name }));
-    let creators: Vec<Value> = match about.has_authors() {
-        true => about.people.iter().map(person).chain(institutes).collect(),
-        false => vec![json!({ "name": context.anonymous_author() })],
-    };
     let mut record = json!({
         "upload_type": "dataset",
         "title": about.title,
-        // Zenodo takes it for HTML.
+        // Zenodo reads it as HTML.
         "description": escaped(&about.description),
-        "creators": creators,
+        "creators": zenodo_creators(context),
         "access_right": "open",
         "license": licence.to_lowercase(),
     });
@@ -101,7 +97,23 @@ pub(super) fn zenodo(context: &Context) -> Option<Value> {
     Some(record)
 }
 
-/// Sets a key that says something.
+fn zenodo_creators(context: &Context) -> Vec<Value> {
+    let about = context.about;
+    if !about.has_authors() {
+        return vec![json!({ "name": context.anonymous_author() })];
+    }
+    let mut creators = Vec::new();
+    for Person { family, given, orcid, affiliation } in &about.people {
+        let mut creator = json!({ "name": format!("{family}, {given}") });
+        insert(&mut creator, "orcid", orcid.as_deref());
+        insert(&mut creator, "affiliation", affiliation.as_deref());
+        creators.push(creator);
+    }
+    creators.extend(about.institutes.iter().map(|institute| json!({ "name": institute.name })));
+    creators
+}
+
+/// Sets a key that has a value.
 pub(super) fn insert(record: &mut Value, key: &str, value: Option<&str>) {
     if let (Some(map), Some(value)) = (record.as_object_mut(), value) {
         map.insert(key.to_owned(), value.into());
@@ -114,14 +126,21 @@ fn escaped(text: &str) -> String {
 
 /// A text as YAML's double-quoted scalar: that of JSON, and without what YAML cannot print.
 fn quoted(text: &str) -> String {
-    let plain = Value::from(text).to_string();
-    let printable = |c: char| match c {
-        '\u{7f}'..='\u{9f}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}' | '\u{2028}' | '\u{2029}' => {
-            format!("\\u{:04x}", u32::from(c))
+    let mut quoted = String::new();
+    for c in Value::from(text).to_string().chars() {
+        match c {
+            '\u{7f}'..='\u{9f}'
+            | '\u{feff}'
+            | '\u{fffe}'
+            | '\u{ffff}'
+            | '\u{2028}'
+            | '\u{2029}' => {
+                quoted += &format!("\\u{:04x}", u32::from(c));
+            }
+            c => quoted.push(c),
         }
-        c => c.to_string(),
-    };
-    plain.chars().map(printable).collect()
+    }
+    quoted
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
-//! What every record says of the catalogue as a whole.
+//! The catalogue as a whole, as every record describes it.
 
 use crate::catalogue::about::About;
 
-/// What every record is made from.
+/// The input of every record.
 pub(super) struct Context<'a> {
     pub about: &'a About,
     /// When the newest entry was added: UTC, ISO 8601.

@@ -25,10 +25,12 @@ pub(super) fn package(
     let about = context.about;
     let schemas: BTreeMap<String, &Written> =
         tables.iter().map(|written| (csv_path(&written.table.name), written)).collect();
-    let resource = |(path, sum): (&String, &Sum)| {
-        let media_type = listed_media_type(path)?;
-        Some(resource(path, sum, media_type, schemas.get(path).copied()))
-    };
+    let mut resources = Vec::new();
+    for (path, sum) in sums {
+        if let Some(media_type) = listed_media_type(path) {
+            resources.push(resource(path, sum, media_type, schemas.get(path).copied()));
+        }
+    }
     let mut package = json!({
         "$schema": "https://datapackage.org/profiles/2.0/datapackage.json",
         "name": name(&about.title),
@@ -37,11 +39,11 @@ pub(super) fn package(
         "contributors": contributors(context),
         "sources": [{ "title": "The tables source and fit_parameter name the source of every number",
             "path": "tables/source.csv" }],
-        "resources": sums.iter().filter_map(resource).collect::<Vec<_>>(),
+        "resources": resources,
     });
     let licences = licences(context, index);
     if !licences.is_empty() {
-        // A list must hold something.
+        // The format forbids an empty list.
         package["licenses"] = licences.into();
     }
     insert(&mut package, "version", about.version.as_deref());
@@ -53,14 +55,13 @@ pub(super) fn package(
 
 /// Letters, digits and hyphens of a title.
 fn name(title: &str) -> String {
-    let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
-    let dashed: String = title.chars().map(plain).collect();
-    let words: Vec<&str> = dashed.split('-').filter(|word| !word.is_empty()).collect();
+    let title = title.to_ascii_lowercase();
+    let words = title.split(|c: char| !c.is_ascii_alphanumeric());
+    let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
     if words.is_empty() { "catalogue".to_owned() } else { words.join("-") }
 }
 
-/// The catalogue's licence first, then those that materials say of themselves: one name each, of an expression
-/// those in it.
+/// The names in the catalogue's licence, then those in the materials' licences, each once.
 fn licences(context: &Context, index: &Index) -> Vec<Value> {
     let own: BTreeSet<&str> = index.materials.iter().map(|entry| entry.licence.as_str()).collect();
     let all = context.about.licence.as_deref().into_iter().chain(own);
@@ -78,7 +79,8 @@ fn contributors(context: &Context) -> Vec<Value> {
     if !context.about.has_authors() {
         return vec![json!({ "title": context.anonymous_author() })];
     }
-    let person = people.iter().map(|person| {
+    let mut contributors = Vec::new();
+    for person in people {
         let mut entry = json!({
             "title": format!("{} {}", person.given, person.family),
             "givenName": person.given,
@@ -86,14 +88,14 @@ fn contributors(context: &Context) -> Vec<Value> {
             "roles": ["creator"],
         });
         insert(&mut entry, "organization", person.affiliation.as_deref());
-        entry
-    });
-    let institute = institutes.iter().map(|institute| {
+        contributors.push(entry);
+    }
+    for institute in institutes {
         let mut entry = json!({ "title": institute.name, "roles": ["creator"] });
         insert(&mut entry, "path", institute.url.as_deref());
-        entry
-    });
-    person.chain(institute).collect()
+        contributors.push(entry);
+    }
+    contributors
 }
 
 fn resource(path: &str, sum: &Sum, media_type: &str, written: Option<&Written>) -> Value {
@@ -120,23 +122,23 @@ fn resource(path: &str, sum: &Sum, media_type: &str, written: Option<&Written>) 
 }
 
 fn schema(table: &Table) -> Value {
-    // To SQL a reference that lacks one of its values refers to nothing; to a data package it dangles.
-    let is_nullable = |name: &String| table.columns.iter().any(|c| c.name == *name && !c.required);
-    let is_whole = |r: &&Reference| !r.columns.iter().any(is_nullable);
+    // In SQL a reference with a missing value refers to nothing; a data package calls it dangling.
+    let nullable = table.columns.iter().filter(|column| !column.required);
+    let nullable: BTreeSet<&String> = nullable.map(|column| &column.name).collect();
+    let mut foreign_keys = Vec::new();
+    for Reference { columns, table, keys } in &table.references {
+        if !columns.iter().any(|column| nullable.contains(column)) {
+            let reference = json!({ "resource": table, "fields": keys });
+            foreign_keys.push(json!({ "fields": columns, "reference": reference }));
+        }
+    }
     let fields: Vec<Value> = table.columns.iter().map(|column| field(table, column)).collect();
-    let mut schema = json!({
-        "fields": fields,
-        "missingValues": [""],
-        "foreignKeys": table.references.iter().filter(is_whole).map(foreign_key).collect::<Vec<_>>(),
-    });
+    let mut schema =
+        json!({ "fields": fields, "missingValues": [""], "foreignKeys": foreign_keys });
     if !table.key.is_empty() {
         schema["primaryKey"] = table.key.clone().into();
     }
     schema
-}
-
-fn foreign_key(r: &Reference) -> Value {
-    json!({ "fields": r.columns, "reference": { "resource": r.table, "fields": r.keys } })
 }
 
 fn field(table: &Table, column: &Column) -> Value {
@@ -154,7 +156,7 @@ fn field(table: &Table, column: &Column) -> Value {
         Err(place) => field["description"] = format!("the unit is in {place}").into(),
     }
     if column.required {
-        // Not of texts: an empty one is a text, but missing to a reader of CSV.
+        // Not for texts: a reader of CSV takes an empty text for a missing one.
         field["constraints"] = json!({ "required": true });
     }
     field

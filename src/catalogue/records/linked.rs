@@ -7,12 +7,11 @@ use serde_json::{Value, json};
 
 use super::citation::{doi_url, insert, orcid_url};
 use super::context::Context;
-use crate::catalogue::about::{Institute, Person};
 use crate::catalogue::folder::Sum;
 use crate::catalogue::layout::{MATERIALS, listed_media_type};
 use crate::material::form::alternative_licences;
 
-/// Where SPDX has the text of a licence; none of an expression of several, or of a licence that is not on its list.
+/// The address of a licence at SPDX; none for an expression of several, or a licence that is not on its list.
 fn licence_url(licence: &str) -> Option<String> {
     match alternative_licences(licence)?.as_slice() {
         [only] => Some(format!("https://spdx.org/licenses/{only}")),
@@ -20,7 +19,7 @@ fn licence_url(licence: &str) -> Option<String> {
     }
 }
 
-/// A licence as schema.org has it: by its address, or else by its name.
+/// A licence in schema.org's terms: its address, or else its name.
 pub(crate) fn licence_record(licence: &str) -> Value {
     match licence_url(licence) {
         Some(url) => url.into(),
@@ -28,15 +27,16 @@ pub(crate) fn licence_record(licence: &str) -> Value {
     }
 }
 
-/// People and institutes as schema.org has them, each with an identifier in this file.
+/// People and institutes in schema.org's terms, each with an identifier in this file.
 fn people(context: &Context) -> Vec<Value> {
     if !context.about.has_authors() {
         return vec![
             json!({ "@id": "#contributors", "@type": "Organization", "name": context.anonymous_author() }),
         ];
     }
-    let person = |(number, person): (usize, &Person)| {
-        let id = person.orcid.as_deref().map_or(format!("#person-{}", number + 1), orcid_url);
+    let mut people = Vec::new();
+    for (number, person) in (1..).zip(&context.about.people) {
+        let id = person.orcid.as_deref().map_or(format!("#person-{number}"), orcid_url);
         let mut entry = json!({
             "@id": id,
             "@type": "Person",
@@ -45,17 +45,16 @@ fn people(context: &Context) -> Vec<Value> {
             "familyName": person.family,
         });
         insert(&mut entry, "affiliation", person.affiliation.as_deref());
-        entry
-    };
-    let institute = |(number, institute): (usize, &Institute)| {
-        let id = institute.url.clone().unwrap_or(format!("#institute-{}", number + 1));
-        json!({ "@id": id, "@type": "Organization", "name": institute.name })
-    };
-    let people = context.about.people.iter().enumerate().map(person);
-    people.chain(context.about.institutes.iter().enumerate().map(institute)).collect()
+        people.push(entry);
+    }
+    for (number, institute) in (1..).zip(&context.about.institutes) {
+        let id = institute.url.clone().unwrap_or(format!("#institute-{number}"));
+        people.push(json!({ "@id": id, "@type": "Organization", "name": institute.name }));
+    }
+    people
 }
 
-/// What both say of the catalogue.
+/// The fields of the catalogue that both files have.
 fn common(context: &Context) -> Value {
     let about = context.about;
     let mut record =
@@ -84,36 +83,26 @@ pub(super) fn dataset(context: &Context, sums: &BTreeMap<String, Sum>) -> Value 
         { "@type": "PropertyValue", "name": "theta_i_rad", "unitCode": "rad",
           "description": "angle of incidence" }
     ]);
-    let download = |(path, sum): (&String, &Sum)| {
-        Some(json!({
-            "@type": "DataDownload",
-            "contentUrl": path,
-            "encodingFormat": listed_media_type(path)?,
-            "contentSize": sum.bytes.to_string(),
-            "sha256": sum.sha256,
-        }))
-    };
-    record["distribution"] = sums.iter().filter_map(download).collect::<Vec<_>>().into();
+    let downloads: Vec<Value> = sums.iter().filter_map(|(path, sum)| download(path, sum)).collect();
+    record["distribution"] = downloads.into();
     record
+}
+
+/// A file in `dataset.jsonld`, if it is listed.
+fn download(path: &str, sum: &Sum) -> Option<Value> {
+    Some(json!({
+        "@type": "DataDownload",
+        "contentUrl": path,
+        "encodingFormat": listed_media_type(path)?,
+        "contentSize": sum.bytes.to_string(),
+        "sha256": sum.sha256,
+    }))
 }
 
 /// `ro-crate-metadata.json`.
 pub(super) fn crate_metadata(context: &Context, sums: &BTreeMap<String, Sum>) -> Value {
-    let file = |(path, sum): (&String, &Sum)| {
-        let name = path.rsplit('/').next();
-        Some(json!({
-            "@id": path,
-            "@type": "File",
-            "name": name,
-            "encodingFormat": listed_media_type(path)?,
-            "contentSize": sum.bytes.to_string(),
-        }))
-    };
-    let files: Vec<Value> = sums.iter().filter_map(file).collect();
+    let files: Vec<Value> = sums.iter().filter_map(|(path, sum)| crate_file(path, sum)).collect();
     let people = people(context);
-    let ids = |entries: &[Value]| -> Vec<Value> {
-        entries.iter().map(|entry| json!({ "@id": entry["@id"] })).collect()
-    };
     let mut parts = ids(&files);
     let mut graph = vec![json!({
         "@id": "ro-crate-metadata.json",
@@ -146,4 +135,20 @@ pub(super) fn crate_metadata(context: &Context, sums: &BTreeMap<String, Sum>) ->
     graph.push(root);
     graph.extend(people.into_iter().chain(single).chain(files));
     json!({ "@context": "https://w3id.org/ro/crate/1.1/context", "@graph": graph })
+}
+
+/// A file in `ro-crate-metadata.json`, if it is listed.
+fn crate_file(path: &str, sum: &Sum) -> Option<Value> {
+    Some(json!({
+        "@id": path,
+        "@type": "File",
+        "name": path.rsplit('/').next(),
+        "encodingFormat": listed_media_type(path)?,
+        "contentSize": sum.bytes.to_string(),
+    }))
+}
+
+/// References to entries by their identifiers.
+fn ids(entries: &[Value]) -> Vec<Value> {
+    entries.iter().map(|entry| json!({ "@id": entry["@id"] })).collect()
 }

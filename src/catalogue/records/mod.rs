@@ -1,4 +1,4 @@
-//! What a publication says of itself in the forms that repositories and search engines read.
+//! Records of a publication in the formats of repositories and search engines.
 
 mod changes;
 mod citation;
@@ -17,8 +17,8 @@ use super::schema;
 use super::tables::Written;
 use context::Context;
 
-/// Writes all records; everything else but the list of hashes stands in the folder already. Whether other data
-/// had the same version there.
+/// Writes all records; every other file but the list of hashes must be in the folder already. Returns whether other
+/// data had the same version there.
 pub(super) fn write(
     folder: &mut Folder,
     about: &About,

@@ -11,7 +11,7 @@ use crate::catalogue::records::licence_record;
 use crate::catalogue::references::{Credit, pruned};
 use crate::store::Stored;
 
-/// What is said of an entry that comes with the program.
+/// The note in the citation of a built-in entry.
 const BUILT_IN: &str = "Built into matdb, not by the publisher of this catalogue";
 
 /// How to cite a material.
@@ -21,7 +21,7 @@ pub(super) struct Citation {
     text: String,
     /// For a bibliography.
     bibtex: String,
-    /// What it is that somebody else is to be credited with, and to whom.
+    /// What another party gets the credit for, and who that is.
     origin: Option<(&'static str, String)>,
     /// For machines.
     #[serde(skip)]
@@ -64,25 +64,38 @@ impl Citation {
             Credit::BuiltIn => Some(("Made by", "matdb, which it is built into".to_owned())),
             Credit::Others(origin) => Some(("Imported from", origin.credit())),
         };
-        let record = pruned(json!({
-            "@context": "https://schema.org/",
-            "@type": "Dataset",
-            "name": name,
-            "identifier": format!("{}@{}", material.slug, stored.revision),
-            "description": cut(&format!("{}. {}", name, material.description), 4000),
-            "license": licence_record(&material.licence),
-            "keywords": material.tags,
-            "version": stored.revision.to_string(),
-            "creator": creator,
-            "isPartOf": { "@type": "DataCatalog", "name": about.title },
-            "distribution": [
-                distribution(&format!("../api/v1/materials/{}.json", material.slug), "application/json"),
-                distribution(&format!("{}.csv", material.slug), "text/csv"),
-            ],
-            "creativeWorkStatus": status,
-        }));
+        let record = record(about, stored, &name, creator, status);
         Citation { text, bibtex, origin, record }
     }
+}
+
+/// A stored revision for machines.
+fn record(
+    about: &About,
+    stored: &Stored,
+    name: &str,
+    creator: Vec<Value>,
+    status: Option<String>,
+) -> Value {
+    let material = &stored.material;
+    let json_path = format!("../api/v1/materials/{}.json", material.slug);
+    pruned(json!({
+        "@context": "https://schema.org/",
+        "@type": "Dataset",
+        "name": name,
+        "identifier": format!("{}@{}", material.slug, stored.revision),
+        "description": cut(&format!("{name}. {}", material.description), 4000),
+        "license": licence_record(&material.licence),
+        "keywords": material.tags,
+        "version": stored.revision.to_string(),
+        "creator": creator,
+        "isPartOf": { "@type": "DataCatalog", "name": about.title },
+        "distribution": [
+            distribution(&json_path, "application/json"),
+            distribution(&format!("{}.csv", material.slug), "text/csv"),
+        ],
+        "creativeWorkStatus": status,
+    }))
 }
 
 /// How to cite the catalogue as a whole.
@@ -109,22 +122,23 @@ fn distribution(path: &str, media_type: &str) -> Value {
 }
 
 fn creators(about: &About) -> Vec<Value> {
-    let person = |person: &Person| {
-        pruned(json!({
+    let mut creators = Vec::new();
+    for Person { family, given, orcid, affiliation } in &about.people {
+        creators.push(pruned(json!({
             "@type": "Person",
-            "familyName": person.family,
-            "givenName": person.given,
-            "affiliation": person.affiliation,
-            "identifier": person.orcid.as_ref().map(|orcid| format!("https://orcid.org/{orcid}")),
-        }))
-    };
-    let institute = |institute: &Institute| {
-        pruned(json!({ "@type": "Organization", "name": institute.name, "url": institute.url }))
-    };
-    about.people.iter().map(person).chain(about.institutes.iter().map(institute)).collect()
+            "familyName": family,
+            "givenName": given,
+            "affiliation": affiliation,
+            "identifier": orcid.as_ref().map(|orcid| format!("https://orcid.org/{orcid}")),
+        })));
+    }
+    for Institute { name, url } in &about.institutes {
+        creators.push(pruned(json!({ "@type": "Organization", "name": name, "url": url })));
+    }
+    creators
 }
 
-/// Somebody of whom only `Family, Given` is known, or the name of an institute.
+/// A person as `Family, Given`, or an institute by its name.
 fn person(author: &str) -> Value {
     match author.split_once(", ") {
         Some((family, given)) => {

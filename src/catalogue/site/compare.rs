@@ -1,4 +1,4 @@
-//! What the page of comparisons needs of a material.
+//! The data of a material on the page of comparisons.
 
 use std::collections::BTreeSet;
 
@@ -8,22 +8,23 @@ use super::curve::{line_word, marks, word};
 use super::entry::{kind_of, status_of};
 use super::levels::{Levels, TABLE_DEG, range_deg, tenth};
 use super::words::cut;
-use crate::material::{Curve, Fit, Material, SourceKind};
+use crate::material::{Curve, Material, SourceKind};
 
 /// Lines, points and a few levels, in ° and dB.
 pub(super) fn data(material: &Material) -> Value {
     let rendered = material.scattering().ok();
     let levels = rendered.as_ref().map(|model| Levels::rendered(material, model));
-    let level = |&deg: &f64| levels.as_ref().map_or(String::new(), |levels| levels.text(deg));
-    let of_fit = |fit: &Fit| {
+    let mut lines = Vec::new();
+    for fit in &material.fits {
         let levels = Levels::stated(material, &fit.model);
-        line(&fit.name, line_word(material, fit), material.kind_words(fit), &levels)
-    };
-    let mut lines: Vec<Value> = material.fits.iter().map(of_fit).collect();
+        lines.push(line(&fit.name, line_word(material, fit), material.kind_words(fit), &levels));
+    }
     let drawn = material.curves.iter().find(|curve| curve.name == material.render);
     if let (Some(drawn), Some(levels)) = (drawn, &levels) {
         lines.push(line(&drawn.name, word(kind_of(material, &drawn.source)), None, levels));
     }
+    let table =
+        TABLE_DEG.map(|deg| levels.as_ref().map_or(String::new(), |levels| levels.text(deg)));
     json!({
         "slug": material.slug,
         "name": cut(&material.name, 200),
@@ -35,11 +36,11 @@ pub(super) fn data(material: &Material) -> Value {
         "deg": range_deg(material),
         "lines": lines,
         "curves": material.curves.iter().map(|c| curve(material, c)).collect::<Vec<_>>(),
-        "table": { "deg": TABLE_DEG, "level": TABLE_DEG.iter().map(level).collect::<Vec<_>>() },
+        "table": { "deg": TABLE_DEG, "level": table },
     })
 }
 
-/// A line; `kind` is that of its style.
+/// A line; `kind` chooses its style.
 fn line(name: &str, kind: &str, kind_words: Option<String>, levels: &Levels) -> Value {
     json!({
         "name": cut(name, 200),

@@ -1,13 +1,14 @@
-//! What a material is made of, whether it may be used, when it was measured and what was tried on it.
+//! Layers, permittivities, status, sessions and findings of a material.
 
 use serde::Serialize;
 
 use super::entry::place_of;
+use super::quantity::quantity;
 use crate::effects::find;
 use crate::formats::words::digits;
 use crate::material::{Finding, FindingVerdict, Layer, Material, Permittivity, Session, Status};
 
-/// What a page says of these.
+/// These parts as the page of a material shows them.
 #[derive(Serialize)]
 pub(super) struct Composition {
     status: Option<StatusView>,
@@ -60,7 +61,7 @@ struct FindingView {
     source_place: usize,
 }
 
-/// What the page of a material says of these.
+/// These parts of a material for its page.
 pub(super) fn view(material: &Material) -> Composition {
     Composition {
         status: status(&material.status),
@@ -102,9 +103,6 @@ fn layer(material: &Material, layer: &Layer) -> LayerView {
 }
 
 fn permittivity(material: &Material, entry: &Permittivity) -> PermittivityView {
-    let with = |value: f64, sd: Option<f64>| {
-        digits(value) + &sd.map_or(String::new(), |sd| format!(" ± {}", digits(sd)))
-    };
     let from = entry.frequency_source.as_ref().map_or(String::new(), |key| format!(", {key}"));
     let celsius = entry.temperature_k.map(|k| digits(k - 273.15));
     PermittivityView {
@@ -112,28 +110,27 @@ fn permittivity(material: &Material, entry: &Permittivity) -> PermittivityView {
             entry.key.clone(),
             digits(entry.frequency_hz / 1e9) + &from,
             celsius.unwrap_or("not stated".to_owned()),
-            with(entry.real, entry.real_sd),
-            with(entry.imaginary, entry.imaginary_sd),
+            with_sd(entry.real, entry.real_sd),
+            with_sd(entry.imaginary, entry.imaginary_sd),
         ],
         source: entry.source.clone(),
         source_place: place_of(material, &entry.source),
     }
 }
 
+fn with_sd(value: f64, sd: Option<f64>) -> String {
+    digits(value) + &sd.map_or(String::new(), |sd| format!(" ± {}", digits(sd)))
+}
+
 fn session(session: &Session) -> SessionView {
-    let part = |value: Option<f64>, what: &str, unit: &str| {
-        value.map(|value| format!("{what} {} {unit}", digits(value)))
-    };
+    let [normal_sd_deg, footprint_sd_deg] =
+        [session.normal_sd_rad, session.footprint_sd_rad].map(|sd| sd.map(f64::to_degrees));
     let parts = [
-        part(session.temperature_k.map(|k| k - 273.15), "at", "°C"),
-        part(session.relative_humidity.map(|share| share * 100.0), "humidity", "%"),
-        part(session.registration_rms_m.map(|m| m * 1e3), "registered to", "mm rms"),
-        part(session.normal_sd_rad.map(f64::to_degrees), "normals known to", "°"),
-        part(
-            session.footprint_sd_rad.map(f64::to_degrees),
-            "normals spread in a footprint by",
-            "°",
-        ),
+        quantity("at", session.temperature_k.map(|k| k - 273.15), "°C"),
+        quantity("humidity", session.relative_humidity.map(|share| share * 100.0), "%"),
+        quantity("registered to", session.registration_rms_m.map(|m| m * 1e3), "mm rms"),
+        quantity("normals known to", normal_sd_deg, "°"),
+        quantity("normals spread in a footprint by", footprint_sd_deg, "°"),
         session.cloud_hash.as_ref().map(|hash| format!("cloud {hash}")),
         session.mesh_hash.as_ref().map(|hash| format!("mesh {hash}")),
     ];

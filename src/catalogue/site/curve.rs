@@ -6,6 +6,7 @@ use super::bins::{Bin, bins};
 use super::entry::{kind_of, place_of};
 use super::levels::{FAINTEST_DB, Levels, TABLE_DEG, angles_deg, range_deg};
 use super::plot::{Plot, Series, Shape};
+use super::quantity::quantity;
 use super::words::grouped;
 use crate::fit::stored_band;
 use crate::formats::words::{digits, percent};
@@ -20,12 +21,12 @@ const INKS: usize = 6;
 pub(super) struct Sample {
     name: String,
     kind: &'static str,
-    /// Those of the badge, where they are not the kind itself.
+    /// The words of the badge, where they differ from the kind.
     kind_words: Option<String>,
     /// `line`, `dots`, `below` or `above`.
     shape: &'static str,
     class: String,
-    /// What stands behind the name.
+    /// The note after the name.
     note: &'static str,
 }
 
@@ -66,34 +67,22 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
         samples.extend(named);
     }
     for (number, fit) in material.fits.iter().enumerate() {
-        let kind = kind_of(material, &fit.source);
         let class = format!("{} is-{}", ink(curves + number), line_word(material, fit));
-        let pieces = Levels::stated(material, &fit.model).line().into_iter();
-        series.extend(pieces.map(|points| Series {
-            shape: Shape::Line,
-            class: class.clone(),
-            points,
-        }));
-        let note = if fit.report.is_some() { "with its 95 % band" } else { "" };
+        series.extend(lines(&Levels::stated(material, &fit.model), &class));
         samples.push(Sample {
             name: fit.name.clone(),
-            kind: word(kind),
+            kind: word(kind_of(material, &fit.source)),
             kind_words: material.kind_words(fit),
             shape: "line",
             class,
-            note,
+            note: if fit.report.is_some() { "with its 95 % band" } else { "" },
         });
     }
     if let Some(number) = material.curves.iter().position(|curve| curve.name == material.render)
         && let Ok(model) = material.scattering()
     {
         let class = format!("{} {}", ink(number), class_of(material.render_kind()));
-        let pieces = Levels::rendered(material, &model).line().into_iter();
-        series.extend(pieces.map(|points| Series {
-            shape: Shape::Line,
-            class: class.clone(),
-            points,
-        }));
+        series.extend(lines(&Levels::rendered(material, &model), &class));
         let name = "between the points".to_owned();
         let kind = word(material.render_kind());
         samples.push(Sample { name, kind, kind_words: None, shape: "line", class, note: "" });
@@ -109,7 +98,16 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
     (plot.svg(), samples)
 }
 
-/// The picture for those who do not see it.
+/// The unbroken pieces of a model's curve.
+fn lines(levels: &Levels, class: &str) -> Vec<Series> {
+    let mut lines = Vec::new();
+    for points in levels.line() {
+        lines.push(Series { shape: Shape::Line, class: class.to_owned(), points });
+    }
+    lines
+}
+
+/// The picture in words, for those who do not see it.
 fn description(material: &Material) -> String {
     let mut text = "σ⁰ in dB over the angle of incidence. ".to_owned();
     if let Ok(model) = material.scattering() {
@@ -139,7 +137,7 @@ pub(super) fn word(kind: Option<SourceKind>) -> &'static str {
     kind.map_or("unknown", SourceKind::as_str)
 }
 
-/// The word for the style of a fit's line: what was stated beside measured points is not drawn as if it were they.
+/// The word for the style of a fit's line. A model that was stated with measured points is not drawn as measured.
 pub(super) fn line_word(material: &Material, fit: &Fit) -> &'static str {
     let kind = kind_of(material, &fit.source);
     let is_stated = fit.curve.is_some() && !fit.is_fitted();
@@ -148,7 +146,6 @@ pub(super) fn line_word(material: &Material, fit: &Fit) -> &'static str {
 
 /// Detections and bounds of a curve, (°, dB), as three kinds of marks.
 pub(super) fn marks(observations: &[Observation]) -> [(Shape, Vec<(f64, f64)>); 3] {
-    let at = |theta_rad: f64, sigma0: f64| (theta_rad.to_degrees(), db_from_ratio(sigma0));
     let mut found = [Shape::Dots, Shape::Below, Shape::Above].map(|shape| (shape, Vec::new()));
     for o in observations.iter().filter(|o| o.is_retro()) {
         let (place, sigma0) = match (o.sigma0, o.threshold_sigma0, o.censor) {
@@ -157,7 +154,7 @@ pub(super) fn marks(observations: &[Observation]) -> [(Shape, Vec<(f64, f64)>); 
             (None, Some(threshold), _) => (1, threshold),
             (None, None, _) => continue,
         };
-        found[place].1.push(at(o.theta_i_rad, sigma0));
+        found[place].1.push((o.theta_i_rad.to_degrees(), db_from_ratio(sigma0)));
     }
     found
 }
@@ -167,30 +164,32 @@ fn points(curve: &Curve, kind: Option<SourceKind>, ink: &str) -> (Vec<Series>, V
     let drawn = marks(&curve.observations).into_iter().filter(|(_, points)| !points.is_empty());
     let drawn: Vec<Series> =
         drawn.map(|(shape, points)| Series { shape, class: class.clone(), points }).collect();
-    let sample = |series: &Series| {
+    let mut samples = Vec::with_capacity(drawn.len());
+    for series in &drawn {
         let (shape, note) = match series.shape {
             Shape::Below => ("below", "no detection: the value lies below"),
             Shape::Above => ("above", "beyond the instrument: the value lies above"),
             _ => ("dots", "detections"),
         };
-        let name = curve.name.clone();
-        Sample { name, kind: word(kind), kind_words: None, shape, class: class.clone(), note }
-    };
-    let samples = drawn.iter().map(sample).collect();
+        let (name, class) = (curve.name.clone(), class.clone());
+        samples.push(Sample { name, kind: word(kind), kind_words: None, shape, class, note });
+    }
     (drawn, samples)
 }
 
 /// The 95 % band of a fit that has a report.
 fn band(material: &Material, fit: &Fit, ink: &str) -> Option<Series> {
-    let ends = |theta_deg: f64| {
-        let band = stored_band(fit, theta_deg.to_radians())?;
+    let (mut points, mut upper) = (Vec::new(), Vec::new());
+    for theta_deg in angles_deg(range_deg(material)) {
+        let Some(band) = stored_band(fit, theta_deg.to_radians()) else { continue };
         let [low_db, high_db] = [band.low, band.high].map(db_from_ratio);
-        (high_db >= FAINTEST_DB).then_some((theta_deg, low_db.max(FAINTEST_DB), high_db))
-    };
-    let ends: Vec<(f64, f64, f64)> = angles_deg(range_deg(material)).filter_map(ends).collect();
-    let low = ends.iter().map(|(theta_deg, low_db, _)| (*theta_deg, *low_db));
-    let high = ends.iter().rev().map(|(theta_deg, _, high_db)| (*theta_deg, *high_db));
-    let points: Vec<(f64, f64)> = low.chain(high).collect();
+        if high_db >= FAINTEST_DB {
+            points.push((theta_deg, low_db.max(FAINTEST_DB)));
+            upper.push((theta_deg, high_db));
+        }
+    }
+    // Along the lower end and back along the upper one.
+    points.extend(upper.into_iter().rev());
     (points.len() > 2).then(|| Series { shape: Shape::Band, class: ink.to_owned(), points })
 }
 
@@ -212,8 +211,9 @@ pub(super) fn view(material: &Material, curve: &Curve) -> CurveView {
 }
 
 fn count(observations: &[Observation]) -> String {
-    let of = |censor: Censor| observations.iter().filter(|o| o.censor == censor).count();
-    let (all, left, right) = (observations.len(), of(Censor::Left), of(Censor::Right));
+    let [left, right] = [Censor::Left, Censor::Right]
+        .map(|censor| observations.iter().filter(|o| o.censor == censor).count());
+    let all = observations.len();
     let mut text = format!("{} points.", grouped(all));
     if left + right == 0 {
         return text + " All were detected.";
@@ -235,28 +235,25 @@ fn instrument_view(instrument: &Instrument) -> InstrumentView {
     let mut facts = vec![format!("{} GHz", digits(instrument.centre_frequency_hz / 1e9))];
     facts.extend(instrument.bandwidth_hz.map(|hz| format!("bandwidth {} GHz", digits(hz / 1e9))));
     facts.extend(instrument.polarisation.as_ref().map(|p| format!("polarisation {p}")));
-    let number = |value: Option<f64>, what: &str, unit: &str| {
-        value.map(|value| format!("{what} {} {unit}", digits(value)))
-    };
-    let word =
-        |word: &Option<String>, what: &str| word.as_ref().map(|word| format!("{what} {word}"));
     let i = instrument;
+    let text =
+        |what: &str, text: &Option<String>| text.as_ref().map(|text| format!("{what} {text}"));
     let more = [
-        word(&i.transmit_polarisation, "sends"),
-        word(&i.receive_polarisation, "receives"),
+        text("sends", &i.transmit_polarisation),
+        text("receives", &i.receive_polarisation),
         i.geometry.map(|geometry| geometry.as_str().to_owned()),
-        number(i.stand_off_m, "stand-off", "m"),
-        number(i.spot_diameter_m.map(|m| m * 1e3), "spot", "mm"),
-        number(i.aperture_m, "aperture", "m"),
-        word(&i.calibration_target, "calibrated with"),
-        number(i.calibration_sd_factor.map(db_from_ratio), "calibration known to", "dB"),
+        quantity("stand-off", i.stand_off_m, "m"),
+        quantity("spot", i.spot_diameter_m.map(|m| m * 1e3), "mm"),
+        quantity("aperture", i.aperture_m, "m"),
+        text("calibrated with", &i.calibration_target),
+        quantity("calibration known to", i.calibration_sd_factor.map(db_from_ratio), "dB"),
         i.scale.map(|scale| format!("{} levels", scale.as_str())),
-        number(i.noise_floor_w.map(dbm_from_watts), "noise floor", "dBm"),
-        number(i.threshold_w.map(dbm_from_watts), "threshold", "dBm"),
-        number(i.false_alarm_probability, "false-alarm probability", "per chirp"),
+        quantity("noise floor", i.noise_floor_w.map(dbm_from_watts), "dBm"),
+        quantity("threshold", i.threshold_w.map(dbm_from_watts), "dBm"),
+        quantity("false-alarm probability", i.false_alarm_probability, "per chirp"),
         i.range_bins.map(|bins| format!("{bins} range bins searched")),
-        number(i.looks, "looks", "in one value"),
-        word(&i.looks_method, "looks were"),
+        quantity("looks", i.looks, "in one value"),
+        text("looks were", &i.looks_method),
     ];
     facts.extend(more.into_iter().flatten());
     InstrumentView { name: instrument.name.clone(), facts, note: instrument.note.clone() }

@@ -7,11 +7,11 @@ use super::words::cut;
 use crate::formats::html::clean;
 use crate::material::{Material, SourceKind};
 
-/// Letters of a name and of a description that are searched and shown: nobody types more.
+/// Longest name and longest description that are searched and shown, characters.
 const NAME: usize = 200;
 const DESCRIPTION: usize = 2000;
 
-/// What the index knows of a material.
+/// The entry of a material in the index.
 #[derive(Debug, Serialize)]
 pub(super) struct Entry {
     slug: String,
@@ -20,7 +20,7 @@ pub(super) struct Entry {
     tags: Vec<String>,
     text: String,
     kind: &'static str,
-    /// What a badge says in the kind's place of a model that goes with a curve.
+    /// Replaces the kind on the badge of a model that is stated with a curve.
     #[serde(skip_serializing_if = "Option::is_none")]
     kind_words: Option<String>,
     /// `superseded` or `withdrawn`; none of what may still be used.
@@ -47,7 +47,6 @@ impl Entry {
         let observations = || material.curves.iter().flat_map(|c| &c.observations);
         let model = material.scattering().ok();
         let levels = model.as_ref().map(|model| Levels::rendered(material, model));
-        let level = |&deg: &f64| levels.as_ref()?.db(deg);
         Entry {
             slug: material.slug.to_string(),
             name: cut(&material.name, NAME),
@@ -63,7 +62,7 @@ impl Entry {
             measured: has_measured_curve(material),
             points: observations().count(),
             censored: observations().filter(|o| o.sigma0.is_none()).count(),
-            level: SMALL_DEG.iter().map(level).collect(),
+            level: SMALL_DEG.map(|deg| levels.as_ref()?.db(deg)).to_vec(),
         }
     }
 }

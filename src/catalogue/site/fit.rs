@@ -1,4 +1,4 @@
-//! A fit: its numbers, what the data tell of them, and how far to trust it.
+//! A fit: its parameters, which of them the data determine, and how far to trust it.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -15,7 +15,7 @@ use crate::units::dbm_from_watts;
 const PRODUCTS: [(&str, &str); 3] =
     [("specular.f_lambda", "S"), ("diffuse.r_s", "R"), ("k", "S and R")];
 
-/// What stands in the place of a kind where a value is neither measured nor stated.
+/// Replaces the kind of a value that is neither measured nor stated.
 const CONVENTION: &str = "convention";
 
 /// A fit as its page shows it.
@@ -48,12 +48,12 @@ struct ParameterView {
     source: String,
     source_place: usize,
     kind: &'static str,
-    /// What the data tell of it, in words, and as a class of the style.
+    /// Whether the data determine it, in words and as a class of the style.
     told: String,
     is_told: bool,
 }
 
-/// A product of parameters that the data can tell.
+/// A product of parameters that the data can determine.
 #[derive(Debug, Serialize)]
 struct ProductView {
     name: &'static str,
@@ -63,7 +63,7 @@ struct ProductView {
     interval: Option<String>,
 }
 
-/// What a fit says of itself.
+/// The report of a fit.
 #[derive(Debug, Serialize)]
 struct ReportView {
     facts: Vec<(String, String)>,
@@ -92,7 +92,7 @@ pub(super) fn view(material: &Material, number: usize, fit: &Fit) -> FitView {
     }
 }
 
-/// An estimator in words; what somebody else calls theirs stays.
+/// An estimator in words; an unknown one keeps its name.
 fn method(estimator: &str) -> String {
     match estimator {
         "stated" => "the numbers are stated",
@@ -111,15 +111,18 @@ fn word(material: &Material, source: &str) -> &'static str {
 
 /// Names of the model and of its parts, as files write them.
 fn model_name(fit: &Fit) -> String {
-    let name = |value: &Value| value.get("model").and_then(Value::as_str).map(str::to_owned);
     let json = serde_json::to_value(&fit.model).unwrap_or_default();
-    let parts: Vec<String> =
-        json.as_object().into_iter().flatten().filter_map(|(_, part)| name(part)).collect();
-    match (name(&json), parts.is_empty()) {
-        (Some(whole), true) => whole,
-        (Some(whole), false) => format!("{whole} of {}", parts.join(" and ")),
-        (None, _) => "unnamed".to_owned(),
+    let parts = json.as_object().into_iter().flatten();
+    let parts: Vec<&str> = parts.filter_map(|(_, part)| model_of(part)).collect();
+    match model_of(&json) {
+        Some(whole) if parts.is_empty() => whole.to_owned(),
+        Some(whole) => format!("{whole} of {}", parts.join(" and ")),
+        None => "unnamed".to_owned(),
     }
+}
+
+fn model_of(value: &Value) -> Option<&str> {
+    value.get("model").and_then(Value::as_str)
 }
 
 fn parameter(
@@ -143,9 +146,9 @@ fn parameter(
         range: interval([parameter.min, parameter.max]),
         source: source.clone(),
         source_place: place_of(material, source),
-        kind: match own_told.is_some_and(|told| told.chosen_by == ChosenBy::Convention) {
-            true => CONVENTION,
-            false => word(material, source),
+        kind: match own_told {
+            Some(told) if told.chosen_by == ChosenBy::Convention => CONVENTION,
+            _ => word(material, source),
         },
         told,
         is_told,
@@ -156,7 +159,7 @@ fn interval([low, high]: [f64; 2]) -> String {
     format!("{} to {}", digits(low), digits(high))
 }
 
-/// Whether the data tell a parameter.
+/// Whether the data determine a parameter, in words and as a flag.
 fn in_words(
     fit: &Fit,
     path: &str,
@@ -187,17 +190,18 @@ fn in_words(
 
 fn products(fit: &Fit) -> Vec<ProductView> {
     let Some([specular, diffuse]) = fit.model.identified_products() else { return Vec::new() };
-    let view = |name: &'static str, is: &'static str, value: f64| {
-        let estimate = fit.report.as_ref().and_then(|report| report.estimate(name));
-        ProductView {
-            name,
-            is,
-            value: digits(value),
-            sd: estimate.and_then(|e| e.sd).map(digits),
-            interval: estimate.and_then(|e| e.interval_95).map(interval),
-        }
-    };
-    vec![view("S", "(1 − k) · f_lambda", specular), view("R", "k · r_s", diffuse)]
+    vec![product(fit, "S", "(1 − k) · f_lambda", specular), product(fit, "R", "k · r_s", diffuse)]
+}
+
+fn product(fit: &Fit, name: &'static str, is: &'static str, value: f64) -> ProductView {
+    let estimate = fit.report.as_ref().and_then(|report| report.estimate(name));
+    ProductView {
+        name,
+        is,
+        value: digits(value),
+        sd: estimate.and_then(|e| e.sd).map(digits),
+        interval: estimate.and_then(|e| e.interval_95).map(interval),
+    }
 }
 
 fn held_out(held: &HeldOut) -> String {
@@ -214,13 +218,14 @@ fn report(report: &FitReport) -> ReportView {
     let end = if report.converged { "converged" } else { "did not converge" };
     let speckle =
         g.speckle_db.map_or(String::new(), |db| format!("; speckle alone leaves {db:.2} dB"));
-    let noise = match report.noise_w > 0.0 {
-        true => format!("{} dBm", digits(dbm_from_watts(report.noise_w))),
-        false => "none".to_owned(),
+    let noise = if report.noise_w > 0.0 {
+        format!("{} dBm", digits(dbm_from_watts(report.noise_w)))
+    } else {
+        "none".to_owned()
     };
     let given: Vec<String> =
         report.given.iter().map(|g| format!("{} = {}", g.name, digits(g.value))).collect();
-    let list = |values: &[f64]| values.iter().map(|v| digits(*v)).collect::<Vec<_>>().join(", ");
+    let singular: Vec<String> = report.singular_values.iter().map(|v| digits(*v)).collect();
     let mut facts = vec![
         ("Method", report.method.clone()),
         ("Search", format!("{end} ({}) after {} steps", report.stop, report.iterations)),
@@ -243,7 +248,7 @@ fn report(report: &FitReport) -> ReportView {
             "Points held out",
             report.held_out.as_ref().map_or("not tried, or not possible".to_owned(), held_out),
         ),
-        ("Singular values", list(&report.singular_values)),
+        ("Singular values", singular.join(", ")),
         ("Data, BLAKE3", report.data_hash.clone()),
         ("Seed and program", format!("{}, matdb {}", report.seed, report.version)),
     ];

@@ -5,7 +5,7 @@ use crate::formats::words::decibels;
 use crate::material::{Material, Reach};
 use crate::units::db_from_ratio;
 
-/// Below this a level says only that nothing comes back, dB.
+/// Below this level there is no echo, dB.
 pub(super) const FAINTEST_DB: f64 = -80.0;
 
 /// Angles of the small curves, °: dense where lobes are narrow.
@@ -17,7 +17,7 @@ pub(super) const SMALL_DEG: [f64; 27] = [
 /// Angles of tables, °.
 pub(super) const TABLE_DEG: [f64; 9] = [0.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0];
 
-/// A model within the angles at which a material answers for it.
+/// A model within the angles for which a material claims it.
 pub(super) struct Levels<'a> {
     model: &'a dyn Scattering,
     reach: Reach,
@@ -25,24 +25,24 @@ pub(super) struct Levels<'a> {
 }
 
 impl<'a> Levels<'a> {
-    /// Of what scenes render.
+    /// Levels of what scenes render.
     pub fn rendered(material: &Material, model: &'a dyn Scattering) -> Levels<'a> {
         Levels { reach: material.reach(), ..Levels::stated(material, model) }
     }
 
-    /// Of a model that answers wherever the material claims to.
+    /// Levels of a model that holds in the whole claimed range of the material.
     pub fn stated(material: &Material, model: &'a dyn Scattering) -> Levels<'a> {
         let reach = Reach::new(material.theta_rad, None);
         Levels { model, reach, range_deg: range_deg(material) }
     }
 
-    /// σ⁰ in dB to a tenth at an angle; none where it is not claimed, or nothing comes back.
+    /// σ⁰ in dB to a tenth at an angle; none where it is not claimed, or there is no echo.
     pub fn db(&self, theta_deg: f64) -> Option<f64> {
         let level_db = db_from_ratio(self.model.sigma0(theta_deg.to_radians()));
         (self.is_claimed(theta_deg) && level_db >= FAINTEST_DB).then(|| tenth(level_db))
     }
 
-    /// The same in words; a level of which only a threshold is known as a bound.
+    /// σ⁰ at an angle in words; a bound where only a threshold is known.
     pub fn text(&self, theta_deg: f64) -> String {
         match (self.below_db(theta_deg), self.db(theta_deg)) {
             (Some(threshold_db), _) => format!("< {}", decibels(threshold_db)),
@@ -63,11 +63,10 @@ impl<'a> Levels<'a> {
 
     /// A curve fine enough for the lobe of a smooth surface: (°, dB), one list per unbroken piece.
     pub fn line(&self) -> Vec<Vec<(f64, f64)>> {
-        let level = |theta_deg: f64| Some((theta_deg, self.db(theta_deg)?));
         let mut pieces: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
-        for point in angles_deg(self.range_deg).map(level) {
-            match (point, pieces.last_mut()) {
-                (Some(point), Some(piece)) => piece.push(point),
+        for theta_deg in angles_deg(self.range_deg) {
+            match (self.db(theta_deg), pieces.last_mut()) {
+                (Some(level_db), Some(piece)) => piece.push((theta_deg, level_db)),
                 (None, Some(piece)) if !piece.is_empty() => pieces.push(Vec::new()),
                 _ => {}
             }
@@ -77,7 +76,7 @@ impl<'a> Levels<'a> {
     }
 }
 
-/// What an angle may lose on its way through degrees, rad.
+/// Rounding of an angle that was converted to degrees and back, rad.
 const ROUNDING_RAD: f64 = 1e-7;
 
 /// Angles from end to end of the claimed range, °: every tenth up to 12°, then every half.

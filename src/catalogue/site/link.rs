@@ -1,13 +1,13 @@
-//! What may be clicked: addresses of the web, and DOIs through their resolver.
+//! Links of the pages: web addresses, and DOIs through their resolver.
 
 use crate::catalogue::about::About;
 use crate::material::Source;
 
-/// Where a source can be followed to, and the words of the link.
+/// The address and the text of a link.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(super) struct Link {
     text: String,
-    /// None: the text is shown and leads nowhere.
+    /// None where the text is shown without a link.
     href: Option<String>,
 }
 
@@ -16,7 +16,7 @@ pub(super) fn of(source: &Source) -> Option<Link> {
     first(&source.doi, &source.url)
 }
 
-/// Where a catalogue stands, if it has a DOI or an address.
+/// The link of a catalogue, if it has a DOI or an address.
 pub(super) fn to_catalogue(about: &About) -> Option<Link> {
     first(&about.doi, &about.url)
 }
@@ -33,8 +33,8 @@ fn first(doi: &Option<String>, url: &Option<String>) -> Option<Link> {
 pub(super) fn doi_href(doi: &str) -> Option<String> {
     let (prefix, suffix) = doi.split_once('/')?;
     let registrant = prefix.strip_prefix("10.")?;
-    let sound = |c: char| c.is_ascii_digit() || c == '.';
-    if registrant.is_empty() || !registrant.chars().all(sound) || suffix.is_empty() {
+    let is_number = registrant.chars().all(|c| c.is_ascii_digit() || c == '.');
+    if registrant.is_empty() || !is_number || suffix.is_empty() {
         return None;
     }
     let escaped: String = suffix.bytes().map(escaped).collect();

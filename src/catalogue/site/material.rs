@@ -1,4 +1,4 @@
-//! What stands on a material's page.
+//! The page of a material.
 
 use serde::Serialize;
 
@@ -25,7 +25,7 @@ pub(super) struct Page<'a> {
     title: String,
     material: Head<'a>,
     kind: &'static str,
-    /// Those of the badge, where they are not the kind itself.
+    /// The words of the badge, where they differ from the kind.
     kind_words: Option<String>,
     kind_means: &'static str,
     revision: u32,
@@ -46,7 +46,7 @@ pub(super) struct Page<'a> {
     history: &'a [RevisionSummary],
 }
 
-/// What stands at the top.
+/// The head of the page.
 #[derive(Serialize)]
 struct Head<'a> {
     slug: &'a str,
@@ -136,8 +136,7 @@ fn head(material: &Material) -> Head<'_> {
 fn levels(material: &Material) -> Vec<(String, String)> {
     let Ok(model) = material.scattering() else { return Vec::new() };
     let levels = Levels::rendered(material, &model);
-    let level = |theta_deg: f64| (format!("{theta_deg:.0}°"), levels.text(theta_deg));
-    TABLE_DEG.into_iter().map(level).collect()
+    TABLE_DEG.map(|theta_deg| (format!("{theta_deg:.0}°"), levels.text(theta_deg))).to_vec()
 }
 
 fn source(source: &Source) -> SourceView<'_> {
@@ -153,24 +152,27 @@ fn source(source: &Source) -> SourceView<'_> {
 
 /// As they are stored: a later program may know more of them than this one.
 fn effects(material: &Material) -> Vec<EffectView> {
-    let view = |entry: &crate::formats::EffectEntry| {
+    let mut views = Vec::with_capacity(material.effects.len());
+    for entry in &material.effects {
         let effect = effects::find(&entry.name);
-        let unit =
-            |name: &str| effect?.parameters().iter().find(|k| k.name == name).map(|k| k.unit);
-        let row = |(name, value): (&String, &f64)| {
-            [name.clone(), digits(*value), unit(name).unwrap_or_default().to_owned()]
-        };
-        EffectView {
+        let mut parameters = Vec::new();
+        for (name, value) in &entry.parameters {
+            let known =
+                effect.and_then(|effect| effect.parameters().iter().find(|k| k.name == name));
+            let unit = known.map_or("", |parameter| parameter.unit);
+            parameters.push([name.clone(), digits(*value), unit.to_owned()]);
+        }
+        views.push(EffectView {
             name: entry.name.clone(),
             source: entry.source.as_ref().map(|key| (key.clone(), place_of(material, key))),
             is: effect.map(|effect| effect.description()),
-            parameters: entry.parameters.iter().map(row).collect(),
-        }
-    };
-    material.effects.iter().map(view).collect()
+            parameters,
+        });
+    }
+    views
 }
 
-/// What is not known: what the entry says, and what follows from what it holds.
+/// What is not known: what the entry states, and what follows from its content.
 fn unknown(material: &Material) -> Vec<String> {
     let mut found = gaps(&material.description);
     found.extend(material.unknown.iter().cloned());
@@ -188,10 +190,15 @@ fn unknown(material: &Material) -> Vec<String> {
     found
 }
 
+/// The claimed ranges of frequency and angle.
 fn validity(material: &Material) -> [String; 2] {
-    let range = |[low, high]: [f64; 2], unit: &str| match low == high {
-        true => format!("{}{unit}", digits(low)),
-        false => format!("{}–{}{unit}", digits(low), digits(high)),
-    };
-    [range(material.frequency_hz.map(|hz| hz / 1e9), "\u{a0}GHz"), range(range_deg(material), "°")]
+    let range_ghz = material.frequency_hz.map(|hz| hz / 1e9);
+    [range(range_ghz, "\u{a0}GHz"), range(range_deg(material), "°")]
+}
+
+fn range([low, high]: [f64; 2], unit: &str) -> String {
+    if low == high {
+        return format!("{}{unit}", digits(low));
+    }
+    format!("{}–{}{unit}", digits(low), digits(high))
 }

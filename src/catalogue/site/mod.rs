@@ -15,6 +15,7 @@ mod levels;
 mod link;
 mod material;
 mod plot;
+mod quantity;
 mod residuals;
 mod script;
 mod table;

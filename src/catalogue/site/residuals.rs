@@ -1,4 +1,4 @@
-//! What a fit leaves of its curve.
+//! The residuals of a fit.
 
 use super::curve::{class_of, marks};
 use super::entry::kind_of;
@@ -12,20 +12,15 @@ use crate::units::db_from_ratio;
 pub(super) fn picture(material: &Material, number: usize, fit: &Fit) -> Option<String> {
     let name = fit.curve.as_ref()?;
     let curve = material.curves.iter().find(|curve| curve.name == *name)?;
-    let less = |(theta_deg, level_db): (f64, f64)| {
-        (theta_deg, level_db - db_from_ratio(fit.model.sigma0(theta_deg.to_radians())))
-    };
     let class = format!("ink0 {}", class_of(kind_of(material, &curve.source)));
-    let left = marks(&curve.observations).into_iter().map(|(shape, points)| Series {
-        shape,
-        class: class.clone(),
-        points: points.into_iter().map(less).collect(),
-    });
-    let nothing = Series {
-        shape: Shape::Line,
-        class: "nothing".to_owned(),
-        points: vec![(0.0, 0.0), (90.0, 0.0)],
-    };
+    let zero = vec![(0.0, 0.0), (90.0, 0.0)];
+    let mut series = vec![Series { shape: Shape::Line, class: "nothing".to_owned(), points: zero }];
+    for (shape, mut points) in marks(&curve.observations) {
+        for (theta_deg, level_db) in &mut points {
+            *level_db -= db_from_ratio(fit.model.sigma0(theta_deg.to_radians()));
+        }
+        series.push(Series { shape, class: class.clone(), points });
+    }
     let plot = Plot {
         id: format!("residuals-{number}"),
         title: format!("What the fit {} leaves of the curve {name}", fit.name),
@@ -34,7 +29,7 @@ pub(super) fn picture(material: &Material, number: usize, fit: &Fit) -> Option<S
             .to_owned(),
         y_label: "point − fit, dB",
         claimed_deg: range_deg(material),
-        series: std::iter::once(nothing).chain(left).collect(),
+        series,
     };
     plot.svg()
 }

@@ -26,7 +26,7 @@ const COLUMNS: [&str; 14] = [
     "yt_m",
 ];
 
-/// Every point, a cell empty where there is nothing.
+/// Every point in a row; a cell without a value is empty.
 pub(super) fn csv(material: &Material) -> Result<Vec<u8>, CatalogueError> {
     let mut out = csv::Writer::from_writer(Vec::new());
     let failed = |reason: csv::Error| unwritable(material, io::Error::other(reason));
@@ -34,10 +34,6 @@ pub(super) fn csv(material: &Material) -> Result<Vec<u8>, CatalogueError> {
     for curve in &material.curves {
         let kind = kind_of(material, &curve.source).map_or("unknown", SourceKind::as_str);
         for o in &curve.observations {
-            let cell = |value: Option<f64>, decimals: usize| {
-                value.map_or(String::new(), |value| format!("{value:.decimals$}"))
-            };
-            let degrees = |rad: f64| cell(Some(rad.to_degrees() + 0.0), 6);
             let record = [
                 curve.name.clone(),
                 kind.to_owned(),
@@ -58,6 +54,15 @@ pub(super) fn csv(material: &Material) -> Result<Vec<u8>, CatalogueError> {
         }
     }
     out.into_inner().map_err(|error| unwritable(material, error.into_error()))
+}
+
+fn cell(value: Option<f64>, decimals: usize) -> String {
+    value.map_or(String::new(), |value| format!("{value:.decimals$}"))
+}
+
+/// An angle in degrees, never −0.
+fn degrees(rad: f64) -> String {
+    cell(Some(rad.to_degrees() + 0.0), 6)
 }
 
 fn unwritable(material: &Material, reason: io::Error) -> CatalogueError {

@@ -8,10 +8,12 @@ use crate::material::SourceKind;
 /// Text on one line of at most so many characters, without marks that turn its direction: for titles,
 /// which cannot be kept apart from what surrounds them.
 pub(super) fn cut(text: &str, most: usize) -> String {
-    let turns = |c: &char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    let line = || text.chars().filter(|c| !turns(c)).map(|c| if c.is_control() { ' ' } else { c });
-    let short: String = line().take(most).collect();
-    if line().nth(most).is_some() { short.trim_end().to_owned() + "…" } else { short }
+    let mut line = text
+        .chars()
+        .filter(|c| !matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}'))
+        .map(|c| if c.is_control() { ' ' } else { c });
+    let short: String = line.by_ref().take(most).collect();
+    if line.next().is_some() { short.trim_end().to_owned() + "…" } else { short }
 }
 
 /// A count with its thousands apart, which a line cannot break.
@@ -31,10 +33,9 @@ pub(super) fn meaning(kind: SourceKind) -> &'static str {
 
 /// The sentences of a description that say what is not known.
 pub(super) fn gaps(description: &str) -> Vec<String> {
-    let start = |text: &str| text.find("Not known:");
     let mut rest: Cow<str> = description.split_whitespace().collect::<Vec<_>>().join(" ").into();
     let mut found = Vec::new();
-    while let Some(at) = start(&rest) {
+    while let Some(at) = rest.find("Not known:") {
         let text = rest.get(at + "Not known:".len()..).unwrap_or("").trim().to_owned();
         let end = text.find(". ").map_or(text.len(), |dot| dot + 1);
         let (sentence, after) = text.split_at(end);

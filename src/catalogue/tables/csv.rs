@@ -1,5 +1,5 @@
-//! Tables as comma-separated values: UTF-8, a header, nothing between two commas where there is no
-//! value, numbers with as many digits as it takes to read them back bit for bit.
+//! Tables as comma-separated values: UTF-8 with a header. A cell without a value is empty, and numbers have as many
+//! digits as it takes to read them back bit for bit.
 
 use std::io;
 
@@ -8,7 +8,7 @@ use crate::catalogue::folder::Folder;
 use crate::catalogue::units::unit;
 use crate::store::{Cell, ColumnKind, Store, StoreError, Table};
 
-/// Writes a table row by row; gives the number of rows.
+/// Writes a table row by row; returns the number of rows.
 pub(super) fn write(
     folder: &mut Folder,
     store: &Store,

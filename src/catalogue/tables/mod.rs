@@ -1,5 +1,5 @@
 //! The database as plain tables: CSV and, where the program was built with it, Parquet. Tables and
-//! columns are those of the database, whatever it has.
+//! columns are those of the database.
 
 mod csv;
 #[cfg(feature = "parquet")]
@@ -16,7 +16,7 @@ pub(super) use parquet::parquet_of;
 /// Whether this program writes Parquet.
 pub const HAS_PARQUET: bool = cfg!(feature = "parquet");
 
-/// A table that was written.
+/// A table that was written, and its number of rows.
 pub(super) struct Written {
     pub table: Table,
     pub rows: u64,

@@ -20,7 +20,7 @@ use crate::catalogue::folder::Folder;
 use crate::catalogue::units::unit;
 use crate::store::{Cell, Column, ColumnKind, Store, Table};
 
-/// Rows that are held at a time.
+/// Number of rows that are kept in memory.
 const GROUP: usize = 1 << 16;
 
 /// Writes `tables/<table>.parquet`.
@@ -38,18 +38,18 @@ fn rows(store: &Store, table: &Table, place: &Path) -> Result<(), CatalogueError
         path: place.to_owned(),
         problem: error.to_string(),
     };
-    let io = |reason| CatalogueError::Io { verb: "write", path: place.to_owned(), reason };
-    let file = File::create(place).map_err(io)?;
+    let file = File::create(place).map_err(|reason| CatalogueError::Io {
+        verb: "write",
+        path: place.to_owned(),
+        reason,
+    })?;
     let schema = Arc::new(schema(table).map_err(failed)?);
     let properties = Arc::new(properties(table, None));
     let mut writer = SerializedFileWriter::new(file, schema, properties).map_err(failed)?;
     let mut group = Group::new(table);
     store.rows(table, |cells| {
         group.push(cells);
-        match group.rows < GROUP {
-            true => Ok(()),
-            false => group.flush(&mut writer).map_err(failed),
-        }
+        if group.rows < GROUP { Ok(()) } else { group.flush(&mut writer).map_err(failed) }
     })?;
     group.flush(&mut writer).map_err(failed)?;
     writer.close().map(|_| ()).map_err(failed)
@@ -61,36 +61,41 @@ pub(crate) fn parquet_of<'a>(
     about: &str,
     rows: impl Iterator<Item = Vec<Cell<'a>>>,
 ) -> Result<Vec<u8>, String> {
+    encoded(table, about, rows).map_err(|error| error.to_string())
+}
+
+fn encoded<'a>(
+    table: &Table,
+    about: &str,
+    rows: impl Iterator<Item = Vec<Cell<'a>>>,
+) -> Result<Vec<u8>, ParquetError> {
+    let (schema, properties) = (schema(table)?, properties(table, Some(about)));
     let mut bytes = Vec::new();
-    let write = || -> Result<(), ParquetError> {
-        let (schema, properties) = (schema(table)?, properties(table, Some(about)));
-        let mut writer =
-            SerializedFileWriter::new(&mut bytes, Arc::new(schema), Arc::new(properties))?;
-        let mut group = Group::new(table);
-        rows.for_each(|cells| group.push(&cells));
-        group.flush(&mut writer)?;
-        writer.close().map(|_| ())
-    };
-    write().map_err(|error| error.to_string())?;
+    let mut writer = SerializedFileWriter::new(&mut bytes, Arc::new(schema), Arc::new(properties))?;
+    let mut group = Group::new(table);
+    rows.for_each(|cells| group.push(&cells));
+    group.flush(&mut writer)?;
+    writer.close()?;
     Ok(bytes)
 }
 
 fn schema(table: &Table) -> Result<Type, ParquetError> {
-    let field = |column: &Column| {
-        let physical = match column.kind {
-            ColumnKind::Integer => Physical::INT64,
-            ColumnKind::Real => Physical::DOUBLE,
-            ColumnKind::Text => Physical::BYTE_ARRAY,
-        };
-        let is_text = column.kind == ColumnKind::Text;
-        let field = Type::primitive_type_builder(&column.name, physical)
-            .with_repetition(Repetition::OPTIONAL)
-            .with_logical_type(is_text.then_some(LogicalType::String))
-            .build();
-        field.map(Arc::new)
-    };
     let fields = table.columns.iter().map(field).collect::<Result<_, _>>()?;
     Type::group_type_builder(&table.name).with_fields(fields).build()
+}
+
+fn field(column: &Column) -> Result<Arc<Type>, ParquetError> {
+    let physical = match column.kind {
+        ColumnKind::Integer => Physical::INT64,
+        ColumnKind::Real => Physical::DOUBLE,
+        ColumnKind::Text => Physical::BYTE_ARRAY,
+    };
+    let is_text = column.kind == ColumnKind::Text;
+    let field = Type::primitive_type_builder(&column.name, physical)
+        .with_repetition(Repetition::OPTIONAL)
+        .with_logical_type(is_text.then_some(LogicalType::String))
+        .build();
+    field.map(Arc::new)
 }
 
 fn properties(table: &Table, about: Option<&str>) -> WriterProperties {
@@ -103,7 +108,7 @@ fn properties(table: &Table, about: Option<&str>) -> WriterProperties {
     WriterProperties::builder().set_key_value_metadata(Some(entries)).build()
 }
 
-/// Values of one column: those that there are, and for every row whether there is one.
+/// Values of one column, and for every row 1 where it has one and 0 where not.
 struct Values {
     there: Vec<i16>,
     kind: Kind,
@@ -123,15 +128,7 @@ struct Group {
 
 impl Group {
     fn new(table: &Table) -> Group {
-        let values = |column: &Column| Values {
-            there: Vec::new(),
-            kind: match column.kind {
-                ColumnKind::Integer => Kind::Integers(Vec::new()),
-                ColumnKind::Real => Kind::Reals(Vec::new()),
-                ColumnKind::Text => Kind::Texts(Vec::new()),
-            },
-        };
-        Group { rows: 0, columns: table.columns.iter().map(values).collect() }
+        Group { rows: 0, columns: table.columns.iter().map(Values::new).collect() }
     }
 
     fn push(&mut self, cells: &[Cell]) {
@@ -150,7 +147,7 @@ impl Group {
                     list.push(ByteArray::from(*text));
                     1
                 }
-                // The database's tables are strict: a cell of another kind is none.
+                // The tables of the database are strict, so that no cell has another kind.
                 _ => 0,
             };
             values.there.push(there);
@@ -189,6 +186,15 @@ impl Group {
 }
 
 impl Values {
+    fn new(column: &Column) -> Values {
+        let kind = match column.kind {
+            ColumnKind::Integer => Kind::Integers(Vec::new()),
+            ColumnKind::Real => Kind::Reals(Vec::new()),
+            ColumnKind::Text => Kind::Texts(Vec::new()),
+        };
+        Values { there: Vec::new(), kind }
+    }
+
     fn clear(&mut self) {
         self.there.clear();
         match &mut self.kind {

@@ -15,6 +15,13 @@ pub(super) struct Axis<'a> {
     pub high: f64,
 }
 
+impl Axis<'_> {
+    /// Where a value lies from the low end, 0, to the high end, 1.
+    fn share(&self, value: f64) -> f32 {
+        ((value - self.low) / (self.high - self.low)) as f32
+    }
+}
+
 /// Data area and heading of a page, px.
 pub(super) struct Axes<'a> {
     x: Axis<'a>,
@@ -58,7 +65,7 @@ impl<'a> Axes<'a> {
         }
     }
 
-    /// Takes the ticks of y away, where y has names and no scale.
+    /// Removes the ticks of y, for an axis of names without a scale.
     pub fn hide_y(&mut self) {
         self.y_ticks.clear();
     }
@@ -70,9 +77,8 @@ impl<'a> Axes<'a> {
 
     /// Where a value stands on the page, px.
     pub fn at(&self, x: f64, y: f64) -> (f32, f32) {
-        let share = |axis: &Axis, value: f64| ((value - axis.low) / (axis.high - axis.low)) as f32;
-        let up = share(&self.y, y) * self.data_height;
-        (self.left + share(&self.x, x) * self.data_width, self.top + self.data_height - up)
+        let up = self.y.share(y) * self.data_height;
+        (self.left + self.x.share(x) * self.data_width, self.top + self.data_height - up)
     }
 
     /// Frame, ticks, labels and heading.

@@ -77,10 +77,12 @@ impl Bars<'_> {
 
     /// The value at the right end: every bar and the note behind it fit.
     fn high(&self) -> f64 {
-        let room = |note: &str| f64::from(((width(note) + 2.0 * GAP_PX) / DATA_WIDTH_PX).min(0.8));
-        let bars = self.bars.iter().map(|bar| bar.value.max(0.0) / (1.0 - room(&bar.note)));
-        let guide = self.guide.map_or(0.0, |(value, _)| 1.1 * value);
-        let high = bars.fold(guide, f64::max);
+        let mut high = self.guide.map_or(0.0, |(value, _)| 1.1 * value);
+        for bar in &self.bars {
+            // Share of the width that the note takes.
+            let note = f64::from(((width(&bar.note) + 2.0 * GAP_PX) / DATA_WIDTH_PX).min(0.8));
+            high = high.max(bar.value.max(0.0) / (1.0 - note));
+        }
         if high > 0.0 && high.is_finite() { high } else { 1.0 }
     }
 }

@@ -10,7 +10,7 @@ use super::ticks::{Tick, ticks};
 
 /// The colour of NaN.
 pub(super) const NOTHING: Rgb = [221, 221, 221];
-/// The same beside colours that are nearly white in their middle.
+/// The colour of NaN among colours that are nearly white in their middle.
 const NOTHING_BESIDE_WHITE: Rgb = [178, 178, 178];
 
 /// Which colours stand for which values.
@@ -21,6 +21,17 @@ pub enum Scale {
     /// Blue below 0, nearly white at 0, red above: for differences. A range that is not given
     /// reaches equally far to both sides of 0.
     Diverging,
+}
+
+impl Scale {
+    /// The colour of a step from 0 to 255.
+    fn colour(self, step: usize) -> Rgb {
+        let colour = match self {
+            Scale::Sequential => colorous::VIRIDIS.eval_rational(step, 256),
+            Scale::Diverging => colorous::RED_BLUE.eval_rational(255 - step, 256),
+        };
+        colour.into_array()
+    }
 }
 
 const BAR_WIDTH_PX: f32 = 24.0;
@@ -47,11 +58,7 @@ impl Colours {
         if !(low < high && (high - low).is_finite()) {
             return Err(FigureError::Range { low, high });
         }
-        let step = |step: usize| match scale {
-            Scale::Sequential => colorous::VIRIDIS.eval_rational(step, 256),
-            Scale::Diverging => colorous::RED_BLUE.eval_rational(255 - step, 256),
-        };
-        let steps = (0..256).map(|number| step(number).into_array()).collect();
+        let steps = (0..256).map(|step| scale.colour(step)).collect();
         Ok(Some(Colours { low, high, steps, nothing: nothing(scale) }))
     }
 
@@ -95,7 +102,7 @@ pub(super) struct Bar<'a> {
     pub height: f32,
     below: bool,
     above: bool,
-    /// Colour of what has no value, and what the reader is told that means.
+    /// Colour of what has no value, and its meaning in words.
     gaps: Option<(Rgb, &'a str)>,
 }
 
@@ -109,16 +116,14 @@ impl<'a> Bar<'a> {
     ) -> Self {
         let label_px = text_width_px(label, LABEL_PX, Weight::Regular);
         // In f32, so that an end that the data reach exactly is not taken for passed.
-        let any = |beyond: &dyn Fn(&Colours, f32) -> bool| {
-            colours.is_some_and(|c| values.iter().any(|&value| beyond(c, value)))
-        };
+        let ends = colours.map(|colours| [colours.low as f32, colours.high as f32]);
         let mut bar = Bar {
             label,
             colours,
             ticks: Vec::new(),
             height: data_height.max(BAR_MIN_HEIGHT_PX),
-            below: any(&|c, value| value < c.low as f32),
-            above: any(&|c, value| value > c.high as f32),
+            below: ends.is_some_and(|[low, _]| values.iter().any(|&value| value < low)),
+            above: ends.is_some_and(|[_, high]| values.iter().any(|&value| value > high)),
             gaps: values.iter().any(|v| v.is_nan()).then_some(gaps),
         };
         bar.height += (label_px - bar.ramp_height()).max(0.0);
@@ -160,13 +165,15 @@ impl<'a> Bar<'a> {
     fn ramp(&self, colours: &Colours, left: f32, top: f32) -> Vec<Shape> {
         let (rows, columns) = (self.ramp_height() as usize, BAR_WIDTH_PX as usize);
         let bottom = top + rows as f32;
-        let step = |row: usize| colours.steps[255 - 256 * row / rows.max(1)];
         let cells = Shape::Cells {
             left_px: left as u32,
             top_px: top as u32,
             cell_px: 1,
             columns,
-            colours: (0..rows).flat_map(|row| std::iter::repeat_n(step(row), columns)).collect(),
+            colours: (0..rows)
+                .map(|row| colours.steps[255 - 256 * row / rows.max(1)])
+                .flat_map(|colour| std::iter::repeat_n(colour, columns))
+                .collect(),
         };
         let mut shapes = vec![cells];
         if self.below {

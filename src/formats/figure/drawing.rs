@@ -95,10 +95,13 @@ impl Drawing {
         }
     }
 
-    /// Pages in rows of so many, from the upper left.
+    /// Pages in rows of `columns` pages, from the upper left.
     pub fn grid(pages: &[Drawing], columns: usize) -> Drawing {
-        let row = |pages: &[Drawing]| pages.iter().cloned().fold(Drawing::default(), Self::beside);
-        pages.chunks(columns.max(1)).map(row).fold(Drawing::default(), Self::above)
+        let mut grid = Drawing::default();
+        for row in pages.chunks(columns.max(1)) {
+            grid = grid.above(row.iter().cloned().fold(Drawing::default(), Self::beside));
+        }
+        grid
     }
 }
 
@@ -202,10 +205,11 @@ impl Drawing {
 
     fn blank_page(&self) -> Result<Pixmap, DrawingError> {
         let (width_px, height_px) = (self.width_px.ceil(), self.height_px.ceil());
-        let drawable = |side_px: f32| (1.0..=MAX_SIDE_PX).contains(&side_px);
-        let page = Some((width_px, height_px))
-            .filter(|&(width, height)| drawable(width) && drawable(height))
-            .and_then(|(width, height)| Pixmap::new(width as u32, height as u32));
+        let sides_px = 1.0..=MAX_SIDE_PX;
+        if !(sides_px.contains(&width_px) && sides_px.contains(&height_px)) {
+            return Err(DrawingError::Page { width_px, height_px });
+        }
+        let page = Pixmap::new(width_px as u32, height_px as u32);
         let mut page = page.ok_or(DrawingError::Page { width_px, height_px })?;
         page.fill(tiny_skia::Color::WHITE);
         Ok(page)
@@ -290,9 +294,9 @@ fn pixel_rows(
     columns: usize,
     cell: u32,
 ) -> impl Iterator<Item = impl Iterator<Item = &Rgb>> {
-    let repeated = move |row| repeat_n(row, cell as usize);
-    let rows = cells.chunks_exact(columns.max(1)).flat_map(repeated);
-    rows.map(move |row| row.iter().flat_map(move |colour| repeat_n(colour, cell as usize)))
+    let cell = cell as usize;
+    let rows = cells.chunks_exact(columns.max(1)).flat_map(move |row| repeat_n(row, cell));
+    rows.map(move |row| row.iter().flat_map(move |colour| repeat_n(colour, cell)))
 }
 
 fn paint_text(page: &mut Pixmap, text: &Text) {
@@ -425,16 +429,19 @@ fn text_element(text: &Text) -> String {
 
 fn path_data(path: &Path) -> String {
     let place = |p: tiny_skia::Point| format!("{:.2} {:.2}", p.x, p.y);
-    let step = |segment| match segment {
-        PathSegment::MoveTo(to) => format!("M{}", place(to)),
-        PathSegment::LineTo(to) => format!("L{}", place(to)),
-        PathSegment::QuadTo(via, to) => format!("Q{} {}", place(via), place(to)),
-        PathSegment::CubicTo(one, two, to) => {
-            format!("C{} {} {}", place(one), place(two), place(to))
-        }
-        PathSegment::Close => "Z".into(),
-    };
-    path.segments().map(step).collect()
+    let mut data = String::new();
+    for segment in path.segments() {
+        data += &match segment {
+            PathSegment::MoveTo(to) => format!("M{}", place(to)),
+            PathSegment::LineTo(to) => format!("L{}", place(to)),
+            PathSegment::QuadTo(via, to) => format!("Q{} {}", place(via), place(to)),
+            PathSegment::CubicTo(one, two, to) => {
+                format!("C{} {} {}", place(one), place(two), place(to))
+            }
+            PathSegment::Close => "Z".into(),
+        };
+    }
+    data
 }
 
 fn listed(points: &[Point]) -> String {
@@ -451,8 +458,7 @@ fn hex([red, green, blue]: Rgb) -> String {
 
 /// Text that an XML attribute can hold: its signs spelled out, control characters as blanks.
 fn escaped(text: &str) -> String {
-    let blank = |letter: char| if letter.is_control() { ' ' } else { letter };
-    let clean: String = text.chars().map(blank).collect();
+    let clean = text.replace(char::is_control, " ");
     clean.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
@@ -460,8 +466,9 @@ fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for three in bytes.chunks(3) {
-        let byte = |place: usize| u32::from(three.get(place).copied().unwrap_or(0));
-        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+        let mut bytes = [0; 4];
+        bytes[1..=three.len()].copy_from_slice(three);
+        let bits = u32::from_be_bytes(bytes);
         for sextet in 0..4 {
             let letter = LETTERS[(bits >> (18 - 6 * sextet) & 63) as usize];
             text.push(if sextet > three.len() { '=' } else { letter.into() });

@@ -11,16 +11,18 @@ const DATA_HEIGHT_PX: f32 = 560.0;
 const EQUAL_SIDE_PX: f32 = 900.0;
 
 const CURVE_PX: f32 = 2.5;
-/// Side of a point among few, and among so many that they would hide each other.
+/// Side of a point, px.
 const POINT_PX: f32 = 7.0;
+/// Side of a point in a series of more than [`DENSE`] points, px.
 const DENSE_POINT_PX: f32 = 3.0;
+/// Largest number of points that do not hide each other.
 const DENSE: usize = 1000;
-/// Length of the sample beside a name in the legend, px.
+/// Length of the sample before a name in the legend, px.
 const SAMPLE_PX: f32 = 34.0;
 /// Length of a dash and of the gap after it, px.
 const DASH_PX: f32 = 7.0;
 
-/// Colour of lines that are no data.
+/// Colour of lines that are not data.
 const GUIDE_INK: Rgb = [140, 140, 140];
 
 /// A plot of any number of series.
@@ -70,8 +72,8 @@ pub enum Style {
     /// Upright bars, each from one point to the next one, in the colour of the other series of its
     /// name. They are not in the legend and take no colour.
     ErrorBars,
-    /// Dashes through the points in the colour of the other series of its name: a curve where nobody
-    /// answers for it. It is not in the legend and takes no colour.
+    /// Dashes through the points in the colour of the other series of its name: a curve outside the range for
+    /// which it is claimed. It is not in the legend and takes no colour.
     Beyond,
     /// A thin grey line to judge data by, such as zero. It takes no colour and does not widen the axes.
     Guide,
@@ -124,18 +126,20 @@ impl Plot<'_> {
 
     /// One colour per series; bands, error bars and dashes have that of the other series of their name.
     fn colours(&self) -> Vec<Rgb> {
-        let own = || self.series.iter().filter(|series| series.style.has_a_colour());
-        let colour = |series: &Series| {
-            let place = match series.style.has_a_colour() {
-                false => own().position(|other| other.name == series.name),
-                true => own().position(|other| std::ptr::eq(other, series)),
+        let own: Vec<&Series> = self.series.iter().filter(|s| s.style.has_a_colour()).collect();
+        let mut colours = Vec::with_capacity(self.series.len());
+        for series in &self.series {
+            let place = if series.style.has_a_colour() {
+                own.iter().position(|other| std::ptr::eq(*other, series))
+            } else {
+                own.iter().position(|other| other.name == series.name)
             };
-            match series.style {
+            colours.push(match series.style {
                 Style::Guide => GUIDE_INK,
                 _ => PALETTE[place.unwrap_or(0) % PALETTE.len()],
-            }
-        };
-        self.series.iter().map(colour).collect()
+            });
+        }
+        colours
     }
 
     /// The given range, or one that holds all finite values with a little room.
@@ -144,19 +148,20 @@ impl Plot<'_> {
         range: Option<(f64, f64)>,
         of: fn(&(f64, f64)) -> f64,
     ) -> Result<Axis<'static>, FigureError> {
-        let is_data = |series: &&Series| !matches!(series.style, Style::Band | Style::Guide);
-        let data = || self.series.iter().filter(is_data);
-        let values = || data().flat_map(|s| &s.points).map(of).filter(|v| v.is_finite());
-        let around = || {
-            let (low, high) = (values().reduce(f64::min)?, values().reduce(f64::max)?);
-            let room = if low < high { 0.04 * (high - low) } else { low.abs().max(1.0) };
-            Some((low - room, high + room))
-        };
-        let (low, high) = range.or_else(around).unwrap_or((f64::NAN, f64::NAN));
+        let (low, high) = range.or_else(|| self.span(of)).unwrap_or((f64::NAN, f64::NAN));
         if low < high && (high - low).is_finite() {
             return Ok(Axis { label: "", low, high });
         }
         Err(FigureError::Range { low, high })
+    }
+
+    /// A range around all finite values of the data; none where there are none.
+    fn span(&self, of: fn(&(f64, f64)) -> f64) -> Option<(f64, f64)> {
+        let data = self.series.iter().filter(|s| !matches!(s.style, Style::Band | Style::Guide));
+        let values = data.flat_map(|s| &s.points).map(of).filter(|value| value.is_finite());
+        let (low, high) = (values.clone().reduce(f64::min)?, values.reduce(f64::max)?);
+        let room = if low < high { 0.04 * (high - low) } else { low.abs().max(1.0) };
+        Some((low - room, high + room))
     }
 
     fn size(&self, width: f64, height: f64) -> [f32; 2] {
@@ -177,8 +182,10 @@ impl Plot<'_> {
             })
             .collect();
         let row_px = 1.4 * TICK_LABEL_PX;
-        let width = |name: &str| text_width_px(name, TICK_LABEL_PX, Weight::Regular);
-        let widest = named.iter().map(|(series, _)| width(&series.name)).fold(0.0, f32::max);
+        let widest = named
+            .iter()
+            .map(|(series, _)| text_width_px(&series.name, TICK_LABEL_PX, Weight::Regular))
+            .fold(0.0, f32::max);
         let size = (widest + SAMPLE_PX + 3.0 * GAP_PX, row_px * named.len() as f32 + 2.0 * GAP_PX);
         let (left, top) = self.emptiest_corner(axes, size);
         let left = left + GAP_PX;
@@ -203,19 +210,18 @@ impl Plot<'_> {
 impl Plot<'_> {
     /// Upper left point of a box of this size in the corner of the data area with the fewest points.
     fn emptiest_corner(&self, axes: &Axes, (width, height): (f32, f32)) -> (f32, f32) {
-        let is_data = |series: &&Series| series.style.has_a_colour();
-        let points = || self.series.iter().filter(is_data).flat_map(|series| &series.points);
-        let hidden = |(left, top): (f32, f32)| {
-            let inside = |(x, y): (f32, f32)| {
-                (left..=left + width).contains(&x) && (top..=top + height).contains(&y)
-            };
-            points().filter(|&&(x, y)| inside(axes.at(x, y))).count()
-        };
+        let data = self.series.iter().filter(|series| series.style.has_a_colour());
+        let points: Vec<(f32, f32)> =
+            data.flat_map(|series| &series.points).map(|&(x, y)| axes.at(x, y)).collect();
         let right = axes.left + axes.data_width - width;
         let bottom = axes.top + axes.data_height - height;
         let corners =
             [(right, axes.top), (axes.left, axes.top), (right, bottom), (axes.left, bottom)];
-        corners.into_iter().min_by_key(|&corner| hidden(corner)).unwrap_or(corners[0])
+        let emptiest = corners.into_iter().min_by_key(|&(left, top)| {
+            let (columns, rows) = (left..=left + width, top..=top + height);
+            points.iter().filter(|(x, y)| columns.contains(x) && rows.contains(y)).count()
+        });
+        emptiest.unwrap_or(corners[0])
     }
 }
 
@@ -231,19 +237,22 @@ impl Series {
             }
             Style::Band => {
                 let finite = self.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
-                let within = |&(px, py): &(f64, f64)| {
-                    axes.at(px.clamp(x.low, x.high), py.clamp(y.low, y.high))
-                };
-                let corners: Vec<(f32, f32)> = finite.map(within).collect();
+                let corners: Vec<(f32, f32)> = finite
+                    .map(|&(px, py)| axes.at(px.clamp(x.low, x.high), py.clamp(y.low, y.high)))
+                    .collect();
                 let area = Shape::Area { corners, colour: colour.map(tint) };
                 (self.points.len() > 2).then_some(area).into_iter().collect()
             }
             Style::ErrorBars => {
-                let within = |&(px, py): &(f64, f64)| axes.at(px, py.clamp(y.low, y.high));
-                let pairs = self.points.chunks_exact(2);
-                let seen = pairs
-                    .filter(|pair| pair.iter().all(|&(px, py)| inside(&x, px) && py.is_finite()));
-                seen.flat_map(|pair| curve(pair.iter().map(within).collect(), colour)).collect()
+                let mut bars = Vec::new();
+                for pair in self.points.chunks_exact(2) {
+                    if pair.iter().all(|&(px, py)| inside(&x, px) && py.is_finite()) {
+                        let ends =
+                            pair.iter().map(|&(px, py)| axes.at(px, py.clamp(y.low, y.high)));
+                        bars.extend(curve(ends.collect(), colour));
+                    }
+                }
+                bars
             }
             Style::Curve | Style::Beyond | Style::Guide => {
                 let line = if self.style == Style::Guide { guide } else { curve };

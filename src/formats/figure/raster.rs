@@ -14,7 +14,7 @@ const DATA_HEIGHT_PX: usize = 1000;
 /// A picture of one channel of a raster.
 ///
 /// Every pixel of the raster is a square of whole image pixels, coloured by its scale. NaN is
-/// grey with a note beside it; a value beyond the range has the colour of the range's end,
+/// grey, which a note explains; a value beyond the range has the colour of the range's end,
 /// and the colour bar ends in a triangle there.
 #[derive(Clone, Copy, Debug)]
 pub struct Figure<'a> {
@@ -77,12 +77,12 @@ impl Figure<'_> {
 
     fn axes(&self) -> [Axis<'_>; 2] {
         let Raster { x_min_m, y_min_m, pixel_m, width, height, .. } = *self.raster;
-        let axis = |label, low: f64, pixels: usize| Axis {
-            label,
-            low,
-            high: low + pixel_m * pixels as f64,
-        };
-        [axis(self.x_label, x_min_m, width), axis(self.y_label, y_min_m, height)]
+        let (x_max_m, y_max_m) =
+            (x_min_m + pixel_m * width as f64, y_min_m + pixel_m * height as f64);
+        [
+            Axis { label: self.x_label, low: x_min_m, high: x_max_m },
+            Axis { label: self.y_label, low: y_min_m, high: y_max_m },
+        ]
     }
 
     fn values(&self) -> Result<&[f32], FigureError> {

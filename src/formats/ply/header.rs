@@ -1,4 +1,4 @@
-//! What a PLY file says it holds.
+//! The header of a PLY file: its encoding, elements and properties.
 
 use std::io::Cursor;
 
@@ -132,8 +132,11 @@ pub(super) struct Element {
 impl Element {
     /// Where among the properties the scalar `name` is.
     pub fn scalar(&self, name: &str) -> Result<usize, FormatError> {
-        let is_it = |p: &Property| p.name == name && matches!(p.shape, Shape::Scalar(_));
-        self.properties.iter().position(is_it).ok_or_else(|| {
+        let at = self
+            .properties
+            .iter()
+            .position(|p| p.name == name && matches!(p.shape, Shape::Scalar(_)));
+        at.ok_or_else(|| {
             FormatError::at(
                 "header",
                 format!("element {} has no number called {name}", self.name),

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use glam::DVec3;
 
 use super::body::{Body, Row};
-use super::header::{Element, Header, Scalar, Shape};
+use super::header::{Element, Header, Shape};
 use super::parallel;
 use crate::formats::error::FormatError;
 use crate::geometry::Mesh;
@@ -91,9 +91,10 @@ impl Faces {
     const LABELS_PER_BYTE: usize = 2;
 
     fn new(element: &Element, vertices: usize, file_bytes: usize) -> Faces {
-        let is_integer = |scalar: Scalar| scalar.integer_range().is_some();
         let labels = element.properties.iter().enumerate().filter_map(|(at, p)| match p.shape {
-            Shape::Scalar(scalar) if is_integer(scalar) => Some((at, LabelBuilder::new(&p.name))),
+            Shape::Scalar(scalar) if scalar.integer_range().is_some() => {
+                Some((at, LabelBuilder::new(&p.name)))
+            }
             _ => None,
         });
         Faces {

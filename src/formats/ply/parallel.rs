@@ -2,7 +2,7 @@
 //! with x, y and z in single precision, and faces that are a count of 8 bits and three integers of
 //! 32 bits.
 //!
-//! Whatever else a file holds is left to [`Body`], and so are all faults, which it finds a place for.
+//! [`Body`] reads every other layout, and finds the place of every fault.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -30,14 +30,20 @@ pub(super) fn vertices(body: &mut Body, element: &Element, xyz: [usize; 3]) -> O
     });
     let (x, y, z) = (x?, y?, z?);
     let rows = body.rows(element, row_bytes)?;
-    let number = |row: &[u8], start: usize| {
-        let bytes = row.get(start..).and_then(|rest| rest.first_chunk());
-        f64::from(f32::from_le_bytes(bytes.copied().unwrap_or_default()))
-    };
-    let vertex = |row| DVec3::new(number(row, x), number(row, y), number(row, z));
-    let vertices = rows.par_chunks_exact(row_bytes).with_min_len(ROWS).map(vertex).collect();
+    let vertices = rows
+        .par_chunks_exact(row_bytes)
+        .with_min_len(ROWS)
+        .map(|row| DVec3::new(float_at(row, x), float_at(row, y), float_at(row, z)))
+        .collect();
     body.advance(rows.len());
     Some(vertices)
+}
+
+/// The number in single precision that starts at a byte of a row.
+#[inline(always)]
+fn float_at(row: &[u8], start: usize) -> f64 {
+    let bytes = row.get(start..).and_then(|rest| rest.first_chunk());
+    f64::from(f32::from_le_bytes(bytes.copied().unwrap_or_default()))
 }
 
 /// The faces, if all are triangles of `vertices` without further properties.
@@ -57,15 +63,18 @@ pub(super) fn triangles(
     let rows = body.rows(element, ROW_BYTES)?;
     let (rows, _) = rows.as_chunks::<ROW_BYTES>();
     let fits = AtomicBool::new(true);
-    let triangle = |&[count, a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3]: &[u8; ROW_BYTES]| {
-        let corners =
-            [[a0, a1, a2, a3], [b0, b1, b2, b3], [c0, c1, c2, c3]].map(u32::from_le_bytes);
-        if count != 3 || corners.iter().any(|&corner| corner as usize >= end) {
-            fits.store(false, Ordering::Relaxed);
-        }
-        corners
-    };
-    let facets = rows.par_iter().with_min_len(ROWS).map(triangle).collect();
+    let facets = rows
+        .par_iter()
+        .with_min_len(ROWS)
+        .map(|&[count, a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3]| {
+            let corners =
+                [[a0, a1, a2, a3], [b0, b1, b2, b3], [c0, c1, c2, c3]].map(u32::from_le_bytes);
+            if count != 3 || corners.iter().any(|&corner| corner as usize >= end) {
+                fits.store(false, Ordering::Relaxed);
+            }
+            corners
+        })
+        .collect();
     fits.into_inner().then(|| {
         body.advance(ROW_BYTES * rows.len());
         facets

@@ -89,28 +89,34 @@ pub fn write_table(table: &Table) -> Result<Vec<u8>, FormatError> {
     Ok(bytes)
 }
 
+/// Refuses a table that has no form as PLY.
 fn check(table: &Table) -> Result<(), FormatError> {
     let rows = table.rows();
     for (at, Column { name, scalar, values }) in table.columns.iter().enumerate() {
-        let fault = |problem: String, way_out: &str| {
-            Err(FormatError::at(format!("column {name:?}"), problem, way_out))
-        };
         if !is_name(name) {
-            return fault("is no PLY name".into(), "use letters, digits and underscores");
+            return Err(column_fault(
+                name,
+                "is not a PLY name",
+                "use letters, digits and underscores",
+            ));
         }
         if table.columns[..at].iter().any(|other| other.name == *name) {
-            return fault("is there twice".into(), "rename one");
+            return Err(column_fault(name, "is there twice", "rename one"));
         }
         if values.len() != rows {
             let problem = format!("has {} values where the first has {rows}", values.len());
-            return fault(problem, "give all columns one length");
+            return Err(column_fault(name, problem, "give all columns one length"));
         }
         if let Some(row) = values.iter().position(|&value| !scalar.holds(value)) {
             let problem = format!("row {row}: {} cannot hold {}", scalar.name(), values[row]);
-            return fault(problem, "use a wider type");
+            return Err(column_fault(name, problem, "use a wider type"));
         }
     }
     Ok(())
+}
+
+fn column_fault(name: &str, problem: impl Into<String>, way_out: &str) -> FormatError {
+    FormatError::at(format!("column {name:?}"), problem, way_out)
 }
 
 fn is_name(name: &str) -> bool {
@@ -122,8 +128,9 @@ fn header_text(table: &Table) -> String {
     let mut lines = vec!["ply".to_owned(), "format binary_little_endian 1.0".to_owned()];
     lines.extend(table.comments.iter().map(|comment| format!("comment {}", one_line(comment))));
     lines.push(format!("element vertex {}", table.rows()));
-    let property = |column: &Column| format!("property {} {}", column.scalar.name(), column.name);
-    lines.extend(table.columns.iter().map(property));
+    for Column { name, scalar, .. } in &table.columns {
+        lines.push(format!("property {} {name}", scalar.name()));
+    }
     lines.push("end_header\n".to_owned());
     lines.join("\n")
 }
@@ -208,7 +215,10 @@ mod tests {
         };
         refused(|t| t.columns[1].values.truncate(2), "column \"power_dbm\": has 2 values where");
         refused(|t| t.columns[1].name = "x".into(), "column \"x\": is there twice");
-        refused(|t| t.columns[1].name = "power dbm".into(), "column \"power dbm\": is no PLY name");
+        refused(
+            |t| t.columns[1].name = "power dbm".into(),
+            "column \"power dbm\": is not a PLY name",
+        );
         refused(|t| t.columns[2].values[1] = -1.0, "column \"facet\": row 1: uint cannot hold -1");
         refused(|t| t.columns[2].values[1] = f64::NAN, "column \"facet\": row 1: uint cannot hold");
         refused(|t| t.columns[6].values[2] = 0.5, "column \"flag\": row 2: uchar cannot hold 0.5");

@@ -1,10 +1,42 @@
 //! Filters: each condition has an index, and one that lets few through is used.
 
 use rusqlite::types::Value;
-use rusqlite::{Connection, Result, params_from_iter};
+use rusqlite::{Connection, Result, Row, params_from_iter};
 
-use super::{Filter, rows, summary};
-use crate::store::Summary;
+use crate::material::{Fit, Material, SourceKind};
+use crate::store::record::Summary;
+use crate::store::rows::rows;
+
+/// Which materials are wanted: those of which all holds that is said here.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Filter {
+    /// A frequency within the range for which the numbers are claimed, Hz.
+    pub frequency_hz: Option<f64>,
+    /// One of its tags.
+    pub tag: Option<String>,
+    /// How the numbers that a scene renders came to be.
+    pub kind: Option<SourceKind>,
+    /// Kind of stuff.
+    pub class: Option<String>,
+    /// Whether it has a model that was fitted to a curve.
+    pub fitted: Option<bool>,
+    /// `active`, `superseded` or `withdrawn`.
+    pub status: Option<String>,
+}
+
+impl Filter {
+    /// Whether it lets a material through that need not be stored: the same as [`Store::find`](crate::store::Store::find) says of the
+    /// current revision of one that is.
+    pub fn lets_through(&self, material: &Material) -> bool {
+        let Filter { frequency_hz, tag, kind, class, fitted, status } = self;
+        frequency_hz.is_none_or(|hz| material.frequency_outside_hz(hz) == 0.0)
+            && tag.as_ref().is_none_or(|tag| material.tags.contains(tag))
+            && kind.is_none_or(|kind| material.render_kind() == Some(kind))
+            && class.as_ref().is_none_or(|class| material.class == *class)
+            && fitted.is_none_or(|fitted| material.fits.iter().any(Fit::is_fitted) == fitted)
+            && status.as_ref().is_none_or(|status| material.status.as_str() == status)
+    }
+}
 
 /// So many are read and sorted at once; where no condition lets so few through, a page is read in the
 /// order of names.
@@ -14,6 +46,21 @@ const LINE: &str = "slug, name, class, revision, kind, status, curves, observati
 
 /// Where the highest frequencies of materials are no more different values than this, each is looked at.
 const FEW_ENDS: usize = 64;
+
+/// A line of a list.
+pub(super) fn summary(row: &Row) -> Result<Summary> {
+    Ok(Summary {
+        slug: row.get(0)?,
+        name: row.get(1)?,
+        class: row.get(2)?,
+        revision: row.get(3)?,
+        render_kind: row.get(4)?,
+        status: row.get(5)?,
+        curves: row.get(6)?,
+        observations: row.get(7)?,
+        fits: row.get(8)?,
+    })
+}
 
 /// What a filter says of one thing.
 struct Condition {
@@ -25,6 +72,19 @@ struct Condition {
     beside: String,
     /// Whether its index has what it lets through in the order of names.
     is_ordered: bool,
+}
+
+impl Condition {
+    /// A condition on one column.
+    fn plain(sql: &str, table: &'static str, values: Vec<Value>, is_ordered: bool) -> Condition {
+        // The sign before a column keeps SQLite from its index.
+        let (sql, beside) = (sql.to_owned(), format!("+{sql}"));
+        Condition { sql, values, table, beside, is_ordered }
+    }
+}
+
+fn text(text: &str) -> Vec<Value> {
+    vec![Value::Text(text.to_owned())]
 }
 
 /// All that a filter lets through, sorted by name.
@@ -120,14 +180,18 @@ fn rare(conn: &Connection, conditions: &[Condition]) -> Result<Option<usize>> {
 fn from(conditions: &[Condition], index: Option<usize>) -> (String, Vec<Value>) {
     let used = index.and_then(|index| conditions.get(index));
     let table = used.map_or("entry", |condition| condition.table);
-    let all: Vec<&str> = conditions
-        .iter()
-        .enumerate()
-        .map(|(place, condition)| match index == Some(place) {
-            true => condition.sql.as_str(),
-            false => condition.beside.as_str(),
-        })
-        .collect();
+    let all: Vec<&str> =
+        conditions
+            .iter()
+            .enumerate()
+            .map(|(place, condition)| {
+                if index == Some(place) {
+                    condition.sql.as_str()
+                } else {
+                    condition.beside.as_str()
+                }
+            })
+            .collect();
     let filter = match all.as_slice() {
         [] => String::new(),
         all => format!(" WHERE {}", all.join(" AND ")),
@@ -139,35 +203,30 @@ fn from(conditions: &[Condition], index: Option<usize>) -> (String, Vec<Value>) 
 /// What a filter says; what mostly lets the fewest through first.
 fn conditions(conn: &Connection, filter: &Filter) -> Result<Vec<Condition>> {
     let Filter { frequency_hz, tag, kind, class, fitted, status } = filter;
-    let text = |text: &str| vec![Value::Text(text.to_owned())];
-    // The sign before a column keeps SQLite from its index.
-    let plain = |sql: &str, table, values, is_ordered| {
-        let (sql, beside) = (sql.to_owned(), format!("+{sql}"));
-        Condition { sql, values, table, beside, is_ordered }
-    };
     let beside = "EXISTS (SELECT 1 FROM entry_tag AS t WHERE t.slug = entry.slug AND t.tag = ?)";
     let tag = tag.as_deref().map(|tag| Condition {
         beside: beside.to_owned(),
-        ..plain(
+        ..Condition::plain(
             "tag = ?",
             "entry_tag INDEXED BY entry_tag_tag CROSS JOIN entry USING (slug)",
             text(tag),
             true,
         )
     });
-    let class = class
-        .as_deref()
-        .map(|class| plain("class = ?", "entry INDEXED BY entry_class", text(class), true));
+    let class = class.as_deref().map(|class| {
+        Condition::plain("class = ?", "entry INDEXED BY entry_class", text(class), true)
+    });
     let frequency = frequency_hz.map(|hz| frequency(conn, hz)).transpose()?;
     let fitted = fitted.map(|fitted| {
         let sql = if fitted { "fitted > 0" } else { "fitted = 0" };
-        plain(sql, "entry INDEXED BY entry_fitted", Vec::new(), !fitted)
+        Condition::plain(sql, "entry INDEXED BY entry_fitted", Vec::new(), !fitted)
     });
-    let status = status
-        .as_deref()
-        .map(|status| plain("status = ?", "entry INDEXED BY entry_status", text(status), true));
-    let kind = kind
-        .map(|kind| plain("kind = ?", "entry INDEXED BY entry_kind", text(kind.as_str()), true));
+    let status = status.as_deref().map(|status| {
+        Condition::plain("status = ?", "entry INDEXED BY entry_status", text(status), true)
+    });
+    let kind = kind.map(|kind| {
+        Condition::plain("kind = ?", "entry INDEXED BY entry_kind", text(kind.as_str()), true)
+    });
     Ok([tag, class, frequency, fitted, status, kind].into_iter().flatten().collect())
 }
 

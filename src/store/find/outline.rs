@@ -4,15 +4,17 @@ use std::collections::BTreeMap;
 
 use rusqlite::{Connection, Error, Result, Row, params, params_from_iter};
 
-use super::{Filter, filter, rows};
+use super::filter::{self, Filter};
 use crate::brdf::{Brdf, Outline};
 use crate::material::Slug;
+use crate::store::database::Store;
+use crate::store::error::{InFile, StoreError};
 use crate::store::read::rendered_in;
-use crate::store::{Store, StoreError};
+use crate::store::rows::rows;
 
 /// What scenes render of a material's current revision, in outline.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outlined {
+pub struct OutlineEntry {
     /// Short name.
     pub slug: String,
     /// Angles of incidence at which it answers, rad: [`Reach::span_rad`](crate::material::Reach::span_rad).
@@ -30,12 +32,12 @@ impl Store {
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn outlines(&self, filter: &Filter) -> std::result::Result<Vec<Outlined>, StoreError> {
-        all(&self.conn, filter).map_err(|error| StoreError::new(&self.path, error))
+    pub fn outlines(&self, filter: &Filter) -> std::result::Result<Vec<OutlineEntry>, StoreError> {
+        all(&self.conn, filter).in_file(&self.path)
     }
 }
 
-fn all(conn: &Connection, filter: &Filter) -> Result<Vec<Outlined>> {
+fn all(conn: &Connection, filter: &Filter) -> Result<Vec<OutlineEntry>> {
     if *filter == Filter::default() {
         return rows(conn, &format!("SELECT {COLUMNS} FROM outline ORDER BY slug"), [], outlined);
     }
@@ -50,9 +52,9 @@ fn all(conn: &Connection, filter: &Filter) -> Result<Vec<Outlined>> {
     Ok(found)
 }
 
-fn outlined(row: &Row) -> Result<Outlined> {
+fn outlined(row: &Row) -> Result<OutlineEntry> {
     let levels = row.get_ref(4)?.as_blob_or_null()?;
-    Ok(Outlined {
+    Ok(OutlineEntry {
         slug: row.get(0)?,
         theta_rad: [row.get(1)?, row.get(2)?],
         model_hash: row.get(3)?,
@@ -61,7 +63,7 @@ fn outlined(row: &Row) -> Result<Outlined> {
 }
 
 /// Writes the line of a material, which is in the lists already, anew.
-pub(in crate::store) fn write(conn: &Connection, line: &Outlined) -> Result<()> {
+pub(crate) fn write(conn: &Connection, line: &OutlineEntry) -> Result<()> {
     let sql = "INSERT OR REPLACE INTO outline
                (slug, theta_min_rad, theta_max_rad, model_hash, levels) VALUES (?1, ?2, ?3, ?4, ?5)";
     let [theta_min_rad, theta_max_rad] = line.theta_rad;
@@ -71,27 +73,28 @@ pub(in crate::store) fn write(conn: &Connection, line: &Outlined) -> Result<()> 
 }
 
 /// The line of a material that renders this, if anything.
-pub(in crate::store) fn line(slug: &Slug, model: Option<&Brdf>, theta_rad: [f64; 2]) -> Outlined {
-    let hash = |model: &Brdf| -> Option<[u8; 16]> {
-        let hash = blake3::hash(&serde_json::to_vec(model).ok()?);
-        hash.as_bytes().first_chunk().copied()
-    };
-    Outlined {
+pub(crate) fn line(slug: &Slug, model: Option<&Brdf>, theta_rad: [f64; 2]) -> OutlineEntry {
+    OutlineEntry {
         slug: slug.to_string(),
         theta_rad,
-        model_hash: model.and_then(hash),
+        model_hash: model.and_then(model_hash),
         outline: model.and_then(Outline::new),
     }
 }
 
+fn model_hash(model: &Brdf) -> Option<[u8; 16]> {
+    let hash = blake3::hash(&serde_json::to_vec(model).ok()?);
+    hash.as_bytes().first_chunk().copied()
+}
+
 /// Writes the lines of everything that an older program stored.
-pub(in crate::store) fn fill(conn: &Connection) -> Result<()> {
+pub(crate) fn fill(conn: &Connection) -> Result<()> {
     each(conn, |line| write(conn, &line))
 }
 
 /// Materials whose line is not that of what they render.
 pub(super) fn stale(conn: &Connection) -> Result<Vec<String>> {
-    let mut kept: BTreeMap<String, Outlined> =
+    let mut kept: BTreeMap<String, OutlineEntry> =
         all(conn, &Filter::default())?.into_iter().map(|line| (line.slug.clone(), line)).collect();
     let mut stale = Vec::new();
     each(conn, |line| {
@@ -104,7 +107,7 @@ pub(super) fn stale(conn: &Connection) -> Result<Vec<String>> {
     Ok(stale)
 }
 
-fn is_same(kept: &Outlined, made: &Outlined) -> bool {
+fn is_same(kept: &OutlineEntry, made: &OutlineEntry) -> bool {
     let levels = match (&kept.outline, &made.outline) {
         (Some(kept), Some(made)) => kept.is_like(made),
         (kept, made) => kept == made,
@@ -113,7 +116,7 @@ fn is_same(kept: &Outlined, made: &Outlined) -> bool {
 }
 
 /// The line that each material should have.
-fn each(conn: &Connection, mut take: impl FnMut(Outlined) -> Result<()>) -> Result<()> {
+fn each(conn: &Connection, mut take: impl FnMut(OutlineEntry) -> Result<()>) -> Result<()> {
     let slugs: Vec<Slug> = rows(conn, "SELECT slug FROM material", [], |row| row.get(0))?;
     for slug in slugs {
         let found = match rendered_in(conn, &slug) {

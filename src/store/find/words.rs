@@ -4,10 +4,27 @@ use std::collections::BTreeSet;
 
 use rusqlite::{Connection, Result, Row, params};
 
-use super::{Hit, rows};
 use crate::material::Slug;
+use crate::store::rows::rows;
 
-/// Words beyond these are not looked for: nobody types more.
+/// A material that words were found in.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Hit {
+    /// Short name.
+    pub slug: Slug,
+    /// Full name.
+    pub name: String,
+    /// Current revision, from 1.
+    pub revision: u32,
+    /// Some words around those that were found, which stand in brackets.
+    pub snippet: String,
+    /// `active`, `superseded` or `withdrawn`.
+    pub status: String,
+    /// How well it fits (BM25), less is better; comparable only within one search, 0 where not ranked.
+    pub rank: f64,
+}
+
+/// Most words that are looked for; further ones are ignored.
 const MOST_WORDS: usize = 32;
 
 /// A word in more materials than this is frequent.
@@ -19,18 +36,17 @@ pub(super) fn search(conn: &Connection, words: &str, most: u32) -> Result<Vec<Hi
     if phrases.is_empty() {
         return Ok(Vec::new());
     }
-    match are_rare(conn, &phrases)? {
-        true => ranked(conn, &beginning(&phrases), most),
-        false => unranked(conn, words, &phrases, most),
+    if are_rare(conn, &phrases)? {
+        return ranked(conn, &beginning(&phrases), most);
     }
+    unranked(conn, words, &phrases, most)
 }
 
 /// Words as the index takes them: each a phrase in quotes.
 fn phrases(words: &str) -> Vec<String> {
-    let apart = |letter: char| letter.is_whitespace() || letter.is_control() || letter == '"';
-    let says_something = |word: &&str| word.chars().any(char::is_alphanumeric);
-    let found = words.split(apart).filter(says_something).take(MOST_WORDS);
-    found.map(|word| format!("\"{word}\"")).collect()
+    let words = words.split(|c: char| c.is_whitespace() || c.is_control() || c == '"');
+    let words = words.filter(|word| word.chars().any(char::is_alphanumeric));
+    words.take(MOST_WORDS).map(|word| format!("\"{word}\"")).collect()
 }
 
 /// All words, the last also as the beginning of one.

@@ -2,12 +2,12 @@
 
 use rusqlite::{Connection, OptionalExtension, Result, params};
 
-use super::{json, optional_json, rows};
 use crate::material::{
     Activity, Citation, Finding, Input, Instrument, Layer, Material, Origin, Permittivity,
     Roughness, Session, Slug, Source,
 };
 use crate::measure::AngleStatistics;
+use crate::store::rows::{json, optional_json, rows};
 
 /// Reads what hangs on a revision beside sources, instruments, curves, fits and effects.
 pub(super) fn fill(material: &mut Material, conn: &Connection, revision_id: i64) -> Result<()> {

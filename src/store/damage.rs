@@ -1,0 +1,25 @@
+//! Finding damage of a file.
+
+use rusqlite::{Connection, Result};
+
+use super::find::stale;
+use super::rows::rows;
+
+/// What is wrong with a file, a sentence each: damaged pages, references to missing rows, and lines of lists that do
+/// not follow from their material.
+pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
+    let found = rows(conn, "PRAGMA integrity_check", [], |row| row.get::<_, String>(0))?;
+    let dangling = rows(conn, "PRAGMA foreign_key_check", [], |row| {
+        let (table, parent): (String, String) = (row.get(0)?, row.get(2)?);
+        Ok(format!("a row of `{table}` refers to a row of `{parent}` that is not there"))
+    })?;
+    let problems: Vec<String> =
+        found.into_iter().filter(|line| line != "ok").chain(dangling).collect();
+    if !problems.is_empty() {
+        return Ok(problems);
+    }
+    let stale = stale(conn)?.into_iter();
+    Ok(stale
+        .map(|slug| format!("what lists and searches say of `{slug}` is not what is stored"))
+        .collect())
+}

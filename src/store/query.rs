@@ -1,0 +1,95 @@
+//! Reading materials by their names.
+
+use super::database::Store;
+use super::error::{InFile, StoreError};
+use super::find::Filter;
+use super::record::{RevisionSummary, Stored, Summary};
+use super::{damage, read};
+use crate::brdf::Brdf;
+use crate::material::Slug;
+use crate::measure::AngleStatistics;
+
+impl Store {
+    /// Every material's current revision, sorted by name.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn list(&self) -> Result<Vec<Summary>, StoreError> {
+        self.find(&Filter::default())
+    }
+
+    /// The licences of the current revisions, each once, sorted.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn licences(&self) -> Result<Vec<String>, StoreError> {
+        read::licences(&self.conn).in_file(&self.path)
+    }
+
+    /// One revision of a material, or the current one; `None` when there is no such material, or it never had that
+    /// revision.
+    ///
+    /// # Errors
+    /// When the file cannot be read, holds something else than was stored, or has lost the revision.
+    pub fn get(&self, slug: &Slug, revision: Option<u32>) -> Result<Option<Stored>, StoreError> {
+        let stored = read::get(&self.conn, slug, revision).in_file(&self.path)?;
+        match stored {
+            Some(stored) if stored.material.content_hash() != stored.content_hash => {
+                let problem =
+                    format!("revision {} of `{slug}` is not what was stored", stored.revision);
+                Err(StoreError::Corrupt { file: self.path.clone(), problem })
+            }
+            stored => Ok(stored),
+        }
+    }
+
+    /// The model that scenes render of a material's current revision, and its range of angles, rad. Nothing else is
+    /// read, and the hash is not compared. `None` when the material does not exist or has no such model.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn rendered(&self, slug: &Slug) -> Result<Option<(Brdf, [f64; 2])>, StoreError> {
+        read::rendered(&self.conn, slug).in_file(&self.path)
+    }
+
+    /// Statistics by angle of a curve of a revision, or of the current one, as they were computed when
+    /// it was added; none for a curve or revision that is not there, for a curve without backscatter, or
+    /// with points above the instrument's range, and for what an older program stored.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn statistics(
+        &self,
+        slug: &Slug,
+        revision: Option<u32>,
+        curve: &str,
+    ) -> Result<Vec<AngleStatistics>, StoreError> {
+        read::statistics(&self.conn, slug, revision, curve).in_file(&self.path)
+    }
+
+    /// What is wrong with the file as such, a sentence each: damaged pages and indexes, references to
+    /// nothing, and what lists and searches say without being so.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn damage(&self) -> Result<Vec<String>, StoreError> {
+        damage::damage(&self.conn).in_file(&self.path)
+    }
+
+    /// Whether there is a material of that name, sound or damaged.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn holds(&self, slug: &Slug) -> Result<bool, StoreError> {
+        let current = read::current_revision(&self.conn, slug);
+        Ok(current.in_file(&self.path)?.is_some())
+    }
+
+    /// Every revision of a material, oldest first; none when there is no such material.
+    ///
+    /// # Errors
+    /// When the file cannot be read, or a material has no revision.
+    pub fn history(&self, slug: &Slug) -> Result<Vec<RevisionSummary>, StoreError> {
+        read::history(&self.conn, slug).in_file(&self.path)
+    }
+}

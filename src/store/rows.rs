@@ -1,0 +1,53 @@
+//! Rows and columns to plain values.
+
+use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, Type, ValueRef};
+use rusqlite::{Connection, Error, Params, Result, Row};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde::de::value::{Error as WordError, StrDeserializer};
+
+use crate::material::{Censor, FindingVerdict, Geometry, Making, Scale, Slug, SourceKind};
+
+/// All rows of a query.
+pub(super) fn rows<T>(
+    conn: &Connection,
+    sql: &str,
+    values: impl Params,
+    read: impl FnMut(&Row) -> Result<T>,
+) -> Result<Vec<T>> {
+    conn.prepare_cached(sql)?.query_map(values, read)?.collect()
+}
+
+/// A column of JSON.
+pub(super) fn json<T: DeserializeOwned>(row: &Row, column: usize) -> Result<T> {
+    parsed(&row.get::<_, String>(column)?, column)
+}
+
+/// A column of JSON or NULL.
+pub(super) fn optional_json<T: DeserializeOwned>(row: &Row, column: usize) -> Result<Option<T>> {
+    let text: Option<String> = row.get(column)?;
+    text.map(|text| parsed(&text, column)).transpose()
+}
+
+fn parsed<T: DeserializeOwned>(text: &str, column: usize) -> Result<T> {
+    serde_json::from_str(text)
+        .map_err(|error| Error::FromSqlConversionFailure(column, Type::Text, error.into()))
+}
+
+/// A value that files and the database write as one word.
+fn word<'de, T: Deserialize<'de>>(value: ValueRef<'de>) -> FromSqlResult<T> {
+    T::deserialize(StrDeserializer::<WordError>::new(value.as_str()?)).map_err(FromSqlError::other)
+}
+
+/// Words of files that the database keeps as they are.
+macro_rules! words {
+    ($($type:ty),+ $(,)?) => {
+        $(impl FromSql for $type {
+            fn column_result(value: ValueRef) -> FromSqlResult<$type> {
+                word(value)
+            }
+        })+
+    };
+}
+
+words!(Censor, FindingVerdict, Geometry, Making, Scale, Slug, SourceKind);
