@@ -9,7 +9,7 @@
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::preset::Check;
+use super::error::Check;
 use crate::frames::{Direction, Point, Ray, Target};
 
 /// The scanning optics, as scene files write them.

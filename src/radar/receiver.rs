@@ -21,10 +21,10 @@ use num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 use serde::{Deserialize, Serialize};
 
-use super::preset::in_range;
+use super::chirp::Chirp;
+use super::error::{RadarError, in_range};
 use super::random::Draws;
 use super::window::{self, Window};
-use super::{Chirp, RadarError};
 use crate::units::{ratio_from_db, watts_from_dbm};
 
 /// Boltzmann's constant, J/K; exact.

@@ -9,10 +9,12 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::error::RenderError;
+use super::observer::Observer;
 use super::path::Path;
-use super::spot::Footprints;
-use super::surface::LocalFrame;
-use super::{Observer, RenderError, Setup};
+use super::setup::Setup;
+use super::spot::{Footprints, Intersection};
+use super::surface::{Facing, LocalFrame};
 use crate::brdf::Scattering;
 use crate::effects::{
     Arrived, Level, Model, Receiver, Shot, Stage, Traced, middle, tilted_cos_theta,
@@ -21,18 +23,6 @@ use crate::frames::{Direction, Global, Point, Pose, Ray, Surface};
 use crate::radar::Link;
 use crate::radar::random::{Key, Purpose};
 use crate::trace::Hit;
-
-/// How the surface lies where a ray meets a target that effects have moved.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Facing {
-    /// Unit normal, towards the radar.
-    pub normal: DVec3,
-    /// Azimuth of the radar about it, from the grain of the region, rad.
-    pub azimuth_rad: f64,
-}
-
-/// What a ray meets, and how it lies where it was moved.
-pub(super) type Meeting = (Option<Hit>, Option<Facing>);
 
 /// The model of a setup, made ready for its scan.
 pub(super) struct Acting<'a> {
@@ -77,7 +67,7 @@ impl<'a> Acting<'a> {
     }
 
     /// What a ray of a chirp meets, from what it hits where the scene has the target.
-    pub fn meet(&self, chirp: usize, ray: &Ray<Global>, hit: Option<Hit>) -> Meeting {
+    pub fn meet(&self, chirp: usize, ray: &Ray<Global>, hit: Option<Hit>) -> Intersection {
         // A ray that misses may still meet a target that has moved.
         let look = hit.map_or(self.blank(chirp, *ray), |hit| self.look(chirp, *ray, hit, None));
         match self.model.placed(&self.stage(), look) {

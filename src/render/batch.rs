@@ -15,13 +15,17 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::detect::Detector;
+use super::error::RenderError;
+use super::observer::Observer;
+use super::setup::Setup;
 use super::spot::{self, Spot};
-use super::surface::LocalFrame;
-use super::{Observer, RenderError, Setup, Surface};
+use super::surface::{LocalFrame, Surface};
 use crate::frames::{Global, Pose, Ray};
 use crate::geometry::Mesh;
 use crate::radar::{Beam, Chirps, Detection, Footprint, Link, Radar};
-use crate::trace::{Bvh, Cone, GpuError, Hit, Lit, RAYS_PER_SHARE, Share, TraceError, Tracer};
+use crate::trace::{
+    Bvh, Cone, EchoTracer, GpuError, Hit, RAYS_PER_SHARE, Share, TraceError, Tracer,
+};
 
 /// Rays that are worked on at once: enough for a device, few enough to hold what each meets.
 const RAYS_PER_TURN: usize = 1 << 20;
@@ -130,7 +134,7 @@ struct Work<'a> {
     rays: usize,
     /// Laws of one scan on the device.
     regions: usize,
-    lit: Option<Lit<'a>>,
+    lit: Option<EchoTracer<'a>>,
 }
 
 impl<'a> Work<'a> {

@@ -1,6 +1,6 @@
 //! Detections as a point cloud.
 
-use super::{Echo, Truth};
+use super::echo::{Echo, Truth};
 use crate::formats::ply::{Column, Scalar, Table};
 
 /// The cloud's table: position in the global frame (double), then what the radar and the renderer

@@ -1,8 +1,10 @@
 //! An echo and what caused it.
 
 use super::detect::Detector;
+use super::observer::Observer;
 use super::path::Path;
-use super::{Footprints, Observer, Setup};
+use super::setup::Setup;
+use super::spot::Footprints;
 use crate::frames::{Global, Point, Pose, Target};
 use crate::radar::Detection;
 use crate::trace::Hit;

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::{Echo, Scan};
+use super::echo::Echo;
+use super::scan::Scan;
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
 use crate::radar::Field;

@@ -10,8 +10,8 @@ use std::f64::consts::{LN_2, TAU};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::acting::{Facing, Meeting};
 use super::edges;
+use super::surface::Facing;
 use crate::frames::{Direction, Global, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Beam, Chirps, Radar};
@@ -19,6 +19,9 @@ use crate::trace::{Bvh, Hit, TraceError, Tracer};
 
 /// 1/φ: successive multiples of it are spread evenly over 0 to 1.
 pub(super) const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// Where a ray meets the target, and how the surface lies there if effects have moved it.
+pub(super) type Intersection = (Option<Hit>, Option<Facing>);
 
 /// What the rays of every chirp met. Kept, it can be shaded again with other materials.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,7 +67,7 @@ pub(super) fn trace_moved(
     tracer: Tracer,
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
-    meet: impl Fn(usize, &Ray<Global>, Option<Hit>) -> Meeting + Sync,
+    meet: impl Fn(usize, &Ray<Global>, Option<Hit>) -> Intersection + Sync,
 ) -> Result<Footprints, TraceError> {
     let scan = Rays { radar, chirps, bvh, tracer, rays_per_chirp };
     let met = scan.meetings(done, meet, |met| met.0)?;

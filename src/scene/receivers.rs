@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::SceneError;
+use super::error::SceneError;
 use super::file::{ReceiverEntry, SceneFile};
 
 /// No antenna may be farther out than this, m.

@@ -6,9 +6,11 @@ use std::sync::OnceLock;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::error::SceneError;
 use super::file::{MeshEntry, SceneFile};
+use super::read::read;
 use super::regions::{MeshSpan, assign};
-use super::{SceneError, mannequin, read, solids};
+use super::{mannequin, solids};
 use crate::formats::MeshFormat;
 use crate::formats::text::nearest;
 use crate::frames::{Global, Model, Point, Pose};

@@ -3,9 +3,9 @@
 //! A ray is told from the facets that it surely passes beside in f32, with a bound of the rounding; f64 decides the
 //! few that are left. The library's own triangle tests lose rays on shared edges; ours is in `facet.rs`.
 
-use super::Hit;
 use super::boxes::{Boxes, PADDING, Sphere};
 use super::facet::{Line, met};
+use super::hit::Hit;
 use super::wide::{Wide, least, most, widest};
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;

@@ -4,7 +4,7 @@ use std::f64::consts::{LN_2, PI};
 
 use glam::DVec3;
 use matdb::brdf::Lambert;
-use matdb::radar::beam::BeamEntry;
+use matdb::radar::BeamEntry;
 use matdb::radar::scan::Raster;
 use matdb::radar::{Beam, Radar};
 use matdb::render::Echo;

@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
-use super::Chirps;
+use super::chirps::Chirps;
 use crate::formats::FormatError;
 use crate::formats::csv::Table;
 use crate::frames::{Direction, Global, Ray};
-use crate::radar::RadarError;
+use crate::radar::error::RadarError;
 use crate::radar::mirror::MirrorAngles;
 
 /// A direction this near to unit length was meant to be one.

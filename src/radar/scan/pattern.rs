@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use crate::radar::error::Check;
 use crate::radar::mirror::{Mirror, MirrorAngles};
-use crate::radar::preset::Check;
 
 /// Reads a pattern; without the key `pattern` it is the elliptical one.
 pub(in crate::radar) fn read<'de, D: Deserializer<'de>>(from: D) -> Result<Pattern, D::Error> {

@@ -4,10 +4,20 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::echo::Cone;
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 use crate::trace::boxes::Boxes;
+
+/// The rays of a chirp, one for each sample of the spot.
+#[derive(Clone, Copy, Debug)]
+pub struct Cone {
+    /// The axis of the beam.
+    pub axis: Ray<Global>,
+    /// What the two coordinates of a sample add to the unit vector along the axis.
+    pub across: [DVec3; 2],
+    /// Number of the law of region 0; those of the other regions follow.
+    pub law: u32,
+}
 
 /// Answers of the device beside the number of a leaf entry: the ray meets nothing, or f32 cannot tell what.
 pub(super) const NOTHING: u32 = u32::MAX;

@@ -1,0 +1,306 @@
+//! A scan from its rays to its echoes.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::acting::{self, Acting};
+use super::detect::{Beats, Detector};
+use super::echo::{Echo, Echoes};
+use super::error::RenderError;
+use super::observer::Observer;
+use super::paths::Paths;
+use super::setup::Setup;
+use super::spot::{self, Footprints};
+use crate::frames::{Global, Point, Ray};
+use crate::geometry::Mesh;
+use crate::radar::{Chirps, Field, Radar, RadarFrames};
+use crate::trace::{Bvh, Hit, Tracer, winding_number};
+use crate::units::dbm_from_watts;
+
+/// What one scan gave at one antenna.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scan {
+    /// Number of chirps sent.
+    pub chirps: usize,
+    /// Number of chirps that met the target.
+    pub hits: usize,
+    /// Chirps that met a surface, in the order they were sent, whatever their power, and false alarms.
+    pub echoes: Vec<Echo>,
+    /// Echoes below this power are not detected, dBm.
+    pub threshold_dbm: f64,
+    /// Mean thermal power in a range cell, dBm; none for a receiver without noise.
+    pub noise_dbm: Option<f64>,
+}
+
+impl Scan {
+    /// The echoes that the radar reports: those at or above the threshold.
+    pub fn detections(&self) -> impl Iterator<Item = &Echo> {
+        self.echoes.iter().filter(|echo| echo.power_dbm >= self.threshold_dbm)
+    }
+}
+
+/// Traces every chirp of a scan with `rays_per_chirp` rays, one or more. `done` is told how many
+/// chirps are finished.
+///
+/// # Errors
+/// When no ray meets the mesh.
+pub fn trace(
+    radar: &Radar,
+    chirps: &Chirps,
+    bvh: &Bvh,
+    rays_per_chirp: usize,
+    done: &(dyn Fn(usize) + Sync),
+) -> Result<Footprints, RenderError> {
+    let rays = rays_per_chirp.max(1);
+    seen(spot::trace(radar, chirps, bvh, Tracer::Automatic, rays, done)?, radar, chirps, bvh)
+}
+
+/// As [`trace`], of the target where the setup's effects place it.
+///
+/// # Errors
+/// When no ray meets the mesh, an effect would count what the setup renders already, or the setup's
+/// tracer does not take the rays or stops working.
+pub fn trace_placed(
+    setup: &Setup,
+    rays_per_chirp: usize,
+    done: &(dyn Fn(usize) + Sync),
+) -> Result<Footprints, RenderError> {
+    let Setup { radar, chirps, bvh, tracer, .. } = *setup;
+    let rays = rays_per_chirp.max(1);
+    acting::check(setup, rays, Observer::Radar)?;
+    let footprints = match Acting::new(setup) {
+        None => spot::trace(radar, chirps, bvh, tracer, rays, done),
+        Some(acting) => {
+            let meet = |chirp, ray: &Ray<Global>, hit| acting.meet(chirp, ray, hit);
+            spot::trace_moved(radar, chirps, bvh, tracer, rays, done, meet)
+        }
+    };
+    seen(footprints?, radar, chirps, bvh)
+}
+
+/// Footprints that are not all empty.
+fn seen(
+    footprints: Footprints,
+    radar: &Radar,
+    chirps: &Chirps,
+    bvh: &Bvh,
+) -> Result<Footprints, RenderError> {
+    match footprints.hits.iter().all(Option::is_none) {
+        true => Err(miss(&radar.frames(), chirps, bvh.mesh())),
+        false => Ok(footprints),
+    }
+}
+
+/// Rays whose chirps are shaded one after the other; a chirp that bounces is a task of its own.
+const RAYS_PER_TASK: usize = 256;
+
+/// Turns hits into echoes at an antenna. With effects the hits are those of [`trace_placed`]. `done` is told how many chirps are finished.
+///
+/// The result is the same for any number of threads.
+///
+/// # Errors
+/// When the antenna stands inside the target, a path is too long for the receiver's sampling,
+/// several paths meet in a receiver that does not know their phases, or an effect would count what the
+/// setup renders already.
+pub fn shade(
+    setup: &Setup,
+    footprints: &Footprints,
+    observer: Observer,
+    done: &(dyn Fn(usize) + Sync),
+) -> Result<Scan, RenderError> {
+    check(setup, footprints, observer)?;
+    let acting = Acting::new(setup);
+    let detector = Detector::new(setup, observer, acting.as_ref())?;
+    let paths = Paths::new(setup, observer, footprints, acting);
+    let target_from_global = setup.radar.frames().global_from_target.inverse();
+    let echoes = Echoes { setup, footprints, observer, detector: &detector, target_from_global };
+    let rays = footprints.rays_per_chirp.max(1);
+    let per_task = if setup.bounce.is_some() { 1 } else { (RAYS_PER_TASK / rays).max(1) };
+    let of_task = |(task, hits): (usize, &[Option<Hit>])| {
+        let chirps = hits.chunks(rays);
+        let count = chirps.len();
+        let (mut ways, mut found) = (Vec::new(), Vec::with_capacity(count));
+        for (chirp, hits) in (task * per_task..).zip(chirps) {
+            paths.fill(chirp, hits, &mut ways);
+            let seen = detector.observe(chirp, &ways)?;
+            found.extend(echoes.echo(chirp, hits, &ways, seen));
+        }
+        done(count);
+        Ok(found)
+    };
+    let tasks = footprints.hits.par_chunks(per_task * rays).enumerate();
+    let echoes: Vec<Vec<Echo>> = tasks.map(of_task).collect::<Result<_, RenderError>>()?;
+    Ok(Scan {
+        chirps: setup.chirps.rays.len(),
+        hits: footprints.chirps().filter(|hits| hits.iter().any(Option::is_some)).count(),
+        echoes: echoes.concat(),
+        threshold_dbm: dbm_from_watts(detector.threshold_w()),
+        noise_dbm: detector.noise_w().map(dbm_from_watts),
+    })
+}
+
+/// The sampled beat signals of a scan at an antenna, chirp after chirp and look after look, as its
+/// receiver has them; none without a `[radar.receiver]`.
+///
+/// # Errors
+/// As [`shade`], at once or when a chirp's turn comes.
+pub fn beat_signals<'a>(
+    setup: &'a Setup<'a>,
+    footprints: &'a Footprints,
+    observer: Observer,
+) -> Result<impl Iterator<Item = Result<Beats, RenderError>> + use<'a>, RenderError> {
+    check(setup, footprints, observer)?;
+    let acting = Acting::new(setup);
+    let detector = Detector::new(setup, observer, acting.as_ref())?;
+    let paths = Paths::new(setup, observer, footprints, acting);
+    let hits = footprints.hits.chunks(footprints.rays_per_chirp.max(1));
+    Ok(hits
+        .enumerate()
+        .map(move |(chirp, hits)| detector.beats(chirp, &paths.of_chirp(chirp, hits))))
+}
+
+/// What must hold before anything is computed.
+fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(), RenderError> {
+    acting::check(setup, footprints.rays_per_chirp, observer)?;
+    if let Observer::Receiver { position, .. } = observer
+        && is_walled_off(setup, position)
+    {
+        let [x_m, y_m, z_m] = position.xyz.to_array();
+        return Err(RenderError::Inside { x_m, y_m, z_m });
+    }
+    if setup.radar.receiver.is_some() && (footprints.rays_per_chirp > 1 || setup.bounce.is_some()) {
+        return match setup.radar.speckle {
+            None => Err(RenderError::Phases),
+            Some(speckle) if speckle.coherent_ratio > 0.0 => Err(RenderError::Coherent),
+            Some(_) => Ok(()),
+        };
+    }
+    Ok(())
+}
+
+/// Whether an antenna is inside something that the radar is outside of. A room around both is no wall
+/// between them.
+fn is_walled_off(setup: &Setup, position: Point<Global>) -> bool {
+    let wound = |point| winding_number(setup.bvh.mesh(), point);
+    // Between 0, outside, and 1, inside; open meshes have anything between.
+    (wound(position) - wound(setup.radar.frames().origin())).abs() > 0.75
+}
+
+fn miss(frames: &RadarFrames, chirps: &Chirps, mesh: &Mesh) -> RenderError {
+    let target_from_global = frames.global_from_target.inverse();
+    let in_target = |&vertex: &DVec3| (target_from_global * Point::from(vertex)).xyz.truncate();
+    let target = Field::around(mesh.vertices.iter().map(in_target));
+    let scan = chirps.field(frames);
+    // Sixty times the paper's target: surely a mesh in millimetres.
+    const HUGE_M: f64 = 100.0;
+    let ahead = |ray: &Ray<Global>| {
+        let along = |&v: &DVec3| (v - ray.origin.xyz).dot(ray.direction.xyz());
+        mesh.vertices.iter().any(|vertex| along(vertex) > 0.0)
+    };
+    let way_out = if target.sides_m().into_iter().any(|side_m| side_m > HUGE_M) {
+        "is the mesh in millimetres? give it scale = 0.001"
+    } else if !chirps.rays.first().is_some_and(ahead) {
+        "it stands behind the radar: move it with translation_m or turn the radar with radar.alpha_deg"
+    } else {
+        "move the mesh with translation_m or the radar with radar.primary_focus_m"
+    };
+    RenderError::Miss { scan, target, way_out }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::{Lambert, Scattering};
+    use crate::frames::Direction;
+    use crate::render::Surface;
+    use crate::scene::solids;
+
+    fn chirps(radar: &Radar) -> Chirps {
+        Chirps::draw(radar, |_| Err("no file".to_owned())).unwrap()
+    }
+
+    #[test]
+    fn a_plate_at_eight_metres_returns_the_hand_computed_power() {
+        let mut mesh = solids::plate(2.0, 2.0);
+        for vertex in &mut mesh.vertices {
+            vertex.y += 1.1;
+        }
+        let lambert = Lambert { albedo: 0.5 };
+        let scan = shaded(&mesh, 1, &lambert);
+        assert_eq!(scan.echoes.len(), 18_529);
+        for echo in &scan.echoes {
+            // P = 7 − 15 + 10·lg(0.196 · 0.5/π) − 20·lg R + 20·lg cos θ, with R = 8/cos θ.
+            let cos = 8.0 / echo.range_m;
+            let expected = -8.0 + 10.0 * (0.196 * 0.5 / std::f64::consts::PI).log10()
+                - 20.0 * echo.range_m.log10()
+                + 20.0 * cos.log10();
+            assert!((echo.power_dbm - expected).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_target_beside_the_field_of_view_is_an_error() {
+        let mut mesh = solids::plate(0.1, 0.1);
+        for vertex in &mut mesh.vertices {
+            vertex.x += 3.0;
+        }
+        let radar = Radar::default();
+        let bvh = Bvh::new(&mesh);
+        let missed = trace(&radar, &chirps(&radar), &bvh, 1, &|_| {}).unwrap_err();
+        assert!(missed.to_string().contains("x 2.950 to 3.050"), "{missed}");
+    }
+
+    /// The scan of a mesh with many rays per chirp.
+    fn shaded(mesh: &Mesh, rays: usize, surface: &dyn Scattering) -> Scan {
+        let radar = Radar::default();
+        let chirps = chirps(&radar);
+        let (bvh, regions) = (Bvh::new(mesh), vec![0; mesh.facets.len()]);
+        let footprints = trace(&radar, &chirps, &bvh, rays, &|_| {}).unwrap();
+        let surfaces = [Surface::new(surface)];
+        let setup = Setup::new(&radar, &chirps, &bvh, &regions, &surfaces);
+        shade(&setup, &footprints, Observer::Radar, &|_| {}).unwrap()
+    }
+
+    #[test]
+    fn on_a_large_plate_the_spot_changes_nothing() {
+        let mut mesh = solids::plate(2.0, 2.0);
+        mesh.vertices.iter_mut().for_each(|vertex| vertex.y += 1.1);
+        let lambert = Lambert { albedo: 0.5 };
+        let (one, many) = (shaded(&mesh, 1, &lambert), shaded(&mesh, 64, &lambert));
+        for (a, b) in std::iter::zip(&one.echoes, &many.echoes) {
+            assert!((a.power_dbm - b.power_dbm).abs() < 1e-3, "{a:?} {b:?}");
+            assert!((a.range_m - b.range_m).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn a_straight_edge_through_the_spot_halves_the_power() {
+        // A half plane that ends at x = 0: the error function of the distance to the edge.
+        let mut mesh = solids::plate(2.0, 2.0);
+        mesh.vertices.iter_mut().for_each(|vertex| *vertex += DVec3::new(1.0, 1.1, 0.0));
+        let lambert = Lambert { albedo: 0.5 };
+        let scan = shaded(&mesh, 400, &lambert);
+        let full_dbm = scan.echoes.iter().map(|e| e.power_dbm).fold(f64::NEG_INFINITY, f64::max);
+        let on_the_edge: Vec<&Echo> = scan.echoes.iter().filter(|e| e.xt_m.abs() < 3e-4).collect();
+        assert!(on_the_edge.len() > 5);
+        for echo in on_the_edge {
+            // Off the centre the beam is as bright; only cos θ and R tell, below 0.03 dB.
+            let lost_db = full_dbm - echo.power_dbm;
+            assert!((lost_db - 10.0 * 2f64.log10()).abs() < 0.3, "{lost_db}");
+        }
+    }
+
+    #[test]
+    fn more_rays_converge() {
+        let mut mesh = solids::icosphere(0.05, 4);
+        mesh.vertices.iter_mut().for_each(|vertex| vertex.y += 1.1);
+        let rough = |i: Direction<crate::frames::Surface>, _| (-(1.0 - i.cos_theta()) / 0.02).exp();
+        let mean_w = |rays: usize| {
+            let scan = shaded(&mesh, rays, &rough);
+            scan.echoes.iter().map(|e| crate::units::watts_from_dbm(e.power_dbm)).sum::<f64>()
+        };
+        let finest = mean_w(1024);
+        let error = |rays: usize| (mean_w(rays) / finest - 1.0).abs();
+        assert!(error(16) < 0.05 && error(128) < 0.01, "{} {}", error(16), error(128));
+    }
+}
