@@ -34,7 +34,7 @@ use matdb::render::{
     Echo, Footprints, Observer, Scan, Setup, Surface, cloud_table, power_image, shade, trace_placed,
 };
 use matdb::scene::{Scene, solids};
-use matdb::trace::{Bvh, Hit};
+use matdb::trace::{Bvh, Hit, ScanGeometry};
 use matdb::units::watts_from_dbm;
 use rayon::prelude::*;
 
@@ -101,8 +101,8 @@ fn main() {
     let surfaces = [Surface::new(&paint)];
     let bvh = Bvh::new(&scene.target.mesh);
     let (radar, chirps, regions) = (scene.radar(), &scene.chirps, &scene.target.region_of_facet);
-    let setup =
-        Setup { seed: scene.file.seed, ..Setup::new(radar, chirps, &bvh, regions, &surfaces) };
+    let geometry = ScanGeometry::new(radar, chirps, &bvh, regions);
+    let setup = Setup { seed: scene.file.seed, ..Setup::new(geometry, &surfaces) };
     let footprints = traced(&setup, 1);
     let scan = shaded(&setup, &footprints);
     let given =
@@ -222,7 +222,10 @@ fn power(given: Given<'_>) -> Vec<Way<'_>> {
         };
         given.footprints.hits.iter().flatten().map(power_w).collect::<Vec<f64>>()
     };
-    let paper = move || shaded(&Setup { radar: &paper, ..*given.setup }, given.footprints);
+    let paper = move || {
+        let geometry = ScanGeometry { radar: &paper, ..given.setup.geometry };
+        shaded(&Setup { geometry, ..*given.setup }, given.footprints)
+    };
     vec![
         Way::new("law and link alone", alone, |powers_w| format!("{} hits", powers_w.len())),
         Way::new("paper's receiver", paper, echoes),

@@ -11,7 +11,7 @@ use matdb::frames::Pose;
 use matdb::material::builtin;
 use matdb::render::{Batch, Surface, Take};
 use matdb::scene::Scene;
-use matdb::trace::{Bvh, Gpu, Tracer};
+use matdb::trace::{Bvh, Gpu, ScanGeometry, Tracer};
 use matdb::units::dbm_from_watts;
 
 type Answer<T> = Result<T, Box<dyn std::error::Error>>;
@@ -54,11 +54,13 @@ fn main() -> Answer<()> {
     };
     let held = gpu.as_ref().map(|gpu| gpu.hold(&bvh)).transpose()?;
     let batch = Batch {
-        radar: scene.radar(),
-        chirps: &scene.chirps,
-        bvh: &bvh,
-        tracer: held.as_ref().map_or(Tracer::Automatic, Tracer::Gpu),
-        region_of_facet: &scene.target.region_of_facet,
+        geometry: ScanGeometry {
+            radar: scene.radar(),
+            chirps: &scene.chirps,
+            bvh: &bvh,
+            tracer: held.as_ref().map_or(Tracer::Automatic, Tracer::Gpu),
+            region_of_facet: &scene.target.region_of_facet,
+        },
         rays_per_chirp,
     };
     if let Some(gpu) = &gpu {

@@ -16,7 +16,7 @@ use matdb::render::{
     Batch, Echo, Observer, RenderError, Setup, Surface, Take, Takes, shade, trace,
 };
 use matdb::scene::{Scene, solids};
-use matdb::trace::{Bvh, Gpu, GpuError, TraceError, Tracer};
+use matdb::trace::{Bvh, Gpu, GpuError, ScanGeometry, TraceError, Tracer};
 use matdb::units::dbm_from_watts;
 
 /// What f32 and the device's functions may cost.
@@ -94,9 +94,10 @@ impl Bench {
             .map(|surface| Surface { grain: take.target.rotation() * surface.grain, ..*surface })
             .collect();
         let bvh = Bvh::new(&mesh);
-        let footprints = trace(&self.radar, &self.chirps, &bvh, rays, &|_| {}).unwrap();
-        let setup = Setup::new(&self.radar, &self.chirps, &bvh, &self.region_of_facet, &surfaces);
-        let setup = Setup { seed: take.seed, ..setup };
+        let Bench { radar, chirps, region_of_facet, .. } = self;
+        let geometry = ScanGeometry::new(radar, chirps, &bvh, region_of_facet);
+        let footprints = trace(&geometry, rays, &|_| {}).unwrap();
+        let setup = Setup { seed: take.seed, ..Setup::new(geometry, &surfaces) };
         let scan = shade(&setup, &footprints, Observer::Radar, &|_| {}).unwrap();
         let mut echoes = vec![None; self.chirps.rays.len()];
         scan.echoes.into_iter().for_each(|echo| echoes[echo.chirp as usize] = Some(echo));
@@ -117,7 +118,8 @@ impl Bench {
         rays_per_chirp: usize,
     ) -> Result<Takes, RenderError> {
         let Bench { radar, chirps, region_of_facet, .. } = self;
-        Batch { radar, chirps, bvh, tracer, region_of_facet, rays_per_chirp }.run(takes)
+        let geometry = ScanGeometry { radar, chirps, bvh, tracer, region_of_facet };
+        Batch { geometry, rays_per_chirp }.run(takes)
     }
 
     /// Compares a batch with its scans one by one; the largest error in dB and the echoes that were compared.

@@ -19,7 +19,7 @@ use matdb::material::builtin;
 use matdb::radar::Link;
 use matdb::render::{Echo, Observer, RenderError, Setup, Surface, shade, trace_placed};
 use matdb::scene::{Scene, SceneFile};
-use matdb::trace::Bvh;
+use matdb::trace::{Bvh, ScanGeometry};
 use matdb::units::{dbm_from_watts, watts_from_dbm};
 use support::{entries, matdb, read_cloud, refused};
 
@@ -87,13 +87,16 @@ impl Bench {
         self.scene.target.regions.iter().map(|region| region.grain).collect()
     }
 
+    fn geometry(&self) -> ScanGeometry<'_> {
+        let Scene { chirps, target, .. } = &self.scene;
+        ScanGeometry::new(self.scene.radar(), chirps, &self.bvh, &target.region_of_facet)
+    }
+
     fn with_stage<T>(&self, then: impl FnOnce(&Stage, &[Shot]) -> T) -> T {
         let (radar, grains) = (self.scene.radar(), self.grains());
         let mut stage = Stage {
-            radar,
+            geometry: self.geometry(),
             link: Link::new(radar),
-            bvh: &self.bvh,
-            region_of_facet: &self.scene.target.region_of_facet,
             grain_of_region: &grains,
             middle: DVec3::ZERO,
         };
@@ -107,12 +110,10 @@ impl Bench {
     }
 
     fn render(&self, model: &Model, rays: usize) -> Result<Vec<Echo>, RenderError> {
-        let regions = &self.scene.target.region_of_facet;
         let surface = |(law, grain)| Surface { scattering: law as &Brdf, grain };
         let surfaces: Vec<Surface> =
             std::iter::zip(&self.laws, self.grains()).map(surface).collect();
-        let chirps = &self.scene.chirps;
-        let paper = Setup::new(self.scene.radar(), chirps, &self.bvh, regions, &surfaces);
+        let paper = Setup::new(self.geometry(), &surfaces);
         let setup = Setup { effects: Some(model), seed: self.scene.file.seed, ..paper };
         let footprints = trace_placed(&setup, rays, &|_| {})?;
         Ok(shade(&setup, &footprints, Observer::Radar, &|_| {})?.echoes)

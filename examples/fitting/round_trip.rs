@@ -11,7 +11,7 @@ use matdb::radar::speckle::standard_deviation_db;
 use matdb::radar::{Noise, Radar, Speckle};
 use matdb::render::{Echo, Observer, Setup, Surface, shade, trace};
 use matdb::scene::Scene;
-use matdb::trace::Bvh;
+use matdb::trace::{Bvh, ScanGeometry};
 use matdb::units::watts_from_dbm;
 
 use crate::Failure;
@@ -176,8 +176,9 @@ fn rendered(
     let bvh = Bvh::new(mesh);
     let surfaces = vec![Surface::new(material as &dyn Scattering); scene.target.regions.len()];
     let regions = &scene.target.region_of_facet;
-    let setup = Setup { seed, ..Setup::new(radar, &scene.chirps, &bvh, regions, &surfaces) };
-    let footprints = trace(radar, &scene.chirps, &bvh, 1, &|_| {})?;
+    let geometry = ScanGeometry::new(radar, &scene.chirps, &bvh, regions);
+    let setup = Setup { seed, ..Setup::new(geometry, &surfaces) };
+    let footprints = trace(&geometry, 1, &|_| {})?;
     Ok(shade(&setup, &footprints, Observer::Radar, &|_| {})?.echoes)
 }
 

@@ -12,7 +12,7 @@ use crate::material::Material;
 use crate::radar::Radar;
 use crate::render::{Bounce, Setup, Surface};
 use crate::scene::Scene;
-use crate::trace::{Bvh, Tracer};
+use crate::trace::{Bvh, ScanGeometry};
 use crate::units::{range, ratio_from_db, rounded, shown};
 
 /// A material as one scene uses it.
@@ -106,11 +106,12 @@ pub(super) fn setup<'a>(
     effects: Option<&'a Model>,
 ) -> Setup<'a> {
     Setup {
-        radar: scene.radar(),
-        chirps: &scene.chirps,
-        bvh,
-        tracer: Tracer::Automatic,
-        region_of_facet: &scene.target.region_of_facet,
+        geometry: ScanGeometry::new(
+            scene.radar(),
+            &scene.chirps,
+            bvh,
+            &scene.target.region_of_facet,
+        ),
         surfaces,
         bounce: scene.file.bounce.map(|bounce| Bounce {
             rays: bounce.rays,

@@ -29,7 +29,7 @@ const FADED: f64 = 3.0;
 /// Distance of a look from the centre on the target, m; infinite where it is more than `far_m`, which costs
 /// no ray.
 fn apart_m(stage: &Stage, look: &Shot, [x_m, y_m]: [f64; 2], far_m: f64) -> f64 {
-    let axes = stage.radar.frames().global_from_target.rotation();
+    let axes = stage.geometry.radar.frames().global_from_target.rotation();
     let aside = (x_m - look.xt_m) * axes.x_axis + (y_m - look.yt_m) * axes.y_axis;
     // Beside the ray of the centre by as much at least.
     let forward = look.ray.direction.xyz();
@@ -39,7 +39,7 @@ fn apart_m(stage: &Stage, look: &Shot, [x_m, y_m]: [f64; 2], far_m: f64) -> f64 
     let Some(direction) = towards.filter(|_| beside_m <= far_m) else { return f64::INFINITY };
     // The centre belongs to the target, wherever that has moved.
     let ray = Ray { origin: look.ray.origin, direction };
-    let centre = match stage.bvh.closest(&ray) {
+    let centre = match stage.geometry.bvh.closest(&ray) {
         Some(hit) => hit.point.xyz,
         None => ray.origin.xyz + look.hit.range_m * direction.xyz(),
     };

@@ -47,7 +47,7 @@ fn grain(stage: &Stage, region: u16) -> DVec3 {
 
 /// The look, had its chirp taken another ray.
 pub(super) fn met(stage: &Stage, look: &Shot, ray: Ray<Global>) -> Option<Shot> {
-    stage.bvh.closest(&ray).map(|hit| at(stage, look, ray, hit))
+    stage.geometry.bvh.closest(&ray).map(|hit| at(stage, look, ray, hit))
 }
 
 /// The same for the closest hit of that ray.
@@ -74,8 +74,8 @@ pub(super) struct Facet {
 
 impl Facet {
     pub(super) fn of(stage: &Stage, number: usize) -> Facet {
-        let region = stage.region_of_facet.get(number).copied().unwrap_or(0);
-        let (normal, grain) = (stage.bvh.mesh().area_normal(number), grain(stage, region));
+        let region = stage.geometry.region_of_facet.get(number).copied().unwrap_or(0);
+        let (normal, grain) = (stage.geometry.bvh.mesh().area_normal(number), grain(stage, region));
         let axes = normal.try_normalize().map(|normal| Axes::new(normal, grain));
         Facet { axes, grain, region }
     }

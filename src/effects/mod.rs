@@ -29,8 +29,8 @@ use glam::DVec3;
 
 use crate::brdf::Brdf;
 use crate::frames::{Global, Pose, Ray};
-use crate::radar::{Link, Radar};
-use crate::trace::{Bvh, Hit};
+use crate::radar::Link;
+use crate::trace::{Hit, ScanGeometry};
 
 pub use ceiling::{Ceiling, Passed, Saturating};
 pub use declared::SceneEffects;
@@ -120,14 +120,10 @@ pub struct Shot {
 /// What all looks of a scan share.
 #[derive(Clone, Copy)]
 pub struct Stage<'a> {
-    /// The instrument.
-    pub radar: &'a Radar,
-    /// Its power balance.
+    /// The instrument and its target.
+    pub geometry: ScanGeometry<'a>,
+    /// The instrument's power balance.
     pub link: Link,
-    /// The target as the scene places it.
-    pub bvh: &'a Bvh<'a>,
-    /// Region of every facet.
-    pub region_of_facet: &'a [u16],
     /// Direction of the grain of every region, global frame.
     pub grain_of_region: &'a [DVec3],
     /// What a pose turns about, m, global frame: the [`middle`] of all looks of the scan, whichever

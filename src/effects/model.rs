@@ -201,7 +201,7 @@ impl Model<'_> {
     pub(crate) fn placed(&self, stage: &Stage, look: Shot) -> Option<Shot> {
         let Some(target) = self.target(stage, &look) else { return Some(look) };
         let ray = seen_from(&target, &look.ray);
-        stage.bvh.closest(&ray).map(|hit| moved(stage, &look, target, (ray, hit)).0)
+        stage.geometry.bvh.closest(&ray).map(|hit| moved(stage, &look, target, (ray, hit)).0)
     }
 
     /// All looks at once, so that rays of one origin share their walk over the facets.
@@ -216,7 +216,7 @@ impl Model<'_> {
             target.map_or(look.ray, |target| seen_from(&target, &look.ray))
         };
         let rays: Vec<Ray<Global>> = looks.par_iter().zip(&targets).map(seen).collect();
-        let hits = closest(stage.bvh, &rays);
+        let hits = closest(stage.geometry.bvh, &rays);
         let placed =
             |(((look, target), ray), hit): (((&Shot, &Option<_>), &Ray<_>), &Option<_>)| {
                 Some(match *target {
@@ -251,7 +251,7 @@ impl Model<'_> {
             let ray = Ray { direction: Direction::new(direction)?, ..look.ray };
             let hit = match moves {
                 true => self.placed(stage, Shot { ray, ..*look })?.hit,
-                false => stage.bvh.closest(&ray)?,
+                false => stage.geometry.bvh.closest(&ray)?,
             };
             Some(hit.range_m)
         };

@@ -50,11 +50,11 @@ impl<'a> Acting<'a> {
             setup: *setup,
             model,
             bare: Model { effects: Vec::new(), ..model.clone() },
-            link: Link::new(setup.radar),
+            link: Link::new(setup.geometry.radar),
             grain_of_region: setup.surfaces.iter().map(|surface| surface.grain).collect(),
             middle: DVec3::ZERO,
-            places: setup.chirps.target_points_m(&setup.radar.frames()).collect(),
-            progress: setup.chirps.progress(),
+            places: setup.geometry.chirps.target_points_m(&setup.geometry.radar.frames()).collect(),
+            progress: setup.geometry.chirps.progress(),
             receiver: model.received(),
         };
         acting.middle = middle(&acting.looks());
@@ -156,10 +156,8 @@ impl<'a> Acting<'a> {
 
     fn stage(&self) -> Stage<'_> {
         Stage {
-            radar: self.setup.radar,
+            geometry: self.setup.geometry,
             link: self.link,
-            bvh: self.setup.bvh,
-            region_of_facet: self.setup.region_of_facet,
             grain_of_region: &self.grain_of_region,
             middle: self.middle,
         }
@@ -168,14 +166,14 @@ impl<'a> Acting<'a> {
     /// One look for every chirp whose axis meets the target as the scene has it.
     fn looks(&self) -> Vec<Shot> {
         let look = |(chirp, ray): (usize, &Ray<Global>)| {
-            Some(self.look(chirp, *ray, self.setup.bvh.closest(ray)?, None))
+            Some(self.look(chirp, *ray, self.setup.geometry.bvh.closest(ray)?, None))
         };
-        self.setup.chirps.rays.par_iter().enumerate().filter_map(look).collect()
+        self.setup.geometry.chirps.rays.par_iter().enumerate().filter_map(look).collect()
     }
 
     /// A ray of a chirp where it was traced to.
     fn seen(&self, chirp: usize, rays: usize, hit: Hit, facing: Option<Facing>) -> Shot {
-        let axis = self.setup.chirps.rays[chirp];
+        let axis = self.setup.geometry.chirps.rays[chirp];
         let ray = match axis.origin.towards(hit.point) {
             Some(direction) if rays > 1 => Ray { direction, ..axis },
             _ => axis,
@@ -186,11 +184,11 @@ impl<'a> Acting<'a> {
     }
 
     fn look(&self, chirp: usize, ray: Ray<Global>, hit: Hit, facing: Option<Facing>) -> Shot {
-        let region = self.setup.region_of_facet[hit.facet as usize];
+        let region = self.setup.geometry.region_of_facet[hit.facet as usize];
         let Facing { normal, azimuth_rad } = facing.unwrap_or_else(|| {
             let back = -ray.direction.xyz();
             let grain = self.grain_of_region[usize::from(region)];
-            let frame = LocalFrame::new(self.setup.bvh.mesh(), &hit, back, grain);
+            let frame = LocalFrame::new(self.setup.geometry.bvh.mesh(), &hit, back, grain);
             let [x, y, _] = frame.local(back).xyz().to_array();
             Facing { normal: frame.normal, azimuth_rad: y.atan2(x) }
         });
@@ -199,7 +197,7 @@ impl<'a> Acting<'a> {
 
     /// A ray that has met nothing.
     fn blank(&self, chirp: usize, ray: Ray<Global>) -> Shot {
-        let chirps = self.setup.chirps;
+        let chirps = self.setup.geometry.chirps;
         Shot {
             chirp: chirps.number[chirp],
             time_s: chirps.time_s[chirp],
@@ -257,7 +255,7 @@ fn tilted(look: &Shot, [along, across]: [f64; 2]) -> Option<Shot> {
 /// Refuses what would be counted twice, and what an effect cannot say.
 pub(super) fn check(setup: &Setup, rays: usize, observer: Observer) -> Result<(), RenderError> {
     let Some(model) = setup.effects else { return Ok(()) };
-    let (radar, bounces) = (setup.radar, setup.bounce.is_some());
+    let (radar, bounces) = (setup.geometry.radar, setup.bounce.is_some());
     for (effect, _) in &model.effects {
         let effect = effect.name();
         let (problem, way_out) = match effect {

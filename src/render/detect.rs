@@ -48,7 +48,7 @@ impl Detector {
         observer: Observer,
         acting: Option<&Acting>,
     ) -> Result<Detector, RenderError> {
-        let radar = setup.radar;
+        let radar = setup.geometry.radar;
         let declared = Receiver::declared(radar);
         let law = acting.map_or(declared, Acting::receiver);
         let mut threshold_w = watts_from_dbm(radar.threshold_dbm);

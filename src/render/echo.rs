@@ -77,10 +77,10 @@ impl Echoes<'_> {
         // Below the threshold a peak is noise as likely as not; the path says where it would be.
         let range_m = detected.map(|seen| seen.range_m).or(cause.map(|path| path.range_m))?;
         let range_m = if reach_m.is_none() { seen?.range_m } else { range_m };
-        let point = self.observer.on_axis(&self.setup.chirps.rays[chirp], range_m)?;
+        let point = self.observer.on_axis(&self.setup.geometry.chirps.rays[chirp], range_m)?;
         let in_target = self.target_from_global * point;
         Some(Echo {
-            chirp: self.setup.chirps.number[chirp],
+            chirp: self.setup.geometry.chirps.number[chirp],
             point,
             range_m,
             xt_m: in_target.xyz.x,
@@ -93,7 +93,7 @@ impl Echoes<'_> {
     fn truth(&self, chirp: usize, hits: &[Option<Hit>], path: &Path) -> Truth {
         Truth {
             hit: path.hit,
-            region: self.setup.region_of_facet[path.hit.facet as usize],
+            region: self.setup.geometry.region_of_facet[path.hit.facet as usize],
             theta_sd_rad: theta_sd_rad(hits),
             azimuth_rad: path.azimuth_rad,
             surfaces: path.surfaces,

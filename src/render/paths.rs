@@ -69,11 +69,11 @@ impl<'a> Paths<'a> {
         footprints: &'a Footprints,
         acting: Option<Acting<'a>>,
     ) -> Paths<'a> {
-        let mut link = Link::new(setup.radar);
+        let mut link = Link::new(setup.geometry.radar);
         if let Observer::Receiver { aperture_m2, .. } = observer {
             link.aperture_m2 = aperture_m2;
         }
-        let beam = Beam::new(setup.radar);
+        let beam = Beam::new(setup.geometry.radar);
         let mut paths =
             Paths { setup, observer, link, beam, footprints, acting, changes: Vec::new() };
         paths.changes = paths.acting.as_ref().map_or(Vec::new(), |acting| paths.changes_by(acting));
@@ -101,7 +101,7 @@ impl<'a> Paths<'a> {
     /// The same in place of what is in a list.
     pub fn fill(&self, number: usize, hits: &[Option<Hit>], paths: &mut Vec<Path>) {
         paths.clear();
-        let axis = &self.setup.chirps.rays[number];
+        let axis = &self.setup.geometry.chirps.rays[number];
         let antenna = self.observer.position(axis.origin.xyz);
         let sent = Sent { paths: self, number, axis, antenna, rays: hits.len() };
         let tilts = self.acting.as_ref().map_or([0.0; 2], |acting| acting.tilts(number));
@@ -128,10 +128,11 @@ impl<'a> Paths<'a> {
 impl<'a> Sent<'a> {
     fn lit(&self, hit: Hit, source: DVec3) -> Lit<'a> {
         let setup = self.paths.setup;
-        let surface = setup.surfaces[usize::from(setup.region_of_facet[hit.facet as usize])];
+        let surface =
+            setup.surfaces[usize::from(setup.geometry.region_of_facet[hit.facet as usize])];
         let towards = |place: DVec3| (place - hit.point.xyz).normalize_or(DVec3::Z);
         let to_source = towards(source);
-        let frame = LocalFrame::new(setup.bvh.mesh(), &hit, to_source, surface.grain);
+        let frame = LocalFrame::new(setup.geometry.bvh.mesh(), &hit, to_source, surface.grain);
         let here = frame.local(to_source);
         let antenna = match self.antenna == source {
             true => here,
@@ -216,7 +217,7 @@ impl<'a> Sent<'a> {
     fn cast(&self, lit: &Lit, towards: Direction<Local>) -> Option<Hit> {
         let origin = Point::from(lit.hit.point.xyz + LIFT_M * lit.frame.normal);
         let direction = Direction::new(lit.frame.world(towards.xyz()))?;
-        self.paths.setup.bvh.closest(&Ray { origin, direction })
+        self.paths.setup.geometry.bvh.closest(&Ray { origin, direction })
     }
 
     /// Whether nothing stands between a lit point and the antenna.

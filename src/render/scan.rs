@@ -12,9 +12,8 @@ use super::paths::Paths;
 use super::setup::Setup;
 use super::spot::{self, Footprints};
 use crate::frames::{Global, Point, Ray};
-use crate::geometry::Mesh;
-use crate::radar::{Chirps, Field, Radar, RadarFrames};
-use crate::trace::{Bvh, Hit, Tracer, winding_number};
+use crate::radar::Field;
+use crate::trace::{Hit, ScanGeometry, winding_number};
 use crate::units::dbm_from_watts;
 
 /// What one scan gave at one antenna.
@@ -45,14 +44,11 @@ impl Scan {
 /// # Errors
 /// When no ray meets the mesh.
 pub fn trace(
-    radar: &Radar,
-    chirps: &Chirps,
-    bvh: &Bvh,
+    geometry: &ScanGeometry,
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Footprints, RenderError> {
-    let rays = rays_per_chirp.max(1);
-    seen(spot::trace(radar, chirps, bvh, Tracer::Automatic, rays, done)?, radar, chirps, bvh)
+    check_hits(spot::trace(geometry, rays_per_chirp.max(1), done)?, geometry)
 }
 
 /// As [`trace`], of the target where the setup's effects place it.
@@ -65,30 +61,25 @@ pub fn trace_placed(
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Footprints, RenderError> {
-    let Setup { radar, chirps, bvh, tracer, .. } = *setup;
+    let geometry = &setup.geometry;
     let rays = rays_per_chirp.max(1);
     acting::check(setup, rays, Observer::Radar)?;
     let footprints = match Acting::new(setup) {
-        None => spot::trace(radar, chirps, bvh, tracer, rays, done),
+        None => spot::trace(geometry, rays, done),
         Some(acting) => {
             let meet = |chirp, ray: &Ray<Global>, hit| acting.meet(chirp, ray, hit);
-            spot::trace_moved(radar, chirps, bvh, tracer, rays, done, meet)
+            spot::trace_moved(geometry, rays, done, meet)
         }
     };
-    seen(footprints?, radar, chirps, bvh)
+    check_hits(footprints?, geometry)
 }
 
-/// Footprints that are not all empty.
-fn seen(
-    footprints: Footprints,
-    radar: &Radar,
-    chirps: &Chirps,
-    bvh: &Bvh,
-) -> Result<Footprints, RenderError> {
-    match footprints.hits.iter().all(Option::is_none) {
-        true => Err(miss(&radar.frames(), chirps, bvh.mesh())),
-        false => Ok(footprints),
+/// Refuses a scan of which no ray meets the target.
+fn check_hits(footprints: Footprints, geometry: &ScanGeometry) -> Result<Footprints, RenderError> {
+    if footprints.hits.iter().all(Option::is_none) {
+        return Err(miss(geometry));
     }
+    Ok(footprints)
 }
 
 /// Rays whose chirps are shaded one after the other; a chirp that bounces is a task of its own.
@@ -112,7 +103,7 @@ pub fn shade(
     let acting = Acting::new(setup);
     let detector = Detector::new(setup, observer, acting.as_ref())?;
     let paths = Paths::new(setup, observer, footprints, acting);
-    let target_from_global = setup.radar.frames().global_from_target.inverse();
+    let target_from_global = setup.geometry.radar.frames().global_from_target.inverse();
     let echoes = Echoes { setup, footprints, observer, detector: &detector, target_from_global };
     let rays = footprints.rays_per_chirp.max(1);
     let per_task = if setup.bounce.is_some() { 1 } else { (RAYS_PER_TASK / rays).max(1) };
@@ -131,7 +122,7 @@ pub fn shade(
     let tasks = footprints.hits.par_chunks(per_task * rays).enumerate();
     let echoes: Vec<Vec<Echo>> = tasks.map(of_task).collect::<Result<_, RenderError>>()?;
     Ok(Scan {
-        chirps: setup.chirps.rays.len(),
+        chirps: setup.geometry.chirps.rays.len(),
         hits: footprints.chirps().filter(|hits| hits.iter().any(Option::is_some)).count(),
         echoes: echoes.concat(),
         threshold_dbm: dbm_from_watts(detector.threshold_w()),
@@ -168,8 +159,10 @@ fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(
         let [x_m, y_m, z_m] = position.xyz.to_array();
         return Err(RenderError::Inside { x_m, y_m, z_m });
     }
-    if setup.radar.receiver.is_some() && (footprints.rays_per_chirp > 1 || setup.bounce.is_some()) {
-        return match setup.radar.speckle {
+    if setup.geometry.radar.receiver.is_some()
+        && (footprints.rays_per_chirp > 1 || setup.bounce.is_some())
+    {
+        return match setup.geometry.radar.speckle {
             None => Err(RenderError::Phases),
             Some(speckle) if speckle.coherent_ratio > 0.0 => Err(RenderError::Coherent),
             Some(_) => Ok(()),
@@ -181,16 +174,19 @@ fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(
 /// Whether an antenna is inside something that the radar is outside of. A room around both is no wall
 /// between them.
 fn is_walled_off(setup: &Setup, position: Point<Global>) -> bool {
-    let wound = |point| winding_number(setup.bvh.mesh(), point);
+    let wound = |point| winding_number(setup.geometry.bvh.mesh(), point);
     // Between 0, outside, and 1, inside; open meshes have anything between.
-    (wound(position) - wound(setup.radar.frames().origin())).abs() > 0.75
+    (wound(position) - wound(setup.geometry.radar.frames().origin())).abs() > 0.75
 }
 
-fn miss(frames: &RadarFrames, chirps: &Chirps, mesh: &Mesh) -> RenderError {
+/// Where the scan looks, where the target lies instead, and the likeliest cause.
+fn miss(geometry: &ScanGeometry) -> RenderError {
+    let (chirps, mesh) = (geometry.chirps, geometry.bvh.mesh());
+    let frames = geometry.radar.frames();
     let target_from_global = frames.global_from_target.inverse();
     let in_target = |&vertex: &DVec3| (target_from_global * Point::from(vertex)).xyz.truncate();
     let target = Field::around(mesh.vertices.iter().map(in_target));
-    let scan = chirps.field(frames);
+    let scan = chirps.field(&frames);
     // Sixty times the paper's target: surely a mesh in millimetres.
     const HUGE_M: f64 = 100.0;
     let ahead = |ray: &Ray<Global>| {
@@ -212,8 +208,11 @@ mod tests {
     use super::*;
     use crate::brdf::{Lambert, Scattering};
     use crate::frames::Direction;
+    use crate::geometry::Mesh;
+    use crate::radar::{Chirps, Radar};
     use crate::render::Surface;
     use crate::scene::solids;
+    use crate::trace::Bvh;
 
     fn chirps(radar: &Radar) -> Chirps {
         Chirps::draw(radar, |_| Err("no file".to_owned())).unwrap()
@@ -245,8 +244,8 @@ mod tests {
             vertex.x += 3.0;
         }
         let radar = Radar::default();
-        let bvh = Bvh::new(&mesh);
-        let missed = trace(&radar, &chirps(&radar), &bvh, 1, &|_| {}).unwrap_err();
+        let (chirps, bvh) = (chirps(&radar), Bvh::new(&mesh));
+        let missed = trace(&ScanGeometry::new(&radar, &chirps, &bvh, &[]), 1, &|_| {}).unwrap_err();
         assert!(missed.to_string().contains("x 2.950 to 3.050"), "{missed}");
     }
 
@@ -255,9 +254,10 @@ mod tests {
         let radar = Radar::default();
         let chirps = chirps(&radar);
         let (bvh, regions) = (Bvh::new(mesh), vec![0; mesh.facets.len()]);
-        let footprints = trace(&radar, &chirps, &bvh, rays, &|_| {}).unwrap();
+        let geometry = ScanGeometry::new(&radar, &chirps, &bvh, &regions);
+        let footprints = trace(&geometry, rays, &|_| {}).unwrap();
         let surfaces = [Surface::new(surface)];
-        let setup = Setup::new(&radar, &chirps, &bvh, &regions, &surfaces);
+        let setup = Setup::new(geometry, &surfaces);
         shade(&setup, &footprints, Observer::Radar, &|_| {}).unwrap()
     }
 

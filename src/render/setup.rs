@@ -3,22 +3,13 @@
 use super::bounce::Bounce;
 use super::surface::Surface;
 use crate::effects::Model;
-use crate::radar::{Chirps, Radar};
-use crate::trace::{Bvh, Tracer};
+use crate::trace::ScanGeometry;
 
-/// Everything a scan meets and how it is rendered.
+/// A scan, what its target is made of, and how it is rendered.
 #[derive(Clone, Copy)]
 pub struct Setup<'a> {
-    /// The instrument.
-    pub radar: &'a Radar,
-    /// The rays of the scan.
-    pub chirps: &'a Chirps,
-    /// The target.
-    pub bvh: &'a Bvh<'a>,
-    /// How the rays of the scan find it; all others ask `bvh`.
-    pub tracer: Tracer<'a>,
-    /// Region of every facet, an index into `surfaces`.
-    pub region_of_facet: &'a [u16],
+    /// The instrument, its chirps and the target.
+    pub geometry: ScanGeometry<'a>,
     /// What each region is made of.
     pub surfaces: &'a [Surface<'a>],
     /// Second-order paths; none, the paper's, for single ones only.
@@ -31,15 +22,8 @@ pub struct Setup<'a> {
 }
 
 impl<'a> Setup<'a> {
-    /// The paper's: single paths only.
-    pub fn new(
-        radar: &'a Radar,
-        chirps: &'a Chirps,
-        bvh: &'a Bvh<'a>,
-        region_of_facet: &'a [u16],
-        surfaces: &'a [Surface<'a>],
-    ) -> Setup<'a> {
-        let (tracer, bounce, effects, seed) = (Tracer::Automatic, None, None, 0);
-        Setup { radar, chirps, bvh, tracer, region_of_facet, surfaces, bounce, effects, seed }
+    /// As in the paper: single paths only, no effects.
+    pub fn new(geometry: ScanGeometry<'a>, surfaces: &'a [Surface<'a>]) -> Setup<'a> {
+        Setup { geometry, surfaces, bounce: None, effects: None, seed: 0 }
     }
 }

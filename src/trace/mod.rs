@@ -15,6 +15,7 @@ mod gpu;
 mod hit;
 mod inside;
 mod pinhole;
+mod scan;
 mod tracer;
 mod wide;
 
@@ -24,4 +25,5 @@ pub(crate) use gpu::{Cone, EchoTracer, RAYS_PER_SHARE, Share};
 pub use hit::Hit;
 pub use inside::winding_number;
 pub use pinhole::{Fan, NoFan};
+pub use scan::ScanGeometry;
 pub use tracer::{TraceError, Tracer, closest};

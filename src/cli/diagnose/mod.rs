@@ -35,7 +35,7 @@ use crate::measure::{Cloud, CloudError};
 use crate::radar::{Link, Pattern, Radar};
 use crate::scene::file::MeshEntry;
 use crate::scene::{Scene, read_text};
-use crate::trace::Bvh;
+use crate::trace::{Bvh, ScanGeometry};
 use crate::units::watts_from_dbm;
 use cannot_tell::CannotTell;
 use earlier::Earlier;
@@ -286,10 +286,8 @@ fn diagnosed(
     let grain_of_region: Vec<_> = scene.target.regions.iter().map(|region| region.grain).collect();
     let radar = scene.radar();
     let mut stage = Stage {
-        radar,
+        geometry: ScanGeometry::new(radar, &scene.chirps, &bvh, &scene.target.region_of_facet),
         link: Link::new(radar),
-        bvh: &bvh,
-        region_of_facet: &scene.target.region_of_facet,
         grain_of_region: &grain_of_region,
         middle: glam::DVec3::ZERO,
     };

@@ -17,7 +17,7 @@ use super::staging::{effects, materials, model, setup, surfaces};
 use crate::error::Error;
 use crate::formats::exr::Packing;
 use crate::geometry::Raster;
-use crate::render::{RenderError, Setup, trace_placed};
+use crate::render::{RenderError, trace_placed};
 use crate::scene::Scene;
 use crate::trace::{Bvh, GpuError};
 use record::Record;
@@ -71,7 +71,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let gpu = gpu(args.tracer, console).map_err(failed)?;
     let held = gpu.as_ref().map(|gpu| gpu.hold(&bvh)).transpose().map_err(failed)?;
     let tracer = tracer(args.tracer, held.as_ref());
-    let setup = Setup { tracer, ..setup(&scene, &bvh, &surfaces, model.as_ref()) };
+    let mut setup = setup(&scene, &bvh, &surfaces, model.as_ref());
+    setup.geometry.tracer = tracer;
     let bar = console.progress("tracing", scene.chirps.rays.len());
     let rays = scene.file.spot.rays;
     let footprints = trace_placed(&setup, rays, &|chirps| bar.inc(chirps as u64));
