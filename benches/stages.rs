@@ -35,7 +35,7 @@ use matdb::render::{
 };
 use matdb::scene::{Scene, solids};
 use matdb::trace::{Bvh, Hit, ScanGeometry};
-use matdb::units::watts_from_dbm;
+use matdb::units::dbm_from_watts;
 use rayon::prelude::*;
 
 const TURNS: usize = 15;
@@ -356,7 +356,7 @@ fn cloud(given: Given) -> Cloud {
         chirp: Some(echo.chirp),
         point: echo.point,
         range_m: Some(echo.range_m),
-        power_dbm: echo.power_dbm,
+        power_dbm: dbm_from_watts(echo.power_w),
     };
     Cloud::new(given.scan.detections().map(point).collect()).expect("a cloud")
 }
@@ -393,7 +393,7 @@ fn fit(given: Given<'_>) -> Vec<Way<'_>> {
         starts: 1,
         ..Fit::default()
     };
-    let noise_w = given.scan.noise_dbm.map(watts_from_dbm);
+    let noise_w = given.scan.noise_w;
     let gamma = Fit { noise_w, starts: 1, ..Fit::default() };
     let fitted = |fit: &Fit, start: &Brdf, curve: &Curve| fit.run(start, curve).expect("a fit");
     let best = fitted(&squares(0.0), &guess(), &curve).model;

@@ -17,7 +17,7 @@ use matdb::render::{
 };
 use matdb::scene::{Scene, solids};
 use matdb::trace::{Bvh, Gpu, GpuError, ScanGeometry, TraceError, Tracer};
-use matdb::units::dbm_from_watts;
+use matdb::units::{db_from_ratio, dbm_from_watts};
 
 /// What f32 and the device's functions may cost.
 const POWER_DB: f64 = 0.02;
@@ -139,14 +139,16 @@ impl Bench {
             assert_eq!(found.len(), expected.len());
             for (chirp, (found, expected)) in found.iter().zip(&expected).enumerate() {
                 let expected = expected.as_ref();
-                let Some(expected) = expected.filter(|echo| echo.power_dbm > FAINTEST_DBM) else {
+                let Some(expected) =
+                    expected.filter(|echo| dbm_from_watts(echo.power_w) > FAINTEST_DBM)
+                else {
                     let found_dbm = found.map_or(-400.0, |found| dbm_from_watts(found.power_w));
                     assert!(found_dbm <= FAINTEST_DBM + POWER_DB, "chirp {chirp}: {found_dbm}");
                     faint += 1;
                     continue;
                 };
                 let found = found.unwrap_or_else(|| panic!("chirp {chirp}: {expected:?}"));
-                let error_db = (dbm_from_watts(found.power_w) - expected.power_dbm).abs();
+                let error_db = db_from_ratio(found.power_w / expected.power_w).abs();
                 assert!(
                     error_db < POWER_DB,
                     "chirp {chirp}: {error_db} dB, {found:?} {expected:?}"
@@ -157,8 +159,9 @@ impl Bench {
                 let error_m = (found.range_m - expected.range_m).abs();
                 let most_m = RANGE * (expected.range_m + radius_m / cos);
                 // Under the noise there may be an echo that the device cannot hold, and so cannot place.
-                let is_held =
-                    means[chirp].as_ref().is_some_and(|mean| mean.power_dbm > FAINTEST_DBM);
+                let is_held = means[chirp]
+                    .as_ref()
+                    .is_some_and(|mean| dbm_from_watts(mean.power_w) > FAINTEST_DBM);
                 assert!(
                     error_m < most_m || !is_held,
                     "chirp {chirp}: {error_m} m, {found:?} {expected:?}"

@@ -201,7 +201,7 @@ fn render(text: &str) {
     let Ok(scan) = shade(&setup, &footprints, Observer::Radar, &|_| {}) else { return };
     for echo in &scan.echoes {
         assert!(echo.range_m.is_finite() && echo.point.xyz.is_finite(), "{text}");
-        assert!(!echo.power_dbm.is_nan(), "{text}");
+        assert!(!echo.power_w.is_nan(), "{text}");
     }
     let field = scene.chirps.field(&scene.radar().frames());
     let spot_m = scene.radar().spot_diameter_m;

@@ -12,7 +12,7 @@ use matdb::radar::{Noise, Radar, Speckle};
 use matdb::render::{Echo, Observer, Setup, Surface, shade, trace};
 use matdb::scene::Scene;
 use matdb::trace::{Bvh, ScanGeometry};
-use matdb::units::watts_from_dbm;
+use matdb::units::{dbm_from_watts, watts_from_dbm};
 
 use crate::Failure;
 use crate::registration::{middle, pushed, scene};
@@ -126,8 +126,10 @@ fn trip(scene: &Scene, seed: u64) -> Result<Trip, Failure> {
     let noisy = Radar { speckle: Some(speckle), noise: Some(noise), ..quiet.clone() };
     let mesh = &scene.target.mesh;
     let echoes = rendered(scene, &noisy, mesh, &truth(), seed)?;
-    let seen: Vec<Echo> =
-        echoes.into_iter().filter(|echo| echo.power_dbm >= noisy.threshold_dbm).collect();
+    let seen: Vec<Echo> = echoes
+        .into_iter()
+        .filter(|echo| dbm_from_watts(echo.power_w) >= noisy.threshold_dbm)
+        .collect();
 
     let cloud = Cloud::new(seen.iter().map(point).collect())?;
     let mut draws = Key { seed, chirp: 0, sub_ray: 7, purpose: Purpose::Noise }.draws();
@@ -156,7 +158,8 @@ fn trip(scene: &Scene, seed: u64) -> Result<Trip, Failure> {
 }
 
 fn point(echo: &Echo) -> CloudPoint {
-    let Echo { chirp, point, range_m, power_dbm, .. } = *echo;
+    let Echo { chirp, point, range_m, power_w, .. } = *echo;
+    let power_dbm = dbm_from_watts(power_w);
     CloudPoint { chirp: Some(chirp), point, range_m: Some(range_m), power_dbm }
 }
 
@@ -185,8 +188,8 @@ fn rendered(
 /// Rms of the difference of two images in the chirps that both show.
 fn rms_db(a: &[Echo], b: &[Echo]) -> f64 {
     let of_chirp: std::collections::HashMap<u32, f64> =
-        b.iter().map(|echo| (echo.chirp, echo.power_dbm)).collect();
-    let gap = |echo: &Echo| Some(echo.power_dbm - of_chirp.get(&echo.chirp)?);
+        b.iter().map(|echo| (echo.chirp, dbm_from_watts(echo.power_w))).collect();
+    let gap = |echo: &Echo| Some(dbm_from_watts(echo.power_w) - of_chirp.get(&echo.chirp)?);
     let gaps_db: Vec<f64> = a.iter().filter_map(gap).filter(|gap| gap.is_finite()).collect();
     (gaps_db.iter().map(|gap| gap * gap).sum::<f64>() / gaps_db.len().max(1) as f64).sqrt()
 }

@@ -7,6 +7,7 @@ use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
 use crate::radar::{Chirps, Radar};
 use crate::render::{Echo, Scan};
+use crate::units::{dbm_from_watts, watts_from_dbm};
 
 /// Agreement of two power images on one grid.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -47,7 +48,7 @@ pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
             range_m: point.range_m.unwrap_or(origin.distance_m(point.point)),
             xt_m: in_target.xyz.x,
             yt_m: in_target.xyz.y,
-            power_dbm: point.power_dbm,
+            power_w: watts_from_dbm(point.power_dbm),
             truth: None,
         }
     };
@@ -55,8 +56,8 @@ pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
         chirps: chirps.rays.len(),
         hits: cloud.points().len(),
         echoes: cloud.points().iter().enumerate().map(echo).collect(),
-        threshold_dbm: f64::NEG_INFINITY,
-        noise_dbm: None,
+        threshold_w: 0.0,
+        noise_w: None,
     }
 }
 
@@ -94,7 +95,7 @@ pub fn along(scan: &Scan, line: Line) -> Vec<(f64, f64)> {
     let mut points: Vec<(f64, f64)> = scan
         .detections()
         .filter(|echo| within(echo.point))
-        .map(|echo| (echo.point.xyz.x, echo.power_dbm))
+        .map(|echo| (echo.point.xyz.x, dbm_from_watts(echo.power_w)))
         .collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     points

@@ -303,6 +303,7 @@ mod tests {
     use crate::render::{shade, trace};
     use crate::scene::solids;
     use crate::trace::Bvh;
+    use crate::units::dbm_from_watts;
 
     fn brushed() -> Brdf {
         Brdf::CookTorrance(CookTorrance {
@@ -357,8 +358,8 @@ mod tests {
                 assert_eq!(found.iter().flatten().count(), scan.echoes.len());
                 for echo in &scan.echoes {
                     let found = found[echo.chirp as usize].unwrap();
-                    let found_dbm = crate::units::dbm_from_watts(found.power_w);
-                    assert!((found_dbm - echo.power_dbm).abs() < 1e-9, "{found:?} {echo:?}");
+                    let [found_dbm, echo_dbm] = [found.power_w, echo.power_w].map(dbm_from_watts);
+                    assert!((found_dbm - echo_dbm).abs() < 1e-9, "{found:?} {echo:?}");
                     assert!((found.range_m - echo.range_m).abs() < 1e-9, "{found:?} {echo:?}");
                 }
             }

@@ -8,7 +8,6 @@ use super::spot::Footprints;
 use crate::frames::{Global, Point, Pose, Target};
 use crate::radar::Detection;
 use crate::trace::Hit;
-use crate::units::dbm_from_watts;
 
 /// What came back from one chirp.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,8 +22,8 @@ pub struct Echo {
     pub xt_m: f64,
     /// y in the target frame, m.
     pub yt_m: f64,
-    /// Received power, dBm; −∞ when nothing comes back.
-    pub power_dbm: f64,
+    /// Received power, W; 0 when nothing comes back.
+    pub power_w: f64,
     /// What caused it; none for a false alarm.
     pub truth: Option<Truth>,
 }
@@ -85,7 +84,7 @@ impl Echoes<'_> {
             range_m,
             xt_m: in_target.xyz.x,
             yt_m: in_target.xyz.y,
-            power_dbm: dbm_from_watts(seen.map_or(0.0, |seen| seen.power_w)),
+            power_w: seen.map_or(0.0, |seen| seen.power_w),
             truth: cause.map(|path| self.truth(chirp, hits, path)),
         })
     }

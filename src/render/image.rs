@@ -9,7 +9,7 @@ use super::scan::Scan;
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
 use crate::radar::Field;
-use crate::units::{dbm_from_watts, watts_from_dbm};
+use crate::units::dbm_from_watts;
 
 /// Names of the channels of a power image, in order.
 pub const CHANNELS: [&str; 5] = ["power_dbm", "range_m", "incidence_deg", "material", "count"];
@@ -111,7 +111,7 @@ impl<'a> Shown<'a> {
         let from_below = span(echo.yt_m, raster.y_min_m, raster.height);
         Shown {
             echo,
-            power_w: watts_from_dbm(echo.power_dbm),
+            power_w: echo.power_w,
             incidence_rad: echo.truth.map(|truth| truth.hit.theta_rad()),
             material: echo.truth.map(|truth| material_of_region[usize::from(truth.region)]),
             columns: span(echo.xt_m, raster.x_min_m, raster.width),
@@ -180,6 +180,7 @@ mod tests {
     use crate::frames::Point;
     use crate::render::Truth;
     use crate::trace::Hit;
+    use crate::units::watts_from_dbm;
 
     fn echo(xt_m: f64, yt_m: f64, power_dbm: f64) -> Echo {
         let point = Point::new(xt_m, yt_m, 0.0);
@@ -193,11 +194,13 @@ mod tests {
             specular_share: 0.0,
             edge_m: 0.0,
         };
-        Echo { chirp: 0, point, range_m: 8.0, xt_m, yt_m, power_dbm, truth: Some(truth) }
+        let power_w = watts_from_dbm(power_dbm);
+        Echo { chirp: 0, point, range_m: 8.0, xt_m, yt_m, power_w, truth: Some(truth) }
     }
 
     fn image(echoes: Vec<Echo>) -> Raster {
-        let scan = Scan { chirps: 0, hits: 0, echoes, threshold_dbm: -77.0, noise_dbm: None };
+        let scan =
+            Scan { chirps: 0, hits: 0, echoes, threshold_w: watts_from_dbm(-77.0), noise_w: None };
         let field = Field { min_m: [-0.25, -0.45], max_m: [0.25, 0.45] };
         power_image(&scan, field, 0.016, &[3], 0.004)
     }

@@ -14,7 +14,6 @@ use super::spot::{self, Footprints};
 use crate::frames::{Global, Point, Ray};
 use crate::radar::Field;
 use crate::trace::{Hit, ScanGeometry, winding_number};
-use crate::units::dbm_from_watts;
 
 /// What one scan gave at one antenna.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,16 +24,16 @@ pub struct Scan {
     pub hits: usize,
     /// Chirps that met a surface, in the order they were sent, whatever their power, and false alarms.
     pub echoes: Vec<Echo>,
-    /// Echoes below this power are not detected, dBm.
-    pub threshold_dbm: f64,
-    /// Mean thermal power in a range cell, dBm; none for a receiver without noise.
-    pub noise_dbm: Option<f64>,
+    /// Echoes below this power are not detected, W.
+    pub threshold_w: f64,
+    /// Mean thermal power in a range cell, W; none for a receiver without noise.
+    pub noise_w: Option<f64>,
 }
 
 impl Scan {
     /// The echoes that the radar reports: those at or above the threshold.
     pub fn detections(&self) -> impl Iterator<Item = &Echo> {
-        self.echoes.iter().filter(|echo| echo.power_dbm >= self.threshold_dbm)
+        self.echoes.iter().filter(|echo| echo.power_w >= self.threshold_w)
     }
 }
 
@@ -125,8 +124,8 @@ pub fn shade(
         chirps: setup.geometry.chirps.rays.len(),
         hits: footprints.chirps().filter(|hits| hits.iter().any(Option::is_some)).count(),
         echoes: echoes.concat(),
-        threshold_dbm: dbm_from_watts(detector.threshold_w()),
-        noise_dbm: detector.noise_w().map(dbm_from_watts),
+        threshold_w: detector.threshold_w(),
+        noise_w: detector.noise_w(),
     })
 }
 
@@ -213,6 +212,7 @@ mod tests {
     use crate::render::Surface;
     use crate::scene::solids;
     use crate::trace::Bvh;
+    use crate::units::{db_from_ratio, dbm_from_watts};
 
     fn chirps(radar: &Radar) -> Chirps {
         Chirps::draw(radar, |_| Err("no file".to_owned())).unwrap()
@@ -233,7 +233,7 @@ mod tests {
             let expected = -8.0 + 10.0 * (0.196 * 0.5 / std::f64::consts::PI).log10()
                 - 20.0 * echo.range_m.log10()
                 + 20.0 * cos.log10();
-            assert!((echo.power_dbm - expected).abs() < 1e-9);
+            assert!((dbm_from_watts(echo.power_w) - expected).abs() < 1e-9);
         }
     }
 
@@ -268,7 +268,8 @@ mod tests {
         let lambert = Lambert { albedo: 0.5 };
         let (one, many) = (shaded(&mesh, 1, &lambert), shaded(&mesh, 64, &lambert));
         for (a, b) in std::iter::zip(&one.echoes, &many.echoes) {
-            assert!((a.power_dbm - b.power_dbm).abs() < 1e-3, "{a:?} {b:?}");
+            let [a_dbm, b_dbm] = [a, b].map(|echo| dbm_from_watts(echo.power_w));
+            assert!((a_dbm - b_dbm).abs() < 1e-3, "{a:?} {b:?}");
             assert!((a.range_m - b.range_m).abs() < 1e-4);
         }
     }
@@ -280,12 +281,12 @@ mod tests {
         mesh.vertices.iter_mut().for_each(|vertex| *vertex += DVec3::new(1.0, 1.1, 0.0));
         let lambert = Lambert { albedo: 0.5 };
         let scan = shaded(&mesh, 400, &lambert);
-        let full_dbm = scan.echoes.iter().map(|e| e.power_dbm).fold(f64::NEG_INFINITY, f64::max);
+        let full_w = scan.echoes.iter().map(|e| e.power_w).fold(0.0, f64::max);
         let on_the_edge: Vec<&Echo> = scan.echoes.iter().filter(|e| e.xt_m.abs() < 3e-4).collect();
         assert!(on_the_edge.len() > 5);
         for echo in on_the_edge {
             // Off the centre the beam is as bright; only cos θ and R tell, below 0.03 dB.
-            let lost_db = full_dbm - echo.power_dbm;
+            let lost_db = db_from_ratio(full_w / echo.power_w);
             assert!((lost_db - 10.0 * 2f64.log10()).abs() < 0.3, "{lost_db}");
         }
     }
@@ -297,7 +298,7 @@ mod tests {
         let rough = |i: Direction<crate::frames::Surface>, _| (-(1.0 - i.cos_theta()) / 0.02).exp();
         let mean_w = |rays: usize| {
             let scan = shaded(&mesh, rays, &rough);
-            scan.echoes.iter().map(|e| crate::units::watts_from_dbm(e.power_dbm)).sum::<f64>()
+            scan.echoes.iter().map(|e| e.power_w).sum::<f64>()
         };
         let finest = mean_w(1024);
         let error = |rays: usize| (mean_w(rays) / finest - 1.0).abs();

@@ -13,7 +13,7 @@ use crate::material::Status;
 use crate::radar::Radar;
 use crate::render::{Scan, Truth};
 use crate::scene::{MeshReport, Scene};
-use crate::units::{range, rounded};
+use crate::units::{dbm_from_watts, range, rounded};
 
 /// Version of the layout of `scan.json`; it grows with every change that a reader could trip over.
 const SCHEMA: u32 = 2;
@@ -172,8 +172,8 @@ impl<'a> Record<'a> {
             frames: frames(scene),
             cloud: if all_hits { "every hit" } else { "detections" },
             meshes: &scene.target.meshes,
-            threshold_dbm: scan.threshold_dbm,
-            noise_dbm: scan.noise_dbm,
+            threshold_dbm: dbm_from_watts(scan.threshold_w),
+            noise_dbm: scan.noise_w.map(dbm_from_watts),
             counts: Counts::new(scene, scan, image),
             power_dbm: PowerRange::new(scan),
             image: json!({
@@ -291,8 +291,8 @@ impl<'a> ReceiverRecord<'a> {
             name: &receiver.name,
             position_m: receiver.position_m,
             aperture_m2: receiver.aperture_m2.unwrap_or(scene.radar().aperture_m2),
-            threshold_dbm: view.scan.threshold_dbm,
-            noise_dbm: view.scan.noise_dbm,
+            threshold_dbm: dbm_from_watts(view.scan.threshold_w),
+            noise_dbm: view.scan.noise_w.map(dbm_from_watts),
             counts: Counts::new(scene, &view.scan, image),
             power_dbm: PowerRange::new(&view.scan),
         })
@@ -346,7 +346,8 @@ impl Counts {
 
 impl PowerRange {
     fn new(scan: &Scan) -> Option<PowerRange> {
-        let mut powers: Vec<f64> = scan.detections().map(|echo| echo.power_dbm).collect();
+        let mut powers: Vec<f64> =
+            scan.detections().map(|echo| dbm_from_watts(echo.power_w)).collect();
         powers.sort_by(f64::total_cmp);
         let (weakest, strongest) = (*powers.first()?, *powers.last()?);
         Some(PowerRange { weakest, median: powers[powers.len() / 2], strongest })
@@ -371,8 +372,8 @@ fn regions<'a>(scene: &'a Scene, material_of_region: &[u16], scan: &Scan) -> Vec
         let Some(truth) = echo.truth else { continue };
         let region = &mut regions[usize::from(truth.region)];
         region.detections += 1;
-        region.strongest_dbm =
-            Some(region.strongest_dbm.map_or(echo.power_dbm, |p| p.max(echo.power_dbm)));
+        let power_dbm = dbm_from_watts(echo.power_w);
+        region.strongest_dbm = Some(region.strongest_dbm.map_or(power_dbm, |p| p.max(power_dbm)));
     }
     regions
 }
