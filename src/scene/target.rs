@@ -1,7 +1,6 @@
 //! The target: all meshes of a scene in the global frame, as one.
 
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -170,13 +169,10 @@ fn load_mesh(entry: &MeshEntry, scene: &Path) -> Result<(Mesh, Option<String>), 
     Ok((mesh, Some(hash.to_hex().to_string())))
 }
 
-/// Made once, however many stand in a scene.
-static MANNEQUIN: OnceLock<Mesh> = OnceLock::new();
-
 fn builtin(name: &str) -> Option<Mesh> {
     // Coarse cells: a flat side needs no more than its corners.
     match name {
-        "mannequin" => Some(MANNEQUIN.get_or_init(mannequin::mannequin).clone()),
+        "mannequin" => Some(mannequin::mannequin()),
         "cuboid" => Some(solids::cuboid(DVec3::ONE, 1.0)),
         "plate" => Some(solids::plate(1.0, 1.0)),
         "sphere" => Some(solids::icosphere(0.5, 5)),
