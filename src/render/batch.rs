@@ -106,10 +106,8 @@ impl Batch<'_> {
     ) -> Result<Vec<Option<Detection>>, RenderError> {
         let setup = Setup { seed: take.seed, ..Setup::new(self.geometry, take.surfaces) };
         let detector = Detector::new(&setup, Observer::Radar, None)?;
-        let received = |(chirp, mean): (usize, &Option<Detection>)| {
-            mean.map(|mean| detector.measured(chirp, mean))
-        };
-        Ok(means.par_iter().enumerate().map(received).collect())
+        let means = means.par_iter().enumerate();
+        Ok(means.map(|(chirp, mean)| mean.map(|mean| detector.measured(chirp, mean))).collect())
     }
 }
 
@@ -181,22 +179,24 @@ impl<'a> Work<'a> {
             }
         };
         let open = self.open(some.start, &spots, &shares);
-        // Power, and power times range.
-        let of_device = |shares: &[Share]| {
-            let per_sr_m2: f64 = shares.iter().map(|share| share.per_sr_m2).sum();
-            let per_sr_m: f64 = shares.iter().map(|share| share.per_sr_m).sum();
-            [per_sr_m2, per_sr_m].map(|sum| self.link.power_w(1.0, 1.0, sum))
-        };
-        let mut sums: Vec<[f64; 2]> = shares.chunks(per_chirp).map(of_device).collect();
+        let mut sums: Vec<[f64; 2]> =
+            shares.chunks(per_chirp).map(|shares| self.power_and_moment(shares)).collect();
         for (place, echo) in self.on_processor(some.start, &open)? {
             sums[place][0] += echo.power_w;
             sums[place][1] += echo.power_w * echo.range_m;
         }
-        let mean = |[power_w, moment]: [f64; 2]| {
+        let means = sums.into_iter().map(|[power_w, moment]| {
             let mean = Detection { range_m: moment / power_w, power_w: power_w / self.rays as f64 };
             (power_w > 0.0).then_some(mean)
-        };
-        Ok((sums.into_iter().map(mean).collect(), open.len()))
+        });
+        Ok((means.collect(), open.len()))
+    }
+
+    /// Power, W, and power times range, W·m, of what the device has of a chirp.
+    fn power_and_moment(&self, shares: &[Share]) -> [f64; 2] {
+        let per_sr_m2: f64 = shares.iter().map(|share| share.per_sr_m2).sum();
+        let per_sr_m: f64 = shares.iter().map(|share| share.per_sr_m).sum();
+        [per_sr_m2, per_sr_m].map(|sum| self.link.power_w(1.0, 1.0, sum))
     }
 
     /// The rays that are left open, each of a chirp so many after the first.
@@ -223,13 +223,13 @@ impl<'a> Work<'a> {
         let geometry = &self.batch.geometry;
         let only: Vec<Ray<Global>> = rays.iter().map(|(_, ray)| *ray).collect();
         let hits = geometry.closest(&only)?;
-        let echo = |((place, ray), hit): (&(usize, Ray<Global>), Option<Hit>)| {
+        let echoes = rays.par_iter().zip(hits).filter_map(|((place, ray), hit)| {
             let hit = hit?;
             let take = &self.takes[self.take(first + place)];
             let power_w = self.power_w(geometry.bvh.mesh(), take, ray, &hit)?;
             Some((*place, Detection { range_m: hit.range_m, power_w }))
-        };
-        Ok(rays.par_iter().zip(hits).filter_map(echo).collect())
+        });
+        Ok(echoes.collect())
     }
 
     /// Equation (11) at a hit; none in a region that is made of nothing.

@@ -105,10 +105,13 @@ impl Echoes<'_> {
 /// The strongest path of the kind that brings more power. Second-order paths are many weak samples of
 /// one integral: only their sum compares with a direct path.
 fn cause(paths: &[Path], near: impl Fn(&&Path) -> bool) -> Option<&Path> {
-    let of = |surfaces: u8| paths.iter().filter(&near).filter(move |p| p.surfaces == surfaces);
-    let power_w = |surfaces: u8| of(surfaces).map(|path| path.power_w).sum::<f64>();
-    let surfaces = if power_w(2) > power_w(1) { 2 } else { 1 };
-    of(surfaces).reduce(|a, b| if b.power_w > a.power_w { b } else { a })
+    let [direct_w, second_order_w] = [1, 2].map(|surfaces| {
+        let of_kind = paths.iter().filter(&near).filter(|path| path.surfaces == surfaces);
+        of_kind.map(|path| path.power_w).sum::<f64>()
+    });
+    let surfaces = if second_order_w > direct_w { 2 } else { 1 };
+    let of_kind = paths.iter().filter(&near).filter(|path| path.surfaces == surfaces);
+    of_kind.reduce(|a, b| if b.power_w > a.power_w { b } else { a })
 }
 
 fn theta_sd_rad(hits: &[Option<Hit>]) -> f64 {
@@ -117,6 +120,6 @@ fn theta_sd_rad(hits: &[Option<Hit>]) -> f64 {
     }
     let count = hits.iter().flatten().count() as f64;
     let mean_rad = hits.iter().flatten().map(Hit::theta_rad).sum::<f64>() / count;
-    let square = |hit: &Hit| (hit.theta_rad() - mean_rad).powi(2);
-    (hits.iter().flatten().map(square).sum::<f64>() / count).sqrt()
+    let squares = hits.iter().flatten().map(|hit| (hit.theta_rad() - mean_rad).powi(2));
+    (squares.sum::<f64>() / count).sqrt()
 }

@@ -18,7 +18,7 @@ pub const CHANNELS: [&str; 5] = ["power_dbm", "range_m", "incidence_deg", "mater
 const BANDS: usize = 16;
 
 /// A detection with what every pixel of its spot takes from it.
-struct Shown<'a> {
+struct Splat<'a> {
     echo: &'a Echo,
     power_w: f64,
     /// None for a false alarm.
@@ -59,18 +59,19 @@ pub fn power_image(
     let mut raster = grid(field, spot_m, pixel_m);
     let mut pixels = vec![Pixel::default(); raster.width * raster.height];
     let detections: Vec<&Echo> = scan.detections().collect();
-    let shown = |&echo| Shown::new(echo, &raster, spot_m, material_of_region);
-    let shown: Vec<Shown> = detections.par_iter().map(shown).collect();
+    let splats = detections.par_iter();
+    let splats: Vec<Splat> =
+        splats.map(|&echo| Splat::new(echo, &raster, spot_m, material_of_region)).collect();
     // A band of rows has all that falls on it in the order of the scan, however many threads there are.
     let band_rows = raster.height.div_ceil(BANDS);
-    let of_bands = by_bands(&shown, band_rows);
+    let of_bands = by_bands(&splats, band_rows);
     let bands = pixels.par_chunks_mut(raster.width * band_rows).enumerate();
-    bands.zip(of_bands).for_each(|((band, pixels), shown)| {
+    bands.zip(of_bands).for_each(|((band, pixels), splats)| {
         let first = band * band_rows;
-        for shown in shown {
-            for (index, distance_m) in shown.covered(&raster, spot_m, first..first + band_rows) {
+        for splat in splats {
+            for (index, distance_m) in splat.covered(&raster, spot_m, first..first + band_rows) {
                 let weight = (-4.0 * std::f64::consts::LN_2 * (distance_m / spot_m).powi(2)).exp();
-                pixels[index - first * raster.width].add(shown, weight);
+                pixels[index - first * raster.width].add(splat, weight);
             }
         }
     });
@@ -90,17 +91,17 @@ fn grid(field: Field, spot_m: f64, pixel_m: f64) -> Raster {
 }
 
 /// For each band of so many rows what may fall on it, in order.
-fn by_bands<'a, 'e>(shown: &'a [Shown<'e>], band_rows: usize) -> [Vec<&'a Shown<'e>>; BANDS] {
+fn by_bands<'a, 'e>(splats: &'a [Splat<'e>], band_rows: usize) -> [Vec<&'a Splat<'e>>; BANDS] {
     let mut of_bands = [const { Vec::new() }; BANDS];
-    for shown in shown {
-        let bands = shown.rows.start / band_rows..shown.rows.end.div_ceil(band_rows);
-        bands.for_each(|band| of_bands[band].push(shown));
+    for splat in splats {
+        let bands = splat.rows.start / band_rows..splat.rows.end.div_ceil(band_rows);
+        bands.for_each(|band| of_bands[band].push(splat));
     }
     of_bands
 }
 
-impl<'a> Shown<'a> {
-    fn new(echo: &'a Echo, raster: &Raster, spot_m: f64, material_of_region: &[u16]) -> Shown<'a> {
+impl<'a> Splat<'a> {
+    fn new(echo: &'a Echo, raster: &Raster, spot_m: f64, material_of_region: &[u16]) -> Splat<'a> {
         let radius_m = spot_m / 2.0;
         let span = |centre_m: f64, min_m: f64, count: usize| {
             let first = ((centre_m - radius_m - min_m) / raster.pixel_m - 0.5).ceil().max(0.0);
@@ -109,7 +110,7 @@ impl<'a> Shown<'a> {
             (first as usize).min(count)..(end as usize).min(count)
         };
         let from_below = span(echo.yt_m, raster.y_min_m, raster.height);
-        Shown {
+        Splat {
             echo,
             power_w: echo.power_w,
             incidence_rad: echo.truth.map(|truth| truth.hit.theta_rad()),
@@ -140,18 +141,18 @@ impl<'a> Shown<'a> {
 }
 
 impl Pixel {
-    fn add(&mut self, shown: &Shown, weight: f64) {
+    fn add(&mut self, splat: &Splat, weight: f64) {
         self.weight += weight;
-        self.power_w += weight * shown.power_w;
-        self.range_m += weight * shown.echo.range_m;
+        self.power_w += weight * splat.power_w;
+        self.range_m += weight * splat.echo.range_m;
         self.count += 1;
-        if let Some(incidence_rad) = shown.incidence_rad {
+        if let Some(incidence_rad) = splat.incidence_rad {
             self.known_weight += weight;
             self.incidence_rad += weight * incidence_rad;
         }
         if weight > self.nearest_weight {
             self.nearest_weight = weight;
-            self.material = shown.material;
+            self.material = splat.material;
         }
     }
 }
@@ -164,14 +165,12 @@ fn channels(pixels: &[Pixel]) -> Vec<Channel> {
         |p| p.material.map_or(f64::NAN, f64::from),
         |p| f64::from(p.count),
     ];
-    let channel = |(name, value): (&str, fn(&Pixel) -> f64)| Channel {
-        name: name.to_owned(),
-        values: pixels
-            .iter()
-            .map(|p| if p.count == 0 { f32::NAN } else { value(p) as f32 })
-            .collect(),
-    };
-    CHANNELS.into_iter().zip(values).map(channel).collect()
+    let mut channels = Vec::new();
+    for (name, value) in CHANNELS.into_iter().zip(values) {
+        let values = pixels.iter().map(|p| if p.count == 0 { f32::NAN } else { value(p) as f32 });
+        channels.push(Channel { name: name.to_owned(), values: values.collect() });
+    }
+    channels
 }
 
 #[cfg(test)]

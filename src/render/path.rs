@@ -23,9 +23,10 @@ pub(super) struct Path {
 /// All power, and the mean range weighted by it; where no power comes back, the plain mean.
 pub(super) fn sum(paths: &[Path]) -> Detection {
     let power_w: f64 = paths.iter().map(|path| path.power_w).sum();
-    let range_m = match power_w > 0.0 {
-        true => paths.iter().map(|path| path.range_m * path.power_w).sum::<f64>() / power_w,
-        false => paths.iter().map(|path| path.range_m).sum::<f64>() / paths.len() as f64,
+    let range_m = if power_w > 0.0 {
+        paths.iter().map(|path| path.range_m * path.power_w).sum::<f64>() / power_w
+    } else {
+        paths.iter().map(|path| path.range_m).sum::<f64>() / paths.len() as f64
     };
     Detection { range_m, power_w }
 }

@@ -40,8 +40,8 @@ pub(super) struct Paths<'a> {
     changes: Vec<Option<Change>>,
 }
 
-/// One chirp, on its way.
-struct Sent<'a> {
+/// One chirp and the antenna that receives it.
+struct Emission<'a> {
     paths: &'a Paths<'a>,
     number: usize,
     axis: &'a Ray<Global>,
@@ -51,7 +51,7 @@ struct Sent<'a> {
 }
 
 /// A lit point of the target.
-struct Lit<'a> {
+struct LitPoint<'a> {
     hit: Hit,
     surface: Surface<'a>,
     frame: LocalFrame,
@@ -80,14 +80,15 @@ impl<'a> Paths<'a> {
         paths
     }
 
-    /// Needs every path of the scan before the first can be told, so that all are found twice.
+    /// What the effects change of every whole echo. They need all echoes of the scan at once, so that all paths are found twice.
     fn changes_by(&self, acting: &Acting) -> Vec<Option<Change>> {
-        let arrived = |(chirp, hits): (usize, &[Option<Hit>])| {
+        let chirps = self.footprints.chirps().enumerate();
+        let sums = chirps.map(|(chirp, hits)| {
             let paths = self.of_chirp(chirp, hits);
             let Detection { power_w, range_m } = sum(&paths);
             (!paths.is_empty()).then_some(Arrived::at_once(power_w, range_m))
-        };
-        acting.arrive(self.footprints, self.footprints.chirps().enumerate().map(arrived).collect())
+        });
+        acting.arrive(self.footprints, sums.collect())
     }
 
     /// All paths of a chirp through the hits of its rays. A direct path is there even when nothing
@@ -98,12 +99,12 @@ impl<'a> Paths<'a> {
         paths
     }
 
-    /// The same in place of what is in a list.
+    /// As [`of_chirp`](Self::of_chirp), into a list whose contents it replaces.
     pub fn fill(&self, number: usize, hits: &[Option<Hit>], paths: &mut Vec<Path>) {
         paths.clear();
         let axis = &self.setup.geometry.chirps.rays[number];
         let antenna = self.observer.position(axis.origin.xyz);
-        let sent = Sent { paths: self, number, axis, antenna, rays: hits.len() };
+        let sent = Emission { paths: self, number, axis, antenna, rays: hits.len() };
         let tilts = self.acting.as_ref().map_or([0.0; 2], |acting| acting.tilts(number));
         for (ray, hit) in hits.iter().enumerate() {
             let Some(hit) = hit else { continue };
@@ -125,24 +126,21 @@ impl<'a> Paths<'a> {
     }
 }
 
-impl<'a> Sent<'a> {
-    fn lit(&self, hit: Hit, source: DVec3) -> Lit<'a> {
+impl<'a> Emission<'a> {
+    fn lit(&self, hit: Hit, source: DVec3) -> LitPoint<'a> {
         let setup = self.paths.setup;
         let surface =
             setup.surfaces[usize::from(setup.geometry.region_of_facet[hit.facet as usize])];
-        let towards = |place: DVec3| (place - hit.point.xyz).normalize_or(DVec3::Z);
-        let to_source = towards(source);
+        let to_source = (source - hit.point.xyz).normalize_or(DVec3::Z);
+        let to_antenna = (self.antenna - hit.point.xyz).normalize_or(DVec3::Z);
         let frame = LocalFrame::new(setup.geometry.bvh.mesh(), &hit, to_source, surface.grain);
         let here = frame.local(to_source);
-        let antenna = match self.antenna == source {
-            true => here,
-            false => frame.local(towards(self.antenna)),
-        };
+        let antenna = if self.antenna == source { here } else { frame.local(to_antenna) };
         let antenna_m = self.antenna.distance(hit.point.xyz);
-        Lit { hit, surface, frame, source: here, antenna, antenna_m }
+        LitPoint { hit, surface, frame, source: here, antenna, antenna_m }
     }
 
-    fn direct(&self, lit: &Lit) -> Path {
+    fn direct(&self, lit: &LitPoint) -> Path {
         // What the radar lights it also sees.
         let seen = self.paths.observer == Observer::Radar || self.is_seen(lit);
         let (received, specular_share) = self.received(lit);
@@ -160,7 +158,7 @@ impl<'a> Sent<'a> {
 
     fn second_order(
         &self,
-        lit: &Lit,
+        lit: &LitPoint,
         flux_w: f64,
         direct: Path,
         bounce: &Bounce,
@@ -189,39 +187,40 @@ impl<'a> Sent<'a> {
         self.paths.footprints.facings.get(self.number * self.rays + ray).copied().flatten()
     }
 
-    /// The same for every observer: where a surface sends its power does not depend on who listens.
+    /// One key for all observers: where a surface sends its power does not depend on who listens.
     fn key(&self, ray: usize) -> Key {
         let (seed, chirp) = (self.paths.setup.seed, self.number as u64);
         Key { seed, chirp, sub_ray: ray as u64, purpose: Purpose::Bounce }
     }
 
     /// Power of one ray on a lit point, W.
-    fn flux_w(&self, lit: &Lit) -> f64 {
+    fn flux_w(&self, lit: &LitPoint) -> f64 {
         self.paths.link.flux_w(lit.hit.cos_theta) / self.rays as f64
     }
 
     /// Share of the power on a lit point that the antenna receives if nothing is in the way, and the
     /// share of that which is reflected like by a mirror.
-    fn received(&self, lit: &Lit) -> (f64, f64) {
+    fn received(&self, lit: &LitPoint) -> (f64, f64) {
         let (f_per_sr, specular_share) =
             lit.surface.scattering.f_and_specular_share(lit.source, lit.antenna);
         let cos_exit = lit.antenna.cos_theta();
-        let received = match cos_exit > 0.0 {
-            true => self.paths.link.received_per_w(lit.antenna_m, cos_exit, f_per_sr),
-            false => 0.0,
+        let received = if cos_exit > 0.0 {
+            self.paths.link.received_per_w(lit.antenna_m, cos_exit, f_per_sr)
+        } else {
+            0.0
         };
         (received, specular_share)
     }
 
     /// What a ray that leaves a lit point meets.
-    fn cast(&self, lit: &Lit, towards: Direction<Local>) -> Option<Hit> {
+    fn cast(&self, lit: &LitPoint, towards: Direction<Local>) -> Option<Hit> {
         let origin = Point::from(lit.hit.point.xyz + LIFT_M * lit.frame.normal);
         let direction = Direction::new(lit.frame.world(towards.xyz()))?;
         self.paths.setup.geometry.bvh.closest(&Ray { origin, direction })
     }
 
     /// Whether nothing stands between a lit point and the antenna.
-    fn is_seen(&self, lit: &Lit) -> bool {
+    fn is_seen(&self, lit: &LitPoint) -> bool {
         let above = lit.antenna.cos_theta() > 0.0;
         above && self.cast(lit, lit.antenna).is_none_or(|hit| hit.range_m >= lit.antenna_m)
     }

@@ -1,6 +1,5 @@
 //! A scan from its rays to its echoes.
 
-use glam::DVec3;
 use rayon::prelude::*;
 
 use super::acting::{self, Acting};
@@ -11,9 +10,9 @@ use super::observer::Observer;
 use super::paths::Paths;
 use super::setup::Setup;
 use super::spot::{self, Footprints};
-use crate::frames::{Global, Point, Ray};
+use crate::frames::{Global, Point};
 use crate::radar::Field;
-use crate::trace::{Hit, ScanGeometry, winding_number};
+use crate::trace::{ScanGeometry, winding_number};
 
 /// What one scan gave at one antenna.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,8 +36,8 @@ impl Scan {
     }
 }
 
-/// Traces every chirp of a scan with `rays_per_chirp` rays, one or more. `done` is told how many
-/// chirps are finished.
+/// Traces every chirp of a scan with `rays_per_chirp` rays, one or more. `done` is called with the number of
+/// chirps that have been finished.
 ///
 /// # Errors
 /// When no ray meets the mesh.
@@ -66,8 +65,7 @@ pub fn trace_placed(
     let footprints = match Acting::new(setup) {
         None => spot::trace(geometry, rays, done),
         Some(acting) => {
-            let meet = |chirp, ray: &Ray<Global>, hit| acting.meet(chirp, ray, hit);
-            spot::trace_moved(geometry, rays, done, meet)
+            spot::trace_moved(geometry, rays, done, |chirp, ray, hit| acting.meet(chirp, ray, hit))
         }
     };
     check_hits(footprints?, geometry)
@@ -84,7 +82,7 @@ fn check_hits(footprints: Footprints, geometry: &ScanGeometry) -> Result<Footpri
 /// Rays whose chirps are shaded one after the other; a chirp that bounces is a task of its own.
 const RAYS_PER_TASK: usize = 256;
 
-/// Turns hits into echoes at an antenna. With effects the hits are those of [`trace_placed`]. `done` is told how many chirps are finished.
+/// Turns hits into echoes at an antenna. With effects the hits are those of [`trace_placed`]. `done` is called with the number of chirps that have been finished.
 ///
 /// The result is the same for any number of threads.
 ///
@@ -106,7 +104,8 @@ pub fn shade(
     let echoes = Echoes { setup, footprints, observer, detector: &detector, target_from_global };
     let rays = footprints.rays_per_chirp.max(1);
     let per_task = if setup.bounce.is_some() { 1 } else { (RAYS_PER_TASK / rays).max(1) };
-    let of_task = |(task, hits): (usize, &[Option<Hit>])| {
+    let tasks = footprints.hits.par_chunks(per_task * rays).enumerate();
+    let echoes = tasks.map(|(task, hits)| {
         let chirps = hits.chunks(rays);
         let count = chirps.len();
         let (mut ways, mut found) = (Vec::new(), Vec::with_capacity(count));
@@ -117,9 +116,8 @@ pub fn shade(
         }
         done(count);
         Ok(found)
-    };
-    let tasks = footprints.hits.par_chunks(per_task * rays).enumerate();
-    let echoes: Vec<Vec<Echo>> = tasks.map(of_task).collect::<Result<_, RenderError>>()?;
+    });
+    let echoes: Vec<Vec<Echo>> = echoes.collect::<Result<_, RenderError>>()?;
     Ok(Scan {
         chirps: setup.geometry.chirps.rays.len(),
         hits: footprints.chirps().filter(|hits| hits.iter().any(Option::is_some)).count(),
@@ -173,9 +171,11 @@ fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(
 /// Whether an antenna is inside something that the radar is outside of. A room around both is no wall
 /// between them.
 fn is_walled_off(setup: &Setup, position: Point<Global>) -> bool {
-    let wound = |point| winding_number(setup.geometry.bvh.mesh(), point);
-    // Between 0, outside, and 1, inside; open meshes have anything between.
-    (wound(position) - wound(setup.geometry.radar.frames().origin())).abs() > 0.75
+    let origin = setup.geometry.radar.frames().origin();
+    let [here, there] =
+        [position, origin].map(|point| winding_number(setup.geometry.bvh.mesh(), point));
+    // A winding number is 0 outside and 1 inside a closed mesh, and anything between near an open one.
+    (here - there).abs() > 0.75
 }
 
 /// Where the scan looks, where the target lies instead, and the likeliest cause.
@@ -183,18 +183,19 @@ fn miss(geometry: &ScanGeometry) -> RenderError {
     let (chirps, mesh) = (geometry.chirps, geometry.bvh.mesh());
     let frames = geometry.radar.frames();
     let target_from_global = frames.global_from_target.inverse();
-    let in_target = |&vertex: &DVec3| (target_from_global * Point::from(vertex)).xyz.truncate();
-    let target = Field::around(mesh.vertices.iter().map(in_target));
+    let vertices = mesh.vertices.iter();
+    let in_target = vertices.map(|&vertex| (target_from_global * Point::from(vertex)).xyz);
+    let target = Field::around(in_target.map(|vertex| vertex.truncate()));
     let scan = chirps.field(&frames);
     // Sixty times the paper's target: surely a mesh in millimetres.
     const HUGE_M: f64 = 100.0;
-    let ahead = |ray: &Ray<Global>| {
-        let along = |&v: &DVec3| (v - ray.origin.xyz).dot(ray.direction.xyz());
-        mesh.vertices.iter().any(|vertex| along(vertex) > 0.0)
-    };
+    let is_ahead = chirps.rays.first().is_some_and(|ray| {
+        let mut to_vertices = mesh.vertices.iter().map(|vertex| vertex - ray.origin.xyz);
+        to_vertices.any(|to_vertex| to_vertex.dot(ray.direction.xyz()) > 0.0)
+    });
     let way_out = if target.sides_m().into_iter().any(|side_m| side_m > HUGE_M) {
         "is the mesh in millimetres? give it scale = 0.001"
-    } else if !chirps.rays.first().is_some_and(ahead) {
+    } else if !is_ahead {
         "it stands behind the radar: move it with translation_m or turn the radar with radar.alpha_deg"
     } else {
         "move the mesh with translation_m or the radar with radar.primary_focus_m"
@@ -204,6 +205,8 @@ fn miss(geometry: &ScanGeometry) -> RenderError {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::brdf::{Lambert, Scattering};
     use crate::frames::Direction;

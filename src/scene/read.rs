@@ -18,10 +18,10 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
 /// Reads a whole file that another one names: a pipe would never end, and a device has no size to trust. What a person
 /// names may well be a pipe.
 pub(crate) fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
-    match std::fs::metadata(path)?.is_file() {
-        true => std::fs::read(path),
-        false => Err(std::io::Error::other("it is not a regular file")),
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("it is not a regular file"));
     }
+    std::fs::read(path)
 }
 
 pub(super) fn read(path: &Path, hint: &'static str) -> Result<Vec<u8>, SceneError> {

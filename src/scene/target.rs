@@ -109,11 +109,10 @@ impl MeshReport {
 }
 
 fn check_grains(file: &SceneFile, path: &Path) -> Result<(), SceneError> {
-    let points_nowhere = |grain: [f64; 3]| {
-        let length = DVec3::from_array(grain).length();
-        !length.is_normal()
-    };
-    match file.region.iter().find(|region| region.grain.is_some_and(points_nowhere)) {
+    let mut regions = file.region.iter();
+    match regions.find(|region| {
+        region.grain.is_some_and(|grain| !DVec3::from_array(grain).length().is_normal())
+    }) {
         None => Ok(()),
         Some(region) => {
             let place = format!("region `{}`", region.name);
@@ -206,9 +205,8 @@ fn place(mut mesh: Mesh, entry: &MeshEntry, scene: &Path) -> Result<Mesh, SceneE
     mesh.vertices.par_iter_mut().for_each(|vertex| {
         *vertex = (global_from_model * Point::from(*vertex * entry.scale * stretch)).xyz;
     });
-    let near = |v: &DVec3| v.is_finite() && v.abs().max_element() < FARTHEST_M;
-    let lost = mesh.vertices.par_iter().position_first(|v| !near(v));
-    match lost {
+    let vertices = mesh.vertices.par_iter();
+    match vertices.position_first(|v| !(v.is_finite() && v.abs().max_element() < FARTHEST_M)) {
         None => Ok(mesh),
         Some(vertex) => {
             let problem = format!("vertex {vertex} ends up more than {FARTHEST_M} m away");

@@ -21,19 +21,15 @@ impl Chirps {
         radar: &Radar,
         read: impl Fn(&str) -> Result<Vec<u8>, String>,
     ) -> Result<Chirps, RadarError> {
-        let points = |points: Vec<[f64; 2]>| {
-            let rays = through_points(&radar.frames(), &points)?;
-            Ok(Chirps::timed(radar, rays, Vec::new()))
-        };
         match &radar.scan {
             Pattern::Elliptical(pattern) => {
                 let angles = pattern.angles(&radar.mirror(), radar.optics.ellipse_height_m);
                 let rays = through_mirror(radar, &angles)?;
                 Ok(Chirps::timed(radar, rays, angles))
             }
-            Pattern::Raster(pattern) => points(pattern.target_points_m()),
-            Pattern::Lissajous(pattern) => points(pattern.target_points_m()),
-            Pattern::Spiral(pattern) => points(pattern.target_points_m()),
+            Pattern::Raster(pattern) => Chirps::through(radar, &pattern.target_points_m()),
+            Pattern::Lissajous(pattern) => Chirps::through(radar, &pattern.target_points_m()),
+            Pattern::Spiral(pattern) => Chirps::through(radar, &pattern.target_points_m()),
             Pattern::Rays(Explicit { file }) => explicit::rays(file, &fetch(file, read)?),
             Pattern::Angles(Explicit { file }) => {
                 let mut chirps = explicit::angles(file, &fetch(file, read)?)?;
@@ -41,6 +37,12 @@ impl Chirps {
                 Ok(chirps)
             }
         }
+    }
+
+    /// Chirps without a mirror through points of the target plane, m.
+    fn through(radar: &Radar, points_m: &[[f64; 2]]) -> Result<Chirps, RadarError> {
+        let rays = through_points(&radar.frames(), points_m)?;
+        Ok(Chirps::timed(radar, rays, Vec::new()))
     }
 
     /// Chirps numbered from 0, one period apart.
@@ -87,15 +89,16 @@ fn through_points(
     points: &[[f64; 2]],
 ) -> Result<Vec<Ray<Global>>, RadarError> {
     let origin = frames.origin();
-    let ray = |(chirp, &[xt_m, yt_m]): (usize, &[f64; 2])| {
+    let mut rays = Vec::with_capacity(points.len());
+    for (chirp, &[xt_m, yt_m]) in points.iter().enumerate() {
         let range_m = PATTERN_RANGE_M;
-        target_z_m(xt_m, yt_m, range_m, frames.reflector_centre)
+        let direction = target_z_m(xt_m, yt_m, range_m, frames.reflector_centre)
             .map(|zt_m| frames.global_from_target * Point::new(xt_m, yt_m, zt_m))
             .and_then(|point| origin.towards(point))
-            .map(|direction| Ray { origin, direction })
-            .ok_or(RadarError::OutOfReach { chirp, xt_m, yt_m, range_m })
-    };
-    points.iter().enumerate().map(ray).collect()
+            .ok_or(RadarError::OutOfReach { chirp, xt_m, yt_m, range_m })?;
+        rays.push(Ray { origin, direction });
+    }
+    Ok(rays)
 }
 
 /// Rays of mirror angles: equation (1) at R = 8 m, then (2) to (4).
