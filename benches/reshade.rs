@@ -18,7 +18,7 @@ use matdb::diagnose;
 use matdb::effects::{self, Effect, Model, PredictionCache, Receiver, Stage};
 use matdb::radar::{Chirps, Link, Radar};
 use matdb::scene::mannequin;
-use matdb::trace::{Bvh, Tracer};
+use matdb::trace::{Bvh, ScanGeometry, Tracer};
 
 const TURNS: usize = 101;
 
@@ -30,10 +30,8 @@ fn main() {
     let regions = vec![0; mesh.facets.len()];
     let link = Link::new(&radar);
     let mut stage = Stage {
-        radar: &radar,
+        geometry: ScanGeometry::new(&radar, &chirps, &bvh, &regions),
         link,
-        bvh: &bvh,
-        region_of_facet: &regions,
         grain_of_region: &[DVec3::Y],
         middle: DVec3::ZERO,
     };

@@ -35,8 +35,7 @@ use matdb::render::{
     Echo, Footprints, Observer, Scan, Setup, Surface, cloud_table, power_image, shade, trace_placed,
 };
 use matdb::scene::{Scene, solids};
-use matdb::trace::{Bvh, Hit};
-use matdb::units::watts_from_dbm;
+use matdb::trace::{Bvh, Hit, ScanGeometry};
 use rayon::prelude::*;
 
 const TURNS: usize = 15;
@@ -102,8 +101,8 @@ fn main() {
     let surfaces = [Surface::new(&paint)];
     let bvh = Bvh::new(&scene.target.mesh);
     let (radar, chirps, regions) = (scene.radar(), &scene.chirps, &scene.target.region_of_facet);
-    let setup =
-        Setup { seed: scene.file.seed, ..Setup::new(radar, chirps, &bvh, regions, &surfaces) };
+    let geometry = ScanGeometry::new(radar, chirps, &bvh, regions);
+    let setup = Setup { seed: scene.file.seed, ..Setup::new(geometry, &surfaces) };
     let footprints = traced(&setup, 1);
     let scan = shaded(&setup, &footprints);
     let given =
@@ -223,7 +222,10 @@ fn power(given: Given<'_>) -> Vec<Way<'_>> {
         };
         given.footprints.hits.iter().flatten().map(power_w).collect::<Vec<f64>>()
     };
-    let paper = move || shaded(&Setup { radar: &paper, ..*given.setup }, given.footprints);
+    let paper = move || {
+        let geometry = ScanGeometry { radar: &paper, ..given.setup.geometry };
+        shaded(&Setup { geometry, ..*given.setup }, given.footprints)
+    };
     vec![
         Way::new("law and link alone", alone, |powers_w| format!("{} hits", powers_w.len())),
         Way::new("paper's receiver", paper, echoes),
@@ -354,7 +356,7 @@ fn cloud(given: Given) -> Cloud {
         chirp: Some(echo.chirp),
         point: echo.point,
         range_m: Some(echo.range_m),
-        power_w: watts_from_dbm(echo.power_dbm),
+        power_w: echo.power_w,
     };
     Cloud::new(given.scan.detections().map(point).collect()).expect("a cloud")
 }
@@ -391,7 +393,7 @@ fn fit(given: Given<'_>) -> Vec<Way<'_>> {
         starts: 1,
         ..Fit::default()
     };
-    let noise_w = given.scan.noise_dbm.map(watts_from_dbm);
+    let noise_w = given.scan.noise_w;
     let gamma = Fit { noise_w, starts: 1, ..Fit::default() };
     let fitted = |fit: &Fit, start: &Brdf, curve: &Curve| fit.run(start, curve).expect("a fit");
     let best = fitted(&squares(0.0), &guess(), &curve).model;

@@ -9,7 +9,7 @@ use glam::DVec3;
 use matdb::frames::Pose;
 use matdb::render::{Batch, Take};
 use matdb::setup::ReadyScene;
-use matdb::trace::{Gpu, Tracer};
+use matdb::trace::{Gpu, ScanGeometry, Tracer};
 use matdb::units::dbm_from_watts;
 
 type Answer<T> = Result<T, Box<dyn std::error::Error>>;
@@ -45,13 +45,12 @@ fn main() -> Answer<()> {
             None
         }
     };
-    let held = gpu.as_ref().map(|gpu| gpu.hold(setup.bvh)).transpose()?;
+    let held = gpu.as_ref().map(|gpu| gpu.hold(setup.geometry.bvh)).transpose()?;
     let batch = Batch {
-        radar: setup.radar,
-        chirps: setup.chirps,
-        bvh: setup.bvh,
-        tracer: held.as_ref().map_or(Tracer::Automatic, Tracer::Gpu),
-        region_of_facet: setup.region_of_facet,
+        geometry: ScanGeometry {
+            tracer: held.as_ref().map_or(Tracer::Automatic, Tracer::Gpu),
+            ..setup.geometry
+        },
         rays_per_chirp,
     };
     if let Some(gpu) = &gpu {

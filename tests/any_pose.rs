@@ -10,6 +10,7 @@ use matdb::geometry::Mesh;
 use matdb::radar::{Chirps, Radar};
 use matdb::render::Echo;
 use matdb::scene::mannequin;
+use matdb::units::dbm_from_watts;
 
 /// Metres and dB that rounding may move.
 const ROUNDING: f64 = 1e-9;
@@ -33,9 +34,12 @@ fn assert_same(radar: &Radar, mesh: &Mesh, other_radar: &Radar, other_mesh: &Mes
     assert!(these.len() > 10_000 && these.len().abs_diff(those.len()) < 5);
     let mut compared = 0;
     for (a, b) in std::iter::zip(&these, &those).filter(|(a, b)| facet(a) == facet(b)) {
-        for (a, b) in
-            [(a.xt_m, b.xt_m), (a.yt_m, b.yt_m), (a.range_m, b.range_m), (a.power_dbm, b.power_dbm)]
-        {
+        for (a, b) in [
+            (a.xt_m, b.xt_m),
+            (a.yt_m, b.yt_m),
+            (a.range_m, b.range_m),
+            (dbm_from_watts(a.power_w), dbm_from_watts(b.power_w)),
+        ] {
             assert!((a - b).abs() < ROUNDING, "{a} is not {b}");
         }
         compared += 1;

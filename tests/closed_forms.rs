@@ -10,6 +10,7 @@ use matdb::geometry::Mesh;
 use matdb::radar::{Chirps, Radar};
 use matdb::render::Echo;
 use matdb::scene::solids;
+use matdb::units::dbm_from_watts;
 
 /// Flat facets are exact: what is left is rounding.
 const FLAT_DB: f64 = 1e-9;
@@ -68,7 +69,10 @@ fn a_tilted_plate_returns_the_power_computed_by_hand() {
                 let range_m = -8.0 * normal.z / ray.dot(normal);
                 let theta_rad = (-ray.dot(normal)).acos();
                 let expected = expected_dbm(range_m, theta_rad, f(theta_rad));
-                assert!((echo.power_dbm - expected).abs() < FLAT_DB, "{tilt_deg}° {echo:?}");
+                assert!(
+                    (dbm_from_watts(echo.power_w) - expected).abs() < FLAT_DB,
+                    "{tilt_deg}° {echo:?}"
+                );
             }
         }
     }
@@ -85,8 +89,10 @@ fn sphere_error_db(subdivisions: u32, surface: &dyn Scattering, f: fn(f64) -> f6
             let off_axis_rad = (-ray.z).acos();
             let theta_rad = (8.0 / RADIUS_M * off_axis_rad.sin()).asin();
             let range_m = 8.0 * off_axis_rad.cos() - RADIUS_M * theta_rad.cos();
-            (theta_rad < 45f64.to_radians())
-                .then(|| (echo.power_dbm - expected_dbm(range_m, theta_rad, f(theta_rad))).abs())
+            (theta_rad < 45f64.to_radians()).then(|| {
+                (dbm_from_watts(echo.power_w) - expected_dbm(range_m, theta_rad, f(theta_rad)))
+                    .abs()
+            })
         })
         .collect();
     assert!(errors.len() > 1000);

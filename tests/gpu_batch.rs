@@ -16,8 +16,8 @@ use matdb::render::{
     Batch, Echo, Observer, RenderError, Setup, Surface, Take, Takes, shade, trace,
 };
 use matdb::scene::{Scene, solids};
-use matdb::trace::{Bvh, Gpu, GpuError, TraceError, Tracer};
-use matdb::units::dbm_from_watts;
+use matdb::trace::{Bvh, Gpu, GpuError, ScanGeometry, TraceError, Tracer};
+use matdb::units::{db_from_ratio, dbm_from_watts};
 
 /// What f32 and the device's functions may cost.
 const POWER_DB: f64 = 0.02;
@@ -94,9 +94,10 @@ impl Bench {
             .map(|surface| Surface { grain: take.target.rotation() * surface.grain, ..*surface })
             .collect();
         let bvh = Bvh::new(&mesh);
-        let footprints = trace(&self.radar, &self.chirps, &bvh, rays, &|_| {}).unwrap();
-        let setup = Setup::new(&self.radar, &self.chirps, &bvh, &self.region_of_facet, &surfaces);
-        let setup = Setup { seed: take.seed, ..setup };
+        let Bench { radar, chirps, region_of_facet, .. } = self;
+        let geometry = ScanGeometry::new(radar, chirps, &bvh, region_of_facet);
+        let footprints = trace(&geometry, rays, &|_| {}).unwrap();
+        let setup = Setup { seed: take.seed, ..Setup::new(geometry, &surfaces) };
         let scan = shade(&setup, &footprints, Observer::Radar, &|_| {}).unwrap();
         let mut echoes = vec![None; self.chirps.rays.len()];
         scan.echoes.into_iter().for_each(|echo| echoes[echo.chirp as usize] = Some(echo));
@@ -117,7 +118,8 @@ impl Bench {
         rays_per_chirp: usize,
     ) -> Result<Takes, RenderError> {
         let Bench { radar, chirps, region_of_facet, .. } = self;
-        Batch { radar, chirps, bvh, tracer, region_of_facet, rays_per_chirp }.run(takes)
+        let geometry = ScanGeometry { radar, chirps, bvh, tracer, region_of_facet };
+        Batch { geometry, rays_per_chirp }.run(takes)
     }
 
     /// Compares a batch with its scans one by one; the largest error in dB and the echoes that were compared.
@@ -137,14 +139,16 @@ impl Bench {
             assert_eq!(found.len(), expected.len());
             for (chirp, (found, expected)) in found.iter().zip(&expected).enumerate() {
                 let expected = expected.as_ref();
-                let Some(expected) = expected.filter(|echo| echo.power_dbm > FAINTEST_DBM) else {
+                let Some(expected) =
+                    expected.filter(|echo| dbm_from_watts(echo.power_w) > FAINTEST_DBM)
+                else {
                     let found_dbm = found.map_or(-400.0, |found| dbm_from_watts(found.power_w));
                     assert!(found_dbm <= FAINTEST_DBM + POWER_DB, "chirp {chirp}: {found_dbm}");
                     faint += 1;
                     continue;
                 };
                 let found = found.unwrap_or_else(|| panic!("chirp {chirp}: {expected:?}"));
-                let error_db = (dbm_from_watts(found.power_w) - expected.power_dbm).abs();
+                let error_db = db_from_ratio(found.power_w / expected.power_w).abs();
                 assert!(
                     error_db < POWER_DB,
                     "chirp {chirp}: {error_db} dB, {found:?} {expected:?}"
@@ -155,8 +159,9 @@ impl Bench {
                 let error_m = (found.range_m - expected.range_m).abs();
                 let most_m = RANGE * (expected.range_m + radius_m / cos);
                 // Under the noise there may be an echo that the device cannot hold, and so cannot place.
-                let is_held =
-                    means[chirp].as_ref().is_some_and(|mean| mean.power_dbm > FAINTEST_DBM);
+                let is_held = means[chirp]
+                    .as_ref()
+                    .is_some_and(|mean| dbm_from_watts(mean.power_w) > FAINTEST_DBM);
                 assert!(
                     error_m < most_m || !is_held,
                     "chirp {chirp}: {error_m} m, {found:?} {expected:?}"

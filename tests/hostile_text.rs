@@ -11,7 +11,7 @@ use matdb::material::file::{parse, points};
 use matdb::radar::Pattern;
 use matdb::render::{Bounce, Observer, Setup, Surface, power_image, shade, trace, trace_placed};
 use matdb::scene::{Scene, SceneFile};
-use matdb::trace::Bvh;
+use matdb::trace::{Bvh, ScanGeometry};
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
 
@@ -186,7 +186,8 @@ fn render(text: &str) {
         scene.target.regions.iter().map(|_| Surface::new(&lambert)).collect();
     let regions = &scene.target.region_of_facet;
     let bounce = scene.file.bounce.map(|b| Bounce { rays: b.rays, outside_spot: 0.1 });
-    let paper = Setup::new(scene.radar(), &scene.chirps, &bvh, regions, &surfaces);
+    let geometry = ScanGeometry::new(scene.radar(), &scene.chirps, &bvh, regions);
+    let paper = Setup::new(geometry, &surfaces);
     let mut effects = SceneEffects::default();
     let levels = [(&scene.file.effect, Level::Scene), (&scene.radar().effect, Level::Instrument)];
     for (entries, level) in levels {
@@ -200,7 +201,7 @@ fn render(text: &str) {
     let Ok(scan) = shade(&setup, &footprints, Observer::Radar, &|_| {}) else { return };
     for echo in &scan.echoes {
         assert!(echo.range_m.is_finite() && echo.point.xyz.is_finite(), "{text}");
-        assert!(!echo.power_dbm.is_nan(), "{text}");
+        assert!(!echo.power_w.is_nan(), "{text}");
     }
     let field = scene.chirps.field(&scene.radar().frames());
     let spot_m = scene.radar().spot_diameter_m;
@@ -210,7 +211,9 @@ fn render(text: &str) {
 #[test]
 fn the_texts_are_good_before_they_are_damaged() {
     let scene = Scene::resolve(SceneFile::parse(SCENE).unwrap(), Path::new("scene.toml")).unwrap();
-    trace(scene.radar(), &scene.chirps, &Bvh::new(&scene.target.mesh), 1, &|_| {}).unwrap();
+    let (bvh, regions) = (Bvh::new(&scene.target.mesh), &scene.target.region_of_facet);
+    let geometry = ScanGeometry::new(scene.radar(), &scene.chirps, &bvh, regions);
+    trace(&geometry, 1, &|_| {}).unwrap();
     parse("material.toml", MATERIAL, |_| Err(String::new())).unwrap();
     assert!(tokens(SCENE).len() > 100);
 }

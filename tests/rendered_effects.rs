@@ -19,8 +19,8 @@ use matdb::material::builtin;
 use matdb::radar::Link;
 use matdb::render::{Echo, Observer, RenderError, Setup, Surface, shade, trace_placed};
 use matdb::scene::{Scene, SceneFile};
-use matdb::trace::Bvh;
-use matdb::units::{dbm_from_watts, watts_from_dbm};
+use matdb::trace::{Bvh, ScanGeometry};
+use matdb::units::{db_from_ratio, dbm_from_watts, watts_from_dbm};
 use support::{entries, matdb, read_cloud, refused};
 
 /// Relative to the same formula evaluated elsewhere: rounding alone.
@@ -87,13 +87,16 @@ impl Bench {
         self.scene.target.regions.iter().map(|region| region.grain).collect()
     }
 
+    fn geometry(&self) -> ScanGeometry<'_> {
+        let Scene { chirps, target, .. } = &self.scene;
+        ScanGeometry::new(self.scene.radar(), chirps, &self.bvh, &target.region_of_facet)
+    }
+
     fn with_stage<T>(&self, then: impl FnOnce(&Stage, &[Shot]) -> T) -> T {
         let (radar, grains) = (self.scene.radar(), self.grains());
         let mut stage = Stage {
-            radar,
+            geometry: self.geometry(),
             link: Link::new(radar),
-            bvh: &self.bvh,
-            region_of_facet: &self.scene.target.region_of_facet,
             grain_of_region: &grains,
             middle: DVec3::ZERO,
         };
@@ -107,12 +110,10 @@ impl Bench {
     }
 
     fn render(&self, model: &Model, rays: usize) -> Result<Vec<Echo>, RenderError> {
-        let regions = &self.scene.target.region_of_facet;
         let surface = |(law, grain)| Surface { scattering: law as &Brdf, grain };
         let surfaces: Vec<Surface> =
             std::iter::zip(&self.laws, self.grains()).map(surface).collect();
-        let chirps = &self.scene.chirps;
-        let paper = Setup::new(self.scene.radar(), chirps, &self.bvh, regions, &surfaces);
+        let paper = Setup::new(self.geometry(), &surfaces);
         let setup = Setup { effects: Some(model), seed: self.scene.file.seed, ..paper };
         let footprints = trace_placed(&setup, rays, &|_| {})?;
         Ok(shade(&setup, &footprints, Observer::Radar, &|_| {})?.echoes)
@@ -149,8 +150,9 @@ fn agrees(bench: &Bench, effects: &SceneEffects, case: &str) -> usize {
                 continue;
             };
             let power_dbm = dbm_from_watts(predicted.passed_w(number));
-            let off_db = (echo.power_dbm - power_dbm).abs();
-            assert!(off_db < POWER_DB || echo.power_dbm == power_dbm, "{case}: {off_db} dB");
+            let echo_dbm = dbm_from_watts(echo.power_w);
+            let off_db = (echo_dbm - power_dbm).abs();
+            assert!(off_db < POWER_DB || echo_dbm == power_dbm, "{case}: {off_db} dB");
             assert!((echo.range_m - arrived.range_m).abs() < RANGE_M, "{case}: {echo:?}");
         }
         shots.len() - missed
@@ -216,7 +218,7 @@ fn an_effect_of_a_material_leaves_the_others_as_they_are() {
     for (bare, with) in std::iter::zip(bench.bare(), with) {
         match bare.truth.unwrap().region {
             0 => assert_eq!(bare, with),
-            _ => changed += usize::from(with.power_dbm > bare.power_dbm),
+            _ => changed += usize::from(with.power_w > bare.power_w),
         }
     }
     assert!(changed > 50, "{changed}");
@@ -252,7 +254,7 @@ fn a_moved_target_is_rendered_where_it_stands_with_its_edges_and_all_rays_of_the
         assert_eq!(moved.len(), there.len());
         for (a, b) in std::iter::zip(&moved, &there) {
             assert_eq!(a.chirp, b.chirp);
-            assert!((a.power_dbm - b.power_dbm).abs() < 1e-6, "{a:?} {b:?}");
+            assert!(db_from_ratio(a.power_w / b.power_w).abs() < 1e-6, "{a:?} {b:?}");
             assert!(a.point.distance_m(b.point) < 1e-9);
             let (a, b) = (a.truth.unwrap(), b.truth.unwrap());
             assert!((a.edge_m - b.edge_m).abs() < 1e-9);
@@ -271,7 +273,7 @@ fn several_rays_of_a_spot_have_the_gain_of_one() {
     for (bare, with) in std::iter::zip(bare, with) {
         let progress = f64::from(bare.chirp) / (24.0 * 24.0 - 1.0);
         let expected_db = 3.0 * (progress - 0.5);
-        assert!((with.power_dbm - bare.power_dbm - expected_db).abs() < POWER_DB);
+        assert!((db_from_ratio(with.power_w / bare.power_w) - expected_db).abs() < POWER_DB);
         assert!((with.range_m - bare.range_m).abs() < RANGE_M);
     }
 }
@@ -294,7 +296,7 @@ fn slanted() -> Bench {
 }
 
 fn powers_w(echoes: &[Echo]) -> Vec<f64> {
-    echoes.iter().map(|echo| watts_from_dbm(echo.power_dbm)).collect()
+    echoes.iter().map(|echo| echo.power_w).collect()
 }
 
 #[test]
@@ -324,9 +326,7 @@ fn tilts_that_vary_scatter_the_power_where_the_curve_is_steep() {
     let model = bench.model(&effects);
     let predicted = bench.with_stage(|stage, shots| model.predict(stage, shots));
     let (bare, with) = (bench.bare(), bench.render(&model, 1).unwrap());
-    let shift = |(with, bare): (&Echo, &Echo)| {
-        (with.power_dbm - bare.power_dbm) / 10.0 * std::f64::consts::LN_10
-    };
+    let shift = |(with, bare): (&Echo, &Echo)| (with.power_w / bare.power_w).ln();
     let shifts: Vec<f64> = std::iter::zip(&with, &bare).map(shift).collect();
     let spread = |shot: usize| predicted.tilt_spread(shot).powi(2);
     let expected = (0..shifts.len()).map(spread).sum::<f64>() / shifts.len() as f64;

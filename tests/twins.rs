@@ -15,6 +15,7 @@ use matdb::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowi
 use matdb::radar::Radar;
 use matdb::radar::speckle::{mean_offset_db, standard_deviation_db};
 use matdb::scene::Scene;
+use matdb::units::dbm_from_watts;
 use serde_json::Value;
 use support::{echoes, entries, matdb};
 use twins::case::{Outcome, Plan};
@@ -142,7 +143,8 @@ fn a_complete_case_is_what_the_renderer_predicts_in_speckle() {
         let law = scattering(&label["base"]);
         let exact = Radar { speckle: None, noise: None, ..scene.radar().clone() };
         let predicted = echoes(&exact, &scene.chirps, &scene.target.mesh, &law);
-        let dbm: BTreeMap<u32, f64> = predicted.iter().map(|e| (e.chirp, e.power_dbm)).collect();
+        let dbm: BTreeMap<u32, f64> =
+            predicted.iter().map(|e| (e.chirp, dbm_from_watts(e.power_w))).collect();
         let cloud = fs::read_to_string(case.join("cloud.csv")).unwrap();
         let off_db: Vec<f64> = cloud
             .lines()

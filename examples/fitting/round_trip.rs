@@ -11,8 +11,8 @@ use matdb::radar::speckle::standard_deviation_db;
 use matdb::radar::{Noise, Radar, Speckle};
 use matdb::render::{Echo, Observer, Setup, Surface, shade, trace};
 use matdb::scene::Scene;
-use matdb::trace::Bvh;
-use matdb::units::watts_from_dbm;
+use matdb::trace::{Bvh, ScanGeometry};
+use matdb::units::{dbm_from_watts, watts_from_dbm};
 
 use crate::Failure;
 use crate::registration::{middle, pushed, scene};
@@ -126,8 +126,8 @@ fn trip(scene: &Scene, seed: u64) -> Result<Trip, Failure> {
     let noisy = Radar { speckle: Some(speckle), noise: Some(noise), ..quiet.clone() };
     let mesh = &scene.target.mesh;
     let echoes = rendered(scene, &noisy, mesh, &truth(), seed)?;
-    let seen: Vec<Echo> =
-        echoes.into_iter().filter(|echo| echo.power_dbm >= noisy.threshold_dbm).collect();
+    let threshold_w = watts_from_dbm(noisy.threshold_dbm);
+    let seen: Vec<Echo> = echoes.into_iter().filter(|echo| echo.power_w >= threshold_w).collect();
 
     let cloud = Cloud::new(seen.iter().map(point).collect())?;
     let mut draws = Key { seed, chirp: 0, sub_ray: 7, purpose: Purpose::Noise }.draws();
@@ -156,8 +156,7 @@ fn trip(scene: &Scene, seed: u64) -> Result<Trip, Failure> {
 }
 
 fn point(echo: &Echo) -> CloudPoint {
-    let Echo { chirp, point, range_m, power_dbm, .. } = *echo;
-    let power_w = watts_from_dbm(power_dbm);
+    let Echo { chirp, point, range_m, power_w, .. } = *echo;
     CloudPoint { chirp: Some(chirp), point, range_m: Some(range_m), power_w }
 }
 
@@ -177,16 +176,17 @@ fn rendered(
     let bvh = Bvh::new(mesh);
     let surfaces = vec![Surface::new(material as &dyn Scattering); scene.target.regions.len()];
     let regions = &scene.target.region_of_facet;
-    let setup = Setup { seed, ..Setup::new(radar, &scene.chirps, &bvh, regions, &surfaces) };
-    let footprints = trace(radar, &scene.chirps, &bvh, 1, &|_| {})?;
+    let geometry = ScanGeometry::new(radar, &scene.chirps, &bvh, regions);
+    let setup = Setup { seed, ..Setup::new(geometry, &surfaces) };
+    let footprints = trace(&geometry, 1, &|_| {})?;
     Ok(shade(&setup, &footprints, Observer::Radar, &|_| {})?.echoes)
 }
 
 /// Rms of the difference of two images in the chirps that both show.
 fn rms_db(a: &[Echo], b: &[Echo]) -> f64 {
     let of_chirp: std::collections::HashMap<u32, f64> =
-        b.iter().map(|echo| (echo.chirp, echo.power_dbm)).collect();
-    let gap = |echo: &Echo| Some(echo.power_dbm - of_chirp.get(&echo.chirp)?);
+        b.iter().map(|echo| (echo.chirp, dbm_from_watts(echo.power_w))).collect();
+    let gap = |echo: &Echo| Some(dbm_from_watts(echo.power_w) - of_chirp.get(&echo.chirp)?);
     let gaps_db: Vec<f64> = a.iter().filter_map(gap).filter(|gap| gap.is_finite()).collect();
     (gaps_db.iter().map(|gap| gap * gap).sum::<f64>() / gaps_db.len().max(1) as f64).sqrt()
 }

@@ -20,7 +20,7 @@ use matdb::material::builtin;
 use matdb::radar::{Chirps, Radar};
 use matdb::render::{Observer, Setup, Surface, shade, trace};
 use matdb::scene::mannequin::mannequin;
-use matdb::trace::{Bvh, Fan, Hit, Tracer};
+use matdb::trace::{Bvh, Fan, Hit, ScanGeometry, Tracer};
 use serde_json::{Value, json};
 use turns::{Answer, join_pool, serve, timed};
 
@@ -80,8 +80,9 @@ fn power() -> Answer<()> {
     let (chirps, bvh, regions) = (scan(&radar)?, Bvh::new(&mesh), vec![0; mesh.facets.len()]);
     let paint = builtin::get("mannequin-paint").ok_or("no such material")??.scattering()?;
     let surfaces = [Surface::new(&paint)];
-    let footprints = trace(&radar, &chirps, &bvh, 1, &|_| {})?;
-    let setup = Setup::new(&radar, &chirps, &bvh, &regions, &surfaces);
+    let geometry = ScanGeometry::new(&radar, &chirps, &bvh, &regions);
+    let footprints = trace(&geometry, 1, &|_| {})?;
+    let setup = Setup::new(geometry, &surfaces);
     serve(|| {
         let (power_ms, scan) = timed(|| shade(&setup, &footprints, Observer::Radar, &|_| {}));
         black_box(scan?);

@@ -391,8 +391,13 @@ impl Diagnosis {
             false => Vec::new(),
         };
         let sd_db = residual::speckle_sd_db(prediction.receiver.looks);
-        let neighbours =
-            residual::of_neighbours(&z_after, shots, stage.radar.spot_diameter_m, sd_db, &folds);
+        let neighbours = residual::of_neighbours(
+            &z_after,
+            shots,
+            stage.geometry.radar.spot_diameter_m,
+            sd_db,
+            &folds,
+        );
         if selection.is_shared(&neighbours, largest_db) {
             unexplained.push(neighbours);
         }

@@ -8,7 +8,7 @@ use crate::effects::{Effect, Receiver, Stage, middle};
 use crate::measure::Cloud;
 use crate::radar::{Link, Radar};
 use crate::scene::Scene;
-use crate::trace::Bvh;
+use crate::trace::{Bvh, ScanGeometry};
 use crate::units::watts_from_dbm;
 
 /// Looks of speckle that stand for a radar without any: a likelihood needs some spread.
@@ -44,10 +44,8 @@ impl MeasuredScene<'_> {
         let bvh = Bvh::new(&scene.target.mesh);
         let grain_of_region: Vec<_> = scene.target.regions.iter().map(|r| r.grain).collect();
         let mut stage = Stage {
-            radar,
+            geometry: ScanGeometry::new(radar, &scene.chirps, &bvh, &scene.target.region_of_facet),
             link: Link::new(radar),
-            bvh: &bvh,
-            region_of_facet: &scene.target.region_of_facet,
             grain_of_region: &grain_of_region,
             middle: glam::DVec3::ZERO,
         };

@@ -253,7 +253,7 @@ impl Selection<'_> {
         let z =
             residual::z(&prediction, problem.declared, problem.observations, self.settings.seed);
         let sd_db = speckle_sd_db(prediction.receiver.looks);
-        let spot_m = problem.stage.radar.spot_diameter_m;
+        let spot_m = problem.stage.geometry.radar.spot_diameter_m;
         residual::of_neighbours(&z, problem.shots, spot_m, sd_db, self.folds).strength_db
     }
 

@@ -16,7 +16,7 @@ use crate::measure::median_point;
 use crate::measure::nearest::Nearest;
 use crate::radar::{Chirps, Radar};
 use crate::render::{LocalFrame, trace};
-use crate::trace::Hit;
+use crate::trace::{Hit, ScanGeometry};
 
 /// What one chirp that should hit the target has seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -69,16 +69,17 @@ pub fn trace_shots(
     radar: &Radar,
     chirps: &Chirps,
 ) -> Result<Vec<Shot>, DiagnoseError> {
-    let footprints = trace(radar, chirps, stage.bvh, 1, &|_| {})?;
+    let footprints = trace(&ScanGeometry { radar, chirps, ..stage.geometry }, 1, &|_| {})?;
     let places: Vec<_> = chirps.target_points_m(&radar.frames()).collect();
     let progress = chirps.progress();
     let shot = |index: usize| {
         let hit = (*footprints.hits.get(index)?)?;
         let ray = *chirps.rays.get(index)?;
-        let region = stage.region_of_facet.get(hit.facet as usize).copied().unwrap_or(0);
+        let region = stage.geometry.region_of_facet.get(hit.facet as usize).copied().unwrap_or(0);
         let grain = stage.grain_of_region.get(usize::from(region)).copied();
         let back = -ray.direction.xyz();
-        let frame = LocalFrame::new(stage.bvh.mesh(), &hit, back, grain.unwrap_or(DVec3::Y));
+        let frame =
+            LocalFrame::new(stage.geometry.bvh.mesh(), &hit, back, grain.unwrap_or(DVec3::Y));
         let towards: Direction<_> = frame.local(back);
         let [x, y, _] = towards.xyz().to_array();
         let place = places.get(index)?;

@@ -11,7 +11,7 @@ use crate::geometry::Mesh;
 use crate::radar::random::{Key, Purpose};
 use crate::radar::{Link, Radar};
 use crate::scene::solids;
-use crate::trace::Bvh;
+use crate::trace::{Bvh, ScanGeometry};
 use crate::units::watts_from_dbm;
 
 const SIDE: usize = 56;
@@ -125,7 +125,8 @@ fn diagnosed_with(
 /// One region around the middle of the target.
 fn stage<'a>(radar: &'a Radar, bvh: &'a Bvh<'a>, region_of_facet: &'a [u16]) -> Stage<'a> {
     let (link, middle) = (Link::new(radar), DVec3::new(0.0, 1.1, 0.0));
-    Stage { radar, link, bvh, region_of_facet, grain_of_region: &[DVec3::Y], middle }
+    let geometry = ScanGeometry::new(radar, Box::leak(Box::default()), bvh, region_of_facet);
+    Stage { geometry, link, grain_of_region: &[DVec3::Y], middle }
 }
 
 /// The same, with all numbers of every effect.

@@ -46,7 +46,7 @@ fn grain(stage: &Stage, region: u16) -> DVec3 {
 
 /// The shot along another ray, at the closest hit of that ray; `None` where the ray misses.
 pub(super) fn shot_along(stage: &Stage, shot: &Shot, ray: Ray<Global>) -> Option<Shot> {
-    let hit = stage.bvh.closest(&ray)?;
+    let hit = stage.geometry.bvh.closest(&ray)?;
     Some(surface_at(stage, &ray, &hit).shot(shot, ray, hit))
 }
 
@@ -69,8 +69,8 @@ pub(super) struct Facet {
 
 impl Facet {
     pub(super) fn of(stage: &Stage, number: usize) -> Facet {
-        let region = stage.region_of_facet.get(number).copied().unwrap_or(0);
-        let (normal, grain) = (stage.bvh.mesh().area_normal(number), grain(stage, region));
+        let region = stage.geometry.region_of_facet.get(number).copied().unwrap_or(0);
+        let (normal, grain) = (stage.geometry.bvh.mesh().area_normal(number), grain(stage, region));
         let axes = normal.try_normalize().map(|normal| Axes::new(normal, grain));
         Facet { axes, grain, region }
     }

@@ -194,7 +194,7 @@ impl Model<'_> {
     pub(crate) fn placed(&self, stage: &Stage, shot: Shot) -> Option<Shot> {
         let Some(target) = self.target(stage, &shot) else { return Some(shot) };
         let ray = seen_from(&target, &shot.ray);
-        let hit = stage.bvh.closest(&ray)?;
+        let hit = stage.geometry.bvh.closest(&ray)?;
         Some(moved(stage, &shot, target, ray, hit).0)
     }
 
@@ -210,7 +210,7 @@ impl Model<'_> {
             .zip(&targets)
             .map(|(shot, target)| target.map_or(shot.ray, |target| seen_from(&target, &shot.ray)))
             .collect();
-        let hits = closest(stage.bvh, &rays);
+        let hits = closest(stage.geometry.bvh, &rays);
         (shots, &targets, &rays, &hits)
             .into_par_iter()
             .map(|(shot, target, ray, hit)| match *target {
@@ -254,7 +254,7 @@ impl Model<'_> {
         let hit = if self.effects.iter().any(|(effect, _)| effect.moves()) {
             self.placed(stage, Shot { ray, ..*shot })?.hit
         } else {
-            stage.bvh.closest(&ray)?
+            stage.geometry.bvh.closest(&ray)?
         };
         Some(hit.range_m)
     }

@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use crate::frames::{Global, Pose, Ray};
-use crate::radar::{Link, Radar};
-use crate::trace::{Bvh, Hit};
+use crate::radar::Link;
+use crate::trace::{Hit, ScanGeometry};
 
 /// One chirp that hits the target, as far as the scene knows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,14 +38,10 @@ pub struct Shot {
 /// What all shots of a scan share: the instrument and the target as the scene places it.
 #[derive(Clone, Copy)]
 pub struct Stage<'a> {
-    /// The instrument.
-    pub radar: &'a Radar,
-    /// Its power balance.
+    /// The instrument and its target.
+    pub geometry: ScanGeometry<'a>,
+    /// The instrument's power balance.
     pub link: Link,
-    /// The target as the scene places it.
-    pub bvh: &'a Bvh<'a>,
-    /// Region of every facet.
-    pub region_of_facet: &'a [u16],
     /// Direction of the grain of every region, global frame.
     pub grain_of_region: &'a [DVec3],
     /// The pivot of a pose, m, global frame: the [`middle`] of all shots of the scan, whichever of them are

@@ -9,9 +9,9 @@ use super::{
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
 use crate::frames::{Point, Pose, Ray};
 use crate::geometry::Mesh;
-use crate::radar::{Link, Radar};
+use crate::radar::{Chirps, Link, Radar};
 use crate::scene::solids;
-use crate::trace::{Bvh, Hit};
+use crate::trace::{Bvh, Hit, ScanGeometry};
 
 /// Decibels of a ratio.
 pub(super) fn db(ratio: f64) -> f64 {
@@ -42,6 +42,7 @@ pub(super) fn paint(lobe: CookTorrance) -> Brdf {
 pub(super) struct Bench {
     bvh: Bvh<'static>,
     radar: Radar,
+    chirps: Chirps,
     regions: Vec<u16>,
     law: Brdf,
     pub shots: Vec<Shot>,
@@ -67,7 +68,8 @@ impl Bench {
         let mesh: &'static Mesh = Box::leak(Box::new(mesh));
         let regions = vec![0; mesh.facets.len()];
         let (bvh, radar, shots) = (Bvh::new(mesh), Radar::default(), Vec::new());
-        let mut bench = Bench { bvh, radar, regions, law: paint(lobe()), shots };
+        let chirps = Chirps::default();
+        let mut bench = Bench { bvh, radar, chirps, regions, law: paint(lobe()), shots };
         let shots = (0..SIDE * SIDE).filter_map(|chirp| shot(&bench.stage(), chirp)).collect();
         bench.shots = shots;
         bench
@@ -75,10 +77,8 @@ impl Bench {
 
     pub(super) fn stage(&self) -> Stage<'_> {
         Stage {
-            radar: &self.radar,
+            geometry: ScanGeometry::new(&self.radar, &self.chirps, &self.bvh, &self.regions),
             link: Link::new(&self.radar),
-            bvh: &self.bvh,
-            region_of_facet: &self.regions,
             grain_of_region: &GRAIN,
             middle: middle(&self.shots),
         }

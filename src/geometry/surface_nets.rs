@@ -83,8 +83,9 @@ pub fn by_blocks<T: Copy + Default + Send, F: Fn(DVec3) -> T>(
     side_m: f64,
     in_ball: impl Fn(DVec3, f64) -> F + Sync,
 ) -> Vec<T> {
-    let block = |point_m: &DVec3| (point_m / side_m).floor().to_array().map(|x| x as i64);
-    let mut sorted: Vec<([i64; 3], u32)> = points_m.iter().map(block).zip(0..).collect();
+    let places = points_m.iter().map(|point_m| (point_m / side_m).floor());
+    let mut sorted: Vec<([i64; 3], u32)> =
+        places.map(|place| place.to_array().map(|x| x as i64)).zip(0..).collect();
     sorted.par_sort_unstable();
     let blocks: Vec<&[([i64; 3], u32)]> = sorted.chunk_by(|a, b| a.0 == b.0).collect();
     let values = |points: &&[([i64; 3], u32)]| {
@@ -209,11 +210,11 @@ impl Lattice {
         let [sx, sy, sz] = self.strides();
         let offsets = [0, 1, 2, 3, 4, 5, 6, 7usize]
             .map(|corner| (corner & 1) * sx + (corner >> 1 & 1) * sy + (corner >> 2) * sz);
-        let vertex = |&(cell, index): &Crossed| {
+        let vertices = crossed.par_iter().map(|&(cell, index)| {
             let corners_m = offsets.map(|offset| distances_m[index + offset]);
             self.position_m(cell) + self.cell_m * mean_crossing(&corners_m)
-        };
-        crossed.par_iter().map(vertex).collect()
+        });
+        vertices.collect()
     }
 
     /// A quad around every crossed lattice edge, right-handed about the outward direction.

@@ -49,7 +49,7 @@ pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
             range_m: point.range_m.unwrap_or(origin.distance_m(point.point)),
             xt_m: in_target.xyz.x,
             yt_m: in_target.xyz.y,
-            power_dbm: dbm_from_watts(point.power_w),
+            power_w: point.power_w,
             truth: None,
         });
     }
@@ -57,8 +57,8 @@ pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
         chirps: chirps.rays.len(),
         hits: cloud.points().len(),
         echoes,
-        threshold_dbm: f64::NEG_INFINITY,
-        noise_dbm: None,
+        threshold_w: 0.0,
+        noise_w: None,
     }
 }
 
@@ -103,7 +103,7 @@ pub fn power_along(scan: &Scan, line: Line) -> Vec<(f64, f64)> {
     let mut points: Vec<(f64, f64)> = scan
         .detections()
         .filter(|echo| within(echo.point))
-        .map(|echo| (echo.point.xyz.x, echo.power_dbm))
+        .map(|echo| (echo.point.xyz.x, dbm_from_watts(echo.power_w)))
         .collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     points

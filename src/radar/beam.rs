@@ -8,43 +8,10 @@
 
 use std::f64::consts::{LN_2, PI};
 
-use serde::{Deserialize, Serialize};
-
-use super::Radar;
-use super::preset::Check;
 use super::scan::PATTERN_RANGE_M;
+use super::settings::{BeamEntry, Radar};
 use crate::frames::{Global, Point, Pose, Ray, Target};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
-
-/// How the spot grows, as scene files write it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct BeamEntry {
-    /// Range at which the beam is focused, m. 8: paper.
-    pub focus_m: f64,
-    /// Diameter at `edge_m` from the centre of the field of view, over the one at the centre, at
-    /// the focus. 1.5: assumed.
-    pub edge_growth: f64,
-    /// Distance from the centre at which it has grown so, m. 0.5: assumed, about the corner of the
-    /// paper's field of view.
-    pub edge_m: f64,
-}
-
-impl Default for BeamEntry {
-    fn default() -> Self {
-        BeamEntry { focus_m: 8.0, edge_growth: 1.5, edge_m: 0.5 }
-    }
-}
-
-impl BeamEntry {
-    pub(super) fn checks(&self) -> Vec<Check> {
-        vec![
-            ("beam.focus_m", self.focus_m, (1e-3, 1e4)),
-            ("beam.edge_growth", self.edge_growth, (0.1, 100.0)),
-            ("beam.edge_m", self.edge_m, (1e-3, 1e3)),
-        ]
-    }
-}
 
 /// The beam of a radar.
 #[derive(Clone, Copy, Debug, PartialEq)]

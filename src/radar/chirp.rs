@@ -17,8 +17,7 @@ use num_complex::Complex;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::RadarError;
-use super::preset::in_range;
+use super::error::{RadarError, in_range};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// One sweep and its sampling.

@@ -7,8 +7,8 @@
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
+use super::error::F5Error;
 use super::mirror::{Mirror, MirrorAngles};
 
 /// Total degree of the polynomial.
@@ -62,31 +62,6 @@ pub struct FitError {
     pub worst_mm: f64,
     /// Root of the mean square, mm.
     pub rms_mm: f64,
-}
-
-/// Why optics have no polynomial.
-#[derive(Debug, Error, PartialEq)]
-pub enum F5Error {
-    /// The beam leaves backwards somewhere in the domain.
-    #[error(
-        "the beam misses the target plane at γ = {gamma_rad} rad, φ = {phi_rad} rad; reduce the \
-         field of view or raise radar.optics.angular_magnification"
-    )]
-    NoBeam {
-        /// Tilt, rad.
-        gamma_rad: f64,
-        /// Rotation, rad.
-        phi_rad: f64,
-    },
-    /// Own coefficients that do not make a polynomial.
-    #[error("radar.f5: {problem}; `matdb radar` writes a complete table to start from")]
-    Own {
-        /// What is wrong.
-        problem: &'static str,
-    },
-    /// The equations have no solution.
-    #[error("no polynomial fits the optics; check radar.optics and the size of the scan")]
-    Singular,
 }
 
 impl F5 {

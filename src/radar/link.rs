@@ -4,21 +4,8 @@
 //! P_r = P_t · A_eq/(4πR²) · σ⁰(θ), and with (10) it becomes equation (11):
 //! P_r = P_t · (A_eq/R²) · f(θ) · cos²θ.
 
-use serde::{Deserialize, Serialize};
-
-use super::Radar;
+use super::settings::{Footprint, Radar};
 use crate::units::{ratio_from_db, watts_from_dbm};
-
-/// How a tilted surface spreads the spot.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Footprint {
-    /// Equation (11) as the paper has it, with cos²θ.
-    #[default]
-    Paper,
-    /// The lit area grows as 1/cos θ, which leaves cos θ once.
-    Projected,
-}
 
 /// Everything in equation (11) that belongs to the instrument and not to the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

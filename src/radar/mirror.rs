@@ -9,7 +9,7 @@
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::preset::Check;
+use super::error::Check;
 use crate::frames::{Direction, Point, Ray, Target};
 
 /// The scanning optics, as scene files write them.
@@ -109,11 +109,11 @@ impl Mirror {
     /// Tangents of the outgoing direction, to the right and upwards, after the reflectors.
     fn outgoing(&self, angles: MirrorAngles) -> [f64; 2] {
         let wave = self.reflected(angles);
-        let magnify = |tangent: f64, offset_deg: f64| {
-            tangent * self.optics.angular_magnification + offset_deg.to_radians().tan()
-        };
-        let [right_deg, up_deg] = self.optics.offset_deg;
-        [magnify(wave.x / -wave.z, right_deg), magnify(wave.y / -wave.z, up_deg)]
+        let Optics { angular_magnification, offset_deg, .. } = self.optics;
+        let tangents = [wave.x / -wave.z, wave.y / -wave.z];
+        [0, 1].map(|axis| {
+            tangents[axis] * angular_magnification + offset_deg[axis].to_radians().tan()
+        })
     }
 
     /// The law of reflection. The undeflected wave leaves along −z, x to the right and y up.

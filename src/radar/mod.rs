@@ -1,26 +1,33 @@
 //! The instrument: its constants, where its rays go, and how much power comes back.
 
 pub mod beam;
+mod check;
 pub mod chirp;
+mod error;
 pub mod f5;
+mod frames;
 pub mod link;
 pub mod mirror;
 pub mod noise;
-pub mod preset;
+mod preset;
 pub mod random;
 pub mod receiver;
 pub mod scan;
+mod settings;
 pub mod speckle;
 pub mod window;
 
 pub use beam::Beam;
 pub use chirp::{Aliased, Chirp, ChirpEntry, Return};
+pub use error::{F5Error, RadarError};
 pub use f5::F5;
-pub use link::{Footprint, Link};
+pub use frames::RadarFrames;
+pub use link::Link;
 pub use mirror::{Mirror, MirrorAngles, Optics};
 pub use noise::Noise;
-pub use preset::{Radar, RadarError, RadarFrames};
+pub use preset::PRESETS;
 pub use receiver::{Detection, RangeProcessor, Receiver};
 pub use scan::{Chirps, Field, Pattern};
+pub use settings::{BeamEntry, Footprint, Radar};
 pub use speckle::Speckle;
 pub use window::Window;

@@ -7,8 +7,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::RadarError;
-use super::preset::in_range;
+use super::error::{RadarError, in_range};
 use super::random::Draws;
 use super::speckle::Speckle;
 

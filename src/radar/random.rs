@@ -79,8 +79,8 @@ impl Draws {
 
     /// A circular complex Gaussian of zero mean and unit variance: E|z|² = 1.
     pub fn complex_gaussian(&mut self) -> Complex<f64> {
-        let mut part = || -> f64 { StandardNormal.sample(&mut self.generator) };
-        Complex::new(part(), part()) * std::f64::consts::FRAC_1_SQRT_2
+        let (re, im) = (self.gaussian(), self.gaussian());
+        Complex::new(re, im) * std::f64::consts::FRAC_1_SQRT_2
     }
 
     /// A Gaussian of zero mean and unit variance.

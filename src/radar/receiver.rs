@@ -21,10 +21,10 @@ use num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 use serde::{Deserialize, Serialize};
 
-use super::preset::in_range;
+use super::chirp::Chirp;
+use super::error::{RadarError, in_range};
 use super::random::Draws;
 use super::window::{self, Window};
-use super::{Chirp, RadarError};
 use crate::units::{ratio_from_db, watts_from_dbm};
 
 /// Boltzmann's constant, J/K; exact.
@@ -223,11 +223,11 @@ impl RangeProcessor {
 
     fn strongest_peak(&self, profile_w: &[f64]) -> Option<usize> {
         let [first, last] = self.gate_bins;
-        let is_peak = |&k: &usize| {
+        let peaks = (first..=last).filter(|&k| {
             let [before, after] = neighbours(profile_w, k);
             profile_w[k] >= before && profile_w[k] > after
-        };
-        (first..=last).filter(is_peak).max_by(|&a, &b| profile_w[a].total_cmp(&profile_w[b]))
+        });
+        peaks.max_by(|&a, &b| profile_w[a].total_cmp(&profile_w[b]))
     }
 
     /// Top of the parabola through the logarithms of a peak and its neighbours.

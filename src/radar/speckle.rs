@@ -9,8 +9,7 @@
 use num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
-use super::RadarError;
-use super::preset::in_range;
+use super::error::{RadarError, in_range};
 use super::random::Draws;
 
 /// Statistics of a speckled return. The default is fully developed speckle in a single look.

@@ -40,12 +40,13 @@ impl Window {
 
     /// The samples w_n for n from 0 to `count` − 1; of period `count`, as a Fourier transform wants.
     pub fn samples(self, count: usize) -> Vec<f64> {
-        let sample = |n: usize| -> f64 {
-            let angle_rad = TAU * n as f64 / count as f64;
-            let terms = self.coefficients().iter().enumerate();
-            terms.map(|(k, a)| a * (k as f64 * (angle_rad + PI)).cos()).sum()
-        };
-        (0..count).map(sample).collect()
+        (0..count).map(|n| self.sample(TAU * n as f64 / count as f64)).collect()
+    }
+
+    /// Σ (−1)ᵏ a_k cos(kα) at the angle α = 2πn/N, rad.
+    fn sample(self, angle_rad: f64) -> f64 {
+        let terms = self.coefficients().iter().enumerate();
+        terms.map(|(k, a)| a * (k as f64 * (angle_rad + PI)).cos()).sum()
     }
 
     /// Full width of the main lobe at half power, in bins, for many samples.
@@ -64,10 +65,18 @@ impl Window {
 
     /// Fourier transform of the centred window at an offset in bins.
     fn transform(self, bins: f64) -> f64 {
-        let sinc = |u: f64| if u == 0.0 { 1.0 } else { (PI * u).sin() / (PI * u) };
-        let shifted = |k: f64| 0.5 * (sinc(bins - k) + sinc(bins + k));
-        self.coefficients().iter().enumerate().map(|(k, a)| a * shifted(k as f64)).sum()
+        let mut sum = 0.0;
+        for (k, a) in self.coefficients().iter().enumerate() {
+            let k = k as f64;
+            sum += a * (0.5 * (sinc(bins - k) + sinc(bins + k)));
+        }
+        sum
     }
+}
+
+/// sin(πu)/(πu).
+fn sinc(u: f64) -> f64 {
+    if u == 0.0 { 1.0 } else { (PI * u).sin() / (PI * u) }
 }
 
 /// Mean of the window's samples: the amplitude that a tone at a bin's centre keeps.
@@ -84,12 +93,14 @@ pub fn noise_bandwidth_bins(samples: &[f64]) -> f64 {
 /// Variance of n/N under the weight w_n²: how far in time the window spreads its energy. It sets
 /// how quickly the spectrum of noise changes from bin to bin.
 pub fn energy_spread(samples: &[f64]) -> f64 {
-    let moment = |power: i32| -> f64 {
-        let place = |n: usize| (n as f64 / samples.len() as f64).powi(power);
-        samples.iter().enumerate().map(|(n, w)| w * w * place(n)).sum()
-    };
-    let [energy, first, second] = [0, 1, 2].map(moment);
+    let [energy, first, second] = [0, 1, 2].map(|power| moment(samples, power));
     second / energy - (first / energy).powi(2)
+}
+
+/// Σ w_n² (n/N)^power.
+fn moment(samples: &[f64], power: i32) -> f64 {
+    let terms = samples.iter().enumerate();
+    terms.map(|(n, w)| w * w * (n as f64 / samples.len() as f64).powi(power)).sum()
 }
 
 #[cfg(test)]

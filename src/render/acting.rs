@@ -9,10 +9,12 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::error::RenderError;
+use super::observer::Observer;
 use super::path::Path;
-use super::spot::Footprints;
-use super::surface::LocalFrame;
-use super::{Observer, RenderError, Setup};
+use super::setup::Setup;
+use super::spot::{Footprints, Intersection};
+use super::surface::{Facing, LocalFrame};
 use crate::brdf::Scattering;
 use crate::effects::{
     Conflict, Level, MeanEcho, Model, PredictionCache, Receiver, Setting, Shot, Stage, middle,
@@ -21,19 +23,7 @@ use crate::effects::{
 use crate::frames::{Direction, Global, Point, Pose, Ray, Surface};
 use crate::radar::Link;
 use crate::radar::random::{Key, Purpose};
-use crate::trace::Hit;
-
-/// How the surface lies where a ray meets a target that effects have moved.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Facing {
-    /// Unit normal, towards the radar.
-    pub normal: DVec3,
-    /// Azimuth of the radar about it, from the grain of the region, rad.
-    pub azimuth_rad: f64,
-}
-
-/// What a ray meets, and how it lies where it was moved.
-pub(super) type Meeting = (Option<Hit>, Option<Facing>);
+use crate::trace::{Hit, ScanGeometry};
 
 /// The model of a setup, made ready for its scan.
 pub(super) struct Acting<'a> {
@@ -61,14 +51,14 @@ impl<'a> Acting<'a> {
             setup: *setup,
             model,
             bare: Model { effects: Vec::new(), ..model.clone() },
-            link: Link::new(setup.radar),
+            link: Link::new(setup.geometry.radar),
             grain_of_region: setup.surfaces.iter().map(|surface| surface.grain).collect(),
             middle: DVec3::ZERO,
-            places: setup.chirps.target_points_m(&setup.radar.frames()).collect(),
-            progress: setup.chirps.progress(),
+            places: setup.geometry.chirps.target_points_m(&setup.geometry.radar.frames()).collect(),
+            progress: setup.geometry.chirps.progress(),
             receiver: model.received(),
         };
-        acting.middle = middle(&acting.looks());
+        acting.middle = middle(&acting.shots());
         Some(acting)
     }
 
@@ -78,11 +68,11 @@ impl<'a> Acting<'a> {
     }
 
     /// What a ray of a chirp meets, from what it hits where the scene has the target.
-    pub fn meet(&self, chirp: usize, ray: &Ray<Global>, hit: Option<Hit>) -> Meeting {
+    pub fn meet(&self, chirp: usize, ray: &Ray<Global>, hit: Option<Hit>) -> Intersection {
         // A ray that misses may still meet a target that has moved.
-        let look = hit.map_or(self.blank(chirp, *ray), |hit| self.look(chirp, *ray, hit, None));
-        match self.model.placed(&self.stage(), look) {
-            Some(placed) if placed == look => (hit, None),
+        let shot = hit.map_or(self.blank(chirp, *ray), |hit| self.shot(chirp, *ray, hit, None));
+        match self.model.placed(&self.stage(), shot) {
+            Some(placed) if placed == shot => (hit, None),
             Some(Shot { hit, normal, azimuth_rad, .. }) if hit.facet != NOWHERE => {
                 (Some(hit), Some(Facing { normal, azimuth_rad }))
             }
@@ -99,16 +89,16 @@ impl<'a> Acting<'a> {
         facing: Option<Facing>,
         tilts: [f64; 2],
     ) -> Path {
-        let (stage, look) = (self.stage(), self.seen(chirp, rays, path.hit, facing));
-        let power_w = |model: &Model, look: &Shot| model.arrived(&stage, look).power_w;
-        let with_w = tilted(&look, tilts).map_or(0.0, |look| power_w(self.model, &look));
+        let (stage, shot) = (self.stage(), self.seen(chirp, rays, path.hit, facing));
+        let with_w =
+            tilted(&shot, tilts).map_or(0.0, |shot| self.model.arrived(&stage, &shot).power_w);
         let Some(Facing { azimuth_rad, .. }) = facing else {
             // Where nothing acts, not even rounding may differ.
-            let same = with_w == power_w(&self.bare, &look);
+            let same = with_w == self.bare.arrived(&stage, &shot).power_w;
             return if same { path } else { Path { power_w: with_w / rays as f64, ..path } };
         };
-        let retro = Direction::<Surface>::from_angles(look.hit.theta_rad(), azimuth_rad);
-        let law = self.model.laws.get(usize::from(look.region));
+        let retro = Direction::<Surface>::from_angles(shot.hit.theta_rad(), azimuth_rad);
+        let law = self.model.laws.get(usize::from(shot.region));
         let specular_share = law.map_or(0.0, |law| law.specular_share(retro, retro));
         Path { power_w: with_w / rays as f64, azimuth_rad, specular_share, ..path }
     }
@@ -121,9 +111,9 @@ impl<'a> Acting<'a> {
         hit: Hit,
         facing: Option<Facing>,
     ) -> f64 {
-        let (stage, look) = (self.stage(), self.seen(chirp, rays, hit, facing));
+        let (stage, shot) = (self.stage(), self.seen(chirp, rays, hit, facing));
         let instrument = self.model.effects.iter().filter(|(e, _)| e.level() == Level::Instrument);
-        instrument.map(|(effect, values)| effect.gain(values, &stage, &look)).product()
+        instrument.map(|(effect, values)| effect.gain(values, &stage, &shot)).product()
     }
 
     /// Tangents of the two tilts of the normals under a chirp.
@@ -143,22 +133,15 @@ impl<'a> Acting<'a> {
         footprints: &Footprints,
         sums: Vec<Option<MeanEcho>>,
     ) -> Vec<Option<Change>> {
-        let first = |chirp: usize| {
-            let hits = footprints.hits.iter().zip(0..).skip(chirp * footprints.rays_per_chirp);
-            let mut hits = hits.take(footprints.rays_per_chirp);
-            let (hit, index) = hits.find_map(|(hit, index)| Some(((*hit)?, index)))?;
-            let facing = footprints.facings.get::<usize>(index).copied().flatten();
-            Some(self.seen(chirp, footprints.rays_per_chirp, hit, facing))
-        };
         let chirps: Vec<(usize, Shot, MeanEcho)> = sums
             .iter()
             .enumerate()
-            .filter_map(|(chirp, sum)| Some((chirp, first(chirp)?, (*sum)?)))
+            .filter_map(|(chirp, sum)| Some((chirp, self.first_shot(footprints, chirp)?, (*sum)?)))
             .collect();
-        let looks: Vec<Shot> = chirps.iter().map(|(_, look, _)| *look).collect();
+        let shots: Vec<Shot> = chirps.iter().map(|(_, shot, _)| *shot).collect();
         let mut after: Vec<Option<MeanEcho>> =
             chirps.iter().map(|(_, _, sum)| Some(*sum)).collect();
-        self.model.arrive(&self.stage(), &looks, &PredictionCache::default(), &mut after);
+        self.model.arrive(&self.stage(), &shots, &PredictionCache::default(), &mut after);
         let mut changes = vec![None; sums.len()];
         for ((chirp, _, before), after) in chirps.into_iter().zip(after.into_iter().flatten()) {
             changes[chirp] = (before != after).then_some(Change { before, after });
@@ -166,43 +149,51 @@ impl<'a> Acting<'a> {
         changes
     }
 
+    /// The first ray of a chirp that meets the target.
+    fn first_shot(&self, footprints: &Footprints, chirp: usize) -> Option<Shot> {
+        let hits = footprints.hits.iter().zip(0..).skip(chirp * footprints.rays_per_chirp);
+        let mut hits = hits.take(footprints.rays_per_chirp);
+        let (hit, index) = hits.find_map(|(hit, index)| Some(((*hit)?, index)))?;
+        let facing = footprints.facings.get::<usize>(index).copied().flatten();
+        Some(self.seen(chirp, footprints.rays_per_chirp, hit, facing))
+    }
+
     fn stage(&self) -> Stage<'_> {
         Stage {
-            radar: self.setup.radar,
+            geometry: self.setup.geometry,
             link: self.link,
-            bvh: self.setup.bvh,
-            region_of_facet: self.setup.region_of_facet,
             grain_of_region: &self.grain_of_region,
             middle: self.middle,
         }
     }
 
-    /// One look for every chirp whose axis meets the target as the scene has it.
-    fn looks(&self) -> Vec<Shot> {
-        let look = |(chirp, ray): (usize, &Ray<Global>)| {
-            Some(self.look(chirp, *ray, self.setup.bvh.closest(ray)?, None))
-        };
-        self.setup.chirps.rays.par_iter().enumerate().filter_map(look).collect()
+    /// One shot for every chirp whose axis meets the target where the scene places it.
+    fn shots(&self) -> Vec<Shot> {
+        let ScanGeometry { chirps, bvh, .. } = self.setup.geometry;
+        let rays = chirps.rays.par_iter().enumerate();
+        let shots =
+            rays.filter_map(|(chirp, ray)| Some(self.shot(chirp, *ray, bvh.closest(ray)?, None)));
+        shots.collect()
     }
 
     /// A ray of a chirp where it was traced to.
     fn seen(&self, chirp: usize, rays: usize, hit: Hit, facing: Option<Facing>) -> Shot {
-        let axis = self.setup.chirps.rays[chirp];
+        let axis = self.setup.geometry.chirps.rays[chirp];
         let ray = match axis.origin.towards(hit.point) {
             Some(direction) if rays > 1 => Ray { direction, ..axis },
             _ => axis,
         };
-        let look = self.look(chirp, ray, hit, facing);
-        let moved = facing.and_then(|_| self.model.target(&self.stage(), &look));
-        Shot { target: moved.unwrap_or(look.target), ..look }
+        let shot = self.shot(chirp, ray, hit, facing);
+        let moved = facing.and_then(|_| self.model.target(&self.stage(), &shot));
+        Shot { target: moved.unwrap_or(shot.target), ..shot }
     }
 
-    fn look(&self, chirp: usize, ray: Ray<Global>, hit: Hit, facing: Option<Facing>) -> Shot {
-        let region = self.setup.region_of_facet[hit.facet as usize];
+    fn shot(&self, chirp: usize, ray: Ray<Global>, hit: Hit, facing: Option<Facing>) -> Shot {
+        let region = self.setup.geometry.region_of_facet[hit.facet as usize];
         let Facing { normal, azimuth_rad } = facing.unwrap_or_else(|| {
             let back = -ray.direction.xyz();
             let grain = self.grain_of_region[usize::from(region)];
-            let frame = LocalFrame::new(self.setup.bvh.mesh(), &hit, back, grain);
+            let frame = LocalFrame::new(self.setup.geometry.bvh.mesh(), &hit, back, grain);
             let [x, y, _] = frame.local(back).xyz().to_array();
             Facing { normal: frame.normal, azimuth_rad: y.atan2(x) }
         });
@@ -211,7 +202,7 @@ impl<'a> Acting<'a> {
 
     /// A ray that has met nothing.
     fn blank(&self, chirp: usize, ray: Ray<Global>) -> Shot {
-        let chirps = self.setup.chirps;
+        let chirps = self.setup.geometry.chirps;
         Shot {
             chirp: chirps.number[chirp],
             time_s: chirps.time_s[chirp],
@@ -247,23 +238,24 @@ impl Change {
         let Change { before, after } = *self;
         let count = paths.len().max(1) as f64;
         for path in paths {
-            path.power_w = match before.power_w > 0.0 {
-                true => path.power_w * (after.power_w / before.power_w),
-                false => after.power_w / count,
+            path.power_w = if before.power_w > 0.0 {
+                path.power_w * (after.power_w / before.power_w)
+            } else {
+                after.power_w / count
             };
             path.range_m += after.range_m - before.range_m;
         }
     }
 }
 
-/// The look with its normal tilted in the plane of incidence and across it; `None` where the facet
+/// The shot with its normal tilted in the plane of incidence and across it; `None` where the facet
 /// then shows its back.
-fn tilted(look: &Shot, [along, across]: [f64; 2]) -> Option<Shot> {
+fn tilted(shot: &Shot, [along, across]: [f64; 2]) -> Option<Shot> {
     if along == 0.0 && across == 0.0 {
-        return Some(*look);
+        return Some(*shot);
     }
-    let cos_theta = tilted_cos_theta(look.hit.theta_rad(), [along, across])?;
-    Some(Shot { hit: Hit { cos_theta, ..look.hit }, ..*look })
+    let cos_theta = tilted_cos_theta(shot.hit.theta_rad(), [along, across])?;
+    Some(Shot { hit: Hit { cos_theta, ..shot.hit }, ..*shot })
 }
 
 /// Refuses what would be counted twice, and effects at another antenna.
@@ -281,7 +273,7 @@ pub(super) fn check(setup: &Setup, rays: usize, observer: Observer) -> Result<()
         let conflict = effect.conflicts.iter().find(|conflict| match conflict.with {
             Setting::SeveralRays => rays > 1,
             Setting::Bounce => setup.bounce.is_some(),
-            Setting::RangeReceiver => setup.radar.receiver.is_some(),
+            Setting::RangeReceiver => setup.geometry.radar.receiver.is_some(),
         });
         if let Some(&Conflict { problem, way_out, .. }) = conflict {
             return Err(RenderError::Effect { effect: effect.name, problem, way_out });

@@ -15,13 +15,17 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::detect::Detector;
+use super::error::RenderError;
+use super::observer::Observer;
+use super::setup::Setup;
 use super::spot::{self, Spot};
-use super::surface::LocalFrame;
-use super::{Observer, RenderError, Setup, Surface};
+use super::surface::{LocalFrame, Surface};
 use crate::frames::{Global, Pose, Ray};
 use crate::geometry::Mesh;
-use crate::radar::{Beam, Chirps, Detection, Footprint, Link, Radar};
-use crate::trace::{Bvh, Cone, GpuError, Hit, Lit, RAYS_PER_SHARE, Share, TraceError, Tracer};
+use crate::radar::{Beam, Detection, Footprint, Link};
+use crate::trace::{
+    Cone, EchoTracer, GpuError, Hit, RAYS_PER_SHARE, ScanGeometry, Share, TraceError, Tracer,
+};
 
 /// Rays that are worked on at once: enough for a device, few enough to hold what each meets.
 const RAYS_PER_TURN: usize = 1 << 20;
@@ -32,16 +36,8 @@ const OPEN: Share = Share { open: u32::MAX, per_sr_m2: 0.0, per_sr_m: 0.0 };
 /// What all scans of a batch have in common. Single paths to the radar's own antenna, without effects.
 #[derive(Clone, Copy)]
 pub struct Batch<'a> {
-    /// The instrument.
-    pub radar: &'a Radar,
-    /// The rays of each scan.
-    pub chirps: &'a Chirps,
-    /// The target.
-    pub bvh: &'a Bvh<'a>,
-    /// How rays find it. [`Tracer::Gpu`] works out what they bring back, too.
-    pub tracer: Tracer<'a>,
-    /// Region of every facet, an index into the surfaces of a scan.
-    pub region_of_facet: &'a [u16],
+    /// The instrument, the chirps of each scan and the target. [`Tracer::Gpu`] computes the echoes, too.
+    pub geometry: ScanGeometry<'a>,
     /// Rays per chirp, one or more.
     pub rays_per_chirp: usize,
 }
@@ -76,18 +72,18 @@ impl Batch<'_> {
     /// When the radar has a receiver that works on beat signals, the tracer does not take the rays, or the graphics
     /// processor holds another mesh, stops working or has no room for what the scans bring along.
     pub fn run(&self, takes: &[Take]) -> Result<Takes, RenderError> {
-        if self.radar.receiver.is_some() {
+        if self.geometry.radar.receiver.is_some() {
             return Err(RenderError::Signals);
         }
         let work = Work::new(self, takes)?;
-        let chirps = self.chirps.rays.len();
+        let chirps = self.geometry.chirps.rays.len();
         let (all, turn) = (chirps * takes.len(), (RAYS_PER_TURN / work.rays).max(1));
         let mut means = Vec::with_capacity(all);
         let mut rays_on_processor = 0;
         while means.len() < all {
             let first = means.len();
             // In the mesh's frame each scan has an origin of its own, and the pinhole takes one.
-            let end = match self.tracer {
+            let end = match self.geometry.tracer {
                 Tracer::Automatic | Tracer::Pinhole => (first / chirps + 1) * chirps,
                 Tracer::Bvh | Tracer::Brute | Tracer::Gpu(_) => all,
             };
@@ -108,14 +104,10 @@ impl Batch<'_> {
         take: &Take,
         means: &[Option<Detection>],
     ) -> Result<Vec<Option<Detection>>, RenderError> {
-        let Batch { radar, chirps, bvh, region_of_facet, .. } = *self;
-        let setup = Setup::new(radar, chirps, bvh, region_of_facet, take.surfaces);
-        let setup = Setup { seed: take.seed, ..setup };
+        let setup = Setup { seed: take.seed, ..Setup::new(self.geometry, take.surfaces) };
         let detector = Detector::new(&setup, Observer::Radar, None)?;
-        let received = |(chirp, mean): (usize, &Option<Detection>)| {
-            mean.map(|mean| detector.measured(chirp, mean))
-        };
-        Ok(means.par_iter().enumerate().map(received).collect())
+        let means = means.par_iter().enumerate();
+        Ok(means.map(|(chirp, mean)| mean.map(|mean| detector.measured(chirp, mean))).collect())
     }
 }
 
@@ -130,7 +122,7 @@ struct Work<'a> {
     rays: usize,
     /// Laws of one scan on the device.
     regions: usize,
-    lit: Option<Lit<'a>>,
+    lit: Option<EchoTracer<'a>>,
 }
 
 impl<'a> Work<'a> {
@@ -139,14 +131,19 @@ impl<'a> Work<'a> {
             batch,
             takes,
             mesh_from_world: takes.iter().map(|take| take.target.inverse()).collect(),
-            link: Link::new(batch.radar),
-            beam: Beam::new(batch.radar),
+            link: Link::new(batch.geometry.radar),
+            beam: Beam::new(batch.geometry.radar),
             rays: batch.rays_per_chirp.max(1),
-            regions: batch.region_of_facet.iter().max().map_or(0, |&last| usize::from(last) + 1),
+            regions: batch
+                .geometry
+                .region_of_facet
+                .iter()
+                .max()
+                .map_or(0, |&last| usize::from(last) + 1),
             lit: None,
         };
-        if let Tracer::Gpu(held) = batch.tracer {
-            if !std::ptr::eq(held.bvh(), batch.bvh) {
+        if let Tracer::Gpu(held) = batch.geometry.tracer {
+            if !std::ptr::eq(held.bvh(), batch.geometry.bvh) {
                 return Err(failed(GpuError::OtherMesh));
             }
             let law = |take: &Take, region: usize| match take.surfaces.get(region) {
@@ -162,7 +159,7 @@ impl<'a> Work<'a> {
                 Footprint::Paper => 2.0,
                 Footprint::Projected => 1.0,
             };
-            let lit = held.lit(batch.region_of_facet, &laws, cosines, &samples);
+            let lit = held.lit(batch.geometry.region_of_facet, &laws, cosines, &samples);
             work.lit = Some(lit.map_err(failed)?);
         }
         Ok(work)
@@ -182,22 +179,24 @@ impl<'a> Work<'a> {
             }
         };
         let open = self.open(some.start, &spots, &shares);
-        // Power, and power times range.
-        let of_device = |shares: &[Share]| {
-            let per_sr_m2: f64 = shares.iter().map(|share| share.per_sr_m2).sum();
-            let per_sr_m: f64 = shares.iter().map(|share| share.per_sr_m).sum();
-            [per_sr_m2, per_sr_m].map(|sum| self.link.power_w(1.0, 1.0, sum))
-        };
-        let mut sums: Vec<[f64; 2]> = shares.chunks(per_chirp).map(of_device).collect();
+        let mut sums: Vec<[f64; 2]> =
+            shares.chunks(per_chirp).map(|shares| self.power_and_moment(shares)).collect();
         for (place, echo) in self.on_processor(some.start, &open)? {
             sums[place][0] += echo.power_w;
             sums[place][1] += echo.power_w * echo.range_m;
         }
-        let mean = |[power_w, moment]: [f64; 2]| {
+        let means = sums.into_iter().map(|[power_w, moment]| {
             let mean = Detection { range_m: moment / power_w, power_w: power_w / self.rays as f64 };
             (power_w > 0.0).then_some(mean)
-        };
-        Ok((sums.into_iter().map(mean).collect(), open.len()))
+        });
+        Ok((means.collect(), open.len()))
+    }
+
+    /// Power, W, and power times range, W·m, of what the device has of a chirp.
+    fn power_and_moment(&self, shares: &[Share]) -> [f64; 2] {
+        let per_sr_m2: f64 = shares.iter().map(|share| share.per_sr_m2).sum();
+        let per_sr_m: f64 = shares.iter().map(|share| share.per_sr_m).sum();
+        [per_sr_m2, per_sr_m].map(|sum| self.link.power_w(1.0, 1.0, sum))
     }
 
     /// The rays that are left open, each of a chirp so many after the first.
@@ -221,21 +220,21 @@ impl<'a> Work<'a> {
         first: usize,
         rays: &[(usize, Ray<Global>)],
     ) -> Result<Vec<(usize, Detection)>, RenderError> {
-        let Batch { tracer, bvh, .. } = *self.batch;
+        let geometry = &self.batch.geometry;
         let only: Vec<Ray<Global>> = rays.iter().map(|(_, ray)| *ray).collect();
-        let hits = tracer.closest(bvh, &only)?;
-        let echo = |((place, ray), hit): (&(usize, Ray<Global>), Option<Hit>)| {
+        let hits = geometry.closest(&only)?;
+        let echoes = rays.par_iter().zip(hits).filter_map(|((place, ray), hit)| {
             let hit = hit?;
             let take = &self.takes[self.take(first + place)];
-            let power_w = self.power_w(bvh.mesh(), take, ray, &hit)?;
+            let power_w = self.power_w(geometry.bvh.mesh(), take, ray, &hit)?;
             Some((*place, Detection { range_m: hit.range_m, power_w }))
-        };
-        Ok(rays.par_iter().zip(hits).filter_map(echo).collect())
+        });
+        Ok(echoes.collect())
     }
 
     /// Equation (11) at a hit; none in a region that is made of nothing.
     fn power_w(&self, mesh: &Mesh, take: &Take, ray: &Ray<Global>, hit: &Hit) -> Option<f64> {
-        let region = self.batch.region_of_facet[hit.facet as usize];
+        let region = self.batch.geometry.region_of_facet[hit.facet as usize];
         let surface = take.surfaces.get(usize::from(region))?;
         let to_radar = -ray.direction.xyz();
         let to_radar = LocalFrame::new(mesh, hit, to_radar, surface.grain).local(to_radar);
@@ -245,7 +244,8 @@ impl<'a> Work<'a> {
 
     /// The spots of some chirps, in the world.
     fn spots(&self, some: Range<usize>) -> Result<Vec<Spot>, RenderError> {
-        let Batch { chirps, tracer, bvh, .. } = *self.batch;
+        let geometry = &self.batch.geometry;
+        let chirps = geometry.chirps;
         let number = |chirp: usize| chirp % chirps.rays.len();
         let ranges_m = match self.rays {
             1 => vec![None; some.len()],
@@ -253,7 +253,7 @@ impl<'a> Work<'a> {
                 let axis = |chirp| seen(self.mesh_from_world(chirp), &chirps.rays[number(chirp)]);
                 let axes: Vec<Ray<Global>> = some.clone().into_par_iter().map(axis).collect();
                 let range_m = |hit: Option<Hit>| hit.map(|hit| hit.range_m);
-                tracer.closest(bvh, &axes)?.into_iter().map(range_m).collect()
+                geometry.closest(&axes)?.into_iter().map(range_m).collect()
             }
         };
         let spot = |(chirp, range_m): (usize, Option<f64>)| {
@@ -275,7 +275,7 @@ impl<'a> Work<'a> {
 
     /// The scan that a chirp belongs to.
     fn take(&self, chirp: usize) -> usize {
-        chirp / self.batch.chirps.rays.len()
+        chirp / self.batch.geometry.chirps.rays.len()
     }
 
     fn mesh_from_world(&self, chirp: usize) -> &Pose<Global, Global> {
@@ -299,9 +299,11 @@ mod tests {
     use crate::brdf::{Brdf, CookTorrance, Distribution, Shadowing};
     use crate::frames::Point;
     use crate::radar::scan::Raster;
-    use crate::radar::{Noise, Pattern, Speckle};
+    use crate::radar::{Chirps, Noise, Pattern, Radar, Speckle};
     use crate::render::{shade, trace};
     use crate::scene::solids;
+    use crate::trace::Bvh;
+    use crate::units::dbm_from_watts;
 
     fn brushed() -> Brdf {
         Brdf::CookTorrance(CookTorrance {
@@ -334,11 +336,7 @@ mod tests {
         });
         for rays_per_chirp in [1, 40] {
             let batch = Batch {
-                radar: &radar,
-                chirps: &chirps,
-                bvh: &bvh,
-                tracer: Tracer::Automatic,
-                region_of_facet: &region_of_facet,
+                geometry: ScanGeometry::new(&radar, &chirps, &bvh, &region_of_facet),
                 rays_per_chirp,
             };
             let found = batch.run(&takes).unwrap();
@@ -353,15 +351,15 @@ mod tests {
                 let grain = take.target.rotation() * surfaces[0].grain;
                 let surfaces = [Surface { grain, ..surfaces[0] }];
                 let bvh = Bvh::new(&mesh);
-                let footprints = trace(&radar, &chirps, &bvh, rays_per_chirp, &|_| {}).unwrap();
-                let setup = Setup::new(&radar, &chirps, &bvh, &region_of_facet, &surfaces);
-                let setup = Setup { seed: 3, ..setup };
+                let geometry = ScanGeometry::new(&radar, &chirps, &bvh, &region_of_facet);
+                let footprints = trace(&geometry, rays_per_chirp, &|_| {}).unwrap();
+                let setup = Setup { seed: 3, ..Setup::new(geometry, &surfaces) };
                 let scan = shade(&setup, &footprints, Observer::Radar, &|_| {}).unwrap();
                 assert_eq!(found.iter().flatten().count(), scan.echoes.len());
                 for echo in &scan.echoes {
                     let found = found[echo.chirp as usize].unwrap();
-                    let found_dbm = crate::units::dbm_from_watts(found.power_w);
-                    assert!((found_dbm - echo.power_dbm).abs() < 1e-9, "{found:?} {echo:?}");
+                    let [found_dbm, echo_dbm] = [found.power_w, echo.power_w].map(dbm_from_watts);
+                    assert!((found_dbm - echo_dbm).abs() < 1e-9, "{found:?} {echo:?}");
                     assert!((found.range_m - echo.range_m).abs() < 1e-9, "{found:?} {echo:?}");
                 }
             }

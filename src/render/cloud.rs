@@ -1,7 +1,8 @@
 //! Detections as a point cloud.
 
-use super::{Echo, Truth};
+use super::echo::{Echo, Truth};
 use crate::formats::ply::{Column, Scalar, Table};
+use crate::units::dbm_from_watts;
 
 /// The cloud's table: position in the global frame (double), then what the radar and the renderer
 /// know of each point. What caused a false alarm is NaN and −1.
@@ -32,7 +33,7 @@ pub fn cloud_table(
         column("xt_m", Scalar::Float, &|e| e.xt_m),
         column("yt_m", Scalar::Float, &|e| e.yt_m),
         column("range_m", Scalar::Float, &|e| e.range_m),
-        column("power_dbm", Scalar::Float, &|e| e.power_dbm),
+        column("power_dbm", Scalar::Float, &|e| dbm_from_watts(e.power_w)),
         known("incidence_deg", &|t| t.hit.theta_rad().to_degrees()),
         known("incidence_sd_deg", &|t| t.theta_sd_rad.to_degrees()),
         known("azimuth_deg", &|t| t.azimuth_rad.to_degrees()),

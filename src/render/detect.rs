@@ -7,13 +7,18 @@
 use num_complex::Complex;
 
 use super::acting::Acting;
-use super::path::Path;
-use super::{Beats, Observer, RenderError, Setup};
+use super::error::RenderError;
+use super::observer::Observer;
+use super::path::{Path, sum};
+use super::setup::Setup;
 use crate::effects::{Receiver, SaturationCurve};
 use crate::radar::noise::measured_w;
 use crate::radar::random::{Draws, Key, Purpose};
 use crate::radar::{Chirp, Detection, RangeProcessor, Return, Speckle};
 use crate::units::watts_from_dbm;
+
+/// The sampled beat signals of one chirp, √W, one for each look.
+pub type Beats = Vec<Vec<Complex<f64>>>;
 
 /// A receiver made ready for a scan.
 pub(super) struct Detector {
@@ -43,7 +48,7 @@ impl Detector {
         observer: Observer,
         acting: Option<&Acting>,
     ) -> Result<Detector, RenderError> {
-        let radar = setup.radar;
+        let radar = setup.geometry.radar;
         let declared = Receiver::declared(radar);
         let law = acting.map_or(declared, Acting::receiver);
         let mut threshold_w = watts_from_dbm(radar.threshold_dbm);
@@ -198,14 +203,4 @@ impl Beat {
         let phasor = self.speckle.map_or(Complex::ONE, |speckle| speckle.phasor(phases));
         Return { range_m: sum.range_m, amplitude_sqrt_w: phasor * sum.power_w.sqrt() }
     }
-}
-
-/// All power, and the mean range weighted by it; where no power comes back, the plain mean.
-pub(super) fn sum(paths: &[Path]) -> Detection {
-    let power_w: f64 = paths.iter().map(|path| path.power_w).sum();
-    let range_m = match power_w > 0.0 {
-        true => paths.iter().map(|path| path.range_m * path.power_w).sum::<f64>() / power_w,
-        false => paths.iter().map(|path| path.range_m).sum::<f64>() / paths.len() as f64,
-    };
-    Detection { range_m, power_w }
 }

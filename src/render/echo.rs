@@ -1,12 +1,13 @@
 //! An echo and what caused it.
 
 use super::detect::Detector;
+use super::observer::Observer;
 use super::path::Path;
-use super::{Footprints, Observer, Setup};
+use super::setup::Setup;
+use super::spot::Footprints;
 use crate::frames::{Global, Point, Pose, Target};
 use crate::radar::Detection;
 use crate::trace::Hit;
-use crate::units::dbm_from_watts;
 
 /// What came back from one chirp.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,8 +22,8 @@ pub struct Echo {
     pub xt_m: f64,
     /// y in the target frame, m.
     pub yt_m: f64,
-    /// Received power, dBm; −∞ when nothing comes back.
-    pub power_dbm: f64,
+    /// Received power, W; 0 when nothing comes back.
+    pub power_w: f64,
     /// What caused it; none for a false alarm.
     pub truth: Option<Truth>,
 }
@@ -75,15 +76,15 @@ impl Echoes<'_> {
         // Below the threshold a peak is noise as likely as not; the path says where it would be.
         let range_m = detected.map(|seen| seen.range_m).or(cause.map(|path| path.range_m))?;
         let range_m = if reach_m.is_none() { seen?.range_m } else { range_m };
-        let point = self.observer.on_axis(&self.setup.chirps.rays[chirp], range_m)?;
+        let point = self.observer.on_axis(&self.setup.geometry.chirps.rays[chirp], range_m)?;
         let in_target = self.target_from_global * point;
         Some(Echo {
-            chirp: self.setup.chirps.number[chirp],
+            chirp: self.setup.geometry.chirps.number[chirp],
             point,
             range_m,
             xt_m: in_target.xyz.x,
             yt_m: in_target.xyz.y,
-            power_dbm: dbm_from_watts(seen.map_or(0.0, |seen| seen.power_w)),
+            power_w: seen.map_or(0.0, |seen| seen.power_w),
             truth: cause.map(|path| self.truth(chirp, hits, path)),
         })
     }
@@ -91,7 +92,7 @@ impl Echoes<'_> {
     fn truth(&self, chirp: usize, hits: &[Option<Hit>], path: &Path) -> Truth {
         Truth {
             hit: path.hit,
-            region: self.setup.region_of_facet[path.hit.facet as usize],
+            region: self.setup.geometry.region_of_facet[path.hit.facet as usize],
             theta_sd_rad: theta_sd_rad(hits),
             azimuth_rad: path.azimuth_rad,
             surfaces: path.surfaces,
@@ -104,10 +105,13 @@ impl Echoes<'_> {
 /// The strongest path of the kind that brings more power. Second-order paths are many weak samples of
 /// one integral: only their sum compares with a direct path.
 fn cause(paths: &[Path], near: impl Fn(&&Path) -> bool) -> Option<&Path> {
-    let of = |surfaces: u8| paths.iter().filter(&near).filter(move |p| p.surfaces == surfaces);
-    let power_w = |surfaces: u8| of(surfaces).map(|path| path.power_w).sum::<f64>();
-    let surfaces = if power_w(2) > power_w(1) { 2 } else { 1 };
-    of(surfaces).reduce(|a, b| if b.power_w > a.power_w { b } else { a })
+    let [direct_w, second_order_w] = [1, 2].map(|surfaces| {
+        let of_kind = paths.iter().filter(&near).filter(|path| path.surfaces == surfaces);
+        of_kind.map(|path| path.power_w).sum::<f64>()
+    });
+    let surfaces = if second_order_w > direct_w { 2 } else { 1 };
+    let of_kind = paths.iter().filter(&near).filter(|path| path.surfaces == surfaces);
+    of_kind.reduce(|a, b| if b.power_w > a.power_w { b } else { a })
 }
 
 fn theta_sd_rad(hits: &[Option<Hit>]) -> f64 {
@@ -116,6 +120,6 @@ fn theta_sd_rad(hits: &[Option<Hit>]) -> f64 {
     }
     let count = hits.iter().flatten().count() as f64;
     let mean_rad = hits.iter().flatten().map(Hit::theta_rad).sum::<f64>() / count;
-    let square = |hit: &Hit| (hit.theta_rad() - mean_rad).powi(2);
-    (hits.iter().flatten().map(square).sum::<f64>() / count).sqrt()
+    let squares = hits.iter().flatten().map(|hit| (hit.theta_rad() - mean_rad).powi(2));
+    (squares.sum::<f64>() / count).sqrt()
 }

@@ -1,6 +1,6 @@
-//! How far each look of a scan is from the nearest edge in depth.
+//! How far each chirp of a scan is from the nearest edge in depth.
 //!
-//! Two neighbouring looks are on two sides of an edge when only one of them meets the target, or
+//! Two neighbouring chirps are on two sides of an edge when only one of them meets the target, or
 //! when their ranges differ by more than a spot and a slope of 60° explain. The edge is taken halfway
 //! between them, so that a distance is good to about one spacing of the scan.
 
@@ -10,21 +10,21 @@ use rayon::prelude::*;
 /// Slope of a surface, as tan 60°, from which on its own range is an edge.
 const STEEPEST: f64 = 1.732_050_807_568_877_2;
 
-/// Looks at most this many mean spacings apart are neighbours.
+/// Chirps at most this many mean spacings apart are neighbours.
 const NEIGHBOURHOOD: f64 = 2.5;
 
-/// Looks of one task.
-const LOOKS_PER_TASK: usize = 512;
+/// Chirps of one task.
+const CHIRPS_PER_TASK: usize = 512;
 
-/// Distance of every look to the nearest edge in the target plane, m, but at most `reach_m`.
+/// Distance of every chirp to the nearest edge in the target plane, m, but at most `reach_m`.
 ///
-/// `looks` are points of the target plane, m, and the ranges there, m; none where nothing is met.
+/// `chirps` are points of the target plane, m, and the ranges there, m; none where nothing is met.
 /// `spot_m` is the spot's diameter.
-pub(super) fn distances_m(looks: &[(DVec2, Option<f64>)], spot_m: f64, reach_m: f64) -> Vec<f64> {
-    let spacing_m = spacing_m(looks);
+pub(super) fn distances_m(chirps: &[(DVec2, Option<f64>)], spot_m: f64, reach_m: f64) -> Vec<f64> {
+    let spacing_m = spacing_m(chirps);
     let near_m = NEIGHBOURHOOD * spacing_m;
-    let distinct = apart(looks, spacing_m / 4.0);
-    let places: Vec<DVec2> = distinct.iter().map(|look| look.0).collect();
+    let distinct = apart(chirps, spacing_m / 4.0);
+    let places: Vec<DVec2> = distinct.iter().map(|chirp| chirp.0).collect();
     let cells = Cells::new(&places, near_m);
     let nearest_across = |number: usize| {
         let distance_m2 = |other: &usize| places[*other].distance_squared(places[number]);
@@ -37,33 +37,36 @@ pub(super) fn distances_m(looks: &[(DVec2, Option<f64>)], spot_m: f64, reach_m: 
     };
     let across: Vec<Option<usize>> = (0..places.len())
         .into_par_iter()
-        .with_min_len(LOOKS_PER_TASK)
+        .with_min_len(CHIRPS_PER_TASK)
         .map(nearest_across)
         .collect();
-    // Only pairs that are nearest to each other; others see past a look on their own side.
-    let edge = |(look, other): (usize, &Option<usize>)| {
-        let other = (*other)?;
-        (across[other] == Some(look)).then(|| 0.5 * (places[look] + places[other]))
-    };
-    let edges: Vec<DVec2> = across.iter().enumerate().filter_map(edge).collect();
+    // Only pairs that are nearest to each other; others see past a chirp on their own side.
+    let mut edges: Vec<DVec2> = Vec::new();
+    for (chirp, other) in across.iter().enumerate() {
+        if let Some(other) = *other
+            && across[other] == Some(chirp)
+        {
+            edges.push(0.5 * (places[chirp] + places[other]));
+        }
+    }
     // Cells smaller than the spacing would be many and empty.
     let cells = Cells::new(&edges, reach_m.max(spacing_m));
-    let distance_m = |look: &(DVec2, Option<f64>)| {
-        let distance_m2 = |edge: usize| edges[edge].distance_squared(look.0);
-        let within = cells.near(look.0).map(distance_m2).filter(|&m2| m2 <= reach_m * reach_m);
+    let distance_m = |chirp: &(DVec2, Option<f64>)| {
+        let distance_m2 = |edge: usize| edges[edge].distance_squared(chirp.0);
+        let within = cells.near(chirp.0).map(distance_m2).filter(|&m2| m2 <= reach_m * reach_m);
         within.fold(f64::INFINITY, f64::min).sqrt().min(reach_m)
     };
-    looks.par_iter().with_min_len(LOOKS_PER_TASK).map(distance_m).collect()
+    chirps.par_iter().with_min_len(CHIRPS_PER_TASK).map(distance_m).collect()
 }
 
-/// One look of each small cell, the first, so that looks on top of each other cost no more than one.
-fn apart(looks: &[(DVec2, Option<f64>)], side_m: f64) -> Vec<(DVec2, Option<f64>)> {
-    let frame = Frame::around(looks.iter().map(|look| look.0), side_m);
+/// One chirp of each small cell, the first, so that chirps on top of each other cost no more than one.
+fn apart(chirps: &[(DVec2, Option<f64>)], side_m: f64) -> Vec<(DVec2, Option<f64>)> {
+    let frame = Frame::around(chirps.iter().map(|chirp| chirp.0), side_m);
     let mut is_taken = vec![false; frame.columns * frame.rows];
-    let is_first = |look: &&(DVec2, Option<f64>)| {
-        frame.number_at(look.0).is_some_and(|cell| !std::mem::replace(&mut is_taken[cell], true))
+    let is_first = |chirp: &&(DVec2, Option<f64>)| {
+        frame.number_at(chirp.0).is_some_and(|cell| !std::mem::replace(&mut is_taken[cell], true))
     };
-    looks.iter().filter(is_first).copied().collect()
+    chirps.iter().filter(is_first).copied().collect()
 }
 
 fn is_across(a: (DVec2, Option<f64>), b: (DVec2, Option<f64>), spot_m: f64) -> bool {
@@ -76,11 +79,11 @@ fn is_across(a: (DVec2, Option<f64>), b: (DVec2, Option<f64>), spot_m: f64) -> b
     }
 }
 
-/// Side of the square that a look has to itself, m; along a line, its share of the line.
-fn spacing_m(looks: &[(DVec2, Option<f64>)]) -> f64 {
-    let min = looks.iter().fold(DVec2::INFINITY, |min, look| min.min(look.0));
-    let max = looks.iter().fold(DVec2::NEG_INFINITY, |max, look| max.max(look.0));
-    let (sides_m, count) = ((max - min).max(DVec2::splat(1e-6)), looks.len().max(1) as f64);
+/// Side of the square that a chirp has to itself, m; along a line, its share of the line.
+fn spacing_m(chirps: &[(DVec2, Option<f64>)]) -> f64 {
+    let min = chirps.iter().fold(DVec2::INFINITY, |min, chirp| min.min(chirp.0));
+    let max = chirps.iter().fold(DVec2::NEG_INFINITY, |max, chirp| max.max(chirp.0));
+    let (sides_m, count) = ((max - min).max(DVec2::splat(1e-6)), chirps.len().max(1) as f64);
     (sides_m.x * sides_m.y / count).sqrt().max(sides_m.max_element() / count)
 }
 
@@ -158,17 +161,19 @@ impl Cells {
         let [column, row] = self.frame.cell(place);
         let low = row.saturating_sub(1).max(0);
         let high = row.saturating_add(1).min(self.frame.rows as i32 - 1);
-        let in_column = move |aside: i32| {
-            let number = |row: i32| self.frame.number(column.saturating_add(aside), row);
-            let of_cells = |first: usize, last: usize| {
+        let columns = [-1, 0, 1].map(|aside| column.saturating_add(aside));
+        let numbers = columns.into_iter().flat_map(move |column| self.in_column(column, low, high));
+        numbers.map(|&number| number as usize)
+    }
+
+    /// The points in some rows of a column, from `low` to `high`.
+    fn in_column(&self, column: i32, low: i32, high: i32) -> &[u32] {
+        match (self.frame.number(column, low), self.frame.number(column, high)) {
+            (Some(first), Some(last)) if low <= high => {
                 &self.numbers[self.starts[first] as usize..self.starts[last + 1] as usize]
-            };
-            match (number(low), number(high)) {
-                (Some(first), Some(last)) if low <= high => of_cells(first, last),
-                _ => &[],
             }
-        };
-        [-1, 0, 1].into_iter().flat_map(in_column).map(|&number| number as usize)
+            _ => &[],
+        }
     }
 }
 

@@ -4,11 +4,12 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::{Echo, Scan};
+use super::echo::Echo;
+use super::scan::Scan;
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
 use crate::radar::Field;
-use crate::units::{dbm_from_watts, watts_from_dbm};
+use crate::units::dbm_from_watts;
 
 /// Names of the channels of a power image, in order.
 pub const CHANNELS: [&str; 5] = ["power_dbm", "range_m", "incidence_deg", "material", "count"];
@@ -17,7 +18,7 @@ pub const CHANNELS: [&str; 5] = ["power_dbm", "range_m", "incidence_deg", "mater
 const BANDS: usize = 16;
 
 /// A detection with what every pixel of its spot takes from it.
-struct Shown<'a> {
+struct Splat<'a> {
     echo: &'a Echo,
     power_w: f64,
     /// None for a false alarm.
@@ -58,18 +59,19 @@ pub fn power_image(
     let mut raster = grid(field, spot_m, pixel_m);
     let mut pixels = vec![Pixel::default(); raster.width * raster.height];
     let detections: Vec<&Echo> = scan.detections().collect();
-    let shown = |&echo| Shown::new(echo, &raster, spot_m, material_of_region);
-    let shown: Vec<Shown> = detections.par_iter().map(shown).collect();
+    let splats = detections.par_iter();
+    let splats: Vec<Splat> =
+        splats.map(|&echo| Splat::new(echo, &raster, spot_m, material_of_region)).collect();
     // A band of rows has all that falls on it in the order of the scan, however many threads there are.
     let band_rows = raster.height.div_ceil(BANDS);
-    let of_bands = by_bands(&shown, band_rows);
+    let of_bands = by_bands(&splats, band_rows);
     let bands = pixels.par_chunks_mut(raster.width * band_rows).enumerate();
-    bands.zip(of_bands).for_each(|((band, pixels), shown)| {
+    bands.zip(of_bands).for_each(|((band, pixels), splats)| {
         let first = band * band_rows;
-        for shown in shown {
-            for (index, distance_m) in shown.covered(&raster, spot_m, first..first + band_rows) {
+        for splat in splats {
+            for (index, distance_m) in splat.covered(&raster, spot_m, first..first + band_rows) {
                 let weight = (-4.0 * std::f64::consts::LN_2 * (distance_m / spot_m).powi(2)).exp();
-                pixels[index - first * raster.width].add(shown, weight);
+                pixels[index - first * raster.width].add(splat, weight);
             }
         }
     });
@@ -89,17 +91,17 @@ fn grid(field: Field, spot_m: f64, pixel_m: f64) -> Raster {
 }
 
 /// For each band of so many rows what may fall on it, in order.
-fn by_bands<'a, 'e>(shown: &'a [Shown<'e>], band_rows: usize) -> [Vec<&'a Shown<'e>>; BANDS] {
+fn by_bands<'a, 'e>(splats: &'a [Splat<'e>], band_rows: usize) -> [Vec<&'a Splat<'e>>; BANDS] {
     let mut of_bands = [const { Vec::new() }; BANDS];
-    for shown in shown {
-        let bands = shown.rows.start / band_rows..shown.rows.end.div_ceil(band_rows);
-        bands.for_each(|band| of_bands[band].push(shown));
+    for splat in splats {
+        let bands = splat.rows.start / band_rows..splat.rows.end.div_ceil(band_rows);
+        bands.for_each(|band| of_bands[band].push(splat));
     }
     of_bands
 }
 
-impl<'a> Shown<'a> {
-    fn new(echo: &'a Echo, raster: &Raster, spot_m: f64, material_of_region: &[u16]) -> Shown<'a> {
+impl<'a> Splat<'a> {
+    fn new(echo: &'a Echo, raster: &Raster, spot_m: f64, material_of_region: &[u16]) -> Splat<'a> {
         let radius_m = spot_m / 2.0;
         let span = |centre_m: f64, min_m: f64, count: usize| {
             let first = ((centre_m - radius_m - min_m) / raster.pixel_m - 0.5).ceil().max(0.0);
@@ -108,9 +110,9 @@ impl<'a> Shown<'a> {
             (first as usize).min(count)..(end as usize).min(count)
         };
         let from_below = span(echo.yt_m, raster.y_min_m, raster.height);
-        Shown {
+        Splat {
             echo,
-            power_w: watts_from_dbm(echo.power_dbm),
+            power_w: echo.power_w,
             incidence_rad: echo.truth.map(|truth| truth.hit.theta_rad()),
             material: echo.truth.map(|truth| material_of_region[usize::from(truth.region)]),
             columns: span(echo.xt_m, raster.x_min_m, raster.width),
@@ -139,18 +141,18 @@ impl<'a> Shown<'a> {
 }
 
 impl Pixel {
-    fn add(&mut self, shown: &Shown, weight: f64) {
+    fn add(&mut self, splat: &Splat, weight: f64) {
         self.weight += weight;
-        self.power_w += weight * shown.power_w;
-        self.range_m += weight * shown.echo.range_m;
+        self.power_w += weight * splat.power_w;
+        self.range_m += weight * splat.echo.range_m;
         self.count += 1;
-        if let Some(incidence_rad) = shown.incidence_rad {
+        if let Some(incidence_rad) = splat.incidence_rad {
             self.known_weight += weight;
             self.incidence_rad += weight * incidence_rad;
         }
         if weight > self.nearest_weight {
             self.nearest_weight = weight;
-            self.material = shown.material;
+            self.material = splat.material;
         }
     }
 }
@@ -163,14 +165,12 @@ fn channels(pixels: &[Pixel]) -> Vec<Channel> {
         |p| p.material.map_or(f64::NAN, f64::from),
         |p| f64::from(p.count),
     ];
-    let channel = |(name, value): (&str, fn(&Pixel) -> f64)| Channel {
-        name: name.to_owned(),
-        values: pixels
-            .iter()
-            .map(|p| if p.count == 0 { f32::NAN } else { value(p) as f32 })
-            .collect(),
-    };
-    CHANNELS.into_iter().zip(values).map(channel).collect()
+    let mut channels = Vec::new();
+    for (name, value) in CHANNELS.into_iter().zip(values) {
+        let values = pixels.iter().map(|p| if p.count == 0 { f32::NAN } else { value(p) as f32 });
+        channels.push(Channel { name: name.to_owned(), values: values.collect() });
+    }
+    channels
 }
 
 #[cfg(test)]
@@ -179,6 +179,7 @@ mod tests {
     use crate::frames::Point;
     use crate::render::Truth;
     use crate::trace::Hit;
+    use crate::units::watts_from_dbm;
 
     fn echo(xt_m: f64, yt_m: f64, power_dbm: f64) -> Echo {
         let point = Point::new(xt_m, yt_m, 0.0);
@@ -192,11 +193,13 @@ mod tests {
             specular_share: 0.0,
             edge_m: 0.0,
         };
-        Echo { chirp: 0, point, range_m: 8.0, xt_m, yt_m, power_dbm, truth: Some(truth) }
+        let power_w = watts_from_dbm(power_dbm);
+        Echo { chirp: 0, point, range_m: 8.0, xt_m, yt_m, power_w, truth: Some(truth) }
     }
 
     fn image(echoes: Vec<Echo>) -> Raster {
-        let scan = Scan { chirps: 0, hits: 0, echoes, threshold_dbm: -77.0, noise_dbm: None };
+        let scan =
+            Scan { chirps: 0, hits: 0, echoes, threshold_w: watts_from_dbm(-77.0), noise_w: None };
         let field = Field { min_m: [-0.25, -0.45], max_m: [0.25, 0.45] };
         power_image(&scan, field, 0.016, &[3], 0.004)
     }

@@ -10,15 +10,18 @@ use std::f64::consts::{LN_2, TAU};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::acting::{Facing, Meeting};
 use super::edges;
+use super::surface::Facing;
 use crate::frames::{Direction, Global, Ray};
+use crate::radar::Beam;
 use crate::radar::scan::PATTERN_RANGE_M;
-use crate::radar::{Beam, Chirps, Radar};
-use crate::trace::{Bvh, Hit, TraceError, Tracer};
+use crate::trace::{Hit, ScanGeometry, TraceError};
 
 /// 1/φ: successive multiples of it are spread evenly over 0 to 1.
 pub(super) const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// Where a ray meets the target, and how the surface lies there if effects have moved it.
+pub(super) type Intersection = (Option<Hit>, Option<Facing>);
 
 /// What the rays of every chirp met. Kept, it can be shaded again with other materials.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,120 +44,112 @@ impl Footprints {
     }
 }
 
-/// Traces N rays for every chirp; `done` is told how many chirps are finished.
+/// Traces N rays for every chirp; calls `done` with the number of chirps that have been finished.
 pub(super) fn trace(
-    radar: &Radar,
-    chirps: &Chirps,
-    bvh: &Bvh,
-    tracer: Tracer,
+    geometry: &ScanGeometry,
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Footprints, TraceError> {
-    let scan = Rays { radar, chirps, bvh, tracer, rays_per_chirp };
-    let hits = scan.meetings(done, |_, _, hit| hit, |hit| *hit)?;
-    let edge_m = edge_distances_m(radar, chirps, &hits, rays_per_chirp);
+    let rays = Rays { geometry: *geometry, rays_per_chirp };
+    let hits = rays.intersections(done, |_, _, hit| hit, |hit| *hit)?;
+    let edge_m = edge_distances_m(geometry, &hits, rays_per_chirp);
     Ok(Footprints { rays_per_chirp, hits, edge_m, facings: Vec::new() })
 }
 
-/// The same, had the rays of every chirp, by its number, met what `meet` makes of their hits.
+/// As [`trace`], but every hit first passes through `place(chirp, ray, hit)`, which may move or drop it.
 pub(super) fn trace_moved(
-    radar: &Radar,
-    chirps: &Chirps,
-    bvh: &Bvh,
-    tracer: Tracer,
+    geometry: &ScanGeometry,
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
-    meet: impl Fn(usize, &Ray<Global>, Option<Hit>) -> Meeting + Sync,
+    place: impl Fn(usize, &Ray<Global>, Option<Hit>) -> Intersection + Sync,
 ) -> Result<Footprints, TraceError> {
-    let scan = Rays { radar, chirps, bvh, tracer, rays_per_chirp };
-    let met = scan.meetings(done, meet, |met| met.0)?;
-    let (hits, mut facings): (Vec<_>, Vec<_>) = met.into_iter().unzip();
+    let rays = Rays { geometry: *geometry, rays_per_chirp };
+    let placed = rays.intersections(done, place, |placed| placed.0)?;
+    let (hits, mut facings): (Vec<_>, Vec<_>) = placed.into_iter().unzip();
     if facings.iter().all(Option::is_none) {
         facings = Vec::new();
     }
-    let edge_m = edge_distances_m(radar, chirps, &hits, rays_per_chirp);
+    let edge_m = edge_distances_m(geometry, &hits, rays_per_chirp);
     Ok(Footprints { rays_per_chirp, hits, edge_m, facings })
 }
 
-/// The rays of a scan and what they may meet.
+/// The rays of a scan.
 #[derive(Clone, Copy)]
 struct Rays<'a> {
-    radar: &'a Radar,
-    chirps: &'a Chirps,
-    bvh: &'a Bvh<'a>,
-    tracer: Tracer<'a>,
+    geometry: ScanGeometry<'a>,
     rays_per_chirp: usize,
 }
 
 impl Rays<'_> {
-    /// What `meet` makes of what the rays of every chirp hit; `hit` is where that is.
-    fn meetings<T: Default + Send + Sync>(
+    /// What `place(chirp, ray, hit)` gives for every ray of every chirp; `hit_of` reads its hit.
+    ///
+    /// The rays along the axes come first: their ranges say how wide the spots are.
+    fn intersections<T: Default + Send + Sync>(
         &self,
         done: &(dyn Fn(usize) + Sync),
-        meet: impl Fn(usize, &Ray<Global>, Option<Hit>) -> T + Sync,
-        hit: impl Fn(&T) -> Option<Hit> + Sync,
+        place: impl Fn(usize, &Ray<Global>, Option<Hit>) -> T + Sync,
+        hit_of: impl Fn(&T) -> Option<Hit> + Sync,
     ) -> Result<Vec<T>, TraceError> {
         /// Rays that are traced at once: enough to share the walk over the facets, few enough to hold.
         const RAYS_PER_TURN: usize = 1 << 18;
-        let axes = &self.chirps.rays;
-        let hits = self.tracer.closest(self.bvh, axes)?;
-        let on_axis =
-            |(number, (axis, hit)): (usize, (&Ray<Global>, Option<Hit>))| meet(number, axis, hit);
-        let met: Vec<T> = axes.par_iter().zip(hits).enumerate().map(on_axis).collect();
+        let axes = &self.geometry.chirps.rays;
+        let hits = self.geometry.closest(axes)?;
+        let on_axis = axes.par_iter().zip(hits).enumerate();
+        let on_axis: Vec<T> = on_axis.map(|(chirp, (ray, hit))| place(chirp, ray, hit)).collect();
         if self.rays_per_chirp == 1 {
             done(axes.len());
-            return Ok(met);
+            return Ok(on_axis);
         }
         let turn = (RAYS_PER_TURN / self.rays_per_chirp).max(1);
         let mut all = Vec::with_capacity(axes.len() * self.rays_per_chirp);
-        for (number, met) in met.chunks(turn).enumerate() {
-            let first = number * turn;
+        for (number, on_axis) in on_axis.chunks(turn).enumerate() {
             let ranges_m: Vec<Option<f64>> =
-                met.iter().map(|met| hit(met).map(|hit| hit.range_m)).collect();
-            all.extend(self.spots(first, &ranges_m, &meet)?);
-            done(met.len());
+                on_axis.iter().map(|placed| hit_of(placed).map(|hit| hit.range_m)).collect();
+            all.extend(self.spots(number * turn, &ranges_m, &place)?);
+            done(on_axis.len());
         }
         Ok(all)
     }
 
-    /// What all rays of some chirps meet, from the ranges on their axes.
+    /// What `place` gives for all rays of the chirps from `first` on, from the ranges on their axes.
     fn spots<T: Default + Send>(
         &self,
         first: usize,
         ranges_m: &[Option<f64>],
-        meet: impl Fn(usize, &Ray<Global>, Option<Hit>) -> T + Sync,
+        place: impl Fn(usize, &Ray<Global>, Option<Hit>) -> T + Sync,
     ) -> Result<Vec<T>, TraceError> {
-        let beam = Beam::new(self.radar);
+        let beam = Beam::new(self.geometry.radar);
         let count = self.rays_per_chirp;
-        let spot = |(offset, &range_m): (usize, &Option<f64>)| {
+        let spots = ranges_m.par_iter().enumerate().flat_map_iter(|(offset, &range_m)| {
             let chirp = first + offset;
-            let spot = Spot::met(&beam, &self.chirps.rays[chirp], range_m, chirp, count);
+            let axis = &self.geometry.chirps.rays[chirp];
+            let spot = Spot::met(&beam, axis, range_m, chirp, count);
             (0..count).map(move |sample| spot.ray(sample))
-        };
-        let rays: Vec<Option<Ray<Global>>> =
-            ranges_m.par_iter().enumerate().flat_map_iter(spot).collect();
+        });
+        let rays: Vec<Option<Ray<Global>>> = spots.collect();
+        // The tracer takes only the rays that exist.
         let given: Vec<Ray<Global>> = rays.iter().flatten().copied().collect();
-        let mut hits = self.tracer.closest(self.bvh, &given)?.into_iter();
+        let mut hits = self.geometry.closest(&given)?.into_iter();
         let hits: Vec<Option<Hit>> =
             rays.iter().map(|ray| ray.and_then(|_| hits.next().flatten())).collect();
-        let meet = |(number, (ray, hit)): (usize, (Option<Ray<Global>>, Option<Hit>))| {
-            ray.map_or(T::default(), |ray| meet(first + number / count, &ray, hit))
-        };
-        Ok(rays.into_par_iter().zip(hits).enumerate().map(meet).collect())
+        let placed = rays.into_par_iter().zip(hits).enumerate().map(|(number, (ray, hit))| {
+            ray.map_or(T::default(), |ray| place(first + number / count, &ray, hit))
+        });
+        Ok(placed.collect())
     }
 }
 
-/// By the first ray of each chirp, which is the nearest to its axis.
+/// Distance of every chirp to the nearest edge in depth, m, by its first ray, which is the nearest to its axis.
 fn edge_distances_m(
-    radar: &Radar,
-    chirps: &Chirps,
+    geometry: &ScanGeometry,
     hits: &[Option<Hit>],
     rays_per_chirp: usize,
 ) -> Vec<f64> {
     const SPOTS: f64 = 3.0;
+    let ScanGeometry { radar, chirps, .. } = geometry;
     let ranges_m = hits.chunks(rays_per_chirp).map(|hits| hits.first()?.map(|hit| hit.range_m));
-    let looks: Vec<_> = chirps.target_points_m(&radar.frames()).zip(ranges_m).collect();
-    edges::distances_m(&looks, radar.spot_diameter_m, SPOTS * radar.spot_diameter_m)
+    let shots: Vec<_> = chirps.target_points_m(&radar.frames()).zip(ranges_m).collect();
+    edges::distances_m(&shots, radar.spot_diameter_m, SPOTS * radar.spot_diameter_m)
 }
 
 /// The rays through the spot of one chirp.

@@ -25,6 +25,15 @@ impl<'a> Surface<'a> {
     }
 }
 
+/// How the surface lies where a ray meets a target that effects have moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facing {
+    /// Unit normal, towards the radar.
+    pub normal: DVec3,
+    /// Azimuth of the radar about it, from the grain of the region, rad.
+    pub azimuth_rad: f64,
+}
+
 /// A facet where a ray has met it: normal towards where the ray came from, tangent along the grain.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalFrame {

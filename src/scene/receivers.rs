@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::SceneError;
+use super::error::SceneError;
 use super::file::{ReceiverEntry, SceneFile};
 
 /// No antenna may be farther out than this, m.
@@ -43,8 +43,8 @@ pub(super) fn check(file: &SceneFile, path: &Path) -> Result<(), SceneError> {
 }
 
 fn is_name(name: &str) -> bool {
-    let fits = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
-    (1..=64).contains(&name.len()) && name.chars().all(fits)
+    (1..=64).contains(&name.len())
+        && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-')
 }
 
 fn check_numbers(entry: &ReceiverEntry) -> Result<(), String> {

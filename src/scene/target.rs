@@ -1,14 +1,15 @@
 //! The target: all meshes of a scene in the global frame, as one.
 
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::error::SceneError;
 use super::file::{MeshEntry, SceneFile};
+use super::read::read;
 use super::regions::{MeshSpan, assign};
-use super::{SceneError, mannequin, read, solids};
+use super::{mannequin, solids};
 use crate::formats::MeshFormat;
 use crate::formats::text::nearest;
 use crate::frames::{Global, Model, Point, Pose};
@@ -108,11 +109,10 @@ impl MeshReport {
 }
 
 fn check_grains(file: &SceneFile, path: &Path) -> Result<(), SceneError> {
-    let points_nowhere = |grain: [f64; 3]| {
-        let length = DVec3::from_array(grain).length();
-        !length.is_normal()
-    };
-    match file.region.iter().find(|region| region.grain.is_some_and(points_nowhere)) {
+    let mut regions = file.region.iter();
+    match regions.find(|region| {
+        region.grain.is_some_and(|grain| !DVec3::from_array(grain).length().is_normal())
+    }) {
         None => Ok(()),
         Some(region) => {
             let place = format!("region `{}`", region.name);
@@ -168,13 +168,10 @@ fn load_mesh(entry: &MeshEntry, scene: &Path) -> Result<(Mesh, Option<String>), 
     Ok((mesh, Some(hash.to_hex().to_string())))
 }
 
-/// Made once, however many stand in a scene.
-static MANNEQUIN: OnceLock<Mesh> = OnceLock::new();
-
 fn builtin(name: &str) -> Option<Mesh> {
     // Coarse cells: a flat side needs no more than its corners.
     match name {
-        "mannequin" => Some(MANNEQUIN.get_or_init(mannequin::mannequin).clone()),
+        "mannequin" => Some(mannequin::mannequin()),
         "cuboid" => Some(solids::cuboid(DVec3::ONE, 1.0)),
         "plate" => Some(solids::plate(1.0, 1.0)),
         "sphere" => Some(solids::icosphere(0.5, 5)),
@@ -208,9 +205,8 @@ fn place(mut mesh: Mesh, entry: &MeshEntry, scene: &Path) -> Result<Mesh, SceneE
     mesh.vertices.par_iter_mut().for_each(|vertex| {
         *vertex = (global_from_model * Point::from(*vertex * entry.scale * stretch)).xyz;
     });
-    let near = |v: &DVec3| v.is_finite() && v.abs().max_element() < FARTHEST_M;
-    let lost = mesh.vertices.par_iter().position_first(|v| !near(v));
-    match lost {
+    let vertices = mesh.vertices.par_iter();
+    match vertices.position_first(|v| !(v.is_finite() && v.abs().max_element() < FARTHEST_M)) {
         None => Ok(mesh),
         Some(vertex) => {
             let problem = format!("vertex {vertex} ends up more than {FARTHEST_M} m away");

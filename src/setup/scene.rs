@@ -14,7 +14,7 @@ use crate::radar::Radar;
 use crate::render::{Bounce, RenderError, Scan, Setup, Surface, power_image};
 use crate::scene::Scene;
 use crate::store::Store;
-use crate::trace::{Bvh, Tracer};
+use crate::trace::{Bvh, ScanGeometry};
 use crate::units::{range, ratio_from_db, rounded, shown};
 
 /// A material as a scene uses it.
@@ -185,11 +185,12 @@ impl<'a> Assembly<'a> {
     pub fn setup(&self) -> Setup<'_> {
         let scene = &self.ready.scene;
         Setup {
-            radar: scene.radar(),
-            chirps: &scene.chirps,
-            bvh: &self.bvh,
-            tracer: Tracer::Automatic,
-            region_of_facet: &scene.target.region_of_facet,
+            geometry: ScanGeometry::new(
+                scene.radar(),
+                &scene.chirps,
+                &self.bvh,
+                &scene.target.region_of_facet,
+            ),
             surfaces: &self.surfaces,
             bounce: scene.file.bounce.map(|bounce| Bounce {
                 rays: bounce.rays,

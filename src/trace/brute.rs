@@ -1,8 +1,8 @@
 //! The oracle: Möller–Trumbore (J. Graphics Tools 2 (1997) 21) in f64 over all facets, the paper's
 //! own method. Slow, obvious, and the judge of every faster tracer.
 
-use super::Hit;
 use super::facet::GRAZING;
+use super::hit::Hit;
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::boxes::Boxes;
 use super::eightfold::Eightfold;
-use super::{Hit, no_hits};
+use super::hit::{Hit, no_hits};
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 

@@ -3,9 +3,9 @@
 //! A ray is told from the facets that it surely passes beside in f32, with a bound of the rounding; f64 decides the
 //! few that are left. The library's own triangle tests lose rays on shared edges; ours is in `facet.rs`.
 
-use super::Hit;
 use super::boxes::{Boxes, PADDING, Sphere};
 use super::facet::{Line, met};
+use super::hit::Hit;
 use super::wide::{Wide, least, most, widest};
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
@@ -169,11 +169,10 @@ fn facets(boxes: &Boxes, branch: usize) -> Vec<u32> {
     while let Some(branch) = open.pop() {
         let node = &boxes.tree.nodes[branch];
         let first = node.first_index as usize;
-        match node.is_leaf() {
-            true => {
-                facets.extend_from_slice(&boxes.facets[first..first + node.prim_count as usize]);
-            }
-            false => open.extend([first, first + 1]),
+        if node.is_leaf() {
+            facets.extend_from_slice(&boxes.facets[first..first + node.prim_count as usize]);
+        } else {
+            open.extend([first, first + 1]);
         }
     }
     facets
@@ -287,12 +286,20 @@ impl Aim {
     /// Marks every box that the ray reaches before `limit`, and where it enters it.
     #[inline(always)]
     fn boxes(&self, node: &Node, limit: f32) -> (Marks, Lanes) {
-        let side = |axis: usize, turned: bool| match (self.per[axis] < 0.0) != turned {
-            true => &node.high[axis],
-            false => &node.low[axis],
-        };
-        let first: [&Lanes; 3] = std::array::from_fn(|axis| side(axis, false));
-        let last: [&Lanes; 3] = std::array::from_fn(|axis| side(axis, true));
+        // The faces at which the ray enters and leaves.
+        let is_turned = self.per.map(|per| per < 0.0);
+        let first: [&Lanes; 3] =
+            std::array::from_fn(
+                |axis| {
+                    if is_turned[axis] { &node.high[axis] } else { &node.low[axis] }
+                },
+            );
+        let last: [&Lanes; 3] =
+            std::array::from_fn(
+                |axis| {
+                    if is_turned[axis] { &node.low[axis] } else { &node.high[axis] }
+                },
+            );
         let ([x, y, z], [per_x, per_y, per_z]) = (self.origin, self.per);
         let (mut near, mut within) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {

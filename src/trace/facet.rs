@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::Hit;
+use super::hit::Hit;
 use crate::frames::{Global, Point, Ray};
 use crate::geometry::Mesh;
 

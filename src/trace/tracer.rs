@@ -4,7 +4,11 @@ use rayon::prelude::*;
 
 use thiserror::Error;
 
-use super::{Bvh, Fan, GpuError, Held, Hit, NoFan, brute};
+use super::brute;
+use super::bvh::Bvh;
+use super::gpu::{GpuError, GpuMesh};
+use super::hit::Hit;
+use super::pinhole::{Fan, NoFan};
 use crate::frames::{Global, Ray};
 
 /// How the closest hits of many rays are found. All ways agree; they differ in time and in what they take.
@@ -20,7 +24,7 @@ pub enum Tracer<'a> {
     /// [`brute`]: any rays, and slow.
     Brute,
     /// A graphics processor that holds the hierarchy: any rays.
-    Gpu(&'a Held<'a>),
+    Gpu(&'a GpuMesh<'a>),
 }
 
 /// Why a tracer does not trace.

@@ -15,7 +15,7 @@ use matdb::brdf::Scattering;
 use matdb::geometry::Mesh;
 use matdb::radar::{Chirps, Radar};
 use matdb::render::{Bounce, Echo, Observer, Setup, Surface, shade, trace};
-use matdb::trace::Bvh;
+use matdb::trace::{Bvh, ScanGeometry};
 
 /// The crate's folder.
 pub fn root() -> &'static Path {
@@ -55,9 +55,10 @@ pub fn echoes_at(
     observer: Observer,
 ) -> Vec<Echo> {
     let (bvh, regions) = (Bvh::new(mesh), vec![0; mesh.facets.len()]);
-    let footprints = trace(radar, chirps, &bvh, rays, &|_| {}).unwrap();
+    let geometry = ScanGeometry::new(radar, chirps, &bvh, &regions);
+    let footprints = trace(&geometry, rays, &|_| {}).unwrap();
     let surfaces = [Surface::new(scattering)];
-    let setup = Setup { bounce, ..Setup::new(radar, chirps, &bvh, &regions, &surfaces) };
+    let setup = Setup { bounce, ..Setup::new(geometry, &surfaces) };
     shade(&setup, &footprints, observer, &|_| {}).unwrap().echoes
 }
 

@@ -10,7 +10,6 @@ use matdb::radar::scan::Raster;
 use matdb::radar::{Chirps, Footprint, Radar};
 use matdb::render::{Bounce, Echo, Observer};
 use matdb::scene::solids::{icosphere, plate};
-use matdb::units::watts_from_dbm;
 
 use super::page::{Row, Section, Table, Tolerance::Below, Tolerance::Within};
 use super::quadrature::integral;
@@ -70,7 +69,7 @@ fn plate_error_db(tilt_rad: f64, place: DVec3) -> f64 {
         let f = 0.3 * 8.0 / (2.0 * PI) * normal.dot((i + o).normalize()).powi(6);
         let expected_w =
             FLUX_W * APERTURE_M2 / distance_m.powi(2) * f * normal.dot(i) * normal.dot(o);
-        10.0 * (watts_from_dbm(echo.power_dbm) / expected_w).log10()
+        10.0 * (echo.power_w / expected_w).log10()
     };
     echoes.iter().map(|echo| error_db(echo).abs()).fold(0.0, f64::max)
 }
@@ -84,7 +83,7 @@ fn sphere_ratio(alpha_rad: f64) -> f64 {
     let radar = Radar { footprint: Footprint::Projected, ..raster(RASTER) };
     let chalk = Lambert { albedo: 0.5 };
     let echoes = scan(&radar, icosphere(RADIUS_M, 5), &chalk, 1, None, receiver(place));
-    let sum_w: f64 = echoes.iter().map(|echo| watts_from_dbm(echo.power_dbm)).sum();
+    let sum_w: f64 = echoes.iter().map(|echo| echo.power_w).sum();
     let cell_m2 = (0.11f64 / 200.0).powi(2);
     let lit_m2 =
         2.0 / 3.0 * RADIUS_M.powi(2) * (alpha_rad.sin() + (PI - alpha_rad) * alpha_rad.cos());
@@ -137,7 +136,7 @@ fn dihedral_error() -> f64 {
         [None, bounce].map(|bounce| scan(&line(), dihedral(), &chalk, 1, bounce, Observer::Radar));
     assert_eq!((one.len(), both.len()), (12, 12));
     let error = |(one, both): (&Echo, &Echo)| {
-        let found = watts_from_dbm(both.power_dbm) / watts_from_dbm(one.power_dbm) - 1.0;
+        let found = both.power_w / one.power_w - 1.0;
         let a_m = one.point.xyz.x.abs() / FRAC_1_SQRT_2;
         (found / second_over_first(a_m, 0.7) - 1.0).abs()
     };
@@ -173,7 +172,7 @@ fn corner_within_the_spot() -> f64 {
     let [none, all] = [0.0, 1.0].map(|outside_spot| {
         let bounce = Some(Bounce { rays: 2000, outside_spot });
         let echoes = scan(&radar, dihedral(), &mirror, 400, bounce, Observer::Radar);
-        watts_from_dbm(echoes[0].power_dbm)
+        echoes[0].power_w
     });
     none / all
 }

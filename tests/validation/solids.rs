@@ -9,7 +9,6 @@ use matdb::radar::scan::Raster;
 use matdb::radar::{Chirps, Pattern, Radar};
 use matdb::render::{Echo, Observer};
 use matdb::scene::solids::{icosphere, plate};
-use matdb::units::watts_from_dbm;
 
 use crate::support::echoes_at;
 
@@ -71,7 +70,7 @@ fn plate_error_db(tilt_rad: f64) -> f64 {
         let ray = (echo.point.xyz - DVec3::new(0.0, 1.1, STAND_OFF_M)).normalize();
         let cos = -ray.dot(normal);
         let expected_w = by_hand_w(STAND_OFF_M * normal.z / cos, cos, 0.5 / PI);
-        10.0 * (watts_from_dbm(echo.power_dbm) / expected_w).log10()
+        10.0 * (echo.power_w / expected_w).log10()
     };
     echoes.iter().map(|echo| error(echo).abs()).fold(0.0, f64::max)
 }
@@ -107,7 +106,7 @@ fn errors(
 ) -> Errors {
     let cell_m2 = scan.width_m / scan.chirps_per_line as f64 * scan.height_m / scan.lines as f64;
     let echoes = echoes(&raster(scan), mesh, 1, &CHALK);
-    let sum_w: f64 = echoes.iter().map(|echo| watts_from_dbm(echo.power_dbm)).sum();
+    let sum_w: f64 = echoes.iter().map(|echo| echo.power_w).sum();
     let incidence: Vec<f64> = echoes
         .iter()
         .filter_map(|echo| {

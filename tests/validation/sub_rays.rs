@@ -4,12 +4,11 @@ use std::f64::consts::{LN_2, PI};
 
 use glam::DVec3;
 use matdb::brdf::Lambert;
-use matdb::radar::beam::BeamEntry;
+use matdb::radar::BeamEntry;
 use matdb::radar::scan::Raster;
 use matdb::radar::{Beam, Radar};
 use matdb::render::Echo;
 use matdb::scene::solids::{icosphere, plate};
-use matdb::units::watts_from_dbm;
 use statrs::function::erf::erfc;
 
 use super::page::{Row, Section, Table, Tolerance::Below, Tolerance::Within};
@@ -47,7 +46,7 @@ fn shares(echoes: &[Echo]) -> Vec<f64> {
     let mut shares = vec![0.0; CHIRPS];
     for echo in echoes {
         let full_w = by_hand_w(STAND_OFF_M, 1.0, 0.5 / PI);
-        shares[echo.chirp as usize] = watts_from_dbm(echo.power_dbm) / full_w;
+        shares[echo.chirp as usize] = echo.power_w / full_w;
     }
     shares
 }

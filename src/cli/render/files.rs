@@ -10,6 +10,7 @@ use crate::render::{Echo, cloud_table};
 use crate::report::ScanRecord;
 use crate::scene::Scene;
 use crate::setup::{ReadyScene, View};
+use crate::units::dbm_from_watts;
 
 /// Names of the radar's files, in the order they are written.
 pub(super) const NAMES: &str = "power.exr, power.png, cloud.ply and scan.json";
@@ -72,7 +73,7 @@ fn power_figure(scene: &Scene, view: &View, image: &Raster) -> Result<Vec<u8>, E
         None => scene.radar().preset.clone(),
         Some(receiver) => format!("{}, receiver {}", scene.radar().preset, receiver.name),
     };
-    let threshold_dbm = (10.0 * scan.threshold_dbm).round() / 10.0;
+    let threshold_dbm = (10.0 * dbm_from_watts(scan.threshold_w)).round() / 10.0;
     let subtitle = format!(
         "{antenna}, {} of {} chirps ≥ {} dBm",
         grouped(scan.detections().count()),

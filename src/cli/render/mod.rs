@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::files::write_all;
 use crate::formats::exr::Packing;
 use crate::geometry::Raster;
-use crate::render::{RenderError, Setup, trace_placed};
+use crate::render::{RenderError, trace_placed};
 use crate::report::ScanRecord;
 use crate::setup::Database;
 use crate::setup::ReadyScene;
@@ -58,7 +58,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let failed = |error: GpuError| ready.render_error("", RenderError::Tracer(error.into()));
     let gpu = gpu(args.tracer, console).map_err(failed)?;
     let held = gpu.as_ref().map(|gpu| gpu.hold(assembly.bvh())).transpose().map_err(failed)?;
-    let setup = Setup { tracer: tracer(args.tracer, held.as_ref()), ..assembly.setup() };
+    let mut setup = assembly.setup();
+    setup.geometry.tracer = tracer(args.tracer, held.as_ref());
     let chirps = ready.scene.chirps.rays.len();
     let bar = console.progress("tracing", chirps);
     let rays = ready.scene.file.spot.rays;

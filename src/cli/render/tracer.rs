@@ -1,7 +1,7 @@
 //! `--tracer`: how the rays of the scan are traced.
 
 use crate::cli::console::Console;
-use crate::trace::{Gpu, GpuError, Held, Tracer};
+use crate::trace::{Gpu, GpuError, GpuMesh, Tracer};
 
 /// Ways to trace the rays of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -35,7 +35,7 @@ pub(super) fn gpu(wanted: Option<Rays>, console: &Console) -> Result<Option<Gpu>
 }
 
 /// The tracer that is wanted; without a graphics processor that the program chooses.
-pub(super) fn tracer<'a>(wanted: Option<Rays>, held: Option<&'a Held<'a>>) -> Tracer<'a> {
+pub(super) fn tracer<'a>(wanted: Option<Rays>, held: Option<&'a GpuMesh<'a>>) -> Tracer<'a> {
     match (wanted, held) {
         (Some(Rays::Pinhole), _) => Tracer::Pinhole,
         (Some(Rays::Bvh), _) => Tracer::Bvh,

@@ -145,15 +145,15 @@ impl Spots {
 /// The spots of all shots, each of a diameter on the target, m.
 fn spots(stage: &Stage, shots: &[Shot], diameter_m: f64) -> Vec<Option<Spot>> {
     let axes: Vec<Ray<Global>> = shots.iter().map(|shot| shot.ray).collect();
-    let centres = closest(stage.bvh, &axes);
+    let centres = closest(stage.geometry.bvh, &axes);
     let rays: Vec<[Ray<Global>; RAYS]> = axes
         .par_iter()
         .zip(&centres)
         .map(|(axis, centre)| spot_rays(axis, centre.map_or(0.0, |hit| diameter_m / hit.range_m)))
         .collect();
-    let hits = closest(stage.bvh, rays.as_flattened());
+    let hits = closest(stage.geometry.bvh, rays.as_flattened());
     // Where facets are few, spots hit most of them many times.
-    let facets = stage.bvh.mesh().facets.len();
+    let facets = stage.geometry.bvh.mesh().facets.len();
     let facets = if facets < shots.len() * RAYS { 0..facets } else { 0..0 };
     let facets: Vec<Facet> =
         facets.into_par_iter().with_min_len(1024).map(|facet| Facet::of(stage, facet)).collect();
@@ -260,7 +260,7 @@ impl Effect for FiniteSpot {
     }
 
     fn starts(&self, stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
-        let nominal_m = stage.radar.spot_diameter_m;
+        let nominal_m = stage.geometry.radar.spot_diameter_m;
         [0.1, 0.3, 0.75, 1.5].map(|share| vec![(share * nominal_m).clamp(1e-3, MOST_M)]).to_vec()
     }
 

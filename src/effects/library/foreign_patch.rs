@@ -31,7 +31,7 @@ const FADED: f64 = 3.0;
 /// Distance of a shot from the centre on the target, m; infinite where it is more than `far_m`, which costs
 /// no ray.
 fn apart_m(stage: &Stage, shot: &Shot, [x_m, y_m]: [f64; 2], far_m: f64) -> f64 {
-    let axes = stage.radar.frames().global_from_target.rotation();
+    let axes = stage.geometry.radar.frames().global_from_target.rotation();
     let aside = (x_m - shot.xt_m) * axes.x_axis + (y_m - shot.yt_m) * axes.y_axis;
     // The shot is at least this far from the ray of the centre.
     let forward = shot.ray.direction.xyz();
@@ -41,7 +41,7 @@ fn apart_m(stage: &Stage, shot: &Shot, [x_m, y_m]: [f64; 2], far_m: f64) -> f64 
     let Some(direction) = towards.filter(|_| beside_m <= far_m) else { return f64::INFINITY };
     // The centre belongs to the target, wherever that has moved.
     let ray = Ray { origin: shot.ray.origin, direction };
-    let centre = match stage.bvh.closest(&ray) {
+    let centre = match stage.geometry.bvh.closest(&ray) {
         Some(hit) => hit.point.xyz,
         None => ray.origin.xyz + shot.hit.range_m * direction.xyz(),
     };

@@ -102,7 +102,7 @@ fn detour(
     let cos_exit = second.normal.dot(back.xyz());
     let back_m = second.hit.point.distance_m(radar);
     let sight = Ray { origin: radar, direction: -back };
-    let hidden = stage.bvh.closest(&sight).is_some_and(|hit| hit.range_m < back_m - 1e-5);
+    let hidden = stage.geometry.bvh.closest(&sight).is_some_and(|hit| hit.range_m < back_m - 1e-5);
     if cos_exit <= 0.0 || hidden {
         return None;
     }

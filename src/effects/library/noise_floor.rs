@@ -35,7 +35,7 @@ impl Effect for NoiseFloor {
     fn starts(&self, stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
         let [least, most] = [NONE_DBM + 1.0, -30.0];
         let below_db = [13.0, 8.0, 4.0];
-        below_db.map(|b| vec![(stage.radar.threshold_dbm - b).clamp(least, most)]).to_vec()
+        below_db.map(|b| vec![(stage.geometry.radar.threshold_dbm - b).clamp(least, most)]).to_vec()
     }
 
     fn receive(&self, values: &[f64], receiver: Receiver) -> Receiver {

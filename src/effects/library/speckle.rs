@@ -33,7 +33,7 @@ impl Effect for Speckle {
 
     /// As shares of the declared looks, or absolute where the radar declares no speckle.
     fn starts(&self, stage: &Stage, _shots: &[Shot]) -> Vec<Vec<f64>> {
-        let declared = stage.radar.speckle.map(|speckle| speckle.looks);
+        let declared = stage.geometry.radar.speckle.map(|speckle| speckle.looks);
         match declared {
             Some(looks) => {
                 [0.95, 0.85, 0.6, 0.3].map(|share| vec![(share * looks).clamp(0.3, ALL)]).to_vec()

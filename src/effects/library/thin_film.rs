@@ -106,7 +106,7 @@ impl Effect for ThinFilm {
             return f_per_sr;
         }
         let theta_rad = shot.hit.theta_rad();
-        let frequency_hz = stage.radar.centre_frequency_ghz * 1e9;
+        let frequency_hz = stage.geometry.radar.centre_frequency_ghz * 1e9;
         let [film, bare] = reflectances(
             [thickness_m, index],
             substrate(law, substrate_ratio),

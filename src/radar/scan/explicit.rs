@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
-use super::Chirps;
+use super::chirps::Chirps;
 use crate::formats::FormatError;
 use crate::formats::csv::Table;
 use crate::frames::{Direction, Global, Ray};
-use crate::radar::RadarError;
+use crate::radar::error::RadarError;
 use crate::radar::mirror::MirrorAngles;
 
 /// A direction this near to unit length was meant to be one.
@@ -17,12 +17,8 @@ pub(super) fn rays(file: &str, bytes: &[u8]) -> Result<Chirps, RadarError> {
     let columns = ["chirp", "ox_m", "oy_m", "oz_m", "dx", "dy", "dz"];
     let mut stretched = 0;
     let mut chirps = read(file, bytes, &columns, |table, row, chirps| {
-        let vector = |names: [&str; 3]| -> Result<DVec3, FormatError> {
-            let [x, y, z] = names.map(|name| table.required_number(row, name));
-            Ok(DVec3::new(x?, y?, z?))
-        };
-        let origin = vector(["ox_m", "oy_m", "oz_m"])?;
-        let along = vector(["dx", "dy", "dz"])?;
+        let origin = vector(table, row, ["ox_m", "oy_m", "oz_m"])?;
+        let along = vector(table, row, ["dx", "dy", "dz"])?;
         let direction: Direction<Global> = Direction::new(along).ok_or_else(|| {
             FormatError::at(table.place(row), "the direction has no length", "give a unit vector")
         })?;
@@ -36,6 +32,12 @@ pub(super) fn rays(file: &str, bytes: &[u8]) -> Result<Chirps, RadarError> {
         ));
     }
     Ok(chirps)
+}
+
+/// Three numbers of a row.
+fn vector(table: &Table, row: usize, names: [&str; 3]) -> Result<DVec3, FormatError> {
+    let [x, y, z] = names.map(|name| table.required_number(row, name));
+    Ok(DVec3::new(x?, y?, z?))
 }
 
 /// Reads `chirp,gamma_rad,phi_rad` and, where it is there, `time_s`; the rays are left for the caller to draw.
@@ -72,10 +74,8 @@ fn read(
             return Err(at(FormatError::at(table.place(row), problem, way_out)));
         }
         chirps.number.push(number);
-        let time_s = match has_times {
-            true => table.required_number(row, "time_s").map_err(at)?,
-            false => 0.0,
-        };
+        let time_s =
+            if has_times { table.required_number(row, "time_s").map_err(at)? } else { 0.0 };
         chirps.time_s.push(time_s);
         rest(&table, row, &mut chirps).map_err(at)?;
     }

@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use crate::radar::error::Check;
 use crate::radar::mirror::{Mirror, MirrorAngles};
-use crate::radar::preset::Check;
 
 /// Reads a pattern; without the key `pattern` it is the elliptical one.
 pub(in crate::radar) fn read<'de, D: Deserializer<'de>>(from: D) -> Result<Pattern, D::Error> {
@@ -195,12 +195,15 @@ impl Elliptical {
 
 impl Raster {
     pub(super) fn target_points_m(&self) -> Vec<[f64; 2]> {
-        let line = |(number, y): (usize, f64)| {
-            let along = move |x: f64| if number.is_multiple_of(2) { x } else { 1.0 - x };
-            progress(self.chirps_per_line)
-                .map(move |x| [self.width_m * (along(x) - 0.5), self.height_m * (y - 0.5)])
-        };
-        progress(self.lines).enumerate().flat_map(line).collect()
+        let mut points_m = Vec::with_capacity(self.lines * self.chirps_per_line);
+        for (number, y) in progress(self.lines).enumerate() {
+            for x in progress(self.chirps_per_line) {
+                // Every other line runs backwards.
+                let along = if number.is_multiple_of(2) { x } else { 1.0 - x };
+                points_m.push([self.width_m * (along - 0.5), self.height_m * (y - 0.5)]);
+            }
+        }
+        points_m
     }
 }
 

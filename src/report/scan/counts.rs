@@ -5,6 +5,7 @@ use serde::Serialize;
 use crate::geometry::Raster;
 use crate::render::Scan;
 use crate::scene::Scene;
+use crate::units::dbm_from_watts;
 
 /// A region of the target.
 #[derive(Serialize)]
@@ -75,7 +76,8 @@ impl Counts {
 
 impl PowerRange {
     pub(super) fn new(scan: &Scan) -> Option<PowerRange> {
-        let mut powers: Vec<f64> = scan.detections().map(|echo| echo.power_dbm).collect();
+        let mut powers: Vec<f64> =
+            scan.detections().map(|echo| dbm_from_watts(echo.power_w)).collect();
         powers.sort_by(f64::total_cmp);
         let (weakest, strongest) = (*powers.first()?, *powers.last()?);
         Some(PowerRange { weakest, median: powers[powers.len() / 2], strongest })
@@ -105,8 +107,9 @@ pub(super) fn regions<'a>(
         let Some(truth) = echo.truth else { continue };
         let region = &mut regions[usize::from(truth.region)];
         region.detections += 1;
+        let power_dbm = dbm_from_watts(echo.power_w);
         region.strongest_dbm =
-            Some(region.strongest_dbm.map_or(echo.power_dbm, |p| p.max(echo.power_dbm)));
+            Some(region.strongest_dbm.map_or(power_dbm, |strongest| strongest.max(power_dbm)));
     }
     regions
 }

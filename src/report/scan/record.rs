@@ -13,6 +13,7 @@ use crate::radar::Radar;
 use crate::render::Scan;
 use crate::scene::{MeshReport, Scene};
 use crate::setup::{MaterialRevision, ReadyScene, SceneMaterial, View};
+use crate::units::dbm_from_watts;
 
 /// Version of the layout of `scan.json`; it grows with every change that a reader could trip over.
 const SCHEMA: u32 = 2;
@@ -163,8 +164,8 @@ impl<'a> ScanRecord<'a> {
             frames: frames(scene),
             cloud: if all_hits { "every hit" } else { "detections" },
             meshes: &scene.target.meshes,
-            threshold_dbm: scan.threshold_dbm,
-            noise_dbm: scan.noise_dbm,
+            threshold_dbm: dbm_from_watts(scan.threshold_w),
+            noise_dbm: scan.noise_w.map(dbm_from_watts),
             counts: Counts::new(scene, scan, image),
             power_dbm: PowerRange::new(scan),
             image: json!({
@@ -234,8 +235,8 @@ impl<'a> ReceiverRecord<'a> {
             name: &receiver.name,
             position_m: receiver.position_m,
             aperture_m2: receiver.aperture_m2.unwrap_or(scene.radar().aperture_m2),
-            threshold_dbm: view.scan.threshold_dbm,
-            noise_dbm: view.scan.noise_dbm,
+            threshold_dbm: dbm_from_watts(view.scan.threshold_w),
+            noise_dbm: view.scan.noise_w.map(dbm_from_watts),
             counts: Counts::new(scene, &view.scan, image),
             power_dbm: PowerRange::new(&view.scan),
         })

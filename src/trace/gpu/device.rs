@@ -9,7 +9,7 @@ use std::task::{Context, Poll, Waker};
 
 use wgpu::BufferUsages as Usage;
 
-use super::GpuError;
+use super::error::GpuError;
 use super::packed::{Aim, Corners, Node, Spot};
 
 /// Invocations of a workgroup, as in the shader.

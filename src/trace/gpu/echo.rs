@@ -5,11 +5,13 @@
 //! What it cannot tell it leaves open, ray by ray: those that [`Answer::Unsure`](super::Answer) names, those
 //! that graze what they meet, and those that meet a law without [`Term`]s. Of all others the power is good to 0.02 dB.
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
-use super::{GpuError, Held, RAYS_AT_ONCE, Table, in_turns, packed};
+use super::device::Table;
+use super::error::GpuError;
+use super::mesh::{GpuMesh, RAYS_AT_ONCE, in_turns};
+use super::packed::{self, Cone};
 use crate::brdf::{Distribution, Facets, Term};
-use crate::frames::{Global, Ray};
 
 /// Rays that one invocation sees to.
 pub const RAYS_PER_SHARE: usize = 32;
@@ -20,17 +22,6 @@ const MOST_COSINES: f64 = 1100.0;
 
 /// A law without terms, as in the shader.
 const NO_TERMS: u32 = u32::MAX;
-
-/// The rays of a chirp, one for each sample of the spot.
-#[derive(Clone, Copy, Debug)]
-pub struct Cone {
-    /// The axis of the beam.
-    pub axis: Ray<Global>,
-    /// What the two coordinates of a sample add to the unit vector along the axis.
-    pub across: [DVec3; 2],
-    /// Number of the law of region 0; those of the other regions follow.
-    pub law: u32,
-}
 
 /// What up to 32 rays of a chirp bring back.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,8 +35,8 @@ pub struct Share {
 }
 
 /// A mesh in the memory of a graphics processor with what is on it and how it is lit.
-pub struct Lit<'a> {
-    held: &'a Held<'a>,
+pub struct EchoTracer<'a> {
+    held: &'a GpuMesh<'a>,
     /// None of a mesh without area.
     table: Option<Table>,
     samples: usize,
@@ -53,7 +44,7 @@ pub struct Lit<'a> {
     reach: f64,
 }
 
-impl Held<'_> {
+impl GpuMesh<'_> {
     /// Of every facet the region, of every region of every target the law, whose terms are worth cosᵃθ more, and the
     /// samples of a spot, one or more.
     pub(crate) fn lit(
@@ -62,7 +53,7 @@ impl Held<'_> {
         laws: &[Option<Vec<Term>>],
         cosines: f64,
         samples: &[DVec2],
-    ) -> Result<Lit<'_>, GpuError> {
+    ) -> Result<EchoTracer<'_>, GpuError> {
         let table = || {
             let facets = &self.bvh.boxes().facets;
             let regions: Vec<u32> =
@@ -72,7 +63,7 @@ impl Held<'_> {
             let (laws, terms) = tabulated(laws, cosines);
             self.gpu.device.table(&regions, &samples, &laws, &terms)
         };
-        Ok(Lit {
+        Ok(EchoTracer {
             held: self,
             table: self.tree.as_ref().map(|_| table()).transpose()?,
             samples: samples.len(),
@@ -81,7 +72,7 @@ impl Held<'_> {
     }
 }
 
-impl Lit<'_> {
+impl EchoTracer<'_> {
     /// Shares of each chirp.
     pub fn shares(&self) -> usize {
         self.samples.div_ceil(RAYS_PER_SHARE)
@@ -89,7 +80,7 @@ impl Lit<'_> {
 
     /// What the rays of all chirps bring back: the shares of each, chirp after chirp.
     pub fn echoes(&self, cones: &[Cone]) -> Result<Vec<Share>, GpuError> {
-        let Held { gpu, bvh, tree } = self.held;
+        let GpuMesh { gpu, bvh, tree } = self.held;
         let shares = self.shares();
         let (Some(tree), Some(table)) = (tree, &self.table) else {
             return Ok(vec![
@@ -162,9 +153,11 @@ fn packed_term(term: &Term, cosines: f64) -> Option<[u32; 4]> {
 
 #[cfg(all(test, feature = "gpu"))]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Mixture, Scattering, Shadowing};
-    use crate::frames::{Direction, Point};
+    use crate::frames::{Direction, Point, Ray};
     use crate::scene::solids;
     use crate::trace::Bvh;
     use crate::trace::gpu::tests::gpu;

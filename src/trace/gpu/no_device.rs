@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use super::GpuError;
+use super::error::GpuError;
 use super::packed::{Aim, Corners, Node, Spot};
 
 pub(super) struct Device(Infallible);

@@ -4,10 +4,20 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-use super::echo::Cone;
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 use crate::trace::boxes::Boxes;
+
+/// The rays of a chirp, one for each sample of the spot.
+#[derive(Clone, Copy, Debug)]
+pub struct Cone {
+    /// The axis of the beam.
+    pub axis: Ray<Global>,
+    /// What the two coordinates of a sample add to the unit vector along the axis.
+    pub across: [DVec3; 2],
+    /// Number of the law of region 0; those of the other regions follow.
+    pub law: u32,
+}
 
 /// Answers of the device beside the number of a leaf entry: the ray meets nothing, or f32 cannot tell what.
 pub(super) const NOTHING: u32 = u32::MAX;
@@ -67,12 +77,16 @@ pub(super) fn aims(boxes: &Boxes, rays: &[Ray<Global>]) -> Vec<Aim> {
     rays.par_iter().with_min_len(1024).map(|ray| aim(boxes, ray)).collect()
 }
 
+/// A ray whose answer is known.
+fn known_aim(answer: u32) -> Aim {
+    [0, 0, 0, answer, 0, 0, 0, 0]
+}
+
 fn aim(boxes: &Boxes, ray: &Ray<Global>) -> Aim {
-    let known = |answer| [0, 0, 0, answer, 0, 0, 0, 0];
-    let Some(entry_m) = boxes.sphere.entry_m(ray) else { return known(NOTHING) };
+    let Some(entry_m) = boxes.sphere.entry_m(ray) else { return known_aim(NOTHING) };
     let (from_centre, direction) = (ray.origin.xyz - boxes.sphere.centre, ray.direction.xyz());
     if from_centre.length() > FARTHEST * boxes.sphere.radius_m {
-        return known(UNSURE);
+        return known_aim(UNSURE);
     }
     let start_m = (entry_m - RUN_UP * boxes.sphere.radius_m).max(0.0);
     let origin = (from_centre + start_m * direction) / boxes.sphere.radius_m;
@@ -87,30 +101,33 @@ pub(super) fn spots(boxes: &Boxes, cones: &[Cone], reach: f64) -> Vec<Spot> {
     cones.par_iter().with_min_len(1024).map(|cone| spot(boxes, cone, reach)).collect()
 }
 
+/// The rays of a chirp whose answer is known.
+fn known_spot(answer: u32) -> Spot {
+    let mut spot = [0; 16];
+    spot[15] = answer;
+    spot
+}
+
 fn spot(boxes: &Boxes, cone: &Cone, reach: f64) -> Spot {
-    let known = |answer| {
-        let mut spot = [0; 16];
-        spot[15] = answer;
-        spot
-    };
     let Cone { axis, across, law } = cone;
     let (from_centre, direction) = (axis.origin.xyz - boxes.sphere.centre, axis.direction.xyz());
     let farthest_m = from_centre.length() + boxes.sphere.radius_m;
     let widest = across.iter().map(|aside| aside.length()).fold(0.0, f64::max);
     let beside_m = reach * widest * farthest_m;
-    let Some(entry_m) = boxes.sphere.entry_beside_m(axis, beside_m) else { return known(NOTHING) };
+    let Some(entry_m) = boxes.sphere.entry_beside_m(axis, beside_m) else {
+        return known_spot(NOTHING);
+    };
     let size = 1.0 + 2.0 * beside_m / boxes.sphere.radius_m;
     if from_centre.length() > FARTHEST * boxes.sphere.radius_m || size > LARGEST {
-        return known(UNSURE);
+        return known_spot(UNSURE);
     }
     let start_m = (entry_m - RUN_UP * boxes.sphere.radius_m).max(0.0);
     let origin = (from_centre + start_m * direction) / boxes.sphere.radius_m;
     let largest = direction.abs().max_element();
     let run = (start_m * largest / boxes.sphere.radius_m) as f32;
-    let place = |vector: DVec3| words(vector.as_vec3());
-    let [x, y, z] = place(origin);
-    let [u, v, w] = place(direction / largest);
-    let [[a, b, c], [d, e, f]] = across.map(|aside| place(aside / largest));
+    let [x, y, z] = words(origin.as_vec3());
+    let [u, v, w] = words((direction / largest).as_vec3());
+    let [[a, b, c], [d, e, f]] = across.map(|aside| words((aside / largest).as_vec3()));
     let (run, size) = (run.to_bits(), (size as f32).to_bits());
     [x, y, z, run, u, v, w, size, a, b, c, *law, d, e, f, UNKNOWN]
 }

@@ -2,10 +2,9 @@
 
 use std::ops::Range;
 
-use super::lanes::{Form, LANES, Nearest};
-use super::patches::{Cells, Forms, Patches, blocks};
+use super::lanes::{Form, LANES, Nearest, ROUNDING};
+use super::patches::{Cells, Forms, NONE, Patches, blocks};
 use super::picture::Picture;
-use super::{NONE, ROUNDING};
 use crate::trace::facet::{Line, plane_m};
 use crate::trace::wide::{Wide, widest};
 

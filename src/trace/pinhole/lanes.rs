@@ -7,6 +7,9 @@ use crate::trace::wide::least;
 /// Rays of a block.
 pub(super) const LANES: usize = 16;
 
+/// Unit roundoff of f32, 2⁻²⁴.
+pub(super) const ROUNDING: f32 = f32::EPSILON / 2.0;
+
 pub(super) type Lanes = [f32; LANES];
 
 /// A facet as linear forms over (u, v).

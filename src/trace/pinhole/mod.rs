@@ -29,23 +29,18 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::bvh::Bvh;
 use super::facet::met_by;
+use super::hit::{Hit, no_hits};
 use super::wide::{Wide, widest};
-use super::{Bvh, Hit, no_hits};
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 use band::Band;
 use lanes::LANES;
-use patches::blocks;
+use patches::{NONE, blocks};
 use picture::Picture;
 
 pub use fan::{Fan, NoFan};
-
-/// Unit roundoff of f32, 2⁻²⁴.
-const ROUNDING: f32 = f32::EPSILON / 2.0;
-
-/// No facet.
-const NONE: u32 = u32::MAX;
 
 /// Facets that are shared out to bands at once.
 const FACETS_PER_TASK: usize = 8192;

@@ -1,10 +1,12 @@
 //! Facets in the picture, a block of them side by side.
 
 use super::fan::Grid;
-use super::lanes::{Form, LANES, Lanes};
-use super::{NONE, ROUNDING};
+use super::lanes::{Form, LANES, Lanes, ROUNDING};
 use crate::trace::facet::GRAZING;
 use crate::trace::wide::{least, most};
+
+/// No facet.
+pub(super) const NONE: u32 = u32::MAX;
 
 /// Twice the bound below which a ray runs along a facet, for rounding.
 const ALONG: f32 = 2.0 * GRAZING as f32;

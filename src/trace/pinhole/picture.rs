@@ -32,7 +32,7 @@ impl<'a> Picture<'a> {
         Picture { fan, mesh, corners }
     }
 
-    /// A block of facets; [`NONE`] is not seen.
+    /// A block of facets; a number that is no facet's is not seen.
     #[inline(always)]
     pub fn patches(&self, facets: &[u32; LANES]) -> Patches {
         let mut corners = [[[0.0; LANES]; 3]; 3];

@@ -1,0 +1,116 @@
+//! Why an instrument cannot exist, and the check of a constant against its range.
+
+use thiserror::Error;
+
+use crate::formats::FormatError;
+use crate::units::shown;
+
+/// Why a radar cannot exist.
+#[derive(Debug, Error, PartialEq)]
+pub enum RadarError {
+    /// No such preset.
+    #[error("there is no radar preset `{name}`; the presets are: {}", presets.join(", "))]
+    UnknownPreset {
+        /// The name that was asked for.
+        name: String,
+        /// Names of all presets.
+        presets: &'static [&'static str],
+    },
+    /// A constant without a physical meaning.
+    #[error("radar.{name} = {} is out of range; give a value from {} to {}", shown(*value), shown(*min), shown(*max))]
+    OutOfRange {
+        /// Name of the field.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Smallest accepted value.
+        min: f64,
+        /// Largest accepted value.
+        max: f64,
+    },
+    /// Noise by its law and by a receiver.
+    #[error(
+        "[radar.noise] and [radar.receiver] both bring thermal noise; remove [radar.noise], the \
+         receiver's is set by radar.receiver.noise_figure_db"
+    )]
+    NoiseTwice,
+    /// A receiver averages a whole number of looks.
+    #[error(
+        "radar.speckle.looks = {looks} cannot be made of beat signals; give a whole number from 1 \
+         to 10 000, or remove [radar.receiver]"
+    )]
+    PartialLook {
+        /// The looks asked for.
+        looks: f64,
+    },
+    /// Equation (1) cannot be fitted.
+    #[error(transparent)]
+    F5(#[from] F5Error),
+    /// The file of an explicit scan cannot be read.
+    #[error("cannot read the scan {file}: {reason}; it is looked for beside the scene file")]
+    Unreadable {
+        /// The file, as the scene gives it.
+        file: String,
+        /// Why.
+        reason: String,
+    },
+    /// The file of an explicit scan does not follow its format.
+    #[error("{file}: {error}")]
+    Explicit {
+        /// The file, as the scene gives it.
+        file: String,
+        /// What is wrong.
+        error: FormatError,
+    },
+    /// Equation (2) has no real root for a chirp.
+    #[error(
+        "chirp {chirp} would look at ({xt_m}, {yt_m}) m in the target plane, beyond the reach of a \
+         range of {range_m} m; shrink the scan or move radar.reflector_centre_m back"
+    )]
+    OutOfReach {
+        /// Chirp number, from 0.
+        chirp: usize,
+        /// x in the target plane, m.
+        xt_m: f64,
+        /// y in the target plane, m.
+        yt_m: f64,
+        /// Range at which the pattern is drawn, m.
+        range_m: f64,
+    },
+}
+
+/// Why optics have no polynomial.
+#[derive(Debug, Error, PartialEq)]
+pub enum F5Error {
+    /// The beam leaves backwards somewhere in the domain.
+    #[error(
+        "the beam misses the target plane at γ = {gamma_rad} rad, φ = {phi_rad} rad; reduce the \
+         field of view or raise radar.optics.angular_magnification"
+    )]
+    NoBeam {
+        /// Tilt, rad.
+        gamma_rad: f64,
+        /// Rotation, rad.
+        phi_rad: f64,
+    },
+    /// Own coefficients that do not make a polynomial.
+    #[error("radar.f5: {problem}; `matdb radar` writes a complete table to start from")]
+    Own {
+        /// What is wrong.
+        problem: &'static str,
+    },
+    /// The equations have no solution.
+    #[error("no polynomial fits the optics; check radar.optics and the size of the scan")]
+    Singular,
+}
+
+/// A named constant with its value and its smallest and largest accepted value.
+pub(super) type Check = (&'static str, f64, (f64, f64));
+
+pub(super) fn in_range((name, value, (min, max)): Check) -> Result<(), RadarError> {
+    if value >= min && value <= max {
+        Ok(())
+    } else {
+        Err(RadarError::OutOfRange { name, value, min, max })
+    }
+}

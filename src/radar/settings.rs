@@ -1,0 +1,142 @@
+//! Every constant of an instrument in one record, as scene files write it.
+//!
+//! Decibels, degrees and gigahertz stay here, at the edge; [`Link`](super::Link), [`Chirp`] and
+//! [`RadarFrames`](super::RadarFrames) hold the same numbers in SI. Every field of a preset can be
+//! overridden in a scene's `[radar]` table.
+//!
+//! The marks in the field docs: **paper** is Ortiz-Jiménez et al., IEEE T-THz Sci. Technol. 2017
+//! (DOI 10.1109/TTHZ.2017.2702590); **assumed** is a value that no publication gives and that we chose.
+
+use serde::{Deserialize, Serialize};
+
+use super::chirp::{Chirp, ChirpEntry};
+use super::error::Check;
+use super::f5::F5;
+use super::mirror::Optics;
+use super::noise::Noise;
+use super::receiver::Receiver;
+use super::scan::pattern::{self, Pattern};
+use super::speckle::Speckle;
+use crate::formats::EffectEntry;
+
+/// An instrument. The default is `upm-300ghz`, the imaging radar of the Universidad Politécnica de
+/// Madrid that the paper describes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Radar {
+    /// The preset that fills the fields that are not given.
+    pub preset: String,
+    /// Centre frequency, GHz. 300: paper.
+    pub centre_frequency_ghz: f64,
+    /// Swept bandwidth, GHz. 27: table in Liang et al. 2022, DOI 10.11972/j.issn.1001-9014.2022.02.011.
+    pub bandwidth_ghz: f64,
+    /// Transmitted power P_t, dBm. 7: assumed.
+    pub transmit_power_dbm: f64,
+    /// Equivalent area of the receiving antenna A_eq, m². 0.196: assumed, a 0.5 m aperture, which
+    /// is λR over the paper's spot diameter.
+    pub aperture_m2: f64,
+    /// Two-way losses and calibration, dB. 15: assumed, so that a painted mannequin's specular peak
+    /// lands where the paper's figure 9 has it.
+    pub system_loss_db: f64,
+    /// Detections below this power are discarded, dBm. −77: paper, Sec. V-C.
+    pub threshold_dbm: f64,
+    /// How a tilted surface spreads the spot. `paper`: equation (11).
+    pub footprint: Footprint,
+    /// Diameter of the spot at the centre of the field of view, m. 0.016: paper, Sec. II-B.
+    pub spot_diameter_m: f64,
+    /// O_c: centre of the main reflector in the target frame, m. (0, 0, 8): assumed to coincide
+    /// with the primary focus, 8 m (paper) in front of the target plane.
+    pub reflector_centre_m: [f64; 3],
+    /// O_t: secondary focus in the antenna frame, m. (0, 0, −8): 8 m is the paper's stand-off; the
+    /// direction is assumed.
+    pub secondary_focus_m: [f64; 3],
+    /// τ: rotation of the target plane against the focal plane, degrees. 0: assumed; τ and α add
+    /// up to one yaw, so that no cloud in the global frame can tell them apart.
+    pub tau_deg: f64,
+    /// O_a: primary focus in the global frame, m. (0, 1.1, 8): assumed; targets stand at the
+    /// origin, and 1.1 m is the height of the paper's line scan.
+    pub primary_focus_m: [f64; 3],
+    /// α: yaw of the antenna on the table, degrees. −90: assumed; antenna and global axes are then
+    /// parallel, and the radar looks along −z.
+    pub alpha_deg: f64,
+    /// Time from one chirp to the next, s. 200e-6: assumed; a scan of 18 529 chirps takes 3.7 s.
+    pub chirp_period_s: f64,
+    /// How a sweep is sampled; of use with a receiver.
+    pub chirp: ChirpEntry,
+    /// From the beat signal to a range and a power. None, the paper's: both are exact.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub receiver: Option<Receiver>,
+    /// Speckle of the echoes. None, the paper's: there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub speckle: Option<Speckle>,
+    /// Thermal noise and range error without a beat signal; a receiver has its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise: Option<Noise>,
+    /// Physical effects of the instrument, each once. None, the paper's.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub effect: Vec<EffectEntry>,
+    /// How the spot grows away from the centre and the focus.
+    pub beam: BeamEntry,
+    /// The scanning mirror and the reflectors behind it.
+    pub optics: Optics,
+    /// Own coefficients of equation (1), in place of those fitted to `optics`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub f5: Option<F5>,
+    /// Where the rays go.
+    #[serde(deserialize_with = "pattern::read")]
+    pub scan: Pattern,
+}
+
+/// How a tilted surface spreads the spot.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Footprint {
+    /// Equation (11) as the paper has it, with cos²θ.
+    #[default]
+    Paper,
+    /// The lit area grows as 1/cos θ, which leaves cos θ once.
+    Projected,
+}
+
+/// How the spot grows, as scene files write it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BeamEntry {
+    /// Range at which the beam is focused, m. 8: paper.
+    pub focus_m: f64,
+    /// Diameter at `edge_m` from the centre of the field of view, over the one at the centre, at
+    /// the focus. 1.5: assumed.
+    pub edge_growth: f64,
+    /// Distance from the centre at which it has grown so, m. 0.5: assumed, about the corner of the
+    /// paper's field of view.
+    pub edge_m: f64,
+}
+
+impl Default for BeamEntry {
+    fn default() -> Self {
+        BeamEntry { focus_m: 8.0, edge_growth: 1.5, edge_m: 0.5 }
+    }
+}
+
+impl BeamEntry {
+    pub(super) fn checks(&self) -> Vec<Check> {
+        vec![
+            ("beam.focus_m", self.focus_m, (1e-3, 1e4)),
+            ("beam.edge_growth", self.edge_growth, (0.1, 100.0)),
+            ("beam.edge_m", self.edge_m, (1e-3, 1e3)),
+        ]
+    }
+}
+
+impl Radar {
+    /// The sweep, in SI.
+    pub fn chirp(&self) -> Chirp {
+        Chirp {
+            centre_frequency_hz: self.centre_frequency_ghz * 1e9,
+            bandwidth_hz: self.bandwidth_ghz * 1e9,
+            duration_s: self.chirp.duration_s,
+            samples: self.chirp.samples,
+            start_phase_rad: 0.0,
+        }
+    }
+}

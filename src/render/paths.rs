@@ -1,0 +1,237 @@
+//! Ways that power takes from the radar to an antenna, and what arrives by each.
+//!
+//! Direct: radar → A → antenna, equation (11) with the bistatic f(i, o). The spot's power P_t falls
+//! on A; of it the antenna at the distance R_o receives f(i, o)·cos θ_o·A_eq/R_o². The paper's further
+//! cos θ_i is part of [`Link::flux_w`].
+//!
+//! Second order: radar → A → B → antenna. A sends f_A(i, ω)·cos θ_ω·dω of its power towards ω, where
+//! B lies, and B sends f_B(−ω, o)·cos θ_o·A_eq/R_o² of that into the antenna. The integral over ω is
+//! estimated in `bounce.rs`. Range is half of the whole way.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::acting::{Acting, Change};
+use super::bounce::{Bounce, directions};
+use super::observer::Observer;
+use super::path::{Path, sum};
+use super::setup::Setup;
+use super::spot::Footprints;
+use super::surface::{Facing, LocalFrame, Surface};
+use crate::effects::MeanEcho;
+use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
+use crate::radar::random::{Key, Purpose};
+use crate::radar::{Beam, Detection, Link};
+use crate::trace::Hit;
+
+/// Rays start this far above a surface, m, so as not to meet it again: far above the rounding of
+/// metres in f64, far below a wavelength.
+const LIFT_M: f64 = 1e-7;
+
+/// All paths of a scan to one antenna.
+pub(super) struct Paths<'a> {
+    setup: &'a Setup<'a>,
+    observer: Observer,
+    link: Link,
+    beam: Beam,
+    footprints: &'a Footprints,
+    acting: Option<Acting<'a>>,
+    /// What the effects make of each chirp's echo as a whole.
+    changes: Vec<Option<Change>>,
+}
+
+/// One chirp and the antenna that receives it.
+struct Emission<'a> {
+    paths: &'a Paths<'a>,
+    number: usize,
+    axis: &'a Ray<Global>,
+    antenna: DVec3,
+    /// Rays that share its power.
+    rays: usize,
+}
+
+/// A lit point of the target.
+struct LitPoint<'a> {
+    hit: Hit,
+    surface: Surface<'a>,
+    frame: LocalFrame,
+    /// Where the light comes from.
+    source: Direction<Local>,
+    /// Where the antenna is, and how far, m.
+    antenna: Direction<Local>,
+    antenna_m: f64,
+}
+
+impl<'a> Paths<'a> {
+    pub fn new(
+        setup: &'a Setup<'a>,
+        observer: Observer,
+        footprints: &'a Footprints,
+        acting: Option<Acting<'a>>,
+    ) -> Paths<'a> {
+        let mut link = Link::new(setup.geometry.radar);
+        if let Observer::Receiver { aperture_m2, .. } = observer {
+            link.aperture_m2 = aperture_m2;
+        }
+        let beam = Beam::new(setup.geometry.radar);
+        let mut paths =
+            Paths { setup, observer, link, beam, footprints, acting, changes: Vec::new() };
+        paths.changes = paths.acting.as_ref().map_or(Vec::new(), |acting| paths.changes_by(acting));
+        paths
+    }
+
+    /// What the effects change of every whole echo. They need all echoes of the scan at once, so that all paths are found twice.
+    fn changes_by(&self, acting: &Acting) -> Vec<Option<Change>> {
+        let chirps = self.footprints.chirps().enumerate();
+        let sums = chirps.map(|(chirp, hits)| {
+            let paths = self.of_chirp(chirp, hits);
+            let Detection { power_w, range_m } = sum(&paths);
+            (!paths.is_empty()).then_some(MeanEcho::at_once(power_w, range_m))
+        });
+        acting.arrive(self.footprints, sums.collect())
+    }
+
+    /// All paths of a chirp through the hits of its rays. A direct path is there even when nothing
+    /// arrives by it.
+    pub fn of_chirp(&self, number: usize, hits: &[Option<Hit>]) -> Vec<Path> {
+        let mut paths = Vec::with_capacity(hits.len());
+        self.fill(number, hits, &mut paths);
+        paths
+    }
+
+    /// As [`of_chirp`](Self::of_chirp), into a list whose contents it replaces.
+    pub fn fill(&self, number: usize, hits: &[Option<Hit>], paths: &mut Vec<Path>) {
+        paths.clear();
+        let axis = &self.setup.geometry.chirps.rays[number];
+        let antenna = self.observer.position(axis.origin.xyz);
+        let sent = Emission { paths: self, number, axis, antenna, rays: hits.len() };
+        let tilts = self.acting.as_ref().map_or([0.0; 2], |acting| acting.tilts(number));
+        for (ray, hit) in hits.iter().enumerate() {
+            let Some(hit) = hit else { continue };
+            let facing = sent.facing(ray);
+            let lit = sent.lit(*hit, axis.origin.xyz);
+            let bare = sent.direct(&lit);
+            let acting = self.acting.as_ref();
+            let direct = acting.map_or(bare, |a| a.direct(bare, number, hits.len(), facing, tilts));
+            paths.push(direct);
+            if let Some(bounce) = &self.setup.bounce {
+                let gain = acting.map(|a| a.instrument_gain(number, hits.len(), *hit, facing));
+                let flux_w = sent.flux_w(&lit) * gain.unwrap_or(1.0);
+                sent.second_order(&lit, flux_w, direct, bounce, ray, paths);
+            }
+        }
+        if let Some(change) = self.changes.get(number).copied().flatten() {
+            change.share_out(paths);
+        }
+    }
+}
+
+impl<'a> Emission<'a> {
+    fn lit(&self, hit: Hit, source: DVec3) -> LitPoint<'a> {
+        let setup = self.paths.setup;
+        let surface =
+            setup.surfaces[usize::from(setup.geometry.region_of_facet[hit.facet as usize])];
+        let to_source = (source - hit.point.xyz).normalize_or(DVec3::Z);
+        let to_antenna = (self.antenna - hit.point.xyz).normalize_or(DVec3::Z);
+        let frame = LocalFrame::new(setup.geometry.bvh.mesh(), &hit, to_source, surface.grain);
+        let here = frame.local(to_source);
+        let antenna = if self.antenna == source { here } else { frame.local(to_antenna) };
+        let antenna_m = self.antenna.distance(hit.point.xyz);
+        LitPoint { hit, surface, frame, source: here, antenna, antenna_m }
+    }
+
+    fn direct(&self, lit: &LitPoint) -> Path {
+        // What the radar lights it also sees.
+        let seen = self.paths.observer == Observer::Radar || self.is_seen(lit);
+        let (received, specular_share) = self.received(lit);
+        let share = if seen { received } else { 0.0 };
+        let [x, y, _] = lit.source.xyz().to_array();
+        Path {
+            range_m: 0.5 * (lit.hit.range_m + lit.antenna_m),
+            power_w: self.flux_w(lit) * share,
+            hit: lit.hit,
+            surfaces: 1,
+            azimuth_rad: y.atan2(x),
+            specular_share,
+        }
+    }
+
+    fn second_order(
+        &self,
+        lit: &LitPoint,
+        flux_w: f64,
+        direct: Path,
+        bounce: &Bounce,
+        ray: usize,
+        paths: &mut Vec<Path>,
+    ) {
+        for (onward, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
+            let Some(hit) = self.cast(lit, onward) else { continue };
+            let (f_per_sr, first_share) =
+                lit.surface.scattering.f_and_specular_share(lit.source, onward);
+            let second = self.lit(hit, lit.hit.point.xyz);
+            let seen = weight * self.pattern(bounce, &hit);
+            let (received, second_share) = self.received(&second);
+            let power_w = flux_w * f_per_sr * onward.cos_theta() * seen * received;
+            if power_w > 0.0 && self.is_seen(&second) {
+                let way_m = lit.hit.range_m + hit.range_m + second.antenna_m;
+                let specular_share = first_share * second_share;
+                let (range_m, surfaces) = (0.5 * way_m, 2);
+                paths.push(Path { range_m, power_w, surfaces, specular_share, ..direct });
+            }
+        }
+    }
+
+    /// How the surface lies at a ray's hit, where effects have moved it.
+    fn facing(&self, ray: usize) -> Option<Facing> {
+        self.paths.footprints.facings.get(self.number * self.rays + ray).copied().flatten()
+    }
+
+    /// One key for all observers: where a surface sends its power does not depend on who listens.
+    fn key(&self, ray: usize) -> Key {
+        let (seed, chirp) = (self.paths.setup.seed, self.number as u64);
+        Key { seed, chirp, sub_ray: ray as u64, purpose: Purpose::Bounce }
+    }
+
+    /// Power of one ray on a lit point, W.
+    fn flux_w(&self, lit: &LitPoint) -> f64 {
+        self.paths.link.flux_w(lit.hit.cos_theta) / self.rays as f64
+    }
+
+    /// Share of the power on a lit point that the antenna receives if nothing is in the way, and the
+    /// share of that which is reflected like by a mirror.
+    fn received(&self, lit: &LitPoint) -> (f64, f64) {
+        let (f_per_sr, specular_share) =
+            lit.surface.scattering.f_and_specular_share(lit.source, lit.antenna);
+        let cos_exit = lit.antenna.cos_theta();
+        let received = if cos_exit > 0.0 {
+            self.paths.link.received_per_w(lit.antenna_m, cos_exit, f_per_sr)
+        } else {
+            0.0
+        };
+        (received, specular_share)
+    }
+
+    /// What a ray that leaves a lit point meets.
+    fn cast(&self, lit: &LitPoint, towards: Direction<Local>) -> Option<Hit> {
+        let origin = Point::from(lit.hit.point.xyz + LIFT_M * lit.frame.normal);
+        let direction = Direction::new(lit.frame.world(towards.xyz()))?;
+        self.paths.setup.geometry.bvh.closest(&Ray { origin, direction })
+    }
+
+    /// Whether nothing stands between a lit point and the antenna.
+    fn is_seen(&self, lit: &LitPoint) -> bool {
+        let above = lit.antenna.cos_theta() > 0.0;
+        above && self.cast(lit, lit.antenna).is_none_or(|hit| hit.range_m >= lit.antenna_m)
+    }
+
+    /// How well the antenna sees a second surface. A separate receiver sees all alike.
+    fn pattern(&self, bounce: &Bounce, hit: &Hit) -> f64 {
+        match self.paths.observer {
+            Observer::Receiver { .. } => 1.0,
+            Observer::Radar => {
+                bounce.pattern(&self.paths.beam, self.axis, self.rays, hit.point.xyz)
+            }
+        }
+    }
+}

@@ -1,0 +1,310 @@
+//! A scan from its rays to its echoes.
+
+use rayon::prelude::*;
+
+use super::acting::{self, Acting};
+use super::detect::{Beats, Detector};
+use super::echo::{Echo, Echoes};
+use super::error::RenderError;
+use super::observer::Observer;
+use super::paths::Paths;
+use super::setup::Setup;
+use super::spot::{self, Footprints};
+use crate::frames::{Global, Point};
+use crate::radar::Field;
+use crate::trace::{ScanGeometry, winding_number};
+
+/// What one scan gave at one antenna.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scan {
+    /// Number of chirps sent.
+    pub chirps: usize,
+    /// Number of chirps that met the target.
+    pub hits: usize,
+    /// Chirps that met a surface, in the order they were sent, whatever their power, and false alarms.
+    pub echoes: Vec<Echo>,
+    /// Echoes below this power are not detected, W.
+    pub threshold_w: f64,
+    /// Mean thermal power in a range cell, W; none for a receiver without noise.
+    pub noise_w: Option<f64>,
+}
+
+impl Scan {
+    /// The echoes that the radar reports: those at or above the threshold.
+    pub fn detections(&self) -> impl Iterator<Item = &Echo> {
+        self.echoes.iter().filter(|echo| echo.power_w >= self.threshold_w)
+    }
+}
+
+/// Traces every chirp of a scan with `rays_per_chirp` rays, one or more. `done` is called with the number of
+/// chirps that have been finished.
+///
+/// # Errors
+/// When no ray meets the mesh.
+pub fn trace(
+    geometry: &ScanGeometry,
+    rays_per_chirp: usize,
+    done: &(dyn Fn(usize) + Sync),
+) -> Result<Footprints, RenderError> {
+    check_hits(spot::trace(geometry, rays_per_chirp.max(1), done)?, geometry)
+}
+
+/// As [`trace`], of the target where the setup's effects place it.
+///
+/// # Errors
+/// When no ray meets the mesh, an effect would count what the setup renders already, or the setup's
+/// tracer does not take the rays or stops working.
+pub fn trace_placed(
+    setup: &Setup,
+    rays_per_chirp: usize,
+    done: &(dyn Fn(usize) + Sync),
+) -> Result<Footprints, RenderError> {
+    let geometry = &setup.geometry;
+    let rays = rays_per_chirp.max(1);
+    acting::check(setup, rays, Observer::Radar)?;
+    let footprints = match Acting::new(setup) {
+        None => spot::trace(geometry, rays, done),
+        Some(acting) => {
+            spot::trace_moved(geometry, rays, done, |chirp, ray, hit| acting.meet(chirp, ray, hit))
+        }
+    };
+    check_hits(footprints?, geometry)
+}
+
+/// Refuses a scan of which no ray meets the target.
+fn check_hits(footprints: Footprints, geometry: &ScanGeometry) -> Result<Footprints, RenderError> {
+    if footprints.hits.iter().all(Option::is_none) {
+        return Err(miss(geometry));
+    }
+    Ok(footprints)
+}
+
+/// Rays whose chirps are shaded one after the other; a chirp that bounces is a task of its own.
+const RAYS_PER_TASK: usize = 256;
+
+/// Turns hits into echoes at an antenna. With effects the hits are those of [`trace_placed`]. `done` is called with the number of chirps that have been finished.
+///
+/// The result is the same for any number of threads.
+///
+/// # Errors
+/// When the antenna stands inside the target, a path is too long for the receiver's sampling,
+/// several paths meet in a receiver that does not know their phases, or an effect would count what the
+/// setup renders already.
+pub fn shade(
+    setup: &Setup,
+    footprints: &Footprints,
+    observer: Observer,
+    done: &(dyn Fn(usize) + Sync),
+) -> Result<Scan, RenderError> {
+    check(setup, footprints, observer)?;
+    let acting = Acting::new(setup);
+    let detector = Detector::new(setup, observer, acting.as_ref())?;
+    let paths = Paths::new(setup, observer, footprints, acting);
+    let target_from_global = setup.geometry.radar.frames().global_from_target.inverse();
+    let echoes = Echoes { setup, footprints, observer, detector: &detector, target_from_global };
+    let rays = footprints.rays_per_chirp.max(1);
+    let per_task = if setup.bounce.is_some() { 1 } else { (RAYS_PER_TASK / rays).max(1) };
+    let tasks = footprints.hits.par_chunks(per_task * rays).enumerate();
+    let echoes = tasks.map(|(task, hits)| {
+        let chirps = hits.chunks(rays);
+        let count = chirps.len();
+        let (mut ways, mut found) = (Vec::new(), Vec::with_capacity(count));
+        for (chirp, hits) in (task * per_task..).zip(chirps) {
+            paths.fill(chirp, hits, &mut ways);
+            let seen = detector.observe(chirp, &ways)?;
+            found.extend(echoes.echo(chirp, hits, &ways, seen));
+        }
+        done(count);
+        Ok(found)
+    });
+    let echoes: Vec<Vec<Echo>> = echoes.collect::<Result<_, RenderError>>()?;
+    Ok(Scan {
+        chirps: setup.geometry.chirps.rays.len(),
+        hits: footprints.chirps().filter(|hits| hits.iter().any(Option::is_some)).count(),
+        echoes: echoes.concat(),
+        threshold_w: detector.threshold_w(),
+        noise_w: detector.noise_w(),
+    })
+}
+
+/// The sampled beat signals of a scan at an antenna, chirp after chirp and look after look, as its
+/// receiver has them; none without a `[radar.receiver]`.
+///
+/// # Errors
+/// As [`shade`], at once or when a chirp's turn comes.
+pub fn beat_signals<'a>(
+    setup: &'a Setup<'a>,
+    footprints: &'a Footprints,
+    observer: Observer,
+) -> Result<impl Iterator<Item = Result<Beats, RenderError>> + use<'a>, RenderError> {
+    check(setup, footprints, observer)?;
+    let acting = Acting::new(setup);
+    let detector = Detector::new(setup, observer, acting.as_ref())?;
+    let paths = Paths::new(setup, observer, footprints, acting);
+    let hits = footprints.hits.chunks(footprints.rays_per_chirp.max(1));
+    Ok(hits
+        .enumerate()
+        .map(move |(chirp, hits)| detector.beats(chirp, &paths.of_chirp(chirp, hits))))
+}
+
+/// What must hold before anything is computed.
+fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(), RenderError> {
+    acting::check(setup, footprints.rays_per_chirp, observer)?;
+    if let Observer::Receiver { position, .. } = observer
+        && is_walled_off(setup, position)
+    {
+        let [x_m, y_m, z_m] = position.xyz.to_array();
+        return Err(RenderError::Inside { x_m, y_m, z_m });
+    }
+    if setup.geometry.radar.receiver.is_some()
+        && (footprints.rays_per_chirp > 1 || setup.bounce.is_some())
+    {
+        return match setup.geometry.radar.speckle {
+            None => Err(RenderError::Phases),
+            Some(speckle) if speckle.coherent_ratio > 0.0 => Err(RenderError::Coherent),
+            Some(_) => Ok(()),
+        };
+    }
+    Ok(())
+}
+
+/// Whether an antenna is inside something that the radar is outside of. A room around both is no wall
+/// between them.
+fn is_walled_off(setup: &Setup, position: Point<Global>) -> bool {
+    let origin = setup.geometry.radar.frames().origin();
+    let [here, there] =
+        [position, origin].map(|point| winding_number(setup.geometry.bvh.mesh(), point));
+    // A winding number is 0 outside and 1 inside a closed mesh, and anything between near an open one.
+    (here - there).abs() > 0.75
+}
+
+/// Where the scan looks, where the target lies instead, and the likeliest cause.
+fn miss(geometry: &ScanGeometry) -> RenderError {
+    let (chirps, mesh) = (geometry.chirps, geometry.bvh.mesh());
+    let frames = geometry.radar.frames();
+    let target_from_global = frames.global_from_target.inverse();
+    let vertices = mesh.vertices.iter();
+    let in_target = vertices.map(|&vertex| (target_from_global * Point::from(vertex)).xyz);
+    let target = Field::around(in_target.map(|vertex| vertex.truncate()));
+    let scan = chirps.field(&frames);
+    // Sixty times the paper's target: surely a mesh in millimetres.
+    const HUGE_M: f64 = 100.0;
+    let is_ahead = chirps.rays.first().is_some_and(|ray| {
+        let mut to_vertices = mesh.vertices.iter().map(|vertex| vertex - ray.origin.xyz);
+        to_vertices.any(|to_vertex| to_vertex.dot(ray.direction.xyz()) > 0.0)
+    });
+    let way_out = if target.sides_m().into_iter().any(|side_m| side_m > HUGE_M) {
+        "is the mesh in millimetres? give it scale = 0.001"
+    } else if !is_ahead {
+        "it stands behind the radar: move it with translation_m or turn the radar with radar.alpha_deg"
+    } else {
+        "move the mesh with translation_m or the radar with radar.primary_focus_m"
+    };
+    RenderError::Miss { scan, target, way_out }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::brdf::{Lambert, Scattering};
+    use crate::frames::Direction;
+    use crate::geometry::Mesh;
+    use crate::radar::{Chirps, Radar};
+    use crate::render::Surface;
+    use crate::scene::solids;
+    use crate::trace::Bvh;
+    use crate::units::{db_from_ratio, dbm_from_watts};
+
+    fn chirps(radar: &Radar) -> Chirps {
+        Chirps::draw(radar, |_| Err("no file".to_owned())).unwrap()
+    }
+
+    #[test]
+    fn a_plate_at_eight_metres_returns_the_hand_computed_power() {
+        let mut mesh = solids::plate(2.0, 2.0);
+        for vertex in &mut mesh.vertices {
+            vertex.y += 1.1;
+        }
+        let lambert = Lambert { albedo: 0.5 };
+        let scan = shaded(&mesh, 1, &lambert);
+        assert_eq!(scan.echoes.len(), 18_529);
+        for echo in &scan.echoes {
+            // P = 7 − 15 + 10·lg(0.196 · 0.5/π) − 20·lg R + 20·lg cos θ, with R = 8/cos θ.
+            let cos = 8.0 / echo.range_m;
+            let expected = -8.0 + 10.0 * (0.196 * 0.5 / std::f64::consts::PI).log10()
+                - 20.0 * echo.range_m.log10()
+                + 20.0 * cos.log10();
+            assert!((dbm_from_watts(echo.power_w) - expected).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_target_beside_the_field_of_view_is_an_error() {
+        let mut mesh = solids::plate(0.1, 0.1);
+        for vertex in &mut mesh.vertices {
+            vertex.x += 3.0;
+        }
+        let radar = Radar::default();
+        let (chirps, bvh) = (chirps(&radar), Bvh::new(&mesh));
+        let missed = trace(&ScanGeometry::new(&radar, &chirps, &bvh, &[]), 1, &|_| {}).unwrap_err();
+        assert!(missed.to_string().contains("x 2.950 to 3.050"), "{missed}");
+    }
+
+    /// The scan of a mesh with many rays per chirp.
+    fn shaded(mesh: &Mesh, rays: usize, surface: &dyn Scattering) -> Scan {
+        let radar = Radar::default();
+        let chirps = chirps(&radar);
+        let (bvh, regions) = (Bvh::new(mesh), vec![0; mesh.facets.len()]);
+        let geometry = ScanGeometry::new(&radar, &chirps, &bvh, &regions);
+        let footprints = trace(&geometry, rays, &|_| {}).unwrap();
+        let surfaces = [Surface::new(surface)];
+        let setup = Setup::new(geometry, &surfaces);
+        shade(&setup, &footprints, Observer::Radar, &|_| {}).unwrap()
+    }
+
+    #[test]
+    fn on_a_large_plate_the_spot_changes_nothing() {
+        let mut mesh = solids::plate(2.0, 2.0);
+        mesh.vertices.iter_mut().for_each(|vertex| vertex.y += 1.1);
+        let lambert = Lambert { albedo: 0.5 };
+        let (one, many) = (shaded(&mesh, 1, &lambert), shaded(&mesh, 64, &lambert));
+        for (a, b) in std::iter::zip(&one.echoes, &many.echoes) {
+            let [a_dbm, b_dbm] = [a, b].map(|echo| dbm_from_watts(echo.power_w));
+            assert!((a_dbm - b_dbm).abs() < 1e-3, "{a:?} {b:?}");
+            assert!((a.range_m - b.range_m).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn a_straight_edge_through_the_spot_halves_the_power() {
+        // A half plane that ends at x = 0: the error function of the distance to the edge.
+        let mut mesh = solids::plate(2.0, 2.0);
+        mesh.vertices.iter_mut().for_each(|vertex| *vertex += DVec3::new(1.0, 1.1, 0.0));
+        let lambert = Lambert { albedo: 0.5 };
+        let scan = shaded(&mesh, 400, &lambert);
+        let full_w = scan.echoes.iter().map(|e| e.power_w).fold(0.0, f64::max);
+        let on_the_edge: Vec<&Echo> = scan.echoes.iter().filter(|e| e.xt_m.abs() < 3e-4).collect();
+        assert!(on_the_edge.len() > 5);
+        for echo in on_the_edge {
+            // Off the centre the beam is as bright; only cos θ and R tell, below 0.03 dB.
+            let lost_db = db_from_ratio(full_w / echo.power_w);
+            assert!((lost_db - 10.0 * 2f64.log10()).abs() < 0.3, "{lost_db}");
+        }
+    }
+
+    #[test]
+    fn more_rays_converge() {
+        let mut mesh = solids::icosphere(0.05, 4);
+        mesh.vertices.iter_mut().for_each(|vertex| vertex.y += 1.1);
+        let rough = |i: Direction<crate::frames::Surface>, _| (-(1.0 - i.cos_theta()) / 0.02).exp();
+        let mean_w = |rays: usize| {
+            let scan = shaded(&mesh, rays, &rough);
+            scan.echoes.iter().map(|e| e.power_w).sum::<f64>()
+        };
+        let finest = mean_w(1024);
+        let error = |rays: usize| (mean_w(rays) / finest - 1.0).abs();
+        assert!(error(16) < 0.05 && error(128) < 0.01, "{} {}", error(16), error(128));
+    }
+}

@@ -1,0 +1,33 @@
+//! Reading the files that a scene names.
+
+use std::path::Path;
+
+use super::error::SceneError;
+use crate::formats::FormatError;
+
+/// Reads a scene file's text.
+pub fn read_text(path: &Path) -> Result<String, SceneError> {
+    String::from_utf8(read(path, "")?).map_err(|error| {
+        let place = format!("byte {}", error.utf8_error().valid_up_to());
+        let way_out = "a scene is a text file in UTF-8; were cloud and scene swapped?";
+        let error = FormatError::at(place, "the text is not UTF-8", way_out);
+        SceneError::Format { file: path.to_owned(), error }
+    })
+}
+
+/// Reads a whole file that another one names: a pipe would never end, and a device has no size to trust. What a person
+/// names may well be a pipe.
+pub(crate) fn read_regular(path: &Path) -> std::io::Result<Vec<u8>> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("it is not a regular file"));
+    }
+    std::fs::read(path)
+}
+
+pub(super) fn read(path: &Path, hint: &'static str) -> Result<Vec<u8>, SceneError> {
+    read_regular(path).map_err(|reason| SceneError::Unreadable {
+        file: path.to_owned(),
+        reason,
+        hint,
+    })
+}

@@ -1,0 +1,42 @@
+//! The geometry of a scan.
+
+use super::bvh::Bvh;
+use super::hit::Hit;
+use super::tracer::{TraceError, Tracer};
+use crate::frames::{Global, Ray};
+use crate::radar::{Chirps, Radar};
+
+/// The geometry of a scan: an instrument, its chirps, the target, and how rays find it.
+#[derive(Clone, Copy)]
+pub struct ScanGeometry<'a> {
+    /// The instrument.
+    pub radar: &'a Radar,
+    /// One ray per chirp.
+    pub chirps: &'a Chirps,
+    /// The target as the scene places it.
+    pub bvh: &'a Bvh<'a>,
+    /// How the rays of the scan find the target; all other rays ask `bvh`.
+    pub tracer: Tracer<'a>,
+    /// Region of every facet: an index into the surfaces of the scan.
+    pub region_of_facet: &'a [u16],
+}
+
+impl<'a> ScanGeometry<'a> {
+    /// A scan whose tracer is [`Tracer::Automatic`].
+    pub fn new(
+        radar: &'a Radar,
+        chirps: &'a Chirps,
+        bvh: &'a Bvh<'a>,
+        region_of_facet: &'a [u16],
+    ) -> ScanGeometry<'a> {
+        ScanGeometry { radar, chirps, bvh, tracer: Tracer::Automatic, region_of_facet }
+    }
+
+    /// The closest hit of each of some rays, by the tracer of the scan.
+    ///
+    /// # Errors
+    /// As [`Tracer::closest`].
+    pub fn closest(&self, rays: &[Ray<Global>]) -> Result<Vec<Option<Hit>>, TraceError> {
+        self.tracer.closest(self.bvh, rays)
+    }
+}
