@@ -395,7 +395,10 @@ fn a_scan_without_times_is_diagnosed_without_what_goes_with_time() {
         asked
     };
     let said = refused(&mut asked("drift"));
-    assert!(said.contains("drift cannot be told without") && said.contains("time_s"), "{said}");
+    assert!(
+        said.contains("drift cannot be identified without") && said.contains("time_s"),
+        "{said}"
+    );
     assert_eq!(json(&at.join("report/report.json"))["verdict"], "cannot-tell");
     asked("fov-gain").assert().success();
     let left_out = || json(&at.join("report/report.json"))["not_tried"].clone();
@@ -421,5 +424,5 @@ fn a_scan_without_times_is_diagnosed_without_what_goes_with_time() {
     }
     all.extend(["--effects", "pose"]);
     let said = refused(matdb(at).args(all));
-    assert!(said.contains("pose cannot be told by powers alone"), "{said}");
+    assert!(said.contains("pose cannot be identified from powers alone"), "{said}");
 }

@@ -127,7 +127,7 @@ fn what_means_nothing_is_refused_in_a_sentence() {
         (vec!["--curve", "coating.csv", "--model", "lamber"], "did you mean `lambert`?"),
         (vec!["--curve", "coating.csv", "--effects", "stray"], "no effect `stray`"),
         (vec!["--curve", "coating.csv", "--noise-db", "0"], "above 0 and up to 100"),
-        (vec!["--curve", "sweep.csv"], "the levels tell no noise"),
+        (vec!["--curve", "sweep.csv"], "the levels do not determine the noise"),
         (vec!["--curve", "few.csv"], "2 detected levels"),
     ] {
         let mut command = vec!["diagnose", "-o", "out"];

@@ -1,6 +1,6 @@
-//! Which chirps are held out together: patches of the target plane, never single chirps.
+//! The chirps that are held out together: patches of the target plane, never single chirps.
 //!
-//! Neighbouring spots overlap, so that a chirp between two others of the fit is no test of it.
+//! Neighbouring spots overlap, so that a chirp between two others of the fit does not test it.
 
 use std::collections::BTreeMap;
 
@@ -18,8 +18,9 @@ pub struct Folds {
     pub blocks: usize,
     /// Number of folds.
     pub folds: usize,
-    /// Smaller patch of every shot, a third as wide, and how many of them there are.
+    /// Cell of every shot, a third as wide as a patch.
     cell: Vec<usize>,
+    /// Number of cells.
     cells: usize,
 }
 
@@ -27,11 +28,10 @@ impl Folds {
     /// Square patches of side `block_m`, m, dealt out to `folds` folds of about equal numbers of shots.
     pub fn new(shots: &[Shot], block_m: f64, folds: usize, seed: u64) -> Folds {
         let folds = folds.max(2);
-        let cell =
-            |shot: &Shot| [shot.yt_m, shot.xt_m].map(|x| (x / block_m.max(1e-6)).floor() as i64);
+        let side_m = block_m.max(1e-6);
         let mut members: BTreeMap<[i64; 2], Vec<usize>> = BTreeMap::new();
         for (index, shot) in shots.iter().enumerate() {
-            members.entry(cell(shot)).or_default().push(index);
+            members.entry(square(shot, side_m)).or_default().push(index);
         }
         let members: Vec<Vec<usize>> = members.into_values().collect();
         let sizes: Vec<usize> = members.iter().map(Vec::len).collect();
@@ -42,19 +42,23 @@ impl Folds {
                 (block[index], fold[index]) = (number, fold_of_block);
             }
         }
+        // The cells of the standard errors, numbered as they first occur.
         let mut numbers = BTreeMap::new();
-        let numbered = |shot: &Shot| {
-            let side_m = block_m.max(1e-6) / 3.0;
-            let place = [shot.yt_m, shot.xt_m].map(|x| (x / side_m).floor() as i64);
+        let mut cell = Vec::with_capacity(shots.len());
+        for shot in shots {
             let next = numbers.len();
-            *numbers.entry(place).or_insert(next)
-        };
-        let cell = shots.iter().map(numbered).collect();
+            cell.push(*numbers.entry(square(shot, side_m / 3.0)).or_insert(next));
+        }
         Folds { block, fold, blocks: members.len(), folds, cell, cells: numbers.len() }
     }
 
-    /// Sum and its standard error over patches of one number for each shot. The patches are smaller
-    /// than those of the folds, or a local effect would lie in one and have no standard error.
+    /// Whether a fold holds a shot out.
+    pub(super) fn holds_out(&self, fold: usize, shot: usize) -> bool {
+        self.fold.get(shot) == Some(&fold)
+    }
+
+    /// Sum of one number per shot, and its standard error over cells. The cells are smaller
+    /// than the patches of the folds: a local effect would lie in one patch and have no standard error.
     pub fn sum(&self, values: &[f64]) -> [f64; 2] {
         let mut sums = vec![0.0; self.cells];
         for (value, &cell) in values.iter().zip(&self.cell) {
@@ -66,4 +70,9 @@ impl Folds {
             sums.iter().map(|s| (s - total / count).powi(2)).sum::<f64>() / (count - 1.0);
         [total, (count * variance).sqrt()]
     }
+}
+
+/// The square of a grid over the target plane in which a shot lies.
+fn square(shot: &Shot, side_m: f64) -> [i64; 2] {
+    [shot.yt_m, shot.xt_m].map(|x| (x / side_m).floor() as i64)
 }

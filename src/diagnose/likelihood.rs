@@ -1,72 +1,56 @@
-//! How probable what was seen is under a prediction.
+//! The likelihood of the observations under a prediction.
 //!
-//! A detected power y has the density of Gamma(L, (μ + N)/L) in ln y, a chirp that saw nothing the
-//! probability of staying below the threshold T, both before a receiver that saturates. Where
+//! A detected power y has the density of Gamma(L, (μ + N)/L) in ln y. A chirp without a detection has the
+//! probability of staying below the threshold T. Both apply before a receiver that saturates. Where
 //! tilts vary at random the likelihood is averaged over them. Ranges are normal about the predicted
-//! ones. A share of one in ten thousand of all chirps may be anything, so that a
-//! silhouette that the mesh misses costs a bounded amount.
+//! ones. One in ten thousand chirps is an outlier of any power, so that a silhouette that the mesh misses
+//! costs a bounded amount.
 
+use super::observation::{Declared, Observation};
 use crate::effects::{MeanEcho, Prediction};
 use crate::fit::gamma_law::{GammaLaw, LnProbability};
 
-use super::shots::Observation;
-
-/// Share of chirps that no model explains.
+/// Share of outliers among chirps.
 const OUTLIERS: f64 = 1e-4;
 /// Their density in ln power, as wide as 60 dB.
 const OUTLIER_DENSITY: f64 = 1.0 / 13.8;
-/// Standard deviations of the score of a shot that count at most where a start is sought.
+/// Largest score of a shot in the search for a start, in standard deviations.
 const MOST_PULL: f64 = 4.0;
-/// Share of ranges that no model explains, and how much wider than the rest these are at least.
+/// Share of outliers among ranges.
 const STRAY_RANGES: f64 = 0.01;
+/// How much wider than the others these spread, at least.
 const STRAY_WIDTH: f64 = 10.0;
-/// Share of the spread of several ways by which their mean is unsure: a few rays stand for all, and speckle
-/// weighs them anew.
+/// Uncertainty of the mean range over several paths, as a share of their spread: a few rays stand for all, and
+/// speckle changes their weights.
 const UNSURE: f64 = 0.1;
-/// A mean so far below the threshold that nothing is ever detected, for rays that miss.
+/// Mean power where rays miss, as a share of the threshold: never detected.
 const NOTHING: f64 = 1e-9;
 
-/// What is declared of the receiver and no effect changes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Declared {
-    /// Least power of a detection, W.
-    pub threshold_w: f64,
-    /// Standard deviation of a range, m; 0 where ranges are not to be used.
-    pub range_sd_m: f64,
-}
-
-impl Declared {
-    /// Measured less expected range, m; `None` where there is none of use.
-    pub(super) fn range_off_m(&self, arrived: &MeanEcho, seen: &Observation) -> Option<f64> {
-        let range_m = seen.range_m.filter(|_| self.range_sd_m > 0.0 && arrived.range_m > 0.0)?;
-        Some(range_m - arrived.range_m)
-    }
-}
-
-/// A law made ready for one prediction.
+/// The likelihood under one prediction.
 pub(super) struct Likelihood<'a> {
     prediction: &'a Prediction,
     declared: Declared,
     law: GammaLaw,
 }
 
-/// One chirp's part.
+/// The part of one chirp in the likelihood.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Term {
     /// ln p.
     pub ln_p: f64,
-    /// ln(μ + N) over all tilts, less what the receiver has taken from what was seen.
+    /// ln(μ + N) over all tilts, less the loss of the observation in a saturating receiver.
     pub ln_mean: f64,
     /// d ln p/d ln mean.
     pub slope: f64,
-    /// The same as if there were no outliers, but no more than [`MOST_PULL`] standard deviations.
+    /// d ln p/d ln mean without outliers, limited to [`MOST_PULL`] standard deviations.
     pub pull: f64,
     /// −d² ln p/d(ln mean)², never negative.
     pub bend: f64,
     /// Predicted range, m; 0 where nothing arrives.
     pub range_m: f64,
-    /// d ln p/d range, 1/m, and −d² ln p/d range², 1/m², never negative.
+    /// d ln p/d range, 1/m.
     pub range_slope: f64,
+    /// −d² ln p/d range², 1/m², never negative.
     pub range_bend: f64,
 }
 
@@ -88,7 +72,7 @@ impl<'a> Likelihood<'a> {
         self.prediction.mean_w(shot).max(NOTHING * self.declared.threshold_w).ln()
     }
 
-    /// One chirp's part of the likelihood.
+    /// The part of one chirp.
     pub fn term(&self, shot: usize, seen: &Observation) -> Term {
         let ln_seen = seen.power_w.unwrap_or(self.declared.threshold_w).ln();
         let (mut p, mut slope, mut bend, mut pull) = (0.0, 0.0, 0.0, 0.0);
@@ -127,10 +111,9 @@ impl<'a> Likelihood<'a> {
 
     /// Probability that the power of a shot stays below a level, W.
     pub fn below(&self, shot: usize, level_w: f64) -> f64 {
-        let part = |(ln_mean, weight): (f64, f64)| {
-            weight * self.limited(level_w.ln(), ln_mean).value.exp()
-        };
-        self.ln_means(shot).map(part).sum()
+        self.ln_means(shot)
+            .map(|(ln_mean, weight)| weight * self.limited(level_w.ln(), ln_mean).value.exp())
+            .sum()
     }
 
     /// Probability that a power of this mean is detected.
@@ -150,15 +133,15 @@ impl<'a> Likelihood<'a> {
         self.law.below(self.entered(ln_mean, ln_limit).0, ln_mean)
     }
 
-    /// ln of what a linear receiver would have seen where this one saw `ln_seen`, and how much of a
-    /// small deviation it has passed.
+    /// ln of the power at the input of the receiver whose output is `ln_seen`, and the slope of the output by
+    /// the input.
     fn entered(&self, ln_mean: f64, ln_seen: f64) -> (f64, f64) {
         let passed = self.prediction.saturating.of(ln_mean);
         (ln_mean + (ln_seen - passed.ln_mean) / passed.slope, passed.slope)
     }
 
-    /// ln p of a range, its slope and its curvature by the predicted range; `None` where there is no
-    /// range, or one that is not to be used.
+    /// ln p of a range, its slope and its curvature by the predicted range; `None` where no
+    /// range is to be used.
     fn range(&self, arrived: &MeanEcho, seen: &Observation) -> Option<[f64; 3]> {
         let sd_m = self.declared.range_sd_m;
         let x = self.declared.range_off_m(arrived, seen)? / sd_m;

@@ -1,19 +1,21 @@
-//! An effect that is none: waves over the target plane, of random direction, length and phase.
+//! A placebo: waves over the target plane, of random direction, length and phase.
 //!
-//! What it gains is what as many free numbers gain by following noise, or whatever else is missing.
+//! It gains what as many free parameters gain by following noise, or anything else that is missing.
+
+use std::f64::consts::TAU;
 
 use crate::effects::{About, Effect, EffectParameter, Level, Shot, Stage};
 use crate::radar::random::{Key, Purpose};
 
-/// Most numbers of a placebo.
+/// Most parameters of a placebo.
 const MOST: usize = 6;
-const KNOB: EffectParameter =
+const WAVE: EffectParameter =
     EffectParameter { name: "wave_db", unit: "dB", min: -10.0, max: 10.0, absent: 0.0, step: 0.2 };
-static KNOBS: [EffectParameter; MOST] = [KNOB; MOST];
+static WAVES: [EffectParameter; MOST] = [WAVE; MOST];
 /// Shortest and longest wave, m.
 const WAVES_M: [f64; 2] = [0.2, 1.0];
 
-/// Gains in dB that swing over the target plane.
+/// Gain in dB as a sum of waves over the target plane.
 pub(super) struct Placebo {
     /// Phase, rad, and its slopes by x_t and y_t, rad/m.
     waves: Vec<[f64; 3]>,
@@ -23,25 +25,25 @@ pub(super) struct Placebo {
 const ABOUT: About = About {
     name: "placebo",
     level: Level::Instrument,
-    description: "A control: random waves that stand for no physics.",
-    signature: "What as many free numbers gain by chance.",
-    parameters: &KNOBS,
+    description: "A control: random waves without a physical meaning.",
+    signature: "The gain of as many free parameters by chance.",
+    parameters: &WAVES,
     conflicts: &[],
 };
 
 impl Placebo {
-    /// With up to six numbers.
+    /// A placebo with up to six parameters.
     pub fn new(numbers: usize, seed: u64) -> Placebo {
         let mut draws = Key { seed, chirp: 0, sub_ray: 2, purpose: Purpose::Fit }.draws();
-        let wave = |_| {
-            let [shortest, longest] = WAVES_M;
-            let length_m = shortest * (longest / shortest).powf(draws.uniform());
-            let [turn, phase] = [0, 1].map(|_| std::f64::consts::TAU * draws.uniform());
-            let rate = std::f64::consts::TAU / length_m;
-            [phase, rate * turn.cos(), rate * turn.sin()]
-        };
-        let waves: Vec<[f64; 3]> = (0..numbers.clamp(1, MOST)).map(wave).collect();
-        let parameters = KNOBS.get(..waves.len()).unwrap_or(&KNOBS);
+        let [shortest_m, longest_m] = WAVES_M;
+        let mut waves = Vec::new();
+        for _ in 0..numbers.clamp(1, MOST) {
+            let length_m = shortest_m * (longest_m / shortest_m).powf(draws.uniform());
+            let [turn, phase] = [0, 1].map(|_| TAU * draws.uniform());
+            let rate = TAU / length_m;
+            waves.push([phase, rate * turn.cos(), rate * turn.sin()]);
+        }
+        let parameters = WAVES.get(..waves.len()).unwrap_or(&WAVES);
         Placebo { waves, about: About { parameters, ..ABOUT } }
     }
 }
@@ -56,9 +58,10 @@ impl Effect for Placebo {
     }
 
     fn gain(&self, values: &[f64], _: &Stage, shot: &Shot) -> f64 {
-        let wave = |([phase, kx, ky], db): (&[f64; 3], &f64)| {
-            db * (phase + kx * shot.xt_m + ky * shot.yt_m).cos()
-        };
-        10f64.powf(0.1 * self.waves.iter().zip(values).map(wave).sum::<f64>())
+        let waves = self.waves.iter().zip(values);
+        let sum_db: f64 = waves
+            .map(|([phase, kx, ky], db)| db * (phase + kx * shot.xt_m + ky * shot.yt_m).cos())
+            .sum();
+        10f64.powf(0.1 * sum_db)
     }
 }

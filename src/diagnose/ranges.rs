@@ -1,31 +1,33 @@
-//! Where ranges put a target that does not stand still where the scene has it: robust least squares of measured
+//! Where the ranges place a target that has moved from its pose in the scene: robust least squares of measured
 //! less predicted ranges, with every ray traced anew after each step, as in the registration of points to
 //! planes (Chen & Medioni, Image and Vision Computing 10, 1992).
 //!
-//! Powers have edges everywhere, at which a search that begins far away stays; ranges change smoothly with the place
-//! of a surface, and those of rays that meet another surface by then have no weight.
+//! Powers jump at edges, and a search by powers that begins far away stops there. Ranges change smoothly with the place
+//! of a surface, and the rays that meet another surface by then have no weight.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::refit::{Problem, Space};
-use super::shots::Observation;
+use super::observation::Observation;
+use super::problem::Problem;
+use super::space::Space;
 use crate::effects::{Effect, Shot};
 use crate::frames::{Global, Pose};
 use crate::measure::icp::bulk_sd_m;
 
-/// Rounds of tracing at most, and the step, in those of the effect's numbers, that is worth no further one.
+/// Most rounds of tracing.
 const ROUNDS: usize = 12;
+/// Step that needs no further round, in steps of the effect's parameters.
 const ARRIVED: f64 = 0.01;
 /// Where the weight of a range ends, in standard deviations: Tukey's biweight with 95 % efficiency.
 const BIWEIGHT: f64 = 4.685;
-/// Step over which the way of a surface point is seen, in those of the numbers.
+/// Step of the difference quotient of a surface point's motion, in steps of the parameters.
 const STEP: f64 = 1e-3;
 
-/// A point with the numbers of its last effect where the ranges put the target, and where they tell
-/// nothing, as of a shift of a plane in itself, within so many steps of the start; the start where they tell nothing
-/// at all.
-pub(super) fn placed(
+/// A point with the parameters of its last effect where the ranges place the target. Directions that the ranges do
+/// not determine, such as a shift of a plane in itself, stay within `within` steps of the start. Returns the start
+/// where the ranges determine nothing.
+pub(super) fn place_by_ranges(
     problem: &Problem,
     space: &Space,
     effect: &dyn Effect,
@@ -49,13 +51,15 @@ pub(super) fn placed(
     at
 }
 
-/// A shot with a range: measured less predicted, m, and the change of the predicted one by every number, m per step.
+/// One measured range.
 struct Row {
+    /// Measured less predicted range, m.
     off_m: f64,
-    by_number: Vec<f64>,
+    /// Change of the predicted range by every parameter, m per step.
+    slopes_m: Vec<f64>,
 }
 
-/// The step from the second point, on the way from the first; numbers are normal about this one beforehand.
+/// A Gauss–Newton step at the second of two points. The parameters have a normal prior about the first.
 fn step(
     problem: &Problem,
     space: &Space,
@@ -63,44 +67,52 @@ fn step(
     [start, at]: [&DVector<f64>; 2],
     within: f64,
 ) -> Option<DVector<f64>> {
-    let model = space.model(problem.receiver, at);
-    let values = space.effect_values(at).pop()?;
-    let row = |(shot, seen): (&Shot, &Observation)| {
-        let range_m = seen.range_m.filter(|_| problem.declared.range_sd_m > 0.0)?;
-        let placed = model.placed(problem.stage, *shot)?;
-        let by_number =
-            (0..values.len()).map(|number| slope(problem, effect, &values, number, &placed));
-        Some(Row { off_m: range_m - placed.hit.range_m, by_number: by_number.collect() })
-    };
-    let rows: Vec<Row> =
-        problem.shots.par_iter().zip(problem.observations).filter_map(row).collect();
+    let rows = rows(problem, space, effect, at);
+    let unknowns = effect.parameters().len();
     let sd_m = bulk_sd_m(rows.iter().map(|row| row.off_m)).max(problem.declared.range_sd_m);
-    let moved = (at - start).remove_rows(0, at.len() - values.len());
-    let mut normal = DMatrix::identity(values.len(), values.len()) / within.powi(2);
+    let moved = (at - start).remove_rows(0, at.len() - unknowns);
+    let mut normal = DMatrix::identity(unknowns, unknowns) / within.powi(2);
     let mut right = -moved / within.powi(2);
-    for Row { off_m, by_number } in &rows {
+    for Row { off_m, slopes_m } in &rows {
         let x = off_m / (BIWEIGHT * sd_m);
         let weight = if x.abs() < 1.0 { ((1.0 - x * x) / sd_m).powi(2) } else { 0.0 };
-        let slopes = DVector::from_column_slice(by_number);
+        let slopes = DVector::from_column_slice(slopes_m);
         normal.ger(weight, &slopes, &slopes, 1.0);
         right.axpy(weight * off_m, &slopes, 1.0);
     }
     normal.cholesky().map(|cholesky| cholesky.solve(&right))
 }
 
-/// Change of the range of a shot by one number, m per step: the way of the surface point that it meets, seen
-/// along the ray.
-fn slope(
+/// Every range that the target at a point has a prediction for.
+fn rows(problem: &Problem, space: &Space, effect: &dyn Effect, at: &DVector<f64>) -> Vec<Row> {
+    let model = space.model(problem.receiver, at);
+    let values = space.effect_values(at).pop().unwrap_or_default();
+    let pairs = problem.shots.par_iter().zip(problem.observations);
+    pairs
+        .filter_map(|(shot, seen): (&Shot, &Observation)| {
+            let range_m = seen.range_m.filter(|_| problem.declared.range_sd_m > 0.0)?;
+            let placed = model.placed(problem.stage, *shot)?;
+            let slopes_m =
+                (0..values.len()).map(|number| slope_m(problem, effect, &values, number, &placed));
+            Some(Row { off_m: range_m - placed.hit.range_m, slopes_m: slopes_m.collect() })
+        })
+        .collect()
+}
+
+/// Change of the range of a shot by one parameter, m per step: the motion of its surface point, projected on the
+/// normal and seen along the ray.
+fn slope_m(
     problem: &Problem,
     effect: &dyn Effect,
     values: &[f64],
     number: usize,
     shot: &Shot,
 ) -> f64 {
-    let motion = |values: &[f64]| effect.motion(values, problem.stage, shot).unwrap_or(Pose::NONE);
     let mut moved = values.to_vec();
     moved[number] += STEP * effect.parameters()[number].step;
-    let motion: Pose<Global, Global> = motion(&moved) * motion(values).inverse();
+    let [there, here] = [moved.as_slice(), values]
+        .map(|values| effect.motion(values, problem.stage, shot).unwrap_or(Pose::NONE));
+    let motion: Pose<Global, Global> = there * here.inverse();
     let way_m = (motion * shot.hit.point).xyz - shot.hit.point.xyz;
     -way_m.dot(shot.normal) / (STEP * shot.hit.cos_theta.max(0.05))
 }

@@ -1,12 +1,17 @@
-//! What a diagnosis says: most of the schema of `report.json`.
+//! The report of a diagnosis: most of the schema of `report.json`.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::{Candidate, Errors, Unexplained};
+use super::evidence::{Candidate, Evidence};
+use super::residual::Unexplained;
+use super::score::Errors;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Level, Place, Shot};
+
+/// Version of a report as JSON.
+pub const SCHEMA: u32 = 3;
 
 /// The answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -14,19 +19,21 @@ use crate::effects::{Effect, Level, Place, Shot};
 pub enum Verdict {
     /// The base model explains the data.
     NoMissingEffect,
-    /// With the effects that were added it does.
+    /// The base model with the added effects explains the data.
     Explained,
-    /// Structure is left that no effect explains.
+    /// Structure remains that no effect explains.
     Unexplained,
 }
 
 impl Verdict {
-    /// The verdict where effects were added or not, and structure is left or not.
-    pub(super) fn new(is_extended: bool, is_unexplained: bool) -> Verdict {
-        match (is_extended, is_unexplained) {
-            (_, true) => Verdict::Unexplained,
-            (true, false) => Verdict::Explained,
-            (false, false) => Verdict::NoMissingEffect,
+    /// The verdict on a model with or without effects, which leaves structure or not.
+    pub(super) fn new(has_effects: bool, has_unexplained: bool) -> Verdict {
+        if has_unexplained {
+            Verdict::Unexplained
+        } else if has_effects {
+            Verdict::Explained
+        } else {
+            Verdict::NoMissingEffect
         }
     }
 }
@@ -36,31 +43,32 @@ impl Verdict {
 pub struct Value {
     /// Value.
     pub value: f64,
-    /// Standard deviation; none where a bound holds the number or the data cannot tell it.
+    /// Standard deviation; none where a bound holds the number or the data do not determine it.
     pub sd: Option<f64>,
     /// UCUM code of its unit; 1 for a pure number.
     pub unit: &'static str,
 }
 
-/// Three numbers that belong together, such as a place.
+/// A vector, such as a place.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Triple {
     /// Values along x, y and z.
     pub value: [f64; 3],
-    /// Their standard deviations, as those of numbers; none for what follows from other numbers.
+    /// Their standard deviations; none where the vector follows from other numbers.
     pub sd: Option<[f64; 3]>,
     /// UCUM code of their unit.
     pub unit: &'static str,
 }
 
-/// The numbers of an effect by name.
+/// The parameters of an effect by name.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Parameters {
     /// Those that were fitted.
     #[serde(flatten)]
     pub numbers: BTreeMap<&'static str, Value>,
-    /// The same as vectors in the global frame: `translation_m` and `rotation_deg` of a pose,
-    /// `centre_m` of a place on the target, and `extent_m`, the sides of the box whose middle that is, where it is no ball.
+    /// Vectors in the global frame: `translation_m` and `rotation_deg` of a pose,
+    /// `centre_m` of a place on the target, and `extent_m`, the sides of the box about that centre, unless the place
+    /// is a ball.
     #[serde(flatten)]
     pub triples: BTreeMap<&'static str, Triple>,
 }
@@ -74,17 +82,18 @@ impl Parameters {
     ) -> Parameters {
         let mut triples = BTreeMap::new();
         for (name, axes) in effect.vectors() {
-            let [x, y, z] = axes.map(|axis| numbers.get(effect.parameters()[axis].name));
-            if let (Some(x), Some(y), Some(z)) = (x, y, z) {
+            let axes = axes.map(|axis| numbers.get(effect.parameters()[axis].name));
+            if let [Some(x), Some(y), Some(z)] = axes {
                 let sd = x.sd.zip(y.sd).zip(z.sd).map(|((x, y), z)| [x, y, z]);
                 let value = [x.value, y.value, z.value];
                 triples.insert(*name, Triple { value, sd, unit: x.unit });
             }
         }
         if let Some((centre, extent)) = place.and_then(|place| place.on_target_m(shots)) {
-            let told = [("centre_m", Some(centre)), ("extent_m", extent)];
-            for (name, value) in told.into_iter().filter_map(|(name, at)| Some((name, at?))) {
-                triples.insert(name, Triple { value: value.to_array(), sd: None, unit: "m" });
+            for (name, at) in [("centre_m", Some(centre)), ("extent_m", extent)] {
+                triples.extend(
+                    at.map(|at| (name, Triple { value: at.to_array(), sd: None, unit: "m" })),
+                );
             }
         }
         Parameters { numbers, triples }
@@ -99,31 +108,16 @@ impl std::ops::Deref for Parameters {
     }
 }
 
-/// Why an effect was added.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Evidence {
-    /// Gain in ln likelihood over the model before.
-    pub gain: f64,
-    /// The gain of a placebo with as many numbers, but at most six.
-    pub placebo_gain: f64,
-    /// Gain in ln p of held-out patches.
-    pub held_out_gain: f64,
-    /// Its standard error over patches.
-    pub held_out_se: f64,
-    /// What it changes: root mean square of mean powers, or of the spread, dB.
-    pub size_db: f64,
-}
-
 /// An effect that was added.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Found {
     /// Its name.
     pub name: &'static str,
-    /// Where it belongs.
+    /// The level it belongs to.
     pub level: Level,
     /// Effects that predict the data as well.
     pub class: Vec<&'static str>,
-    /// Its numbers by name, fitted together with everything else.
+    /// Its parameters by name, fitted together with everything else.
     pub parameters: Parameters,
     /// The part of the target where it acts; none where it acts everywhere.
     #[serde(skip)]
@@ -139,10 +133,10 @@ pub struct BeforeAfter {
     pub before: Errors,
     /// With the effects.
     pub after: Errors,
-    /// With the effects and the smooth term of what is unknown, which has not seen a patch that it is judged
-    /// on either; none where nothing of that kind is left.
+    /// With the effects and a smooth field of unknown origin, fitted without the patch that it is judged
+    /// on; none where no such structure remains.
     pub with_unknown: Option<Errors>,
-    /// The rmse of a model that is right, dB.
+    /// The rmse of a correct model, dB.
     pub noise_floor_db: f64,
     /// (before − after)/(before − floor) of the squared rmse; none where before is at the floor.
     pub explained_share: Option<f64>,
@@ -154,19 +148,19 @@ pub struct BeforeAfter {
     pub held_out: bool,
 }
 
-/// A law's number as fitted.
+/// A parameter of a scattering model, as fitted.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BaseValue {
-    /// Region whose law it is.
+    /// Region with that scattering model.
     pub region: usize,
     /// Its name.
     pub name: String,
-    /// The number.
+    /// Its value.
     #[serde(flatten)]
     pub value: Value,
 }
 
-/// Where a mesh stands in the global frame.
+/// Pose of a mesh in the global frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeshPose {
     /// Its name.
@@ -177,10 +171,10 @@ pub struct MeshPose {
     pub translation_m: [f64; 3],
 }
 
-/// What the effects are added to.
+/// The model that the effects are added to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Base {
-    /// The laws' numbers, as fitted with the effects.
+    /// Parameters of the scattering models, as fitted with the effects.
     pub parameters: Vec<BaseValue>,
     /// Looks of speckle, as declared.
     pub looks: f64,
@@ -190,41 +184,41 @@ pub struct Base {
     pub noise_dbm: Option<f64>,
     /// Standard deviation of a range, m, as declared; 0 where ranges are not used.
     pub range_sd_m: f64,
-    /// Where the meshes stand, as declared; a diagnosis leaves them there.
+    /// Poses of the meshes, as declared; a diagnosis does not change them.
     pub pose: Vec<MeshPose>,
     /// Whether the final fit converged.
     pub converged: bool,
 }
 
-/// From which size on an effect was found that was put into data drawn by the base model.
+/// The size from which on an effect was found in data that the base model simulated with it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Power {
     /// Effect.
     pub name: &'static str,
-    /// The smallest size, dB left when the laws are refitted, that was found; none where none was.
+    /// The smallest size that was found, dB remaining after a refit of the scattering models; none where none was.
     pub least_db: Option<f64>,
-    /// The largest size below it, dB, that was not found; none where all were.
+    /// The largest size below it that was not found, dB; none where all were found.
     pub missed_db: Option<f64>,
 }
 
-/// What the answer is to be held against.
+/// Controls of the answer.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Controls {
-    /// Held-out gain in ln p, and its standard error, of a random smooth field with as many numbers as the
-    /// first effect that was added, or else as the one that gained most.
+    /// A random smooth field with as many parameters as the first effect that was added, or else as the one that
+    /// gained most.
     pub placebo: Option<Control>,
-    /// The same of a spline over the best covariate.
+    /// A spline with as many parameters over the best covariate.
     pub equal_df_spline: Option<Control>,
-    /// For every effect, the size from which it was found again.
+    /// For every effect, the size from which on it was found.
     pub injection_recovery: Vec<Power>,
 }
 
-/// A term that means nothing, beside one that is claimed to.
+/// A term without a physical meaning.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Control {
-    /// Its numbers.
+    /// Number of its parameters.
     pub numbers: usize,
-    /// What it goes over.
+    /// What it depends on.
     pub over: String,
     /// Gain in ln likelihood over the base.
     pub gain: f64,
@@ -234,7 +228,7 @@ pub struct Control {
     pub held_out_se: f64,
 }
 
-/// One shot, as a table of residuals has it.
+/// One shot in the table of residuals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Row {
     /// Chirp number.
@@ -243,13 +237,13 @@ pub struct Row {
     pub observed_dbm: Option<f64>,
     /// E[dBm | detected] of the base model, from a fit without this shot's fold.
     pub before_dbm: f64,
-    /// The same with the effects.
+    /// E[dBm | detected] of the model with the effects, from a fit without this shot's fold.
     pub after_dbm: f64,
     /// Randomised quantile residual of the base model, fitted to all shots.
     pub z_before: f64,
-    /// The same with the effects.
+    /// Randomised quantile residual of the model with the effects, fitted to all shots.
     pub z_after: f64,
-    /// Fold that it was held out with.
+    /// Fold that the shot was held out with.
     pub fold: usize,
     /// Incidence, degrees.
     pub theta_deg: f64,
@@ -269,12 +263,12 @@ pub struct Row {
     pub time_s: f64,
     /// Region, from 0.
     pub region: u16,
-    /// What a smooth field over all covariates, fitted without this shot's fold, would add to the mean
-    /// power of the final model, dB; 0 where such a field finds nothing.
+    /// Change of the mean power of the final model, dB, by a smooth field over all covariates that was fitted without
+    /// this shot's fold; 0 where such a field finds nothing.
     pub unknown_db: f64,
 }
 
-/// Everything that was found.
+/// The report.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// Version of the schema.
@@ -285,18 +279,18 @@ pub struct Report {
     pub effects: Vec<Found>,
     /// Every effect of every round.
     pub ranking: Vec<Candidate>,
-    /// What no effect explains.
+    /// Structure that no effect explains.
     pub unexplained: Vec<Unexplained>,
     /// Errors on held-out patches.
     pub error: BeforeAfter,
-    /// Detections that lie elsewhere than their chirps meet the target: set aside, and their chirps count as
+    /// Detections away from where their chirps meet the target. They are set aside, and their chirps count as
     /// silent.
     pub set_aside: usize,
-    /// What the answer is to be held against.
+    /// Controls of the answer.
     pub controls: Controls,
-    /// What the effects are added to.
+    /// The model that the effects are added to.
     pub base: Base,
-    /// The laws of every region as fitted with the effects.
+    /// The scattering model of every region as fitted with the effects.
     #[serde(skip)]
     pub laws: Vec<Brdf>,
     /// Every shot.
@@ -305,8 +299,8 @@ pub struct Report {
 }
 
 impl Report {
-    /// The effects that were tried and neither found nor as good as one that was, each as the last round that
-    /// tried it saw it.
+    /// The effects that were tried and are neither among those found nor equally good, each as in the last round that
+    /// tried it.
     pub fn not_found(&self) -> impl Iterator<Item = &Candidate> {
         self.ranking.iter().enumerate().filter_map(|(place, tried)| {
             let mut later = self.ranking.iter().skip(place + 1);
@@ -315,7 +309,7 @@ impl Report {
         })
     }
 
-    /// Whether an effect was found, or one from which the data cannot tell it apart.
+    /// Whether an effect was found, or one that predicts the data equally well.
     fn has_found(&self, name: &str) -> bool {
         self.effects.iter().any(|effect| effect.name == name || effect.class.contains(&name))
     }

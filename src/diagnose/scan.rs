@@ -1,8 +1,12 @@
 //! The diagnosis of a cloud against the scene that was measured.
 
-use super::{
-    Declared, DiagnoseError, Diagnosis, MeshPose, Report, Subject, match_cloud, trace_shots,
-};
+use super::error::DiagnoseError;
+use super::matching::match_cloud;
+use super::observation::Declared;
+use super::report::{MeshPose, Report};
+use super::settings::Diagnosis;
+use super::shots::trace_shots;
+use super::subject::Subject;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Receiver, Stage, middle};
 use crate::measure::Cloud;
@@ -11,7 +15,7 @@ use crate::scene::Scene;
 use crate::trace::{Bvh, ScanGeometry};
 use crate::units::watts_from_dbm;
 
-/// Looks of speckle that stand for a radar without any: a likelihood needs some spread.
+/// Looks that represent a radar without speckle: a likelihood needs some spread.
 const MOST_LOOKS: f64 = 1e4;
 
 /// A scene and the cloud that was measured of it.
@@ -21,22 +25,22 @@ pub struct MeasuredScene<'a> {
     pub scene: &'a Scene,
     /// The cloud, in the global frame.
     pub cloud: &'a Cloud,
-    /// Scattering of each region, where the refit begins.
+    /// Scattering model of each region, where the refit begins.
     pub laws: &'a [Brdf],
     /// Effects that the scene declares, at fixed values.
     pub declared_effects: &'a [(&'a dyn Effect, Vec<f64>)],
 }
 
 impl MeasuredScene<'_> {
-    /// Diagnoses the cloud, trying these effects; `hear` receives in a few words what is being done.
+    /// Diagnoses the cloud, trying these effects; `notify` receives a few words about each step.
     ///
     /// # Errors
-    /// When the data are too few to tell anything, or are not of this scene.
+    /// When the data are too few for an answer, or are not of this scene.
     pub fn diagnose(
         &self,
         seed: u64,
         effects: &[&dyn Effect],
-        hear: &(dyn Fn(&str) + Sync),
+        notify: &(dyn Fn(&str) + Sync),
     ) -> Result<Report, DiagnoseError> {
         let MeasuredScene { scene, cloud, laws, declared_effects } = *self;
         let radar = scene.radar();
@@ -66,11 +70,11 @@ impl MeasuredScene<'_> {
             pose: &poses(scene),
         };
         Diagnosis { seed, ..Diagnosis::for_spot(radar.spot_diameter_m) }
-            .run_with(&subject, effects, hear)
+            .run_with(&subject, effects, notify)
     }
 }
 
-/// The law of a radar's receiver, its threshold and its error of ranges, as declared.
+/// A radar's receiver, its threshold and its error of ranges, as declared.
 pub fn declared_receiver(radar: &Radar) -> (Receiver, Declared) {
     let receiver = Receiver::declared(radar);
     let receiver = Receiver { looks: receiver.looks.min(MOST_LOOKS), ..receiver };
@@ -79,7 +83,7 @@ pub fn declared_receiver(radar: &Radar) -> (Receiver, Declared) {
     (receiver, Declared { threshold_w, range_sd_m })
 }
 
-/// Where the scene puts its meshes.
+/// Poses of the meshes of a scene.
 fn poses(scene: &Scene) -> Vec<MeshPose> {
     let mut poses = Vec::new();
     for mesh in &scene.file.mesh {

@@ -1,27 +1,27 @@
-//! How far predictions are from what was seen, and how far a perfect model's would be.
+//! The error of predictions, and the error of a correct model.
 //!
-//! A detection is compared, in dB, with E[dB | detected], and a perfect model is off by the
-//! standard deviation of dB about it. Both are integrals over Gamma(L, 1/L) above the threshold, done
-//! once for a table of ln(T/mean).
+//! A detection is compared, in dB, with E[dB | detected]; the rms residual of a correct model is the
+//! standard deviation of dB about it. Both are integrals over Gamma(L, 1/L) above the threshold,
+//! tabulated over ln(T/mean).
 
 use serde::Serialize;
 use statrs::function::gamma::ln_gamma;
 
 use super::folds::Folds;
-use super::likelihood::{Declared, Likelihood};
-use super::shots::Observation;
+use super::likelihood::Likelihood;
+use super::observation::{Declared, Observation};
 use crate::effects::Prediction;
 use crate::units::dbm_from_watts;
 
-/// Times the noise floor below which an error has no excess to explain a share of.
+/// Errors below this multiple of the noise floor count as at the floor, with no excess to explain.
 pub(super) const AT_THE_FLOOR: f64 = 1.05;
 
 /// dB in one e-fold.
 pub(super) const DB: f64 = 10.0 / std::f64::consts::LN_10;
 
-/// One shot, predicted without having been fitted.
+/// The score of a prediction at one shot.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Scored {
+pub(super) struct Score {
     /// ln p.
     pub ln_p: f64,
     /// E[dBm | detected].
@@ -41,41 +41,44 @@ pub(super) struct Scored {
 pub struct Errors {
     /// Root mean square over detections about E[dB | detected], dB.
     pub rmse_db: f64,
-    /// Its standard error, by how small patches of the target differ, dB.
+    /// Its standard error over small patches of the target, dB.
     pub rmse_se_db: f64,
-    /// Mean of the same, dB.
+    /// Mean residual over detections, dB.
     pub bias_db: f64,
-    /// Its standard error, likewise, dB.
+    /// Its standard error over small patches of the target, dB.
     pub bias_se_db: f64,
     /// Mean ln p of all shots, the censored ones included.
     pub log_score: f64,
-    /// Share of detections within the central half of their law.
+    /// Share of detections within the central half of their distribution.
     pub coverage_50: f64,
-    /// The same of the central 90 %.
+    /// Share of detections within the central 90 % of their distribution.
     pub coverage_90: f64,
     /// Brier score of the probability of a detection, over all shots.
     pub brier: f64,
-    /// The rmse of a model that is right, dB.
+    /// The rmse of a correct model, dB.
     pub noise_floor_db: f64,
 }
 
-/// Mean and variance of ln y over a tabulated threshold.
-pub(super) struct Above {
+/// Mean and variance of ln(y/mean) above a threshold, tabulated over ln(T/mean).
+pub(super) struct MomentTable {
     knots: Vec<[f64; 2]>,
 }
 
+/// Ends of the table in ln(T/mean).
 const FIRST: f64 = -8.0;
 const LAST: f64 = 6.0;
 const CELLS: usize = 560;
-/// A mean so many e-folds below the threshold is as good as none.
+/// Lowest mean below the threshold that counts, in e-folds.
 const FARTHEST: f64 = 100.0;
 
-impl Above {
-    /// For L looks.
-    pub fn new(looks: f64) -> Above {
-        let knot =
-            |k: usize| moments_above(looks, FIRST + (LAST - FIRST) * k as f64 / CELLS as f64);
-        Above { knots: (0..=CELLS).map(knot).collect() }
+impl MomentTable {
+    /// The table of a number of looks.
+    pub fn new(looks: f64) -> MomentTable {
+        let mut knots = Vec::with_capacity(CELLS + 1);
+        for k in 0..=CELLS {
+            knots.push(moments_above(looks, FIRST + (LAST - FIRST) * k as f64 / CELLS as f64));
+        }
+        MomentTable { knots }
     }
 
     /// Mean and variance of ln(y/mean) above ln(T/mean).
@@ -84,13 +87,14 @@ impl Above {
         let cell = (x as usize).min(CELLS - 1);
         let t = x - cell as f64;
         let [a, b] = [cell, cell + 1].map(|k| self.knots.get(k).copied().unwrap_or_default());
-        // So far above the mean, what is detected lies close to the threshold.
+        // Far above the mean, detections lie close to the threshold.
         let beyond = (ln_threshold - LAST).max(0.0);
         [(1.0 - t) * a[0] + t * b[0] + beyond, (1.0 - t) * a[1] + t * b[1]]
     }
 }
 
-/// By the midpoint rule over ln y, from the threshold or where nothing lies below.
+/// Mean and variance of ln(y/mean) above a threshold, by the midpoint rule from the threshold or, where that is
+/// lower, from where the density begins.
 fn moments_above(looks: f64, ln_threshold: f64) -> [f64; 2] {
     const STEPS: usize = 400;
     let reach = 12.0 / looks.sqrt().min(looks);
@@ -112,38 +116,40 @@ fn moments_above(looks: f64, ln_threshold: f64) -> [f64; 2] {
     [mean, (sums[2] / sums[0] - mean * mean).max(0.0)]
 }
 
-/// Scores the shots for which `wanted` holds.
-pub(super) fn scored(
+/// Scores of the shots that are `wanted`, with their numbers.
+pub(super) fn scores(
     prediction: &Prediction,
     declared: Declared,
     observations: &[Observation],
-    wanted: &dyn Fn(usize) -> bool,
-) -> Vec<(usize, Scored)> {
+    wanted: impl Fn(usize) -> bool,
+) -> Vec<(usize, Score)> {
     let likelihood = Likelihood::new(prediction, declared);
-    let above = Above::new(prediction.receiver.looks);
-    let one = |(shot, seen): (usize, &Observation)| {
-        let below = |level_w: f64| likelihood.below(shot, level_w);
-        let [mean, variance] = detected_moments(&likelihood, &above, prediction, declared, shot);
+    let table = MomentTable::new(prediction.receiver.looks);
+    let mut scores = Vec::new();
+    for (shot, seen) in observations.iter().enumerate().filter(|(shot, _)| wanted(*shot)) {
+        let [mean, variance] = detected_moments(&likelihood, &table, prediction, declared, shot);
         let expected_dbm = DB * mean + dbm_from_watts(1.0);
-        let missed = below(declared.threshold_w);
-        let share = |power_w: f64| (below(power_w) - missed) / (1.0 - missed).max(1e-300);
-        Scored {
+        let missed = likelihood.below(shot, declared.threshold_w);
+        let share = seen
+            .power_w
+            .map(|power_w| (likelihood.below(shot, power_w) - missed) / (1.0 - missed).max(1e-300));
+        let score = Score {
             ln_p: likelihood.term(shot, seen).ln_p,
             expected_dbm,
             variance_db2: DB * DB * variance,
             residual_db: seen.power_w.map(|power_w| dbm_from_watts(power_w) - expected_dbm),
             chance: 1.0 - missed,
-            share: seen.power_w.map(share),
-        }
-    };
-    let shots = observations.iter().enumerate().filter(|(shot, _)| wanted(*shot));
-    shots.map(|(shot, seen)| (shot, one((shot, seen)))).collect()
+            share,
+        };
+        scores.push((shot, score));
+    }
+    scores
 }
 
-/// Mean and variance of ln y given a detection, over the tilts.
+/// Mean and variance of ln y given a detection, averaged over tilts.
 fn detected_moments(
     likelihood: &Likelihood,
-    above: &Above,
+    table: &MomentTable,
     prediction: &Prediction,
     declared: Declared,
     shot: usize,
@@ -151,9 +157,9 @@ fn detected_moments(
     let ln_threshold = declared.threshold_w.ln();
     let mut sums = [0.0; 3];
     for (ln_mean, weight) in likelihood.ln_means(shot) {
-        // What is detected where nothing is expected lies at the threshold.
+        // Detections far above their mean lie at the threshold.
         let passed = prediction.saturating.of(ln_mean.max(ln_threshold - FARTHEST));
-        let [mean, variance] = above.at((ln_threshold - passed.ln_mean) / passed.slope);
+        let [mean, variance] = table.at((ln_threshold - passed.ln_mean) / passed.slope);
         let variance = passed.slope * passed.slope * variance;
         let chance = if weight == 1.0 { 1.0 } else { likelihood.chance(ln_mean) };
         let (mean, weight) = (passed.ln_mean + passed.slope * mean, weight * chance.max(1e-300));
@@ -165,37 +171,45 @@ fn detected_moments(
     [mean, (sums[2] / sums[0] - mean * mean).max(0.0)]
 }
 
-/// Sums up shots.
-pub(super) fn errors(scored: &[Scored], folds: &Folds) -> Errors {
-    let mean = |values: &mut dyn Iterator<Item = f64>| {
-        let (sum, count) = values.fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
-        sum / f64::max(count, 1.0)
-    };
-    let detected = || scored.iter().filter_map(|s| Some((s, s.residual_db?)));
-    let inside = |central: f64| {
-        let within = move |share: f64| (share - 0.5).abs() <= 0.5 * central;
-        mean(&mut scored.iter().filter_map(|s| s.share).map(|s| f64::from(u8::from(within(s)))))
-    };
-    let brier = |s: &Scored| (s.chance - f64::from(u8::from(s.residual_db.is_some()))).powi(2);
-    let bias_db = mean(&mut detected().map(|(_, r)| r));
-    let square_db2 = mean(&mut detected().map(|(_, r)| r * r));
-    let count = detected().count().max(1) as f64;
-    let standard_error = |off: &dyn Fn(f64) -> f64| {
-        let off: Vec<f64> = scored.iter().map(|s| s.residual_db.map_or(0.0, off)).collect();
-        folds.sum(&off)[1] / count
-    };
-    let square_se_db2 = standard_error(&|r| r * r - square_db2);
+/// The errors of a model from its scores.
+pub(super) fn errors(scores: &[Score], folds: &Folds) -> Errors {
+    let residuals_db: Vec<f64> = scores.iter().filter_map(|score| score.residual_db).collect();
+    let bias_db = mean(residuals_db.iter().copied());
+    let square_db2 = mean(residuals_db.iter().map(|r| r * r));
+    let square_se_db2 = standard_error(scores, folds, |r| r * r - square_db2);
+    let detected = scores.iter().filter(|score| score.residual_db.is_some());
     Errors {
         rmse_db: square_db2.sqrt(),
         rmse_se_db: square_se_db2 / (2.0 * square_db2.sqrt().max(f64::MIN_POSITIVE)),
         bias_db,
-        bias_se_db: standard_error(&|r| r - bias_db),
-        log_score: mean(&mut scored.iter().map(|s| s.ln_p)),
-        coverage_50: inside(0.5),
-        coverage_90: inside(0.9),
-        brier: mean(&mut scored.iter().map(brier)),
-        noise_floor_db: mean(&mut detected().map(|(s, _)| s.variance_db2)).sqrt(),
+        bias_se_db: standard_error(scores, folds, |r| r - bias_db),
+        log_score: mean(scores.iter().map(|score| score.ln_p)),
+        coverage_50: coverage(scores, 0.5),
+        coverage_90: coverage(scores, 0.9),
+        brier: mean(scores.iter().map(|score| {
+            (score.chance - f64::from(u8::from(score.residual_db.is_some()))).powi(2)
+        })),
+        noise_floor_db: mean(detected.map(|score| score.variance_db2)).sqrt(),
     }
+}
+
+/// Mean of some numbers; 0 of none.
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), x| (sum + x, count + 1.0));
+    sum / f64::max(count, 1.0)
+}
+
+/// Share of detections within the central part of their distribution.
+fn coverage(scores: &[Score], central: f64) -> f64 {
+    let shares = scores.iter().filter_map(|score| score.share);
+    mean(shares.map(|share| f64::from(u8::from((share - 0.5).abs() <= 0.5 * central))))
+}
+
+/// Standard error over cells of a mean over detections.
+fn standard_error(scores: &[Score], folds: &Folds, off: impl Fn(f64) -> f64) -> f64 {
+    let count = scores.iter().filter(|score| score.residual_db.is_some()).count().max(1);
+    let off: Vec<f64> = scores.iter().map(|score| score.residual_db.map_or(0.0, &off)).collect();
+    folds.sum(&off)[1] / count as f64
 }
 
 #[cfg(test)]
@@ -215,7 +229,7 @@ mod tests {
             let n = x.len() as f64;
             let mean = x.iter().sum::<f64>() / n;
             let variance = x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n;
-            let [m, v] = Above::new(looks).at(ln_threshold);
+            let [m, v] = MomentTable::new(looks).at(ln_threshold);
             // Five standard errors of the mean; the variance of heavy tails within 3 %.
             assert!((m - mean).abs() < 5.0 * (variance / n).sqrt(), "{looks}: {m} {mean}");
             assert!((v / variance - 1.0).abs() < 0.03, "{looks}: {v} {variance}");

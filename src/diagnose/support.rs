@@ -1,166 +1,138 @@
-//! Whether the data speak for one more effect: the rule by which one is added, exchanged or kept.
+//! Whether the data support one more effect: the rule by which one is added, exchanged or kept.
 
 use std::cell::OnceCell;
 
+use super::evidence::{Candidate, Largest};
 use super::field::Structure;
-use super::score::{Scored, errors};
-use super::select::{Added, Candidate, SHARE_OF_LARGEST, Selection, State, larger};
+use super::score::Score;
+use super::scorer::{Scorer, State};
+use super::screen::Screen;
+use super::settings::Diagnosis;
+use super::size::Size;
 use super::trial::Trial;
-use super::{Diagnosis, Evidence};
 
-/// Share of the largest effect that one of the scatter must reach: a form that is off here and there
-/// scatters more than it shifts.
+/// Share of the largest effect's size below which another may only correct the form of the largest.
+pub(super) const SHARE_OF_LARGEST: f64 = 0.2;
+/// The same share for an effect on the scatter: a wrong form scatters more than it shifts.
 const SHARE_OF_SPREAD: f64 = 0.4;
-/// Share of the largest gain below which an effect may make up for the error of another's form, and that of
-/// one of the scatter, which gains little for its size.
-const SHARE_OF_GAIN: f64 = 0.1;
-const SHARE_OF_GAIN_OF_SPREAD: f64 = 0.05;
-/// Gain of each shot beyond which it tells that something was out of place, and no more of how large a form is.
-const MOST_OF_A_SHOT: f64 = 2.0;
-/// Share of its gain that an effect of the scatter must keep where a field has corrected the means.
+/// Share of its gain that an effect on the scatter must keep where a field has corrected the means.
 const SHARE_BESIDE_FIELD: f64 = 0.5;
-/// Share of the size of such an effect that neighbours may have in common: scatter is each shot's own.
+/// Largest residual that neighbours may share, as a share of the size of such an effect: the scatter of every shot
+/// is independent.
 const MOST_SHARED: f64 = 0.6;
-/// Share of its gain that an effect of one small place keeps where it is held out, and how many least
-/// gains it is worth.
+/// Share of its gain that an effect of one small place keeps where it is held out.
 const SHARE_KEPT: f64 = 0.6;
+/// Gain of such an effect, in least gains.
 const FAR_BEYOND: f64 = 4.0;
 
-/// The largest of the effects that were added: size, dB, and gain in ln likelihood.
-#[derive(Clone, Copy, Default)]
-pub(super) struct Largest {
-    pub size_db: f64,
-    gain: f64,
-}
-
-impl Largest {
-    pub fn of(added: &[Added]) -> Largest {
-        let largest = |of: fn(&Evidence) -> f64| {
-            added.iter().map(|one| of(&one.evidence)).fold(0.0, f64::max)
-        };
-        Largest { size_db: largest(|e| e.size_db), gain: largest(|e| e.gain) }
-    }
-
-    /// The gain of one more effect below which it may be the error of this one's form, by so many shots.
-    pub fn least_gain(self, is_spread: bool, shots: usize) -> f64 {
-        let share = if is_spread { SHARE_OF_GAIN_OF_SPREAD } else { SHARE_OF_GAIN };
-        share * self.gain.min(MOST_OF_A_SHOT * shots as f64)
-    }
-}
-
-/// What an effect has to say for itself.
+/// What speaks for an effect.
 pub(super) struct Claim {
-    /// Gain in ln likelihood, and the least that counts by itself.
+    /// Gain in ln likelihood.
     pub gain: f64,
+    /// Least gain that counts.
     pub least: f64,
     /// Gain in ln p of held-out patches and its standard error.
     pub held_out: [f64; 2],
-    /// What it changes of the means and of the spread, dB.
-    pub sizes_db: [f64; 2],
+    pub size: Size,
     /// Share of the largest size that it must reach.
     pub share_of_size: f64,
-    /// What it has to stand beside.
+    /// The largest of the other effects.
     pub largest: Largest,
 }
 
 impl Claim {
-    /// The smaller gain: a fit without a patch may be far off where the patch was all that held it.
+    /// The smaller gain. A fit without a patch may be far off where only that patch held it.
     fn counts(&self) -> f64 {
         self.held_out[0].min(self.gain)
     }
+
+    /// Whether fit, held-out patches and size support the effect, on a scan of this many shots.
+    pub fn is_supported(&self, settings: &Diagnosis, shots: usize) -> bool {
+        let Diagnosis { least_size_db, standard_errors, .. } = *settings;
+        let Claim { gain, least, held_out: [held_out, se], size, largest, .. } = *self;
+        // An effect of one small place, which no scatter is, has no standard error over places. It
+        // must be far beyond chance and be found again where it was not fitted.
+        let is_local = !size.is_spread()
+            && gain >= FAR_BEYOND * least
+            && held_out >= SHARE_KEPT * gain
+            && held_out > se;
+        gain >= least.max(largest.least_gain(size.is_spread(), shots))
+            && size.larger_db() >= least_size_db.max(self.share_of_size * largest.size_db)
+            && (self.counts() > standard_errors * se || is_local)
+    }
 }
 
-/// Whether an effect of these sizes changes the scatter more than the means.
-fn is_spread([mean_db, spread_db]: [f64; 2]) -> bool {
-    spread_db > mean_db
-}
-
-/// What a model leaves, once it is asked for: by a field, and what neighbours have in common, dB.
-#[derive(Default)]
-pub(super) struct Left {
+/// Judges trials of one more effect against a model.
+pub(super) struct Judge<'j, 'p, 'a> {
+    scorer: Scorer<'p>,
+    state: &'j State<'a>,
+    largest: Largest,
+    /// Computed on first use, as few trials need them.
     structure: OnceCell<Structure>,
     shared_db: OnceCell<f64>,
+    screen: OnceCell<Screen<'p>>,
 }
 
-impl Selection<'_> {
-    /// What held-out shots are under a trial and the gain that speaks for it; `None` where it is not
-    /// supported.
-    pub(super) fn support<'a>(
-        &self,
-        state: &State<'a>,
-        trial: &mut Trial<'a>,
-        largest: Largest,
-        left: &Left,
-    ) -> Option<(Vec<Scored>, f64)> {
-        let Candidate { gain, numbers, size_db, .. } = trial.candidate;
-        let is_spread = is_spread(trial.sizes_db);
-        let share_of_size = if is_spread { SHARE_OF_SPREAD } else { SHARE_OF_LARGEST };
+impl<'j, 'p, 'a> Judge<'j, 'p, 'a> {
+    /// A judge of trials against a model with these effects.
+    pub fn new(scorer: Scorer<'p>, state: &'j State<'a>, largest: Largest) -> Judge<'j, 'p, 'a> {
+        let (structure, shared_db, screen) = Default::default();
+        Judge { scorer, state, largest, structure, shared_db, screen }
+    }
+
+    /// Held-out scores of a trial and the gain that counts; `None` where it is not supported.
+    pub fn support(&self, trial: &mut Trial) -> Option<(Vec<Score>, f64)> {
+        let Candidate { gain, numbers, .. } = trial.candidate;
+        let (settings, shots) = (self.scorer.settings, self.scorer.problem.shots.len());
+        let is_spread = trial.size.is_spread();
         let mut claim = Claim {
             gain,
-            least: self.settings.least_gain_of(numbers, trial.tried),
+            least: settings.least_gain_of(numbers, trial.tried),
             held_out: [f64::INFINITY, 0.0],
-            sizes_db: trial.sizes_db,
-            share_of_size,
-            largest,
+            size: trial.size,
+            share_of_size: if is_spread { SHARE_OF_SPREAD } else { SHARE_OF_LARGEST },
+            largest: self.largest,
         };
-        // Held-out patches are dear: nobody asks them of what fails without.
-        if !self.is_supported(&claim) {
+        // Held-out patches take long and are computed only for trials that would pass without them.
+        if !claim.is_supported(settings, shots) {
             return None;
         }
-        let held_out = self.held_out(&trial.space, &trial.fitted.at);
-        claim.held_out = self.difference(&held_out, &state.held_out);
+        let held_out = self.scorer.held_out(&trial.space, &trial.fit.at);
+        claim.held_out = self.scorer.difference(&held_out, &self.state.held_out);
         trial.candidate.held_out = Some(claim.held_out);
-        if !self.is_supported(&claim) || self.is_farther_off(&held_out, &state.held_out) {
+        if !claim.is_supported(settings, shots)
+            || self.scorer.is_farther_off(&held_out, &self.state.held_out)
+            || (is_spread && self.is_structure_of_means(trial))
+        {
             return None;
-        }
-        if is_spread {
-            let structure = left.structure.get_or_init(|| self.structure(state));
-            let shared_db = *left.shared_db.get_or_init(|| self.shared_db(state));
-            let beside = self.gain_beside(state, trial, structure);
-            if beside < SHARE_BESIDE_FIELD * gain || shared_db > MOST_SHARED * size_db {
-                return None;
-            }
         }
         Some((held_out, claim.counts()))
     }
 
-    /// Whether fit, held-out patches and size speak for an effect.
-    pub(super) fn is_supported(&self, claim: &Claim) -> bool {
-        let Diagnosis { least_size_db, standard_errors, .. } = *self.settings;
-        let Claim { gain, least, held_out: [held_out, se], largest, .. } = *claim;
-        let is_spread = is_spread(claim.sizes_db);
-        // What acts in one small place, as no scatter does, has no standard error over places; it
-        // must be far beyond chance and be found again where it was not fitted.
-        let is_local = !is_spread
-            && gain >= FAR_BEYOND * least
-            && held_out >= SHARE_KEPT * gain
-            && held_out > se;
-        let beside = largest.least_gain(is_spread, self.problem.shots.len());
-        gain >= least.max(beside)
-            && larger(claim.sizes_db) >= least_size_db.max(claim.share_of_size * largest.size_db)
-            && (claim.counts() > standard_errors * se || is_local)
+    /// Whether an effect on the scatter only stands for structure of the means.
+    fn is_structure_of_means(&self, trial: &Trial) -> bool {
+        let structure = self.structure.get_or_init(|| self.scorer.structure(self.state));
+        let shared_db = *self.shared_db.get_or_init(|| {
+            let prediction = self.scorer.predict(self.state);
+            self.scorer.shared(&prediction, &self.scorer.z(&prediction)).strength_db
+        });
+        let with = self.scorer.ln_likelihood_with(&trial.space, &trial.fit, structure);
+        let without = self.scorer.ln_likelihood_with(&self.state.space, &self.state.fit, structure);
+        let Candidate { gain, size_db, .. } = trial.candidate;
+        with - without < SHARE_BESIDE_FIELD * gain || shared_db > MOST_SHARED * size_db
     }
 
-    /// Whether held-out errors grow by more than their standard error.
-    fn is_farther_off(&self, now: &[Scored], before: &[Scored]) -> bool {
-        let [now, before] = [now, before].map(|scored| errors(scored, self.folds));
-        now.rmse_db > before.rmse_db + now.rmse_se_db
+    /// Gain that a placebo with this number of parameters promises.
+    pub fn placebo_gain(&self, numbers: usize) -> f64 {
+        let State { space, fit, .. } = self.state;
+        let screen = self.screen.get_or_init(|| Screen::new(self.scorer.problem, space, &fit.at));
+        screen.placebo_gain(space, &fit.at, numbers, self.scorer.settings.seed)
     }
-}
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_stands_beside_a_large_effect_must_be_large_itself() {
-        let is_near = |gain: f64, expected: f64| (gain - expected).abs() < 1e-9;
-        let large = Largest { size_db: 2.0, gain: 7_580.0 };
-        assert!(is_near(Largest::default().least_gain(false, 18_529), 0.0));
-        assert!(is_near(large.least_gain(false, 18_529), 758.0));
-        assert!(is_near(large.least_gain(true, 18_529), 379.0));
-        // A pose far off gains without end at edges, and hides nothing else for that.
-        let far = Largest { gain: 170_150.0, ..large };
-        assert!(is_near(far.least_gain(false, 8_708), 1_741.6));
+    /// Whether a trial gains more than a placebo with as many parameters.
+    pub fn beats_placebos(&self, trial: &mut Trial) -> bool {
+        let placebo_gain = self.placebo_gain(trial.candidate.numbers);
+        trial.candidate.placebo_gain = Some(placebo_gain);
+        trial.candidate.gain > placebo_gain
     }
 }

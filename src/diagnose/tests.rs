@@ -3,9 +3,12 @@
 
 use glam::DVec3;
 
+use super::shots::missed_shot;
 use super::*;
-use crate::brdf::{BlinnPhong, CookTorrance, Distribution, Mixture, Shadowing};
-use crate::effects::{About, EffectParameter, Level, Model, Place, find};
+use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
+use crate::effects::{
+    About, Effect, EffectParameter, Level, Model, Place, Receiver, Shot, Stage, find,
+};
 use crate::frames::{Point, Ray};
 use crate::geometry::Mesh;
 use crate::radar::random::{Key, Purpose};
@@ -60,7 +63,7 @@ fn chirps(radar: &Radar) -> crate::radar::Chirps {
     }
 }
 
-/// A law of gain over the shots.
+/// An effect that changes the gain over the shots.
 struct Gain {
     about: About,
     db: fn(&Shot) -> f64,
@@ -112,7 +115,7 @@ fn diagnosed(truth: &[(&'static dyn Effect, f64)], seed: u64) -> Report {
     diagnosed_with(&LIBRARY, truth, seed)
 }
 
-/// The same, by a library.
+/// The report on a scan whose truth has these effects, searched in a library.
 fn diagnosed_with(
     library: &[&'static dyn Effect],
     truth: &[(&'static dyn Effect, f64)],
@@ -122,14 +125,14 @@ fn diagnosed_with(
     diagnosed_of(library, effects.collect(), seed)
 }
 
-/// One region around the middle of the target.
+/// A stage with one region.
 fn stage<'a>(radar: &'a Radar, bvh: &'a Bvh<'a>, region_of_facet: &'a [u16]) -> Stage<'a> {
     let (link, middle) = (Link::new(radar), DVec3::new(0.0, 1.1, 0.0));
     let geometry = ScanGeometry::new(radar, Box::leak(Box::default()), bvh, region_of_facet);
     Stage { geometry, link, grain_of_region: &[DVec3::Y], middle }
 }
 
-/// The same, with all numbers of every effect.
+/// The report on a scan whose truth has these effects with all their parameters, searched in a library.
 fn diagnosed_of(
     library: &[&'static dyn Effect],
     effects: Vec<(&'static dyn Effect, Vec<f64>)>,
@@ -151,9 +154,10 @@ fn diagnosed_of(
         let mut draws = key.draws();
         let power_w = (arrived.power_w + noise_w) * draws.gamma(receiver.looks);
         let range_m = arrived.range_m + RANGE_SD_M * draws.gaussian();
-        match power_w >= declared.threshold_w {
-            true => Observation { power_w: Some(power_w), range_m: Some(range_m) },
-            false => Observation::default(),
+        if power_w >= declared.threshold_w {
+            Observation { power_w: Some(power_w), range_m: Some(range_m) }
+        } else {
+            Observation::default()
         }
     };
     let observations: Vec<Observation> = prediction.arrived.iter().enumerate().map(seen).collect();
@@ -178,7 +182,7 @@ fn diagnosed_of(
     report
 }
 
-/// The rows are those that the errors were computed from.
+/// Checks that the rows reproduce the errors.
 fn assert_row_errors(report: &Report) {
     let off = report.rows.iter().filter_map(|row| Some(row.observed_dbm? - row.after_dbm));
     let squares: Vec<f64> = off.map(|db| db * db).collect();
@@ -225,8 +229,8 @@ fn a_missing_effect_is_named_and_its_number_found() {
         let error = &report.error;
         assert!((error.after.rmse_db / error.after.noise_floor_db - 1.0).abs() < 0.045);
         assert!(error.after.log_score > error.before.log_score);
-        // 2400 shots of 2 dB would tell a tenth of the effect that is there, of which the laws take a part;
-        // what was missed is the next smaller size.
+        // 2400 shots of 2 dB show a tenth of the injected effect, of which the scattering models absorb a part.
+        // The missed size is the next smaller one.
         let powers = &report.controls.injection_recovery;
         let power = powers.iter().find(|power| power.name == effect.name()).unwrap();
         let least_db = power.least_db.unwrap();
@@ -243,14 +247,14 @@ fn two_missing_effects_are_both_found() {
     assert_eq!(names, ["bowl", "drift"], "{report:#?}");
 }
 
-/// Farther than powers lead a search, which have an edge at every facet.
+/// The shift is farther than a search by powers leads, which jump at every facet.
 #[test]
 fn a_target_that_has_moved_far_is_found_by_its_ranges() {
     let library = ["pose", "motion"].map(|name| find(name).unwrap());
     let mut path = vec![0.0; library[1].parameters().len()];
     let way_m = [("z1_m", 0.03), ("x2_m", -0.02), ("y3_m", 0.01)];
-    for (knob, value) in library[1].parameters().iter().zip(&mut path) {
-        *value = way_m.iter().find(|(name, _)| *name == knob.name).map_or(0.0, |(_, m)| *m);
+    for (known, value) in library[1].parameters().iter().zip(&mut path) {
+        *value = way_m.iter().find(|(name, _)| *name == known.name).map_or(0.0, |(_, m)| *m);
     }
     let report = diagnosed_of(&library, vec![(library[1], path.clone())], 5);
     let names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
@@ -261,15 +265,15 @@ fn a_target_that_has_moved_far_is_found_by_its_ranges() {
         let sd = sd.unwrap();
         assert!((value - m).abs() < 4.0 * sd && sd < 0.02, "{name}: {:?}", found[name]);
     }
-    // Along the plate the target's place is seen by the sphere, which the scan passes in between.
+    // Only the sphere shows a shift along the plate, and the scan passes it in these rows.
     let values: Vec<f64> =
-        library[1].parameters().iter().map(|knob| found[knob.name].value).collect();
+        library[1].parameters().iter().map(|known| found[known.name].value).collect();
     let chirps = chirps(&Radar::default());
     for index in (chirps.rays.len() / 2..chirps.rays.len() * 4 / 5).step_by(40) {
-        let shot = shots::missed(&chirps, &chirps.progress(), index).unwrap();
+        let shot = missed_shot(&chirps, &chirps.progress(), index).unwrap();
         let mut off_m = DVec3::ZERO;
-        for (knob, (value, expected)) in values.iter().zip(&path).enumerate() {
-            let (axis, share) = library[1].shifts(knob, &shot).unwrap();
+        for (number, (value, expected)) in values.iter().zip(&path).enumerate() {
+            let (axis, share) = library[1].shifts(number, &shot).unwrap();
             off_m[axis] += share * (value - expected);
         }
         assert!(off_m.length() < 0.003, "{index}: {off_m}");
@@ -279,11 +283,11 @@ fn a_target_that_has_moved_far_is_found_by_its_ranges() {
 
 #[test]
 fn an_effect_that_took_what_another_left_gives_way() {
-    // While the step is not there, the bent slant predicts better than the slant that is true.
+    // Without the step, the bent slant predicts better than the true slant.
     let report = diagnosed_with(&[&BENT, &SLANT, &STEP], &[(&SLANT, 6.0), (&STEP, 1.5)], 5);
     let first = report.ranking.first().unwrap();
     assert_eq!((first.round, first.name), (1, "bent"), "{:#?}", report.ranking);
-    // It did not stay, so that nobody reads that it was added.
+    // It did not stay, and the ranking does not show it as added.
     assert!(report.ranking.iter().all(|candidate| candidate.name != "bent" || !candidate.accepted));
     let mut names: Vec<&str> = report.effects.iter().map(|e| e.name).collect();
     names.sort_unstable();
@@ -298,7 +302,7 @@ fn what_no_effect_explains_is_called_unexplained() {
     let with_unknown = report.error.with_unknown.as_ref().unwrap().rmse_db;
     assert!(with_unknown < report.error.after.rmse_db, "{:#?}", report.error);
     assert!(with_unknown > 0.98 * report.error.noise_floor_db, "{:#?}", report.error);
-    // The map of what is unknown has the stripes, of 1.2 dB and drawn to nothing by the field's prior.
+    // The map of the unknown structure has the stripes, of 1.2 dB less the shrinkage by the field's prior.
     let stripe = |row: &Row| row.unknown_db * (9.0 * row.xt_m).sin().signum();
     let mean_db = report.rows.iter().map(stripe).sum::<f64>() / report.rows.len() as f64;
     assert!((0.4..1.3).contains(&mean_db), "{mean_db}");
@@ -358,7 +362,7 @@ fn a_scan_with_too_little_says_so() {
     assert!(matches!(below, DiagnoseError::Threshold { below, .. } if below > 500), "{below}");
     let unlike = refused(&|shot| if shot % 2 == 0 { 2e-11 } else { 1e-5 });
     assert!(matches!(unlike, DiagnoseError::Unlike { .. }), "{unlike}");
-    // Fifteen decibels up or down by chance are nothing that any of the effects does.
+    // None of the effects makes random steps of 15 dB.
     let far = refused(&|shot| if (shot * 7919) % 13 < 6 { 2e-11 } else { 6e-10 });
     assert!(matches!(far, DiagnoseError::FarOff { .. }), "{far}");
 }
@@ -396,7 +400,7 @@ fn a_cloud_finds_its_shots() {
     let cloud = Cloud::new(points.clone()).unwrap();
     let by_direction = match_cloud(&cloud, &chirps(&radar), &shots).unwrap();
     assert_eq!(by_direction.observations, found.observations);
-    // With numbers that are not theirs they are refused.
+    // Points with the numbers of other chirps are refused.
     for off in [1, -1] {
         let mut points = numbered.points().to_vec();
         for point in &mut points {
@@ -412,7 +416,7 @@ fn a_cloud_finds_its_shots() {
     passes.rays.extend_from_slice(&once.rays);
     passes.number.extend(once.number.iter().map(|number| number + (SIDE * SIDE) as u32));
     passes.time_s.extend_from_slice(&once.time_s);
-    let shots_twice = super::shots::trace_shots(&stage, &radar, &passes).unwrap();
+    let shots_twice = trace_shots(&stage, &radar, &passes).unwrap();
     for first in [0, (SIDE * SIDE) as u32] {
         let of_pass = numbered.points()[..8]
             .iter()
@@ -421,7 +425,7 @@ fn a_cloud_finds_its_shots() {
         let found = match_cloud(&cloud, &passes, &shots_twice).unwrap();
         assert_eq!(found.observations.iter().filter(|o| o.power_w.is_some()).count(), 8);
     }
-    // As are the numbers of rows.
+    // Row numbers in place of chirp numbers are refused.
     let given = |points: Vec<CloudPoint>| {
         match_cloud(&Cloud::new(points).unwrap(), &chirps(&radar), &shots).unwrap_err()
     };
@@ -433,7 +437,7 @@ fn a_cloud_finds_its_shots() {
         matches!(strange, DiagnoseError::Strange { placed: 8, matched: 0, points: 8 }),
         "{strange}"
     );
-    // A cloud that lies beside its rays as a whole is out of place, whatever it meets there.
+    // A cloud that lies off its rays as a whole is out of place.
     let aside = on_target.iter().enumerate().map(|(number, point)| {
         // By 9 or 10 chirps, so that no one number is added to all.
         let shift = DVec3::new(if number % 2 == 0 { 0.15 } else { 0.175 }, 0.0, 0.0);

@@ -1,41 +1,44 @@
-//! One round's fits of every effect that is not there yet, from what a sample of the shots promises to
-//! a fit of all shots for the best few.
+//! Fits of one more effect: from the promise of every effect on a sample of the shots to a fit to all shots for
+//! the best few.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::ranges;
-use super::refit::{Fitted, Space, sum};
+use super::evidence::{Candidate, Largest};
+use super::problem::Sample;
+use super::ranges::place_by_ranges;
+use super::refit::{Fit, SCOUT, SEARCH};
+use super::scorer::{Scorer, State};
 use super::screen::Screen;
-use super::select::{Candidate, SCOUT, SEARCH, Selection, State, larger};
-use super::support::Largest;
+use super::size::Size;
+use super::space::Space;
 use crate::effects::{Effect, EffectParameter};
 
 /// Starts of an effect that are followed.
 const STARTS: usize = 2;
-/// How often a fit to the sample is continued that has not settled.
+/// How often a fit that has not converged is continued.
 const LONGER: usize = 3;
 /// Gain in ln likelihood for which it is continued once more.
 const WORTH_MORE: f64 = 3.0;
-/// How far the shape of a start is moved, in felt steps.
+/// Distances by which the shape of a start is moved, in steps of the parameters.
 const SHAPE_STEPS: [f64; 3] = [4.0, 2.0, 1.0];
-/// How far from a start the ranges may put the target where they tell nothing, in felt steps.
+/// How far from a start the target may be placed where the ranges do not determine it, in steps of the parameters.
 const WITHIN: [f64; 2] = [1.0, 10.0];
 /// Strengths of a start that are tried.
 const STRENGTHS: [f64; 6] = [0.3, 1.0, 3.0, 7.0, 12.0, 20.0];
-/// Of the starts that are followed none promises less than this share of what the best does.
+/// A start that promises less than this share of the best is not followed.
 const SHARE_OF_START: f64 = 0.7;
-/// One that gains less than this share of its promise is moved by what it gains.
+/// A start that gains less than this share of its promise is moved by its gain instead.
 const SHARE_OF_WORD: f64 = 0.3;
-/// Effects that promise less than this share of the best are not fitted at all.
+/// An effect that promises less than this share of the best is not fitted.
 const SHARE_TO_SCOUT: f64 = 0.05;
-/// Effects of each round that are fitted to all shots and predict held-out patches: at most so many,
-/// and none that gains less than this share of the best.
+/// Effects of each round that are fitted to all shots and predict held-out patches.
 const SHORTLIST: usize = 5;
-/// A refit that keeps less of its promise does not count among them.
-const SHARE_OF_PROMISE: f64 = 0.3;
+/// An effect that gains less than this share of the best is not among them.
 const SHARE_OF_BEST: f64 = 0.3;
-/// One that gains less than this share of what it must beside the effects that are there is not searched for
+/// A refit that keeps less than this share of its promise does not count among them.
+const SHARE_OF_PROMISE: f64 = 0.3;
+/// An effect that gains less than this share of what it needs beside the effects already added is not searched for
 /// further.
 const SHARE_OF_HOPE: f64 = 0.5;
 
@@ -43,18 +46,34 @@ const SHARE_OF_HOPE: f64 = 0.5;
 pub(super) struct Trial<'a> {
     pub effect: &'a dyn Effect,
     pub space: Space<'a>,
-    /// What they promise, and where they are.
-    starts: Vec<(f64, DVector<f64>)>,
-    /// How many starts there were.
+    starts: Vec<Start>,
+    /// Number of starts before the choice of the best.
     pub tried: usize,
-    pub fitted: Fitted,
-    /// What it changes of the means and of the spread, dB.
-    pub sizes_db: [f64; 2],
+    pub fit: Fit,
+    pub size: Size,
     pub candidate: Candidate,
 }
 
-impl Selection<'_> {
-    /// Every effect that is not there yet, best first. Those worth it are fitted to all shots, the
+/// Where a fit begins.
+#[derive(Clone)]
+struct Start {
+    /// Gain in ln likelihood that is promised or found there.
+    worth: f64,
+    at: DVector<f64>,
+}
+
+/// Searches for one more effect.
+#[derive(Clone, Copy)]
+pub(super) struct Search<'p> {
+    pub scorer: Scorer<'p>,
+    /// A sample of the shots, for a first view.
+    pub sample: &'p Sample,
+    /// Receives a few words about each step.
+    pub notify: &'p (dyn Fn(&str) + Sync),
+}
+
+impl<'p> Search<'p> {
+    /// Every effect that the model does not have yet, best first. The best few are fitted to all shots, the
     /// rest to a sample.
     pub fn trials<'a>(
         &self,
@@ -63,228 +82,239 @@ impl Selection<'_> {
         round: usize,
         largest: Largest,
     ) -> Vec<Trial<'a>> {
-        let absent = |effect: &&&dyn Effect| !state.space.has(effect.name());
-        (self.hear)(&format!("round {round}: screening {} effects", effects.len()));
-        let sample = self.sample;
-        let screen = Screen::new(sample.problem(&self.problem), &state.space, &state.fitted.at);
-        let promised =
-            |effect: &&'a dyn Effect| self.promised(state, &screen, sample.weight, *effect, round);
-        let absent: Vec<_> = effects.iter().filter(absent).collect();
-        let mut trials: Vec<Trial> = absent.into_par_iter().filter_map(promised).collect();
+        (self.notify)(&format!("round {round}: screening {} effects", effects.len()));
+        let screen = self.screen(state);
+        let absent: Vec<_> =
+            effects.iter().filter(|effect| !state.space.has(effect.name())).collect();
+        let mut trials: Vec<Trial> = absent
+            .into_par_iter()
+            .filter_map(|effect| self.promise(state, &screen, *effect, round))
+            .collect();
         sort(&mut trials);
-        let mut best = 0.25 * self.settings.least_gain_of(1, 1) / SHARE_TO_SCOUT;
-        for trial in &mut trials {
-            if trial.candidate.gain >= SHARE_TO_SCOUT * best {
-                (self.hear)(&format!("round {round}: trying {}", trial.effect.name()));
-                self.scout(state, &screen, sample.weight, trial);
-                best = best.max(trial.candidate.gain);
-            }
-        }
+        self.scout_promising(state, &screen, &mut trials, round);
         sort(&mut trials);
-        // Measured by what the refits keep: a sample may promise what all shots do not.
-        let (mut best, mut kept) = (0.5 * self.settings.least_gain_of(1, 1) / SHARE_OF_BEST, 0);
-        // An effect of the scatter needs the lesser gain.
-        let hopeless = SHARE_OF_HOPE * largest.least_gain(true, self.problem.shots.len());
-        for trial in &mut trials {
-            let promised = trial.candidate.gain;
-            if kept == SHORTLIST || promised < hopeless.max(SHARE_OF_BEST * best) {
-                break;
-            }
-            (self.hear)(&format!("round {round}: refitting with {}", trial.effect.name()));
-            self.refit(state, trial);
-            best = best.max(trial.candidate.gain);
-            kept += usize::from(trial.candidate.gain >= SHARE_OF_PROMISE * promised);
-        }
+        // Effects on the scatter need the smaller gain.
+        let hopeless = SHARE_OF_HOPE * largest.least_gain(true, self.scorer.problem.shots.len());
+        self.refit_shortlist(state, &mut trials, round, hopeless);
         sort(&mut trials);
         if let Some(first) = trials.first_mut() {
-            self.continued(state, first, hopeless);
+            self.continue_fit(state, first, hopeless);
             sort(&mut trials);
         }
         trials
     }
 
     /// One effect, fitted to all shots whatever it promises.
-    pub fn tried<'a>(&self, state: &State<'a>, effect: &'a dyn Effect) -> Option<Trial<'a>> {
-        let problem = self.sample.problem(&self.problem);
-        let screen = Screen::new(problem, &state.space, &state.fitted.at);
-        let mut trial = self.promised(state, &screen, self.sample.weight, effect, 0)?;
-        self.scout(state, &screen, self.sample.weight, &mut trial);
+    pub fn trial<'a>(&self, state: &State<'a>, effect: &'a dyn Effect) -> Option<Trial<'a>> {
+        let screen = self.screen(state);
+        let mut trial = self.promise(state, &screen, effect, 0)?;
+        self.scout(state, &screen, &mut trial);
         self.refit(state, &mut trial);
         Some(trial)
     }
 
+    /// The sample as seen by a model.
+    fn screen(&self, state: &State) -> Screen<'p> {
+        let problem = self.sample.problem(&self.scorer.problem);
+        Screen::new(problem, &state.space, &state.fit.at)
+    }
+
+    /// Fits those trials to the sample that promise enough.
+    fn scout_promising(&self, state: &State, screen: &Screen, trials: &mut [Trial], round: usize) {
+        let mut best = 0.25 * self.scorer.settings.least_gain_of(1, 1) / SHARE_TO_SCOUT;
+        for trial in trials {
+            if trial.candidate.gain >= SHARE_TO_SCOUT * best {
+                (self.notify)(&format!("round {round}: trying {}", trial.effect.name()));
+                self.scout(state, screen, trial);
+                best = best.max(trial.candidate.gain);
+            }
+        }
+    }
+
+    /// Fits the best few trials to all shots. They are compared with what the refits keep: a sample may promise what
+    /// all shots do not.
+    fn refit_shortlist(&self, state: &State, trials: &mut [Trial], round: usize, hopeless: f64) {
+        let mut best = 0.5 * self.scorer.settings.least_gain_of(1, 1) / SHARE_OF_BEST;
+        let mut kept = 0;
+        for trial in trials {
+            let promised = trial.candidate.gain;
+            if kept == SHORTLIST || promised < hopeless.max(SHARE_OF_BEST * best) {
+                break;
+            }
+            (self.notify)(&format!("round {round}: refitting with {}", trial.effect.name()));
+            self.refit(state, trial);
+            best = best.max(trial.candidate.gain);
+            kept += usize::from(trial.candidate.gain >= SHARE_OF_PROMISE * promised);
+        }
+    }
+
     /// An effect at the start that promises most.
-    fn promised<'a>(
+    fn promise<'a>(
         &self,
         state: &State<'a>,
         screen: &Screen,
-        weight: f64,
         effect: &'a dyn Effect,
         round: usize,
     ) -> Option<Trial<'a>> {
         let space = state.space.with(effect);
-        let values = effect.starts(self.problem.stage, self.problem.shots);
-        let mut starts: Vec<(f64, DVector<f64>)> = values
+        let problem = &self.scorer.problem;
+        let values = effect.starts(problem.stage, problem.shots);
+        let mut starts = self.promising_starts(state, screen, &space, effect, &values);
+        for start in &mut starts {
+            self.improve(screen, &space, effect, start);
+            if effect.moves() {
+                self.place(screen, &space, effect, start);
+            }
+        }
+        // A start at which the effect is absent promises nothing; it is tried all the same.
+        let is_absent = values.len() == 1 && starts.iter().all(|start| start.worth == 0.0);
+        // Without an effect that bends the whole curve, such as a ceiling, the scattering models may be far from those
+        // that fit best with it.
+        let is_first = state.space.effects.is_empty() && !is_absent;
+        if (is_first || screen.leaves_laws_open)
+            && let Some(at) = from_declared_laws(screen, state, &space, effect, &values)
+        {
+            // Followed whatever it promises: a promise is about a step from the fitted scattering models.
+            starts.push(Start { worth: starts.first().map_or(0.0, |start| start.worth), at });
+        }
+        let Start { worth, at } = starts.first()?.clone();
+        let gain = if is_absent { f64::INFINITY } else { worth };
+        let candidate = Candidate::sampled(round, effect.name(), effect.parameters().len(), gain);
+        let fit = Fit { at, ln_likelihood: f64::NEG_INFINITY, converged: false, is_stuck: false };
+        let (tried, size) = (values.len(), Size::default());
+        Some(Trial { effect, space, starts, tried, fit, size, candidate })
+    }
+
+    /// The starts of different shapes that promise most, best first.
+    fn promising_starts(
+        &self,
+        state: &State,
+        screen: &Screen,
+        space: &Space,
+        effect: &dyn Effect,
+        values: &[Vec<f64>],
+    ) -> Vec<Start> {
+        let mut starts: Vec<Start> = values
             .iter()
             .map(|values| {
-                let start = Space::joined(&state.fitted.at, effect, values);
-                (weight * screen.promise(&space, &start), start)
+                let at = Space::joined(&state.fit.at, effect, values);
+                Start { worth: self.sample.weight * screen.promise(space, &at), at }
             })
             .collect();
-        starts.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let tried = starts.len();
+        starts.sort_by(|a, b| b.worth.total_cmp(&a.worth));
         // Starts that differ by their strength alone lead to the same place.
         let mut shapes: Vec<Vec<f64>> = Vec::new();
-        starts.retain(|(_, start)| {
-            let shape: Vec<f64> = start.iter().skip(state.fitted.at.len() + 1).copied().collect();
+        starts.retain(|start| {
+            let shape: Vec<f64> = start.at.iter().skip(state.fit.at.len() + 1).copied().collect();
             let is_new = !shapes.contains(&shape);
             shapes.push(shape);
             is_new
         });
         starts.truncate(STARTS);
-        starts.iter_mut().for_each(|start| self.placed(screen, &space, effect, start));
-        if effect.moves() {
-            starts.iter_mut().for_each(|(_, start)| self.ranged(screen, &space, effect, start));
-        }
-        // A start at which the effect is absent promises nothing, and is tried all the same.
-        let is_absent = tried == 1 && starts.iter().all(|start| start.0 == 0.0);
-        // Without an effect that bends the whole curve, such as a ceiling, the laws may have come far from any that
-        // go with it.
-        let is_first = state.space.effects.is_empty() && !is_absent;
-        if (is_first || screen.leaves_laws_open)
-            && let Some(start) = from_declared_laws(screen, state, &space, effect, &values)
-        {
-            // Followed whatever it promises: the promise is of a step from the fitted laws.
-            starts.push((starts.first().map_or(0.0, |start| start.0), start));
-        }
-        let (gain, at) = starts.first()?.clone();
-        let gain = if is_absent { f64::INFINITY } else { gain };
-        let candidate = Candidate {
-            round,
-            name: effect.name(),
-            numbers: effect.parameters().len(),
-            gain,
-            sampled: true,
-            placebo_gain: None,
-            held_out: None,
-            size_db: 0.0,
-            converged: false,
-            accepted: false,
-        };
-        let fitted =
-            Fitted { at, ln_likelihood: f64::NEG_INFINITY, converged: false, is_stuck: false };
-        Some(Trial { effect, space, starts, tried, fitted, sizes_db: [0.0; 2], candidate })
+        starts
     }
 
-    /// Moves a start to where it is worth most: what only shapes the effect, such as a place, by what it promises, and
-    /// then its strength by what it gains.
-    fn placed(
-        &self,
-        screen: &Screen,
-        space: &Space,
-        effect: &dyn Effect,
-        start: &mut (f64, DVector<f64>),
-    ) {
+    /// Moves a start to where it is worth most: the shape of the effect, such as a place, by the promise, and
+    /// then the strength by the gain.
+    fn improve(&self, screen: &Screen, space: &Space, effect: &dyn Effect, start: &mut Start) {
         let weight = self.sample.weight;
-        if start.0 > 0.0 {
+        if start.worth > 0.0 {
             climb(effect, start, SHAPE_STEPS.len(), |at| weight * screen.promise(space, at));
         }
-        let Some(knob) = effect.parameters().first() else { return };
-        let (first, promise) = (start.1.len() - effect.parameters().len(), start.0);
+        let Some(known) = effect.parameters().first() else { return };
+        let first = start.at.len() - effect.parameters().len();
         let gain = |at: &DVector<f64>| weight * screen.gain(space, at);
-        let scaled = |scale: f64| {
-            let mut scaled = start.1.clone();
-            let value = knob.absent + scale * (start.1[first] * knob.step - knob.absent);
-            scaled[first] = value.clamp(knob.min, knob.max) / knob.step;
-            (gain(&scaled), scaled)
-        };
-        let mut strengths = STRENGTHS.map(scaled).to_vec();
-        strengths.sort_by(|a, b| b.0.total_cmp(&a.0));
-        // Far from the data a promise takes in what is no part of it, and none of the strengths keeps it.
-        if strengths.first().is_some_and(|best| best.0 < SHARE_OF_WORD * promise) {
+        let mut strengths = STRENGTHS.map(|scale| {
+            let mut at = start.at.clone();
+            let value = known.absent + scale * (start.at[first] * known.step - known.absent);
+            at[first] = value.clamp(known.min, known.max) / known.step;
+            Start { worth: gain(&at), at }
+        });
+        strengths.sort_by(|a, b| b.worth.total_cmp(&a.worth));
+        // Far from the data a promise may be due to other effects, and no strength keeps it.
+        if strengths[0].worth < SHARE_OF_WORD * start.worth {
             strengths.iter_mut().for_each(|start| climb(effect, start, 1, gain));
         }
-        if let Some(best) = strengths.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
-            start.1 = best.1;
+        if let Some(best) = strengths.into_iter().max_by(|a, b| a.worth.total_cmp(&b.worth)) {
+            start.at = best.at;
         }
     }
 
-    /// Moves a start to where the ranges put the target, if that is likelier.
-    fn ranged(
-        &self,
-        screen: &Screen,
-        space: &Space,
-        effect: &dyn Effect,
-        start: &mut DVector<f64>,
-    ) {
-        let ln_p = |at: &DVector<f64>| sum(&screen.problem.terms(space, at));
-        let there = WITHIN.map(|steps| ranges::placed(&self.problem, space, effect, start, steps));
-        let all = there.into_iter().chain([start.clone()]).map(|at| (ln_p(&at), at));
+    /// Moves a start to where the ranges place the target, if that is more likely.
+    fn place(&self, screen: &Screen, space: &Space, effect: &dyn Effect, start: &mut Start) {
+        let problem = &self.scorer.problem;
+        let placed = WITHIN.map(|steps| place_by_ranges(problem, space, effect, &start.at, steps));
+        let all = placed
+            .into_iter()
+            .chain([start.at.clone()])
+            .map(|at| (screen.problem.ln_likelihood(space, &at), at));
         if let Some(best) = all.max_by(|a, b| a.0.total_cmp(&b.0)) {
-            *start = best.1;
+            start.at = best.1;
         }
     }
 
     /// Fits a trial to the sample.
-    fn scout(&self, state: &State, screen: &Screen, weight: f64, trial: &mut Trial) {
+    fn scout(&self, state: &State, screen: &Screen, trial: &mut Trial) {
         let space = &trial.space;
-        let here = sum(&screen.problem.terms(&state.space, &state.fitted.at));
-        let most = trial.starts.first().map_or(0.0, |start| start.0);
-        let useful = trial.starts.iter().filter(|start| start.0 >= SHARE_OF_START * most);
-        let held = state.space.costly(&state.fitted.at);
-        let scouts = useful.map(|(_, start)| screen.problem.fit(space, start, &held, &SCOUT));
-        let best = scouts
+        let here = screen.problem.ln_likelihood(&state.space, &state.fit.at);
+        let held = state.space.costly(&state.fit.at);
+        let most = trial.starts.first().map_or(0.0, |start| start.worth);
+        let best = trial
+            .starts
+            .iter()
+            .filter(|start| start.worth >= SHARE_OF_START * most)
+            .map(|start| screen.problem.fit(space, &start.at, &held, &SCOUT))
             .filter(|fit| fit.ln_likelihood.is_finite())
             .max_by(|a, b| a.ln_likelihood.total_cmp(&b.ln_likelihood));
-        if let Some(mut best) = best {
-            // One that must carry the laws far away with it comes slowly.
-            for _ in 0..LONGER {
-                if best.converged || is_at_rest(&best, trial.effect) {
-                    break;
-                }
-                best = screen.problem.fit(space, &best.at, &held, &SCOUT);
+        let Some(mut best) = best else { return };
+        // A fit that must move the scattering models far takes many steps.
+        for _ in 0..LONGER {
+            if best.converged || is_at_rest(&best, trial.effect) {
+                break;
             }
-            trial.candidate.gain = weight * (best.ln_likelihood - here);
-            trial.candidate.converged = best.converged;
-            trial.sizes_db = self.sizes_db(state, space, &best.at);
-            trial.fitted = best;
-            trial.candidate.size_db = larger(trial.sizes_db);
+            best = screen.problem.fit(space, &best.at, &held, &SCOUT);
         }
+        trial.candidate.gain = self.sample.weight * (best.ln_likelihood - here);
+        self.set_fit(state, trial, best);
     }
 
     /// Fits a trial to all shots.
     fn refit(&self, state: &State, trial: &mut Trial) {
-        let held = state.space.costly(&state.fitted.at);
-        let ln_p = |at: &DVector<f64>| sum(&self.problem.terms(&trial.space, at));
-        // What suits the sample may suit the whole worse than no effect at all.
-        let absent: Vec<f64> = trial.effect.parameters().iter().map(|knob| knob.absent).collect();
-        let without = Space::joined(&state.fitted.at, trial.effect, &absent);
-        let is_worse = ln_p(&trial.fitted.at) < ln_p(&without);
-        let start = if is_worse { without } else { trial.fitted.at.clone() };
-        trial.fitted = self.problem.fit(&trial.space, &start, &held, &SEARCH);
-        trial.candidate.gain = trial.fitted.ln_likelihood - state.fitted.ln_likelihood;
+        let problem = &self.scorer.problem;
+        let held = state.space.costly(&state.fit.at);
+        // A fit to the sample may be worse for all shots than the effect's absence.
+        let absent: Vec<f64> = trial.effect.parameters().iter().map(|known| known.absent).collect();
+        let without = Space::joined(&state.fit.at, trial.effect, &absent);
+        let [ln_with, ln_without] =
+            [&trial.fit.at, &without].map(|at| problem.ln_likelihood(&trial.space, at));
+        let start = if ln_with < ln_without { without } else { trial.fit.at.clone() };
+        let fit = problem.fit(&trial.space, &start, &held, &SEARCH);
+        trial.candidate.gain = fit.ln_likelihood - state.fit.ln_likelihood;
         trial.candidate.sampled = false;
-        trial.sizes_db = self.sizes_db(state, &trial.space, &trial.fitted.at);
-        trial.candidate.size_db = larger(trial.sizes_db);
-        trial.candidate.converged = trial.fitted.converged;
+        self.set_fit(state, trial, fit);
     }
 
-    /// Goes on with the fit of the best effect while it gains: one that moves facets under the rays may rest
-    /// before a step of ln p.
-    fn continued(&self, state: &State, trial: &mut Trial, hopeless: f64) {
+    /// Takes a fit over into a trial.
+    fn set_fit(&self, state: &State, trial: &mut Trial, fit: Fit) {
+        trial.size = self.scorer.size(state, &trial.space, &fit.at);
+        trial.candidate.size_db = trial.size.larger_db();
+        trial.candidate.converged = fit.converged;
+        trial.fit = fit;
+    }
+
+    /// Continues the fit of the best effect while it gains: a fit that moves facets under the rays may stop
+    /// before a jump of ln p.
+    fn continue_fit(&self, state: &State, trial: &mut Trial, hopeless: f64) {
         for _ in 0..LONGER {
             let Candidate { gain, sampled, converged, numbers, .. } = trial.candidate;
-            let least = self.settings.least_gain_of(numbers, trial.tried).max(hopeless);
-            if sampled || converged || gain < least {
-                return;
-            }
-            if is_at_rest(&trial.fitted, trial.effect) {
+            let least = self.scorer.settings.least_gain_of(numbers, trial.tried).max(hopeless);
+            if sampled || converged || gain < least || is_at_rest(&trial.fit, trial.effect) {
                 return;
             }
             if trial.effect.moves()
-                && let Some(at) = self.problem.along_axes(&trial.space, &trial.fitted.at)
+                && let Some(at) = self.scorer.problem.along_axes(&trial.space, &trial.fit.at)
             {
-                trial.fitted.at = at;
+                trial.fit.at = at;
             }
             self.refit(state, trial);
             if trial.candidate.gain < gain + WORTH_MORE {
@@ -294,35 +324,40 @@ impl Selection<'_> {
     }
 }
 
-/// Moves what only shapes an effect for so many rounds to where a start is worth more.
+/// Moves the shape of an effect, parameter by parameter, to where a start is worth more.
 fn climb(
     effect: &dyn Effect,
-    (worth, start): &mut (f64, DVector<f64>),
+    start: &mut Start,
     rounds: usize,
     worth_of: impl Fn(&DVector<f64>) -> f64,
 ) {
-    let first = start.len().saturating_sub(effect.parameters().len());
-    let shapes = effect.parameters().iter().enumerate().skip(1);
-    let is_shape = |(_, knob): &(usize, &EffectParameter)| knob.absent != knob.max;
-    for (index, knob) in shapes.filter(is_shape).collect::<Vec<_>>().repeat(rounds) {
+    let first = start.at.len().saturating_sub(effect.parameters().len());
+    let shapes: Vec<(usize, &EffectParameter)> = effect
+        .parameters()
+        .iter()
+        .enumerate()
+        .skip(1)
+        .filter(|(_, known)| known.absent != known.max)
+        .collect();
+    for (index, known) in shapes.repeat(rounds) {
         for steps in SHAPE_STEPS.iter().flat_map(|s| [*s, -*s]) {
-            let mut moved = start.clone();
-            let place = &mut moved[first + index];
-            *place = (*place + steps).clamp(knob.min / knob.step, knob.max / knob.step);
-            let there = worth_of(&moved);
-            if there > *worth {
-                (*worth, *start) = (there, moved);
+            let mut at = start.at.clone();
+            let place = &mut at[first + index];
+            *place = (*place + steps).clamp(known.min / known.step, known.max / known.step);
+            let worth = worth_of(&at);
+            if worth > start.worth {
+                *start = Start { worth, at };
             }
         }
     }
 }
 
-/// Whether to search on would be to try the same steps again; a target that moves is searched by wider steps first.
-fn is_at_rest(fitted: &Fitted, effect: &dyn Effect) -> bool {
-    fitted.is_stuck && !effect.moves()
+/// Whether a further search would repeat the same steps. A target that moves is searched by wider steps first.
+fn is_at_rest(fit: &Fit, effect: &dyn Effect) -> bool {
+    fit.is_stuck && !effect.moves()
 }
 
-/// The best start with the laws as the scene declares them.
+/// The best start with the scattering models as the scene declares them.
 fn from_declared_laws(
     screen: &Screen,
     state: &State,
@@ -330,12 +365,13 @@ fn from_declared_laws(
     effect: &dyn Effect,
     values: &[Vec<f64>],
 ) -> Option<DVector<f64>> {
-    let declared = state.space.restarted(&state.fitted.at);
+    let declared = state.space.restarted(&state.fit.at);
     let starts = values.iter().map(|values| Space::joined(&declared, effect, values));
     let gains = starts.map(|start| (screen.gain(space, &start), start));
     gains.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, start)| start)
 }
 
+/// Sorts trials by their gain, best first.
 fn sort(trials: &mut [Trial]) {
     trials.sort_by(|a, b| b.candidate.gain.total_cmp(&a.candidate.gain));
 }

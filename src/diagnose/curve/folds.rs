@@ -1,10 +1,10 @@
-//! Which angles are held out together: runs of neighbours, never single angles.
+//! The angles that are held out together: runs of neighbours, never single angles.
 
-use super::LEAST_BLOCKS;
 use super::points::Points;
+use super::settings::LEAST_BLOCKS;
 use crate::radar::random::{Key, Purpose};
 
-/// Points of a run at least: fewer are no gap that a smooth curve could not bridge.
+/// Least points of a run: a smooth curve bridges a shorter gap.
 const LEAST_POINTS: f64 = 3.0;
 /// Correlation lengths in a run.
 const LENGTHS: f64 = 3.0;
@@ -18,7 +18,7 @@ pub(super) struct Folds {
     pub folds: usize,
     /// Width of a run, rad.
     pub width_rad: f64,
-    /// Where the autocorrelation of what no smooth curve explains is below 1/e, rad.
+    /// Distance at which the autocorrelation of the residual of smooth curves is below 1/e, rad.
     pub correlation_rad: f64,
 }
 
@@ -82,16 +82,17 @@ fn runs(points: &Points, width_rad: f64) -> (Vec<usize>, usize) {
     // A gap of the scan leaves a run empty.
     let mut used = block.clone();
     used.dedup();
-    let number = |run: &usize| used.binary_search(run).unwrap_or(0);
-    (block.iter().map(number).collect(), used.len())
+    (block.iter().map(|run| used.binary_search(run).unwrap_or(0)).collect(), used.len())
 }
 
-/// Median distance of neighbours, rad; repeats are no neighbours.
+/// Median distance of neighbours, rad; repeats do not count.
 fn step_rad(points: &Points) -> f64 {
     const SAME_RAD: f64 = 1e-6;
-    let angle = |index: usize| points.points.get(index).map_or(0.0, |p| points.angle_rad(p));
-    let steps = points.neighbours().map(|[a, b]| angle(b) - angle(a));
-    let mut steps: Vec<f64> = steps.filter(|step| *step > SAME_RAD).collect();
+    let mut steps: Vec<f64> = points
+        .neighbours()
+        .map(|[a, b]| points.angle_rad(b) - points.angle_rad(a))
+        .filter(|step| *step > SAME_RAD)
+        .collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).copied().unwrap_or(0.0)
 }
@@ -105,7 +106,7 @@ fn correlation_rad(points: &Points, residual_db: &[f64], step_rad: f64) -> f64 {
     lag as f64 * step_rad
 }
 
-/// Correlation of points so many places apart in one scan; 0 without such pairs.
+/// Correlation of points `lag` places apart in one scan; 0 without such pairs.
 pub(super) fn autocorrelation(points: &Points, values: &[f64], lag: usize) -> f64 {
     let seen = |index: usize| points.points.get(index).filter(|point| !point.censored);
     let (mut products, mut pairs, mut squares, mut count) = (0.0, 0.0, 0.0, 0.0);
@@ -119,10 +120,7 @@ pub(super) fn autocorrelation(points: &Points, values: &[f64], lag: usize) -> f6
             pairs += 1.0;
         }
     }
-    match pairs > 0.0 && squares > 0.0 {
-        true => (products / pairs) / (squares / count),
-        false => 0.0,
-    }
+    if pairs > 0.0 && squares > 0.0 { (products / pairs) / (squares / count) } else { 0.0 }
 }
 
 #[cfg(test)]

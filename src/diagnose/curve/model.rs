@@ -1,9 +1,9 @@
-//! A law with terms, fitted to the levels of a curve in dB.
+//! A scattering model with terms, fitted to the levels of a curve in dB.
 //!
-//! A level y is normal about the model's with a scale s; a censored one says that y lies below. s is the
-//! rms of what the fit leaves, and at least the noise: a model in error must not look sure of itself.
-//! Held-out levels are scored by Student's law with four degrees of freedom and the same variance:
-//! what a model in error leaves has tails, and a few angles must not decide alone.
+//! A level y is normal about the model's with a scale s; a censored one states that y lies below. s is the
+//! rms residual of the fit, and at least the noise: a wrong model must not appear certain.
+//! Held-out levels are scored by Student's distribution with four degrees of freedom and the same variance:
+//! the residual of a wrong model has tails, and a few angles must not decide alone.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,25 +16,25 @@ use crate::fit::uncertainty::deviations;
 use crate::fit::{FitError, normal_share};
 use crate::units::db_from_ratio;
 
-/// dB of what a model calls nothing.
+/// Level where the model is zero, dB.
 const NOTHING_DB: f64 = -200.0;
 /// Step of the derivatives in the search.
 const STEP: f64 = 1e-5;
 const SEARCH: Minimise = Minimise { iterations: 150, tolerance: 1e-5, patience: usize::MAX };
-/// With censored levels the fit depends on the scale, and the scale on the fit.
+/// Rounds of fit and scale: with censored levels each depends on the other.
 const ROUNDS: usize = 3;
 
-/// A law and the terms that are added to it.
+/// A scattering model and the terms that are added to it.
 #[derive(Clone)]
 pub(super) struct Model {
     pub coordinates: Coordinates,
     pub terms: Vec<&'static dyn Term>,
 }
 
-/// Where a fit ended.
+/// The end of a fit.
 #[derive(Clone)]
-pub(super) struct Fitted {
-    /// The law's coordinates, then the terms' numbers over their steps.
+pub(super) struct Fit {
+    /// The coordinates of the scattering model, then the parameters of the terms in steps.
     pub at: DVector<f64>,
     /// s, dB.
     pub scale_db: f64,
@@ -44,40 +44,38 @@ pub(super) struct Fitted {
     curvature: DMatrix<f64>,
 }
 
-/// One point as a model sees it.
+/// The score of a model at one point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Scored {
+pub(super) struct Score {
     /// 10·lg f of the model.
     pub f_db: f64,
     pub log_p: f64,
 }
 
-impl Scored {
-    /// A held-out point by a level and a scale, both dB.
-    pub fn new(point: &Point, f_db: f64, scale_db: f64) -> Scored {
-        let log_p = match point.censored {
-            true => log_p(point, f_db, scale_db),
-            false => {
-                // Four degrees of freedom have twice the variance of their scale, and 3/8 in the middle.
-                let width_db = scale_db * std::f64::consts::FRAC_1_SQRT_2;
-                let z = (point.f_db - f_db) / width_db;
-                0.375f64.ln() - width_db.ln() - 2.5 * (0.25 * z * z).ln_1p()
-            }
-        };
-        Scored { f_db, log_p }
+impl Score {
+    /// The score of a level at a held-out point; level and scale in dB.
+    pub fn new(point: &Point, f_db: f64, scale_db: f64) -> Score {
+        if point.censored {
+            return Score { f_db, log_p: log_p(point, f_db, scale_db) };
+        }
+        // With four degrees of freedom the variance is twice the squared scale, and the peak density 3/8.
+        let width_db = scale_db * std::f64::consts::FRAC_1_SQRT_2;
+        let z = (point.f_db - f_db) / width_db;
+        let log_p = 0.375f64.ln() - width_db.ln() - 2.5 * (0.25 * z * z).ln_1p();
+        Score { f_db, log_p }
     }
 }
 
 impl Model {
     pub fn new(law: &Brdf) -> Result<Model, FitError> {
         let coordinates = Coordinates::new(law, &frequencies(law), &[], Some(1.0))?;
-        match coordinates.len() {
-            0 => Err(FitError::NothingFree),
-            _ => Ok(Model { coordinates, terms: Vec::new() }),
+        if coordinates.len() == 0 {
+            return Err(FitError::NothingFree);
         }
+        Ok(Model { coordinates, terms: Vec::new() })
     }
 
-    /// The same with one term more.
+    /// The model with one more term.
     pub fn with(&self, term: &'static dyn Term) -> Model {
         let mut model = self.clone();
         model.terms.push(term);
@@ -94,17 +92,16 @@ impl Model {
     }
 
     fn bounds(&self) -> [DVector<f64>; 2] {
-        let knobs = || self.terms.iter().flat_map(|term| term.parameters());
-        let join = |law: DVector<f64>, ends: Vec<f64>| {
-            DVector::from_iterator(law.len() + ends.len(), law.iter().copied().chain(ends))
-        };
-        [
-            join(self.coordinates.lower(), knobs().map(|knob| knob.min / knob.step).collect()),
-            join(self.coordinates.upper(), knobs().map(|knob| knob.max / knob.step).collect()),
-        ]
+        let mut lower: Vec<f64> = self.coordinates.lower().iter().copied().collect();
+        let mut upper: Vec<f64> = self.coordinates.upper().iter().copied().collect();
+        for known in self.terms.iter().flat_map(|term| term.parameters()) {
+            lower.push(known.min / known.step);
+            upper.push(known.max / known.step);
+        }
+        [DVector::from_vec(lower), DVector::from_vec(upper)]
     }
 
-    /// The law, and the numbers of every term.
+    /// The scattering model, and the parameters of every term.
     pub fn numbers(&self, at: &DVector<f64>) -> (Brdf, Vec<Vec<f64>>) {
         let of_law = self.coordinates.len().min(at.len());
         let law = self.coordinates.model(&at.rows(0, of_law).into_owned());
@@ -119,17 +116,19 @@ impl Model {
     /// 10·lg f at every point.
     pub fn levels_db(&self, at: &DVector<f64>, points: &[Point]) -> Vec<f64> {
         let (law, values) = self.numbers(at);
-        let level = |point: &Point| {
-            let bare = law.f_per_sr(point.i, point.o);
-            let acted = self.terms.iter().zip(&values);
-            let f = acted.fold(bare, |f, (term, values)| term.scatter(values, &law, point, f));
-            db_from_ratio(f.max(0.0)).max(NOTHING_DB)
-        };
-        points.iter().map(level).collect()
+        let mut levels = Vec::with_capacity(points.len());
+        for point in points {
+            let mut f_per_sr = law.f_per_sr(point.i, point.o);
+            for (term, values) in self.terms.iter().zip(&values) {
+                f_per_sr = term.scatter(values, &law, point, f_per_sr);
+            }
+            levels.push(db_from_ratio(f_per_sr.max(0.0)).max(NOTHING_DB));
+        }
+        levels
     }
 
-    /// Fits to the points for which `used` is true, from a start.
-    pub fn fit(&self, points: &Points, used: &[bool], start: &DVector<f64>) -> Fitted {
+    /// A fit to the points for which `used` is true, from a start.
+    pub fn fit(&self, points: &Points, used: &[bool], start: &DVector<f64>) -> Fit {
         let chosen: Vec<Point> = points
             .points
             .iter()
@@ -150,7 +149,7 @@ impl Model {
         let levels = self.levels_db(&found.at, &chosen);
         let log_p = chosen.iter().zip(&levels).map(|(p, db)| log_p(p, *db, scale_db)).sum();
         let curvature = self.local(&found.at, &bounds[1], &chosen, scale_db).curvature;
-        Fitted { scale_db, log_p, converged: found.converged(), curvature, at: found.at }
+        Fit { scale_db, log_p, converged: found.converged(), curvature, at: found.at }
     }
 
     fn search(
@@ -164,7 +163,7 @@ impl Model {
             .run(start, [&bounds[0], &bounds[1]], |at| self.local(at, &bounds[1], points, scale_db))
     }
 
-    /// Rms of what is left of the detections, per degree of freedom, and at least the noise, dB.
+    /// Rms residual of the detections, per degree of freedom, and at least the noise, dB.
     fn scale_db(&self, at: &DVector<f64>, points: &[Point], noise_db: f64) -> f64 {
         let levels = self.levels_db(at, points);
         let seen = points.iter().zip(&levels).filter(|(point, _)| !point.censored);
@@ -192,16 +191,15 @@ impl Model {
             .collect();
         let mut sum = Local::zero(at.len());
         for (row, (point, level_db)) in points.iter().zip(&here).enumerate() {
-            let slope = |(step, there): &(f64, Vec<f64>)| (there[row] - level_db) / step;
-            let jacobian: Vec<f64> = moved.iter().map(slope).collect();
+            let jacobian: Vec<f64> =
+                moved.iter().map(|(step, there)| (there[row] - level_db) / step).collect();
             let z = (point.f_db - level_db) / scale_db;
-            let (first, second) = match point.censored {
-                true => {
-                    // d/dμ of −ln Φ((T − μ)/s), and an expected curvature that is never negative.
-                    let pull = mills(z);
-                    (pull / scale_db, (pull * (pull + z)).max(0.0) / scale_db.powi(2))
-                }
-                false => (-z / scale_db, scale_db.powi(-2)),
+            let (first, second) = if point.censored {
+                // d/dμ of −ln Φ((T − μ)/s), and an expected curvature that is never negative.
+                let pull = mills(z);
+                (pull / scale_db, (pull * (pull + z)).max(0.0) / scale_db.powi(2))
+            } else {
+                (-z / scale_db, scale_db.powi(-2))
             };
             sum.value -= log_p(point, *level_db, scale_db);
             sum.add(first, second, &jacobian);
@@ -209,16 +207,16 @@ impl Model {
         sum
     }
 
-    /// How every point fares with a fit.
-    pub fn scored(&self, fitted: &Fitted, points: &[Point]) -> Vec<Scored> {
+    /// The score of every point under a fit.
+    pub fn scores(&self, fitted: &Fit, points: &[Point]) -> Vec<Score> {
         let levels = self.levels_db(&fitted.at, points);
         let pairs = points.iter().zip(&levels);
-        pairs.map(|(point, f_db)| Scored::new(point, *f_db, fitted.scale_db)).collect()
+        pairs.map(|(point, f_db)| Score::new(point, *f_db, fitted.scale_db)).collect()
     }
 
-    /// Standard deviations of all unknowns in the search; none at a bound or where the data do not
-    /// tell. `correlated`: by how much neighbours that err together stretch variances.
-    pub fn deviations(&self, fitted: &Fitted, correlated: f64) -> Vec<Option<f64>> {
+    /// Standard deviations of all unknowns; none at a bound or where the data do not determine the unknown.
+    /// `correlated`: factor on variances by the correlation of neighbours.
+    pub fn deviations(&self, fitted: &Fit, correlated: f64) -> Vec<Option<f64>> {
         let [lower, upper] = self.bounds();
         let at = &fitted.at;
         let free: Vec<usize> =
@@ -236,10 +234,10 @@ impl Model {
 /// ln p of a point about a model's level, both dB.
 fn log_p(point: &Point, level_db: f64, scale_db: f64) -> f64 {
     let z = (point.f_db - level_db) / scale_db;
-    match point.censored {
-        true => log_below(z),
-        false => -0.5 * z * z - scale_db.ln() - 0.5 * std::f64::consts::TAU.ln(),
+    if point.censored {
+        return log_below(z);
     }
+    -0.5 * z * z - scale_db.ln() - 0.5 * std::f64::consts::TAU.ln()
 }
 
 /// ln Φ(z).

@@ -1,7 +1,7 @@
 //! A measured curve as points in the order of its scans, and the noise of its levels.
 //!
-//! The noise is, in this order: what the caller declares; the scatter of repeats; what the file states;
-//! and else the scatter of a point about the line through its two neighbours, which takes every
+//! The noise is the first of these that is known: the value that the caller declares, the scatter of repeats, the
+//! value that the file states, the scatter of a point about the line through its two neighbours. The last one takes every
 //! bend of the curve between them for noise and is an upper bound on coarse scans.
 
 use std::collections::BTreeMap;
@@ -39,7 +39,7 @@ pub struct Point {
     pub f_db: f64,
     /// Nothing was detected.
     pub censored: bool,
-    /// What turns 10·lg f into the level that the file has, dB.
+    /// Level of the file less 10·lg f, dB.
     pub offset_db: f64,
     /// Which scan of the curve it belongs to: the number of its angle of incidence, or 0.
     pub scan: usize,
@@ -62,7 +62,7 @@ pub enum NoiseSource {
 /// Noise of the levels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Noise {
-    /// Standard deviation of a level, dB; infinite where nothing tells it.
+    /// Standard deviation of a level, dB; infinite where it is unknown.
     pub sd_db: f64,
     /// How it is known.
     pub source: NoiseSource,
@@ -79,15 +79,15 @@ pub struct Points {
     pub noise: Noise,
 }
 
-/// Smallest noise of a file that is believed, dB: files round.
+/// Least noise of a file, dB: files round.
 const LEAST_NOISE_DB: f64 = 0.01;
-/// Share of the sizes below the one that tells the noise, and that size of a standard normal number:
-/// twice as sure as the median, and few bends do not count.
+/// Quantile of the deviations that gives the noise: twice as precise as the median, and insensitive to a few bends.
 const BELOW: f64 = 0.8;
+/// That quantile of the absolute value of a standard normal number.
 const SIZE: f64 = 1.2816;
 
 impl Points {
-    /// Of a backscatter curve. Rows at grazing incidence, where σ⁰ says nothing of f, are left out.
+    /// The points of a backscatter curve. Rows at grazing incidence, where σ⁰ does not determine f, are left out.
     pub fn backscatter(curve: &Curve, noise_db: Option<f64>) -> Points {
         const GRAZING_RAD: f64 = 1.569;
         let mut points: Vec<Point> = curve
@@ -114,12 +114,12 @@ impl Points {
         Points::new(Kind::Backscatter, points, noise_db, None)
     }
 
-    /// Of values in the plane of incidence; repeats become their mean level.
+    /// The points of values in the plane of incidence; repeats become their mean level.
     pub fn in_plane(values: &[InPlane], noise_db: Option<f64>) -> Points {
-        let key = |angle_rad: f64| (angle_rad.to_degrees() * 1e4).round() as i64;
         let mut places: BTreeMap<[i64; 2], Vec<&InPlane>> = BTreeMap::new();
         for value in values {
-            let place = [key(value.theta_i_rad), key(value.theta_s_rad)];
+            let place = [value.theta_i_rad, value.theta_s_rad]
+                .map(|angle_rad| (angle_rad.to_degrees() * 1e4).round() as i64);
             places.entry(place).or_default().push(value);
         }
         let mut points: Vec<Point> = Vec::new();
@@ -144,14 +144,16 @@ impl Points {
         noise_db: Option<f64>,
         of_file: Option<Noise>,
     ) -> Points {
-        let declared = noise_db.map(|sd_db| Noise { sd_db, source: NoiseSource::Declared });
-        let estimated = || Noise {
-            sd_db: neighbours(&points).unwrap_or(f64::INFINITY),
-            source: NoiseSource::Neighbours,
+        let noise = match noise_db {
+            Some(sd_db) => Noise { sd_db, source: NoiseSource::Declared },
+            None => {
+                let known = of_file.unwrap_or_else(|| Noise {
+                    sd_db: neighbours(&points).unwrap_or(f64::INFINITY),
+                    source: NoiseSource::Neighbours,
+                });
+                Noise { sd_db: known.sd_db.max(LEAST_NOISE_DB), ..known }
+            }
         };
-        let known = of_file.unwrap_or_else(estimated);
-        let known = Noise { sd_db: known.sd_db.max(LEAST_NOISE_DB), ..known };
-        let noise = declared.unwrap_or(known);
         Points { kind, points, noise }
     }
 
@@ -163,16 +165,16 @@ impl Points {
         }
     }
 
-    /// Neighbouring points of one scan: numbers of both.
-    pub fn neighbours(&self) -> impl Iterator<Item = [usize; 2]> {
-        let one = |(index, pair): (usize, &[Point])| match pair {
-            [a, b] if a.scan == b.scan => Some([index, index + 1]),
+    /// Neighbouring points of one scan.
+    pub fn neighbours(&self) -> impl Iterator<Item = [&Point; 2]> {
+        self.points.windows(2).filter_map(|pair| match pair {
+            [a, b] if a.scan == b.scan => Some([a, b]),
             _ => None,
-        };
-        self.points.windows(2).enumerate().filter_map(one)
+        })
     }
 }
 
+/// Repeats of one pair of angles as a point of their mean level.
 fn mean_point(values: &[&InPlane]) -> Option<Point> {
     let first = values.first()?;
     let side = if first.theta_s_rad < 0.0 { PI } else { 0.0 };
@@ -200,12 +202,15 @@ fn repeats(places: &BTreeMap<[i64; 2], Vec<&InPlane>>) -> Option<Noise> {
         spare += count - 1.0;
         inverse += 1.0 / count;
     }
-    /// Fewer tell no scatter.
+    /// Degrees of freedom that a scatter needs.
     const LEAST_SPARE: f64 = 5.0;
-    let sd_db = || (squares / spare * inverse / places.len() as f64).sqrt();
-    (spare >= LEAST_SPARE).then(|| Noise { sd_db: sd_db(), source: NoiseSource::Repeats })
+    (spare >= LEAST_SPARE).then(|| Noise {
+        sd_db: (squares / spare * inverse / places.len() as f64).sqrt(),
+        source: NoiseSource::Repeats,
+    })
 }
 
+/// Noise that the file states.
 fn stated(values: &[InPlane]) -> Option<Noise> {
     let known: Option<Vec<f64>> = values.iter().map(|value| value.sd_db).collect();
     let known = known.filter(|known| !known.is_empty())?;
@@ -213,24 +218,29 @@ fn stated(values: &[InPlane]) -> Option<Noise> {
     Some(Noise { sd_db: square.sqrt(), source: NoiseSource::File })
 }
 
-/// Scatter about the line through the neighbours; `None` where no scan has three angles.
+/// Scatter about the line through the neighbours, dB; `None` where no scan has three angles.
 fn neighbours(points: &[Point]) -> Option<f64> {
     let seen: Vec<&Point> = points.iter().filter(|point| !point.censored).collect();
-    let off = |three: &[&Point]| match three {
-        [a, b, c] if a.scan == c.scan => {
-            let angle = |point: &Point| point.theta_s_rad;
-            let span = angle(c) - angle(a);
-            let share = if span == 0.0 { 0.5 } else { (angle(b) - angle(a)) / span };
-            let level = |point: &Point| point.f_db + point.offset_db;
-            let line_db = (1.0 - share) * level(a) + share * level(c);
-            let width = (1.0 + share * share + (1.0 - share).powi(2)).sqrt();
-            Some((level(b) - line_db).abs() / width)
-        }
-        _ => None,
-    };
-    let mut sizes: Vec<f64> = seen.windows(3).filter_map(off).collect();
+    let mut sizes: Vec<f64> = seen
+        .windows(3)
+        .filter_map(|three| match three {
+            [a, b, c] if a.scan == c.scan => Some(off_line_db(a, b, c)),
+            _ => None,
+        })
+        .collect();
     sizes.sort_by(f64::total_cmp);
     sizes.get((BELOW * sizes.len() as f64) as usize).map(|size| size / SIZE)
+}
+
+/// Deviation of a level from the line through its neighbours, dB, scaled to the noise of one level.
+fn off_line_db(before: &Point, point: &Point, after: &Point) -> f64 {
+    let span = after.theta_s_rad - before.theta_s_rad;
+    let way = point.theta_s_rad - before.theta_s_rad;
+    let share = if span == 0.0 { 0.5 } else { way / span };
+    let [a_db, b_db, c_db] = [before, point, after].map(|p| p.f_db + p.offset_db);
+    let line_db = (1.0 - share) * a_db + share * c_db;
+    let width = (1.0 + share * share + (1.0 - share).powi(2)).sqrt();
+    (b_db - line_db).abs() / width
 }
 
 /// f of a point, 1/sr.

@@ -1,24 +1,26 @@
-//! What is left when no term is supported any more, and the numbers of those that were.
+//! What remains when no further term is supported, and the parameters of those that were added.
 
 use std::collections::BTreeMap;
 
 use super::folds::autocorrelation;
-use super::model::Scored;
+use super::model::{Fit, Score};
 use super::points::Points;
-use super::select::{Added, Selection, State};
+use super::report::{CurveBaseValue, CurveErrors, CurveFound, CurveUnknown};
+use super::select::{Addition, Selection, State};
 use super::smooth::{Covariate, Smooth, covariates};
-use super::{CurveBaseValue, CurveFound, CurveUnknown, Value, errors};
+use crate::diagnose::report::Value;
 use crate::fit::normal_share;
 
-/// Name of what nothing explains.
+/// Name of structure of unknown origin.
 const UNKNOWN: &str = "unknown";
-/// Lags over which errors are looked at for going together.
+/// Lags over which the correlation of residuals is summed.
 const LAGS: usize = 20;
+/// Correlation below which the sum ends.
+const LEAST_CORRELATION: f64 = 0.1;
 
-/// Residuals less smooth curves over every angle, dB: what is shared by neighbours for no reason.
+/// Residuals less smooth curves over every angle, dB: what neighbours share without a smooth reason.
 pub(super) fn without_smooth(points: &Points, levels_db: &[f64], scale_db: f64) -> Vec<f64> {
-    let mut left_db: Vec<f64> =
-        points.points.iter().zip(levels_db).map(|(point, db)| point.f_db - db).collect();
+    let mut left_db = residuals_db(points, levels_db);
     for covariate in covariates(points.kind) {
         let smooth = fit(points, covariate, &left_db, scale_db, |_| true);
         for (left, point) in left_db.iter_mut().zip(&points.points) {
@@ -36,16 +38,15 @@ fn fit(
     scale_db: f64,
     used: impl Fn(usize) -> bool,
 ) -> Smooth {
-    let xs = || points.points.iter().map(covariate.of);
-    let ends = [xs().fold(f64::INFINITY, f64::min), xs().fold(f64::NEG_INFINITY, f64::max)];
-    let pairs: Vec<(f64, f64)> = points
-        .points
-        .iter()
-        .zip(residual_db)
-        .enumerate()
-        .filter(|(index, (point, _))| !point.censored && used(*index))
-        .map(|(_, (point, residual))| ((covariate.of)(point), *residual))
-        .collect();
+    let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+    let mut pairs = Vec::new();
+    for (index, (point, residual)) in points.points.iter().zip(residual_db).enumerate() {
+        let x = (covariate.of)(point);
+        ends = [ends[0].min(x), ends[1].max(x)];
+        if !point.censored && used(index) {
+            pairs.push((x, *residual));
+        }
+    }
     Smooth::fit(&pairs, ends, scale_db)
 }
 
@@ -55,39 +56,17 @@ pub(super) fn unexplained(selection: &Selection, state: &State) -> Vec<CurveUnkn
     let mut found: Vec<CurveUnknown> =
         covariates.filter_map(|covariate| over(selection, state, covariate)).collect();
     found.sort_by(|a, b| b.held_out_gain.unwrap_or(0.0).total_cmp(&a.held_out_gain.unwrap_or(0.0)));
-    found.extend(together(selection, state));
+    found.extend(correlated(selection, state));
     found
 }
 
 /// A smooth curve over one angle, if it predicts held-out angles.
 fn over(selection: &Selection, state: &State, covariate: &Covariate) -> Option<CurveUnknown> {
-    let Selection { points, folds, settings } = *selection;
-    let mut after: Vec<Scored> = state.held_out.clone();
-    for (fold, fitted) in state.of_fold.iter().enumerate() {
-        let levels_db = state.model.levels_db(&fitted.at, &points.points);
-        let residual_db: Vec<f64> =
-            points.points.iter().zip(&levels_db).map(|(point, db)| point.f_db - db).collect();
-        let used = |index: usize| folds.fold.get(index) != Some(&fold);
-        let smooth = fit(points, covariate, &residual_db, fitted.scale_db, used);
-        let bend = |index: usize| {
-            points.points.get(index).map_or(0.0, |point| smooth.at((covariate.of)(point)))
-        };
-        let train = (0..points.points.len()).filter(|&index| used(index));
-        let squares: Vec<f64> = train
-            .filter(|&index| !points.points[index].censored)
-            .map(|index| (residual_db[index] - bend(index)).powi(2))
-            .collect();
-        let rms_db = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
-        let scale_db = rms_db.max(points.noise.sd_db);
-        for (index, scored) in after.iter_mut().enumerate().filter(|(index, _)| !used(*index)) {
-            let f_db = levels_db[index] + bend(index);
-            *scored = Scored::new(&points.points[index], f_db, scale_db);
-        }
-    }
+    let Selection { points, settings, .. } = *selection;
+    let after = held_out_with_smooth(selection, state, covariate);
     let [gain, se] = selection.gain(&state.held_out, &after);
-    let levels_db = state.model.levels_db(&state.fitted.at, &points.points);
-    let residual_db: Vec<f64> =
-        points.points.iter().zip(&levels_db).map(|(point, db)| point.f_db - db).collect();
+    // The size is that of a curve through all residuals.
+    let residual_db = residuals_of(points, state, &state.fitted);
     let smooth = fit(points, covariate, &residual_db, state.fitted.scale_db, |_| true);
     let squares: f64 =
         points.points.iter().map(|point| smooth.at((covariate.of)(point)).powi(2)).sum();
@@ -101,21 +80,46 @@ fn over(selection: &Selection, state: &State, covariate: &Covariate) -> Option<C
         strength_db,
         held_out_gain: Some(gain),
         held_out_se: Some(se),
-        held_out_rmse_db: Some(errors(points, &after).rmse_db),
+        held_out_rmse_db: Some(CurveErrors::of(points, &after).rmse_db),
         p_value: normal_share(-gain / se.max(f64::MIN_POSITIVE)),
     })
 }
 
-/// Whether neighbours in a scan err to the same side.
-fn together(selection: &Selection, state: &State) -> Option<CurveUnknown> {
+/// Held-out scores of a model with a smooth curve over one angle, fitted without each fold as the model is.
+fn held_out_with_smooth(selection: &Selection, state: &State, covariate: &Covariate) -> Vec<Score> {
+    let Selection { points, folds, .. } = *selection;
+    let mut after = state.held_out.clone();
+    for (fold, fitted) in state.of_fold.iter().enumerate() {
+        let levels_db = state.model.levels_db(&fitted.at, &points.points);
+        let residual_db = residuals_db(points, &levels_db);
+        let used = |index: usize| folds.fold.get(index) != Some(&fold);
+        let smooth = fit(points, covariate, &residual_db, fitted.scale_db, used);
+        let bend_db: Vec<f64> =
+            points.points.iter().map(|point| smooth.at((covariate.of)(point))).collect();
+        // The scale is what model and curve leave of the detections that they were fitted to.
+        let squares: Vec<f64> = (0..points.points.len())
+            .filter(|&index| used(index) && !points.points[index].censored)
+            .map(|index| (residual_db[index] - bend_db[index]).powi(2))
+            .collect();
+        let rms_db = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
+        let scale_db = rms_db.max(points.noise.sd_db);
+        for (index, score) in after.iter_mut().enumerate().filter(|(index, _)| !used(*index)) {
+            let f_db = levels_db[index] + bend_db[index];
+            *score = Score::new(&points.points[index], f_db, scale_db);
+        }
+    }
+    after
+}
+
+/// The correlation of neighbours in a scan, if it exceeds chance.
+fn correlated(selection: &Selection, state: &State) -> Option<CurveUnknown> {
     let Selection { points, settings, .. } = *selection;
-    let residual_db = residual_db(selection, state);
-    let seen: Vec<usize> =
-        (0..residual_db.len()).filter(|&index| !points.points[index].censored).collect();
-    let square = seen.iter().map(|&index| residual_db[index].powi(2)).sum::<f64>()
-        / seen.len().max(1) as f64;
+    let residual_db = residuals_of(points, state, &state.fitted);
+    let pairs = points.points.iter().zip(&residual_db).filter(|(point, _)| !point.censored);
+    let squares: Vec<f64> = pairs.map(|(_, residual_db)| residual_db.powi(2)).collect();
+    let square = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
     let shared = autocorrelation(points, &residual_db, 1);
-    let p_value = normal_share(-shared * (seen.len() as f64).sqrt());
+    let p_value = normal_share(-shared * (squares.len() as f64).sqrt());
     let strength_db = (shared.max(0.0) * square).sqrt();
     let is_found = p_value <= settings.family_error && strength_db >= settings.least_size_db;
     is_found.then_some(CurveUnknown {
@@ -129,58 +133,50 @@ fn together(selection: &Selection, state: &State) -> Option<CurveUnknown> {
     })
 }
 
-fn residual_db(selection: &Selection, state: &State) -> Vec<f64> {
-    let points = &selection.points.points;
-    let levels_db = state.model.levels_db(&state.fitted.at, points);
-    points.iter().zip(levels_db).map(|(point, db)| point.f_db - db).collect()
+/// Measured less predicted levels under a fit, dB.
+fn residuals_of(points: &Points, state: &State, fit: &Fit) -> Vec<f64> {
+    residuals_db(points, &state.model.levels_db(&fit.at, &points.points))
 }
 
-/// Terms and law with the numbers of the last fit and their standard deviations.
+/// Measured less predicted levels, dB.
+fn residuals_db(points: &Points, levels_db: &[f64]) -> Vec<f64> {
+    points.points.iter().zip(levels_db).map(|(point, db)| point.f_db - db).collect()
+}
+
+/// The terms and the scattering model with the parameters of the last fit and their standard deviations.
 pub(super) fn values(
     selection: &Selection,
     state: &State,
-    added: Vec<Added>,
+    added: Vec<Addition>,
 ) -> (Vec<CurveFound>, Vec<CurveBaseValue>) {
-    let residual_db = residual_db(selection, state);
+    let residual_db = residuals_of(selection.points, state, &state.fitted);
     let shared: f64 = (1..=LAGS)
         .map(|lag| autocorrelation(selection.points, &residual_db, lag))
-        .take_while(|correlation| *correlation > 0.1)
+        .take_while(|correlation| *correlation > LEAST_CORRELATION)
         .sum();
     let deviations = state.model.deviations(&state.fitted, 1.0 + 2.0 * shared);
-    let coordinates = &state.model.coordinates;
     let (law, values) = state.model.numbers(&state.fitted.at);
+    let coordinates = &state.model.coordinates;
     let units = law.parameters();
-    let unit = |name: &str| units.iter().find(|p| p.path == name).map_or("1", |p| p.unit);
-    let at = state.fitted.at.iter();
-    let parameters = coordinates
-        .list
-        .iter()
-        .zip(at.zip(&deviations))
-        .map(|(coordinate, (&u, sd))| CurveBaseValue {
-            name: coordinate.name.clone(),
-            value: Value {
-                value: coordinate.value(u),
-                sd: sd.map(|sd| sd * coordinate.slope(u).abs()),
-                unit: unit(&coordinate.name),
-            },
-        })
-        .collect();
+    let mut parameters = Vec::new();
+    for (coordinate, (&u, sd)) in
+        coordinates.list.iter().zip(state.fitted.at.iter().zip(&deviations))
+    {
+        let unit = units.iter().find(|p| p.path == coordinate.name).map_or("1", |p| p.unit);
+        let sd = sd.map(|sd| sd * coordinate.slope(u).abs());
+        let value = Value { value: coordinate.value(u), sd, unit };
+        parameters.push(CurveBaseValue { name: coordinate.name.clone(), value });
+    }
     let mut rest = deviations.iter().skip(coordinates.len());
     let mut found = Vec::new();
-    for (added, values) in added.into_iter().zip(values) {
-        let number = |(knob, value): (&crate::effects::EffectParameter, f64)| {
-            let sd = rest.next().copied().flatten().map(|sd| sd * knob.step);
-            (knob.name, Value { value, sd, unit: knob.unit })
-        };
-        let parameters: BTreeMap<_, _> =
-            added.term.parameters().iter().zip(values).map(number).collect();
-        found.push(CurveFound {
-            name: added.term.name(),
-            level: added.term.level(),
-            class: added.class,
-            parameters,
-            evidence: added.evidence,
-        });
+    for (Addition { term, class, evidence }, values) in added.into_iter().zip(values) {
+        let mut parameters = BTreeMap::new();
+        for (known, value) in term.parameters().iter().zip(values) {
+            let sd = rest.next().copied().flatten().map(|sd| sd * known.step);
+            parameters.insert(known.name, Value { value, sd, unit: known.unit });
+        }
+        let (name, level) = (term.name(), term.level());
+        found.push(CurveFound { name, level, class, parameters, evidence });
     }
     (found, parameters)
 }

@@ -1,59 +1,41 @@
-//! Terms one by one: fitted with everything else, and added when they predict held-out angles.
+//! The choice of terms: one by one, fitted with everything else, and added when they predict held-out angles.
 
 use nalgebra::DVector;
 use rayon::prelude::*;
-use serde::Serialize;
 
+use super::evidence::{CurveEvidence, Ranked};
 use super::folds::Folds;
-use super::model::{Fitted, Model, Scored};
+use super::model::{Fit, Model, Score};
 use super::points::Points;
+use super::settings::CurveDiagnosis;
 use super::terms::Term;
-use super::{CurveDiagnosis, CurveEvidence};
 
 /// Starts of a term that are followed to their end.
 const FOLLOWED: usize = 3;
 /// Terms of a round that are judged on held-out angles.
 const SHORT_LIST: usize = 5;
-/// Held-out ln p by which one term must beat another to be told from it, besides one standard error.
+/// Difference in held-out ln p below which two terms predict equally well; so does less than one standard error.
 const SAME: f64 = 2.0;
-
-/// A term in one round.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Ranked {
-    /// Round, from 1.
-    pub round: usize,
-    /// The term.
-    pub name: &'static str,
-    /// Its numbers.
-    pub numbers: usize,
-    /// Gain in ln likelihood over the model before.
-    pub gain: f64,
-    /// Gain in ln p of held-out angles and its standard error; none off the short list.
-    pub held_out: Option<[f64; 2]>,
-    /// Root mean square change of the levels, dB.
-    pub size_db: f64,
-    /// Whether its fit converged.
-    pub converged: bool,
-    /// Whether it was added.
-    pub accepted: bool,
-}
 
 /// A model, its fit to everything, and its fits to everything but a fold.
 #[derive(Clone)]
 pub(super) struct State {
     pub model: Model,
-    pub fitted: Fitted,
-    pub of_fold: Vec<Fitted>,
-    pub held_out: Vec<Scored>,
+    pub fitted: Fit,
+    /// Fits without each fold.
+    pub of_fold: Vec<Fit>,
+    /// Score of every point by the fit without its fold.
+    pub held_out: Vec<Score>,
 }
 
-/// A term that was added, before the numbers of the last fit are known.
-pub(super) struct Added {
+/// A term that was added.
+pub(super) struct Addition {
     pub term: &'static dyn Term,
     pub class: Vec<&'static str>,
     pub evidence: CurveEvidence,
 }
 
+/// Chooses the terms of a curve.
 #[derive(Clone, Copy)]
 pub(super) struct Selection<'a> {
     pub points: &'a Points,
@@ -61,27 +43,28 @@ pub(super) struct Selection<'a> {
     pub settings: &'a CurveDiagnosis,
 }
 
+/// A fit of one more term.
 struct Trial {
     term: &'static dyn Term,
     ranked: Ranked,
     state: Option<State>,
     model: Model,
-    fitted: Fitted,
+    fitted: Fit,
 }
 
 impl Selection<'_> {
     /// A fitted model with its held-out scores.
-    pub fn state(&self, model: Model, fitted: Fitted) -> State {
+    pub fn state(&self, model: Model, fitted: Fit) -> State {
         let points = &self.points.points;
-        let of_fold: Vec<Fitted> = (0..self.folds.folds)
+        let of_fold: Vec<Fit> = (0..self.folds.folds)
             .into_par_iter()
             .map(|fold| {
                 let used: Vec<bool> = self.folds.fold.iter().map(|f| *f != fold).collect();
                 model.fit(self.points, &used, &fitted.at)
             })
             .collect();
-        let scored: Vec<Vec<Scored>> =
-            of_fold.iter().map(|fitted| model.scored(fitted, points)).collect();
+        let scored: Vec<Vec<Score>> =
+            of_fold.iter().map(|fitted| model.scores(fitted, points)).collect();
         let held_out = self
             .folds
             .fold
@@ -97,33 +80,22 @@ impl Selection<'_> {
         &self,
         mut state: State,
         terms: &[&'static dyn Term],
-    ) -> (State, Vec<Ranked>, Vec<Added>) {
-        let (mut ranking, mut added) = (Vec::new(), Vec::<Added>::new());
+    ) -> (State, Vec<Ranked>, Vec<Addition>) {
+        let (mut ranking, mut added) = (Vec::new(), Vec::<Addition>::new());
         for round in 1..=self.settings.most_terms + 1 {
-            let is_new = |term: &&&'static dyn Term| {
-                added.iter().all(|added| added.term.name() != term.name())
-            };
-            let left: Vec<&'static dyn Term> = terms.iter().filter(is_new).copied().collect();
+            let mut left = terms.to_vec();
+            left.retain(|term| added.iter().all(|added| added.term.name() != term.name()));
             let mut trials = self.trials(round, &state, &left);
-            let best = match round <= self.settings.most_terms {
-                true => self.best(&trials),
-                false => None,
-            };
-            let chosen = best.map(|index| {
+            let best = self.best(&trials).filter(|_| round <= self.settings.most_terms);
+            let next = best.and_then(|index| {
                 let class = self.class(&trials, index);
-                let trial = &mut trials[index];
-                trial.ranked.accepted = true;
-                let [held_out_gain, held_out_se] = trial.ranked.held_out.unwrap_or_default();
-                let Ranked { gain, size_db, .. } = trial.ranked;
-                let evidence = CurveEvidence { gain, held_out_gain, held_out_se, size_db };
-                added.push(Added { term: trial.term, class, evidence });
-                trial.state.take()
+                let (addition, next) = trials[index].accept(class);
+                added.push(addition);
+                next
             });
             ranking.extend(trials.into_iter().map(|trial| trial.ranked));
-            match chosen.flatten() {
-                Some(next) => state = next,
-                None => break,
-            }
+            let Some(next) = next else { break };
+            state = next;
         }
         (state, ranking, added)
     }
@@ -142,28 +114,22 @@ impl Selection<'_> {
         trials
     }
 
+    /// A term fitted from its best starts.
     fn trial(&self, round: usize, state: &State, term: &'static dyn Term) -> Trial {
         let points = self.points;
         let all = vec![true; points.points.len()];
         let model = state.model.with(term);
-        let joined = |values: Vec<f64>| {
-            let steps = term.parameters().iter().zip(values).map(|(knob, value)| value / knob.step);
-            let law = state.fitted.at.iter().copied();
-            DVector::from_vec(law.chain(steps).collect())
-        };
-        let misfit = |at: &DVector<f64>| -> f64 {
-            let levels = model.levels_db(at, &points.points);
-            let pairs = points.points.iter().zip(levels).filter(|(point, _)| !point.censored);
-            pairs.map(|(point, db)| (point.f_db - db).powi(2)).sum()
-        };
-        let mut starts: Vec<(f64, DVector<f64>)> =
-            term.starts().into_iter().map(joined).map(|at| (misfit(&at), at)).collect();
+        let mut starts: Vec<(f64, DVector<f64>)> = Vec::new();
+        for values in term.starts() {
+            let at = joined(&state.fitted.at, term, &values);
+            starts.push((misfit(&model, &at, points), at));
+        }
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let absent = joined(term.parameters().iter().map(|knob| knob.absent).collect());
         let fits = starts.iter().take(FOLLOWED).map(|(_, at)| model.fit(points, &all, at));
-        let fitted = fits
-            .max_by(|a, b| a.log_p.total_cmp(&b.log_p))
-            .unwrap_or_else(|| model.fit(points, &all, &absent));
+        let fitted = fits.max_by(|a, b| a.log_p.total_cmp(&b.log_p)).unwrap_or_else(|| {
+            let absent: Vec<f64> = term.parameters().iter().map(|known| known.absent).collect();
+            model.fit(points, &all, &joined(&state.fitted.at, term, &absent))
+        });
         let [before, after] = [
             state.model.levels_db(&state.fitted.at, &points.points),
             model.levels_db(&fitted.at, &points.points),
@@ -184,16 +150,19 @@ impl Selection<'_> {
 
     /// The supported term with the largest held-out gain.
     fn best(&self, trials: &[Trial]) -> Option<usize> {
-        let gain = |trial: &Trial| trial.ranked.held_out.map_or(0.0, |[gain, _]| gain);
-        (0..trials.len())
-            .filter(|&index| self.is_supported(&trials[index].ranked))
-            .max_by(|&a, &b| gain(&trials[a]).total_cmp(&gain(&trials[b])))
+        let supported = (0..trials.len()).filter(|&index| self.is_supported(&trials[index].ranked));
+        supported.max_by(|&a, &b| {
+            let [a, b] = [a, b].map(|index| trials[index].held_out_gain());
+            a.total_cmp(&b)
+        })
     }
 
+    /// Whether a term predicts held-out angles and changes enough.
     fn is_supported(&self, ranked: &Ranked) -> bool {
-        let enough =
-            |[gain, se]: [f64; 2]| gain > self.settings.standard_errors * se && gain > SAME;
-        ranked.held_out.is_some_and(enough) && ranked.size_db >= self.settings.least_size_db
+        let Some([gain, se]) = ranked.held_out else { return false };
+        gain > self.settings.standard_errors * se
+            && gain > SAME
+            && ranked.size_db >= self.settings.least_size_db
     }
 
     /// Other supported terms that predict held-out angles as well as the best.
@@ -201,18 +170,53 @@ impl Selection<'_> {
         let Some(winner) = trials.get(best).and_then(|trial| trial.state.as_ref()) else {
             return Vec::new();
         };
-        let as_good = |trial: &&Trial| {
-            let Some(state) = &trial.state else { return false };
-            let [behind, se] = self.gain(&state.held_out, &winner.held_out);
-            self.is_supported(&trial.ranked) && behind <= SAME.max(se)
-        };
-        let others = trials.iter().enumerate().filter(|(index, _)| *index != best);
-        others.map(|(_, trial)| trial).filter(as_good).map(|trial| trial.ranked.name).collect()
+        let mut class = Vec::new();
+        for (index, trial) in trials.iter().enumerate() {
+            if index != best
+                && self.is_supported(&trial.ranked)
+                && let Some(state) = &trial.state
+            {
+                let [behind, se] = self.gain(&state.held_out, &winner.held_out);
+                if behind <= SAME.max(se) {
+                    class.push(trial.ranked.name);
+                }
+            }
+        }
+        class
     }
 
     /// Gain in ln p of held-out angles and its standard error over runs.
-    pub fn gain(&self, before: &[Scored], after: &[Scored]) -> [f64; 2] {
+    pub fn gain(&self, before: &[Score], after: &[Score]) -> [f64; 2] {
         let gains: Vec<f64> = before.iter().zip(after).map(|(b, a)| a.log_p - b.log_p).collect();
         self.folds.sum(&gains)
     }
+}
+
+impl Trial {
+    /// Gain in ln p of held-out angles; 0 where it is unknown.
+    fn held_out_gain(&self) -> f64 {
+        self.ranked.held_out.map_or(0.0, |[gain, _]| gain)
+    }
+
+    /// Accepts the term: the addition, and the model with it.
+    fn accept(&mut self, class: Vec<&'static str>) -> (Addition, Option<State>) {
+        self.ranked.accepted = true;
+        let [held_out_gain, held_out_se] = self.ranked.held_out.unwrap_or_default();
+        let Ranked { gain, size_db, .. } = self.ranked;
+        let evidence = CurveEvidence { gain, held_out_gain, held_out_se, size_db };
+        (Addition { term: self.term, class, evidence }, self.state.take())
+    }
+}
+
+/// A point with the parameters of one more term.
+fn joined(at: &DVector<f64>, term: &dyn Term, values: &[f64]) -> DVector<f64> {
+    let more = term.parameters().iter().zip(values).map(|(known, value)| value / known.step);
+    DVector::from_vec(at.iter().copied().chain(more).collect())
+}
+
+/// Sum of the squared residuals of the detections, dB².
+fn misfit(model: &Model, at: &DVector<f64>, points: &Points) -> f64 {
+    let levels_db = model.levels_db(at, &points.points);
+    let pairs = points.points.iter().zip(levels_db).filter(|(point, _)| !point.censored);
+    pairs.map(|(point, db)| (point.f_db - db).powi(2)).sum()
 }

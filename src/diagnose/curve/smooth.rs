@@ -1,7 +1,7 @@
-//! What no term explains: a smooth curve over an angle, without a name.
+//! Structure that no term explains: a smooth curve over an angle, of unknown origin.
 //!
-//! Hats over a covariate, with a penalty on bends, are fitted to what a model leaves of the angles that
-//! it was fitted to, and must predict what it leaves of the others.
+//! Hat functions over a covariate, with a penalty on bends, are fitted to the residual at the angles of the fit
+//! and must predict the residual at the others.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,17 +9,17 @@ use super::points::{Kind, Point};
 
 /// Hats over a covariate.
 const HATS: usize = 9;
-/// A bend from hat to hat that is nothing special, dB.
+/// Prior standard deviation of a bend from hat to hat, dB.
 const BEND_DB: f64 = 1.0;
 
-/// Something that a residual can go with.
+/// An angle that a residual can depend on.
 #[derive(Clone, Copy)]
 pub(super) struct Covariate {
     pub name: &'static str,
     pub of: fn(&Point) -> f64,
 }
 
-/// What is tried.
+/// The covariates of a curve.
 pub(super) fn covariates(kind: Kind) -> &'static [Covariate] {
     match kind {
         Kind::Backscatter => &[Covariate { name: "theta", of: |p| p.theta_i_rad }],
@@ -40,7 +40,7 @@ pub(super) struct Smooth {
 }
 
 impl Smooth {
-    /// Fitted to (covariate, residual in dB) pairs of a scale `scale_db`, over a range.
+    /// A curve over a range, fitted to pairs of covariate and residual, dB, that scatter by `scale_db`.
     pub fn fit(pairs: &[(f64, f64)], [from, to]: [f64; 2], scale_db: f64) -> Smooth {
         let step = ((to - from) / (HATS - 1) as f64).max(1e-12);
         let mut smooth = Smooth { from, step, hats: DVector::zeros(HATS) };
@@ -64,7 +64,7 @@ impl Smooth {
                 }
             }
         }
-        // Where there are too few places for a line, 0.
+        // A small ridge: 0 where the pairs do not even determine a line.
         for k in 0..HATS {
             normal[(k, k)] += 1e-6 + 1e-3 * penalty;
         }

@@ -1,6 +1,6 @@
-//! What a law of scattering can lack in a curve: one small object each, nested in the law.
+//! Terms that a scattering model can lack in a curve, one small object each.
 //!
-//! With its numbers at their `absent` values a term changes nothing, exactly.
+//! With its parameters at their `absent` values a term changes nothing, exactly.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,27 +9,27 @@ use crate::brdf::{Brdf, CookTorrance, Distribution, Scattering, Shadowing};
 use crate::effects::{EffectParameter, Level};
 use crate::frames::{Direction, Surface};
 
-/// Something that a law lacks.
+/// A term that a scattering model can lack.
 pub trait Term: Sync {
     /// Its name, as reports write it.
     fn name(&self) -> &'static str;
 
-    /// Where it belongs.
+    /// The level it belongs to.
     fn level(&self) -> Level;
 
-    /// Its numbers.
+    /// Its parameters.
     fn parameters(&self) -> &'static [EffectParameter];
 
-    /// What it is, in a sentence for a person.
+    /// Description in one sentence.
     fn description(&self) -> &'static str;
 
-    /// What it does to a curve, and what tells it from its neighbours.
+    /// Its signature in a curve, and how it differs from similar terms.
     fn signature(&self) -> &'static str;
 
-    /// Where a search begins.
+    /// Starts of a search.
     fn starts(&self) -> Vec<Vec<f64>>;
 
-    /// f at a point, 1/sr, where the law without this term has `f_per_sr`.
+    /// f with this term at a point, 1/sr; `f_per_sr` is f without it.
     fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64;
 }
 
@@ -54,7 +54,7 @@ pub fn term(name: &str) -> Option<&'static dyn Term> {
     terms().into_iter().find(|term| term.name() == name)
 }
 
-const fn knob(
+const fn parameter(
     name: &'static str,
     unit: &'static str,
     [min, max]: [f64; 2],
@@ -69,9 +69,9 @@ fn pairs(first: &[f64], second: &[f64]) -> Vec<Vec<f64>> {
     first.iter().flat_map(|&a| second.iter().map(move |&b| vec![a, b])).collect()
 }
 
-/// Names, level, knobs and words of a term.
+/// Name, level, texts and parameters of a term.
 macro_rules! described {
-    ($name:literal, $level:ident, $is:literal, $shows:literal, $($knob:expr),+ $(,)?) => {
+    ($name:literal, $level:ident, $is:literal, $shows:literal, $($parameter:expr),+ $(,)?) => {
         fn name(&self) -> &'static str {
             $name
         }
@@ -81,8 +81,8 @@ macro_rules! described {
         }
 
         fn parameters(&self) -> &'static [EffectParameter] {
-            const KNOBS: &[EffectParameter] = &[$($knob),+];
-            KNOBS
+            const PARAMETERS: &[EffectParameter] = &[$($parameter),+];
+            PARAMETERS
         }
 
         fn description(&self) -> &'static str {
@@ -101,14 +101,14 @@ fn diffuse_per_sr(law: &Brdf, point: &Point) -> f64 {
     (1.0 - specular_share) * f_per_sr
 }
 
-/// Cosine between the normal and the direction midway, and between that and the receiver.
+/// Cosine between the normal and the half direction, and between that and the receiver.
 fn half(point: &Point) -> [f64; 2] {
     let sum = point.i.xyz() + point.o.xyz();
     let h = sum / sum.length().max(f64::MIN_POSITIVE);
     [h.z, point.o.xyz().dot(h)].map(|cos: f64| cos.clamp(0.0, 1.0))
 }
 
-/// What the Cook–Torrance lobes of a law give, each times a factor, 1/sr.
+/// Sum of the Cook–Torrance lobes of a scattering model, each times a factor, 1/sr.
 fn lobes_per_sr(law: &Brdf, point: &Point, factor: &dyn Fn(&CookTorrance) -> f64) -> f64 {
     law.sum_over_parts(&|part| match part {
         Brdf::CookTorrance(lobe) => factor(lobe) * part.f_per_sr(point.i, point.o),
@@ -126,7 +126,7 @@ impl Term for DiffuseLobe {
          or rough layers below the surface.",
         "The level falls with the angle between the normal and the direction midway between source and \
          receiver, smoothly and at all incidences alike. Limb darkening goes with both angles apart.",
-        knob("alpha", "1", [0.0, 50.0], 0.0, 0.1),
+        parameter("alpha", "1", [0.0, 50.0], 0.0, 0.1),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -142,7 +142,7 @@ impl Term for DiffuseLobe {
 
 struct LimbDarkening;
 
-/// Grazing directions see nothing.
+/// Least cosine of a direction: grazing directions have f of 0.
 const LEAST_COS: f64 = 1e-3;
 
 impl Term for LimbDarkening {
@@ -153,7 +153,7 @@ impl Term for LimbDarkening {
          that leaves a deep layer.",
         "The diffuse level falls (k above 0) or rises (below 0) towards grazing angles of the source \
          and of the receiver, whatever lies between them.",
-        knob("k", "1", [-0.9, 5.0], 0.0, 0.05),
+        parameter("k", "1", [-0.9, 5.0], 0.0, 0.05),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -178,8 +178,8 @@ impl Term for SecondLobe {
         "A narrow core on a broad foot, or the reverse, that follows the mirror direction and grows \
          towards grazing incidence. Which of two lobes is called the second means nothing. A lobe of the \
          instrument keeps its width at all incidences.",
-        knob("f_lambda", "1", [0.0, 1.0], 0.0, 1e-3),
-        knob("m", "1", [0.01, 1.5], 0.3, 0.01),
+        parameter("f_lambda", "1", [0.0, 1.0], 0.0, 1e-3),
+        parameter("m", "1", [0.01, 1.5], 0.3, 0.01),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -190,7 +190,7 @@ impl Term for SecondLobe {
         let &[f_lambda, m] = values else { return f_per_sr };
         let (distribution, shadowing) = (Distribution::Ggx, Shadowing::Separable);
         let lobe = CookTorrance { f_lambda, m, m_across: None, distribution, shadowing };
-        // Schlick's term does not vanish with f_λ.
+        // Schlick's factor does not vanish with f_λ.
         let share = f_lambda / (f_lambda + 1e-6);
         f_per_sr + share * lobe.f_per_sr(point.i, point.o)
     }
@@ -206,7 +206,7 @@ impl Term for FresnelGrowth {
          incidence, and all towards grazing (another index of refraction).",
         "The specular level rises more steeply (above 0) or less (below 0) from one incidence to \
          the next than its level says. In backscatter facets are met at right angles, and it does not show.",
-        knob("level_db", "dB", [-30.0, 30.0], 0.0, 0.2),
+        parameter("level_db", "dB", [-30.0, 30.0], 0.0, 0.2),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -218,11 +218,11 @@ impl Term for FresnelGrowth {
         let amount = 10f64.powf(0.1 * level_db);
         let growth = (1.0 - half(point)[1]).powi(5);
         let schlick = |r0: f64| r0 + (1.0 - r0) * growth;
-        let change = |lobe: &CookTorrance| {
-            let f = lobe.f_lambda.max(1e-9);
-            amount * schlick((f / amount).min(1.0)) / schlick(f) - 1.0
-        };
-        f_per_sr + lobes_per_sr(law, point, &change)
+        f_per_sr
+            + lobes_per_sr(law, point, &|lobe| {
+                let f = lobe.f_lambda.max(1e-9);
+                amount * schlick((f / amount).min(1.0)) / schlick(f) - 1.0
+            })
     }
 }
 
@@ -236,7 +236,7 @@ impl Term for Subsurface {
          every angle: f rises as 1/(cos θ_i·cos θ_s).",
         "The curve flattens, or bends upwards, towards grazing angles of source and receiver alike. Stray \
          light rises with the receiver's angle alone, at every incidence by the same amount.",
-        knob("sigma_v", "1", [0.0, 1.0], 0.0, 5e-4),
+        parameter("sigma_v", "1", [0.0, 1.0], 0.0, 5e-4),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -263,8 +263,8 @@ impl Term for ThinFilm {
          thickness is optical, in wavelengths.",
         "Maxima and minima that crowd towards grazing angles. No other term goes up and down more than \
          once. Thicknesses that put the same number of ripples over the angles cannot be told apart.",
-        knob("visibility", "1", [-0.95, 0.95], 0.0, 0.02),
-        knob("thickness", "1", [0.1, 20.0], 1.0, 0.01),
+        parameter("visibility", "1", [-0.95, 0.95], 0.0, 0.02),
+        parameter("thickness", "1", [0.1, 20.0], 1.0, 0.01),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -274,12 +274,15 @@ impl Term for ThinFilm {
 
     fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
         let &[visibility, thickness] = values else { return f_per_sr };
-        let inside = |d: Direction<Surface>| {
-            (1.0 - (1.0 - d.cos_theta().powi(2)) / FILM_INDEX.powi(2)).max(0.0).sqrt()
-        };
-        let phase_rad = TAU * thickness * (inside(point.i) + inside(point.o));
+        let [i, o] = [point.i, point.o].map(cos_inside);
+        let phase_rad = TAU * thickness * (i + o);
         f_per_sr + lobes_per_sr(law, point, &|_| visibility * phase_rad.cos())
     }
+}
+
+/// Cosine between the normal and a direction refracted into a film.
+fn cos_inside(d: Direction<Surface>) -> f64 {
+    (1.0 - (1.0 - d.cos_theta().powi(2)) / FILM_INDEX.powi(2)).max(0.0).sqrt()
 }
 
 struct Opposition;
@@ -292,8 +295,8 @@ impl Term for Opposition {
          that go one way round and the other interfere.",
         "A peak about the direction of the source at every incidence, where the detector does not hide \
          it. A backscatter curve is all peak and does not show it.",
-        knob("height", "1", [0.0, 3.0], 0.0, 0.02),
-        knob("width_deg", "deg", [0.5, 30.0], 5.0, 0.2),
+        parameter("height", "1", [0.0, 3.0], 0.0, 0.02),
+        parameter("width_deg", "deg", [0.5, 30.0], 5.0, 0.2),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -317,7 +320,7 @@ impl Term for AngleOffset {
          much: everything is seen from so much further off the normal.",
         "The peaks of all incidences are shifted to the same side by the same angle, and each flank errs \
          by its slope.",
-        knob("offset_deg", "deg", [-10.0, 10.0], 0.0, 0.1),
+        parameter("offset_deg", "deg", [-10.0, 10.0], 0.0, 0.1),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -327,17 +330,16 @@ impl Term for AngleOffset {
     fn scatter(&self, values: &[f64], law: &Brdf, point: &Point, f_per_sr: f64) -> f64 {
         const GRAZING_RAD: f64 = 1.57;
         let &[offset_deg] = values else { return f_per_sr };
-        let shifted = |theta_rad: f64, side: f64| {
-            let theta_rad =
-                (theta_rad + side * offset_deg.to_radians()).clamp(-GRAZING_RAD, GRAZING_RAD);
-            Direction::from_angles(theta_rad.abs(), if theta_rad < 0.0 { PI } else { 0.0 })
+        // In backscatter the source moves with the receiver, on its own side.
+        let is_backscatter = point.i == point.o;
+        let theta_rad = if is_backscatter {
+            -point.theta_i_rad - offset_deg.to_radians()
+        } else {
+            point.theta_s_rad + offset_deg.to_radians()
         };
-        // In backscatter the source moves with the receiver.
-        let o = match point.i == point.o {
-            true => shifted(-point.theta_i_rad, -1.0),
-            false => shifted(point.theta_s_rad, 1.0),
-        };
-        let i = if point.i == point.o { o } else { point.i };
+        let theta_rad = theta_rad.clamp(-GRAZING_RAD, GRAZING_RAD);
+        let o = Direction::from_angles(theta_rad.abs(), if theta_rad < 0.0 { PI } else { 0.0 });
+        let i = if is_backscatter { o } else { point.i };
         let here = law.f_per_sr(point.i, point.o);
         if here > 0.0 { f_per_sr * law.f_per_sr(i, o) / here } else { f_per_sr }
     }
@@ -352,8 +354,8 @@ impl Term for InstrumentLobe {
         "A narrow lobe of fixed width in the mirror direction: the mirror image of the source, as wide as \
          the beam and the receiver's aperture.",
         "A peak a few degrees wide, and equally wide at all incidences, exactly in the mirror direction.",
-        knob("level_per_sr", "sr-1", [0.0, 1e4], 0.0, 1e-3),
-        knob("width_deg", "deg", [0.1, 5.0], 1.0, 0.05),
+        parameter("level_per_sr", "sr-1", [0.0, 1e4], 0.0, 1e-3),
+        parameter("width_deg", "deg", [0.1, 5.0], 1.0, 0.05),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -378,7 +380,7 @@ impl Term for StrayLight {
          receiver's cosine it becomes s/cos θ_s.",
         "The curve rises (s above 0) or falls (below 0) towards grazing receivers, most where the sample is \
          darkest, and by the same amount at every incidence.",
-        knob("s_per_sr", "sr-1", [-0.1, 0.1], 0.0, 1e-4),
+        parameter("s_per_sr", "sr-1", [-0.1, 0.1], 0.0, 1e-4),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -409,11 +411,12 @@ mod tests {
                 };
                 points.iter().map(one).fold(0.0, f64::max)
             };
-            let absent: Vec<f64> = term.parameters().iter().map(|knob| knob.absent).collect();
+            let absent: Vec<f64> = term.parameters().iter().map(|known| known.absent).collect();
             assert!(change(&absent) < 1e-12, "{}", term.name());
             for start in term.starts() {
-                let inside =
-                    |(knob, value): (&EffectParameter, &f64)| (knob.min..=knob.max).contains(value);
+                let inside = |(known, value): (&EffectParameter, &f64)| {
+                    (known.min..=known.max).contains(value)
+                };
                 assert!(term.parameters().iter().zip(&start).all(inside), "{}", term.name());
                 assert!(change(&start) > 1e-6, "{} {start:?}", term.name());
             }

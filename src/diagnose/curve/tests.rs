@@ -2,7 +2,8 @@
 
 use super::testing::{curve_of, noisy};
 use super::*;
-use crate::brdf::Scattering;
+use crate::brdf::{Brdf, Scattering};
+use crate::diagnose::report::Verdict;
 use crate::measure::Curve;
 use crate::units::db_from_ratio;
 
@@ -76,11 +77,11 @@ fn what_is_put_in_is_found_with_its_numbers() {
             }
             continue;
         }
-        let knobs = term(name).unwrap().parameters();
-        for (knob, truth) in knobs.iter().zip(numbers) {
-            let found = &report.effects[0].parameters[knob.name];
+        let parameters = term(name).unwrap().parameters();
+        for (known, truth) in parameters.iter().zip(numbers) {
+            let found = &report.effects[0].parameters[known.name];
             let off = (found.value - truth) / found.sd.unwrap();
-            assert!(off.abs() < OFF, "{name} {}: {found:?}", knob.name);
+            assert!(off.abs() < OFF, "{name} {}: {found:?}", known.name);
         }
     }
 }

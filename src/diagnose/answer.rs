@@ -1,0 +1,140 @@
+//! From the fitted models to the tables of the report.
+
+use super::explanation::{Addition, Explanation};
+use super::folds::Folds;
+use super::report::{Base, BaseValue, BeforeAfter, Found, Parameters, Row, Value};
+use super::score::{AT_THE_FLOOR, DB, Errors};
+use super::scorer::{Scorer, State};
+use super::subject::Subject;
+use crate::brdf::Brdf;
+use crate::effects::{Effect, Prediction, Shot};
+use crate::units::dbm_from_watts;
+
+/// A model as the table of residuals shows it.
+#[derive(Clone, Copy)]
+pub(super) struct Column<'a> {
+    pub state: &'a State<'a>,
+    /// Randomised quantile residuals.
+    pub z: &'a [f64],
+}
+
+/// One row per shot. `unknown`: change of ln mean of every shot by a smooth field, or nothing.
+pub(super) fn rows(
+    subject: &Subject,
+    prediction: &Prediction,
+    folds: &Folds,
+    [before, after]: [Column; 2],
+    unknown: &[f64],
+) -> Vec<Row> {
+    let mut rows = Vec::with_capacity(subject.shots.len());
+    for (index, (shot, seen)) in subject.shots.iter().zip(subject.observations).enumerate() {
+        let arrived = prediction.arrived.get(index).copied().flatten();
+        rows.push(Row {
+            chirp: shot.chirp,
+            observed_dbm: seen.power_w.map(dbm_from_watts),
+            before_dbm: before.state.held_out[index].expected_dbm,
+            after_dbm: after.state.held_out[index].expected_dbm,
+            z_before: before.z[index],
+            z_after: after.z[index],
+            fold: folds.fold[index],
+            theta_deg: shot.hit.theta_rad().to_degrees(),
+            azimuth_deg: shot.azimuth_rad.to_degrees(),
+            range_m: shot.hit.range_m,
+            range_residual_m: seen.range_m.zip(arrived).map(|(seen_m, a)| seen_m - a.range_m),
+            xt_m: shot.xt_m,
+            yt_m: shot.yt_m,
+            edge_m: shot.edge_m,
+            time_s: shot.time_s,
+            region: shot.region,
+            unknown_db: DB * unknown.get(index).copied().unwrap_or(0.0),
+        });
+    }
+    rows
+}
+
+/// The base model as fitted with the effects; `sd`: standard deviations of all unknowns.
+pub(super) fn base(subject: &Subject, state: &State, sd: &[f64]) -> Base {
+    let Subject { receiver, declared, .. } = *subject;
+    let laws = state.space.model(receiver, &state.fit.at).laws;
+    let mut parameters = Vec::new();
+    for (known, sd) in state.space.base_values(&state.fit.at).into_iter().zip(sd) {
+        let units = laws.get(known.region).map_or(Vec::new(), Brdf::parameters);
+        let unit = units.iter().find(|p| p.path == known.name).map_or("1", |p| p.unit);
+        let value = Value { value: known.value, sd: finite(sd * known.slope), unit };
+        parameters.push(BaseValue { region: known.region, name: known.name, value });
+    }
+    Base {
+        parameters,
+        looks: receiver.looks,
+        threshold_dbm: dbm_from_watts(declared.threshold_w),
+        noise_dbm: (receiver.noise_w > 0.0).then(|| dbm_from_watts(receiver.noise_w)),
+        range_sd_m: declared.range_sd_m,
+        pose: subject.pose.to_vec(),
+        converged: state.fit.converged,
+    }
+}
+
+/// The effects of a model with their parameters; `sd`: standard deviations of all unknowns.
+pub(super) fn effects(model: &Explanation, sd: &[f64], shots: &[Shot]) -> Vec<Found> {
+    let Explanation { state, added } = model;
+    let mut rest = sd.iter().skip(state.space.base_len());
+    let mut effects = Vec::new();
+    let values = state.space.effect_values(&state.fit.at);
+    for ((effect, values), added) in state.space.effects.iter().zip(values).zip(added) {
+        let sd: Vec<f64> = rest.by_ref().take(values.len()).copied().collect();
+        effects.push(found(*effect, &values, &sd, added, shots));
+    }
+    effects
+}
+
+fn found(
+    effect: &dyn Effect,
+    values: &[f64],
+    sd: &[f64],
+    added: &Addition,
+    shots: &[Shot],
+) -> Found {
+    let place = effect.place(values);
+    let mut numbers = std::collections::BTreeMap::new();
+    for ((known, &value), sd) in effect.parameters().iter().zip(values).zip(sd) {
+        let sd = finite(sd * known.step);
+        numbers.insert(known.name, Value { value, sd, unit: known.unit });
+    }
+    Found {
+        name: effect.name(),
+        level: effect.level(),
+        class: added.class.clone(),
+        parameters: Parameters::new(effect, numbers, place, shots),
+        place,
+        evidence: added.evidence.clone(),
+    }
+}
+
+/// A standard deviation; none where the data do not determine the number.
+fn finite(sd: f64) -> Option<f64> {
+    sd.is_finite().then_some(sd)
+}
+
+/// Errors without and with the effects.
+pub(super) fn before_after(
+    scorer: &Scorer,
+    [before, after]: [Errors; 2],
+    with_unknown: Option<Errors>,
+) -> BeforeAfter {
+    let noise_floor_db = after.noise_floor_db;
+    let excess = before.rmse_db.powi(2) - noise_floor_db.powi(2);
+    let removed = before.rmse_db.powi(2) - after.rmse_db.powi(2);
+    let is_above = before.rmse_db > AT_THE_FLOOR * noise_floor_db;
+    let explained_share = is_above.then_some(removed / excess);
+    let Folds { folds, blocks, .. } = *scorer.folds;
+    BeforeAfter {
+        before,
+        after,
+        with_unknown,
+        noise_floor_db,
+        explained_share,
+        folds,
+        blocks,
+        held_out: true,
+    }
+}

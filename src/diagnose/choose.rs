@@ -1,0 +1,221 @@
+//! The choice of the effects that a model lacks.
+//!
+//! All effects are screened on a sample of the shots. Those that promise enough are fitted together with
+//! the scattering models, first to the sample, the best few to all shots. These predict held-out patches from fits
+//! without them. One is accepted under four conditions. Its held-out gain, or its gain in the fit if that is less, exceeds
+//! two standard errors over patches (or, for means that shift in one small place, is far beyond chance and
+//! found again where it was not fitted). Held-out errors do not grow. Its gain in the fit beats that of
+//! placebos and a stated least. It changes the data by a stated least size. Where placebos beat all, two effects that
+//! predict held-out patches are tried together: either alone describes both worse than a wave does.
+
+use nalgebra::DVector;
+
+use super::evidence::{Candidate, Evidence};
+use super::exchange::{SAME, exchange};
+use super::explanation::{Addition, Explanation};
+use super::field::Structure;
+use super::refit::{Fit, SCOUT};
+use super::score::Score;
+use super::scorer::State;
+use super::space::Space;
+use super::support::Judge;
+use super::trial::{Search, Trial};
+use crate::effects::Effect;
+
+/// Effects of one round of which pairs are tried.
+const MOST_PAIRED: usize = 4;
+/// Share of the best held-out gain from which an effect may yet prove better.
+const SHARE_OF_RIVAL: f64 = 0.9;
+/// Rivals of each effect that are tried again.
+const MOST_RIVALS: usize = 2;
+
+/// The result of the choice.
+pub(super) struct Choice<'a> {
+    pub model: Explanation<'a>,
+    /// Every effect of every round.
+    pub ranking: Vec<Candidate>,
+    /// The structure that a field finds beside the model.
+    pub structure: Structure,
+}
+
+/// Adds effects until none is supported, and removes those that others made superfluous or that are
+/// smaller than the structure that the model leaves.
+pub(super) fn choose_effects<'a>(
+    search: &Search,
+    base: State<'a>,
+    effects: &[&'a dyn Effect],
+) -> Choice<'a> {
+    let scorer = &search.scorer;
+    let mut ranking = Vec::new();
+    let mut model = Explanation { state: base.clone(), added: Vec::new() };
+    for round in 1.. {
+        if model.added.len() >= scorer.settings.most_effects {
+            break;
+        }
+        let mut trials = search.trials(&model.state, effects, round, model.largest());
+        let has_grown =
+            add_best(search, &mut model, &mut trials) || add_pair(search, &mut model, &mut trials);
+        ranking.extend(trials.into_iter().map(|trial| trial.candidate));
+        if !has_grown {
+            break;
+        }
+    }
+    (search.notify)("testing whether each effect is needed");
+    exchange(search, &mut model);
+    model.remove_superfluous(scorer);
+    let had_some = !model.added.is_empty();
+    let mut structure = model.remove_smaller_than_structure(scorer);
+    // A model from which all effects were removed differs from the base in the last digits.
+    if had_some && model.added.is_empty() {
+        model.state = base;
+        structure = scorer.structure(&model.state);
+    }
+    let space = &model.state.space;
+    model.added.iter_mut().for_each(|one| one.class.retain(|name| !space.has(name)));
+    ranking.iter_mut().for_each(|one| one.accepted &= space.has(one.name));
+    Choice { model, ranking, structure }
+}
+
+/// A trial that the data support.
+struct Contender {
+    /// Its place among the trials.
+    trial: usize,
+    held_out: Vec<Score>,
+    /// The gain that counts.
+    gain: f64,
+}
+
+/// Adds the best trial that is supported; false where there is none.
+fn add_best<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Trial<'a>]) -> bool {
+    let scorer = &search.scorer;
+    let judge = Judge::new(*scorer, &model.state, model.largest());
+    let mut contenders = contenders(&judge, trials);
+    while let Some(best) = contenders.first()
+        && !judge.beats_placebos(&mut trials[best.trial])
+    {
+        contenders.remove(0);
+    }
+    let Some(first) = contenders.first() else { return false };
+    // Of those that predict equally well, by the rule of one standard error, the one with the fewest parameters in use
+    // is added, and of equally simple ones the likelier.
+    let mut tied = Vec::new();
+    for other in &contenders {
+        let [worse, se] = scorer.difference(&first.held_out, &other.held_out);
+        if worse <= se.max(SAME)
+            && (other.trial == first.trial || judge.beats_placebos(&mut trials[other.trial]))
+        {
+            tied.push(other);
+        }
+    }
+    let best = tied.iter().min_by_key(|one| {
+        let Trial { space, fit, .. } = &trials[one.trial];
+        space.parameters_in_use(&fit.at)
+    });
+    let best = best.map_or(first, |best| *best);
+    let class = tied.iter().filter(|one| one.trial != best.trial);
+    let class = class.map(|one| trials[one.trial].candidate.name).collect();
+    let rivals = contenders
+        .iter()
+        .filter(|one| one.trial != best.trial && one.gain >= SHARE_OF_RIVAL * first.gain)
+        .take(MOST_RIVALS)
+        .map(|one| trials[one.trial].effect)
+        .collect();
+    let trial = &mut trials[best.trial];
+    trial.candidate.accepted = true;
+    model.added.push(Addition { class, evidence: Evidence::from(&trial.candidate), rivals });
+    let (space, fit) = (trial.space.clone(), trial.fit.clone());
+    model.state = scorer.settle(&model.state, space, fit, best.held_out.clone());
+    true
+}
+
+/// The trials that the data support, the one with the largest gain first.
+fn contenders(judge: &Judge, trials: &mut [Trial]) -> Vec<Contender> {
+    let mut contenders = Vec::new();
+    for (index, trial) in trials.iter_mut().enumerate() {
+        if !trial.candidate.sampled
+            && let Some((held_out, gain)) = judge.support(trial)
+        {
+            contenders.push(Contender { trial: index, held_out, gain });
+        }
+    }
+    contenders.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    contenders
+}
+
+/// Two effects in one fit.
+struct Pair<'t, 'a> {
+    trials: [&'t Trial<'a>; 2],
+    space: Space<'a>,
+    fit: Fit,
+}
+
+/// Adds two effects of which each predicts held-out patches but gains less than placebos, because these
+/// also fit the part of the other. Together they must gain more than placebos. False where no pair does.
+fn add_pair<'a>(search: &Search, model: &mut Explanation<'a>, trials: &mut [Trial<'a>]) -> bool {
+    let scorer = &search.scorer;
+    if model.added.len() + 2 > scorer.settings.most_effects {
+        return false;
+    }
+    let Some(Pair { trials: pair, space, fit }) = best_pair(search, &model.state, trials) else {
+        return false;
+    };
+    let gain = fit.ln_likelihood - model.state.fit.ln_likelihood;
+    let numbers = pair.iter().map(|trial| trial.candidate.numbers).sum();
+    let placebo_gain = Judge::new(*scorer, &model.state, model.largest()).placebo_gain(numbers);
+    let next = scorer.state(space, fit);
+    if gain <= placebo_gain || !are_both_needed(search, &next, pair) {
+        return false;
+    }
+    // Each has the evidence of both: alone it has none.
+    let [held_out_gain, held_out_se] = scorer.difference(&next.held_out, &model.state.held_out);
+    for trial in pair {
+        let size_db = trial.candidate.size_db;
+        let evidence = Evidence { gain, placebo_gain, held_out_gain, held_out_se, size_db };
+        model.added.push(Addition { class: Vec::new(), evidence, rivals: Vec::new() });
+    }
+    model.state = next;
+    let names = pair.map(|trial| trial.candidate.name);
+    for trial in trials.iter_mut().filter(|trial| names.contains(&trial.candidate.name)) {
+        trial.candidate.accepted = true;
+    }
+    true
+}
+
+/// The likeliest pair of effects that predict held-out patches and gain less than placebos.
+fn best_pair<'t, 'a>(
+    search: &Search,
+    state: &State<'a>,
+    trials: &'t [Trial<'a>],
+) -> Option<Pair<'t, 'a>> {
+    let errors = search.scorer.settings.standard_errors;
+    let mut beaten = Vec::new();
+    for trial in trials {
+        let Candidate { gain, placebo_gain, held_out, .. } = trial.candidate;
+        let predicts = held_out.is_some_and(|[gain, se]| gain > errors * se);
+        if predicts && placebo_gain.is_some_and(|placebo| gain <= placebo) {
+            beaten.push(trial);
+        }
+    }
+    beaten.truncate(MOST_PAIRED);
+    let mut pairs = Vec::new();
+    for (index, &a) in beaten.iter().enumerate() {
+        for &b in &beaten[index + 1..] {
+            let space = a.space.with(b.effect);
+            let start = a.fit.at.iter().chain(b.fit.at.iter().skip(state.fit.at.len()));
+            let start = DVector::from_vec(start.copied().collect());
+            let fit = search.scorer.problem.fit(&space, &start, &[], &SCOUT);
+            pairs.push(Pair { trials: [a, b], space, fit });
+        }
+    }
+    pairs.into_iter().max_by(|a, b| a.fit.ln_likelihood.total_cmp(&b.fit.ln_likelihood))
+}
+
+/// Whether a model with a pair of effects predicts held-out patches better than with either alone.
+fn are_both_needed(search: &Search, both: &State, pair: [&Trial; 2]) -> bool {
+    let scorer = &search.scorer;
+    pair.iter().all(|trial| {
+        let alone = scorer.held_out(&trial.space, &trial.fit.at);
+        let [gain, se] = scorer.difference(&both.held_out, &alone);
+        gain > scorer.settings.standard_errors * se
+    })
+}

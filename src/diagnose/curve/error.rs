@@ -1,0 +1,44 @@
+//! Why a curve cannot be diagnosed.
+
+use thiserror::Error;
+
+use super::settings::{LEAST_BLOCKS, LEAST_POINTS};
+use crate::fit::FitError;
+use crate::units::{rounded, shown};
+
+/// Why the diagnosis of a curve has no answer.
+#[derive(Debug, Error, PartialEq)]
+pub enum CurveDiagnoseError {
+    /// The scattering model cannot be fitted.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// Too few detections.
+    #[error("{detected} detected levels cannot distinguish terms; measure {LEAST_POINTS} or more")]
+    TooFew {
+        /// Levels.
+        detected: usize,
+    },
+    /// Too few runs of angles.
+    #[error(
+        "the angles make {blocks} runs of {}° and {LEAST_BLOCKS} are needed to hold some out; \
+         measure more angles or more incidences", shown(rounded(*.width_deg))
+    )]
+    TooShort {
+        /// Runs.
+        blocks: usize,
+        /// Their width, degrees.
+        width_deg: f64,
+    },
+    /// The noise is unknown.
+    #[error(
+        "the levels do not determine the noise: no incidence has three angles, none is repeated and no `sd_db` is \
+         given; state it by --noise-db, or measure more angles of each incidence"
+    )]
+    Noiseless,
+    /// A noise without a meaning.
+    #[error("a noise of {noise_db} dB has no meaning; give a value above 0 and up to 100")]
+    Noise {
+        /// Declared noise, dB.
+        noise_db: f64,
+    },
+}

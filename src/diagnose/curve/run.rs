@@ -1,0 +1,145 @@
+//! The steps of the diagnosis of a curve.
+
+use super::error::CurveDiagnoseError;
+use super::evidence::Ranked;
+use super::folds::Folds;
+use super::model::{Model, Score};
+use super::points::{Points, f_per_sr};
+use super::remains;
+use super::report::{
+    CurveBase, CurveBeforeAfter, CurveErrors, CurveFacts, CurveReport, CurveRow, CurveUnknown,
+};
+use super::select::{Addition, Selection, State};
+use super::settings::{CurveDiagnosis, LEAST_BLOCKS, LEAST_POINTS};
+use super::terms::Term;
+use crate::brdf::{Brdf, CookTorrance, Distribution, Lambert, Shadowing, Sum};
+use crate::diagnose::report::{SCHEMA, Verdict};
+use crate::diagnose::score::AT_THE_FLOOR;
+use crate::fit::bistatic::{Bistatic, Sample};
+
+/// The default scattering model: one GGX lobe over Lambert, with values to start from.
+pub fn base_law() -> Brdf {
+    let (distribution, shadowing) = (Distribution::Ggx, Shadowing::Separable);
+    let lobe = CookTorrance { f_lambda: 0.05, m: 0.3, m_across: None, distribution, shadowing };
+    Brdf::Sum(Sum { parts: vec![Brdf::Lambert(Lambert { albedo: 0.1 }), Brdf::CookTorrance(lobe)] })
+}
+
+impl CurveDiagnosis {
+    /// Diagnoses a curve against a scattering model, trying these terms.
+    ///
+    /// # Errors
+    /// When the curve is too short for an answer, or the scattering model cannot be fitted.
+    pub fn run(
+        &self,
+        points: &Points,
+        law: &Brdf,
+        terms: &[&'static dyn Term],
+    ) -> Result<CurveReport, CurveDiagnoseError> {
+        let detected = points.points.iter().filter(|point| !point.censored).count();
+        if detected < LEAST_POINTS {
+            return Err(CurveDiagnoseError::TooFew { detected });
+        }
+        let noise_db = points.noise.sd_db;
+        if noise_db == f64::INFINITY {
+            return Err(CurveDiagnoseError::Noiseless);
+        }
+        if !(noise_db > 0.0 && noise_db <= 100.0) {
+            return Err(CurveDiagnoseError::Noise { noise_db });
+        }
+        let model = Model::new(&self.first_fit(points, law)?)?;
+        let all = vec![true; points.points.len()];
+        let fitted = model.fit(points, &all, &model.start());
+        let levels_db = model.levels_db(&fitted.at, &points.points);
+        let rough_db = remains::without_smooth(points, &levels_db, fitted.scale_db);
+        let folds = Folds::new(points, &rough_db, self.folds, self.seed);
+        if folds.blocks < LEAST_BLOCKS {
+            let width_deg = folds.width_rad.to_degrees();
+            return Err(CurveDiagnoseError::TooShort { blocks: folds.blocks, width_deg });
+        }
+        let selection = Selection { points, folds: &folds, settings: self };
+        let before = selection.state(model, fitted);
+        let (after, ranking, added) = selection.run(before.clone(), terms);
+        let unexplained = remains::unexplained(&selection, &after);
+        Ok(self.report(&selection, [&before, &after], ranking, added, unexplained))
+    }
+
+    /// The scattering model by least squares in dB of all detections, from several starts.
+    fn first_fit(&self, points: &Points, law: &Brdf) -> Result<Brdf, CurveDiagnoseError> {
+        let samples: Vec<Sample> = points
+            .points
+            .iter()
+            .filter(|point| !point.censored)
+            .map(|point| Sample { i: point.i, o: point.o, f_per_sr: f_per_sr(point) })
+            .collect();
+        Ok(Bistatic { seed: self.seed, ..Bistatic::default() }.run(law, &samples)?.model)
+    }
+
+    fn report(
+        &self,
+        selection: &Selection,
+        [before, after]: [&State; 2],
+        ranking: Vec<Ranked>,
+        added: Vec<Addition>,
+        unexplained: Vec<CurveUnknown>,
+    ) -> CurveReport {
+        let Selection { points, folds, .. } = *selection;
+        let (effects, parameters) = remains::values(selection, after, added);
+        let verdict = Verdict::new(!effects.is_empty(), !unexplained.is_empty());
+        let scans = points.points.last().map_or(0, |point| point.scan + 1);
+        CurveReport {
+            schema: SCHEMA,
+            verdict,
+            effects,
+            ranking,
+            unexplained,
+            error: before_after(points, folds, [&before.held_out, &after.held_out]),
+            base: CurveBase { parameters, converged: after.fitted.converged },
+            curve: CurveFacts {
+                kind: points.kind,
+                points: points.points.len(),
+                censored: points.points.iter().filter(|point| point.censored).count(),
+                scans,
+            },
+            rows: rows(points, folds, [&before.held_out, &after.held_out]),
+        }
+    }
+}
+
+/// Errors without and with the terms.
+fn before_after(points: &Points, folds: &Folds, scores: [&[Score]; 2]) -> CurveBeforeAfter {
+    let [before, after] = scores.map(|scores| CurveErrors::of(points, scores));
+    let floor_db = points.noise.sd_db;
+    let above = before.rmse_db.powi(2) - floor_db.powi(2);
+    let gone = before.rmse_db.powi(2) - after.rmse_db.powi(2);
+    let explained_share = (before.rmse_db > AT_THE_FLOOR * floor_db).then(|| gone / above);
+    CurveBeforeAfter {
+        before,
+        after,
+        noise_floor_db: floor_db,
+        noise_source: points.noise.source,
+        explained_share,
+        folds: folds.folds,
+        blocks: folds.blocks,
+        block_deg: folds.width_rad.to_degrees(),
+        correlation_deg: folds.correlation_rad.to_degrees(),
+        held_out: true,
+    }
+}
+
+/// One row per level.
+fn rows(points: &Points, folds: &Folds, [before, after]: [&[Score]; 2]) -> Vec<CurveRow> {
+    let rows = points.points.iter().enumerate().filter_map(|(index, point)| {
+        Some(CurveRow {
+            theta_i_deg: point.theta_i_rad.to_degrees(),
+            theta_s_deg: point.theta_s_rad.to_degrees(),
+            observed_db: point.f_db + point.offset_db,
+            censored: point.censored,
+            before_db: before.get(index)?.f_db + point.offset_db,
+            after_db: after.get(index)?.f_db + point.offset_db,
+            fold: *folds.fold.get(index)?,
+            block: *folds.block.get(index)?,
+            scan: point.scan,
+        })
+    });
+    rows.collect()
+}

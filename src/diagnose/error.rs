@@ -1,0 +1,158 @@
+//! Why a scan cannot be diagnosed.
+
+use thiserror::Error;
+
+use super::settings::{LEAST_BLOCKS, LEAST_DETECTIONS};
+use crate::fit::FitError;
+use crate::render::RenderError;
+
+/// Why a diagnosis has no answer.
+#[derive(Debug, Error)]
+pub enum DiagnoseError {
+    /// The scan cannot be traced, for example because no chirp meets the target.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// A scattering model cannot be fitted.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// The points cannot be assigned to chirps.
+    #[error(
+        "the cloud has no chirp numbers and the rays of the scan do not start from one point; export \
+         the cloud with a column `chirp`"
+    )]
+    Unnumbered,
+    /// The points lie on the rays of other chirps.
+    #[error(
+        "most points of the cloud lie on the rays of the chirps numbered {} {} than they state; number \
+         them as the scene's scan does, from its first chirp on, or leave the column `chirp` out",
+        .off.unsigned_abs(),
+        if *.off > 0 { "lower" } else { "higher" }
+    )]
+    Misnumbered {
+        /// By how much their numbers are too high.
+        off: i64,
+    },
+    /// The chirp numbers are not those of the scan.
+    #[error(
+        "by their chirp numbers {matched} of the cloud's {points} points lie on the target, and by their \
+         directions {placed}: the numbers are not those of the scene's scan; leave the column `chirp` out"
+    )]
+    Strange {
+        /// Points on the target when chirps are found by direction.
+        placed: usize,
+        /// Points on the target when chirps are found by number.
+        matched: usize,
+        /// Points.
+        points: usize,
+    },
+    /// Chirps have several detections each.
+    #[error(
+        "{second} of the cloud's {points} points belong to chirps that already have a point on the target; \
+         keep one point of each chirp"
+    )]
+    Repeated {
+        /// Points of chirps that already have one.
+        second: usize,
+        /// Points.
+        points: usize,
+    },
+    /// The cloud is of another target, or elsewhere.
+    #[error(
+        "{matched} of the cloud's {points} points lie where the scan meets the mesh; check the scene, \
+         its pose and the frame and unit of the cloud, or register it with `matdb measure`"
+    )]
+    Elsewhere {
+        /// Points on the mesh.
+        matched: usize,
+        /// Points.
+        points: usize,
+    },
+    /// Detections that the declared threshold rules out.
+    #[error(
+        "{below} of {detected} detections are weaker than the threshold of {threshold_dbm:.2} dBm that the \
+         scene declares; correct `threshold_dbm` under [radar], or the powers of the cloud"
+    )]
+    Threshold {
+        /// Detections below the threshold.
+        below: usize,
+        /// Detections.
+        detected: usize,
+        /// Declared threshold, dBm.
+        threshold_dbm: f64,
+    },
+    /// Even with all effects found the model is far off.
+    #[error(
+        "even with the effects that fit best the residual is {rmse_db:.1} dB rms, and a correct model leaves \
+         {noise_floor_db:.1} dB: the target may be another one; check mesh, pose and radar of the scene, or \
+         register the cloud with `matdb measure`"
+    )]
+    FarOff {
+        /// Rms residual on held-out patches, dB.
+        rmse_db: f64,
+        /// Rms residual of a correct model, dB.
+        noise_floor_db: f64,
+    },
+    /// Effects over time, and a scan without times.
+    #[error(
+        "the scan of the scene has no times, and {effects} cannot be identified without them; give its chirps a \
+         column `time_s`"
+    )]
+    Untimed {
+        /// Their names.
+        effects: String,
+    },
+    /// Effects that move the target, and a scene without a range error.
+    #[error(
+        "the scene states no error of ranges, and {effects} cannot be identified from powers alone; give \
+         `range_sd_m` under [radar.noise]"
+    )]
+    Unranged {
+        /// Their names.
+        effects: String,
+    },
+    /// The refitted model is far off in many places.
+    #[error(
+        "the refitted model is far off at {wild} of {shots} chirps: target or power balance may be \
+         different ones; check mesh, pose and radar of the scene, or register the cloud with `matdb measure`"
+    )]
+    Unlike {
+        /// Chirps beyond 4.5 standard deviations.
+        wild: usize,
+        /// Chirps that meet the target.
+        shots: usize,
+    },
+    /// Too few detections.
+    #[error(
+        "{detected} detections on the target cannot distinguish effects; {LEAST_DETECTIONS} are needed, \
+         so check scene and threshold, or scan more"
+    )]
+    TooFew {
+        /// Detections.
+        detected: usize,
+    },
+    /// The scanned part of the target is too small for held-out patches.
+    #[error(
+        "the chirps on the target fill {blocks} patches and {LEAST_BLOCKS} are needed; scan a larger part of \
+         the target, or a larger target"
+    )]
+    TooSmall {
+        /// Patches.
+        blocks: usize,
+    },
+    /// The number of observations differs from that of the chirps on the target.
+    #[error(
+        "{observations} observations do not match {shots} chirps on the target; match the cloud again"
+    )]
+    Unmatched {
+        /// Observations.
+        observations: usize,
+        /// Chirps on the target.
+        shots: usize,
+    },
+    /// A number of looks without a speckle distribution.
+    #[error("{looks} looks of speckle give no likelihood; declare between 0.1 and 10000")]
+    Looks {
+        /// Declared number of looks.
+        looks: f64,
+    },
+}

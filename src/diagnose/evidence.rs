@@ -1,0 +1,126 @@
+//! The evidence for an effect.
+
+use serde::Serialize;
+
+/// An effect in one round of the search.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Candidate {
+    /// Round, from 1.
+    pub round: usize,
+    /// Name of the effect.
+    pub name: &'static str,
+    /// Number of its parameters.
+    pub numbers: usize,
+    /// Gain in ln likelihood over the model so far.
+    pub gain: f64,
+    /// Whether the gain is that of a sample of the shots, too small for a fit to all of them.
+    pub sampled: bool,
+    /// Largest gain of a placebo with as many parameters, at most six; only for effects on the short list.
+    pub placebo_gain: Option<f64>,
+    /// Gain in ln p of held-out patches and its standard error; only for effects on the short list.
+    pub held_out: Option<[f64; 2]>,
+    /// Change of the data: root mean square of mean powers, or of the spread, dB.
+    pub size_db: f64,
+    /// Whether the fit converged.
+    pub converged: bool,
+    /// Whether the effect was added in this round and stayed.
+    pub accepted: bool,
+}
+
+impl Candidate {
+    /// A candidate of which only the gain on a sample is known.
+    pub(super) fn sampled(
+        round: usize,
+        name: &'static str,
+        numbers: usize,
+        gain: f64,
+    ) -> Candidate {
+        Candidate {
+            round,
+            name,
+            numbers,
+            gain,
+            sampled: true,
+            placebo_gain: None,
+            held_out: None,
+            size_db: 0.0,
+            converged: false,
+            accepted: false,
+        }
+    }
+}
+
+/// Why an effect was added.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Evidence {
+    /// Gain in ln likelihood over the model before.
+    pub gain: f64,
+    /// Gain of a placebo with as many parameters, at most six.
+    pub placebo_gain: f64,
+    /// Gain in ln p of held-out patches.
+    pub held_out_gain: f64,
+    /// Its standard error over patches.
+    pub held_out_se: f64,
+    /// Change of the data: root mean square of mean powers, or of the spread, dB.
+    pub size_db: f64,
+}
+
+impl From<&Candidate> for Evidence {
+    fn from(candidate: &Candidate) -> Evidence {
+        let [held_out_gain, held_out_se] = candidate.held_out.unwrap_or_default();
+        Evidence {
+            gain: candidate.gain,
+            placebo_gain: candidate.placebo_gain.unwrap_or_default(),
+            held_out_gain,
+            held_out_se,
+            size_db: candidate.size_db,
+        }
+    }
+}
+
+/// Share of the largest gain below which an effect may compensate for an error of the form of another.
+const SHARE_OF_GAIN: f64 = 0.1;
+/// The same share for an effect on the scatter, which gains little for its size.
+const SHARE_OF_GAIN_OF_SPREAD: f64 = 0.05;
+/// Largest gain per shot that measures how large an effect is. A larger one shows that something was out of place.
+const MOST_OF_A_SHOT: f64 = 2.0;
+
+/// The largest size, dB, and the largest gain in ln likelihood among effects.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Largest {
+    pub size_db: f64,
+    gain: f64,
+}
+
+impl Largest {
+    /// The largest of several effects; zero of none.
+    pub fn of<'e>(evidence: impl Iterator<Item = &'e Evidence>) -> Largest {
+        evidence.fold(Largest::default(), |Largest { size_db, gain }, one| Largest {
+            size_db: size_db.max(one.size_db),
+            gain: gain.max(one.gain),
+        })
+    }
+
+    /// Gain below which another effect may only correct the form of the largest, on a scan of this many shots.
+    pub fn least_gain(self, is_spread: bool, shots: usize) -> f64 {
+        let share = if is_spread { SHARE_OF_GAIN_OF_SPREAD } else { SHARE_OF_GAIN };
+        share * self.gain.min(MOST_OF_A_SHOT * shots as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stands_beside_a_large_effect_must_be_large_itself() {
+        let is_near = |gain: f64, expected: f64| (gain - expected).abs() < 1e-9;
+        let large = Largest { size_db: 2.0, gain: 7_580.0 };
+        assert!(is_near(Largest::default().least_gain(false, 18_529), 0.0));
+        assert!(is_near(large.least_gain(false, 18_529), 758.0));
+        assert!(is_near(large.least_gain(true, 18_529), 379.0));
+        // A pose far off gains without end at edges, which must not hide any other effect.
+        let far = Largest { gain: 170_150.0, ..large };
+        assert!(is_near(far.least_gain(false, 8_708), 1_741.6));
+    }
+}

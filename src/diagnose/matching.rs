@@ -1,0 +1,262 @@
+//! A measured cloud against the chirps of its scan: which point is the detection of which chirp.
+
+use std::collections::{HashMap, HashSet};
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::error::DiagnoseError;
+use super::observation::Observation;
+use super::shots::missed_shot;
+use crate::effects::{Model, Shot, Stage};
+use crate::frames::{Global, Point, Ray};
+use crate::measure::cloud::{Cloud, CloudPoint};
+use crate::measure::median_point;
+use crate::measure::nearest::Nearest;
+use crate::radar::Chirps;
+
+/// Share of a cloud off the target from which it is a cloud of another target.
+pub(super) const MOST_STRAYS: f64 = 0.25;
+/// Largest distance of a detection from where its chirp meets the target, m.
+const GATE_M: f64 = 0.1;
+/// Largest distance of a detection from its chirp's ray, m: less than from one chirp to the next.
+const ON_RAY_M: f64 = 0.01;
+
+/// A detection that belongs to no shot: its chirp misses the target, or meets it at another range.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stray {
+    /// Its chirp, with range 0 where that misses; none where the scan has no such chirp.
+    pub shot: Option<Shot>,
+    /// Range of the detection, m.
+    pub range_m: f64,
+}
+
+impl Stray {
+    /// Whether the detection lies on the target where the effects of a model place it.
+    pub(super) fn is_on_target(&self, model: &Model, stage: &Stage) -> bool {
+        let ranges_m = self.shot.map_or(Vec::new(), |shot| model.ranges_m(stage, &shot));
+        ranges_m.iter().any(|range_m| (range_m - self.range_m).abs() <= GATE_M)
+    }
+}
+
+/// The points of a cloud, assigned to the shots of its scan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CloudMatch {
+    /// One for each shot.
+    pub observations: Vec<Observation>,
+    /// Detections that belong to no shot.
+    pub strays: Vec<Stray>,
+}
+
+/// Assigns the points of a cloud to the shots of its scan, by chirp numbers or, without them, by directions. A detection
+/// farther than 0.1 m from where its chirp meets the target is a stray, and its chirp then counts as
+/// silent.
+///
+/// # Errors
+/// When points have no chirp number and no direction from a common origin, when they lie on the rays of
+/// other chirps than their numbers state, or when more than a quarter are further points of their chirps, or are
+/// neither on the target nor past its edge by a wide spot.
+pub fn match_cloud(
+    cloud: &Cloud,
+    chirps: &Chirps,
+    shots: &[Shot],
+) -> Result<CloudMatch, DiagnoseError> {
+    let scan = Scan::new(chirps);
+    let is_numbered = cloud.points().iter().all(|point| point.chirp.is_some());
+    if !is_numbered && scan.directions.is_none() {
+        return Err(DiagnoseError::Unnumbered);
+    }
+    if is_numbered && let Some(off) = scan.number_off(cloud) {
+        return Err(DiagnoseError::Misnumbered { off });
+    }
+    let own = scan.assign(cloud, shots, is_numbered);
+    if own.is_of_target(cloud) {
+        return Ok(own.cloud_match);
+    }
+    let (matched, points) = (own.on_target, cloud.points().len());
+    if own.second as f64 > MOST_STRAYS * points as f64 {
+        return Err(DiagnoseError::Repeated { second: own.second, points });
+    }
+    // Row numbers are not the chirps of the scan; a cloud that is only out of place keeps its chirps.
+    if is_numbered && scan.directions.is_some() && !scan.is_shifted(cloud) {
+        let by_direction = scan.assign(cloud, shots, false);
+        if by_direction.is_of_target(cloud) {
+            let placed = by_direction.on_target;
+            return Err(DiagnoseError::Strange { placed, matched, points });
+        }
+    }
+    Err(DiagnoseError::Elsewhere { matched, points })
+}
+
+/// An assignment and its quality.
+struct Assignment {
+    cloud_match: CloudMatch,
+    /// Detections on the target, one per chirp.
+    on_target: usize,
+    /// Further detections of chirps that already have one.
+    second: usize,
+}
+
+impl Assignment {
+    fn is_of_target(&self, cloud: &Cloud) -> bool {
+        let points = cloud.points().len();
+        (points - self.on_target) as f64 <= MOST_STRAYS * points as f64
+    }
+}
+
+/// The chirps of a scan, by number and by direction.
+struct Scan<'a> {
+    chirps: &'a Chirps,
+    index_of_chirp: HashMap<u32, usize>,
+    /// `None` unless all rays start from one point.
+    directions: Option<Directions>,
+}
+
+impl Scan<'_> {
+    fn new(chirps: &Chirps) -> Scan<'_> {
+        let index_of_chirp = chirps.number.iter().copied().zip(0..).collect();
+        Scan { chirps, index_of_chirp, directions: Directions::new(chirps) }
+    }
+
+    /// The ray of a chirp.
+    fn ray(&self, chirp: u32) -> Option<&Ray<Global>> {
+        self.chirps.rays.get(*self.index_of_chirp.get(&chirp)?)
+    }
+
+    /// The chirp in whose direction a point lies.
+    fn chirp_towards(&self, point: Point<Global>) -> Option<u32> {
+        self.directions.as_ref()?.chirp(self.chirps, point)
+    }
+
+    /// Whether most points lie off the rays of their chirps by one common shift.
+    fn is_shifted(&self, cloud: &Cloud) -> bool {
+        let shifts: Vec<DVec3> = cloud
+            .points()
+            .iter()
+            .filter_map(|point| Some(off_ray_m(point, self.ray(point.chirp?)?)))
+            .collect();
+        let shift = median_point(&shifts);
+        let alike = shifts.iter().filter(|own| own.distance(shift) <= GATE_M).count();
+        alike as f64 >= (1.0 - MOST_STRAYS) * cloud.points().len() as f64
+    }
+
+    /// By how much most chirp numbers are too high; `None` unless the same number is for most points. A cloud that is
+    /// out of place lies on rays to either side, as the scan goes to and fro. A cloud on its own rays
+    /// may also lie on those of a second pass.
+    fn number_off(&self, cloud: &Cloud) -> Option<i64> {
+        let offs: Vec<i64> =
+            cloud.points().par_iter().filter_map(|point| self.number_off_of(point)).collect();
+        let mut counts: HashMap<i64, usize> = HashMap::new();
+        for off in offs {
+            *counts.entry(off).or_default() += 1;
+        }
+        let (off, count) = counts.into_iter().max_by_key(|(off, count)| (*count, *off))?;
+        (off != 0 && 2 * count > cloud.points().len()).then_some(off)
+    }
+
+    /// By how much the chirp number of a point is higher than that of the nearest ray; 0 where its own is as near.
+    fn number_off_of(&self, point: &CloudPoint) -> Option<i64> {
+        /// The rounding of a point by f32 in a file.
+        const NEARER_M: f64 = 1e-5;
+        let (own, nearest) = (point.chirp?, self.chirp_towards(point.point)?);
+        if let (Some(own_ray), Some(nearest_ray)) = (self.ray(own), self.ray(nearest)) {
+            let [own_m, nearest_m] =
+                [own_ray, nearest_ray].map(|ray| off_ray_m(point, ray).length());
+            if own_m <= nearest_m + NEARER_M {
+                return Some(0);
+            }
+        }
+        Some(i64::from(own) - i64::from(nearest))
+    }
+
+    /// Assigns points to chirps by their numbers or by their directions. A stray still counts for the target
+    /// where it lies on its chirp's ray and near where other chirps meet the target: a wide spot sees past the edge.
+    fn assign(&self, cloud: &Cloud, shots: &[Shot], by_number: bool) -> Assignment {
+        let shot_of_chirp: HashMap<u32, usize> =
+            shots.iter().enumerate().map(|(index, shot)| (shot.chirp, index)).collect();
+        let progress = self.chirps.progress();
+        let places: Vec<DVec3> = shots.iter().map(|shot| shot.hit.point.xyz).collect();
+        let target = Nearest::new(&places);
+        let mut observations = vec![Observation::default(); shots.len()];
+        let (mut strays, mut on_target, mut second) = (Vec::new(), 0, 0);
+        let mut past_the_edge = HashSet::new();
+        for point in cloud.points() {
+            let chirp = if by_number { point.chirp } else { self.chirp_towards(point.point) };
+            let index = chirp.and_then(|chirp| shot_of_chirp.get(&chirp).copied());
+            if let Some((shot, observation)) =
+                index.and_then(|index| Some((shots.get(index)?, observations.get_mut(index)?)))
+            {
+                // The chirp meets the target.
+                let range_m = range_m(point, shot);
+                let is_near = off_m(point, shot) <= GATE_M;
+                if is_near && observation.power_w.is_none() {
+                    on_target += 1;
+                    let power_w = Some(point.power_w);
+                    *observation = Observation { power_w, range_m: Some(range_m) };
+                } else {
+                    second += usize::from(is_near);
+                    strays.push(Stray { shot: Some(*shot), range_m });
+                }
+            } else {
+                // The chirp misses, or the scan has no such chirp.
+                let sent = chirp.and_then(|chirp| self.index_of_chirp.get(&chirp).copied());
+                let shot = sent.and_then(|index| missed_shot(self.chirps, &progress, index));
+                let range_m = shot.map_or(0.0, |shot| range_m(point, &shot));
+                if let Some(shot) = shot
+                    && is_past_an_edge(point, &shot, target.as_ref())
+                {
+                    let is_first = past_the_edge.insert(shot.chirp);
+                    on_target += usize::from(is_first);
+                    second += usize::from(!is_first);
+                }
+                strays.push(Stray { shot, range_m });
+            }
+        }
+        Assignment { cloud_match: CloudMatch { observations, strays }, on_target, second }
+    }
+}
+
+/// The directions of a scan whose rays start from one point.
+struct Directions {
+    origin: Point<Global>,
+    tree: Nearest,
+}
+
+impl Directions {
+    fn new(chirps: &Chirps) -> Option<Directions> {
+        const APART_M: f64 = 1e-6;
+        let origin = chirps.rays.first()?.origin;
+        let common = chirps.rays.iter().all(|ray| ray.origin.distance_m(origin) < APART_M);
+        let directions: Vec<DVec3> = chirps.rays.iter().map(|ray| ray.direction.xyz()).collect();
+        let tree = Nearest::new(&directions)?;
+        common.then_some(Directions { origin, tree })
+    }
+
+    fn chirp(&self, chirps: &Chirps, point: Point<Global>) -> Option<u32> {
+        let direction = self.origin.towards(point)?;
+        chirps.number.get(self.tree.find(direction.xyz()).0).copied()
+    }
+}
+
+/// Whether a point lies on its chirp's ray and near the target, which that ray misses.
+fn is_past_an_edge(point: &CloudPoint, shot: &Shot, target: Option<&Nearest>) -> bool {
+    let nearest_m = target.map_or(f64::INFINITY, |target| target.find(point.point.xyz).1);
+    nearest_m <= GATE_M && off_ray_m(point, &shot.ray).length() <= ON_RAY_M
+}
+
+/// Range of a point, m.
+fn range_m(point: &CloudPoint, shot: &Shot) -> f64 {
+    point.range_m.unwrap_or_else(|| shot.ray.origin.distance_m(point.point))
+}
+
+/// The shortest way from a ray to a point, m.
+fn off_ray_m(point: &CloudPoint, ray: &Ray<Global>) -> DVec3 {
+    let along = ray.direction.xyz();
+    let from_origin = point.point.xyz - ray.origin.xyz;
+    from_origin - from_origin.dot(along) * along
+}
+
+/// Distance of a point from where its chirp meets the target: along the ray and across it, m.
+fn off_m(point: &CloudPoint, shot: &Shot) -> f64 {
+    (range_m(point, shot) - shot.hit.range_m).abs() + off_ray_m(point, &shot.ray).length()
+}

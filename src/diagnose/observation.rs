@@ -1,0 +1,29 @@
+//! What a chirp recorded, and what is declared of the receiver.
+
+use crate::effects::MeanEcho;
+
+/// The record of one chirp that meets the target.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Observation {
+    /// Received power, W; `None` where nothing was detected.
+    pub power_w: Option<f64>,
+    /// Range, m; `None` where nothing was detected or the cloud has no range.
+    pub range_m: Option<f64>,
+}
+
+/// Declared properties of the receiver that no effect changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Declared {
+    /// Least power of a detection, W.
+    pub threshold_w: f64,
+    /// Standard deviation of a range, m; 0 where ranges are not to be used.
+    pub range_sd_m: f64,
+}
+
+impl Declared {
+    /// Measured less expected range, m; `None` where either is missing or ranges are not to be used.
+    pub(super) fn range_off_m(&self, arrived: &MeanEcho, seen: &Observation) -> Option<f64> {
+        let range_m = seen.range_m.filter(|_| self.range_sd_m > 0.0 && arrived.range_m > 0.0)?;
+        Some(range_m - arrived.range_m)
+    }
+}

@@ -1,0 +1,202 @@
+//! The data of a diagnosis and their likelihood under a model, with its slopes by every unknown.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use super::likelihood::{Likelihood, Term};
+use super::observation::{Declared, Observation};
+use super::space::Space;
+use crate::effects::{Model, Prediction, PredictionCache, Receiver, Shot, Stage};
+
+/// Shift of the target in a difference quotient, m per step of an effect's parameter.
+const SHIFT_STEP_M: f64 = 2e-3;
+/// Step of a difference quotient by an effect's parameter, in steps of the parameter.
+pub(super) const EFFECT_STEP: f64 = 0.25;
+/// Chirps of a sample; more take time and add little.
+const ENOUGH: usize = 2500;
+
+/// The data of a diagnosis.
+#[derive(Clone, Copy)]
+pub(super) struct Problem<'a> {
+    pub stage: &'a Stage<'a>,
+    pub shots: &'a [Shot],
+    pub observations: &'a [Observation],
+    pub declared: Declared,
+    pub receiver: Receiver,
+    /// Rays already traced for these shots.
+    pub traced: &'a PredictionCache,
+}
+
+impl Problem<'_> {
+    /// The prediction of a point.
+    pub fn predict(&self, space: &Space, at: &DVector<f64>) -> Prediction {
+        space.model(self.receiver, at).predict_with(self.stage, self.shots, self.traced)
+    }
+
+    /// The part of every chirp in the likelihood of a point.
+    pub fn terms(&self, space: &Space, at: &DVector<f64>) -> Vec<Term> {
+        self.terms_of(&space.model(self.receiver, at))
+    }
+
+    /// ln likelihood of a point.
+    pub fn ln_likelihood(&self, space: &Space, at: &DVector<f64>) -> f64 {
+        ln_likelihood(&self.terms(space, at))
+    }
+
+    fn terms_of(&self, model: &Model) -> Vec<Term> {
+        let prediction = model.predict_with(self.stage, self.shots, self.traced);
+        let likelihood = Likelihood::new(&prediction, self.declared);
+        let seen = self.observations.par_iter().enumerate();
+        seen.map(|(shot, seen)| likelihood.term(shot, seen)).collect()
+    }
+
+    /// Slopes of every shot by every unknown: forward differences for scattering models, which are
+    /// smooth, and central ones over wide steps for effects, which facets make rough.
+    pub fn slopes(
+        &self,
+        space: &Space,
+        at: &DVector<f64>,
+        bounds: [&DVector<f64>; 2],
+        here: &[Term],
+    ) -> Vec<Vec<Slope>> {
+        self.slopes_over(EFFECT_STEP, space, at, bounds, here)
+    }
+
+    /// [`Problem::slopes`] with another step of the effects' parameters.
+    pub fn slopes_over(
+        &self,
+        effect_step: f64,
+        space: &Space,
+        at: &DVector<f64>,
+        bounds: [&DVector<f64>; 2],
+        here: &[Term],
+    ) -> Vec<Vec<Slope>> {
+        let is_free = |index: usize| bounds[0][index] < bounds[1][index];
+        // Unknowns that shift the target along one axis share the slopes by that shift.
+        let mut axes = BTreeSet::new();
+        for index in (0..at.len()).filter(|&index| is_free(index)) {
+            axes.extend(space.shift(index, self.shots).map(|shift| shift.axis));
+        }
+        let by_shift: BTreeMap<usize, Vec<Slope>> = axes
+            .into_par_iter()
+            .map(|axis| (axis, self.slopes_by_shift(effect_step * SHIFT_STEP_M, space, at, axis)))
+            .collect();
+        (0..at.len())
+            .into_par_iter()
+            .map(|index| {
+                if !is_free(index) {
+                    return vec![Slope::default(); self.shots.len()];
+                }
+                if let Some(shift) = space.shift(index, self.shots) {
+                    let slopes = self.shots.iter().zip(&by_shift[&shift.axis]);
+                    return slopes
+                        .map(|(shot, slope)| slope.times(shift.per_unit_m(shot)))
+                        .collect();
+                }
+                let difference = space.difference(at, bounds, index, effect_step);
+                let [more, less] = difference.ends.map(|there| {
+                    if there == *at { here.to_vec() } else { self.terms(space, &there) }
+                });
+                quotients(&more, &less, difference.width)
+            })
+            .collect()
+    }
+
+    /// Slopes of every shot by a shift of the target along an axis, per m.
+    fn slopes_by_shift(
+        &self,
+        step_m: f64,
+        space: &Space,
+        at: &DVector<f64>,
+        axis: usize,
+    ) -> Vec<Slope> {
+        let [more, less] = [step_m, -step_m]
+            .map(|by_m| self.terms_of(&space.model(self.receiver, at).shifted(axis, by_m)));
+        quotients(&more, &less, 2.0 * step_m)
+    }
+
+    /// Slopes of ln mean before the receiver by every unknown that changes it. Unlike [`Term::ln_mean`]
+    /// they do not depend on the observations.
+    pub fn mean_slopes(&self, space: &Space, at: &DVector<f64>) -> Vec<Vec<f64>> {
+        let [lower, upper] = space.bounds();
+        let mut all = Vec::new();
+        for index in 0..at.len() {
+            let difference = space.difference(at, [&lower, &upper], index, EFFECT_STEP);
+            let [more, less] = difference.ends.map(|end| self.ln_means(space, &end));
+            let width = difference.width.max(f64::MIN_POSITIVE);
+            let slopes: Vec<f64> = more.iter().zip(less).map(|(a, b)| (a - b) / width).collect();
+            if slopes.iter().any(|slope| *slope != 0.0) {
+                all.push(slopes);
+            }
+        }
+        all
+    }
+
+    /// ln of the mean power of every shot before the receiver.
+    fn ln_means(&self, space: &Space, at: &DVector<f64>) -> Vec<f64> {
+        let prediction = self.predict(space, at);
+        (0..self.shots.len())
+            .map(|shot| prediction.mean_w(shot).max(f64::MIN_POSITIVE).ln())
+            .collect()
+    }
+}
+
+/// Slopes of one shot by one unknown.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Slope {
+    pub ln_p: f64,
+    pub ln_mean: f64,
+    pub range_m: f64,
+}
+
+impl Slope {
+    fn times(self, by: f64) -> Slope {
+        let Slope { ln_p, ln_mean, range_m } = self;
+        Slope { ln_p: by * ln_p, ln_mean: by * ln_mean, range_m: by * range_m }
+    }
+}
+
+/// Slopes of all shots from their terms at two points a distance `width` apart; zero where that is zero.
+fn quotients(more: &[Term], less: &[Term], width: f64) -> Vec<Slope> {
+    let per_width = if width > 0.0 { 1.0 / width } else { 0.0 };
+    let pairs = more.iter().zip(less);
+    pairs
+        .map(|(a, b)| {
+            let (ln_p, ln_mean) = (a.ln_p - b.ln_p, a.ln_mean - b.ln_mean);
+            Slope { ln_p, ln_mean, range_m: a.range_m - b.range_m }.times(per_width)
+        })
+        .collect()
+}
+
+/// ln likelihood.
+pub(super) fn ln_likelihood(terms: &[Term]) -> f64 {
+    terms.iter().map(|term| term.ln_p).sum()
+}
+
+/// Equally spaced shots of a scan.
+pub(super) struct Sample {
+    shots: Vec<Shot>,
+    observations: Vec<Observation>,
+    traced: PredictionCache,
+    /// Shots of the scan per shot of the sample.
+    pub weight: f64,
+}
+
+impl Sample {
+    /// A sample of the shots of a problem.
+    pub fn new(problem: &Problem) -> Sample {
+        let every = (problem.shots.len() / ENOUGH).max(1);
+        let shots: Vec<Shot> = problem.shots.iter().step_by(every).copied().collect();
+        let observations = problem.observations.iter().step_by(every).copied().collect();
+        let weight = problem.shots.len() as f64 / shots.len().max(1) as f64;
+        Sample { shots, observations, traced: PredictionCache::default(), weight }
+    }
+
+    /// The problem of the sample alone.
+    pub fn problem<'a>(&'a self, whole: &Problem<'a>) -> Problem<'a> {
+        let Sample { shots, observations, traced, .. } = self;
+        Problem { shots, observations, traced, ..*whole }
+    }
+}

@@ -1,0 +1,51 @@
+//! What a model leaves unexplained, by all tests together.
+
+use super::covariates::covariates;
+use super::field::Structure;
+use super::problem::Problem;
+use super::residual::{self, Unexplained, speckle_sd_db};
+use super::scatter::Tests;
+use super::scorer::{SHARE_OF_FORM, Scorer};
+use super::settings::Diagnosis;
+use crate::effects::Prediction;
+
+/// The final model as the tests see it.
+pub(super) struct Remainder<'a> {
+    pub prediction: &'a Prediction,
+    /// Randomised quantile residuals.
+    pub z: &'a [f64],
+    /// Structure of the means; `None` where a field finds none.
+    pub structure: Option<&'a Structure>,
+    /// Size of the largest effect of the model, dB.
+    pub largest_db: f64,
+    /// Detections far off the target.
+    pub off_target: usize,
+}
+
+/// Every structure that exceeds chance, strongest first.
+pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<Unexplained> {
+    let Remainder { prediction, z, structure, largest_db, off_target } = *remainder;
+    let Problem { shots, observations, declared, .. } = scorer.problem;
+    let covariates = covariates(shots, prediction, observations);
+    let tests = tests(scorer.settings, largest_db);
+    let mut found = tests.run(z, shots, prediction, &covariates, scorer.folds);
+    if let Some(structure) = structure {
+        found.extend(residual::of_field(structure));
+    }
+    let neighbours = scorer.shared(prediction, z);
+    if scorer.is_shared(&neighbours, largest_db) {
+        found.push(neighbours);
+    }
+    found.extend(residual::outliers(z, prediction, declared, observations, off_target));
+    found.extend(residual::steps(observations));
+    found.extend(residual::skewness(z, speckle_sd_db(prediction.receiver.looks)));
+    found.sort_by(|a, b| b.strength_db.total_cmp(&a.strength_db));
+    found
+}
+
+/// The tests of the scatter beside effects of this size.
+fn tests(settings: &Diagnosis, largest_db: f64) -> Tests {
+    let Diagnosis { seed, draws, block_m, family_error, .. } = *settings;
+    let least_size_db = settings.least_size_db.max(SHARE_OF_FORM * largest_db);
+    Tests { seed, draws, block_m, family_error, least_size_db }
+}

@@ -1,0 +1,158 @@
+//! The steps of a diagnosis.
+
+use super::answer::{self, Column};
+use super::choose::{Choice, choose_effects};
+use super::controls::controls;
+use super::error::DiagnoseError;
+use super::evidence::Candidate;
+use super::folds::Folds;
+use super::matching::MOST_STRAYS;
+use super::problem::{Problem, Sample};
+use super::remains::{Remainder, find_unexplained};
+use super::report::{Controls, Report, SCHEMA, Verdict};
+use super::residual;
+use super::score::Errors;
+use super::scorer::{Scorer, State, with_wide_speckle};
+use super::settings::Diagnosis;
+use super::space::Space;
+use super::subject::Subject;
+use super::trial::Search;
+use crate::effects::{Effect, PredictionCache};
+
+/// Multiple of the noise floor beyond which the target is another one: structure that no effect explains leaves less
+/// than two.
+const MOST_FLOORS: f64 = 3.0;
+/// Share of chirps far off the refitted model from which no effect explains them.
+const MOST_WILD: f64 = 0.25;
+
+impl Diagnosis {
+    /// Diagnoses a scan, trying these effects.
+    ///
+    /// # Errors
+    /// When the data are too few for an answer, or a declaration has no meaning.
+    pub fn run(&self, subject: &Subject, effects: &[&dyn Effect]) -> Result<Report, DiagnoseError> {
+        self.run_with(subject, effects, &|_| ())
+    }
+
+    /// As [`Diagnosis::run`]; `notify` receives a few words about each step.
+    ///
+    /// # Errors
+    /// As [`Diagnosis::run`].
+    pub fn run_with(
+        &self,
+        subject: &Subject,
+        effects: &[&dyn Effect],
+        notify: &(dyn Fn(&str) + Sync),
+    ) -> Result<Report, DiagnoseError> {
+        let Subject { stage, laws, at_work, receiver, declared, .. } = *subject;
+        let Subject { shots, observations, .. } = *subject;
+        let folds = &Folds::new(shots, self.block_m, self.folds, self.seed);
+        subject.check(folds)?;
+        let traced = &PredictionCache::default();
+        let problem = Problem { stage, shots, observations, declared, receiver, traced };
+        let sample = &Sample::new(&problem);
+        let scorer = Scorer { problem, folds, settings: self };
+        let search = Search { scorer, sample, notify };
+
+        notify("refitting the scattering models");
+        let base = scorer.base(sample, Space::new(shots, receiver.looks, laws, at_work)?);
+        refuse_another_target(&scorer, &base)?;
+
+        let choice = choose_effects(&search, base.clone(), effects);
+        let off_target = detections_off_target(&scorer, subject, &choice.model.state)?;
+        refuse_a_poor_fit(&scorer.errors(&choice.model.state.held_out))?;
+
+        notify("controls");
+        let controls = controls(&search, &base, effects, numbers_of_controls(&choice.ranking));
+
+        notify("testing the remainder");
+        Ok(report(subject, &scorer, &base, choice, off_target, controls))
+    }
+}
+
+/// Tests what the final model leaves unexplained, and reports everything.
+fn report(
+    subject: &Subject,
+    scorer: &Scorer,
+    base: &State,
+    Choice { model, ranking, structure }: Choice,
+    off_target: usize,
+    controls: Controls,
+) -> Report {
+    let State { space, fit, held_out } = &model.state;
+    let prediction = &scorer.predict(&model.state);
+    let [z_before, z] = [&scorer.predict(base), prediction].map(|prediction| scorer.z(prediction));
+    let largest_db = model.largest().size_db;
+    let structure =
+        Some(&structure).filter(|structure| scorer.is_structured(structure, largest_db));
+    let remainder = Remainder { prediction, z: &z, structure, largest_db, off_target };
+    let unexplained = find_unexplained(scorer, &remainder);
+    // Held-out errors without and with the effects, and with the field.
+    let errors = [&base.held_out, held_out].map(|held_out| scorer.errors(held_out));
+    let with_unknown = structure.map(|structure| {
+        scorer.errors(&scorer.held_out_with(space, &fit.at, &structure.ln_factor))
+    });
+    let unknown = structure.map(|structure| prediction.as_passed(&structure.ln_factor));
+    let columns = [Column { state: base, z: &z_before }, Column { state: &model.state, z: &z }];
+    let unknown = &unknown.unwrap_or_default();
+    let sd = scorer.problem.sd(space, &fit.at);
+    Report {
+        schema: SCHEMA,
+        verdict: Verdict::new(!model.added.is_empty(), !unexplained.is_empty()),
+        effects: answer::effects(&model, &sd, subject.shots),
+        ranking,
+        unexplained,
+        error: answer::before_after(scorer, errors, with_unknown),
+        set_aside: subject.strays.len(),
+        controls,
+        base: answer::base(subject, &model.state, &sd),
+        laws: space.model(subject.receiver, &fit.at).laws,
+        rows: answer::rows(subject, prediction, scorer.folds, columns, unknown),
+    }
+}
+
+/// Refuses data that the refitted base is far off in many places. Judged with much speckle: that there is some
+/// may be found later, by an effect.
+fn refuse_another_target(scorer: &Scorer, base: &State) -> Result<(), DiagnoseError> {
+    let receiver = with_wide_speckle(scorer.problem.receiver);
+    let problem = Problem { receiver, ..scorer.problem };
+    let wide = Scorer { problem, ..*scorer };
+    let wild = residual::outlying_powers(&wide.z(&wide.predict(base)));
+    let shots = scorer.problem.shots.len();
+    if wild as f64 > MOST_WILD * shots as f64 {
+        return Err(DiagnoseError::Unlike { wild, shots });
+    }
+    Ok(())
+}
+
+/// Number of detections off the target, or a refusal if they are many. Detections past an edge are assigned to a wide
+/// spot at first, which the model may not have.
+fn detections_off_target(
+    scorer: &Scorer,
+    subject: &Subject,
+    state: &State,
+) -> Result<usize, DiagnoseError> {
+    let model = state.space.model(scorer.problem.receiver, &state.fit.at);
+    let strays = subject.strays.iter();
+    let off = strays.filter(|stray| !stray.is_on_target(&model, subject.stage)).count();
+    let points = subject.strays.len() + subject.detected();
+    if off as f64 > MOST_STRAYS * points as f64 {
+        return Err(DiagnoseError::Elsewhere { matched: points - off, points });
+    }
+    Ok(off)
+}
+
+/// Refuses a model that is far from the data with all effects found.
+fn refuse_a_poor_fit(errors: &Errors) -> Result<(), DiagnoseError> {
+    let Errors { rmse_db, noise_floor_db, .. } = *errors;
+    if rmse_db > MOST_FLOORS * noise_floor_db {
+        return Err(DiagnoseError::FarOff { rmse_db, noise_floor_db });
+    }
+    Ok(())
+}
+
+/// Parameters of the first effect that was added, or else of the one that gained most.
+fn numbers_of_controls(ranking: &[Candidate]) -> usize {
+    let first = ranking.iter().find(|candidate| candidate.accepted).or(ranking.first());
+    first.map_or(1, |candidate| candidate.numbers)
+}

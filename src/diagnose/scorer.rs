@@ -1,0 +1,196 @@
+//! What a model is worth: its score on patches of the scan that took no part in its fit, and the structure
+//! that it leaves unexplained.
+
+use nalgebra::DVector;
+
+use super::covariates::covariates;
+use super::field::{Field, Model, Structure, scaled, terms};
+use super::folds::Folds;
+use super::problem::{Problem, Sample};
+use super::refit::{Fit, SCOUT, SEARCH};
+use super::residual::{self, Unexplained, speckle_sd_db};
+use super::score::{Errors, Score, errors, scores};
+use super::settings::Diagnosis;
+use super::size::Size;
+use super::space::Space;
+use crate::effects::{Prediction, Receiver};
+
+/// Share of the largest effect's size below which structure may be an error of that effect's form.
+pub(super) const SHARE_OF_FORM: f64 = 0.25;
+/// Standard errors by which a field's held-out gain must exceed zero.
+const FIELD_ERRORS: f64 = 3.0;
+/// Probability by chance below which the correlation of neighbours counts.
+const CHANCE: f64 = 1e-3;
+/// Most looks in the first fit of the base, which starts far from the data, and in the test whether the data are
+/// of the right target.
+const WIDE_LOOKS: f64 = 4.0;
+
+/// Judges models on held-out patches.
+#[derive(Clone, Copy)]
+pub(super) struct Scorer<'p> {
+    pub problem: Problem<'p>,
+    pub folds: &'p Folds,
+    pub settings: &'p Diagnosis,
+}
+
+/// A model, fitted to all shots, with its held-out scores.
+#[derive(Clone)]
+pub(super) struct State<'a> {
+    pub space: Space<'a>,
+    pub fit: Fit,
+    /// Score of every shot by a fit without its fold.
+    pub held_out: Vec<Score>,
+}
+
+impl Scorer<'_> {
+    /// A fitted model with its held-out scores.
+    pub fn state<'a>(&self, space: Space<'a>, fit: Fit) -> State<'a> {
+        let held_out = self.held_out(&space, &fit.at);
+        State { space, fit, held_out }
+    }
+
+    /// The model without effects. A sample gives the start.
+    pub fn base<'a>(&self, sample: &Sample, space: Space<'a>) -> State<'a> {
+        let receiver = with_wide_speckle(self.problem.receiver);
+        let wide = Problem { receiver, ..sample.problem(&self.problem) };
+        let near = wide.fit(&space, &space.start(), &[], &SEARCH).at;
+        // The scene's own scattering models may fit better, as to a cloud without speckle that it rendered.
+        let [ln_near, ln_own] =
+            [&near, &space.start()].map(|at| self.problem.ln_likelihood(&space, at));
+        let start = if ln_near > ln_own { near } else { space.start() };
+        let fit = self.problem.fit(&space, &start, &[], &SEARCH);
+        self.state(space, fit)
+    }
+
+    /// The model without one of its effects, refitted.
+    pub fn without<'a>(&self, state: &State<'a>, index: usize) -> State<'a> {
+        let (space, start) = state.space.without(&state.fit.at, index);
+        let fit = self.problem.fit(&space, &start, &[], &SEARCH);
+        self.state(space, fit)
+    }
+
+    /// The model with an effect that is accepted, refitted with everything free that its trial kept fixed.
+    pub fn settle<'a>(
+        &self,
+        before: &State,
+        space: Space<'a>,
+        mut fit: Fit,
+        mut held_out: Vec<Score>,
+    ) -> State<'a> {
+        if !before.space.costly(&before.fit.at).is_empty() {
+            fit = self.problem.fit(&space, &fit.at, &[], &SCOUT);
+            held_out = self.held_out(&space, &fit.at);
+        }
+        // Scattering models fitted without the effect may be far from those that fit best with it.
+        let (start, held) = (space.restarted(&fit.at), space.costly(&fit.at));
+        let again = self.problem.fit(&space, &start, &held, &SEARCH);
+        let gain = again.ln_likelihood - fit.ln_likelihood;
+        let has_arrived = again.converged && !fit.converged && gain >= -SEARCH.tolerance;
+        if gain > SEARCH.tolerance || has_arrived {
+            fit = if held.is_empty() {
+                again
+            } else {
+                self.problem.fit(&space, &again.at, &[], &SCOUT)
+            };
+            held_out = self.held_out(&space, &fit.at);
+        }
+        State { space, fit, held_out }
+    }
+
+    /// Score of every shot by a fit without its fold.
+    pub fn held_out(&self, space: &Space, at: &DVector<f64>) -> Vec<Score> {
+        self.held_out_with(space, at, &[])
+    }
+
+    /// Held-out scores with factors on the means, given by their logarithms.
+    pub fn held_out_with(&self, space: &Space, at: &DVector<f64>, ln_factor: &[f64]) -> Vec<Score> {
+        let Problem { declared, observations, .. } = self.problem;
+        let mut all: Vec<(usize, Score)> = Vec::new();
+        for (fold, at) in self.problem.fit_without(space, at, self.folds).enumerate() {
+            let prediction = scaled(self.problem.predict(space, &at), ln_factor);
+            let is_held_out = |shot| self.folds.holds_out(fold, shot);
+            all.extend(scores(&prediction, declared, observations, is_held_out));
+        }
+        all.sort_by_key(|(shot, _)| *shot);
+        all.into_iter().map(|(_, score)| score).collect()
+    }
+
+    /// Difference in ln p of all shots, and its standard error.
+    pub fn difference(&self, a: &[Score], b: &[Score]) -> [f64; 2] {
+        let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a.ln_p - b.ln_p).collect();
+        self.folds.sum(&differences)
+    }
+
+    /// Errors of held-out scores.
+    pub fn errors(&self, held_out: &[Score]) -> Errors {
+        errors(held_out, self.folds)
+    }
+
+    /// Whether held-out errors grow by more than their standard error.
+    pub fn is_farther_off(&self, now: &[Score], before: &[Score]) -> bool {
+        let [now, before] = [now, before].map(|scores| self.errors(scores));
+        now.rmse_db > before.rmse_db + now.rmse_se_db
+    }
+
+    /// The prediction of a model.
+    pub fn predict(&self, state: &State) -> Prediction {
+        self.problem.predict(&state.space, &state.fit.at)
+    }
+
+    /// Change of the data by a model with more effects.
+    pub fn size(&self, state: &State, space: &Space, at: &DVector<f64>) -> Size {
+        let before = self.predict(state);
+        Size::of(self.problem.observations, &before, &self.problem.predict(space, at))
+    }
+
+    /// Randomised quantile residual of every shot.
+    pub fn z(&self, prediction: &Prediction) -> Vec<f64> {
+        let Problem { declared, observations, .. } = self.problem;
+        residual::z(prediction, declared, observations, self.settings.seed)
+    }
+
+    /// The residual that neighbours share.
+    pub fn shared(&self, prediction: &Prediction, z: &[f64]) -> Unexplained {
+        let sd_db = speckle_sd_db(prediction.receiver.looks);
+        let spot_m = self.problem.stage.geometry.radar.spot_diameter_m;
+        residual::of_neighbours(z, self.problem.shots, spot_m, sd_db, self.folds)
+    }
+
+    /// The structure that a field finds beside a model.
+    pub fn structure(&self, state: &State) -> Structure {
+        let problem = &self.problem;
+        let prediction = &self.predict(state);
+        let covariates = covariates(problem.shots, prediction, problem.observations);
+        let slopes = &problem.mean_slopes(&state.space, &state.fit.at);
+        let model = Model { problem, prediction, slopes };
+        Field::new(problem.shots, &covariates).structure(model, self.folds)
+    }
+
+    /// Whether the structure of a field exceeds chance and a possible error of the form of the largest effect.
+    pub fn is_structured(&self, structure: &Structure, largest_db: f64) -> bool {
+        let [gain, se] = structure.gain;
+        gain > FIELD_ERRORS * se && structure.size_db >= self.least_structure_db(largest_db)
+    }
+
+    /// Whether the residual that neighbours share exceeds chance and a possible error of the form of the largest
+    /// effect.
+    pub fn is_shared(&self, neighbours: &Unexplained, largest_db: f64) -> bool {
+        neighbours.p_value < CHANCE && neighbours.strength_db >= self.least_structure_db(largest_db)
+    }
+
+    fn least_structure_db(&self, largest_db: f64) -> f64 {
+        self.settings.least_structure_db.max(SHARE_OF_FORM * largest_db)
+    }
+
+    /// ln likelihood of a fit with the means corrected by a field.
+    pub fn ln_likelihood_with(&self, space: &Space, fit: &Fit, structure: &Structure) -> f64 {
+        let prediction = self.problem.predict(space, &fit.at);
+        let terms = terms(&self.problem, &prediction, &structure.ln_factor);
+        terms.iter().map(|term| term.ln_p).sum()
+    }
+}
+
+/// The receiver with much speckle, under which no shot of the right target is far off.
+pub(super) fn with_wide_speckle(receiver: Receiver) -> Receiver {
+    Receiver { looks: receiver.looks.min(WIDE_LOOKS), ..receiver }
+}

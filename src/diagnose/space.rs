@@ -1,0 +1,284 @@
+//! The unknowns of a model: the coordinates of every scattering model that is fitted, and after them the
+//! parameters of the effects in units of their steps.
+
+use nalgebra::DVector;
+
+use crate::brdf::Brdf;
+use crate::effects::{Effect, Model, Receiver, Shot, rank};
+use crate::fit::FitError;
+use crate::fit::coordinates::{Coordinates, frequencies};
+
+/// Chirps that must meet a region for its scattering model to be fitted.
+pub(crate) const LEAST_SHOTS: usize = 100;
+/// Step of a difference quotient by a coordinate of a scattering model.
+const LAW_STEP: f64 = 5e-4;
+
+/// The unknowns of a model.
+#[derive(Clone)]
+pub(super) struct Space<'a> {
+    laws: Vec<Brdf>,
+    /// Regions whose scattering models are fitted, and the coordinates of these.
+    free: Vec<(usize, Coordinates)>,
+    /// Effects at declared values.
+    declared: &'a [(&'a dyn Effect, Vec<f64>)],
+    pub effects: Vec<&'a dyn Effect>,
+}
+
+/// A parameter of a scattering model at a point of the space.
+pub(super) struct LawValue {
+    pub region: usize,
+    pub name: String,
+    pub value: f64,
+    /// Change of the value by its unknown.
+    pub slope: f64,
+}
+
+/// Two points that differ in one unknown.
+pub(super) struct Difference {
+    pub ends: [DVector<f64>; 2],
+    /// Difference of the unknown.
+    pub width: f64,
+}
+
+/// An unknown that does nothing but shift the target along an axis.
+pub(super) struct Shift<'a> {
+    effect: &'a dyn Effect,
+    number: usize,
+    /// 0, 1 or 2 for x, y or z.
+    pub axis: usize,
+    step: f64,
+}
+
+impl Shift<'_> {
+    /// Shift of the target at a shot per unit of the unknown, m.
+    pub fn per_unit_m(&self, shot: &Shot) -> f64 {
+        self.effect.shifts(self.number, shot).map_or(0.0, |(_, per_unit)| per_unit * self.step)
+    }
+}
+
+impl<'a> Space<'a> {
+    /// A space without effects. Regions that fewer than [`LEAST_SHOTS`] chirps meet keep their scattering models.
+    pub fn new(
+        shots: &[Shot],
+        looks: f64,
+        laws: &[Brdf],
+        declared: &'a [(&'a dyn Effect, Vec<f64>)],
+    ) -> Result<Space<'a>, FitError> {
+        let mut free = Vec::new();
+        for (region, law) in laws.iter().enumerate() {
+            let here = shots.iter().filter(|shot| usize::from(shot.region) == region);
+            if here.count() >= LEAST_SHOTS {
+                let coordinates = Coordinates::new(law, &frequencies(law), &[], Some(looks))?;
+                free.push((region, coordinates));
+            }
+        }
+        Ok(Space { laws: laws.to_vec(), free, declared, effects: Vec::new() })
+    }
+
+    /// The space with one more effect.
+    pub fn with(&self, effect: &'a dyn Effect) -> Space<'a> {
+        let mut space = self.clone();
+        space.effects.push(effect);
+        space
+    }
+
+    /// The space without one of its effects, and a point without the parameters of that effect.
+    pub fn without(&self, at: &DVector<f64>, index: usize) -> (Space<'a>, DVector<f64>) {
+        let mut space = self.clone();
+        let before: usize =
+            self.effects.iter().take(index).map(|effect| effect.parameters().len()).sum();
+        let removed = space.effects.remove(index).parameters().len();
+        let first = self.base_len() + before;
+        (space, at.clone().remove_rows(first, removed))
+    }
+
+    /// The space with its first effect as the last, and a point reordered in the same way.
+    pub fn rotated(&self, at: &DVector<f64>) -> (Space<'a>, DVector<f64>) {
+        let values = self.effect_values(at).into_iter().next();
+        let Some((&first, values)) = self.effects.first().zip(values) else {
+            return (self.clone(), at.clone());
+        };
+        let (space, at) = self.without(at, 0);
+        (space.with(first), Space::joined(&at, first, &values))
+    }
+
+    /// Whether the space has an effect of this name.
+    pub fn has(&self, name: &str) -> bool {
+        self.effects.iter().any(|effect| effect.name() == name)
+    }
+
+    /// Unknowns of the effects for which rays must be traced anew. They are few, and another effect
+    /// hardly changes them.
+    pub fn costly(&self, at: &DVector<f64>) -> Vec<usize> {
+        let mut first = self.base_len();
+        let mut costly = Vec::new();
+        for (effect, values) in self.effects.iter().zip(self.effect_values(at)) {
+            let next = first + values.len();
+            if effect.moves() || effect.survey_key(&values).is_some_and(|on| !on.is_empty()) {
+                costly.extend(first..next);
+            }
+            first = next;
+        }
+        costly
+    }
+
+    /// Unknowns of the effects that move the target.
+    pub fn moving(&self) -> Vec<usize> {
+        let mut first = self.base_len();
+        let mut moving = Vec::new();
+        for effect in &self.effects {
+            let next = first + effect.parameters().len();
+            if effect.moves() {
+                moving.extend(first..next);
+            }
+            first = next;
+        }
+        moving
+    }
+
+    /// The effect of an unknown and the number of its parameter; none for unknowns of scattering models.
+    fn parameter(&self, index: usize) -> Option<(&'a dyn Effect, usize)> {
+        let mut number = index.checked_sub(self.base_len())?;
+        for effect in &self.effects {
+            if number < effect.parameters().len() {
+                return Some((*effect, number));
+            }
+            number -= effect.parameters().len();
+        }
+        None
+    }
+
+    /// An unknown as a shift of the target; `None` for an unknown that does anything else.
+    pub fn shift(&self, index: usize, shots: &[Shot]) -> Option<Shift<'a>> {
+        let (effect, number) = self.parameter(index)?;
+        let (axis, _) = effect.shifts(number, shots.first()?)?;
+        Some(Shift { effect, number, axis, step: effect.parameters()[number].step })
+    }
+
+    /// Number of unknowns of the scattering models, which come first.
+    pub fn base_len(&self) -> usize {
+        self.free.iter().map(|(_, coordinates)| coordinates.len()).sum()
+    }
+
+    /// Start of the unknowns of the scattering models.
+    pub fn start(&self) -> DVector<f64> {
+        let mut start = Vec::new();
+        for (_, coordinates) in &self.free {
+            start.extend(coordinates.start().iter());
+        }
+        DVector::from_vec(start)
+    }
+
+    /// A point with the scattering models back at their start.
+    pub fn restarted(&self, at: &DVector<f64>) -> DVector<f64> {
+        let effects = at.iter().skip(self.base_len());
+        DVector::from_vec(self.start().iter().chain(effects).copied().collect())
+    }
+
+    /// Two points about another that differ in one unknown. Scattering models are smooth, so that one of the
+    /// two is the point itself; the parameters of effects are moved to both sides.
+    pub fn difference(
+        &self,
+        at: &DVector<f64>,
+        bounds: [&DVector<f64>; 2],
+        index: usize,
+        effect_step: f64,
+    ) -> Difference {
+        let is_law = index < self.base_len();
+        let step = if is_law { LAW_STEP } else { effect_step };
+        let more = moved(at, bounds, index, step);
+        let is_one_sided = is_law && more[index] > at[index];
+        let less = if is_one_sided { at.clone() } else { moved(at, bounds, index, -step) };
+        let width = more[index] - less[index];
+        Difference { ends: [more, less], width }
+    }
+
+    /// A point with the parameters of one more effect.
+    pub fn joined(at: &DVector<f64>, effect: &dyn Effect, values: &[f64]) -> DVector<f64> {
+        let parameters = effect.parameters().iter().zip(values);
+        let more = parameters.map(|(known, value)| value.clamp(known.min, known.max) / known.step);
+        DVector::from_iterator(at.len() + effect.parameters().len(), at.iter().copied().chain(more))
+    }
+
+    /// Every fitted parameter of the scattering models.
+    pub fn base_values(&self, at: &DVector<f64>) -> Vec<LawValue> {
+        let mut unknowns = at.iter();
+        let mut values = Vec::new();
+        for (region, coordinates) in &self.free {
+            for (known, &u) in coordinates.list.iter().zip(unknowns.by_ref()) {
+                let (value, slope) = (known.value(u), known.slope(u));
+                values.push(LawValue { region: *region, name: known.name.clone(), value, slope });
+            }
+        }
+        values
+    }
+
+    /// Parameter values of every effect.
+    pub fn effect_values(&self, at: &DVector<f64>) -> Vec<Vec<f64>> {
+        let mut rest = at.iter().skip(self.base_len());
+        let mut all = Vec::new();
+        for effect in &self.effects {
+            let parameters =
+                effect.parameters().iter().zip(rest.by_ref().take(effect.parameters().len()));
+            all.push(
+                parameters.map(|(known, u)| (u * known.step).clamp(known.min, known.max)).collect(),
+            );
+        }
+        all
+    }
+
+    /// How many parameters of the last effect are in use. Each one of a pose is, however small; others are where they
+    /// differ from their absent value by more than a step.
+    pub fn parameters_in_use(&self, at: &DVector<f64>) -> usize {
+        let Some((effect, values)) = self.effects.last().zip(self.effect_values(at).pop()) else {
+            return 0;
+        };
+        let parameters = effect.parameters().iter().zip(values);
+        parameters
+            .filter(|(known, value)| effect.moves() || (value - known.absent).abs() > known.step)
+            .count()
+    }
+
+    /// The model at a point.
+    pub fn model(&self, receiver: Receiver, at: &DVector<f64>) -> Model<'a> {
+        let mut laws = self.laws.clone();
+        let mut from = 0;
+        for (region, coordinates) in &self.free {
+            let part = at.rows(from, coordinates.len()).into_owned();
+            from += coordinates.len();
+            if let Some(law) = laws.get_mut(*region) {
+                *law = coordinates.model(&part);
+            }
+        }
+        let found = self.effects.iter().copied().zip(self.effect_values(at));
+        let mut effects: Vec<_> = self.declared.iter().cloned().chain(found).collect();
+        effects.sort_by_key(|(effect, _)| rank(effect.name()));
+        Model { laws, receiver, effects }
+    }
+
+    /// Least and largest value of every unknown.
+    pub fn bounds(&self) -> [DVector<f64>; 2] {
+        let (mut lower, mut upper) = (Vec::new(), Vec::new());
+        for (_, coordinates) in &self.free {
+            lower.extend(coordinates.lower().iter());
+            upper.extend(coordinates.upper().iter());
+        }
+        for known in self.effects.iter().flat_map(|effect| effect.parameters()) {
+            lower.push(known.min / known.step);
+            upper.push(known.max / known.step);
+        }
+        [DVector::from_vec(lower), DVector::from_vec(upper)]
+    }
+}
+
+/// A point with one unknown moved within bounds.
+fn moved(
+    at: &DVector<f64>,
+    [lower, upper]: [&DVector<f64>; 2],
+    index: usize,
+    by: f64,
+) -> DVector<f64> {
+    let mut there = at.clone();
+    there[index] = (at[index] + by).clamp(lower[index], upper[index]);
+    there
+}
