@@ -3,12 +3,18 @@
 //!     cargo bench --bench diagnose
 //!     cargo bench --bench diagnose -- json     a line for each
 //!
-//! Every scan is rendered first, and the time of that, in the same run, is the measure: machines
+//! Every scan is rendered first, and the time of that, without its files, in the same run, is the measure: machines
 //! differ, and their clocks drift. The goal is 60 s on two cores.
 
 use std::path::Path;
-use std::process::Command;
 use std::time::Instant;
+
+use matdb::diagnose::{MeasuredScene, Report};
+use matdb::effects::library;
+use matdb::error::Error;
+use matdb::measure::{Cloud, CloudPoint};
+use matdb::render::trace_placed;
+use matdb::setup::ReadyScene;
 
 /// What is hidden in a scan: its name, and what the scene that made it says of it.
 const HIDDEN: [(&str, &str); 8] = [
@@ -26,10 +32,10 @@ const HIDDEN: [(&str, &str); 8] = [
     ("multi-bounce", "[[effect]]\nname = 'multi-bounce'\ncoupling_db = 10.0\n"),
 ];
 
-fn main() {
+fn main() -> Result<(), Error> {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let bench = std::fs::read_to_string(root.join("scenes/bench.toml")).expect("the scene");
+    let declared = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bench.toml");
+    let bench = std::fs::read_to_string(&declared).expect("the scene");
     let json = std::env::args().any(|argument| argument == "json");
     if !json {
         println!("hidden          diagnosis     render      ratio   verdict");
@@ -37,45 +43,62 @@ fn main() {
     for (name, effect) in HIDDEN {
         let scene = folder.path().join(format!("{name}.toml"));
         std::fs::write(&scene, format!("{bench}\n{effect}")).expect("room for a scene");
-        let (made, why) = (folder.path().join(name), folder.path().join(format!("why-{name}")));
-        let render_s = seconds(&["render".as_ref(), scene.as_ref(), "-o".as_ref(), made.as_ref()]);
-        let (cloud, declared) = (made.join("cloud.ply"), root.join("scenes/bench.toml"));
-        let diagnose_s = seconds(&[
-            "diagnose".as_ref(),
-            cloud.as_ref(),
-            "--scene".as_ref(),
-            declared.as_ref(),
-            "-o".as_ref(),
-            why.as_ref(),
-        ]);
+        let begun = Instant::now();
+        let cloud = rendered(&scene)?;
+        let render_s = begun.elapsed().as_secs_f64();
+        let begun = Instant::now();
+        let report = diagnosed(&declared, &cloud)?;
+        let diagnose_s = begun.elapsed().as_secs_f64();
         let ratio = diagnose_s / render_s;
-        let said = verdict(&why.join("report.json"));
-        match json {
-            true => println!(
-                "{}",
-                serde_json::json!({
-                    "hidden": name, "diagnose_s": diagnose_s, "render_s": render_s, "said": said,
-                })
-            ),
-            false => {
-                println!("{name:<14} {diagnose_s:>8.1} s {render_s:>8.2} s {ratio:>10.0}   {said}")
-            }
+        let said = verdict(&report);
+        if json {
+            let row = serde_json::json!({
+                "hidden": name, "diagnose_s": diagnose_s, "render_s": render_s, "said": said,
+            });
+            println!("{row}");
+        } else {
+            println!("{name:<14} {diagnose_s:>8.1} s {render_s:>8.2} s {ratio:>10.0}   {said}");
         }
     }
+    Ok(())
 }
 
-fn seconds(arguments: &[&std::ffi::OsStr]) -> f64 {
-    let begun = Instant::now();
-    let mut matdb = Command::new(env!("CARGO_BIN_EXE_matdb"));
-    let status = matdb.env_remove("MATDB").arg("--quiet").args(arguments).status();
-    assert!(status.expect("the program runs").success(), "{arguments:?}");
-    begun.elapsed().as_secs_f64()
+/// The detections of a scene as a cloud.
+fn rendered(scene: &Path) -> Result<Cloud, Error> {
+    let ready = ReadyScene::open(scene, None)?;
+    let assembly = ready.assemble();
+    let setup = assembly.setup();
+    let footprints = trace_placed(&setup, ready.scene.file.spot.rays, &|_| ())
+        .map_err(|error| ready.render_error("", error))?;
+    let views = assembly.views(&setup, &footprints, &|_| ())?;
+    let mut points = Vec::new();
+    for echo in views[0].scan.detections() {
+        points.push(CloudPoint {
+            chirp: Some(echo.chirp),
+            point: echo.point,
+            range_m: Some(echo.range_m),
+            power_w: echo.power_w,
+        });
+    }
+    Ok(Cloud::new(points).expect("a scan with detections"))
+}
+
+/// What a scene lacks to explain a cloud.
+fn diagnosed(scene: &Path, cloud: &Cloud) -> Result<Report, Error> {
+    let ready = ReadyScene::open(scene, None)?;
+    let model = ready.model();
+    let measured = MeasuredScene {
+        scene: &ready.scene,
+        cloud,
+        laws: &ready.laws(),
+        declared_effects: model.as_ref().map_or(&[][..], |model| &model.effects),
+    };
+    Ok(measured.diagnose(0, &library(), &|_| ())?)
 }
 
 /// The verdict and the names of a report.
-fn verdict(report: &Path) -> String {
-    let bytes = std::fs::read(report).expect("a report");
-    let report: serde_json::Value = serde_json::from_slice(&bytes).expect("JSON");
+fn verdict(report: &Report) -> String {
+    let report = serde_json::json!(report);
     let names = report["effects"].as_array().into_iter().flatten();
     let names: Vec<&str> = names.filter_map(|effect| effect["name"].as_str()).collect();
     format!("{}: {}", report["verdict"].as_str().unwrap_or("none"), names.join(", "))
