@@ -117,7 +117,7 @@ impl<'a> CloudRequest<'a> {
             }
         }
         if choice.tried.is_empty() {
-            let names: Vec<&str> = self.effects.iter().map(|effect| effect.name()).collect();
+            let names: Vec<&str> = asked.iter().map(|effect| effect.name()).collect();
             return Err(Error::Usage {
                 problem: format!("the scene declares {} already", names.join(", ")),
                 way_out: "name other effects, or diagnose with the scene that lacks them"

@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use super::layout::DATABASE;
 use super::problem::{Problem, problem};
 use crate::fit::again::{lacks_report, problems};
 use crate::material::Fit;
@@ -15,73 +14,133 @@ pub struct CheckCount {
     pub materials: usize,
     /// Their revisions, whose hashes were recomputed.
     pub revisions: usize,
-    /// Fits of current revisions that were made again.
+    /// Curves of these.
+    #[serde(skip)]
+    pub curves: usize,
+    /// Fits that were made again.
     pub fits: usize,
 }
 
-/// Checks a database: its pages and indexes are sound, every revision has the content of its hash, everything else
-/// that is stored follows from the content, and every fit of a current revision follows from its curve. `report` gets
-/// every problem.
-pub fn check_store(store: &Store, report: &mut dyn FnMut(Problem)) -> CheckCount {
-    check_each(store, Refit::All, report, |_, _, _| ())
-}
-
 /// Which fits are made again.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Refit {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refit {
+    /// None.
     None,
+    /// Those of current revisions.
+    Current,
+    /// Those of all revisions.
     All,
 }
 
-/// Checks every material of a database; `each` gets every current revision with its line in the list.
-pub(super) fn check_each(
-    store: &Store,
-    refit: Refit,
-    report: &mut dyn FnMut(Problem),
-    mut each: impl FnMut(&Summary, &Stored, &mut dyn FnMut(Problem)),
-) -> CheckCount {
-    let mut checked = CheckCount::default();
-    let opened = check_file_itself(store, report).and_then(|()| Ok((store.list()?, Again::new()?)));
-    let (summaries, mut again) = match opened {
-        Ok(opened) => opened,
-        Err(error) => {
-            report(problem("materials", error));
-            return checked;
-        }
-    };
-    for summary in &summaries {
-        checked.materials += 1;
-        let done =
-            check_material(store, &mut again, summary, refit, report, &mut checked, &mut each);
-        if let Err(error) = done {
-            report(problem(summary.slug.as_str(), error));
-        }
-    }
-    checked
+/// Checks a database: its pages and indexes are sound, its tables, indexes, views and triggers are those that matdb
+/// makes, every revision has the content of its hash, everything else that is stored follows from the content, and
+/// fits follow from their curves.
+pub struct StoreCheck<'a> {
+    /// What the database is called in a problem.
+    pub name: &'a str,
+    /// Which fits are made again.
+    pub refit: Refit,
+    /// Gets every problem.
+    pub report: &'a mut dyn FnMut(Problem),
+    /// Called after every revision.
+    pub advance: &'a mut dyn FnMut(),
 }
 
-/// Checks pages, indexes and the table of units.
-fn check_file_itself(store: &Store, report: &mut dyn FnMut(Problem)) -> Result<(), StoreError> {
-    store.damage()?.into_iter().for_each(|what| report(problem(DATABASE, what)));
-    if !Again::new()?.has_own_units(store)? {
-        report(problem(DATABASE, OTHER_UNITS));
+impl StoreCheck<'_> {
+    /// Checks every material of a database.
+    pub fn run(self, store: &Store) -> CheckCount {
+        self.run_with(store, |_, _, _| ())
     }
-    Ok(())
+
+    /// Checks every material of a database; `each` gets every current revision with its line in the list.
+    pub(super) fn run_with(
+        mut self,
+        store: &Store,
+        mut each: impl FnMut(&Summary, &Stored, &mut dyn FnMut(Problem)),
+    ) -> CheckCount {
+        let mut count = CheckCount::default();
+        let opened = self.check_file(store).and_then(|()| Ok((store.list()?, Again::new()?)));
+        let (summaries, mut again) = match opened {
+            Ok(opened) => opened,
+            Err(error) => {
+                (self.report)(problem("materials", error));
+                return count;
+            }
+        };
+        for summary in &summaries {
+            count.materials += 1;
+            let done = self.check_material(store, &mut again, summary, &mut count, &mut each);
+            if let Err(error) = done {
+                (self.report)(problem(summary.slug.as_str(), error));
+            }
+        }
+        count
+    }
+
+    /// Checks pages, indexes, the schema and the table of units.
+    fn check_file(&mut self, store: &Store) -> Result<(), StoreError> {
+        for problems in [store.damage()?, store.changed_schema()?] {
+            problems.into_iter().for_each(|what| (self.report)(problem(self.name, what)));
+        }
+        if !Again::new()?.has_own_units(store)? {
+            (self.report)(problem(self.name, OTHER_UNITS));
+        }
+        Ok(())
+    }
+
+    fn check_material(
+        &mut self,
+        store: &Store,
+        again: &mut Again,
+        summary: &Summary,
+        count: &mut CheckCount,
+        each: &mut impl FnMut(&Summary, &Stored, &mut dyn FnMut(Problem)),
+    ) -> Result<(), StoreError> {
+        let history = match store.history(&summary.slug) {
+            Err(StoreError::Corrupt { problem: what, .. }) => {
+                (self.report)(problem(summary.slug.as_str(), what));
+                return Ok(());
+            }
+            history => history?,
+        };
+        for RevisionSummary { revision, .. } in history {
+            let place = format!("{}@{revision}", summary.slug);
+            // Reading recomputes the hash.
+            match store.get(&summary.slug, Some(revision)) {
+                Ok(Some(stored)) => {
+                    count.revisions += 1;
+                    count.curves += stored.material.curves.len();
+                    if let Err(error) = stored.material.validate() {
+                        (self.report)(problem(place, error));
+                    } else {
+                        derived(again, store, &stored)?.into_iter().for_each(&mut *self.report);
+                        let is_current = revision == summary.revision;
+                        if self.refit == Refit::All || self.refit == Refit::Current && is_current {
+                            count.fits += check_fits(&stored, self.report);
+                        }
+                        if is_current {
+                            each(summary, &stored, self.report);
+                        }
+                    }
+                }
+                Ok(None) => (self.report)(problem(place, "is not there")),
+                Err(StoreError::Corrupt { problem: what, .. }) => {
+                    (self.report)(problem(place, what));
+                }
+                Err(error) => return Err(error),
+            }
+            (self.advance)();
+        }
+        Ok(())
+    }
 }
 
 /// What is wrong with a database whose table of units was changed.
-pub const OTHER_UNITS: &str = "its units of columns are not those that matdb writes";
+const OTHER_UNITS: &str = "its units of columns are not those that matdb writes";
 
 /// What of a stored revision does not follow from its content: statistics of curves, numbers beside
 /// parameters, and whatever else the program writes twice.
-///
-/// # Errors
-/// When the database cannot be read.
-pub fn derived(
-    again: &mut Again,
-    store: &Store,
-    stored: &Stored,
-) -> Result<Vec<Problem>, StoreError> {
+fn derived(again: &mut Again, store: &Store, stored: &Stored) -> Result<Vec<Problem>, StoreError> {
     let place = format!("{}@{}", stored.material.slug, stored.revision);
     let differences = again.differences(store, stored)?.into_iter();
     let problems = differences.map(|found| match found.curve {
@@ -95,46 +154,6 @@ pub fn derived(
         }
     });
     Ok(problems.collect())
-}
-
-fn check_material(
-    store: &Store,
-    again: &mut Again,
-    summary: &Summary,
-    refit: Refit,
-    report: &mut dyn FnMut(Problem),
-    checked: &mut CheckCount,
-    each: &mut impl FnMut(&Summary, &Stored, &mut dyn FnMut(Problem)),
-) -> Result<(), StoreError> {
-    for RevisionSummary { revision, .. } in store.history(&summary.slug)? {
-        let place = || format!("{}@{revision}", summary.slug);
-        // Reading recomputes the hash.
-        let stored = match store.get(&summary.slug, Some(revision)) {
-            Ok(Some(stored)) => stored,
-            Ok(None) => {
-                report(problem(place(), "is not there"));
-                continue;
-            }
-            Err(StoreError::Corrupt { problem: what, .. }) => {
-                report(problem(place(), what));
-                continue;
-            }
-            Err(error) => return Err(error),
-        };
-        checked.revisions += 1;
-        if let Err(error) = stored.material.validate() {
-            report(problem(place(), error));
-            continue;
-        }
-        derived(again, store, &stored)?.into_iter().for_each(&mut *report);
-        if revision == summary.revision {
-            if refit == Refit::All {
-                checked.fits += check_fits(&stored, report);
-            }
-            each(summary, &stored, report);
-        }
-    }
-    Ok(())
 }
 
 /// Makes the fits of a revision again; returns their number.
@@ -157,6 +176,6 @@ fn check_fits(stored: &Stored, report: &mut dyn FnMut(Problem)) -> usize {
 }
 
 /// What is wrong with a fit whose report was taken away.
-pub fn without_report(fit: &Fit) -> String {
+fn without_report(fit: &Fit) -> String {
     format!("was found by `{}`, but the report of that is not there", fit.estimator)
 }

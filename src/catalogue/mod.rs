@@ -34,7 +34,7 @@ mod units;
 mod verify;
 
 pub use about::{About, AboutError};
-pub use check_store::{CheckCount, OTHER_UNITS, check_store, derived, without_report};
+pub use check_store::{CheckCount, Refit, StoreCheck};
 pub use diff::{CurveChange, Diff, Field, Levels};
 pub use error::CatalogueError;
 pub use folder::{Folder, Sum};

@@ -10,7 +10,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::api::{Entry, Index, LARGEST_MATERIAL_BYTES, Record};
-use super::check_store::{CheckCount, Refit, check_each, check_store};
+use super::check_store::{CheckCount, Refit, StoreCheck};
 use super::error::CatalogueError;
 use super::folder::hashed;
 use super::layout::{DATABASE, INDEX, MATERIALS, SUMS, material_path};
@@ -45,7 +45,13 @@ pub fn verify(bundle: &Path) -> Result<Verification, CatalogueError> {
     if bundle.is_file() {
         alone(bundle)?;
         let store = database(bundle)?;
-        verified.checked = check_store(&store, &mut |found| problems.push(found));
+        verified.checked = StoreCheck {
+            name: DATABASE,
+            refit: Refit::Current,
+            report: &mut |found| problems.push(found),
+            advance: &mut || (),
+        }
+        .run(&store);
         return Ok(verified);
     }
     let sums = sums(bundle, problems)?;
@@ -60,7 +66,7 @@ pub fn verify(bundle: &Path) -> Result<Verification, CatalogueError> {
     }
     match database(&bundle.join(DATABASE)) {
         Ok(store) => {
-            verified.checked = check_content(bundle, &store, &sums, Refit::All, problems);
+            verified.checked = check_content(bundle, &store, &sums, Refit::Current, problems);
             // What is wrong already would be found wrong again in every file made of it.
             if problems.is_empty() {
                 verified.notes = check_rebuilt(bundle, &store, &sums, problems);
@@ -77,9 +83,6 @@ pub(super) fn check_staged(bundle: &Path, store: &Store) -> Result<Vec<Problem>,
     let mut problems = Vec::new();
     let sums = sums(bundle, &mut problems)?;
     check_files(bundle, &sums, &mut problems)?;
-    if !store.has_own_schema()? {
-        problems.push(problem(DATABASE, "its tables, indexes or views are not those of matdb"));
-    }
     check_content(bundle, store, &sums, Refit::None, &mut problems);
     Ok(problems)
 }
@@ -224,13 +227,18 @@ fn check_content(
     problems: &mut Vec<Problem>,
 ) -> CheckCount {
     let mut entries = Vec::new();
-    let checked =
-        check_each(store, refit, &mut |found| problems.push(found), |summary, stored, report| {
-            entries.push(Entry::new(summary, stored));
-            if let Some(found) = check_record(bundle, stored) {
-                report(found);
-            }
-        });
+    let check = StoreCheck {
+        name: DATABASE,
+        refit,
+        report: &mut |found| problems.push(found),
+        advance: &mut || (),
+    };
+    let checked = check.run_with(store, |summary, stored, report| {
+        entries.push(Entry::new(summary, stored));
+        if let Some(found) = check_record(bundle, stored) {
+            report(found);
+        }
+    });
     problems.extend(check_index(bundle, &entries));
     let known: BTreeSet<&str> = entries.iter().map(|entry| entry.path.as_str()).collect();
     let strangers = sums.keys().filter(|path| path.starts_with(MATERIALS));

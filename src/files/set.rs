@@ -102,7 +102,7 @@ fn create_folder(folder: &Path) -> Result<Vec<PathBuf>, FilesError> {
                 verb: "create the folder",
                 path: folder.to_owned(),
                 reason,
-                way_out: "choose another",
+                way_out: "choose another with -o",
             })
         }
     }
@@ -211,7 +211,12 @@ impl Replaced {
 }
 
 fn unwritable(path: PathBuf, reason: io::Error) -> FilesError {
-    FilesError { verb: "write", path, reason, way_out: "make room or choose another folder" }
+    FilesError {
+        verb: "write",
+        path,
+        reason,
+        way_out: "make room or choose another folder with -o",
+    }
 }
 
 #[cfg(test)]

@@ -64,13 +64,12 @@ impl RadarReport {
 /// The radar of a preset or a scene file, and its chirps.
 fn load(wanted: &str) -> Result<(Radar, Chirps), Error> {
     let path = Path::new(wanted);
-    let radar = match wanted.ends_with(".toml") {
-        true => {
-            SceneFile::parse(&read_text(path)?)
-                .map_err(|error| SceneError::Format { file: path.to_owned(), error })?
-                .radar
-        }
-        false => Radar { preset: wanted.to_owned(), ..Radar::default() },
+    let radar = if wanted.ends_with(".toml") {
+        SceneFile::parse(&read_text(path)?)
+            .map_err(|error| SceneError::Format { file: path.to_owned(), error })?
+            .radar
+    } else {
+        Radar { preset: wanted.to_owned(), ..Radar::default() }
     };
     radar.validate()?;
     let folder = path.parent().unwrap_or(Path::new(""));

@@ -30,10 +30,8 @@ pub(super) fn encode(
     let materials: Vec<&str> = materials.iter().map(String::as_str).collect();
     let exr = |image| exr::write_packed(image, &exr_attributes(image, &materials), packing);
     let cloud = |view: &View| {
-        let echoes: Vec<&Echo> = match all {
-            true => view.scan.echoes.iter().collect(),
-            false => view.scan.detections().collect(),
-        };
+        let echoes: Vec<&Echo> =
+            if all { view.scan.echoes.iter().collect() } else { view.scan.detections().collect() };
         let table = cloud_table(&echoes, &ready.material_of_region, &regions, &materials);
         ply::write_table(&table)
     };
