@@ -11,7 +11,6 @@ use std::time::Instant;
 
 use matdb::diagnose::{MeasuredScene, Report};
 use matdb::effects::library;
-use matdb::error::Error;
 use matdb::measure::{Cloud, CloudPoint};
 use matdb::render::trace_placed;
 use matdb::setup::ReadyScene;
@@ -32,7 +31,10 @@ const HIDDEN: [(&str, &str); 8] = [
     ("multi-bounce", "[[effect]]\nname = 'multi-bounce'\ncoupling_db = 10.0\n"),
 ];
 
-fn main() -> Result<(), Error> {
+/// Whatever a scene or a scan is refused for.
+type Failure = Box<dyn std::error::Error>;
+
+fn main() -> Result<(), Failure> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let declared = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bench.toml");
     let bench = std::fs::read_to_string(&declared).expect("the scene");
@@ -64,7 +66,7 @@ fn main() -> Result<(), Error> {
 }
 
 /// The detections of a scene as a cloud.
-fn rendered(scene: &Path) -> Result<Cloud, Error> {
+fn rendered(scene: &Path) -> Result<Cloud, Failure> {
     let ready = ReadyScene::open(scene, None)?;
     let assembly = ready.assemble();
     let setup = assembly.setup();
@@ -84,7 +86,7 @@ fn rendered(scene: &Path) -> Result<Cloud, Error> {
 }
 
 /// What a scene lacks to explain a cloud.
-fn diagnosed(scene: &Path, cloud: &Cloud) -> Result<Report, Error> {
+fn diagnosed(scene: &Path, cloud: &Cloud) -> Result<Report, Failure> {
     let ready = ReadyScene::open(scene, None)?;
     let model = ready.model();
     let measured = MeasuredScene {

@@ -1,6 +1,6 @@
 //! The database of materials: a file of SQLite, and the only SQL in the crate.
 //!
-//! Plain [`Material`]s go in and come out, bit for bit; a revision once written never changes.
+//! Plain [`Material`](crate::material::Material)s go in and come out, bit for bit; a revision once written never changes.
 //! Every call that writes is one transaction: it happens as a whole or not at all, whenever the
 //! program or the machine stops. Several programs may use a file at once.
 //!
