@@ -237,9 +237,74 @@ fn the_same_content_mends_a_damaged_material_and_rm_removes_it() {
 
         fs::write(&path, &damaged).unwrap();
         matdb(folder.path()).args(["check", "--repair"]).assert().success();
-        assert_eq!(contents(&path), whole, "{case}");
         assert!(is_sound(&path), "{case}");
+        let store = Store::open_existing(&path).unwrap().unwrap();
+        for material in &whole {
+            let stored = store.get(&material.slug, None).unwrap().unwrap();
+            assert_eq!(stored.material, *material, "{case}");
+            // The number of a revision that was lost never comes to mean something else.
+            let is_lost = case.contains("not there") && material.slug.as_str() == "ptfe";
+            assert_eq!(stored.revision, if is_lost { 10 } else { 1 }, "{case}");
+            assert!(!is_lost || store.get(&material.slug, Some(9)).unwrap().is_none());
+        }
     }
+}
+
+#[test]
+fn a_material_whose_row_is_lost_comes_back_with_all_that_was_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("matdb.sqlite");
+    let own = sound("own");
+    Store::open(&path).unwrap().add([&own, &support::database::change(sound("own"))]).unwrap();
+    let whole = contents(&path);
+    assert_eq!(whole.len(), 2);
+    tamper(&path, "DELETE FROM material");
+    let message = refused(matdb(folder.path()).args(["publish", "site"]));
+    assert!(message.contains("is damaged"), "{message}");
+    matdb(folder.path()).args(["check", "--repair"]).assert().success();
+    assert_eq!(contents(&path), whole);
+
+    // Without any word of its name it cannot come back, and its measured rows stay all the same.
+    tamper(&path, "DELETE FROM material; DELETE FROM entry");
+    matdb(folder.path()).args(["check", "--repair"]).assert().failure();
+    let left: i64 = Connection::open(&path)
+        .unwrap()
+        .query_row("SELECT count(*) FROM observation", [], |row| row.get(0))
+        .unwrap();
+    assert!(left > 0);
+}
+
+#[test]
+fn one_bad_name_does_not_keep_the_rest_from_being_mended() {
+    let (folder, path) = database(&["ptfe", "glass"]);
+    tamper(
+        &path,
+        "PRAGMA ignore_check_constraints = on; UPDATE material SET slug = 'No Name' WHERE slug = 'glass';
+         DROP TABLE unit; UPDATE fit_parameter SET value = value / 2 WHERE path = 'k' AND revision_id IN
+         (SELECT revision.id FROM revision JOIN material ON material.id = material_id WHERE slug = 'ptfe')",
+    );
+    let output = matdb(folder.path()).args(["check", "--repair", "--json"]).output().unwrap();
+    let record: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let text = record.to_string();
+    assert!(text.contains("`ptfe@1` was written anew") && text.contains("table unit"), "{text}");
+    assert!(text.contains("`No Name` is not a name"), "{text}");
+    matdb(folder.path()).args(["show", "ptfe"]).assert().success();
+}
+
+#[test]
+fn mending_a_revision_of_an_old_program_leaves_its_neighbours_sound() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("matdb.sqlite");
+    fs::copy(support::root().join("tests/fixtures/schema-0003.sqlite"), &path).unwrap();
+    let mut store = Store::open(&path).unwrap();
+    let slug = store.list().unwrap()[0].slug.clone();
+    let stored = store.get(&slug, None).unwrap().unwrap();
+    tamper(&path, "UPDATE source SET title = 'other' WHERE revision_id = 2");
+    assert_eq!(store.add([&stored.material]).unwrap(), [Added::Repaired(stored.revision)]);
+    drop(store);
+    let output = matdb(folder.path()).args(["check", "--json"]).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(!text.contains("statistics"), "{text}");
 }
 
 #[test]

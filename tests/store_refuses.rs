@@ -126,7 +126,10 @@ fn right_or_damaged(path: &Path, case: &str) -> bool {
     };
     let Err(error) = use_it() else { return false };
     let message = sentence(&error, path);
-    let known = matches!(error, StoreError::Corrupt { .. } | StoreError::Foreign { .. });
+    let known = matches!(
+        error,
+        StoreError::Corrupt { .. } | StoreError::CutOff { .. } | StoreError::Foreign { .. }
+    );
     assert!(known, "{case}: {message}");
     true
 }

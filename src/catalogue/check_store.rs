@@ -79,7 +79,7 @@ impl StoreCheck<'_> {
 
     /// Checks pages, indexes, the schema and the table of units.
     fn check_file(&mut self, store: &Store) -> Result<(), StoreError> {
-        for problems in [store.damage()?, store.changed_schema()?] {
+        for problems in [store.damage()?, store.changed_schema()?, store.added_objects()?] {
             problems.into_iter().for_each(|what| (self.report)(problem(self.name, what)));
         }
         if !Again::new()?.has_own_units(store)? {

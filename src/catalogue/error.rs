@@ -25,6 +25,14 @@ pub enum CatalogueError {
         /// The first thing that is wrong.
         problem: String,
     },
+    /// The database has tables, indexes or views of somebody else, which a publication would pass on.
+    #[error("in {} {added}; nothing was published, as a publication has no tables of others", database.display())]
+    Added {
+        /// The database.
+        database: PathBuf,
+        /// The first of them, and how to remove it.
+        added: String,
+    },
     /// The folder holds something else than an earlier publication; it was not touched.
     #[error(
         "{} holds `{stranger}`, which no publication of matdb has put there; name a new folder, or move \

@@ -65,8 +65,11 @@ pub fn publish(
 fn check_sound(store: &Store) -> Result<(), CatalogueError> {
     let mut problems = store.damage()?;
     problems.extend(store.changed_schema()?);
-    match problems.into_iter().next() {
+    if let Some(problem) = problems.into_iter().next() {
+        return Err(CatalogueError::damaged(store, problem));
+    }
+    match store.added_objects()?.into_iter().next() {
         None => Ok(()),
-        Some(problem) => Err(CatalogueError::damaged(store, problem)),
+        Some(added) => Err(CatalogueError::Added { database: store.path().to_owned(), added }),
     }
 }

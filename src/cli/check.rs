@@ -8,6 +8,7 @@ use crate::catalogue::{CheckCount, Problem, Refit, StoreCheck};
 use crate::error::Error;
 use crate::material::builtin;
 use crate::setup::Database;
+use crate::store::Repair;
 
 /// Verify the whole database: pages, hashes, values, statistics of curves, and fits by fitting again
 #[derive(Debug, clap::Args)]
@@ -36,9 +37,9 @@ struct Record {
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
-    let mut repaired = Vec::new();
+    let mut repair = Repair::default();
     if args.repair && db.read()?.is_some() {
-        repaired = db.write()?.repair(&builtin::all()?)?;
+        repair = db.write()?.repair(&builtin::all()?)?;
     }
     let Some(store) = db.read()? else {
         return Err(Error::Usage {
@@ -49,7 +50,9 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let file = db.path().display().to_string();
     let revisions = store.list()?.iter().map(|material| material.revision as usize).sum();
     let progress = console.progress("checking", revisions);
-    let mut findings = Vec::new();
+    let failed = repair.failed.into_iter();
+    let mut findings: Vec<Problem> =
+        failed.map(|problem| Problem { place: file.clone(), problem }).collect();
     let count = StoreCheck {
         name: &file,
         refit: Refit::All,
@@ -59,7 +62,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     .run(&store);
     progress.finish_and_clear();
     let CheckCount { revisions, curves, fits, .. } = count;
-    let record = Record { revisions, curves, fits, repaired, findings };
+    let record = Record { revisions, curves, fits, repaired: repair.mended, findings };
     console.result(&text(&record, &file), &record)?;
     match record.findings.len() {
         0 => Ok(()),

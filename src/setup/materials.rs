@@ -69,15 +69,13 @@ pub fn unknown_material(
 /// # Errors
 /// A database that cannot be read.
 pub fn builtin_not_added(store: Option<&Store>) -> Result<Vec<Material>, Error> {
-    let mut missing = Vec::new();
-    for name in builtin::names() {
-        let Some(material) = builtin::get(name) else { continue };
-        let material = material?;
-        if store.map_or(Ok(None), |store| store.summary(&material.slug))?.is_none() {
-            missing.push(material);
-        }
+    let mut materials = builtin::all()?;
+    if let Some(store) = store {
+        let slugs: Vec<Slug> = materials.iter().map(|material| material.slug.clone()).collect();
+        let present = store.present(&slugs)?;
+        materials.retain(|material| !present.contains(&material.slug));
     }
-    Ok(missing)
+    Ok(materials)
 }
 
 /// A database in memory of the built-in materials that `store` does not have, to be searched as `store` is.

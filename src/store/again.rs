@@ -7,7 +7,9 @@ use rusqlite::{Connection, Result, Statement, params};
 use super::database::Store;
 use super::error::{InFile, StoreError};
 use super::record::Stored;
-use super::tables::{Table, follows_from_content, listed, quoted, tables, unit_rows};
+use super::tables::{
+    Table, follows_from_content, has_statistics, listed, quoted, tables, unit_rows,
+};
 use super::{connect, write};
 
 /// The table of which an older program wrote nothing.
@@ -76,7 +78,7 @@ impl Again {
     ) -> Result<Vec<Difference>> {
         let tx = self.scratch.transaction()?;
         // What it would be found by is compared elsewhere, and is not made.
-        write::Adding::new(&tx).add(&stored.material, None)?;
+        write::write_alone(&tx, &stored.material)?;
         let new: i64 = tx.query_row("SELECT max(id) FROM revision", [], |row| row.get(0))?;
         let sql = "SELECT revision.id FROM revision JOIN material ON material.id = material_id
                    WHERE slug = ?1 AND number = ?2";
@@ -96,13 +98,6 @@ impl Again {
         }
         Ok(differences)
     }
-}
-
-/// Whether the revision must have statistics: a program that writes them has written it.
-fn has_statistics(conn: &Connection, revision_id: i64) -> Result<bool> {
-    let sql = "SELECT EXISTS (SELECT 1 FROM activity WHERE revision_id = ?1)
-               OR EXISTS (SELECT 1 FROM curve_statistic WHERE revision_id <= ?1)";
-    conn.query_row(sql, [revision_id], |row| row.get(0))
 }
 
 /// Everything but the number of the revision, that of a curve first.

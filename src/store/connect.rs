@@ -277,8 +277,7 @@ fn check_length(path: &Path, conn: &Connection) -> Result<(), StoreError> {
     if has_log || u64::try_from(said).is_ok_and(|said| said <= bytes) {
         return Ok(());
     }
-    let problem = format!("it has {bytes} bytes and says that it has {said}, so it was cut off");
-    Err(StoreError::Corrupt { file: path.to_owned(), problem })
+    Err(StoreError::CutOff { file: path.to_owned(), bytes, said })
 }
 
 /// A path in a form that SQLite takes for nothing but a path: a bare `file:a.sqlite` is an address to it, and

@@ -87,6 +87,19 @@ pub enum StoreError {
         /// Which material, and what came back.
         problem: String,
     },
+    /// Its end is missing.
+    #[error(
+        "{} was cut off: it has {bytes} bytes and says that it has {said}; only a copy of the file brings back the rest",
+        file.display()
+    )]
+    CutOff {
+        /// The file.
+        file: PathBuf,
+        /// Its length.
+        bytes: u64,
+        /// The length of which it speaks.
+        said: i64,
+    },
     /// No room left.
     #[error("the disk has no room left for {}; free some and try again", file.display())]
     Full {

@@ -38,4 +38,5 @@ pub use database::Store;
 pub use error::StoreError;
 pub use find::{Filter, Hit, OutlineEntry};
 pub use record::{Added, Removed, RevisionSummary, Stored, Summary};
+pub use repair::Repair;
 pub use tables::{Cell, Column, ColumnKind, Reference, Table};

@@ -16,21 +16,27 @@ impl Store {
         Ok(own == there)
     }
 
-    /// Every table, index, trigger or view that is not as this program makes it, a clause each: what is missing or
-    /// another one, and what somebody has added.
+    /// Every table, index, trigger or view that this program makes and that is missing or another one, a clause each.
     ///
     /// # Errors
     /// When the file cannot be read.
     pub fn changed_schema(&self) -> Result<Vec<String>, StoreError> {
         let [own, there] = self.schemas()?;
-        let mut changed = Vec::new();
-        for one in own.iter().filter(|one| !there.contains(one)) {
-            changed.push(format!("{} is not the one that matdb makes", named(one)));
-        }
-        for one in there.iter().filter(|one| !own.iter().any(|own| own[..2] == one[..2])) {
-            changed.push(format!("{} is none that matdb makes", named(one)));
-        }
-        Ok(changed)
+        let changed = own.iter().filter(|one| !there.contains(one));
+        Ok(changed.map(|one| format!("{} is not the one that matdb makes", named(one))).collect())
+    }
+
+    /// Every table, index, trigger or view that somebody has added, a clause each with the way to remove it.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn added_objects(&self) -> Result<Vec<String>, StoreError> {
+        let [own, there] = self.schemas()?;
+        let is_added = |one: &&[Option<String>; 4]| !own.iter().any(|own| own[..2] == one[..2]);
+        let added = there.iter().filter(is_added);
+        Ok(added
+            .map(|one| format!("{0} is none that matdb makes: DROP {0} removes it", named(one)))
+            .collect())
     }
 
     /// What this program makes, and what is in the file.

@@ -43,6 +43,14 @@ impl Store {
         }
     }
 
+    /// Those of some materials that are there, sound or damaged, sorted.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn present(&self, slugs: &[Slug]) -> Result<Vec<Slug>, StoreError> {
+        read::present(&self.conn, slugs).in_file(&self.path)
+    }
+
     /// The model that scenes render of a material's current revision, and its range of angles, rad. Nothing else is
     /// read, and the hash is not compared. `None` when the material does not exist or has no such model.
     ///

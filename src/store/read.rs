@@ -47,6 +47,14 @@ pub(super) fn current_revision(conn: &Connection, slug: &Slug) -> Result<Option<
         .optional()
 }
 
+/// Those of some materials that are there, found by looking once through all of them.
+pub(super) fn present(conn: &Connection, slugs: &[Slug]) -> Result<Vec<Slug>> {
+    let wanted = serde_json::json!(slugs).to_string();
+    let sql = "SELECT slug FROM material NOT INDEXED
+               WHERE slug IN (SELECT value FROM json_each(?1)) ORDER BY slug";
+    rows(conn, sql, [wanted], |row| row.get(0))
+}
+
 /// Fails when a material of which nothing was found is there after all.
 pub(super) fn check_absent(conn: &Connection, slug: &Slug) -> Result<()> {
     match current_revision(conn, slug)? {
@@ -87,12 +95,12 @@ pub(super) fn get_in(
     number: Option<u32>,
 ) -> Result<Option<Stored>> {
     let Some((revision_id, mut stored)) = revision(conn, slug, number)? else {
-        let current = current_revision(conn, slug)?;
-        // Revisions are removed all together, so that one up to the current is missing by damage.
-        return match (current, number) {
-            (None, _) => Ok(None),
-            (Some(current), Some(wanted)) if wanted == 0 || wanted > current => Ok(None),
-            (Some(current), _) => Err(missing(slug, number.unwrap_or(current))),
+        // A material has its current revision, but not every number before: what was damaged is passed over.
+        return match current_revision(conn, slug)? {
+            Some(current) if number.is_none_or(|wanted| wanted == current) => {
+                Err(missing(slug, current))
+            }
+            _ => Ok(None),
         };
     };
     let material = &mut stored.material;

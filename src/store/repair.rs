@@ -8,57 +8,109 @@ use super::database::Store;
 use super::error::{InFile, StoreError};
 use super::record::Stored;
 use super::rows::rows;
-use super::tables::{schema, tables, unit_rows};
+use super::tables::{schema, unit_rows};
 use super::{read, write};
 use crate::material::{Material, Slug};
 
+/// What [`Store::repair`] did, a sentence each.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Repair {
+    /// What was mended; nothing where nothing was damaged.
+    pub mended: Vec<String>,
+    /// What could not be mended, and why.
+    pub failed: Vec<String>,
+}
+
 impl Store {
-    /// Mends what can be, in one transaction, and says what was mended, a sentence each; none where nothing was
-    /// damaged. Indexes, views, units, lists, searches and statistics are made anew from the content of revisions.
-    /// A revision whose content is damaged is written anew if one of `at_hand` has its hash. A material that has
-    /// lost its current revision gets the latest one that is there. [`Store::damage`] and the hashes of
-    /// [`Store::get`] tell what is left.
+    /// Mends what can be, in one transaction. Nothing that was measured or fitted is removed.
+    ///
+    /// Indexes, views, units, lists, searches and statistics are made anew from the content of revisions. A revision
+    /// whose content is damaged is written anew if one of `at_hand` has its hash. A material whose own row is lost
+    /// comes back from what lists say of it, if its content has the hash that was stored. A material that has lost
+    /// its current revision gets the latest one that is there as a further revision, so that no number comes to mean
+    /// something else. [`Store::damage`] and the hashes of [`Store::get`] tell what is left.
     ///
     /// # Errors
     /// When the file cannot be written, or is so damaged that SQLite cannot go through it.
-    pub fn repair(&mut self, at_hand: &[Material]) -> std::result::Result<Vec<String>, StoreError> {
+    pub fn repair(&mut self, at_hand: &[Material]) -> std::result::Result<Repair, StoreError> {
         let mut again = Again::new()?;
         let Store { conn, path, .. } = self;
         repair(conn, &mut again, at_hand).in_file(path)
     }
 }
 
-fn repair(conn: &mut Connection, again: &mut Again, at_hand: &[Material]) -> Result<Vec<String>> {
-    let is_sound_before = damage(conn)?.is_empty();
+fn repair(conn: &mut Connection, again: &mut Again, at_hand: &[Material]) -> Result<Repair> {
     let tx = conn.transaction()?;
     tx.pragma_update(None, "defer_foreign_keys", true)?;
-    let mut mended = own_schema(&tx, again)?;
-    tx.execute_batch("REINDEX")?;
-    mended.extend(units(&tx, again)?);
-    mended.extend(orphans(&tx)?);
-    mended.extend(current_revisions(&tx)?);
-    let slugs: Vec<Slug> = rows(&tx, "SELECT slug FROM material", [], |row| row.get(0))?;
-    for slug in &slugs {
-        mended.extend(revisions(&tx, again, slug, at_hand)?);
+    let before = damage(&tx)?;
+    let mut repair = Repair::default();
+    repair.attempt(&tx, "tables, indexes and views", || own_schema(&tx, again))?;
+    repair.attempt(&tx, "indexes", || tx.execute_batch("REINDEX").map(|()| Vec::new()))?;
+    repair.attempt(&tx, "units of columns", || units(&tx, again))?;
+    repair.attempt(&tx, "materials without a row", || lost_materials(&tx))?;
+    repair.attempt(&tx, "lists", || unreachable_lines(&tx))?;
+    let mut slugs = Vec::new();
+    let named: Vec<String> = rows(&tx, "SELECT slug FROM material", [], |row| row.get(0))?;
+    for name in named {
+        match name.parse::<Slug>() {
+            Ok(slug) => slugs.push(slug),
+            Err(_) => repair.failed.push(format!("`{name}` is not a name of a material")),
+        }
     }
-    lists(&tx, &slugs)?;
-    if !is_sound_before && mended.is_empty() {
-        mended.push("indexes, lists and searches were made anew".to_owned());
+    for slug in &slugs {
+        repair.attempt(&tx, slug.as_str(), || revisions(&tx, again, slug, at_hand))?;
+        repair.attempt(&tx, slug.as_str(), || lost_current_revision(&tx, slug))?;
+    }
+    repair.attempt(&tx, "lists and searches", || lists(&tx, &slugs))?;
+    if repair.mended.is_empty() && damage(&tx)? != before {
+        repair.mended.push("indexes, lists and searches were made anew".to_owned());
     }
     tx.commit()?;
-    Ok(mended)
+    Ok(repair)
 }
 
-/// Makes indexes, views and triggers anew that are missing or others; tables stay as they are.
+impl Repair {
+    /// Takes one step, which is taken back by itself where it fails.
+    fn attempt(
+        &mut self,
+        tx: &Transaction,
+        what: &str,
+        step: impl FnOnce() -> Result<Vec<String>>,
+    ) -> Result<()> {
+        tx.execute_batch("SAVEPOINT step")?;
+        match step() {
+            Ok(mended) => {
+                self.mended.extend(mended);
+                tx.execute_batch("RELEASE step")
+            }
+            Err(error) => {
+                self.failed.push(format!("{what} cannot be mended: {error}"));
+                tx.execute_batch("ROLLBACK TO step; RELEASE step")
+            }
+        }
+    }
+}
+
+/// Makes indexes, views and triggers anew that are missing or others, and tables that are missing; other tables stay
+/// as they are.
 fn own_schema(tx: &Transaction, again: &Again) -> Result<Vec<String>> {
     let there = schema(tx)?;
+    let mut own = schema(again.scratch())?;
+    // An index or a view needs its table.
+    own.sort_by_key(|[kind, ..]| kind.as_deref() != Some("table"));
     let mut mended = Vec::new();
-    for object in schema(again.scratch())? {
+    for object in own {
         let [Some(kind), Some(name), _, Some(sql)] = &object else { continue };
-        if kind == "table" || there.contains(&object) {
+        // Tables of the full-text index come with it.
+        let is_shadow = name.starts_with("search_") && kind == "table";
+        let is_kept_table = kind == "table" && there.iter().any(|other| other[1] == object[1]);
+        if is_shadow || is_kept_table || there.contains(&object) {
             continue;
         }
-        tx.execute_batch(&format!("DROP {kind} IF EXISTS \"{name}\"; {sql}"))?;
+        if kind != "table" {
+            tx.execute_batch(&format!("DROP {kind} IF EXISTS \"{name}\""))?;
+        }
+        tx.execute_batch(sql)?;
         mended.push(format!("{kind} {name} was made anew"));
     }
     Ok(mended)
@@ -77,43 +129,68 @@ fn units(tx: &Transaction, again: &Again) -> Result<Vec<String>> {
     Ok(vec!["units of columns were written anew".to_owned()])
 }
 
-/// Removes rows of revisions and materials that are not there any more, which nothing can reach.
-fn orphans(tx: &Transaction) -> Result<Vec<String>> {
-    let mut removed = Vec::new();
-    removed.extend(remove(tx, "revision", "material_id NOT IN (SELECT id FROM material)")?);
-    for table in tables(tx)? {
-        if table.columns.iter().any(|column| column.name == "revision_id") {
-            let condition = "revision_id NOT IN (SELECT id FROM revision)";
-            removed.extend(remove(tx, &table.name, condition)?);
+/// Brings back materials whose own row is lost, by the name and the number that lists have of them.
+fn lost_materials(tx: &Transaction) -> Result<Vec<String>> {
+    let sql = "SELECT material_id, slug, revision FROM entry
+               WHERE material_id NOT IN (SELECT id FROM material)
+               AND material_id IN (SELECT material_id FROM revision)";
+    let lost: Vec<(i64, String, u32)> =
+        rows(tx, sql, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+    let mut mended = Vec::new();
+    for (id, name, number) in lost {
+        tx.execute_batch("SAVEPOINT lost")?;
+        tx.execute(
+            "INSERT INTO material (id, slug, current_revision) VALUES (?1, ?2, ?3)",
+            params![id, name, number],
+        )?;
+        // The hash is of the content with its name: a wrong name is no answer.
+        let slug = name.parse::<Slug>().ok();
+        let stored = slug.and_then(|slug| read::get_in(tx, &slug, None).ok().flatten());
+        if stored.is_some_and(|stored| stored.material.content_hash() == stored.content_hash) {
+            mended.push(format!("`{name}` has its row again"));
+            tx.execute_batch("RELEASE lost")?;
+        } else {
+            tx.execute_batch("ROLLBACK TO lost; RELEASE lost")?;
         }
     }
-    removed.extend(remove(tx, "entry", "material_id NOT IN (SELECT id FROM material)")?);
-    removed.extend(remove(tx, "search", "rowid NOT IN (SELECT id FROM material)")?);
-    Ok(removed)
-}
-
-/// Removes rows of a table; returns a sentence if there were any.
-fn remove(tx: &Transaction, table: &str, condition: &str) -> Result<Option<String>> {
-    let count = tx.execute(&format!("DELETE FROM \"{table}\" WHERE {condition}"), [])?;
-    Ok((count > 0).then(|| format!("{count} of `{table}` belonged to nothing and were removed")))
-}
-
-/// Gives materials that have lost their current revision the latest one that is there.
-fn current_revisions(tx: &Transaction) -> Result<Vec<String>> {
-    let sql = "SELECT material.id, slug, current_revision, max(number) FROM material
-               JOIN revision ON material_id = material.id GROUP BY material.id
-               HAVING sum(number = current_revision) = 0";
-    let lost: Vec<(i64, String, i64, i64)> =
-        rows(tx, sql, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?)))?;
-    let mut mended = Vec::new();
-    for (id, slug, number, latest) in lost {
-        let update = "UPDATE material SET current_revision = ?2 WHERE id = ?1";
-        tx.execute(update, [id, latest])?;
-        mended.push(format!(
-            "`{slug}` has lost its revision {number}; the latest that is there, {latest}, is current now"
-        ));
-    }
     Ok(mended)
+}
+
+/// Removes lines of lists and searches that are of no material, and of which nothing can come back.
+fn unreachable_lines(tx: &Transaction) -> Result<Vec<String>> {
+    let condition = "NOT IN (SELECT id FROM material)";
+    let of_no_revision = "AND material_id NOT IN (SELECT material_id FROM revision)";
+    let lines = tx.execute(
+        &format!("DELETE FROM entry WHERE material_id {condition} {of_no_revision}"),
+        [],
+    )?;
+    tx.execute(&format!("DELETE FROM search WHERE rowid {condition}"), [])?;
+    Ok((lines > 0)
+        .then(|| format!("{lines} of the lines of lists were of no material and were removed"))
+        .into_iter()
+        .collect())
+}
+
+/// Gives a material that has lost its current revision the latest sound one that is there, as a further revision.
+fn lost_current_revision(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
+    let sql = "SELECT current_revision FROM material WHERE slug = ?1 AND NOT EXISTS
+               (SELECT 1 FROM revision WHERE material_id = material.id AND number = current_revision)";
+    let lost: Vec<i64> = rows(tx, sql, [slug.as_str()], |row| row.get(0))?;
+    let Some(lost) = lost.first() else { return Ok(Vec::new()) };
+    let sql = "SELECT number FROM revision JOIN material ON material.id = material_id
+               WHERE slug = ?1 ORDER BY number DESC";
+    let numbers: Vec<u32> = rows(tx, sql, [slug.as_str()], |row| row.get(0))?;
+    for number in numbers {
+        let stored = read::get_in(tx, slug, Some(number)).ok().flatten();
+        let sound = stored.filter(|stored| stored.material.content_hash() == stored.content_hash);
+        if let Some(Stored { material, activity, .. }) = sound {
+            let added = write::Adding::new(tx).add(&material, activity.as_ref())?.revision();
+            return Ok(vec![format!(
+                "`{slug}` has lost its revision {lost}; revision {added} repeats revision {number}"
+            )]);
+        }
+    }
+    Ok(Vec::new())
 }
 
 /// Writes revisions of a material anew that are not what their hash says or whose other rows do not follow.
@@ -143,32 +220,31 @@ fn revisions(
     Ok(mended)
 }
 
-/// Makes all that materials are found by anew.
-fn lists(tx: &Transaction, slugs: &[Slug]) -> Result<()> {
+/// Makes all that materials are found by anew; a material that cannot be read keeps the lines that it has.
+fn lists(tx: &Transaction, slugs: &[Slug]) -> Result<Vec<String>> {
     tx.execute("INSERT INTO search (search) VALUES ('rebuild')", [])?;
     let mut adding = write::Adding::new(tx);
     for slug in slugs {
-        // What cannot be read is in no list.
         let Ok(Some(stored)) = read::get_in(tx, slug, None) else { continue };
         let sql = "SELECT id FROM material WHERE slug = ?1";
         let material_id = tx.query_row(sql, [slug.as_str()], |row| row.get(0))?;
         adding.find_by(material_id, &stored.material)?;
     }
-    adding.finish()
+    adding.finish().map(|()| Vec::new())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::material::builtin;
-    use crate::store::tables::follows_from_content;
+    use crate::store::tables::{follows_from_content, tables};
 
     #[test]
     fn a_sound_database_has_nothing_to_mend_and_stays_as_it_is() {
         let mut store = Store::in_memory().unwrap();
         let paint = builtin::get("mannequin-paint").unwrap().unwrap();
         store.add([&paint]).unwrap();
-        assert_eq!(store.repair(&[]).unwrap(), Vec::<String>::new());
+        assert_eq!(store.repair(&[]).unwrap(), Repair::default());
         assert_eq!(store.damage().unwrap(), Vec::<String>::new());
         assert_eq!(store.get(&paint.slug, None).unwrap().unwrap().material, paint);
     }
@@ -184,7 +260,8 @@ mod tests {
             let emptied =
                 store.conn.execute(&format!("DELETE FROM \"{}\"", table.name), []).unwrap();
             store.conn.pragma_update(None, "foreign_keys", true).unwrap();
-            let mended = store.repair(std::slice::from_ref(&paint)).unwrap();
+            let Repair { mended, failed } = store.repair(std::slice::from_ref(&paint)).unwrap();
+            assert_eq!(failed, Vec::<String>::new());
             assert_eq!(mended.is_empty(), emptied == 0, "{}: {mended:?}", table.name);
             assert_eq!(store.get(&paint.slug, None).unwrap().unwrap().material, paint);
             assert_eq!(store.damage().unwrap(), Vec::<String>::new(), "{}", table.name);

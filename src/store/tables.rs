@@ -178,6 +178,13 @@ pub(super) fn quoted(name: &str) -> String {
 /// Tables that record who made a revision, which does not follow from its content.
 const MAKING: [&str; 4] = ["activity", "activity_input", "origin", "origin_author"];
 
+/// Whether the revision must have statistics: a program that writes them has written it.
+pub(super) fn has_statistics(conn: &Connection, revision_id: i64) -> Result<bool> {
+    let sql = "SELECT EXISTS (SELECT 1 FROM activity WHERE revision_id = ?1)
+               OR EXISTS (SELECT 1 FROM curve_statistic WHERE revision_id <= ?1)";
+    conn.query_row(sql, [revision_id], |row| row.get(0))
+}
+
 /// Whether every row of a table follows from the content of a revision.
 pub(super) fn follows_from_content(table: &Table) -> bool {
     table.columns.iter().any(|column| column.name == "revision_id")
@@ -275,6 +282,8 @@ mod tests {
         assert!(store.has_own_schema().unwrap());
         store.conn.execute_batch("CREATE VIEW more AS SELECT 1").unwrap();
         assert!(!store.has_own_schema().unwrap());
-        assert_eq!(store.changed_schema().unwrap(), ["view more is none that matdb makes"]);
+        assert_eq!(store.changed_schema().unwrap(), Vec::<String>::new());
+        let added = "view more is none that matdb makes: DROP view more removes it";
+        assert_eq!(store.added_objects().unwrap(), [added]);
     }
 }

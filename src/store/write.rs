@@ -12,7 +12,7 @@ use super::find::outline::{self, OutlineEntry};
 use super::read;
 use super::record::{Added, Removed};
 use super::rows::rows;
-use super::tables::{follows_from_content, tables};
+use super::tables::{follows_from_content, has_statistics, tables};
 use crate::formats::EffectEntry;
 use crate::material::{Activity, Covariance, Curve, Fit, Material, Slug};
 use crate::measure::statistics::by_angle;
@@ -191,6 +191,7 @@ fn read_back(tx: &Transaction, material: &Material, content_hash: &str) -> Resul
 /// Writes the rows of a revision anew; who made it, and when, stays.
 pub(super) fn rewrite(tx: &Transaction, revision_id: i64, material: &Material) -> Result<()> {
     tx.pragma_update(None, "defer_foreign_keys", true)?;
+    let is_with_statistics = has_statistics(tx, revision_id)?;
     for table in tables(tx)?.iter().filter(|table| follows_from_content(table)) {
         let sql = format!("DELETE FROM \"{}\" WHERE revision_id = ?1", table.name);
         tx.execute(&sql, [revision_id])?;
@@ -199,7 +200,17 @@ pub(super) fn rewrite(tx: &Transaction, revision_id: i64, material: &Material) -
     let values = values.collect::<Vec<_>>().join(", ");
     let update = format!("UPDATE revision SET ({CONTENT}) = ({values}) WHERE id = {revision_id}");
     tx.execute(&update, params_from_iter(content(material)?))?;
-    Rows { tx, revision_id }.material(material)
+    Rows { tx, revision_id }.material(material)?;
+    if !is_with_statistics {
+        // Later revisions of the program that wrote none would be expected to have them, too.
+        tx.execute("DELETE FROM curve_statistic WHERE revision_id = ?1", [revision_id])?;
+    }
+    Ok(())
+}
+
+/// Writes a material into an empty database, without all that it is found by.
+pub(super) fn write_alone(tx: &Transaction, material: &Material) -> Result<()> {
+    revision(tx, material, 1, &material.content_hash(), None).map(|_| ())
 }
 
 /// Columns of a revision's own row that its content gives.
