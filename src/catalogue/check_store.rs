@@ -59,7 +59,7 @@ impl StoreCheck<'_> {
         mut each: impl FnMut(&Summary, &Stored, &mut dyn FnMut(Problem)),
     ) -> CheckCount {
         let mut count = CheckCount::default();
-        let opened = self.check_file(store).and_then(|()| Ok((store.list()?, Again::new()?)));
+        let opened = self.check_file(store).and_then(|again| Ok((store.list()?, again)));
         let (summaries, mut again) = match opened {
             Ok(opened) => opened,
             Err(error) => {
@@ -77,15 +77,16 @@ impl StoreCheck<'_> {
         count
     }
 
-    /// Checks pages, indexes, the schema and the table of units.
-    fn check_file(&mut self, store: &Store) -> Result<(), StoreError> {
+    /// Checks pages, indexes, the schema and the table of units; gives what revisions are written again into.
+    fn check_file(&mut self, store: &Store) -> Result<Again, StoreError> {
         for problems in [store.damage()?, store.changed_schema()?, store.added_objects()?] {
             problems.into_iter().for_each(|what| (self.report)(problem(self.name, what)));
         }
-        if !Again::new()?.has_own_units(store)? {
+        let again = Again::new()?;
+        if !again.has_own_units(store)? {
             (self.report)(problem(self.name, OTHER_UNITS));
         }
-        Ok(())
+        Ok(again)
     }
 
     fn check_material(
