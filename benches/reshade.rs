@@ -35,8 +35,7 @@ fn main() {
         grain_of_region: &[DVec3::Y],
         middle: DVec3::ZERO,
     };
-    let shots =
-        diagnose::trace_shots(&stage, &radar, &chirps).expect("chirps that meet the target");
+    let shots = diagnose::trace_shots(&stage).expect("chirps that meet the target");
     stage.middle = effects::middle(&shots);
     let drift = effects::find("drift").expect("the effect");
     let json = std::env::args().any(|argument| argument == "json");

@@ -100,7 +100,7 @@ impl Bench {
             grain_of_region: &grains,
             middle: DVec3::ZERO,
         };
-        let shots = diagnose::trace_shots(&stage, radar, &self.scene.chirps).unwrap();
+        let shots = diagnose::trace_shots(&stage).unwrap();
         stage.middle = middle(&shots);
         then(&stage, &shots)
     }

@@ -8,7 +8,6 @@ use super::scorer::{Scorer, State};
 use super::subject::Subject;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Prediction, Shot};
-use crate::units::dbm_from_watts;
 
 /// A model as the table of residuals shows it.
 #[derive(Clone, Copy)]
@@ -31,14 +30,14 @@ pub(super) fn rows(
         let arrived = prediction.arrived.get(index).copied().flatten();
         rows.push(Row {
             chirp: shot.chirp,
-            observed_dbm: seen.power_w.map(dbm_from_watts),
-            before_dbm: before.state.held_out[index].expected_dbm,
-            after_dbm: after.state.held_out[index].expected_dbm,
+            observed_w: seen.power_w,
+            before_w: before.state.held_out[index].expected_w,
+            after_w: after.state.held_out[index].expected_w,
             z_before: before.z[index],
             z_after: after.z[index],
             fold: folds.fold[index],
-            theta_deg: shot.hit.theta_rad().to_degrees(),
-            azimuth_deg: shot.azimuth_rad.to_degrees(),
+            theta_rad: shot.hit.theta_rad(),
+            azimuth_rad: shot.azimuth_rad,
             range_m: shot.hit.range_m,
             range_residual_m: seen.range_m.zip(arrived).map(|(seen_m, a)| seen_m - a.range_m),
             xt_m: shot.xt_m,
@@ -66,8 +65,8 @@ pub(super) fn base(subject: &Subject, state: &State, sd: &[f64]) -> Base {
     Base {
         parameters,
         looks: receiver.looks,
-        threshold_dbm: dbm_from_watts(declared.threshold_w),
-        noise_dbm: (receiver.noise_w > 0.0).then(|| dbm_from_watts(receiver.noise_w)),
+        threshold_w: declared.threshold_w,
+        noise_w: receiver.noise_w,
         range_sd_m: declared.range_sd_m,
         pose: subject.pose.to_vec(),
         converged: state.fit.converged,

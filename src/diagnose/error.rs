@@ -5,6 +5,7 @@ use thiserror::Error;
 use super::settings::{LEAST_BLOCKS, LEAST_DETECTIONS};
 use crate::fit::FitError;
 use crate::render::RenderError;
+use crate::units::dbm_from_watts;
 
 /// Why a diagnosis has no answer.
 #[derive(Debug, Error)]
@@ -69,16 +70,17 @@ pub enum DiagnoseError {
     },
     /// Detections that the declared threshold rules out.
     #[error(
-        "{below} of {detected} detections are weaker than the threshold of {threshold_dbm:.2} dBm that the \
-         scene declares; correct `threshold_dbm` under [radar], or the powers of the cloud"
+        "{below} of {detected} detections are weaker than the threshold of {:.2} dBm that the \
+         scene declares; correct `threshold_dbm` under [radar], or the powers of the cloud",
+        dbm_from_watts(*threshold_w)
     )]
     Threshold {
         /// Detections below the threshold.
         below: usize,
         /// Detections.
         detected: usize,
-        /// Declared threshold, dBm.
-        threshold_dbm: f64,
+        /// Declared threshold, W.
+        threshold_w: f64,
     },
     /// Even with all effects found the model is far off.
     #[error(

@@ -2,13 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::evidence::{Candidate, Evidence};
 use super::residual::Unexplained;
 use super::score::Errors;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Level, Place, Shot};
+use crate::units::dbm_from_watts;
 
 /// Version of a report as JSON.
 pub const SCHEMA: u32 = 3;
@@ -178,16 +179,28 @@ pub struct Base {
     pub parameters: Vec<BaseValue>,
     /// Looks of speckle, as declared.
     pub looks: f64,
-    /// Threshold, dBm, as declared.
-    pub threshold_dbm: f64,
-    /// Thermal noise, dBm, as declared; none where there is none.
-    pub noise_dbm: Option<f64>,
+    /// Threshold, W, as declared; a report states it as `threshold_dbm`.
+    #[serde(rename = "threshold_dbm", serialize_with = "write_dbm")]
+    pub threshold_w: f64,
+    /// Thermal noise, W, as declared; a report states it as `noise_dbm`, null for a receiver without noise.
+    #[serde(rename = "noise_dbm", serialize_with = "write_dbm_if_positive")]
+    pub noise_w: f64,
     /// Standard deviation of a range, m, as declared; 0 where ranges are not used.
     pub range_sd_m: f64,
     /// Poses of the meshes, as declared; a diagnosis does not change them.
     pub pose: Vec<MeshPose>,
     /// Whether the final fit converged.
     pub converged: bool,
+}
+
+/// Writes a power in W as its level in dBm.
+fn write_dbm<S: Serializer>(power_w: &f64, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_f64(dbm_from_watts(*power_w))
+}
+
+/// Writes a power in W as its level in dBm, and 0 as null.
+fn write_dbm_if_positive<S: Serializer>(power_w: &f64, to: S) -> Result<S::Ok, S::Error> {
+    (*power_w > 0.0).then(|| dbm_from_watts(*power_w)).serialize(to)
 }
 
 /// The size from which on an effect was found in data that the base model simulated with it.
@@ -229,26 +242,27 @@ pub struct Control {
 }
 
 /// One shot in the table of residuals.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
     /// Chirp number.
     pub chirp: u32,
-    /// Received power, dBm; none where nothing was detected.
-    pub observed_dbm: Option<f64>,
-    /// E[dBm | detected] of the base model, from a fit without this shot's fold.
-    pub before_dbm: f64,
-    /// E[dBm | detected] of the model with the effects, from a fit without this shot's fold.
-    pub after_dbm: f64,
+    /// Received power, W; none where nothing was detected.
+    pub observed_w: Option<f64>,
+    /// Geometric mean of the power of a detection, W, by the base model, from a fit without this shot's fold.
+    pub before_w: f64,
+    /// Geometric mean of the power of a detection, W, by the model with the effects, from a fit without this shot's
+    /// fold.
+    pub after_w: f64,
     /// Randomised quantile residual of the base model, fitted to all shots.
     pub z_before: f64,
     /// Randomised quantile residual of the model with the effects, fitted to all shots.
     pub z_after: f64,
     /// Fold that the shot was held out with.
     pub fold: usize,
-    /// Incidence, degrees.
-    pub theta_deg: f64,
-    /// Azimuth of the radar about the normal, degrees.
-    pub azimuth_deg: f64,
+    /// Incidence angle, rad.
+    pub theta_rad: f64,
+    /// Azimuth of the radar about the normal, rad.
+    pub azimuth_rad: f64,
     /// Range of the mesh, m.
     pub range_m: f64,
     /// Measured less predicted range with the effects, m; none where there is no range.

@@ -53,7 +53,7 @@ impl MeasuredScene<'_> {
             grain_of_region: &grain_of_region,
             middle: glam::DVec3::ZERO,
         };
-        let shots = trace_shots(&stage, radar, &scene.chirps)?;
+        let shots = trace_shots(&stage)?;
         stage.middle = middle(&shots);
         // The cloud against the chirps.
         let matched = match_cloud(cloud, &scene.chirps, &shots)?;

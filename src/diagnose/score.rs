@@ -11,7 +11,6 @@ use super::folds::Folds;
 use super::likelihood::Likelihood;
 use super::observation::{Declared, Observation};
 use crate::effects::Prediction;
-use crate::units::dbm_from_watts;
 
 /// Errors below this multiple of the noise floor count as at the floor, with no excess to explain.
 pub(super) const AT_THE_FLOOR: f64 = 1.05;
@@ -24,8 +23,8 @@ pub(super) const DB: f64 = 10.0 / std::f64::consts::LN_10;
 pub(super) struct Score {
     /// ln p.
     pub ln_p: f64,
-    /// E[dBm | detected].
-    pub expected_dbm: f64,
+    /// Geometric mean of the power of a detection, W: exp E[ln P | detected].
+    pub expected_w: f64,
     /// Var[dB | detected].
     pub variance_db2: f64,
     /// Detected minus expected, dB; none where nothing was detected.
@@ -128,16 +127,15 @@ pub(super) fn scores(
     let mut scores = Vec::new();
     for (shot, seen) in observations.iter().enumerate().filter(|(shot, _)| wanted(*shot)) {
         let [mean, variance] = detected_moments(&likelihood, &table, prediction, declared, shot);
-        let expected_dbm = DB * mean + dbm_from_watts(1.0);
         let missed = likelihood.below(shot, declared.threshold_w);
         let share = seen
             .power_w
             .map(|power_w| (likelihood.below(shot, power_w) - missed) / (1.0 - missed).max(1e-300));
         let score = Score {
             ln_p: likelihood.term(shot, seen).ln_p,
-            expected_dbm,
+            expected_w: mean.exp(),
             variance_db2: DB * DB * variance,
-            residual_db: seen.power_w.map(|power_w| dbm_from_watts(power_w) - expected_dbm),
+            residual_db: seen.power_w.map(|power_w| DB * (power_w.ln() - mean)),
             chance: 1.0 - missed,
             share,
         };

@@ -9,20 +9,17 @@ use rayon::prelude::*;
 use super::error::DiagnoseError;
 use crate::effects::{Shot, Stage};
 use crate::frames::{Direction, Pose};
-use crate::radar::{Chirps, Radar};
+use crate::radar::Chirps;
 use crate::render::{LocalFrame, trace};
 use crate::trace::{Hit, ScanGeometry};
 
-/// The shot of every chirp that meets the target, along the axis of the beam.
+/// Traces the shot of every chirp of the stage that meets the target, along the axis of the beam.
 ///
 /// # Errors
 /// When no chirp does.
-pub fn trace_shots(
-    stage: &Stage,
-    radar: &Radar,
-    chirps: &Chirps,
-) -> Result<Vec<Shot>, DiagnoseError> {
-    let footprints = trace(&ScanGeometry { radar, chirps, ..stage.geometry }, 1, &|_| {})?;
+pub fn trace_shots(stage: &Stage) -> Result<Vec<Shot>, DiagnoseError> {
+    let ScanGeometry { radar, chirps, .. } = stage.geometry;
+    let footprints = trace(&stage.geometry, 1, &|_| {})?;
     let places: Vec<_> = chirps.target_points_m(&radar.frames()).collect();
     let progress = chirps.progress();
     let shots = (0..chirps.rays.len()).into_par_iter().filter_map(|index| {

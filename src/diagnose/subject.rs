@@ -8,7 +8,6 @@ use super::report::MeshPose;
 use super::settings::{LEAST_BLOCKS, LEAST_DETECTIONS};
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Receiver, Shot, Stage};
-use crate::units::dbm_from_watts;
 
 /// Share of detections that may lie below the threshold by the rounding of a file.
 const MOST_BELOW: f64 = 0.01;
@@ -58,8 +57,7 @@ impl Subject<'_> {
         let powers_w = self.observations.iter().filter_map(|seen| seen.power_w);
         let below = powers_w.filter(|power_w| *power_w < BELOW * threshold_w).count();
         if below as f64 > MOST_BELOW * detected as f64 {
-            let threshold_dbm = dbm_from_watts(threshold_w);
-            return Err(DiagnoseError::Threshold { below, detected, threshold_dbm });
+            return Err(DiagnoseError::Threshold { below, detected, threshold_w });
         }
         if folds.blocks < LEAST_BLOCKS {
             return Err(DiagnoseError::TooSmall { blocks: folds.blocks });

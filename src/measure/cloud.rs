@@ -84,7 +84,7 @@ pub enum CloudError {
     NoSuchPower {
         /// Point, from 0.
         point: usize,
-        /// Its power, dBm.
+        /// Its power, dBm: as the file states it, which in W may be beyond any number.
         power_dbm: f64,
     },
     /// A power in watts that is not positive.

@@ -2,14 +2,12 @@
 //! to 15).
 
 use super::cloud::Cloud;
-use crate::frames::Point;
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
 use crate::radar::{Chirps, Radar};
 use crate::render::{Echo, Scan};
-use crate::units::dbm_from_watts;
 
-/// Agreement of two power images on one grid.
+/// Agreement of two power images on one grid, in dB: a residual is a ratio of powers.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Agreement {
     /// Pixels with power in both.
@@ -96,14 +94,12 @@ fn count_of_first(first_dbm: &[f32], second_dbm: &[f32]) -> usize {
     pixels.filter(|(first, second)| first.is_finite() && !second.is_finite()).count()
 }
 
-/// (x, dBm) of the detections within a line, x in the global frame, m, from left to right.
+/// The detections within a line from left to right: x in the global frame, m, and received power, W.
 pub fn power_along(scan: &Scan, line: Line) -> Vec<(f64, f64)> {
-    let within =
-        |point: Point<crate::frames::Global>| (point.xyz.y - line.y_m).abs() <= 0.5 * line.width_m;
     let mut points: Vec<(f64, f64)> = scan
         .detections()
-        .filter(|echo| within(echo.point))
-        .map(|echo| (echo.point.xyz.x, dbm_from_watts(echo.power_w)))
+        .filter(|echo| (echo.point.xyz.y - line.y_m).abs() <= 0.5 * line.width_m)
+        .map(|echo| (echo.point.xyz.x, echo.power_w))
         .collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     points
@@ -112,8 +108,8 @@ pub fn power_along(scan: &Scan, line: Line) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frames::Point;
     use crate::measure::cloud::CloudPoint;
-    use crate::units::watts_from_dbm;
 
     fn raster(values: [f32; 4]) -> Raster {
         let channels = vec![Channel { name: "power_dbm".to_owned(), values: values.to_vec() }];
@@ -141,24 +137,17 @@ mod tests {
     #[test]
     fn a_line_holds_what_lies_within_it_from_left_to_right() {
         let radar = Radar::default();
-        let point = |x, y, power_dbm| CloudPoint {
+        let point = |x, y, power_w| CloudPoint {
             chirp: None,
             point: Point::new(x, y, 0.0),
             range_m: None,
-            power_w: watts_from_dbm(power_dbm),
+            power_w,
         };
-        let points =
-            vec![point(0.1, 1.105, -40.0), point(-0.1, 1.095, -50.0), point(0.0, 1.2, -60.0)];
+        let points = vec![point(0.1, 1.105, 1e-7), point(-0.1, 1.095, 1e-8), point(0.0, 1.2, 1e-9)];
         let cloud = Cloud::new(points).unwrap();
         let scan = measured_scan(&radar, &Chirps::default(), &cloud);
         let line = power_along(&scan, Line { y_m: 1.1, width_m: 0.02 });
-        let expected = [(-0.1, -50.0), (0.1, -40.0)];
-        assert_eq!(line.len(), expected.len());
-        for ((x_m, power_dbm), (expected_m, expected_dbm)) in std::iter::zip(line, expected) {
-            assert_eq!(x_m, expected_m);
-            // A level that was converted to watts and back.
-            assert!(f64::abs(power_dbm - expected_dbm) < 1e-12, "{power_dbm}");
-        }
+        assert_eq!(line, [(-0.1, 1e-8), (0.1, 1e-7)]);
         assert!((scan.echoes[2].yt_m - 0.1).abs() < 1e-12);
         assert!((scan.echoes[2].range_m - 8.0f64.hypot(0.1)).abs() < 1e-12);
     }

@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::units::{dbm_from_watts, rounded};
+
 /// Why a registration fails.
 #[derive(Debug, Error, PartialEq)]
 pub enum RegistrationError {
@@ -117,19 +119,20 @@ pub enum ReductionError {
     },
     /// The radar of the scene could not have detected this.
     #[error(
-        "{below} of {points} powers lie below the scene's threshold of {threshold_dbm} dBm, the weakest \
-         at {weakest_dbm:.1} dBm; give the scene the radar.threshold_dbm of the measurement, or check \
-         the unit of the power"
+        "{below} of {points} powers lie below the scene's threshold of {} dBm, the weakest \
+         at {:.1} dBm; give the scene the radar.threshold_dbm of the measurement, or check \
+         the unit of the power",
+        rounded(dbm_from_watts(*threshold_w)), dbm_from_watts(*weakest_w)
     )]
     BelowThreshold {
         /// Detections below it.
         below: usize,
         /// All detections.
         points: usize,
-        /// The threshold, dBm.
-        threshold_dbm: f64,
-        /// The weakest power, dBm.
-        weakest_dbm: f64,
+        /// The threshold, W.
+        threshold_w: f64,
+        /// The weakest power, W.
+        weakest_w: f64,
     },
     /// Several detections of one chirp.
     #[error(

@@ -25,7 +25,7 @@ use crate::material::Observation;
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Chirps, Footprint, Link, Radar};
 use crate::scene::Target;
-use crate::units::{dbm_from_watts, watts_from_dbm};
+use crate::units::watts_from_dbm;
 
 /// Settings of the reduction of a registered cloud to a curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -383,18 +383,17 @@ impl Assignment {
 
 /// The threshold of the scene must be that of the measurement, or silence means something else.
 fn check_threshold(radar: &Radar, cloud: &Cloud) -> Result<(), ReductionError> {
-    // Rounding in a file.
-    const ROUNDING_DB: f64 = 0.05;
-    let threshold_dbm = radar.threshold_dbm;
-    let least_w = watts_from_dbm(threshold_dbm - ROUNDING_DB);
+    // A file may round its powers by this ratio, 0.05 dB.
+    const ROUNDING: f64 = 0.988_553;
+    let threshold_w = watts_from_dbm(radar.threshold_dbm);
+    let least_w = ROUNDING * threshold_w;
     let below = cloud.points().iter().filter(|point| point.power_w < least_w).count();
     let points = cloud.points().len();
     if below * TOLERATED <= points {
         return Ok(());
     }
     let weakest_w = cloud.points().iter().map(|point| point.power_w).fold(f64::INFINITY, f64::min);
-    let weakest_dbm = dbm_from_watts(weakest_w);
-    Err(ReductionError::BelowThreshold { below, points, threshold_dbm, weakest_dbm })
+    Err(ReductionError::BelowThreshold { below, points, threshold_w, weakest_w })
 }
 
 /// Indices of the chirps of which no point has the number and no unnumbered point lies on the ray.

@@ -7,6 +7,7 @@ use crate::measure::Cloud;
 use crate::measure::compare::{Agreement, Line, difference, measured_scan, power_along};
 use crate::render::{Observer, Scan, shade, trace_placed};
 use crate::setup::ReadyScene;
+use crate::units::dbm_from_watts;
 
 /// A measured and a rendered scan of one scene.
 pub struct Comparison {
@@ -74,7 +75,10 @@ impl Comparison {
                 Series {
                     name: format!("{name}, y = {} ± {} m", line.y_m, 0.5 * line.width_m),
                     style: Style::Points,
-                    points: power_along(scan, line),
+                    points: power_along(scan, line)
+                        .into_iter()
+                        .map(|(x_m, power_w)| (x_m, dbm_from_watts(power_w)))
+                        .collect(),
                 }
             });
         let is_empty = series.iter().all(|series| series.points.is_empty());

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use crate::diagnose::Row;
 use crate::diagnose::curve::CurveRow;
+use crate::units::dbm_from_watts;
 
 const COLUMNS: [&str; 17] = [
     "chirp",
@@ -34,14 +35,14 @@ pub(super) fn of_cloud(rows: &[Row]) -> Vec<u8> {
             text,
             "{},{},{:.4},{:.4},{:.4},{:.4},{},{:.4},{:.4},{:.5},{},{:.5},{:.5},{:.5},{:.6},{},{:.4}",
             row.chirp,
-            cell(row.observed_dbm, 4),
-            row.before_dbm,
-            row.after_dbm,
+            cell(row.observed_w.map(dbm_from_watts), 4),
+            dbm_from_watts(row.before_w),
+            dbm_from_watts(row.after_w),
             row.z_before,
             row.z_after,
             row.fold,
-            row.theta_deg,
-            row.azimuth_deg,
+            row.theta_rad.to_degrees(),
+            row.azimuth_rad.to_degrees(),
             row.range_m,
             cell(row.range_residual_m, 6),
             row.xt_m,

@@ -10,6 +10,7 @@ use crate::formats::figure::{Figure, FigureError, Scale};
 use crate::formats::words::signed;
 use crate::geometry::Raster;
 use crate::report::picture::Picture;
+use crate::units::db_from_ratio;
 
 /// Colours reach as far as this share of the pixels where speckle is among them.
 const MOST: f64 = 0.98;
@@ -52,8 +53,8 @@ pub(super) fn residuals(report: &Report, spot_m: f64) -> Result<Picture, FigureE
     };
     let notes = [error_note(&report.error.before), error_note(&report.error.after)];
     let picks: [Pick; 2] = [
-        |row| Some(row.observed_dbm? - row.before_dbm),
-        |row| Some(row.observed_dbm? - row.after_dbm),
+        |row| Some(db_from_ratio(row.observed_w? / row.before_w)),
+        |row| Some(db_from_ratio(row.observed_w? / row.after_w)),
     ];
     maps(&subject, report, spot_m, before_after(report, notes, picks))
 }

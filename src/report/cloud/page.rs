@@ -80,7 +80,7 @@ pub(super) fn page(
         heading: heading(report.verdict, report.effects.len()),
         sentence: sentence(report),
         shots: report.rows.len(),
-        detected: report.rows.iter().filter(|row| row.observed_dbm.is_some()).count(),
+        detected: report.rows.iter().filter(|row| row.observed_w.is_some()).count(),
         seed,
         notices,
         effects: report.effects.iter().map(of_cloud).collect(),

@@ -74,15 +74,15 @@ mod tests {
 
     #[test]
     fn a_pixel_is_the_mean_of_its_shots_and_upright() {
-        let at = |xt_m, yt_m, observed_dbm| Row { xt_m, yt_m, observed_dbm, ..row() };
+        let at = |xt_m, yt_m, observed_w| Row { xt_m, yt_m, observed_w, ..row() };
         let rows =
-            [at(0.005, 0.005, Some(-50.0)), at(0.006, 0.004, Some(-53.0)), at(0.035, 0.025, None)];
+            [at(0.005, 0.005, Some(1.0)), at(0.006, 0.004, Some(2.0)), at(0.035, 0.025, None)];
         let around = empty(&rows, 0.01);
         assert_eq!((around.width, around.height), (6, 5));
-        let map = filled(&around, &rows, |row| row.observed_dbm);
+        let map = filled(&around, &rows, |row| row.observed_w);
         let values = map.channel(CHANNEL).unwrap();
         // The lowest row but the margin's is the last but one.
-        assert_eq!(values[3 * 6 + 1], -51.5);
+        assert_eq!(values[3 * 6 + 1], 1.5);
         assert_eq!(values.iter().filter(|v| v.is_nan()).count(), 29);
     }
 

@@ -4,6 +4,7 @@ use super::models::{names, shown};
 use crate::diagnose::{Report, Row};
 use crate::formats::figure::{FigureError, Plot, Series, Style};
 use crate::report::picture::{Picture, guide};
+use crate::units::{db_from_ratio, dbm_from_watts};
 
 /// Bins of as many detections each.
 const BINS: usize = 16;
@@ -18,11 +19,11 @@ struct Covariate {
 }
 
 const COVARIATES: [Covariate; 9] = [
-    Covariate { name: "Angle", label: "incidence θ, °", of: |row| row.theta_deg },
+    Covariate { name: "Angle", label: "incidence θ, °", of: |row| row.theta_rad.to_degrees() },
     Covariate {
         name: "Azimuth",
         label: "azimuth of the radar about the normal, °",
-        of: |row| row.azimuth_deg,
+        of: |row| row.azimuth_rad.to_degrees(),
     },
     Covariate { name: "Range", label: "range, m", of: |row| row.range_m },
     Covariate { name: "Place, x", label: "x in the target plane, m", of: |row| row.xt_m },
@@ -37,7 +38,7 @@ const COVARIATES: [Covariate; 9] = [
     Covariate {
         name: "Power",
         label: "power predicted by the base model, dBm",
-        of: |row| row.before_dbm,
+        of: |row| dbm_from_watts(row.before_w),
     },
 ];
 
@@ -83,8 +84,8 @@ pub(super) fn picture(report: &Report) -> Result<Picture, FigureError> {
 fn trends(rows: &[Row]) -> Vec<Trend> {
     let mut trends = Vec::new();
     for covariate in &COVARIATES {
-        let before = bins(rows, covariate.of, |row| row.before_dbm);
-        let after = bins(rows, covariate.of, |row| row.after_dbm);
+        let before = bins(rows, covariate.of, |row| row.before_w);
+        let after = bins(rows, covariate.of, |row| row.after_w);
         if before.len() > 2 {
             trends.push(Trend { covariate, before, after });
         }
@@ -133,10 +134,11 @@ fn strength(bins: &[Bin]) -> f64 {
 }
 
 /// Detections in bins of equally many; what has the same covariate stays together.
-fn bins(rows: &[Row], of: fn(&Row) -> f64, predicted: fn(&Row) -> f64) -> Vec<Bin> {
+fn bins(rows: &[Row], of: fn(&Row) -> f64, predicted_w: fn(&Row) -> f64) -> Vec<Bin> {
     let mut points: Vec<(f64, f64)> = Vec::new();
     for row in rows {
-        points.extend(row.observed_dbm.map(|dbm| (of(row), dbm - predicted(row))));
+        let ratio = row.observed_w.map(|observed_w| observed_w / predicted_w(row));
+        points.extend(ratio.map(|ratio| (of(row), db_from_ratio(ratio))));
     }
     points.retain(|(at, residual_db)| at.is_finite() && residual_db.is_finite());
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -173,36 +175,32 @@ fn bin_of(points: &[(f64, f64)]) -> Option<Bin> {
 mod tests {
     use super::*;
     use crate::report::cloud::testing::row;
+    use crate::units::watts_from_dbm;
 
     #[test]
     fn bins_have_the_mean_and_standard_error_of_their_shots() {
         let look = |i: u32| Row {
-            theta_deg: f64::from(i / 100),
-            observed_dbm: Some(
+            time_s: f64::from(i / 100),
+            observed_w: Some(watts_from_dbm(
                 -60.0 + 0.1 * f64::from(i / 100) + if i.is_multiple_of(2) { 1.0 } else { -1.0 },
-            ),
-            before_dbm: -60.0,
+            )),
             ..row()
         };
         let mut rows: Vec<Row> = (0..1600).map(look).collect();
-        rows.push(Row { observed_dbm: None, ..look(0) });
-        let bins = bins(&rows, |row| row.theta_deg, |row| row.before_dbm);
+        rows.push(Row { observed_w: None, ..look(0) });
+        let bins = bins(&rows, |row| row.time_s, |row| row.before_w);
         assert_eq!(bins.len(), 16);
-        for (degree, bin) in (0..16).zip(&bins) {
-            assert_eq!(bin.at, f64::from(degree));
-            assert!((bin.mean_db - 0.1 * f64::from(degree)).abs() < 1e-9);
+        for (second, bin) in (0..16).zip(&bins) {
+            assert_eq!(bin.at, f64::from(second));
+            assert!((bin.mean_db - 0.1 * f64::from(second)).abs() < 1e-9);
             assert!((bin.se_db - (1.0 / 99f64).sqrt()).abs() < 1e-9);
         }
     }
 
     #[test]
     fn equal_values_share_a_bin() {
-        let look = |i: u32| Row {
-            edge_m: if i < 50 { 0.01 } else { 0.048 },
-            observed_dbm: Some(-60.0),
-            ..row()
-        };
+        let look = |i: u32| Row { edge_m: if i < 50 { 0.01 } else { 0.048 }, ..row() };
         let rows: Vec<Row> = (0..1000).map(look).collect();
-        assert_eq!(bins(&rows, |row| row.edge_m, |row| row.before_dbm).len(), 2);
+        assert_eq!(bins(&rows, |row| row.edge_m, |row| row.before_w).len(), 2);
     }
 }
