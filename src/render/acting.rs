@@ -1,10 +1,9 @@
-//! The effects of a setup, acting on the radar's own echoes.
+//! Applies the effects of a setup to the radar's own echoes.
 //!
-//! Every ray of a chirp is a [`Shot`] that a [`Model`] predicts: where it meets the target, and the
-//! mean power that comes straight back. What the model makes of a whole echo
-//! ([`Effect::arrive`](crate::effects::Effect::arrive)) it makes of the sum over the paths of the
-//! chirp, and every path has its share of the change. Second-order paths know the gains of the
-//! instrument and nothing else of the effects.
+//! Every ray of a chirp is a [`Shot`], of which a [`Model`] predicts the intersection and the mean power of the single
+//! path. Effects on a whole echo ([`Effect::arrive`](crate::effects::Effect::arrive)) act on the sum over the paths of
+//! a chirp, and every path gets its share of the change. Of all effects, only the gains of the instrument act on
+//! second-order paths.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -25,23 +24,23 @@ use crate::radar::Link;
 use crate::radar::random::{Key, Purpose};
 use crate::trace::{Hit, ScanGeometry};
 
-/// The model of a setup, made ready for its scan.
+/// The model of a setup, prepared for its scan.
 pub(super) struct Acting<'a> {
     setup: Setup<'a>,
     model: &'a Model<'a>,
-    /// The same without effects.
+    /// The model without effects.
     bare: Model<'a>,
     link: Link,
     grain_of_region: Vec<DVec3>,
     middle: DVec3,
-    /// Where the ray of every chirp passes 8 m in the target frame, m.
+    /// Point of every chirp's ray at 8 m in the target frame, m.
     places: Vec<DVec2>,
     progress: Vec<f64>,
     receiver: Receiver,
 }
 
-/// The facet of a ray that has met nothing yet.
-const NOWHERE: u32 = u32::MAX;
+/// Facet of a shot that misses the target.
+const NO_FACET: u32 = u32::MAX;
 
 impl<'a> Acting<'a> {
     /// `None` for a setup without effects.
@@ -62,25 +61,27 @@ impl<'a> Acting<'a> {
         Some(acting)
     }
 
-    /// The receiver's law with the effects.
+    /// The receiver with the effects on it.
     pub fn receiver(&self) -> Receiver {
         self.receiver
     }
 
-    /// What a ray of a chirp meets, from what it hits where the scene has the target.
+    /// The intersection of a ray with the target where the effects place it. `hit` is its hit where the scene places the
+    /// target.
     pub fn meet(&self, chirp: usize, ray: &Ray<Global>, hit: Option<Hit>) -> Intersection {
-        // A ray that misses may still meet a target that has moved.
-        let shot = hit.map_or(self.blank(chirp, *ray), |hit| self.shot(chirp, *ray, hit, None));
+        // A ray that misses may hit the target after the effects have moved it.
+        let shot =
+            hit.map_or(self.missed_shot(chirp, *ray), |hit| self.shot(chirp, *ray, hit, None));
         match self.model.placed(&self.stage(), shot) {
             Some(placed) if placed == shot => (hit, None),
-            Some(Shot { hit, normal, azimuth_rad, .. }) if hit.facet != NOWHERE => {
+            Some(Shot { hit, normal, azimuth_rad, .. }) if hit.facet != NO_FACET => {
                 (Some(hit), Some(Facing { normal, azimuth_rad }))
             }
             _ => (None, None),
         }
     }
 
-    /// A direct path, given without effects, with them.
+    /// Applies the effects to a single path.
     pub fn direct(
         &self,
         path: Path,
@@ -89,11 +90,11 @@ impl<'a> Acting<'a> {
         facing: Option<Facing>,
         tilts: [f64; 2],
     ) -> Path {
-        let (stage, shot) = (self.stage(), self.seen(chirp, rays, path.hit, facing));
+        let (stage, shot) = (self.stage(), self.traced_shot(chirp, rays, path.hit, facing));
         let with_w =
             tilted(&shot, tilts).map_or(0.0, |shot| self.model.arrived(&stage, &shot).power_w);
         let Some(Facing { azimuth_rad, .. }) = facing else {
-            // Where nothing acts, not even rounding may differ.
+            // Without a change the path stays the same bit for bit.
             let same = with_w == self.bare.arrived(&stage, &shot).power_w;
             return if same { path } else { Path { power_w: with_w / rays as f64, ..path } };
         };
@@ -103,7 +104,7 @@ impl<'a> Acting<'a> {
         Path { power_w: with_w / rays as f64, azimuth_rad, specular_share, ..path }
     }
 
-    /// Factor of the instrument on all that comes back through a ray of a chirp, a ratio.
+    /// Gain of the effects of the instrument on the power of one ray of a chirp, as a ratio.
     pub fn instrument_gain(
         &self,
         chirp: usize,
@@ -111,12 +112,12 @@ impl<'a> Acting<'a> {
         hit: Hit,
         facing: Option<Facing>,
     ) -> f64 {
-        let (stage, shot) = (self.stage(), self.seen(chirp, rays, hit, facing));
+        let (stage, shot) = (self.stage(), self.traced_shot(chirp, rays, hit, facing));
         let instrument = self.model.effects.iter().filter(|(e, _)| e.level() == Level::Instrument);
         instrument.map(|(effect, values)| effect.gain(values, &stage, &shot)).product()
     }
 
-    /// Tangents of the two tilts of the normals under a chirp.
+    /// Draws the tangents of the two tilts of the normals under a chirp.
     pub fn tilts(&self, chirp: usize) -> [f64; 2] {
         let sd_rad = self.receiver.tilt_sd_rad;
         if sd_rad == 0.0 {
@@ -127,8 +128,8 @@ impl<'a> Acting<'a> {
         [(); 2].map(|()| (sd_rad * draws.gaussian()).tan())
     }
 
-    /// What the effects make of the sums over the paths of all chirps.
-    pub fn arrive(
+    /// The change of every chirp's whole echo by the effects, from the sums over its paths; `None` without a change.
+    pub fn changes(
         &self,
         footprints: &Footprints,
         sums: Vec<Option<MeanEcho>>,
@@ -149,13 +150,13 @@ impl<'a> Acting<'a> {
         changes
     }
 
-    /// The first ray of a chirp that meets the target.
+    /// The shot of a chirp's first ray that hits the target.
     fn first_shot(&self, footprints: &Footprints, chirp: usize) -> Option<Shot> {
         let hits = footprints.hits.iter().zip(0..).skip(chirp * footprints.rays_per_chirp);
         let mut hits = hits.take(footprints.rays_per_chirp);
         let (hit, index) = hits.find_map(|(hit, index)| Some(((*hit)?, index)))?;
         let facing = footprints.facings.get::<usize>(index).copied().flatten();
-        Some(self.seen(chirp, footprints.rays_per_chirp, hit, facing))
+        Some(self.traced_shot(chirp, footprints.rays_per_chirp, hit, facing))
     }
 
     fn stage(&self) -> Stage<'_> {
@@ -167,7 +168,7 @@ impl<'a> Acting<'a> {
         }
     }
 
-    /// One shot for every chirp whose axis meets the target where the scene places it.
+    /// The shot of every chirp whose axis hits the target where the scene places it.
     fn shots(&self) -> Vec<Shot> {
         let ScanGeometry { chirps, bvh, .. } = self.setup.geometry;
         let rays = chirps.rays.par_iter().enumerate();
@@ -176,8 +177,8 @@ impl<'a> Acting<'a> {
         shots.collect()
     }
 
-    /// A ray of a chirp where it was traced to.
-    fn seen(&self, chirp: usize, rays: usize, hit: Hit, facing: Option<Facing>) -> Shot {
+    /// The shot of a ray with a hit on the target where the effects place it.
+    fn traced_shot(&self, chirp: usize, rays: usize, hit: Hit, facing: Option<Facing>) -> Shot {
         let axis = self.setup.geometry.chirps.rays[chirp];
         let ray = match axis.origin.towards(hit.point) {
             Some(direction) if rays > 1 => Ray { direction, ..axis },
@@ -188,6 +189,7 @@ impl<'a> Acting<'a> {
         Shot { target: moved.unwrap_or(shot.target), ..shot }
     }
 
+    /// The shot of a ray with a hit. Without `facing` the surface lies as the mesh has it.
     fn shot(&self, chirp: usize, ray: Ray<Global>, hit: Hit, facing: Option<Facing>) -> Shot {
         let region = self.setup.geometry.region_of_facet[hit.facet as usize];
         let Facing { normal, azimuth_rad } = facing.unwrap_or_else(|| {
@@ -197,11 +199,11 @@ impl<'a> Acting<'a> {
             let [x, y, _] = frame.local(back).xyz().to_array();
             Facing { normal: frame.normal, azimuth_rad: y.atan2(x) }
         });
-        Shot { hit, normal, azimuth_rad, region, ..self.blank(chirp, ray) }
+        Shot { hit, normal, azimuth_rad, region, ..self.missed_shot(chirp, ray) }
     }
 
-    /// A ray that has met nothing.
-    fn blank(&self, chirp: usize, ray: Ray<Global>) -> Shot {
+    /// The shot of a ray that misses the target.
+    fn missed_shot(&self, chirp: usize, ray: Ray<Global>) -> Shot {
         let chirps = self.setup.geometry.chirps;
         Shot {
             chirp: chirps.number[chirp],
@@ -209,7 +211,7 @@ impl<'a> Acting<'a> {
             progress: self.progress[chirp],
             ray,
             hit: Hit {
-                facet: NOWHERE,
+                facet: NO_FACET,
                 range_m: 0.0,
                 point: Point::from(DVec3::ZERO),
                 cos_theta: 1.0,
@@ -225,7 +227,7 @@ impl<'a> Acting<'a> {
     }
 }
 
-/// What the effects make of a whole echo.
+/// The change of a whole echo by the effects.
 #[derive(Clone, Copy)]
 pub(super) struct Change {
     before: MeanEcho,
@@ -233,8 +235,8 @@ pub(super) struct Change {
 }
 
 impl Change {
-    /// Gives every path its share.
-    pub fn share_out(&self, paths: &mut [Path]) {
+    /// Applies the change to the paths of the echo: powers in proportion, ranges by the same shift.
+    pub fn apply(&self, paths: &mut [Path]) {
         let Change { before, after } = *self;
         let count = paths.len().max(1) as f64;
         for path in paths {
@@ -248,8 +250,8 @@ impl Change {
     }
 }
 
-/// The shot with its normal tilted in the plane of incidence and across it; `None` where the facet
-/// then shows its back.
+/// The shot with its normal tilted in the plane of incidence and across it, by these tangents; `None` if the facet then
+/// faces away.
 fn tilted(shot: &Shot, [along, across]: [f64; 2]) -> Option<Shot> {
     if along == 0.0 && across == 0.0 {
         return Some(*shot);
@@ -258,7 +260,7 @@ fn tilted(shot: &Shot, [along, across]: [f64; 2]) -> Option<Shot> {
     Some(Shot { hit: Hit { cos_theta, ..shot.hit }, ..*shot })
 }
 
-/// Refuses what would be counted twice, and effects at another antenna.
+/// Refuses effects that would be counted twice, and effects at a separate receiver.
 pub(super) fn check(setup: &Setup, rays: usize, observer: Observer) -> Result<(), RenderError> {
     let Some(model) = setup.effects else { return Ok(()) };
     for (effect, _) in &model.effects {

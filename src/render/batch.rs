@@ -1,14 +1,14 @@
-//! Many scans of one target by one instrument: other poses, materials and seeds.
+//! Renders many scans of one target by one instrument, with other poses, materials and seeds.
 //!
-//! With [`Tracer::Gpu`] the mesh and its hierarchy stay on the device from call to call, and the device traces the rays
-//! of whole chirps, evaluates equation (11) for each and adds them up over the spot, equation (7), many scans at
-//! a time. What it leaves open, ray by ray, is worked out here in f64, as everything is with any other
-//! tracer: rays that pass near an edge, and laws that are no sum of [`Term`](crate::brdf::Term)s. Poses are the processor's, in
-//! f64, as are the places of the spots and what the receiver makes of a mean power.
+//! With [`Tracer::Gpu`] the mesh and its hierarchy stay on the device. It traces the rays
+//! of whole chirps, evaluates equation (11) for each and sums over the spot, equation (7), for many scans at
+//! a time. The CPU computes in f64 the rays that the device leaves open: rays near an edge, and rays on scattering
+//! models that are not a sum of [`Term`](crate::brdf::Term)s. With any other tracer it computes all rays. Poses, spots and the
+//! receiver are always computed on the CPU, in f64.
 //!
-//! A mean power of the device is within 0.02 dB of the renderer's, and its range within 1.1 millionths of the range and of
-//! the target's radius over cos θ. Of a power that an f32 cannot hold, about −350 dBm with the paper's radar, only that it is
-//! not more is known.
+//! A mean power of the device is within 0.02 dB of the renderer's. Its range is within 1.1·10⁻⁶ of the range plus the
+//! target's radius over cos θ. Powers below the smallest f32, about −350 dBm with the paper's radar, are only known
+//! to be below it.
 
 use std::ops::Range;
 
@@ -27,16 +27,16 @@ use crate::trace::{
     Cone, EchoTracer, GpuError, Hit, RAYS_PER_SHARE, ScanGeometry, Share, TraceError, Tracer,
 };
 
-/// Rays that are worked on at once: enough for a device, few enough to hold what each meets.
+/// Rays per turn: enough to occupy a device, and few enough to hold their hits.
 const RAYS_PER_TURN: usize = 1 << 20;
 
-/// A share that nobody has seen to.
+/// A share of which the CPU must compute all rays.
 const OPEN: Share = Share { open: u32::MAX, per_sr_m2: 0.0, per_sr_m: 0.0 };
 
-/// What all scans of a batch have in common. Single paths to the radar's own antenna, without effects.
+/// The settings that all scans of a batch share. A batch has single paths to the radar's own antenna, without effects.
 #[derive(Clone, Copy)]
 pub struct Batch<'a> {
-    /// The instrument, the chirps of each scan and the target. [`Tracer::Gpu`] computes the echoes, too.
+    /// The instrument, the chirps of each scan and the target. [`Tracer::Gpu`] also computes the echoes.
     pub geometry: ScanGeometry<'a>,
     /// Rays per chirp, one or more.
     pub rays_per_chirp: usize,
@@ -45,32 +45,32 @@ pub struct Batch<'a> {
 /// One scan of a batch.
 #[derive(Clone, Copy)]
 pub struct Take<'a> {
-    /// Moves the target from where its mesh has it.
+    /// Pose of the mesh.
     pub target: Pose<Global, Global>,
-    /// What each region is made of; its grain is that of the mesh, and moves with it.
+    /// The surface of each region. Its grain is in the frame of the mesh and moves with it.
     pub surfaces: &'a [Surface<'a>],
     /// Seed of the receiver's speckle and noise.
     pub seed: u64,
 }
 
-/// What the scans of a batch gave.
+/// The echoes of the scans of a batch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Takes {
-    /// For every scan and every one of its chirps what the receiver makes of it, below the threshold, too;
-    /// none where nothing comes back.
+    /// The range and power that the receiver measures of every chirp of every scan, also below the threshold; `None`
+    /// without an echo.
     pub echoes: Vec<Vec<Option<Detection>>>,
-    /// Rays of all scans.
+    /// Number of rays of all scans.
     pub rays: usize,
-    /// Rays whose echo the processor worked out.
+    /// Number of rays that the CPU computed.
     pub rays_on_processor: usize,
 }
 
 impl Batch<'_> {
-    /// All scans, in their order.
+    /// Renders all scans, in their order.
     ///
     /// # Errors
-    /// When the radar has a receiver that works on beat signals, the tracer does not take the rays, or the graphics
-    /// processor holds another mesh, stops working or has no room for what the scans bring along.
+    /// When the radar has a receiver that works on beat signals, the tracer does not accept the rays, or the graphics
+    /// processor holds another mesh, fails, or has too little memory for the materials of the scans.
     pub fn run(&self, takes: &[Take]) -> Result<Takes, RenderError> {
         if self.geometry.radar.receiver.is_some() {
             return Err(RenderError::Signals);
@@ -82,7 +82,7 @@ impl Batch<'_> {
         let mut rays_on_processor = 0;
         while means.len() < all {
             let first = means.len();
-            // In the mesh's frame each scan has an origin of its own, and the pinhole takes one.
+            // In the frame of the mesh every scan has its own origin, and the pinhole accepts only one.
             let end = match self.geometry.tracer {
                 Tracer::Automatic | Tracer::Pinhole => (first / chirps + 1) * chirps,
                 Tracer::Bvh | Tracer::Brute | Tracer::Gpu(_) => all,
@@ -92,14 +92,14 @@ impl Batch<'_> {
             rays_on_processor += open;
         }
         let echoes = takes.iter().enumerate().map(|(number, take)| {
-            self.received(take, &means[number * chirps..(number + 1) * chirps])
+            self.detect(take, &means[number * chirps..(number + 1) * chirps])
         });
         let echoes = echoes.collect::<Result<_, RenderError>>()?;
         Ok(Takes { echoes, rays: all * work.rays, rays_on_processor })
     }
 
-    /// What the receiver makes of the means of a scan.
-    fn received(
+    /// The range and power that the receiver measures, from the means of a scan.
+    fn detect(
         &self,
         take: &Take,
         means: &[Option<Detection>],
@@ -107,22 +107,22 @@ impl Batch<'_> {
         let setup = Setup { seed: take.seed, ..Setup::new(self.geometry, take.surfaces) };
         let detector = Detector::new(&setup, Observer::Radar, None)?;
         let means = means.par_iter().enumerate();
-        Ok(means.map(|(chirp, mean)| mean.map(|mean| detector.measured(chirp, mean))).collect())
+        Ok(means.map(|(chirp, mean)| mean.map(|mean| detector.measure_mean(chirp, mean))).collect())
     }
 }
 
-/// A batch made ready. Chirps are counted through all scans.
+/// A batch prepared for rendering. Chirps are numbered through all scans.
 struct Work<'a> {
     batch: &'a Batch<'a>,
     takes: &'a [Take<'a>],
-    /// The way from the world to each mesh.
+    /// The inverse pose of each scan.
     mesh_from_world: Vec<Pose<Global, Global>>,
     link: Link,
     beam: Beam,
     rays: usize,
-    /// Laws of one scan on the device.
+    /// Number of regions, and so of scattering models per scan.
     regions: usize,
-    lit: Option<EchoTracer<'a>>,
+    echo_tracer: Option<EchoTracer<'a>>,
 }
 
 impl<'a> Work<'a> {
@@ -140,11 +140,11 @@ impl<'a> Work<'a> {
                 .iter()
                 .max()
                 .map_or(0, |&last| usize::from(last) + 1),
-            lit: None,
+            echo_tracer: None,
         };
         if let Tracer::Gpu(held) = batch.geometry.tracer {
             if !std::ptr::eq(held.bvh(), batch.geometry.bvh) {
-                return Err(failed(GpuError::OtherMesh));
+                return Err(gpu_error(GpuError::OtherMesh));
             }
             let law = |take: &Take, region: usize| match take.surfaces.get(region) {
                 Some(surface) => surface.scattering.backscatter(),
@@ -159,29 +159,30 @@ impl<'a> Work<'a> {
                 Footprint::Paper => 2.0,
                 Footprint::Projected => 1.0,
             };
-            let lit = held.lit(batch.geometry.region_of_facet, &laws, cosines, &samples);
-            work.lit = Some(lit.map_err(failed)?);
+            let region_of_facet = batch.geometry.region_of_facet;
+            let tracer = held.echo_tracer(region_of_facet, &laws, cosines, &samples);
+            work.echo_tracer = Some(tracer.map_err(gpu_error)?);
         }
         Ok(work)
     }
 
-    /// Mean power of some chirps and their range by power, none where nothing comes back, and how many
-    /// rays were left to the processor.
+    /// Mean power of some chirps and their mean range weighted by power (`None` without an echo), and the number of
+    /// rays that the CPU computed.
     fn means(&self, some: Range<usize>) -> Result<(Vec<Option<Detection>>, usize), RenderError> {
         let spots = self.spots(some.clone())?;
         let per_chirp = self.rays.div_ceil(RAYS_PER_SHARE);
-        let shares = match &self.lit {
+        let shares = match &self.echo_tracer {
             None => vec![OPEN; per_chirp * spots.len()],
-            Some(lit) => {
+            Some(tracer) => {
                 let cones = some.clone().into_par_iter().zip(&spots);
                 let cones: Vec<Cone> = cones.map(|(chirp, spot)| self.cone(chirp, spot)).collect();
-                lit.echoes(&cones).map_err(failed)?
+                tracer.echoes(&cones).map_err(gpu_error)?
             }
         };
-        let open = self.open(some.start, &spots, &shares);
+        let open = self.open_rays(some.start, &spots, &shares);
         let mut sums: Vec<[f64; 2]> =
             shares.chunks(per_chirp).map(|shares| self.power_and_moment(shares)).collect();
-        for (place, echo) in self.on_processor(some.start, &open)? {
+        for (place, echo) in self.trace_open_rays(some.start, &open)? {
             sums[place][0] += echo.power_w;
             sums[place][1] += echo.power_w * echo.range_m;
         }
@@ -192,15 +193,20 @@ impl<'a> Work<'a> {
         Ok((means.collect(), open.len()))
     }
 
-    /// Power, W, and power times range, W·m, of what the device has of a chirp.
+    /// Power, W, and power times range, W·m, that the device computed of a chirp.
     fn power_and_moment(&self, shares: &[Share]) -> [f64; 2] {
         let per_sr_m2: f64 = shares.iter().map(|share| share.per_sr_m2).sum();
         let per_sr_m: f64 = shares.iter().map(|share| share.per_sr_m).sum();
         [per_sr_m2, per_sr_m].map(|sum| self.link.power_w(1.0, 1.0, sum))
     }
 
-    /// The rays that are left open, each of a chirp so many after the first.
-    fn open(&self, first: usize, spots: &[Spot], shares: &[Share]) -> Vec<(usize, Ray<Global>)> {
+    /// The rays that the device left open, in the frame of the mesh, each with the number of its chirp after `first`.
+    fn open_rays(
+        &self,
+        first: usize,
+        spots: &[Spot],
+        shares: &[Share],
+    ) -> Vec<(usize, Ray<Global>)> {
         let per_chirp = self.rays.div_ceil(RAYS_PER_SHARE);
         let chirps = spots.par_iter().zip(shares.par_chunks(per_chirp)).enumerate();
         let open = chirps.flat_map_iter(|(place, (spot, shares))| {
@@ -208,14 +214,15 @@ impl<'a> Work<'a> {
                 shares[ray / RAYS_PER_SHARE].open >> (ray % RAYS_PER_SHARE) & 1 == 1
             };
             let mesh_from_world = self.mesh_from_world(first + place);
-            let seen = move |ray| Some((place, seen(mesh_from_world, &spot.ray(ray)?)));
-            (0..self.rays).filter(is_open).filter_map(seen)
+            (0..self.rays)
+                .filter(is_open)
+                .filter_map(move |ray| Some((place, in_mesh(mesh_from_world, &spot.ray(ray)?))))
         });
         open.collect()
     }
 
-    /// What these bring back.
-    fn on_processor(
+    /// Range and power of the open rays that hit the target, each with the number of its chirp after `first`.
+    fn trace_open_rays(
         &self,
         first: usize,
         rays: &[(usize, Ray<Global>)],
@@ -232,7 +239,7 @@ impl<'a> Work<'a> {
         Ok(echoes.collect())
     }
 
-    /// Equation (11) at a hit; none in a region that is made of nothing.
+    /// Received power of a ray by equation (11), W; `None` in a region without a surface.
     fn power_w(&self, mesh: &Mesh, take: &Take, ray: &Ray<Global>, hit: &Hit) -> Option<f64> {
         let region = self.batch.geometry.region_of_facet[hit.facet as usize];
         let surface = take.surfaces.get(usize::from(region))?;
@@ -242,7 +249,7 @@ impl<'a> Work<'a> {
         Some(self.link.power_w(hit.range_m, hit.cos_theta, f_per_sr))
     }
 
-    /// The spots of some chirps, in the world.
+    /// The spots of some chirps, in the global frame.
     fn spots(&self, some: Range<usize>) -> Result<Vec<Spot>, RenderError> {
         let geometry = &self.batch.geometry;
         let chirps = geometry.chirps;
@@ -250,7 +257,8 @@ impl<'a> Work<'a> {
         let ranges_m = match self.rays {
             1 => vec![None; some.len()],
             _ => {
-                let axis = |chirp| seen(self.mesh_from_world(chirp), &chirps.rays[number(chirp)]);
+                let axis =
+                    |chirp| in_mesh(self.mesh_from_world(chirp), &chirps.rays[number(chirp)]);
                 let axes: Vec<Ray<Global>> = some.clone().into_par_iter().map(axis).collect();
                 let range_m = |hit: Option<Hit>| hit.map(|hit| hit.range_m);
                 geometry.closest(&axes)?.into_iter().map(range_m).collect()
@@ -263,11 +271,11 @@ impl<'a> Work<'a> {
         Ok(some.into_par_iter().zip(ranges_m).map(spot).collect())
     }
 
-    /// A chirp as the device takes it.
+    /// A chirp in the frame of the mesh, for the device.
     fn cone(&self, chirp: usize, spot: &Spot) -> Cone {
         let mesh_from_world = self.mesh_from_world(chirp);
         Cone {
-            axis: seen(mesh_from_world, &spot.axis),
+            axis: in_mesh(mesh_from_world, &spot.axis),
             across: spot.across().map(|aside| mesh_from_world.rotation() * aside),
             law: (self.take(chirp) * self.regions) as u32,
         }
@@ -283,11 +291,12 @@ impl<'a> Work<'a> {
     }
 }
 
-fn seen(mesh_from_world: &Pose<Global, Global>, ray: &Ray<Global>) -> Ray<Global> {
+/// A ray in the frame of the mesh.
+fn in_mesh(mesh_from_world: &Pose<Global, Global>, ray: &Ray<Global>) -> Ray<Global> {
     Ray { origin: *mesh_from_world * ray.origin, direction: *mesh_from_world * ray.direction }
 }
 
-fn failed(error: GpuError) -> RenderError {
+fn gpu_error(error: GpuError) -> RenderError {
     TraceError::from(error).into()
 }
 

@@ -4,10 +4,10 @@ use super::echo::{Echo, Truth};
 use crate::formats::ply::{Column, Scalar, Table};
 use crate::units::dbm_from_watts;
 
-/// The cloud's table: position in the global frame (double), then what the radar and the renderer
-/// know of each point. What caused a false alarm is NaN and −1.
+/// The table of a point cloud: position in the global frame (double), then the measured values and the true cause of
+/// each point. The cause of a false alarm is NaN, or −1 for whole numbers.
 ///
-/// `regions` and `materials` are written into the header, so that the numbers keep their names.
+/// The names of `regions` and `materials` are written into the header.
 pub fn cloud_table(
     echoes: &[&Echo],
     material_of_region: &[u16],

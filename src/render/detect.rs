@@ -1,8 +1,8 @@
-//! From the paths of a chirp to what the receiver reports: range and power.
+//! Computes the range and power that the receiver reports from the paths of a chirp.
 //!
-//! Three receivers. Without settings both are exact, the paper's: powers add, and the range is their
-//! mean weighted by power. With speckle or noise they follow their laws. With a `[radar.receiver]`
-//! every path becomes a tone of the beat signal, and range and power are read off its spectrum.
+//! There are three kinds of receiver. Without settings it is exact, as in the paper: powers add, and the range is the
+//! mean weighted by power. With speckle or noise, power and range are drawn from their distributions. With a
+//! `[radar.receiver]` every path becomes a tone of the beat signal, and range and power are read from its spectrum.
 
 use num_complex::Complex;
 
@@ -17,18 +17,19 @@ use crate::radar::random::{Draws, Key, Purpose};
 use crate::radar::{Chirp, Detection, RangeProcessor, Return, Speckle};
 use crate::units::watts_from_dbm;
 
-/// The sampled beat signals of one chirp, √W, one for each look.
+/// The sampled beat signals of one chirp, √W, one per look.
 pub type Beats = Vec<Vec<Complex<f64>>>;
 
-/// A receiver made ready for a scan.
+/// A receiver prepared for a scan.
 pub(super) struct Detector {
     seed: u64,
     observer: u64,
     kind: Kind,
     threshold_w: f64,
-    saturating: SaturationCurve,
+    saturation: SaturationCurve,
 }
 
+/// The kinds of receiver.
 enum Kind {
     Exact,
     Laws { law: Receiver, speckle: Option<Speckle>, range_sd_m: f64 },
@@ -43,6 +44,10 @@ struct Beat {
 }
 
 impl Detector {
+    /// Prepares the receiver that the radar of a setup declares, with the effects on it.
+    ///
+    /// # Errors
+    /// When the settings of the receiver are inconsistent.
     pub fn new(
         setup: &Setup,
         observer: Observer,
@@ -74,7 +79,7 @@ impl Detector {
             observer: observer.number(),
             kind,
             threshold_w,
-            saturating: law.saturating(),
+            saturation: law.saturating(),
         })
     }
 
@@ -83,7 +88,7 @@ impl Detector {
         self.threshold_w
     }
 
-    /// Mean thermal power in a range cell, W; none for a receiver without noise.
+    /// Mean thermal power in a range cell, W; `None` for a receiver without noise.
     pub fn noise_w(&self) -> Option<f64> {
         let noise_w = match &self.kind {
             Kind::Exact => 0.0,
@@ -93,45 +98,45 @@ impl Detector {
         (noise_w > 0.0).then_some(noise_w)
     }
 
-    /// What the receiver makes of a chirp, below the threshold, too; `None` for a silent one.
+    /// The range and power that the receiver measures of a chirp, also below the threshold; `None` without any.
     pub fn observe(&self, chirp: usize, paths: &[Path]) -> Result<Option<Detection>, RenderError> {
         match &self.kind {
             Kind::Beat(beat) => {
                 let peak = beat.processor.peak(&self.mean_profile_w(beat, chirp, paths)?);
                 let mean_w = paths.iter().map(|path| path.power_w).sum();
-                Ok(peak.map(|peak| self.passed(mean_w, peak)))
+                Ok(peak.map(|peak| self.saturate(mean_w, peak)))
             }
             _ if paths.is_empty() => Ok(None),
-            _ => Ok(Some(self.measured(chirp, sum(paths)))),
+            _ => Ok(Some(self.measure_mean(chirp, sum(paths)))),
         }
     }
 
-    /// What a receiver without beat signals makes of a chirp whose mean is this.
-    pub fn measured(&self, chirp: usize, mean: Detection) -> Detection {
+    /// The range and power that a receiver without beat signals measures of a chirp with this mean.
+    pub fn measure_mean(&self, chirp: usize, mean: Detection) -> Detection {
         let Kind::Laws { law, speckle, range_sd_m } = &self.kind else {
-            return self.passed(mean.power_w, mean);
+            return self.saturate(mean.power_w, mean);
         };
         let Detection { range_m, power_w } = mean;
         if power_w == 0.0 {
-            // Nothing comes back, and no range is read from noise alone.
+            // Without an echo there is no range to measure.
             return mean;
         }
         let mut draws = self.draws(chirp, Purpose::Speckle);
         let linear_w = measured_w(power_w, law.noise_w, *speckle, &mut draws);
-        let power_w = self.saturating.passed_w(power_w + law.noise_w, linear_w);
+        let power_w = self.saturation.passed_w(power_w + law.noise_w, linear_w);
         let error_m = range_sd_m * self.draws(chirp, Purpose::Range).gaussian();
         Detection { range_m: range_m + error_m, power_w }
     }
 
-    /// What a receiver that saturates makes of a power of this mean.
-    fn passed(&self, mean_w: f64, linear: Detection) -> Detection {
-        // Noise alone has no other mean than itself.
+    /// The output of a receiver that saturates, for a linear power with the mean `mean_w`.
+    fn saturate(&self, mean_w: f64, linear: Detection) -> Detection {
+        // Noise alone has no mean echo, and the power takes its place.
         let mean_w = if mean_w > 0.0 { mean_w } else { linear.power_w };
-        Detection { power_w: self.saturating.passed_w(mean_w, linear.power_w), ..linear }
+        Detection { power_w: self.saturation.passed_w(mean_w, linear.power_w), ..linear }
     }
 
-    /// How far a detection may lie from the range of the path that caused it, m; none where a
-    /// receiver does not tell ranges apart.
+    /// Largest distance of a detection from the range of the path that caused it, m; `None` for a receiver that does
+    /// not separate ranges.
     pub fn reach_m(&self) -> Option<f64> {
         match &self.kind {
             Kind::Beat(beat) => Some(beat.processor.resolution_m()),
@@ -139,7 +144,7 @@ impl Detector {
         }
     }
 
-    /// The beat signals of a chirp, one for each look; none without a receiver.
+    /// The beat signals of a chirp, one per look; empty without a `[radar.receiver]`.
     pub fn beats(&self, chirp: usize, paths: &[Path]) -> Result<Beats, RenderError> {
         match &self.kind {
             Kind::Beat(beat) => self.signals(beat, chirp, paths).collect(),
@@ -155,17 +160,17 @@ impl Detector {
     ) -> impl Iterator<Item = Result<Vec<Complex<f64>>, RenderError>> {
         let mut phases = self.draws(chirp, Purpose::SurfacePhase);
         let mut noise = self.draws(chirp, Purpose::Noise);
-        let together = beat.together(paths);
+        let tones = beat.merge_indistinct(paths);
         (0..beat.looks).map(move |_| {
             let returns: Vec<Return> =
-                together.iter().map(|&sum| beat.echo(sum, &mut phases)).collect();
+                tones.iter().map(|&sum| beat.echo(sum, &mut phases)).collect();
             let mut signal = beat.chirp.beat_signal(&returns)?;
             beat.processor.add_noise(&mut signal, &mut noise);
             Ok(signal)
         })
     }
 
-    /// The mean over the looks of the power spectrum over range.
+    /// The power spectrum over range, W, averaged over the looks.
     fn mean_profile_w(
         &self,
         beat: &Beat,
@@ -188,9 +193,9 @@ impl Detector {
 }
 
 impl Beat {
-    /// Paths that no receiver could tell apart, as one: Gaussian phasors add up to a Gaussian phasor
-    /// of all their power. Only a single path can be anything else.
-    fn together(&self, paths: &[Path]) -> Vec<Detection> {
+    /// Merges paths that lie within a sixteenth of a range cell. Their Gaussian phasors add up to one Gaussian phasor
+    /// with the total power. Other phasors occur only for a single path.
+    fn merge_indistinct(&self, paths: &[Path]) -> Vec<Detection> {
         const PART_OF_A_CELL: f64 = 1.0 / 16.0;
         let part_m = PART_OF_A_CELL * self.chirp.range_resolution_m();
         let part = |path: &Path| (path.range_m / part_m) as u64;

@@ -1,4 +1,4 @@
-//! An echo and what caused it.
+//! An echo and its cause.
 
 use super::detect::Detector;
 use super::observer::Observer;
@@ -9,46 +9,46 @@ use crate::frames::{Global, Point, Pose, Target};
 use crate::radar::Detection;
 use crate::trace::Hit;
 
-/// What came back from one chirp.
+/// The echo of one chirp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Echo {
     /// Chirp number, from 0 or as an explicit scan gives it.
     pub chirp: u32,
-    /// Where the radar believes the echo comes from: on the beam's axis, at its range.
+    /// The measured position: on the beam's axis, at the measured range.
     pub point: Point<Global>,
-    /// Half the way from the radar to the antenna, m.
+    /// Measured range, half the path length from the radar to the antenna, m.
     pub range_m: f64,
     /// x in the target frame, m.
     pub xt_m: f64,
     /// y in the target frame, m.
     pub yt_m: f64,
-    /// Received power, W; 0 when nothing comes back.
+    /// Received power, W; 0 without an echo.
     pub power_w: f64,
-    /// What caused it; none for a false alarm.
+    /// The cause; `None` for a false alarm.
     pub truth: Option<Truth>,
 }
 
-/// What caused an echo: the strongest path of the stronger kind, direct or by way of a second
-/// surface, among those that the receiver saw as one.
+/// The cause of an echo: among the paths that the receiver does not separate, the strongest of the kind, single or
+/// second-order, that brings more power.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
-    /// Where the path first met the target.
+    /// First intersection of the path with the target.
     pub hit: Hit,
     /// Region of that facet.
     pub region: u16,
-    /// Standard deviation of the incidence over the rays of the spot, rad; 0 for a single ray.
+    /// Standard deviation of the incidence angle over the rays of the spot, rad; 0 for a single ray.
     pub theta_sd_rad: f64,
     /// Azimuth of the radar about the facet's normal, from the grain of its region, rad.
     pub azimuth_rad: f64,
-    /// Surfaces that the path met: 1 for a direct echo, 2 for one by way of another surface.
+    /// Number of surfaces on the path: 1 for a single path, 2 for a second-order one.
     pub surfaces: u8,
-    /// Share of the power that every surface on the way reflects like a mirror, rough or not.
+    /// Share of the power that is specular at every surface of the path, 0 to 1.
     pub specular_share: f64,
     /// Distance in the target plane to the nearest edge in depth, m, at most three spots.
     pub edge_m: f64,
 }
 
-/// Turns what a receiver saw of a chirp into an echo.
+/// Builds echoes from the detections of a receiver.
 pub(super) struct Echoes<'a> {
     pub setup: &'a Setup<'a>,
     pub footprints: &'a Footprints,
@@ -58,7 +58,7 @@ pub(super) struct Echoes<'a> {
 }
 
 impl Echoes<'_> {
-    /// The echo of a chirp that met the target, however weak, or a false alarm.
+    /// The echo of a chirp: of one that hits the target, however weak, or a false alarm. `None` for any other chirp.
     pub fn echo(
         &self,
         chirp: usize,
@@ -73,7 +73,7 @@ impl Echoes<'_> {
             _ => true,
         };
         let cause = cause(paths, near);
-        // Below the threshold a peak is noise as likely as not; the path says where it would be.
+        // Below the threshold a peak may be noise, and the range is taken from the path.
         let range_m = detected.map(|seen| seen.range_m).or(cause.map(|path| path.range_m))?;
         let range_m = if reach_m.is_none() { seen?.range_m } else { range_m };
         let point = self.observer.on_axis(&self.setup.geometry.chirps.rays[chirp], range_m)?;
@@ -102,8 +102,8 @@ impl Echoes<'_> {
     }
 }
 
-/// The strongest path of the kind that brings more power. Second-order paths are many weak samples of
-/// one integral: only their sum compares with a direct path.
+/// The strongest path of the kind, single or second-order, that brings more power. Second-order paths are many weak
+/// samples of one integral, so that only their sum is comparable with a single path.
 fn cause(paths: &[Path], near: impl Fn(&&Path) -> bool) -> Option<&Path> {
     let [direct_w, second_order_w] = [1, 2].map(|surfaces| {
         let of_kind = paths.iter().filter(&near).filter(|path| path.surfaces == surfaces);
@@ -114,6 +114,7 @@ fn cause(paths: &[Path], near: impl Fn(&&Path) -> bool) -> Option<&Path> {
     of_kind.reduce(|a, b| if b.power_w > a.power_w { b } else { a })
 }
 
+/// Standard deviation of the incidence angle over the hits of a chirp, rad; 0 for a single ray.
 fn theta_sd_rad(hits: &[Option<Hit>]) -> f64 {
     if hits.len() == 1 {
         return 0.0;

@@ -1,29 +1,29 @@
-//! How far each chirp of a scan is from the nearest edge in depth.
+//! The distance of each chirp of a scan from the nearest edge in depth.
 //!
-//! Two neighbouring chirps are on two sides of an edge when only one of them meets the target, or
-//! when their ranges differ by more than a spot and a slope of 60° explain. The edge is taken halfway
-//! between them, so that a distance is good to about one spacing of the scan.
+//! An edge lies between two neighbouring chirps if only one of them hits the target, or
+//! if their ranges differ by more than a spot diameter plus a slope of 60°. The edge is assumed halfway
+//! between them, so that distances are accurate to about one spacing of the scan.
 
 use glam::DVec2;
 use rayon::prelude::*;
 
-/// Slope of a surface, as tan 60°, from which on its own range is an edge.
+/// Steepest slope of a surface that is not an edge, tan 60°.
 const STEEPEST: f64 = 1.732_050_807_568_877_2;
 
 /// Chirps at most this many mean spacings apart are neighbours.
 const NEIGHBOURHOOD: f64 = 2.5;
 
-/// Chirps of one task.
+/// Chirps per task.
 const CHIRPS_PER_TASK: usize = 512;
 
-/// Distance of every chirp to the nearest edge in the target plane, m, but at most `reach_m`.
+/// Distance of every chirp from the nearest edge in the target plane, m, at most `reach_m`.
 ///
-/// `chirps` are points of the target plane, m, and the ranges there, m; none where nothing is met.
-/// `spot_m` is the spot's diameter.
+/// Each chirp is a point of the target plane, m, and a range, m, which is `None` for a miss. `spot_m` is the
+/// diameter of the spot.
 pub(super) fn distances_m(chirps: &[(DVec2, Option<f64>)], spot_m: f64, reach_m: f64) -> Vec<f64> {
     let spacing_m = spacing_m(chirps);
     let near_m = NEIGHBOURHOOD * spacing_m;
-    let distinct = apart(chirps, spacing_m / 4.0);
+    let distinct = thin_out(chirps, spacing_m / 4.0);
     let places: Vec<DVec2> = distinct.iter().map(|chirp| chirp.0).collect();
     let cells = Cells::new(&places, near_m);
     let nearest_across = |number: usize| {
@@ -40,7 +40,7 @@ pub(super) fn distances_m(chirps: &[(DVec2, Option<f64>)], spot_m: f64, reach_m:
         .with_min_len(CHIRPS_PER_TASK)
         .map(nearest_across)
         .collect();
-    // Only pairs that are nearest to each other; others see past a chirp on their own side.
+    // Only pairs that are nearest to each other: between others there is a chirp of the same side.
     let mut edges: Vec<DVec2> = Vec::new();
     for (chirp, other) in across.iter().enumerate() {
         if let Some(other) = *other
@@ -49,7 +49,7 @@ pub(super) fn distances_m(chirps: &[(DVec2, Option<f64>)], spot_m: f64, reach_m:
             edges.push(0.5 * (places[chirp] + places[other]));
         }
     }
-    // Cells smaller than the spacing would be many and empty.
+    // Cells smaller than the spacing would mostly be empty.
     let cells = Cells::new(&edges, reach_m.max(spacing_m));
     let distance_m = |chirp: &(DVec2, Option<f64>)| {
         let distance_m2 = |edge: usize| edges[edge].distance_squared(chirp.0);
@@ -59,8 +59,8 @@ pub(super) fn distances_m(chirps: &[(DVec2, Option<f64>)], spot_m: f64, reach_m:
     chirps.par_iter().with_min_len(CHIRPS_PER_TASK).map(distance_m).collect()
 }
 
-/// One chirp of each small cell, the first, so that chirps on top of each other cost no more than one.
-fn apart(chirps: &[(DVec2, Option<f64>)], side_m: f64) -> Vec<(DVec2, Option<f64>)> {
+/// Keeps the first chirp of each small cell, so that many chirps at one place cost no more than one.
+fn thin_out(chirps: &[(DVec2, Option<f64>)], side_m: f64) -> Vec<(DVec2, Option<f64>)> {
     let frame = Frame::around(chirps.iter().map(|chirp| chirp.0), side_m);
     let mut is_taken = vec![false; frame.columns * frame.rows];
     let is_first = |chirp: &&(DVec2, Option<f64>)| {
@@ -69,6 +69,7 @@ fn apart(chirps: &[(DVec2, Option<f64>)], side_m: f64) -> Vec<(DVec2, Option<f64
     chirps.iter().filter(is_first).copied().collect()
 }
 
+/// Whether an edge lies between two chirps.
 fn is_across(a: (DVec2, Option<f64>), b: (DVec2, Option<f64>), spot_m: f64) -> bool {
     match (a.1, b.1) {
         (Some(here_m), Some(there_m)) => {
@@ -79,7 +80,7 @@ fn is_across(a: (DVec2, Option<f64>), b: (DVec2, Option<f64>), spot_m: f64) -> b
     }
 }
 
-/// Side of the square that a chirp has to itself, m; along a line, its share of the line.
+/// Mean spacing of the chirps, m: the side of a square with a chirp's share of the area, or its share of a line.
 fn spacing_m(chirps: &[(DVec2, Option<f64>)]) -> f64 {
     let min = chirps.iter().fold(DVec2::INFINITY, |min, chirp| min.min(chirp.0));
     let max = chirps.iter().fold(DVec2::NEG_INFINITY, |max, chirp| max.max(chirp.0));
@@ -97,7 +98,7 @@ struct Frame {
 }
 
 impl Frame {
-    /// All cells that points are in, and those between.
+    /// The smallest rectangle of cells with side `side_m` around points; points that are not finite do not count.
     fn around(points: impl Iterator<Item = DVec2>, side_m: f64) -> Frame {
         let bounds = points.filter(|point| point.is_finite()).fold(None, |bounds, point| {
             let (least, most): (DVec2, DVec2) = bounds.unwrap_or((point, point));
@@ -116,25 +117,25 @@ impl Frame {
         ((point - self.corner) / self.side_m).floor().to_array().map(|x| x as i32)
     }
 
-    /// Number of the cell that a point is in.
+    /// Number of the cell that contains a point; `None` outside.
     fn number_at(&self, point: DVec2) -> Option<usize> {
         let [column, row] = self.cell(point);
         point.is_finite().then(|| self.number(column, row))?
     }
 
-    /// Number of a cell, column after column; none outside.
+    /// Number of a cell, counted column after column; `None` outside.
     fn number(&self, column: i32, row: i32) -> Option<usize> {
         let within = |at: i32, count: usize| usize::try_from(at).ok().filter(|&at| at < count);
         Some(within(column, self.columns)? * self.rows + within(row, self.rows)?)
     }
 }
 
-/// Points sorted into square cells, for look-ups within one cell's side.
+/// Points sorted into square cells, for searches within the side of a cell.
 struct Cells {
     frame: Frame,
-    /// Where the points of each cell begin, and the end.
+    /// First place of each cell in `numbers`, and the length of the list.
     starts: Vec<u32>,
-    /// Points by number, cell after cell.
+    /// Numbers of the points, cell after cell.
     numbers: Vec<u32>,
 }
 
@@ -156,7 +157,7 @@ impl Cells {
         Cells { frame, starts, numbers }
     }
 
-    /// The points in the cell of a place and in the eight around it: all that are within a side of it.
+    /// The points in the cell of a place and in its eight neighbours, which include all within one side of it.
     fn near(&self, place: DVec2) -> impl Iterator<Item = usize> {
         let [column, row] = self.frame.cell(place);
         let low = row.saturating_sub(1).max(0);
@@ -166,7 +167,7 @@ impl Cells {
         numbers.map(|&number| number as usize)
     }
 
-    /// The points in some rows of a column, from `low` to `high`.
+    /// The points in the rows from `low` to `high` of a column.
     fn in_column(&self, column: i32, low: i32, high: i32) -> &[u32] {
         match (self.frame.number(column, low), self.frame.number(column, high)) {
             (Some(first), Some(last)) if low <= high => {

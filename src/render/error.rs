@@ -1,24 +1,24 @@
-//! Why there is nothing to render.
+//! Errors of rendering.
 
 use thiserror::Error;
 
 use crate::radar::{Aliased, Field, RadarError};
 use crate::trace::TraceError;
 
-/// Why there is nothing to render.
+/// Why a scan cannot be rendered.
 #[derive(Debug, Error, PartialEq)]
 pub enum RenderError {
-    /// No ray meets the target.
+    /// No ray hits the target.
     #[error(
         "no chirp of the scan hits the target: at 8 m the scan covers {scan}, the target lies at {target} of the \
          target frame; {way_out}"
     )]
     Miss {
-        /// Where the scan looks.
+        /// The field of view at 8 m, in the target frame.
         scan: Field,
-        /// Where the target is.
+        /// The extent of the target, in the target frame.
         target: Field,
-        /// What to do.
+        /// The likely remedy.
         way_out: &'static str,
     },
     /// An antenna stands inside the target.
@@ -34,42 +34,42 @@ pub enum RenderError {
         /// z, m.
         z_m: f64,
     },
-    /// A path is longer than the sampling can tell.
+    /// A path is longer than the unambiguous range of the sampling.
     #[error(transparent)]
     Aliased(#[from] Aliased),
-    /// A receiver adds amplitudes, and nothing says with which phases.
+    /// A receiver adds amplitudes of several paths, whose phases are undeclared.
     #[error(
         "the paths of one chirp reach the receiver with unknown phases, which is speckle; add \
          [radar.speckle] (looks = 64 averages most of it away), or set spot.rays = 1 and remove \
          [bounce]"
     )]
     Phases,
-    /// The coherent part of speckle is that of one path.
+    /// A coherent part of speckle is declared, which is defined for one path only.
     #[error(
         "radar.speckle.coherent_ratio is that of a whole echo and cannot be shared out among several \
          paths; set it to 0, or set spot.rays = 1 and remove [bounce]"
     )]
     Coherent,
-    /// A receiver works on beat signals, and a batch has powers.
+    /// A receiver needs beat signals, which a batch does not compute.
     #[error(
         "a batch of scans has no beat signals for a [radar.receiver]; remove it, or render the scans one \
          by one"
     )]
     Signals,
-    /// An effect that would count twice, or that cannot be had.
+    /// An effect would be counted twice, or is undefined for this scan.
     #[error("effect `{effect}` {problem}; {way_out}")]
     Effect {
-        /// The effect.
+        /// Name of the effect.
         effect: &'static str,
-        /// What is wrong.
+        /// The conflict.
         problem: &'static str,
-        /// What to do.
+        /// The likely remedy.
         way_out: &'static str,
     },
-    /// The receiver cannot work.
+    /// The settings of the receiver are inconsistent.
     #[error(transparent)]
     Radar(#[from] RadarError),
-    /// The tracer that was asked for does not take the rays of the scan, or stopped working.
+    /// The chosen tracer does not accept the rays of the scan, or failed.
     #[error(transparent)]
     Tracer(#[from] TraceError),
 }

@@ -14,41 +14,42 @@ use crate::units::dbm_from_watts;
 /// Names of the channels of a power image, in order.
 pub const CHANNELS: [&str; 5] = ["power_dbm", "range_m", "incidence_deg", "material", "count"];
 
-/// Parts of an image that are filled at the same time.
+/// Number of bands of rows that are filled in parallel.
 const BANDS: usize = 16;
 
-/// A detection with what every pixel of its spot takes from it.
+/// A detection, its contribution to every pixel of its spot, and the pixels that the spot may cover.
 struct Splat<'a> {
     echo: &'a Echo,
     power_w: f64,
-    /// None for a false alarm.
+    /// Incidence angle, rad; `None` for a false alarm.
     incidence_rad: Option<f64>,
     material: Option<u16>,
-    /// Pixels that its spot may cover, rows counted from above.
+    /// Columns that its spot may cover.
     columns: Range<usize>,
+    /// Rows that its spot may cover, counted from the top.
     rows: Range<usize>,
 }
 
-/// Sums over the detections whose spot covers one pixel.
+/// Weighted sums over the detections whose spots cover a pixel.
 #[derive(Clone, Copy, Default)]
 struct Pixel {
     weight: f64,
     power_w: f64,
     range_m: f64,
     incidence_rad: f64,
-    /// Weight of what is not a false alarm.
+    /// Total weight of the detections that are not false alarms.
     known_weight: f64,
     nearest_weight: f64,
     material: Option<u16>,
     count: u32,
 }
 
-/// The power image of a scan: channels [`CHANNELS`] over x_t and y_t, NaN where nothing was detected.
+/// Draws the power image of a scan: the channels [`CHANNELS`] over x_t and y_t, NaN where nothing was detected.
 ///
-/// A pixel averages the detections whose spot covers it, each with a Gaussian weight of the spot's
-/// diameter at half height; power is averaged in watts. `material` is that of the nearest
-/// detection, as an index; `count` is how many were averaged. The grid covers `field`, where the
-/// scan looks at 8 m, and half a spot around it.
+/// A pixel is the mean of the detections whose spots cover it, each with a Gaussian weight whose full width at half
+/// maximum is the spot's diameter. Power is averaged in watts. `material` is the index of the material of the nearest
+/// detection, and `count` the number of detections. The grid covers `field`, the field of view at 8 m, and a margin of
+/// half a spot.
 pub fn power_image(
     scan: &Scan,
     field: Field,
@@ -62,7 +63,7 @@ pub fn power_image(
     let splats = detections.par_iter();
     let splats: Vec<Splat> =
         splats.map(|&echo| Splat::new(echo, &raster, spot_m, material_of_region)).collect();
-    // A band of rows has all that falls on it in the order of the scan, however many threads there are.
+    // Every band adds up its detections in the order of the scan, so that the sums do not depend on the threads.
     let band_rows = raster.height.div_ceil(BANDS);
     let of_bands = by_bands(&splats, band_rows);
     let bands = pixels.par_chunks_mut(raster.width * band_rows).enumerate();
@@ -79,9 +80,9 @@ pub fn power_image(
     raster
 }
 
-/// An empty raster around a field; pixel edges are whole multiples of the pixel.
+/// An empty raster that covers a field and half a spot around it. Pixel edges are multiples of the pixel's side.
 fn grid(field: Field, spot_m: f64, pixel_m: f64) -> Raster {
-    // A hair beyond a pixel's edge is rounding, not field of view.
+    // Excess of the field over the edge of a pixel, in pixels, that counts as rounding.
     const HAIR: f64 = 1e-6;
     let first = field.min_m.map(|min_m| ((min_m - spot_m / 2.0) / pixel_m + HAIR).floor());
     let end = field.max_m.map(|max_m| ((max_m + spot_m / 2.0) / pixel_m - HAIR).ceil());
@@ -90,7 +91,7 @@ fn grid(field: Field, spot_m: f64, pixel_m: f64) -> Raster {
     Raster { width, height, x_min_m, y_min_m, pixel_m, channels: Vec::new() }
 }
 
-/// For each band of so many rows what may fall on it, in order.
+/// For each band of `band_rows` rows the detections whose spots may reach into it, in order.
 fn by_bands<'a, 'e>(splats: &'a [Splat<'e>], band_rows: usize) -> [Vec<&'a Splat<'e>>; BANDS] {
     let mut of_bands = [const { Vec::new() }; BANDS];
     for splat in splats {
@@ -106,7 +107,7 @@ impl<'a> Splat<'a> {
         let span = |centre_m: f64, min_m: f64, count: usize| {
             let first = ((centre_m - radius_m - min_m) / raster.pixel_m - 0.5).ceil().max(0.0);
             let end = ((centre_m + radius_m - min_m) / raster.pixel_m + 0.5).floor();
-            // Float to integer saturates, so that a detection outside the grid gives an empty span.
+            // The conversion to integers saturates: a detection outside the grid gives an empty span.
             (first as usize).min(count)..(end as usize).min(count)
         };
         let from_below = span(echo.yt_m, raster.y_min_m, raster.height);
@@ -120,7 +121,7 @@ impl<'a> Splat<'a> {
         }
     }
 
-    /// Pixels in some rows whose centre lies within the spot, with their distance from its centre, m.
+    /// The pixels in some rows whose centres lie within the spot, with their distances from its centre, m.
     fn covered(
         &self,
         raster: &Raster,

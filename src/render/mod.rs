@@ -1,13 +1,13 @@
-//! Scan × target × materials → detections. Plain values in and out: no files, no database.
+//! Renders a scan of a target with materials to detections. Plain values in and out: no files, no database.
 //!
 //! | step | file |
 //! |---|---|
-//! | where the rays of each chirp meet the target | `spot.rs`, equation (7) |
-//! | what scatters there, in its own frame | `surface.rs` |
-//! | what arrives at an antenna, directly | `paths.rs`, equation (11) |
-//! | … and by way of a second surface | `bounce.rs` |
-//! | … with the physical effects that are declared | `acting.rs` |
-//! | what the receiver makes of it, and what caused that | `detect.rs`, `echo.rs` |
+//! | intersections of the rays of each chirp with the target | `spot.rs`, equation (7) |
+//! | surfaces and their local frames | `surface.rs` |
+//! | power that arrives at an antenna by single paths | `paths.rs`, equation (11) |
+//! | … and by second-order paths | `bounce.rs` |
+//! | … with declared physical effects | `acting.rs` |
+//! | detection by the receiver, and the cause of each echo | `detect.rs`, `echo.rs` |
 //! | image and point cloud | `image.rs`, `cloud.rs` |
 //! | many scans at once, on a graphics processor | `batch.rs` |
 

@@ -1,19 +1,19 @@
-//! Who listens: the radar itself, or a receiver that stands elsewhere.
+//! Where echoes are received: at the radar, or at a separate receiver.
 
 use glam::DVec3;
 
 use crate::frames::{Global, Point, Ray};
 
-/// Where echoes are received.
+/// The antenna that receives the echoes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Observer {
-    /// The radar, through the antenna that it sends with.
+    /// The antenna with which the radar transmits.
     Radar,
-    /// Another antenna, which sees the whole target alike.
+    /// Another antenna, with the same gain for all directions to the target.
     Receiver {
-        /// Its number from 1; receivers have their own noise and speckle.
+        /// Its number, from 1. Every receiver has its own noise and speckle.
         number: u32,
-        /// Where it stands.
+        /// Its position.
         position: Point<Global>,
         /// Equivalent area A_eq, m².
         aperture_m2: f64,
@@ -29,7 +29,7 @@ impl Observer {
         }
     }
 
-    /// Where it stands, for a radar at `origin`.
+    /// Its position, for a radar at `origin`.
     pub(super) fn position(&self, origin: DVec3) -> DVec3 {
         match self {
             Observer::Radar => origin,
@@ -37,17 +37,17 @@ impl Observer {
         }
     }
 
-    /// The point of the beam's axis from which an echo comes that has gone 2·`range_m` in all.
+    /// The point on the beam's axis to which an echo of path length 2·`range_m` belongs; `None` if there is none.
     ///
-    /// With b from the source to the receiver and s along the axis d, s + |s·d − b| = 2R gives
-    /// s = (4R² − b²)/(4R − 2·b·d). `None` where no point of the axis is so far.
+    /// For the vector b from source to receiver, the unit vector d of the axis and the distance s along it,
+    /// s + |s·d − b| = 2R gives s = (4R² − b²)/(4R − 2·b·d).
     pub(super) fn on_axis(&self, axis: &Ray<Global>, range_m: f64) -> Option<Point<Global>> {
         let (origin, direction) = (axis.origin.xyz, axis.direction.xyz());
         let base = self.position(origin) - origin;
         let path_m = 2.0 * range_m;
         let along_m = match self {
             Observer::Radar => range_m,
-            // Shorter than the straight way between the antennas.
+            // The path is shorter than the distance between the antennas.
             Observer::Receiver { .. } if path_m <= base.length() => return None,
             Observer::Receiver { .. } => {
                 let left_m2 = path_m * path_m - base.length_squared();
@@ -74,7 +74,7 @@ mod tests {
         assert!(found.distance_m(target) < 1e-12);
         let direct = Observer::Radar.on_axis(&axis, origin.distance_m(target)).unwrap();
         assert!(direct.distance_m(target) < 1e-12);
-        // Shorter than the way from one antenna to the other.
+        // The path is shorter than the distance between the antennas.
         assert!(receiver.on_axis(&axis, 1.0).is_none());
     }
 }

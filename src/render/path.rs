@@ -1,26 +1,26 @@
-//! One way from the radar to an antenna, and the sum over several.
+//! A path from the radar to an antenna, and the sum over several.
 
 use crate::radar::Detection;
 use crate::trace::Hit;
 
-/// One way from the radar to the antenna.
+/// A path from the radar to the antenna.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Path {
-    /// Half of its length, m.
+    /// Half of the path's length, m.
     pub range_m: f64,
-    /// Mean power that arrives by it, W, per ray of the spot.
+    /// Mean power that arrives, W, as the share of one ray of the spot.
     pub power_w: f64,
-    /// Where it met the first surface.
+    /// Intersection with the first surface.
     pub hit: Hit,
-    /// Surfaces met, 1 or 2.
+    /// Number of surfaces on the path, 1 or 2.
     pub surfaces: u8,
-    /// Azimuth of the source about the first surface's normal, from its grain, rad.
+    /// Azimuth of the source about the normal of the first surface, from its grain, rad.
     pub azimuth_rad: f64,
-    /// Share of the power that every surface on the way reflects like a mirror, rough or not.
+    /// Share of the power that is specular at every surface of the path, 0 to 1.
     pub specular_share: f64,
 }
 
-/// All power, and the mean range weighted by it; where no power comes back, the plain mean.
+/// Total power, and the mean range weighted by power; without power, the plain mean of the ranges.
 pub(super) fn sum(paths: &[Path]) -> Detection {
     let power_w: f64 = paths.iter().map(|path| path.power_w).sum();
     let range_m = if power_w > 0.0 {

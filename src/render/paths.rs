@@ -1,12 +1,12 @@
-//! Ways that power takes from the radar to an antenna, and what arrives by each.
+//! The paths of power from the radar to an antenna.
 //!
-//! Direct: radar → A → antenna, equation (11) with the bistatic f(i, o). The spot's power P_t falls
-//! on A; of it the antenna at the distance R_o receives f(i, o)·cos θ_o·A_eq/R_o². The paper's further
-//! cos θ_i is part of [`Link::flux_w`].
+//! Single path: radar → A → antenna, equation (11) with the bistatic f(i, o). The spot's power P_t falls
+//! on A, and an antenna at the distance R_o receives the share f(i, o)·cos θ_o·A_eq/R_o² of it. The other factor
+//! cos θ_i of the paper is part of [`Link::flux_w`].
 //!
-//! Second order: radar → A → B → antenna. A sends f_A(i, ω)·cos θ_ω·dω of its power towards ω, where
-//! B lies, and B sends f_B(−ω, o)·cos θ_o·A_eq/R_o² of that into the antenna. The integral over ω is
-//! estimated in `bounce.rs`. Range is half of the whole way.
+//! Second-order path: radar → A → B → antenna. A scatters the share f_A(i, ω)·cos θ_ω·dω of its power into the
+//! direction ω of B, and the antenna receives the share f_B(−ω, o)·cos θ_o·A_eq/R_o² of that. `bounce.rs` estimates
+//! the integral over ω. The range is half the path length.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -24,11 +24,11 @@ use crate::radar::random::{Key, Purpose};
 use crate::radar::{Beam, Detection, Link};
 use crate::trace::Hit;
 
-/// Rays start this far above a surface, m, so as not to meet it again: far above the rounding of
-/// metres in f64, far below a wavelength.
+/// Distance above a surface at which a ray starts, m, so that it does not hit the same surface again. It is far above
+/// the rounding of f64 and far below a wavelength.
 const LIFT_M: f64 = 1e-7;
 
-/// All paths of a scan to one antenna.
+/// Computes the paths of a scan to one antenna.
 pub(super) struct Paths<'a> {
     setup: &'a Setup<'a>,
     observer: Observer,
@@ -36,29 +36,30 @@ pub(super) struct Paths<'a> {
     beam: Beam,
     footprints: &'a Footprints,
     acting: Option<Acting<'a>>,
-    /// What the effects make of each chirp's echo as a whole.
+    /// The change of each chirp's whole echo by the effects; empty without effects.
     changes: Vec<Option<Change>>,
 }
 
-/// One chirp and the antenna that receives it.
+/// One chirp and the position of the antenna that receives it.
 struct Emission<'a> {
     paths: &'a Paths<'a>,
     number: usize,
     axis: &'a Ray<Global>,
     antenna: DVec3,
-    /// Rays that share its power.
+    /// Number of rays that share its power.
     rays: usize,
 }
 
-/// A lit point of the target.
+/// An illuminated point of the target.
 struct LitPoint<'a> {
     hit: Hit,
     surface: Surface<'a>,
     frame: LocalFrame,
-    /// Where the light comes from.
+    /// Direction to the source.
     source: Direction<Local>,
-    /// Where the antenna is, and how far, m.
+    /// Direction to the antenna.
     antenna: Direction<Local>,
+    /// Distance to the antenna, m.
     antenna_m: f64,
 }
 
@@ -80,7 +81,8 @@ impl<'a> Paths<'a> {
         paths
     }
 
-    /// What the effects change of every whole echo. They need all echoes of the scan at once, so that all paths are found twice.
+    /// The change of every whole echo by the effects. It depends on all echoes of the scan, so that all paths are
+    /// computed once more before.
     fn changes_by(&self, acting: &Acting) -> Vec<Option<Change>> {
         let chirps = self.footprints.chirps().enumerate();
         let sums = chirps.map(|(chirp, hits)| {
@@ -88,11 +90,10 @@ impl<'a> Paths<'a> {
             let Detection { power_w, range_m } = sum(&paths);
             (!paths.is_empty()).then_some(MeanEcho::at_once(power_w, range_m))
         });
-        acting.arrive(self.footprints, sums.collect())
+        acting.changes(self.footprints, sums.collect())
     }
 
-    /// All paths of a chirp through the hits of its rays. A direct path is there even when nothing
-    /// arrives by it.
+    /// All paths of a chirp through the hits of its rays, including single paths without power.
     pub fn of_chirp(&self, number: usize, hits: &[Option<Hit>]) -> Vec<Path> {
         let mut paths = Vec::with_capacity(hits.len());
         self.fill(number, hits, &mut paths);
@@ -109,7 +110,7 @@ impl<'a> Paths<'a> {
         for (ray, hit) in hits.iter().enumerate() {
             let Some(hit) = hit else { continue };
             let facing = sent.facing(ray);
-            let lit = sent.lit(*hit, axis.origin.xyz);
+            let lit = sent.lit_point(*hit, axis.origin.xyz);
             let bare = sent.direct(&lit);
             let acting = self.acting.as_ref();
             let direct = acting.map_or(bare, |a| a.direct(bare, number, hits.len(), facing, tilts));
@@ -121,13 +122,14 @@ impl<'a> Paths<'a> {
             }
         }
         if let Some(change) = self.changes.get(number).copied().flatten() {
-            change.share_out(paths);
+            change.apply(paths);
         }
     }
 }
 
 impl<'a> Emission<'a> {
-    fn lit(&self, hit: Hit, source: DVec3) -> LitPoint<'a> {
+    /// The point at a hit of a ray from `source`.
+    fn lit_point(&self, hit: Hit, source: DVec3) -> LitPoint<'a> {
         let setup = self.paths.setup;
         let surface =
             setup.surfaces[usize::from(setup.geometry.region_of_facet[hit.facet as usize])];
@@ -140,10 +142,11 @@ impl<'a> Emission<'a> {
         LitPoint { hit, surface, frame, source: here, antenna, antenna_m }
     }
 
+    /// The single path by way of a point.
     fn direct(&self, lit: &LitPoint) -> Path {
-        // What the radar lights it also sees.
+        // Every point that the radar illuminates is visible to it.
         let seen = self.paths.observer == Observer::Radar || self.is_seen(lit);
-        let (received, specular_share) = self.received(lit);
+        let (received, specular_share) = self.received_share(lit);
         let share = if seen { received } else { 0.0 };
         let [x, y, _] = lit.source.xyz().to_array();
         Path {
@@ -156,6 +159,7 @@ impl<'a> Emission<'a> {
         }
     }
 
+    /// Appends the second-order paths by way of a point that receives `flux_w`, W.
     fn second_order(
         &self,
         lit: &LitPoint,
@@ -166,41 +170,41 @@ impl<'a> Emission<'a> {
         paths: &mut Vec<Path>,
     ) {
         for (onward, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
-            let Some(hit) = self.cast(lit, onward) else { continue };
+            let Some(hit) = self.trace_from(lit, onward) else { continue };
             let (f_per_sr, first_share) =
                 lit.surface.scattering.f_and_specular_share(lit.source, onward);
-            let second = self.lit(hit, lit.hit.point.xyz);
+            let second = self.lit_point(hit, lit.hit.point.xyz);
             let seen = weight * self.pattern(bounce, &hit);
-            let (received, second_share) = self.received(&second);
+            let (received, second_share) = self.received_share(&second);
             let power_w = flux_w * f_per_sr * onward.cos_theta() * seen * received;
             if power_w > 0.0 && self.is_seen(&second) {
-                let way_m = lit.hit.range_m + hit.range_m + second.antenna_m;
+                let path_m = lit.hit.range_m + hit.range_m + second.antenna_m;
                 let specular_share = first_share * second_share;
-                let (range_m, surfaces) = (0.5 * way_m, 2);
+                let (range_m, surfaces) = (0.5 * path_m, 2);
                 paths.push(Path { range_m, power_w, surfaces, specular_share, ..direct });
             }
         }
     }
 
-    /// How the surface lies at a ray's hit, where effects have moved it.
+    /// The orientation of the surface at the hit of a ray, if effects have moved it.
     fn facing(&self, ray: usize) -> Option<Facing> {
         self.paths.footprints.facings.get(self.number * self.rays + ray).copied().flatten()
     }
 
-    /// One key for all observers: where a surface sends its power does not depend on who listens.
+    /// The key of the random directions from the hit of a ray. It is the same for all observers, since a surface
+    /// scatters independently of them.
     fn key(&self, ray: usize) -> Key {
         let (seed, chirp) = (self.paths.setup.seed, self.number as u64);
         Key { seed, chirp, sub_ray: ray as u64, purpose: Purpose::Bounce }
     }
 
-    /// Power of one ray on a lit point, W.
+    /// Power of one ray on a point, W.
     fn flux_w(&self, lit: &LitPoint) -> f64 {
         self.paths.link.flux_w(lit.hit.cos_theta) / self.rays as f64
     }
 
-    /// Share of the power on a lit point that the antenna receives if nothing is in the way, and the
-    /// share of that which is reflected like by a mirror.
-    fn received(&self, lit: &LitPoint) -> (f64, f64) {
+    /// Share of the power on a point that the antenna receives if nothing occludes it, and the specular share of that.
+    fn received_share(&self, lit: &LitPoint) -> (f64, f64) {
         let (f_per_sr, specular_share) =
             lit.surface.scattering.f_and_specular_share(lit.source, lit.antenna);
         let cos_exit = lit.antenna.cos_theta();
@@ -212,20 +216,20 @@ impl<'a> Emission<'a> {
         (received, specular_share)
     }
 
-    /// What a ray that leaves a lit point meets.
-    fn cast(&self, lit: &LitPoint, towards: Direction<Local>) -> Option<Hit> {
+    /// The closest hit of a ray from a point.
+    fn trace_from(&self, lit: &LitPoint, towards: Direction<Local>) -> Option<Hit> {
         let origin = Point::from(lit.hit.point.xyz + LIFT_M * lit.frame.normal);
         let direction = Direction::new(lit.frame.world(towards.xyz()))?;
         self.paths.setup.geometry.bvh.closest(&Ray { origin, direction })
     }
 
-    /// Whether nothing stands between a lit point and the antenna.
+    /// Whether a point is visible from the antenna.
     fn is_seen(&self, lit: &LitPoint) -> bool {
         let above = lit.antenna.cos_theta() > 0.0;
-        above && self.cast(lit, lit.antenna).is_none_or(|hit| hit.range_m >= lit.antenna_m)
+        above && self.trace_from(lit, lit.antenna).is_none_or(|hit| hit.range_m >= lit.antenna_m)
     }
 
-    /// How well the antenna sees a second surface. A separate receiver sees all alike.
+    /// Gain of the antenna towards a second surface, relative to that towards the spot. It is 1 for a separate receiver.
     fn pattern(&self, bounce: &Bounce, hit: &Hit) -> f64 {
         match self.paths.observer {
             Observer::Receiver { .. } => 1.0,

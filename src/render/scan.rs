@@ -1,4 +1,4 @@
-//! A scan from its rays to its echoes.
+//! Renders a scan: from its rays to its echoes.
 
 use rayon::prelude::*;
 
@@ -14,33 +14,33 @@ use crate::frames::{Global, Point};
 use crate::radar::Field;
 use crate::trace::{ScanGeometry, winding_number};
 
-/// What one scan gave at one antenna.
+/// The echoes of one scan at one antenna.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scan {
     /// Number of chirps sent.
     pub chirps: usize,
-    /// Number of chirps that met the target.
+    /// Number of chirps that hit the target.
     pub hits: usize,
-    /// Chirps that met a surface, in the order they were sent, whatever their power, and false alarms.
+    /// The echoes of all chirps that hit the target, of any power, and false alarms, in the order of transmission.
     pub echoes: Vec<Echo>,
     /// Echoes below this power are not detected, W.
     pub threshold_w: f64,
-    /// Mean thermal power in a range cell, W; none for a receiver without noise.
+    /// Mean thermal power in a range cell, W; `None` for a receiver without noise.
     pub noise_w: Option<f64>,
 }
 
 impl Scan {
-    /// The echoes that the radar reports: those at or above the threshold.
+    /// The echoes at or above the threshold, which the radar reports.
     pub fn detections(&self) -> impl Iterator<Item = &Echo> {
         self.echoes.iter().filter(|echo| echo.power_w >= self.threshold_w)
     }
 }
 
-/// Traces every chirp of a scan with `rays_per_chirp` rays, one or more. `done` is called with the number of
-/// chirps that have been finished.
+/// Traces `rays_per_chirp` rays, one or more, for every chirp of a scan. `done` is called repeatedly with the number of
+/// chirps that were finished since the last call.
 ///
 /// # Errors
-/// When no ray meets the mesh.
+/// When no ray hits the mesh, or when the tracer does not accept the rays or fails.
 pub fn trace(
     geometry: &ScanGeometry,
     rays_per_chirp: usize,
@@ -49,11 +49,10 @@ pub fn trace(
     check_hits(spot::trace(geometry, rays_per_chirp.max(1), done)?, geometry)
 }
 
-/// As [`trace`], of the target where the setup's effects place it.
+/// As [`trace`], with the target where the effects of the setup place it.
 ///
 /// # Errors
-/// When no ray meets the mesh, an effect would count what the setup renders already, or the setup's
-/// tracer does not take the rays or stops working.
+/// As [`trace`], and when an effect would be counted twice.
 pub fn trace_placed(
     setup: &Setup,
     rays_per_chirp: usize,
@@ -71,7 +70,7 @@ pub fn trace_placed(
     check_hits(footprints?, geometry)
 }
 
-/// Refuses a scan of which no ray meets the target.
+/// Fails if no ray of a scan hits the target.
 fn check_hits(footprints: Footprints, geometry: &ScanGeometry) -> Result<Footprints, RenderError> {
     if footprints.hits.iter().all(Option::is_none) {
         return Err(miss(geometry));
@@ -79,17 +78,17 @@ fn check_hits(footprints: Footprints, geometry: &ScanGeometry) -> Result<Footpri
     Ok(footprints)
 }
 
-/// Rays whose chirps are shaded one after the other; a chirp that bounces is a task of its own.
+/// Rays per task of shading. With second-order paths every chirp is a task.
 const RAYS_PER_TASK: usize = 256;
 
-/// Turns hits into echoes at an antenna. With effects the hits are those of [`trace_placed`]. `done` is called with the number of chirps that have been finished.
+/// Computes the echoes at an antenna from the hits of [`trace`], or of [`trace_placed`] for a setup with effects. `done`
+/// is called repeatedly with the number of chirps that were finished since the last call.
 ///
-/// The result is the same for any number of threads.
+/// The result does not depend on the number of threads.
 ///
 /// # Errors
 /// When the antenna stands inside the target, a path is too long for the receiver's sampling,
-/// several paths meet in a receiver that does not know their phases, or an effect would count what the
-/// setup renders already.
+/// a receiver gets several paths of undeclared phases, or an effect would be counted twice.
 pub fn shade(
     setup: &Setup,
     footprints: &Footprints,
@@ -108,11 +107,11 @@ pub fn shade(
     let echoes = tasks.map(|(task, hits)| {
         let chirps = hits.chunks(rays);
         let count = chirps.len();
-        let (mut ways, mut found) = (Vec::new(), Vec::with_capacity(count));
+        let (mut of_chirp, mut found) = (Vec::new(), Vec::with_capacity(count));
         for (chirp, hits) in (task * per_task..).zip(chirps) {
-            paths.fill(chirp, hits, &mut ways);
-            let seen = detector.observe(chirp, &ways)?;
-            found.extend(echoes.echo(chirp, hits, &ways, seen));
+            paths.fill(chirp, hits, &mut of_chirp);
+            let seen = detector.observe(chirp, &of_chirp)?;
+            found.extend(echoes.echo(chirp, hits, &of_chirp, seen));
         }
         done(count);
         Ok(found)
@@ -127,11 +126,11 @@ pub fn shade(
     })
 }
 
-/// The sampled beat signals of a scan at an antenna, chirp after chirp and look after look, as its
-/// receiver has them; none without a `[radar.receiver]`.
+/// Computes the sampled beat signals of a scan at an antenna, chirp after chirp; those of a chirp are empty without a
+/// `[radar.receiver]`.
 ///
 /// # Errors
-/// As [`shade`], at once or when a chirp's turn comes.
+/// As [`shade`]: from this function, or from the iterator for a chirp with a path that is too long.
 pub fn beat_signals<'a>(
     setup: &'a Setup<'a>,
     footprints: &'a Footprints,
@@ -147,7 +146,7 @@ pub fn beat_signals<'a>(
         .map(move |(chirp, hits)| detector.beats(chirp, &paths.of_chirp(chirp, hits))))
 }
 
-/// What must hold before anything is computed.
+/// Checks the setup before anything is computed.
 fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(), RenderError> {
     acting::check(setup, footprints.rays_per_chirp, observer)?;
     if let Observer::Receiver { position, .. } = observer
@@ -168,17 +167,16 @@ fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(
     Ok(())
 }
 
-/// Whether an antenna is inside something that the radar is outside of. A room around both is no wall
-/// between them.
+/// Whether an antenna is inside a closed mesh that the radar is outside of. A room around both does not count.
 fn is_walled_off(setup: &Setup, position: Point<Global>) -> bool {
     let origin = setup.geometry.radar.frames().origin();
     let [here, there] =
         [position, origin].map(|point| winding_number(setup.geometry.bvh.mesh(), point));
-    // A winding number is 0 outside and 1 inside a closed mesh, and anything between near an open one.
+    // A winding number is 0 outside and 1 inside a closed mesh, and a fraction near an open one.
     (here - there).abs() > 0.75
 }
 
-/// Where the scan looks, where the target lies instead, and the likeliest cause.
+/// The error of a scan that misses its target: field of view, extent of the target, and the likeliest remedy.
 fn miss(geometry: &ScanGeometry) -> RenderError {
     let (chirps, mesh) = (geometry.chirps, geometry.bvh.mesh());
     let frames = geometry.radar.frames();
@@ -187,7 +185,7 @@ fn miss(geometry: &ScanGeometry) -> RenderError {
     let in_target = vertices.map(|&vertex| (target_from_global * Point::from(vertex)).xyz);
     let target = Field::around(in_target.map(|vertex| vertex.truncate()));
     let scan = chirps.field(&frames);
-    // Sixty times the paper's target: surely a mesh in millimetres.
+    // Sixty times the size of the paper's target indicates a mesh in millimetres.
     const HUGE_M: f64 = 100.0;
     let is_ahead = chirps.rays.first().is_some_and(|ray| {
         let mut to_vertices = mesh.vertices.iter().map(|vertex| vertex - ray.origin.xyz);

@@ -1,28 +1,28 @@
-//! What a scan is rendered from.
+//! The input of a rendering.
 
 use super::bounce::Bounce;
 use super::surface::Surface;
 use crate::effects::Model;
 use crate::trace::ScanGeometry;
 
-/// A scan, what its target is made of, and how it is rendered.
+/// A scan, the materials of its target, and how it is rendered.
 #[derive(Clone, Copy)]
 pub struct Setup<'a> {
     /// The instrument, its chirps and the target.
     pub geometry: ScanGeometry<'a>,
-    /// What each region is made of.
+    /// The surface of each region.
     pub surfaces: &'a [Surface<'a>],
-    /// Second-order paths; none, the paper's, for single ones only.
+    /// Second-order paths; `None`, as in the paper, for single paths only.
     pub bounce: Option<Bounce>,
-    /// Physical effects on the radar's own echoes. The model's laws are those of `surfaces`, its
-    /// receiver is the one that the radar [declares](crate::effects::Receiver::declared).
+    /// Physical effects on the radar's own echoes. The model must have the scattering models of `surfaces`, and the
+    /// receiver that the radar [declares](crate::effects::Receiver::declared).
     pub effects: Option<&'a Model<'a>>,
     /// Seed of everything random.
     pub seed: u64,
 }
 
 impl<'a> Setup<'a> {
-    /// As in the paper: single paths only, no effects.
+    /// A rendering as in the paper: single paths, no effects, seed 0.
     pub fn new(geometry: ScanGeometry<'a>, surfaces: &'a [Surface<'a>]) -> Setup<'a> {
         Setup { geometry, surfaces, bounce: None, effects: None, seed: 0 }
     }

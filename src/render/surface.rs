@@ -1,5 +1,5 @@
-//! Between the world and a surface: the one place that knows both world directions and the local
-//! frame in which scattering lives.
+//! Surfaces, and the conversion between world directions and the local frame of scattering. No other file of the
+//! renderer uses both.
 
 use glam::DVec3;
 
@@ -8,24 +8,24 @@ use crate::frames::{Direction, Surface as Local};
 use crate::geometry::Mesh;
 use crate::trace::Hit;
 
-/// What the facets of one region are made of.
+/// The surface of the facets of one region.
 #[derive(Clone, Copy)]
 pub struct Surface<'a> {
-    /// How it scatters.
+    /// Its scattering model.
     pub scattering: &'a dyn Scattering,
-    /// Direction of its grain in the global frame, of any length; on a facet it is projected along
-    /// the normal. Azimuth counts from it, and `m` of an anisotropic model is along it.
+    /// Direction of its grain in the global frame, of any length. On a facet it is projected along the normal. Azimuths
+    /// count from it, and `m` of an anisotropic model is the roughness along it.
     pub grain: DVec3,
 }
 
 impl<'a> Surface<'a> {
-    /// A surface whose grain runs upwards.
+    /// A surface whose grain is the y axis, upwards.
     pub fn new(scattering: &'a dyn Scattering) -> Surface<'a> {
         Surface { scattering, grain: DVec3::Y }
     }
 }
 
-/// How the surface lies where a ray meets a target that effects have moved.
+/// The orientation of the surface at a hit on a target that effects have moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facing {
     /// Unit normal, towards the radar.
@@ -34,7 +34,7 @@ pub struct Facing {
     pub azimuth_rad: f64,
 }
 
-/// A facet where a ray has met it: normal towards where the ray came from, tangent along the grain.
+/// The local frame of a facet at a hit: the normal on the side of the ray, the tangent along the grain.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalFrame {
     pub normal: DVec3,
@@ -43,28 +43,28 @@ pub(crate) struct LocalFrame {
 }
 
 impl LocalFrame {
-    /// The frame at a hit; `to_source` points back along the ray.
+    /// The frame at a hit; `to_source` is the unit vector back along the ray.
     pub fn new(mesh: &Mesh, hit: &Hit, to_source: DVec3, grain: DVec3) -> LocalFrame {
         let outward = mesh.area_normal(hit.facet as usize).normalize_or(to_source);
         let normal = if outward.dot(to_source) < 0.0 { -outward } else { outward };
         let along = grain - grain.dot(normal) * normal;
-        // A grain that stands on the surface has no direction along it.
-        let stands = along.length_squared() <= 1e-18 * grain.length_squared();
-        let tangent = match along.try_normalize().filter(|_| !stands) {
+        // A grain along the normal has no direction on the surface.
+        let is_normal = along.length_squared() <= 1e-18 * grain.length_squared();
+        let tangent = match along.try_normalize().filter(|_| !is_normal) {
             Some(tangent) => tangent,
             None => normal.any_orthonormal_vector(),
         };
         LocalFrame { normal, tangent, bitangent: normal.cross(tangent) }
     }
 
-    /// A world direction (a unit vector), seen from the surface.
+    /// Converts a world direction, a unit vector, to the local frame.
     pub fn local(&self, world: DVec3) -> Direction<Local> {
         let xyz =
             DVec3::new(world.dot(self.tangent), world.dot(self.bitangent), world.dot(self.normal));
         Direction::new(xyz).unwrap_or(Direction::from_angles(0.0, 0.0))
     }
 
-    /// A direction of the surface, as a unit vector of the world.
+    /// Converts a local direction, a unit vector, to the world.
     pub fn world(&self, local: DVec3) -> DVec3 {
         local.x * self.tangent + local.y * self.bitangent + local.z * self.normal
     }

@@ -1,4 +1,4 @@
-//! Boxes around the facets of a mesh, in f32: a tree of two branches that `obvhs` builds.
+//! The bounding boxes of facets in f32, as a binary tree that `obvhs` builds.
 
 use std::time::Duration;
 
@@ -11,19 +11,20 @@ use obvhs::bvh2::builder::build_bvh2;
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 
-/// Boxes are grown by this share of the mesh's radius, some eighty times the rounding of f32.
+/// Margin of every box, as a share of the mesh's radius: about eighty times the rounding of f32.
 pub(super) const PADDING: f64 = 1e-5;
 
-/// The boxes, from the centre of a sphere around the facets.
+/// A binary tree of bounding boxes. Coordinates count from the centre of `sphere`.
 pub(super) struct Boxes {
     pub tree: Bvh2,
     /// Facet of each leaf entry.
     pub facets: Vec<u32>,
+    /// A sphere around all facets.
     pub sphere: Sphere,
 }
 
 impl Boxes {
-    /// Around some facets, which must have an area.
+    /// Builds the tree over facets, all of which must have an area.
     pub fn new(mesh: &Mesh, facets: &[u32]) -> Boxes {
         let sphere = Sphere::around(mesh, facets);
         let padding = Vec3A::splat((PADDING * sphere.radius_m) as f32);
@@ -36,14 +37,14 @@ impl Boxes {
                 Aabb::new(tight.min - padding, tight.max + padding)
             })
             .collect();
-        // Walked eight boxes at a time, the trees of its slower presets are hardly faster, and they take far longer to build.
+        // Slower presets take far longer to build, and their trees are hardly faster when eight boxes are tested at once.
         let tree = build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut Duration::default());
         let facets = tree.primitive_indices.iter().map(|&entry| facets[entry as usize]).collect();
         Boxes { tree, facets, sphere }
     }
 }
 
-/// A sphere around facets. Seen from its centre, and from where a ray reaches it, f32 is precise.
+/// A sphere around facets. f32 is precise for coordinates from its centre, and for distances from where a ray enters.
 #[derive(Clone, Copy)]
 pub(super) struct Sphere {
     pub centre: DVec3,
@@ -51,7 +52,7 @@ pub(super) struct Sphere {
 }
 
 impl Sphere {
-    /// Around the corners of some facets.
+    /// A sphere around the corners of facets.
     fn around(mesh: &Mesh, facets: &[u32]) -> Sphere {
         let corners = || facets.iter().flat_map(|&facet| mesh.corners(facet as usize));
         let min = corners().fold(DVec3::INFINITY, DVec3::min);
@@ -61,19 +62,20 @@ impl Sphere {
         Sphere { centre, radius_m }
     }
 
-    /// Distance at which a ray reaches it, m; 0 from within.
+    /// Distance at which a ray enters the sphere, m; 0 if it starts inside, `None` if it misses.
     #[inline]
     pub fn entry_m(&self, ray: &Ray<Global>) -> Option<f64> {
-        self.entry_beside_m(ray, 0.0)
+        self.entry_within_m(ray, 0.0)
     }
 
-    /// The same of a sphere that is larger by `beside_m`.
+    /// Distance at which a ray enters a sphere that is larger by `margin_m`, m; 0 if it starts inside, `None` if it
+    /// misses.
     #[inline]
-    pub fn entry_beside_m(&self, ray: &Ray<Global>, beside_m: f64) -> Option<f64> {
+    pub fn entry_within_m(&self, ray: &Ray<Global>, margin_m: f64) -> Option<f64> {
         let to_centre = self.centre - ray.origin.xyz;
         let along_m = to_centre.dot(ray.direction.xyz());
         let beside2 = (to_centre - along_m * ray.direction.xyz()).length_squared();
-        let radius_m = (self.radius_m + beside_m) * (1.0 + PADDING);
+        let radius_m = (self.radius_m + margin_m) * (1.0 + PADDING);
         let half_chord_m = (radius_m * radius_m - beside2).max(0.0).sqrt();
         let reached = beside2 <= radius_m * radius_m && along_m + half_chord_m > 0.0;
         reached.then(|| (along_m - half_chord_m).max(0.0))

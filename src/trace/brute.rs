@@ -1,12 +1,12 @@
-//! The oracle: Möller–Trumbore (J. Graphics Tools 2 (1997) 21) in f64 over all facets, the paper's
-//! own method. Slow, obvious, and the judge of every faster tracer.
+//! The test oracle: the intersection formula of Möller and Trumbore (J. Graphics Tools 2 (1997) 21) in f64 over all
+//! facets, which is the paper's own method. It is slow and simple, and every faster tracer is compared with it.
 
 use super::facet::GRAZING;
 use super::hit::Hit;
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 
-/// The closest hit of one ray; of equally near facets the one with the smallest number.
+/// The closest hit of one ray; among equally near facets, the one with the smallest number.
 pub fn closest(mesh: &Mesh, ray: &Ray<Global>) -> Option<Hit> {
     let mut best: Option<Hit> = None;
     for facet in 0..mesh.facets.len() {
@@ -27,7 +27,7 @@ pub fn closest(mesh: &Mesh, ray: &Ray<Global>) -> Option<Hit> {
     best
 }
 
-/// Distance along the ray to the facet, m.
+/// Distance along the ray to the facet, m; `None` if the ray misses it or grazes its plane.
 fn intersect(mesh: &Mesh, facet: usize, ray: &Ray<Global>) -> Option<f64> {
     let [a, b, c] = mesh.corners(facet);
     let (ab, ac, direction) = (b - a, c - a, ray.direction.xyz());
@@ -39,6 +39,6 @@ fn intersect(mesh: &Mesh, facet: usize, ray: &Ray<Global>) -> Option<f64> {
     let v = direction.dot(q) / determinant;
     let t = ac.dot(q) / determinant;
     let is_within = u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0;
-    // Last, as few facets come so far.
+    // This test comes last, since few facets get this far.
     (is_within && determinant.abs() > GRAZING * ab.length() * ac.length()).then_some(t)
 }

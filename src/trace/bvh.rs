@@ -1,4 +1,4 @@
-//! A hierarchy of boxes over a mesh, for any ray: f32 finds, f64 decides.
+//! A hierarchy of bounding boxes over a mesh, which traces any ray. f32 culls, f64 decides.
 
 use std::sync::OnceLock;
 
@@ -6,18 +6,18 @@ use rayon::prelude::*;
 
 use super::boxes::Boxes;
 use super::eightfold::Eightfold;
-use super::hit::{Hit, no_hits};
+use super::hit::{Hit, allocate_hits};
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 
-/// A hierarchy over one mesh, built when the first ray asks for it.
+/// A hierarchy of bounding boxes over one mesh. It is built on first use.
 pub struct Bvh<'a> {
     mesh: &'a Mesh,
-    /// The facets that it holds; none for all that have an area.
+    /// Its facets; `None` for all that have an area.
     only: Option<Vec<u32>>,
-    /// What a graphics processor takes.
+    /// The binary tree, for graphics processors.
     boxes: OnceLock<Boxes>,
-    /// What the processor walks through.
+    /// The tree with eight branches per node, for the CPU.
     eightfold: OnceLock<Eightfold>,
 }
 
@@ -27,33 +27,33 @@ impl<'a> Bvh<'a> {
         Bvh { mesh, only: None, boxes: OnceLock::new(), eightfold: OnceLock::new() }
     }
 
-    /// The same over some facets, which must have an area.
+    /// A hierarchy over these facets, all of which must have an area.
     pub(super) fn over(mesh: &'a Mesh, facets: Vec<u32>) -> Bvh<'a> {
         Bvh { only: Some(facets), ..Bvh::new(mesh) }
     }
 
-    /// The mesh that it is over.
+    /// The mesh.
     pub fn mesh(&self) -> &'a Mesh {
         self.mesh
     }
 
-    /// Whether a ray has asked for it yet.
+    /// Whether the hierarchy has been built.
     pub fn is_built(&self) -> bool {
         self.eightfold.get().is_some() || self.boxes.get().is_some()
     }
 
-    /// The closest hit of one ray; of equally near facets the one with the smallest number.
+    /// The closest hit of one ray; among equally near facets, the one with the smallest number.
     pub fn closest(&self, ray: &Ray<Global>) -> Option<Hit> {
         let mut hit = [None];
         self.eightfold().closest(self.mesh, std::slice::from_ref(ray), &mut hit);
         hit[0]
     }
 
-    /// The closest hit of each ray, by all threads.
+    /// The closest hit of each ray, computed on all threads.
     pub fn closest_of_each(&self, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
         /// Rays of one task.
         const RAYS: usize = 64;
-        let mut hits = no_hits(rays.len());
+        let mut hits = allocate_hits(rays.len());
         let tasks = rays.par_chunks(RAYS).zip(hits.par_chunks_mut(RAYS));
         tasks.for_each(|(rays, hits)| self.eightfold().closest(self.mesh, rays, hits));
         hits
@@ -62,24 +62,22 @@ impl<'a> Bvh<'a> {
     fn eightfold(&self) -> &Eightfold {
         self.eightfold.get_or_init(|| match self.boxes.get() {
             Some(boxes) => Eightfold::new(self.mesh, boxes),
-            None => Eightfold::new(self.mesh, &self.built()),
+            None => Eightfold::new(self.mesh, &self.build()),
         })
     }
 
-    /// The boxes themselves, which are built if they are not yet.
+    /// The binary tree, built on first use.
     pub(super) fn boxes(&self) -> &Boxes {
-        self.boxes.get_or_init(|| self.built())
+        self.boxes.get_or_init(|| self.build())
     }
 
-    fn built(&self) -> Boxes {
-        let live = |&facet: &u32| !self.mesh.is_degenerate(facet as usize);
-        match &self.only {
-            Some(facets) => Boxes::new(self.mesh, facets),
-            None => {
-                let all: Vec<u32> = (0..self.mesh.facets.len() as u32).filter(live).collect();
-                Boxes::new(self.mesh, &all)
-            }
+    fn build(&self) -> Boxes {
+        if let Some(facets) = &self.only {
+            return Boxes::new(self.mesh, facets);
         }
+        let mut facets: Vec<u32> = (0..self.mesh.facets.len() as u32).collect();
+        facets.retain(|&facet| !self.mesh.is_degenerate(facet as usize));
+        Boxes::new(self.mesh, &facets)
     }
 }
 

@@ -1,100 +1,97 @@
-//! Boxes eight to a node and facets eight to a block, side by side for vector instructions.
+//! A hierarchy with eight boxes per node and eight facets per block, laid out for vector instructions.
 //!
-//! A ray is told from the facets that it surely passes beside in f32, with a bound of the rounding; f64 decides the
-//! few that are left. The library's own triangle tests lose rays on shared edges; ours is in `facet.rs`.
+//! Facets are culled conservatively in f32, with a bound of the rounding; f64 decides the few survivors (`facet.rs`).
+//! The triangle test of `obvhs` is not used, because it loses rays on shared edges.
 
 use super::boxes::{Boxes, PADDING, Sphere};
-use super::facet::{Line, met};
+use super::facet::{Line, plane_hit};
 use super::hit::Hit;
 use super::wide::{Wide, least, most, widest};
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 
-/// Boxes of a node, facets of a block.
+/// Boxes per node, and facets per block.
 const LANES: usize = 8;
 
 type Lanes = [f32; LANES];
 
-/// Marks the number of a block among those of nodes.
+/// Bit that distinguishes the number of a block from that of a node.
 const BLOCK: u32 = 1 << 31;
 
-/// Branches that are kept beside each other; more are put aside, which tests shall see too.
+/// Branches on the stack's array; more spill into a list. The array is small in tests, so that they cover this.
 const STACK: usize = if cfg!(test) { 2 * LANES } else { 64 };
 
-/// The hierarchy, from the centre of its sphere.
+/// The hierarchy. Coordinates count from the centre of its sphere.
 pub(super) struct Eightfold {
     nodes: Vec<Node>,
     blocks: Vec<Block>,
     sphere: Sphere,
 }
 
-/// Boxes by axis, and what is in each: a node, or the first block of facets.
+/// Eight boxes: their bounds by axis, and the content of each, a node or (with the bit [`BLOCK`]) its first block.
 #[derive(Clone, Copy)]
 #[repr(align(32))]
 struct Node {
     low: [Lanes; 3],
     high: [Lanes; 3],
-    within: [u32; LANES],
+    content: [u32; LANES],
 }
 
-/// Facets by corner and axis.
+/// Up to eight facets: the coordinates of their corners by corner and axis, and their numbers.
 #[derive(Clone, Copy)]
 #[repr(align(32))]
 struct Block {
     corners: [[Lanes; 3]; 3],
     facets: [u32; LANES],
-    /// A bit for each that there is.
+    /// A bit per lane that holds a facet.
     live: u32,
-    /// Whether the next block has more of the same box.
-    goes_on: bool,
+    /// Whether the next block belongs to the same box.
+    continues: bool,
 }
 
 impl Node {
-    /// Boxes that no ray meets.
+    /// Boxes that no ray enters.
     const EMPTY: Node = Node {
         low: [[f32::INFINITY; LANES]; 3],
         high: [[f32::NEG_INFINITY; LANES]; 3],
-        within: [0; LANES],
+        content: [0; LANES],
     };
 }
 
 impl Eightfold {
-    /// From boxes with two branches each.
+    /// Converts a binary tree.
     pub fn new(mesh: &Mesh, boxes: &Boxes) -> Eightfold {
         let mut eightfold =
             Eightfold { nodes: Vec::new(), blocks: Vec::new(), sphere: boxes.sphere };
         if boxes.facets.is_empty() {
             return eightfold;
         }
-        let counts = counts(boxes);
+        let counts = count_facets(boxes);
         eightfold.nodes.push(Node::EMPTY);
         let mut open = vec![(0, 0)];
         while let Some((branch, number)) = open.pop() {
-            for (lane, branch) in branches(boxes, &counts, branch).into_iter().enumerate() {
-                let within = match counts[branch] as usize {
-                    0..=LANES => eightfold.push_facets(mesh, &facets(boxes, branch)),
-                    _ if boxes.tree.nodes[branch].is_leaf() => {
-                        eightfold.push_facets(mesh, &facets(boxes, branch))
-                    }
-                    _ => {
-                        eightfold.nodes.push(Node::EMPTY);
-                        let number = eightfold.nodes.len() - 1;
-                        open.push((branch, number));
-                        number as u32
-                    }
+            for (lane, branch) in open_branches(boxes, &counts, branch).into_iter().enumerate() {
+                let content = if is_whole(boxes, &counts, branch) {
+                    eightfold.push_facets(mesh, &facets_under(boxes, branch))
+                } else {
+                    eightfold.nodes.push(Node::EMPTY);
+                    let number = eightfold.nodes.len() - 1;
+                    open.push((branch, number));
+                    number as u32
                 };
                 let (around, node) = (boxes.tree.nodes[branch].aabb, &mut eightfold.nodes[number]);
                 for axis in 0..3 {
                     node.low[axis][lane] = around.min[axis];
                     node.high[axis][lane] = around.max[axis];
                 }
-                node.within[lane] = within;
+                node.content[lane] = content;
             }
         }
         eightfold
     }
 
-    /// Facets in one box, at least one; the mark and number of their first block.
+    /// Appends blocks with the facets of one box, of which there must be at least one. Returns the number of the
+    /// first block with the bit [`BLOCK`].
     fn push_facets(&mut self, mesh: &Mesh, facets: &[u32]) -> u32 {
         let first = self.blocks.len() as u32;
         for facets in facets.chunks(LANES) {
@@ -102,7 +99,7 @@ impl Eightfold {
                 corners: [[[0.0; LANES]; 3]; 3],
                 facets: [0; LANES],
                 live: 0,
-                goes_on: true,
+                continues: true,
             };
             for (lane, &facet) in facets.iter().enumerate() {
                 block.facets[lane] = facet;
@@ -115,19 +112,19 @@ impl Eightfold {
             self.blocks.push(block);
         }
         if let Some(last) = self.blocks.last_mut() {
-            last.goes_on = false;
+            last.continues = false;
         }
         BLOCK | first
     }
 
-    /// The closest hit of each ray; of equally near facets the one with the smallest number.
+    /// Finds the closest hit of each ray; among equally near facets, the one with the smallest number.
     pub fn closest(&self, mesh: &Mesh, rays: &[Ray<Global>], hits: &mut [Option<Hit>]) {
         widest(Walks { eightfold: self, mesh, rays, hits });
     }
 }
 
-/// How many facets are under each branch.
-fn counts(boxes: &Boxes) -> Vec<u32> {
+/// Number of facets under each branch.
+fn count_facets(boxes: &Boxes) -> Vec<u32> {
     let nodes = &boxes.tree.nodes;
     let mut counts = vec![0; nodes.len()];
     let mut open = vec![0];
@@ -147,13 +144,17 @@ fn counts(boxes: &Boxes) -> Vec<u32> {
     counts
 }
 
-/// Up to eight branches that a branch is made of: the largest are opened first.
-fn branches(boxes: &Boxes, counts: &[u32], branch: usize) -> Vec<usize> {
+/// Whether a branch is not opened further: it is a leaf, or its facets fit into one block.
+fn is_whole(boxes: &Boxes, counts: &[u32], branch: usize) -> bool {
+    counts[branch] <= LANES as u32 || boxes.tree.nodes[branch].is_leaf()
+}
+
+/// Opens a branch into up to eight branches below it, always the largest next.
+fn open_branches(boxes: &Boxes, counts: &[u32], branch: usize) -> Vec<usize> {
     let nodes = &boxes.tree.nodes;
     let mut branches = vec![branch];
     while branches.len() < LANES {
-        let is_whole = |branch: usize| counts[branch] <= LANES as u32 || nodes[branch].is_leaf();
-        let open = (0..branches.len()).filter(|&place| !is_whole(branches[place]));
+        let open = (0..branches.len()).filter(|&place| !is_whole(boxes, counts, branches[place]));
         let area = |&place: &usize| nodes[branches[place]].aabb.half_area();
         let Some(place) = open.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
         let first = nodes[branches[place]].first_index as usize;
@@ -164,7 +165,7 @@ fn branches(boxes: &Boxes, counts: &[u32], branch: usize) -> Vec<usize> {
 }
 
 /// All facets under a branch.
-fn facets(boxes: &Boxes, branch: usize) -> Vec<u32> {
+fn facets_under(boxes: &Boxes, branch: usize) -> Vec<u32> {
     let (mut facets, mut open) = (Vec::new(), vec![branch]);
     while let Some(branch) = open.pop() {
         let node = &boxes.tree.nodes[branch];
@@ -178,7 +179,7 @@ fn facets(boxes: &Boxes, branch: usize) -> Vec<u32> {
     facets
 }
 
-/// Rays on their way through the boxes.
+/// Rays to be traced, and their hits.
 struct Walks<'a> {
     eightfold: &'a Eightfold,
     mesh: &'a Mesh,
@@ -194,13 +195,13 @@ impl Wide for Walks<'_> {
         let mut stack = Stack::new();
         for (ray, hit) in self.rays.iter().zip(self.hits) {
             let facet = self.eightfold.nearest(self.mesh, ray, &mut stack);
-            *hit = facet.and_then(|facet| met(self.mesh, facet, ray));
+            *hit = facet.and_then(|facet| plane_hit(self.mesh, facet, ray));
         }
     }
 }
 
 impl Eightfold {
-    /// The nearest facet of a ray, by a stack that is empty before and after.
+    /// Finds the nearest facet of a ray. `stack` must be empty, and is empty afterwards.
     #[inline(always)]
     fn nearest(&self, mesh: &Mesh, ray: &Ray<Global>, stack: &mut Stack) -> Option<u32> {
         let Eightfold { nodes, blocks, sphere } = self;
@@ -208,36 +209,36 @@ impl Eightfold {
         let (aim, line) = (Aim::new(sphere, ray, start_m), Line::new(ray));
         let (mut nearest, mut limit): (Option<(f64, u32)>, f32) = (None, f32::INFINITY);
         stack.push(0.0, 0);
-        'branches: while let Some((near, mut within)) = stack.pop() {
+        'branches: while let Some((near, mut content)) = stack.pop() {
             if near > limit {
                 continue;
             }
-            while within & BLOCK == 0 {
-                let node = &nodes[within as usize];
+            while content & BLOCK == 0 {
+                let node = &nodes[content as usize];
                 let (hits, near) = aim.boxes(node, limit);
-                if let Some(lane) = hits.only() {
-                    within = node.within[lane];
+                if let Some(lane) = hits.single() {
+                    content = node.content[lane];
                     continue;
                 }
                 stack.make_room();
                 let base = stack.len;
                 for lane in hits {
-                    stack.sort_in(base, near[lane], node.within[lane]);
+                    stack.insert_sorted(base, near[lane], node.content[lane]);
                 }
                 continue 'branches;
             }
-            for block in &blocks[(within ^ BLOCK) as usize..] {
+            for block in &blocks[(content ^ BLOCK) as usize..] {
                 for lane in aim.facets(block) {
                     let facet = block.facets[lane];
-                    if let Some(range_m) = line.crossing_m(mesh, facet as usize)
+                    if let Some(range_m) = line.range_to_facet_m(mesh, facet as usize)
                         && nearest.is_none_or(|nearest| (range_m, facet) < nearest)
                     {
                         nearest = Some((range_m, facet));
-                        // Later boxes are skipped only when they are farther by more than f32 can blur.
+                        // A box is skipped only if it is farther by more than the rounding of f32.
                         limit = (range_m - start_m + 2.0 * PADDING * sphere.radius_m) as f32;
                     }
                 }
-                if !block.goes_on {
+                if !block.continues {
                     break;
                 }
             }
@@ -246,16 +247,16 @@ impl Eightfold {
     }
 }
 
-/// A ray in f32, from where it reaches the sphere.
+/// A ray in f32 that starts where it enters the sphere.
 struct Aim {
     origin: [f32; 3],
-    /// One over the direction.
+    /// Reciprocal of the direction.
     per: [f32; 3],
-    /// The axis that the ray runs along most, and the other two.
+    /// The axis with the largest component of the direction, and the other two.
     axes: [usize; 3],
-    /// How far it runs along these two while it runs along the first.
+    /// Direction along the second and third axis over direction along the first.
     shear: [f32; 2],
-    /// Twice what a corner's place beside the ray is good to, m.
+    /// Twice the bound of the rounding of a corner's distance from the ray, m.
     margin_m: f32,
 }
 
@@ -267,12 +268,12 @@ impl Aim {
         let along = direction.abs().max_position();
         let axes = [along, (along + 1) % 3, (along + 2) % 3];
         let shear = [1, 2].map(|axis| (direction[axes[axis]] / direction[along]) as f32);
-        // Origin and corners lie within one radius of the centre. Their rounding and that of what is
-        // computed of them come to 16 roundoffs of it: 4 of their difference along each axis, 8 of
-        // what the shear takes off, 4 of taking it off.
+        // Origin and corners lie within one radius of the centre. All rounding together is at most 16 unit
+        // roundoffs of the radius: 4 for their difference along each axis, 8 for the product with the shear,
+        // 4 for its subtraction.
         let doubt = 16.0 * f64::from(f32::EPSILON / 2.0);
-        // The other half is for products and sums of an edge, at most 8 roundoffs of its reach, and for f64, which
-        // is this good while the ray begins within 10⁸ radii.
+        // The factor 2 covers the products and sums of an edge, at most 8 roundoffs, and the rounding of f64 for
+        // rays that start within 10⁸ radii.
         let margin_m = (2.0 * doubt * sphere.radius_m * (1.0 + PADDING)) as f32;
         Aim {
             origin: origin.as_vec3().to_array(),
@@ -283,23 +284,16 @@ impl Aim {
         }
     }
 
-    /// Marks every box that the ray reaches before `limit`, and where it enters it.
+    /// Marks the boxes that the ray enters before `limit`, m, and returns the distance of each entry, m.
     #[inline(always)]
     fn boxes(&self, node: &Node, limit: f32) -> (Marks, Lanes) {
         // The faces at which the ray enters and leaves.
         let is_turned = self.per.map(|per| per < 0.0);
-        let first: [&Lanes; 3] =
-            std::array::from_fn(
-                |axis| {
-                    if is_turned[axis] { &node.high[axis] } else { &node.low[axis] }
-                },
-            );
-        let last: [&Lanes; 3] =
-            std::array::from_fn(
-                |axis| {
-                    if is_turned[axis] { &node.low[axis] } else { &node.high[axis] }
-                },
-            );
+        let sides: [[&Lanes; 2]; 3] = std::array::from_fn(|axis| {
+            let (low, high) = (&node.low[axis], &node.high[axis]);
+            if is_turned[axis] { [high, low] } else { [low, high] }
+        });
+        let [first, last] = [0, 1].map(|side| sides.map(|sides| sides[side]));
         let ([x, y, z], [per_x, per_y, per_z]) = (self.origin, self.per);
         let (mut near, mut within) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
@@ -307,7 +301,7 @@ impl Aim {
                 let [at_x, at_y, at_z] = sides.map(|side| side[lane]);
                 [(at_x - x) * per_x, (at_y - y) * per_y, (at_z - z) * per_z]
             };
-            // Along a face that it runs in, a ray is at no number; it then is within.
+            // A ray in the plane of a face gives NaN for it, which `most` and `least` take as inside.
             let [a, b, c] = met(first);
             near[lane] = most(c, most(b, most(a, 0.0)));
             let [a, b, c] = met(last);
@@ -316,7 +310,7 @@ impl Aim {
         (Marks::of_signs(&within), near)
     }
 
-    /// Marks every facet that the ray does not surely pass beside.
+    /// Marks the facets that the ray may hit: all but those that it certainly misses.
     #[inline(always)]
     fn facets(&self, block: &Block) -> Marks {
         let [along, across, up] = self.axes;
@@ -325,17 +319,17 @@ impl Aim {
         let origin = self.axes.map(|axis| self.origin[axis]);
         let mut within = [0.0; LANES];
         for lane in 0..LANES {
-            // How far a corner lies beside the ray, m, and what that is worth in the volume of an edge, m².
+            // Offset of a corner from the ray, m, and the resulting bound on an edge function, m².
             let beside = |corner: usize| {
                 let depth = corners[corner][0][lane] - origin[0];
                 let x = corners[corner][1][lane] - origin[1] - self.shear[0] * depth;
                 let y = corners[corner][2][lane] - origin[2] - self.shear[1] * depth;
-                // The product of two doubts, too; and one of what is too small for an f32.
+                // The bound includes the product of two roundings, and underflow.
                 let doubt = self.margin_m * (x.abs() + y.abs() + self.margin_m) + f32::MIN_POSITIVE;
                 [x, y, doubt]
             };
             let (a, b, c) = (beside(0), beside(1), beside(2));
-            // The volume of an edge is of either sign when it is nearer to zero than its doubt.
+            // An edge function within its bound of zero may have either sign.
             let edge = |from: [f32; 3], to: [f32; 3]| {
                 let edge = from[0] * to[1] - from[1] * to[0];
                 let doubt = from[2] + to[2];
@@ -350,18 +344,18 @@ impl Aim {
     }
 }
 
-/// Lanes of which something is true, a bit for each.
+/// A set of lanes, one bit per lane.
 #[derive(Clone, Copy)]
 struct Marks(u32);
 
 impl Marks {
-    /// The lane, when there is one alone.
+    /// The lane, if the set has exactly one.
     #[inline(always)]
-    fn only(self) -> Option<usize> {
+    fn single(self) -> Option<usize> {
         self.0.is_power_of_two().then(|| self.0.trailing_zeros() as usize % LANES)
     }
 
-    /// Of numbers whose sign is not set.
+    /// The lanes whose sign bit is not set.
     #[inline(always)]
     fn of_signs(numbers: &Lanes) -> Marks {
         #[cfg(target_arch = "x86_64")]
@@ -370,7 +364,7 @@ impl Marks {
         Marks::of_signs_one_by_one(numbers)
     }
 
-    /// From comparisons the compiler puts a mask together bit by bit.
+    /// As [`Marks::of_signs_one_by_one`], which the compiler does not turn into the single instruction.
     #[cfg(target_arch = "x86_64")]
     #[inline(always)]
     fn of_signs_by_sse(&[a, b, c, d, e, f, g, h]: &Lanes) -> Marks {
@@ -404,45 +398,46 @@ impl Iterator for Marks {
     }
 }
 
-/// Branches that a ray has yet to look into, the nearest of a node on top.
+/// Branches that a ray has yet to visit, the nearest of each node on top.
 struct Stack {
-    /// Distances as the bits of an f32 that is not negative, which are ordered as it is; below them what is within.
+    /// In the high half the distance as the bits of an f32, which for positive numbers sort as the numbers do; in
+    /// the low half the content.
     top: [u64; STACK],
     len: usize,
-    /// What did not fit.
-    aside: Vec<u64>,
+    /// Entries that did not fit into `top`.
+    spilled: Vec<u64>,
 }
 
 impl Stack {
     #[inline(always)]
     fn new() -> Stack {
-        Stack { top: [0; STACK], len: 0, aside: Vec::new() }
+        Stack { top: [0; STACK], len: 0, spilled: Vec::new() }
     }
 
     #[inline(always)]
-    fn push(&mut self, near: f32, within: u32) {
-        self.sort_in(self.len, near, within);
+    fn push(&mut self, near: f32, content: u32) {
+        self.insert_sorted(self.len, near, content);
     }
 
-    /// Makes room for a node's branches.
+    /// Makes room for the branches of a node.
     #[inline(always)]
     fn make_room(&mut self) {
         if self.len + LANES > STACK {
-            self.put_aside();
+            self.spill();
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn put_aside(&mut self) {
-        self.aside.extend_from_slice(&self.top[..self.len]);
+    fn spill(&mut self) {
+        self.spilled.extend_from_slice(&self.top[..self.len]);
         self.len = 0;
     }
 
-    /// Pushes a branch; those from `base` on stay sorted.
+    /// Pushes a branch so that the entries from `base` on stay sorted, the nearest last.
     #[inline(always)]
-    fn sort_in(&mut self, base: usize, near: f32, within: u32) {
-        let branch = u64::from(near.to_bits()) << 32 | u64::from(within);
+    fn insert_sorted(&mut self, base: usize, near: f32, content: u32) {
+        let branch = u64::from(near.to_bits()) << 32 | u64::from(content);
         let mut at = self.len.min(STACK - 1);
         while at > base && self.top[at - 1] < branch {
             self.top[at] = self.top[at - 1];
@@ -455,7 +450,7 @@ impl Stack {
     #[inline(always)]
     fn pop(&mut self) -> Option<(f32, u32)> {
         let branch = match self.len {
-            0 => self.aside.pop()?,
+            0 => self.spilled.pop()?,
             _ => {
                 self.len -= 1;
                 self.top[self.len]
@@ -481,7 +476,7 @@ mod tests {
     }
 
     proptest! {
-        /// Rays at corners, along edges and beside them by what f32 cannot see, from near and far, at any scale.
+        /// Rays at corners and edges, and beside them by less than the rounding of f32, from near and far, at any scale.
         #[test]
         fn what_64_bits_may_hit_is_marked(
             corners in prop::array::uniform3(prop::array::uniform3(-1.0f64..1.0)),
@@ -503,7 +498,7 @@ mod tests {
             let ray = Ray { origin, direction };
             let boxes = Boxes::new(&mesh, &[0]);
             let eightfold = Eightfold::new(&mesh, &boxes);
-            let exact = Line::new(&ray).crossing_m(&mesh, 0);
+            let exact = Line::new(&ray).range_to_facet_m(&mesh, 0);
             prop_assert_eq!(hit(&eightfold, &mesh, ray).map(|hit| hit.range_m), exact);
         }
 
@@ -539,8 +534,8 @@ mod tests {
         let all: Vec<u32> = (0..ball.facets.len() as u32).collect();
         let sphere = Boxes::new(&ball, &all).sphere;
         let mut heap = Eightfold { nodes: vec![Node::EMPTY], blocks: Vec::new(), sphere };
-        let within = heap.push_facets(&ball, &all);
-        heap.nodes[0].within[3] = within;
+        let content = heap.push_facets(&ball, &all);
+        heap.nodes[0].content[3] = content;
         for axis in 0..3 {
             (heap.nodes[0].low[axis][3], heap.nodes[0].high[axis][3]) = (-1.0, 1.0);
         }
@@ -562,7 +557,7 @@ mod tests {
             stack.push(branch as f32, branch);
         }
         let popped: Vec<u32> =
-            std::iter::from_fn(|| stack.pop()).map(|(_, within)| within).collect();
+            std::iter::from_fn(|| stack.pop()).map(|(_, content)| content).collect();
         assert_eq!(popped, (0..1000).rev().collect::<Vec<_>>());
     }
 }

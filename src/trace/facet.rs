@@ -1,4 +1,4 @@
-//! Rays and facets in f64.
+//! The intersection of a ray with a facet, in f64.
 
 use glam::DVec3;
 
@@ -6,17 +6,19 @@ use super::hit::Hit;
 use crate::frames::{Global, Point, Ray};
 use crate::geometry::Mesh;
 
-/// A ray made ready to be tested against many facets.
+/// A ray prepared for tests against many facets.
 ///
-/// By Woop, Benthin and Wald (JCGT 2 (2013) 65): the corners are sheared so that the ray becomes an axis,
-/// which depends on the corner and the ray alone, and an edge is the difference of two products. Rounding
-/// cannot turn its sign, only make it zero, which counts as inside: no ray slips between
-/// neighbours, nor through the corner where many meet.
+/// The test is watertight (Woop, Benthin and Wald, JCGT 2 (2013) 65). A shear turns the ray into an axis; where it
+/// puts a corner depends on the corner and the ray alone. The side of an edge on which the ray passes is then the
+/// sign of a difference of two products. Rounding can make that zero, which counts as inside, but cannot
+/// change its sign. So no ray slips between neighbours or through a common corner.
 pub(super) struct Line<'a> {
     ray: &'a Ray<Global>,
-    /// The axis that the ray runs along most, and the other two.
+    /// The axis with the largest component of the direction.
     along: usize,
+    /// The other two axes.
     beside: [usize; 2],
+    /// Direction along these two over direction along the first.
     shear: [f64; 2],
 }
 
@@ -29,9 +31,9 @@ impl<'a> Line<'a> {
         Line { ray, along, beside, shear: beside.map(|axis| direction[axis] / direction[along]) }
     }
 
-    /// Distance to a facet, m; `None` when the ray passes beside it or away from it.
+    /// Distance along the ray to a facet, m; `None` if the ray misses it.
     #[inline(always)]
-    pub fn crossing_m(&self, mesh: &Mesh, facet: usize) -> Option<f64> {
+    pub fn range_to_facet_m(&self, mesh: &Mesh, facet: usize) -> Option<f64> {
         let Line { ray, along, beside: [across, up], shear } = *self;
         let beside = |corner: DVec3| {
             let at = (corner - ray.origin.xyz).to_array();
@@ -45,56 +47,56 @@ impl<'a> Line<'a> {
         if !all(|v| v >= 0.0) && !all(|v| v <= 0.0) {
             return None;
         }
-        plane_m(mesh, facet, ray)
+        range_to_plane_m(mesh, facet, ray)
     }
 }
 
-/// Distance along the ray to the plane of a facet, m, for a ray that passes through the facet; `None`
-/// when it lies behind or along the ray.
+/// Distance along the ray to the plane of a facet, m; `None` if the plane lies behind or along the ray.
 #[inline]
-pub(super) fn plane_m(mesh: &Mesh, facet: usize, ray: &Ray<Global>) -> Option<f64> {
+pub(super) fn range_to_plane_m(mesh: &Mesh, facet: usize, ray: &Ray<Global>) -> Option<f64> {
     let corners = mesh.corners(facet);
-    let range_m = crossed_m(ray.origin.xyz, ray.direction.xyz(), corners, normal(corners));
+    let range_m = crossing_range_m(ray.origin.xyz, ray.direction.xyz(), corners, normal(corners));
     is_ahead(range_m).then_some(range_m)
 }
 
-/// Normal of a facet, as long as twice its area.
+/// Normal of a facet; its length is twice the area.
 #[inline(always)]
 fn normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-/// Cosine of incidence below which a ray runs along a facet whose edges stand square, and sooner along a sliver: where
-/// it would cross the plane is left to rounding.
+/// Cosine of the incidence angle below which a ray counts as parallel to a facet with perpendicular edges, because
+/// rounding would decide where it crosses the plane. For slivers the limit is larger.
 pub(super) const GRAZING: f64 = 1e-10;
 
-/// Where a ray crosses the plane of a facet, m, NaN when it runs along it: of the same bits wherever it is asked for.
+/// Signed distance along a ray to the plane of a facet, m; NaN for a ray parallel to it. All callers share this
+/// function, so that all get the same bits.
 #[inline(always)]
-fn crossed_m(origin: DVec3, along: DVec3, [a, b, c]: [DVec3; 3], normal: DVec3) -> f64 {
+fn crossing_range_m(origin: DVec3, along: DVec3, [a, b, c]: [DVec3; 3], normal: DVec3) -> f64 {
     let sinks = along.dot(normal);
     let edges2 = (b - a).length_squared() * (c - a).length_squared();
     let range_m = (a - origin).dot(normal) / sinks;
     if sinks * sinks <= GRAZING * GRAZING * edges2 { f64::NAN } else { range_m }
 }
 
-/// Whether a plane is crossed at this distance, m. In plain comparisons, which stay side by side.
+/// Whether a distance, m, is positive and finite. Plain comparisons, since these compile to vector instructions.
 #[inline(always)]
 fn is_ahead(range_m: f64) -> bool {
     (range_m > 0.0) & (range_m < f64::INFINITY)
 }
 
-/// Where a ray meets the plane of a facet; `None` where the plane lies behind or along the ray.
+/// The hit of a ray on the plane of a facet; `None` if the plane lies behind or along the ray.
 #[inline]
-pub(super) fn met(mesh: &Mesh, facet: u32, ray: &Ray<Global>) -> Option<Hit> {
+pub(super) fn plane_hit(mesh: &Mesh, facet: u32, ray: &Ray<Global>) -> Option<Hit> {
     let mut hit = [None];
-    met_by(mesh, [facet], [ray], &mut hit);
+    plane_hits(mesh, [facet], [ray], &mut hit);
     hit[0]
 }
 
-/// The same for rays of one origin side by side, with as many hits as are wanted; `None`, too, for a number that
-/// is no facet's.
+/// The hits of `N` rays of one origin, each on the plane of its facet, computed in parallel lanes. `hits` may be
+/// shorter than `N`. A hit is `None` if the plane lies behind or along the ray, or if the facet does not exist.
 #[inline(always)]
-pub(super) fn met_by<const N: usize>(
+pub(super) fn plane_hits<const N: usize>(
     mesh: &Mesh,
     facets: [u32; N],
     rays: [&Ray<Global>; N],
@@ -118,7 +120,7 @@ pub(super) fn met_by<const N: usize>(
         let [along, a, b, c] = [&along, &a, &b, &c]
             .map(|list| DVec3::new(list[0][lane], list[1][lane], list[2][lane]));
         let normal = normal([a, b, c]);
-        range_m[lane] = crossed_m(origin, along, [a, b, c], normal);
+        range_m[lane] = crossing_range_m(origin, along, [a, b, c], normal);
         let per_length = 1.0 / normal.dot(normal).sqrt();
         let unit = if per_length < f64::INFINITY { normal * per_length } else { DVec3::ZERO };
         cos_theta[lane] = along.dot(unit).abs();

@@ -1,25 +1,25 @@
-//! Where a ray meets a facet.
+//! The intersection of a ray with a facet.
 
 use rayon::prelude::*;
 
 use crate::frames::{Global, Point};
 
-/// Where a ray meets a facet, in f64.
+/// The intersection of a ray with a facet, computed in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Facet number in the mesh.
     pub facet: u32,
-    /// Distance from the ray's origin R, m.
+    /// Distance R from the ray's origin, m.
     pub range_m: f64,
-    /// Where it is.
+    /// The intersection point.
     pub point: Point<Global>,
-    /// Cosine of the angle between the reversed ray and the facet's normal turned to the radar.
+    /// Cosine of the incidence angle, between the reversed ray and the facet's normal on the ray's side; 0 to 1.
     pub cos_theta: f64,
 }
 
-/// Room for the hits of so many rays, whose memory all threads touch first: to first touch it is much of the work of
-/// many rays.
-pub(super) fn no_hits(rays: usize) -> Vec<Option<Hit>> {
+/// Allocates the hits of this number of rays, all `None`, on all threads: the first access to fresh memory is a
+/// large part of the time that tracing many rays takes.
+pub(super) fn allocate_hits(rays: usize) -> Vec<Option<Hit>> {
     (0..rays).into_par_iter().with_min_len(1 << 14).map(|_| None).collect()
 }
 

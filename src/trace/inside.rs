@@ -1,4 +1,4 @@
-//! How often a mesh winds around a point.
+//! Whether a point lies inside a mesh: the winding number.
 
 use std::f64::consts::PI;
 
@@ -7,16 +7,17 @@ use glam::DVec3;
 use crate::frames::{Global, Point};
 use crate::geometry::Mesh;
 
-/// The winding number: 0 outside, ±1 inside a closed mesh (negative where its facets run clockwise
-/// seen from outside), more inside overlapping ones, and a fraction near an open one.
+/// The winding number of a mesh about a point: 0 outside a closed mesh and ±1 inside (negative where its facets run
+/// clockwise seen from outside). It is larger inside overlapping meshes, and a fraction near an open one.
 ///
-/// The solid angles of all facets over 4π, each by Van Oosterom and Strackee 1983,
+/// It is the sum of the solid angles of all facets over 4π, each by Van Oosterom and Strackee 1983,
 /// DOI 10.1109/TBME.1983.325207.
 pub fn winding_number(mesh: &Mesh, point: Point<Global>) -> f64 {
     (0..mesh.facets.len()).map(|facet| solid_angle_sr(mesh, facet, point.xyz)).sum::<f64>()
         / (4.0 * PI)
 }
 
+/// Signed solid angle of a facet seen from a point, sr.
 fn solid_angle_sr(mesh: &Mesh, facet: usize, from: DVec3) -> f64 {
     let [a, b, c] = mesh.corners(facet).map(|corner| corner - from);
     let [u, v, w] = [a.length(), b.length(), c.length()];

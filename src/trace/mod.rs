@@ -1,10 +1,11 @@
-//! Closest hits of rays on a mesh.
+//! The closest intersection of each ray with a mesh.
 //!
-//! [`Fan`] finds what rays of one origin meet, as the rays of a scan are, and builds nothing for it. [`Bvh`]
-//! takes any ray and finds facets with boxes; a [`Gpu`] does the same with many rays at once. All look in
-//! f32 and decide and measure in f64; [`brute`] is the naive loop that judges them, and [`Tracer`] chooses.
-//! All take any mesh that passes [`Mesh::validate`](crate::geometry::Mesh::validate) and lies within
-//! 100 km, where f32 does its work; facets without area are never hit.
+//! [`Fan`] traces rays of one origin, as a scan has them, without building a hierarchy. [`Bvh`] traces any rays by a
+//! hierarchy of boxes, and [`Gpu`] does so on a graphics processor. All of them search in f32, and decide and
+//! measure in f64. [`Tracer`] chooses among them. [`brute`], the naive loop over all facets, is their test oracle.
+//!
+//! The mesh must pass [`Mesh::validate`](crate::geometry::Mesh::validate) and lie within 100 km of the origin, where
+//! f32 is precise enough. Facets without area are never hit.
 
 mod boxes;
 pub mod brute;

@@ -1,4 +1,4 @@
-//! The geometry of a scan.
+//! The geometry of a scan: instrument, chirps and target.
 
 use super::bvh::Bvh;
 use super::hit::Hit;
@@ -6,7 +6,7 @@ use super::tracer::{TraceError, Tracer};
 use crate::frames::{Global, Ray};
 use crate::radar::{Chirps, Radar};
 
-/// The geometry of a scan: an instrument, its chirps, the target, and how rays find it.
+/// The geometry of a scan: the instrument, its chirps, the target and the tracer.
 #[derive(Clone, Copy)]
 pub struct ScanGeometry<'a> {
     /// The instrument.
@@ -15,14 +15,14 @@ pub struct ScanGeometry<'a> {
     pub chirps: &'a Chirps,
     /// The target as the scene places it.
     pub bvh: &'a Bvh<'a>,
-    /// How the rays of the scan find the target; all other rays ask `bvh`.
+    /// Traces the rays of the scan. All other rays, such as those of second-order paths, use `bvh`.
     pub tracer: Tracer<'a>,
     /// Region of every facet: an index into the surfaces of the scan.
     pub region_of_facet: &'a [u16],
 }
 
 impl<'a> ScanGeometry<'a> {
-    /// A scan whose tracer is [`Tracer::Automatic`].
+    /// A scan with the tracer [`Tracer::Automatic`].
     pub fn new(
         radar: &'a Radar,
         chirps: &'a Chirps,
@@ -32,7 +32,7 @@ impl<'a> ScanGeometry<'a> {
         ScanGeometry { radar, chirps, bvh, tracer: Tracer::Automatic, region_of_facet }
     }
 
-    /// The closest hit of each of some rays, by the tracer of the scan.
+    /// Traces rays with the tracer of the scan: the closest hit of each, in their order.
     ///
     /// # Errors
     /// As [`Tracer::closest`].

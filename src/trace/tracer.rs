@@ -1,4 +1,4 @@
-//! Which way the closest hits of many rays are found.
+//! The choice of a tracer for many rays.
 
 use rayon::prelude::*;
 
@@ -11,40 +11,39 @@ use super::hit::Hit;
 use super::pinhole::{Fan, NoFan};
 use crate::frames::{Global, Ray};
 
-/// How the closest hits of many rays are found. All ways agree; they differ in time and in what they take.
+/// A method to find the closest hits of many rays. All give the same hits ([`Brute`](Self::Brute) up to rounding);
+/// they differ in speed and in the rays that they accept.
 #[derive(Clone, Copy, Default)]
 pub enum Tracer<'a> {
-    /// The pinhole where all rays share an origin, else the hierarchy.
+    /// [`Fan`] if all rays share an origin, otherwise [`Bvh`].
     #[default]
     Automatic,
-    /// [`Fan`]: rays of one origin only, nothing is built.
+    /// [`Fan`]: accepts rays of one origin only, and builds no hierarchy.
     Pinhole,
-    /// [`Bvh`]: any rays.
+    /// [`Bvh`]: accepts any rays.
     Bvh,
-    /// [`brute`]: any rays, and slow.
+    /// [`brute`]: accepts any rays; slow.
     Brute,
-    /// A graphics processor that holds the hierarchy: any rays.
+    /// A graphics processor with the hierarchy in its memory: accepts any rays.
     Gpu(&'a GpuMesh<'a>),
 }
 
-/// Why a tracer does not trace.
+/// Why rays cannot be traced.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum TraceError {
-    /// The pinhole is told to take rays that it cannot.
+    /// The rays do not suit the tracer `pinhole`.
     #[error(transparent)]
     NoFan(#[from] NoFan),
-    /// The graphics processor does not work.
+    /// The graphics processor fails.
     #[error(transparent)]
     Gpu(#[from] GpuError),
 }
 
 impl Tracer<'_> {
-    /// The closest hit of every ray on the hierarchy's mesh. The hierarchy itself is built only if it
-    /// is asked.
+    /// Finds the closest hit of every ray on the mesh of `bvh`. The hierarchy is built only if the tracer uses it.
     ///
     /// # Errors
-    /// When the pinhole is told to take rays that it cannot, or the graphics processor stops working or
-    /// holds another hierarchy.
+    /// When the rays do not suit [`Tracer::Pinhole`], or when the graphics processor fails or holds another hierarchy.
     pub fn closest(self, bvh: &Bvh, rays: &[Ray<Global>]) -> Result<Vec<Option<Hit>>, TraceError> {
         Ok(match self {
             Tracer::Pinhole => Fan::new(rays)?.closest(bvh.mesh()),
@@ -57,7 +56,7 @@ impl Tracer<'_> {
     }
 }
 
-/// The closest hit of every ray by what is fastest for them: [`Tracer::Automatic`], which takes any rays.
+/// Finds the closest hit of every ray with [`Tracer::Automatic`], which accepts any rays and cannot fail.
 pub fn closest(bvh: &Bvh, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
     match Fan::new(rays) {
         Ok(fan) => fan.closest(bvh.mesh()),

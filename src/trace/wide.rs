@@ -1,34 +1,34 @@
-//! Loops that are compiled once for each width of vector instructions.
+//! Loops that are compiled once per width of vector instructions, and run at the widest that the processor has.
 
-/// Plain loops over arrays of fixed length, which become vector instructions.
+/// A computation of plain loops over arrays of fixed length, which the compiler turns into vector instructions.
 ///
-/// No product is fused with a sum, so that every width gives the same bits.
+/// It must not fuse products with sums (FMA), so that every width gives the same bits.
 pub(super) trait Wide {
-    /// What they compute.
+    /// The result.
     type Answer;
 
-    /// Computes it; to be marked `#[inline(always)]`, or it is not compiled anew.
+    /// Computes the result. Implementations must be `#[inline(always)]`, or they are compiled for one width only.
     fn run(self) -> Self::Answer;
 }
 
-/// Runs loops with the widest instructions that the processor has.
+/// Runs a computation with the widest instructions that the processor has.
 #[inline]
 pub(super) fn widest<W: Wide>(work: W) -> W::Answer {
     #[cfg(target_arch = "x86_64")]
     {
         if at_most_bits() >= 512 && is_x86_feature_detected!("avx512f") {
-            // SAFETY: the processor has just been asked for the only feature that it needs.
+            // SAFETY: the processor has avx512f, the only feature that the function requires.
             return unsafe { x86::of_512_bits(work) };
         }
         if at_most_bits() >= 256 && is_x86_feature_detected!("avx2") {
-            // SAFETY: as above.
+            // SAFETY: the processor has avx2, the only feature that the function requires.
             return unsafe { x86::of_256_bits(work) };
         }
     }
     work.run()
 }
 
-/// Widths that are left out of account, so that tests can hold one against another.
+/// The widest instructions that may be used, in bits. Tests lower it to compare the widths.
 #[cfg(all(test, target_arch = "x86_64"))]
 static AT_MOST_BITS: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(512);
 
@@ -40,13 +40,13 @@ fn at_most_bits() -> u32 {
     512
 }
 
-/// The lesser; the second where the first is no number. Other than the standard library's it is one instruction.
+/// The smaller number, or `b` if `a` is NaN. It is a single instruction, unlike `f32::min`.
 #[inline(always)]
 pub(super) fn least(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// The greater; the second where the first is no number.
+/// The larger number, or `b` if `a` is NaN. It is a single instruction, unlike `f32::max`.
 #[inline(always)]
 pub(super) fn most(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }

@@ -1,4 +1,4 @@
-//! All that knows `wgpu`: an adapter, buffers in its memory, and the two shaders that it runs.
+//! The only file that uses `wgpu`: an adapter, buffers in its memory, and the two shaders.
 
 use std::fmt::Display;
 use std::future::Future;
@@ -12,7 +12,7 @@ use wgpu::BufferUsages as Usage;
 use super::error::GpuError;
 use super::packed::{Aim, Corners, Node, Spot};
 
-/// Invocations of a workgroup, as in the shader.
+/// Invocations per workgroup, as in the shaders.
 const WORKGROUP: u64 = 64;
 
 /// An adapter, ready to trace.
@@ -22,9 +22,9 @@ pub(super) struct Device {
     closest: wgpu::ComputePipeline,
     echo: wgpu::ComputePipeline,
     adapter: String,
-    /// Bytes of the largest buffer.
+    /// Size of the largest buffer, bytes.
     most: u64,
-    /// The first thing that went wrong where nobody waited for it.
+    /// The first error that was reported asynchronously.
     trouble: Arc<OnceLock<String>>,
 }
 
@@ -34,7 +34,7 @@ pub(super) struct Tree {
     corners: wgpu::Buffer,
 }
 
-/// What is on a tree, and how it is lit.
+/// The scattering models on a tree and the samples of a spot, in the device's memory.
 pub(super) struct Table {
     regions: wgpu::Buffer,
     samples: wgpu::Buffer,
@@ -42,7 +42,7 @@ pub(super) struct Table {
     terms: wgpu::Buffer,
 }
 
-/// Rays that the device is at work on.
+/// A launched computation.
 pub(super) struct Flight {
     submission: wgpu::SubmissionIndex,
     answers: wgpu::Buffer,
@@ -50,22 +50,22 @@ pub(super) struct Flight {
 }
 
 impl Device {
-    /// The fastest kind of adapter, with buffers of at most `most` bytes.
+    /// Opens the fastest kind of adapter, with buffers of at most `most` bytes.
     pub fn open(most: u64) -> Result<Device, GpuError> {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
             backends: wgpu::Backends::VULKAN,
             flags: wgpu::InstanceFlags::empty(),
             ..wgpu::InstanceDescriptor::new_without_display_handle()
         });
-        let no_adapter = |reason: &dyn Display| GpuError::NoAdapter { reason: line(reason) };
-        let adapter = at_once(instance.request_adapter(&wgpu::RequestAdapterOptions {
+        let no_adapter = |reason: &dyn Display| GpuError::NoAdapter { reason: single_line(reason) };
+        let adapter = block_on(instance.request_adapter(&wgpu::RequestAdapterOptions {
             power_preference: wgpu::PowerPreference::HighPerformance,
             ..Default::default()
         }))
         .map_err(|reason| no_adapter(&reason))?;
         let limits = adapter.limits();
         let most = most.min(limits.max_buffer_size).min(limits.max_storage_buffer_binding_size);
-        let (device, queue) = at_once(adapter.request_device(&wgpu::DeviceDescriptor {
+        let (device, queue) = block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             required_limits: limits,
             ..Default::default()
         }))
@@ -73,8 +73,8 @@ impl Device {
         let trouble = Arc::new(OnceLock::new());
         let note = |trouble: &Arc<OnceLock<String>>| {
             let trouble = trouble.clone();
-            // What follows from the first trouble says less.
-            move |reason: &dyn Display| drop(trouble.set(line(reason)))
+            // Errors that follow from the first one are less informative and dropped.
+            move |reason: &dyn Display| drop(trouble.set(single_line(reason)))
         };
         let (failed, lost) = (note(&trouble), note(&trouble));
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| failed(&error)));
@@ -96,31 +96,32 @@ impl Device {
         });
         let adapter = adapter.get_info().name;
         let device = Device { device, queue, closest, echo, adapter, most, trouble };
-        device.untroubled().map(|()| device)
+        device.check_trouble().map(|()| device)
     }
 
     pub fn adapter(&self) -> &str {
         &self.adapter
     }
 
-    /// Rays of one call, at most `most`.
+    /// Number of rays per call, at most `most`.
     pub fn rays_at_once(&self, most: u64) -> usize {
         self.fitting(most, size_of::<Aim>() as u64, 1)
     }
 
-    /// Chirps of so many shares of one call, at most `most`.
+    /// Number of chirps per call, at most `most`, with `shares` shares each.
     pub fn spots_at_once(&self, most: u64, shares: u64) -> usize {
         let bytes = (size_of::<Spot>() as u64).max(shares * size_of::<[u32; 3]>() as u64);
         self.fitting(most, bytes, shares)
     }
 
-    /// Items of one call, at most `most`, that take so many bytes in a buffer and so many invocations each.
+    /// Number of items per call, at most `most`, if each needs `bytes` in a buffer and `invocations`.
     fn fitting(&self, most: u64, bytes: u64, invocations: u64) -> usize {
         let groups = u64::from(self.device.limits().max_compute_workgroups_per_dimension);
         let fit = (self.most / bytes).min(WORKGROUP * groups / invocations);
         most.min(fit).max(1) as usize
     }
 
+    /// Copies a hierarchy to the device.
     pub fn hold(&self, nodes: &[Node], corners: &[Corners]) -> Result<Tree, GpuError> {
         let [nodes, corners]: [&[u8]; 2] =
             [bytemuck::cast_slice(nodes), bytemuck::cast_slice(corners)];
@@ -130,10 +131,10 @@ impl Device {
             return Err(GpuError::TooLarge { adapter, needed, most });
         }
         let tree = Tree { nodes: self.filled(nodes)?, corners: self.filled(corners)? };
-        self.untroubled().map(|()| tree)
+        self.check_trouble().map(|()| tree)
     }
 
-    /// What is on a tree: the region of each leaf entry, the samples of a spot, laws and their terms.
+    /// Copies the region of each leaf entry, the samples of a spot, and the scattering models with their terms.
     pub fn table(
         &self,
         regions: &[u32],
@@ -154,17 +155,17 @@ impl Device {
         }
         let [regions, samples, laws, terms] = parts.map(|part| self.filled(part));
         let table = Table { regions: regions?, samples: samples?, laws: laws?, terms: terms? };
-        self.untroubled().map(|()| table)
+        self.check_trouble().map(|()| table)
     }
 
-    /// Sets the device to work: an answer for each ray.
+    /// Launches the search for the closest facets: one word per ray.
     pub fn launch(&self, tree: &Tree, aims: &[Aim]) -> Result<Flight, GpuError> {
         let rays = self.filled(bytemuck::cast_slice(aims))?;
         let given = [(0, &tree.nodes), (1, &tree.corners), (2, &rays)];
         self.start(&self.closest, &given, aims.len() as u64, 1)
     }
 
-    /// The same: three words for every share of each chirp.
+    /// Launches the sums of echoes: three words per share of each chirp.
     pub fn launch_echoes(
         &self,
         tree: &Tree,
@@ -185,7 +186,7 @@ impl Device {
         self.start(&self.echo, &given, spots.len() as u64 * shares, 3)
     }
 
-    /// So many invocations, each with so many words for an answer.
+    /// Launches `invocations` of a shader that write `words` each.
     fn start(
         &self,
         pipeline: &wgpu::ComputePipeline,
@@ -193,7 +194,7 @@ impl Device {
         invocations: u64,
         words: u64,
     ) -> Result<Flight, GpuError> {
-        /// Where the shaders write.
+        /// Binding of the buffer that the shaders write.
         const ANSWERS: u32 = 3;
         let bytes = invocations * words * size_of::<u32>() as u64;
         let found = self.buffer(bytes, Usage::STORAGE | Usage::COPY_SRC)?;
@@ -219,19 +220,19 @@ impl Device {
         drop(pass);
         encoder.copy_buffer_to_buffer(&found, 0, &answers, 0, bytes);
         let submission = self.queue.submit([encoder.finish()]);
-        let (tell, mapped) = channel();
-        // Nobody listens any more when a later call has failed.
-        answers.map_async(wgpu::MapMode::Read, .., move |result| drop(tell.send(result)));
-        self.untroubled()?;
+        let (sender, mapped) = channel();
+        // Sending fails if the receiver was dropped because a later call failed.
+        answers.map_async(wgpu::MapMode::Read, .., move |result| drop(sender.send(result)));
+        self.check_trouble()?;
         Ok(Flight { submission, answers, mapped })
     }
 
-    /// Waits for the answers.
+    /// Waits for a computation and returns its words.
     pub fn land(&self, flight: Flight) -> Result<Vec<u32>, GpuError> {
         let Flight { submission, answers, mapped } = flight;
         let wait = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
         let polled = self.device.poll(wait);
-        self.untroubled()?;
+        self.check_trouble()?;
         polled.map_err(|reason| self.lost(&reason))?;
         match mapped.try_recv() {
             Ok(Ok(())) => {}
@@ -242,7 +243,7 @@ impl Device {
         Ok(bytemuck::pod_collect_to_vec(&view[..]))
     }
 
-    /// A buffer with this in it.
+    /// A storage buffer with these contents.
     fn filled(&self, bytes: &[u8]) -> Result<wgpu::Buffer, GpuError> {
         let buffer = self.buffer(bytes.len() as u64, Usage::STORAGE | Usage::COPY_DST)?;
         self.queue.write_buffer(&buffer, 0, bytes);
@@ -257,23 +258,24 @@ impl Device {
             usage,
             mapped_at_creation: false,
         });
-        match at_once(scope.pop()) {
+        match block_on(scope.pop()) {
             None => Ok(buffer),
             Some(_) => Err(GpuError::Full { adapter: self.adapter.clone(), needed: bytes }),
         }
     }
 
-    fn untroubled(&self) -> Result<(), GpuError> {
+    /// Fails if an error was reported asynchronously.
+    fn check_trouble(&self) -> Result<(), GpuError> {
         self.trouble.get().map_or(Ok(()), |reason| Err(self.lost(reason)))
     }
 
     fn lost(&self, reason: &dyn Display) -> GpuError {
-        GpuError::Lost { adapter: self.adapter.clone(), reason: line(reason) }
+        GpuError::Lost { adapter: self.adapter.clone(), reason: single_line(reason) }
     }
 }
 
-/// What a future gives that is ready, as those of native drivers are.
-fn at_once<F: Future>(future: F) -> F::Output {
+/// Runs a future to its end. The futures of native drivers are ready at once.
+fn block_on<F: Future>(future: F) -> F::Output {
     let (mut future, mut context) = (pin!(future), Context::from_waker(Waker::noop()));
     loop {
         if let Poll::Ready(output) = future.as_mut().poll(&mut context) {
@@ -283,8 +285,8 @@ fn at_once<F: Future>(future: F) -> F::Output {
     }
 }
 
-/// What somebody else says, in one line.
-fn line(reason: &dyn Display) -> String {
+/// A message in a single line.
+fn single_line(reason: &dyn Display) -> String {
     let text = reason.to_string();
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
@@ -307,7 +309,7 @@ mod tests {
         assert!(text.ends_with("try again, or use the tracer `bvh`"), "{text}");
     }
 
-    /// A box without anything in it.
+    /// A box without content.
     const EMPTY: Node = [0, 0, 0, 1, 0, 0, 0, 0];
     const POINT: Corners = [[0.0; 4]; 3];
 
@@ -346,7 +348,7 @@ mod tests {
         let expected = Tracer::Bvh.closest(&bvh, &rays).unwrap();
         assert_eq!(Tracer::Gpu(&held).closest(&bvh, &rays).unwrap(), expected);
         // While the first answers are seen to, the next are under way and others are still to come.
-        let broken = held.each(&rays, |_, answer| {
+        let broken = held.map_answers(&rays, |_, answer| {
             gpu.device.device.destroy();
             answer
         });

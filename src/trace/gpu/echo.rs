@@ -1,53 +1,54 @@
-//! Echoes on a graphics processor: it traces the rays of whole chirps and adds up what comes straight back of
-//! them by equation (11), in f32 (`echo.wgsl`).
+//! Computes echoes on a graphics processor: it traces the rays of whole chirps and adds up their single paths to
+//! the radar by equation (11), in f32 (`echo.wgsl`).
 //!
-//! A chirp goes to the device as its axis and what the samples of its spot add to that; the rays are made there.
-//! What it cannot tell it leaves open, ray by ray: those that [`Answer::Unsure`](super::Answer) names, those
-//! that graze what they meet, and those that meet a law without [`Term`]s. Of all others the power is good to 0.02 dB.
+//! A chirp is passed as its axis and the two vectors that span its spot; the device generates the rays. It leaves rays
+//! open that it cannot compute: those with [`Answer::Unsure`](super::Answer), those at grazing incidence, and those
+//! on a scattering model without [`Term`]s. The power of all others is within 0.02 dB.
 
 use glam::DVec2;
 
 use super::device::Table;
 use super::error::GpuError;
-use super::mesh::{GpuMesh, RAYS_AT_ONCE, in_turns};
+use super::mesh::{GpuMesh, RAYS_AT_ONCE, pipeline};
 use super::packed::{self, Cone};
 use crate::brdf::{Distribution, Facets, Term};
 
-/// Rays that one invocation sees to.
+/// Rays per invocation, and so per [`Share`].
 pub const RAYS_PER_SHARE: usize = 32;
 
-/// What f32 can tell: m from here on, powers of the cosine up to there.
+/// Least roughness m of facets that f32 can evaluate.
 const LEAST_M: f64 = 1e-3;
+/// Largest power of the cosine that f32 can evaluate.
 const MOST_COSINES: f64 = 1100.0;
 
-/// A law without terms, as in the shader.
+/// Number of terms that marks a scattering model without terms, as in the shader.
 const NO_TERMS: u32 = u32::MAX;
 
-/// What up to 32 rays of a chirp bring back.
+/// The sums over up to [`RAYS_PER_SHARE`] rays of a chirp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Share {
-    /// Rays that are left to the processor, a bit for each, the lowest for the first.
+    /// Rays left to the CPU, one bit each, the lowest for the first ray.
     pub open: u32,
-    /// Sum over the others of f·cosᵃθ/R², 1/(sr·m²).
+    /// Sum of f·cosᵃθ/R² over the other rays, 1/(sr·m²).
     pub per_sr_m2: f64,
-    /// Sum over the others of f·cosᵃθ/R, 1/(sr·m).
+    /// Sum of f·cosᵃθ/R over the other rays, 1/(sr·m).
     pub per_sr_m: f64,
 }
 
-/// A mesh in the memory of a graphics processor with what is on it and how it is lit.
+/// A mesh in the memory of a graphics processor, with its scattering models and the samples of a spot.
 pub struct EchoTracer<'a> {
     held: &'a GpuMesh<'a>,
-    /// None of a mesh without area.
+    /// `None` for a mesh without area.
     table: Option<Table>,
     samples: usize,
-    /// Distance of the farthest sample from the middle.
+    /// Distance of the farthest sample from the centre.
     reach: f64,
 }
 
 impl GpuMesh<'_> {
-    /// Of every facet the region, of every region of every target the law, whose terms are worth cosᵃθ more, and the
-    /// samples of a spot, one or more.
-    pub(crate) fn lit(
+    /// Prepares the mesh for echoes: the region of every facet, the scattering model of every region of every scan as
+    /// terms, a power of cos θ by which all terms are multiplied, and the samples of a spot, one or more.
+    pub(crate) fn echo_tracer(
         &self,
         region_of_facet: &[u16],
         laws: &[Option<Vec<Term>>],
@@ -60,7 +61,7 @@ impl GpuMesh<'_> {
                 facets.iter().map(|&facet| region_of_facet[facet as usize].into()).collect();
             let samples: Vec<[f32; 2]> =
                 samples.iter().map(|sample| sample.as_vec2().to_array()).collect();
-            let (laws, terms) = tabulated(laws, cosines);
+            let (laws, terms) = pack_laws(laws, cosines);
             self.gpu.device.table(&regions, &samples, &laws, &terms)
         };
         Ok(EchoTracer {
@@ -73,12 +74,12 @@ impl GpuMesh<'_> {
 }
 
 impl EchoTracer<'_> {
-    /// Shares of each chirp.
+    /// Number of shares per chirp.
     pub fn shares(&self) -> usize {
         self.samples.div_ceil(RAYS_PER_SHARE)
     }
 
-    /// What the rays of all chirps bring back: the shares of each, chirp after chirp.
+    /// Traces the rays of all chirps: the shares of each, chirp after chirp.
     pub fn echoes(&self, cones: &[Cone]) -> Result<Vec<Share>, GpuError> {
         let GpuMesh { gpu, bvh, tree } = self.held;
         let shares = self.shares();
@@ -96,7 +97,7 @@ impl EchoTracer<'_> {
             gpu.device.launch_echoes(tree, table, &spots, shares as u64)
         };
         let mut all = Vec::with_capacity(shares * cones.len());
-        in_turns(cones, at_once, launch, |_, flight| {
+        pipeline(cones, at_once, launch, |_, flight| {
             let words = gpu.device.land(flight)?;
             all.extend(words.chunks_exact(3).map(|words| share(words, boxes.sphere.radius_m)));
             Ok(())
@@ -105,6 +106,7 @@ impl EchoTracer<'_> {
     }
 }
 
+/// Unpacks the three words of a share. All rays are left open if a sum is not finite.
 fn share(words: &[u32], radius_m: f64) -> Share {
     let [power, moment] = [words[1], words[2]].map(|word| f64::from(f32::from_bits(word)));
     if !power.is_finite() || !moment.is_finite() {
@@ -114,14 +116,13 @@ fn share(words: &[u32], radius_m: f64) -> Share {
     Share { open: words[0], per_sr_m2: power * per_m * per_m, per_sr_m: moment * per_m }
 }
 
-/// First term and number of terms of each law, and all terms; neither is empty.
-fn tabulated(laws: &[Option<Vec<Term>>], cosines: f64) -> (Vec<[u32; 2]>, Vec<[u32; 4]>) {
+/// Packs scattering models: first term and number of terms of each, and all terms. Neither list is empty.
+fn pack_laws(laws: &[Option<Vec<Term>>], cosines: f64) -> (Vec<[u32; 2]>, Vec<[u32; 4]>) {
     let mut terms = Vec::new();
     let mut of_laws = Vec::with_capacity(laws.len().max(1));
     for law in laws {
-        let told = |term: &Term| packed_term(term, cosines);
         let own: Option<Vec<[u32; 4]>> =
-            law.as_ref().and_then(|law| law.iter().map(told).collect());
+            law.as_ref().and_then(|law| law.iter().map(|term| pack_term(term, cosines)).collect());
         let count = own.as_ref().map_or(NO_TERMS, |own| own.len() as u32);
         of_laws.push([terms.len() as u32, count]);
         terms.extend(own.into_iter().flatten());
@@ -135,8 +136,8 @@ fn tabulated(laws: &[Option<Vec<Term>>], cosines: f64) -> (Vec<[u32; 2]>, Vec<[u
     (of_laws, terms)
 }
 
-/// A term as the device takes it; `None` beyond what f32 can tell.
-fn packed_term(term: &Term, cosines: f64) -> Option<[u32; 4]> {
+/// Packs a term; `None` for one that f32 cannot evaluate.
+fn pack_term(term: &Term, cosines: f64) -> Option<[u32; 4]> {
     let (m, form) = match term.facets {
         None => (0.0, 0),
         Some(Facets { m, distribution, shadowed }) if m >= LEAST_M => {
@@ -146,9 +147,9 @@ fn packed_term(term: &Term, cosines: f64) -> Option<[u32; 4]> {
     };
     let cosines = term.cosines + cosines;
     let values = [term.level_per_sr, cosines, m].map(|value| value as f32);
-    let is_told = cosines.abs() <= MOST_COSINES && values.iter().all(|value| value.is_finite());
+    let is_in_range = cosines.abs() <= MOST_COSINES && values.iter().all(|value| value.is_finite());
     let [level, cosines, m] = values.map(f32::to_bits);
-    is_told.then_some([level, cosines, m, form])
+    is_in_range.then_some([level, cosines, m, form])
 }
 
 #[cfg(all(test, feature = "gpu"))]
@@ -229,7 +230,7 @@ mod tests {
         let terms: Vec<_> = laws.iter().map(Scattering::backscatter).collect();
         let samples: Vec<DVec2> =
             (0..50).map(|i| 0.14 * f64::from(i).sqrt() * DVec2::from_angle(f64::from(i))).collect();
-        let lit = held.lit(&vec![0; ball.facets.len()], &terms, 2.0, &samples).unwrap();
+        let lit = held.echo_tracer(&vec![0; ball.facets.len()], &terms, 2.0, &samples).unwrap();
         let cones = cones(2000);
         let shares = lit.echoes(&cones).unwrap();
         assert_eq!((lit.shares(), shares.len()), (2, 4000));
@@ -257,7 +258,7 @@ mod tests {
         let term = |facets, cosines| Some(vec![Term { level_per_sr: 1.0, cosines, facets }]);
         let laws = [None, term(Some(narrow), 0.0), term(None, 1e4), term(None, 0.0)];
         let regions = vec![0; ball.facets.len()];
-        let lit = held.lit(&regions, &laws, 2.0, &[DVec2::ZERO]).unwrap();
+        let lit = held.echo_tracer(&regions, &laws, 2.0, &[DVec2::ZERO]).unwrap();
         let origin = Point::new(0.013, 0.021, 5.0);
         let direction = Direction::new(DVec3::NEG_Z).unwrap();
         let of_law = |law| {
@@ -273,7 +274,8 @@ mod tests {
         let plate = solids::plate(1.0, 1.0);
         let bvh = Bvh::new(&plate);
         let held = gpu.hold(&bvh).unwrap();
-        let lit = held.lit(&vec![0; plate.facets.len()], &laws, 2.0, &[DVec2::ZERO]).unwrap();
+        let lit =
+            held.echo_tracer(&vec![0; plate.facets.len()], &laws, 2.0, &[DVec2::ZERO]).unwrap();
         let from = |height_m: f64, x_m: f64| {
             let origin = Point::new(x_m, 0.1, height_m);
             let direction = Direction::new(DVec3::new(-1.0, 0.03, -1e-3)).unwrap();

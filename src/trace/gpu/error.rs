@@ -1,35 +1,35 @@
-//! Why a graphics processor does not trace.
+//! Errors of tracing on a graphics processor.
 
 use thiserror::Error;
 
-/// Why a graphics processor does not trace.
+/// Why a graphics processor cannot trace.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum GpuError {
-    /// The program was built without it.
+    /// The program was built without the feature `gpu`.
     #[error(
         "this matdb was built without the tracer `gpu`; build it with `--features gpu`, or leave the choice to \
          the program"
     )]
     NotBuilt,
-    /// No driver, or none that can compute.
+    /// There is no driver that can compute.
     #[error("the tracer `gpu` finds no adapter with a Vulkan driver: {reason}")]
     NoAdapter {
-        /// What the search says.
+        /// The message of the search.
         reason: String,
     },
-    /// The mesh and its hierarchy are larger than the device takes.
+    /// The mesh or its hierarchy exceeds the device's largest buffer.
     #[error(
         "the mesh takes {needed} bytes in one buffer of `{adapter}`, which has room for {most}; use the tracer `bvh`"
     )]
     TooLarge {
         /// The device.
         adapter: String,
-        /// Bytes that are needed.
+        /// Bytes needed.
         needed: u64,
-        /// Bytes that it has.
+        /// Bytes of the largest buffer.
         most: u64,
     },
-    /// More materials, or more rays in a spot, than the device takes.
+    /// The materials or the rays of a spot exceed the device's largest buffer.
     #[error(
         "the materials and spots of the scans take {needed} bytes in one buffer of `{adapter}`, which has room for \
          {most}; give fewer scans at once"
@@ -37,28 +37,28 @@ pub enum GpuError {
     TooMany {
         /// The device.
         adapter: String,
-        /// Bytes that are needed.
+        /// Bytes needed.
         needed: u64,
-        /// Bytes that it has.
+        /// Bytes of the largest buffer.
         most: u64,
     },
-    /// The device's memory is in use.
+    /// The device has no free memory.
     #[error("`{adapter}` has no memory left for {needed} bytes; use the tracer `bvh`")]
     Full {
         /// The device.
         adapter: String,
-        /// Bytes that were asked for.
+        /// Bytes requested.
         needed: u64,
     },
-    /// It stopped.
+    /// The device stopped working.
     #[error("`{adapter}` stopped working: {reason}; try again, or use the tracer `bvh`")]
     Lost {
         /// The device.
         adapter: String,
-        /// What the driver says.
+        /// The message of the driver.
         reason: String,
     },
-    /// It holds another mesh.
+    /// The device holds another mesh.
     #[error("the tracer `gpu` holds another mesh than the one that is traced; hold this one")]
     OtherMesh,
 }

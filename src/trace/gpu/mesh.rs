@@ -7,10 +7,10 @@ use super::error::GpuError;
 use super::packed::{self, NOTHING};
 use crate::frames::{Global, Ray};
 use crate::trace::bvh::Bvh;
-use crate::trace::facet::met;
+use crate::trace::facet::plane_hit;
 use crate::trace::hit::Hit;
 
-/// Rays of one call of the device: enough to occupy it, and not so many that a driver thinks it hangs.
+/// Most rays per call of the device: enough to occupy it, and few enough that no driver takes it for hung.
 pub(super) const RAYS_AT_ONCE: u64 = 1 << 20;
 
 /// A graphics processor.
@@ -22,31 +22,31 @@ pub struct Gpu {
 pub struct GpuMesh<'a> {
     pub(super) gpu: &'a Gpu,
     pub(super) bvh: &'a Bvh<'a>,
-    /// None of a mesh without area.
+    /// `None` for a mesh without area.
     pub(super) tree: Option<Tree>,
 }
 
-/// What the device says of a ray.
+/// The answer of the device for one ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// It meets no facet.
+    /// The ray hits no facet.
     Nothing,
-    /// It meets this facet first.
+    /// The ray hits this facet first.
     Facet(u32),
-    /// f32 cannot tell.
+    /// f32 cannot decide.
     Unsure,
 }
 
 impl Gpu {
-    /// The fastest kind of adapter that there is: discrete before integrated before virtual before software.
+    /// Opens the fastest kind of adapter: discrete before integrated before virtual before software.
     ///
     /// # Errors
-    /// When there is none, or the program was built without the feature `gpu`.
+    /// When there is no adapter, or the program was built without the feature `gpu`.
     pub fn new() -> Result<Gpu, GpuError> {
         Gpu::limited(u64::MAX)
     }
 
-    /// The same, whose buffers have at most so many bytes each: smaller meshes, and fewer rays at once.
+    /// As [`new`](Self::new), with buffers of at most `buffer_bytes`: for smaller meshes and fewer rays per call.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -59,10 +59,10 @@ impl Gpu {
         self.device.adapter()
     }
 
-    /// Takes a mesh and its hierarchy over; that is built if it is not yet.
+    /// Copies a mesh and its hierarchy to the device. The hierarchy is built if necessary.
     ///
     /// # Errors
-    /// When the device has no room for them.
+    /// When they exceed the device's memory.
     pub fn hold<'a>(&'a self, bvh: &'a Bvh<'a>) -> Result<GpuMesh<'a>, GpuError> {
         let boxes = bvh.boxes();
         let hold = || self.device.hold(&packed::nodes(boxes), &packed::corners(boxes, bvh.mesh()));
@@ -72,37 +72,37 @@ impl Gpu {
 }
 
 impl<'a> GpuMesh<'a> {
-    /// The hierarchy that is held.
+    /// The hierarchy in the device's memory.
     pub fn bvh(&self) -> &'a Bvh<'a> {
         self.bvh
     }
 
-    /// The closest hits of all rays, in their order; of equally near facets the one with the smallest
-    /// number.
+    /// Finds the closest hit of every ray, in the order of the rays; among equally near facets, the one with the
+    /// smallest number.
     ///
     /// # Errors
     /// When the device stops working or has no memory for the rays.
     pub fn closest(&self, rays: &[Ray<Global>]) -> Result<Vec<Option<Hit>>, GpuError> {
-        self.each(rays, |ray, answer| match answer {
+        self.map_answers(rays, |ray, answer| match answer {
             Answer::Nothing => None,
             Answer::Unsure => self.bvh.closest(ray),
             Answer::Facet(facet) => {
-                let hit = met(self.bvh.mesh(), facet, ray);
+                let hit = plane_hit(self.bvh.mesh(), facet, ray);
                 hit.or_else(|| self.bvh.closest(ray))
             }
         })
     }
 
-    /// What the device says by itself.
+    /// The answers of the device alone, without a decision in f64.
     ///
     /// # Errors
     /// As [`closest`](Self::closest).
     pub fn answers(&self, rays: &[Ray<Global>]) -> Result<Vec<Answer>, GpuError> {
-        self.each(rays, |_, answer| answer)
+        self.map_answers(rays, |_, answer| answer)
     }
 
-    /// What becomes of the answer to every ray.
-    pub(super) fn each<T: Send>(
+    /// Traces rays on the device and maps every ray and its answer by `then`.
+    pub(super) fn map_answers<T: Send>(
         &self,
         rays: &[Ray<Global>],
         then: impl Fn(&Ray<Global>, Answer) -> T + Sync,
@@ -119,7 +119,7 @@ impl<'a> GpuMesh<'a> {
         };
         let at_once = self.gpu.device.rays_at_once(RAYS_AT_ONCE);
         let launch = |rays: &[_]| self.gpu.device.launch(tree, &packed::aims(boxes, rays));
-        in_turns(rays, at_once, launch, |rays, flight| {
+        pipeline(rays, at_once, launch, |rays, flight| {
             let answers = self.gpu.device.land(flight)?;
             let each = rays.par_iter().zip(answers).with_min_len(1024);
             all.par_extend(each.map(|(ray, code)| then(ray, answer(code))));
@@ -129,8 +129,8 @@ impl<'a> GpuMesh<'a> {
     }
 }
 
-/// The device has the next items while the processor sees to these.
-pub(super) fn in_turns<T>(
+/// Launches items on the device in batches of `at_once`, and lands each batch while the device works on the next.
+pub(super) fn pipeline<T>(
     items: &[T],
     at_once: usize,
     launch: impl Fn(&[T]) -> Result<Flight, GpuError>,

@@ -1,16 +1,16 @@
-//! Closest hits on a graphics processor: any rays, by any Vulkan driver. Feature `gpu`.
+//! Traces rays on a graphics processor, by any Vulkan driver. Feature `gpu`.
 //!
-//! The device walks the hierarchy of [`Bvh`], one invocation for each ray (`closest.wgsl`). A picture of
-//! the rays, as in the pinhole, would serve one origin only; a walk serves the scans of many poses, receivers and
-//! bounces alike, in one call, and on a device it is the build that is slow, which [`GpuMesh`] keeps.
+//! The device traverses the hierarchy of [`Bvh`](super::Bvh), one invocation per ray (`closest.wgsl`). Unlike the
+//! picture of a fan, a traversal serves scans of many poses, receivers and second-order paths in one call. Its slow
+//! part is the upload of the hierarchy, which [`GpuMesh`] does once.
 //!
-//! - **The device finds**, in f32 with bounds of its rounding. It names a facet when the ray surely passes
-//!   through it, and surely nearer than through any other; it says that there is none when there surely is none.
-//! - **The processor decides** in f64 the rays of which the device is not sure: those that pass near
-//!   an edge, and those that meet two facets at almost the same range. For all it measures range and angle.
+//! - **The device searches** in f32, with bounds of its rounding. It names a facet if the ray certainly passes
+//!   through it, and certainly nearer than through any other. It reports a miss if the ray certainly misses everything.
+//! - **The CPU decides** the other rays in f64: those near an edge, and those with two facets at almost
+//!   the same range. It computes the range and angle of every hit.
 //!
-//! So the hits are those of the hierarchy, bit for bit, on any device. What comes back of them is the device's where
-//! whole scans are wanted and f32 will do (`echo.rs`), else the processor's.
+//! So the hits are bit for bit those of the hierarchy, on any device. Where f32 is precise enough, the device can also
+//! add up the echoes of whole scans (`echo.rs`).
 
 #[cfg(feature = "gpu")]
 mod device;
@@ -31,7 +31,7 @@ pub use packed::Cone;
 mod tests {
     use super::Gpu;
 
-    /// An adapter with buffers of at most so many bytes; `None`, with a word about it, where there is none.
+    /// An adapter with buffers of at most `buffer_bytes`. Without an adapter it prints the reason and returns `None`.
     pub fn gpu(buffer_bytes: u64) -> Option<Gpu> {
         match Gpu::limited(buffer_bytes) {
             Ok(gpu) => Some(gpu),

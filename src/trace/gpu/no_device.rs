@@ -1,4 +1,4 @@
-//! What stands in for a device in a program that was built without: there is none to be had.
+//! Replaces `device.rs` in a program built without the feature `gpu`: no device can be opened.
 
 use std::convert::Infallible;
 

@@ -1,5 +1,5 @@
-//! A hierarchy and rays as the device takes them: in f32, in radii of the sphere around the mesh and
-//! from its centre. `closest.wgsl` reads the same words.
+//! The memory layout of a hierarchy and of rays on the device, as `closest.wgsl` reads it. Numbers are f32; lengths
+//! are in radii of the sphere around the mesh, and count from its centre.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -8,44 +8,45 @@ use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
 use crate::trace::boxes::Boxes;
 
-/// The rays of a chirp, one for each sample of the spot.
+/// The rays of a chirp, one per sample of the spot.
 #[derive(Clone, Copy, Debug)]
 pub struct Cone {
     /// The axis of the beam.
     pub axis: Ray<Global>,
-    /// What the two coordinates of a sample add to the unit vector along the axis.
+    /// The two vectors by which the coordinates of a sample are multiplied before they are added to the unit vector
+    /// along the axis.
     pub across: [DVec3; 2],
-    /// Number of the law of region 0; those of the other regions follow.
+    /// Number of the scattering model of region 0; those of the other regions follow.
     pub law: u32,
 }
 
-/// Answers of the device beside the number of a leaf entry: the ray meets nothing, or f32 cannot tell what.
+/// Answers of the device other than the number of a leaf entry: the ray hits nothing, or f32 cannot decide.
 pub(super) const NOTHING: u32 = u32::MAX;
 const UNSURE: u32 = u32::MAX - 1;
 
-/// For a ray whose answer is not known before it is traced.
+/// Marks a ray that the device must trace, since its answer is not known in advance.
 const UNKNOWN: u32 = 0;
 
-/// A box and what is in it.
+/// A box and its content.
 pub(super) type Node = [u32; 8];
 
 /// The corners of a leaf entry's facet, and behind each a component of its unit normal.
 pub(super) type Corners = [[f32; 4]; 3];
 
-/// A ray from where it comes near the mesh.
+/// A ray that starts near the mesh.
 pub(super) type Aim = [u32; 8];
 
-/// The rays of a chirp from where its axis comes near the mesh.
+/// The rays of a chirp, which start where its axis comes near the mesh.
 pub(super) type Spot = [u32; 16];
 
-/// Rays from farther off are not the device's, in radii: f64 places their entry to 2⁻³⁰ up to here.
+/// Largest distance of a ray's origin, in radii, up to which f64 computes its entry to 2⁻³⁰. The CPU traces others.
 const FARTHEST: f64 = (1u64 << 20) as f64;
 
-/// A ray starts this much before it comes near the mesh, so that it meets what is there at a depth that is surely positive;
-/// in radii.
+/// Distance by which a ray starts before the sphere, in radii, so that every hit has a positive depth.
 const RUN_UP: f64 = 0.01;
 
-/// A spot that reaches as far as the mesh's radius is not the device's: its bounds would be those of the boxes.
+/// Largest diameter of mesh and spot together, in radii. The CPU traces wider spots, for which the bounds would be
+/// too coarse.
 const LARGEST: f64 = 3.0;
 
 /// All boxes, the root first.
@@ -72,12 +73,12 @@ pub(super) fn corners(boxes: &Boxes, mesh: &Mesh) -> Vec<Corners> {
     corners.collect()
 }
 
-/// Rays, or what is known of them without asking.
+/// Packs rays, or their answers where these are known in advance.
 pub(super) fn aims(boxes: &Boxes, rays: &[Ray<Global>]) -> Vec<Aim> {
     rays.par_iter().with_min_len(1024).map(|ray| aim(boxes, ray)).collect()
 }
 
-/// A ray whose answer is known.
+/// Packs a ray with a known answer.
 fn known_aim(answer: u32) -> Aim {
     [0, 0, 0, answer, 0, 0, 0, 0]
 }
@@ -90,18 +91,19 @@ fn aim(boxes: &Boxes, ray: &Ray<Global>) -> Aim {
     }
     let start_m = (entry_m - RUN_UP * boxes.sphere.radius_m).max(0.0);
     let origin = (from_centre + start_m * direction) / boxes.sphere.radius_m;
-    // Its largest component becomes 1 or -1, exactly.
+    // The largest component becomes exactly 1 or −1.
     let slopes = direction / direction.abs().max_element();
     let ([x, y, z], [u, v, w]) = (words(origin.as_vec3()), words(slopes.as_vec3()));
     [x, y, z, UNKNOWN, u, v, w, 1f32.to_bits()]
 }
 
-/// The rays of chirps whose samples lie within `reach` of the middle, or what is known of them without asking.
+/// Packs the rays of chirps, whose samples lie within `reach` of the centre, or their answers where these are known in
+/// advance.
 pub(super) fn spots(boxes: &Boxes, cones: &[Cone], reach: f64) -> Vec<Spot> {
     cones.par_iter().with_min_len(1024).map(|cone| spot(boxes, cone, reach)).collect()
 }
 
-/// The rays of a chirp whose answer is known.
+/// Packs the rays of a chirp with a known answer.
 fn known_spot(answer: u32) -> Spot {
     let mut spot = [0; 16];
     spot[15] = answer;
@@ -113,11 +115,11 @@ fn spot(boxes: &Boxes, cone: &Cone, reach: f64) -> Spot {
     let (from_centre, direction) = (axis.origin.xyz - boxes.sphere.centre, axis.direction.xyz());
     let farthest_m = from_centre.length() + boxes.sphere.radius_m;
     let widest = across.iter().map(|aside| aside.length()).fold(0.0, f64::max);
-    let beside_m = reach * widest * farthest_m;
-    let Some(entry_m) = boxes.sphere.entry_beside_m(axis, beside_m) else {
+    let margin_m = reach * widest * farthest_m;
+    let Some(entry_m) = boxes.sphere.entry_within_m(axis, margin_m) else {
         return known_spot(NOTHING);
     };
-    let size = 1.0 + 2.0 * beside_m / boxes.sphere.radius_m;
+    let size = 1.0 + 2.0 * margin_m / boxes.sphere.radius_m;
     if from_centre.length() > FARTHEST * boxes.sphere.radius_m || size > LARGEST {
         return known_spot(UNSURE);
     }

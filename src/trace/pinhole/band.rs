@@ -1,20 +1,20 @@
-//! Some rows of the grid, and the nearest facet of every ray there.
+//! The search for the nearest facet of every ray in some rows of the grid.
 
 use std::ops::Range;
 
 use super::lanes::{Form, LANES, Nearest, ROUNDING};
 use super::patches::{Cells, Forms, NONE, Patches, blocks};
 use super::picture::Picture;
-use crate::trace::facet::{Line, plane_m};
+use crate::trace::facet::{Line, range_to_plane_m};
 use crate::trace::wide::{Wide, widest};
 
-/// The nearest facets of the rays of some rows, among those that have been met.
+/// The rays of some rows of the grid, with the nearest of the facets that have been tested so far.
 pub(super) struct Band<'a> {
     picture: &'a Picture<'a>,
     rows: Range<usize>,
-    /// The first place of its rays in the fan's lists.
+    /// Place of its first ray in the lists of the fan.
     first: usize,
-    /// For every ray bounds of the nearest inverse depth, 1/m, and its facet; a block more at the end.
+    /// Bounds of the nearest inverse depth of every ray, 1/m, and its facet; one block longer than the rays.
     low: Vec<f32>,
     high: Vec<f32>,
     facet: Vec<u32>,
@@ -28,14 +28,14 @@ impl<'a> Band<'a> {
         Band { picture, rows, first, low, high, facet: vec![NONE; count] }
     }
 
-    /// The band when these facets, in ascending order, have been met too.
-    pub fn walked(mut self, facets: impl Iterator<Item = u32>) -> Band<'a> {
+    /// The band after tests of more facets, given in ascending order.
+    pub fn with_facets(mut self, facets: impl Iterator<Item = u32>) -> Band<'a> {
         widest(Walk { band: &mut self, facets });
         self
     }
 
-    /// The band when all facets that another one of the same rows has met have been met too.
-    pub fn nearer(mut self, other: Band<'a>) -> Band<'a> {
+    /// Merges with a band of the same rows that has tested other facets.
+    pub fn merge(mut self, other: Band<'a>) -> Band<'a> {
         for own in 0..self.facet.len() - LANES {
             let facet = other.facet[own];
             if facet == NONE || other.high[own] < self.low[own] {
@@ -51,44 +51,46 @@ impl<'a> Band<'a> {
         self
     }
 
-    /// The nearest facet of every ray.
-    pub fn facets(mut self) -> Vec<u32> {
+    /// The nearest facet of every ray, or [`NONE`].
+    pub fn into_facets(mut self) -> Vec<u32> {
         self.facet.truncate(self.facet.len() - LANES);
         self.facet
     }
 
-    /// Facets in ascending order.
+    /// Tests facets, given in ascending order.
     #[inline(always)]
-    fn walk(&mut self, facets: impl Iterator<Item = u32>) {
+    fn test_facets(&mut self, facets: impl Iterator<Item = u32>) {
         let grid = &self.picture.fan.sorted.grid;
         for block in blocks(facets) {
             let patches = self.picture.patches(&block);
             let forms = patches.forms(grid);
             for lane in patches.seen() {
-                self.meet(block[lane], &patches, &forms, lane);
+                self.test_facet(block[lane], &patches, &forms, lane);
             }
         }
     }
 
+    /// Tests a facet against the rays of the cells that its box touches.
     #[inline(always)]
-    fn meet(&mut self, facet: u32, patches: &Patches, forms: &Forms, lane: usize) {
+    fn test_facet(&mut self, facet: u32, patches: &Patches, forms: &Forms, lane: usize) {
         if !forms.has_area(lane) && self.picture.mesh.is_degenerate(facet as usize) {
             return;
         }
         let (cells, form) = (patches.cells(lane), forms.of(lane));
-        let mut is_open = false;
+        let mut is_unsure = false;
         for (place, count) in self.blocks(cells) {
-            is_open |= self.note(facet, &form, place, count);
+            is_unsure |= self.record(facet, &form, place, count);
         }
-        // Once all is noted: with a call in the loop nothing would stay in its register.
-        if is_open {
+        // After the loop, because a call inside it would keep the values out of the registers.
+        if is_unsure {
             self.settle(facet, &form, cells);
         }
     }
 
-    /// Notes where a facet is the nearest, for the first `count` rays from a place on; true when f32 cannot tell of some.
+    /// Records a facet for those of the first `count` rays from a place on of which it is certainly the nearest. Returns
+    /// whether f32 cannot decide others.
     #[inline(always)]
-    fn note(&mut self, facet: u32, form: &Form, place: usize, count: usize) -> bool {
+    fn record(&mut self, facet: u32, form: &Form, place: usize, count: usize) -> bool {
         let (sorted, own, count) = (&self.picture.fan.sorted, place - self.first, count as f32);
         let (Some(u), Some(v)) = (lanes(&sorted.u, place), lanes(&sorted.v, place)) else {
             return false;
@@ -101,12 +103,12 @@ impl<'a> Band<'a> {
             return false;
         };
         match form.see(u, v, low, count) {
-            Some(seen) => form.note(facet, &seen, Nearest { low, high, facet: best }, count),
+            Some(seen) => form.record(facet, &seen, Nearest { low, high, facet: best }, count),
             None => false,
         }
     }
 
-    /// Decides in f64 what f32 could not tell of a facet.
+    /// Decides in f64 the rays of a facet that f32 cannot.
     #[cold]
     #[inline(never)]
     fn settle(&mut self, facet: u32, form: &Form, cells: Cells) {
@@ -121,15 +123,16 @@ impl<'a> Band<'a> {
         }
     }
 
+    /// Decides in f64 whether a facet is the nearest of one ray.
     fn decide(&mut self, facet: u32, place: usize) {
         let Picture { fan, mesh, .. } = *self.picture;
         let ray = &fan.rays[fan.sorted.ray_at[place] as usize];
-        let Some(range_m) = Line::new(ray).crossing_m(mesh, facet as usize) else { return };
+        let Some(range_m) = Line::new(ray).range_to_facet_m(mesh, facet as usize) else { return };
         let own = place - self.first;
         let so_far = self.facet[own];
         let nearest_m = match so_far {
             NONE => None,
-            facet => plane_m(mesh, facet as usize, ray),
+            facet => range_to_plane_m(mesh, facet as usize, ray),
         };
         if nearest_m.is_none_or(|nearest_m| (range_m, facet) < (nearest_m, so_far)) {
             let per_m = 1.0 / (range_m * (fan.frame * ray.direction.xyz()).z);
@@ -138,7 +141,7 @@ impl<'a> Band<'a> {
         }
     }
 
-    /// Where the rays of some cells begin, [`LANES`] and fewer at a time, and how many are left in their row.
+    /// The blocks of the rays in some cells: first place, and number of rays from there to the end of the row.
     #[inline(always)]
     fn blocks(&self, cells: Cells) -> impl Iterator<Item = (usize, usize)> + use<'a> {
         let grid = &self.picture.fan.sorted.grid;
@@ -150,7 +153,7 @@ impl<'a> Band<'a> {
     }
 }
 
-/// Facets that a band has yet to meet.
+/// Tests facets against the rays of a band.
 struct Walk<'a, 'b, I> {
     band: &'a mut Band<'b>,
     facets: I,
@@ -161,7 +164,7 @@ impl<I: Iterator<Item = u32>> Wide for Walk<'_, '_, I> {
 
     #[inline(always)]
     fn run(self) {
-        self.band.walk(self.facets);
+        self.band.test_facets(self.facets);
     }
 }
 

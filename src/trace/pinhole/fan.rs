@@ -1,4 +1,4 @@
-//! Rays of one origin as points of a plane, sorted into cells.
+//! Rays of one origin as points (u, v) of a plane, sorted into the cells of a grid.
 
 use std::sync::Arc;
 
@@ -13,35 +13,35 @@ use crate::trace::wide::{Wide, least, most, widest};
 /// Least cosine between a ray and the axis of its fan: 84°.
 const LEAST_COS: f64 = 0.1;
 
-/// Height of a cell over its width. A facet reads its cells row by row, a block of lanes at a time:
-/// high cells make full blocks.
+/// Height of a cell over its width. The rays of a facet's cells are read row by row in blocks, and high cells give
+/// fuller blocks.
 const CELL_HEIGHT: f64 = 3.0;
 
-/// Least side of a cell over the largest coordinate: four times what rounding moves a box by.
+/// Least side of a cell over the largest coordinate: four times the rounding of a box.
 const LEAST_CELL: f64 = 1e-6;
 
-/// Rays of one task.
+/// Rays per task.
 const CHUNK: usize = 4096;
 
-/// Below this the coordinates are as good as in the middle of the picture.
+/// Least value of [`Grid::reach`].
 const LEAST_REACH: f32 = 0.01;
 
 /// Rays that share an origin, sorted for [`Fan::closest`].
 ///
-/// In a frame whose z axis is the mean direction, a ray is the point (u, v) = (d_x/d_z, d_y/d_z).
-/// A fan belongs to its rays alone: it serves every mesh and every pose of it.
+/// In a frame with the mean direction as z axis, a ray with direction d is the point (u, v) = (d_x/d_z, d_y/d_z).
+/// A fan does not depend on a mesh: it can trace any number of them.
 pub struct Fan<'a> {
     pub(super) rays: &'a [Ray<Global>],
     pub(super) origin: DVec3,
-    /// Turns a direction into the frame of the fan.
+    /// Rotates a direction into the frame of the fan.
     pub(super) frame: DMat3,
     pub(super) sorted: Arc<Sorted>,
 }
 
-/// The rays of a fan in its frame, cell after cell.
+/// The rays of a fan in its frame, ordered by cell.
 pub(super) struct Sorted {
     pub grid: Grid,
-    /// Coordinates of the rays, cell after cell, and [`LANES`] more that are read and not used.
+    /// Coordinates of the rays, ordered by cell, and [`LANES`] more that are read and not used.
     pub u: Vec<f32>,
     pub v: Vec<f32>,
     /// The ray at each place of these lists, and the place of each ray.
@@ -49,7 +49,7 @@ pub(super) struct Sorted {
     pub place_of: Vec<u32>,
 }
 
-/// Cells over (u, v), and which places belong to each, row by row.
+/// A grid of cells over (u, v), and the places of the rays in each, row by row.
 pub(super) struct Grid {
     pub min: [f32; 2],
     pub max: [f32; 2],
@@ -59,40 +59,40 @@ pub(super) struct Grid {
     pub cell: [f32; 2],
     pub columns: usize,
     pub rows: usize,
-    /// The largest coordinate, which is what they are rounded to.
+    /// The largest coordinate, at least [`LEAST_REACH`]. Rounding is proportional to it.
     pub reach: f32,
-    /// First place of each cell, and the end.
+    /// First place of each cell, and the number of rays at the end.
     starts: Vec<u32>,
 }
 
-/// Why rays are no fan.
+/// Why rays do not form a [`Fan`].
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum NoFan {
-    /// There is no ray, or more than can be numbered.
+    /// There are no rays, or too many.
     #[error(
         "the tracer `pinhole` takes 1 to 2³² − 2 rays and not {rays}; use `bvh`, or leave the choice to the \
          program"
     )]
     Count {
-        /// How many there are.
+        /// Number of rays.
         rays: usize,
     },
-    /// They start at several places.
+    /// The rays have different origins.
     #[error(
         "the tracer `pinhole` needs rays of one origin, and ray {ray} starts elsewhere than ray 0; \
          use `bvh`, or leave the choice to the program"
     )]
     Origins {
-        /// The first that starts elsewhere, from 0.
+        /// Number of the first ray with another origin than ray 0.
         ray: usize,
     },
-    /// They point all around.
+    /// A ray points too far from the mean direction.
     #[error(
         "the tracer `pinhole` needs rays within 84° of their mean, and ray {ray} is not; use `bvh`, or \
          leave the choice to the program"
     )]
     Wide {
-        /// The first such ray, from 0.
+        /// Number of the first such ray, from 0.
         ray: usize,
     },
 }
@@ -103,18 +103,18 @@ impl<'a> Fan<'a> {
     /// # Errors
     /// When they do not share an origin, or point more than 84° away from their mean direction.
     pub fn new(rays: &'a [Ray<Global>]) -> Result<Fan<'a>, NoFan> {
-        // Within the pool: from outside, every step would wake it anew.
-        rayon::scope(|_| Fan::sorted(rays))
+        // Inside the thread pool, since every parallel step from outside would have to wake it.
+        rayon::scope(|_| Fan::sort(rays))
     }
 
-    fn sorted(rays: &'a [Ray<Global>]) -> Result<Fan<'a>, NoFan> {
+    fn sort(rays: &'a [Ray<Global>]) -> Result<Fan<'a>, NoFan> {
         let origin = match rays.first() {
             Some(ray) if rays.len() < u32::MAX as usize => ray.origin.xyz,
             _ => return Err(NoFan::Count { rays: rays.len() }),
         };
         let elsewhere = |rays: &[Ray<Global>]| rays.iter().position(|ray| ray.origin.xyz != origin);
         let sum = |rays: &[Ray<Global>]| rays.iter().map(|ray| ray.direction.xyz()).sum::<DVec3>();
-        // Fixed chunks, so that the sum does not depend on the threads.
+        // The chunks are fixed, so that the sum does not depend on the number of threads.
         let chunks: Vec<_> =
             rays.par_chunks(CHUNK).map(|rays| (elsewhere(rays), sum(rays))).collect();
         for (chunk, (elsewhere, _)) in chunks.iter().enumerate() {
@@ -123,7 +123,7 @@ impl<'a> Fan<'a> {
             }
         }
         let sum = chunks.iter().map(|(_, sum)| sum).sum::<DVec3>();
-        let frame = frame(sum.normalize_or(rays[0].direction.xyz()));
+        let frame = frame_about(sum.normalize_or(rays[0].direction.xyz()));
         let blocks = rays.par_chunks(LANES).with_min_len(256);
         let flat: Vec<_> = blocks.map(|rays| widest(Flattening { frame, rays })).collect();
         let flat = &flat.as_flattened()[..rays.len()];
@@ -149,8 +149,8 @@ impl<'a> Fan<'a> {
         Ok(Fan { rays, origin, frame, sorted: Arc::new(sorted) })
     }
 
-    /// The fan of the same rays at another pose, which need not be sorted again; `None` unless there are as
-    /// many. Each of `rays` must be the one of this fan, carried by `pose`.
+    /// The fan of the same rays moved by a pose, without sorting them again. `rays` must be the rays of this fan moved by
+    /// `pose`, in the same order; the result is `None` if their number differs.
     ///
     /// ```
     /// use matdb::frames::{Point, Pose, Ray};
@@ -175,13 +175,13 @@ impl<'a> Fan<'a> {
     }
 }
 
-/// Rows: two axes across a direction, and it.
-fn frame(axis: DVec3) -> DMat3 {
+/// The rotation into a frame with a direction as z axis.
+fn frame_about(axis: DVec3) -> DMat3 {
     let (right, up) = axis.any_orthonormal_pair();
     DMat3::from_cols(right, up, axis).transpose()
 }
 
-/// (u, v) of up to [`LANES`] rays; not a number for one that is too far from the axis.
+/// Projects up to [`LANES`] rays to (u, v); NaN for a ray too far from the axis.
 struct Flattening<'a> {
     frame: DMat3,
     rays: &'a [Ray<Global>],
@@ -209,7 +209,7 @@ impl Wide for Flattening<'_> {
 }
 
 impl Grid {
-    /// Cells as wide as the rays' mean spacing; along a line, their spacing on it.
+    /// A grid over all rays. Cells are as wide as the mean spacing of the rays; for rays along a line, the spacing on it.
     fn over(flat: &[[f32; 2]]) -> Grid {
         let bounds = |points: &[[f32; 2]]| {
             let (mut min, mut max) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
@@ -236,29 +236,29 @@ impl Grid {
         Grid { min, max, per, cell, columns, rows, reach, starts: vec![0; columns * rows + 1] }
     }
 
-    /// Column or row of a coordinate; outside the grid the nearest. It never falls as `at` grows.
+    /// Column (axis 0) or row (axis 1) of a coordinate; outside the grid the nearest one. It is monotonic in `at`.
     #[inline(always)]
     pub fn step(&self, axis: usize, at: f32) -> u32 {
         let last = if axis == 0 { self.columns } else { self.rows } - 1;
         let step = least(most((at - self.min[axis]) * self.per[axis], 0.0), last as f32);
-        // A sum of 2²³ and less than that is rounded to a whole number, which its last 23 bits are.
+        // Adding 2²³ rounds to a whole number and leaves it in the last 23 bits.
         const WHOLE: f32 = (1 << 23) as f32;
         (step + WHOLE).to_bits() - WHOLE.to_bits()
     }
 
-    /// The places of some columns, from first to last, of a row.
+    /// The range of places of the columns from `first` to `last` in a row: first place, and the place after the last.
     #[inline(always)]
     pub fn places(&self, row: usize, first: usize, last: usize) -> [usize; 2] {
         let cell = row * self.columns;
         [cell + first, cell + last + 1].map(|cell| self.starts[cell] as usize)
     }
 
-    /// The first place of a row; of the row after the last, the end.
+    /// The first place of a row. The row after the last gives the number of rays.
     pub fn row_start(&self, row: usize) -> usize {
         self.starts[row * self.columns] as usize
     }
 
-    /// The place of every ray, cell after cell and in a cell by number.
+    /// Orders the rays by cell, and within a cell by number. Returns the place of every ray.
     fn sort(&mut self, flat: &[[f32; 2]]) -> Vec<u32> {
         let columns = self.columns as u32;
         let cell = |&[u, v]: &[f32; 2]| self.step(1, v) * columns + self.step(0, u);

@@ -1,10 +1,8 @@
-//! One facet against a block of rays, in f32 and side by side.
-//!
-//! Plain loops over arrays of fixed length, which become vector instructions ([`Wide`](crate::trace::wide::Wide)).
+//! Tests one facet against a block of rays in f32, by vector instructions ([`Wide`](crate::trace::wide::Wide)).
 
 use crate::trace::wide::least;
 
-/// Rays of a block.
+/// Rays per block.
 pub(super) const LANES: usize = 16;
 
 /// Unit roundoff of f32, 2⁻²⁴.
@@ -12,46 +10,47 @@ pub(super) const ROUNDING: f32 = f32::EPSILON / 2.0;
 
 pub(super) type Lanes = [f32; LANES];
 
-/// A facet as linear forms over (u, v).
+/// The linear forms of a facet over (u, v).
 ///
-/// Twice the areas that a point spans with the edges are b, c and `area` − b − c, all positive
-/// inside; the inverse depth, 1/m, is `w` + `w_b`·b + `w_c`·c.
+/// b, c and `area` − b − c are twice the areas of the triangles that a point spans with the edges, all positive for a
+/// point inside. The inverse depth, 1/m, is `w` + `w_b`·b + `w_c`·c.
 #[derive(Clone, Copy)]
 pub(super) struct Form {
     /// The first corner.
     pub at: [f32; 2],
-    /// The edges from the first corner to the second and from the third to it; both turned around
-    /// when the facet runs clockwise.
+    /// The edges from the first corner to the second, and from the third to the first. Both are reversed if the
+    /// facet runs clockwise.
     pub ab: [f32; 2],
     pub ca: [f32; 2],
+    /// Twice the area of the facet.
     pub area: f32,
-    /// An area nearer to zero than this may have either sign.
+    /// Bound of the rounding of twice an area: one nearer to zero may have either sign.
     pub doubt: f32,
     pub w: f32,
     pub w_b: f32,
     pub w_c: f32,
-    /// The inverse depth is good to this, 1/m.
+    /// Bound of the rounding of the inverse depth, 1/m.
     pub w_doubt: f32,
 }
 
-/// What a block of rays sees of a facet.
+/// The forms of a facet at a block of rays.
 pub(super) struct Seen {
-    /// The least of the three areas.
+    /// The smallest of the three areas, doubled.
     pub least: Lanes,
     /// Inverse depth, 1/m.
     pub w: Lanes,
 }
 
-/// The nearest so far of a block of rays.
+/// The nearest facets so far of a block of rays.
 pub(super) struct Nearest<'a> {
-    /// Bounds of the inverse depth, 1/m.
+    /// Bounds of their inverse depths, 1/m.
     pub low: &'a mut Lanes,
     pub high: &'a mut Lanes,
     pub facet: &'a mut [u32; LANES],
 }
 
 impl Form {
-    /// The least of the three areas that a point spans with the edges, and the inverse depth, 1/m.
+    /// Evaluates the forms at a point: the smallest of the three areas, doubled, and the inverse depth, 1/m.
     #[inline(always)]
     fn at(&self, [u, v]: [f32; 2]) -> (f32, f32) {
         let (x, y) = (u - self.at[0], v - self.at[1]);
@@ -61,14 +60,15 @@ impl Form {
         (least(a, least(b, c)), self.w + b * self.w_b + c * self.w_c)
     }
 
-    /// Whether a ray may meet the facet, and no nearer one: not with certainty the one or the other.
+    /// Whether the facet may be the nearest of a ray, whose nearest so far has at least the inverse depth `low`.
     #[inline(always)]
     pub fn may_meet(&self, at: [f32; 2], low: f32) -> bool {
         let (least, w) = self.at(at);
         (least >= -self.doubt) & (w + self.w_doubt >= low)
     }
 
-    /// The first `count` rays of a block; none when all surely pass beside the facet or meet a nearer one.
+    /// Evaluates the forms at a block, of which the first `count` rays count. `None` if each of these certainly misses
+    /// the facet or has a nearer one.
     #[inline(always)]
     pub fn see(&self, u: &Lanes, v: &Lanes, low: &Lanes, count: f32) -> Option<Seen> {
         let mut seen = Seen { least: [0.0; LANES], w: [0.0; LANES] };
@@ -83,9 +83,9 @@ impl Form {
         (any != 0).then_some(seen)
     }
 
-    /// Notes where the facet is surely the nearest; true when f32 cannot tell of some rays.
+    /// Records the facet for the rays of which it is certainly the nearest. Returns whether f32 cannot decide others.
     #[inline(always)]
-    pub fn note(&self, facet: u32, seen: &Seen, nearest: Nearest, count: f32) -> bool {
+    pub fn record(&self, facet: u32, seen: &Seen, nearest: Nearest, count: f32) -> bool {
         let mut any = 0;
         for lane in 0..LANES {
             let (low, high) = (seen.w[lane] - self.w_doubt, seen.w[lane] + self.w_doubt);

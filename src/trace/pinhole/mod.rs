@@ -1,21 +1,21 @@
-//! Rays that share their origin: a scan as a picture. No hierarchy is built.
+//! Traces rays that share an origin by rasterisation: the facets are drawn into a picture seen from the origin, and
+//! no hierarchy is built.
 //!
-//! Seen from the origin a ray is a point (u, v) and a facet its perspective picture: whether the one lies
-//! in the other is told by three linear forms, and inverse depth is a fourth. The rays are sorted once into
-//! a grid ([`Fan`]); then the facets are walked, each over the cells that its box touches.
+//! In the picture a ray is a point (u, v) and a facet a triangle. Three linear forms over (u, v) say whether the ray
+//! passes through the facet, and a fourth gives the inverse depth. The rays are sorted once into a grid
+//! ([`Fan`]). Then each facet is tested against the rays of the cells that its bounding box touches.
 //!
-//! - **f32 finds.** Differences from the facet's first corner come before products, and every form has a bound
-//!   of its rounding (`patches.rs`): for a facet of 1 cm at 8 m some micrometres beside an edge. A ray farther than
-//!   that inside, and nearer by more than the bound on inverse depth than what it has met so far, is decided.
-//! - **f64 decides** the rest, one ray in some hundreds, by the rule of the hierarchy: edge volumes that are exact negatives for
-//!   neighbours, so that nothing slips between, and of equally near facets the one with the smallest number.
-//! - Range and angle are those of the hierarchy, bit for bit.
-//! - Facets behind the origin are passed over. Those that cross its plane, or come so near to it
-//!   that their picture is of no use, have a hierarchy of their own, if they are in the field at all.
+//! - **f32 searches.** Every form has a bound of its rounding (`patches.rs`), for a facet of 1 cm at 8 m a few
+//!   micrometres from an edge. If a ray passes inside by more than this bound, and nearer than every facet before by
+//!   more than the bound on inverse depth, the hit is certain.
+//! - **f64 decides** the other rays, about one in some hundreds, by the test of the hierarchy (`facet.rs`). It is
+//!   watertight, and among equally near facets the one with the smallest number wins.
+//! - Range and angle are bit for bit those of the hierarchy.
+//! - Facets behind the origin are skipped. Facets that cross the plane of the origin, or come too near to it for the
+//!   projection, get a hierarchy of their own if any ray may hit them.
 //!
-//! What a ray meets first does not depend on the order of the facets: f32 notes what is certain, and f64
-//! orders the rest by range and number. So the work may be shared by rays or by facets, and the result is the
-//! same on any number of threads.
+//! The hits do not depend on the order of the facets: f32 records only what is certain, and f64 orders the rest by
+//! range and number. So the work may be split by rays or by facets, with the same result on any number of threads.
 
 mod band;
 mod fan;
@@ -30,8 +30,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::bvh::Bvh;
-use super::facet::met_by;
-use super::hit::{Hit, no_hits};
+use super::facet::plane_hits;
+use super::hit::{Hit, allocate_hits};
 use super::wide::{Wide, widest};
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
@@ -42,49 +42,49 @@ use picture::Picture;
 
 pub use fan::{Fan, NoFan};
 
-/// Facets that are shared out to bands at once.
+/// Facets that one task assigns to bands.
 const FACETS_PER_TASK: usize = 8192;
 
-/// So few rays that every thread can have all of them in its cache, and work is shared by facets.
+/// Up to this number all rays fit into the cache of every thread, and the work is split by facets.
 const FEW_RAYS: usize = 1 << 16;
 
-/// Of more facets than this for each ray their lists would cost more than a second look at the rays.
+/// Above this number of facets per ray, lists of facets cost more than testing all rays in every thread.
 const MANY_FACETS_PER_RAY: usize = 8;
 
-/// Shares of the facets for every thread, where there are few rays.
-const SHARES_PER_THREAD: usize = 2;
+/// Parts of the facets per thread, if the work is split by facets.
+const PARTS_PER_THREAD: usize = 2;
 
-/// Bands of the grid for every thread: more of them share the work more evenly.
+/// Bands of the grid per thread, if the work is split by rays; more bands balance the load better.
 const BANDS_PER_THREAD: usize = 4;
 
 impl Fan<'_> {
-    /// The closest hits of all rays on a mesh, in their order; of equally near facets the one with the
-    /// smallest number.
+    /// Finds the closest hit of every ray on a mesh, in the order of the rays; among equally near facets, the one with
+    /// the smallest number.
     pub fn closest(&self, mesh: &Mesh) -> Vec<Option<Hit>> {
-        // Within the pool: from outside, every step would wake it anew.
+        // Inside the thread pool, since every parallel step from outside would have to wake it.
         rayon::scope(|_| self.nearest_hits(mesh))
     }
 
     fn nearest_hits(&self, mesh: &Mesh) -> Vec<Option<Hit>> {
         let picture = Picture::new(self, mesh);
-        let nearest = nearest(&picture);
+        let nearest = nearest_facets(&picture);
         let left_out = picture.left_out();
         let bvh = (!left_out.is_empty()).then(|| Bvh::over(mesh, left_out));
-        let mut hits = no_hits(self.rays.len());
+        let mut hits = allocate_hits(self.rays.len());
         let blocks = self.rays.par_chunks(LANES).zip(self.sorted.place_of.par_chunks(LANES));
         let blocks = blocks.zip(hits.par_chunks_mut(LANES)).with_min_len(64);
         blocks.for_each(|((rays, places), hits)| {
             widest(Meeting { mesh, rays, places, nearest: &nearest, hits });
             if let Some(bvh) = &bvh {
                 let behind = rays.iter().map(|ray| bvh.closest(ray));
-                hits.iter_mut().zip(behind).for_each(|(hit, other)| *hit = nearer(*hit, other));
+                hits.iter_mut().zip(behind).for_each(|(hit, other)| *hit = nearer_hit(*hit, other));
             }
         });
         hits
     }
 }
 
-/// Up to [`LANES`] rays that meet the facets at their places.
+/// Computes the hits of up to [`LANES`] rays on the nearest facets at their places.
 struct Meeting<'a> {
     mesh: &'a Mesh,
     rays: &'a [Ray<Global>],
@@ -105,12 +105,13 @@ impl Wide for Meeting<'_> {
         if facets != [NONE; LANES] {
             let mut rays = [&self.rays[0]; LANES];
             rays.iter_mut().zip(self.rays).for_each(|(lane, ray)| *lane = ray);
-            met_by(self.mesh, facets, rays, self.hits);
+            plane_hits(self.mesh, facets, rays, self.hits);
         }
     }
 }
 
-fn nearer(a: Option<Hit>, b: Option<Hit>) -> Option<Hit> {
+/// The nearer of two hits; of equally near ones the one with the smaller number of its facet.
+fn nearer_hit(a: Option<Hit>, b: Option<Hit>) -> Option<Hit> {
     let key = |hit: &Hit| (hit.range_m, hit.facet);
     match (a, b) {
         (Some(a), Some(b)) => Some(if key(&b) < key(&a) { b } else { a }),
@@ -119,29 +120,30 @@ fn nearer(a: Option<Hit>, b: Option<Hit>) -> Option<Hit> {
 }
 
 /// The nearest facet of the ray at every place, or [`NONE`].
-fn nearest(picture: &Picture) -> Vec<u32> {
+fn nearest_facets(picture: &Picture) -> Vec<u32> {
     let (facets, rays) = (picture.mesh.facets.len(), picture.fan.rays.len());
     let are_few = rays <= FEW_RAYS || facets / MANY_FACETS_PER_RAY > rays;
     match rayon::current_num_threads() {
-        1 => shared_by_facets(picture, 1),
-        threads if are_few => shared_by_facets(picture, SHARES_PER_THREAD * threads),
-        threads => shared_by_rays(picture, BANDS_PER_THREAD * threads),
+        1 => split_by_facets(picture, 1),
+        threads if are_few => split_by_facets(picture, PARTS_PER_THREAD * threads),
+        threads => split_by_rays(picture, BANDS_PER_THREAD * threads),
     }
 }
 
-/// Every task has all rays and some of the facets.
-fn shared_by_facets(picture: &Picture, shares: usize) -> Vec<u32> {
+/// Nearest facets by tasks that test all rays against a part of the facets each.
+fn split_by_facets(picture: &Picture, parts: usize) -> Vec<u32> {
     let (facets, rows) = (picture.mesh.facets.len(), picture.fan.sorted.grid.rows);
-    let cut = |share: usize| (share * facets / shares) as u32;
-    let among = |share| Band::new(picture, 0..rows).walked(cut(share)..cut(share + 1));
-    let found = (0..shares).into_par_iter().map(among).reduce_with(Band::nearer);
-    found.map_or(Vec::new(), Band::facets)
+    let cut = |part: usize| (part * facets / parts) as u32;
+    let bands = (0..parts)
+        .into_par_iter()
+        .map(|part| Band::new(picture, 0..rows).with_facets(cut(part)..cut(part + 1)));
+    bands.reduce_with(Band::merge).map_or(Vec::new(), Band::into_facets)
 }
 
-/// Every task has some of the rays and the facets that reach among them.
-fn shared_by_rays(picture: &Picture, bands: usize) -> Vec<u32> {
+/// Nearest facets by tasks that test a band of the rays against the facets that reach into it each.
+fn split_by_rays(picture: &Picture, bands: usize) -> Vec<u32> {
     let facets = picture.mesh.facets.len();
-    let cuts = cuts(picture.fan, bands);
+    let cuts = band_starts(picture.fan, bands);
     let tasks: Vec<Vec<Vec<u32>>> = (0..facets.div_ceil(FACETS_PER_TASK))
         .into_par_iter()
         .map(|task| {
@@ -152,13 +154,13 @@ fn shared_by_rays(picture: &Picture, bands: usize) -> Vec<u32> {
         .collect();
     let band = |number: usize| {
         let facets = tasks.iter().flat_map(|bands| bands[number].iter().copied());
-        Band::new(picture, cuts[number]..cuts[number + 1]).walked(facets).facets()
+        Band::new(picture, cuts[number]..cuts[number + 1]).with_facets(facets).into_facets()
     };
     (0..cuts.len() - 1).into_par_iter().flat_map_iter(band).collect()
 }
 
-/// Rows at which bands of about equally many rays begin, and the end.
-fn cuts(fan: &Fan, bands: usize) -> Vec<usize> {
+/// First rows of bands with about equal numbers of rays, and the number of rows as the end of the last.
+fn band_starts(fan: &Fan, bands: usize) -> Vec<usize> {
     let (grid, rays) = (&fan.sorted.grid, fan.rays.len());
     let mut cuts = vec![0];
     for row in 1..grid.rows {
@@ -170,7 +172,7 @@ fn cuts(fan: &Fan, bands: usize) -> Vec<usize> {
     cuts
 }
 
-/// For every band the facets that reach into it, in ascending order.
+/// Assigns facets to bands: for every band the facets that reach into it, in ascending order.
 struct Sharing<'a> {
     picture: &'a Picture<'a>,
     cuts: &'a [usize],

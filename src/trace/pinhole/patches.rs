@@ -1,36 +1,37 @@
-//! Facets in the picture, a block of them side by side.
+//! The projections of a block of facets, and their linear forms, in f32.
 
 use super::fan::Grid;
 use super::lanes::{Form, LANES, Lanes, ROUNDING};
 use crate::trace::facet::GRAZING;
 use crate::trace::wide::{least, most};
 
-/// No facet.
+/// Stands for no facet.
 pub(super) const NONE: u32 = u32::MAX;
 
-/// Twice the bound below which a ray runs along a facet, for rounding.
+/// Bound below which a ray may count as parallel to a facet: twice that of `facet.rs`, for rounding.
 const ALONG: f32 = 2.0 * GRAZING as f32;
 
-/// A block of facets, and the cells that their boxes touch.
+/// The projections of a block of facets, and the cells that their bounding boxes touch.
 pub(super) struct Patches {
     /// u, v and 1/z of the three corners.
     corners: [[Lanes; 3]; 3],
+    /// Least and largest u, v and 1/z.
     low: [Lanes; 3],
     high: [Lanes; 3],
     /// First and last column, first and last row.
     cells: [[[u32; LANES]; 2]; 2],
-    /// 1 where rays may pass near the facet and it has its place in the picture.
+    /// 1 for a facet that is projected and that rays may hit.
     is_seen: [u32; LANES],
 }
 
-/// Cells of the grid: the first and the last of each.
+/// A rectangle of cells: first and last column, first and last row.
 #[derive(Clone, Copy)]
 pub(super) struct Cells {
     pub columns: [usize; 2],
     pub rows: [usize; 2],
 }
 
-/// The forms of a block of facets.
+/// The linear forms of a block of facets; their fields are those of [`Form`].
 pub(super) struct Forms {
     at: [Lanes; 2],
     ab: [Lanes; 2],
@@ -43,7 +44,7 @@ pub(super) struct Forms {
 }
 
 impl Patches {
-    /// Facets with these corners (u, v, 1/z); one that is all 0 is not seen.
+    /// Facets with these corners (u, v, 1/z). A facet with a corner of all 0 is not projected.
     #[inline(always)]
     pub fn new(corners: [[Lanes; 3]; 3], grid: &Grid) -> Patches {
         let [a, b, c] = &corners;
@@ -63,7 +64,7 @@ impl Patches {
         for axis in 0..2 {
             for lane in 0..LANES {
                 let (low, high) = (low[axis][lane], high[axis][lane]);
-                // Both the corners and the rays are rounded.
+                // Covers the rounding of both corners and rays.
                 let slack = 4.0 * ROUNDING * most(most(low.abs(), high.abs()), grid.reach);
                 let (near, far) = (low - slack, high + slack);
                 let in_field = (far >= grid.min[axis]) & (near <= grid.max[axis]);
@@ -75,7 +76,7 @@ impl Patches {
         Patches { corners, low, high, cells, is_seen }
     }
 
-    /// Where in the block rays may pass near the facet.
+    /// The lanes of the facets that are projected and that rays may hit.
     #[inline(always)]
     pub fn seen(&self) -> impl Iterator<Item = usize> {
         let bits = (0..LANES).fold(0, |bits, lane| bits | self.is_seen[lane] << lane);
@@ -84,7 +85,7 @@ impl Patches {
             .map(|bits| bits.trailing_zeros() as usize)
     }
 
-    /// The cells that a facet's box touches.
+    /// The cells that the bounding box of a facet touches.
     #[inline(always)]
     pub fn cells(&self, lane: usize) -> Cells {
         let [columns, rows] = &self.cells;
@@ -92,17 +93,17 @@ impl Patches {
         Cells { columns: of(columns), rows: of(rows) }
     }
 
-    /// The forms of the facets, for rays within their cells.
+    /// The forms of the facets, valid for rays within their cells.
     ///
-    /// Let M be the largest coordinate, L the longest side of the box and two cells more, and η = 2⁻²⁴.
-    /// Coordinates err by 1.1·ηM, their differences by 2.2·ηM + ηL, an area by 8.8·ηLM + 8·ηL², and the
-    /// third area, which is what the other two leave, by 27·ηLM + 34·ηL²: all by less than
-    /// e = 36·ηL(M + L). Where rounding turned the sign of the whole area, a point inside may
-    /// show −2e, hence a doubt of 2e. The shares of two corners err by 2e/area each and the
+    /// Let M be the largest coordinate, L the longest side of the box plus two cells, and η = 2⁻²⁴.
+    /// The errors are at most 1.1·ηM for coordinates, 2.2·ηM + ηL for their differences, 8.8·ηLM + 8·ηL² for an area,
+    /// and 27·ηLM + 34·ηL² for the third area, which is the difference of the others. All are below
+    /// e = 36·ηL(M + L). If rounding changes the sign of the whole area, a point inside may
+    /// get −2e, hence `doubt` = 2e. The weights of two corners err by 2e/area each, and the
     /// inverse depths by a few η.
     ///
-    /// A ray in the plane of a facet passes it by (`facet.rs`), if |d·n| ≤ 10⁻¹⁰·|ab|·|ac|. With depths from z to Z it
-    /// is |d·n| ≥ z³/Z·area/(1 + 2M), and an edge is no longer than 1.5·ZL + (Z − z)(1 + 2M).
+    /// A ray counts as parallel to a facet, and misses it, if |d·n| ≤ 10⁻¹⁰·|ab|·|ac| (`facet.rs`). For depths from
+    /// z to Z, |d·n| ≥ z³/Z·area/(1 + 2M), and an edge is at most 1.5·ZL + (Z − z)(1 + 2M) long.
     #[inline(always)]
     pub fn forms(&self, grid: &Grid) -> Forms {
         let Patches { corners: [a, b, c], low, high, .. } = self;
@@ -125,7 +126,7 @@ impl Patches {
             let ab = [b[0][lane] - a[0][lane], b[1][lane] - a[1][lane]];
             let ca = [a[0][lane] - c[0][lane], a[1][lane] - c[1][lane]];
             let area = ab[1] * ca[0] - ab[0] * ca[1];
-            // One that runs clockwise is turned around.
+            // A facet that runs clockwise is reversed.
             let sign = if area < 0.0 { -1.0 } else { 1.0 };
             let area = sign * area;
             for axis in 0..2 {
@@ -143,8 +144,8 @@ impl Patches {
             let spread = 3.0 * doubt * per_area * (near - far);
             let at = a[2][lane];
             let w = [at, (b[2][lane] - at) * per_area, (c[2][lane] - at) * per_area];
-            // Seen edge-on: nothing is sure but that it is no nearer than its nearest corner, and for rays along it
-            // not even that it is met.
+            // For a facet seen edge-on it is certain only that it is no nearer than its nearest corner; for one
+            // that may be parallel to the ray, not even that.
             forms.w[0][lane] = if is_sure { w[0] } else { near };
             forms.w[1][lane] = if is_sure { w[1] } else { 0.0 };
             forms.w[2][lane] = if is_sure { w[2] } else { 0.0 };
@@ -158,7 +159,7 @@ impl Patches {
 }
 
 impl Forms {
-    /// The form of one facet.
+    /// The forms of one facet.
     #[inline(always)]
     pub fn of(&self, lane: usize) -> Form {
         Form {
@@ -174,16 +175,17 @@ impl Forms {
         }
     }
 
-    /// Whether the facet surely has an area: one that is not seen edge-on and whose corners are not far apart in depth. The
-    /// corners of one without area are collinear to 10⁻¹² of its length, at most 200 depths of the farthest,
-    /// and its picture can only be wide enough if one corner is 300 times as near as another.
+    /// Whether the facet certainly has an area: it is not seen edge-on, and its corners have similar depths.
+    ///
+    /// The corners of a facet without area are collinear to 10⁻¹² of its length, which is at most 200 depths of the
+    /// farthest corner. Its projection can then be wide enough only if one corner is 300 times as near as another.
     #[inline(always)]
     pub fn has_area(&self, lane: usize) -> bool {
         self.has_area[lane] == 1
     }
 }
 
-/// Cuts numbers into blocks, the last filled up with [`NONE`].
+/// Splits a list of facets into blocks; the last one is filled with [`NONE`].
 #[inline(always)]
 pub(super) fn blocks(mut facets: impl Iterator<Item = u32>) -> impl Iterator<Item = [u32; LANES]> {
     std::iter::from_fn(move || {

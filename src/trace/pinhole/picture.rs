@@ -1,4 +1,4 @@
-//! A mesh as a fan of rays sees it: every corner as (u, v, 1/z).
+//! Projects a mesh into the frame of a fan: every corner becomes (u, v, 1/z).
 
 use glam::{DVec3, Vec4};
 use rayon::prelude::*;
@@ -9,17 +9,17 @@ use super::patches::Patches;
 use crate::geometry::Mesh;
 use crate::trace::wide::{Wide, widest};
 
-/// Corners farther than this from the axis have no place in the picture: cosine of 89.4°.
+/// Least cosine between a corner and the axis of the fan, 89.4°. Corners beyond are not projected.
 const LEAST_COS: f64 = 0.01;
 
-/// Corners nearer than this have none either, m.
+/// Least depth of a corner, m. Corners nearer are not projected.
 const LEAST_DEPTH_M: f64 = 1e-6;
 
 /// The projected mesh.
 pub(super) struct Picture<'a> {
     pub fan: &'a Fan<'a>,
     pub mesh: &'a Mesh,
-    /// (u, v, 1/z, 0) of every vertex; all 0 for one that has no place in the picture.
+    /// (u, v, 1/z, 0) of every vertex; all 0 for one that is not projected.
     corners: Vec<Vec4>,
 }
 
@@ -32,7 +32,7 @@ impl<'a> Picture<'a> {
         Picture { fan, mesh, corners }
     }
 
-    /// A block of facets; a number that is no facet's is not seen.
+    /// Projects a block of facets. A lane whose facet does not exist or is not projected counts as not seen.
     #[inline(always)]
     pub fn patches(&self, facets: &[u32; LANES]) -> Patches {
         let mut corners = [[[0.0; LANES]; 3]; 3];
@@ -46,7 +46,7 @@ impl<'a> Picture<'a> {
         Patches::new(corners, &self.fan.sorted.grid)
     }
 
-    /// Facets that rays may meet and that have no place in the picture.
+    /// The facets that are not projected and that rays may hit.
     pub fn left_out(&self) -> Vec<u32> {
         if self.corners.par_iter().with_min_len(4096).all(|corner| corner.z > 0.0) {
             return Vec::new();
@@ -60,7 +60,7 @@ impl<'a> Picture<'a> {
         if corners.iter().all(|&vertex| self.corners[vertex as usize].z > 0.0) {
             return false;
         }
-        // The rays lie in a pyramid; a facet wholly beyond one of its sides is not met.
+        // The rays lie in a pyramid. A facet wholly beyond one of its sides is not hit.
         const MARGIN: f64 = 1e-6;
         let Fan { frame, origin, ref sorted, .. } = *self.fan;
         let corners = self.mesh.corners(facet as usize).map(|corner| frame * (corner - origin));
@@ -78,7 +78,7 @@ impl<'a> Picture<'a> {
     }
 }
 
-/// (u, v, 1/z, 0) of up to [`LANES`] vertices.
+/// Projects up to [`LANES`] vertices to (u, v, 1/z, 0).
 struct Projection<'a> {
     fan: &'a Fan<'a>,
     vertices: &'a [DVec3],

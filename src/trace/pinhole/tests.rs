@@ -6,7 +6,7 @@ use crate::frames::Point;
 use crate::scene::{mannequin, solids};
 use crate::trace::brute;
 
-/// The naive loop measures by another formula.
+/// Relative difference of ranges from the naive loop, which uses another formula.
 const RANGE: f64 = 1e-9;
 
 fn ray(origin: DVec3, through: DVec3) -> Ray<Global> {
@@ -24,16 +24,17 @@ fn soup(corners: &[[f64; 3]], facets: &[[u32; 3]]) -> Mesh {
     Mesh { vertices, facets: facets.to_vec(), labels: vec![] }
 }
 
-/// Traces as the hierarchy does, bit for bit, on one thread and on three, and alike however the work is shared.
+/// Asserts that the fan gives the hits of the hierarchy, bit for bit, on one thread and on three, however the work is
+/// split. Returns the hits.
 fn traced(mesh: &Mesh, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
     let bvh = Bvh::new(mesh);
     let expected: Vec<_> = rays.iter().map(|ray| bvh.closest(ray)).collect();
     let fan = Fan::new(rays).unwrap();
     let picture = Picture::new(&fan, mesh);
-    let alone = shared_by_facets(&picture, 1);
+    let alone = split_by_facets(&picture, 1);
     for shares in [2, 7] {
-        assert!(shared_by_facets(&picture, shares) == alone, "{shares} shares of the facets");
-        assert!(shared_by_rays(&picture, shares) == alone, "{shares} bands");
+        assert!(split_by_facets(&picture, shares) == alone, "{shares} parts of the facets");
+        assert!(split_by_rays(&picture, shares) == alone, "{shares} bands");
     }
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -45,7 +46,7 @@ fn traced(mesh: &Mesh, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
     expected
 }
 
-/// Traces as the naive loop does, to rounding.
+/// Asserts that the fan also gives the hits of the naive loop, up to rounding. Returns the hits.
 fn judged(mesh: &Mesh, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
     let found = traced(mesh, rays);
     for (ray, found) in rays.iter().zip(&found) {
