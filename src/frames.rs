@@ -191,6 +191,13 @@ impl<To, From> Mul<Direction<From>> for Pose<To, From> {
     }
 }
 
+impl<To, From> Mul<Ray<From>> for Pose<To, From> {
+    type Output = Ray<To>;
+    fn mul(self, ray: Ray<From>) -> Ray<To> {
+        Ray { origin: self * ray.origin, direction: self * ray.direction }
+    }
+}
+
 impl<To, Mid, From> Mul<Pose<Mid, From>> for Pose<To, Mid> {
     type Output = Pose<To, From>;
     fn mul(self, inner: Pose<Mid, From>) -> Pose<To, From> {

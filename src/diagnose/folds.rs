@@ -60,19 +60,23 @@ impl Folds {
     /// Sum of one number per shot, and its standard error over cells. The cells are smaller
     /// than the patches of the folds: a local effect would lie in one patch and have no standard error.
     pub fn sum(&self, values: &[f64]) -> [f64; 2] {
-        let mut sums = vec![0.0; self.cells];
-        for (value, &cell) in values.iter().zip(&self.cell) {
-            sums[cell] += value;
-        }
-        let count = sums.len().max(2) as f64;
-        let total: f64 = sums.iter().sum();
-        let variance =
-            sums.iter().map(|s| (s - total / count).powi(2)).sum::<f64>() / (count - 1.0);
-        [total, (count * variance).sqrt()]
+        sum_by_cell(values, &self.cell, self.cells)
     }
 }
 
+/// Sum of the values, and its standard error over cells; `cell` is the cell of each value, below `cells`.
+pub(super) fn sum_by_cell(values: &[f64], cell: &[usize], cells: usize) -> [f64; 2] {
+    let mut sums = vec![0.0; cells];
+    for (value, &cell) in values.iter().zip(cell) {
+        sums[cell] += value;
+    }
+    let count = sums.len().max(2) as f64;
+    let total: f64 = sums.iter().sum();
+    let variance = sums.iter().map(|s| (s - total / count).powi(2)).sum::<f64>() / (count - 1.0);
+    [total, (count * variance).sqrt()]
+}
+
 /// The square of a grid over the target plane in which a shot lies.
-fn square(shot: &Shot, side_m: f64) -> [i64; 2] {
+pub(super) fn square(shot: &Shot, side_m: f64) -> [i64; 2] {
     [shot.yt_m, shot.xt_m].map(|x| (x / side_m).floor() as i64)
 }

@@ -7,7 +7,6 @@ use rayon::prelude::*;
 
 use super::error::DiagnoseError;
 use super::observation::Observation;
-use super::shots::missed_shot;
 use crate::effects::{Model, Shot, Stage};
 use crate::frames::{Global, Point, Ray};
 use crate::measure::cloud::{Cloud, CloudPoint};
@@ -200,7 +199,7 @@ impl Scan<'_> {
             } else {
                 // The chirp misses, or the scan has no such chirp.
                 let sent = chirp.and_then(|chirp| self.index_of_chirp.get(&chirp).copied());
-                let shot = sent.and_then(|index| missed_shot(self.chirps, &progress, index));
+                let shot = sent.map(|index| Shot::missed(self.chirps, index, progress[index]));
                 let range_m = shot.map_or(0.0, |shot| range_m(point, &shot));
                 if let Some(shot) = shot
                     && is_past_an_edge(point, &shot, target.as_ref())

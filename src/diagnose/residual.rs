@@ -14,7 +14,7 @@ use statrs::function::erf::{erfc, erfc_inv};
 use statrs::function::gamma::digamma;
 
 use super::field::Structure;
-use super::folds::Folds;
+use super::folds::{Folds, square};
 use super::likelihood::Likelihood;
 use super::observation::{Declared, Observation};
 use super::score::DB;
@@ -125,11 +125,6 @@ fn sum_over_neighbours(
         }
     }
     (count > 0.0).then_some((sum, count))
-}
-
-/// The square of a grid over the target plane in which a shot lies.
-fn square(shot: &Shot, side_m: f64) -> [i64; 2] {
-    [shot.xt_m, shot.yt_m].map(|x| (x / side_m).floor() as i64)
 }
 
 /// Number of shots beyond [`OUTLYING`] standard deviations in power.

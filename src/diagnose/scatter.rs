@@ -6,7 +6,7 @@
 //! reason. Every strength must also reach a declared size: with thousands of shots everything is significant.
 
 use super::covariates::{Covariate, quantiles};
-use super::folds::Folds;
+use super::folds::{Folds, square};
 use super::residual::{Unexplained, speckle_sd_db};
 use crate::effects::{Prediction, Shot};
 use crate::radar::random::{Key, Purpose};
@@ -114,10 +114,7 @@ impl Tests {
     /// Cells of the target plane.
     fn map(&self, shots: &[Shot]) -> Vec<usize> {
         let side_m = MAP_CELL * self.block_m;
-        let cell_of_shot: Vec<[i64; 2]> = shots
-            .iter()
-            .map(|shot| [shot.xt_m, shot.yt_m].map(|x| (x / side_m).floor() as i64))
-            .collect();
+        let cell_of_shot: Vec<[i64; 2]> = shots.iter().map(|shot| square(shot, side_m)).collect();
         let mut cells = cell_of_shot.clone();
         cells.sort_unstable();
         cells.dedup();

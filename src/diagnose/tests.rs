@@ -3,7 +3,6 @@
 
 use glam::DVec3;
 
-use super::shots::missed_shot;
 use super::*;
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
 use crate::effects::{
@@ -277,7 +276,7 @@ fn a_target_that_has_moved_far_is_found_by_its_ranges() {
         library[1].parameters().iter().map(|known| found[known.name].value).collect();
     let chirps = chirps(&Radar::default());
     for index in (chirps.rays.len() / 2..chirps.rays.len() * 4 / 5).step_by(40) {
-        let shot = missed_shot(&chirps, &chirps.progress(), index).unwrap();
+        let shot = Shot::missed(&chirps, index, chirps.progress()[index]);
         let mut off_m = DVec3::ZERO;
         for (number, (value, expected)) in values.iter().zip(&path).enumerate() {
             let (axis, share) = library[1].shifts(number, &shot).unwrap();

@@ -163,6 +163,15 @@ pub struct Conflict {
     pub way_out: &'static str,
 }
 
+impl Conflict {
+    /// The conflict of every effect that moves the target.
+    pub(super) const OF_MOTION: Conflict = Conflict {
+        with: Setting::Bounce,
+        problem: "moves the target, and [bounce] follows paths on it where the scene has it",
+        way_out: "remove [bounce], or move the mesh by its translation_m and rotation_deg",
+    };
+}
+
 /// A setting of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Setting {
@@ -216,7 +225,7 @@ pub struct EffectParameter {
 }
 
 impl EffectParameter {
-    pub(super) const fn new(
+    pub(crate) const fn new(
         name: &'static str,
         unit: &'static str,
         [min, max]: [f64; 2],

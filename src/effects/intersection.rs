@@ -4,40 +4,11 @@ use glam::{DMat3, DVec3};
 
 use super::shot::{Shot, Stage};
 use crate::frames::{Direction, Global, Pose, Ray, Surface};
-use crate::trace::Hit;
+use crate::trace::{Hit, LocalFrame};
 
-/// Axes on a surface: along the grain, across it, and the normal.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Axes(DMat3);
-
-impl Axes {
-    /// At a normal; a grain that stands on the surface has no direction along it.
-    pub(super) fn new(normal: DVec3, grain: DVec3) -> Axes {
-        let along = grain - grain.dot(normal) * normal;
-        let stands = along.length_squared() <= 1e-18 * grain.length_squared();
-        let along = if stands { normal.any_orthonormal_vector() } else { along.normalize() };
-        Axes(DMat3::from_cols(along, normal.cross(along), normal))
-    }
-
-    /// At the surface of a shot.
-    pub(super) fn of(stage: &Stage, shot: &Shot) -> Axes {
-        Axes::new(shot.normal, grain(stage, shot.region))
-    }
-
-    fn normal(&self) -> DVec3 {
-        self.0.z_axis
-    }
-
-    /// A unit vector of the world, seen from the surface.
-    pub(super) fn local(&self, world: DVec3) -> Direction<Surface> {
-        let above = Direction::from_angles(0.0, 0.0);
-        Direction::new(self.0.transpose() * world).unwrap_or(above)
-    }
-
-    /// A vector of the surface, in the world.
-    pub(super) fn world(&self, local: DVec3) -> DVec3 {
-        self.0 * local
-    }
+/// The local frame at the surface of a shot.
+pub(super) fn local_frame(stage: &Stage, shot: &Shot) -> LocalFrame {
+    LocalFrame::new(shot.normal, grain(stage, shot.region))
 }
 
 fn grain(stage: &Stage, region: u16) -> DVec3 {
@@ -47,7 +18,12 @@ fn grain(stage: &Stage, region: u16) -> DVec3 {
 /// The shot along another ray, at the closest hit of that ray; `None` where the ray misses.
 pub(super) fn shot_along(stage: &Stage, shot: &Shot, ray: Ray<Global>) -> Option<Shot> {
     let hit = stage.geometry.bvh.closest(&ray)?;
-    Some(surface_at(stage, &ray, &hit).shot(shot, ray, hit))
+    Some(shot_at(stage, &Shot { ray, ..*shot }, hit))
+}
+
+/// The shot at a hit of its ray.
+pub(crate) fn shot_at(stage: &Stage, shot: &Shot, hit: Hit) -> Shot {
+    surface_at(stage, &shot.ray, &hit).shot(shot, shot.ray, hit)
 }
 
 /// The surface where a ray hits it.
@@ -61,8 +37,8 @@ pub(super) struct HitSurface {
 
 /// A facet, whose two sides are alike.
 pub(super) struct Facet {
-    /// At its outward normal; `None` where rounding leaves no normal.
-    axes: Option<Axes>,
+    /// The frame at its outward normal; `None` where rounding leaves no normal.
+    frame: Option<LocalFrame>,
     grain: DVec3,
     region: u16,
 }
@@ -71,19 +47,21 @@ impl Facet {
     pub(super) fn of(stage: &Stage, number: usize) -> Facet {
         let region = stage.geometry.region_of_facet.get(number).copied().unwrap_or(0);
         let (normal, grain) = (stage.geometry.bvh.mesh().area_normal(number), grain(stage, region));
-        let axes = normal.try_normalize().map(|normal| Axes::new(normal, grain));
-        Facet { axes, grain, region }
+        let frame = normal.try_normalize().map(|normal| LocalFrame::new(normal, grain));
+        Facet { frame, grain, region }
     }
 
     /// The side of it from which a ray comes.
     pub(super) fn surface(&self, ray: &Ray<Global>) -> HitSurface {
         let back = -ray.direction.xyz();
-        let axes = match self.axes {
-            None => Axes::new(back, self.grain),
-            Some(axes) if axes.normal().dot(back) < 0.0 => Axes::new(-axes.normal(), self.grain),
-            Some(axes) => axes,
+        let frame = match self.frame {
+            None => LocalFrame::new(back, self.grain),
+            Some(frame) if frame.normal().dot(back) < 0.0 => {
+                LocalFrame::new(-frame.normal(), self.grain)
+            }
+            Some(frame) => frame,
         };
-        HitSurface { normal: axes.normal(), region: self.region, to_radar: axes.local(back) }
+        HitSurface { normal: frame.normal(), region: self.region, to_radar: frame.local(back) }
     }
 }
 
@@ -106,14 +84,8 @@ pub(super) fn motion(rotation: DMat3, pivot: DVec3, shift_m: DVec3) -> Pose<Glob
     Pose::new(rotation, pivot + shift_m - rotation * pivot)
 }
 
-/// The ray in the frame of a target that has moved: what it hits there, the true ray hits on the moved target.
-pub(super) fn seen_from(target: &Pose<Global, Global>, ray: &Ray<Global>) -> Ray<Global> {
-    let back = target.inverse();
-    Ray { origin: back * ray.origin, direction: back * ray.direction }
-}
-
-/// The shot at a target that has moved, from the closest hit of its ray as [`seen_from`] the target, and the
-/// direction of the radar from its surface.
+/// The shot at a target that has moved, and the direction of the radar from its surface. `ray` is its ray in the frame of
+/// the target, and `hit` the closest hit of that.
 pub(super) fn moved(
     stage: &Stage,
     shot: &Shot,

@@ -36,6 +36,7 @@ pub use declared::SceneEffects;
 pub use echo::MeanEcho;
 pub use effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
 pub use entry::{EffectError, EffectList, entry, resolve};
+pub(crate) use intersection::shot_at;
 pub(crate) use library::rank;
 pub use library::{find, library};
 pub use model::{Model, Prediction, PredictionCache, Tilts};

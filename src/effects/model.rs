@@ -9,7 +9,7 @@ use super::cache::Cache;
 use super::ceiling::SaturationCurve;
 use super::echo::MeanEcho;
 use super::effect::{Effect, Survey};
-use super::intersection::{moved, seen_from};
+use super::intersection::moved;
 use super::library::pose::Pose as PoseEffect;
 use super::receiver::Receiver;
 use super::shot::{Shot, Stage};
@@ -193,7 +193,7 @@ impl Model<'_> {
     /// The shot where it hits the target, as the effects place that; `None` where its ray misses.
     pub(crate) fn placed(&self, stage: &Stage, shot: Shot) -> Option<Shot> {
         let Some(target) = self.target(stage, &shot) else { return Some(shot) };
-        let ray = seen_from(&target, &shot.ray);
+        let ray = target.inverse() * shot.ray;
         let hit = stage.geometry.bvh.closest(&ray)?;
         Some(moved(stage, &shot, target, ray, hit).0)
     }
@@ -203,18 +203,18 @@ impl Model<'_> {
         let targets: Vec<Option<Pose<Global, Global>>> =
             shots.par_iter().map(|shot| self.target(stage, shot)).collect();
         if targets.iter().all(Option::is_none) {
-            return shots.par_iter().map(|shot| Some((*shot, to_radar(shot)))).collect();
+            return shots.par_iter().map(|shot| Some((*shot, shot.to_radar()))).collect();
         }
         let rays: Vec<Ray<Global>> = shots
             .par_iter()
             .zip(&targets)
-            .map(|(shot, target)| target.map_or(shot.ray, |target| seen_from(&target, &shot.ray)))
+            .map(|(shot, target)| target.map_or(shot.ray, |target| target.inverse() * shot.ray))
             .collect();
         let hits = closest(stage.geometry.bvh, &rays);
         (shots, &targets, &rays, &hits)
             .into_par_iter()
             .map(|(shot, target, ray, hit)| match *target {
-                None => Some((*shot, to_radar(shot))),
+                None => Some((*shot, shot.to_radar())),
                 Some(target) => Some(moved(stage, shot, target, *ray, (*hit)?)),
             })
             .collect()
@@ -294,7 +294,7 @@ impl Model<'_> {
 
     /// Equation (11) with every effect on the surface and the gain.
     fn power_w(&self, stage: &Stage, shot: &Shot) -> f64 {
-        let f_per_sr = self.law_per_sr(shot, to_radar(shot));
+        let f_per_sr = self.law_per_sr(shot, shot.to_radar());
         self.gain(stage, shot) * self.scattered_w(stage, shot, f_per_sr)
     }
 
@@ -331,11 +331,6 @@ impl Model<'_> {
             (factor, weight)
         })
     }
-}
-
-/// The direction of the radar from the surface of a shot.
-fn to_radar(shot: &Shot) -> Direction<Surface> {
-    Direction::from_angles(shot.hit.theta_rad(), shot.azimuth_rad)
 }
 
 /// A number of every intersection; 0 where there is none.

@@ -2,9 +2,12 @@
 
 use glam::DVec3;
 
-use crate::frames::{Global, Pose, Ray};
-use crate::radar::Link;
+use crate::frames::{Direction, Global, Pose, Ray, Surface};
+use crate::radar::{Chirps, Link};
 use crate::trace::{Hit, ScanGeometry};
+
+/// Facet of a shot that misses the target.
+const NO_FACET: u32 = u32::MAX;
 
 /// One chirp that hits the target, as far as the scene knows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +36,38 @@ pub struct Shot {
     pub yt_m: f64,
     /// Distance in the target plane to the nearest edge in depth, m, at most three spots.
     pub edge_m: f64,
+}
+
+impl Shot {
+    /// The shot of a chirp that misses the target, at place 0 of the target frame and with range 0. `index` is that of the
+    /// chirp in the scan, and `progress` the share of the scan that is over.
+    pub(crate) fn missed(chirps: &Chirps, index: usize, progress: f64) -> Shot {
+        let ray = chirps.rays[index];
+        Shot {
+            chirp: chirps.number[index],
+            time_s: chirps.time_s.get(index).copied().unwrap_or(0.0),
+            progress,
+            ray,
+            hit: Hit { facet: NO_FACET, range_m: 0.0, point: ray.origin, cos_theta: 1.0 },
+            normal: -ray.direction.xyz(),
+            target: Pose::NONE,
+            azimuth_rad: 0.0,
+            region: 0,
+            xt_m: 0.0,
+            yt_m: 0.0,
+            edge_m: 0.0,
+        }
+    }
+
+    /// Direction to the radar in the local frame of the surface.
+    pub(crate) fn to_radar(&self) -> Direction<Surface> {
+        Direction::from_angles(self.hit.theta_rad(), self.azimuth_rad)
+    }
+
+    /// Whether the chirp misses the target.
+    pub(crate) fn misses(&self) -> bool {
+        self.hit.facet == NO_FACET
+    }
 }
 
 /// What all shots of a scan share: the instrument and the target as the scene places it.

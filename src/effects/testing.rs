@@ -7,11 +7,11 @@ use super::{
     Effect, EffectParameter, MeanEcho, Model, Prediction, Receiver, Shot, Stage, library, middle,
 };
 use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
-use crate::frames::{Point, Pose, Ray};
+use crate::frames::{Point, Ray};
 use crate::geometry::Mesh;
 use crate::radar::{Chirps, Link, Radar};
 use crate::scene::solids;
-use crate::trace::{Bvh, Hit, ScanGeometry};
+use crate::trace::{Bvh, ScanGeometry};
 
 /// Decibels of a ratio.
 pub(super) fn db(ratio: f64) -> f64 {
@@ -113,26 +113,14 @@ fn shot(stage: &Stage, chirp: u32) -> Option<Shot> {
     let (xt_m, yt_m) = (at(chirp % SIDE), at(chirp / SIDE));
     let origin = Point::new(0.0, 0.0, 8.0);
     let ray = Ray { origin, direction: origin.towards(Point::new(xt_m, yt_m, 0.0))? };
-    let hit = Hit { facet: 0, range_m: 0.0, point: origin, cos_theta: 1.0 };
-    let progress = f64::from(chirp) / f64::from(SIDE * SIDE - 1);
-    let (time_s, normal) = (f64::from(chirp) * 2e-4, DVec3::Z);
-    let (azimuth_rad, region, edge_m) = (0.0, 0, 0.05);
-    let target = Pose::NONE;
-    let blank = Shot {
-        chirp,
-        time_s,
-        progress,
-        ray,
-        hit,
-        normal,
-        target,
-        azimuth_rad,
-        region,
-        xt_m,
-        yt_m,
-        edge_m,
+    let chirps = Chirps {
+        rays: vec![ray],
+        number: vec![chirp],
+        time_s: vec![2e-4 * f64::from(chirp)],
+        ..Chirps::default()
     };
-    shot_along(stage, &blank, ray)
+    let missed = Shot::missed(&chirps, 0, f64::from(chirp) / f64::from(SIDE * SIDE - 1));
+    shot_along(stage, &Shot { xt_m, yt_m, edge_m: 0.05, ..missed }, ray)
 }
 
 /// Two walls that face each other at a right angle, open towards the radar.

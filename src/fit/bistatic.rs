@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::coordinates::{Coordinates, frequencies};
 use super::error::FitError;
-use super::minimise::{Local, Minimise, Stop};
+use super::minimise::{Local, Minimise, Stop, step_each};
 use super::search::drawn_start;
 use crate::brdf::{Brdf, Scattering};
 use crate::frames::{Direction, Surface};
@@ -122,14 +122,7 @@ impl Bistatic {
 fn local(coordinates: &Coordinates, samples: &[Sample], at: &DVector<f64>) -> Local {
     let upper = coordinates.upper();
     let here = levels_db(&coordinates.model(at), samples);
-    // The levels after a step of each coordinate, for one-sided differences.
-    let mut moved: Vec<(f64, Vec<f64>)> = Vec::new();
-    for index in 0..at.len() {
-        let step = if at[index] + STEP > upper[index] { -STEP } else { STEP };
-        let mut there = at.clone();
-        there[index] += step;
-        moved.push((step, levels_db(&coordinates.model(&there), samples)));
-    }
+    let moved = step_each(at, &upper, STEP, |there| levels_db(&coordinates.model(there), samples));
     let mut sum = Local::zero(at.len());
     for (row, (sample, level_db)) in samples.iter().zip(&here).enumerate() {
         let residual = level_db - db_from_ratio(sample.f_per_sr);

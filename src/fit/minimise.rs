@@ -233,6 +233,23 @@ fn step(local: &Local, free: &[usize], damping: f64) -> DVector<f64> {
     step
 }
 
+/// The values after a step of each unknown, with the step, for one-sided differences. A step that would pass the upper
+/// bound goes the other way.
+pub(crate) fn step_each<T>(
+    at: &DVector<f64>,
+    upper: &DVector<f64>,
+    step: f64,
+    value: impl Fn(&DVector<f64>) -> T,
+) -> Vec<(f64, T)> {
+    let one = |index: usize| {
+        let step = if at[index] + step > upper[index] { -step } else { step };
+        let mut there = at.clone();
+        there[index] += step;
+        (step, value(&there))
+    };
+    (0..at.len()).map(one).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,11 +4,11 @@
 use glam::DVec3;
 
 use super::error::RegistrationError;
-use super::icp::{Gap, Motion, NormalEquations, bulk_sd_m, point_to_point, rigid};
+use super::icp::{Gap, Motion, NormalEquations, bulk_sd_m, median, point_to_point, rigid};
 use super::nearest::Nearest;
 use super::settings::{Metric, Registration};
 use super::tracer::Intersection;
-use super::view::{View, median};
+use super::view::View;
 use crate::frames::{Global, Point, Pose};
 
 /// Each virtual scan pairs points within half the reach of the one before, down to this, m.

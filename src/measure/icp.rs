@@ -77,12 +77,17 @@ impl Kernel {
 
 /// Standard deviation of the bulk of some gaps by the median of their sizes, m; 0 for none.
 pub fn bulk_sd_m(sizes_m: impl Iterator<Item = f64>) -> f64 {
-    let mut sizes_m: Vec<f64> = sizes_m.map(f64::abs).collect();
-    if sizes_m.is_empty() {
+    SD_PER_MEDIAN * median(sizes_m.map(f64::abs))
+}
+
+/// The median; 0 of none.
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    if values.is_empty() {
         return 0.0;
     }
-    let middle = sizes_m.len() / 2;
-    SD_PER_MEDIAN * *sizes_m.select_nth_unstable_by(middle, f64::total_cmp).1
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 impl Motion {

@@ -74,10 +74,8 @@ impl<'a> Incidence<'a> {
         let Hit { range_m, cos_theta, point, .. } = sighting.hit;
         let tangent = (1.0 / (cos_theta * cos_theta) - 1.0).max(0.0).sqrt();
         let step_m = 2.0 * margin_m * tangent.max(1.0);
-        around(ray, point, margin_m).all(|beside| {
-            let seen =
-                beside.and_then(|beside| self.tracer.intersect(&self.registered.pose, &beside));
-            seen.is_some_and(|Intersection { hit, .. }| {
+        self.around(ray, point, margin_m).all(|beside| {
+            beside.is_some_and(|Intersection { hit, .. }| {
                 self.region(&hit) == Some(sighting.region)
                     && (hit.range_m - range_m).abs() <= step_m
             })
@@ -92,32 +90,30 @@ impl<'a> Incidence<'a> {
         let point = sighting.hit.point;
         let aside_m = SURE_SD * self.registered.shift_sd_m(point);
         let Some(here) = self.tracer.intersect(&self.registered.pose, ray) else { return false };
-        around(ray, point, aside_m).all(|beside| {
-            let there =
-                beside.and_then(|beside| self.tracer.intersect(&self.registered.pose, &beside));
-            there.is_some_and(|there| there.normal.dot(here.normal) > 1.0 - ONE_PLANE)
+        self.around(ray, point, aside_m).all(|beside| {
+            beside.is_some_and(|beside| beside.normal.dot(here.normal) > 1.0 - ONE_PLANE)
         })
     }
 
     fn region(&self, hit: &Hit) -> Option<u16> {
         self.target.region_of_facet.get(hit.facet as usize).copied()
     }
-}
-
-/// Eight rays from where a ray starts to a circle about a point, across the beam.
-fn around(
-    ray: &Ray<Global>,
-    point: Point<Global>,
-    radius_m: f64,
-) -> impl Iterator<Item = Option<Ray<Global>>> {
-    const AROUND: usize = 8;
-    let (origin, (u, v)) = (ray.origin, ray.direction.xyz().any_orthonormal_pair());
-    (0..AROUND).map(move |number| {
-        let (sin, cos) = (std::f64::consts::TAU * number as f64 / AROUND as f64).sin_cos();
-        let aside: DVec3 = radius_m * (cos * u + sin * v);
-        let direction = origin.towards(Point::from(point.xyz + aside))?;
-        Some(Ray { origin, direction })
-    })
+    /// The intersections of eight rays from the origin of a ray to a circle about a point, across the beam.
+    fn around(
+        &self,
+        ray: &Ray<Global>,
+        point: Point<Global>,
+        radius_m: f64,
+    ) -> impl Iterator<Item = Option<Intersection>> {
+        const AROUND: usize = 8;
+        let (origin, (u, v)) = (ray.origin, ray.direction.xyz().any_orthonormal_pair());
+        (0..AROUND).map(move |number| {
+            let (sin, cos) = (std::f64::consts::TAU * number as f64 / AROUND as f64).sin_cos();
+            let aside: DVec3 = radius_m * (cos * u + sin * v);
+            let direction = origin.towards(Point::from(point.xyz + aside))?;
+            self.tracer.intersect(&self.registered.pose, &Ray { origin, direction })
+        })
+    }
 }
 
 #[cfg(test)]

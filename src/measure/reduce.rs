@@ -441,8 +441,8 @@ mod tests {
     }
 
     fn reduce(measured: &Measured, settings: Reduction) -> Result<ReductionResult, ReductionError> {
-        let Measured { mesh, radar, chirps, cloud } = measured;
-        let registered = Registration::default().run(mesh, radar, chirps, cloud).unwrap();
+        let registered = measured.register(&Registration::default()).unwrap();
+        let Measured { radar, chirps, cloud, .. } = measured;
         settings.run(&target(measured), radar, chirps, cloud, &registered)
     }
 

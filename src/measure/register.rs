@@ -257,9 +257,7 @@ mod tests {
     fn register(settings: Registration, seed: u64) -> (Measured, RegistrationResult) {
         let measured = mannequin(2e-3, seed);
         let start = Start::Given(pushed(&measured, 0.03, 5f64.to_radians(), seed));
-        let found = Registration { start, ..settings }
-            .run(&measured.mesh, &measured.radar, &measured.chirps, &measured.cloud)
-            .unwrap();
+        let found = measured.register(&Registration { start, ..settings }).unwrap();
         (measured, found)
     }
 
@@ -290,8 +288,8 @@ mod tests {
         let mut normalised = 0.0;
         for seed in 0..SEEDS {
             let measured = mannequin(2e-3, 100 + seed);
-            let found = Registration { keep_given: false, ..Default::default() }
-                .run(&measured.mesh, &measured.radar, &measured.chirps, &measured.cloud)
+            let found = measured
+                .register(&Registration { keep_given: false, ..Default::default() })
                 .unwrap();
             let error = Motion::of(&found.pose.inverse(), found.pivot.xyz);
             let covariance = nalgebra::Matrix6::from_fn(|i, j| found.covariance[i][j]);
@@ -310,8 +308,7 @@ mod tests {
         let measured = mannequin(2e-3, 4);
         let run = |start| {
             let settings = Registration { start, ..Default::default() };
-            let Measured { mesh, radar, chirps, cloud } = &measured;
-            settings.run(mesh, radar, chirps, cloud).unwrap()
+            measured.register(&settings).unwrap()
         };
         let right = run(Start::default());
         assert!(right.kept && apart(&right) == (0.0, 0.0));
@@ -323,9 +320,7 @@ mod tests {
     #[test]
     fn a_plane_says_what_it_does_not_tell() {
         let measured = Measured::of(crate::scene::solids::plate(2.0, 2.0), 2e-3, 1);
-        let found = Registration::default()
-            .run(&measured.mesh, &measured.radar, &measured.chirps, &measured.cloud)
-            .unwrap();
+        let found = measured.register(&Registration::default()).unwrap();
         assert_eq!(found.verdicts.len(), 3, "{:?}", found.verdicts);
         for words in ["shift along x", "shift along y", "turn about z"] {
             assert!(found.verdicts.iter().any(|v| v.contains(words)), "{:?}", found.verdicts);
@@ -338,17 +333,13 @@ mod tests {
     fn a_tenth_of_false_alarms_changes_nothing() {
         let measured = mannequin(2e-3, 3).with_false_alarms(10, 3);
         let start = Start::Given(pushed(&measured, 0.03, 5f64.to_radians(), 3));
-        let found = Registration { start, ..Default::default() }
-            .run(&measured.mesh, &measured.radar, &measured.chirps, &measured.cloud)
-            .unwrap();
+        let found = measured.register(&Registration { start, ..Default::default() }).unwrap();
         let (shift_m, turn_rad) = apart(&found);
         assert!(shift_m < NEAR_M && turn_rad < NEAR_RAD, "{shift_m} {turn_rad}");
     }
 
     fn refused(measured: &Measured, settings: Registration) -> RegistrationError {
-        settings
-            .run(&measured.mesh, &measured.radar, &measured.chirps, &measured.cloud)
-            .unwrap_err()
+        measured.register(&settings).unwrap_err()
     }
 
     #[test]
@@ -413,8 +404,8 @@ mod tests {
             DVec3::new(0.4, 0.1, 0.5),
         );
         turned.mesh.vertices.iter_mut().for_each(|v| *v = (away * Point::from(*v)).xyz);
-        let found = Registration { start: Start::Automatic, ..Default::default() }
-            .run(&turned.mesh, &turned.radar, &turned.chirps, &turned.cloud)
+        let found = turned
+            .register(&Registration { start: Start::Automatic, ..Default::default() })
             .unwrap();
         let error = Motion::of(&(found.pose * away), found.pivot.xyz);
         let (shift_m, turn_rad) = (error.shift_m.length(), error.turn_rad.length());

@@ -3,8 +3,10 @@
 use glam::DVec3;
 
 use super::cloud::{Cloud, CloudPoint};
+use super::error::RegistrationError;
 use super::icp::Motion;
 use super::register::RegistrationResult;
+use super::settings::Registration;
 use super::tracer::{Intersection, RaySet, Tracer};
 use crate::frames::{Global, Point, Pose};
 use crate::geometry::Mesh;
@@ -54,6 +56,14 @@ impl Measured {
         }
         let cloud = Cloud::new(points).unwrap();
         Measured { mesh, radar, chirps, cloud }
+    }
+
+    /// Registers the mesh to its cloud.
+    pub fn register(
+        &self,
+        settings: &Registration,
+    ) -> Result<RegistrationResult, RegistrationError> {
+        settings.run(&self.mesh, &self.radar, &self.chirps, &self.cloud)
     }
 
     /// The first points only.

@@ -40,7 +40,7 @@ impl<'a> RaySet<'a> {
 
     /// The closest hits of the rays, moved by `pose`.
     fn closest(&self, bvh: &Bvh, pose: &Pose<Global, Global>) -> Vec<Option<Hit>> {
-        let there: Vec<Ray<Global>> = self.rays.iter().map(|ray| carried(pose, ray)).collect();
+        let there: Vec<Ray<Global>> = self.rays.iter().map(|ray| *pose * *ray).collect();
         match self.fan.as_ref().and_then(|fan| fan.carried(&there, pose)) {
             Some(fan) => fan.closest(bvh.mesh()),
             None => bvh.closest_of_each(&there),
@@ -79,7 +79,7 @@ impl<'a> Tracer<'a> {
         pose: &Pose<Global, Global>,
         ray: &Ray<Global>,
     ) -> Option<Intersection> {
-        let hit = self.bvh.closest(&carried(&pose.inverse(), ray))?;
+        let hit = self.bvh.closest(&(pose.inverse() * *ray))?;
         Some(self.moved(pose, ray, hit))
     }
 
@@ -102,10 +102,6 @@ impl<'a> Tracer<'a> {
         let turned = if normal.dot(ray.direction.xyz()) > 0.0 { -normal } else { normal };
         Intersection { hit: Hit { point: *pose * hit.point, ..hit }, normal: turned }
     }
-}
-
-fn carried(back: &Pose<Global, Global>, ray: &Ray<Global>) -> Ray<Global> {
-    Ray { origin: *back * ray.origin, direction: *back * ray.direction }
 }
 
 #[cfg(test)]

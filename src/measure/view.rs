@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::cloud::Cloud;
-use super::icp::Gap;
+use super::icp::{Gap, median};
 use super::tracer::{Intersection, RaySet, Tracer};
 use crate::frames::{Global, Pose, Ray};
 use crate::geometry::Mesh;
@@ -78,16 +78,6 @@ impl RayGap {
         let gap = Gap { at: hit.point.xyz, gradient, size_m: range_error_m / steep };
         Some(RayGap { gap, range_error_m })
     }
-}
-
-/// The median; 0 for none.
-pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Median of each coordinate: a few points far off do not move it.

@@ -13,13 +13,13 @@ use super::observer::Observer;
 use super::path::Path;
 use super::setup::Setup;
 use super::spot::{Footprints, Intersection};
-use super::surface::{Facing, LocalFrame};
+use super::surface::Facing;
 use crate::brdf::Scattering;
 use crate::effects::{
     Conflict, Level, MeanEcho, Model, PredictionCache, Receiver, Setting, Shot, Stage, middle,
-    tilted_cos_theta,
+    shot_at, tilted_cos_theta,
 };
-use crate::frames::{Direction, Global, Point, Pose, Ray, Surface};
+use crate::frames::{Direction, Global, Ray, Surface};
 use crate::radar::Link;
 use crate::radar::random::{Key, Purpose};
 use crate::trace::{Hit, ScanGeometry};
@@ -38,9 +38,6 @@ pub(super) struct Acting<'a> {
     progress: Vec<f64>,
     receiver: Receiver,
 }
-
-/// Facet of a shot that misses the target.
-const NO_FACET: u32 = u32::MAX;
 
 impl<'a> Acting<'a> {
     /// `None` for a setup without effects.
@@ -74,7 +71,8 @@ impl<'a> Acting<'a> {
             hit.map_or(self.missed_shot(chirp, *ray), |hit| self.shot(chirp, *ray, hit, None));
         match self.model.placed(&self.stage(), shot) {
             Some(placed) if placed == shot => (hit, None),
-            Some(Shot { hit, normal, azimuth_rad, .. }) if hit.facet != NO_FACET => {
+            Some(placed) if !placed.misses() => {
+                let Shot { hit, normal, azimuth_rad, .. } = placed;
                 (Some(hit), Some(Facing { normal, azimuth_rad }))
             }
             _ => (None, None),
@@ -191,39 +189,19 @@ impl<'a> Acting<'a> {
 
     /// The shot of a ray with a hit. Without `facing` the surface lies as the mesh has it.
     fn shot(&self, chirp: usize, ray: Ray<Global>, hit: Hit, facing: Option<Facing>) -> Shot {
+        let missed = self.missed_shot(chirp, ray);
+        let Some(Facing { normal, azimuth_rad }) = facing else {
+            return shot_at(&self.stage(), &missed, hit);
+        };
         let region = self.setup.geometry.region_of_facet[hit.facet as usize];
-        let Facing { normal, azimuth_rad } = facing.unwrap_or_else(|| {
-            let back = -ray.direction.xyz();
-            let grain = self.grain_of_region[usize::from(region)];
-            let frame = LocalFrame::new(self.setup.geometry.bvh.mesh(), &hit, back, grain);
-            let [x, y, _] = frame.local(back).xyz().to_array();
-            Facing { normal: frame.normal, azimuth_rad: y.atan2(x) }
-        });
-        Shot { hit, normal, azimuth_rad, region, ..self.missed_shot(chirp, ray) }
+        Shot { hit, normal, azimuth_rad, region, ..missed }
     }
 
     /// The shot of a ray that misses the target.
     fn missed_shot(&self, chirp: usize, ray: Ray<Global>) -> Shot {
-        let chirps = self.setup.geometry.chirps;
-        Shot {
-            chirp: chirps.number[chirp],
-            time_s: chirps.time_s[chirp],
-            progress: self.progress[chirp],
-            ray,
-            hit: Hit {
-                facet: NO_FACET,
-                range_m: 0.0,
-                point: Point::from(DVec3::ZERO),
-                cos_theta: 1.0,
-            },
-            normal: -ray.direction.xyz(),
-            target: Pose::NONE,
-            azimuth_rad: 0.0,
-            region: 0,
-            xt_m: self.places[chirp].x,
-            yt_m: self.places[chirp].y,
-            edge_m: 0.0,
-        }
+        let missed = Shot::missed(self.setup.geometry.chirps, chirp, self.progress[chirp]);
+        let DVec2 { x: xt_m, y: yt_m } = self.places[chirp];
+        Shot { ray, normal: -ray.direction.xyz(), xt_m, yt_m, ..missed }
     }
 }
 

@@ -19,12 +19,13 @@ use super::error::RenderError;
 use super::observer::Observer;
 use super::setup::Setup;
 use super::spot::{self, Spot};
-use super::surface::{LocalFrame, Surface};
+use super::surface::Surface;
 use crate::frames::{Global, Pose, Ray};
 use crate::geometry::Mesh;
 use crate::radar::{Beam, Detection, Footprint, Link};
 use crate::trace::{
-    Cone, EchoTracer, GpuError, Hit, RAYS_PER_SHARE, ScanGeometry, Share, TraceError, Tracer,
+    Cone, EchoTracer, GpuError, Hit, LocalFrame, RAYS_PER_SHARE, ScanGeometry, Share, TraceError,
+    Tracer,
 };
 
 /// Rays per turn: enough to occupy a device, and few enough to hold their hits.
@@ -216,7 +217,7 @@ impl<'a> Work<'a> {
             let mesh_from_world = self.mesh_from_world(first + place);
             (0..self.rays)
                 .filter(is_open)
-                .filter_map(move |ray| Some((place, in_mesh(mesh_from_world, &spot.ray(ray)?))))
+                .filter_map(move |ray| Some((place, *mesh_from_world * spot.ray(ray)?)))
         });
         open.collect()
     }
@@ -244,7 +245,7 @@ impl<'a> Work<'a> {
         let region = self.batch.geometry.region_of_facet[hit.facet as usize];
         let surface = take.surfaces.get(usize::from(region))?;
         let to_radar = -ray.direction.xyz();
-        let to_radar = LocalFrame::new(mesh, hit, to_radar, surface.grain).local(to_radar);
+        let to_radar = LocalFrame::at_hit(mesh, hit, to_radar, surface.grain).local(to_radar);
         let f_per_sr = surface.scattering.f_per_sr(to_radar, to_radar);
         Some(self.link.power_w(hit.range_m, hit.cos_theta, f_per_sr))
     }
@@ -257,8 +258,7 @@ impl<'a> Work<'a> {
         let ranges_m = match self.rays {
             1 => vec![None; some.len()],
             _ => {
-                let axis =
-                    |chirp| in_mesh(self.mesh_from_world(chirp), &chirps.rays[number(chirp)]);
+                let axis = |chirp| *self.mesh_from_world(chirp) * chirps.rays[number(chirp)];
                 let axes: Vec<Ray<Global>> = some.clone().into_par_iter().map(axis).collect();
                 let range_m = |hit: Option<Hit>| hit.map(|hit| hit.range_m);
                 geometry.closest(&axes)?.into_iter().map(range_m).collect()
@@ -275,7 +275,7 @@ impl<'a> Work<'a> {
     fn cone(&self, chirp: usize, spot: &Spot) -> Cone {
         let mesh_from_world = self.mesh_from_world(chirp);
         Cone {
-            axis: in_mesh(mesh_from_world, &spot.axis),
+            axis: *mesh_from_world * spot.axis,
             across: spot.across().map(|aside| mesh_from_world.rotation() * aside),
             law: (self.take(chirp) * self.regions) as u32,
         }
@@ -289,11 +289,6 @@ impl<'a> Work<'a> {
     fn mesh_from_world(&self, chirp: usize) -> &Pose<Global, Global> {
         &self.mesh_from_world[self.take(chirp)]
     }
-}
-
-/// A ray in the frame of the mesh.
-fn in_mesh(mesh_from_world: &Pose<Global, Global>, ray: &Ray<Global>) -> Ray<Global> {
-    Ray { origin: *mesh_from_world * ray.origin, direction: *mesh_from_world * ray.direction }
 }
 
 fn gpu_error(error: GpuError) -> RenderError {

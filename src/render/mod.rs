@@ -3,7 +3,7 @@
 //! | step | file |
 //! |---|---|
 //! | intersections of the rays of each chirp with the target | `spot.rs`, equation (7) |
-//! | surfaces and their local frames | `surface.rs` |
+//! | the surfaces of the target | `surface.rs` |
 //! | power that arrives at an antenna by single paths | `paths.rs`, equation (11) |
 //! | … and by second-order paths | `bounce.rs` |
 //! | … with declared physical effects | `acting.rs` |
@@ -39,5 +39,4 @@ pub use observer::Observer;
 pub use scan::{Scan, beat_signals, shade, trace, trace_placed};
 pub use setup::Setup;
 pub use spot::Footprints;
-pub(crate) use surface::LocalFrame;
 pub use surface::{Facing, Surface};

@@ -17,12 +17,12 @@ use super::observer::Observer;
 use super::path::{Path, sum};
 use super::setup::Setup;
 use super::spot::Footprints;
-use super::surface::{Facing, LocalFrame, Surface};
+use super::surface::{Facing, Surface};
 use crate::effects::MeanEcho;
 use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
 use crate::radar::random::{Key, Purpose};
 use crate::radar::{Beam, Detection, Link};
-use crate::trace::Hit;
+use crate::trace::{Hit, LocalFrame};
 
 /// Distance above a surface at which a ray starts, m, so that it does not hit the same surface again. It is far above
 /// the rounding of f64 and far below a wavelength.
@@ -135,7 +135,7 @@ impl<'a> Emission<'a> {
             setup.surfaces[usize::from(setup.geometry.region_of_facet[hit.facet as usize])];
         let to_source = (source - hit.point.xyz).normalize_or(DVec3::Z);
         let to_antenna = (self.antenna - hit.point.xyz).normalize_or(DVec3::Z);
-        let frame = LocalFrame::new(setup.geometry.bvh.mesh(), &hit, to_source, surface.grain);
+        let frame = LocalFrame::at_hit(setup.geometry.bvh.mesh(), &hit, to_source, surface.grain);
         let here = frame.local(to_source);
         let antenna = if self.antenna == source { here } else { frame.local(to_antenna) };
         let antenna_m = self.antenna.distance(hit.point.xyz);
@@ -218,7 +218,7 @@ impl<'a> Emission<'a> {
 
     /// The closest hit of a ray from a point.
     fn trace_from(&self, lit: &LitPoint, towards: Direction<Local>) -> Option<Hit> {
-        let origin = Point::from(lit.hit.point.xyz + LIFT_M * lit.frame.normal);
+        let origin = Point::from(lit.hit.point.xyz + LIFT_M * lit.frame.normal());
         let direction = Direction::new(lit.frame.world(towards.xyz()))?;
         self.paths.setup.geometry.bvh.closest(&Ray { origin, direction })
     }

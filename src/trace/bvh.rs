@@ -86,23 +86,13 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::frames::Point;
     use crate::trace::brute;
+    use crate::trace::testing::{mesh, ray, soup};
     use proptest::prelude::*;
 
     fn plate() -> Mesh {
-        Mesh {
-            vertices: [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-                .map(|(x, y)| DVec3::new(x, y, 0.0))
-                .to_vec(),
-            facets: vec![[0, 1, 2], [0, 2, 3]],
-            labels: vec![],
-        }
-    }
-
-    fn ray(origin: DVec3, through: DVec3) -> Ray<Global> {
-        let origin = Point::from(origin);
-        Ray { origin, direction: origin.towards(through.into()).unwrap() }
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        mesh(&corners.map(|[x, y]| [x, y, 0.0]), &[[0, 1, 2], [0, 2, 3]])
     }
 
     #[test]
@@ -156,28 +146,11 @@ mod tests {
 
     #[test]
     fn from_inside_a_box_the_nearer_wall_is_hit() {
-        let mut mesh = plate();
-        let back = Mesh {
-            vertices: mesh.vertices.iter().map(|v| *v + 4.0 * DVec3::Z).collect(),
-            ..plate()
-        };
+        let (mut mesh, mut back) = (plate(), plate());
+        back.vertices.iter_mut().for_each(|vertex| vertex.z = 4.0);
         mesh.append(&back).unwrap();
         let hit = Bvh::new(&mesh).closest(&ray(DVec3::new(0.1, 0.2, 3.0), DVec3::ZERO)).unwrap();
         assert!(hit.facet < 2 && hit.range_m < 3.1);
-    }
-
-    prop_compose! {
-        fn soup()(
-            corners in prop::collection::vec(prop::array::uniform3(-1.0f64..1.0), 3..90),
-            picks in prop::collection::vec(prop::array::uniform3(0usize..90), 1..60),
-        ) -> Mesh {
-            let n = corners.len();
-            Mesh {
-                vertices: corners.into_iter().map(DVec3::from).collect(),
-                facets: picks.into_iter().map(|p| p.map(|i| (i % n) as u32)).collect(),
-                labels: vec![],
-            }
-        }
     }
 
     proptest! {

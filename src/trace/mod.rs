@@ -15,8 +15,11 @@ mod facet;
 mod gpu;
 mod hit;
 mod inside;
+mod local_frame;
 mod pinhole;
 mod scan;
+#[cfg(test)]
+mod testing;
 mod tracer;
 mod wide;
 
@@ -25,6 +28,7 @@ pub use gpu::{Answer, Gpu, GpuError, GpuMesh};
 pub(crate) use gpu::{Cone, EchoTracer, RAYS_PER_SHARE, Share};
 pub use hit::Hit;
 pub use inside::winding_number;
+pub use local_frame::LocalFrame;
 pub use pinhole::{Fan, NoFan};
 pub use scan::ScanGeometry;
 pub use tracer::{TraceError, Tracer, closest};

@@ -67,12 +67,11 @@ pub fn closest(bvh: &Bvh, rays: &[Ray<Global>]) -> Vec<Option<Hit>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frames::Point;
     use crate::scene::solids;
+    use crate::trace::testing;
 
     fn ray(from: [f64; 3], to: [f64; 3]) -> Ray<Global> {
-        let [origin, to] = [from, to].map(|[x, y, z]| Point::new(x, y, z));
-        Ray { origin, direction: origin.towards(to).unwrap() }
+        testing::ray(from.into(), to.into())
     }
 
     #[test]

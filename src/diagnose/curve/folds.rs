@@ -2,6 +2,7 @@
 
 use super::points::Points;
 use super::settings::LEAST_BLOCKS;
+use crate::diagnose::folds::sum_by_cell;
 use crate::radar::random::{Key, Purpose};
 
 /// Least points of a run: a smooth curve bridges a shorter gap.
@@ -53,15 +54,7 @@ impl Folds {
 
     /// Sum and its standard error over runs of one number for each point.
     pub fn sum(&self, values: &[f64]) -> [f64; 2] {
-        let mut sums = vec![0.0; self.blocks];
-        for (value, &block) in values.iter().zip(&self.block) {
-            sums[block] += value;
-        }
-        let count = sums.len().max(2) as f64;
-        let total: f64 = sums.iter().sum();
-        let variance =
-            sums.iter().map(|s| (s - total / count).powi(2)).sum::<f64>() / (count - 1.0);
-        [total, (count * variance).sqrt()]
+        sum_by_cell(values, &self.block, self.blocks)
     }
 }
 

@@ -11,7 +11,7 @@ use super::points::{Point, Points};
 use super::terms::Term;
 use crate::brdf::{Brdf, Scattering};
 use crate::fit::coordinates::{Coordinates, frequencies};
-use crate::fit::minimise::{Local, Minimise, Minimum};
+use crate::fit::minimise::{Local, Minimise, Minimum, step_each};
 use crate::fit::uncertainty::deviations;
 use crate::fit::{FitError, normal_share};
 use crate::units::db_from_ratio;
@@ -181,14 +181,7 @@ impl Model {
         scale_db: f64,
     ) -> Local {
         let here = self.levels_db(at, points);
-        let moved: Vec<(f64, Vec<f64>)> = (0..at.len())
-            .map(|index| {
-                let step = if at[index] + STEP > upper[index] { -STEP } else { STEP };
-                let mut there = at.clone();
-                there[index] += step;
-                (step, self.levels_db(&there, points))
-            })
-            .collect();
+        let moved = step_each(at, upper, STEP, |there| self.levels_db(there, points));
         let mut sum = Local::zero(at.len());
         for (row, (point, level_db)) in points.iter().zip(&here).enumerate() {
             let jacobian: Vec<f64> =

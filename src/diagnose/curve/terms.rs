@@ -54,16 +54,6 @@ pub fn term(name: &str) -> Option<&'static dyn Term> {
     terms().into_iter().find(|term| term.name() == name)
 }
 
-const fn parameter(
-    name: &'static str,
-    unit: &'static str,
-    [min, max]: [f64; 2],
-    absent: f64,
-    step: f64,
-) -> EffectParameter {
-    EffectParameter { name, unit, min, max, absent, step }
-}
-
 /// Every pair of two lists.
 fn pairs(first: &[f64], second: &[f64]) -> Vec<Vec<f64>> {
     first.iter().flat_map(|&a| second.iter().map(move |&b| vec![a, b])).collect()
@@ -126,7 +116,7 @@ impl Term for DiffuseLobe {
          or rough layers below the surface.",
         "The level falls with the angle between the normal and the direction midway between source and \
          receiver, smoothly and at all incidences alike. Limb darkening goes with both angles apart.",
-        parameter("alpha", "1", [0.0, 50.0], 0.0, 0.1),
+        EffectParameter::new("alpha", "1", [0.0, 50.0], 0.0, 0.1),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -153,7 +143,7 @@ impl Term for LimbDarkening {
          that leaves a deep layer.",
         "The diffuse level falls (k above 0) or rises (below 0) towards grazing angles of the source \
          and of the receiver, whatever lies between them.",
-        parameter("k", "1", [-0.9, 5.0], 0.0, 0.05),
+        EffectParameter::new("k", "1", [-0.9, 5.0], 0.0, 0.05),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -178,8 +168,8 @@ impl Term for SecondLobe {
         "A narrow core on a broad foot, or the reverse, that follows the mirror direction and grows \
          towards grazing incidence. Which of two lobes is called the second means nothing. A lobe of the \
          instrument keeps its width at all incidences.",
-        parameter("f_lambda", "1", [0.0, 1.0], 0.0, 1e-3),
-        parameter("m", "1", [0.01, 1.5], 0.3, 0.01),
+        EffectParameter::new("f_lambda", "1", [0.0, 1.0], 0.0, 1e-3),
+        EffectParameter::new("m", "1", [0.01, 1.5], 0.3, 0.01),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -206,7 +196,7 @@ impl Term for FresnelGrowth {
          incidence, and all towards grazing (another index of refraction).",
         "The specular level rises more steeply (above 0) or less (below 0) from one incidence to \
          the next than its level says. In backscatter facets are met at right angles, and it does not show.",
-        parameter("level_db", "dB", [-30.0, 30.0], 0.0, 0.2),
+        EffectParameter::new("level_db", "dB", [-30.0, 30.0], 0.0, 0.2),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -236,7 +226,7 @@ impl Term for Subsurface {
          every angle: f rises as 1/(cos θ_i·cos θ_s).",
         "The curve flattens, or bends upwards, towards grazing angles of source and receiver alike. Stray \
          light rises with the receiver's angle alone, at every incidence by the same amount.",
-        parameter("sigma_v", "1", [0.0, 1.0], 0.0, 5e-4),
+        EffectParameter::new("sigma_v", "1", [0.0, 1.0], 0.0, 5e-4),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -263,8 +253,8 @@ impl Term for ThinFilm {
          thickness is optical, in wavelengths.",
         "Maxima and minima that crowd towards grazing angles. No other term goes up and down more than \
          once. Thicknesses that put the same number of ripples over the angles cannot be told apart.",
-        parameter("visibility", "1", [-0.95, 0.95], 0.0, 0.02),
-        parameter("thickness", "1", [0.1, 20.0], 1.0, 0.01),
+        EffectParameter::new("visibility", "1", [-0.95, 0.95], 0.0, 0.02),
+        EffectParameter::new("thickness", "1", [0.1, 20.0], 1.0, 0.01),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -295,8 +285,8 @@ impl Term for Opposition {
          that go one way round and the other interfere.",
         "A peak about the direction of the source at every incidence, where the detector does not hide \
          it. A backscatter curve is all peak and does not show it.",
-        parameter("height", "1", [0.0, 3.0], 0.0, 0.02),
-        parameter("width_deg", "deg", [0.5, 30.0], 5.0, 0.2),
+        EffectParameter::new("height", "1", [0.0, 3.0], 0.0, 0.02),
+        EffectParameter::new("width_deg", "deg", [0.5, 30.0], 5.0, 0.2),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -320,7 +310,7 @@ impl Term for AngleOffset {
          much: everything is seen from so much further off the normal.",
         "The peaks of all incidences are shifted to the same side by the same angle, and each flank errs \
          by its slope.",
-        parameter("offset_deg", "deg", [-10.0, 10.0], 0.0, 0.1),
+        EffectParameter::new("offset_deg", "deg", [-10.0, 10.0], 0.0, 0.1),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -354,8 +344,8 @@ impl Term for InstrumentLobe {
         "A narrow lobe of fixed width in the mirror direction: the mirror image of the source, as wide as \
          the beam and the receiver's aperture.",
         "A peak a few degrees wide, and equally wide at all incidences, exactly in the mirror direction.",
-        parameter("level_per_sr", "sr-1", [0.0, 1e4], 0.0, 1e-3),
-        parameter("width_deg", "deg", [0.1, 5.0], 1.0, 0.05),
+        EffectParameter::new("level_per_sr", "sr-1", [0.0, 1e4], 0.0, 1e-3),
+        EffectParameter::new("width_deg", "deg", [0.1, 5.0], 1.0, 0.05),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {
@@ -380,7 +370,7 @@ impl Term for StrayLight {
          receiver's cosine it becomes s/cos θ_s.",
         "The curve rises (s above 0) or falls (below 0) towards grazing receivers, most where the sample is \
          darkest, and by the same amount at every incidence.",
-        parameter("s_per_sr", "sr-1", [-0.1, 0.1], 0.0, 1e-4),
+        EffectParameter::new("s_per_sr", "sr-1", [-0.1, 0.1], 0.0, 1e-4),
     );
 
     fn starts(&self) -> Vec<Vec<f64>> {

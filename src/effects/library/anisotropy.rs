@@ -54,7 +54,7 @@ impl Effect for Anisotropy {
             return f_per_sr;
         }
         let theta_rad = shot.hit.theta_rad();
-        let retro = Direction::from_angles(theta_rad, shot.azimuth_rad);
+        let retro = shot.to_radar();
         let turned = Direction::from_angles(theta_rad, shot.azimuth_rad - turn_deg.to_radians());
         rescaled(law, retro, f_per_sr, &|lobe| stretched(lobe, ratio).f_per_sr(turned, turned))
     }

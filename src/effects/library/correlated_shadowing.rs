@@ -4,7 +4,6 @@ use crate::brdf::{Brdf, CookTorrance, Scattering, Shadowing};
 use crate::effects::effect::{About, Effect, EffectParameter, Level};
 use crate::effects::lobes::rescaled;
 use crate::effects::shot::{Shot, Stage};
-use crate::frames::Direction;
 
 /// The effect `correlated-shadowing`.
 pub(crate) struct CorrelatedShadowing;
@@ -35,7 +34,7 @@ impl Effect for CorrelatedShadowing {
         if share == 0.0 {
             return f_per_sr;
         }
-        let retro = Direction::from_angles(shot.hit.theta_rad(), shot.azimuth_rad);
+        let retro = shot.to_radar();
         rescaled(law, retro, f_per_sr, &|lobe| {
             let once = CookTorrance { shadowing: Shadowing::Correlated, ..*lobe };
             (1.0 - share) * lobe.f_per_sr(retro, retro) + share * once.f_per_sr(retro, retro)

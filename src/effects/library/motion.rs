@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
 
-use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting};
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level};
 use crate::effects::intersection::motion;
 use crate::effects::shot::{Shot, Stage};
 use crate::frames::{Global, Pose};
@@ -14,41 +14,21 @@ use crate::frames::{Global, Pose};
 /// The effect `motion`.
 pub(crate) struct Motion;
 
+/// The parameters `x0_m`, `y0_m`, `z0_m`, `x1_m` and so on of the terms with these numbers.
+macro_rules! along_axes {
+    ($($term:literal)+) => {
+        [$(
+            along(concat!("x", $term, "_m")),
+            along(concat!("y", $term, "_m")),
+            along(concat!("z", $term, "_m")),
+        )+]
+    };
+}
+
 /// Cosines of a path, the constant among them, and all its terms: up to about two and a half cycles a scan.
 const COSINES: usize = 8;
 const TERMS: usize = COSINES + 2;
-const PARAMETERS: [EffectParameter; 3 * TERMS] = [
-    along("x0_m"),
-    along("y0_m"),
-    along("z0_m"),
-    along("x1_m"),
-    along("y1_m"),
-    along("z1_m"),
-    along("x2_m"),
-    along("y2_m"),
-    along("z2_m"),
-    along("x3_m"),
-    along("y3_m"),
-    along("z3_m"),
-    along("x4_m"),
-    along("y4_m"),
-    along("z4_m"),
-    along("x5_m"),
-    along("y5_m"),
-    along("z5_m"),
-    along("x6_m"),
-    along("y6_m"),
-    along("z6_m"),
-    along("x7_m"),
-    along("y7_m"),
-    along("z7_m"),
-    along("x8_m"),
-    along("y8_m"),
-    along("z8_m"),
-    along("x9_m"),
-    along("y9_m"),
-    along("z9_m"),
-];
+const PARAMETERS: [EffectParameter; 3 * TERMS] = along_axes!(0 1 2 3 4 5 6 7 8 9);
 
 const fn along(axis: &'static str) -> EffectParameter {
     EffectParameter::new(axis, "m", [-0.1, 0.1], 0.0, 2e-3)
@@ -95,11 +75,7 @@ const ABOUT: About = About {
          mirror passes twice disagree. A wrong pose is off alike from the first chirp to the last; a \
          drift of the gain leaves the ranges as they are.",
     parameters: &PARAMETERS,
-    conflicts: &[Conflict {
-        with: Setting::Bounce,
-        problem: "moves the target, and [bounce] follows paths on it where the scene has it",
-        way_out: "remove [bounce], or move the mesh by its translation_m and rotation_deg",
-    }],
+    conflicts: &[Conflict::OF_MOTION],
 };
 
 impl Effect for Motion {

@@ -13,10 +13,11 @@ use rayon::prelude::*;
 use crate::brdf::{Brdf, Distribution, Scattering};
 use crate::effects::echo::MeanEcho;
 use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
-use crate::effects::intersection::{Axes, shot_along};
+use crate::effects::intersection::{local_frame, shot_along};
 use crate::effects::shot::{Shot, Stage};
 use crate::effects::spread::sunflower;
 use crate::frames::{Direction, Point, Ray, Surface};
+use crate::trace::LocalFrame;
 use crate::units::ratio_from_db;
 
 /// The effect `multi-bounce`.
@@ -89,11 +90,11 @@ impl Detour {
 fn detour(
     stage: &Stage,
     shot: &Shot,
-    axes: &Axes,
+    frame: &LocalFrame,
     o: Direction<Surface>,
     density_per_sr: f64,
 ) -> Option<Detour> {
-    let onward = axes.world(o.xyz());
+    let onward = frame.world(o.xyz());
     let start = shot.hit.point.xyz + CLEARANCE_M * shot.normal;
     let ray = Ray { origin: Point::from(start), direction: Direction::new(onward)? };
     let second = shot_along(stage, shot, ray)?;
@@ -106,13 +107,13 @@ fn detour(
     if cos_exit <= 0.0 || hidden {
         return None;
     }
-    let there = Axes::of(stage, &second);
+    let there = local_frame(stage, &second);
     let way_m = shot.hit.point.distance_m(second.hit.point) + back_m;
     let sent_w = stage.link.flux_w(shot.hit.cos_theta) * o.cos_theta() / density_per_sr;
     let share = stage.link.received_per_w(back_m, cos_exit, 1.0) / (KINDS * DIRECTIONS) as f64;
     Some(Detour {
         regions: [shot.region, second.region],
-        first: [axes.local(-shot.ray.direction.xyz()), o],
+        first: [frame.local(-shot.ray.direction.xyz()), o],
         second: [there.local(-onward), there.local(back.xyz())],
         watts_per_f2: sent_w * share,
         range_m: (shot.hit.range_m + way_m) / 2.0,
@@ -122,9 +123,9 @@ fn detour(
 /// All paths of a chirp by way of second surfaces, on the target as the scene has it.
 fn detours(stage: &Stage, shot: &Shot) -> Vec<Detour> {
     let Some(shot) = &shot_along(stage, shot, shot.ray) else { return Vec::new() };
-    let axes = Axes::of(stage, shot);
-    let i = axes.local(-shot.ray.direction.xyz());
-    onward(i).filter_map(|(o, density)| detour(stage, shot, &axes, o, density)).collect()
+    let frame = local_frame(stage, shot);
+    let i = frame.local(-shot.ray.direction.xyz());
+    onward(i).filter_map(|(o, density)| detour(stage, shot, &frame, o, density)).collect()
 }
 
 /// Power, W, and range, m, of all that a chirp returns by way of a second surface.

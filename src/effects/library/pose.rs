@@ -3,7 +3,7 @@
 
 use glam::{DMat3, DVec3};
 
-use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting};
+use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level};
 use crate::effects::intersection::motion;
 use crate::effects::shot::{Shot, Stage};
 use crate::frames::{Global, Pose as FramePose};
@@ -39,11 +39,7 @@ const ABOUT: About = About {
          wrong: too strong on one side of the brightest place and too weak on the other. Edges have \
          hits where none should be. Motion does the same, but changes along the scan.",
     parameters: &PARAMETERS,
-    conflicts: &[Conflict {
-        with: Setting::Bounce,
-        problem: "moves the target, and [bounce] follows paths on it where the scene has it",
-        way_out: "remove [bounce], or move the mesh by its translation_m and rotation_deg",
-    }],
+    conflicts: &[Conflict::OF_MOTION],
 };
 
 impl Effect for Pose {

@@ -11,7 +11,6 @@
 use crate::brdf::{Brdf, Fresnel, Layer, Layered, Scattering, ScatteringModel};
 use crate::effects::effect::{About, Effect, EffectParameter, Level};
 use crate::effects::shot::{Shot, Stage};
-use crate::frames::Direction;
 
 /// The effect `thin-film`.
 pub(crate) struct ThinFilm;
@@ -113,7 +112,7 @@ impl Effect for ThinFilm {
             frequency_hz,
             theta_rad,
         );
-        let retro = Direction::from_angles(theta_rad, shot.azimuth_rad);
+        let retro = shot.to_radar();
         let share = law.specular_share(retro, retro);
         let specular = film / bare.max(1e-9);
         let crossed = ((1.0 - film) / (1.0 - bare).max(1e-9)).powi(2);

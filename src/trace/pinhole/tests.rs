@@ -5,23 +5,14 @@ use super::*;
 use crate::frames::Point;
 use crate::scene::{mannequin, solids};
 use crate::trace::brute;
+use crate::trace::testing::{mesh, ray, soup};
 
 /// Relative difference of ranges from the naive loop, which uses another formula.
 const RANGE: f64 = 1e-9;
 
-fn ray(origin: DVec3, through: DVec3) -> Ray<Global> {
-    let origin = Point::from(origin);
-    Ray { origin, direction: origin.towards(through.into()).unwrap() }
-}
-
 /// Rays from one point through many.
 fn rays(origin: DVec3, through: impl IntoIterator<Item = DVec3>) -> Vec<Ray<Global>> {
     through.into_iter().map(|at| ray(origin, at)).collect()
-}
-
-fn soup(corners: &[[f64; 3]], facets: &[[u32; 3]]) -> Mesh {
-    let vertices = corners.iter().copied().map(DVec3::from).collect();
-    Mesh { vertices, facets: facets.to_vec(), labels: vec![] }
 }
 
 /// Asserts that the fan gives the hits of the hierarchy, bit for bit, on one thread and on three, however the work is
@@ -124,7 +115,7 @@ fn a_body_and_a_ball_are_the_naive_loop_s() {
 
 #[test]
 fn one_facet_and_one_ray_will_do() {
-    let mesh = soup(&[[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]], &[[0, 1, 2]]);
+    let mesh = mesh(&[[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]], &[[0, 1, 2]]);
     let origin = DVec3::new(0.2, 0.1, 4.0);
     assert!(judged(&mesh, &rays(origin, [DVec3::ZERO]))[0].is_some());
     assert!(judged(&mesh, &rays(origin, [DVec3::new(0.9, 0.9, 0.0)]))[0].is_none());
@@ -139,7 +130,7 @@ fn one_facet_and_one_ray_will_do() {
 fn of_facets_on_top_of_each_other_the_first_is_met() {
     let corners = [[-1.0, -1.0, 0.3], [1.0, -1.0, -0.2], [0.9, 1.0, 0.1], [-1.0, 1.0, 0.0]];
     // Twice the same, once turned around, and a part of its plane.
-    let mut mesh = soup(&corners, &[[0, 1, 2], [1, 2, 0], [0, 2, 1], [0, 2, 3]]);
+    let mut mesh = mesh(&corners, &[[0, 1, 2], [1, 2, 0], [0, 2, 1], [0, 2, 3]]);
     let [a, b, c] = mesh.corners(0);
     mesh.vertices.push((a + b + c) / 3.0);
     mesh.facets.push([0, 1, 4]);
@@ -171,7 +162,7 @@ fn facets_behind_across_and_beside_the_origin() {
         [0.01, 0.01, -4.0],
         [0.03, 0.0, -4.0],
     ];
-    let mesh = soup(&corners, &[[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11], [12, 13, 14]]);
+    let mesh = mesh(&corners, &[[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11], [12, 13, 14]]);
     let through = grid(50, 0.5).chain([DVec3::new(0.004, 0.003, 0.0)]);
     let hits = judged(&mesh, &rays(origin, through));
     let met = |facet: u32| hits.iter().flatten().filter(|hit| hit.facet == facet).count();
@@ -213,7 +204,7 @@ fn needles_and_slivers() {
 fn a_facet_without_area_is_met_by_nothing() {
     let corners =
         [[0.0, 0.0, 0.0], [1e-9, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.5, 0.0], [1.0, 1.0, -1.0]];
-    let mesh = soup(&corners, &[[0, 3, 2], [0, 0, 2], [0, 2, 4]]);
+    let mesh = mesh(&corners, &[[0, 3, 2], [0, 0, 2], [0, 2, 4]]);
     let aims = (0..=1000).map(|i| DVec3::new(0.0, 1e-3 * f64::from(i), 0.0));
     assert!(traced(&mesh, &rays(DVec3::Z, aims)).iter().flatten().all(|hit| hit.facet == 2));
 }
@@ -245,7 +236,7 @@ fn the_bounds_hold() {
         };
         let middle = near(0.8);
         let corners = [0; 3].map(|_| (middle + near(size)).to_array());
-        let mesh = soup(&corners, &[[0, 1, 2]]);
+        let mesh = mesh(&corners, &[[0, 1, 2]]);
         let [a, b, c] = mesh.corners(0);
         let aims = (0..200).map(|i| {
             let along = a.lerp(b, f64::from(i) / 199.0);
@@ -258,24 +249,10 @@ fn the_bounds_hold() {
     }
 }
 
-prop_compose! {
-    fn any_soup()(
-        corners in prop::collection::vec(prop::array::uniform3(-1.0f64..1.0), 3..90),
-        picks in prop::collection::vec(prop::array::uniform3(0usize..90), 1..60),
-    ) -> Mesh {
-        let n = corners.len();
-        Mesh {
-            vertices: corners.into_iter().map(DVec3::from).collect(),
-            facets: picks.into_iter().map(|p| p.map(|i| (i % n) as u32)).collect(),
-            labels: vec![],
-        }
-    }
-}
-
 proptest! {
     #[test]
     fn it_traces_as_the_naive_loop_does(
-        mesh in any_soup(),
+        mesh in soup(),
         // Within a facet: exactly on an outer edge the two may round to different sides.
         aims in prop::collection::vec((0usize..60, 0.01f64..0.49, 0.01f64..0.49), 40),
         far in 0.2f64..20.0,
@@ -296,7 +273,7 @@ proptest! {
 
     #[test]
     fn it_traces_as_the_hierarchy_does_on_edges_and_corners(
-        mesh in any_soup(),
+        mesh in soup(),
         far in 1.5f64..20.0,
     ) {
         traced(&mesh, &rays(DVec3::new(0.4, 0.3, far), edges(&mesh)));
