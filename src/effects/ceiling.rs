@@ -1,29 +1,30 @@
-//! A receiver that saturates: how much of an echo and of its speckle it passes.
+//! A receiver that saturates: its output for an echo and for the speckle of the echo.
 //!
-//! It acts on a power u as h(u) = u·(1 + (u/P_sat)^p)^(−1/p). Acting at once, on the mean of ℓ of the
-//! L looks at a time, it turns a mean P̄ into M = E h(u), u of the Gamma law of ℓ looks about P̄, and
-//! the relative deviation 1/√L of the speckle into β/√L, β = √ℓ·sd h(u)/M. A gain control slower than
-//! a chirp acts on the mean alone: M = h(P̄), β = 1. What is received as P then leaves as M·(P/P̄)^β,
-//! which has that mean and that deviation to first order, and can be inverted.
+//! The output for a power u is h(u) = u·(1 + (u/P_sat)^p)^(−1/p). A fast receiver applies h to the mean of ℓ of
+//! the L looks at a time. It turns a mean P̄ into M = E h(u), with u from the Gamma distribution of ℓ looks about P̄, and
+//! the relative deviation 1/√L of the speckle into β/√L, with β = √ℓ·sd h(u)/M. A gain control slower than
+//! a chirp acts on the mean alone: M = h(P̄), β = 1. The output for a received power P is then M·(P/P̄)^β. It has that
+//! mean and that deviation to first order, and can be inverted.
 
-/// Looks that fluctuate too little to matter.
+/// Number of looks from which speckle is neglected.
 const STEADY: f64 = 1e4;
-/// Nodes of an integral over the speckle, and how many of its standard deviations these reach.
+/// Nodes of an integral over the speckle.
 const NODES: usize = 40;
+/// Reach of these nodes, in standard deviations of the speckle.
 const REACH: f64 = 8.0;
-/// Least β: a receiver that passes nothing of a fluctuation cannot be inverted.
+/// Least β, so that the output can be inverted.
 const LEAST_PASSED: f64 = 0.01;
 
 /// The saturation of a receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ceiling {
-    /// Power P_sat above which most is lost, W; infinite for a receiver that is linear.
+    /// Saturation power P_sat, W; infinite for a linear receiver.
     pub saturation_w: f64,
-    /// How suddenly it begins, the exponent p.
+    /// Exponent p: the larger, the sharper the onset.
     pub knee: f64,
-    /// Whether it acts at once, 1, or by the mean alone, 0, or something between.
+    /// 1 for a fast receiver, 0 for one that acts on the mean alone; values between interpolate.
     pub at_once: f64,
-    /// How many looks are averaged before it acts: ln ℓ/ln L, from 0, each by itself, to 1, all.
+    /// Looks averaged before the saturation, as ln ℓ/ln L: from 0 for single looks to 1 for all.
     pub averaged: f64,
 }
 
@@ -31,16 +32,18 @@ pub struct Ceiling {
 #[derive(Clone, Debug, PartialEq)]
 pub struct SaturationCurve {
     ln_saturation: f64,
-    /// ln(M/P_sat) and β over ln(P̄/P_sat) from [`FIRST`] by [`STEP`]; none for a receiver that is linear.
+    /// ln(M/P_sat) and β over ln(P̄/P_sat), from [`FIRST`] in steps of [`STEP`]; empty for a linear receiver.
     knots: Vec<[f64; 2]>,
 }
 
-/// Range of ln(P̄/P_sat) beyond which nothing changes, and the step, which costs 0.002 dB.
+/// First ln(P̄/P_sat) of the table; below it the receiver is linear.
 const FIRST: f64 = -14.0;
+/// Last ln(P̄/P_sat) of the table; above it the output is constant.
 const LAST: f64 = 12.0;
+/// Step of the table in ln(P̄/P_sat), whose interpolation errs by 0.002 dB.
 const STEP: f64 = 0.05;
 
-/// A mean power and the speckle about it behind the receiver.
+/// The mean and the speckle at the output of the receiver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Output {
     /// ln M.
@@ -54,7 +57,7 @@ impl Ceiling {
     pub const NONE: Ceiling =
         Ceiling { saturation_w: f64::INFINITY, knee: 1.0, at_once: 1.0, averaged: 1.0 };
 
-    /// For speckle of this many looks.
+    /// The saturation curve for speckle of this number of looks.
     pub fn over(self, looks: f64) -> SaturationCurve {
         let ln_saturation = self.saturation_w.ln();
         if ln_saturation == f64::INFINITY {
@@ -98,7 +101,7 @@ impl Ceiling {
 }
 
 impl SaturationCurve {
-    /// The mean behind the receiver and β, from the ln of the mean power.
+    /// The mean of the output and β, from ln of the mean power, W.
     pub fn of(&self, ln_mean: f64) -> Output {
         let below = ln_mean - self.ln_saturation - FIRST;
         let (true, [_, .., last]) = (below > 0.0, &self.knots[..]) else {
@@ -111,7 +114,7 @@ impl SaturationCurve {
         Output { ln_mean: self.ln_saturation + ln_held, slope }
     }
 
-    /// The power behind the receiver, W, of a received power, W, about a mean, W.
+    /// The output, W, for a received power, W, whose mean is `mean_w`, W.
     pub fn passed_w(&self, mean_w: f64, power_w: f64) -> f64 {
         if self.knots.is_empty() || mean_w <= 0.0 || power_w <= 0.0 {
             return power_w;
@@ -120,7 +123,7 @@ impl SaturationCurve {
         (ln_mean + slope * (power_w / mean_w).ln()).exp()
     }
 
-    /// How much of a small relative change of a mean, W, passes.
+    /// Relative change of the mean output per small relative change of the mean `mean_w`, W.
     pub fn passes(&self, mean_w: f64) -> f64 {
         const STEP: f64 = 0.01;
         let [more, less] = [STEP, -STEP].map(|step| self.of(mean_w.ln() + step).ln_mean);
@@ -128,9 +131,9 @@ impl SaturationCurve {
     }
 }
 
-/// Powers over their mean of ℓ looks, and their weights, by the midpoint rule over ln u.
+/// Powers of ℓ looks over their mean, with their weights, by the midpoint rule over ln u.
 struct Speckle {
-    /// None where nothing fluctuates.
+    /// Empty without fluctuation.
     nodes: Vec<(f64, f64)>,
     sd: f64,
 }
@@ -168,7 +171,7 @@ mod tests {
         let linear = Ceiling::NONE.over(LOOKS);
         assert_eq!(linear.passed_w(1e-9, 3e-9), 3e-9);
         assert_eq!(linear.of(-20.0).slope, 1.0);
-        // Far below a ceiling, neither does one that has it.
+        // Far below its saturation power a receiver is linear, too.
         let high = Ceiling { saturation_w: 1.0, ..Ceiling::NONE }.over(LOOKS);
         assert!((high.passed_w(1e-9, 3e-9) / 3e-9 - 1.0).abs() < 1e-6);
     }

@@ -21,7 +21,7 @@ impl SceneEffects {
         self.everywhere.extend(effects);
     }
 
-    /// Adds the effects of a material, which act where `is_of_it` of the region is true.
+    /// Adds the effects of a material. They act on the regions for which `is_of_it` is true.
     pub fn add_to_regions(&mut self, effects: EffectList, is_of_it: &[bool]) {
         for (effect, values) in effects {
             self.on_regions.push((OnRegions { effect, is_of_it: is_of_it.to_vec() }, values));
@@ -33,7 +33,7 @@ impl SceneEffects {
         self.everywhere.is_empty() && self.on_regions.is_empty()
     }
 
-    /// The base laws of the regions with all of these effects.
+    /// The scattering models of the regions with all of these effects.
     pub fn model(&self, laws: Vec<Brdf>, receiver: Receiver) -> Model<'_> {
         let everywhere = self.everywhere.iter().map(|(e, v)| (*e as &dyn Effect, v.clone()));
         let on_regions = self.on_regions.iter().map(|(e, v)| (e as &dyn Effect, v.clone()));
@@ -43,7 +43,7 @@ impl SceneEffects {
     }
 }
 
-/// An effect of a material: it changes how the regions of that material scatter, and nothing else.
+/// An effect of a material, restricted to the regions of that material.
 #[derive(Clone)]
 struct OnRegions {
     effect: &'static dyn Effect,

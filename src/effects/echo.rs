@@ -1,14 +1,14 @@
 //! The mean echo of a chirp.
 
-/// The echo of one shot in the mean.
+/// The mean echo of one shot over speckle and noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeanEcho {
     /// Mean power, W.
     pub power_w: f64,
-    /// Range, the mean by power, m.
+    /// Mean range, weighted by power, m.
     pub range_m: f64,
-    /// Standard deviation, weighted by power, of the ranges of all that arrives, m. Speckle weighs these ranges
-    /// differently in each chirp, so the measured range may lie this far from the mean.
+    /// Standard deviation of the ranges of all paths, weighted by power, m. Speckle weights these ranges
+    /// differently in each chirp, so that the measured range may differ from the mean by this much.
     pub spread_m: f64,
 }
 
@@ -18,7 +18,7 @@ impl MeanEcho {
         MeanEcho { power_w, range_m, spread_m: 0.0 }
     }
 
-    /// Both echoes together; unchanged where neither has any power.
+    /// The sum of both echoes; unchanged if neither has power.
     pub fn with(self, other: MeanEcho) -> MeanEcho {
         let power_w = self.power_w + other.power_w;
         if power_w <= 0.0 {

@@ -1,4 +1,4 @@
-//! What a physical effect is.
+//! The interface of a physical effect.
 
 use std::any::Any;
 
@@ -13,7 +13,7 @@ use crate::frames::{Global, Pose};
 ///
 /// `values` are those of [`parameters`](Effect::parameters), in their order and within their ranges.
 pub trait Effect: Sync {
-    /// Its name, parameters, words and conflicts.
+    /// Its name, parameters, texts and conflicts.
     fn about(&self) -> &About;
 
     /// Its name, as reports and scenes write it.
@@ -21,33 +21,33 @@ pub trait Effect: Sync {
         self.about().name
     }
 
-    /// Where it belongs.
+    /// Its level: instrument, material or scene.
     fn level(&self) -> Level {
         self.about().level
     }
 
-    /// Its numbers.
+    /// Its parameters.
     fn parameters(&self) -> &'static [EffectParameter] {
         self.about().parameters
     }
 
-    /// What it is, in a sentence for a person.
+    /// Its description in one sentence, for a person.
     fn description(&self) -> &'static str {
         self.about().description
     }
 
-    /// How the data show it, and what distinguishes it from similar effects, for a person.
+    /// Its signature in the data, and how it differs from similar effects, for a person.
     fn signature(&self) -> &'static str {
         self.about().signature
     }
 
-    /// A sentence that sums up its values, for an effect that has too many to read one by one.
+    /// A phrase that summarises its values; `None` for an effect with few parameters.
     fn summary(&self, _values: &[f64]) -> Option<String> {
         None
     }
 
-    /// Where a search for it begins: values that are present but weak. Several where one start would
-    /// miss it, such as places over the target.
+    /// Values from which a search starts, with a weak effect. There are several if one start could miss the optimum,
+    /// such as places over the target.
     fn starts(&self, stage: &Stage, shots: &[Shot]) -> Vec<Vec<f64>>;
 
     /// Whether it depends on the time of a chirp.
@@ -60,8 +60,8 @@ pub trait Effect: Sync {
         false
     }
 
-    /// The global axis along which a parameter shifts the target under a shot, and by how many m per unit of
-    /// the parameter, after all that the others do; `None` for a parameter that does anything else.
+    /// The global axis (0, 1 or 2) along which a parameter shifts the target at a shot, and the shift, m per unit of
+    /// the parameter, applied after the other parameters. `None` for a parameter that does anything else.
     fn shifts(&self, _parameter: usize, _shot: &Shot) -> Option<(usize, f64)> {
         None
     }
@@ -71,7 +71,7 @@ pub trait Effect: Sync {
         &[]
     }
 
-    /// How it moves the target under the ray of a shot, by its values alone; `None` where the target rests.
+    /// The motion of the target at the time of a shot; `None` if the target does not move.
     fn motion(
         &self,
         _values: &[f64],
@@ -86,12 +86,12 @@ pub trait Effect: Sync {
         None
     }
 
-    /// The largest distance from the axis of its beam at which a chirp sees the target, m at 8 m.
+    /// The largest distance from the axis of the beam at which a chirp detects the target, m at 8 m.
     fn reach_off_axis_m(&self, _values: &[f64]) -> f64 {
         0.0
     }
 
-    /// f in backscatter, 1/sr, of a shot whose law without this effect has `f_per_sr`.
+    /// f in backscatter with this effect, 1/sr; `f_per_sr` is f without it.
     fn scatter(
         &self,
         _values: &[f64],
@@ -103,7 +103,7 @@ pub trait Effect: Sync {
         f_per_sr
     }
 
-    /// Factor on the power of a shot, a ratio.
+    /// Factor on the power of a shot, as a ratio.
     fn gain(&self, _values: &[f64], _stage: &Stage, _shot: &Shot) -> f64 {
         1.0
     }
@@ -113,53 +113,53 @@ pub trait Effect: Sync {
         None
     }
 
-    /// Traces the rays that a chirp needs besides its own: one entry for each shot, for any laws.
+    /// Traces further rays for every shot: one entry per shot, independent of the scattering models.
     fn survey(&self, _values: &[f64], _stage: &Stage, _shots: &[Shot]) -> Survey {
         Box::new(())
     }
 
-    /// Applies the laws of the regions to a survey: what does not depend on the values.
+    /// Applies the scattering models of the regions to a survey: the part that does not depend on the values.
     fn shade(&self, _survey: &Survey, _laws: &[Brdf]) -> Survey {
         Box::new(())
     }
 
-    /// Changes the mean powers, W, and ranges, m, of all shots together by a shaded survey, after all gains.
+    /// Changes the mean powers and ranges of all shots by a shaded survey. It is called after all gains.
     fn arrive(&self, _values: &[f64], _shaded: &Survey, _echoes: &mut [Option<MeanEcho>]) {}
 
-    /// Changes the receiver's law.
+    /// Changes the distribution of received powers.
     fn receive(&self, _values: &[f64], receiver: Receiver) -> Receiver {
         receiver
     }
 }
 
-/// What an effect has traced, or computed from that: a list of its own type with an entry for each shot.
+/// The traced rays of an effect, or values computed from them: a list of the effect's own type, one entry per shot.
 pub type Survey = Box<dyn Any + Send + Sync>;
 
-/// What is to say of an effect, whatever its values.
+/// The facts about an effect that do not depend on its values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct About {
     /// Its name, as reports and scenes write it.
     pub name: &'static str,
-    /// Where it belongs.
+    /// Its level: instrument, material or scene.
     pub level: Level,
-    /// What it is, in a sentence for a person.
+    /// Its description in one sentence, for a person.
     pub description: &'static str,
-    /// How the data show it, and what distinguishes it from similar effects, for a person.
+    /// Its signature in the data, and how it differs from similar effects, for a person.
     pub signature: &'static str,
-    /// Its numbers.
+    /// Its parameters.
     pub parameters: &'static [EffectParameter],
-    /// Settings of a scene that it cannot act with.
+    /// Settings of a scene that exclude it.
     pub conflicts: &'static [Conflict],
 }
 
-/// A setting of a scene that an effect cannot act with.
+/// A setting of a scene that excludes an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Conflict {
     /// The setting.
     pub with: Setting,
-    /// Why, as the end of a sentence that begins with the effect.
+    /// The reason, as the end of a sentence whose subject is the effect.
     pub problem: &'static str,
-    /// What to change.
+    /// The remedy.
     pub way_out: &'static str,
 }
 
@@ -183,7 +183,7 @@ pub enum Setting {
     RangeReceiver,
 }
 
-/// Where an effect belongs, and is stored after a diagnosis has found it.
+/// The level of an effect, which says where it is stored after a diagnosis has found it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Level {
@@ -206,7 +206,7 @@ impl Level {
     }
 }
 
-/// One number of an effect.
+/// A parameter of an effect.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct EffectParameter {
     /// Its name, with its unit.
@@ -217,10 +217,10 @@ pub struct EffectParameter {
     pub min: f64,
     /// Largest value.
     pub max: f64,
-    /// The value at which the effect is absent; for a number that only shapes an effect, such as a
-    /// place, where a search begins.
+    /// The value at which the effect is absent. For a parameter that only shapes an effect, such as a
+    /// place, the value from which a search starts.
     pub absent: f64,
-    /// A change that the data show: the step of a difference quotient and the first step of a search.
+    /// A change with a visible result: the step of difference quotients, and the first step of a search.
     pub step: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Effects as files write them.
+//! Effects as entries of files.
 
 use thiserror::Error;
 
@@ -17,22 +17,22 @@ pub enum EffectError {
     /// No such effect.
     #[error("there is no effect `{name}`; {way_out}")]
     Unknown {
-        /// The name that was asked for.
+        /// The name in the file.
         name: String,
         /// The nearest name, or all of them.
         way_out: String,
     },
-    /// The effect has no such number.
+    /// The effect has no such parameter.
     #[error("effect `{effect}` has no parameter `{parameter}`; {way_out}")]
     Parameter {
         /// The effect.
         effect: &'static str,
-        /// The parameter that was asked for.
+        /// The name in the file.
         parameter: String,
         /// The nearest name, or all of them.
         way_out: String,
     },
-    /// A number beyond its range.
+    /// A value is out of range.
     #[error(
         "effect `{effect}`: {parameter} = {} is out of range; give a value from {} to {}",
         shown(*value), shown(*min), shown(*max)
@@ -49,18 +49,18 @@ pub enum EffectError {
         /// Largest value.
         max: f64,
     },
-    /// The same effect again.
+    /// An effect is given twice.
     #[error("effect `{effect}` is given twice; give it once, with all its parameters")]
     Twice {
         /// The effect.
         effect: &'static str,
     },
-    /// The effect is written where it does not belong.
+    /// The effect is of another level than the place where it is written.
     #[error("effect `{effect}` does not belong here; {}", level.place())]
     Misplaced {
         /// The effect.
         effect: &'static str,
-        /// Where it belongs.
+        /// Its level.
         level: Level,
     },
 }
@@ -76,12 +76,11 @@ impl Level {
     }
 }
 
-/// The effects that entries mean, in the order in which they act; parameters that are not given have
+/// The effects of entries, in the order in which they act. Parameters that are not given have
 /// their [absent](EffectParameter::absent) values.
 ///
 /// # Errors
-/// When an entry names no effect or parameter of the library, a number is beyond its range, an effect
-/// is given twice, or is not of this level.
+/// When an effect or parameter is unknown, a value is out of range, or an effect is given twice or is of another level.
 ///
 /// ```
 /// use matdb::effects::{Level, resolve};
@@ -109,7 +108,7 @@ pub fn resolve(entries: &[EffectEntry], level: Level) -> Result<EffectList, Effe
     Ok(chosen)
 }
 
-/// How files write an effect with these values: all of its parameters, by name.
+/// The entry of an effect with these values, with all parameters by name.
 ///
 /// ```
 /// use matdb::effects::{Level, entry, find, resolve};
@@ -123,7 +122,7 @@ pub fn entry(effect: &dyn Effect, values: &[f64]) -> EffectEntry {
     EffectEntry { name: effect.name().to_owned(), source: None, parameters }
 }
 
-/// The value of every parameter of an effect: as the entry gives it, or absent.
+/// The value of every parameter of an effect: that of the entry, or the absent value.
 fn values(effect: &dyn Effect, entry: &EffectEntry) -> Result<Vec<f64>, EffectError> {
     let known: Vec<&str> = effect.parameters().iter().map(|parameter| parameter.name).collect();
     if let Some(name) = entry.parameters.keys().find(|name| !known.contains(&name.as_str())) {

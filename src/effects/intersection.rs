@@ -35,7 +35,7 @@ pub(super) struct HitSurface {
     pub to_radar: Direction<Surface>,
 }
 
-/// A facet, whose two sides are alike.
+/// A facet, which scatters alike on both sides.
 pub(super) struct Facet {
     /// The frame at its outward normal; `None` where rounding leaves no normal.
     frame: Option<LocalFrame>,
@@ -51,7 +51,7 @@ impl Facet {
         Facet { frame, grain, region }
     }
 
-    /// The side of it from which a ray comes.
+    /// The surface on the side from which a ray comes.
     pub(super) fn surface(&self, ray: &Ray<Global>) -> HitSurface {
         let back = -ray.direction.xyz();
         let frame = match self.frame {

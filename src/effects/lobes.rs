@@ -1,10 +1,10 @@
-//! A law with other specular lobes, for effects that act on the lobes alone.
+//! Replaces the specular lobes of a scattering model, for effects that act on the lobes alone.
 
 use crate::brdf::{Brdf, CookTorrance, Scattering};
 use crate::frames::{Direction, Surface};
 
-/// `f_per_sr` times the ratio of the law with other lobes to the law as it is, in backscatter: each
-/// Cook–Torrance lobe scatters as `lobe` says, 1/sr.
+/// `f_per_sr` times the ratio of the scattering model with other lobes to the model itself, in backscatter. `lobe` gives
+/// f of each replaced Cook–Torrance lobe, 1/sr.
 pub(super) fn rescaled(
     law: &Brdf,
     retro: Direction<Surface>,
@@ -16,6 +16,6 @@ pub(super) fn rescaled(
         other => other.f_per_sr(retro, retro),
     });
     let without = law.f_per_sr(retro, retro);
-    // Far down a Gaussian lobe there is nothing to scale.
+    // On the far flank of a Gaussian lobe f underflows, and there is no ratio.
     if without > f64::MIN_POSITIVE { (f_per_sr / without) * with } else { f_per_sr + with }
 }

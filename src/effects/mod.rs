@@ -1,17 +1,15 @@
-//! Physical effects beyond the paper's model: one file each, one interface, the same object in a
-//! diagnosis and in a prediction.
+//! Physical effects beyond the paper's model. Each has a file; all share one interface, which diagnosis and
+//! rendering use.
 //!
-//! A prediction starts from what the scene knows of every chirp, a [`Shot`], and asks every effect in
-//! turn for each of four things; an effect answers those that it changes:
+//! A prediction starts from the [`Shot`] of every chirp. Each effect then overrides the steps that it changes:
 //!
-//! 1. where and how the chirp hits the target ([`Effect::motion`]): pose, motion;
-//! 2. how the surface scatters ([`Effect::scatter`]): subsurface, thin film, anisotropy, shadowing;
-//! 3. how much power arrives ([`Effect::gain`], [`Effect::arrive`]): layers, patches, gains, bounces;
-//! 4. what the receiver reports of it ([`Effect::receive`]): compression, speckle, noise, tilts that vary
-//!    at random.
+//! 1. intersection with the target ([`Effect::motion`]): pose, motion;
+//! 2. scattering ([`Effect::scatter`]): subsurface, thin film, anisotropy, shadowing;
+//! 3. received power ([`Effect::gain`], [`Effect::arrive`]): layers, patches, gains, bounces;
+//! 4. detection by the receiver ([`Effect::receive`]): compression, speckle, noise, random tilts.
 //!
 //! An effect whose parameters are at their [`absent`](EffectParameter::absent) values changes nothing,
-//! exactly. [`library`] has all effects; another one is a file and a line of its list.
+//! exactly. [`library`] lists all effects; a new one is a file and a line of the list.
 
 mod cache;
 mod ceiling;

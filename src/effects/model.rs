@@ -1,4 +1,4 @@
-//! A base law with any number of effects, and what it predicts of a scan.
+//! Scattering models with any number of effects, and their prediction of a scan.
 
 use std::f64::consts::TAU;
 
@@ -19,42 +19,42 @@ use crate::frames::{Direction, Global, Pose, Ray, Surface};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::trace::{Hit, closest};
 
-/// A base law and the effects added to it, each with its values.
+/// The scattering models of a target, the receiver, and effects with their values.
 #[derive(Clone)]
 pub struct Model<'a> {
-    /// Scattering of each region.
+    /// Scattering model of each region.
     pub laws: Vec<Brdf>,
-    /// Law of the receiver without effects.
+    /// The receiver without effects.
     pub receiver: Receiver,
     /// The effects, in the order in which they act.
     pub effects: Vec<(&'a dyn Effect, Vec<f64>)>,
 }
 
-/// What a model predicts.
+/// The prediction of a model for the shots of a scan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prediction {
     /// Mean power and range of every shot, without thermal noise; `None` where the ray misses.
     pub arrived: Vec<Option<MeanEcho>>,
-    /// Of every shot, where tilts vary at random from chirp to chirp; empty where none do.
+    /// The random tilts of every shot; empty without such tilts.
     pub tilts: Vec<Tilts>,
-    /// How powers are distributed about the mean.
+    /// The distribution of powers about the mean.
     pub receiver: Receiver,
     /// The saturation of the receiver.
     pub saturating: SaturationCurve,
 }
 
-/// Factor on the power of a shot for every tilt of its normal, and the tilt's probability.
+/// Factor on the power of a shot and probability, for every tilt of its normal.
 pub type Tilts = [(f64, f64); NODES];
 
-/// What was traced and computed for one list of shots, for as long as what it depends on comes again: a
-/// search turns one number at a time, and few numbers move a ray or change a law.
+/// Traced rays and computed values of one list of shots, which are reused as long as their inputs do not change. A
+/// search changes one parameter at a time, and few parameters move a ray or change a scattering model.
 #[derive(Default)]
 pub struct PredictionCache {
-    /// Large, and on one number each.
+    /// Few, since each is large.
     surveys: Cache<Key, Survey, 4>,
     shaded: Cache<(Key, Vec<Brdf>), Survey>,
     intersections: Cache<Vec<Key>, Vec<Option<Intersection>>>,
-    /// f of the laws by themselves, 1/sr, by the laws and what moves the shots.
+    /// f of the scattering models without effects, 1/sr, by the models and the effects that move the target.
     scattered: Cache<(Vec<Brdf>, Vec<Key>), Vec<f64>>,
     /// The product of all gains.
     gains: Cache<Vec<Key>, Vec<f64>>,
@@ -63,7 +63,7 @@ pub struct PredictionCache {
 /// A shot where the effects place it, and the direction of the radar from its surface.
 type Intersection = (Shot, Direction<Surface>);
 
-/// Name of an effect and the values that matter.
+/// Name of an effect, and the values on which a result depends.
 type Key = (&'static str, Vec<f64>);
 
 impl Prediction {
@@ -111,7 +111,7 @@ impl Prediction {
 }
 
 impl Model<'_> {
-    /// This model with the target shifted along an axis, m, after all that its effects do with it.
+    /// This model with the target shifted along an axis by `by_m`, m, after its effects have moved it.
     pub(crate) fn shifted(mut self, axis: usize, by_m: f64) -> Self {
         let mut pose = vec![0.0; PoseEffect.parameters().len()];
         pose[axis] = by_m;
@@ -119,23 +119,23 @@ impl Model<'_> {
         self
     }
 
-    /// What arrives of every shot.
+    /// The prediction for every shot.
     pub fn predict(&self, stage: &Stage, shots: &[Shot]) -> Prediction {
         self.predict_with(stage, shots, &PredictionCache::default())
     }
 
-    /// As [`predict`](Model::predict), with what may have been traced for these very shots before.
+    /// As [`predict`](Model::predict), with a cache, which must belong to these shots.
     pub fn predict_with(
         &self,
         stage: &Stage,
         shots: &[Shot],
         cache: &PredictionCache,
     ) -> Prediction {
-        // Where every shot hits, by the effects that move the target.
+        // The intersections of all shots, with the effects that move the target.
         let moving = self.keys(|effect| effect.moves());
         let make = || self.intersect_all(stage, shots);
         let intersections = cache.intersections.get_or_make(moving.clone(), make);
-        // f of the base laws and the gains there, apart: they depend on different values.
+        // f of the scattering models and the gains, in caches of their own, since they depend on different values.
         let f_per_sr = cache.scattered.get_or_make((self.laws.clone(), moving), || {
             let laws: Vec<Retro> = self.laws.iter().map(Retro::new).collect();
             of_every(&intersections, |shot, to_radar| {
@@ -162,12 +162,12 @@ impl Model<'_> {
         } else {
             Vec::new()
         };
-        // What acts on all shots together comes last.
+        // Effects on all shots together come last.
         self.arrive(stage, shots, cache, &mut arrived);
         Prediction { arrived, tilts, saturating: receiver.saturating(), receiver }
     }
 
-    /// Names and values of the effects of which something holds.
+    /// Names and values of the effects for which `holds` is true.
     fn keys(&self, holds: fn(&dyn Effect) -> bool) -> Vec<Key> {
         let matters = self.effects.iter().filter(|(effect, _)| holds(*effect));
         matters.map(|(effect, values)| (effect.name(), values.clone())).collect()
@@ -190,7 +190,7 @@ impl Model<'_> {
             .collect()
     }
 
-    /// The shot where it hits the target, as the effects place that; `None` where its ray misses.
+    /// The shot at its intersection with the target where the effects place it; `None` if its ray misses.
     pub(crate) fn placed(&self, stage: &Stage, shot: Shot) -> Option<Shot> {
         let Some(target) = self.target(stage, &shot) else { return Some(shot) };
         let ray = target.inverse() * shot.ray;
@@ -198,7 +198,7 @@ impl Model<'_> {
         Some(moved(stage, &shot, target, ray, hit).0)
     }
 
-    /// All shots at once, so that rays of one origin share their walk over the facets.
+    /// The intersections of all shots, traced together: rays of one origin are then rasterised.
     fn intersect_all(&self, stage: &Stage, shots: &[Shot]) -> Vec<Option<Intersection>> {
         let targets: Vec<Option<Pose<Global, Global>>> =
             shots.par_iter().map(|shot| self.target(stage, shot)).collect();
@@ -220,14 +220,14 @@ impl Model<'_> {
             .collect()
     }
 
-    /// Where the effects have the target under a shot; `None` where the scene has it.
+    /// The pose of the target at a shot by the effects; `None` if none moves it.
     pub(crate) fn target(&self, stage: &Stage, shot: &Shot) -> Option<Pose<Global, Global>> {
         let motions = self.effects.iter().filter(|(effect, _)| effect.moves());
         let motions = motions.filter_map(|(effect, values)| effect.motion(values, stage, shot));
         motions.reduce(|target, motion| motion * target)
     }
 
-    /// Ranges, m, at which a chirp may see the target, along its axis or off it.
+    /// Ranges at which a chirp may detect the target, along its axis or off it, m.
     pub(crate) fn ranges_m(&self, stage: &Stage, shot: &Shot) -> Vec<f64> {
         const AROUND: usize = 8;
         const RINGS: [f64; 3] = [1.0 / 3.0, 2.0 / 3.0, 1.0];
@@ -259,12 +259,12 @@ impl Model<'_> {
         Some(hit.range_m)
     }
 
-    /// What arrives of one shot by itself.
+    /// The mean echo of one shot by itself.
     pub(crate) fn arrived(&self, stage: &Stage, shot: &Shot) -> MeanEcho {
         MeanEcho::at_once(self.power_w(stage, shot), shot.hit.range_m)
     }
 
-    /// Applies the effects that act on all that arrives together.
+    /// Applies the effects that act on the echoes of all shots together.
     pub(crate) fn arrive(
         &self,
         stage: &Stage,
@@ -283,7 +283,7 @@ impl Model<'_> {
         }
     }
 
-    /// The receiver's law with the effects.
+    /// The receiver with the effects on it.
     pub(crate) fn received(&self) -> Receiver {
         let mut receiver = self.receiver;
         for (effect, values) in &self.effects {
@@ -298,7 +298,7 @@ impl Model<'_> {
         self.gain(stage, shot) * self.scattered_w(stage, shot, f_per_sr)
     }
 
-    /// f of the law of a shot by itself, 1/sr.
+    /// f of the scattering model of a shot without effects, 1/sr.
     fn law_per_sr(&self, shot: &Shot, to_radar: Direction<Surface>) -> f64 {
         let law = self.laws.get(usize::from(shot.region));
         law.map_or(0.0, |law| law.f_per_sr(to_radar, to_radar))
@@ -319,7 +319,7 @@ impl Model<'_> {
         self.effects.iter().map(|(effect, values)| effect.gain(values, stage, shot)).product()
     }
 
-    /// The tilts of a shot of a mean power, W.
+    /// The random tilts of a shot with the mean power `power_w`, W.
     fn tilts(&self, stage: &Stage, shot: &Shot, power_w: f64, receiver: &Receiver) -> Tilts {
         let theta_rad = shot.hit.theta_rad();
         nodes(receiver.tilt_sd_rad).map(|(tilts, weight)| {
@@ -333,7 +333,7 @@ impl Model<'_> {
     }
 }
 
-/// A number of every intersection; 0 where there is none.
+/// A value of every intersection; 0 for a shot that misses.
 fn of_every(
     intersections: &[Option<Intersection>],
     number: impl Fn(&Shot, Direction<Surface>) -> f64 + Sync,

@@ -26,8 +26,8 @@ pub enum Place {
 }
 
 impl Place {
-    /// Where it is on a target, global frame, m: for a round place its centre; for another the middle of
-    /// the box around it, and the sides of that box. `None` where no shot lies in it.
+    /// Its position on the target in the global frame, m: for a round place the centre; for another the centre of its
+    /// bounding box, and the sides of that box. `None` if no shot lies in it.
     pub fn on_target_m(&self, shots: &[Shot]) -> Option<(DVec3, Option<DVec3>)> {
         match *self {
             Place::Round { x_m, y_m, .. } => {

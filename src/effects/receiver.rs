@@ -4,30 +4,30 @@ use super::ceiling::{Ceiling, SaturationCurve};
 use crate::radar::Radar;
 use crate::units::watts_from_dbm;
 
-/// How received powers are distributed about their mean.
+/// The distribution of received powers about their mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Receiver {
     /// Looks L of the speckle.
     pub looks: f64,
     /// Mean thermal power, W.
     pub noise_w: f64,
-    /// Standard deviation of each of the two tilts of a normal that differ from chirp to chirp, rad.
+    /// Standard deviation of each of the two random tilts of the normal under a chirp, rad.
     pub tilt_sd_rad: f64,
-    /// Where it saturates.
+    /// The saturation.
     pub ceiling: Ceiling,
 }
 
 impl Receiver {
-    /// No speckle, no noise, no tilt, no ceiling.
+    /// A receiver without speckle, noise, tilts and saturation.
     pub const LINEAR: Receiver =
         Receiver { looks: f64::INFINITY, noise_w: 0.0, tilt_sd_rad: 0.0, ceiling: Ceiling::NONE };
 
-    /// Its ceiling, averaged over its speckle.
+    /// The saturation curve for its speckle.
     pub fn saturating(&self) -> SaturationCurve {
         self.ceiling.over(self.looks)
     }
 
-    /// The law that a radar declares: its speckle, infinitely many looks where it has none, and the
+    /// The receiver that a radar declares: its speckle (infinitely many looks if it has none), and the
     /// thermal noise of its `[radar.noise]`.
     pub fn declared(radar: &Radar) -> Receiver {
         Receiver {

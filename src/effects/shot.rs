@@ -1,4 +1,4 @@
-//! What a scene knows of a chirp, and of all chirps together.
+//! The geometry of a chirp, and what all chirps of a scan share.
 
 use glam::DVec3;
 
@@ -9,7 +9,7 @@ use crate::trace::{Hit, ScanGeometry};
 /// Facet of a shot that misses the target.
 const NO_FACET: u32 = u32::MAX;
 
-/// One chirp that hits the target, as far as the scene knows it.
+/// One chirp and its intersection with the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shot {
     /// Chirp number.
@@ -24,7 +24,7 @@ pub struct Shot {
     pub hit: Hit,
     /// Unit normal there, towards the radar.
     pub normal: DVec3,
-    /// Where effects have moved the target from where the scene has it.
+    /// Motion of the target by effects, from where the scene places it.
     pub target: Pose<Global, Global>,
     /// Azimuth of the radar about the normal, from the grain of the region, rad.
     pub azimuth_rad: f64,
@@ -79,12 +79,11 @@ pub struct Stage<'a> {
     pub link: Link,
     /// Direction of the grain of every region, global frame.
     pub grain_of_region: &'a [DVec3],
-    /// The pivot of a pose, m, global frame: the [`middle`] of all shots of the scan, whichever of them are
-    /// predicted.
+    /// The pivot of a pose, m, global frame: the [`middle`] of all shots of the scan, even if only some are predicted.
     pub middle: DVec3,
 }
 
-/// Mean of the points where shots hit the target, m, global frame; the origin without shots.
+/// Mean of the intersections of the shots, m, global frame; the origin without shots.
 pub fn middle(shots: &[Shot]) -> DVec3 {
     let sum: DVec3 = shots.iter().map(|shot| shot.hit.point.xyz).sum();
     sum / shots.len().max(1) as f64

@@ -12,11 +12,7 @@ use crate::geometry::Mesh;
 use crate::radar::{Chirps, Link, Radar};
 use crate::scene::solids;
 use crate::trace::{Bvh, ScanGeometry};
-
-/// Decibels of a ratio.
-pub(super) fn db(ratio: f64) -> f64 {
-    crate::units::db_from_ratio(ratio)
-}
+pub(super) use crate::units::db_from_ratio as db;
 
 /// A specular lobe.
 pub(super) fn lobe() -> CookTorrance {

@@ -1,12 +1,12 @@
-//! Tilts of a normal that differ at random from chirp to chirp, and means over them.
+//! Random tilts of the normal under a chirp, and means over them.
 //!
-//! Two tilts, along the plane of incidence and across it, each normal about 0. Means over them are
-//! sums over nodes of Gauss and Hermite: five along, and two across, of which only the square counts,
-//! so that they are one. They are exact for polynomials of the ninth degree along and the third across.
+//! There are two tilts, along the plane of incidence and across it, both normally distributed about 0. Means over
+//! them are Gauss–Hermite sums with five nodes along, and two across. Since only the square of the tilt across counts,
+//! these two are one. The sums are exact for polynomials of degree nine along and three across.
 
-/// Nodes of [`nodes`].
+/// Number of nodes of [`nodes`].
 pub const NODES: usize = 5;
-/// Places along the plane of incidence, in standard deviations, and weights.
+/// Nodes along the plane of incidence, in standard deviations, and their weights.
 const ALONG: [(f64, f64); NODES] = [
     (-2.856_970_013_872_806, 0.011_257_411_327_721),
     (-1.355_626_179_974_266, 0.222_075_922_005_613),
@@ -14,20 +14,20 @@ const ALONG: [(f64, f64); NODES] = [
     (1.355_626_179_974_266, 0.222_075_922_005_613),
     (2.856_970_013_872_806, 0.011_257_411_327_721),
 ];
-/// Place across the plane of incidence, in standard deviations.
+/// Node across the plane of incidence, in standard deviations.
 const ACROSS: f64 = 1.0;
 /// Least cos θ: below it a tilted facet faces away from the radar.
 const LEAST_COS_THETA: f64 = 1e-6;
 
-/// Cosine of the angle of incidence θ under tilts of these tangents along the plane of incidence and
-/// across it; `None` where the facet then faces away.
+/// Cosine of the incidence angle after tilts of the normal by these tangents, along the plane of incidence and
+/// across it; `None` if the facet then faces away.
 pub fn tilted_cos_theta(theta_rad: f64, [along, across]: [f64; 2]) -> Option<f64> {
     let length = (1.0 + along * along + across * across).sqrt();
     let cos_theta = (theta_rad.cos() + along * theta_rad.sin()) / length;
     (cos_theta > LEAST_COS_THETA).then_some(cos_theta)
 }
 
-/// Tangents of the two tilts and their weight at every node, for tilts of a standard deviation, rad.
+/// Tangents of the two tilts and their weight at every node, for tilts of the standard deviation `sd_rad`, rad.
 pub fn nodes(sd_rad: f64) -> [([f64; 2], f64); NODES] {
     ALONG.map(|(along, weight)| ([along, ACROSS].map(|t| (sd_rad * t).tan()), weight))
 }

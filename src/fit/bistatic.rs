@@ -41,7 +41,7 @@ impl Default for Bistatic {
     }
 }
 
-/// What a bistatic fit found.
+/// The result of a bistatic fit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BistaticResult {
     /// The fitted model.

@@ -16,15 +16,15 @@ pub(crate) const SPECULAR_LEVEL: &str = "S";
 pub(crate) const DIFFUSE_LEVEL: &str = "R";
 /// Name of the looks of the speckle.
 pub(crate) const LOOKS: &str = "looks";
-/// Levels that have a meaning: a billionth is 60 dB below the weakest detection.
+/// Range of the levels: 10⁻⁹ is 60 dB below the weakest detection.
 const LEVEL_RANGE: (f64, f64) = (1e-9, 1.0);
-/// Looks from far stronger than fully developed speckle to practically none.
+/// Range of the looks: from far stronger than fully developed speckle to practically no speckle.
 const LOOKS_RANGE: (f64, f64) = (0.1, 1e4);
 
-/// How a number is searched.
+/// The scale on which a number is searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Scale {
-    /// As it is.
+    /// u = v.
     Linear,
     /// u = ln(v + offset).
     Log {
@@ -115,7 +115,7 @@ impl Coordinate {
         [self.searched(self.min), self.searched(self.max)]
     }
 
-    /// How far from the start other starts are drawn.
+    /// Largest distance of a drawn start from the given one.
     pub fn spread(&self) -> f64 {
         let [lower, upper] = self.ends();
         let most = match self.scale {
@@ -179,12 +179,12 @@ impl Coordinates {
         Ok(Coordinates { list, base, gauge, looks: looks.unwrap_or(1.0) })
     }
 
-    /// How many numbers are searched.
+    /// Number of coordinates.
     pub fn len(&self) -> usize {
         self.list.len()
     }
 
-    /// Where the search begins.
+    /// The start of the search.
     pub fn start(&self) -> DVector<f64> {
         self.vector(|c| c.searched(c.start))
     }

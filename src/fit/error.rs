@@ -9,81 +9,81 @@ use crate::units::shown;
 /// Why a curve cannot be fitted.
 #[derive(Debug, Error, PartialEq)]
 pub enum FitError {
-    /// No rows.
+    /// The curve has no rows.
     #[error("the curve has no rows; give it at least one for each free parameter")]
     Empty,
-    /// Upper limits only.
+    /// All rows are censored.
     #[error(
         "all {rows} rows are censored and give only upper limits; measure nearer or add detections"
     )]
     AllCensored {
-        /// How many.
+        /// Number of rows.
         rows: usize,
     },
-    /// As many unknowns as detections, or more.
+    /// There are no more detections than unknowns.
     #[error(
         "{detected} detections cannot give {unknowns} unknowns and their errors; fix parameters or add rows"
     )]
     TooFewRows {
-        /// Detections.
+        /// Number of detections.
         detected: usize,
-        /// Numbers to find.
+        /// Number of unknowns.
         unknowns: usize,
     },
     /// A row that is not backscatter.
     #[error(transparent)]
     Observation(#[from] ObservationError),
-    /// A row with a number that is out of range.
+    /// A value of a row is out of range.
     #[error("row {row} (from 0) has {name} = {}, {wanted}; correct or remove it", shown(*value))]
     Row {
-        /// Its number from 0.
+        /// Row, from 0.
         row: usize,
-        /// Its field.
+        /// Name of the field.
         name: &'static str,
         /// The value.
         value: f64,
-        /// What it should be.
+        /// The requirement, as the end of the sentence.
         wanted: &'static str,
     },
-    /// A name that the model does not have.
+    /// The model has no parameter of this name.
     #[error(
         "the model has no free `{name}`; `fixed` takes the model's paths, `bounds` what is fitted"
     )]
     UnknownParameter {
-        /// The name.
+        /// The unknown name.
         name: String,
     },
-    /// Bounds outside the range, or the greater one first.
+    /// Bounds are outside the range of the parameter, or in the wrong order.
     #[error(
         "bounds of {name} are {} and {}; give the smaller first, both from {} to {}",
         shown(*min), shown(*max), shown(range[0]), shown(range[1])
     )]
     Bounds {
-        /// Whose.
+        /// Name of the parameter.
         name: String,
-        /// Lower.
+        /// Lower bound.
         min: f64,
-        /// Upper.
+        /// Upper bound.
         max: f64,
-        /// What is allowed.
+        /// Range of the parameter.
         range: [f64; 2],
     },
-    /// A setting out of range.
+    /// A setting is out of range.
     #[error("fit.{name} = {} is out of range; give a value from {} to {}", shown(*value), shown(*min), shown(*max))]
     Setting {
         /// Its name.
         name: &'static str,
         /// The value.
         value: f64,
-        /// Smallest.
+        /// Least value allowed.
         min: f64,
-        /// Largest.
+        /// Largest value allowed.
         max: f64,
     },
-    /// A start or fixed value out of range.
+    /// A start or fixed value is out of range.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
-    /// A model without free parameters.
+    /// The model has no free parameter.
     #[error("nothing is left to fit; free a parameter or choose a model that has some")]
     NothingFree,
 }

@@ -1,4 +1,4 @@
-//! Whether a fitted law explains the rows, by randomised quantile residuals.
+//! Whether a fitted model explains the rows, by randomised quantile residuals.
 //!
 //! A detected row has u = F(y | fit), a censored one u uniform on (0, F(T | fit)), and z = Φ⁻¹(u) is
 //! standard normal if the law is right (Dunn & Smyth 1996, DOI 10.1080/10618600.1996.10474708). Least

@@ -1,4 +1,4 @@
-//! What a fit cannot promise: findings from its rows, its numbers and their uncertainty.
+//! The findings on a fit, from its rows, its numbers and their uncertainty.
 
 use super::coordinates::{DIFFUSE_LEVEL, SPECULAR_LEVEL};
 use super::result::FitResult;
@@ -10,7 +10,7 @@ use crate::brdf::{Brdf, ParameterError};
 use crate::formats::words::significant;
 use crate::material::{Estimate, Observation};
 
-/// Correlation from which two numbers are said to be hard to tell apart.
+/// Correlation from which two numbers are reported as hard to distinguish.
 const CORRELATED: f64 = 0.95;
 /// Kolmogorov's distance times √rows that chance exceeds once in a hundred times.
 const KOLMOGOROV_1_PERCENT: f64 = 1.63;

@@ -31,12 +31,12 @@ pub(super) struct Deviations {
     pub level_sd_db: f64,
 }
 
-/// A curve made ready for many evaluations.
+/// A curve prepared for many evaluations.
 #[derive(Clone, Debug)]
 pub(super) struct Squares<'a> {
     coordinates: &'a Coordinates,
     deviations: Deviations,
-    /// None for a row that was not detected: it keeps its place, so that the same rows are summed together.
+    /// `None` for a censored row, which keeps its place so that the chunks of the sum do not change.
     levels: Vec<Option<Level>>,
 }
 

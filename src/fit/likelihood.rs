@@ -31,14 +31,14 @@ pub(super) enum Curvature {
     Scores,
 }
 
-/// A curve made ready for many evaluations.
+/// A curve prepared for many evaluations.
 #[derive(Clone, Debug)]
 pub(super) struct Likelihood<'a> {
     coordinates: &'a Coordinates,
     chirps: Vec<Chirp>,
 }
 
-/// One row, its power as σ⁰.
+/// One row; its power is in units of σ⁰.
 #[derive(Clone, Debug)]
 struct Chirp {
     ln_sigma0: f64,
@@ -47,7 +47,7 @@ struct Chirp {
     nodes: Vec<(Place, f64)>,
 }
 
-/// Tables for one point of the search.
+/// The model at one point of the search, tabulated.
 struct Tables {
     ln_sigma0: Table,
     by_coordinate: Vec<Option<Table>>,
@@ -96,7 +96,7 @@ impl<'a> Likelihood<'a> {
         self.chirps.iter().map(|chirp| chirp.score(&tables, &mut scratch)).collect()
     }
 
-    /// For each row ln of the probability that the power is below what it is, given the fit.
+    /// ln of the probability of a lower power than that of the row, for each row.
     pub fn ln_below(&self, at: &DVector<f64>) -> Vec<f64> {
         let table = Table::new(&self.coordinates.model(at));
         let law = GammaLaw::new(self.coordinates.looks(at));
@@ -104,7 +104,7 @@ impl<'a> Likelihood<'a> {
     }
 }
 
-/// Room for one chirp's sums.
+/// Buffers for the sums of one chirp.
 struct Scratch {
     terms: Vec<f64>,
     laws: Vec<(LnProbability, f64)>,

@@ -9,19 +9,19 @@
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-/// A cost near a point.
+/// The local quadratic of a cost.
 #[derive(Clone, Debug)]
 pub(crate) struct Local {
     /// The cost.
     pub value: f64,
     /// Its gradient.
     pub gradient: DVector<f64>,
-    /// A curvature that is symmetric and never negative.
+    /// Its curvature, symmetric and positive semidefinite.
     pub curvature: DMatrix<f64>,
 }
 
 impl Local {
-    /// Nothing yet, for a sum.
+    /// Zero, as the start of a sum.
     pub fn zero(len: usize) -> Local {
         let (gradient, curvature) = (DVector::zeros(len), DMatrix::zeros(len, len));
         Local { value: 0.0, gradient, curvature }
@@ -52,13 +52,13 @@ impl Local {
 pub enum Stop {
     /// No step promises an improvement: converged.
     Stationary,
-    /// Every unknown is held by a bound: converged, but the bounds say so and not the data.
+    /// Every unknown is at a bound: converged, but determined by the bounds and not by the data.
     Bounded,
     /// No step improves although one should, as far as patience goes.
     Stuck,
     /// The iterations ran out.
     Iterations,
-    /// The cost has no number at the start.
+    /// The cost is not finite at the start.
     NotFinite,
 }
 

@@ -1,8 +1,8 @@
-//! Models by the names that people call them by, with values to start a search from.
+//! Scattering models by name, with values from which a search starts.
 
 use crate::brdf::Brdf;
 
-/// Names that [`model`] knows, sorted.
+/// The names of [`model`], sorted.
 pub fn model_names() -> impl Iterator<Item = &'static str> {
     let mut names: Vec<&str> = starts().map(|(name, _)| name).collect();
     names.sort_unstable();
@@ -16,7 +16,7 @@ pub fn model(name: &str) -> Option<Brdf> {
     serde_json::from_str(json).ok()
 }
 
-/// What the kinds of models say of where to start.
+/// Name and JSON of every model to start from.
 fn starts() -> impl Iterator<Item = (&'static str, &'static str)> {
     Brdf::KINDS.iter().flat_map(|kind| kind.starts).copied()
 }

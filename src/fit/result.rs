@@ -24,7 +24,7 @@ pub struct Band {
     pub high: f64,
 }
 
-/// What a fit found.
+/// The result of a fit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FitResult {
     /// The settings.
@@ -59,7 +59,7 @@ pub struct FitResult {
     pub iterations: usize,
     /// Starts that reached the best fit.
     pub agreeing_starts: usize,
-    /// What the fit cannot promise.
+    /// Findings that limit the use of the fit.
     pub verdict: Vec<Finding>,
     /// Hash (BLAKE3, hexadecimal) of the rows as numbers.
     pub data_hash: String,

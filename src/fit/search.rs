@@ -24,7 +24,7 @@ const SQUARES_TOLERANCE: f64 = 1e-8;
 /// Loss of cost that still counts as the same optimum.
 const SAME: f64 = 0.01;
 
-/// What a search found.
+/// The result of a search.
 pub(super) struct SearchResult {
     pub best: Minimum,
     pub agreeing: usize,

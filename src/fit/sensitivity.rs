@@ -9,8 +9,8 @@ use super::table::Table;
 /// Step in the search: about the relative error of a one-sided difference, far above that of its rounding.
 const STEP: f64 = 1e-6;
 
-/// d ln σ⁰/du at every knot, for each coordinate, from the table `here`; none for the looks, which do
-/// not move σ⁰.
+/// d ln σ⁰/du at every knot for each coordinate; `here` is the table at the point. `None` for the looks, which do
+/// not change σ⁰.
 pub(super) fn derivatives(
     coordinates: &Coordinates,
     at: &DVector<f64>,

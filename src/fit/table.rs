@@ -12,7 +12,7 @@ use crate::brdf::Scattering;
 
 /// Intervals between knots.
 const INTERVALS: usize = 1024;
-/// How much denser the knots are at normal incidence than at grazing: about e^β/2.
+/// β: the knots are about e^β/2 times as dense at normal incidence as at grazing incidence.
 const BETA: f64 = 6.0;
 /// Last knot, rad; at π/2 itself ln σ⁰ is −∞.
 const THETA_END_RAD: f64 = 0.999 * FRAC_PI_2;
@@ -26,7 +26,7 @@ static THETA_RAD: LazyLock<Vec<f64>> = LazyLock::new(|| {
         .collect()
 });
 
-/// How fast sinh's argument grows with θ, 1/rad.
+/// sinh β/θ_end: the argument of asinh per rad of θ, 1/rad.
 static STRETCH_PER_RAD: LazyLock<f64> = LazyLock::new(|| BETA.sinh() / THETA_END_RAD);
 
 /// ln σ⁰ at every knot.
@@ -35,7 +35,7 @@ pub(super) struct Table {
     knots: Vec<f64>,
 }
 
-/// An angle's place among the knots.
+/// An angle among the knots, with its interpolation weights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     /// The four knots around it.
@@ -85,7 +85,7 @@ impl Table {
 }
 
 impl Place {
-    /// The place of an angle; negative angles are mirrored, angles beyond the last knot take its place.
+    /// The place of an angle. Negative angles are mirrored, and angles beyond the last knot are clamped to it.
     pub fn new(theta_rad: f64) -> Place {
         Place::bending(theta_rad).0
     }

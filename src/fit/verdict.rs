@@ -1,4 +1,4 @@
-//! What a fit cannot promise, in sentences.
+//! The findings on a fit, with their sentences.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::minimise::Stop;
 use crate::formats::words::{listed, significant};
 
-/// One thing that the reader of a fit must know.
+/// A finding on a fit that limits its use.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "finding", rename_all = "kebab-case")]
 pub enum Finding {
@@ -23,9 +23,9 @@ pub enum Finding {
     },
     /// Other starts ended elsewhere with a worse cost.
     StartsDisagree {
-        /// Starts that reached the best.
+        /// Number of starts that reached the best fit.
         agreeing: usize,
-        /// All starts.
+        /// Number of starts.
         starts: usize,
     },
     /// No detection near normal incidence.
@@ -40,60 +40,60 @@ pub enum Finding {
     },
     /// Censored rows that the method does not use.
     CensoredIgnored {
-        /// How many.
+        /// Number of censored rows.
         censored: usize,
-        /// Of how many.
+        /// Number of rows.
         rows: usize,
     },
-    /// A number stopped at the end of its range.
+    /// A number stopped at a bound of its range.
     AtBound {
         /// Its name.
         name: String,
-        /// The end.
+        /// The bound.
         value: f64,
     },
-    /// The data see only a combination.
+    /// The data determine only a combination of several numbers.
     OnlyTogether {
-        /// Whose.
+        /// Names of these numbers.
         names: Vec<String>,
     },
-    /// The data say nothing of a number.
+    /// The data do not determine a number.
     Unconstrained {
         /// Its name.
         name: String,
     },
     /// Two numbers that could replace each other.
     HardToTellApart {
-        /// The two.
+        /// Their names.
         names: [String; 2],
         /// Their correlation.
         correlation: f64,
     },
-    /// An interval ends where the range ends and not where the data refuse.
+    /// An interval ends at a bound of the range, before the data reject the number.
     OpenInterval {
-        /// Whose.
+        /// Name of the number.
         name: String,
-        /// The end of the range.
+        /// The bound.
         value: f64,
     },
     /// The fitted model is outside its own range.
     OutOfRange {
-        /// What is wrong.
+        /// The parameter that would be out of range, and its value.
         problem: String,
-        /// The parameters that were held.
+        /// The fixed parameters.
         held: Vec<String>,
     },
-    /// The law of the fit does not explain the rows.
+    /// The fitted distribution does not explain the rows.
     PoorFit {
-        /// Distance of the residuals' law from the expected.
+        /// Kolmogorov distance of the residuals from their expected distribution.
         ks_distance: f64,
-        /// The largest that chance explains once in a hundred times.
+        /// The distance that chance exceeds in 1 % of all fits.
         limit: f64,
     },
 }
 
 impl Finding {
-    /// Whether the curve of the model is open somewhere, and not only how its numbers share it.
+    /// Whether the data leave the curve of the model undetermined at some angle, and not only its numbers.
     pub fn leaves_the_curve_open(&self) -> bool {
         matches!(
             self,

@@ -4,7 +4,6 @@ use crate::effects::effect::{About, Effect, EffectParameter, Level};
 use crate::effects::receiver::Receiver;
 use crate::effects::shot::{Shot, Stage};
 
-/// The effect `angle-error`.
 pub(crate) struct AngleError;
 
 const ABOUT: About = About {

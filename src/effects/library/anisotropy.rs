@@ -6,7 +6,6 @@ use crate::effects::lobes::rescaled;
 use crate::effects::shot::{Shot, Stage};
 use crate::frames::Direction;
 
-/// The effect `anisotropy`.
 pub(crate) struct Anisotropy;
 
 /// Roughness that a lobe can have.

@@ -10,7 +10,6 @@ use crate::effects::receiver::Receiver;
 use crate::effects::shot::{Shot, Stage};
 use crate::units::watts_from_dbm;
 
-/// The effect `compression`.
 pub(crate) struct Compression;
 
 /// A saturation that no echo reaches, dBm.

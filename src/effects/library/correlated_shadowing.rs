@@ -5,7 +5,6 @@ use crate::effects::effect::{About, Effect, EffectParameter, Level};
 use crate::effects::lobes::rescaled;
 use crate::effects::shot::{Shot, Stage};
 
-/// The effect `correlated-shadowing`.
 pub(crate) struct CorrelatedShadowing;
 
 const ABOUT: About = About {

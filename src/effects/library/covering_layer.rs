@@ -6,7 +6,6 @@ use crate::effects::place::{Place, along_m};
 use crate::effects::shot::{Shot, Stage};
 use crate::units::ratio_from_db;
 
-/// The effect `covering-layer`.
 pub(crate) struct CoveringLayer;
 
 /// Least cos θ: a flat layer seen edge-on is as deep as it is wide.

@@ -7,7 +7,6 @@ use crate::effects::effect::{About, Effect, EffectParameter, Level};
 use crate::effects::shot::{Shot, Stage};
 use crate::units::ratio_from_db;
 
-/// The effect `drift`.
 pub(crate) struct Drift;
 
 const ABOUT: About = About {

@@ -15,7 +15,6 @@ use crate::effects::spread::sunflower;
 use crate::frames::{Direction, Global, Ray, Surface};
 use crate::trace::{Hit, closest};
 
-/// The effect `finite-spot`.
 pub(crate) struct FiniteSpot;
 
 /// Rays that stand for a spot. On a ball a highlight may be a tenth of it.

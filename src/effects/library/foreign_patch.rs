@@ -8,7 +8,6 @@ use crate::frames::{Direction, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::units::ratio_from_db;
 
-/// The effect `foreign-patch`.
 pub(crate) struct ForeignPatch;
 
 const PARAMETERS: [EffectParameter; 5] = [

@@ -4,7 +4,6 @@ use crate::effects::effect::{About, Effect, EffectParameter, Level};
 use crate::effects::shot::{Shot, Stage};
 use crate::units::ratio_from_db;
 
-/// The effect `fov-gain`.
 pub(crate) struct FovGain;
 
 /// Distance from the centre at which the gain is `edge_db`, m.

@@ -11,7 +11,6 @@ use crate::effects::intersection::motion;
 use crate::effects::shot::{Shot, Stage};
 use crate::frames::{Global, Pose};
 
-/// The effect `motion`.
 pub(crate) struct Motion;
 
 /// The parameters `x0_m`, `y0_m`, `z0_m`, `x1_m` and so on of the terms with these numbers.

@@ -20,7 +20,6 @@ use crate::frames::{Direction, Point, Ray, Surface};
 use crate::trace::LocalFrame;
 use crate::units::ratio_from_db;
 
-/// The effect `multi-bounce`.
 pub(crate) struct MultiBounce;
 
 /// A coupling that counts as none, dB.

@@ -5,7 +5,6 @@ use crate::effects::receiver::Receiver;
 use crate::effects::shot::{Shot, Stage};
 use crate::units::watts_from_dbm;
 
-/// The effect `noise-floor`.
 pub(crate) struct NoiseFloor;
 
 /// A level below anything thermal, dBm: no noise.

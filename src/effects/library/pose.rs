@@ -11,7 +11,6 @@ use crate::frames::{Global, Pose as FramePose};
 /// From where the scene has the target to where it stands.
 type Motion = FramePose<Global, Global>;
 
-/// The effect `pose`.
 pub(crate) struct Pose;
 
 const SHIFT_M: [f64; 2] = [-0.2, 0.2];

@@ -4,7 +4,6 @@ use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Se
 use crate::effects::receiver::Receiver;
 use crate::effects::shot::{Shot, Stage};
 
-/// The effect `speckle`.
 pub(crate) struct Speckle;
 
 /// A number of looks that leaves no speckle.

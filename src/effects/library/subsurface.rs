@@ -9,7 +9,6 @@ use crate::brdf::Brdf;
 use crate::effects::effect::{About, Effect, EffectParameter, Level};
 use crate::effects::shot::{Shot, Stage};
 
-/// The effect `subsurface`.
 pub(crate) struct Subsurface;
 
 /// At grazing incidence nothing gets in.

@@ -12,7 +12,6 @@ use crate::brdf::{Brdf, Fresnel, Layer, Layered, Scattering, ScatteringModel};
 use crate::effects::effect::{About, Effect, EffectParameter, Level};
 use crate::effects::shot::{Shot, Stage};
 
-/// The effect `thin-film`.
 pub(crate) struct ThinFilm;
 
 /// Reflectance at normal incidence of a substrate whose law has no f_λ: an index of 2.

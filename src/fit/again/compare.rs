@@ -193,13 +193,9 @@ fn held_out(old: &HeldOut, found: &FitResult, curve: &Curve) -> Option<String> {
 }
 
 fn is_same_score(old: &HeldOut, new: &HeldOut) -> bool {
-    let score = match (old.score.zip(old.score_sd), new.score.zip(new.score_sd)) {
-        (Some((old, old_sd)), Some((new, sd))) => {
-            is_near(old, new, SAME_NUMBER_SD * sd) && is_near(old_sd, sd, SAME_SD * sd)
-        }
-        (old, new) => old.is_none() && new.is_none(),
-    };
-    score
+    let sd = new.score_sd.unwrap_or(0.0);
+    are_near(old.score, new.score, SAME_NUMBER_SD * sd)
+        && are_near(old.score_sd, new.score_sd, SAME_SD * sd)
         && is_near(old.rms_db, new.rms_db, SAME_LEVEL_DB)
         && (old.folds, old.blocks, &old.blocks_of, old.block_m, &old.fold_hash)
             == (new.folds, new.blocks, &new.blocks_of, new.block_m, &new.fold_hash)
@@ -217,12 +213,8 @@ fn settings(
         && std::iter::zip(&old.singular_values, &new.singular_values)
             .all(|(old, new)| is_near(*old, *new, SAME_SD * scale));
     let looks_sd = new.estimate(LOOKS).and_then(|e| e.sd);
-    let same_looks = match (old.looks, new.looks) {
-        (Some(old), Some(new)) => {
-            is_near(old, new, SAME_NUMBER_SD * looks_sd.unwrap_or(0.0) + SAME_SUM * new)
-        }
-        (old, new) => old.is_none() && new.is_none(),
-    };
+    let looks_step = SAME_NUMBER_SD * looks_sd.unwrap_or(0.0) + SAME_SUM * new.looks.unwrap_or(0.0);
+    let same_looks = are_near(old.looks, new.looks, looks_step);
     let checks = [
         ("estimator", stored.estimator == estimator && old.method == new.method),
         ("settings", old.given == new.given && old.noise_w == new.noise_w),
@@ -243,10 +235,7 @@ fn step_db(size_db: f64) -> f64 {
 fn goodness(old: &Goodness, new: &Goodness) -> Vec<String> {
     // Residuals of a curve without noise are steps of the search, and follow no law.
     let step = SAME_SUM + SAME_LEVEL_DB / new.rms_db.max(f64::MIN_POSITIVE);
-    let speckle = match (old.speckle_db, new.speckle_db) {
-        (Some(old), Some(new)) => is_near(old, new, step_db(new)),
-        (old, new) => old.is_none() && new.is_none(),
-    };
+    let speckle = are_near(old.speckle_db, new.speckle_db, step_db(new.speckle_db.unwrap_or(0.0)));
     let checks = [
         ("rms_db", is_near(old.rms_db, new.rms_db, step_db(new.rms_db))),
         ("mean_db", is_near(old.mean_db, new.mean_db, step_db(new.rms_db))),
@@ -313,6 +302,14 @@ fn parts(sentence: &str) -> Vec<String> {
         }
     }
     parts
+}
+
+/// Whether two numbers are near, or both are missing.
+fn are_near(a: Option<f64>, b: Option<f64>, step: f64) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => is_near(a, b, step),
+        (a, b) => a.is_none() && b.is_none(),
+    }
 }
 
 /// Whether two numbers differ by no more than `step` and rounding; false for NaN.
