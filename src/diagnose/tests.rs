@@ -124,16 +124,29 @@ fn diagnosed_with(
     diagnosed_of(library, effects.collect(), seed)
 }
 
-/// A stage with one region.
-fn stage<'a>(
-    radar: &'a Radar,
-    chirps: &'a Chirps,
-    bvh: &'a Bvh<'a>,
-    region_of_facet: &'a [u16],
-) -> Stage<'a> {
-    let (link, middle) = (Link::new(radar), DVec3::new(0.0, 1.1, 0.0));
-    let geometry = ScanGeometry::new(radar, chirps, bvh, region_of_facet);
-    Stage { geometry, link, grain_of_region: &[DVec3::Y], middle }
+/// A scan of a mesh with one region.
+struct Bench {
+    radar: Radar,
+    chirps: Chirps,
+    bvh: Bvh<'static>,
+    regions: Vec<u16>,
+}
+
+impl Bench {
+    fn new(mesh: Mesh) -> Bench {
+        let (radar, regions) = (Radar::default(), vec![0; mesh.facets.len()]);
+        Bench { chirps: chirps(&radar), radar, bvh: Bvh::new(Box::leak(Box::new(mesh))), regions }
+    }
+
+    fn stage(&self) -> Stage<'_> {
+        let Bench { radar, chirps, bvh, regions } = self;
+        Stage {
+            geometry: ScanGeometry::new(radar, chirps, bvh, regions),
+            link: Link::new(radar),
+            grain_of_region: &[DVec3::Y],
+            middle: DVec3::new(0.0, 1.1, 0.0),
+        }
+    }
 }
 
 /// The report on a scan whose truth has these effects with all their parameters, searched in a library.
@@ -142,11 +155,8 @@ fn diagnosed_of(
     effects: Vec<(&'static dyn Effect, Vec<f64>)>,
     seed: u64,
 ) -> Report {
-    let (radar, mesh) = (Radar::default(), target());
-    let bvh = Bvh::new(&mesh);
-    let regions = vec![0; mesh.facets.len()];
-    let chirps = chirps(&radar);
-    let stage = stage(&radar, &chirps, &bvh, &regions);
+    let bench = Bench::new(target());
+    let stage = bench.stage();
     let shots = trace_shots(&stage).unwrap();
     let noise_w = watts_from_dbm(-100.0);
     let receiver = Receiver { looks: 4.0, noise_w, ..Receiver::LINEAR };
@@ -316,11 +326,8 @@ fn what_no_effect_explains_is_called_unexplained() {
 
 #[test]
 fn places_are_on_the_target() {
-    let (radar, mesh) = (Radar::default(), target());
-    let bvh = Bvh::new(&mesh);
-    let regions = vec![0; mesh.facets.len()];
-    let chirps = chirps(&radar);
-    let stage = stage(&radar, &chirps, &bvh, &regions);
+    let bench = Bench::new(target());
+    let stage = bench.stage();
     let shots = trace_shots(&stage).unwrap();
     let (plate_z_m, on_sphere_z_m) = (0.0, 0.1 + 0.35);
     let round = Place::Round { x_m: 0.1, y_m: 0.0, radius_m: 0.1 };
@@ -337,11 +344,8 @@ fn places_are_on_the_target() {
 
 #[test]
 fn a_scan_with_too_little_says_so() {
-    let (radar, mesh) = (Radar::default(), target());
-    let bvh = Bvh::new(&mesh);
-    let regions = vec![0; mesh.facets.len()];
-    let chirps = chirps(&radar);
-    let stage = stage(&radar, &chirps, &bvh, &regions);
+    let bench = Bench::new(target());
+    let stage = bench.stage();
     let shots = trace_shots(&stage).unwrap();
     let receiver = Receiver { looks: 4.0, noise_w: 0.0, ..Receiver::LINEAR };
     let declared = Declared { threshold_w: 1e-11, range_sd_m: RANGE_SD_M };
@@ -378,11 +382,8 @@ fn a_scan_with_too_little_says_so() {
 #[test]
 fn a_cloud_finds_its_shots() {
     use crate::measure::cloud::{Cloud, CloudPoint};
-    let (radar, mesh) = (Radar::default(), target());
-    let bvh = Bvh::new(&mesh);
-    let regions = vec![0; mesh.facets.len()];
-    let chirps = chirps(&radar);
-    let stage = stage(&radar, &chirps, &bvh, &regions);
+    let bench = Bench::new(target());
+    let (stage, chirps) = (bench.stage(), &bench.chirps);
     let shots = trace_shots(&stage).unwrap();
     let missed = (0..(SIDE * SIDE) as u32).find(|c| shots.iter().all(|l| l.chirp != *c)).unwrap();
     let point = |shot: &Shot, chirp: u32, off_m: f64| {
@@ -397,7 +398,7 @@ fn a_cloud_finds_its_shots() {
     let numbered = Cloud::new(points.clone()).unwrap();
     points.push(point(&shots[9], missed, 0.0));
     let cloud = Cloud::new(points.clone()).unwrap();
-    let found = match_cloud(&cloud, &chirps, &shots).unwrap();
+    let found = match_cloud(&cloud, chirps, &shots).unwrap();
     let [behind, beside] = &found.strays[..] else { panic!("{:?}", found.strays) };
     assert_eq!(behind.shot, Some(shots[8]));
     assert!((behind.range_m - shots[8].hit.range_m - 0.5).abs() < 1e-9);
@@ -407,7 +408,7 @@ fn a_cloud_finds_its_shots() {
     points.pop();
     points.iter_mut().for_each(|point| point.chirp = None);
     let cloud = Cloud::new(points.clone()).unwrap();
-    let by_direction = match_cloud(&cloud, &chirps, &shots).unwrap();
+    let by_direction = match_cloud(&cloud, chirps, &shots).unwrap();
     assert_eq!(by_direction.observations, found.observations);
     // Points with the numbers of other chirps are refused.
     for off in [1, -1] {
@@ -415,7 +416,7 @@ fn a_cloud_finds_its_shots() {
         for point in &mut points {
             point.chirp = point.chirp.and_then(|chirp| chirp.checked_add_signed(off));
         }
-        let refused = match_cloud(&Cloud::new(points).unwrap(), &chirps, &shots);
+        let refused = match_cloud(&Cloud::new(points).unwrap(), chirps, &shots);
         let Err(DiagnoseError::Misnumbered { off: found }) = refused else { panic!("{refused:?}") };
         assert_eq!(found, i64::from(off));
     }
@@ -439,7 +440,7 @@ fn a_cloud_finds_its_shots() {
     }
     // Row numbers in place of chirp numbers are refused.
     let given = |points: Vec<CloudPoint>| {
-        match_cloud(&Cloud::new(points).unwrap(), &chirps, &shots).unwrap_err()
+        match_cloud(&Cloud::new(points).unwrap(), chirps, &shots).unwrap_err()
     };
     let on_target = &numbered.points()[..8];
     let rows =
@@ -462,7 +463,7 @@ fn a_cloud_finds_its_shots() {
     assert!(matches!(twice, DiagnoseError::Repeated { second: 8, points: 16 }), "{twice}");
     // A cloud of something else is refused.
     points.iter_mut().for_each(|p| p.point = Point::from(p.point.xyz + DVec3::new(0.0, 0.0, 3.0)));
-    let elsewhere = match_cloud(&Cloud::new(points).unwrap(), &chirps, &shots);
+    let elsewhere = match_cloud(&Cloud::new(points).unwrap(), chirps, &shots);
     assert!(matches!(elsewhere, Err(DiagnoseError::Elsewhere { matched: 0, points: 9 })));
     assert!((found.observations[20].power_w.unwrap() - 1e-9).abs() < 1e-20);
     assert!((found.observations[20].range_m.unwrap() - shots[20].hit.range_m - 1e-3).abs() < 1e-9);
@@ -471,11 +472,10 @@ fn a_cloud_finds_its_shots() {
 #[test]
 fn a_wide_spot_sees_past_the_edge() {
     use crate::measure::cloud::{Cloud, CloudPoint};
-    let (radar, mut mesh) = (Radar::default(), solids::plate(0.5, 0.5));
+    let mut mesh = solids::plate(0.5, 0.5);
     mesh.vertices.iter_mut().for_each(|v| *v += DVec3::new(0.0, 1.1, 0.0));
-    let (bvh, regions) = (Bvh::new(&mesh), vec![0; mesh.facets.len()]);
-    let chirps = chirps(&radar);
-    let stage = stage(&radar, &chirps, &bvh, &regions);
+    let bench = Bench::new(mesh);
+    let (stage, chirps) = (bench.stage(), &bench.chirps);
     let shots = trace_shots(&stage).unwrap();
     // Every chirp within 8 cm of the plate answers, at the plate's range.
     let cloud = |by_m: f64| {
@@ -494,7 +494,7 @@ fn a_wide_spot_sees_past_the_edge() {
         Cloud::new(chirps.number.iter().zip(&chirps.rays).filter_map(point).collect()).unwrap()
     };
     let seen = cloud(0.0);
-    let found = match_cloud(&seen, &chirps, &shots).unwrap();
+    let found = match_cloud(&seen, chirps, &shots).unwrap();
     assert!(found.strays.len() * 3 > seen.points().len(), "{}", found.strays.len());
     // Twice as often, and half a metre behind, they are not of it.
     let stray = |point: &&CloudPoint| shots.iter().all(|shot| Some(shot.chirp) != point.chirp);
@@ -502,8 +502,8 @@ fn a_wide_spot_sees_past_the_edge() {
     let mut twice = [seen.points(), &strays, &strays].concat();
     twice.iter_mut().for_each(|point| point.chirp = None);
     let twice = Cloud::new(twice).unwrap();
-    let twice = match_cloud(&twice, &chirps, &shots).unwrap_err();
+    let twice = match_cloud(&twice, chirps, &shots).unwrap_err();
     assert!(matches!(twice, DiagnoseError::Repeated { .. }), "{twice}");
-    let behind = match_cloud(&cloud(0.5), &chirps, &shots).unwrap_err();
+    let behind = match_cloud(&cloud(0.5), chirps, &shots).unwrap_err();
     assert!(matches!(behind, DiagnoseError::Elsewhere { matched: 0, .. }), "{behind}");
 }

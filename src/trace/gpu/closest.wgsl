@@ -1,34 +1,36 @@
-// The nearest facet of every ray, in f32 with bounds of its rounding; one invocation for each ray.
+// Finds the nearest facet of every ray, in f32 with bounds of its rounding; one invocation per ray.
 //
-// Lengths are in radii of the sphere around the mesh, and its centre is the origin: every coordinate
-// and depth is at most 2.1 times the ray's `size`, which is 1 or little more. Depth is the path along the axis on which a ray's direction is 1 or -1.
+// Lengths are in radii of the sphere around the mesh, and count from its centre. Every coordinate
+// and depth is at most 2.1 times the ray's `size`, which is 1 or slightly more. Depth is the path along the axis on
+// which a ray's direction is 1 or -1.
 //
-// Let n = 2^-24. A corner from the ray's origin errs by 4.2 n: n and 1.1 n are in what comes in, 2.1 n in
-// the difference. Sheared along the ray, whose slopes err by n, it errs by 17 n; below that is 24 n.
-// An edge form is the difference of two products of such coordinates, the largest being m: it errs by
-// less than 4 (m + 2 d) (d + n m), with d for 24 n. All bounds grow with `size`. No bound minds whether a product is fused with a sum.
+// Let n = 2^-24. The vector from the ray's origin to a corner errs by 4.2 n: n and 1.1 n from the inputs, and 2.1 n
+// from the difference. After the shear along the ray, whose slopes err by n, it errs by at most 17 n, for which 24 n
+// is used. An edge form is the difference of two products of such coordinates. If m is the largest of them and d = 24 n,
+// it errs by less than 4 (m + 2 d) (d + n m). All bounds are proportional to `size`, and hold whether or not products
+// are fused with sums.
 
 const ROUNDING: f32 = 5.9604645e-8;
 const BESIDE_ERROR: f32 = 24.0 * ROUNDING;
 const DEPTH_ERROR: f32 = 16.0 * ROUNDING;
 
-/// Farther than anything.
+/// A depth beyond all others.
 const FAR: f32 = 1e30;
 
-/// A direction's component below this is held to be this: over the mesh that moves the ray by 2^-28,
-/// and boxes are grown by 1e-5.
+/// Least component of a direction; smaller ones are replaced by it. Across the mesh this moves the ray by 2^-28, far
+/// less than the margin of the boxes, 1e-5.
 const LEAST_SLOPE: f32 = 9.313226e-10;
 
-/// Answers beside the number of a leaf entry.
+/// Answers other than the number of a leaf entry: a miss, and a ray that f32 cannot decide.
 const NOTHING: u32 = 0xffffffffu;
 const UNSURE: u32 = 0xfffffffeu;
 
-/// Boxes that wait; a ray that leaves more behind is the processor's.
+/// Size of the stack of boxes. The CPU traces a ray that needs more.
 const WAITING: u32 = 64u;
 
 struct Node {
     low: vec3f,
-    /// Leaf entries from `first` on; none for an inner node, whose children are `first` and the next.
+    /// Number of leaf entries from `first` on; 0 for an inner node, whose children are `first` and `first` + 1.
     count: u32,
     high: vec3f,
     first: u32,
@@ -36,20 +38,20 @@ struct Node {
 
 struct Ray {
     origin: vec3f,
-    /// An answer that is known already, or 0.
+    /// The answer if it is known in advance, otherwise 0.
     known: u32,
     direction: vec3f,
     size: f32,
 }
 
 @group(0) @binding(0) var<storage, read> nodes: array<Node>;
-/// Three of each leaf entry; their fourth components are the unit normal.
+/// Three corners per leaf entry; their fourth components are the unit normal.
 @group(0) @binding(1) var<storage, read> corners: array<vec4f>;
 @group(0) @binding(2) var<storage, read> rays: array<Ray>;
 @group(0) @binding(3) var<storage, read_write> answers: array<u32>;
 
-/// What a ray has met so far. Of facets that it surely meets the nearest is the one whose upper bound is the
-/// least; of all others only the least lower bound counts.
+/// The facets of a ray so far. Of those that it certainly hits, `entry` has the least upper bound of the depth, with the
+/// bounds `low` and `high`. `others_low` is the least lower bound of all others.
 struct Met {
     entry: u32,
     low: f32,
@@ -112,7 +114,7 @@ fn answer(ray: Ray) -> u32 {
     return met.entry;
 }
 
-/// The depth at which the ray enters a box; FAR when it passes beside or enters beyond `end`.
+/// Depth at which the ray enters a box; FAR if it misses the box or enters beyond `end`.
 fn entered(ray: Ray, per: vec3f, at: u32, end: f32) -> f32 {
     let node = nodes[at];
     let one = (node.low - ray.origin) * per;
@@ -124,7 +126,7 @@ fn entered(ray: Ray, per: vec3f, at: u32, end: f32) -> f32 {
     return select(FAR, first, first <= last);
 }
 
-/// The components with the one last along which the direction is 1 or -1.
+/// The components of v in cyclic order, with the axis last on which the direction is 1 or -1.
 fn turned(v: vec3f, direction: vec3f) -> vec3f {
     let size = abs(direction);
     if size.z == 1.0 {
@@ -164,8 +166,8 @@ fn meet(ray: Ray, entry: u32, met: ptr<function, Met>) {
     }
 }
 
-/// The depths between which a facet is met. Each corner weighs what its edge form is of their sum, and that
-/// errs by 4.1 times the doubt over the sum. A facet seen edge-on is met between its corners.
+/// Bounds of the depth of a hit. The weight of a corner is the share of its edge form in their sum, and errs by at most
+/// 4.1 times the doubt over the sum. For a facet seen edge-on the bounds are the depths of its corners.
 fn bounds(corners: vec3f, edges: vec3f, doubt: f32, depth_error: f32) -> vec2f {
     var low = min(min(corners.x, corners.y), corners.z);
     var high = max(max(corners.x, corners.y), corners.z);

@@ -173,7 +173,7 @@ mod tests {
         Brdf::Mixture(Mixture { k: 1e-3, diffuse, specular })
     }
 
-    /// Narrow cones from all around to a ball of 0.3 m, its rim and what is beside it.
+    /// Narrow cones from all directions towards a ball of 0.3 m, some of which miss it.
     fn cones(count: usize) -> Vec<Cone> {
         let turn = |i: usize, step: f64| (i as f64 * step).fract() - 0.5;
         let cone = |i: usize| {
@@ -270,7 +270,7 @@ mod tests {
         }
         let told = of_law(3);
         assert!(told.open == 0 && (told.per_sr_m / told.per_sr_m2 - 4.7).abs() < 0.02, "{told:?}");
-        // Along a plate nothing is told, and beside it there is nothing.
+        // A ray along a plate is left open, and one beside it misses.
         let plate = solids::plate(1.0, 1.0);
         let bvh = Bvh::new(&plate);
         let held = gpu.hold(&bvh).unwrap();

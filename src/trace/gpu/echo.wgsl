@@ -1,49 +1,49 @@
-// What comes back to the antenna of the rays of a chirp; one invocation for up to 32 of them. Stands behind
-// closest.wgsl, which finds what they meet.
+// Sums the echoes of the rays of a chirp; one invocation per 32 rays. It is appended to closest.wgsl, which finds
+// their hits.
 //
-// A ray of the spot leaves the antenna along the axis's direction and an aside of it. Asides are small, and so is what
-// they err by: a slope errs by n more than the axis's, and the place where the ray comes near the mesh by n more and
-// by 6 n for each radius that the spot reaches there. Sheared along the ray, a corner then errs by 22 n and
-// 23 n for each radius, which stays below 24 n times `size`, 1 and twice that reach.
+// The direction of a ray of the spot is that of the axis plus a small aside, whose rounding is small, too: a slope errs
+// by n more than that of the axis, and the point where the ray starts near the mesh by n more, and by 6 n per radius of
+// the spot's reach there. After the shear along the ray, a corner errs by 22 n, and by 23 n per radius of reach. This
+// stays below 24 n times `size`, which is 1 plus twice the reach.
 //
-// cos θ errs by 6 n and the range, in radii, by 18 n over cos θ. Where that could tell, the ray is the processor's.
+// cos θ errs by 6 n, and the range, in radii, by 18 n over cos θ. The CPU computes the rays for which this matters.
 //
-// A power that an f32 cannot hold is `LEAST`, so that there is an echo where an f64 has one, however faint.
+// A power below the range of f32 becomes `LEAST`, so that there is an echo wherever f64 has one.
 
-/// cos θ, and cos θ times a range below 1, from which on f32 tells the power to 0.02 dB.
+/// Least cos θ, and least cos θ times a range below 1, for which f32 gives the power within 0.02 dB.
 const GRAZING: f32 = 2e-3;
 
-/// Far below any receiver, and far enough above the least f32 to be multiplied with a range.
+/// A power far below any threshold, yet large enough for an f32 to be multiplied by a range.
 const LEAST: f32 = 1e-34;
 
-/// exp(-x) is 0 in f64 from the second on, and not yet at the first, whatever it is multiplied with.
+/// exp(-x) times any factor is certainly not 0 in f64 up to FAINT, and certainly 0 from GONE on.
 const FAINT: f32 = 650.0;
 const GONE: f32 = 750.0;
 
-/// Rays of one invocation, a bit for each.
+/// Rays per invocation, one bit each.
 const SHARE: u32 = 32u;
 
-/// Roughness of what is no facet's, which divides by nothing.
+/// Roughness in place of the 0 of a diffuse term, to avoid a division by zero.
 const LEAST_M: f32 = 1e-3;
 
-/// A law that has no terms to add up.
+/// Number of terms of a scattering model without terms.
 const NO_TERMS: u32 = 0xffffffffu;
 
 const GGX: u32 = 1u;
 
-/// A chirp where its axis comes near the mesh.
+/// A chirp that starts where its axis comes near the mesh.
 struct Spot {
     origin: vec3f,
-    /// How often `direction` fits between the antenna and there.
+    /// Distance from the antenna to `origin` in lengths of `direction`.
     run: f32,
     direction: vec3f,
     size: f32,
-    /// What the coordinates of a sample add to the direction.
+    /// The vectors by which the coordinates of a sample are multiplied before they are added to the direction.
     right: vec3f,
-    /// The law of region 0.
+    /// Number of the scattering model of region 0.
     law: u32,
     up: vec3f,
-    /// An answer that is known already, or 0.
+    /// The answer if it is known in advance, otherwise 0.
     known: u32,
 }
 
@@ -51,26 +51,26 @@ struct Spot {
 struct Term {
     level: f32,
     cosines: f32,
-    /// m, 0 for a diffuse term.
+    /// Roughness m; 0 for a diffuse term.
     m: f32,
-    /// The law P and, from bit 1 on, s.
+    /// The distribution P in bit 0, and s from bit 1 on.
     form: u32,
 }
 
 @group(0) @binding(4) var<storage, read> regions: array<u32>;
 @group(0) @binding(5) var<storage, read> spots: array<Spot>;
 @group(0) @binding(6) var<storage, read> samples: array<vec2f>;
-/// First term and number of terms.
+/// First term and number of terms of each scattering model.
 @group(0) @binding(7) var<storage, read> laws: array<vec2u>;
 @group(0) @binding(8) var<storage, read> terms: array<Term>;
 
-/// A ray of a spot, and the stretch of its direction over the axis's.
+/// A ray of a spot, and the length of its direction over that of the axis.
 struct Beside {
     ray: Ray,
     stretch: f32,
 }
 
-/// What a ray brings back: f cosᵃ θ / R² in radii, and R; below 0 where f32 cannot tell.
+/// The echo of a ray: f cosᵃ θ / R² in radii, and R. `power` is negative if f32 cannot compute it.
 struct Back {
     power: f32,
     range: f32,
@@ -128,7 +128,7 @@ fn beside(spot: Spot, sample: vec2f) -> Beside {
     );
     let along = dot(aside, select(vec3f(0.0), spot.direction, is_along));
     let stretch = 1.0 + along;
-    // One component stays 1 or -1, exactly.
+    // One component stays exactly 1 or -1.
     let direction = spot.direction + (aside - along * spot.direction) / stretch;
     return Beside(Ray(spot.origin + spot.run * aside, 0u, direction, spot.size), stretch);
 }
@@ -146,7 +146,7 @@ fn scattered(spot: Spot, way: Beside, entry: u32) -> Back {
     if cosine < GRAZING || cosine * range < GRAZING || law.y == NO_TERMS {
         return Back(-1.0, 0.0);
     }
-    // The difference of 1 and cos² θ would have lost its digits.
+    // 1 - cos² θ would suffer from cancellation.
     let across = cross(ray.direction, normal) / unit;
     let tangent = sqrt(dot(across, across)) / cosine;
     var sum = 0.0;
@@ -162,7 +162,7 @@ fn scattered(spot: Spot, way: Beside, entry: u32) -> Back {
     return Back(max(sum / (range * range), LEAST), range);
 }
 
-/// Below 0 where f32 cannot tell whether an f64 holds it.
+/// Negative if f32 cannot decide whether the value is 0 in f64.
 fn told(term: Term, cosine: f32, tangent: f32) -> f32 {
     let slope = tangent / max(term.m, LEAST_M);
     let is_diffuse = term.m == 0.0;
@@ -186,7 +186,7 @@ fn told(term: Term, cosine: f32, tangent: f32) -> f32 {
     return max(level * law * together, LEAST);
 }
 
-/// Smith's G1 of m tan θ.
+/// Smith's shadowing function G1 of m tan θ.
 fn seen_beckmann(slope: f32) -> f32 {
     if slope <= 0.625 {
         return 1.0;
