@@ -15,7 +15,7 @@
 //! | probability of the observations | `likelihood.rs`, `problem.rs` |
 //! | scattering models and effects together | `space.rs`, `refit.rs`, `ranges.rs` |
 //! | the promise of an effect | `screen.rs` |
-//! | what a model is worth on held-out patches | `folds.rs`, `score.rs`, `scorer.rs` |
+//! | the score of a model on held-out patches | `folds.rs`, `score.rs`, `scorer.rs` |
 //! | the choice: trials, support, rivals, removal | `trial.rs`, `support.rs`, `choose.rs`, `exchange.rs`, `explanation.rs` |
 //! | what remains | `covariates.rs`, `field.rs`, `residual.rs`, `scatter.rs`, `remains.rs` |
 //! | controls of the answer | `controls.rs`, `placebo.rs`, `recovery.rs` |

@@ -1,4 +1,4 @@
-//! What a chirp recorded, and what is declared of the receiver.
+//! The record of a chirp, and the declared properties of the receiver.
 
 use crate::effects::MeanEcho;
 

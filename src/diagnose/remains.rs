@@ -43,7 +43,7 @@ pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<Un
     found
 }
 
-/// The tests of the scatter beside effects of this size.
+/// The tests of the scatter for a model whose largest effect has this size.
 fn tests(settings: &Diagnosis, largest_db: f64) -> Tests {
     let Diagnosis { seed, draws, block_m, family_error, .. } = *settings;
     let least_size_db = settings.least_size_db.max(SHARE_OF_FORM * largest_db);

@@ -161,7 +161,7 @@ pub struct BaseValue {
     pub value: Value,
 }
 
-/// Pose of a mesh in the global frame.
+/// Pose of a mesh in the global frame, in the units of `report.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeshPose {
     /// Its name.
@@ -172,7 +172,7 @@ pub struct MeshPose {
     pub translation_m: [f64; 3],
 }
 
-/// The model that the effects are added to.
+/// The model that the effects are added to. A part of `report.json`, whose units its fields have when written.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Base {
     /// Parameters of the scattering models, as fitted with the effects.

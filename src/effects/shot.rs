@@ -60,7 +60,7 @@ impl Shot {
     }
 
     /// Direction to the radar in the local frame of the surface.
-    pub(crate) fn to_radar(&self) -> Direction<Surface> {
+    pub(crate) fn to_radar(self) -> Direction<Surface> {
         Direction::from_angles(self.hit.theta_rad(), self.azimuth_rad)
     }
 

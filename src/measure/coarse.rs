@@ -18,7 +18,7 @@ const BEYOND_THE_EDGE: f64 = 4.0;
 /// With a smaller share of points near the mesh, the clouds do not overlap.
 const LEAST_OVERLAP: f64 = 0.2;
 
-/// Where a coarse alignment ended.
+/// The result of a coarse alignment.
 pub(super) struct Alignment {
     pub pose: Pose<Global, Global>,
     pub scans: usize,
@@ -105,7 +105,7 @@ fn pairs(
             pairs.push(Pair { model, measured, normal: moved.rotation() * seen.normal });
         }
     }
-    // Beyond the edge of what the virtual scan saw, pairs lie far off sideways.
+    // Pairs beyond the edge of the virtual scan lie far apart sideways.
     let typical_m = median(pairs.iter().map(Pair::sideways_m));
     pairs.retain(|pair| pair.sideways_m() <= BEYOND_THE_EDGE * typical_m);
     pairs

@@ -1,4 +1,4 @@
-//! How far a simulated scan is from a measured one: pixel by pixel, and along a line (paper, Figs. 10
+//! Compares a simulated scan with a measured one: pixel by pixel, and along a line (paper, Figs. 10
 //! to 15).
 
 use super::cloud::Cloud;
@@ -29,12 +29,11 @@ pub struct Agreement {
 pub struct Line {
     /// Height of its middle, m.
     pub y_m: f64,
-    /// How high it is, m.
+    /// Its height, m.
     pub width_m: f64,
 }
 
-/// A measured cloud as a scan, so that it can be drawn as simulated ones are. Nothing is known of what
-/// caused its echoes.
+/// Converts a measured cloud to a scan, so that it can be drawn like a simulated one. Its echoes have no known cause.
 pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
     let frames = radar.frames();
     let (origin, target_from_global) = (frames.origin(), frames.global_from_target.inverse());

@@ -105,7 +105,7 @@ impl Motion {
     }
 }
 
-/// Rounding must not stretch a pose that is multiplied a hundred times.
+/// The pose with its rotation orthonormalised, since rounding accumulates over a hundred products.
 pub fn rigid(pose: &Pose<Global, Global>) -> Pose<Global, Global> {
     let rotation = DQuat::from_mat3(&pose.rotation()).normalize();
     Pose::new(DMat3::from_quat(rotation), pose.translation_m())

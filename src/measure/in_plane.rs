@@ -2,7 +2,7 @@
 //!
 //! As CSV: `theta_i_deg,theta_s_deg,brdf_per_sr`, and `sd_db` where it is known. θ_s is positive on the
 //! side of the mirror direction, so that θ_s = θ_i is the mirror and θ_s = −θ_i the way back. A pair of
-//! angles that stands there several times was measured several times. Values that the instrument could
+//! angles may occur several times, as repeated measurements. Values that the instrument could
 //! not measure, such as those behind its own detector, are left out.
 //!
 //! Also read are the isotropic tables of optical design programs (`.bsdf`), whose angles are counted from
@@ -98,7 +98,7 @@ pub fn read_bsdf(bytes: &[u8]) -> Result<Vec<InPlane>, FormatError> {
                 _ => continue,
             };
             for (&radial_deg, f_per_sr) in header.radials_deg.iter().zip(row) {
-                // The mirror direction stands in both rows of the plane.
+                // Both rows of the plane contain the mirror direction.
                 if towards < 0.0 || radial_deg != 0.0 {
                     let theta_s_deg = incidence_deg + towards * radial_deg;
                     found.extend(in_plane(incidence_deg, theta_s_deg, f_per_sr));

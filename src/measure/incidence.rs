@@ -1,8 +1,8 @@
 //! The point and the angle of incidence at which a ray hits the registered target, and their uncertainty.
 //!
 //! The standard deviation of a tilt of the normal against the ray has three parts: the turn of the
-//! pose, the normal noise of the mesh ([`super::normals`]), and what the caller adds. What a shifted
-//! pose does to the angle on a curved surface is left out: half a millimetre over a radius of 100 mm
+//! pose, the normal noise of the mesh ([`super::normals`]), and a part that the caller adds. The effect of a shifted
+//! pose on the angle on a curved surface is neglected: half a millimetre over a radius of 100 mm
 //! is 0.3°, and registered poses are ten times better.
 
 use glam::DVec3;
@@ -35,8 +35,8 @@ pub struct Incidence<'a> {
 }
 
 impl<'a> Incidence<'a> {
-    /// `extra_sd_rad`: a further standard deviation of each tilt, rad, 0 or more, for what neither
-    /// the pose nor the mesh knows.
+    /// `extra_sd_rad` is a further standard deviation of each tilt, rad, 0 or more, for errors that are neither in the
+    /// pose nor in the mesh.
     pub fn new(
         target: &'a Target,
         registered: &'a RegistrationResult,

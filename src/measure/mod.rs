@@ -1,6 +1,6 @@
 //! From a measured cloud to a curve of a material: pose, angles of incidence, σ⁰.
 //!
-//! [`Cloud`] is what the radar measured. [`Registration`] finds where the mesh stood, [`Incidence`]
+//! [`Cloud`] holds the measured points and powers. [`Registration`] finds the pose of the mesh, [`Incidence`]
 //! gives the point and the angle at which each ray hits it, and [`Reduction`] converts powers to σ⁰.
 
 pub mod cloud;

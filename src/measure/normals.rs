@@ -1,4 +1,4 @@
-//! How far the normals of a mesh's facets deviate from those of the surface that it approximates.
+//! The deviation of the normals of a mesh's facets from those of the surface that it approximates.
 //!
 //! Two errors, both as the variance of one of the two tilts of a facet's normal. *Noise*: the vertices
 //! of a scanned mesh are off, so that a facet leans against its neighbours. Between a normal with

@@ -1,4 +1,4 @@
-//! Powers to σ⁰: equation (8) solved for the material's share.
+//! Converts powers to σ⁰: equation (8) solved for the material's share.
 //!
 //! σ⁰(θ) = P_r · 4πR²/(P_t · A_eq · g), with the system gain g. A curve's σ⁰ is by definition (10),
 //! 4π·f·cos²θ. With [`Footprint::Projected`] the instrument's model is P_r = P_t·A_eq·g/R² · f·cos θ,
@@ -75,7 +75,7 @@ pub struct Exclusions {
 /// A hundredth of the points may contradict the scene before the cloud is refused.
 const TOLERATED: usize = 100;
 
-/// What becomes of a detection or a silent chirp: a row, or why not.
+/// A row from a detection or a silent chirp, or the reason why there is none.
 enum Fate {
     Row(Observation),
     Missed,
@@ -85,7 +85,7 @@ enum Fate {
     Unsure,
 }
 
-/// Turns chirps into rows.
+/// Converts chirps to rows.
 struct Reducer<'a> {
     incidence: Incidence<'a>,
     link: Link,

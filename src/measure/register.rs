@@ -1,4 +1,4 @@
-//! Where the mesh stood when the cloud was measured (paper, Sec. V-B and Fig. 8).
+//! The pose of the mesh when the cloud was measured (paper, Sec. V-B and Fig. 8).
 //!
 //! First the paper's loop: the mesh is scanned with the measurement's own pattern, and its virtual
 //! cloud is aligned to the measured one by nearest neighbours, until the pose stops changing. Nearest
@@ -58,7 +58,7 @@ pub struct RegistrationResult {
     pub pivot: Point<Global>,
     /// Root mean square of the range errors of the inliers, m.
     pub rms_m: f64,
-    /// By what the variance was widened because neighbouring points share errors, 1 or more.
+    /// Factor on the variance because neighbouring points share errors, 1 or more.
     pub widened: f64,
     /// Whether the given pose was kept, because it is within chance of the found one.
     pub kept: bool,
@@ -221,8 +221,7 @@ impl RegistrationResult {
         self
     }
 
-    /// How far a point of the target may be from where the pose puts it, standard deviation in any
-    /// direction, m.
+    /// Standard deviation of the position of a point of the target under the pose, over all directions together, m.
     pub fn shift_sd_m(&self, point: Point<Global>) -> f64 {
         let arm_m = point.distance_m(self.pivot);
         let [x, y, z, turn_x, turn_y, turn_z] = std::array::from_fn(|i| self.covariance[i][i]);

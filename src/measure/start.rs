@@ -41,7 +41,7 @@ fn guesses<'v>(view: &'v View) -> impl Iterator<Item = Pose<Global, Global>> + '
     })
 }
 
-/// A guess after a coarse alignment, and how badly it fits, m.
+/// A guess after a coarse alignment, and its mean error along the rays, m.
 fn improved(
     view: &View,
     settings: &Registration,
@@ -55,9 +55,9 @@ fn improved(
     Some((errors_m.sum::<f64>() / gaps.len().max(1) as f64, pose))
 }
 
-/// Shifts a guess until what the scan sees of the mesh has its middle where the cloud has.
+/// Shifts a guess until the middle of the scanned part of the mesh is at the middle of the cloud.
 fn onto_the_cloud(view: &View, mut pose: Pose<Global, Global>) -> Option<Pose<Global, Global>> {
-    // What comes into view changes the middle; it settles soon.
+    // A shift changes the scanned part, and so its middle, but this converges fast.
     const SHIFTS: usize = 3;
     for _ in 0..SHIFTS {
         let seen = view.tracer.scan(&pose, &view.chirps).into_iter().flatten();

@@ -10,7 +10,7 @@ use std::f64::consts::FRAC_PI_2;
 use crate::material::{Censor, Observation};
 use crate::radar::random::{Key, Purpose};
 
-/// What the points of one range of angles say together.
+/// Statistics of the points in one range of angles.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct AngleStatistics {
     /// Least and greatest angle of incidence, rad; equal where points were taken at one angle.
@@ -29,7 +29,7 @@ pub struct AngleStatistics {
     pub interval_95: Option<[f64; 2]>,
 }
 
-/// Seed of the bootstrap: what is stored must come out again.
+/// Seed of the bootstrap, fixed so that stored statistics can be reproduced.
 const SEED: u64 = 0;
 const RESAMPLES: u64 = 400;
 /// Fewer points than this give no interval.
@@ -249,7 +249,7 @@ impl Spread {
                 return Some(*level);
             }
         }
-        // Without anything below, the lowest is all that is left.
+        // Without weight below a threshold, the lowest detection is the quantile.
         self.detected.last().filter(|_| self.below.is_empty()).map(|(level, _)| *level)
     }
 }

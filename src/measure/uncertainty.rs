@@ -1,4 +1,4 @@
-//! How well a pose is known.
+//! The covariance of a registered pose.
 //!
 //! With independent errors the covariance of the least-squares pose is σ²(JᵀJ)⁻¹. Neighbouring
 //! points share errors: their spots overlap, and they lie on the same facets. So the sum of JᵀeeᵀJ is
@@ -21,12 +21,12 @@ const LEAST_CELLS: usize = 30;
 /// A direction with a larger standard deviation is reported as not determined, m.
 const UNKNOWN_SD_M: f64 = 5e-3;
 
-/// What is known of a pose.
+/// The uncertainty of a pose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Uncertainty {
     /// Covariance of shift (m) and turn (rad) about the pivot.
     pub covariance: [[f64; 6]; 6],
-    /// By what the variance was widened for shared errors, 1 or more.
+    /// Factor on the variance for shared errors, 1 or more.
     pub widened: f64,
     /// Directions in which the points do not determine the pose, in words.
     pub unknown: Vec<String>,

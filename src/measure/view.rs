@@ -1,4 +1,4 @@
-//! What an alignment compares: the mesh, the rays of the scan, and the measured points with their rays.
+//! The input of an alignment: the mesh, the rays of the scan, and the measured points with their rays.
 
 use glam::DVec3;
 

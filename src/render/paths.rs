@@ -170,7 +170,7 @@ impl<'a> Emission<'a> {
         paths: &mut Vec<Path>,
     ) {
         for (onward, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
-            let Some(hit) = self.trace_from(lit, onward) else { continue };
+            let Some(hit) = self.trace_onward(lit, onward) else { continue };
             let (f_per_sr, first_share) =
                 lit.surface.scattering.f_and_specular_share(lit.source, onward);
             let second = self.lit_point(hit, lit.hit.point.xyz);
@@ -217,7 +217,7 @@ impl<'a> Emission<'a> {
     }
 
     /// The closest hit of a ray from a point.
-    fn trace_from(&self, lit: &LitPoint, towards: Direction<Local>) -> Option<Hit> {
+    fn trace_onward(&self, lit: &LitPoint, towards: Direction<Local>) -> Option<Hit> {
         let origin = Point::from(lit.hit.point.xyz + LIFT_M * lit.frame.normal());
         let direction = Direction::new(lit.frame.world(towards.xyz()))?;
         self.paths.setup.geometry.bvh.closest(&Ray { origin, direction })
@@ -226,7 +226,7 @@ impl<'a> Emission<'a> {
     /// Whether a point is visible from the antenna.
     fn is_seen(&self, lit: &LitPoint) -> bool {
         let above = lit.antenna.cos_theta() > 0.0;
-        above && self.trace_from(lit, lit.antenna).is_none_or(|hit| hit.range_m >= lit.antenna_m)
+        above && self.trace_onward(lit, lit.antenna).is_none_or(|hit| hit.range_m >= lit.antenna_m)
     }
 
     /// Gain of the antenna towards a second surface, relative to that towards the spot. It is 1 for a separate receiver.

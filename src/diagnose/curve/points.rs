@@ -35,7 +35,7 @@ pub struct Point {
     pub theta_i_rad: f64,
     /// Angle of the receiver, rad, positive on the mirror's side.
     pub theta_s_rad: f64,
-    /// 10·lg f, f in 1/sr; where censored f is below that.
+    /// 10·lg f, f in 1/sr; where censored f is below that. In dB, in which the fit minimises the residual.
     pub f_db: f64,
     /// Nothing was detected.
     pub censored: bool,

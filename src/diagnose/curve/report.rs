@@ -126,7 +126,7 @@ pub struct CurveFacts {
     pub scans: usize,
 }
 
-/// One level.
+/// One level of a curve, as a line of `residuals.csv` has it. Levels are in dB, in which the fit minimises the residual.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CurveRow {
     /// Angle of incidence, degrees.

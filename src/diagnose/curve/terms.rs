@@ -242,7 +242,7 @@ impl Term for Subsurface {
 
 struct ThinFilm;
 
-/// Index of refraction of a film: paints and oxides have 1.4 to 1.8, and the ripple hardly tells.
+/// Index of refraction of a film: paints and oxides have 1.4 to 1.8, and the ripple hardly depends on it.
 const FILM_INDEX: f64 = 1.5;
 
 impl Term for ThinFilm {
