@@ -86,25 +86,27 @@ class Page(unittest.TestCase):
             ],
             "fits": [ms(2.0, fit="f", program="matdb"), ms(1.0, fit="f", program="odrpack", gap=1e-7)],
         }
-        lost = self.lines(results, "| 1 000 facets, ") + self.lines(results, "| f |  |")
-        self.assertEqual(lost, [
-            "| 1 000 facets, 2 000 rays | 2 | Embree, low build | × 0.500 | × 0.250 |",
-            "| 1 000 facets, 2 000 rays | 2 | Embree, medium build | × 3.00 | × 0.500 |",
-            "| f |  | odrpack | × 0.500 |  |",
-        ])
+        row, = self.lines(results, "| 1 000 × 2 000 | 2.00 (1.80–2.20) |")
+        self.assertTrue(row.endswith(" | **0.500** / **0.250** | 3.00 / **0.500** |  | 4.00 / 1.50 |  |"), row)
+        lost, = self.lines(results, "- **Slower:**")
+        self.assertEqual(lost, "- **Slower:** tracing 1 000 × 2 000 (× 0.500); f (× 0.500).")
+        once, = self.lines(results, "- **Once built:**")
+        self.assertIn("the others trace faster in 2 of 3", once)
 
     def test_what_is_missing_is_said_and_is_no_loss(self):
         results = {
             "trace": [
-                trace("body", "matdb pinhole", 0.0, 2.0),
-                {"workload": "body", "facets": 1000, "rays": 2000, "threads": 2, "mesh_mb": 10.0,
+                trace("paper", "matdb pinhole", 0.0, 2.0),
+                {"workload": "paper", "facets": 1000, "rays": 2000, "threads": 2, "mesh_mb": 10.0,
                  "coherent": True, "tracer": "Open3D", "missing": "No module named 'open3d'"},
             ],
             "failed": {"store": "no cargo"},
         }
         row, = self.lines(results, "| Open3D |")
         self.assertIn("No module named 'open3d'", row)
-        self.assertEqual(self.lines(results, "Nowhere"), ["Nowhere in this run."])
+        row, = self.lines(results, "| 1 000 × 2 000 | 2.00 ")
+        self.assertIn("| not installed |", row)
+        self.assertEqual(self.lines(results, "- **Slower:**"), ["- **Slower:** nowhere in this run."])
         self.assertEqual(self.lines(results, "- store"), ["- store could not be measured: no cargo"])
 
     def test_parts_of_another_run_tell_when_it_was(self):
@@ -114,12 +116,13 @@ class Page(unittest.TestCase):
             "parts": {
                 "trace": run | {"minutes": 7.0},
                 "fits": other | {"minutes": 3.0},
+                "render": other | {"minutes": 1.0},
                 "store": other | {"minutes": 42.2, "cpu": "Slide rule"},
             },
         }
         told = "measured on 1999-12-31 at `ba9876543210`, {} minutes, load before them 1.5"
         self.assertEqual(self.lines(results, "- trace"), [])
-        self.assertEqual(self.lines(results, "- fits"), ["- fits: " + told.format(3)])
+        self.assertEqual(self.lines(results, "- fits"), ["- fits, render: " + told.format(4)])
         self.assertEqual(self.lines(results, "- store"), ["- store: " + told.format(42) + ", by Slide rule"])
 
     def test_registration_must_be_faster_than_the_fastest_and_as_exact(self):
