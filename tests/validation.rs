@@ -1,7 +1,7 @@
-//! Promise: docs/validation.md says what the crate computes, number for number, and every number
-//! lies within its tolerance unless the page says that it does not.
+//! Promise: docs/validation.md says what the crate computes, tests/validation/rows.md says it number for
+//! number, and every number lies within its tolerance unless the page says that it does not.
 //!
-//! `MATDB_WRITE_VALIDATION=1 cargo test --test validation` writes the page.
+//! `MATDB_WRITE_VALIDATION=1 cargo test --test validation` writes both.
 
 mod support;
 
@@ -42,14 +42,20 @@ fn the_page_holds_what_the_crate_computes() {
     let surprises: Vec<String> =
         sections.iter().flat_map(Section::rows).filter_map(Row::surprise).collect();
     assert!(surprises.is_empty(), "{}", surprises.join("\n"));
-    let (path, made) = (support::root().join(PAGE), page::markdown(&sections));
+    for (path, made) in [(PAGE, page::markdown(&sections)), (page::ROWS, page::rows(&sections))] {
+        compare_or_write(path, &made);
+    }
+}
+
+/// A file that is as it is made; written where that is asked for.
+fn compare_or_write(name: &str, made: &str) {
+    let path = support::root().join(name);
     if std::env::var_os("MATDB_WRITE_VALIDATION").is_some() {
         return std::fs::write(path, made).unwrap();
     }
     let committed = std::fs::read_to_string(path).unwrap_or_default();
-    let lines = |text: &str| text.lines().map(str::to_owned).collect::<Vec<_>>();
-    for (number, (made, committed)) in std::iter::zip(lines(&made), lines(&committed)).enumerate() {
-        assert_eq!(made, committed, "line {} of {PAGE} is stale; {}", number + 1, page::COMMAND);
+    for (number, (made, committed)) in std::iter::zip(made.lines(), committed.lines()).enumerate() {
+        assert_eq!(made, committed, "line {} of {name} is stale; {}", number + 1, page::COMMAND);
     }
-    assert!(made == committed, "{PAGE} has other lines than it should; {}", page::COMMAND);
+    assert!(made == committed, "{name} has other lines than it should; {}", page::COMMAND);
 }

@@ -83,8 +83,7 @@ pub fn section() -> Section {
     let groups = groups();
     assert_eq!(groups.values().map(|group| group.0).sum::<usize>(), 200);
     let row = |(name, (count, errors)): (&String, &(usize, [f64; 2]))| {
-        let of =
-            |term: &str| format!("{name}: worst relative difference of {term} over {count} pairs");
+        let of = |term: &str| format!("{name}, {count} pairs: worst relative difference of {term}");
         [(of("D"), errors[0]), (of("f"), errors[1])]
             .map(|(what, error)| Row::new(what, error, Below(SINGLE_PRECISION)))
     };

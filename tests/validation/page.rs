@@ -1,7 +1,16 @@
 //! The page: sections of tables whose rows carry a number, its tolerance and a verdict.
 
+/// Every row of every table, beside the page that sums them up.
+pub const ROWS: &str = "tests/validation/rows.md";
+
 /// Writes the page.
 pub const COMMAND: &str = "`MATDB_WRITE_VALIDATION=1 cargo test --test validation` writes it";
+
+/// Margins that differ by less are equal: rounding must not choose which row is shown.
+const SAME_MARGIN: f64 = 1e-6;
+
+/// So many rows of one kind are shown as the worst of them.
+const MANY: usize = 3;
 
 /// Below this a number is rounding and differs from one machine to the next.
 const ROUNDING: f64 = 1e-12;
@@ -93,14 +102,56 @@ impl Row {
         with_unit(&number(self.value, self.digits), self.unit)
     }
 
-    fn markdown(&self) -> String {
+    /// What is measured, without of what.
+    fn kind(&self) -> &str {
+        self.what.rsplit_once(": ").map_or(&self.what, |(_, kind)| kind)
+    }
+
+    /// Share of its tolerance that the number takes.
+    fn share_of_tolerance(&self) -> f64 {
+        match self.tolerance {
+            Tolerance::Below(most) => self.value / most,
+            Tolerance::Within(least, most) => {
+                (2.0 * self.value - least - most).abs() / (most - least)
+            }
+        }
+    }
+
+    fn tolerance(&self) -> String {
         let tolerance = match self.tolerance {
             Tolerance::Below(most) => format!("≤ {}", plain(most)),
             Tolerance::Within(least, most) => format!("{} to {}", plain(least), plain(most)),
         };
-        let verdict = if self.passes() { "passes" } else { "**fails**" };
-        let tolerance = with_unit(&tolerance, self.unit);
-        format!("| {} | {} | {tolerance} | {verdict} |\n", self.what, self.found())
+        with_unit(&tolerance, self.unit)
+    }
+
+    fn markdown(&self, what: &str) -> String {
+        format!("| {what} | {} | {} |\n", self.found(), self.tolerance())
+    }
+}
+
+/// The rows of a table that pass; many of one kind as the one that takes most of its tolerance.
+fn summary(table: &Table) -> String {
+    let mut kinds: Vec<(&str, Vec<&Row>)> = Vec::new();
+    for row in table.rows.iter().filter(|row| row.passes()) {
+        match kinds.iter_mut().find(|(kind, _)| *kind == row.kind()) {
+            Some((_, rows)) => rows.push(row),
+            None => kinds.push((row.kind(), vec![row])),
+        }
+    }
+    kinds.iter().map(|(kind, rows)| summary_of_kind(kind, rows)).collect()
+}
+
+fn summary_of_kind(kind: &str, rows: &[&Row]) -> String {
+    if rows.len() < MANY {
+        return rows.iter().map(|row| row.markdown(&row.what)).collect();
+    }
+    let most = rows.iter().map(|row| row.share_of_tolerance()).fold(0.0, f64::max);
+    let is_worst = |row: &&&Row| row.share_of_tolerance() >= most - SAME_MARGIN;
+    let worst = rows.iter().find(is_worst).expect("one of them takes most");
+    match worst.value.abs() < ROUNDING {
+        true => worst.markdown(&format!("all {}: {kind}", rows.len())),
+        false => worst.markdown(&format!("worst of {}, {}", rows.len(), worst.what)),
     }
 }
 
@@ -127,14 +178,15 @@ fn plain(value: f64) -> String {
     if value != 0.0 && value.abs() < 1e-3 { format!("{value:e}") } else { format!("{value}") }
 }
 
-const HEAD: &str = "| what | found | tolerance | verdict |\n|---|---|---|---|\n";
+const HEAD: &str = "| what | found | tolerance |\n|---|---|---|\n";
 
 fn introduction() -> String {
     format!(
         "This page compares what the code computes with closed forms, published figures, limits that two models must \
          share, and another renderer. It checks the code, not whether a model suits a material; nothing here is \
          measured. Generated: `tests/validation.rs` computes every number and fails when one leaves its tolerance or \
-         differs from this page; {COMMAND}."
+         changes; {COMMAND}. Where a table has many rows of one kind, the page shows the one that takes most of its \
+         tolerance. `{ROWS}` has every row."
     )
 }
 
@@ -163,7 +215,7 @@ pub fn markdown(sections: &[Section]) -> String {
     let mut page = format!("# Validation\n\n{}\n\n## What fails\n\n", wrapped(&introduction()));
     for row in sections.iter().flat_map(Section::rows) {
         if let Some(reason) = &row.fails_because {
-            page += &format!("- {}: {}. {reason}\n", row.what, row.found());
+            page += &format!("- {} {}. {reason}\n", row.what, row.found());
         }
     }
     page += "\n## What is not covered\n\n";
@@ -173,9 +225,25 @@ pub fn markdown(sections: &[Section]) -> String {
     for section in sections {
         page += &format!("\n## {}\n", section.title);
         for table in &section.tables {
-            page += &format!("\n{}\n\n{HEAD}", wrapped(&table.text));
-            page.extend(table.rows.iter().map(Row::markdown));
+            page += &format!("\n{}\n\n{HEAD}{}", wrapped(&table.text), summary(table));
         }
     }
     page
+}
+
+/// Every row of every table.
+pub fn rows(sections: &[Section]) -> String {
+    let mut text = format!("Every number of docs/validation.md; {COMMAND}.\n");
+    for section in sections {
+        text += &format!(
+            "\n## {}\n\n| what | found | tolerance | verdict |\n|---|---|---|---|\n",
+            section.title
+        );
+        for row in section.rows() {
+            let verdict = if row.passes() { "passes" } else { "**fails**" };
+            text +=
+                &format!("| {} | {} | {} | {verdict} |\n", row.what, row.found(), row.tolerance());
+        }
+    }
+    text
 }

@@ -34,6 +34,8 @@ const NO_SHADOWING: &str = "The model has no shadowing, as its documentation say
 const BLINN_PHONG: &str = "The paper's model is not normalised; r_s up to 1/4 is safe for any α.";
 const MIXED: &str = "Each part keeps energy, but nothing bounds a sum.";
 
+const BUILT_IN: &str = "built-in material";
+
 /// Model as a material file has it (in JSON), what to call it, and why it breaks energy if it does.
 type Entry = (&'static str, &'static str, Option<&'static str>);
 
@@ -168,19 +170,26 @@ struct Judged {
     fails_because: Option<&'static str>,
 }
 
+impl Judged {
+    /// What the largest value is one of, for the page.
+    fn of_what(&self) -> &'static str {
+        if self.kind == BUILT_IN { " of a built-in material" } else { " of a model" }
+    }
+}
+
 fn judged() -> Vec<Judged> {
     let stored = MODELS.iter().map(|(name, json, fails_because)| {
         let value: serde_json::Value = serde_json::from_str(json).unwrap();
         let kind = value["model"].as_str().unwrap().to_owned();
         let model: Brdf = serde_json::from_value(value).unwrap();
         model.validate().unwrap();
-        let name = format!("`{kind}`, {name}");
+        let name = format!("`{kind}`, {name},");
         Judged { kind, name, model, fails_because: *fails_because }
     });
     let built_in = builtin::names().map(|name| {
         let model = builtin::get(name).unwrap().unwrap().scattering().unwrap();
-        let kind = "built-in material".to_owned();
-        Judged { kind, name: format!("material `{name}`"), model, fails_because: None }
+        let kind = BUILT_IN.to_owned();
+        Judged { kind, name: format!("`{name}`"), model, fails_because: None }
     });
     stored.chain(built_in).collect()
 }
@@ -250,8 +259,9 @@ fn reciprocity(models: &[Judged]) -> Vec<Row> {
         let found = worst.entry(&judged.kind).or_default();
         *found = found.max(worst_asymmetry(&judged.model, seed));
     }
-    let row =
-        |(kind, value): (&&str, &f64)| Row::new(format!("`{kind}`"), *value, Below(RECIPROCAL));
+    let row = |(kind, value): (&&str, &f64)| {
+        Row::new(format!("`{kind}`: asymmetry"), *value, Below(RECIPROCAL))
+    };
     worst.iter().map(row).collect()
 }
 
@@ -276,7 +286,7 @@ fn energy(models: &[Judged]) -> (Vec<Row>, f64) {
         let (worst_deg, worst) = largest(&albedos);
         let finer = albedo(&judged.model, worst_deg.to_radians(), 2 * NODES);
         change = change.max((worst - finer).abs());
-        let what = format!("{}, largest at {worst_deg}°", judged.name);
+        let what = format!("{} at {worst_deg}°: largest{}", judged.name, judged.of_what());
         let row = Row::new(what, worst, Below(ALL_OF_IT)).digits(3);
         rows.push(match judged.fails_because {
             None => row,
