@@ -71,6 +71,9 @@ fn by_strength(cases: &[Case]) -> String {
         "all wrong names per case",
         "no answer",
     ];
+    if Strength::ALL.iter().all(|&strength| singles(cases, strength).is_empty()) {
+        return String::new();
+    }
     let row = |strength: Strength| {
         let cases = singles(cases, strength);
         vec![
@@ -276,6 +279,7 @@ fn errors(cases: &[Case]) -> String {
     rows.push(row("all with known effects", &expecting(cases, Expected::Named)));
     rows.push(row("nothing missing", &expecting(cases, Expected::Complete)));
     rows.push(row("unknown effects", &expecting(cases, Expected::Unknown)));
+    rows.retain(|row| row[1] != "0");
     format!(
         "Columns are medians over cases unless they say otherwise. “Explained share” is the share of the squared error \
          before, beyond the floor, that the named effects remove.\n\n{}",

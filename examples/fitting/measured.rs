@@ -37,8 +37,9 @@ pub fn section(folder: &Path) -> Result<String, Failure> {
     let coatings = coatings(&folder.join(COATINGS))?;
     let ptfe = ptfe(&folder.join(PTFE))?;
     let mut text = INTRODUCTION.to_owned();
+    text += &header();
     for set in coatings.iter().chain(&ptfe) {
-        text += &table(set)?;
+        text += &row(set)?;
         eprintln!("{}", set.name);
     }
     text += JUDGEMENT;
@@ -67,40 +68,37 @@ Lambertian within 0.25 dB up to 60°. The lobe that the fits add there removes 0
 facet lobe. These fits show how flexible the models are; their numbers do not hold at 300 GHz.
 ";
 
-fn table(set: &Measured) -> Result<String, Failure> {
-    let repeat = set.repeat_db.map_or("no repeats".to_owned(), |db| format!("repeat {db:.2} dB"));
-    let mut text = format!(
+fn header() -> String {
+    let of_model =
+        |(name, start): &(&str, Brdf)| format!(" {name}, {} |", start.parameters().len());
+    let models: String = models().iter().map(of_model).collect();
+    format!(
         "
-{}: {} directions, {} left out, {repeat}.
+Residual rms in dB, by model and number of free parameters; in brackets the starts that agree, where not all do:
 
-| model | free | rms, dB | starts that agree | found |
-|---|--:|--:|--:|---|
+| set | directions | left out | repeat |{models}
+|---|{}
 ",
-        set.name,
-        set.samples.len(),
-        set.left_out
-    );
+        "--:|".repeat(3 + self::models().len())
+    )
+}
+
+fn row(set: &Measured) -> Result<String, Failure> {
+    let repeat = set.repeat_db.map_or("–".to_owned(), |db| format!("{db:.2}"));
+    let mut text =
+        format!("| {} | {} | {} | {repeat} |", set.name, set.samples.len(), set.left_out);
     let bistatic = Bistatic::default();
-    let fits: Vec<_> = models()
-        .into_par_iter()
-        .map(|(name, start)| (name, bistatic.run(&start, &set.samples)))
-        .collect();
-    for (name, found) in fits {
+    let fits: Vec<_> =
+        models().into_par_iter().map(|(_, start)| bistatic.run(&start, &set.samples)).collect();
+    for found in fits {
         let found = found?;
-        let parameters = found.model.parameters();
-        let numbers: Vec<String> =
-            parameters.iter().map(|p| format!("{} = {:.3}", p.path, p.value)).collect();
-        let unfinished = if found.converged { "" } else { " (not converged)" };
-        text += &format!(
-            "| {name}{unfinished} | {} | {:.2} | {} of {} | {} |\n",
-            parameters.len(),
-            found.rms_db,
-            found.agreeing_starts,
-            bistatic.starts,
-            numbers.join(", ")
-        );
+        text += &format!(" {:.2}", found.rms_db);
+        if found.agreeing_starts < bistatic.starts {
+            text += &format!(" ({} of {})", found.agreeing_starts, bistatic.starts);
+        }
+        text += if found.converged { " |" } else { " (not converged) |" };
     }
-    Ok(text)
+    Ok(text + "\n")
 }
 
 fn models() -> Vec<(&'static str, Brdf)> {

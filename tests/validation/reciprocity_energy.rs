@@ -171,9 +171,9 @@ struct Judged {
 }
 
 impl Judged {
-    /// What the largest value is one of, for the page.
+    /// What returns the energy, for the page.
     fn of_what(&self) -> &'static str {
-        if self.kind == BUILT_IN { " of a built-in material" } else { " of a model" }
+        if self.kind == BUILT_IN { " by a built-in material" } else { " by a model" }
     }
 }
 
@@ -286,7 +286,7 @@ fn energy(models: &[Judged]) -> (Vec<Row>, f64) {
         let (worst_deg, worst) = largest(&albedos);
         let finer = albedo(&judged.model, worst_deg.to_radians(), 2 * NODES);
         change = change.max((worst - finer).abs());
-        let what = format!("{} at {worst_deg}°: largest{}", judged.name, judged.of_what());
+        let what = format!("{} at {worst_deg}°: energy returned{}", judged.name, judged.of_what());
         let row = Row::new(what, worst, Below(ALL_OF_IT)).digits(3);
         rows.push(match judged.fails_because {
             None => row,
