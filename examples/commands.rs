@@ -19,7 +19,7 @@ pub fn page() -> String {
         "# Commands\n\nGenerated from the program's `--help` by `{COMMAND}`; edit the help instead. `matdb help COMMAND` shows \
          the same.\n\nEvery command takes these options:\n\n"
     );
-    text += &table(program.get_arguments().filter(|argument| argument.is_global_set()));
+    text += &list(program.get_arguments().filter(|argument| argument.is_global_set()));
     for command in program.get_subcommands_mut().filter(|command| command.get_name() != "help") {
         text += &section(command);
     }
@@ -34,20 +34,40 @@ fn section(command: &mut Command) -> String {
     let mut text =
         format!("\n## {}\n\n{}.\n\n```text\n{usage}\n```\n\n", command.get_name(), prose(&about));
     let own = command.get_arguments().filter(|a| !a.is_global_set() && a.get_id() != "help");
-    text += &table(own);
+    text += &list(own);
     if let Some(after) = command.get_after_long_help().or(command.get_after_help()) {
-        text += &format!("\n```text\n{}\n```\n", after.to_string().trim_end());
+        text += &format!("\n```text\n{}\n```\n", wrapped(after.to_string().trim_end()));
     }
     text
 }
 
-/// A row for each argument; empty where there is none.
-fn table<'a>(arguments: impl Iterator<Item = &'a Arg>) -> String {
-    let rows: String = arguments.map(row).collect();
-    if rows.is_empty() { rows } else { format!("| argument | meaning |\n|---|---|\n{rows}") }
+/// Text with lines of at most 100 characters, as in a terminal; examples are shorter.
+fn wrapped(text: &str) -> String {
+    const WIDTH: usize = 100;
+    let mut wrapped = String::new();
+    for line in text.lines() {
+        let mut length = 0;
+        for word in line.split_inclusive(' ') {
+            let is_full = length > 0 && length + word.trim_end().chars().count() > WIDTH;
+            if is_full {
+                wrapped.truncate(wrapped.trim_end_matches(' ').len());
+                wrapped.push('\n');
+                length = 0;
+            }
+            wrapped += word;
+            length += word.chars().count();
+        }
+        wrapped.push('\n');
+    }
+    wrapped.trim_end().to_owned()
 }
 
-fn row(argument: &Arg) -> String {
+/// An item for each argument; empty where there is none.
+fn list<'a>(arguments: impl Iterator<Item = &'a Arg>) -> String {
+    arguments.map(item).collect()
+}
+
+fn item(argument: &Arg) -> String {
     let help = argument.get_long_help().or(argument.get_help()).map(ToString::to_string);
     let mut meaning = prose(&help.unwrap_or_default());
     let is_flag = !argument.get_action().takes_values();
@@ -62,16 +82,25 @@ fn row(argument: &Arg) -> String {
     if !is_flag && !argument.is_hide_possible_values_set() {
         meaning += &possible_values(argument);
     }
-    format!("| `{}` | {meaning} |\n", name(argument).replace('|', "\\|"))
+    format!("- `{}`: {meaning}\n", name(argument))
 }
 
-/// The values to choose from, each with its help where it has one.
+/// The values to choose from: an item for each where they have help.
 fn possible_values(argument: &Arg) -> String {
-    let of_value = |value: &clap::builder::PossibleValue| {
-        let help = value.get_help().map(|help| format!(" – {}", prose(&help.to_string())));
-        format!("<br>`{}`{}", value.get_name(), help.unwrap_or_default())
-    };
-    argument.get_possible_values().iter().filter(|v| !v.is_hide_set()).map(of_value).collect()
+    let values = argument.get_possible_values();
+    let shown: Vec<_> = values.iter().filter(|value| !value.is_hide_set()).collect();
+    let names = shown.iter().map(|value| format!("`{}`", value.get_name()));
+    if shown.is_empty() {
+        return String::new();
+    }
+    if shown.iter().all(|value| value.get_help().is_none()) {
+        return format!(" [{}]", names.collect::<Vec<_>>().join(", "));
+    }
+    let helps = shown.iter().map(|value| value.get_help().map(ToString::to_string));
+    names
+        .zip(helps)
+        .map(|(name, help)| format!("\n  - {name}: {}", prose(&help.unwrap_or_default())))
+        .collect()
 }
 
 /// As an argument is typed: `-o, --output <DIR>` or `<SCENE>`.
@@ -88,8 +117,8 @@ fn name(argument: &Arg) -> String {
     format!("{flags} {value}").trim().to_owned()
 }
 
-/// Help as a cell of a table: on one line, with what Markdown would read as markup quoted.
+/// Help on one line, with what Markdown would read as markup quoted.
 fn prose(help: &str) -> String {
     let line = help.split_whitespace().collect::<Vec<_>>().join(" ");
-    line.replace('|', "\\|").replace('<', "&lt;").replace("[[", "\\[\\[")
+    line.replace('<', "&lt;").replace("[[", "\\[\\[")
 }

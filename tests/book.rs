@@ -160,8 +160,7 @@ fn effects_page(effects: &[Value]) -> String {
 fn effect_section(effect: &Value) -> String {
     let text = |key: &str| effect[key].as_str().unwrap_or_default().to_owned();
     let mut section = format!(
-        "\n### {}\n\nLevel: {}. {}\n\n*How it shows:* {}\n\n| parameter | unit | from | to | default |\n\
-         |---|---|--:|--:|--:|\n",
+        "\n### {}\n\nLevel: {}. {}\n\n*How it shows:* {}\n\n",
         text("name"),
         text("level"),
         text("is"),
@@ -169,15 +168,19 @@ fn effect_section(effect: &Value) -> String {
     );
     let parameters = effect["parameters"].as_array().unwrap();
     for group in parameters.chunk_by(|a, b| cells(a) == cells(b)) {
-        section += &format!("| {} | {} |\n", names(group), cells(&group[0]).join(" | "));
+        let [unit, least, most, default] = cells(&group[0]);
+        section += &format!("- {}{unit}: {least} to {most}, default {default}\n", names(group));
     }
     section
 }
 
-/// Unit, range and default of a parameter.
+/// Unit, after a comma, range and default of a parameter; a pure number has no unit.
 fn cells(parameter: &Value) -> [String; 4] {
     let number = |key: &str| parameter[key].to_string();
-    let unit = parameter["unit"].as_str().unwrap_or_default().to_owned();
+    let unit = match parameter["unit"].as_str().unwrap_or_default() {
+        "1" => String::new(),
+        unit => format!(", {unit}"),
+    };
     [unit, number("min"), number("max"), number("absent")]
 }
 

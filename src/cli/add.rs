@@ -13,7 +13,7 @@ use crate::material::builtin;
 use crate::setup::Database;
 use crate::store::Added;
 
-/// Put materials into the database, built-in ones by name or your own from files
+/// Put materials into the database: built-in ones or your own
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb add mannequin-paint ptfe       two built-in materials
@@ -27,7 +27,7 @@ use crate::store::Added;
     --kind measured --source 'Our bench, 2026' --licence CC-BY-4.0 \\
     --instrument 'Our radar' --frequency 300 --threshold -77      a bare curve
 
-A bare curve has the columns theta_deg and sigma0_db; where nothing was detected sigma0_db is empty,
+A bare curve has the columns theta_deg and sigma0_db; where nothing was detected sigma0_db is empty, \
 censor is left and threshold_db the limit in dB. docs/materials.md has the other columns.")]
 #[command(group = clap::ArgGroup::new("what").required(true).multiple(true))]
 pub(super) struct Args {

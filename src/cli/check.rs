@@ -10,16 +10,16 @@ use crate::material::builtin;
 use crate::setup::Database;
 use crate::store::Repair;
 
-/// Verify the whole database: pages, hashes, values, statistics of curves, and fits by fitting again
+/// Verify the whole database, and fit again what it holds
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb check
   matdb check --json | jq '.findings[].place'
   matdb check --repair                 mend what can be, then verify
 
-Ends with status 1 when anything is wrong.")]
+Verifies pages, hashes, values, statistics of curves, and fits. The status is 1 when anything is wrong.")]
 pub(super) struct Args {
-    /// First make indexes, lists and statistics anew, and damaged built-in materials; nothing that is sound changes
+    /// First rebuild indexes, lists, statistics and damaged built-in materials; nothing sound changes
     #[arg(long)]
     repair: bool,
 }

@@ -13,12 +13,15 @@ use crate::measure::compare::{Agreement, Line};
 use crate::report::Comparison;
 use crate::setup::{Database, ReadyScene};
 
-/// Compare a measured cloud with the rendered scene: images side by side, a line scan, the error
+/// Compare a measured cloud with the rendered scene
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb compare cloud.ply --scene scenes/mannequin.toml -o compared
-  matdb compare cloud.ply --scene scene.toml --pose measured/pose.json --line y=1.1,width=0.02 -o compared
-  matdb compare cloud.ply --scene scene.toml --fit mixture-mse -o by-mse      what another fit makes of it")]
+  matdb compare cloud.ply --scene scene.toml --pose measured/pose.json -o compared
+  matdb compare cloud.ply --scene scene.toml --line y=1.1,width=0.02 -o compared
+  matdb compare cloud.ply --scene scene.toml --fit mixture-mse -o by-mse    another fit
+
+Writes both images side by side, a line scan, and the error.")]
 pub(super) struct Args {
     #[command(flatten)]
     cloud: CloudArgs,
@@ -34,7 +37,7 @@ pub(super) struct Args {
     /// Stripe of the line scan in the global frame
     #[arg(long, value_name = "y=M,width=M", default_value = "y=1.1,width=0.02")]
     line: String,
-    /// Folder to write into; created when it is not there
+    /// Folder to write; created if needed
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
 }

@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::formats::text::nearest;
 use crate::units::shown;
 
-/// List the physical effects that `diagnose` tries on a scan and on a curve, or explain one
+/// List the physical effects that `diagnose` tries, or explain one
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb effects

@@ -12,7 +12,7 @@ use crate::files::{folder_of, write_all};
 use crate::setup::Database;
 use crate::setup::{MaterialRevision, find_material, later_status_warning, status_warning};
 
-/// Write a material in somebody else's format, and say what it cannot carry
+/// Write a material in another format, and say what that cannot carry
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb export mannequin-paint --as mitsuba -o paint.xml

@@ -10,13 +10,13 @@ use crate::material::{Activity, Material, Origin};
 use crate::setup::Database;
 use crate::setup::{find_material, unknown_material};
 
-/// List the revisions of a material: when, by which command of which files, and what changed
+/// List the revisions of a material: when, by which command, what changed
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb history my-paint
   matdb history my-paint --json | jq '.[].activity'
 
-`matdb diff my-paint@1 my-paint@2` says all that changed.")]
+`matdb diff my-paint@1 my-paint@2` shows every change.")]
 pub(super) struct Args {
     /// Name of the material
     name: String,

@@ -9,16 +9,16 @@ use crate::catalogue::{Import, ImportSummary, MaterialPlan, Outcome};
 use crate::error::Error;
 use crate::setup::Database;
 
-/// Take over another laboratory's published catalogue; nothing of yours is overwritten
+/// Take over another laboratory's published catalogue
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb import site --dry-run                  see what would be added
   matdb import site                            add what is not there, report conflicts
   matdb import site --as-prefix roe-           add conflicting materials as roe-NAME
 
-The catalogue is verified first. All of it is added, or nothing. What was taken over before and is as it
-was then gets their newer revisions; what was changed here since is a conflict. `matdb history` tells
-from which catalogue a revision was taken.")]
+The catalogue is verified first. All of it is added, or nothing, and nothing of yours is overwritten. \
+A material that was imported before and is unchanged gets the newer revisions; one that was changed here \
+is a conflict. `matdb history` names the catalogue of a revision.")]
 pub(super) struct Args {
     /// A published folder, or its catalogue.sqlite
     bundle: PathBuf,

@@ -12,7 +12,7 @@ use crate::setup::Database;
 use crate::setup::builtin_not_added;
 use crate::store::{Filter, Store, Summary};
 
-/// List the materials in the database, all or those that you ask for
+/// List the materials in the database
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb list
@@ -41,10 +41,10 @@ pub(super) struct Wanted {
     /// Only those with this tag
     #[arg(long, value_name = "TAG")]
     tag: Option<String>,
-    /// Only those whose rendered numbers came to be like this
+    /// Only those whose rendered numbers are of this origin
     #[arg(long)]
     kind: Option<Kind>,
-    /// Only those of this kind of stuff, such as paint or metal
+    /// Only those of this class, such as paint or metal
     #[arg(long, value_name = "CLASS")]
     class: Option<String>,
     /// Only those with a model that was fitted to a curve
@@ -53,7 +53,7 @@ pub(super) struct Wanted {
     /// Only those without one
     #[arg(long)]
     not_fitted: bool,
-    /// Only those that may still be used, that are superseded, or that were withdrawn
+    /// Only those with this status
     #[arg(long, value_parser = ["active", "superseded", "withdrawn"])]
     status: Option<String>,
 }

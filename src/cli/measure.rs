@@ -14,7 +14,7 @@ use crate::report::{measured_curve_plot, pose_record};
 use crate::scene::Scene;
 use crate::setup::Database;
 
-/// Turn a measured cloud into a material's curve: register it to the scene, find the angles
+/// Register a measured cloud to its scene and reduce it to a curve
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb measure out/cloud.ply --scene scenes/mannequin.toml -o measured
@@ -31,14 +31,14 @@ pub(super) struct Args {
     /// The scene that was measured: its mesh, its radar and its scan
     #[arg(long, value_name = "SCENE")]
     scene: PathBuf,
-    /// Rough pose of the target: X,Y,Z or X,Y,Z,RX,RY,RZ (m, degrees) after the scene's placing,
-    /// `auto`, or a pose.json [default: as the scene places it]
+    /// Rough pose of the target: X,Y,Z[,RX,RY,RZ] in m and degrees after the scene's own, `auto`, or a
+    /// pose.json [default: the scene's own]
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
     /// Use the found pose even where the points agree with the given one
     #[arg(long)]
     refine: bool,
-    /// What the registration makes small
+    /// What the registration minimises
     #[arg(long, default_value = "along-ray")]
     metric: MetricFlag,
     /// Only this region of the scene
@@ -50,13 +50,13 @@ pub(super) struct Args {
     /// The target is the facets of the mesh, as in a rendered cloud: their normals have no error
     #[arg(long)]
     exact_mesh: bool,
-    /// Store the curve in this material, which must be there, as a new revision, too
+    /// Also store the curve as a new revision of this material, which must exist
     #[arg(long, value_name = "MATERIAL")]
     save: Option<String>,
     /// Name of the stored curve
     #[arg(long, value_name = "NAME", default_value = "measured")]
     curve: String,
-    /// How the cloud came to be
+    /// Origin of the cloud
     #[arg(long, value_enum)]
     kind: Option<Kind>,
     /// Who measured or made the cloud, when and how
@@ -67,7 +67,7 @@ pub(super) struct Args {
     /// Day of the measurement, YYYY-MM-DD: with it pose, registration and the cloud's hash are stored as a session
     #[arg(long, value_name = "DAY", requires = "save")]
     date: Option<String>,
-    /// Folder to write into; created when it is not there
+    /// Folder to write; created if needed
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
 }

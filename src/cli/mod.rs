@@ -64,7 +64,7 @@ struct Options {
     /// Print nothing but errors
     #[arg(long, short, global = true)]
     quiet: bool,
-    /// Say more of what is done
+    /// Print more about each step
     #[arg(long, short, global = true, action = ArgAction::Count)]
     verbose: u8,
 }

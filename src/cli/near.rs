@@ -17,18 +17,18 @@ use crate::units::{range, shown};
 /// Find the known materials that a measured curve is nearest to
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  matdb near --curve curve.csv --measured-at 300   and how far from 300 GHz materials are described
-  matdb near --curve curve.csv --shape             the level of the curve is not known
+  matdb near --curve curve.csv --measured-at 300   a curve of 300 GHz
+  matdb near --curve curve.csv --shape             without a calibrated level
   matdb near --material my-paint --frequency 300   among what holds at 300 GHz
 
-The distance is the root mean square difference in dB between the curve's mean at each angle and what
-scenes render of a material, at angles within that material's range. Below the threshold only a
-material that lies above it differs. Materials with fewer than 3 angles with an echo, or half of the
-curve's angles, in common are left out. Of a material that is not described at the frequency of the
-curve the notes say how far away that is; the distance does not count it.")]
+The distance is the rms difference in dB between the curve's mean at each angle and what scenes render of \
+a material, at angles within that material's range. Where the curve is below the threshold, only a \
+material above it differs. Materials that share fewer than 3 angles with an echo, or fewer than half of \
+the curve's angles, are left out. Notes say how far a material's frequencies are from that of the curve; \
+the distance does not count it.")]
 #[command(group = clap::ArgGroup::new("what").required(true))]
 pub(super) struct Args {
-    /// A curve, as `matdb measure` writes it: theta_deg and sigma0_db, others if there are
+    /// A curve's CSV file, as `matdb measure` writes it
     #[arg(long, value_name = "FILE", group = "what")]
     curve: Option<PathBuf>,
     /// The longest curve of this material, NAME or NAME@REVISION
@@ -37,7 +37,7 @@ pub(super) struct Args {
     /// Frequency at which the curve was measured [default: that of the material's instrument]
     #[arg(long, value_name = "GHZ", value_parser = frequency, allow_negative_numbers = true)]
     measured_at: Option<f64>,
-    /// Rank by shape: the level of the curve is not known
+    /// Rank by shape, for a curve of unknown level
     #[arg(long)]
     shape: bool,
     /// How many to show at most

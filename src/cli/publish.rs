@@ -10,7 +10,7 @@ use crate::files::FilesError;
 use crate::material::form::licence_doubt;
 use crate::setup::Database;
 
-/// Publish the database as a catalogue: a static site and the data in open formats
+/// Publish the database as a catalogue: a static site and open formats
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb publish site                           every material of the database
@@ -18,8 +18,8 @@ use crate::setup::Database;
 pub(super) struct Args {
     /// Folder to write; an earlier publication there is replaced
     folder: PathBuf,
-    /// TOML file with title, description, licence, url, [[person]]s and [[institute]]s of the catalogue [default: as the
-    /// publication there has them, and the licence that all materials share]
+    /// TOML file about the catalogue: title, licence, people [default: those of the publication there,
+    /// and the licence that all materials share]
     #[arg(long, value_name = "FILE")]
     about: Option<PathBuf>,
 }

@@ -15,12 +15,12 @@ use crate::report::RadarReport;
   matdb radar upm-300ghz -o radar
   matdb radar scenes/mannequin.toml -o radar --json
 
-Writes scan.csv, scan.png and scan.svg (where each chirp looks), spot.csv and spot.png (how wide the
+Writes scan.csv, scan.png and scan.svg (where each chirp looks), spot.csv and spot.png (how wide the \
 spot is), and f5.toml (the coefficients, to be pasted into a scene).")]
 pub(super) struct Args {
     /// A preset's name or a scene file
     radar: String,
-    /// Folder to write into; created when it is not there
+    /// Folder to write; created if needed
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
 }

@@ -9,14 +9,15 @@ use crate::setup::Database;
 use crate::setup::store_of_not_added;
 use crate::store::{Hit, Store};
 
-/// Search materials for words: names, tags, class, description, finish, what is not known, sources
+/// Search materials for words
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb search matt pai          all words must be there; the last may be a beginning
   matdb search piesiewicz        by an author of a source
   matdb search skin --json | jq '.[].slug'
 
-Built-in materials that are not in the database are searched, too.")]
+Searches name, tags, class, description, finish, unknowns and sources, also of built-in materials that \
+are not in the database.")]
 pub(super) struct Args {
     /// Words to look for
     #[arg(required = true)]

@@ -7,7 +7,7 @@ use super::summary::counted;
 use crate::catalogue::{Verification, verify};
 use crate::error::Error;
 
-/// Check a published catalogue: hashes of files and materials, and every fit made again
+/// Check a published catalogue, and fit again what it holds
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb verify site                            a published folder

@@ -7,14 +7,14 @@ use crate::adopt::Withdrawal;
 use crate::error::Error;
 use crate::setup::Database;
 
-/// Say that a material must not be used any more, and why; it and its revisions stay
+/// Say that a material must not be used any more, and why
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb withdraw my-paint --reason 'The trihedral was dented: levels are 3 dB low.'
-  matdb withdraw my-paint --superseded-by my-paint-2 --reason 'Measured again with a sound trihedral.'
+  matdb withdraw my-paint --superseded-by my-paint-2 --reason 'Measured again.'
 
-`matdb list --status withdrawn` lists such materials, and a published page says the reason first. An
-entry that is added again with `status = { is = \"active\" }` may be used again.")]
+The material and its revisions stay. `matdb list --status withdrawn` lists such materials, and a published \
+page says the reason first. An entry that is added again with `status = { is = \"active\" }` may be used again.")]
 pub(super) struct Args {
     /// Name of the material
     name: String,

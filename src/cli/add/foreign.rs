@@ -43,13 +43,13 @@ pub(super) struct Beside {
     /// Year of it
     #[arg(long, value_name = "YYYY")]
     year: Option<u16>,
-    /// How the numbers came to be
+    /// Origin of the numbers
     #[arg(long)]
     kind: Option<Kind>,
     /// Name of the instrument
     #[arg(long, value_name = "TEXT")]
     instrument: Option<String>,
-    /// Frequency of a curve, or at which optical constants are wanted [default there: 300]
+    /// Frequency of a curve, or of optical constants [default of these: 300]
     #[arg(long, value_name = "GHZ")]
     frequency: Option<f64>,
     /// Least power that counts as a detection

@@ -4,19 +4,20 @@ use std::path::PathBuf;
 
 use crate::cli::cloud::CloudArgs;
 
-/// Find the physical effect that a scene lacks to explain a measured cloud, or a law a measured curve
+/// Find the physical effect that a model lacks to explain a measurement
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("cloud", |cloud| cloud.required(false)))]
 #[command(mut_args(of_clouds))]
 #[command(after_help = "Examples:
   matdb diagnose cloud.ply --scene scene.toml -o diagnosis
   matdb diagnose cloud.ply --scene scene.toml --effects drift,fov-gain -o diagnosis
-  matdb diagnose --curve coating.csv -o diagnosis            theta_i_deg,theta_s_deg,brdf_per_sr
   matdb diagnose cloud.ply --scene scene.toml -o diagnosis --add    store what is found
-  matdb effects                                              what is tried, and how to tell it
+  matdb diagnose --curve coating.csv -o diagnosis
+  matdb effects                             what is tried, and its signature
 
-Writes report.html (all of it, for a person), report.json, residuals.csv (one line per chirp) and
-pictures (.svg and .png), and after.toml, the scene with what was found. Too few data: report.html and report.json say so, and the status is not 0.")]
+Writes report.html (for a person), report.json, residuals.csv (one line per chirp), pictures (.svg and \
+.png), and after.toml, the scene with what was found. With too few data, only report.html and \
+report.json are written, and the status is not 0.")]
 pub struct Args {
     #[command(flatten)]
     pub cloud: Option<CloudArgs>,
@@ -27,7 +28,7 @@ pub struct Args {
     /// incidence (.csv: theta_i_deg,theta_s_deg,brdf_per_sr) or a .bsdf
     #[arg(long, value_name = "FILE")]
     pub curve: Option<PathBuf>,
-    /// Law that a curve is held against [default: one GGX lobe over Lambert]
+    /// Law that a curve is compared with [default: one GGX lobe over Lambert]
     #[arg(long, value_name = "MODEL", requires = "curve")]
     pub model: Option<String>,
     /// Noise of a curve's levels, dB [default: from repeats, the file, or neighbouring angles]
@@ -36,17 +37,17 @@ pub struct Args {
     /// Try only these effects [default: all]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub effects: Vec<String>,
-    /// Store what is found, and what was tried and not found, as new revisions of the materials; with
-    /// something found the scene, too, as SCENE-after.toml beside it
+    /// Store what was found, and what was tried and not found, as new revisions of the materials, and a
+    /// changed scene as SCENE-after.toml
     #[arg(long, conflicts_with = "curve")]
     pub add: bool,
-    /// The material that takes refitted law and effects in [default: all of the scene with enough chirps]
+    /// The only material to store the findings in [default: all of the scene with enough chirps]
     #[arg(long, value_name = "NAME", conflicts_with = "curve")]
     pub material: Option<String>,
     /// Seed of folds and of everything random
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// Folder to write into; created when it is not there
+    /// Folder to write; created if needed
     #[arg(long, short, value_name = "DIR")]
     pub output: PathBuf,
 }

@@ -24,19 +24,21 @@ use crate::store::Store;
 use crate::units::watts_from_dbm;
 
 const EXAMPLES_AND_METHODS: &str = "Examples:
-  matdb fit curve.csv                           the paper's five parameters, censored likelihood
+  matdb fit curve.csv                 the paper's five parameters, censored likelihood
   matdb fit curve.csv --model mixture-ggx -o fit.svg
   matdb fit curve.csv --method tls-tail --alpha 3
   matdb fit cotton --fix diffuse.alpha=4 --save
-  matdb fit my-paint --save                     a fit of its longest curve, into my-paint
+  matdb fit my-paint --save           a fit of its longest curve, into my-paint
   matdb fit spring.csv --save my-paint --curve spring --kind measured \\
     --source 'Our bench, 2026' --licence CC-BY-4.0 \\
     --instrument 'Our radar' --frequency 300 --threshold -77
-                                                curve and fit into my-paint, which is there already;
-                                                `matdb add --from spring.csv …` makes a new material
 
-Methods: censored (speckle and missing chirps by their laws), tls (orthogonal distance in dB),
-tls-tail (the same with alpha given), mse (least squares in two pieces).
+The last one stores curve and fit in the material my-paint, which must exist; \
+`matdb add --from spring.csv …` makes a new one.
+
+Methods: censored (speckle and missing chirps by their laws), tls (orthogonal distance in dB), tls-tail \
+(the same with alpha given), mse (least squares in two pieces).
+
 ";
 
 fn after_help() -> String {
@@ -51,8 +53,7 @@ pub(super) struct Args {
     /// A curve's CSV file, or NAME or NAME@REVISION of a material with a curve
     #[arg(value_name = "MATERIAL|CURVE.csv")]
     what: String,
-    /// Which curve of the material [default: the longest]; for a file, the name to store it
-    /// under [default: that of the file]
+    /// Curve of the material [default: the longest], or the name to store a file's curve under [default: that of the file]
     #[arg(long, value_name = "NAME")]
     curve: Option<String>,
     /// What to fit, and where to start [default: what the material renders, else mixture]
@@ -79,7 +80,7 @@ pub(super) struct Args {
     /// Deviation of the level for tls, dB [default: that of speckle of one look]
     #[arg(long, value_name = "X")]
     level_sd_db: Option<f64>,
-    /// Where mse parts the specular from the diffuse piece, degrees
+    /// Angle between the specular and the diffuse piece of mse, degrees
     #[arg(long, value_name = "X", default_value_t = 6.0)]
     split_deg: f64,
     /// Points that the search starts from
@@ -88,8 +89,7 @@ pub(super) struct Args {
     /// Seed of the starts and of the residuals of missing chirps
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Store the fit in the material; a file's curve goes with it, into the material NAME,
-    /// which must be there
+    /// Store the fit, and a file's curve with it, in the material NAME, which must exist
     #[arg(long, value_name = "NAME", num_args = 0..=1)]
     save: Option<Option<String>>,
     /// Name of the stored fit [default: MODEL-METHOD]
@@ -98,7 +98,7 @@ pub(super) struct Args {
     /// Let scenes render what they rendered before
     #[arg(long, requires = "save")]
     keep_render: bool,
-    /// How a file's curve came to be
+    /// Origin of a file's curve
     #[arg(long, value_enum, requires = "save")]
     kind: Option<Kind>,
     /// Who measured or made a file's curve, when and how

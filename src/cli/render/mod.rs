@@ -26,24 +26,24 @@ use tracer::{Rays, gpu, tracer};
 #[command(after_help = "Examples:
   matdb render scenes/mannequin.toml -o out
   matdb render scenes/mannequin.toml -o out --all --json
-  matdb render scenes/showcase.toml -o out      spot, speckle, noise, two receivers, second bounce")]
+  matdb render scenes/showcase.toml -o out    spot, speckle, noise, receivers, second bounce")]
 pub(super) struct Args {
     /// The scene file
     scene: PathBuf,
-    /// Folder to write into; created when it is not there
+    /// Folder to write; created if needed
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
     /// Put every hit into cloud.ply, not only those above the threshold
     #[arg(long)]
     all: bool,
-    /// Write the sampled beat signals, too: beat.npy, chirps x samples; needs [radar.receiver]
+    /// Also write the beat signals: beat.npy, chirps x samples; needs [radar.receiver]
     #[arg(long)]
     beat: bool,
     /// Do not compress power.exr, for programs that cannot unpack it
     #[arg(long)]
     uncompressed: bool,
-    /// How the rays of the scan are traced; all find the same, `brute` to its rounding [default: pinhole
-    /// where they share their origin, else bvh]
+    /// How rays are traced; all give the same hits, `brute` to rounding [default: pinhole where
+    /// rays share their origin, else bvh]
     #[arg(long, value_name = "NAME")]
     tracer: Option<Rays>,
 }
