@@ -123,4 +123,8 @@ const LEGEND: &str = "
 - *False alarm*: any name, or any verdict but `no-missing-effect`, where nothing is missing.
 - *No answer*: `cannot-tell`, or a command that failed. It counts as a miss, and as a false alarm where nothing is missing.
 - *Error*: root mean square of observed − expected power over held-out detections. *Noise floor*: the error of a correct model.
+- *Explained share*: share of the squared error before, beyond the floor, that the named effects remove.
+- *Gain*: in ln likelihood, in the first round; ≈ marks a gain from a sample of the chirps.
+- *Reason* of a miss: follows by rule from the report, from the round in which a wrong effect was added, else from the last. Effects
+  with their own measure have an rms of 0.
 ";

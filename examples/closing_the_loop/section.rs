@@ -280,11 +280,7 @@ fn errors(cases: &[Case]) -> String {
     rows.push(row("nothing missing", &expecting(cases, Expected::Complete)));
     rows.push(row("unknown effects", &expecting(cases, Expected::Unknown)));
     rows.retain(|row| row[1] != "0");
-    format!(
-        "Columns are medians over cases unless they say otherwise. “Explained share” is the share of the squared error \
-         before, beyond the floor, that the named effects remove.\n\n{}",
-        table(&head, rows)
-    )
+    format!("Columns are medians over cases unless they say otherwise.\n\n{}", table(&head, rows))
 }
 
 fn parameters(cases: &[Case]) -> String {
@@ -344,12 +340,7 @@ fn misses(cases: &[Case]) -> String {
         return "There is none.\n".into();
     }
     missed.sort_by_key(|case| (put_in(case), case.label.strength, case.label.seed));
-    format!(
-        "Gains are in ln likelihood, of the first round; ≈ marks a gain from a sample of the chirps. The reason follows \
-         by rule from the report, from the round in which a wrong effect was added, else from the last. Effects with \
-         their own measure have an rms of 0.\n\n{}",
-        listing(&MISS, missed.into_iter().map(miss))
-    )
+    listing(&MISS, missed.into_iter().map(miss))
 }
 
 /// What is told of a case that was missed.
