@@ -80,7 +80,7 @@ def contests(results):
     """Every piece of work that others do, too, with the ratio of the fastest of them."""
     for rows in traces(results):
         if ratios := [fastest(rows, tracer, "total") for tracer in RIVALS if named(rows, tracer)]:
-            yield f"tracing {size_of(rows[0])}", min(ratios) / total(ours(rows))
+            yield size_of(rows[0]), min(ratios) / total(ours(rows))
     for part, key in [("registration", "threads"), ("fits", "fit"), ("formats", "work")]:
         groups = {}
         for row, ratio in beside(results.get(part, []), key):
@@ -102,7 +102,7 @@ def contests_in_words(results):
   cases. `matdb` builds nothing for rays of one origin.""" if built else ""
     return f"""## Where we win and where we lose
 
-Each against the fastest other program. Tracing is named by facets × rays, on two threads, as in [its table](#tracing).
+Each against the fastest other program. Tracing comes first, by facets × rays on two threads, as in [its table](#tracing).
 
 - **Faster:** {listed(True)}.
 - **Slower:** {listed(False)}.{once}

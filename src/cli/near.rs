@@ -22,10 +22,8 @@ use crate::units::{range, shown};
   matdb near --material my-paint --frequency 300   among what holds at 300 GHz
 
 The distance is the rms difference in dB between the curve's mean at each angle and what scenes render of \
-a material, at angles within that material's range. Where the curve is below the threshold, only a \
-material above it differs. Materials that share fewer than 3 angles with an echo, or fewer than half of \
-the curve's angles, are left out. Notes say how far a material's frequencies are from that of the curve; \
-the distance does not count it.")]
+a material, at common angles within that material's range. Where the curve is below the threshold, only a \
+material above it differs. Materials with too few common angles are left out.")]
 #[command(group = clap::ArgGroup::new("what").required(true))]
 pub(super) struct Args {
     /// A curve's CSV file, as `matdb measure` writes it

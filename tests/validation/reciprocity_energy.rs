@@ -30,7 +30,7 @@ const AZIMUTH_PANELS: u32 = 8;
 const ANGLES_DEG: [f64; 14] =
     [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 75.0, 80.0, 83.0, 85.0, 87.0, 89.0];
 
-const NO_SHADOWING: &str = "The model has no shadowing, as its documentation says.";
+const NO_SHADOWING: &str = "The model has no shadowing.";
 const BLINN_PHONG: &str = "The paper's model is not normalised; r_s up to 1/4 is safe for any α.";
 const MIXED: &str = "Each part keeps energy, but nothing bounds a sum.";
 
@@ -173,7 +173,7 @@ struct Judged {
 impl Judged {
     /// What returns the energy, for the page.
     fn of_what(&self) -> &'static str {
-        if self.kind == BUILT_IN { " by a built-in material" } else { " by a model" }
+        if self.kind == BUILT_IN { " by a built-in material" } else { "" }
     }
 }
 
