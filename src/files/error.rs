@@ -24,4 +24,10 @@ impl FilesError {
     pub fn unreadable(path: &Path, reason: io::Error) -> FilesError {
         FilesError { verb: "read", path: path.to_owned(), reason, way_out: "check the path" }
     }
+
+    /// That a file or folder cannot be written; the way out is room or another folder.
+    pub fn unwritable(verb: &'static str, path: &Path, reason: io::Error) -> FilesError {
+        let way_out = "make room or choose another folder";
+        FilesError { verb, path: path.to_owned(), reason, way_out }
+    }
 }

@@ -60,14 +60,15 @@ impl Placement {
                 let path = folder.join(name.as_ref());
                 match file {
                     Ok(file) => pending.push((path, file)),
-                    Err(reason) => return Err(unwritable(path, reason)),
+                    Err(reason) => return Err(FilesError::unwritable("write", &path, reason)),
                 }
             }
         }
         // Bytes that a device or another program has read cannot be taken back, so it gets them last.
         pending.sort_by_key(|(_, file)| matches!(file, Pending::Stream(..)));
         for (path, file) in pending {
-            let replaced = file.place().map_err(|reason| unwritable(path, reason))?;
+            let replaced =
+                file.place().map_err(|reason| FilesError::unwritable("write", &path, reason))?;
             placement.replaced.extend(replaced);
         }
         Ok(placement)
@@ -98,12 +99,7 @@ fn create_folder(folder: &Path) -> Result<Vec<PathBuf>, FilesError> {
         Ok(()) => Ok(missing),
         Err(reason) => {
             remove_empty(&missing);
-            Err(FilesError {
-                verb: "create the folder",
-                path: folder.to_owned(),
-                reason,
-                way_out: "choose another with -o",
-            })
+            Err(FilesError::unwritable("create the folder", folder, reason))
         }
     }
 }
@@ -207,15 +203,6 @@ impl Replaced {
             Some(before) => drop(before.persist(&self.path)),
             None => drop(std::fs::remove_file(&self.path)),
         }
-    }
-}
-
-fn unwritable(path: PathBuf, reason: io::Error) -> FilesError {
-    FilesError {
-        verb: "write",
-        path,
-        reason,
-        way_out: "make room or choose another folder with -o",
     }
 }
 
