@@ -13,6 +13,7 @@ mod diff;
 mod effects;
 mod export;
 mod fit;
+mod hint;
 mod history;
 mod import;
 mod list;

@@ -5,7 +5,7 @@ use crate::formats::figure::{Figure, Plot, Scale, Series, Style, beside};
 use crate::geometry::Raster;
 use crate::measure::Cloud;
 use crate::measure::compare::{Agreement, Line, difference, measured_scan, power_along};
-use crate::render::{Observer, Scan, shade, trace_placed};
+use crate::render::Scan;
 use crate::setup::ReadyScene;
 
 /// A measured and a rendered scan of one scene.
@@ -122,7 +122,6 @@ impl Comparison {
 fn simulate(ready: &ReadyScene) -> Result<Scan, Error> {
     let assembly = ready.assemble();
     let setup = assembly.setup();
-    trace_placed(&setup, ready.scene.file.spot.rays, &|_| {})
-        .and_then(|footprints| shade(&setup, &footprints, Observer::Radar, &|_| {}))
-        .map_err(|error| ready.render_error("", error))
+    let footprints = assembly.trace(&setup, &|_| {})?;
+    assembly.shade(&setup, &footprints, &|_| {})
 }
