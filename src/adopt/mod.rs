@@ -16,7 +16,7 @@ mod request;
 mod scene_after;
 mod withdrawal;
 
-pub use curve::{AddedCurve, CurveOrigin, add_curve};
+pub use curve::{AddedCurve, CurveOrigin, add_curve, check_frequency_and_threshold};
 pub use earlier::{Earlier, check_folder};
 pub use fit_storage::{FitStorage, StoredFit};
 pub use fit_subject::FitSubject;

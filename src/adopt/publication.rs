@@ -228,9 +228,11 @@ impl<'a> Publication<'a> {
     }
 
     fn scene_text(&self, head: &str, file: &SceneFile) -> Result<Vec<u8>, Error> {
-        let text = file.write(&self.checked.scene_text).map_err(|error| Error::Usage {
-            problem: format!("{}: {error}", self.checked.request.scene.display()),
-            way_out: "leave the scene as it is while it is diagnosed".to_owned(),
+        let text = file.write(&self.checked.scene_text).map_err(|error| {
+            Error::usage(
+                format!("{}: {error}", self.checked.request.scene.display()),
+                "leave the scene as it is while it is diagnosed",
+            )
         })?;
         Ok((head.to_owned() + &text).into_bytes())
     }

@@ -118,11 +118,10 @@ impl<'a> CloudRequest<'a> {
         }
         if choice.tried.is_empty() {
             let names: Vec<&str> = asked.iter().map(|effect| effect.name()).collect();
-            return Err(Error::Usage {
-                problem: format!("the scene declares {} already", names.join(", ")),
-                way_out: "name other effects, or diagnose with the scene that lacks them"
-                    .to_owned(),
-            });
+            return Err(Error::usage(
+                format!("the scene declares {} already", names.join(", ")),
+                "name other effects, or diagnose with the scene that lacks them",
+            ));
         }
         Ok(choice)
     }
@@ -210,5 +209,5 @@ fn check_predicted(scene: &Scene, path: &Path) -> Result<(), Error> {
         return Ok(());
     };
     let problem = format!("{}: no diagnosis predicts {what}", path.display());
-    Err(Error::Usage { problem, way_out: way_out.to_owned() })
+    Err(Error::usage(problem, way_out))
 }

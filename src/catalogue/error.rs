@@ -83,7 +83,7 @@ pub enum CatalogueError {
     /// The materials share no licence, and none was declared for the catalogue.
     #[error(
         "the materials are under {found}, which is no one licence for the catalogue; nothing was published, \
-         declare one in a file for --about, such as licence = \"{example}\""
+         declare one for the catalogue, such as licence = \"{example}\""
     )]
     NoLicence {
         /// Their licences.

@@ -76,21 +76,21 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let curve = args.curve.as_deref();
     if let Some(name) = curve.filter(|name| material.curves.iter().all(|c| c.name != *name)) {
         let names: Vec<&str> = material.curves.iter().map(|curve| curve.name.as_str()).collect();
-        return Err(Error::Usage {
-            problem: format!("`{}` has no curve `{name}`", args.material),
-            way_out: if names.is_empty() {
+        return Err(Error::usage(
+            format!("`{}` has no curve `{name}`", args.material),
+            if names.is_empty() {
                 "leave --curve out: its model is written".to_owned()
             } else {
                 format!("there are: {}", names.join(", "))
             },
-        });
+        ));
     }
     let subject = Subject { material: &material, revision, added_at, origin, curve };
     let Some(name) = args.output.file_name().and_then(|name| name.to_str()) else {
-        return Err(Error::Usage {
-            problem: format!("{} names no file", args.output.display()),
-            way_out: "name one with -o, such as -o paint.brdf".to_owned(),
-        });
+        return Err(Error::usage(
+            format!("{} names no file", args.output.display()),
+            "name one with -o, such as -o paint.brdf",
+        ));
     };
     let Export { files, lost } = exchange::export(&subject, args.format.into(), name)?;
     write_all(folder_of(&args.output), &files)?;

@@ -10,7 +10,7 @@ use crate::adopt::{MeasurementStorage, admission};
 use crate::error::Error;
 use crate::files::write_all;
 use crate::measure::{Curve, Metric, Reduction, ReductionResult, Registration, RegistrationResult};
-use crate::report::{measured_curve_plot, pose_record};
+use crate::report::{json_file, measured_curve_plot, pose_record};
 use crate::scene::Scene;
 use crate::setup::Database;
 
@@ -103,8 +103,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         let (material, _) = storage.prepare(&reduced.curve, &registered, db.read()?.as_ref())?;
         admission::doubts(&material).iter().for_each(|doubt| console.notice(doubt));
     }
-    let mut pose = serde_json::to_vec_pretty(&record)?;
-    pose.push(b'\n');
+    let pose = json_file(&record)?;
     let svg = measured_curve_plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
     let files = [("pose.json", pose), ("curve.csv", reduced.curve.write()), ("curve.svg", svg)];
     write_all(&args.output, &files)?;
@@ -173,10 +172,10 @@ fn reduction(args: &Args, scene: &Scene) -> Result<Reduction, Error> {
         Some(name) => Some(region(name, scene)?),
     };
     match args.edge_margin {
-        Some(margin_m) if !(0.0..=1.0).contains(&margin_m) => Err(Error::Usage {
-            problem: format!("--edge-margin {margin_m} is no margin"),
-            way_out: "give metres from 0 to 1".to_owned(),
-        }),
+        Some(margin_m) if !(0.0..=1.0).contains(&margin_m) => Err(Error::usage(
+            format!("--edge-margin {margin_m} is no margin"),
+            "give metres from 0 to 1",
+        )),
         edge_margin_m => {
             let exact_mesh = args.exact_mesh;
             Ok(Reduction { region, edge_margin_m, exact_mesh, ..Reduction::default() })
@@ -188,9 +187,11 @@ fn region(name: &str, scene: &Scene) -> Result<u16, Error> {
     let regions = scene.target.regions.iter();
     let names: Vec<&str> = regions.map(|region| region.name.as_str()).collect();
     let found = names.iter().position(|region| *region == name);
-    found.map(|number| number as u16).ok_or_else(|| Error::Usage {
-        problem: format!("the scene has no region `{name}`"),
-        way_out: format!("its regions are: {}", names.join(", ")),
+    found.map(|number| number as u16).ok_or_else(|| {
+        Error::usage(
+            format!("the scene has no region `{name}`"),
+            format!("its regions are: {}", names.join(", ")),
+        )
     })
 }
 

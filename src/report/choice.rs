@@ -27,7 +27,7 @@ impl Reason {
             Reason::Declared => "declared already, so at work in the model",
             Reason::NoTimes => "the scan has no times",
             Reason::NoRanges => "the scene states no `range_sd_m` under [radar.noise]",
-            Reason::NotAsked => "--effects names others",
+            Reason::NotAsked => "others were asked for",
         }
     }
 }

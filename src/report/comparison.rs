@@ -36,11 +36,10 @@ impl Comparison {
         let images = [ready.image(&measured), ready.image(&simulated)];
         let (error, agreement) = difference(&images[0], &images[1]);
         if agreement.both == 0 {
-            return Err(Error::Usage {
-                problem: format!("no pixel of `{}` has power in both images", ready.path.display()),
-                way_out: "check the frame of the cloud, or register it with `matdb measure`"
-                    .to_owned(),
-            });
+            return Err(Error::usage(
+                format!("no pixel of `{}` has power in both images", ready.path.display()),
+                "check the frame of the cloud, or register it with `matdb measure`",
+            ));
         }
         let title = scene.file.name.clone();
         Ok(Comparison { title, measured, simulated, images, error, agreement })

@@ -115,11 +115,13 @@ fn split<'a>(wanted: &'a str, asked_by: &str) -> Result<(&'a str, Option<u32>), 
     let Some((name, revision)) = wanted.split_once('@') else {
         return Ok((wanted, None));
     };
-    let number = revision.parse().map_err(|_| Error::Usage {
-        problem: format!(
-            "{asked_by}`{wanted}` asks for revision `{revision}`, which is no whole number"
-        ),
-        way_out: format!("write {name}@1 or just {name}"),
+    let number = revision.parse().map_err(|_| {
+        Error::usage(
+            format!(
+                "{asked_by}`{wanted}` asks for revision `{revision}`, which is no whole number"
+            ),
+            format!("write {name}@1 or just {name}"),
+        )
     })?;
     Ok((name, Some(number)))
 }

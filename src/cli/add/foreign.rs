@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::adopt::foreign_format;
+use crate::adopt::{check_frequency_and_threshold, foreign_format};
 use crate::catalogue::exchange::Given;
 use crate::cli::list::Kind;
 use crate::error::Error;
@@ -69,24 +69,14 @@ impl Beside {
             2.. => "several foreign files would get one name",
             _ => return Ok(()),
         };
-        Err(Error::Usage {
-            problem: problem.to_owned(),
-            way_out: "name one .csv, .brdf or .yml file with --from, and no other".to_owned(),
-        })
+        Err(Error::usage(problem, "name one .csv, .brdf or .yml file with --from, and no other"))
     }
 
     /// The flags as plain values.
     pub fn given(&self) -> Result<Given, Error> {
         let frequency_hz = self.frequency.map(|ghz| ghz * 1e9);
         let threshold_w = self.threshold.map(watts_from_dbm);
-        let numbers = [frequency_hz, threshold_w];
-        if numbers.into_iter().flatten().any(|number| !(number > 0.0 && number.is_finite())) {
-            return Err(Error::Usage {
-                problem: "--frequency or --threshold cannot be".to_owned(),
-                way_out: "give a frequency in GHz such as 300, a threshold in dBm such as -77"
-                    .to_owned(),
-            });
-        }
+        check_frequency_and_threshold(frequency_hz, threshold_w)?;
         Ok(Given {
             slug: self.name.clone(),
             name: self.title.clone(),

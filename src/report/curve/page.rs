@@ -44,7 +44,7 @@ struct Remaining<'a> {
 
 /// The page of a diagnosis.
 pub(super) fn page(answer: CurveAnswer, picture: &Picture) -> Result<Vec<u8>, Error> {
-    let CurveAnswer { report, name, model, seed, not_tried } = answer;
+    let CurveAnswer { report, name, model, seed, not_tried, .. } = answer;
     let mut unexplained = Vec::new();
     for unknown in &report.unexplained {
         unexplained.push(Remaining { angle: angle(unknown.covariate), unknown });

@@ -65,7 +65,7 @@ pub(super) fn advice(answer: CurveAnswer) -> Option<String> {
         Some("mixture" | "mixture-ggx") => {
             "measure another sample on the same bench: what belongs to the instrument stays"
         }
-        _ => "try a law of the sample with two lobes: --model mixture",
+        _ => &format!("try a law of the sample with two lobes: {}", answer.two_lobes),
     };
     (!blamed.is_empty()).then(|| format!("before {} is blamed, {what}", listed(&blamed)))
 }

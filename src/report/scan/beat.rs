@@ -20,13 +20,10 @@ impl BeatShape {
     /// # Errors
     /// The scene's radar has no receiver, or the signals of all antennas take more than 1 GiB.
     pub fn new(scene: &Scene) -> Result<BeatShape, Error> {
-        let usage = |problem: String, way_out: &str| {
-            Err(Error::Usage { problem, way_out: way_out.to_owned() })
-        };
         let radar = scene.radar();
         if radar.receiver.is_none() {
-            let problem = "a radar without a receiver has no beat signals".to_owned();
-            return usage(problem, "add a [radar.receiver] table to the scene");
+            let problem = "a radar without a receiver has no beat signals";
+            return Err(Error::usage(problem, "add a [radar.receiver] table to the scene"));
         }
         let looks = radar.speckle.map_or(1, |speckle| speckle.looks as usize);
         let (rows, columns) = (scene.chirps.rays.len().saturating_mul(looks), radar.chirp.samples);
@@ -39,7 +36,7 @@ impl BeatShape {
             );
             let way_out =
                 "1 GiB is the most: use fewer looks, chirps, receivers or radar.chirp.samples";
-            return usage(problem, way_out);
+            return Err(Error::usage(problem, way_out));
         }
         Ok(BeatShape([rows, columns]))
     }
