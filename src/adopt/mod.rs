@@ -23,7 +23,7 @@ pub use fit_subject::FitSubject;
 pub use material_files::{AddedMaterial, NewMaterials, foreign_format};
 pub use measurement::MeasurementStorage;
 pub use provenance::{activity, add_source, input};
-pub use publication::{Publication, Published};
+pub use publication::{Publication, PublicationResult};
 pub use recipients::{
     Adoption, Recipient, check_fit_name, find_recipient, pinned_name, replaced_name,
 };

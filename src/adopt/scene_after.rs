@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::diagnose::Found;
+use crate::diagnose::FoundEffect;
 use crate::effects::Level;
 use crate::error::Error;
 use crate::files::{FilesError, folder_of};
@@ -18,7 +18,7 @@ pub const MARK: &str = "# Written by `matdb diagnose --add`, which may write it 
 
 /// The scene file with the effects of the scene and of the radar that were found; `materials` are the names that
 /// its regions get.
-pub fn scene_with_found(scene: &Scene, found: &[Found], materials: &[String]) -> SceneFile {
+pub fn scene_with_found(scene: &Scene, found: &[FoundEffect], materials: &[String]) -> SceneFile {
     let mut file = scene.file.clone();
     file.effect.extend(entries(found, Level::Scene));
     file.radar.effect.extend(entries(found, Level::Instrument));
@@ -29,7 +29,10 @@ pub fn scene_with_found(scene: &Scene, found: &[Found], materials: &[String]) ->
 }
 
 /// The effects of a level that were found, as entries of a file.
-pub(super) fn entries(found: &[Found], level: Level) -> impl Iterator<Item = EffectEntry> + '_ {
+pub(super) fn entries(
+    found: &[FoundEffect],
+    level: Level,
+) -> impl Iterator<Item = EffectEntry> + '_ {
     found.iter().filter(move |one| one.level == level).map(|one| EffectEntry {
         name: one.name.to_owned(),
         source: None,

@@ -21,7 +21,7 @@ use crate::store::{Filter, Store, Summary};
   matdb list --json | jq '.[].slug'")]
 pub(super) struct Args {
     #[command(flatten)]
-    filter: Wanted,
+    filter: FilterArgs,
     /// How many to show at most [default: 200, with --json all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     limit: Option<u32>,
@@ -34,7 +34,7 @@ const MOST_COUNTED: u32 = 10_000;
 
 /// Which materials are wanted; all that is said must hold.
 #[derive(Debug, clap::Args)]
-pub(super) struct Wanted {
+pub(super) struct FilterArgs {
     /// Only those whose numbers are claimed at this frequency
     #[arg(long, value_name = "GHZ", value_parser = frequency, allow_negative_numbers = true)]
     frequency: Option<f64>,
@@ -78,7 +78,7 @@ impl From<Kind> for SourceKind {
     }
 }
 
-impl Wanted {
+impl FilterArgs {
     pub fn filter(&self) -> Filter {
         Filter {
             frequency_hz: self.frequency.map(|ghz| ghz * 1e9),

@@ -34,7 +34,7 @@ pub type FolderFiles<'a, Name> = (&'a Path, &'a [(Name, Vec<u8>)]);
 #[derive(Default)]
 #[must_use = "files that are not kept are taken back"]
 pub struct Placement {
-    replaced: Vec<Replaced>,
+    replaced: Vec<Replacement>,
     /// Folders that were not there, those within others first.
     created: Vec<PathBuf>,
 }
@@ -83,7 +83,7 @@ impl Placement {
 
 impl Drop for Placement {
     fn drop(&mut self) {
-        self.replaced.drain(..).rev().for_each(Replaced::restore);
+        self.replaced.drain(..).rev().for_each(Replacement::restore);
         remove_empty(&self.created);
     }
 }
@@ -160,7 +160,7 @@ fn is_database(path: &Path) -> bool {
 
 impl Pending<'_> {
     /// Puts the file in its place; what was there is kept under a temporary name.
-    fn place(self) -> io::Result<Option<Replaced>> {
+    fn place(self) -> io::Result<Option<Replacement>> {
         let (file, path) = match self {
             Pending::Whole(file, path) => (file, path),
             Pending::Stream(bytes, path) => {
@@ -179,7 +179,7 @@ impl Pending<'_> {
             Err(_) => None,
         };
         let placed = file.persist(&path);
-        let replaced = Replaced { path, before };
+        let replaced = Replacement { path, before };
         match placed {
             Ok(_) => Ok(Some(replaced)),
             Err(error) => {
@@ -191,12 +191,12 @@ impl Pending<'_> {
 }
 
 /// The place of a file that was written, and what was there before.
-struct Replaced {
+struct Replacement {
     path: PathBuf,
     before: Option<TempPath>,
 }
 
-impl Replaced {
+impl Replacement {
     fn restore(self) {
         // The error that led here is the one to report; a second one could only hide it.
         match self.before {

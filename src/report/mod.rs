@@ -20,7 +20,7 @@ mod templates;
 mod words;
 
 pub use cannot_tell::CannotTell;
-pub use choice::{Choice, Measured, NotTried, Reason, terms_not_asked};
+pub use choice::{Choice, Measurands, Reason, UntriedEffect, terms_not_asked};
 pub use cloud::{CloudAnswer, CloudReport, NextSteps};
 pub use comparison::Comparison;
 pub use curve::{CurveAnswer, CurveRequest};

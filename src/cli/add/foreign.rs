@@ -12,7 +12,7 @@ use crate::units::watts_from_dbm;
 /// What a foreign file does not say.
 #[derive(Debug, Default, PartialEq, clap::Args)]
 #[command(next_help_heading = "For a .csv, .brdf or .yml file")]
-pub(super) struct Beside {
+pub(super) struct DetailArgs {
     /// Short name that the material gets
     #[arg(long, value_name = "NAME")]
     name: Option<Slug>,
@@ -57,13 +57,13 @@ pub(super) struct Beside {
     threshold: Option<f64>,
 }
 
-impl Beside {
+impl DetailArgs {
     /// Refuses flags that would be dropped in silence, and one name for several files.
     pub fn check(&self, from: &[PathBuf]) -> Result<(), Error> {
         let foreign =
             from.iter().filter(|path| !path.is_dir() && foreign_format(path).is_some()).count();
         let problem = match foreign {
-            0 if *self != Beside::default() => {
+            0 if *self != DetailArgs::default() => {
                 "--name and its like say what a foreign file does not"
             }
             2.. => "several foreign files would get one name",

@@ -12,11 +12,11 @@ use crate::report::{RenderProgress, RenderStage};
 pub(super) struct Stages<'a> {
     console: &'a Console,
     start: Instant,
-    running: Mutex<Running>,
+    running: Mutex<RunningStage>,
 }
 
 /// The stage that is running, and those before it with their times in ms.
-struct Running {
+struct RunningStage {
     stage: &'static str,
     since: Instant,
     bar: Option<ProgressBar>,
@@ -27,7 +27,7 @@ impl<'a> Stages<'a> {
     /// Begins the first stage.
     pub fn start(stage: &'static str, console: &'a Console) -> Stages<'a> {
         let start = Instant::now();
-        let running = Running { stage, since: start, bar: None, ended: Vec::new() };
+        let running = RunningStage { stage, since: start, bar: None, ended: Vec::new() };
         Stages { console, start, running: Mutex::new(running) }
     }
 
@@ -66,7 +66,7 @@ impl<'a> Stages<'a> {
     }
 }
 
-impl Running {
+impl RunningStage {
     fn end(&mut self, console: &Console) {
         let ms = self.since.elapsed().as_secs_f64() * 1e3;
         self.bar.take().iter().for_each(ProgressBar::finish_and_clear);

@@ -7,7 +7,7 @@ use super::text::{advice, angle, noise_source, sentence};
 use crate::diagnose::curve::{CurveEvidence, CurveReport, CurveUnknown};
 use crate::error::Error;
 use crate::formats::words::capitalised;
-use crate::report::choice::{LeftOut, left_out};
+use crate::report::choice::{Omission, left_out};
 use crate::report::effect::{Article, of_curve};
 use crate::report::picture::{Figure, Picture};
 use crate::report::templates;
@@ -29,7 +29,7 @@ struct Page<'a> {
     share: Option<String>,
     picture: Figure<'a>,
     unexplained: Vec<Remaining<'a>>,
-    not_tried: Vec<LeftOut>,
+    not_tried: Vec<Omission>,
     /// Numbers of the base law: name and value.
     law: Vec<[String; 2]>,
     advice: Option<String>,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::answer::CurveAnswer;
 use crate::diagnose::Verdict;
-use crate::diagnose::curve::{CurveFound, CurveReport, CurveUnknown, NoiseSource};
+use crate::diagnose::curve::{CurveReport, CurveUnknown, FoundTerm, NoiseSource};
 use crate::effects::Level;
 use crate::formats::words::{listed, plus_minus};
 use crate::report::words::{gone, others, value, verdict};
@@ -93,7 +93,7 @@ pub(super) fn text(answer: CurveAnswer, folder: &Path) -> String {
     )
 }
 
-fn effect(found: &CurveFound) -> String {
+fn effect(found: &FoundTerm) -> String {
     let mut numbers = Vec::new();
     for (name, number) in &found.parameters {
         numbers.push(format!("{name} = {}", value(number)));
