@@ -9,8 +9,9 @@ use crate::catalogue::Credit;
 use crate::catalogue::exchange::{self, Export, Subject};
 use crate::error::Error;
 use crate::files::{folder_of, write_all};
-use crate::setup::Database;
-use crate::setup::{MaterialRevision, find_material, later_status_warning, status_warning};
+use crate::setup::{
+    Database, MaterialRevision, find_material, later_status_warning, status_warning,
+};
 
 /// Write a material in somebody else's format, and say what it cannot carry
 #[derive(Debug, clap::Args)]
@@ -65,12 +66,9 @@ impl From<Format> for exchange::Format {
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let store = db.read()?;
-    let MaterialRevision { material, revision } =
-        find_material(store.as_ref(), &args.material, "")?;
-    let stored = match &store {
-        Some(store) if revision.is_some() => store.get(&material.slug, revision)?,
-        _ => None,
-    };
+    let found = find_material(store.as_ref(), &args.material, "")?;
+    let stored = found.stored(store.as_ref())?;
+    let MaterialRevision { material, revision } = found;
     let added_at = stored.as_ref().map(|stored| stored.added_at.as_str());
     let origin = stored.as_ref().and_then(|stored| Credit::of(stored).origin());
     let curve = args.curve.as_deref();

@@ -33,7 +33,7 @@ pub fn message(error: &Error) -> String {
 fn flags(details: &[Detail]) -> String {
     let mut flags = Vec::new();
     for detail in details {
-        let (noun, (example, _)) = (detail.noun(), detail.example());
+        let (noun, example) = (detail.noun(), detail.example());
         let quote = if example.contains(' ') { "\"" } else { "" };
         flags.push(format!("--{noun} {quote}{example}{quote}"));
     }

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use clap::ValueEnum;
-
 use super::console::Console;
+use super::curves::kind_of;
 use super::summary::{grouped, table, with_status};
 use crate::error::Error;
 use crate::material::{Material, SourceKind};
@@ -42,8 +41,8 @@ pub(super) struct FilterArgs {
     #[arg(long, value_name = "TAG")]
     tag: Option<String>,
     /// Only those whose rendered numbers came to be like this
-    #[arg(long)]
-    kind: Option<Kind>,
+    #[arg(long, value_parser = kind_of(KINDS))]
+    kind: Option<SourceKind>,
     /// Only those of this kind of stuff, such as paint or metal
     #[arg(long, value_name = "CLASS")]
     class: Option<String>,
@@ -58,32 +57,16 @@ pub(super) struct FilterArgs {
     status: Option<String>,
 }
 
-/// How numbers came to be, as flags say it.
-#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
-pub(super) enum Kind {
-    Measured,
-    Literature,
-    Modelled,
-    Synthetic,
-}
-
-impl From<Kind> for SourceKind {
-    fn from(kind: Kind) -> SourceKind {
-        match kind {
-            Kind::Measured => SourceKind::Measured,
-            Kind::Literature => SourceKind::Literature,
-            Kind::Modelled => SourceKind::Modelled,
-            Kind::Synthetic => SourceKind::Synthetic,
-        }
-    }
-}
+/// How numbers can have come to be.
+pub(super) const KINDS: [SourceKind; 4] =
+    [SourceKind::Measured, SourceKind::Literature, SourceKind::Modelled, SourceKind::Synthetic];
 
 impl FilterArgs {
     pub fn filter(&self) -> Filter {
         Filter {
             frequency_hz: self.frequency.map(|ghz| ghz * 1e9),
             tag: self.tag.clone(),
-            kind: self.kind.map(SourceKind::from),
+            kind: self.kind,
             class: self.class.clone(),
             fitted: (self.fitted || self.not_fitted).then_some(self.fitted),
             status: self.status.clone(),

@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use super::cloud::{CloudArgs, start};
 use super::console::Console;
-use super::curves::{Circumstances, Kind};
+use super::curves::{Circumstances, OWN, kind_of};
 use super::summary::grouped;
 use crate::adopt::{MeasurementStorage, admission};
 use crate::error::Error;
 use crate::files::write_all;
+use crate::material::SourceKind;
 use crate::measure::{Curve, Metric, Reduction, ReductionResult, Registration, RegistrationResult};
 use crate::report::{json_file, measured_curve_plot, pose_record};
 use crate::scene::Scene;
@@ -57,8 +58,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "NAME", default_value = "measured")]
     curve: String,
     /// How the cloud came to be
-    #[arg(long, value_enum)]
-    kind: Option<Kind>,
+    #[arg(long, value_parser = kind_of(OWN))]
+    kind: Option<SourceKind>,
     /// Who measured or made the cloud, when and how
     #[arg(long, value_name = "TITLE")]
     source: Option<String>,

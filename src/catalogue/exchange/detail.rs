@@ -26,29 +26,25 @@ pub enum Detail {
 impl Detail {
     /// The word for it.
     pub fn noun(self) -> &'static str {
-        match self {
-            Detail::Name => "name",
-            Detail::Class => "class",
-            Detail::Licence => "licence",
-            Detail::Source => "source",
-            Detail::Kind => "kind",
-            Detail::Instrument => "instrument",
-            Detail::Frequency => "frequency",
-            Detail::Threshold => "threshold",
-        }
+        self.words()[0]
     }
 
-    /// An example of it, and its unit.
-    pub fn example(self) -> (&'static str, &'static str) {
+    /// An example of it without its unit, which is that of the program's flags.
+    pub fn example(self) -> &'static str {
+        self.words()[1]
+    }
+
+    /// Noun, example and unit.
+    fn words(self) -> [&'static str; 3] {
         match self {
-            Detail::Name => ("my-paint", ""),
-            Detail::Class => ("paint", ""),
-            Detail::Licence => ("CC-BY-4.0", ""),
-            Detail::Source => ("who measured it, where, when", ""),
-            Detail::Kind => ("measured", ""),
-            Detail::Instrument => ("name of the radar", ""),
-            Detail::Frequency => ("300", " GHz"),
-            Detail::Threshold => ("-77", " dBm"),
+            Detail::Name => ["name", "my-paint", ""],
+            Detail::Class => ["class", "paint", ""],
+            Detail::Licence => ["licence", "CC-BY-4.0", ""],
+            Detail::Source => ["source", "who measured it, where, when", ""],
+            Detail::Kind => ["kind", "measured", ""],
+            Detail::Instrument => ["instrument", "name of the radar", ""],
+            Detail::Frequency => ["frequency", "300", " GHz"],
+            Detail::Threshold => ["threshold", "-77", " dBm"],
         }
     }
 
@@ -60,7 +56,7 @@ impl Detail {
 
 impl fmt::Display for Detail {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let (example, unit) = self.example();
-        write!(f, "{} ({example}{unit})", self.noun())
+        let [noun, example, unit] = self.words();
+        write!(f, "{noun} ({example}{unit})")
     }
 }

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use crate::adopt::{check_frequency_and_threshold, foreign_format};
 use crate::catalogue::exchange::Given;
-use crate::cli::list::Kind;
+use crate::cli::curves::kind_of;
+use crate::cli::list::KINDS;
 use crate::error::Error;
 use crate::material::{Slug, SourceKind};
 use crate::units::watts_from_dbm;
@@ -44,8 +45,8 @@ pub(super) struct DetailArgs {
     #[arg(long, value_name = "YYYY")]
     year: Option<u16>,
     /// How the numbers came to be
-    #[arg(long)]
-    kind: Option<Kind>,
+    #[arg(long, value_parser = kind_of(KINDS))]
+    kind: Option<SourceKind>,
     /// Name of the instrument
     #[arg(long, value_name = "TEXT")]
     instrument: Option<String>,
@@ -88,7 +89,7 @@ impl DetailArgs {
             year: self.year,
             licence: self.licence.clone(),
             source: self.source.clone(),
-            kind: self.kind.map(SourceKind::from),
+            kind: self.kind,
             instrument: self.instrument.clone(),
             frequency_hz,
             threshold_w,

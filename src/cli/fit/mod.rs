@@ -8,7 +8,7 @@ use clap::ValueEnum;
 use serde::Serialize;
 
 use super::console::Console;
-use super::curves::{Circumstances, Kind};
+use super::curves::{Circumstances, OWN, kind_of};
 use super::plot::write_plot;
 use crate::adopt::{FitStorage, FitSubject, StoredFit, admission};
 use crate::brdf::Brdf;
@@ -16,10 +16,10 @@ use crate::error::Error;
 use crate::fit::coordinates::frequencies;
 use crate::fit::{Fit, FitResult, Method, model, model_names};
 use crate::formats::text::nearest;
+use crate::material::SourceKind;
 use crate::radar::speckle::standard_deviation_db;
 use crate::report::{FigureFormat, curve_points, fit_layers, incidence_plot};
-use crate::setup::Database;
-use crate::setup::find_material;
+use crate::setup::{Database, find_material};
 use crate::store::Store;
 use crate::units::watts_from_dbm;
 
@@ -99,8 +99,8 @@ pub(super) struct Args {
     #[arg(long, requires = "save")]
     keep_render: bool,
     /// How a file's curve came to be
-    #[arg(long, value_enum, requires = "save")]
-    kind: Option<Kind>,
+    #[arg(long, value_parser = kind_of(OWN), requires = "save")]
+    kind: Option<SourceKind>,
     /// Who measured or made a file's curve, when and how
     #[arg(long, value_name = "TITLE", requires = "save")]
     source: Option<String>,

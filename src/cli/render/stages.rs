@@ -6,7 +6,7 @@ use std::time::Instant;
 use indicatif::ProgressBar;
 
 use crate::cli::console::Console;
-use crate::report::{RenderProgress, RenderStage};
+use crate::report::RenderStage;
 
 /// Stages of a command, of which the last one is running.
 pub(super) struct Stages<'a> {
@@ -40,18 +40,14 @@ impl<'a> Stages<'a> {
         running.since = Instant::now();
     }
 
-    /// Shows how far a rendering has come; `chirps` are those of the scan, at `antennas`.
-    pub fn show(&self, progress: RenderProgress, chirps: usize, antennas: usize) {
-        match progress {
-            RenderProgress::Begin(RenderStage::Trace) => {
-                self.begin("trace", Some(("tracing", chirps)))
-            }
-            RenderProgress::Begin(RenderStage::Power) => {
-                self.begin("power", Some(("receiving", antennas * chirps)))
-            }
-            RenderProgress::Begin(RenderStage::Image) => self.begin("image", None),
-            RenderProgress::Begin(RenderStage::Encode) => self.begin("encode", None),
-            RenderProgress::Chirps(done) => {
+    /// Shows how far a rendering has come; `chirps` are all that are traced, and all that are received.
+    pub fn show(&self, stage: RenderStage, done: usize, chirps: [usize; 2]) {
+        match (stage, done) {
+            (RenderStage::Trace, 0) => self.begin("trace", Some(("tracing", chirps[0]))),
+            (RenderStage::Power, 0) => self.begin("power", Some(("receiving", chirps[1]))),
+            (RenderStage::Image, _) => self.begin("image", None),
+            (RenderStage::Encode, _) => self.begin("encode", None),
+            _ => {
                 let Ok(running) = self.running.lock() else { return };
                 running.bar.iter().for_each(|bar| bar.inc(done as u64));
             }

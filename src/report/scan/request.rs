@@ -40,15 +40,6 @@ pub enum RenderStage {
     Encode,
 }
 
-/// How far a rendering has come.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RenderProgress {
-    /// A stage begins, and the stage before it has ended.
-    Begin(RenderStage),
-    /// Chirps of the current stage that are done, in addition to those before.
-    Chirps(usize),
-}
-
 /// The files of a rendering and what they record.
 pub struct RenderFiles<'a> {
     /// What `scan.json` holds.
@@ -65,32 +56,32 @@ impl<'a> RenderRequest<'a> {
         RenderRequest { ready, tracer, gpu: None, all_hits: false, beat: None, packing }
     }
 
-    /// Renders the scene and encodes its files; `progress` hears of the stages and of the chirps that are done.
+    /// Renders the scene and encodes its files; `progress` hears of every stage with 0 chirps when
+    /// it begins, then with the chirps that are done in addition to those before.
     ///
     /// # Errors
     /// What the tracer or the renderer refuses; a picture that is too large.
     pub fn render(
         &self,
-        progress: &(dyn Fn(RenderProgress) + Sync),
+        progress: &(dyn Fn(RenderStage, usize) + Sync),
     ) -> Result<RenderFiles<'a>, Error> {
         let RenderRequest { ready, all_hits, .. } = *self;
-        let advance = |chirps| progress(RenderProgress::Chirps(chirps));
-
-        progress(RenderProgress::Begin(RenderStage::Trace));
+        progress(RenderStage::Trace, 0);
         let assembly = ready.assemble();
         let failed = |error: GpuError| ready.render_error("", RenderError::Tracer(error.into()));
         let gpu_mesh = self.gpu.map(|gpu| gpu.hold(assembly.bvh())).transpose().map_err(failed)?;
         let mut setup = assembly.setup();
         setup.geometry.tracer = gpu_mesh.as_ref().map_or(self.tracer, Tracer::Gpu);
-        let footprints = assembly.trace(&setup, &advance)?;
+        let footprints = assembly.trace(&setup, &|chirps| progress(RenderStage::Trace, chirps))?;
 
-        progress(RenderProgress::Begin(RenderStage::Power));
-        let views = assembly.views(&setup, &footprints, &advance)?;
+        progress(RenderStage::Power, 0);
+        let views =
+            assembly.views(&setup, &footprints, &|chirps| progress(RenderStage::Power, chirps))?;
 
-        progress(RenderProgress::Begin(RenderStage::Image));
+        progress(RenderStage::Image, 0);
         let images: Vec<Raster> = views.iter().map(|view| ready.image(&view.scan)).collect();
 
-        progress(RenderProgress::Begin(RenderStage::Encode));
+        progress(RenderStage::Encode, 0);
         let record = ScanRecord::new(ready, assembly.model(), &views, &images, all_hits);
         let mut files = encode(all_hits, self.packing, ready, &views, &images, &record)?;
         if let Some(shape) = self.beat {
