@@ -12,7 +12,6 @@ use std::time::Instant;
 use matdb::diagnose::{MeasuredScene, Report};
 use matdb::effects::library;
 use matdb::measure::{Cloud, CloudPoint};
-use matdb::render::trace_placed;
 use matdb::setup::ReadyScene;
 
 /// What is hidden in a scan: its name, and what the scene that made it says of it.
@@ -70,19 +69,9 @@ fn rendered(scene: &Path) -> Result<Cloud, Failure> {
     let ready = ReadyScene::open(scene, None)?;
     let assembly = ready.assemble();
     let setup = assembly.setup();
-    let footprints = trace_placed(&setup, ready.scene.file.spot.rays, &|_| ())
-        .map_err(|error| ready.render_error("", error))?;
-    let views = assembly.views(&setup, &footprints, &|_| ())?;
-    let mut points = Vec::new();
-    for echo in views[0].scan.detections() {
-        points.push(CloudPoint {
-            chirp: Some(echo.chirp),
-            point: echo.point,
-            range_m: Some(echo.range_m),
-            power_w: echo.power_w,
-        });
-    }
-    Ok(Cloud::new(points).expect("a scan with detections"))
+    let footprints = assembly.trace(&setup, &|_| ())?;
+    let scan = assembly.shade(&setup, &footprints, &|_| ())?;
+    Ok(Cloud::new(scan.detections().map(CloudPoint::from).collect())?)
 }
 
 /// What a scene lacks to explain a cloud.

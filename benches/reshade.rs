@@ -10,28 +10,27 @@
 mod clock;
 
 use std::hint::black_box;
+use std::path::Path;
 
 use clock::{quartiles, timed};
 use glam::DVec3;
 use matdb::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
 use matdb::diagnose;
 use matdb::effects::{self, Effect, Model, PredictionCache, Receiver, Stage};
-use matdb::radar::{Chirps, Link, Radar};
-use matdb::scene::mannequin;
-use matdb::trace::{Bvh, ScanGeometry, Tracer};
+use matdb::radar::Link;
+use matdb::setup::ReadyScene;
+use matdb::trace::Tracer;
 
 const TURNS: usize = 101;
 
 fn main() {
-    let radar = Radar::default();
-    let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).expect("the paper's scan");
-    let mesh = mannequin::mannequin();
-    let bvh = Bvh::new(&mesh);
-    let regions = vec![0; mesh.facets.len()];
-    let link = Link::new(&radar);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bench.toml");
+    let ready = ReadyScene::open(&path, None).expect("the scene");
+    let assembly = ready.assemble();
+    let (radar, chirps, bvh) = (ready.scene.radar(), &ready.scene.chirps, assembly.bvh());
     let mut stage = Stage {
-        geometry: ScanGeometry::new(&radar, &chirps, &bvh, &regions),
-        link,
+        geometry: assembly.setup().geometry,
+        link: Link::new(radar),
         grain_of_region: &[DVec3::Y],
         middle: DVec3::ZERO,
     };
@@ -53,7 +52,7 @@ fn main() {
                     model(m, drift, drift_db).predict_with(&stage, &shots, &kept)
                 };
                 let ways: [&dyn Fn(); 4] = [
-                    &|| drop(black_box(Tracer::Pinhole.closest(&bvh, &chirps.rays))),
+                    &|| drop(black_box(Tracer::Pinhole.closest(bvh, &chirps.rays))),
                     &|| drop(black_box(predict(0.2, 1.0))),
                     &|| drop(black_box(predict(0.2 + 0.1 * change, 1.0))),
                     &|| drop(black_box(predict(0.2, 1.0 + change))),
@@ -92,7 +91,7 @@ fn model(m: f64, drift: &dyn Effect, drift_db: f64) -> Model<'_> {
         diffuse: Box::new(Brdf::BlinnPhong(BlinnPhong { r_s: 0.02, alpha: 4.0 })),
         specular: Box::new(Brdf::CookTorrance(lobe)),
     });
-    let values = drift.parameters().iter().map(|knob| knob.absent);
+    let values = drift.parameters().iter().map(|parameter| parameter.absent);
     let values = values.enumerate().map(|(k, absent)| if k == 0 { drift_db } else { absent });
     Model {
         laws: vec![paint],

@@ -23,7 +23,6 @@ use matdb::formats::exr::{self, Packing};
 use matdb::formats::figure::{Figure, Scale};
 use matdb::formats::{MeshFormat, ply};
 use matdb::geometry::{Mesh, Raster};
-use matdb::material::builtin;
 use matdb::measure::icp::Motion;
 use matdb::measure::{
     Cloud, CloudPoint, Curve, Metric, Reduction, ReductionResult, Registration, RegistrationResult,
@@ -32,10 +31,11 @@ use matdb::measure::{
 use matdb::radar::random::{Key, Purpose};
 use matdb::radar::{Link, Radar};
 use matdb::render::{
-    Echo, Footprints, Observer, Scan, Setup, Surface, cloud_table, power_image, shade, trace_placed,
+    Echo, Footprints, Observer, Scan, Setup, cloud_table, power_image, shade, trace_placed,
 };
-use matdb::scene::{Scene, solids};
-use matdb::trace::{Bvh, Hit, ScanGeometry};
+use matdb::scene::solids;
+use matdb::setup::ReadyScene;
+use matdb::trace::{Hit, ScanGeometry};
 use rayon::prelude::*;
 
 const TURNS: usize = 15;
@@ -48,11 +48,10 @@ const PUSH: Motion =
 const FITTED: usize = 5000;
 const REFITS: u64 = 100;
 
-/// A scan and what was made of it on the way.
+/// A scan of a scene, and what leads to it.
 #[derive(Clone, Copy)]
-struct Given<'a> {
-    scene: &'a Scene,
-    paint: &'a Brdf,
+struct Rendering<'a> {
+    ready: &'a ReadyScene,
     setup: &'a Setup<'a>,
     footprints: &'a Footprints,
     scan: &'a Scan,
@@ -81,7 +80,7 @@ impl<'a> Way<'a> {
     }
 }
 
-type Stage = for<'a> fn(Given<'a>) -> Vec<Way<'a>>;
+type Stage = for<'a> fn(Rendering<'a>) -> Vec<Way<'a>>;
 const STAGES: [(&str, Stage); 8] = [
     ("mesh", mesh),
     ("power", power),
@@ -95,18 +94,12 @@ const STAGES: [(&str, Stage); 8] = [
 
 fn main() {
     let (wanted, turns) = arguments();
-    let scene = scene();
-    let paint = builtin::get("mannequin-paint").expect("a built-in material").expect("its file");
-    let paint = paint.scattering().expect("a law");
-    let surfaces = [Surface::new(&paint)];
-    let bvh = Bvh::new(&scene.target.mesh);
-    let (radar, chirps, regions) = (scene.radar(), &scene.chirps, &scene.target.region_of_facet);
-    let geometry = ScanGeometry::new(radar, chirps, &bvh, regions);
-    let setup = Setup { seed: scene.file.seed, ..Setup::new(geometry, &surfaces) };
+    let ready = scene();
+    let assembly = ready.assemble();
+    let setup = assembly.setup();
     let footprints = traced(&setup, 1);
     let scan = shaded(&setup, &footprints);
-    let given =
-        Given { scene: &scene, paint: &paint, setup: &setup, footprints: &footprints, scan: &scan };
+    let given = Rendering { ready: &ready, setup: &setup, footprints: &footprints, scan: &scan };
     println!(
         "{} threads, medians and quartiles of {turns} turns, ms",
         rayon::current_num_threads()
@@ -150,9 +143,9 @@ fn tell(mut ways: Vec<Way>, turns: usize) {
     }
 }
 
-fn scene() -> Scene {
+fn scene() -> ReadyScene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/bench.toml");
-    Scene::load(&path).expect("the scene")
+    ReadyScene::open(&path, None).expect("the scene")
 }
 
 fn traced(setup: &Setup, rays: usize) -> Footprints {
@@ -164,7 +157,7 @@ fn shaded(setup: &Setup, footprints: &Footprints) -> Scan {
 }
 
 /// Bytes to a mesh that has been checked, and a scene file to a target and a scan.
-fn mesh(_: Given<'_>) -> Vec<Way<'_>> {
+fn mesh(_: Rendering<'_>) -> Vec<Way<'_>> {
     let ball = solids::icosphere(0.5, 8);
     let (ply, obj) = (binary_ply(&ball), obj(&ball));
     let read = |name, format: MeshFormat, bytes: Vec<u8>| {
@@ -175,7 +168,7 @@ fn mesh(_: Given<'_>) -> Vec<Way<'_>> {
     vec![
         read("binary PLY", MeshFormat::Ply, ply),
         read("OBJ", MeshFormat::Obj, obj),
-        Way::new("scene", scene, |scene| {
+        Way::new("scene", scene, |ReadyScene { scene, .. }| {
             let (facets, chirps) = (scene.target.mesh.facets.len(), scene.chirps.rays.len());
             format!("{facets} facets from formulas, {chirps} chirps")
         }),
@@ -213,12 +206,13 @@ fn obj(mesh: &Mesh) -> Vec<u8> {
 
 /// Hits to echoes: by the paper's receiver, which takes the power as it is, and by that of the scene; and what of
 /// it the law and the power balance take by themselves, on one thread.
-fn power(given: Given<'_>) -> Vec<Way<'_>> {
+fn power(given: Rendering<'_>) -> Vec<Way<'_>> {
     let paper = Radar::default();
-    let link = Link::new(&paper);
+    let (link, paint) = (Link::new(&paper), &given.ready.materials[0].scattering);
     let alone = move || {
         let power_w = |hit: &Hit| {
-            link.power_w(hit.range_m, hit.cos_theta, given.paint.retro_per_sr(hit.theta_rad()))
+            let f_per_sr = paint.retro_per_sr(hit.theta_rad());
+            link.power_w(hit.range_m, hit.cos_theta, f_per_sr)
         };
         given.footprints.hits.iter().flatten().map(power_w).collect::<Vec<f64>>()
     };
@@ -239,7 +233,7 @@ fn echoes(scan: &Scan) -> String {
 }
 
 /// Hits and echoes of a finite spot.
-fn spot(given: Given<'_>) -> Vec<Way<'_>> {
+fn spot(given: Rendering<'_>) -> Vec<Way<'_>> {
     let footprints = traced(given.setup, SPOT_RAYS);
     let rays = footprints.hits.len();
     let met = |footprints: &Footprints| {
@@ -257,7 +251,7 @@ fn spot(given: Given<'_>) -> Vec<Way<'_>> {
 }
 
 /// Detections to the image's grid.
-fn image(given: Given<'_>) -> Vec<Way<'_>> {
+fn image(given: Rendering<'_>) -> Vec<Way<'_>> {
     let gridded = |name, finer: f64| {
         Way::new(
             name,
@@ -271,14 +265,14 @@ fn image(given: Given<'_>) -> Vec<Way<'_>> {
     vec![gridded("the scene's pixels", 1.0), gridded("four times finer", 4.0)]
 }
 
-fn raster(given: Given, finer: f64) -> Raster {
-    let Given { scene, scan, .. } = given;
+fn raster(given: Rendering, finer: f64) -> Raster {
+    let Rendering { ready: ReadyScene { scene, .. }, scan, .. } = given;
     let field = scene.chirps.field(&scene.radar().frames());
     power_image(scan, field, scene.radar().spot_diameter_m, &[0], scene.pixel_m() / finer)
 }
 
 /// Image and cloud to bytes, and these into a folder.
-fn files(given: Given<'_>) -> Vec<Way<'_>> {
+fn files(given: Rendering<'_>) -> Vec<Way<'_>> {
     let raster = raster(given, 1.0);
     let exr =
         |raster: &Raster, packing| exr::write_packed(raster, &[], packing).expect("a picture");
@@ -328,7 +322,7 @@ fn png(raster: &Raster) -> Vec<u8> {
 }
 
 /// A cloud and a rough pose to a pose.
-fn register(given: Given<'_>) -> Vec<Way<'_>> {
+fn register(given: Rendering<'_>) -> Vec<Way<'_>> {
     let found = |registered: &RegistrationResult| {
         let RegistrationResult { points, scans, iterations, .. } = registered;
         format!("{points} points, {scans} virtual scans, {iterations} steps")
@@ -345,24 +339,18 @@ fn register(given: Given<'_>) -> Vec<Way<'_>> {
     vec![by("along the rays", Metric::AlongRay), by("point to plane", Metric::PointToPlane)]
 }
 
-fn registered(given: Given, settings: &Registration, cloud: &Cloud) -> RegistrationResult {
-    let Given { scene, .. } = given;
+fn registered(given: Rendering, settings: &Registration, cloud: &Cloud) -> RegistrationResult {
+    let scene = &given.ready.scene;
     settings.run(&scene.target.mesh, scene.radar(), &scene.chirps, cloud).expect("a pose")
 }
 
 /// The detections as a radar that was not here would tell them.
-fn cloud(given: Given) -> Cloud {
-    let point = |echo: &Echo| CloudPoint {
-        chirp: Some(echo.chirp),
-        point: echo.point,
-        range_m: Some(echo.range_m),
-        power_w: echo.power_w,
-    };
-    Cloud::new(given.scan.detections().map(point).collect()).expect("a cloud")
+fn cloud(given: Rendering) -> Cloud {
+    Cloud::new(given.scan.detections().map(CloudPoint::from).collect()).expect("a cloud")
 }
 
 /// A registered cloud to a curve.
-fn curve(given: Given<'_>) -> Vec<Way<'_>> {
+fn curve(given: Rendering<'_>) -> Vec<Way<'_>> {
     let cloud = cloud(given);
     let registered = registered(given, &Registration::default(), &cloud);
     let run = move || reduced(given, &cloud, &registered);
@@ -372,8 +360,8 @@ fn curve(given: Given<'_>) -> Vec<Way<'_>> {
     })]
 }
 
-fn reduced(given: Given, cloud: &Cloud, registered: &RegistrationResult) -> ReductionResult {
-    let Given { scene, .. } = given;
+fn reduced(given: Rendering, cloud: &Cloud, registered: &RegistrationResult) -> ReductionResult {
+    let scene = &given.ready.scene;
     let reduction = Reduction { exact_mesh: true, ..Reduction::default() };
     let (radar, chirps) = (scene.radar(), &scene.chirps);
     reduction.run(&scene.target, radar, chirps, cloud, registered).expect("a curve")
@@ -381,7 +369,7 @@ fn reduced(given: Given, cloud: &Cloud, registered: &RegistrationResult) -> Redu
 
 /// A curve to a law: squares of levels, of distances, the Gamma law of speckle, and squares of curves drawn from this
 /// one.
-fn fit(given: Given<'_>) -> Vec<Way<'_>> {
+fn fit(given: Rendering<'_>) -> Vec<Way<'_>> {
     let cloud = cloud(given);
     let registered = registered(given, &Registration::default(), &cloud);
     let ReductionResult { mut curve, .. } = reduced(given, &cloud, &registered);

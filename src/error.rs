@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use crate::catalogue::exchange::ExchangeError;
+use crate::catalogue::exchange::{Detail, ExchangeError};
 use crate::catalogue::{AboutError, CatalogueError};
 use crate::diagnose::DiagnoseError;
 use crate::diagnose::curve::CurveDiagnoseError;
@@ -124,8 +124,8 @@ pub enum Error {
     },
     /// A search that found no optimum; nothing was stored.
     #[error(
-        "{curve}: the fit did not converge ({stop}), so nothing was stored; hold a parameter with \
-         --fix, try more --starts or another --model"
+        "{curve}: the fit did not converge ({stop}), so nothing was stored; hold a parameter, try more starts or another \
+         model"
     )]
     NotConverged {
         /// The file, or the material and its curve.
@@ -154,13 +154,37 @@ pub enum Error {
         /// The nearest name or how to add it.
         way_out: String,
     },
+    /// A database that was named and is not there.
+    #[error("there is no database {}; check its path, `matdb add NAME` makes one", path.display())]
+    NoDatabase {
+        /// Its file.
+        path: PathBuf,
+    },
+    /// Something that is to be stored lacks details.
+    #[error("{what} needs more; state its {}", Detail::list(missing))]
+    Missing {
+        /// What is to be stored, with its article.
+        what: &'static str,
+        /// What is missing.
+        missing: Vec<Detail>,
+    },
+    /// A detail of what is to be stored cannot be.
+    #[error("the {} {problem}; {way_out}", detail.noun())]
+    Detail {
+        /// The detail.
+        detail: Detail,
+        /// What is wrong, as a predicate.
+        problem: &'static str,
+        /// What to do.
+        way_out: &'static str,
+    },
     /// A record could not be written as JSON.
     #[error("cannot write the record as JSON: {0}; please report this")]
     Json(#[from] serde_json::Error),
     /// A file or folder cannot be read or written.
     #[error(transparent)]
     Files(#[from] FilesError),
-    /// A flag that means nothing.
+    /// Something that was asked for and cannot be.
     #[error("{problem}; {way_out}")]
     Usage {
         /// What is wrong.
@@ -168,4 +192,11 @@ pub enum Error {
         /// What to do.
         way_out: String,
     },
+}
+
+impl Error {
+    /// Something that was asked for and cannot be, and what to do.
+    pub(crate) fn usage(problem: impl Into<String>, way_out: impl Into<String>) -> Error {
+        Error::Usage { problem: problem.into(), way_out: way_out.into() }
+    }
 }

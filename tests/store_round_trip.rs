@@ -6,10 +6,10 @@ use matdb::brdf::{
 };
 use matdb::formats::EffectEntry;
 use matdb::material::{
-    Activity, Censor, Citation, Covariance, Curve, Estimate, Finding, FindingVerdict, Fit,
-    FitReport, FixedNumber, Geometry, Goodness, HeldOut, Input, Instrument, Layer, Making,
-    Material, Observation, Origin, Permittivity, Roughness, Scale, Session, SessionPose, Slug,
-    Source, SourceKind, Status, builtin,
+    Activity, Censor, Citation, Covariance, CrossValidation, Curve, Estimate, Finding,
+    FindingVerdict, Fit, FitReport, FixedNumber, Geometry, Goodness, Input, Instrument, Layer,
+    Making, Material, Observation, Origin, Permittivity, Roughness, Scale, Session, SessionPose,
+    Slug, Source, SourceKind, Status, builtin,
 };
 use matdb::measure::statistics::by_angle;
 use matdb::store::{Added, Store};
@@ -230,10 +230,10 @@ prop_compose! {
     fn held_out()(
         folds in any::<u32>(), blocks in any::<u32>(), block_m in option::of(positive()),
         score in option::of(number()), score_sd in option::of(positive()), rms_db in positive(),
-    ) -> HeldOut {
+    ) -> CrossValidation {
         let fold_hash = "fedcba9876543210".repeat(4);
         let blocks_of = "squares".to_owned();
-        HeldOut { folds, blocks, blocks_of, block_m, score, score_sd, rms_db, fold_hash }
+        CrossValidation { folds, blocks, blocks_of, block_m, score, score_sd, rms_db, fold_hash }
     }
 }
 

@@ -15,7 +15,7 @@ pub struct Number {
 
 /// An effect that was named.
 #[derive(Clone, Debug, Deserialize)]
-pub struct Found {
+pub struct FoundEffect {
     pub name: String,
     /// Effects that predict the data as well.
     #[serde(default)]
@@ -59,7 +59,7 @@ pub struct BeforeAfter {
 pub struct Report {
     pub verdict: String,
     #[serde(default)]
-    pub effects: Vec<Found>,
+    pub effects: Vec<FoundEffect>,
     #[serde(default)]
     pub ranking: Vec<Candidate>,
     pub error: Option<BeforeAfter>,
@@ -89,7 +89,7 @@ impl Run {
         self.report.as_ref().map_or("failed", |report| &report.verdict)
     }
 
-    pub fn found(&self) -> &[Found] {
+    pub fn found(&self) -> &[FoundEffect] {
         self.report.as_ref().map_or(&[], |report| &report.effects)
     }
 
@@ -117,7 +117,7 @@ impl Run {
 
     /// Whether it is the first name, or in that one's class.
     pub fn first_or_class(&self, name: &str) -> bool {
-        let in_class = |found: &Found| found.class.iter().any(|other| other == name);
+        let in_class = |found: &FoundEffect| found.class.iter().any(|other| other == name);
         self.first() == name || self.found().first().is_some_and(in_class)
     }
 
@@ -129,7 +129,7 @@ impl Run {
 
     /// Everything that was said, in few words.
     pub fn said(&self) -> String {
-        let name = |found: &Found| match found.class.is_empty() {
+        let name = |found: &FoundEffect| match found.class.is_empty() {
             true => found.name.clone(),
             false => format!("{} (or {})", found.name, found.class.join(", ")),
         };

@@ -129,7 +129,7 @@ fn trip(scene: &Scene, seed: u64) -> Result<Trip, Failure> {
     let threshold_w = watts_from_dbm(noisy.threshold_dbm);
     let seen: Vec<Echo> = echoes.into_iter().filter(|echo| echo.power_w >= threshold_w).collect();
 
-    let cloud = Cloud::new(seen.iter().map(point).collect())?;
+    let cloud = Cloud::new(seen.iter().map(CloudPoint::from).collect())?;
     let mut draws = Key { seed, chirp: 0, sub_ray: 7, purpose: Purpose::Noise }.draws();
     let middle = middle(&cloud);
     let begin = pushed(&mut draws, middle);
@@ -153,11 +153,6 @@ fn trip(scene: &Scene, seed: u64) -> Result<Trip, Failure> {
         between_db: rms_db(&unmoved, &exact),
         found,
     })
-}
-
-fn point(echo: &Echo) -> CloudPoint {
-    let Echo { chirp, point, range_m, power_w, .. } = *echo;
-    CloudPoint { chirp: Some(chirp), point, range_m: Some(range_m), power_w }
 }
 
 fn moved(mesh: &Mesh, pose: &Pose<Global, Global>) -> Mesh {

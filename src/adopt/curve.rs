@@ -2,6 +2,7 @@
 
 use super::admission;
 use super::provenance::{add_source, free_key};
+use crate::catalogue::exchange::Detail;
 use crate::error::Error;
 use crate::material::form::is_licence;
 use crate::material::{Curve, Instrument, Material, SourceKind};
@@ -41,10 +42,10 @@ impl CurveOrigin {
     pub(super) fn source(&self, subject: &str) -> Result<(SourceKind, &str), Error> {
         match (self.kind, &self.title) {
             (Some(kind), Some(title)) => Ok((kind, title)),
-            _ => Err(usage(
+            _ => Err(Error::usage(
                 format!("nobody has said where {subject} comes from"),
-                "add --kind measured or --kind synthetic, and --source with who, when and how; a measured \
-                 curve needs --licence, --instrument, --frequency and --threshold, too",
+                "state its kind, measured or synthetic, and its source: who, when and how; a measured curve needs \
+                 licence, instrument, frequency and threshold, too",
             )),
         }
     }
@@ -56,26 +57,20 @@ impl CurveOrigin {
     /// not enough is stated.
     pub fn check(&self, material: &Material) -> Result<(), Error> {
         if self.licence.as_ref().is_some_and(|licence| !is_licence(licence)) {
-            return Err(usage(
-                "--licence is no SPDX expression".to_owned(),
-                "write an SPDX identifier such as CC-BY-4.0, or LicenseRef-proprietary",
-            ));
+            return Err(Error::Detail {
+                detail: Detail::Licence,
+                problem: "is no SPDX expression",
+                way_out: "write an SPDX identifier such as CC-BY-4.0, or LicenseRef-proprietary",
+            });
         }
-        let numbers = [self.frequency_hz, self.threshold_w];
-        if numbers.into_iter().flatten().any(|number| !(number > 0.0 && number.is_finite())) {
-            return Err(usage(
-                "--frequency or --threshold cannot be".to_owned(),
-                "give a frequency in GHz such as 300, a threshold in dBm such as -77",
-            ));
-        }
+        check_frequency_and_threshold(self.frequency_hz, self.threshold_w)?;
         if self.known_instrument(material).is_some_and(|known| self.contradicts(known)) {
-            return Err(usage(
-                "the material's instrument of that name has another frequency or threshold"
-                    .to_owned(),
-                "leave --frequency and --threshold out, or name another --instrument",
+            return Err(Error::usage(
+                "the material's instrument of that name has another frequency or threshold",
+                "leave frequency and threshold out, or name another instrument",
             ));
         }
-        let missing = self.missing_flags(material);
+        let missing = self.missing(material);
         if missing.is_empty() {
             return Ok(());
         }
@@ -83,7 +78,7 @@ impl CurveOrigin {
             Some(SourceKind::Measured) => "a measured curve",
             _ => "the instrument of a curve",
         };
-        Err(usage(format!("{what} needs more"), &format!("add {}", missing.join(", "))))
+        Err(Error::Missing { what, missing })
     }
 
     /// Whether an instrument has another frequency or threshold than is stated.
@@ -92,8 +87,8 @@ impl CurveOrigin {
             || self.threshold_w.is_some_and(|power_w| known.threshold_w != Some(power_w))
     }
 
-    /// Flags that state what is missing.
-    fn missing_flags(&self, material: &Material) -> Vec<&'static str> {
+    /// What is not stated and not known of the material.
+    fn missing(&self, material: &Material) -> Vec<Detail> {
         let is_measured = self.kind == Some(SourceKind::Measured);
         let is_known = self.known_instrument(material).is_some();
         let is_stated =
@@ -101,16 +96,16 @@ impl CurveOrigin {
         let needs_instrument = (is_measured || is_stated) && !is_known;
         let mut missing = Vec::new();
         if is_measured && self.licence.is_none() {
-            missing.push("--licence CC-BY-4.0");
+            missing.push(Detail::Licence);
         }
         if needs_instrument && self.instrument.is_none() {
-            missing.push("--instrument \"name of the radar\"");
+            missing.push(Detail::Instrument);
         }
         if needs_instrument && self.frequency_hz.is_none() {
-            missing.push("--frequency 300");
+            missing.push(Detail::Frequency);
         }
         if is_measured && !is_known && self.threshold_w.is_none() {
-            missing.push("--threshold -77");
+            missing.push(Detail::Threshold);
         }
         missing
     }
@@ -140,6 +135,25 @@ impl CurveOrigin {
     }
 }
 
+/// Checks the frequency and the threshold of an instrument, where they are stated.
+///
+/// # Errors
+/// A number that is not finite or not above 0.
+pub fn check_frequency_and_threshold(
+    frequency_hz: Option<f64>,
+    threshold_w: Option<f64>,
+) -> Result<(), Error> {
+    for (number, detail, way_out) in [
+        (frequency_hz, Detail::Frequency, "give one in GHz such as 300"),
+        (threshold_w, Detail::Threshold, "give one in dBm such as -77"),
+    ] {
+        if number.is_some_and(|number| !(number > 0.0 && number.is_finite())) {
+            return Err(Error::Detail { detail, problem: "cannot be", way_out });
+        }
+    }
+    Ok(())
+}
+
 /// Adds a curve to a material, unless it has the same points already, maybe under another name.
 ///
 /// # Errors
@@ -158,19 +172,19 @@ pub fn add_curve(
             return Ok(AddedCurve { curve: known.name.clone(), source });
         }
         let slug = &material.slug;
-        return Err(usage(
+        return Err(Error::usage(
             format!(
                 "`{slug}` has these points already, as the curve `{}` from {}",
                 known.name,
                 title_of(material, &known.source)
             ),
-            &format!("`matdb fit {slug} --curve {} --save` fits that", known.name),
+            format!("fit the curve `{}` of `{slug}`", known.name),
         ));
     }
     if let Some(what) = owner_of_name(material, name) {
-        return Err(usage(
+        return Err(Error::usage(
             format!("`{}` has {what}", material.slug),
-            "give this curve another name with --curve",
+            "give this curve another name",
         ));
     }
     let curve = Curve {
@@ -182,9 +196,9 @@ pub fn add_curve(
     };
     let gaps = admission::missing(material, &curve);
     if !gaps.is_empty() {
-        return Err(usage(
+        return Err(Error::usage(
             format!("a measured curve needs more: {}", admission::clauses(&gaps)),
-            "name another --instrument, with --frequency and --threshold",
+            "name another instrument, with its frequency and its threshold",
         ));
     }
     material.curves.push(curve);
@@ -212,8 +226,4 @@ fn owner_of_name(material: &Material, name: &str) -> Option<String> {
 fn title_of<'a>(material: &'a Material, key: &str) -> &'a str {
     let source = material.sources.iter().find(|source| source.key == key);
     source.map_or("nowhere", |source| &source.title)
-}
-
-pub(super) fn usage(problem: String, way_out: &str) -> Error {
-    Error::Usage { problem, way_out: way_out.to_owned() }
 }

@@ -39,23 +39,20 @@ pub fn check_folder(folder: &Path, read: &[&Path], inputs: &[String]) -> Result<
         let Some(real) = real_path(path) else { continue };
         for name in &written {
             if real_path(&folder.join(name)).is_some_and(|other| other == real) {
-                return Err(Error::Usage {
-                    problem: format!(
-                        "{name} would be written over {}, which is read",
-                        path.display()
-                    ),
-                    way_out: "choose another folder with -o".to_owned(),
-                });
+                return Err(Error::usage(
+                    format!("{name} would be written over {}, which is read", path.display()),
+                    "choose another folder",
+                ));
             }
         }
     }
     for name in inputs {
         let path = folder.join(name);
         if is_file(&path) && !is_ours(&path) {
-            return Err(Error::Usage {
-                problem: format!("{} is there and no diagnosis wrote it", path.display()),
-                way_out: "rename it, or choose another folder with -o".to_owned(),
-            });
+            return Err(Error::usage(
+                format!("{} is there and no diagnosis wrote it", path.display()),
+                "rename it, or choose another folder",
+            ));
         }
     }
     Ok(())

@@ -1,6 +1,6 @@
 //! The effects that a diagnosis tried, as a material keeps them: found or not.
 
-use crate::diagnose::{Candidate, Found, Report, Unexplained};
+use crate::diagnose::{Candidate, FoundEffect, Report, ResidualStructure};
 use crate::material::{Finding, FindingVerdict};
 
 /// The findings of a diagnosis: effects that were found, effects that were tried and not found, and trends that
@@ -42,7 +42,7 @@ pub(super) fn findings(
     findings
 }
 
-fn found(effect: &Found, blank: Finding) -> Finding {
+fn found(effect: &FoundEffect, blank: Finding) -> Finding {
     Finding {
         effect: effect.name.to_owned(),
         gain: finite(effect.evidence.gain),
@@ -67,7 +67,7 @@ fn not_found(candidate: &Candidate, blank: Finding) -> Finding {
     }
 }
 
-fn unexplained(trend: &Unexplained, blank: Finding) -> Finding {
+fn unexplained(trend: &ResidualStructure, blank: Finding) -> Finding {
     Finding {
         effect: trend.covariate.clone(),
         p: finite(trend.p_value).map(|p| p.clamp(0.0, 1.0)),

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::curve::{AddedCurve, CurveOrigin, add_curve, usage};
+use super::curve::{AddedCurve, CurveOrigin, add_curve};
 use super::fit_subject::FitSubject;
 use super::provenance::{activity, add_source};
 use super::recipients::replace_fit;
@@ -108,9 +108,9 @@ impl FitStorage {
         } else {
             return Ok(target);
         };
-        Err(usage(
+        Err(Error::usage(
             format!("`{}` has {what} of the name `{name}`", material.slug),
-            "give the fit another name with --fit-name",
+            "give the fit another name",
         ))
     }
 
@@ -123,15 +123,15 @@ impl FitStorage {
     ) -> Result<Target, Error> {
         let slug = &found.material.slug;
         if self.material.as_ref().is_some_and(|name| name != slug.as_str()) {
-            return Err(usage(
+            return Err(Error::usage(
                 format!("a fit of a curve of `{slug}` belongs to `{slug}`"),
-                "leave the name after --save out",
+                "leave the name of the material out",
             ));
         }
         if self.origin != CurveOrigin::default() {
-            return Err(usage(
+            return Err(Error::usage(
                 format!("the curve of `{slug}` has a source already"),
-                "leave --kind, --source and what goes with them out",
+                "leave its kind, its source and what goes with them out",
             ));
         }
         // The current revision: it may have been revised while the fit ran.
@@ -143,9 +143,9 @@ impl FitStorage {
                 let (curve, source) = (name.clone(), source.clone());
                 Ok(Target { material, curve, source })
             }
-            None => Err(usage(
+            None => Err(Error::usage(
                 format!("the curve of {} is not that of the current revision", subject.wanted),
-                "fit the current one, or leave --save out",
+                "fit the current one, or do not store the fit",
             )),
         }
     }
@@ -153,25 +153,19 @@ impl FitStorage {
     /// The material that is named, with the curve of the file in it.
     fn target_of_file(&self, subject: &FitSubject, store: Option<&Store>) -> Result<Target, Error> {
         let Some(name) = &self.material else {
-            return Err(usage(
+            return Err(Error::usage(
                 format!("{} belongs to no material yet", subject.label),
-                "name the one to store it in, as in --save my-paint",
+                "name the one to store it in",
             ));
         };
         if name.contains('@') {
-            return Err(usage(
+            return Err(Error::usage(
                 format!("`{name}` names a revision, and a revision never changes"),
                 "give the bare name; the fit becomes a new revision",
             ));
         }
         self.origin.source(&subject.label)?;
-        let mut material = match find_material(store, name, "--save: ") {
-            Err(Error::UnknownMaterial { asked_by, name, way_out }) => {
-                let way_out = how_to_add(subject, &name, &way_out);
-                return Err(Error::UnknownMaterial { asked_by, name, way_out });
-            }
-            found => found?.material,
-        };
+        let mut material = find_material(store, name, "")?.material;
         let AddedCurve { curve, source } =
             add_curve(&mut material, &subject.curve_name, &subject.curve, &self.origin)?;
         Ok(Target { material, curve, source })
@@ -180,20 +174,6 @@ impl FitStorage {
 
 fn curve_of<'a>(material: &'a Material, name: &str) -> Option<&'a Curve> {
     material.curves.iter().find(|curve| curve.name == name)
-}
-
-/// How the material that gets a curve is made of it; `way_out` may have a name that was meant instead.
-fn how_to_add(subject: &FitSubject, name: &str, way_out: &str) -> String {
-    let meant = if way_out.starts_with("did you mean") {
-        format!("{way_out} Else ")
-    } else {
-        String::new()
-    };
-    format!(
-        "{meant}`matdb add --from {} --name {name} --class CLASS …` makes one of the curve, and then \
-         `matdb fit {name} --save` stores the fit",
-        subject.wanted
-    )
 }
 
 /// Adds the sources of the parameters that no data gave: those that were fixed, and those that are a convention.

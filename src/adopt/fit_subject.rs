@@ -115,8 +115,9 @@ fn no_curve(slug: &str, wanted: Option<&str>, curves: &[material::Curve]) -> Err
         }
         _ => (
             format!("`{slug}` has no curve that could be fitted"),
-            format!("fit a file: `matdb fit curve.csv --save {slug} --kind … --source …`"),
+            "fit the curve of a file, and store it in the material with its kind and its source"
+                .to_owned(),
         ),
     };
-    Error::Usage { problem, way_out }
+    Error::usage(problem, way_out)
 }

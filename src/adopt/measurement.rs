@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::curve::{AddedCurve, CurveOrigin, add_curve, usage};
+use super::curve::{AddedCurve, CurveOrigin, add_curve};
 use super::provenance::{activity, free_key};
 use crate::error::Error;
 use crate::material::{Material, Session, SessionPose};
@@ -35,13 +35,13 @@ impl MeasurementStorage<'_> {
     pub fn check(&self, store: Option<&Store>) -> Result<Material, Error> {
         let name = &self.material;
         if name.contains('@') {
-            return Err(usage(
+            return Err(Error::usage(
                 format!("`{name}` names a revision, and a revision never changes"),
                 "give the bare name; the curve becomes part of a new revision",
             ));
         }
         self.origin.source(&self.cloud.display().to_string())?;
-        let material = find_material(store, name, "--save: ")?.material;
+        let material = find_material(store, name, "")?.material;
         self.origin.check(&material)?;
         Ok(material)
     }

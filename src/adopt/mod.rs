@@ -16,14 +16,14 @@ mod request;
 mod scene_after;
 mod withdrawal;
 
-pub use curve::{AddedCurve, CurveOrigin, add_curve};
+pub use curve::{AddedCurve, CurveOrigin, add_curve, check_frequency_and_threshold};
 pub use earlier::{Earlier, check_folder};
 pub use fit_storage::{FitStorage, StoredFit};
 pub use fit_subject::FitSubject;
 pub use material_files::{AddedMaterial, NewMaterials, foreign_format};
 pub use measurement::MeasurementStorage;
 pub use provenance::{activity, add_source, input};
-pub use publication::{Publication, Published};
+pub use publication::{Publication, PublicationResult};
 pub use recipients::{
     Adoption, Recipient, check_fit_name, find_recipient, pinned_name, replaced_name,
 };

@@ -31,7 +31,7 @@ pub struct Publication<'a> {
 
 /// What was published.
 #[derive(Default)]
-pub struct Published {
+pub struct PublicationResult {
     /// Files for the folder of the report, `report.html` first.
     pub files: Vec<(String, Vec<u8>)>,
     /// Materials that were stored, with their revisions.
@@ -110,7 +110,7 @@ impl<'a> Publication<'a> {
         &self,
         store: &mut Store,
         write: impl FnOnce(&[File], &[File]) -> Result<Written, Error>,
-    ) -> Result<(Published, Written), Error> {
+    ) -> Result<(PublicationResult, Written), Error> {
         if self.adoption.report.effects.is_empty() {
             self.store_not_found(store, write)
         } else {
@@ -122,7 +122,7 @@ impl<'a> Publication<'a> {
         &self,
         store: &mut Store,
         write: impl FnOnce(&[File], &[File]) -> Result<Written, Error>,
-    ) -> Result<(Published, Written), Error> {
+    ) -> Result<(PublicationResult, Written), Error> {
         let mut files = self.report.tables_and_pictures()?;
         let activity = self.activity()?;
         let title = self.title(&activity);
@@ -131,7 +131,7 @@ impl<'a> Publication<'a> {
             materials.extend(self.adoption.revise(recipient, &title, store)?);
             last.push(materials.len() - 1);
         }
-        let mut published = Published::default();
+        let mut published = PublicationResult::default();
         store.record(activity);
         let written = store.add_if(&materials, |added| {
             for (material, added) in at_places(&materials, added, &last) {
@@ -158,8 +158,9 @@ impl<'a> Publication<'a> {
         &self,
         store: &mut Store,
         write: impl FnOnce(&[File], &[File]) -> Result<Written, Error>,
-    ) -> Result<(Published, Written), Error> {
-        let mut published = Published { files: self.files()?, ..Published::default() };
+    ) -> Result<(PublicationResult, Written), Error> {
+        let mut published =
+            PublicationResult { files: self.files()?, ..PublicationResult::default() };
         let activity = self.activity()?;
         let title = self.title(&activity);
         let (materials, last) = self.adoption.record_not_found(&title, store)?;
@@ -228,9 +229,11 @@ impl<'a> Publication<'a> {
     }
 
     fn scene_text(&self, head: &str, file: &SceneFile) -> Result<Vec<u8>, Error> {
-        let text = file.write(&self.checked.scene_text).map_err(|error| Error::Usage {
-            problem: format!("{}: {error}", self.checked.request.scene.display()),
-            way_out: "leave the scene as it is while it is diagnosed".to_owned(),
+        let text = file.write(&self.checked.scene_text).map_err(|error| {
+            Error::usage(
+                format!("{}: {error}", self.checked.request.scene.display()),
+                "leave the scene as it is while it is diagnosed",
+            )
         })?;
         Ok((head.to_owned() + &text).into_bytes())
     }

@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::files::folder_of;
 use crate::measure::{Cloud, CloudError};
 use crate::radar::Pattern;
-use crate::report::{Choice, Measured, Reason};
+use crate::report::{Choice, Measurands, Reason};
 use crate::scene::{Scene, read_text};
 use crate::setup::ReadyScene;
 use crate::store::Store;
@@ -102,7 +102,7 @@ impl<'a> CloudRequest<'a> {
         let scene = &ready.scene;
         let (_, of_radar) = declared_receiver(scene.radar());
         let measured =
-            Measured { times: scene.chirps.is_timed(), ranges: of_radar.range_sd_m > 0.0 };
+            Measurands { times: scene.chirps.is_timed(), ranges: of_radar.range_sd_m > 0.0 };
         let asked =
             if self.effects.is_empty() { library().to_vec() } else { self.effects.to_vec() };
         let choice = Choice::new(&asked, &declared, measured);
@@ -118,11 +118,10 @@ impl<'a> CloudRequest<'a> {
         }
         if choice.tried.is_empty() {
             let names: Vec<&str> = asked.iter().map(|effect| effect.name()).collect();
-            return Err(Error::Usage {
-                problem: format!("the scene declares {} already", names.join(", ")),
-                way_out: "name other effects, or diagnose with the scene that lacks them"
-                    .to_owned(),
-            });
+            return Err(Error::usage(
+                format!("the scene declares {} already", names.join(", ")),
+                "name other effects, or diagnose with the scene that lacks them",
+            ));
         }
         Ok(choice)
     }
@@ -210,5 +209,5 @@ fn check_predicted(scene: &Scene, path: &Path) -> Result<(), Error> {
         return Ok(());
     };
     let problem = format!("{}: no diagnosis predicts {what}", path.display());
-    Err(Error::Usage { problem, way_out: way_out.to_owned() })
+    Err(Error::usage(problem, way_out))
 }

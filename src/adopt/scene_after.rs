@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::diagnose::Found;
+use crate::diagnose::FoundEffect;
 use crate::effects::Level;
 use crate::error::Error;
 use crate::files::{FilesError, folder_of};
@@ -13,12 +13,12 @@ use crate::scene::{Scene, SceneFile};
 /// Name of the scene file with what was found, in the folder of the report.
 pub const AFTER: &str = "after.toml";
 
-/// First line of a scene that `--add` wrote and may write again.
+/// First line of a scene that a diagnosis wrote when it stored what it found, and may write again.
 pub const MARK: &str = "# Written by `matdb diagnose --add`, which may write it again.\n";
 
 /// The scene file with the effects of the scene and of the radar that were found; `materials` are the names that
 /// its regions get.
-pub fn scene_with_found(scene: &Scene, found: &[Found], materials: &[String]) -> SceneFile {
+pub fn scene_with_found(scene: &Scene, found: &[FoundEffect], materials: &[String]) -> SceneFile {
     let mut file = scene.file.clone();
     file.effect.extend(entries(found, Level::Scene));
     file.radar.effect.extend(entries(found, Level::Instrument));
@@ -29,7 +29,10 @@ pub fn scene_with_found(scene: &Scene, found: &[Found], materials: &[String]) ->
 }
 
 /// The effects of a level that were found, as entries of a file.
-pub(super) fn entries(found: &[Found], level: Level) -> impl Iterator<Item = EffectEntry> + '_ {
+pub(super) fn entries(
+    found: &[FoundEffect],
+    level: Level,
+) -> impl Iterator<Item = EffectEntry> + '_ {
     found.iter().filter(move |one| one.level == level).map(|one| EffectEntry {
         name: one.name.to_owned(),
         source: None,
@@ -59,29 +62,31 @@ pub fn relocate_files(
 
 /// A path as a scene file can hold it.
 fn utf8(path: PathBuf) -> Result<String, Error> {
-    path.into_os_string().into_string().map_err(|path| Error::Usage {
-        problem: format!("{} is not UTF-8, and a scene cannot say it", path.display()),
-        way_out: "rename the folder, or write into one beside the scene with -o".to_owned(),
+    path.into_os_string().into_string().map_err(|path| {
+        Error::usage(
+            format!("{} is not UTF-8, and a scene cannot say it", path.display()),
+            "rename the folder, or write into one beside the scene",
+        )
     })
 }
 
-/// Name of the scene file that `--add` writes next to `scene`.
+/// Name of the scene file with what was found and stored, next to `scene`.
 pub fn name_beside(scene: &Path) -> String {
     format!("{}-after.toml", scene.file_stem().unwrap_or_default().to_string_lossy())
 }
 
-/// Checks that `--add` may write its scene file next to `scene`.
+/// Checks that the scene file with what was found may be written next to `scene`.
 ///
 /// # Errors
-/// A file of that name that `--add` did not write.
+/// A file of that name that no diagnosis wrote.
 pub fn check_beside(scene: &Path) -> Result<(), Error> {
     let beside = folder_of(scene).join(name_beside(scene));
     let is_there = beside.symlink_metadata().is_ok();
     if is_there && !std::fs::read(&beside).is_ok_and(|text| text.starts_with(MARK.as_bytes())) {
-        return Err(Error::Usage {
-            problem: format!("{} is there and --add did not write it", beside.display()),
-            way_out: "rename it, or leave --add out".to_owned(),
-        });
+        return Err(Error::usage(
+            format!("{} is there and no diagnosis wrote it", beside.display()),
+            "rename it, or do not store what is found",
+        ));
     }
     Ok(())
 }
@@ -132,7 +137,7 @@ mod tests {
         let checked = || check_beside(&at("scene.toml")).map_err(|error| error.to_string());
         assert_eq!(checked(), Ok(()));
         std::fs::write(at("scene-after.toml"), "name = \"mine\"\n").unwrap();
-        assert!(checked().unwrap_err().contains("--add did not write it"));
+        assert!(checked().unwrap_err().contains("no diagnosis wrote it"));
         std::fs::write(at("scene-after.toml"), MARK).unwrap();
         assert_eq!(checked(), Ok(()));
     }

@@ -31,10 +31,10 @@ impl Withdrawal {
         };
         let Some(stored) = stored else {
             find_material(known.as_ref(), &self.name, "")?;
-            return Err(Error::Usage {
-                problem: format!("`{}` is not in {}", self.name, database.path().display()),
-                way_out: "give the bare name of one that `matdb list` shows".to_owned(),
-            });
+            return Err(Error::usage(
+                format!("`{}` is not in {}", self.name, database.path().display()),
+                "give the bare name of one that `matdb list` shows",
+            ));
         };
         let reason = self.reason.clone();
         let status = match &self.superseded_by {
@@ -55,7 +55,7 @@ impl Withdrawal {
 
 /// The name of the better one, which must be known.
 fn find_successor(store: Option<&Store>, name: &str, by: &str) -> Result<Slug, Error> {
-    const ASKED_BY: &str = "--superseded-by: ";
+    const ASKED_BY: &str = "the successor: ";
     let error = match find_material(store, by, ASKED_BY) {
         Ok(found) if found.material.slug.as_str() == by => return Ok(found.material.slug),
         Ok(_) => unknown_material(store, by, ASKED_BY)?,

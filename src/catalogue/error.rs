@@ -1,10 +1,10 @@
 //! What can go wrong with a publication, in the words of its user.
 
-use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::files::FilesError;
 use crate::store::{Store, StoreError};
 
 /// Why a catalogue could not be published or taken over. Nothing has changed then.
@@ -83,7 +83,7 @@ pub enum CatalogueError {
     /// The materials share no licence, and none was declared for the catalogue.
     #[error(
         "the materials are under {found}, which is no one licence for the catalogue; nothing was published, \
-         declare one in a file for --about, such as licence = \"{example}\""
+         declare one for the catalogue, such as licence = \"{example}\""
     )]
     NoLicence {
         /// Their licences.
@@ -148,15 +148,8 @@ pub enum CatalogueError {
         problem: String,
     },
     /// A file or folder cannot be read or written.
-    #[error("cannot {verb} {}: {reason}; make room or choose another folder", path.display())]
-    Io {
-        /// `read`, `write`, `create`.
-        verb: &'static str,
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system says.
-        reason: io::Error,
-    },
+    #[error(transparent)]
+    Files(#[from] FilesError),
     /// A page cannot be made.
     #[error("cannot make the page {name}: {reason}; please report this")]
     Page {
@@ -171,10 +164,5 @@ impl CatalogueError {
     /// A database that is damaged.
     pub(super) fn damaged(store: &Store, problem: String) -> CatalogueError {
         CatalogueError::Damaged { database: store.path().to_owned(), problem }
-    }
-
-    /// A file or folder that cannot be read or written.
-    pub(super) fn io(verb: &'static str, path: &Path, reason: io::Error) -> CatalogueError {
-        CatalogueError::Io { verb, path: path.to_owned(), reason }
     }
 }

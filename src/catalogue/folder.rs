@@ -10,9 +10,9 @@ use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
 use super::error::CatalogueError;
-use super::layout::{ABOUT, INDEX, KEPT, SUMS};
+use super::layout::{ABOUT, CONTENT, INDEX, KEPT, SUMS};
 use super::listing::files;
-use super::stage::{Stage, hindrance, parent};
+use crate::files::{FilesError, NewFolder, replacement_obstacle};
 
 /// A file of a publication.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -34,16 +34,16 @@ pub struct Folder {
 /// Where files go before they are in their place.
 #[derive(Debug)]
 enum Place {
-    /// Beside the target.
-    Staged(Stage),
-    /// Nowhere, only their hashes are wanted; what must be written by its path is removed again.
+    /// Into a folder that replaces the target.
+    Target(NewFolder),
+    /// Nowhere: only their hashes are wanted; what must be written by its path is removed again.
     Hashed(TempDir),
 }
 
 impl Place {
     fn path(&self) -> &Path {
         match self {
-            Place::Staged(stage) => stage.path(),
+            Place::Target(folder) => folder.path(),
             Place::Hashed(folder) => folder.path(),
         }
     }
@@ -66,24 +66,24 @@ impl Folder {
     pub fn new(target: &Path) -> Result<Folder, CatalogueError> {
         // A link stays, and what it leads to is replaced.
         let resolved = match target.symlink_metadata() {
-            Ok(_) => fs::canonicalize(target)
-                .map_err(|reason| CatalogueError::io("read", target, reason))?,
+            Ok(_) => {
+                fs::canonicalize(target).map_err(|reason| FilesError::unreadable(target, reason))?
+            }
             Err(_) => target.to_owned(),
         };
         let stranger =
-            stranger(&resolved).map_err(|reason| CatalogueError::io("read", target, reason))?;
+            stranger(&resolved).map_err(|reason| FilesError::unreadable(target, reason))?;
         if let Some(stranger) = stranger {
             return Err(CatalogueError::Occupied { folder: target.to_owned(), stranger });
         }
-        if let Some(problem) = hindrance(&resolved) {
+        if let Some(problem) = replacement_obstacle(&resolved) {
             return Err(CatalogueError::Fixed { folder: target.to_owned(), problem });
         }
         if let Some(publication) = publication_around(&resolved) {
             return Err(CatalogueError::Within { folder: target.to_owned(), publication });
         }
-        let stage = Stage::new(&resolved)
-            .map_err(|reason| CatalogueError::io("create", parent(&resolved), reason))?;
-        Ok(Folder { target: resolved, place: Place::Staged(stage), sums: BTreeMap::new() })
+        let place = Place::Target(NewFolder::new(&resolved, CONTENT)?);
+        Ok(Folder { target: resolved, place, sums: BTreeMap::new() })
     }
 
     /// What would be written over `published`, as hashes only; those of `sums` are known.
@@ -95,7 +95,7 @@ impl Folder {
         sums: BTreeMap<String, Sum>,
     ) -> Result<Folder, CatalogueError> {
         let folder = tempfile::tempdir()
-            .map_err(|reason| CatalogueError::io("write", &std::env::temp_dir(), reason))?;
+            .map_err(|reason| FilesError::unwritable("write", &std::env::temp_dir(), reason))?;
         let place = Place::Hashed(folder);
         Ok(Folder { target: published.to_owned(), place, sums })
     }
@@ -123,7 +123,7 @@ impl Folder {
         write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> Result<(), CatalogueError> {
         let sum = match &self.place {
-            Place::Staged(stage) => write_hashed(&stage.path().join(path), write),
+            Place::Target(folder) => write_hashed(&folder.path().join(path), write),
             Place::Hashed(_) => hash(BufWriter::new(io::sink()), write),
         };
         let sum = sum.map_err(|reason| self.unwritable(path, reason))?;
@@ -155,7 +155,7 @@ impl Folder {
     }
 
     fn unwritable(&self, path: &str, reason: io::Error) -> CatalogueError {
-        CatalogueError::Io { verb: "write", path: self.target.join(path), reason }
+        FilesError::unwritable("write", &self.target.join(path), reason).into()
     }
 
     /// Hash and length of every file so far, by path.
@@ -175,13 +175,8 @@ impl Folder {
             self.sums.iter().map(|(path, sum)| format!("{}  {path}\n", sum.sha256)).collect();
         self.write(SUMS, list.as_bytes())?;
         check(self.place.path())?;
-        let Folder { target, place, .. } = self;
-        match place {
-            Place::Staged(stage) => stage.keep().map_err(|reason| CatalogueError::Io {
-                verb: "write",
-                path: target,
-                reason,
-            }),
+        match self.place {
+            Place::Target(folder) => Ok(folder.replace_target()?),
             Place::Hashed(_) => Ok(()),
         }
     }

@@ -1,5 +1,7 @@
 //! Names of the files of a publication.
 
+use crate::files::FolderContent;
+
 /// The list of hashes, which tells a publication from another folder.
 pub(super) const SUMS: &str = "SHA256SUMS";
 
@@ -20,6 +22,9 @@ pub(super) const ZENODO: &str = ".zenodo.json";
 
 /// What else may stand in a published folder: it belongs to version control and to web hosts.
 pub(super) const KEPT: [&str; 3] = [".git", ".nojekyll", "CNAME"];
+
+/// What of a published folder matters when a new publication replaces it.
+pub(super) const CONTENT: FolderContent = FolderContent { kept: &KEPT, proof: SUMS };
 
 /// The file of a material.
 pub(super) fn material_path(slug: &str) -> String {

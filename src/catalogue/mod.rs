@@ -28,7 +28,6 @@ mod records;
 mod references;
 mod schema;
 mod site;
-mod stage;
 mod tables;
 mod units;
 mod verify;

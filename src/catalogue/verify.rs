@@ -18,6 +18,7 @@ use super::listing::files;
 use super::problem::{Problem, problem};
 use super::read::{LARGEST_FILE_BYTES, LARGEST_TABLE_BYTES, read};
 use super::rebuild::check_rebuilt;
+use crate::files::FilesError;
 use crate::store::{Store, Stored};
 
 /// What [`verify`] found.
@@ -128,7 +129,7 @@ fn no_bundle(path: &Path, problem: &str) -> CatalogueError {
 }
 
 fn unreadable(path: &Path, reason: io::Error) -> CatalogueError {
-    CatalogueError::Io { verb: "read", path: path.to_owned(), reason }
+    FilesError::unreadable(path, reason).into()
 }
 
 /// The list of hashes: path → SHA-256.

@@ -45,7 +45,7 @@ pub(super) struct Args {
     #[arg(long, group = "what", conflicts_with_all = ["names", "all", "from"])]
     template: bool,
     #[command(flatten)]
-    foreign: foreign::Beside,
+    foreign: foreign::DetailArgs,
 }
 
 /// A complete material.toml; docs/materials.md shows the same.

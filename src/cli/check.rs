@@ -42,10 +42,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         repair = db.write()?.repair(&builtin::all()?)?;
     }
     let Some(store) = db.read()? else {
-        return Err(Error::Usage {
-            problem: format!("there is no database {}", db.path().display()),
-            way_out: "name one with --db; `matdb add NAME` makes one".to_owned(),
-        });
+        return Err(Error::NoDatabase { path: db.path().to_owned() });
     };
     let file = db.path().display().to_string();
     let revisions = store.list()?.iter().map(|material| material.revision as usize).sum();
@@ -66,14 +63,14 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     console.result(&text(&record, &file), &record)?;
     match record.findings.len() {
         0 => Ok(()),
-        count => Err(Error::Usage {
-            problem: format!("{} wrong in {file}", counted(count, "thing")),
-            way_out: if args.repair {
-                "add the damaged materials again, or restore the file from a copy".to_owned()
+        count => Err(Error::usage(
+            format!("{} wrong in {file}", counted(count, "thing")),
+            if args.repair {
+                "add the damaged materials again, or restore the file from a copy"
             } else {
-                "`matdb check --repair` mends what can be".to_owned()
+                "`matdb check --repair` mends what can be"
             },
-        }),
+        )),
     }
 }
 

@@ -5,8 +5,7 @@ use serde_json::json;
 use super::console::Console;
 use crate::catalogue::{Citable, Credit, references};
 use crate::error::Error;
-use crate::setup::Database;
-use crate::setup::{find_material, later_status_warning};
+use crate::setup::{Database, find_material, later_status_warning};
 
 /// Say how to cite a material, and which source each of its numbers rests on
 #[derive(Debug, clap::Args)]
@@ -31,10 +30,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let material = &found.material;
     let later = later_status_warning(store.as_ref(), &material.slug, found.revision)?;
     later.iter().for_each(|later| console.notice(later));
-    let stored = match (&store, found.revision) {
-        (Some(store), Some(_)) => store.get(&material.slug, found.revision)?,
-        _ => None,
-    };
+    let stored = found.stored(store.as_ref())?;
     let credit = stored.as_ref().map_or(Credit::BuiltIn, Credit::of);
     let year = stored.as_ref().and_then(|stored| credit.year(stored));
     let citable = Citable { material, revision: found.revision, year, credit };

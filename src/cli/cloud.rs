@@ -80,10 +80,10 @@ pub(super) fn start(text: Option<&str>) -> Result<Start, Error> {
 pub(super) fn pose(text: Option<&str>) -> Result<Pose<Global, Global>, Error> {
     match start(text)? {
         Start::Given(pose) => Ok(pose),
-        Start::Automatic => Err(Error::Usage {
-            problem: "--pose auto needs a registration".to_owned(),
-            way_out: "run `matdb measure --pose auto` and give its pose.json here".to_owned(),
-        }),
+        Start::Automatic => Err(Error::usage(
+            "--pose auto needs a registration",
+            "run `matdb measure --pose auto` and give its pose.json here",
+        )),
     }
 }
 
@@ -101,9 +101,8 @@ fn pose_numbers(text: &str) -> Result<Pose<Global, Global>, Error> {
             return Ok(Pose::from_euler_xyz(turn_rad, shift_m));
         }
     }
-    Err(Error::Usage {
-        problem: format!("`{text}` is no pose"),
-        way_out: "write --pose X,Y,Z or X,Y,Z,RX,RY,RZ (m, degrees), `auto`, or a pose.json"
-            .to_owned(),
-    })
+    Err(Error::usage(
+        format!("`{text}` is no pose"),
+        "write --pose X,Y,Z or X,Y,Z,RX,RY,RZ (m, degrees), `auto`, or a pose.json",
+    ))
 }

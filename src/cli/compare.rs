@@ -10,7 +10,7 @@ use super::summary::grouped;
 use crate::error::Error;
 use crate::files::write_all;
 use crate::measure::compare::{Agreement, Line};
-use crate::report::Comparison;
+use crate::report::{Comparison, json_file};
 use crate::setup::{Database, ReadyScene};
 
 /// Compare a measured cloud with the rendered scene
@@ -54,13 +54,11 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let notices = [cloud.notices, ready.notices()].concat();
     let record = record(args, &comparison.agreement, &notices);
     let line_plot = comparison.line_plot(line);
-    let mut json = serde_json::to_vec_pretty(&record)?;
-    json.push(b'\n');
     let files = [
         ("images.png", comparison.images_png()?),
         ("line.svg", line_plot.svg()?.into_bytes()),
         ("line.png", line_plot.png()?),
-        ("error.json", json),
+        ("error.json", json_file(&record)?),
     ];
     write_all(&args.output, &files)?;
     notices.iter().for_each(|notice| console.notice(notice));
@@ -82,10 +80,10 @@ fn line(text: &str) -> Result<Line, Error> {
         *slot = value;
     }
     if !is_line || line.y_m.is_nan() {
-        return Err(Error::Usage {
-            problem: format!("--line {text} is no line"),
-            way_out: "write it as --line y=1.1,width=0.02".to_owned(),
-        });
+        return Err(Error::usage(
+            format!("--line {text} is no line"),
+            "write it as --line y=1.1,width=0.02",
+        ));
     }
     if line.width_m.is_nan() {
         line.width_m = 0.02;

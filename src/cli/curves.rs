@@ -1,25 +1,21 @@
 //! Flags that say where a curve comes from.
 
-use clap::ValueEnum;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use crate::adopt::CurveOrigin;
 use crate::material::SourceKind;
 use crate::units::watts_from_dbm;
 
-/// How a curve came to be, as flags say it.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(super) enum Kind {
-    Measured,
-    Synthetic,
-}
+/// Kinds of numbers that the user has made, not read.
+pub(super) const OWN: [SourceKind; 2] = [SourceKind::Measured, SourceKind::Synthetic];
 
-impl From<Kind> for SourceKind {
-    fn from(kind: Kind) -> SourceKind {
-        match kind {
-            Kind::Measured => SourceKind::Measured,
-            Kind::Synthetic => SourceKind::Synthetic,
-        }
-    }
+/// Reads one of these kinds by its word.
+pub(super) fn kind_of<const N: usize>(
+    kinds: [SourceKind; N],
+) -> impl TypedValueParser<Value = SourceKind> {
+    PossibleValuesParser::new(kinds.map(SourceKind::as_str)).try_map(move |word| {
+        kinds.into_iter().find(|kind| kind.as_str() == word).ok_or("there is no such kind")
+    })
 }
 
 /// What a person says of a curve that is to be stored.
@@ -42,9 +38,9 @@ pub(super) struct Circumstances {
 
 impl Circumstances {
     /// All that is stated of a curve.
-    pub fn origin(&self, kind: Option<Kind>, title: Option<&String>) -> CurveOrigin {
+    pub fn origin(&self, kind: Option<SourceKind>, title: Option<&String>) -> CurveOrigin {
         CurveOrigin {
-            kind: kind.map(SourceKind::from),
+            kind,
             title: title.cloned(),
             licence: self.licence.clone(),
             instrument: self.instrument.clone(),

@@ -101,17 +101,10 @@ pub(super) fn each_once(names: &[String]) -> impl Iterator<Item = &String> {
 fn known(name: &str) -> Result<&'static dyn Effect, Error> {
     find(name).ok_or_else(|| {
         if name == UNKNOWN.name {
-            return Error::Usage {
-                problem: "`unknown` is no effect to try".to_owned(),
-                way_out: "leave it out: what no effect explains is always looked for".to_owned(),
-            };
+            return Error::usage("`unknown` is no effect to try", "leave it out: what no effect explains is always looked for");
         }
         if term(name).is_some() {
-            return Error::Usage {
-                problem: format!("`{name}` is an effect of curves and not of clouds"),
-                way_out: "give the curve with --curve, or name effects of clouds: `matdb effects` lists them"
-                    .to_owned(),
-            };
+            return Error::usage(format!("`{name}` is an effect of curves and not of clouds"), "give the curve with --curve, or name effects of clouds: `matdb effects` lists them");
         }
         stranger(name, library().map(|effect| effect.name()).into_iter())
     })
@@ -123,7 +116,7 @@ fn stranger(name: &str, known: impl Iterator<Item = &'static str>) -> Error {
         Some(near) => format!("did you mean `{near}`?"),
         None => "`matdb effects` lists them".to_owned(),
     };
-    Error::Usage { problem: format!("there is no effect `{name}`"), way_out }
+    Error::usage(format!("there is no effect `{name}`"), way_out)
 }
 
 fn list(all: &[Record]) -> String {

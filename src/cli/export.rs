@@ -9,8 +9,9 @@ use crate::catalogue::Credit;
 use crate::catalogue::exchange::{self, Export, Subject};
 use crate::error::Error;
 use crate::files::{folder_of, write_all};
-use crate::setup::Database;
-use crate::setup::{MaterialRevision, find_material, later_status_warning, status_warning};
+use crate::setup::{
+    Database, MaterialRevision, find_material, later_status_warning, status_warning,
+};
 
 /// Write a material in another format, and say what that cannot carry
 #[derive(Debug, clap::Args)]
@@ -65,32 +66,29 @@ impl From<Format> for exchange::Format {
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let store = db.read()?;
-    let MaterialRevision { material, revision } =
-        find_material(store.as_ref(), &args.material, "")?;
-    let stored = match &store {
-        Some(store) if revision.is_some() => store.get(&material.slug, revision)?,
-        _ => None,
-    };
+    let found = find_material(store.as_ref(), &args.material, "")?;
+    let stored = found.stored(store.as_ref())?;
+    let MaterialRevision { material, revision } = found;
     let added_at = stored.as_ref().map(|stored| stored.added_at.as_str());
     let origin = stored.as_ref().and_then(|stored| Credit::of(stored).origin());
     let curve = args.curve.as_deref();
     if let Some(name) = curve.filter(|name| material.curves.iter().all(|c| c.name != *name)) {
         let names: Vec<&str> = material.curves.iter().map(|curve| curve.name.as_str()).collect();
-        return Err(Error::Usage {
-            problem: format!("`{}` has no curve `{name}`", args.material),
-            way_out: if names.is_empty() {
+        return Err(Error::usage(
+            format!("`{}` has no curve `{name}`", args.material),
+            if names.is_empty() {
                 "leave --curve out: its model is written".to_owned()
             } else {
                 format!("there are: {}", names.join(", "))
             },
-        });
+        ));
     }
     let subject = Subject { material: &material, revision, added_at, origin, curve };
     let Some(name) = args.output.file_name().and_then(|name| name.to_str()) else {
-        return Err(Error::Usage {
-            problem: format!("{} names no file", args.output.display()),
-            way_out: "name one with -o, such as -o paint.brdf".to_owned(),
-        });
+        return Err(Error::usage(
+            format!("{} names no file", args.output.display()),
+            "name one with -o, such as -o paint.brdf",
+        ));
     };
     let Export { files, lost } = exchange::export(&subject, args.format.into(), name)?;
     write_all(folder_of(&args.output), &files)?;

@@ -77,14 +77,14 @@ fn none(args: &Args, db: &Database, has_store: bool) -> Result<Error, Error> {
     let store = if has_store { db.read()? } else { None };
     let name = &args.name;
     match find_material(store.as_ref(), name, "") {
-        Ok(_) if name.contains('@') => Ok(Error::Usage {
-            problem: format!("`{name}` is one revision"),
-            way_out: "give the bare name; `matdb show` shows one revision".to_owned(),
-        }),
-        Ok(_) => Ok(Error::Usage {
-            problem: format!("`{name}` is built in and not in {}", db.path().display()),
-            way_out: format!("`matdb add {name}` begins its history"),
-        }),
+        Ok(_) if name.contains('@') => Ok(Error::usage(
+            format!("`{name}` is one revision"),
+            "give the bare name; `matdb show` shows one revision",
+        )),
+        Ok(_) => Ok(Error::usage(
+            format!("`{name}` is built in and not in {}", db.path().display()),
+            format!("`matdb add {name}` begins its history"),
+        )),
         Err(_) => unknown_material(store.as_ref(), name, ""),
     }
 }

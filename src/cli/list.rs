@@ -2,9 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use clap::ValueEnum;
-
 use super::console::Console;
+use super::curves::kind_of;
 use super::summary::{grouped, table, with_status};
 use crate::error::Error;
 use crate::material::{Material, SourceKind};
@@ -21,7 +20,7 @@ use crate::store::{Filter, Store, Summary};
   matdb list --json | jq '.[].slug'")]
 pub(super) struct Args {
     #[command(flatten)]
-    filter: Wanted,
+    filter: FilterArgs,
     /// How many to show at most [default: 200, with --json all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     limit: Option<u32>,
@@ -34,7 +33,7 @@ const MOST_COUNTED: u32 = 10_000;
 
 /// Which materials are wanted; all that is said must hold.
 #[derive(Debug, clap::Args)]
-pub(super) struct Wanted {
+pub(super) struct FilterArgs {
     /// Only those whose numbers are claimed at this frequency
     #[arg(long, value_name = "GHZ", value_parser = frequency, allow_negative_numbers = true)]
     frequency: Option<f64>,
@@ -42,8 +41,8 @@ pub(super) struct Wanted {
     #[arg(long, value_name = "TAG")]
     tag: Option<String>,
     /// Only those whose rendered numbers are of this origin
-    #[arg(long)]
-    kind: Option<Kind>,
+    #[arg(long, value_parser = kind_of(KINDS))]
+    kind: Option<SourceKind>,
     /// Only those of this class, such as paint or metal
     #[arg(long, value_name = "CLASS")]
     class: Option<String>,
@@ -58,32 +57,16 @@ pub(super) struct Wanted {
     status: Option<String>,
 }
 
-/// How numbers came to be, as flags say it.
-#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
-pub(super) enum Kind {
-    Measured,
-    Literature,
-    Modelled,
-    Synthetic,
-}
+/// How numbers can have come to be.
+pub(super) const KINDS: [SourceKind; 4] =
+    [SourceKind::Measured, SourceKind::Literature, SourceKind::Modelled, SourceKind::Synthetic];
 
-impl From<Kind> for SourceKind {
-    fn from(kind: Kind) -> SourceKind {
-        match kind {
-            Kind::Measured => SourceKind::Measured,
-            Kind::Literature => SourceKind::Literature,
-            Kind::Modelled => SourceKind::Modelled,
-            Kind::Synthetic => SourceKind::Synthetic,
-        }
-    }
-}
-
-impl Wanted {
+impl FilterArgs {
     pub fn filter(&self) -> Filter {
         Filter {
             frequency_hz: self.frequency.map(|ghz| ghz * 1e9),
             tag: self.tag.clone(),
-            kind: self.kind.map(SourceKind::from),
+            kind: self.kind,
             class: self.class.clone(),
             fitted: (self.fitted || self.not_fitted).then_some(self.fitted),
             status: self.status.clone(),

@@ -4,13 +4,14 @@ use std::path::PathBuf;
 
 use super::cloud::{CloudArgs, start};
 use super::console::Console;
-use super::curves::{Circumstances, Kind};
+use super::curves::{Circumstances, OWN, kind_of};
 use super::summary::grouped;
 use crate::adopt::{MeasurementStorage, admission};
 use crate::error::Error;
 use crate::files::write_all;
+use crate::material::SourceKind;
 use crate::measure::{Curve, Metric, Reduction, ReductionResult, Registration, RegistrationResult};
-use crate::report::{measured_curve_plot, pose_record};
+use crate::report::{json_file, measured_curve_plot, pose_record};
 use crate::scene::Scene;
 use crate::setup::Database;
 
@@ -57,8 +58,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "NAME", default_value = "measured")]
     curve: String,
     /// Origin of the cloud
-    #[arg(long, value_enum)]
-    kind: Option<Kind>,
+    #[arg(long, value_parser = kind_of(OWN))]
+    kind: Option<SourceKind>,
     /// Who measured or made the cloud, when and how
     #[arg(long, value_name = "TITLE")]
     source: Option<String>,
@@ -103,8 +104,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         let (material, _) = storage.prepare(&reduced.curve, &registered, db.read()?.as_ref())?;
         admission::doubts(&material).iter().for_each(|doubt| console.notice(doubt));
     }
-    let mut pose = serde_json::to_vec_pretty(&record)?;
-    pose.push(b'\n');
+    let pose = json_file(&record)?;
     let svg = measured_curve_plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
     let files = [("pose.json", pose), ("curve.csv", reduced.curve.write()), ("curve.svg", svg)];
     write_all(&args.output, &files)?;
@@ -173,10 +173,10 @@ fn reduction(args: &Args, scene: &Scene) -> Result<Reduction, Error> {
         Some(name) => Some(region(name, scene)?),
     };
     match args.edge_margin {
-        Some(margin_m) if !(0.0..=1.0).contains(&margin_m) => Err(Error::Usage {
-            problem: format!("--edge-margin {margin_m} is no margin"),
-            way_out: "give metres from 0 to 1".to_owned(),
-        }),
+        Some(margin_m) if !(0.0..=1.0).contains(&margin_m) => Err(Error::usage(
+            format!("--edge-margin {margin_m} is no margin"),
+            "give metres from 0 to 1",
+        )),
         edge_margin_m => {
             let exact_mesh = args.exact_mesh;
             Ok(Reduction { region, edge_margin_m, exact_mesh, ..Reduction::default() })
@@ -188,9 +188,11 @@ fn region(name: &str, scene: &Scene) -> Result<u16, Error> {
     let regions = scene.target.regions.iter();
     let names: Vec<&str> = regions.map(|region| region.name.as_str()).collect();
     let found = names.iter().position(|region| *region == name);
-    found.map(|number| number as u16).ok_or_else(|| Error::Usage {
-        problem: format!("the scene has no region `{name}`"),
-        way_out: format!("its regions are: {}", names.join(", ")),
+    found.map(|number| number as u16).ok_or_else(|| {
+        Error::usage(
+            format!("the scene has no region `{name}`"),
+            format!("its regions are: {}", names.join(", ")),
+        )
     })
 }
 

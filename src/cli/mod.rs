@@ -13,6 +13,7 @@ mod diff;
 mod effects;
 mod export;
 mod fit;
+mod hint;
 mod history;
 mod import;
 mod list;
@@ -37,6 +38,7 @@ use crate::error::Error;
 use crate::setup::Database;
 use console::Console;
 pub use console::readable;
+pub use hint::message;
 
 /// A material database and renderer for 300 GHz imaging radar.
 #[derive(Debug, Parser)]

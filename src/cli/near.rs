@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::console::Console;
-use super::list::{Wanted, frequency};
+use super::list::{FilterArgs, frequency};
 use super::summary::table;
 use crate::catalogue::{Distance, Rank};
 use crate::error::Error;
@@ -42,7 +42,7 @@ pub(super) struct Args {
     #[arg(long, default_value_t = 10, value_name = "N")]
     limit: usize,
     #[command(flatten)]
-    filter: Wanted,
+    filter: FilterArgs,
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {

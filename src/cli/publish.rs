@@ -30,10 +30,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         None => About::of_publication(&args.folder).unwrap_or_default(),
     };
     let Some(store) = db.read()? else {
-        return Err(Error::Usage {
-            problem: format!("there is no database {}", db.path().display()),
-            way_out: "`matdb add --all` makes one of the built-in materials".to_owned(),
-        });
+        return Err(Error::usage(
+            format!("there is no database {}", db.path().display()),
+            "`matdb add --all` makes one of the built-in materials",
+        ));
     };
     let published = publish(&store, &about, &args.folder, |_| ())?;
     if args.about.is_none() && about != About::default() {

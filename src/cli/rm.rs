@@ -26,7 +26,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     for name in &args.names {
         if args.names.iter().filter(|other| *other == name).count() > 1 {
             let way_out = "name each material once".to_owned();
-            return Err(Error::Usage { problem: format!("`{name}` is named twice"), way_out });
+            return Err(Error::usage(format!("`{name}` is named twice"), way_out));
         }
         let slug = name.parse().ok();
         match (slug, &known) {
@@ -58,5 +58,5 @@ fn absent(name: &str, store: Option<&Store>, db: &Database) -> Result<Error, Err
         (None, None) => "`matdb list` shows what it holds".to_owned(),
     };
     let problem = format!("{} holds no material `{name}`", db.path().display());
-    Ok(Error::Usage { problem, way_out })
+    Ok(Error::usage(problem, way_out))
 }

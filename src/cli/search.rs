@@ -39,10 +39,10 @@ struct Record {
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let words = args.words.join(" ");
     if !words.chars().any(char::is_alphanumeric) {
-        return Err(Error::Usage {
-            problem: "there is no word to look for".to_owned(),
-            way_out: "give one with a letter or a digit, as in `matdb search paint`".to_owned(),
-        });
+        return Err(Error::usage(
+            "there is no word to look for",
+            "give one with a letter or a digit, as in `matdb search paint`",
+        ));
     }
     let store = db.read()?;
     let missing = store_of_not_added(store.as_ref())?;

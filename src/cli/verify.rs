@@ -37,9 +37,9 @@ pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
     console.result(&text, &verified)?;
     match problems.len() {
         0 => Ok(()),
-        number => Err(Error::Usage {
-            problem: format!("{} has {}", args.bundle.display(), counted(number, "problem")),
-            way_out: "get a sound copy, or publish it again".to_owned(),
-        }),
+        number => Err(Error::usage(
+            format!("{} has {}", args.bundle.display(), counted(number, "problem")),
+            "get a sound copy, or publish it again",
+        )),
     }
 }

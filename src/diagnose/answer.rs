@@ -2,7 +2,7 @@
 
 use super::explanation::{Addition, Explanation};
 use super::folds::Folds;
-use super::report::{Base, BaseValue, BeforeAfter, Found, Parameters, Row, Value};
+use super::report::{Base, BaseValue, BeforeAfter, FoundEffect, Parameters, Row, Value};
 use super::score::{AT_THE_FLOOR, DB, Errors};
 use super::scorer::{Scorer, State};
 use super::subject::Subject;
@@ -74,7 +74,7 @@ pub(super) fn base(subject: &Subject, state: &State, sd: &[f64]) -> Base {
 }
 
 /// The effects of a model with their parameters; `sd`: standard deviations of all unknowns.
-pub(super) fn effects(model: &Explanation, sd: &[f64], shots: &[Shot]) -> Vec<Found> {
+pub(super) fn effects(model: &Explanation, sd: &[f64], shots: &[Shot]) -> Vec<FoundEffect> {
     let Explanation { state, added } = model;
     let mut rest = sd.iter().skip(state.space.base_len());
     let mut effects = Vec::new();
@@ -92,14 +92,14 @@ fn found(
     sd: &[f64],
     added: &Addition,
     shots: &[Shot],
-) -> Found {
+) -> FoundEffect {
     let place = effect.place(values);
     let mut numbers = std::collections::BTreeMap::new();
     for ((known, &value), sd) in effect.parameters().iter().zip(values).zip(sd) {
         let sd = finite(sd * known.step);
         numbers.insert(known.name, Value { value, sd, unit: known.unit });
     }
-    Found {
+    FoundEffect {
         name: effect.name(),
         level: effect.level(),
         class: added.class.clone(),

@@ -6,7 +6,7 @@
 //! ones. One in ten thousand chirps is an outlier of any power, so that a silhouette that the mesh misses
 //! costs a bounded amount.
 
-use super::observation::{Declared, Observation};
+use super::observation::{Observation, ReceiverLimits};
 use crate::effects::{MeanEcho, Prediction};
 use crate::fit::gamma_law::{GammaLaw, LnProbability};
 
@@ -29,7 +29,7 @@ const NOTHING: f64 = 1e-9;
 /// The likelihood under one prediction.
 pub(super) struct Likelihood<'a> {
     prediction: &'a Prediction,
-    declared: Declared,
+    declared: ReceiverLimits,
     law: GammaLaw,
 }
 
@@ -55,7 +55,7 @@ pub(super) struct Term {
 }
 
 impl<'a> Likelihood<'a> {
-    pub fn new(prediction: &'a Prediction, declared: Declared) -> Likelihood<'a> {
+    pub fn new(prediction: &'a Prediction, declared: ReceiverLimits) -> Likelihood<'a> {
         Likelihood { prediction, declared, law: GammaLaw::new(prediction.receiver.looks) }
     }
 

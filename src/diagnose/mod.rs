@@ -64,12 +64,12 @@ pub use error::DiagnoseError;
 pub use evidence::{Candidate, Evidence};
 pub use folds::Folds;
 pub use matching::{CloudMatch, Stray, match_cloud};
-pub use observation::{Declared, Observation};
+pub use observation::{Observation, ReceiverLimits};
 pub use report::{
-    Base, BaseValue, BeforeAfter, Control, Controls, Found, MeshPose, Parameters, Power, Report,
-    Row, SCHEMA, Triple, Value, Verdict,
+    Base, BaseValue, BeforeAfter, Control, Controls, FoundEffect, MeshPose, Parameters, Power,
+    Report, Row, SCHEMA, Triple, Value, Verdict,
 };
-pub use residual::Unexplained;
+pub use residual::ResidualStructure;
 pub use scan::{MeasuredScene, declared_receiver};
 pub use score::Errors;
 pub use settings::Diagnosis;

@@ -13,14 +13,14 @@ pub struct Observation {
 
 /// Declared properties of the receiver that no effect changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Declared {
+pub struct ReceiverLimits {
     /// Least power of a detection, W.
     pub threshold_w: f64,
     /// Standard deviation of a range, m; 0 where ranges are not to be used.
     pub range_sd_m: f64,
 }
 
-impl Declared {
+impl ReceiverLimits {
     /// Measured less expected range, m; `None` where either is missing or ranges are not to be used.
     pub(super) fn range_off_m(&self, arrived: &MeanEcho, seen: &Observation) -> Option<f64> {
         let range_m = seen.range_m.filter(|_| self.range_sd_m > 0.0 && arrived.range_m > 0.0)?;

@@ -6,7 +6,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::likelihood::{Likelihood, Term};
-use super::observation::{Declared, Observation};
+use super::observation::{Observation, ReceiverLimits};
 use super::space::Space;
 use crate::effects::{Model, Prediction, PredictionCache, Receiver, Shot, Stage};
 
@@ -23,7 +23,7 @@ pub(super) struct Problem<'a> {
     pub stage: &'a Stage<'a>,
     pub shots: &'a [Shot],
     pub observations: &'a [Observation],
-    pub declared: Declared,
+    pub declared: ReceiverLimits,
     pub receiver: Receiver,
     /// Rays already traced for these shots.
     pub traced: &'a PredictionCache,

@@ -5,7 +5,7 @@
 use nalgebra::DVector;
 
 use super::folds::Folds;
-use super::observation::{Declared, Observation};
+use super::observation::{Observation, ReceiverLimits};
 use super::problem::Problem;
 use super::refit::SCOUT;
 use super::report::Power;
@@ -188,7 +188,7 @@ impl Bench<'_> {
     }
 
     fn simulate_shot(&self, prediction: &Prediction, shot: usize) -> Observation {
-        let Declared { threshold_w, range_sd_m } = self.scorer.problem.declared;
+        let ReceiverLimits { threshold_w, range_sd_m } = self.scorer.problem.declared;
         let (seed, chirp) = (self.scorer.settings.seed, shot as u64);
         let mut draws = Key { seed, chirp, sub_ray: 4, purpose: Purpose::Fit }.draws();
         // One of the tilts, by its weight.

@@ -3,7 +3,7 @@
 use super::covariates::covariates;
 use super::field::Structure;
 use super::problem::Problem;
-use super::residual::{self, Unexplained, speckle_sd_db};
+use super::residual::{self, ResidualStructure, speckle_sd_db};
 use super::scatter::Tests;
 use super::scorer::{SHARE_OF_FORM, Scorer};
 use super::settings::Diagnosis;
@@ -23,7 +23,7 @@ pub(super) struct Remainder<'a> {
 }
 
 /// Every structure that exceeds chance, strongest first.
-pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<Unexplained> {
+pub(super) fn find_unexplained(scorer: &Scorer, remainder: &Remainder) -> Vec<ResidualStructure> {
     let Remainder { prediction, z, structure, largest_db, off_target } = *remainder;
     let Problem { shots, observations, declared, .. } = scorer.problem;
     let covariates = covariates(shots, prediction, observations);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Serialize, Serializer};
 
 use super::evidence::{Candidate, Evidence};
-use super::residual::Unexplained;
+use super::residual::ResidualStructure;
 use super::score::Errors;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Level, Place, Shot};
@@ -111,7 +111,7 @@ impl std::ops::Deref for Parameters {
 
 /// An effect that was added.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Found {
+pub struct FoundEffect {
     /// Its name.
     pub name: &'static str,
     /// The level it belongs to.
@@ -290,11 +290,11 @@ pub struct Report {
     /// The answer.
     pub verdict: Verdict,
     /// Effects in the order in which they were added.
-    pub effects: Vec<Found>,
+    pub effects: Vec<FoundEffect>,
     /// Every effect of every round.
     pub ranking: Vec<Candidate>,
     /// Structure that no effect explains.
-    pub unexplained: Vec<Unexplained>,
+    pub unexplained: Vec<ResidualStructure>,
     /// Errors on held-out patches.
     pub error: BeforeAfter,
     /// Detections away from where their chirps meet the target. They are set aside, and their chirps count as

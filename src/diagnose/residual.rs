@@ -16,7 +16,7 @@ use statrs::function::gamma::digamma;
 use super::field::Structure;
 use super::folds::{Folds, square};
 use super::likelihood::Likelihood;
-use super::observation::{Declared, Observation};
+use super::observation::{Observation, ReceiverLimits};
 use super::score::DB;
 use crate::effects::{Prediction, Shot};
 use crate::radar::random::{Key, Purpose};
@@ -39,7 +39,7 @@ const LEAST_STEPS_DB: f64 = 0.1;
 
 /// Structure that a model does not explain.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Unexplained {
+pub struct ResidualStructure {
     /// The covariate it depends on; `spread` where the scatter differs everywhere, `spread over …` where the scatter,
     /// and not the level, depends on a covariate.
     pub covariate: String,
@@ -52,7 +52,7 @@ pub struct Unexplained {
 /// z of every shot.
 pub(super) fn z(
     prediction: &Prediction,
-    declared: Declared,
+    declared: ReceiverLimits,
     observations: &[Observation],
     seed: u64,
 ) -> Vec<f64> {
@@ -84,7 +84,7 @@ pub(super) fn of_neighbours(
     spot_m: f64,
     sd_db: f64,
     folds: &Folds,
-) -> Unexplained {
+) -> ResidualStructure {
     let mut members: HashMap<[i64; 2], Vec<usize>> = HashMap::new();
     for (index, shot) in shots.iter().enumerate() {
         members.entry(square(shot, 2.0 * spot_m)).or_default().push(index);
@@ -101,7 +101,7 @@ pub(super) fn of_neighbours(
     let covariance = sum / shots.len().max(1) as f64;
     let strength_db = sd_db * covariance.max(0.0).sqrt();
     let p_value = 0.5 * erfc(sum / se.max(f64::MIN_POSITIVE) / SQRT_2);
-    Unexplained { covariate: "neighbourhood".to_owned(), strength_db, p_value }
+    ResidualStructure { covariate: "neighbourhood".to_owned(), strength_db, p_value }
 }
 
 /// Sum and number of the residuals one to two spots from a shot; `None` where there are none.
@@ -135,7 +135,7 @@ pub(super) fn outlying_powers(z: &[f64]) -> usize {
 /// Number of ranges beyond [`OUTLYING`] standard deviations.
 fn outlying_ranges(
     prediction: &Prediction,
-    declared: Declared,
+    declared: ReceiverLimits,
     observations: &[Observation],
 ) -> usize {
     let mut count = 0;
@@ -153,10 +153,10 @@ fn outlying_ranges(
 pub(super) fn outliers(
     z: &[f64],
     prediction: &Prediction,
-    declared: Declared,
+    declared: ReceiverLimits,
     observations: &[Observation],
     false_alarms: usize,
-) -> Option<Unexplained> {
+) -> Option<ResidualStructure> {
     let count = z.len().max(1) as f64;
     // Stray detections are not among the shots.
     let kinds = [
@@ -169,7 +169,7 @@ pub(super) fn outliers(
     let expected = OUTLIERS * count;
     let p_value = (0.5 * erfc((number as f64 - expected) / (2.0 * expected).sqrt())).max(1e-300);
     let strength_db = OUTLYING_DB * share.sqrt();
-    (share > 3.0 * OUTLIERS && number >= 10).then(|| Unexplained {
+    (share > 3.0 * OUTLIERS && number >= 10).then(|| ResidualStructure {
         covariate: covariate.to_owned(),
         strength_db,
         p_value,
@@ -179,14 +179,14 @@ pub(super) fn outliers(
 /// Scatter of another shape than declared, such as a speckle that is not Gamma: z is skewed
 /// although mean and spread are right. Its third moment is 0 under the model, with the standard
 /// deviation √(6/n); the corresponding displacement is (z² − 1)/6 of it (Cornish and Fisher).
-pub(super) fn skewness(z: &[f64], sd_db: f64) -> Option<Unexplained> {
+pub(super) fn skewness(z: &[f64], sd_db: f64) -> Option<ResidualStructure> {
     // Single shots far out count as outliers.
     let inner: Vec<f64> = z.iter().map(|z| z.clamp(-SKEWED_REACH, SKEWED_REACH)).collect();
     let count = inner.len().max(1) as f64;
     let mean = inner.iter().sum::<f64>() / count;
     let third = inner.iter().map(|z| (z - mean).powi(3)).sum::<f64>() / count;
     let chance = erfc(third.abs() / (6.0 / count).sqrt() / SQRT_2);
-    (third.abs() > SKEWED && chance < SKEWED_BY_CHANCE).then(|| Unexplained {
+    (third.abs() > SKEWED && chance < SKEWED_BY_CHANCE).then(|| ResidualStructure {
         covariate: "form of the scatter".to_owned(),
         strength_db: sd_db * SQRT_2 * third.abs() / 6.0,
         p_value: chance,
@@ -194,7 +194,7 @@ pub(super) fn skewness(z: &[f64], sd_db: f64) -> Option<Unexplained> {
 }
 
 /// Powers in coarse steps, as from a converter with few bits.
-pub(super) fn steps(observations: &[Observation]) -> Option<Unexplained> {
+pub(super) fn steps(observations: &[Observation]) -> Option<ResidualStructure> {
     let powers = observations.iter().filter_map(|seen| seen.power_w);
     let mut powers: Vec<f64> = powers.map(|power_w| DB * power_w.ln()).collect();
     powers.sort_by(f64::total_cmp);
@@ -204,7 +204,7 @@ pub(super) fn steps(observations: &[Observation]) -> Option<Unexplained> {
     let step_db = span_db / powers.len().max(2) as f64;
     // A uniform error of a step has the standard deviation step/√12.
     let strength_db = step_db / 12f64.sqrt();
-    (powers.len() * 10 < count && strength_db >= LEAST_STEPS_DB).then(|| Unexplained {
+    (powers.len() * 10 < count && strength_db >= LEAST_STEPS_DB).then(|| ResidualStructure {
         covariate: "steps of the power".to_owned(),
         strength_db,
         p_value: 0.0,
@@ -212,14 +212,14 @@ pub(super) fn steps(observations: &[Observation]) -> Option<Unexplained> {
 }
 
 /// Structure of the means that a field has found: the covariates with the largest parts.
-pub(super) fn of_field(structure: &Structure) -> Vec<Unexplained> {
+pub(super) fn of_field(structure: &Structure) -> Vec<ResidualStructure> {
     let [gain, se] = structure.gain;
     let p_value = 0.5 * erfc(gain / se / SQRT_2);
     let most_db = structure.parts_db.first().map_or(0.0, |part| part.1);
     let large = structure.parts_db.iter().filter(|part| part.1 >= 0.5 * most_db).take(3);
     let share = structure.size_db / most_db.max(f64::MIN_POSITIVE);
     large
-        .map(|(name, part_db)| Unexplained {
+        .map(|(name, part_db)| ResidualStructure {
             covariate: (*name).to_owned(),
             strength_db: share * part_db,
             p_value,

@@ -2,7 +2,7 @@
 
 use super::error::DiagnoseError;
 use super::matching::match_cloud;
-use super::observation::Declared;
+use super::observation::ReceiverLimits;
 use super::report::{MeshPose, Report};
 use super::settings::Diagnosis;
 use super::shots::trace_shots;
@@ -75,12 +75,12 @@ impl MeasuredScene<'_> {
 }
 
 /// A radar's receiver, its threshold and its error of ranges, as declared.
-pub fn declared_receiver(radar: &Radar) -> (Receiver, Declared) {
+pub fn declared_receiver(radar: &Radar) -> (Receiver, ReceiverLimits) {
     let receiver = Receiver::declared(radar);
     let receiver = Receiver { looks: receiver.looks.min(MOST_LOOKS), ..receiver };
     let range_sd_m = radar.noise.map_or(0.0, |noise| noise.range_sd_m);
     let threshold_w = watts_from_dbm(radar.threshold_dbm);
-    (receiver, Declared { threshold_w, range_sd_m })
+    (receiver, ReceiverLimits { threshold_w, range_sd_m })
 }
 
 /// Poses of the meshes of a scene.

@@ -7,7 +7,7 @@
 
 use super::covariates::{Covariate, quantiles};
 use super::folds::{Folds, square};
-use super::residual::{Unexplained, speckle_sd_db};
+use super::residual::{ResidualStructure, speckle_sd_db};
 use crate::effects::{Prediction, Shot};
 use crate::radar::random::{Key, Purpose};
 
@@ -45,7 +45,7 @@ impl Tests {
         prediction: &Prediction,
         covariates: &[Covariate],
         folds: &Folds,
-    ) -> Vec<Unexplained> {
+    ) -> Vec<ResidualStructure> {
         // A spread s times the declared one has z² of mean s²: half of the excess is that of s.
         let whole: Vec<f64> = z.iter().map(|z| z * z - 1.0).collect();
         let mean = whole.iter().sum::<f64>() / whole.len().max(1) as f64;
@@ -63,7 +63,7 @@ impl Tests {
             let (excess, p_value) = self.test(squares, bin, folds, number);
             let strength_db = 0.5 * sd_db * excess;
             if p_value <= limit && strength_db >= self.least_size_db {
-                found.push(Unexplained { covariate, strength_db, p_value });
+                found.push(ResidualStructure { covariate, strength_db, p_value });
             }
         }
         found

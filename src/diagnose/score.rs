@@ -9,7 +9,7 @@ use statrs::function::gamma::ln_gamma;
 
 use super::folds::Folds;
 use super::likelihood::Likelihood;
-use super::observation::{Declared, Observation};
+use super::observation::{Observation, ReceiverLimits};
 use crate::effects::Prediction;
 
 /// Errors below this multiple of the noise floor count as at the floor, with no excess to explain.
@@ -118,7 +118,7 @@ fn moments_above(looks: f64, ln_threshold: f64) -> [f64; 2] {
 /// Scores of the shots that are `wanted`, with their numbers.
 pub(super) fn scores(
     prediction: &Prediction,
-    declared: Declared,
+    declared: ReceiverLimits,
     observations: &[Observation],
     wanted: impl Fn(usize) -> bool,
 ) -> Vec<(usize, Score)> {
@@ -149,7 +149,7 @@ fn detected_moments(
     likelihood: &Likelihood,
     table: &MomentTable,
     prediction: &Prediction,
-    declared: Declared,
+    declared: ReceiverLimits,
     shot: usize,
 ) -> [f64; 2] {
     let ln_threshold = declared.threshold_w.ln();

@@ -8,7 +8,7 @@ use super::field::{Field, Model, Structure, scaled, terms};
 use super::folds::Folds;
 use super::problem::{Problem, Sample};
 use super::refit::{Fit, SCOUT, SEARCH};
-use super::residual::{self, Unexplained, speckle_sd_db};
+use super::residual::{self, ResidualStructure, speckle_sd_db};
 use super::score::{Errors, Score, errors, scores};
 use super::settings::Diagnosis;
 use super::size::Size;
@@ -150,7 +150,7 @@ impl Scorer<'_> {
     }
 
     /// The residual that neighbours share.
-    pub fn shared(&self, prediction: &Prediction, z: &[f64]) -> Unexplained {
+    pub fn shared(&self, prediction: &Prediction, z: &[f64]) -> ResidualStructure {
         let sd_db = speckle_sd_db(prediction.receiver.looks);
         let spot_m = self.problem.stage.geometry.radar.spot_diameter_m;
         residual::of_neighbours(z, self.problem.shots, spot_m, sd_db, self.folds)
@@ -174,7 +174,7 @@ impl Scorer<'_> {
 
     /// Whether the residual that neighbours share exceeds chance and a possible error of the form of the largest
     /// effect.
-    pub fn is_shared(&self, neighbours: &Unexplained, largest_db: f64) -> bool {
+    pub fn is_shared(&self, neighbours: &ResidualStructure, largest_db: f64) -> bool {
         neighbours.p_value < CHANCE && neighbours.strength_db >= self.least_structure_db(largest_db)
     }
 

@@ -3,7 +3,7 @@
 use super::error::DiagnoseError;
 use super::folds::Folds;
 use super::matching::Stray;
-use super::observation::{Declared, Observation};
+use super::observation::{Observation, ReceiverLimits};
 use super::report::MeshPose;
 use super::settings::{LEAST_BLOCKS, LEAST_DETECTIONS};
 use crate::brdf::Brdf;
@@ -28,7 +28,7 @@ pub struct Subject<'a> {
     /// The receiver without effects; its looks lie between 0.1 and 10⁴.
     pub receiver: Receiver,
     /// Threshold and range error.
-    pub declared: Declared,
+    pub declared: ReceiverLimits,
     /// Every chirp that meets the target.
     pub shots: &'a [Shot],
     /// The observation of each shot.

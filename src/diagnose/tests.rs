@@ -160,7 +160,7 @@ fn diagnosed_of(
     let shots = trace_shots(&stage).unwrap();
     let noise_w = watts_from_dbm(-100.0);
     let receiver = Receiver { looks: 4.0, noise_w, ..Receiver::LINEAR };
-    let declared = Declared { threshold_w: watts_from_dbm(-77.0), range_sd_m: RANGE_SD_M };
+    let declared = ReceiverLimits { threshold_w: watts_from_dbm(-77.0), range_sd_m: RANGE_SD_M };
     let model = Model { laws: vec![law()], receiver, effects };
     let prediction = model.predict(&stage, &shots);
     let seen = |(shot, arrived): (usize, &Option<crate::effects::MeanEcho>)| {
@@ -348,7 +348,7 @@ fn a_scan_with_too_little_says_so() {
     let stage = bench.stage();
     let shots = trace_shots(&stage).unwrap();
     let receiver = Receiver { looks: 4.0, noise_w: 0.0, ..Receiver::LINEAR };
-    let declared = Declared { threshold_w: 1e-11, range_sd_m: RANGE_SD_M };
+    let declared = ReceiverLimits { threshold_w: 1e-11, range_sd_m: RANGE_SD_M };
     let observations = vec![Observation::default(); shots.len()];
     let subject = Subject {
         stage: &stage,

@@ -20,8 +20,16 @@ pub struct FilesError {
 }
 
 impl FilesError {
+    /// The way out of a folder that cannot be written into.
+    pub const OTHER_FOLDER: &str = "make room or choose another folder";
+
     /// That a file cannot be read; the way out is to check its path.
     pub fn unreadable(path: &Path, reason: io::Error) -> FilesError {
         FilesError { verb: "read", path: path.to_owned(), reason, way_out: "check the path" }
+    }
+
+    /// That a file or folder cannot be written; the way out is room or another folder.
+    pub fn unwritable(verb: &'static str, path: &Path, reason: io::Error) -> FilesError {
+        FilesError { verb, path: path.to_owned(), reason, way_out: FilesError::OTHER_FOLDER }
     }
 }

@@ -34,7 +34,7 @@ pub type FolderFiles<'a, Name> = (&'a Path, &'a [(Name, Vec<u8>)]);
 #[derive(Default)]
 #[must_use = "files that are not kept are taken back"]
 pub struct Placement {
-    replaced: Vec<Replaced>,
+    replaced: Vec<Replacement>,
     /// Folders that were not there, those within others first.
     created: Vec<PathBuf>,
 }
@@ -60,14 +60,15 @@ impl Placement {
                 let path = folder.join(name.as_ref());
                 match file {
                     Ok(file) => pending.push((path, file)),
-                    Err(reason) => return Err(unwritable(path, reason)),
+                    Err(reason) => return Err(FilesError::unwritable("write", &path, reason)),
                 }
             }
         }
         // Bytes that a device or another program has read cannot be taken back, so it gets them last.
         pending.sort_by_key(|(_, file)| matches!(file, Pending::Stream(..)));
         for (path, file) in pending {
-            let replaced = file.place().map_err(|reason| unwritable(path, reason))?;
+            let replaced =
+                file.place().map_err(|reason| FilesError::unwritable("write", &path, reason))?;
             placement.replaced.extend(replaced);
         }
         Ok(placement)
@@ -82,7 +83,7 @@ impl Placement {
 
 impl Drop for Placement {
     fn drop(&mut self) {
-        self.replaced.drain(..).rev().for_each(Replaced::restore);
+        self.replaced.drain(..).rev().for_each(Replacement::restore);
         remove_empty(&self.created);
     }
 }
@@ -98,12 +99,7 @@ fn create_folder(folder: &Path) -> Result<Vec<PathBuf>, FilesError> {
         Ok(()) => Ok(missing),
         Err(reason) => {
             remove_empty(&missing);
-            Err(FilesError {
-                verb: "create the folder",
-                path: folder.to_owned(),
-                reason,
-                way_out: "choose another with -o",
-            })
+            Err(FilesError::unwritable("create the folder", folder, reason))
         }
     }
 }
@@ -164,7 +160,7 @@ fn is_database(path: &Path) -> bool {
 
 impl Pending<'_> {
     /// Puts the file in its place; what was there is kept under a temporary name.
-    fn place(self) -> io::Result<Option<Replaced>> {
+    fn place(self) -> io::Result<Option<Replacement>> {
         let (file, path) = match self {
             Pending::Whole(file, path) => (file, path),
             Pending::Stream(bytes, path) => {
@@ -183,7 +179,7 @@ impl Pending<'_> {
             Err(_) => None,
         };
         let placed = file.persist(&path);
-        let replaced = Replaced { path, before };
+        let replaced = Replacement { path, before };
         match placed {
             Ok(_) => Ok(Some(replaced)),
             Err(error) => {
@@ -195,27 +191,18 @@ impl Pending<'_> {
 }
 
 /// The place of a file that was written, and what was there before.
-struct Replaced {
+struct Replacement {
     path: PathBuf,
     before: Option<TempPath>,
 }
 
-impl Replaced {
+impl Replacement {
     fn restore(self) {
         // The error that led here is the one to report; a second one could only hide it.
         match self.before {
             Some(before) => drop(before.persist(&self.path)),
             None => drop(std::fs::remove_file(&self.path)),
         }
-    }
-}
-
-fn unwritable(path: PathBuf, reason: io::Error) -> FilesError {
-    FilesError {
-        verb: "write",
-        path,
-        reason,
-        way_out: "make room or choose another folder with -o",
     }
 }
 

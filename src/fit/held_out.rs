@@ -10,7 +10,7 @@ use super::goodness::residuals_db;
 use super::likelihood::Likelihood;
 use super::result::FitResult;
 use super::settings::Method;
-use crate::material::{HeldOut, Observation};
+use crate::material::{CrossValidation, Observation};
 use crate::measure::curve::Curve;
 use crate::radar::random::{Key, Purpose};
 
@@ -29,7 +29,7 @@ impl FitResult {
     ///
     /// `None` where there are fewer blocks than parts, where a part leaves too few detections for the fit,
     /// or where a fit does not converge.
-    pub fn hold_out(&self, curve: &Curve) -> Option<HeldOut> {
+    pub fn hold_out(&self, curve: &Curve) -> Option<CrossValidation> {
         let Blocks { of, block_of_row, block_m } = Blocks::new(&curve.observations);
         let blocks = block_of_row.iter().max().map_or(0, |most| most + 1);
         if blocks < FOLDS {
@@ -58,7 +58,7 @@ impl FitResult {
         }
         let [score, score_sd] = mean(&scores, &sizes);
         let has_law = self.fit.method == Method::Censored;
-        Some(HeldOut {
+        Some(CrossValidation {
             folds: FOLDS as u32,
             blocks: u32::try_from(blocks).unwrap_or(u32::MAX),
             blocks_of: of.to_owned(),

@@ -11,7 +11,7 @@ use super::settings::Fit;
 use super::table::{Place, Table};
 use super::verdict::Finding;
 use crate::brdf::{Brdf, Scattering};
-use crate::material::{Estimate, Goodness, HeldOut};
+use crate::material::{CrossValidation, Estimate, Goodness};
 
 /// A 95 % band of the fitted mean σ⁰.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -50,7 +50,7 @@ pub struct FitResult {
     /// How well the rows are explained.
     pub goodness: Goodness,
     /// How well the fit predicts rows that took no part in it, as [`FitResult::hold_out`] returns; none until then.
-    pub held_out: Option<HeldOut>,
+    pub held_out: Option<CrossValidation>,
     /// Whether the search ended at an optimum.
     pub converged: bool,
     /// Why it ended.

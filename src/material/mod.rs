@@ -35,7 +35,7 @@ pub use provenance::{
     USUAL_TITLE,
 };
 pub use reach::Reach;
-pub use report::{Estimate, FitReport, FixedNumber, Goodness, HeldOut};
+pub use report::{CrossValidation, Estimate, FitReport, FixedNumber, Goodness};
 pub use revision::Material;
 pub use slug::Slug;
 pub use status::Status;

@@ -32,7 +32,7 @@ pub struct FitReport {
     pub goodness: Goodness,
     /// How well points are predicted that took no part in the fit; none where that was not tried.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub held_out: Option<HeldOut>,
+    pub held_out: Option<CrossValidation>,
     /// Whether the search ended at an optimum.
     pub converged: bool,
     /// Why it ended.
@@ -56,7 +56,7 @@ pub struct FitReport {
 /// How well points are predicted by fits that they took no part in.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct HeldOut {
+pub struct CrossValidation {
     /// Parts that took turns at being held out.
     pub folds: u32,
     /// Blocks of neighbouring points that the parts were dealt.
@@ -119,7 +119,7 @@ pub struct Goodness {
     pub rows: u32,
 }
 
-impl HeldOut {
+impl CrossValidation {
     /// What the blocks are, in words.
     pub fn of(&self) -> String {
         match (self.blocks_of.as_str(), self.block_m) {
@@ -200,7 +200,7 @@ impl FitReport {
         [rms_db, mean_db, z_mean, z_variance, ks_distance, self.noise_w, self.objective]
             .into_iter()
             .chain(speckle_db)
-            .chain(self.held_out.iter().flat_map(HeldOut::numbers))
+            .chain(self.held_out.iter().flat_map(CrossValidation::numbers))
             .chain(self.looks)
             .chain(self.given.iter().map(|given| given.value))
             .chain(self.estimates.iter().flat_map(Estimate::numbers))
@@ -239,7 +239,7 @@ mod tests {
                 ks_distance: 0.1,
                 rows: 9,
             },
-            held_out: Some(HeldOut {
+            held_out: Some(CrossValidation {
                 folds: 5,
                 blocks: 9,
                 blocks_of: "squares".to_owned(),

@@ -11,6 +11,7 @@ use thiserror::Error;
 
 use crate::formats::FormatError;
 use crate::frames::{Global, Point};
+use crate::render::Echo;
 use crate::units::{dbm_from_watts, rounded, shown, watts_from_dbm};
 
 /// Larger than any target of this radar, m: beyond, the unit is wrong.
@@ -29,6 +30,14 @@ pub struct CloudPoint {
     pub range_m: Option<f64>,
     /// Received power, W.
     pub power_w: f64,
+}
+
+impl From<&Echo> for CloudPoint {
+    /// The point that the radar reports of an echo.
+    fn from(echo: &Echo) -> CloudPoint {
+        let Echo { chirp, point, range_m, power_w, .. } = *echo;
+        CloudPoint { chirp: Some(chirp), point, range_m: Some(range_m), power_w }
+    }
 }
 
 /// A measured cloud that passed [`Cloud::new`].

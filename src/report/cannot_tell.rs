@@ -116,10 +116,10 @@ fn would_help_curve(error: &CurveDiagnoseError) -> &'static str {
              held out together, and several of them are needed."
         }
         CurveDiagnoseError::Noise { .. } | CurveDiagnoseError::Noiseless => {
-            "The scatter of a level, in dB: by --noise-db, from repeats, or told from neighbouring angles, of \
-             which every incidence has three or more."
+            "The scatter of a level, in dB: stated, from repeats, or from neighbouring angles, of which every incidence \
+             has three or more."
         }
-        CurveDiagnoseError::Fit(_) => "Another law to begin from, by --model.",
+        CurveDiagnoseError::Fit(_) => "Another law to begin from.",
     }
 }
 

@@ -27,14 +27,14 @@ impl Reason {
             Reason::Declared => "declared already, so at work in the model",
             Reason::NoTimes => "the scan has no times",
             Reason::NoRanges => "the scene states no `range_sd_m` under [radar.noise]",
-            Reason::NotAsked => "--effects names others",
+            Reason::NotAsked => "others were asked for",
         }
     }
 }
 
 /// An effect that is not tried.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct NotTried {
+pub struct UntriedEffect {
     /// Its name.
     pub name: &'static str,
     /// Why.
@@ -43,19 +43,19 @@ pub struct NotTried {
 
 /// An effect that is not tried, as a page shows it.
 #[derive(Serialize)]
-pub(super) struct LeftOut {
+pub(super) struct Omission {
     name: &'static str,
     because: &'static str,
 }
 
 /// Effects that are not tried, for a page.
-pub(super) fn left_out(not_tried: &[NotTried]) -> Vec<LeftOut> {
-    not_tried.iter().map(|one| LeftOut { name: one.name, because: one.reason.words() }).collect()
+pub(super) fn left_out(not_tried: &[UntriedEffect]) -> Vec<Omission> {
+    not_tried.iter().map(|one| Omission { name: one.name, because: one.reason.words() }).collect()
 }
 
 /// What a scan measures besides powers.
 #[derive(Clone, Copy, Debug)]
-pub struct Measured {
+pub struct Measurands {
     /// The time of every chirp.
     pub times: bool,
     /// Ranges with a known error.
@@ -67,18 +67,18 @@ pub struct Choice {
     /// Effects to try.
     pub tried: Vec<&'static dyn Effect>,
     /// The others.
-    pub not_tried: Vec<NotTried>,
+    pub not_tried: Vec<UntriedEffect>,
 }
 
 impl Choice {
     /// Sorts the effects that were asked for; `declared` names those at work in the scene already.
-    pub fn new(asked: &[&'static dyn Effect], declared: &[&str], measured: Measured) -> Choice {
+    pub fn new(asked: &[&'static dyn Effect], declared: &[&str], measured: Measurands) -> Choice {
         let mut choice = Choice { tried: Vec::new(), not_tried: Vec::new() };
         for effect in library() {
             let name = effect.name();
             let is_asked = asked.iter().any(|other| other.name() == name);
             if let Some(reason) = reason_against(effect, is_asked, declared, measured) {
-                choice.not_tried.push(NotTried { name, reason });
+                choice.not_tried.push(UntriedEffect { name, reason });
             }
         }
         // The order of the tried effects is the one in which they were asked for.
@@ -112,7 +112,7 @@ fn reason_against(
     effect: &dyn Effect,
     is_asked: bool,
     declared: &[&str],
-    measured: Measured,
+    measured: Measurands,
 ) -> Option<Reason> {
     if declared.contains(&effect.name()) {
         Some(Reason::Declared)
@@ -128,11 +128,11 @@ fn reason_against(
 }
 
 /// The effects of a curve that are not asked for.
-pub fn terms_not_asked(asked: &[&'static dyn Term]) -> Vec<NotTried> {
+pub fn terms_not_asked(asked: &[&'static dyn Term]) -> Vec<UntriedEffect> {
     let mut others = Vec::new();
     for term in terms() {
         if asked.iter().all(|other| other.name() != term.name()) {
-            others.push(NotTried { name: term.name(), reason: Reason::NotAsked });
+            others.push(UntriedEffect { name: term.name(), reason: Reason::NotAsked });
         }
     }
     others
@@ -146,9 +146,9 @@ mod tests {
     #[test]
     fn every_effect_is_tried_or_has_a_reason() {
         let asked = ["fov-gain", "drift", "pose", "motion"].map(|name| find(name).unwrap());
-        let choice = Choice::new(&asked, &["pose"], Measured { times: true, ranges: false });
+        let choice = Choice::new(&asked, &["pose"], Measurands { times: true, ranges: false });
         assert_eq!(choice.left_out(Reason::NoRanges), ["motion"]);
-        let choice = Choice::new(&asked, &["pose"], Measured { times: false, ranges: true });
+        let choice = Choice::new(&asked, &["pose"], Measurands { times: false, ranges: true });
         assert_eq!(choice.tried[0].name(), "fov-gain");
         assert_eq!(choice.left_out(Reason::Declared), ["pose"]);
         assert_eq!(choice.left_out(Reason::NoTimes), ["motion", "drift"]);

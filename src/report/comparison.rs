@@ -5,7 +5,7 @@ use crate::formats::figure::{Figure, Plot, Scale, Series, Style, beside};
 use crate::geometry::Raster;
 use crate::measure::Cloud;
 use crate::measure::compare::{Agreement, Line, difference, measured_scan, power_along};
-use crate::render::{Observer, Scan, shade, trace_placed};
+use crate::render::Scan;
 use crate::setup::ReadyScene;
 use crate::units::dbm_from_watts;
 
@@ -37,11 +37,10 @@ impl Comparison {
         let images = [ready.image(&measured), ready.image(&simulated)];
         let (error, agreement) = difference(&images[0], &images[1]);
         if agreement.both == 0 {
-            return Err(Error::Usage {
-                problem: format!("no pixel of `{}` has power in both images", ready.path.display()),
-                way_out: "check the frame of the cloud, or register it with `matdb measure`"
-                    .to_owned(),
-            });
+            return Err(Error::usage(
+                format!("no pixel of `{}` has power in both images", ready.path.display()),
+                "check the frame of the cloud, or register it with `matdb measure`",
+            ));
         }
         let title = scene.file.name.clone();
         Ok(Comparison { title, measured, simulated, images, error, agreement })
@@ -126,7 +125,6 @@ impl Comparison {
 fn simulate(ready: &ReadyScene) -> Result<Scan, Error> {
     let assembly = ready.assemble();
     let setup = assembly.setup();
-    trace_placed(&setup, ready.scene.file.spot.rays, &|_| {})
-        .and_then(|footprints| shade(&setup, &footprints, Observer::Radar, &|_| {}))
-        .map_err(|error| ready.render_error("", error))
+    let footprints = assembly.trace(&setup, &|_| {})?;
+    assembly.shade(&setup, &footprints, &|_| {})
 }

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::words::{belongs, numbers, others, summary, value};
-use crate::diagnose::curve::{CurveEvidence, CurveFound, term};
-use crate::diagnose::{Evidence, Found};
+use crate::diagnose::curve::{CurveEvidence, FoundTerm, term};
+use crate::diagnose::{Evidence, FoundEffect};
 use crate::effects::{EffectParameter, Level, Place, find};
 use crate::formats::words::{digits, in_unit};
 
@@ -48,7 +48,7 @@ struct Other {
 }
 
 /// An effect of a cloud.
-pub(super) fn of_cloud(found: &Found) -> Article<'_, Evidence> {
+pub(super) fn of_cloud(found: &FoundEffect) -> Article<'_, Evidence> {
     let effect = find(found.name);
     let mut rivals = Vec::new();
     for name in others(&found.class, found.name) {
@@ -74,7 +74,7 @@ pub(super) fn of_cloud(found: &Found) -> Article<'_, Evidence> {
 }
 
 /// An effect of a curve.
-pub(super) fn of_curve(found: &CurveFound) -> Article<'_, CurveEvidence> {
+pub(super) fn of_curve(found: &FoundTerm) -> Article<'_, CurveEvidence> {
     let effect = term(found.name);
     let mut rivals = Vec::new();
     for name in others(&found.class, found.name) {

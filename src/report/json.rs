@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::choice::NotTried;
+use super::choice::UntriedEffect;
 use crate::error::Error;
 
 /// A diagnosis of a cloud or of a curve, and the effects that it did not try.
@@ -12,7 +12,7 @@ pub struct Record<'a, Report> {
     #[serde(flatten)]
     pub report: &'a Report,
     /// Effects that were left out, with the reason.
-    pub not_tried: &'a [NotTried],
+    pub not_tried: &'a [UntriedEffect],
 }
 
 /// A value as the bytes of a JSON file.

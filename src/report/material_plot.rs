@@ -33,10 +33,10 @@ impl FigureFormat {
         match path.extension().and_then(|extension| extension.to_str()) {
             Some("svg") => Ok(FigureFormat::Svg),
             Some("png") => Ok(FigureFormat::Png),
-            _ => Err(Error::Usage {
-                problem: format!("`{}` does not end in .svg or .png", path.display()),
-                way_out: "name the file so".to_owned(),
-            }),
+            _ => Err(Error::usage(
+                format!("`{}` does not end in .svg or .png", path.display()),
+                "name the file so",
+            )),
         }
     }
 
@@ -89,24 +89,27 @@ pub fn material_plot(material: &Material) -> Result<Vec<Series>, Error> {
 pub fn sweep_plot(material: &Material, sweep: &str) -> Result<Vec<Series>, Error> {
     let base = material.scattering()?;
     let Some((path, values)) = sweep.split_once('=') else {
-        let way_out = "write it as --sweep specular.m=0.01,0.05,0.1";
-        return Err(usage(format!("`{sweep}` names no values"), way_out));
+        let way_out = "write it as specular.m=0.01,0.05,0.1";
+        return Err(Error::usage(format!("`{sweep}` names no values"), way_out));
     };
     let mut series = Vec::new();
     for text in values.split(',').map(str::trim) {
         let Ok(value) = text.parse() else {
-            return Err(usage(format!("`{text}` is no number"), "separate numbers by commas"));
+            return Err(Error::usage(
+                format!("`{text}` is no number"),
+                "separate numbers by commas",
+            ));
         };
         let mut model = base.clone();
         if !model.set_parameter(path, value) {
             let paths: Vec<String> = base.parameters().into_iter().map(|p| p.path).collect();
-            return Err(usage(
+            return Err(Error::usage(
                 format!("`{}` has no parameter `{path}`", material.slug),
-                &format!("there are: {}", paths.join(", ")),
+                format!("there are: {}", paths.join(", ")),
             ));
         }
         if let Err(error) = model.validate() {
-            return Err(usage(error.to_string(), "leave it out of the sweep"));
+            return Err(Error::usage(error.to_string(), "leave it out of the sweep"));
         }
         series.extend(split_at_reach(material, model_curve(&format!("{path} = {text}"), &model)));
     }
@@ -236,8 +239,4 @@ fn model_curve(name: &str, model: &dyn Scattering) -> Series {
         points.push((theta_deg, if level_db >= FAINTEST_DB { level_db } else { f64::NAN }));
     }
     Series { name: name.to_owned(), style: Style::Curve, points }
-}
-
-fn usage(problem: String, way_out: &str) -> Error {
-    Error::Usage { problem, way_out: way_out.to_owned() }
 }

@@ -1,4 +1,4 @@
-//! What a person reads: the page, the pictures, the tables and the words of a diagnosis, the record of a rendering,
+//! What a person reads: the page, the pictures, the tables and the words of a diagnosis, the files of a rendering,
 //! plots of materials and fits. Plain values go in and the bytes of files come out; nothing here writes a file.
 
 mod cannot_tell;
@@ -20,7 +20,7 @@ mod templates;
 mod words;
 
 pub use cannot_tell::CannotTell;
-pub use choice::{Choice, Measured, NotTried, Reason, terms_not_asked};
+pub use choice::{Choice, Measurands, Reason, UntriedEffect, terms_not_asked};
 pub use cloud::{CloudAnswer, CloudReport, NextSteps};
 pub use comparison::Comparison;
 pub use curve::{CurveAnswer, CurveRequest};
@@ -33,5 +33,8 @@ pub use measurement::{measured_curve_plot, pose_record};
 pub use neighbours::{Neighbour, NeighbourReport, NeighbourSearch};
 pub use picture::Picture;
 pub use radar::RadarReport;
-pub use scan::{Counts, PowerRange, ReceiverRecord, RegionRecord, ScanRecord};
+pub use scan::{
+    BeatShape, Counts, PowerRange, ReceiverRecord, RegionRecord, RenderFiles, RenderRequest,
+    RenderStage, ScanRecord,
+};
 pub use shell::shell_word;

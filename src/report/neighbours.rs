@@ -77,10 +77,7 @@ impl NeighbourSearch {
         let longest =
             material.curves.into_iter().rev().max_by_key(|curve| curve.observations.len());
         let Some(curve) = longest else {
-            return Err(Error::Usage {
-                problem: format!("`{name}` has no curve"),
-                way_out: "give one with --curve FILE".to_owned(),
-            });
+            return Err(Error::usage(format!("`{name}` has no curve"), "give the file of one"));
         };
         let instrument =
             material.instruments.iter().find(|own| Some(&own.key) == curve.instrument.as_ref());
@@ -104,12 +101,11 @@ impl NeighbourSearch {
         limit: usize,
     ) -> Result<NeighbourReport, Error> {
         let Some(probe) = Probe::new(&self.observations) else {
-            return Err(Error::Usage {
-                problem: "the curve has no backscatter that was detected, or a point above the \
-                          instrument's range"
-                    .to_owned(),
-                way_out: "give a curve with detections below that range".to_owned(),
-            });
+            return Err(Error::usage(
+                "the curve has no backscatter that was detected, or a point above the \
+                          instrument's range",
+                "give a curve with detections below that range",
+            ));
         };
         let built_in = store_of_not_added(store)?;
         let mut report = NeighbourReport {

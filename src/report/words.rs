@@ -1,6 +1,6 @@
 //! What a diagnosis found in words, for the terminal and for the page.
 
-use crate::diagnose::{Found, Parameters, Report, Triple, Value, Verdict};
+use crate::diagnose::{FoundEffect, Parameters, Report, Triple, Value, Verdict};
 use crate::effects::{Level, find};
 use crate::formats::words::{digits, in_unit, listed, plus_minus};
 
@@ -105,7 +105,7 @@ pub(super) fn numbers(parameters: &Parameters) -> Vec<[String; 2]> {
 }
 
 /// What the values of an effect mean together, where they are too many to be read one by one.
-pub(super) fn summary(found: &Found) -> Option<String> {
+pub(super) fn summary(found: &FoundEffect) -> Option<String> {
     let effect = find(found.name)?;
     let mut values = Vec::new();
     for parameter in effect.parameters() {

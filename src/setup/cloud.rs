@@ -17,10 +17,10 @@ use crate::measure::{Cloud, CloudFormat, CloudReading};
 pub fn read_cloud(path: &Path, reading: &CloudReading) -> Result<Cloud, Error> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     let Some(format) = CloudFormat::from_extension(&extension) else {
-        return Err(Error::Usage {
-            problem: format!("`{}` does not end in .ply, .csv or .xyz", path.display()),
-            way_out: "convert or rename the cloud".to_owned(),
-        });
+        return Err(Error::usage(
+            format!("`{}` does not end in .ply, .csv or .xyz", path.display()),
+            "convert or rename the cloud",
+        ));
     };
     let cloud = reading.read(format, &read(path)?);
     cloud.map_err(|error| Error::Cloud { file: path.to_owned(), error })
@@ -64,10 +64,10 @@ impl PoseRecord {
 }
 
 fn no_pose(path: &Path, problem: &str) -> Error {
-    Error::Usage {
-        problem: format!("{}: {problem}", path.display()),
-        way_out: "give a pose.json that `matdb measure` wrote".to_owned(),
-    }
+    Error::usage(
+        format!("{}: {problem}", path.display()),
+        "give a pose.json that `matdb measure` wrote",
+    )
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, FilesError> {

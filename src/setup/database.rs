@@ -36,10 +36,7 @@ impl Database {
     pub fn read(&self) -> Result<Option<Store>, Error> {
         let store = Store::open_existing(&self.path)?;
         if store.is_none() && self.asked_for {
-            return Err(Error::Usage {
-                problem: format!("there is no database {}", self.path.display()),
-                way_out: "check --db and $MATDB; `matdb add NAME` makes one".to_owned(),
-            });
+            return Err(Error::NoDatabase { path: self.path.clone() });
         }
         Ok(store)
     }

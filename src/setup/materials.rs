@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::formats::text::nearest;
 use crate::material::{Material, Slug, builtin};
-use crate::store::Store;
+use crate::store::{Store, Stored};
 
 /// A material and where it was found.
 #[derive(Clone, Debug)]
@@ -12,6 +12,19 @@ pub struct MaterialRevision {
     pub material: Material,
     /// Its revision in the database; `None` for a built-in one that is not in it.
     pub revision: Option<u32>,
+}
+
+impl MaterialRevision {
+    /// The revision with the circumstances of its storage; `None` for a built-in material that is not in the database.
+    ///
+    /// # Errors
+    /// A database that cannot be read.
+    pub fn stored(&self, store: Option<&Store>) -> Result<Option<Stored>, Error> {
+        match (store, self.revision) {
+            (Some(store), Some(_)) => Ok(store.get(&self.material.slug, self.revision)?),
+            _ => Ok(None),
+        }
+    }
 }
 
 /// Finds a material in the database, else among those that are built in.
@@ -115,11 +128,13 @@ fn split<'a>(wanted: &'a str, asked_by: &str) -> Result<(&'a str, Option<u32>), 
     let Some((name, revision)) = wanted.split_once('@') else {
         return Ok((wanted, None));
     };
-    let number = revision.parse().map_err(|_| Error::Usage {
-        problem: format!(
-            "{asked_by}`{wanted}` asks for revision `{revision}`, which is no whole number"
-        ),
-        way_out: format!("write {name}@1 or just {name}"),
+    let number = revision.parse().map_err(|_| {
+        Error::usage(
+            format!(
+                "{asked_by}`{wanted}` asks for revision `{revision}`, which is no whole number"
+            ),
+            format!("write {name}@1 or just {name}"),
+        )
     })?;
     Ok((name, Some(number)))
 }

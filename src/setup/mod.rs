@@ -2,15 +2,13 @@
 //! from those that are built in, and a scene with the materials, laws and effects of its regions.
 //!
 //! ```
-//! use matdb::render::{Observer, shade, trace_placed};
 //! use matdb::setup::ReadyScene;
 //!
 //! let ready = ReadyScene::open("scenes/mannequin.toml".as_ref(), None)?;
 //! let assembly = ready.assemble();
 //! let setup = assembly.setup();
-//! # let at = |error| ready.render_error("", error);
-//! let footprints = trace_placed(&setup, ready.scene.file.spot.rays, &|_| {}).map_err(at)?;
-//! let scan = shade(&setup, &footprints, Observer::Radar, &|_| {}).map_err(at)?;
+//! let footprints = assembly.trace(&setup, &|_| {})?;
+//! let scan = assembly.shade(&setup, &footprints, &|_| {})?;
 //! assert!(scan.detections().count() > 0);
 //! # Ok::<(), matdb::error::Error>(())
 //! ```

@@ -146,10 +146,10 @@ impl ReadyScene {
         if is_chosen {
             return Ok(());
         }
-        Err(Error::Usage {
-            problem: format!("no material of the scene has a fit `{name}`"),
-            way_out: format!("there are: {}", known.join(", ")),
-        })
+        Err(Error::usage(
+            format!("no material of the scene has a fit `{name}`"),
+            format!("there are: {}", known.join(", ")),
+        ))
     }
 
     /// Sentences on materials that are withdrawn or superseded, or make no claim at the radar's frequency.

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::scene::Assembly;
 use crate::error::Error;
 use crate::frames::Point;
-use crate::render::{Footprints, Observer, Scan, Setup, shade};
+use crate::render::{Footprints, Observer, Scan, Setup, shade, trace_placed};
 use crate::scene::file::ReceiverEntry;
 
 /// What one antenna received.
@@ -29,6 +29,34 @@ impl View<'_> {
 }
 
 impl<'a> Assembly<'a> {
+    /// Where the rays of the scan meet the target; `advance` hears of chirps as they are done.
+    ///
+    /// # Errors
+    /// What the renderer refuses, with the scene's file.
+    pub fn trace(
+        &self,
+        setup: &Setup,
+        advance: &(dyn Fn(usize) + Sync),
+    ) -> Result<Footprints, Error> {
+        let ready = self.ready();
+        trace_placed(setup, ready.scene.file.spot.rays, advance)
+            .map_err(|error| ready.render_error("", error))
+    }
+
+    /// What the radar receives; `advance` hears of chirps as they are done.
+    ///
+    /// # Errors
+    /// What the renderer refuses, with the scene's file.
+    pub fn shade(
+        &self,
+        setup: &Setup,
+        footprints: &Footprints,
+        advance: &(dyn Fn(usize) + Sync),
+    ) -> Result<Scan, Error> {
+        shade(setup, footprints, Observer::Radar, advance)
+            .map_err(|error| self.ready().render_error("", error))
+    }
+
     /// The radar's own view first, then those of the receivers; `advance` hears of chirps as they are done.
     ///
     /// # Errors
@@ -40,8 +68,7 @@ impl<'a> Assembly<'a> {
         advance: &(dyn Fn(usize) + Sync),
     ) -> Result<Vec<View<'a>>, Error> {
         let ready = self.ready();
-        let scan = shade(setup, footprints, Observer::Radar, advance)
-            .map_err(|error| ready.render_error("", error))?;
+        let scan = self.shade(setup, footprints, advance)?;
         let mut views = vec![View { receiver: None, observer: Observer::Radar, scan }];
         for (number, receiver) in (1u32..).zip(&ready.scene.file.receiver) {
             let observer = Observer::Receiver {

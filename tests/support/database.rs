@@ -6,9 +6,9 @@ use std::process::Command;
 
 use matdb::formats::EffectEntry;
 use matdb::material::{
-    Censor, Citation, Covariance, Curve, Estimate, Finding, FindingVerdict, FitReport, FixedNumber,
-    Geometry, Goodness, HeldOut, Instrument, Layer, Making, Material, Observation, Permittivity,
-    Roughness, Scale, Session, SessionPose, Status, file,
+    Censor, Citation, Covariance, CrossValidation, Curve, Estimate, Finding, FindingVerdict,
+    FitReport, FixedNumber, Geometry, Goodness, Instrument, Layer, Making, Material, Observation,
+    Permittivity, Roughness, Scale, Session, SessionPose, Status, file,
 };
 use matdb::store::Store;
 
@@ -206,7 +206,7 @@ pub fn placed(slug: &str) -> Material {
     for observation in &mut material.curves[0].observations {
         observation.target_m = Some([-0.125, 0.5]);
     }
-    material.fits[0].report.as_mut().unwrap().held_out = Some(HeldOut {
+    material.fits[0].report.as_mut().unwrap().held_out = Some(CrossValidation {
         folds: 5,
         blocks: 20,
         blocks_of: "squares".to_owned(),

@@ -21,20 +21,15 @@ pub(super) use missing::{clauses, missing};
 pub fn check(material: &Material, file: &Path) -> Result<(), Error> {
     let gaps = missing::all(material);
     if !gaps.is_empty() {
-        return Err(Error::Usage {
-            problem: format!(
-                "{}: what was measured needs more: {}",
-                file.display(),
-                clauses(&gaps)
-            ),
-            way_out: missing::way_out(&gaps),
-        });
+        return Err(Error::usage(
+            format!("{}: what was measured needs more: {}", file.display(), clauses(&gaps)),
+            missing::way_out(&gaps),
+        ));
     }
     match slips::slips(material).into_iter().next() {
         None => Ok(()),
-        Some((problem, way_out)) => Err(Error::Usage {
-            problem: format!("{}: {problem}", file.display()),
-            way_out: way_out.to_owned(),
-        }),
+        Some((problem, way_out)) => {
+            Err(Error::usage(format!("{}: {problem}", file.display()), way_out))
+        }
     }
 }

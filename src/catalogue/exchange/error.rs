@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::detail::Detail;
 use crate::formats::FormatError;
 use crate::material::{MaterialError, Slug};
 
@@ -25,12 +26,12 @@ pub enum ExchangeError {
         error: MaterialError,
     },
     /// Neither the file nor the user states what an entry needs.
-    #[error("{file} does not say all that an entry needs; add {}", missing.join(", "))]
+    #[error("{file} does not say all that an entry needs; state its {}", Detail::list(missing))]
     Missing {
         /// The file.
         file: String,
-        /// The flags that say it, each with an example.
-        missing: Vec<String>,
+        /// What is missing.
+        missing: Vec<Detail>,
     },
     /// The material lacks what the format needs.
     #[error("`{slug}` cannot be written as {format}: {problem}; {way_out}")]

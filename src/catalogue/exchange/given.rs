@@ -1,5 +1,6 @@
 //! What a person states about a foreign file that does not state it itself.
 
+use super::detail::Detail;
 use super::error::ExchangeError;
 use crate::material::{Material, Slug, SourceKind};
 
@@ -57,20 +58,9 @@ pub(super) fn file_name(file: &str) -> &str {
     file.rsplit(['/', '\\']).next().unwrap_or(file)
 }
 
-/// The refusal that names all the flags that are missing.
-pub(super) fn missing(file: &str, flags: &[(bool, &str)]) -> ExchangeError {
-    let missing = flags.iter().filter(|(there, _)| !there);
-    ExchangeError::Missing {
-        file: file.to_owned(),
-        missing: missing.map(|(_, flag)| (*flag).to_owned()).collect(),
-    }
+/// The refusal that names all details that are missing.
+pub(super) fn missing(file: &str, details: &[(bool, Detail)]) -> ExchangeError {
+    let missing = details.iter().filter(|(there, _)| !there);
+    let missing = missing.map(|(_, detail)| *detail).collect();
+    ExchangeError::Missing { file: file.to_owned(), missing }
 }
-
-pub(super) const NAME: &str = "--name my-paint";
-pub(super) const CLASS: &str = "--class paint";
-pub(super) const LICENCE: &str = "--licence CC-BY-4.0";
-pub(super) const SOURCE: &str = "--source \"who measured it, where, when\"";
-pub(super) const KIND: &str = "--kind measured";
-pub(super) const INSTRUMENT: &str = "--instrument \"name of the radar\"";
-pub(super) const THRESHOLD: &str = "--threshold -77";
-pub(super) const FREQUENCY: &str = "--frequency 300";

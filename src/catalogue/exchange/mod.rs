@@ -16,6 +16,7 @@
 mod dispersion;
 mod error;
 mod export_files;
+mod detail;
 mod given;
 mod mitsuba;
 mod open_material;
@@ -31,6 +32,7 @@ mod universal_brdf_in;
 
 use crate::material::Material;
 
+pub use detail::Detail;
 pub use error::ExchangeError;
 pub use export_files::Export;
 pub use given::Given;

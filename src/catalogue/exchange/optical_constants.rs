@@ -8,9 +8,10 @@
 //! where it is tabulated apart from k. Lost: frequencies further away than a third, the conditions
 //! other than the temperature, HTML.
 
+use super::detail::Detail;
 use super::dispersion::{Formula, formula};
 use super::error::ExchangeError;
-use super::given::{CLASS, Given, LICENCE, NAME, file_name, missing};
+use super::given::{Given, file_name, missing};
 use super::page::{Block, Page, parse};
 use crate::brdf::{Brdf, Fresnel};
 use crate::formats::FormatError;
@@ -49,15 +50,15 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
     let page = page.map_err(|error| ExchangeError::in_file(file, error))?;
     let known = page.is_cc0.then(|| "CC0-1.0".to_owned());
     let licence = given.licence.clone().or(known);
-    let flags = [
-        (given.slug.is_some(), NAME),
-        (given.class.is_some(), CLASS),
-        (licence.is_some(), LICENCE),
+    let details = [
+        (given.slug.is_some(), Detail::Name),
+        (given.class.is_some(), Detail::Class),
+        (licence.is_some(), Detail::Licence),
     ];
     let (Some(slug), Some(class), Some(licence)) =
         (given.slug.clone(), given.class.clone(), licence)
     else {
-        return Err(missing(file, &flags));
+        return Err(missing(file, &details));
     };
     let wanted_hz = given.frequency_hz.unwrap_or(USUAL_HZ);
     let (nearest, constants) = constants(&page)
@@ -126,7 +127,7 @@ fn around(
             "the tabulated frequency nearest to {wanted} GHz is {near:.5} GHz, {away:.5} GHz away, \
              and nothing is extrapolated"
         );
-        let way_out = format!("ask for it with --frequency {near:.5}, or name another page");
+        let way_out = format!("ask for the frequency {near:.5} GHz, or name another page");
         return Err(FormatError::at("DATA", problem, way_out));
     }
     all.retain(|c| away(c) <= REACH * wanted_hz);

@@ -6,11 +6,10 @@
 
 use std::path::Path;
 
+use super::detail::Detail;
 use super::error::ExchangeError;
 use super::export_files::Export;
-use super::given::{
-    CLASS, FREQUENCY, Given, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD, file_name, missing,
-};
+use super::given::{Given, file_name, missing};
 use super::subject::{Points, Subject};
 use crate::formats::FormatError;
 use crate::formats::words::round_significant;
@@ -81,15 +80,15 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
     let has_threshold = !is_measured
         || given.threshold_w.is_some()
         || observations.iter().all(|row| row.threshold_sigma0.is_some());
-    let flags = [
-        (slug.is_some(), NAME),
-        (class.is_some(), CLASS),
-        (licence.is_some(), LICENCE),
-        (source.is_some(), SOURCE),
-        (kind.is_some(), KIND),
-        (frequency_hz.is_some(), FREQUENCY),
-        (instrument.is_some() || !is_measured, INSTRUMENT),
-        (has_threshold, THRESHOLD),
+    let details = [
+        (slug.is_some(), Detail::Name),
+        (class.is_some(), Detail::Class),
+        (licence.is_some(), Detail::Licence),
+        (source.is_some(), Detail::Source),
+        (kind.is_some(), Detail::Kind),
+        (frequency_hz.is_some(), Detail::Frequency),
+        (instrument.is_some() || !is_measured, Detail::Instrument),
+        (has_threshold, Detail::Threshold),
     ];
     let (Some(slug), Some(class), Some(licence), Some(title), Some(kind), Some(hz), true) = (
         slug.clone(),
@@ -100,7 +99,7 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
         *frequency_hz,
         has_threshold && (instrument.is_some() || !is_measured),
     ) else {
-        return Err(missing(file, &flags));
+        return Err(missing(file, &details));
     };
     let instrument = instrument.as_ref().map(|name| Instrument {
         key: RADAR.to_owned(),

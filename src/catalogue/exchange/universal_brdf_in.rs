@@ -7,11 +7,9 @@ use std::f64::consts::PI;
 
 use serde_json::Value;
 
+use super::detail::Detail;
 use super::error::ExchangeError;
-use super::given::{
-    CLASS, FREQUENCY, Given, INSTRUMENT, KIND, LICENCE, NAME, SOURCE, THRESHOLD as DETECTED,
-    missing,
-};
+use super::given::{Given, missing};
 use super::plain_csv::{RADAR, SingleCurve, of_curve};
 use super::universal_brdf::{CENSOR, OURS, THRESHOLD};
 use crate::formats::FormatError;
@@ -37,21 +35,21 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
     let is_limited = kind != Some(SourceKind::Measured)
         || threshold_w.is_some()
         || observations.iter().all(|row| row.threshold_sigma0.is_some());
-    let flags = [
-        (given.slug.is_some(), NAME),
-        (given.class.is_some(), CLASS),
-        (licence.is_some(), LICENCE),
-        (source.is_some(), SOURCE),
-        (kind.is_some(), KIND),
-        (hz.is_some(), FREQUENCY),
-        (is_named, INSTRUMENT),
-        (is_limited, DETECTED),
+    let details = [
+        (given.slug.is_some(), Detail::Name),
+        (given.class.is_some(), Detail::Class),
+        (licence.is_some(), Detail::Licence),
+        (source.is_some(), Detail::Source),
+        (kind.is_some(), Detail::Kind),
+        (hz.is_some(), Detail::Frequency),
+        (is_named, Detail::Instrument),
+        (is_limited, Detail::Threshold),
     ];
     let is_whole = is_named && is_limited;
     let (Some(slug), Some(class), Some(licence), Some(title), Some(kind), Some(hz), true) =
         (given.slug.clone(), given.class.clone(), licence, source, kind, hz, is_whole)
     else {
-        return Err(missing(file, &flags));
+        return Err(missing(file, &details));
     };
     let stated = &ours["instrument"];
     let instrument = name.map(|name| Instrument {

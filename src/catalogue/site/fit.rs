@@ -8,7 +8,7 @@ use super::residuals;
 use super::words::grouped;
 use crate::brdf::Parameter;
 use crate::formats::words::digits;
-use crate::material::{ChosenBy, Fit, FitNumber, FitReport, HeldOut, Material, SourceKind};
+use crate::material::{ChosenBy, CrossValidation, Fit, FitNumber, FitReport, Material, SourceKind};
 use crate::units::dbm_from_watts;
 
 /// Parameters that backscatter sees only inside a product, and the product's name.
@@ -204,12 +204,12 @@ fn product(fit: &Fit, name: &'static str, is: &'static str, value: f64) -> Produ
     }
 }
 
-fn held_out(held: &HeldOut) -> String {
+fn held_out(held: &CrossValidation) -> String {
     let of = held.of();
     let score = held.score.zip(held.score_sd).map_or(String::new(), |(score, sd)| {
         format!("; mean ln p of a point {score:.4} ± {sd:.4}")
     });
-    let HeldOut { folds, blocks, rms_db, .. } = held;
+    let CrossValidation { folds, blocks, rms_db, .. } = held;
     format!("{rms_db:.2} dB rms in {folds} turns of {} {of}{score}", grouped(*blocks as usize))
 }
 

@@ -1,9 +1,9 @@
 //! The points of a material's curves as a table for other programs.
 
 use std::io;
-use std::path::PathBuf;
 
 use crate::catalogue::error::CatalogueError;
+use crate::files::FilesError;
 use crate::material::{Material, SourceKind};
 use crate::units::{db_from_ratio, dbm_from_watts};
 
@@ -66,6 +66,6 @@ fn degrees(rad: f64) -> String {
 }
 
 fn unwritable(material: &Material, reason: io::Error) -> CatalogueError {
-    let path = PathBuf::from(format!("material/{}.csv", material.slug));
-    CatalogueError::Io { verb: "write", path, reason }
+    let path = format!("material/{}.csv", material.slug);
+    FilesError::unwritable("write", path.as_ref(), reason).into()
 }

@@ -18,6 +18,7 @@ use parquet::schema::types::Type;
 use crate::catalogue::error::CatalogueError;
 use crate::catalogue::folder::Folder;
 use crate::catalogue::units::unit;
+use crate::files::FilesError;
 use crate::store::{Cell, Column, ColumnKind, Store, Table};
 
 /// Number of rows that are kept in memory.
@@ -38,11 +39,8 @@ fn rows(store: &Store, table: &Table, place: &Path) -> Result<(), CatalogueError
         path: place.to_owned(),
         problem: error.to_string(),
     };
-    let file = File::create(place).map_err(|reason| CatalogueError::Io {
-        verb: "write",
-        path: place.to_owned(),
-        reason,
-    })?;
+    let file =
+        File::create(place).map_err(|reason| FilesError::unwritable("write", place, reason))?;
     let schema = Arc::new(schema(table).map_err(failed)?);
     let properties = Arc::new(properties(table, None));
     let mut writer = SerializedFileWriter::new(file, schema, properties).map_err(failed)?;

@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use crate::adopt::foreign_format;
+use crate::adopt::{check_frequency_and_threshold, foreign_format};
 use crate::catalogue::exchange::Given;
-use crate::cli::list::Kind;
+use crate::cli::curves::kind_of;
+use crate::cli::list::KINDS;
 use crate::error::Error;
 use crate::material::{Slug, SourceKind};
 use crate::units::watts_from_dbm;
@@ -12,7 +13,7 @@ use crate::units::watts_from_dbm;
 /// What a foreign file does not say.
 #[derive(Debug, Default, PartialEq, clap::Args)]
 #[command(next_help_heading = "For a .csv, .brdf or .yml file")]
-pub(super) struct Beside {
+pub(super) struct DetailArgs {
     /// Short name that the material gets
     #[arg(long, value_name = "NAME")]
     name: Option<Slug>,
@@ -44,8 +45,8 @@ pub(super) struct Beside {
     #[arg(long, value_name = "YYYY")]
     year: Option<u16>,
     /// Origin of the numbers
-    #[arg(long)]
-    kind: Option<Kind>,
+    #[arg(long, value_parser = kind_of(KINDS))]
+    kind: Option<SourceKind>,
     /// Name of the instrument
     #[arg(long, value_name = "TEXT")]
     instrument: Option<String>,
@@ -57,36 +58,26 @@ pub(super) struct Beside {
     threshold: Option<f64>,
 }
 
-impl Beside {
+impl DetailArgs {
     /// Refuses flags that would be dropped in silence, and one name for several files.
     pub fn check(&self, from: &[PathBuf]) -> Result<(), Error> {
         let foreign =
             from.iter().filter(|path| !path.is_dir() && foreign_format(path).is_some()).count();
         let problem = match foreign {
-            0 if *self != Beside::default() => {
+            0 if *self != DetailArgs::default() => {
                 "--name and its like say what a foreign file does not"
             }
             2.. => "several foreign files would get one name",
             _ => return Ok(()),
         };
-        Err(Error::Usage {
-            problem: problem.to_owned(),
-            way_out: "name one .csv, .brdf or .yml file with --from, and no other".to_owned(),
-        })
+        Err(Error::usage(problem, "name one .csv, .brdf or .yml file with --from, and no other"))
     }
 
     /// The flags as plain values.
     pub fn given(&self) -> Result<Given, Error> {
         let frequency_hz = self.frequency.map(|ghz| ghz * 1e9);
         let threshold_w = self.threshold.map(watts_from_dbm);
-        let numbers = [frequency_hz, threshold_w];
-        if numbers.into_iter().flatten().any(|number| !(number > 0.0 && number.is_finite())) {
-            return Err(Error::Usage {
-                problem: "--frequency or --threshold cannot be".to_owned(),
-                way_out: "give a frequency in GHz such as 300, a threshold in dBm such as -77"
-                    .to_owned(),
-            });
-        }
+        check_frequency_and_threshold(frequency_hz, threshold_w)?;
         Ok(Given {
             slug: self.name.clone(),
             name: self.title.clone(),
@@ -98,7 +89,7 @@ impl Beside {
             year: self.year,
             licence: self.licence.clone(),
             source: self.source.clone(),
-            kind: self.kind.map(SourceKind::from),
+            kind: self.kind,
             instrument: self.instrument.clone(),
             frequency_hz,
             threshold_w,

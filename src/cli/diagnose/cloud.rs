@@ -6,7 +6,7 @@ use std::path::Path;
 use super::args::Args;
 use super::refusal::write_refusal;
 use crate::adopt::{
-    CheckedRequest, CloudRequest, Earlier, Publication, Published, as_answer, name_beside,
+    CheckedRequest, CloudRequest, Earlier, Publication, PublicationResult, as_answer, name_beside,
 };
 use crate::cli::cloud::CloudArgs;
 use crate::cli::console::Console;
@@ -90,7 +90,7 @@ fn publish(
     } else {
         let files = publication.files()?;
         write_all(request.folder, &files)?;
-        Published { files, ..Published::default() }
+        PublicationResult { files, ..PublicationResult::default() }
     };
     for notice in earlier.remove_all_but(&published.files) {
         console.notice(&notice);
@@ -117,7 +117,7 @@ fn refuse(error: DiagnoseError, request: &CloudRequest, console: &Console) -> Re
 /// A line on what was stored.
 fn stored(
     publication: &Publication,
-    published: &Published,
+    published: &PublicationResult,
     request: &CloudRequest,
     db: &Path,
 ) -> String {

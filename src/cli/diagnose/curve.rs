@@ -48,6 +48,7 @@ fn publish(
         model: args.model.as_deref(),
         seed: args.seed,
         not_tried: &terms_not_asked(effects),
+        two_lobes: "--model mixture",
     };
     let files = answer.files()?;
     let earlier = Earlier::in_folder(&args.output, &[path]);
@@ -93,5 +94,5 @@ fn unknown(what: &str, name: &str, known: &[&str]) -> Error {
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("choose {}", known.join(", ")),
     };
-    Error::Usage { problem: format!("a curve has no {what} `{name}`"), way_out }
+    Error::usage(format!("a curve has no {what} `{name}`"), way_out)
 }

@@ -15,9 +15,9 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     match (&args.curve, &args.cloud, &args.scene) {
         (Some(curve), None, None) => curve::run(curve, args, console),
         (None, Some(cloud), Some(scene)) => cloud::run(cloud, scene, args, db, console),
-        _ => Err(Error::Usage {
-            problem: "a diagnosis is of a cloud and its scene, or of a curve".to_owned(),
-            way_out: "give CLOUD --scene SCENE, or --curve FILE alone".to_owned(),
-        }),
+        _ => Err(Error::usage(
+            "a diagnosis is of a cloud and its scene, or of a curve",
+            "give CLOUD --scene SCENE, or --curve FILE alone",
+        )),
     }
 }

@@ -8,7 +8,7 @@ use clap::ValueEnum;
 use serde::Serialize;
 
 use super::console::Console;
-use super::curves::{Circumstances, Kind};
+use super::curves::{Circumstances, OWN, kind_of};
 use super::plot::write_plot;
 use crate::adopt::{FitStorage, FitSubject, StoredFit, admission};
 use crate::brdf::Brdf;
@@ -16,10 +16,10 @@ use crate::error::Error;
 use crate::fit::coordinates::frequencies;
 use crate::fit::{Fit, FitResult, Method, model, model_names};
 use crate::formats::text::nearest;
+use crate::material::SourceKind;
 use crate::radar::speckle::standard_deviation_db;
 use crate::report::{FigureFormat, curve_points, fit_layers, incidence_plot};
-use crate::setup::Database;
-use crate::setup::find_material;
+use crate::setup::{Database, find_material};
 use crate::store::Store;
 use crate::units::watts_from_dbm;
 
@@ -99,8 +99,8 @@ pub(super) struct Args {
     #[arg(long, requires = "save")]
     keep_render: bool,
     /// Origin of a file's curve
-    #[arg(long, value_enum, requires = "save")]
-    kind: Option<Kind>,
+    #[arg(long, value_parser = kind_of(OWN), requires = "save")]
+    kind: Option<SourceKind>,
     /// Who measured or made a file's curve, when and how
     #[arg(long, value_name = "TITLE", requires = "save")]
     source: Option<String>,
@@ -139,7 +139,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let fit_name = fit_name(args, &start);
     let storage = args.save.as_ref().map(|material| storage(args, material, fit_name.clone()));
     if let Some(storage) = &storage {
-        let material = storage.check(&subject, store.as_ref())?;
+        let material = storage.check(&subject, store.as_ref());
+        let material = material.map_err(|error| how_to_add(error, &subject))?;
         if subject.file.is_some() {
             admission::doubts(&material).iter().for_each(|doubt| console.notice(doubt));
         }
@@ -168,12 +169,29 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         return Err(Error::NotConverged { curve: subject.label, stop: found.stop.as_str() });
     }
     if !is_possible && args.save.is_some() {
-        return Err(Error::Usage {
-            problem: format!("{}: nothing is stored, since the fit is out of range", subject.label),
-            way_out: "the verdict says what to let go of".to_owned(),
-        });
+        return Err(Error::usage(
+            format!("{}: nothing is stored, since the fit is out of range", subject.label),
+            "the verdict says what to let go of",
+        ));
     }
     Ok(())
+}
+
+/// The error with the commands that make the material of a file's curve, where it is that there is no such material.
+fn how_to_add(error: Error, subject: &FitSubject) -> Error {
+    match error {
+        Error::UnknownMaterial { asked_by, name, way_out } if subject.file.is_some() => {
+            let meant = way_out.starts_with("did you mean");
+            let meant = if meant { format!("{way_out} Else ") } else { String::new() };
+            let way_out = format!(
+                "{meant}`matdb add --from {} --name {name} --class CLASS …` makes one of the curve, and then \
+                 `matdb fit {name} --save` stores the fit",
+                subject.wanted
+            );
+            Error::UnknownMaterial { asked_by, name, way_out }
+        }
+        error => error,
+    }
 }
 
 fn storage(args: &Args, material: &Option<String>, fit_name: String) -> FitStorage {
@@ -220,15 +238,15 @@ fn no_model(name: &str) -> Error {
             format!("name a material or one of {}", model_names().collect::<Vec<_>>().join(", "))
         }
     };
-    Error::Usage { problem: format!("there is no model and no material `{name}`"), way_out }
+    Error::usage(format!("there is no model and no material `{name}`"), way_out)
 }
 
 fn settings(args: &Args, subject: &FitSubject, start: &Brdf) -> Result<Fit, Error> {
     if args.noise_dbm.is_some() && subject.curve.lacks_power() {
-        return Err(Error::Usage {
-            problem: format!("{} has no powers that noise could be compared with", subject.label),
-            way_out: "leave --noise-dbm out or give the curve a column power_dbm".to_owned(),
-        });
+        return Err(Error::usage(
+            format!("{} has no powers that noise could be compared with", subject.label),
+            "leave --noise-dbm out or give the curve a column power_dbm",
+        ));
     }
     let fixed = fixed(args, start)?;
     let tls = Method::Tls {
@@ -253,39 +271,32 @@ fn fixed(args: &Args, start: &Brdf) -> Result<Vec<(String, f64)>, Error> {
     match (args.alpha, alpha) {
         (Some(value), Some(path)) => fixed.push((path.clone(), value)),
         (Some(_), None) => {
-            return Err(usage(
-                "this model has no alpha".to_owned(),
-                "leave --alpha out".to_owned(),
-            ));
+            return Err(Error::usage("this model has no alpha", "leave --alpha out"));
         }
         (None, _) if args.method == MethodName::TlsTail => {
-            let way_out = "give it with --alpha, or use --method tls to find it".to_owned();
-            return Err(usage("tls-tail takes the tail's exponent as given".to_owned(), way_out));
+            let way_out = "give it with --alpha, or use --method tls to find it";
+            return Err(Error::usage("tls-tail takes the tail's exponent as given", way_out));
         }
         (None, _) => {}
     }
     for text in &args.fixed {
         let parts = text.split_once('=').map(|(path, value)| (path, value.trim().parse()));
         let Some((path, Ok(value))) = parts else {
-            let way_out = "write it as --fix diffuse.alpha=3".to_owned();
-            return Err(usage(format!("`{text}` is no parameter with a value"), way_out));
+            let way_out = "write it as --fix diffuse.alpha=3";
+            return Err(Error::usage(format!("`{text}` is no parameter with a value"), way_out));
         };
         if !paths.iter().any(|known| known == path) {
             let way_out = format!("there are: {}", paths.join(", "));
-            return Err(usage(format!("the model has no parameter `{path}`"), way_out));
+            return Err(Error::usage(format!("the model has no parameter `{path}`"), way_out));
         }
         if is_held(path, &fixed) {
-            return Err(usage(format!("`{path}` is held twice"), "hold it once".to_owned()));
+            return Err(Error::usage(format!("`{path}` is held twice"), "hold it once"));
         }
         fixed.push((path.to_owned(), value));
     }
     let own = frequencies(start);
     fixed.extend(own.into_iter().filter(|(path, _)| !is_held(path, &fixed)).collect::<Vec<_>>());
     Ok(fixed)
-}
-
-fn usage(problem: String, way_out: String) -> Error {
-    Error::Usage { problem, way_out }
 }
 
 fn is_held(path: &str, fixed: &[(String, f64)]) -> bool {

@@ -3,7 +3,7 @@
 use crate::adopt::{FitSubject, StoredFit};
 use crate::cli::summary::{grouped, table};
 use crate::formats::words::significant;
-use crate::material::{Fit, FitReport, Goodness, HeldOut};
+use crate::material::{CrossValidation, Fit, FitReport, Goodness};
 use crate::units::dbm_from_watts;
 
 /// All that a person wants to know of a fit.
@@ -109,8 +109,8 @@ fn goodness(goodness: &Goodness) -> String {
 }
 
 /// How the fit did on points that it had not seen.
-fn held_out(held: &HeldOut) -> String {
-    let HeldOut { folds, blocks, score, score_sd, rms_db, .. } = held;
+fn held_out(held: &CrossValidation) -> String {
+    let CrossValidation { folds, blocks, score, score_sd, rms_db, .. } = held;
     let of = held.of();
     let score = score
         .zip(*score_sd)

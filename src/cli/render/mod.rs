@@ -1,7 +1,5 @@
 //! `matdb render`.
 
-mod beat;
-mod files;
 mod report;
 mod stages;
 mod tracer;
@@ -9,17 +7,16 @@ mod tracer;
 use std::path::PathBuf;
 
 use super::console::Console;
+use super::hint::or_else;
 use crate::error::Error;
 use crate::files::write_all;
 use crate::formats::exr::Packing;
-use crate::geometry::Raster;
-use crate::render::{RenderError, trace_placed};
-use crate::report::ScanRecord;
-use crate::setup::Database;
-use crate::setup::ReadyScene;
-use crate::trace::GpuError;
+use crate::render::RenderError;
+use crate::report::{BeatShape, RenderFiles, RenderRequest};
+use crate::setup::{Database, ReadyScene};
+use crate::trace::Tracer;
 use stages::Stages;
-use tracer::{Rays, gpu, tracer};
+use tracer::{Rays, gpu};
 
 /// Render a scene: power.exr, power.png, cloud.ply and scan.json
 #[derive(Debug, clap::Args)]
@@ -49,42 +46,24 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
-    let mut stages = Stages::start();
+    let stages = Stages::start("load", console);
     let ready = ReadyScene::open(&args.scene, db.read()?.as_ref())?;
-    let beat = args.beat.then(|| beat::Shape::new(&ready.scene)).transpose()?;
-    stages.end("load", console);
-
-    let assembly = ready.assemble();
-    let failed = |error: GpuError| ready.render_error("", RenderError::Tracer(error.into()));
-    let gpu = gpu(args.tracer, console).map_err(failed)?;
-    let held = gpu.as_ref().map(|gpu| gpu.hold(assembly.bvh())).transpose().map_err(failed)?;
-    let mut setup = assembly.setup();
-    setup.geometry.tracer = tracer(args.tracer, held.as_ref());
-    let chirps = ready.scene.chirps.rays.len();
-    let bar = console.progress("tracing", chirps);
-    let rays = ready.scene.file.spot.rays;
-    let footprints = trace_placed(&setup, rays, &|chirps| bar.inc(chirps as u64));
-    bar.finish_and_clear();
-    let footprints = footprints.map_err(|error| ready.render_error("", error))?;
-    stages.end("trace", console);
-
-    let bar = console.progress("receiving", (1 + ready.scene.file.receiver.len()) * chirps);
-    let views = assembly.views(&setup, &footprints, &|chirps| bar.inc(chirps as u64));
-    bar.finish_and_clear();
-    let views = views?;
-    stages.end("power", console);
-    let images: Vec<Raster> = views.iter().map(|view| ready.image(&view.scan)).collect();
-    stages.end("image", console);
-
-    let packing = if args.uncompressed { Packing::Uncompressed } else { Packing::Zip16 };
-    let record = ScanRecord::new(&ready, assembly.model(), &views, &images, args.all);
-    let mut files = files::encode(args.all, packing, &ready, &views, &images, &record)?;
-    if let Some(shape) = beat {
-        files.extend(beat::encode(&args.scene, shape, &setup, &footprints, &views)?);
-    }
-    stages.end("encode", console);
-
+    let beat = args.beat.then(|| BeatShape::new(&ready.scene)).transpose();
+    let beat = beat.map_err(|error| or_else(error, "leave --beat out"))?;
+    let gpu = gpu(args.tracer, console);
+    let gpu = gpu.map_err(|error| ready.render_error("", RenderError::Tracer(error.into())))?;
+    let request = RenderRequest {
+        tracer: args.tracer.map_or(Tracer::Automatic, Rays::tracer),
+        gpu: gpu.as_ref(),
+        all_hits: args.all,
+        beat,
+        packing: if args.uncompressed { Packing::Uncompressed } else { Packing::Zip16 },
+        ..RenderRequest::new(&ready)
+    };
+    let (chirps, antennas) = (ready.scene.chirps.rays.len(), 1 + ready.scene.file.receiver.len());
+    let RenderFiles { record, files } =
+        request.render(&|stage, done| stages.show(stage, done, [chirps, antennas * chirps]))?;
+    stages.begin("write", None);
     write_all(&args.output, &files)?;
-    stages.end("write", console);
-    report::print(&args.output, &record, &stages, console)
+    report::print(&args.output, &record, stages, console)
 }

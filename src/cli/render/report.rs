@@ -4,25 +4,25 @@ use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
-use super::files::NAMES;
 use super::stages::Stages;
 use crate::cli::console::Console;
 use crate::cli::summary::{grouped, table};
 use crate::error::Error;
 use crate::report::{Counts, ReceiverRecord, ScanRecord};
 
-/// Prints the summary of a rendering that was written to `folder`.
+/// Prints the summary of a rendering that was written to `folder`, which ends the last stage.
 pub(super) fn print(
     folder: &Path,
     record: &ScanRecord,
-    stages: &Stages,
+    stages: Stages,
     console: &Console,
 ) -> Result<(), Error> {
+    let (stages_ms, total_s) = stages.end();
     record.notices().iter().for_each(|notice| console.notice(notice));
-    console.result(&text(folder, record, stages), &value(folder, record, stages))
+    console.result(&text(folder, record, total_s), &value(folder, record, stages_ms))
 }
 
-fn text(folder: &Path, record: &ScanRecord, stages: &Stages) -> String {
+fn text(folder: &Path, record: &ScanRecord, total_s: f64) -> String {
     let materials = record.material_origins();
     let regions = table(
         &["region", "material", "facets", "hits", "detections", "strongest dBm"],
@@ -43,11 +43,11 @@ fn text(folder: &Path, record: &ScanRecord, stages: &Stages) -> String {
         _ => ", and the same of each receiver,",
     };
     format!(
-        "{regions}{} chirps, {}\n{receivers}wrote {NAMES}{more} to {} in {:.2} s\n",
+        "{regions}{} chirps, {}\n{receivers}wrote power.exr, power.png, cloud.ply and scan.json{more} to {} in \
+         {total_s:.2} s\n",
         grouped(record.counts().chirps),
         counted(record.counts()),
         folder.display(),
-        stages.total_s()
     )
 }
 
@@ -68,9 +68,9 @@ fn counted(counts: Counts) -> String {
     )
 }
 
-fn value(folder: &Path, record: &ScanRecord, stages: &Stages) -> Value {
+fn value(folder: &Path, record: &ScanRecord, stages_ms: Vec<(&str, f64)>) -> Value {
     let timings: Map<String, Value> =
-        stages.ended().map(|(stage, ms)| (stage.to_owned(), json!(ms))).collect();
+        stages_ms.into_iter().map(|(stage, ms)| (stage.to_owned(), json!(ms))).collect();
     json!({
         "output": folder.to_string_lossy(),
         "counts": record.counts(),

@@ -1,35 +1,72 @@
-//! Wall-clock time of the stages of a command.
+//! Progress and wall-clock time of the stages of a rendering.
 
+use std::sync::Mutex;
 use std::time::Instant;
 
-use crate::cli::console::Console;
+use indicatif::ProgressBar;
 
-/// Stages that have ended, with their times in ms.
-pub(super) struct Stages {
+use crate::cli::console::Console;
+use crate::report::RenderStage;
+
+/// Stages of a command, of which the last one is running.
+pub(super) struct Stages<'a> {
+    console: &'a Console,
     start: Instant,
+    running: Mutex<RunningStage>,
+}
+
+/// The stage that is running, and those before it with their times in ms.
+struct RunningStage {
+    stage: &'static str,
     since: Instant,
+    bar: Option<ProgressBar>,
     ended: Vec<(&'static str, f64)>,
 }
 
-impl Stages {
-    pub fn start() -> Stages {
-        let now = Instant::now();
-        Stages { start: now, since: now, ended: Vec::new() }
+impl<'a> Stages<'a> {
+    /// Begins the first stage.
+    pub fn start(stage: &'static str, console: &'a Console) -> Stages<'a> {
+        let start = Instant::now();
+        let running = RunningStage { stage, since: start, bar: None, ended: Vec::new() };
+        Stages { console, start, running: Mutex::new(running) }
     }
 
-    /// Ends the current stage, which `-v` shows, and begins the next.
-    pub fn end(&mut self, stage: &'static str, console: &Console) {
+    /// Ends the running stage, which `-v` shows, and begins the next, with a bar over this many chirps.
+    pub fn begin(&self, stage: &'static str, bar: Option<(&'static str, usize)>) {
+        let Ok(mut running) = self.running.lock() else { return };
+        running.end(self.console);
+        running.stage = stage;
+        running.bar = bar.map(|(what, chirps)| self.console.progress(what, chirps));
+        running.since = Instant::now();
+    }
+
+    /// Shows how far a rendering has come; `chirps` are all that are traced, and all that are received.
+    pub fn show(&self, stage: RenderStage, done: usize, chirps: [usize; 2]) {
+        match (stage, done) {
+            (RenderStage::Trace, 0) => self.begin("trace", Some(("tracing", chirps[0]))),
+            (RenderStage::Power, 0) => self.begin("power", Some(("receiving", chirps[1]))),
+            (RenderStage::Image, _) => self.begin("image", None),
+            (RenderStage::Encode, _) => self.begin("encode", None),
+            _ => {
+                let Ok(running) = self.running.lock() else { return };
+                running.bar.iter().for_each(|bar| bar.inc(done as u64));
+            }
+        }
+    }
+
+    /// Ends the last stage; all stages with their times in ms, and the time of all, s.
+    pub fn end(self) -> (Vec<(&'static str, f64)>, f64) {
+        let Ok(mut running) = self.running.into_inner() else { return (Vec::new(), 0.0) };
+        running.end(self.console);
+        (running.ended, self.start.elapsed().as_secs_f64())
+    }
+}
+
+impl RunningStage {
+    fn end(&mut self, console: &Console) {
         let ms = self.since.elapsed().as_secs_f64() * 1e3;
-        console.detail(&format!("{stage:>8} {ms:8.1} ms"));
-        self.ended.push((stage, ms));
-        self.since = Instant::now();
-    }
-
-    pub fn ended(&self) -> impl Iterator<Item = (&'static str, f64)> + '_ {
-        self.ended.iter().copied()
-    }
-
-    pub fn total_s(&self) -> f64 {
-        self.start.elapsed().as_secs_f64()
+        self.bar.take().iter().for_each(ProgressBar::finish_and_clear);
+        console.detail(&format!("{:>8} {ms:8.1} ms", self.stage));
+        self.ended.push((self.stage, ms));
     }
 }

@@ -1,7 +1,7 @@
 //! `--tracer`: how the rays of the scan are traced.
 
 use crate::cli::console::Console;
-use crate::trace::{Gpu, GpuError, GpuMesh, Tracer};
+use crate::trace::{Gpu, GpuError, Tracer};
 
 /// Ways to trace the rays of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -34,13 +34,14 @@ pub(super) fn gpu(wanted: Option<Rays>, console: &Console) -> Result<Option<Gpu>
     }
 }
 
-/// The tracer that is wanted; without a graphics processor that the program chooses.
-pub(super) fn tracer<'a>(wanted: Option<Rays>, held: Option<&'a GpuMesh<'a>>) -> Tracer<'a> {
-    match (wanted, held) {
-        (Some(Rays::Pinhole), _) => Tracer::Pinhole,
-        (Some(Rays::Bvh), _) => Tracer::Bvh,
-        (Some(Rays::Brute), _) => Tracer::Brute,
-        (Some(Rays::Gpu), Some(held)) => Tracer::Gpu(held),
-        (Some(Rays::Gpu) | None, _) => Tracer::Automatic,
+impl Rays {
+    /// The tracer of this name; without a graphics processor that the program chooses.
+    pub fn tracer(self) -> Tracer<'static> {
+        match self {
+            Rays::Pinhole => Tracer::Pinhole,
+            Rays::Bvh => Tracer::Bvh,
+            Rays::Brute => Tracer::Brute,
+            Rays::Gpu => Tracer::Automatic,
+        }
     }
 }

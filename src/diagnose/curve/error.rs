@@ -32,7 +32,7 @@ pub enum CurveDiagnoseError {
     /// The noise is unknown.
     #[error(
         "the levels do not determine the noise: no incidence has three angles, none is repeated and no `sd_db` is \
-         given; state it by --noise-db, or measure more angles of each incidence"
+         given; state it, or measure more angles of each incidence"
     )]
     Noiseless,
     /// A noise without a meaning.

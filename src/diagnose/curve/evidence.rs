@@ -4,7 +4,7 @@ use serde::Serialize;
 
 /// A term in one round.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Ranked {
+pub struct RankedTerm {
     /// Round, from 1.
     pub round: usize,
     /// The term.

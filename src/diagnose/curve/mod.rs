@@ -32,11 +32,11 @@ mod testing;
 mod tests;
 
 pub use error::CurveDiagnoseError;
-pub use evidence::{CurveEvidence, Ranked};
+pub use evidence::{CurveEvidence, RankedTerm};
 pub use points::{Kind, Noise, NoiseSource, Point, Points};
 pub use report::{
-    CurveBase, CurveBaseValue, CurveBeforeAfter, CurveErrors, CurveFacts, CurveFound, CurveReport,
-    CurveRow, CurveUnknown,
+    CurveBase, CurveBaseValue, CurveBeforeAfter, CurveErrors, CurveFacts, CurveReport, CurveRow,
+    CurveUnknown, FoundTerm,
 };
 pub use run::base_law;
 pub use settings::CurveDiagnosis;

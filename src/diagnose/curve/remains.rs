@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::folds::autocorrelation;
 use super::model::{Fit, Score};
 use super::points::Points;
-use super::report::{CurveBaseValue, CurveErrors, CurveFound, CurveUnknown};
+use super::report::{CurveBaseValue, CurveErrors, CurveUnknown, FoundTerm};
 use super::select::{Addition, Selection, State};
 use super::smooth::{Covariate, Smooth, covariates};
 use crate::diagnose::report::Value;
@@ -148,7 +148,7 @@ pub(super) fn values(
     selection: &Selection,
     state: &State,
     added: Vec<Addition>,
-) -> (Vec<CurveFound>, Vec<CurveBaseValue>) {
+) -> (Vec<FoundTerm>, Vec<CurveBaseValue>) {
     let residual_db = residuals_of(selection.points, state, &state.fitted);
     let shared: f64 = (1..=LAGS)
         .map(|lag| autocorrelation(selection.points, &residual_db, lag))
@@ -176,7 +176,7 @@ pub(super) fn values(
             parameters.insert(known.name, Value { value, sd, unit: known.unit });
         }
         let (name, level) = (term.name(), term.level());
-        found.push(CurveFound { name, level, class, parameters, evidence });
+        found.push(FoundTerm { name, level, class, parameters, evidence });
     }
     (found, parameters)
 }

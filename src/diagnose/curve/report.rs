@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::evidence::{CurveEvidence, Ranked};
+use super::evidence::{CurveEvidence, RankedTerm};
 use super::model::Score;
 use super::points::{Kind, NoiseSource, Points};
 use crate::diagnose::report::{Value, Verdict};
@@ -12,7 +12,7 @@ use crate::effects::Level;
 
 /// A term that was added.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CurveFound {
+pub struct FoundTerm {
     /// Its name.
     pub name: &'static str,
     /// The level it belongs to.
@@ -157,9 +157,9 @@ pub struct CurveReport {
     /// The answer.
     pub verdict: Verdict,
     /// Terms in the order in which they were added.
-    pub effects: Vec<CurveFound>,
+    pub effects: Vec<FoundTerm>,
     /// Every term of every round.
-    pub ranking: Vec<Ranked>,
+    pub ranking: Vec<RankedTerm>,
     /// Structure that no term explains.
     pub unexplained: Vec<CurveUnknown>,
     /// Errors on held-out angles.

@@ -1,7 +1,7 @@
 //! The steps of the diagnosis of a curve.
 
 use super::error::CurveDiagnoseError;
-use super::evidence::Ranked;
+use super::evidence::RankedTerm;
 use super::folds::Folds;
 use super::model::{Model, Score};
 use super::points::{Points, f_per_sr};
@@ -78,7 +78,7 @@ impl CurveDiagnosis {
         &self,
         selection: &Selection,
         [before, after]: [&State; 2],
-        ranking: Vec<Ranked>,
+        ranking: Vec<RankedTerm>,
         added: Vec<Addition>,
         unexplained: Vec<CurveUnknown>,
     ) -> CurveReport {

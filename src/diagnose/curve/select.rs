@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::evidence::{CurveEvidence, Ranked};
+use super::evidence::{CurveEvidence, RankedTerm};
 use super::folds::Folds;
 use super::model::{Fit, Model, Score};
 use super::points::Points;
@@ -46,7 +46,7 @@ pub(super) struct Selection<'a> {
 /// A fit of one more term.
 struct Trial {
     term: &'static dyn Term,
-    ranked: Ranked,
+    ranked: RankedTerm,
     state: Option<State>,
     model: Model,
     fitted: Fit,
@@ -80,7 +80,7 @@ impl Selection<'_> {
         &self,
         mut state: State,
         terms: &[&'static dyn Term],
-    ) -> (State, Vec<Ranked>, Vec<Addition>) {
+    ) -> (State, Vec<RankedTerm>, Vec<Addition>) {
         let (mut ranking, mut added) = (Vec::new(), Vec::<Addition>::new());
         for round in 1..=self.settings.most_terms + 1 {
             let mut left = terms.to_vec();
@@ -135,7 +135,7 @@ impl Selection<'_> {
             model.levels_db(&fitted.at, &points.points),
         ];
         let squares: f64 = before.iter().zip(&after).map(|(a, b)| (a - b).powi(2)).sum();
-        let ranked = Ranked {
+        let ranked = RankedTerm {
             round,
             name: term.name(),
             numbers: term.parameters().len(),
@@ -158,7 +158,7 @@ impl Selection<'_> {
     }
 
     /// Whether a term predicts held-out angles and changes enough.
-    fn is_supported(&self, ranked: &Ranked) -> bool {
+    fn is_supported(&self, ranked: &RankedTerm) -> bool {
         let Some([gain, se]) = ranked.held_out else { return false };
         gain > self.settings.standard_errors * se
             && gain > SAME
@@ -202,7 +202,7 @@ impl Trial {
     fn accept(&mut self, class: Vec<&'static str>) -> (Addition, Option<State>) {
         self.ranked.accepted = true;
         let [held_out_gain, held_out_se] = self.ranked.held_out.unwrap_or_default();
-        let Ranked { gain, size_db, .. } = self.ranked;
+        let RankedTerm { gain, size_db, .. } = self.ranked;
         let evidence = CurveEvidence { gain, held_out_gain, held_out_se, size_db };
         (Addition { term: self.term, class, evidence }, self.state.take())
     }

@@ -6,7 +6,7 @@ use crate::fit::coordinates::{DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
 use crate::fit::interval::DEVIATE_95;
 use crate::fit::result::FitResult;
 use crate::fit::verdict::Finding;
-use crate::material::{self, Estimate, FitReport, Goodness, HeldOut};
+use crate::material::{self, CrossValidation, Estimate, FitReport, Goodness};
 use crate::measure::curve::Curve;
 
 /// How far ln likelihoods, or half sums of squares, of two searches for one optimum may differ: where
@@ -186,13 +186,13 @@ fn is_square(matrix: &[Vec<f64>], size: usize) -> bool {
 }
 
 /// The score on points that took no part in the fit, if there is one.
-fn held_out(old: &HeldOut, found: &FitResult, curve: &Curve) -> Option<String> {
+fn held_out(old: &CrossValidation, found: &FitResult, curve: &Curve) -> Option<String> {
     let is_same = found.hold_out(curve).is_some_and(|new| is_same_score(old, &new));
     (!is_same)
         .then(|| "its score on held-out points is not the one that a new fit gives".to_owned())
 }
 
-fn is_same_score(old: &HeldOut, new: &HeldOut) -> bool {
+fn is_same_score(old: &CrossValidation, new: &CrossValidation) -> bool {
     let sd = new.score_sd.unwrap_or(0.0);
     are_near(old.score, new.score, SAME_NUMBER_SD * sd)
         && are_near(old.score_sd, new.score_sd, SAME_SD * sd)

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::diagnose::Report;
-use crate::report::choice::NotTried;
+use crate::report::choice::UntriedEffect;
 use crate::scene::Scene;
 
 /// A diagnosis of a cloud and what a reader needs besides it.
@@ -22,7 +22,7 @@ pub struct CloudAnswer<'a> {
     /// Sentences on materials that are withdrawn or extrapolated, and on the scene.
     pub notices: &'a [String],
     /// Effects that were left out.
-    pub not_tried: &'a [NotTried],
+    pub not_tried: &'a [UntriedEffect],
     /// Seed of everything random.
     pub seed: u64,
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::diagnose::{Found, Row};
+use crate::diagnose::{FoundEffect, Row};
 use crate::effects::Place;
 use crate::formats::figure::drawing::{Drawing, Shape};
 use crate::geometry::Raster;
@@ -19,7 +19,7 @@ pub(super) enum Outline {
 
 impl Outline {
     /// The outline of an effect; `None` where it acts everywhere.
-    pub fn new(found: &Found, rows: &[Row]) -> Option<Outline> {
+    pub fn new(found: &FoundEffect, rows: &[Row]) -> Option<Outline> {
         match found.place? {
             Place::Beyond { off_m, direction_deg } => Some(Outline::Line { off_m, direction_deg }),
             Place::Round { x_m, y_m, radius_m } => {

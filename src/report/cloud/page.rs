@@ -6,7 +6,7 @@ use super::answer::{CloudAnswer, NextSteps};
 use super::places::{self, Peak};
 use crate::diagnose::{BaseValue, Candidate, Control, Controls, Evidence, MeshPose, Report};
 use crate::error::Error;
-use crate::report::choice::{LeftOut, left_out};
+use crate::report::choice::{Omission, left_out};
 use crate::report::effect::{Article, of_cloud};
 use crate::report::picture::{Figure, Picture};
 use crate::report::templates;
@@ -38,7 +38,7 @@ struct Page<'a> {
     controls: Vec<(&'static str, &'a Control)>,
     /// What was tried and not found, the largest gain first.
     not_found: Vec<&'a Candidate>,
-    not_tried: Vec<LeftOut>,
+    not_tried: Vec<Omission>,
     laws: Vec<LawNumber<'a>>,
     pose: String,
     next: &'a NextSteps,

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::places::{self, Peak};
-use crate::diagnose::{Errors, Found, Report};
+use crate::diagnose::{Errors, FoundEffect, Report};
 use crate::formats::words::{listed, plus_minus, uncapitalised};
 use crate::report::words::{covariate, gone, numbers, others, sentence, summary, verdict};
 
@@ -35,7 +35,7 @@ pub(super) fn text(report: &Report, peaks: &[Peak], files: &[String], folder: &P
     text + &written(files, folder)
 }
 
-fn effect(found: &Found) -> String {
+fn effect(found: &FoundEffect) -> String {
     let values = summary(found).unwrap_or_else(|| {
         let numbers = numbers(&found.parameters);
         numbers.iter().map(|number| number.join(" = ")).collect::<Vec<_>>().join(", ")

@@ -1,7 +1,7 @@
 //! The diagnosis of a curve with what was asked.
 
 use crate::diagnose::curve::CurveReport;
-use crate::report::choice::NotTried;
+use crate::report::choice::UntriedEffect;
 
 /// A diagnosis of a curve and what a reader needs besides it.
 #[derive(Clone, Copy)]
@@ -15,5 +15,7 @@ pub struct CurveAnswer<'a> {
     /// Seed of everything random.
     pub seed: u64,
     /// Effects that were left out.
-    pub not_tried: &'a [NotTried],
+    pub not_tried: &'a [UntriedEffect],
+    /// How the reader asks for a law with two lobes.
+    pub two_lobes: &'a str,
 }

@@ -7,7 +7,7 @@ use super::text::{advice, angle, noise_source, sentence};
 use crate::diagnose::curve::{CurveEvidence, CurveReport, CurveUnknown};
 use crate::error::Error;
 use crate::formats::words::capitalised;
-use crate::report::choice::{LeftOut, left_out};
+use crate::report::choice::{Omission, left_out};
 use crate::report::effect::{Article, of_curve};
 use crate::report::picture::{Figure, Picture};
 use crate::report::templates;
@@ -29,7 +29,7 @@ struct Page<'a> {
     share: Option<String>,
     picture: Figure<'a>,
     unexplained: Vec<Remaining<'a>>,
-    not_tried: Vec<LeftOut>,
+    not_tried: Vec<Omission>,
     /// Numbers of the base law: name and value.
     law: Vec<[String; 2]>,
     advice: Option<String>,
@@ -44,7 +44,7 @@ struct Remaining<'a> {
 
 /// The page of a diagnosis.
 pub(super) fn page(answer: CurveAnswer, picture: &Picture) -> Result<Vec<u8>, Error> {
-    let CurveAnswer { report, name, model, seed, not_tried } = answer;
+    let CurveAnswer { report, name, model, seed, not_tried, .. } = answer;
     let mut unexplained = Vec::new();
     for unknown in &report.unexplained {
         unexplained.push(Remaining { angle: angle(unknown.covariate), unknown });

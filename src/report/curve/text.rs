@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::answer::CurveAnswer;
 use crate::diagnose::Verdict;
-use crate::diagnose::curve::{CurveFound, CurveReport, CurveUnknown, NoiseSource};
+use crate::diagnose::curve::{CurveReport, CurveUnknown, FoundTerm, NoiseSource};
 use crate::effects::Level;
 use crate::formats::words::{listed, plus_minus};
 use crate::report::words::{gone, others, value, verdict};
@@ -65,7 +65,7 @@ pub(super) fn advice(answer: CurveAnswer) -> Option<String> {
         Some("mixture" | "mixture-ggx") => {
             "measure another sample on the same bench: what belongs to the instrument stays"
         }
-        _ => "try a law of the sample with two lobes: --model mixture",
+        _ => &format!("try a law of the sample with two lobes: {}", answer.two_lobes),
     };
     (!blamed.is_empty()).then(|| format!("before {} is blamed, {what}", listed(&blamed)))
 }
@@ -93,7 +93,7 @@ pub(super) fn text(answer: CurveAnswer, folder: &Path) -> String {
     )
 }
 
-fn effect(found: &CurveFound) -> String {
+fn effect(found: &FoundTerm) -> String {
     let mut numbers = Vec::new();
     for (name, number) in &found.parameters {
         numbers.push(format!("{name} = {}", value(number)));

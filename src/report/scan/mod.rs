@@ -1,8 +1,14 @@
-//! The record of a rendering, `scan.json`, and what a person should not overlook in it.
+//! The files of a rendering: images and clouds of every antenna, beat signals, and the record, `scan.json`, with what a
+//! person should not overlook in it.
 
+mod beat;
 mod counts;
+mod files;
 mod notices;
 mod record;
+mod request;
 
+pub use beat::BeatShape;
 pub use counts::{Counts, PowerRange, RegionRecord};
 pub use record::{ReceiverRecord, ScanRecord};
+pub use request::{RenderFiles, RenderRequest, RenderStage};

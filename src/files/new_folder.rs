@@ -1,5 +1,5 @@
-//! The folder beside a target in which a publication grows, how it takes the target's place, and what
-//! becomes of those that a killed program has left.
+//! A folder that is written next to its target and then exchanged for it, so that the target is replaced whole or not
+//! at all; what a killed program has left is removed.
 
 use std::ffi::OsStr;
 use std::fs::{self, File, Permissions};
@@ -8,29 +8,49 @@ use std::path::{Path, PathBuf};
 
 use tempfile::{Builder, TempDir};
 
-use super::layout::{KEPT, SUMS};
+use super::error::FilesError;
+use super::path::folder_of;
 
 /// Ends the name of what stood at the target while something else takes its place.
 const BEFORE: &str = "before";
 
-/// A folder that is being written. It is locked while it lives, so that nobody takes it for left over.
+/// What of a target folder matters to its replacement.
+#[derive(Clone, Copy, Debug)]
+pub struct FolderContent {
+    /// Names of files and folders that move from the old folder into the new one.
+    pub kept: &'static [&'static str],
+    /// A file that only a complete folder has.
+    pub proof: &'static str,
+}
+
+/// A folder that is being written to replace `target`. It is locked until it is dropped, so that no other program
+/// removes it as left over.
 #[derive(Debug)]
-pub(super) struct Stage {
+pub struct NewFolder {
     folder: TempDir,
     target: PathBuf,
+    content: FolderContent,
     _claim: Option<File>,
 }
 
-impl Stage {
-    /// Makes a folder beside the target and removes those that no program writes any more.
-    pub fn new(target: &Path) -> io::Result<Stage> {
-        let beside = parent(target);
+impl NewFolder {
+    /// Makes an empty folder next to `target` and removes those that no program writes any more.
+    ///
+    /// # Errors
+    /// Nothing can be written next to the target.
+    pub fn new(target: &Path, content: FolderContent) -> Result<NewFolder, FilesError> {
+        NewFolder::create(target, content)
+            .map_err(|reason| FilesError::unwritable("create", folder_of(target), reason))
+    }
+
+    fn create(target: &Path, content: FolderContent) -> io::Result<NewFolder> {
+        let beside = folder_of(target);
         fs::create_dir_all(beside)?;
-        // Others neither look at a stage between its making and its locking, nor at two names that
+        // Others neither look at a new folder between its making and its locking, nor at two names that
         // are just being exchanged.
         let _turn = locked(beside);
         let prefix = prefix(target);
-        sweep(beside, &prefix, target)?;
+        sweep(beside, &prefix, target, content)?;
         let mut builder = Builder::new();
         builder.prefix(&prefix);
         #[cfg(unix)]
@@ -40,33 +60,42 @@ impl Stage {
         }
         let folder = builder.tempdir_in(beside)?;
         let claim = File::open(folder.path()).ok().filter(|claim| claim.try_lock().is_ok());
-        Ok(Stage { folder, target: target.to_owned(), _claim: claim })
+        Ok(NewFolder { folder, target: target.to_owned(), content, _claim: claim })
     }
 
+    /// Where the files are written.
     pub fn path(&self) -> &Path {
         self.folder.path()
     }
 
-    /// Puts the folder in the target's place, and removes what stood there but for what is [`KEPT`].
-    pub fn keep(self) -> io::Result<()> {
-        let Stage { folder, target, _claim } = &self;
-        let _turn = locked(parent(target));
+    /// Replaces the target by this folder; of the old one only the [kept](FolderContent::kept) names remain.
+    ///
+    /// # Errors
+    /// The folders cannot be exchanged; the old one then stays.
+    pub fn replace_target(self) -> Result<(), FilesError> {
+        self.exchange().map_err(|reason| FilesError::unwritable("write", &self.target, reason))
+    }
+
+    fn exchange(&self) -> io::Result<()> {
+        let NewFolder { folder, target, content, .. } = self;
+        let _turn = locked(folder_of(target));
         written(folder.path())?;
         if !target.exists() {
             fs::rename(folder.path(), target)?;
         } else if exchange(folder.path(), target).is_ok() {
-            if let Err(reason) = carry(folder.path(), target) {
+            if let Err(reason) = carry(content.kept, folder.path(), target) {
                 // The first error is the one to report.
-                let _ = carry(target, folder.path());
+                let _ = carry(content.kept, target, folder.path());
                 let _ = exchange(folder.path(), target);
                 return Err(reason);
             }
         } else {
             let aside = folder.path().with_extension(BEFORE);
             fs::rename(target, &aside)?;
-            let placed = fs::rename(folder.path(), target).and_then(|()| carry(&aside, target));
+            let placed = fs::rename(folder.path(), target)
+                .and_then(|()| carry(content.kept, &aside, target));
             if let Err(reason) = placed {
-                let _ = carry(target, &aside);
+                let _ = carry(content.kept, target, &aside);
                 let _ = fs::rename(target, folder.path());
                 let _ = fs::rename(&aside, target);
                 return Err(reason);
@@ -74,16 +103,12 @@ impl Stage {
             fs::remove_dir_all(&aside)?;
         }
         // The names are there whether or not the disk knows them already.
-        let _ = File::open(parent(target)).and_then(|folder| folder.sync_all());
+        let _ = File::open(folder_of(target)).and_then(|folder| folder.sync_all());
         Ok(())
     }
 }
 
-pub(super) fn parent(target: &Path) -> &Path {
-    target.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// Begins the name of every stage of a target, and of no other target in the same folder.
+/// Begins the name of every new folder of a target, and of no other target in the same folder.
 fn prefix(target: &Path) -> String {
     let name = target.file_name().unwrap_or_default();
     let hash = blake3::hash(name.as_encoded_bytes()).to_hex();
@@ -98,7 +123,7 @@ fn locked(folder: &Path) -> Option<File> {
 }
 
 /// Removes what programs that were killed have left, and puts back what they had moved away.
-fn sweep(beside: &Path, prefix: &str, target: &Path) -> io::Result<()> {
+fn sweep(beside: &Path, prefix: &str, target: &Path, content: FolderContent) -> io::Result<()> {
     for entry in fs::read_dir(beside)? {
         let entry = entry?;
         let is_ours = entry.file_name().to_string_lossy().starts_with(prefix);
@@ -112,13 +137,13 @@ fn sweep(beside: &Path, prefix: &str, target: &Path) -> io::Result<()> {
             continue;
         }
         let stood_there = stale.extension() == Some(OsStr::new(BEFORE));
-        if stood_there && !target.exists() && stale.join(SUMS).exists() {
+        if stood_there && !target.exists() && stale.join(content.proof).exists() {
             fs::rename(&stale, target)?;
             continue;
         }
-        carry(&stale, target)?;
-        if KEPT.iter().all(|name| stale.join(name).symlink_metadata().is_err()) {
-            // Whoever has just put a publication in place may be removing it, too.
+        carry(content.kept, &stale, target)?;
+        if content.kept.iter().all(|name| stale.join(name).symlink_metadata().is_err()) {
+            // Whoever has just replaced the target may be removing it, too.
             let _ = fs::remove_dir_all(&stale);
         }
     }
@@ -126,8 +151,8 @@ fn sweep(beside: &Path, prefix: &str, target: &Path) -> io::Result<()> {
 }
 
 /// Moves what is kept from one folder to another, unless that has its own.
-fn carry(from: &Path, to: &Path) -> io::Result<()> {
-    for name in KEPT {
+fn carry(kept: &[&str], from: &Path, to: &Path) -> io::Result<()> {
+    for name in kept {
         let [old, new] = [from, to].map(|folder| folder.join(name));
         let is_wanted = old.symlink_metadata().is_ok() && new.symlink_metadata().is_err();
         if is_wanted && to.is_dir() {
@@ -157,16 +182,21 @@ fn written(folder: &Path) -> io::Result<()> {
 
 #[cfg(not(target_os = "linux"))]
 fn written(folder: &Path) -> io::Result<()> {
-    let files = super::listing::files(folder)?;
-    files
-        .iter()
-        .try_for_each(|(path, _)| File::options().write(true).open(folder.join(path))?.sync_all())
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            written(&entry.path())?;
+        } else {
+            File::options().write(true).open(entry.path())?.sync_all()?;
+        }
+    }
+    Ok(())
 }
 
-/// Why a folder cannot give way to another, if that can be told without trying.
-pub(super) fn hindrance(target: &Path) -> Option<&'static str> {
+/// Why a folder cannot be replaced by another, if that is known without trying.
+pub fn replacement_obstacle(target: &Path) -> Option<&'static str> {
     if target.file_name().is_none() {
-        return Some("that is no name that a folder could get");
+        return Some("that is not a name that a folder could get");
     }
     if !target.exists() {
         return None;
@@ -181,7 +211,7 @@ pub(super) fn hindrance(target: &Path) -> Option<&'static str> {
 fn is_mount(target: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
     let device = |path: &Path| fs::metadata(path).map(|found| found.dev()).ok();
-    device(target) != device(parent(target))
+    device(target) != device(folder_of(target))
 }
 
 #[cfg(not(unix))]
@@ -192,6 +222,8 @@ fn is_mount(_: &Path) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const CONTENT: FolderContent = FolderContent { kept: &["CNAME"], proof: "SUMS" };
 
     fn names(folder: &Path) -> Vec<String> {
         let names = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name());
@@ -206,9 +238,9 @@ mod tests {
         let [site, other] = ["site", "other"].map(|name| root.path().join(name));
         let prefix = prefix(&site);
         fs::create_dir_all(root.path().join(format!("{prefix}dead/x"))).unwrap();
-        let running = Stage::new(&site).unwrap();
-        let of_other = Stage::new(&other).unwrap();
-        drop(Stage::new(&site).unwrap());
+        let running = NewFolder::new(&site, CONTENT).unwrap();
+        let of_other = NewFolder::new(&other, CONTENT).unwrap();
+        drop(NewFolder::new(&site, CONTENT).unwrap());
         let mut left = names(root.path());
         left.retain(|name| *name != running.path().file_name().unwrap().to_string_lossy());
         assert_eq!(left, [of_other.path().file_name().unwrap().to_string_lossy()]);
@@ -221,13 +253,13 @@ mod tests {
         let prefix = prefix(&site);
         let before = root.path().join(format!("{prefix}dead.{BEFORE}"));
         fs::create_dir(&before).unwrap();
-        fs::write(before.join(SUMS), "").unwrap();
-        let stage = root.path().join(format!("{prefix}dead"));
-        fs::create_dir(&stage).unwrap();
-        fs::write(stage.join("CNAME"), "example.org").unwrap();
-        drop(Stage::new(&site).unwrap());
-        drop(Stage::new(&site).unwrap());
+        fs::write(before.join(CONTENT.proof), "").unwrap();
+        let new = root.path().join(format!("{prefix}dead"));
+        fs::create_dir(&new).unwrap();
+        fs::write(new.join("CNAME"), "example.org").unwrap();
+        drop(NewFolder::new(&site, CONTENT).unwrap());
+        drop(NewFolder::new(&site, CONTENT).unwrap());
         assert_eq!(names(root.path()), ["site"]);
-        assert_eq!(names(&site), ["CNAME", SUMS]);
+        assert_eq!(names(&site), ["CNAME", CONTENT.proof]);
     }
 }

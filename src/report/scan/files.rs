@@ -1,19 +1,17 @@
 //! The files of a rendering, as bytes: three for each antenna, and the record.
 
-use crate::cli::summary::grouped;
+use super::record::ScanRecord;
 use crate::error::Error;
 use crate::formats::exr::{self, Attribute, Packing};
 use crate::formats::figure::{Figure, Scale};
 use crate::formats::ply;
+use crate::formats::words::grouped;
 use crate::geometry::Raster;
 use crate::render::{Echo, cloud_table};
-use crate::report::ScanRecord;
+use crate::report::json::json_file;
 use crate::scene::Scene;
 use crate::setup::{ReadyScene, View};
 use crate::units::dbm_from_watts;
-
-/// Names of the radar's files, in the order they are written.
-pub(super) const NAMES: &str = "power.exr, power.png, cloud.ply and scan.json";
 
 /// Encodes every file of a rendering; `all` puts hits below the threshold into the clouds, too.
 pub(super) fn encode(
@@ -43,9 +41,7 @@ pub(super) fn encode(
         files.push((view.file_name("power", "png"), figure?));
         files.push((view.file_name("cloud", "ply"), cloud?));
     }
-    let mut json = serde_json::to_vec_pretty(record)?;
-    json.push(b'\n');
-    files.push(("scan.json".to_owned(), json));
+    files.push(("scan.json".to_owned(), json_file(record)?));
     Ok(files)
 }
 

@@ -1,0 +1,94 @@
+//! A scene to be rendered, and the files of its rendering.
+
+use super::beat::BeatShape;
+use super::files::encode;
+use super::record::ScanRecord;
+use crate::error::Error;
+use crate::formats::exr::Packing;
+use crate::geometry::Raster;
+use crate::render::RenderError;
+use crate::setup::ReadyScene;
+use crate::trace::{Gpu, GpuError, Tracer};
+
+/// A scene to be rendered, and what its files hold.
+#[derive(Clone, Copy)]
+pub struct RenderRequest<'a> {
+    /// The scene.
+    pub ready: &'a ReadyScene,
+    /// How its rays are traced.
+    pub tracer: Tracer<'a>,
+    /// A graphics processor that traces them instead.
+    pub gpu: Option<&'a Gpu>,
+    /// Whether the clouds hold every hit, not only those at or above the threshold.
+    pub all_hits: bool,
+    /// The shape of the sampled beat signals, where there are to be files of them.
+    pub beat: Option<BeatShape>,
+    /// How the EXR images are packed.
+    pub packing: Packing,
+}
+
+/// A stage of a rendering.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RenderStage {
+    /// The closest intersection of every ray.
+    Trace,
+    /// The received power of every chirp at every antenna.
+    Power,
+    /// The image of every antenna.
+    Image,
+    /// The bytes of the files.
+    Encode,
+}
+
+/// The files of a rendering and what they record.
+pub struct RenderFiles<'a> {
+    /// What `scan.json` holds.
+    pub record: ScanRecord<'a>,
+    /// Names and bytes: `power.exr`, `power.png` and `cloud.ply` of every antenna, `scan.json`, and the beat signals
+    /// that were asked for.
+    pub files: Vec<(String, Vec<u8>)>,
+}
+
+impl<'a> RenderRequest<'a> {
+    /// The usual files of a scene: detections, without beat signals.
+    pub fn new(ready: &'a ReadyScene) -> RenderRequest<'a> {
+        let (tracer, packing) = (Tracer::Automatic, Packing::Zip16);
+        RenderRequest { ready, tracer, gpu: None, all_hits: false, beat: None, packing }
+    }
+
+    /// Renders the scene and encodes its files; `progress` hears of every stage with 0 chirps when
+    /// it begins, then with the chirps that are done in addition to those before.
+    ///
+    /// # Errors
+    /// What the tracer or the renderer refuses; a picture that is too large.
+    pub fn render(
+        &self,
+        progress: &(dyn Fn(RenderStage, usize) + Sync),
+    ) -> Result<RenderFiles<'a>, Error> {
+        let RenderRequest { ready, all_hits, .. } = *self;
+        progress(RenderStage::Trace, 0);
+        let assembly = ready.assemble();
+        let failed = |error: GpuError| ready.render_error("", RenderError::Tracer(error.into()));
+        let gpu_mesh = self.gpu.map(|gpu| gpu.hold(assembly.bvh())).transpose().map_err(failed)?;
+        let mut setup = assembly.setup();
+        setup.geometry.tracer = gpu_mesh.as_ref().map_or(self.tracer, Tracer::Gpu);
+        let footprints = assembly.trace(&setup, &|chirps| progress(RenderStage::Trace, chirps))?;
+
+        progress(RenderStage::Power, 0);
+        let views =
+            assembly.views(&setup, &footprints, &|chirps| progress(RenderStage::Power, chirps))?;
+
+        progress(RenderStage::Image, 0);
+        let images: Vec<Raster> = views.iter().map(|view| ready.image(&view.scan)).collect();
+
+        progress(RenderStage::Encode, 0);
+        let record = ScanRecord::new(ready, assembly.model(), &views, &images, all_hits);
+        let mut files = encode(all_hits, self.packing, ready, &views, &images, &record)?;
+        if let Some(shape) = self.beat {
+            for view in &views {
+                files.push(shape.encode(ready, &setup, &footprints, view)?);
+            }
+        }
+        Ok(RenderFiles { record, files })
+    }
+}
