@@ -11,16 +11,17 @@ use rusqlite::functions::FunctionFlags;
 use rusqlite::{Connection, ErrorCode, OpenFlags, Transaction, TransactionBehavior};
 use rusqlite_migration::{M, Migrations};
 
-use super::error::{InFile, StoreError, directory_of};
+use super::error::{InFile, StoreError};
 use super::find::outline;
 use super::rows::rows;
-use super::write;
+use super::{law, write};
+use crate::files::folder_of;
 
 /// "matd" in the file's header.
 const APPLICATION_ID: i64 = 0x6d61_7464;
 
 /// The latest schema.
-const LATEST: usize = 10;
+const LATEST: usize = 11;
 
 /// All schemas there ever were, oldest first. Append only: files in the world have stopped at each.
 fn schemas() -> [M<'static>; LATEST] {
@@ -35,14 +36,15 @@ fn schemas() -> [M<'static>; LATEST] {
         }),
         M::up_with_hook(
             include_str!("../../migrations/0007_attribution.sql"),
-            |tx: &Transaction| {
-                write::fill_estimates(tx)?;
-                Ok(outline::fill(tx)?)
-            },
+            |tx: &Transaction| Ok(outline::fill(tx)?),
         ),
         M::up(include_str!("../../migrations/0008_origin_author.sql")),
         M::up(include_str!("../../migrations/0009_held_out.sql")),
         M::up(include_str!("../../migrations/0010_four_letters.sql")),
+        M::up_with_hook(include_str!("../../migrations/0011_one_value.sql"), |tx: &Transaction| {
+            law::remove_copies(tx)?;
+            Ok(write::fill_numbers(tx)?)
+        }),
     ]
 }
 
@@ -233,7 +235,7 @@ fn unwritable(path: &Path) -> Result<Connection, StoreError> {
     let conn = immutable(path).in_file(path)?;
     conn.pragma_update(None, "query_only", true).in_file(path)?;
     // As where no log can be made.
-    if nobody_writes || !may_add_to(directory_of(path)) {
+    if nobody_writes || !may_add_to(folder_of(path)) {
         check_length(path, &conn)?;
         return Ok(conn);
     }

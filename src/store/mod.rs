@@ -23,6 +23,7 @@ mod database;
 mod edit;
 mod error;
 mod find;
+mod law;
 mod open;
 mod own_schema;
 mod query;

@@ -43,6 +43,14 @@ impl Store {
         }
     }
 
+    /// Number of the revision before one of a material; `None` for the first. A number between the two may be missing.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn revision_before(&self, slug: &Slug, revision: u32) -> Result<Option<u32>, StoreError> {
+        read::revision_before(&self.conn, slug, revision).in_file(&self.path)
+    }
+
     /// Those of some materials that are there, sound or damaged, sorted.
     ///
     /// # Errors

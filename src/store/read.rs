@@ -10,6 +10,7 @@ use rusqlite::{
     Connection, Error, OptionalExtension, Result, Row, Transaction, TransactionBehavior, params,
 };
 
+use super::law;
 use super::record::{RevisionSummary, Stored};
 use super::rows::{json, optional_json, rows};
 use crate::brdf::Brdf;
@@ -45,6 +46,13 @@ pub(super) fn current_revision(conn: &Connection, slug: &Slug) -> Result<Option<
     conn.prepare_cached("SELECT current_revision FROM material NOT INDEXED WHERE slug = ?1")?
         .query_row([slug.as_str()], |row| row.get(0))
         .optional()
+}
+
+/// The greatest number of a revision of a material below this one.
+pub(super) fn revision_before(conn: &Connection, slug: &Slug, number: u32) -> Result<Option<u32>> {
+    let sql = "SELECT max(number) FROM revision JOIN material ON material.id = material_id
+               WHERE slug = ?1 AND number < ?2";
+    conn.query_row(sql, params![slug.as_str(), number], |row| row.get(0))
 }
 
 /// Those of some materials that are there, found by looking once through all of them.
@@ -138,12 +146,13 @@ pub(super) fn rendered_in(
         .prepare_cached(sql)?
         .query_row([slug.as_str()], |row| {
             let (revision_id, render): (i64, String) = (row.get(0)?, row.get(1)?);
-            Ok((revision_id, render, [row.get(2)?, row.get(3)?], optional_json(row, 4)?))
+            let structure: Option<String> = row.get(4)?;
+            Ok((revision_id, render, [row.get(2)?, row.get(3)?], structure))
         })
         .optional()?;
-    let Some((revision_id, render, theta_rad, model)) = found else { return Ok(None) };
-    if let Some(mut model) = model {
-        parameters(conn, revision_id, &render, &mut model)?;
+    let Some((revision_id, render, theta_rad, structure)) = found else { return Ok(None) };
+    if let Some(structure) = structure {
+        let (model, _) = law::read(conn, revision_id, &render, &structure)?;
         return Ok(Some((Some(model), theta_rad)));
     }
     let curve = curves(conn, revision_id, Some(&render))?.pop();
@@ -261,8 +270,8 @@ pub(super) fn fits(conn: &Connection, revision_id: i64) -> Result<Vec<Fit>> {
                WHERE revision_id = ?1 ORDER BY position";
     rows(conn, sql, [revision_id], |row| {
         let name: String = row.get(0)?;
-        let mut model: Brdf = json(row, 1)?;
-        let parameter_sources = parameters(conn, revision_id, &name, &mut model)?;
+        let structure: String = row.get(1)?;
+        let (model, parameter_sources) = law::read(conn, revision_id, &name, &structure)?;
         let covariance = covariance(conn, revision_id, &name)?;
         Ok(Fit {
             name,
@@ -275,27 +284,6 @@ pub(super) fn fits(conn: &Connection, revision_id: i64) -> Result<Vec<Fit>> {
             report: optional_json(row, 5)?,
         })
     })
-}
-
-/// Sets a model's parameters and gives those with a source of their own, sorted by path.
-fn parameters(
-    conn: &Connection,
-    revision_id: i64,
-    fit: &str,
-    model: &mut Brdf,
-) -> Result<Vec<(String, String)>> {
-    let sql = "SELECT path, value, source FROM fit_parameter
-               WHERE revision_id = ?1 AND fit = ?2 ORDER BY path";
-    let sources = rows(conn, sql, params![revision_id, fit], |row| {
-        let path: String = row.get(0)?;
-        if !model.set_parameter(&path, row.get(1)?) {
-            let problem = format!("the model of fit `{fit}` has no parameter `{path}`");
-            return Err(Error::FromSqlConversionFailure(0, Type::Text, problem.into()));
-        }
-        let source: Option<String> = row.get(2)?;
-        Ok(source.map(|source| (path, source)))
-    })?;
-    Ok(sources.into_iter().flatten().collect())
 }
 
 fn covariance(conn: &Connection, revision_id: i64, fit: &str) -> Result<Option<Covariance>> {

@@ -9,7 +9,7 @@ use super::error::{InFile, StoreError};
 use super::record::Stored;
 use super::rows::rows;
 use super::tables::{schema, unit_rows};
-use super::{read, write};
+use super::{law, read, write};
 use crate::material::{Material, Slug};
 
 /// What [`Store::repair`] did, a sentence each.
@@ -206,18 +206,46 @@ fn revisions(
         rows(tx, sql, [slug.as_str()], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
     let mut mended = Vec::new();
     for (id, number, hash) in listed {
+        let place = format!("`{slug}@{number}`");
         let stored = read::get_in(tx, slug, Some(number)).ok().flatten();
-        let stored = stored.filter(|stored| stored.material.content_hash() == hash);
-        let content = match &stored {
-            Some(stored) if again.compare(tx, stored)?.is_empty() => continue,
-            Some(Stored { material, .. }) => Some(material),
-            None => at_hand.iter().find(|material| material.content_hash() == hash),
-        };
-        let Some(content) = content else { continue };
-        write::rewrite(tx, id, content)?;
-        mended.push(format!("`{slug}@{number}` was written anew"));
+        if let Some(stored) = stored {
+            if stored.material.content_hash() == hash {
+                if !again.compare(tx, &stored)?.is_empty() {
+                    write::rewrite(tx, id, &stored.material)?;
+                    mended.push(format!("{place} was written anew"));
+                }
+                continue;
+            }
+            let by_structure = with_values_of_structure(tx, id, stored.material)?;
+            if by_structure.content_hash() == hash {
+                write::rewrite(tx, id, &by_structure)?;
+                mended.push(format!(
+                    "{place} was written anew with the values in `fit.model`: its hash covers them, and not those \
+                     in `fit_parameter`"
+                ));
+                continue;
+            }
+        }
+        if let Some(content) = at_hand.iter().find(|material| material.content_hash() == hash) {
+            write::rewrite(tx, id, content)?;
+            mended.push(format!("{place} was written anew"));
+        }
     }
     Ok(mended)
+}
+
+/// A revision with the values that migration 11 has left in `fit.model` instead of those in `fit_parameter`.
+fn with_values_of_structure(
+    tx: &Transaction,
+    revision_id: i64,
+    mut material: Material,
+) -> Result<Material> {
+    for (name, model) in law::left_in_structure(tx, revision_id)? {
+        for fit in material.fits.iter_mut().filter(|fit| fit.name == name) {
+            fit.model = model.clone();
+        }
+    }
+    Ok(material)
 }
 
 /// Makes all that materials are found by anew; a material that cannot be read keeps the lines that it has.

@@ -29,7 +29,8 @@ pub(super) fn optional_json<T: DeserializeOwned>(row: &Row, column: usize) -> Re
     text.map(|text| parsed(&text, column)).transpose()
 }
 
-fn parsed<T: DeserializeOwned>(text: &str, column: usize) -> Result<T> {
+/// A value of JSON that stands in a column.
+pub(super) fn parsed<T: DeserializeOwned>(text: &str, column: usize) -> Result<T> {
     serde_json::from_str(text)
         .map_err(|error| Error::FromSqlConversionFailure(column, Type::Text, error.into()))
 }

@@ -9,10 +9,10 @@ use rusqlite::{
 use serde::Serialize;
 
 use super::find::outline::{self, OutlineEntry};
-use super::read;
 use super::record::{Added, Removed};
 use super::rows::rows;
 use super::tables::{follows_from_content, has_statistics, tables};
+use super::{law, read};
 use crate::formats::EffectEntry;
 use crate::material::{Activity, Covariance, Curve, Fit, Material, Slug};
 use crate::measure::statistics::by_angle;
@@ -110,14 +110,14 @@ impl<'a> Adding<'a> {
     }
 }
 
-/// Writes what the fits that an older program stored say of their numbers.
-pub(super) fn fill_estimates(tx: &Transaction) -> Result<()> {
+/// Writes the rows of `fit_number` for the fits that an older program stored.
+pub(super) fn fill_numbers(tx: &Transaction) -> Result<()> {
     let sql = "SELECT DISTINCT revision_id FROM fit WHERE report IS NOT NULL";
     let revisions: Vec<i64> = rows(tx, sql, [], |row| row.get(0))?;
     revisions.into_iter().try_for_each(|revision_id| match read::fits(tx, revision_id) {
         // What cannot be read must not keep the rest of the file from being read.
         Err(Error::FromSqlConversionFailure(..)) => Ok(()),
-        fits => fits?.iter().try_for_each(|fit| Rows { tx, revision_id }.estimates(fit)),
+        fits => fits?.iter().try_for_each(|fit| Rows { tx, revision_id }.numbers(fit)),
     })
 }
 
@@ -343,14 +343,14 @@ impl Rows<'_> {
 
     fn fit(&self, position: u32, fit: &Fit) -> Result<()> {
         let Fit { name, model, estimator, curve, source, .. } = fit;
-        let (model, report) = (json(model)?, fit.report.as_ref().map(json).transpose()?);
+        let (model, report) = (law::structure(model)?, fit.report.as_ref().map(json).transpose()?);
         self.insert(
             "INSERT INTO fit (revision_id, position, name, model, estimator, curve, source, report)
              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
             params![self.revision_id, position, name, model, estimator, curve, source, report],
         )?;
         self.parameters(fit)?;
-        self.estimates(fit)?;
+        self.numbers(fit)?;
         fit.covariance.as_ref().map_or(Ok(()), |covariance| self.covariance(name, covariance))
     }
 
@@ -378,27 +378,22 @@ impl Rows<'_> {
         })
     }
 
-    /// What the fit says of each number.
-    fn estimates(&self, fit: &Fit) -> Result<()> {
-        numbered(&fit.numbers(), |position, told| {
+    /// Writes where each number of a fit comes from.
+    fn numbers(&self, fit: &Fit) -> Result<()> {
+        numbered(&fit.numbers(), |position, number| {
+            let estimate = number.estimate.map(|place| format!("$.estimates[{place}]"));
             self.insert(
-                "INSERT INTO fit_estimate
-                 (revision_id, fit, position, name, value, unit, sd, low_95, high_95, chosen_by, at_bound,
-                  identified)
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
+                "INSERT INTO fit_number
+                 (revision_id, fit, position, name, estimate, chosen_by, at_bound)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
                 params![
                     self.revision_id,
                     fit.name,
                     position,
-                    told.name,
-                    told.value,
-                    told.unit,
-                    told.sd,
-                    told.interval_95.map(|[low, _]| low),
-                    told.interval_95.map(|[_, high]| high),
-                    told.chosen_by.as_str(),
-                    told.is_at_bound,
-                    told.is_identified(),
+                    number.name,
+                    estimate,
+                    number.chosen_by.as_str(),
+                    number.is_at_bound,
                 ],
             )
         })
