@@ -1,4 +1,4 @@
--- The latest schema in one piece, written by a test: see `FRESH` in connect.rs. Change
+-- The latest schema in one piece, written by a test: see `LATEST_SCHEMA` in connect.rs. Change
 -- migrations/ instead.
 
 CREATE TABLE material (

@@ -1,4 +1,4 @@
-//! The file as plain tables, whatever tables a schema has: what exports read.
+//! The database as plain tables, for exports of any schema.
 
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, Result};
@@ -8,14 +8,14 @@ use super::error::{InFile, StoreError};
 use super::law;
 use super::rows::rows;
 
-/// A table as it stands in the file.
+/// A table of the database.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Table {
     /// Its name.
     pub name: String,
     /// Its columns, in order.
     pub columns: Vec<Column>,
-    /// Names of the columns that tell rows apart and in whose order rows come.
+    /// Names of the key columns, by which rows are sorted.
     pub key: Vec<String>,
     /// References to other tables.
     pub references: Vec<Reference>,
@@ -106,7 +106,7 @@ impl Store {
 
 /// Kind, name, table and statement of everything in the file.
 pub(super) fn schema(conn: &Connection) -> Result<Vec<[Option<String>; 4]>> {
-    // What ANALYZE leaves helps to find rows and answers nothing.
+    // Tables of ANALYZE help to find rows and have no content.
     let sql = "SELECT type, name, tbl_name, sql FROM sqlite_schema
                WHERE name NOT LIKE 'sqlite\\_stat%' ESCAPE '\\' ORDER BY type, name";
     conn.prepare(sql)?
@@ -176,7 +176,7 @@ fn table(conn: &Connection, name: String) -> Result<Table> {
 }
 
 fn references(conn: &Connection, table: &str) -> Result<Vec<Reference>> {
-    // A reference that names no column there means the key of that table.
+    // A reference without a column means the key of that table.
     let sql = "SELECT id, \"table\", \"from\", coalesce(\"to\", 'id')
                FROM pragma_foreign_key_list(?1) ORDER BY id DESC, seq";
     let mut statement = conn.prepare(sql)?;
@@ -215,7 +215,7 @@ pub(super) fn quoted(name: &str) -> String {
 /// Tables that record who made a revision, which does not follow from its content.
 const MAKING: [&str; 4] = ["activity", "activity_input", "origin", "origin_author"];
 
-/// Whether the revision must have statistics: a program that writes them has written it.
+/// Whether the revision must have statistics: older programs did not write them.
 pub(super) fn has_statistics(conn: &Connection, revision_id: i64) -> Result<bool> {
     let sql = "SELECT EXISTS (SELECT 1 FROM activity WHERE revision_id = ?1)
                OR EXISTS (SELECT 1 FROM curve_statistic WHERE revision_id <= ?1)";
