@@ -57,6 +57,21 @@ fn adding_twice_changes_nothing_and_a_change_is_a_new_revision() {
 }
 
 #[test]
+fn after_a_missing_number_what_differs_is_told_from_the_revision_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    json(folder, &["add", "ptfe"]);
+    let lose = "PRAGMA foreign_keys = off; UPDATE material SET current_revision = 9";
+    let conn = rusqlite::Connection::open(folder.join("matdb.sqlite")).unwrap();
+    conn.execute_batch(lose).unwrap();
+    drop(conn);
+    variant(folder, "ptfe", "m = 0.05", "m = 0.06");
+    let added = json(folder, &["add", "--from", "ptfe"]);
+    assert_eq!(added[0]["revision"], 10);
+    assert!(added[0]["differs"].as_str().unwrap().contains("fit"), "{added}");
+}
+
+#[test]
 fn several_materials_are_added_together_or_not_at_all() {
     let folder = tempfile::tempdir().unwrap();
     let count = matdb::material::builtin::names().count();

@@ -556,6 +556,32 @@ fn statement(migration: &str, begin: &str) -> String {
     text[from..=from + text[from..].find(';').unwrap()].to_owned()
 }
 
+/// Puts the values of parameters into `fit.model`, where schemas before 11 had them, too.
+fn put_values_into_models(site: &Path) {
+    let conn = rusqlite::Connection::open(site.join("catalogue.sqlite")).unwrap();
+    let mut statement = conn.prepare("SELECT revision_id, name, model FROM fit").unwrap();
+    let read = |row: &rusqlite::Row| Ok((row.get(0)?, row.get(1)?, row.get(2)?));
+    let fits: Vec<(i64, String, String)> =
+        statement.query_map([], read).unwrap().map(Result::unwrap).collect();
+    for (revision_id, name, model) in fits {
+        let sql = "SELECT path, value FROM fit_parameter WHERE revision_id = ?1 AND fit = ?2";
+        let mut model: Value = serde_json::from_str(&model).unwrap();
+        let mut statement = conn.prepare(sql).unwrap();
+        let mut rows = statement.query((revision_id, &name)).unwrap();
+        while let Some(row) = rows.next().unwrap() {
+            let (path, value): (String, f64) = (row.get(0).unwrap(), row.get(1).unwrap());
+            let place = model.pointer_mut(&format!("/{}", path.replace('.', "/"))).unwrap();
+            assert!(place.is_null(), "{path}");
+            *place = value.into();
+        }
+        let update = "UPDATE fit SET model = ?1 WHERE revision_id = ?2 AND name = ?3";
+        conn.execute(update, (model.to_string(), revision_id, name)).unwrap();
+    }
+    drop(statement);
+    drop(conn);
+    support::list_hashes(site);
+}
+
 #[test]
 fn a_publication_of_an_older_schema_is_verified_and_imported() {
     let folder = laboratory();
@@ -565,15 +591,18 @@ fn a_publication_of_an_older_schema_is_verified_and_imported() {
     // Back to schema 8, which had no places.
     let curves = statement("0004_catalogue.sql", "CREATE VIEW v_curves");
     let fits = statement("0007_attribution.sql", "CREATE VIEW v_fits");
+    let estimates = statement("0007_attribution.sql", "CREATE TABLE fit_estimate");
     resql(
         &site,
         &format!(
             "DROP VIEW v_findings; DROP VIEW v_fits; DROP VIEW v_curves;
+             DROP VIEW fit_estimate; DROP TABLE fit_number; {estimates}
              ALTER TABLE observation DROP COLUMN yt_m; ALTER TABLE observation DROP COLUMN xt_m;
              DELETE FROM unit WHERE column_name LIKE 'held_out%' OR column_name IN ('xt_m', 'yt_m');
              {curves} {fits} PRAGMA user_version = 8;"
         ),
     );
+    put_values_into_models(&site);
     relist(&site, "tables/observation.csv", b"of other columns");
     let output = matdb(at).args(["verify", "site"]).output().unwrap();
     let said = String::from_utf8([output.stdout, output.stderr].concat()).unwrap();

@@ -19,7 +19,7 @@ use support::database::{
     attributed, change, complete, contents, fitted, placed, sample, with_effects,
 };
 
-const NEWEST: &str = "schema-0010.sqlite";
+const NEWEST: &str = "schema-0011.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
@@ -59,7 +59,7 @@ fn held(file: &str) -> [Material; 3] {
 fn files() -> Vec<String> {
     let names = fs::read_dir(fixtures()).unwrap().map(|entry| entry.unwrap().file_name());
     let names = names.map(|name| name.into_string().unwrap());
-    let mut files: Vec<String> = names.filter(|name| name.ends_with(".sqlite")).collect();
+    let mut files: Vec<String> = names.filter(|name| name.starts_with("schema-")).collect();
     files.sort();
     files
 }
@@ -228,12 +228,14 @@ fn the_database_itself_refuses_what_a_material_may_not_be() {
         "UPDATE layer SET thickness_m = 0",
         "UPDATE layer SET source = 'other'",
         "UPDATE effect SET source = 'other'",
-        "UPDATE fit_estimate SET fit = 'other'",
         "UPDATE fit_estimate SET sd = -1",
         "UPDATE fit_estimate SET high_95 = low_95 - 1",
         "UPDATE fit_estimate SET identified = 2",
-        "UPDATE fit_estimate SET at_bound = 2",
-        "UPDATE fit_estimate SET chosen_by = 'chance'",
+        "UPDATE fit_number SET fit = 'other'",
+        "UPDATE fit_number SET at_bound = 2",
+        "UPDATE fit_number SET chosen_by = 'chance'",
+        "UPDATE fit_number SET estimate = NULL",
+        "UPDATE fit_number SET estimate = '$.sd'",
         "UPDATE roughness SET rms_height_m = -1",
         "UPDATE roughness SET correlation_length_m = 0",
         "UPDATE roughness SET source = 'other'",

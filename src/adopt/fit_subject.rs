@@ -74,7 +74,7 @@ impl FitSubject {
         let curves = &found.material.curves;
         let chosen = match curve {
             Some(name) => curves.iter().find(|known| known.name == name),
-            None => curves.iter().rev().max_by_key(|known| known.observations.len()),
+            None => found.material.longest_curve(),
         };
         let Some(chosen) = chosen else {
             return Err(no_curve(found.material.slug.as_str(), curve, curves));

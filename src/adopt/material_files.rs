@@ -107,8 +107,11 @@ impl AddedMaterial {
     fn new(material: &Material, added: Added, store: &Store) -> AddedMaterial {
         let slug = material.slug.clone();
         let before = match added {
-            // It is stored by now: a revision before that cannot be read is no error.
-            Added::Revision(number) => store.get(&slug, Some(number - 1)).ok().flatten(),
+            // It is stored by now: a revision before that cannot be read is not an error.
+            Added::Revision(number) => {
+                let before = store.revision_before(&slug, number).ok().flatten();
+                before.and_then(|before| store.get(&slug, Some(before)).ok().flatten())
+            }
             Added::New | Added::Unchanged(_) | Added::Repaired(_) => None,
         };
         let Some(before) = before else {

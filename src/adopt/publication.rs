@@ -131,13 +131,13 @@ impl<'a> Publication<'a> {
             materials.extend(self.adoption.revise(recipient, &title, store)?);
             last.push(materials.len() - 1);
         }
-        let mut published = PublicationResult::default();
+        let (mut published, mut all_added) = (PublicationResult::default(), Vec::new());
         store.record(activity);
         let written = store.add_if(&materials, |added| {
             for (material, added) in at_places(&materials, added, &last) {
                 published.stored.push(pinned_name(material, added));
-                published.replaced.extend(replaced_name(material, added));
             }
+            all_added = added.to_vec();
             let next = NextSteps {
                 is_stored: self.unstored().len() < self.adoption.report.effects.len(),
                 stored: published.stored.clone(),
@@ -150,6 +150,9 @@ impl<'a> Publication<'a> {
             let beside = self.scene_text(MARK, &self.scene_with(&names))?;
             write(&files, &[(name_beside(self.checked.request.scene), beside)])
         })?;
+        for (material, added) in at_places(&materials, &all_added, &last) {
+            published.replaced.extend(replaced_name(material, added, store));
+        }
         published.files = files;
         Ok((published, written))
     }

@@ -238,10 +238,14 @@ pub fn pinned_name(material: &Material, added: Added) -> String {
     format!("{}@{}", material.slug, added.revision())
 }
 
-/// A material's name with the revision that was current before, where what was added is a new one.
-pub fn replaced_name(material: &Material, added: Added) -> Option<String> {
+/// A material's name with the revision before the added one, where that is a new one.
+pub fn replaced_name(material: &Material, added: Added, store: &Store) -> Option<String> {
     match added {
-        Added::Revision(new) => Some(format!("{}@{}", material.slug, new.saturating_sub(1))),
+        // It is stored by now: a revision before that cannot be read is not an error.
+        Added::Revision(new) => {
+            let before = store.revision_before(&material.slug, new).ok().flatten()?;
+            Some(format!("{}@{before}", material.slug))
+        }
         Added::New | Added::Unchanged(_) | Added::Repaired(_) => None,
     }
 }
@@ -263,4 +267,26 @@ fn slug_of_copy(name: &str) -> Result<Slug, Error> {
 
 fn has_source(material: &Material, key: &str) -> bool {
     material.sources.iter().any(|source| source.key == key)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::builtin;
+
+    #[test]
+    fn the_replaced_revision_is_the_one_before_even_if_a_number_is_missing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("matdb.sqlite");
+        let mut ptfe = builtin::get("ptfe").unwrap().unwrap();
+        Store::open(&path).unwrap().add([&ptfe]).unwrap();
+        let lose = "PRAGMA foreign_keys = off; UPDATE material SET current_revision = 9";
+        rusqlite::Connection::open(&path).unwrap().execute_batch(lose).unwrap();
+        ptfe.description += " Changed.";
+        let mut store = Store::open(&path).unwrap();
+        let added = store.add([&ptfe]).unwrap()[0];
+        assert_eq!(pinned_name(&ptfe, added), "ptfe@10");
+        assert_eq!(replaced_name(&ptfe, added, &store).as_deref(), Some("ptfe@1"));
+        assert_eq!(replaced_name(&ptfe, Added::New, &store), None);
+    }
 }

@@ -14,7 +14,7 @@ use super::folder::Folder;
 use super::layout::{INDEX, material_path};
 use super::references::Credit;
 use crate::material::{Material, Origin, Slug, Status};
-use crate::store::{Stored, Summary};
+use crate::store::{StoredRevision, Summary};
 
 /// The version of the shape of every JSON file here.
 pub(super) const SCHEMA_VERSION: u32 = 1;
@@ -37,7 +37,7 @@ pub(super) struct Record<'a> {
 }
 
 impl Record<'_> {
-    pub fn new(stored: &Stored) -> Record<'_> {
+    pub fn new(stored: &StoredRevision) -> Record<'_> {
         Record {
             schema_version: SCHEMA_VERSION,
             revision: stored.revision,
@@ -76,7 +76,7 @@ pub(super) struct Entry {
 }
 
 impl Entry {
-    pub fn new(summary: &Summary, stored: &Stored) -> Entry {
+    pub fn new(summary: &Summary, stored: &StoredRevision) -> Entry {
         Entry {
             slug: summary.slug.clone(),
             name: summary.name.clone(),
@@ -138,7 +138,7 @@ impl Index {
 }
 
 /// Writes a material's own file.
-pub(super) fn write(folder: &mut Folder, stored: &Stored) -> Result<(), CatalogueError> {
+pub(super) fn write(folder: &mut Folder, stored: &StoredRevision) -> Result<(), CatalogueError> {
     let slug = stored.material.slug.as_str();
     json(folder, &material_path(slug), &Record::new(stored))?;
     folder.sums().get(&material_path(slug)).map_or(Ok(()), |sum| check_size(slug, sum.bytes))

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::problem::{Problem, problem};
 use crate::fit::again::{lacks_report, problems};
 use crate::material::Fit;
-use crate::store::{Again, RevisionSummary, Store, StoreError, Stored, Summary};
+use crate::store::{RevisionSummary, RowCheck, Store, StoreError, StoredRevision, Summary};
 
 /// How much was checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -56,11 +56,11 @@ impl StoreCheck<'_> {
     pub(super) fn run_with(
         mut self,
         store: &Store,
-        mut each: impl FnMut(&Summary, &Stored, &mut dyn FnMut(Problem)),
+        mut each: impl FnMut(&Summary, &StoredRevision, &mut dyn FnMut(Problem)),
     ) -> CheckCount {
         let mut count = CheckCount::default();
-        let opened = self.check_file(store).and_then(|again| Ok((store.list()?, again)));
-        let (summaries, mut again) = match opened {
+        let opened = self.check_file(store).and_then(|row_check| Ok((store.list()?, row_check)));
+        let (summaries, mut row_check) = match opened {
             Ok(opened) => opened,
             Err(error) => {
                 (self.report)(problem("materials", error));
@@ -69,7 +69,7 @@ impl StoreCheck<'_> {
         };
         for summary in &summaries {
             count.materials += 1;
-            let done = self.check_material(store, &mut again, summary, &mut count, &mut each);
+            let done = self.check_material(store, &mut row_check, summary, &mut count, &mut each);
             if let Err(error) = done {
                 (self.report)(problem(summary.slug.as_str(), error));
             }
@@ -77,25 +77,25 @@ impl StoreCheck<'_> {
         count
     }
 
-    /// Checks pages, indexes, the schema and the table of units; gives what revisions are written again into.
-    fn check_file(&mut self, store: &Store) -> Result<Again, StoreError> {
+    /// Checks pages, indexes, the schema and the table of units. Returns the check for the rows of revisions.
+    fn check_file(&mut self, store: &Store) -> Result<RowCheck, StoreError> {
         for problems in [store.damage()?, store.changed_schema()?, store.added_objects()?] {
             problems.into_iter().for_each(|what| (self.report)(problem(self.name, what)));
         }
-        let again = Again::new()?;
-        if !again.has_own_units(store)? {
+        let row_check = RowCheck::new()?;
+        if !row_check.has_own_units(store)? {
             (self.report)(problem(self.name, OTHER_UNITS));
         }
-        Ok(again)
+        Ok(row_check)
     }
 
     fn check_material(
         &mut self,
         store: &Store,
-        again: &mut Again,
+        row_check: &mut RowCheck,
         summary: &Summary,
         count: &mut CheckCount,
-        each: &mut impl FnMut(&Summary, &Stored, &mut dyn FnMut(Problem)),
+        each: &mut impl FnMut(&Summary, &StoredRevision, &mut dyn FnMut(Problem)),
     ) -> Result<(), StoreError> {
         let history = match store.history(&summary.slug) {
             Err(StoreError::Corrupt { problem: what, .. }) => {
@@ -114,7 +114,7 @@ impl StoreCheck<'_> {
                     if let Err(error) = stored.material.validate() {
                         (self.report)(problem(place, error));
                     } else {
-                        derived(again, store, &stored)?.into_iter().for_each(&mut *self.report);
+                        derived(row_check, store, &stored)?.into_iter().for_each(&mut *self.report);
                         let is_current = revision == summary.revision;
                         if self.refit == Refit::All || self.refit == Refit::Current && is_current {
                             count.fits += check_fits(&stored, self.report);
@@ -139,11 +139,14 @@ impl StoreCheck<'_> {
 /// What is wrong with a database whose table of units was changed.
 const OTHER_UNITS: &str = "its units of columns are not those that matdb writes";
 
-/// What of a stored revision does not follow from its content: statistics of curves, numbers beside
-/// parameters, and whatever else the program writes twice.
-fn derived(again: &mut Again, store: &Store, stored: &Stored) -> Result<Vec<Problem>, StoreError> {
+/// Rows of a stored revision that do not follow from its content, such as statistics of curves and numbers of fits.
+fn derived(
+    row_check: &mut RowCheck,
+    store: &Store,
+    stored: &StoredRevision,
+) -> Result<Vec<Problem>, StoreError> {
     let place = format!("{}@{}", stored.material.slug, stored.revision);
-    let differences = again.differences(store, stored)?.into_iter();
+    let differences = row_check.differences(store, stored)?.into_iter();
     let problems = differences.map(|found| match found.curve {
         Some(curve) => {
             problem(format!("{place}, curve {curve}"), "its statistics are not those of its points")
@@ -158,7 +161,7 @@ fn derived(again: &mut Again, store: &Store, stored: &Stored) -> Result<Vec<Prob
 }
 
 /// Makes the fits of a revision again; returns their number.
-fn check_fits(stored: &Stored, report: &mut dyn FnMut(Problem)) -> usize {
+fn check_fits(stored: &StoredRevision, report: &mut dyn FnMut(Problem)) -> usize {
     let material = &stored.material;
     for fit in material.fits.iter().filter(|fit| lacks_report(fit)) {
         let place = format!("{}@{}, fit `{}`", material.slug, stored.revision, fit.name);

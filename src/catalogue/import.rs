@@ -13,7 +13,7 @@ use super::read::{about, is_newer};
 use super::verify::{database, verify};
 use crate::effects::{Level, resolve};
 use crate::material::{Activity, Material, Origin, Slug};
-use crate::store::{Added, RevisionSummary, Store, StoreError, Stored};
+use crate::store::{Added, RevisionSummary, Store, StoreError, StoredRevision};
 
 /// Another laboratory's catalogue that was [verified](super::verify()) and may be imported.
 #[derive(Debug)]
@@ -153,7 +153,7 @@ impl Import {
     fn beside(
         &self,
         ours: &Store,
-        known: Stored,
+        known: StoredRevision,
         slug: &Slug,
         name: &Slug,
     ) -> Result<Outcome, CatalogueError> {
@@ -176,7 +176,7 @@ impl Import {
     /// from: no other may revise or withdraw it.
     fn is_theirs(
         &self,
-        known: &Stored,
+        known: &StoredRevision,
         slug: &Slug,
         since: &[u32],
     ) -> Result<bool, CatalogueError> {
@@ -278,7 +278,7 @@ impl Import {
         }
     }
 
-    fn stored(&self, slug: &Slug, number: u32) -> Result<Stored, CatalogueError> {
+    fn stored(&self, slug: &Slug, number: u32) -> Result<StoredRevision, CatalogueError> {
         self.theirs.get(slug, Some(number))?.ok_or_else(|| CatalogueError::Unsound {
             bundle: self.path.clone(),
             problem: format!("{slug}@{number} is not there any more"),
@@ -332,7 +332,7 @@ impl Outcome {
 
 /// Where a revision of theirs comes from. If they imported it themselves, this is the catalogue that published it
 /// first, which gets the credit.
-fn origin(about: &Option<About>, stored: &Stored) -> Origin {
+fn origin(about: &Option<About>, stored: &StoredRevision) -> Origin {
     if let Some(first) = stored.activity.as_ref().and_then(|activity| activity.origin.clone()) {
         return first;
     }

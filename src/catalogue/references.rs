@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::bibtex::entry;
 use super::leaves::{Leaf, leaves};
 use crate::material::{Citation, Fit, Material, Origin, Source, SourceKind, builtin};
-use crate::store::Stored;
+use crate::store::StoredRevision;
 
 /// A source and the numbers that come from it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -139,7 +139,7 @@ pub enum Credit<'a> {
 
 impl<'a> Credit<'a> {
     /// Of a stored revision.
-    pub fn of(stored: &'a Stored) -> Credit<'a> {
+    pub fn of(stored: &'a StoredRevision) -> Credit<'a> {
         let built_in = builtin::get(stored.material.slug.as_str()).and_then(Result::ok);
         let origin = stored.activity.as_ref().and_then(|activity| activity.origin.as_ref());
         match origin {
@@ -161,7 +161,7 @@ impl<'a> Credit<'a> {
 
     /// The year for the citation of a stored revision: when it was first added, for an imported one in the catalogue
     /// that it came from.
-    pub fn year(self, stored: &Stored) -> Option<u16> {
+    pub fn year(self, stored: &StoredRevision) -> Option<u16> {
         let added_at = self.origin().map_or(&stored.added_at, |origin| &origin.added_at);
         added_at.get(..4)?.parse().ok()
     }

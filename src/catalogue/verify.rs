@@ -19,7 +19,7 @@ use super::problem::{Problem, problem};
 use super::read::{LARGEST_FILE_BYTES, LARGEST_TABLE_BYTES, read};
 use super::rebuild::check_rebuilt;
 use crate::files::FilesError;
-use crate::store::{Store, Stored};
+use crate::store::{Store, StoredRevision};
 
 /// What [`verify`] found.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
@@ -248,7 +248,7 @@ fn check_content(
     checked
 }
 
-fn check_record(bundle: &Path, stored: &Stored) -> Option<Problem> {
+fn check_record(bundle: &Path, stored: &StoredRevision) -> Option<Problem> {
     let path = material_path(stored.material.slug.as_str());
     let mut wanted = serde_json::to_value(Record::new(stored)).unwrap_or_default();
     match read::<Value>(bundle, &path) {

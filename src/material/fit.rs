@@ -43,6 +43,8 @@ pub struct Covariance {
 pub struct FitNumber {
     /// As [`name`](Estimate::name) of an estimate.
     pub name: String,
+    /// Its place among [`FitReport::estimates`]; none where it was not searched for.
+    pub estimate: Option<usize>,
     /// Its value, in `unit`.
     pub value: f64,
     /// UCUM code.
@@ -95,9 +97,9 @@ impl Fit {
         let parameters = self.model.parameters();
         let mut numbers: Vec<FitNumber> =
             parameters.iter().map(|parameter| FitNumber::of_parameter(parameter, report)).collect();
-        for estimate in &report.estimates {
+        for (place, estimate) in report.estimates.iter().enumerate() {
             if !parameters.iter().any(|parameter| parameter.path == estimate.name) {
-                numbers.push(FitNumber::of_estimate(estimate));
+                numbers.push(FitNumber::of_estimate(place, estimate));
             }
         }
         numbers
@@ -113,13 +115,15 @@ impl FitNumber {
     /// A parameter of the model, by the report of the fit.
     fn of_parameter(parameter: &Parameter, report: &FitReport) -> FitNumber {
         let Parameter { path, value, min, max, .. } = parameter;
-        let estimate = report.estimate(path);
+        let place = report.estimates.iter().position(|estimate| estimate.name == *path);
+        let estimate = place.and_then(|place| report.estimates.get(place));
         // Ranges may have been narrowed by hand.
         let ends = [format!("{path}.min"), format!("{path}.max")];
         let is_at_narrowed_end =
             report.given.iter().any(|given| ends.contains(&given.name) && given.value == *value);
         FitNumber {
             name: path.clone(),
+            estimate: place,
             value: *value,
             unit: parameter.unit,
             sd: estimate.and_then(|estimate| estimate.sd),
@@ -134,9 +138,10 @@ impl FitNumber {
     }
 
     /// What was found besides the parameters of the model.
-    fn of_estimate(estimate: &Estimate) -> FitNumber {
+    fn of_estimate(place: usize, estimate: &Estimate) -> FitNumber {
         FitNumber {
             name: estimate.name.clone(),
+            estimate: Some(place),
             value: estimate.value,
             unit: "1",
             sd: estimate.sd,

@@ -112,6 +112,11 @@ impl Material {
         self.kind_words(self.fits.iter().find(|fit| fit.name == self.render)?)
     }
 
+    /// The curve with the most points, the first of several.
+    pub fn longest_curve(&self) -> Option<&Curve> {
+        self.curves.iter().rev().max_by_key(|curve| curve.observations.len())
+    }
+
     /// Hash of everything in the material: equal exactly when nothing differs.
     ///
     /// Databases keep it: a field added later must serialise to nothing while it is empty, or what

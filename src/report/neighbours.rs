@@ -74,17 +74,15 @@ impl NeighbourSearch {
         let MaterialRevision { material, revision } = find_material(store, name, "")?;
         let current = store.map(|store| store.summary(&material.slug)).transpose()?.flatten();
         let is_current = current.map(|current| current.revision) == revision;
-        let longest =
-            material.curves.into_iter().rev().max_by_key(|curve| curve.observations.len());
-        let Some(curve) = longest else {
+        let Some(curve) = material.longest_curve() else {
             return Err(Error::usage(format!("`{name}` has no curve"), "give the file of one"));
         };
         let instrument =
             material.instruments.iter().find(|own| Some(&own.key) == curve.instrument.as_ref());
         Ok(NeighbourSearch {
-            observations: curve.observations,
+            observations: curve.observations.clone(),
             frequency_hz: measured_at_hz.or(instrument.map(|own| own.centre_frequency_hz)),
-            own: is_current.then_some(material.slug),
+            own: is_current.then(|| material.slug.clone()),
         })
     }
 

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::formats::text::nearest;
 use crate::material::{Material, Slug, builtin};
-use crate::store::{Store, Stored};
+use crate::store::{Store, StoredRevision};
 
 /// A material and where it was found.
 #[derive(Clone, Debug)]
@@ -19,7 +19,7 @@ impl MaterialRevision {
     ///
     /// # Errors
     /// A database that cannot be read.
-    pub fn stored(&self, store: Option<&Store>) -> Result<Option<Stored>, Error> {
+    pub fn stored(&self, store: Option<&Store>) -> Result<Option<StoredRevision>, Error> {
         match (store, self.revision) {
             (Some(store), Some(_)) => Ok(store.get(&self.material.slug, self.revision)?),
             _ => Ok(None),

@@ -1,4 +1,4 @@
-//! Opening a file: telling ours from others' without touching it, and bringing it up to date.
+//! Opens a database file: recognises files of other programs without changing them, and migrates older schemas.
 
 use std::fs;
 use std::io::{self, Read, Seek};
@@ -11,18 +11,19 @@ use rusqlite::functions::FunctionFlags;
 use rusqlite::{Connection, ErrorCode, OpenFlags, Transaction, TransactionBehavior};
 use rusqlite_migration::{M, Migrations};
 
-use super::error::{InFile, StoreError, directory_of};
+use super::error::{InFile, StoreError};
 use super::find::outline;
 use super::rows::rows;
-use super::write;
+use super::{law, write};
+use crate::files::folder_of;
 
 /// "matd" in the file's header.
 const APPLICATION_ID: i64 = 0x6d61_7464;
 
 /// The latest schema.
-const LATEST: usize = 10;
+const LATEST: usize = 11;
 
-/// All schemas there ever were, oldest first. Append only: files in the world have stopped at each.
+/// Every migration, oldest first. Append only: users have files of every schema.
 fn schemas() -> [M<'static>; LATEST] {
     [
         M::up(include_str!("../../migrations/0001_materials.sql")),
@@ -35,22 +36,23 @@ fn schemas() -> [M<'static>; LATEST] {
         }),
         M::up_with_hook(
             include_str!("../../migrations/0007_attribution.sql"),
-            |tx: &Transaction| {
-                write::fill_estimates(tx)?;
-                Ok(outline::fill(tx)?)
-            },
+            |tx: &Transaction| Ok(outline::fill(tx)?),
         ),
         M::up(include_str!("../../migrations/0008_origin_author.sql")),
         M::up(include_str!("../../migrations/0009_held_out.sql")),
         M::up(include_str!("../../migrations/0010_four_letters.sql")),
+        M::up_with_hook(include_str!("../../migrations/0011_one_value.sql"), |tx: &Transaction| {
+            law::remove_copies(tx)?;
+            Ok(write::fill_numbers(tx)?)
+        }),
     ]
 }
 
-/// What all schemas one after the other make of an empty file, in one step: SQLite parses every table anew
-/// after each change of one. `cargo test --lib store::connect -- --ignored` writes it.
-const FRESH: &str = include_str!("schema.sql");
+/// The latest schema in one step, equal to all migrations of an empty file. One step is faster, since SQLite parses
+/// every table again after each change. `cargo test --lib store::connect -- --ignored` writes it.
+const LATEST_SCHEMA: &str = include_str!("schema.sql");
 
-/// What SQLite takes for the whole of a database in one step.
+/// Makes a backup copy the whole database in one step.
 const ALL_PAGES: i32 = -1;
 
 /// How long to wait while another program writes.
@@ -58,37 +60,37 @@ const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Opens a database for reading and writing; makes it when there is none.
 pub(super) fn writable(path: &Path) -> Result<Connection, StoreError> {
-    patiently(|| open_writable(path))
+    retry_while_busy(|| open_writable(path))
 }
 
 /// Opens a database for reading; `None` when there is none, or none with tables.
 pub(super) fn readable(path: &Path) -> Result<Option<Connection>, StoreError> {
-    patiently(|| open_readable(path))
+    retry_while_busy(|| open_readable(path))
 }
 
-/// Opens a file that nobody writes, somebody else's copy above all: logs and journals beside it are
-/// not looked at, so that nothing is written, made or removed on their word.
+/// Opens a file that no program writes, such as a published database. Ignores logs and journals next to it, so that
+/// they cannot make SQLite write or remove anything.
 pub(super) fn frozen(path: &Path) -> Result<Option<Connection>, StoreError> {
     if size_bytes(path)? == 0 {
         return Ok(None);
     }
-    let conn = immutable(path).in_file(path)?;
+    let conn = open_immutable(path).in_file(path)?;
     conn.pragma_update(None, "query_only", true).in_file(path)?;
-    modern(path, conn)
+    at_latest_schema(path, conn)
 }
 
-/// An empty database of the latest schema that is nowhere on the disk.
+/// An empty database of the latest schema in memory.
 pub(super) fn in_memory() -> Result<Connection, StoreError> {
     let path = Path::new(":memory:");
     let mut conn = Connection::open_in_memory().in_file(path)?;
-    equip(&conn).in_file(path)?;
+    configure(&conn).in_file(path)?;
     migrate(path, &mut conn)?;
     Ok(conn)
 }
 
-/// Tries again while others are busy. SQLite itself does not wait where waiting could lock two
-/// programs up, as when both turn a new file's log on.
-fn patiently<T>(open: impl Fn() -> Result<T, StoreError>) -> Result<T, StoreError> {
+/// Retries while another program is busy. SQLite itself does not wait where two programs could wait for each other,
+/// for example when both turn on the log of a new file.
+fn retry_while_busy<T>(open: impl Fn() -> Result<T, StoreError>) -> Result<T, StoreError> {
     let start = Instant::now();
     loop {
         match open() {
@@ -101,12 +103,12 @@ fn patiently<T>(open: impl Fn() -> Result<T, StoreError>) -> Result<T, StoreErro
 }
 
 fn open_writable(path: &Path) -> Result<Connection, StoreError> {
-    // A stranger's file is never opened for writing.
+    // A file of another program is never opened for writing.
     if size_bytes(path)? > 0 {
-        match quiet(path) {
-            // A write of ours that was cut short, which SQLite takes back when it opens the file.
+        match open_unchanged(path) {
+            // An interrupted write of matdb. SQLite rolls it back when it opens the file.
             Err(StoreError::Interrupted { .. }) if !names_another_file(path) => {
-                check_admissible(path, &immutable(path).in_file(path)?)?;
+                check_admissible(path, &open_immutable(path).in_file(path)?)?;
             }
             conn => check_admissible(path, &conn?)?,
         }
@@ -117,7 +119,7 @@ fn open_writable(path: &Path) -> Result<Connection, StoreError> {
         return Err(StoreError::read_only(path));
     }
     conn.pragma_update(None, "journal_mode", "wal").in_file(path)?;
-    // Two writers that each read first would stand in the other's way.
+    // Two writers that both begin with reading would block each other.
     conn.set_transaction_behavior(TransactionBehavior::Immediate);
     migrate(path, &mut conn)?;
     Ok(conn)
@@ -127,41 +129,42 @@ fn open_readable(path: &Path) -> Result<Option<Connection>, StoreError> {
     if size_bytes(path)? == 0 {
         return Ok(None);
     }
-    modern(path, quiet(path)?)
+    at_latest_schema(path, open_unchanged(path)?)
 }
 
-/// The connection, or one to a copy in memory that has the latest schema.
-fn modern(path: &Path, conn: Connection) -> Result<Option<Connection>, StoreError> {
+/// The connection itself, or for an older schema one to a migrated copy in memory. `None` without tables.
+fn at_latest_schema(path: &Path, conn: Connection) -> Result<Option<Connection>, StoreError> {
     match schema_of(path, &conn)? {
         0 => Ok(None),
-        schema if schema < LATEST => modern_copy(path, &conn).map(Some),
+        schema if schema < LATEST => migrated_copy(path, &conn).map(Some),
         _ => Ok(Some(conn)),
     }
 }
 
-/// Refuses a file of somebody else, of a newer schema, or with triggers of somebody else: these would run
-/// whenever we write.
+/// Refuses a file of another program, of a newer schema, or with unknown triggers: those would run whenever matdb
+/// writes.
 fn check_admissible(path: &Path, conn: &Connection) -> Result<(), StoreError> {
     schema_of(path, conn)?;
-    let strangers = strange_triggers(conn).in_file(path)?;
+    let strangers = unknown_triggers(conn).in_file(path)?;
     match strangers.into_iter().next() {
         None => Ok(()),
         Some(name) => Err(StoreError::Trigger { file: path.to_owned(), name }),
     }
 }
 
-/// Names of triggers that no schema of ours has.
-fn strange_triggers(conn: &Connection) -> rusqlite::Result<Vec<String>> {
+/// Names of triggers that are not in the schema of matdb.
+fn unknown_triggers(conn: &Connection) -> rusqlite::Result<Vec<String>> {
     let sql = "SELECT name, sql FROM sqlite_schema WHERE type = 'trigger'";
     let triggers: Vec<(String, String)> =
         rows(conn, sql, [], |row| Ok((row.get(0)?, row.get(1)?)))?;
-    let strangers = triggers.into_iter().filter(|(_, sql)| !FRESH.contains(&format!("{sql};\n")));
+    let strangers =
+        triggers.into_iter().filter(|(_, sql)| !LATEST_SCHEMA.contains(&format!("{sql};\n")));
     Ok(strangers.map(|(name, _)| name).collect())
 }
 
-/// A copy of an older database in memory, brought up to date there. Who only reads changes no file,
-/// and may not even be allowed to.
-fn modern_copy(path: &Path, old: &Connection) -> Result<Connection, StoreError> {
+/// A copy in memory of an older database, migrated there. A reader must not change the file, and may lack the
+/// permission.
+fn migrated_copy(path: &Path, old: &Connection) -> Result<Connection, StoreError> {
     check_admissible(path, old)?;
     let mut copy = in_memory_copy(path, old)?;
     migrate(path, &mut copy)?;
@@ -176,7 +179,7 @@ fn in_memory_copy(path: &Path, original: &Connection) -> Result<Connection, Stor
     if !matches!(step.in_file(path)?, StepResult::Done) {
         return Err(StoreError::Busy { file: path.to_owned() });
     }
-    equip(&copy).in_file(path)?;
+    configure(&copy).in_file(path)?;
     Ok(copy)
 }
 
@@ -184,7 +187,7 @@ fn in_memory_copy(path: &Path, original: &Connection) -> Result<Connection, Stor
 fn size_bytes(path: &Path) -> Result<u64, StoreError> {
     let file = path.to_owned();
     match fs::metadata(path) {
-        // To SQLite a file of one byte is empty, and it would write over it.
+        // SQLite treats a file of one byte as empty and would overwrite it.
         Ok(found) if found.is_file() && found.len() != 1 => Ok(found.len()),
         Ok(_) => Err(StoreError::Foreign { file }),
         Err(reason) if reason.kind() == io::ErrorKind::NotFound => Ok(0),
@@ -192,13 +195,12 @@ fn size_bytes(path: &Path) -> Result<u64, StoreError> {
     }
 }
 
-/// Opens an existing file, whosever it is, so that nothing in it can change.
-fn quiet(path: &Path) -> Result<Connection, StoreError> {
+/// Opens an existing file of any program so that nothing in it can change.
+fn open_unchanged(path: &Path) -> Result<Connection, StoreError> {
     let [log_exists, journal_exists] =
         ["-wal", "-journal"].map(|ending| beside(path, ending).symlink_metadata().is_ok());
-    // A read-only connection leaves an empty log behind. A writable one clears that away, but would
-    // also write a log that it finds into the database, and do what a journal says: that may be to
-    // remove any file.
+    // A read-only connection leaves an empty log behind; a writable one removes it. But a writable one also writes an
+    // existing log into the database and follows a journal, which may name any file for removal.
     let flags = if log_exists || journal_exists {
         OpenFlags::SQLITE_OPEN_READ_ONLY
     } else {
@@ -206,16 +208,16 @@ fn quiet(path: &Path) -> Result<Connection, StoreError> {
     };
     let conn = connect(path, flags).in_file(path)?;
     if !log_exists && !journal_exists && conn.is_readonly("main").in_file(path)? {
-        return unwritable(path);
+        return open_unwritable(path);
     }
     conn.pragma_update(None, "query_only", true).in_file(path)?;
     match conn.query_row("SELECT count(*) FROM sqlite_schema", [], |_| Ok(())) {
-        // Where no log can be made nobody writes, so the file may be read as if it never changed.
+        // Where no log can be created, no program writes: the file may be read as one that never changes.
         Err(error) if is_interrupted(&error) => {
             Err(StoreError::Interrupted { file: path.to_owned() })
         }
-        Err(error) if !log_exists && !journal_exists && wants_a_log(&error) => {
-            immutable(path).in_file(path)
+        Err(error) if !log_exists && !journal_exists && needs_log(&error) => {
+            open_immutable(path).in_file(path)
         }
         result => {
             result.in_file(path)?;
@@ -225,19 +227,19 @@ fn quiet(path: &Path) -> Result<Connection, StoreError> {
     }
 }
 
-/// Opens a file that we may not write and beside which lies no log. One that is made for reading would
-/// stay there with the rights of the file, or as ours, and keep from writing whoever may.
-fn unwritable(path: &Path) -> Result<Connection, StoreError> {
+/// Opens a file that this user may not write and that has no log. A log created for reading would stay, with this user
+/// as its owner, and could stop others from writing.
+fn open_unwritable(path: &Path) -> Result<Connection, StoreError> {
     let nobody_writes = fs::metadata(path).is_ok_and(|found| found.permissions().readonly());
     let before = state(path)?;
-    let conn = immutable(path).in_file(path)?;
+    let conn = open_immutable(path).in_file(path)?;
     conn.pragma_update(None, "query_only", true).in_file(path)?;
-    // As where no log can be made.
-    if nobody_writes || !may_add_to(directory_of(path)) {
+    // No program writes, or no log can be created: as in `open_unchanged`.
+    if nobody_writes || !may_add_to(folder_of(path)) {
         check_length(path, &conn)?;
         return Ok(conn);
     }
-    // Somebody else may write it meanwhile: what is read is a copy of one moment.
+    // Another user may write meanwhile: read a copy of one moment.
     let copy = check_length(path, &conn).and_then(|()| in_memory_copy(path, &conn));
     if before != state(path)? {
         return Err(StoreError::Busy { file: path.to_owned() });
@@ -255,7 +257,7 @@ fn state(path: &Path) -> Result<(u64, Option<SystemTime>, bool), StoreError> {
     Ok((found.len(), found.modified().ok(), has_log))
 }
 
-/// Whether we may make files in a folder; where nobody can say, perhaps.
+/// Whether this user may create files in a folder. On systems where this is unknown: yes.
 #[cfg(target_os = "linux")]
 fn may_add_to(folder: &Path) -> bool {
     rustix::fs::access(folder, rustix::fs::Access::WRITE_OK).is_ok()
@@ -266,12 +268,11 @@ fn may_add_to(_: &Path) -> bool {
     true
 }
 
-/// Refuses a file that was cut off: SQLite notices only when it reads what is not there, and takes half a
-/// page for one that is filled with zeros.
+/// Refuses a truncated file. SQLite notices only when it reads a missing page, and fills half a page with zeros.
 fn check_length(path: &Path, conn: &Connection) -> Result<(), StoreError> {
     let sql = "SELECT page_count * page_size FROM pragma_page_count, pragma_page_size";
     let said: i64 = conn.query_row(sql, [], |row| row.get(0)).in_file(path)?;
-    // What a writer has added may still be in the log alone; in this order the file has it if there is none.
+    // New pages may still be in the log alone. The log is looked at first: if there is none, the file has them.
     let has_log = beside(path, "-wal").symlink_metadata().is_ok_and(|found| found.len() > 0);
     let bytes = size_bytes(path)?;
     if has_log || u64::try_from(said).is_ok_and(|said| said <= bytes) {
@@ -280,36 +281,35 @@ fn check_length(path: &Path, conn: &Connection) -> Result<(), StoreError> {
     Err(StoreError::CutOff { file: path.to_owned(), bytes, said })
 }
 
-/// A path in a form that SQLite takes for nothing but a path: a bare `file:a.sqlite` is an address to it, and
-/// `:memory:` no file at all.
-pub(super) fn literal(path: &Path) -> PathBuf {
+/// A path that SQLite reads as a path: a bare `file:a.sqlite` would be a URI, and `:memory:` would not be a file.
+pub(super) fn literal_path(path: &Path) -> PathBuf {
     Path::new(".").join(path)
 }
 
 fn connect(path: &Path, flags: OpenFlags) -> rusqlite::Result<Connection> {
-    connect_by_name(&literal(path), flags)
+    connect_by_name(&literal_path(path), flags)
 }
 
-/// Opens what SQLite understands by a name, which may be an address.
+/// Opens a database by a name in SQLite's sense, which may be a URI.
 fn connect_by_name(name: &Path, flags: OpenFlags) -> rusqlite::Result<Connection> {
     let conn = Connection::open_with_flags(name, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)?;
     conn.busy_timeout(PATIENCE)?;
-    equip(&conn)?;
+    configure(&conn)?;
     Ok(conn)
 }
 
-/// What every connection needs.
-fn equip(conn: &Connection) -> rusqlite::Result<()> {
+/// Sets the options and functions that every connection needs.
+fn configure(conn: &Connection) -> rusqlite::Result<()> {
     conn.pragma_update(None, "foreign_keys", true)?;
-    // A file from elsewhere gets no functions with side effects, no cell that reaches out of its page, and no
-    // way past the tables (sqlite.org/security.html).
+    // Protects from hostile files: no functions with side effects, no cell beyond its page, no direct writes to the
+    // schema (sqlite.org/security.html).
     conn.pragma_update(None, "trusted_schema", false)?;
     conn.pragma_update(None, "cell_size_check", true)?;
     conn.set_db_config(DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true)?;
-    // Enough for every statement that writes a material; a smaller cache would parse most of them
-    // again for each.
+    // Enough for every statement that writes a material. A smaller cache would parse most of them again for each
+    // material.
     conn.set_prepared_statement_cache_capacity(64);
-    // The views in decibels call it, and the SQLite that is built in has none.
+    // The views in decibels call it, and the bundled SQLite does not have it.
     let flags = FunctionFlags::SQLITE_UTF8
         | FunctionFlags::SQLITE_DETERMINISTIC
         | FunctionFlags::SQLITE_INNOCUOUS;
@@ -318,7 +318,7 @@ fn equip(conn: &Connection) -> rusqlite::Result<()> {
     })
 }
 
-fn immutable(path: &Path) -> rusqlite::Result<Connection> {
+fn open_immutable(path: &Path) -> rusqlite::Result<Connection> {
     let escaped: String = path.as_os_str().as_encoded_bytes().iter().map(escape).collect();
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI;
     connect_by_name(Path::new(&format!("file:{escaped}?immutable=1")), flags)
@@ -333,18 +333,19 @@ fn escape(byte: &u8) -> String {
     }
 }
 
-fn wants_a_log(error: &rusqlite::Error) -> bool {
+fn needs_log(error: &rusqlite::Error) -> bool {
     matches!(error.sqlite_error_code(), Some(ErrorCode::CannotOpen | ErrorCode::ReadOnly))
 }
 
-/// Whether a journal beside the file waits to be rolled back.
+/// Whether the error says that a journal next to the file must be rolled back.
 fn is_interrupted(error: &rusqlite::Error) -> bool {
     let code = error.sqlite_error().map(|failure| failure.extended_code);
     code == Some(rusqlite::ffi::SQLITE_READONLY_ROLLBACK)
 }
 
-/// Whether the journal beside a database ends with the name of another one, which SQLite would remove:
-/// ours never do (sqlite.org/fileformat.html, "The Rollback Journal"). One that cannot be read counts.
+/// Whether the journal of a database ends with the name of another journal, which SQLite would remove
+/// (sqlite.org/fileformat.html, "The Rollback Journal"). Journals of matdb never do. True for a journal that cannot be
+/// read.
 fn names_another_file(path: &Path) -> bool {
     const MAGIC: [u8; 8] = [0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7];
     journal_end(path).map_or(true, |end| end == MAGIC)
@@ -388,7 +389,7 @@ fn migrate(path: &Path, conn: &mut Connection) -> Result<(), StoreError> {
         make(path, conn)?;
     }
     let outcome = Migrations::new(schemas().into()).to_latest(conn);
-    // Another program may have done it while this one waited for its turn.
+    // Another program may have migrated the file while this one waited.
     if schema_of(path, conn)? == LATEST {
         return Ok(());
     }
@@ -398,11 +399,11 @@ fn migrate(path: &Path, conn: &mut Connection) -> Result<(), StoreError> {
     })
 }
 
-/// Gives a file without tables those of the latest schema, unless another program was quicker.
+/// Creates the tables of the latest schema in an empty file, unless another program has done so.
 fn make(path: &Path, conn: &mut Connection) -> Result<(), StoreError> {
     let tx = conn.transaction_with_behavior(TransactionBehavior::Immediate).in_file(path)?;
     if schema_of(path, &tx)? == 0 {
-        tx.execute_batch(FRESH).in_file(path)?;
+        tx.execute_batch(LATEST_SCHEMA).in_file(path)?;
         tx.pragma_update(None, "application_id", APPLICATION_ID).in_file(path)?;
         tx.pragma_update(None, "user_version", LATEST as i64).in_file(path)?;
     }
@@ -416,7 +417,7 @@ mod tests {
     /// An empty database that went through all schemas.
     fn migrated() -> Connection {
         let mut conn = Connection::open_in_memory().unwrap();
-        equip(&conn).unwrap();
+        configure(&conn).unwrap();
         Migrations::new(schemas().into()).to_latest(&mut conn).unwrap();
         conn
     }
@@ -448,7 +449,7 @@ mod tests {
     #[test]
     #[ignore = "writes src/store/schema.sql; run it when a schema is added"]
     fn write_the_latest_schema() {
-        let head = "-- The latest schema in one piece, written by a test: see `FRESH` in connect.rs. Change\n\
+        let head = "-- The latest schema in one piece, written by a test: see `LATEST_SCHEMA` in connect.rs. Change\n\
                     -- migrations/ instead.\n\n";
         let text = statements(&migrated()).join(";\n\n") + ";\n";
         fs::write(
@@ -494,6 +495,6 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("50 % of #1?mode=memory&ü.sqlite");
         drop(writable(&path).unwrap());
-        assert_eq!(schema_of(&path, &immutable(&path).unwrap()).unwrap(), LATEST);
+        assert_eq!(schema_of(&path, &open_immutable(&path).unwrap()).unwrap(), LATEST);
     }
 }

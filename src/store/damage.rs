@@ -1,12 +1,12 @@
-//! Finding damage of a file.
+//! Finds damage of a database file.
 
 use rusqlite::{Connection, Result};
 
 use super::find::stale;
 use super::rows::rows;
 
-/// What is wrong with a file, a sentence each: damaged pages, references to missing rows, and lines of lists that do
-/// not follow from their material.
+/// Every problem of a file as a sentence: damaged pages, references to missing rows, and rows of lists and searches
+/// that differ from their material.
 pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
     let found = rows(conn, "PRAGMA integrity_check", [], |row| row.get::<_, String>(0))?;
     let dangling = rows(conn, "PRAGMA foreign_key_check", [], |row| {

@@ -1,4 +1,4 @@
-//! Adding and removing materials.
+//! MaterialWriter and removing materials.
 
 use super::database::Store;
 use super::error::{InFile, StoreError};
@@ -58,7 +58,7 @@ impl Store {
         }
         let Store { conn, path, .. } = self;
         let tx = conn.transaction().in_file(path)?;
-        let mut adding = write::Adding::new(&tx);
+        let mut adding = write::MaterialWriter::new(&tx);
         let added: Result<Vec<Added>, _> =
             made.iter().map(|(material, activity)| adding.add(material, *activity)).collect();
         let added = added.and_then(|added| adding.finish().map(|()| added)).in_file(path)?;
@@ -93,7 +93,7 @@ impl Store {
     ) -> Result<(), E> {
         let Store { conn, path, .. } = self;
         let tx = conn.transaction().in_file(path)?;
-        let mut adding = write::Adding::new(&tx);
+        let mut adding = write::MaterialWriter::new(&tx);
         for made in made {
             let (material, activity) = made?;
             check(&material)?;

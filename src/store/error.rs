@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use rusqlite::ErrorCode;
 use thiserror::Error;
 
+use crate::files::folder_of;
 use crate::material::MaterialError;
 
 /// Why a database could not be used. A refused write has changed nothing.
@@ -223,15 +224,10 @@ fn way_to_write(path: &Path) -> String {
     }
 }
 
-/// The folder that a file stands in.
-pub(super) fn directory_of(path: &Path) -> &Path {
-    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
 /// Why a file cannot be opened. SQLite does not say, and to try it ourselves would drop the locks
 /// that other connections of this process hold, so this only looks.
 fn reason(path: &Path) -> io::Error {
-    match (fs::metadata(path), fs::metadata(directory_of(path))) {
+    match (fs::metadata(path), fs::metadata(folder_of(path))) {
         (_, Err(reason)) => reason,
         (Err(reason), _) if reason.kind() != io::ErrorKind::NotFound => reason,
         (_, Ok(found)) if !found.is_dir() => io::ErrorKind::NotADirectory.into(),

@@ -1,4 +1,4 @@
-//! One material among many: filters, words, and the line that lists show.
+//! Finds materials: filters, full-text search, and the rows of lists.
 
 mod filter;
 pub(super) mod outline;
@@ -19,7 +19,7 @@ pub use outline::OutlineEntry;
 pub use words::Hit;
 
 impl Store {
-    /// The current revisions of the materials that a filter lets through, sorted by name.
+    /// The current revisions of the materials that match a filter, sorted by name.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -27,7 +27,7 @@ impl Store {
         filter::all(&self.conn, filter).in_file(&self.path)
     }
 
-    /// The first `most` of them, without reading the others.
+    /// The first `most` materials that match a filter, sorted by name. Does not read the others.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -35,7 +35,7 @@ impl Store {
         filter::page(&self.conn, filter, most).in_file(&self.path)
     }
 
-    /// How many there are, but no more than `most`, without counting the others.
+    /// Number of materials that match a filter, at most `most`. Does not count the others.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -44,7 +44,7 @@ impl Store {
         counted.in_file(&self.path)
     }
 
-    /// Every class that a current revision is of, sorted.
+    /// The classes of all current revisions, each once, sorted.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -52,7 +52,7 @@ impl Store {
         filter::classes(&self.conn).in_file(&self.path)
     }
 
-    /// The first `most` tags that any material has, sorted.
+    /// The first `most` tags of all materials, sorted.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -60,7 +60,7 @@ impl Store {
         filter::tags(&self.conn, most).in_file(&self.path)
     }
 
-    /// What a list says of one material; `None` when there is none of that name.
+    /// The list entry of one material; `None` when it does not exist.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -68,8 +68,8 @@ impl Store {
         one(&self.conn, slug).in_file(&self.path)
     }
 
-    /// What is said of the model that scenes render of a material where it goes with a curve
-    /// ([`Material::rendered_words`](crate::material::Material::rendered_words)), read without all else.
+    /// Kind of the rendered model in words, as [`Material::rendered_words`](crate::material::Material::rendered_words)
+    /// gives it. Does not read the rest of the material.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -117,7 +117,7 @@ fn words_of(conn: &Connection, slug: &Slug) -> Result<Option<String>> {
     found.optional()
 }
 
-/// Materials whose line, words or outline are not those of their current revision.
+/// Materials whose rows in lists, searches or outlines differ from their current revision.
 pub(super) fn stale(conn: &Connection) -> Result<Vec<String>> {
     let sql = "
         SELECT slug FROM (

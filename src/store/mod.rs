@@ -15,7 +15,6 @@
 //! assert_eq!(store.get(&paint.slug, None).unwrap().unwrap().material, paint);
 //! ```
 
-mod again;
 mod connect;
 mod copy;
 mod damage;
@@ -23,20 +22,22 @@ mod database;
 mod edit;
 mod error;
 mod find;
+mod law;
 mod open;
 mod own_schema;
 mod query;
 mod read;
 mod record;
 mod repair;
+mod row_check;
 mod rows;
 mod tables;
 mod write;
 
-pub use again::{Again, Difference};
 pub use database::Store;
 pub use error::StoreError;
 pub use find::{Filter, Hit, OutlineEntry};
-pub use record::{Added, Removed, RevisionSummary, Stored, Summary};
+pub use record::{Added, Removed, RevisionSummary, StoredRevision, Summary};
 pub use repair::Repair;
+pub use row_check::{Difference, RowCheck};
 pub use tables::{Cell, Column, ColumnKind, Reference, Table};

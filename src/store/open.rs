@@ -1,4 +1,4 @@
-//! Opening databases.
+//! Opens databases.
 
 use std::path::{Path, PathBuf};
 
@@ -7,11 +7,11 @@ use super::database::Store;
 use super::error::StoreError;
 
 impl Store {
-    /// Opens a database, makes it when there is none, and brings an older one up to date.
+    /// Opens a database. Creates it when there is none, and migrates an older schema.
     ///
     /// # Errors
-    /// When the file is somebody else's, newer than the program, damaged, locked or cannot be
-    /// written. Somebody else's file and a newer one are left as they are.
+    /// When the file belongs to another program, is newer than this program, damaged or locked, or cannot be written.
+    /// A file of another program or of a newer matdb stays as it is.
     pub fn open(path: impl AsRef<Path>) -> Result<Store, StoreError> {
         let path = path.as_ref().to_owned();
         let conn = connect::writable(&path)?;
@@ -47,7 +47,7 @@ impl Store {
         &self.path
     }
 
-    /// The same, but errors name the file of which this is a copy.
+    /// This database, with errors that name the file of which it is a copy.
     pub(crate) fn known_as(self, original: &Store) -> Store {
         Store { path: original.path.clone(), ..self }
     }

@@ -1,4 +1,4 @@
-//! Whether a file has exactly the schema of this program.
+//! Compares the schema of a file with that of this program.
 
 use super::connect;
 use super::database::Store;
@@ -6,8 +6,8 @@ use super::error::{InFile, StoreError};
 use super::tables::schema;
 
 impl Store {
-    /// Whether tables, indexes and views are exactly those that this program makes. A file from
-    /// elsewhere could have others of the same names that answer what they like.
+    /// Whether tables, indexes, views and triggers are exactly those of this program. A file from elsewhere could have
+    /// others of the same names, with any content.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -16,7 +16,7 @@ impl Store {
         Ok(own == there)
     }
 
-    /// Every table, index, trigger or view that this program makes and that is missing or another one, a clause each.
+    /// Every table, index, trigger or view of this program that is missing or different, as a clause each.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -26,7 +26,7 @@ impl Store {
         Ok(changed.map(|one| format!("{} is not the one that matdb makes", named(one))).collect())
     }
 
-    /// Every table, index, trigger or view that somebody has added, a clause each with the way to remove it.
+    /// Every table, index, trigger or view that is not of this program, as a clause each with the way to remove it.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -39,7 +39,7 @@ impl Store {
             .collect())
     }
 
-    /// What this program makes, and what is in the file.
+    /// The schema of this program, and that of the file.
     fn schemas(&self) -> Result<[Vec<[Option<String>; 4]>; 2], StoreError> {
         let own = connect::in_memory()?;
         Ok([schema(&own).in_file(&self.path)?, schema(&self.conn).in_file(&self.path)?])

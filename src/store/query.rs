@@ -1,9 +1,9 @@
-//! Reading materials by their names.
+//! Reads materials by their names.
 
 use super::database::Store;
 use super::error::{InFile, StoreError};
 use super::find::Filter;
-use super::record::{RevisionSummary, Stored, Summary};
+use super::record::{RevisionSummary, StoredRevision, Summary};
 use super::{damage, read};
 use crate::brdf::Brdf;
 use crate::material::Slug;
@@ -26,12 +26,15 @@ impl Store {
         read::licences(&self.conn).in_file(&self.path)
     }
 
-    /// One revision of a material, or the current one; `None` when there is no such material, or it never had that
-    /// revision.
+    /// One revision of a material, or the current one. `None` when the material or the revision does not exist.
     ///
     /// # Errors
     /// When the file cannot be read, holds something else than was stored, or has lost the revision.
-    pub fn get(&self, slug: &Slug, revision: Option<u32>) -> Result<Option<Stored>, StoreError> {
+    pub fn get(
+        &self,
+        slug: &Slug,
+        revision: Option<u32>,
+    ) -> Result<Option<StoredRevision>, StoreError> {
         let stored = read::get(&self.conn, slug, revision).in_file(&self.path)?;
         match stored {
             Some(stored) if stored.material.content_hash() != stored.content_hash => {
@@ -43,7 +46,15 @@ impl Store {
         }
     }
 
-    /// Those of some materials that are there, sound or damaged, sorted.
+    /// Number of the revision before one of a material; `None` for the first. A number between the two may be missing.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn revision_before(&self, slug: &Slug, revision: u32) -> Result<Option<u32>, StoreError> {
+        read::revision_before(&self.conn, slug, revision).in_file(&self.path)
+    }
+
+    /// Which of these materials the database has, sound or damaged, sorted.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -60,9 +71,9 @@ impl Store {
         read::rendered(&self.conn, slug).in_file(&self.path)
     }
 
-    /// Statistics by angle of a curve of a revision, or of the current one, as they were computed when
-    /// it was added; none for a curve or revision that is not there, for a curve without backscatter, or
-    /// with points above the instrument's range, and for what an older program stored.
+    /// Statistics by angle of a curve of one revision, or of the current one, computed when it was added. Empty when
+    /// the curve or the revision does not exist, has no backscatter or has points above the instrument's range, or
+    /// when an older program stored it.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -75,8 +86,8 @@ impl Store {
         read::statistics(&self.conn, slug, revision, curve).in_file(&self.path)
     }
 
-    /// What is wrong with the file as such, a sentence each: damaged pages and indexes, references to
-    /// nothing, and what lists and searches say without being so.
+    /// Every problem of the file as such, as a sentence each: damaged pages and indexes, references to missing rows,
+    /// and wrong rows of lists and searches.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -84,7 +95,7 @@ impl Store {
         damage::damage(&self.conn).in_file(&self.path)
     }
 
-    /// Whether there is a material of that name, sound or damaged.
+    /// Whether a material of that name exists, sound or damaged.
     ///
     /// # Errors
     /// When the file cannot be read.

@@ -1,4 +1,4 @@
-//! Rows to plain types.
+//! Reads rows as plain types.
 
 mod provenance;
 
@@ -10,7 +10,8 @@ use rusqlite::{
     Connection, Error, OptionalExtension, Result, Row, Transaction, TransactionBehavior, params,
 };
 
-use super::record::{RevisionSummary, Stored};
+use super::law;
+use super::record::{RevisionSummary, StoredRevision};
 use super::rows::{json, optional_json, rows};
 use crate::brdf::Brdf;
 use crate::formats::EffectEntry;
@@ -39,15 +40,22 @@ pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSumm
     Ok(history)
 }
 
-/// Number of the current revision of a material, found by looking through all of them: a damaged index cannot
-/// hide it. `None` when there is none of that name.
+/// Number of the current revision of a material. Scans the table, so that a damaged index cannot hide it. `None` when
+/// the material does not exist.
 pub(super) fn current_revision(conn: &Connection, slug: &Slug) -> Result<Option<u32>> {
     conn.prepare_cached("SELECT current_revision FROM material NOT INDEXED WHERE slug = ?1")?
         .query_row([slug.as_str()], |row| row.get(0))
         .optional()
 }
 
-/// Those of some materials that are there, found by looking once through all of them.
+/// The greatest number of a revision of a material below this one.
+pub(super) fn revision_before(conn: &Connection, slug: &Slug, number: u32) -> Result<Option<u32>> {
+    let sql = "SELECT max(number) FROM revision JOIN material ON material.id = material_id
+               WHERE slug = ?1 AND number < ?2";
+    conn.query_row(sql, params![slug.as_str(), number], |row| row.get(0))
+}
+
+/// Which of these materials the database has, by one scan of the table.
 pub(super) fn present(conn: &Connection, slugs: &[Slug]) -> Result<Vec<Slug>> {
     let wanted = serde_json::json!(slugs).to_string();
     let sql = "SELECT slug FROM material NOT INDEXED
@@ -55,7 +63,7 @@ pub(super) fn present(conn: &Connection, slugs: &[Slug]) -> Result<Vec<Slug>> {
     rows(conn, sql, [wanted], |row| row.get(0))
 }
 
-/// Fails when a material of which nothing was found is there after all.
+/// Fails when a material exists of which an index has found nothing.
 pub(super) fn check_absent(conn: &Connection, slug: &Slug) -> Result<()> {
     match current_revision(conn, slug)? {
         None => Ok(()),
@@ -63,7 +71,7 @@ pub(super) fn check_absent(conn: &Connection, slug: &Slug) -> Result<()> {
     }
 }
 
-/// The error for a revision that must be there and is not.
+/// The error for a missing revision that must exist.
 fn missing(slug: &Slug, number: u32) -> Error {
     damaged(format!("`{slug}` is there, but its revision {number} is not"))
 }
@@ -82,8 +90,12 @@ pub(super) fn licences(conn: &Connection) -> Result<Vec<String>> {
 }
 
 /// One revision of a material, or the current one.
-pub(super) fn get(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result<Option<Stored>> {
-    // All rows from one moment, whoever writes meanwhile.
+pub(super) fn get(
+    conn: &Connection,
+    slug: &Slug,
+    number: Option<u32>,
+) -> Result<Option<StoredRevision>> {
+    // One transaction: another program may write meanwhile.
     let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
     get_in(&tx, slug, number)
 }
@@ -93,9 +105,9 @@ pub(super) fn get_in(
     conn: &Connection,
     slug: &Slug,
     number: Option<u32>,
-) -> Result<Option<Stored>> {
+) -> Result<Option<StoredRevision>> {
     let Some((revision_id, mut stored)) = revision(conn, slug, number)? else {
-        // A material has its current revision, but not every number before: what was damaged is passed over.
+        // The current revision must exist. A number before it may be missing.
         return match current_revision(conn, slug)? {
             Some(current) if number.is_none_or(|wanted| wanted == current) => {
                 Err(missing(slug, current))
@@ -114,7 +126,7 @@ pub(super) fn get_in(
     Ok(Some(stored))
 }
 
-/// What scenes render of the current revision, and the angles at which it answers, rad.
+/// The model that scenes render of the current revision, and its range of angles, rad.
 pub(super) fn rendered(conn: &Connection, slug: &Slug) -> Result<Option<(Brdf, [f64; 2])>> {
     let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
     let found = rendered_in(&tx, slug)?;
@@ -124,7 +136,7 @@ pub(super) fn rendered(conn: &Connection, slug: &Slug) -> Result<Option<(Brdf, [
     Ok(found.and_then(|(model, theta_rad)| Some((model?, theta_rad))))
 }
 
-/// The same within a transaction; no model where no curve can be made of it.
+/// As [`rendered`], within a transaction. No model where the rendered curve cannot be interpolated.
 pub(super) fn rendered_in(
     conn: &Connection,
     slug: &Slug,
@@ -138,12 +150,13 @@ pub(super) fn rendered_in(
         .prepare_cached(sql)?
         .query_row([slug.as_str()], |row| {
             let (revision_id, render): (i64, String) = (row.get(0)?, row.get(1)?);
-            Ok((revision_id, render, [row.get(2)?, row.get(3)?], optional_json(row, 4)?))
+            let structure: Option<String> = row.get(4)?;
+            Ok((revision_id, render, [row.get(2)?, row.get(3)?], structure))
         })
         .optional()?;
-    let Some((revision_id, render, theta_rad, model)) = found else { return Ok(None) };
-    if let Some(mut model) = model {
-        parameters(conn, revision_id, &render, &mut model)?;
+    let Some((revision_id, render, theta_rad, structure)) = found else { return Ok(None) };
+    if let Some(structure) = structure {
+        let (model, _) = law::read(conn, revision_id, &render, &structure)?;
         return Ok(Some((Some(model), theta_rad)));
     }
     let curve = curves(conn, revision_id, Some(&render))?.pop();
@@ -152,7 +165,11 @@ pub(super) fn rendered_in(
 }
 
 /// A revision's own row, or that of the current one, and its number in the file.
-fn revision(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result<Option<(i64, Stored)>> {
+fn revision(
+    conn: &Connection,
+    slug: &Slug,
+    number: Option<u32>,
+) -> Result<Option<(i64, StoredRevision)>> {
     let sql = "
         SELECT slug, name, class, description, licence, tags, frequency_min_hz, frequency_max_hz,
             theta_min_rad, theta_max_rad, render, number, content_hash, added_at, program_version,
@@ -164,8 +181,8 @@ fn revision(conn: &Connection, slug: &Slug, number: Option<u32>) -> Result<Optio
         .optional()
 }
 
-/// A revision's own row; what hangs on it is still missing.
-fn stored(row: &Row) -> Result<Stored> {
+/// A revision by its own row, without the rows of other tables.
+fn stored(row: &Row) -> Result<StoredRevision> {
     let material = Material {
         slug: row.get(0)?,
         name: row.get(1)?,
@@ -190,7 +207,7 @@ fn stored(row: &Row) -> Result<Stored> {
         sessions: Vec::new(),
         findings: Vec::new(),
     };
-    Ok(Stored {
+    Ok(StoredRevision {
         material,
         revision: row.get(11)?,
         content_hash: row.get(12)?,
@@ -200,7 +217,7 @@ fn stored(row: &Row) -> Result<Stored> {
     })
 }
 
-/// Three columns: the word, the reason, what has taken its place.
+/// Reads a status from three columns: word, reason, successor.
 fn status(row: &Row, column: usize) -> Result<Status> {
     let word: String = row.get(column)?;
     let (reason, by) = (row.get(column + 1)?, row.get(column + 2)?);
@@ -261,8 +278,8 @@ pub(super) fn fits(conn: &Connection, revision_id: i64) -> Result<Vec<Fit>> {
                WHERE revision_id = ?1 ORDER BY position";
     rows(conn, sql, [revision_id], |row| {
         let name: String = row.get(0)?;
-        let mut model: Brdf = json(row, 1)?;
-        let parameter_sources = parameters(conn, revision_id, &name, &mut model)?;
+        let structure: String = row.get(1)?;
+        let (model, parameter_sources) = law::read(conn, revision_id, &name, &structure)?;
         let covariance = covariance(conn, revision_id, &name)?;
         Ok(Fit {
             name,
@@ -275,27 +292,6 @@ pub(super) fn fits(conn: &Connection, revision_id: i64) -> Result<Vec<Fit>> {
             report: optional_json(row, 5)?,
         })
     })
-}
-
-/// Sets a model's parameters and gives those with a source of their own, sorted by path.
-fn parameters(
-    conn: &Connection,
-    revision_id: i64,
-    fit: &str,
-    model: &mut Brdf,
-) -> Result<Vec<(String, String)>> {
-    let sql = "SELECT path, value, source FROM fit_parameter
-               WHERE revision_id = ?1 AND fit = ?2 ORDER BY path";
-    let sources = rows(conn, sql, params![revision_id, fit], |row| {
-        let path: String = row.get(0)?;
-        if !model.set_parameter(&path, row.get(1)?) {
-            let problem = format!("the model of fit `{fit}` has no parameter `{path}`");
-            return Err(Error::FromSqlConversionFailure(0, Type::Text, problem.into()));
-        }
-        let source: Option<String> = row.get(2)?;
-        Ok(source.map(|source| (path, source)))
-    })?;
-    Ok(sources.into_iter().flatten().collect())
 }
 
 fn covariance(conn: &Connection, revision_id: i64, fit: &str) -> Result<Option<Covariance>> {

@@ -1,17 +1,17 @@
-//! Plain data that the database gives back: revisions, lines of lists, and results of writing.
+//! Plain data that the database returns: revisions, rows of lists, and results of writing.
 
 use crate::material::{Activity, Material, Slug, SourceKind};
 
-/// What adding a material did.
+/// Result of adding a material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Added {
-    /// There was none of that name: this is revision 1.
+    /// The material is new and has revision 1.
     New,
-    /// It differs from the current revision and became the revision of this number.
+    /// It differs from the current revision and is now the revision of this number.
     Revision(u32),
-    /// It is what the current revision, of this number, already says.
+    /// It equals the current revision, which has this number.
     Unchanged(u32),
-    /// It is what the current revision, of this number, was, whose rows were damaged: they were written anew.
+    /// It has the hash of the current revision, which has this number. The rows were damaged and have been rewritten.
     Repaired(u32),
 }
 
@@ -27,7 +27,7 @@ impl Added {
 
 /// One revision of a material, as stored.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stored {
+pub struct StoredRevision {
     /// The material.
     pub material: Material,
     /// Its revision, from 1.
@@ -38,11 +38,11 @@ pub struct Stored {
     pub added_at: String,
     /// Version of the program that added it.
     pub program_version: String,
-    /// Which command made it of what; none where that was not recorded.
+    /// The command that made it and its inputs; none where that was not recorded.
     pub activity: Option<Activity>,
 }
 
-/// A line of [`Store::history`](crate::store::Store::history).
+/// One entry of [`Store::history`](crate::store::Store::history).
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct RevisionSummary {
     /// Its number, from 1.
@@ -51,23 +51,23 @@ pub struct RevisionSummary {
     pub added_at: String,
     /// Version of the program that added it.
     pub program_version: String,
-    /// Title of somebody else's catalogue that it was taken from.
+    /// Title of the catalogue from which it was imported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub origin: Option<String>,
 }
 
-/// A line of [`Store::list`](crate::store::Store::list).
+/// One entry of [`Store::list`](crate::store::Store::list).
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Summary {
     /// Short name.
     pub slug: Slug,
     /// Full name.
     pub name: String,
-    /// Kind of stuff.
+    /// Class, such as `polymer`.
     pub class: String,
     /// Current revision, from 1.
     pub revision: u32,
-    /// How the numbers that a scene renders came to be.
+    /// Kind of the source of what scenes render.
     pub render_kind: SourceKind,
     /// `active`, `superseded` or `withdrawn`.
     pub status: String,
@@ -79,7 +79,7 @@ pub struct Summary {
     pub fits: u32,
 }
 
-/// What [`Store::remove`](crate::store::Store::remove) took away.
+/// Result of [`Store::remove`](crate::store::Store::remove).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Removed {
     /// Number of revisions.

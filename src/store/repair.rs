@@ -1,52 +1,51 @@
-//! Mending a damaged file as far as what is lost follows from what is left, or from content that is at hand.
+//! Repairs a damaged file as far as lost rows follow from the remaining ones, or from content that is at hand.
 
 use rusqlite::{Connection, Result, Transaction, params};
 
-use super::again::Again;
 use super::damage::damage;
 use super::database::Store;
 use super::error::{InFile, StoreError};
-use super::record::Stored;
+use super::record::StoredRevision;
+use super::row_check::RowCheck;
 use super::rows::rows;
 use super::tables::{schema, unit_rows};
-use super::{read, write};
+use super::{law, read, write};
 use crate::material::{Material, Slug};
 
-/// What [`Store::repair`] did, a sentence each.
+/// Result of [`Store::repair`], a sentence each.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Repair {
-    /// What was mended; nothing where nothing was damaged.
+    /// Repaired damage; empty when nothing was damaged.
     pub mended: Vec<String>,
-    /// What could not be mended, and why.
+    /// Steps that failed, and why.
     pub failed: Vec<String>,
 }
 
 impl Store {
-    /// Mends what can be, in one transaction. Nothing that was measured or fitted is removed.
-    ///
-    /// Indexes, views, units, lists, searches and statistics are made anew from the content of revisions. A revision
-    /// whose content is damaged is written anew if one of `at_hand` has its hash. A material whose own row is lost
-    /// comes back from what lists say of it, if its content has the hash that was stored. A material that has lost
-    /// its current revision gets the latest one that is there as a further revision, so that no number comes to mean
-    /// something else. [`Store::damage`] and the hashes of [`Store::get`] tell what is left.
+    /// Repairs what can be repaired, in one transaction. Removes nothing that was measured or fitted.
+    /// Rebuilds indexes, views, units, lists, searches and statistics from the content of revisions. Rewrites a
+    /// revision with damaged content if one of `at_hand` has its hash. Restores the lost row of a material from its
+    /// row in the lists, if the content then has the stored hash. Where the current revision of a material is lost,
+    /// repeats the latest sound one under a new number, so that no number changes its meaning. [`Store::damage`] and
+    /// the hashes of [`Store::get`] show the remaining damage.
     ///
     /// # Errors
-    /// When the file cannot be written, or is so damaged that SQLite cannot go through it.
+    /// When the file cannot be written, or SQLite cannot read it to the end.
     pub fn repair(&mut self, at_hand: &[Material]) -> std::result::Result<Repair, StoreError> {
-        let mut again = Again::new()?;
+        let mut row_check = RowCheck::new()?;
         let Store { conn, path, .. } = self;
-        repair(conn, &mut again, at_hand).in_file(path)
+        repair(conn, &mut row_check, at_hand).in_file(path)
     }
 }
 
-fn repair(conn: &mut Connection, again: &mut Again, at_hand: &[Material]) -> Result<Repair> {
+fn repair(conn: &mut Connection, row_check: &mut RowCheck, at_hand: &[Material]) -> Result<Repair> {
     let tx = conn.transaction()?;
     tx.pragma_update(None, "defer_foreign_keys", true)?;
     let before = damage(&tx)?;
     let mut repair = Repair::default();
-    repair.attempt(&tx, "tables, indexes and views", || own_schema(&tx, again))?;
+    repair.attempt(&tx, "tables, indexes and views", || own_schema(&tx, row_check))?;
     repair.attempt(&tx, "indexes", || tx.execute_batch("REINDEX").map(|()| Vec::new()))?;
-    repair.attempt(&tx, "units of columns", || units(&tx, again))?;
+    repair.attempt(&tx, "units of columns", || units(&tx, row_check))?;
     repair.attempt(&tx, "materials without a row", || lost_materials(&tx))?;
     repair.attempt(&tx, "lists", || unreachable_lines(&tx))?;
     let mut slugs = Vec::new();
@@ -58,7 +57,7 @@ fn repair(conn: &mut Connection, again: &mut Again, at_hand: &[Material]) -> Res
         }
     }
     for slug in &slugs {
-        repair.attempt(&tx, slug.as_str(), || revisions(&tx, again, slug, at_hand))?;
+        repair.attempt(&tx, slug.as_str(), || revisions(&tx, row_check, slug, at_hand))?;
         repair.attempt(&tx, slug.as_str(), || lost_current_revision(&tx, slug))?;
     }
     repair.attempt(&tx, "lists and searches", || lists(&tx, &slugs))?;
@@ -70,7 +69,7 @@ fn repair(conn: &mut Connection, again: &mut Again, at_hand: &[Material]) -> Res
 }
 
 impl Repair {
-    /// Takes one step, which is taken back by itself where it fails.
+    /// Takes one step. A step that fails is undone alone.
     fn attempt(
         &mut self,
         tx: &Transaction,
@@ -91,17 +90,16 @@ impl Repair {
     }
 }
 
-/// Makes indexes, views and triggers anew that are missing or others, and tables that are missing; other tables stay
-/// as they are.
-fn own_schema(tx: &Transaction, again: &Again) -> Result<Vec<String>> {
+/// Creates missing tables, and indexes, views and triggers that are missing or different. Existing tables stay.
+fn own_schema(tx: &Transaction, row_check: &RowCheck) -> Result<Vec<String>> {
     let there = schema(tx)?;
-    let mut own = schema(again.scratch())?;
-    // An index or a view needs its table.
+    let mut own = schema(row_check.scratch())?;
+    // An index needs its table.
     own.sort_by_key(|[kind, ..]| kind.as_deref() != Some("table"));
     let mut mended = Vec::new();
     for object in own {
         let [Some(kind), Some(name), _, Some(sql)] = &object else { continue };
-        // Tables of the full-text index come with it.
+        // The full-text index creates its own tables.
         let is_shadow = name.starts_with("search_") && kind == "table";
         let is_kept_table = kind == "table" && there.iter().any(|other| other[1] == object[1]);
         if is_shadow || is_kept_table || there.contains(&object) {
@@ -116,9 +114,9 @@ fn own_schema(tx: &Transaction, again: &Again) -> Result<Vec<String>> {
     Ok(mended)
 }
 
-/// Writes the units of columns anew where they are others.
-fn units(tx: &Transaction, again: &Again) -> Result<Vec<String>> {
-    let own = unit_rows(again.scratch())?;
+/// Rewrites the units of columns where they differ.
+fn units(tx: &Transaction, row_check: &RowCheck) -> Result<Vec<String>> {
+    let own = unit_rows(row_check.scratch())?;
     if unit_rows(tx)? == own {
         return Ok(Vec::new());
     }
@@ -129,7 +127,7 @@ fn units(tx: &Transaction, again: &Again) -> Result<Vec<String>> {
     Ok(vec!["units of columns were written anew".to_owned()])
 }
 
-/// Brings back materials whose own row is lost, by the name and the number that lists have of them.
+/// Restores lost rows of materials, by the name and the number in the lists.
 fn lost_materials(tx: &Transaction) -> Result<Vec<String>> {
     let sql = "SELECT material_id, slug, revision FROM entry
                WHERE material_id NOT IN (SELECT id FROM material)
@@ -143,7 +141,7 @@ fn lost_materials(tx: &Transaction) -> Result<Vec<String>> {
             "INSERT INTO material (id, slug, current_revision) VALUES (?1, ?2, ?3)",
             params![id, name, number],
         )?;
-        // The hash is of the content with its name: a wrong name is no answer.
+        // The hash covers the name: a wrong name is not restored.
         let slug = name.parse::<Slug>().ok();
         let stored = slug.and_then(|slug| read::get_in(tx, &slug, None).ok().flatten());
         if stored.is_some_and(|stored| stored.material.content_hash() == stored.content_hash) {
@@ -156,7 +154,7 @@ fn lost_materials(tx: &Transaction) -> Result<Vec<String>> {
     Ok(mended)
 }
 
-/// Removes lines of lists and searches that are of no material, and of which nothing can come back.
+/// Removes rows of lists and searches without a material or revision.
 fn unreachable_lines(tx: &Transaction) -> Result<Vec<String>> {
     let condition = "NOT IN (SELECT id FROM material)";
     let of_no_revision = "AND material_id NOT IN (SELECT material_id FROM revision)";
@@ -171,7 +169,7 @@ fn unreachable_lines(tx: &Transaction) -> Result<Vec<String>> {
         .collect())
 }
 
-/// Gives a material that has lost its current revision the latest sound one that is there, as a further revision.
+/// Where the current revision of a material is lost, repeats the latest sound one as a new revision.
 fn lost_current_revision(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
     let sql = "SELECT current_revision FROM material WHERE slug = ?1 AND NOT EXISTS
                (SELECT 1 FROM revision WHERE material_id = material.id AND number = current_revision)";
@@ -183,8 +181,9 @@ fn lost_current_revision(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
     for number in numbers {
         let stored = read::get_in(tx, slug, Some(number)).ok().flatten();
         let sound = stored.filter(|stored| stored.material.content_hash() == stored.content_hash);
-        if let Some(Stored { material, activity, .. }) = sound {
-            let added = write::Adding::new(tx).add(&material, activity.as_ref())?.revision();
+        if let Some(StoredRevision { material, activity, .. }) = sound {
+            let added =
+                write::MaterialWriter::new(tx).add(&material, activity.as_ref())?.revision();
             return Ok(vec![format!(
                 "`{slug}` has lost its revision {lost}; revision {added} repeats revision {number}"
             )]);
@@ -193,10 +192,10 @@ fn lost_current_revision(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
     Ok(Vec::new())
 }
 
-/// Writes revisions of a material anew that are not what their hash says or whose other rows do not follow.
+/// Rewrites revisions of a material with another content than their hash says, or with wrong derived rows.
 fn revisions(
     tx: &Transaction,
-    again: &mut Again,
+    row_check: &mut RowCheck,
     slug: &Slug,
     at_hand: &[Material],
 ) -> Result<Vec<String>> {
@@ -206,29 +205,57 @@ fn revisions(
         rows(tx, sql, [slug.as_str()], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
     let mut mended = Vec::new();
     for (id, number, hash) in listed {
+        let place = format!("`{slug}@{number}`");
         let stored = read::get_in(tx, slug, Some(number)).ok().flatten();
-        let stored = stored.filter(|stored| stored.material.content_hash() == hash);
-        let content = match &stored {
-            Some(stored) if again.compare(tx, stored)?.is_empty() => continue,
-            Some(Stored { material, .. }) => Some(material),
-            None => at_hand.iter().find(|material| material.content_hash() == hash),
-        };
-        let Some(content) = content else { continue };
-        write::rewrite(tx, id, content)?;
-        mended.push(format!("`{slug}@{number}` was written anew"));
+        if let Some(stored) = stored {
+            if stored.material.content_hash() == hash {
+                if !row_check.compare(tx, &stored)?.is_empty() {
+                    write::rewrite(tx, id, &stored.material)?;
+                    mended.push(format!("{place} was written anew"));
+                }
+                continue;
+            }
+            let by_structure = with_values_of_structure(tx, id, stored.material)?;
+            if by_structure.content_hash() == hash {
+                write::rewrite(tx, id, &by_structure)?;
+                mended.push(format!(
+                    "{place} was written anew with the values in `fit.model`: its hash covers them, and not those \
+                     in `fit_parameter`"
+                ));
+                continue;
+            }
+        }
+        if let Some(content) = at_hand.iter().find(|material| material.content_hash() == hash) {
+            write::rewrite(tx, id, content)?;
+            mended.push(format!("{place} was written anew"));
+        }
     }
     Ok(mended)
 }
 
-/// Makes all that materials are found by anew; a material that cannot be read keeps the lines that it has.
+/// A revision with the values that migration 11 has left in `fit.model` instead of those in `fit_parameter`.
+fn with_values_of_structure(
+    tx: &Transaction,
+    revision_id: i64,
+    mut material: Material,
+) -> Result<Material> {
+    for (name, model) in law::left_in_structure(tx, revision_id)? {
+        for fit in material.fits.iter_mut().filter(|fit| fit.name == name) {
+            fit.model = model.clone();
+        }
+    }
+    Ok(material)
+}
+
+/// Rebuilds lists and searches. A material that cannot be read keeps its rows there.
 fn lists(tx: &Transaction, slugs: &[Slug]) -> Result<Vec<String>> {
     tx.execute("INSERT INTO search (search) VALUES ('rebuild')", [])?;
-    let mut adding = write::Adding::new(tx);
+    let mut adding = write::MaterialWriter::new(tx);
     for slug in slugs {
         let Ok(Some(stored)) = read::get_in(tx, slug, None) else { continue };
         let sql = "SELECT id FROM material WHERE slug = ?1";
         let material_id = tx.query_row(sql, [slug.as_str()], |row| row.get(0))?;
-        adding.find_by(material_id, &stored.material)?;
+        adding.queue(material_id, &stored.material)?;
     }
     adding.finish().map(|()| Vec::new())
 }

@@ -1,4 +1,4 @@
-//! Rows and columns to plain values.
+//! Reads rows and columns as plain values.
 
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, Type, ValueRef};
 use rusqlite::{Connection, Error, Params, Result, Row};
@@ -29,12 +29,13 @@ pub(super) fn optional_json<T: DeserializeOwned>(row: &Row, column: usize) -> Re
     text.map(|text| parsed(&text, column)).transpose()
 }
 
-fn parsed<T: DeserializeOwned>(text: &str, column: usize) -> Result<T> {
+/// A value of JSON that stands in a column.
+pub(super) fn parsed<T: DeserializeOwned>(text: &str, column: usize) -> Result<T> {
     serde_json::from_str(text)
         .map_err(|error| Error::FromSqlConversionFailure(column, Type::Text, error.into()))
 }
 
-/// A value that files and the database write as one word.
+/// Reads a value that files and the database write as one word.
 fn word<'de, T: Deserialize<'de>>(value: ValueRef<'de>) -> FromSqlResult<T> {
     T::deserialize(StrDeserializer::<WordError>::new(value.as_str()?)).map_err(FromSqlError::other)
 }

@@ -1,4 +1,4 @@
--- The latest schema in one piece, written by a test: see `FRESH` in connect.rs. Change
+-- The latest schema in one piece, written by a test: see `LATEST_SCHEMA` in connect.rs. Change
 -- migrations/ instead.
 
 CREATE TABLE material (
@@ -366,23 +366,6 @@ CREATE TABLE effect_parameter (
     FOREIGN KEY (revision_id, effect) REFERENCES effect (revision_id, name) ON DELETE CASCADE
 ) STRICT, WITHOUT ROWID;
 
-CREATE TABLE fit_estimate (
-    revision_id INTEGER NOT NULL,
-    fit         TEXT    NOT NULL,
-    position    INTEGER NOT NULL,
-    name        TEXT    NOT NULL,                                   -- a parameter's path, S, R, looks
-    value       REAL    NOT NULL,                                   -- in `unit`
-    unit        TEXT    NOT NULL,                                   -- UCUM code
-    sd          REAL    CHECK (sd >= 0),                            -- NULL: not told by itself
-    low_95      REAL,
-    high_95     REAL    CHECK (high_95 >= low_95),
-    chosen_by   TEXT    NOT NULL CHECK (chosen_by IN ('data', 'hand', 'convention')),
-    at_bound    INTEGER NOT NULL CHECK (at_bound IN (0, 1)),
-    identified  INTEGER NOT NULL CHECK (identified IN (0, 1)),
-    PRIMARY KEY (revision_id, fit, position),
-    FOREIGN KEY (revision_id, fit) REFERENCES fit (revision_id, name) ON DELETE CASCADE
-) STRICT, WITHOUT ROWID;
-
 CREATE VIEW entry_made AS
 SELECT slug, material.id AS material_id, number AS revision, name, class, status,
     (SELECT kind FROM source JOIN (
@@ -454,6 +437,32 @@ CREATE VIRTUAL TABLE search USING fts5 (
     slug, name, class, tags, description, finish, unknown, sources,
     tokenize = 'unicode61 remove_diacritics 2', prefix = '2 3 4'
 );
+
+CREATE TABLE fit_number (
+    revision_id INTEGER NOT NULL,
+    fit         TEXT    NOT NULL,
+    position    INTEGER NOT NULL,
+    name        TEXT    NOT NULL,                                   -- a parameter's path, S, R, looks
+    estimate    TEXT    CHECK (estimate GLOB '$.estimates[[]*]'),   -- JSON path in `fit.report`
+    chosen_by   TEXT    NOT NULL CHECK (chosen_by IN ('data', 'hand', 'convention')),
+    at_bound    INTEGER NOT NULL CHECK (at_bound IN (0, 1)),
+    PRIMARY KEY (revision_id, fit, position),
+    CHECK ((estimate IS NULL) = (chosen_by <> 'data')),
+    FOREIGN KEY (revision_id, fit) REFERENCES fit (revision_id, name) ON DELETE CASCADE
+) STRICT, WITHOUT ROWID;
+
+CREATE VIEW fit_estimate AS
+SELECT n.revision_id AS revision_id, n.fit AS fit, n.position AS position, n.name AS name,
+    CAST(coalesce(p.value, json_extract(report, estimate || '.value')) AS REAL) AS value,
+    coalesce(p.unit, '1') AS unit,
+    CAST(json_extract(report, estimate || '.sd') AS REAL) AS sd,
+    CAST(json_extract(report, estimate || '.interval_95[0]') AS REAL) AS low_95,
+    CAST(json_extract(report, estimate || '.interval_95[1]') AS REAL) AS high_95,
+    chosen_by, at_bound,
+    CAST(at_bound = 0 AND json_extract(report, estimate || '.sd') IS NOT NULL AS INTEGER) AS identified
+FROM fit_number AS n
+JOIN fit ON fit.revision_id = n.revision_id AND fit.name = n.fit
+LEFT JOIN fit_parameter AS p ON p.revision_id = n.revision_id AND p.fit = n.fit AND p.path = n.name;
 
 INSERT INTO unit VALUES ('aperture_m', 'm', 'diameter of the antenna');
 

@@ -1,20 +1,21 @@
-//! The file as plain tables, whatever tables a schema has: what exports read.
+//! The database as plain tables, for exports of any schema.
 
 use rusqlite::types::ValueRef;
 use rusqlite::{Connection, Result};
 
 use super::database::Store;
 use super::error::{InFile, StoreError};
+use super::law;
 use super::rows::rows;
 
-/// A table as it stands in the file.
+/// A table of the database.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Table {
     /// Its name.
     pub name: String,
     /// Its columns, in order.
     pub columns: Vec<Column>,
-    /// Names of the columns that tell rows apart and in whose order rows come.
+    /// Names of the key columns, by which rows are sorted.
     pub key: Vec<String>,
     /// References to other tables.
     pub references: Vec<Reference>,
@@ -67,16 +68,17 @@ pub enum Cell<'a> {
 }
 
 impl Store {
-    /// Every table that holds materials, sorted by name; those of indexes, whether SQLite keeps them for
-    /// itself or the program as [`Store::outlines`], are left out.
+    /// Every table that holds materials, sorted by name. Indexes are left out, both those of SQLite and those of
+    /// the program, such as [`Store::outlines`]. The view `fit_estimate` replaces the table that it is made of.
     ///
     /// # Errors
     /// When the file cannot be read.
     pub fn tables(&self) -> Result<Vec<Table>, StoreError> {
-        tables(&self.conn).in_file(&self.path)
+        readable_tables(&self.conn).in_file(&self.path)
     }
 
-    /// Gives every row of a table to `take`, in the order of the table's key, one at a time.
+    /// Gives every row of a table to `take`, in the order of the table's key, one at a time. The model of a fit
+    /// comes with the values of its parameters.
     ///
     /// # Errors
     /// When the file cannot be read, and the first of `take`.
@@ -91,7 +93,12 @@ impl Store {
         while let Some(row) = rows.next().in_file(&self.path)? {
             let cells: Result<Vec<Cell>> =
                 (0..table.columns.len()).map(|index| cell(row.get_ref(index)?)).collect();
-            take(&cells.in_file(&self.path)?)?;
+            let mut cells = cells.in_file(&self.path)?;
+            let model = model(&self.conn, table, &cells).in_file(&self.path)?;
+            if let (Some(model), Some(cell)) = (&model, cells.get_mut(MODEL)) {
+                *cell = Cell::Text(model);
+            }
+            take(&cells)?;
         }
         Ok(())
     }
@@ -99,7 +106,7 @@ impl Store {
 
 /// Kind, name, table and statement of everything in the file.
 pub(super) fn schema(conn: &Connection) -> Result<Vec<[Option<String>; 4]>> {
-    // What ANALYZE leaves helps to find rows and answers nothing.
+    // Tables of ANALYZE help to find rows and have no content.
     let sql = "SELECT type, name, tbl_name, sql FROM sqlite_schema
                WHERE name NOT LIKE 'sqlite\\_stat%' ESCAPE '\\' ORDER BY type, name";
     conn.prepare(sql)?
@@ -116,6 +123,36 @@ pub(super) fn tables(conn: &Connection) -> Result<Vec<Table>> {
     names.into_iter().map(|name| table(conn, name)).collect()
 }
 
+/// The tables with `fit_estimate` in the place of `fit_number`.
+fn readable_tables(conn: &Connection) -> Result<Vec<Table>> {
+    let mut tables = tables(conn)?;
+    for numbers in tables.iter_mut().filter(|table| table.name == "fit_number") {
+        let mut estimates = table(conn, "fit_estimate".to_owned())?;
+        for column in &mut estimates.columns {
+            column.required = !["sd", "low_95", "high_95"].contains(&column.name.as_str());
+        }
+        // SQLite does not say this of a view.
+        estimates.key.clone_from(&numbers.key);
+        estimates.references.clone_from(&numbers.references);
+        *numbers = estimates;
+    }
+    Ok(tables)
+}
+
+/// Place of the column `model` in the table `fit`.
+const MODEL: usize = 3;
+
+/// The model of a row of `fit` as JSON with the values of its parameters; `None` for other tables.
+fn model(conn: &Connection, table: &Table, cells: &[Cell]) -> Result<Option<String>> {
+    match (table.name.as_str(), cells) {
+        ("fit", [Cell::Integer(revision_id), _, Cell::Text(fit), Cell::Text(structure), ..]) => {
+            let (model, _) = law::read(conn, *revision_id, fit, structure)?;
+            law::text(&model).map(Some)
+        }
+        _ => Ok(None),
+    }
+}
+
 fn table(conn: &Connection, name: String) -> Result<Table> {
     let sql =
         "SELECT name, type, \"notnull\" OR pk > 0, pk FROM pragma_table_info(?1) ORDER BY cid";
@@ -123,7 +160,7 @@ fn table(conn: &Connection, name: String) -> Result<Table> {
         .prepare(sql)?
         .query_map([&name], |row| {
             let kind = match row.get::<_, String>(1)?.as_str() {
-                "INTEGER" => ColumnKind::Integer,
+                "INTEGER" | "INT" => ColumnKind::Integer,
                 "REAL" => ColumnKind::Real,
                 _ => ColumnKind::Text,
             };
@@ -139,7 +176,7 @@ fn table(conn: &Connection, name: String) -> Result<Table> {
 }
 
 fn references(conn: &Connection, table: &str) -> Result<Vec<Reference>> {
-    // A reference that names no column there means the key of that table.
+    // A reference without a column means the key of that table.
     let sql = "SELECT id, \"table\", \"from\", coalesce(\"to\", 'id')
                FROM pragma_foreign_key_list(?1) ORDER BY id DESC, seq";
     let mut statement = conn.prepare(sql)?;
@@ -178,7 +215,7 @@ pub(super) fn quoted(name: &str) -> String {
 /// Tables that record who made a revision, which does not follow from its content.
 const MAKING: [&str; 4] = ["activity", "activity_input", "origin", "origin_author"];
 
-/// Whether the revision must have statistics: a program that writes them has written it.
+/// Whether the revision must have statistics: older programs did not write them.
 pub(super) fn has_statistics(conn: &Connection, revision_id: i64) -> Result<bool> {
     let sql = "SELECT EXISTS (SELECT 1 FROM activity WHERE revision_id = ?1)
                OR EXISTS (SELECT 1 FROM curve_statistic WHERE revision_id <= ?1)";
@@ -201,7 +238,8 @@ fn cell(value: ValueRef) -> Result<Cell> {
     Ok(match value {
         ValueRef::Null => Cell::Null,
         ValueRef::Integer(number) => Cell::Integer(number),
-        ValueRef::Real(number) => Cell::Real(number),
+        // A table has no −0, but JSON may.
+        ValueRef::Real(number) => Cell::Real(number + 0.0),
         ValueRef::Text(_) => Cell::Text(value.as_str()?),
         ValueRef::Blob(_) => {
             return Err(rusqlite::Error::InvalidColumnType(

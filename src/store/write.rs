@@ -1,4 +1,4 @@
-//! Plain types to rows.
+//! Writes plain types as rows.
 
 mod provenance;
 
@@ -9,38 +9,36 @@ use rusqlite::{
 use serde::Serialize;
 
 use super::find::outline::{self, OutlineEntry};
-use super::read;
 use super::record::{Added, Removed};
 use super::rows::rows;
 use super::tables::{follows_from_content, has_statistics, tables};
+use super::{law, read};
 use crate::formats::EffectEntry;
 use crate::material::{Activity, Covariance, Curve, Fit, Material, Slug};
 use crate::measure::statistics::by_angle;
 
-/// Materials of which lines are made at once.
+/// Number of materials whose rows in lists and searches are written together.
 const AT_ONCE: usize = 500;
 
-/// Materials on their way into the file, within one transaction.
-///
-/// What they are found by is made of many at once: SQLite writes the full-text index out at the end of
+/// Adds materials within one transaction.
+/// Writes the rows in lists and searches for many materials together: SQLite writes the full-text index at the end of
 /// every statement, which for one material takes longer than all its other rows.
-pub(super) struct Adding<'a> {
+pub(super) struct MaterialWriter<'a> {
     tx: &'a Transaction<'a>,
-    /// Numbers of materials whose lines are still to be made.
+    /// Row numbers of the materials that wait for their rows in lists and searches.
     waiting: Vec<i64>,
-    /// What they render.
+    /// Their outlines.
     outlines: Vec<OutlineEntry>,
 }
 
-impl<'a> Adding<'a> {
-    pub fn new(tx: &'a Transaction<'a>) -> Adding<'a> {
-        Adding { tx, waiting: Vec::new(), outlines: Vec::new() }
+impl<'a> MaterialWriter<'a> {
+    pub fn new(tx: &'a Transaction<'a>) -> MaterialWriter<'a> {
+        MaterialWriter { tx, waiting: Vec::new(), outlines: Vec::new() }
     }
 
-    /// Adds a material, or a revision to it, with what made it, and reads it back.
-    ///
-    /// What the current revision says already is not added again. Where its rows are damaged, they are written
-    /// anew: the hash that was stored with them tells that they were this content.
+    /// Adds a material, or a revision of it, with its activity, and reads it back.
+    /// Does not add the content of the current revision again. Rewrites its rows where they are damaged: the stored
+    /// hash shows that they had this content.
     pub fn add(&mut self, material: &Material, activity: Option<&Activity>) -> Result<Added> {
         let tx = self.tx;
         let content_hash = material.content_hash();
@@ -62,34 +60,34 @@ impl<'a> Adding<'a> {
             None => (Added::New, revision(tx, material, 1, &content_hash, activity)?),
         };
         read_back(tx, material, &content_hash)?;
-        self.find_by(material_id, material)?;
+        self.queue(material_id, material)?;
         Ok(added)
     }
 
-    /// Remembers a material whose lines in lists and searches are to be made.
-    pub fn find_by(&mut self, material_id: i64, material: &Material) -> Result<()> {
+    /// Queues a material for lists and searches.
+    pub fn queue(&mut self, material_id: i64, material: &Material) -> Result<()> {
         self.waiting.push(material_id);
         let (model, reach) = (material.scattering().ok(), material.reach());
         self.outlines.push(outline::line(&material.slug, model.as_ref(), reach.span_rad()));
         if self.waiting.len() >= AT_ONCE {
-            self.lines()?;
+            self.write_lists()?;
         }
         Ok(())
     }
 
-    /// Makes what is still missing.
+    /// Writes the remaining rows of lists and searches.
     pub fn finish(mut self) -> Result<()> {
-        self.lines()
+        self.write_lists()
     }
 
-    /// Makes what materials are found by anew of their current revisions.
-    fn lines(&mut self) -> Result<()> {
+    /// Rewrites the rows of the queued materials in lists and searches.
+    fn write_lists(&mut self) -> Result<()> {
         const STEPS: [&str; 5] = [
             "DELETE FROM entry WHERE material_id IN (SELECT value FROM json_each(?1))",
             "DELETE FROM search WHERE rowid IN (SELECT value FROM json_each(?1))",
             "INSERT INTO entry SELECT * FROM entry_made
              WHERE material_id IN (SELECT value FROM json_each(?1))",
-            // Through its view SQLite would look at all materials.
+            // Through its view SQLite would read all materials.
             "INSERT OR IGNORE INTO entry_tag
              SELECT slug, value FROM material
              JOIN revision ON material_id = material.id AND number = current_revision
@@ -110,18 +108,18 @@ impl<'a> Adding<'a> {
     }
 }
 
-/// Writes what the fits that an older program stored say of their numbers.
-pub(super) fn fill_estimates(tx: &Transaction) -> Result<()> {
+/// Writes the rows of `fit_number` for the fits that an older program stored.
+pub(super) fn fill_numbers(tx: &Transaction) -> Result<()> {
     let sql = "SELECT DISTINCT revision_id FROM fit WHERE report IS NOT NULL";
     let revisions: Vec<i64> = rows(tx, sql, [], |row| row.get(0))?;
     revisions.into_iter().try_for_each(|revision_id| match read::fits(tx, revision_id) {
-        // What cannot be read must not keep the rest of the file from being read.
+        // An unreadable fit must not make the whole file unreadable.
         Err(Error::FromSqlConversionFailure(..)) => Ok(()),
-        fits => fits?.iter().try_for_each(|fit| Rows { tx, revision_id }.estimates(fit)),
+        fits => fits?.iter().try_for_each(|fit| Rows { tx, revision_id }.numbers(fit)),
     })
 }
 
-/// Removes materials and all that hangs on them, all or none.
+/// Removes materials with all their rows, all or none.
 pub(super) fn remove(conn: &mut Connection, slugs: &[&Slug]) -> Result<Vec<Option<Removed>>> {
     let tx = conn.transaction()?;
     let removed = slugs.iter().map(|slug| remove_one(&tx, slug)).collect::<Result<_>>()?;
@@ -130,7 +128,7 @@ pub(super) fn remove(conn: &mut Connection, slugs: &[&Slug]) -> Result<Vec<Optio
 }
 
 fn remove_one(tx: &Transaction, slug: &Slug) -> Result<Option<Removed>> {
-    // No index is asked: what is damaged can be removed, too.
+    // Without an index, a damaged material can be removed, too.
     let sql = "SELECT id FROM material NOT INDEXED WHERE slug = ?1";
     let found = tx.query_row(sql, [slug.as_str()], |row| row.get::<_, i64>(0)).optional()?;
     let Some(material_id) = found else { return Ok(None) };
@@ -163,20 +161,20 @@ fn current(tx: &Transaction, slug: &Slug) -> Result<Option<Current>> {
         .optional()
 }
 
-/// Whether the current revision says what a material does, and its hash, too.
+/// Whether the current revision has the content of a material, and its hash.
 fn is_intact(tx: &Transaction, material: &Material, current: &Current, hash: &str) -> bool {
     current.content_hash.as_ref().is_some_and(|(_, stored)| stored == hash)
         && read_back(tx, material, hash).is_ok()
 }
 
-/// The number after that of every revision that a material has.
+/// One more than the greatest revision number of a material.
 fn next_number(tx: &Transaction, current: &Current) -> Result<u32> {
     let sql = "SELECT coalesce(max(number), 0) FROM revision NOT INDEXED WHERE material_id = ?1";
     let greatest: u32 = tx.query_row(sql, [current.material_id], |row| row.get(0))?;
     Ok(greatest.max(current.number) + 1)
 }
 
-/// Reads a material as everybody will, and fails where that is not what was to be written.
+/// Reads a material back and fails where it differs from what was written.
 fn read_back(tx: &Transaction, material: &Material, content_hash: &str) -> Result<()> {
     let slug = &material.slug;
     let problem = match read::get_in(tx, slug, None) {
@@ -188,7 +186,7 @@ fn read_back(tx: &Transaction, material: &Material, content_hash: &str) -> Resul
     Err(Error::ToSqlConversionFailure(problem.into()))
 }
 
-/// Writes the rows of a revision anew; who made it, and when, stays.
+/// Rewrites the rows of a revision. Its activity, date and program version stay.
 pub(super) fn rewrite(tx: &Transaction, revision_id: i64, material: &Material) -> Result<()> {
     tx.pragma_update(None, "defer_foreign_keys", true)?;
     let is_with_statistics = has_statistics(tx, revision_id)?;
@@ -202,18 +200,18 @@ pub(super) fn rewrite(tx: &Transaction, revision_id: i64, material: &Material) -
     tx.execute(&update, params_from_iter(content(material)?))?;
     Rows { tx, revision_id }.material(material)?;
     if !is_with_statistics {
-        // Later revisions of the program that wrote none would be expected to have them, too.
+        // Otherwise later revisions of the program that wrote none would need statistics, too.
         tx.execute("DELETE FROM curve_statistic WHERE revision_id = ?1", [revision_id])?;
     }
     Ok(())
 }
 
-/// Writes a material into an empty database, without all that it is found by.
+/// Writes a material into an empty database, without lists and searches.
 pub(super) fn write_alone(tx: &Transaction, material: &Material) -> Result<()> {
     revision(tx, material, 1, &material.content_hash(), None).map(|_| ())
 }
 
-/// Columns of a revision's own row that its content gives.
+/// Columns of `revision` that follow from the content.
 const CONTENT: &str = "name, class, description, licence, tags, frequency_min_hz, frequency_max_hz, \
      theta_min_rad, theta_max_rad, render, status, status_reason, superseded_by, finish, unknown";
 
@@ -241,7 +239,7 @@ fn content(material: &Material) -> Result<[Value; 15]> {
     ])
 }
 
-/// Writes a revision, makes it the current one, and gives the number of the material.
+/// Writes a revision and makes it the current one. Returns the row number of the material.
 fn revision(
     tx: &Transaction,
     material: &Material,
@@ -273,7 +271,7 @@ fn revision(
     Ok(material_id)
 }
 
-/// Writes what hangs on one revision.
+/// Writes the rows that belong to one revision.
 struct Rows<'a> {
     tx: &'a Transaction<'a>,
     revision_id: i64,
@@ -343,14 +341,14 @@ impl Rows<'_> {
 
     fn fit(&self, position: u32, fit: &Fit) -> Result<()> {
         let Fit { name, model, estimator, curve, source, .. } = fit;
-        let (model, report) = (json(model)?, fit.report.as_ref().map(json).transpose()?);
+        let (model, report) = (law::structure(model)?, fit.report.as_ref().map(json).transpose()?);
         self.insert(
             "INSERT INTO fit (revision_id, position, name, model, estimator, curve, source, report)
              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
             params![self.revision_id, position, name, model, estimator, curve, source, report],
         )?;
         self.parameters(fit)?;
-        self.estimates(fit)?;
+        self.numbers(fit)?;
         fit.covariance.as_ref().map_or(Ok(()), |covariance| self.covariance(name, covariance))
     }
 
@@ -378,27 +376,22 @@ impl Rows<'_> {
         })
     }
 
-    /// What the fit says of each number.
-    fn estimates(&self, fit: &Fit) -> Result<()> {
-        numbered(&fit.numbers(), |position, told| {
+    /// Writes where each number of a fit comes from.
+    fn numbers(&self, fit: &Fit) -> Result<()> {
+        numbered(&fit.numbers(), |position, number| {
+            let estimate = number.estimate.map(|place| format!("$.estimates[{place}]"));
             self.insert(
-                "INSERT INTO fit_estimate
-                 (revision_id, fit, position, name, value, unit, sd, low_95, high_95, chosen_by, at_bound,
-                  identified)
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)",
+                "INSERT INTO fit_number
+                 (revision_id, fit, position, name, estimate, chosen_by, at_bound)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
                 params![
                     self.revision_id,
                     fit.name,
                     position,
-                    told.name,
-                    told.value,
-                    told.unit,
-                    told.sd,
-                    told.interval_95.map(|[low, _]| low),
-                    told.interval_95.map(|[_, high]| high),
-                    told.chosen_by.as_str(),
-                    told.is_at_bound,
-                    told.is_identified(),
+                    number.name,
+                    estimate,
+                    number.chosen_by.as_str(),
+                    number.is_at_bound,
                 ],
             )
         })

@@ -11,7 +11,7 @@ use crate::catalogue::about::About;
 use crate::catalogue::api::Index;
 use crate::catalogue::folder::Sum;
 use crate::catalogue::layout::{csv_path, listed_media_type};
-use crate::catalogue::tables::Written;
+use crate::catalogue::tables::WrittenTable;
 use crate::catalogue::units::unit;
 use crate::material::form::{is_licence, licence_names};
 use crate::store::{Column, ColumnKind, Reference, Table};
@@ -19,11 +19,11 @@ use crate::store::{Column, ColumnKind, Reference, Table};
 pub(super) fn package(
     context: &Context,
     index: &Index,
-    tables: &[Written],
+    tables: &[WrittenTable],
     sums: &BTreeMap<String, Sum>,
 ) -> Value {
     let about = context.about;
-    let schemas: BTreeMap<String, &Written> =
+    let schemas: BTreeMap<String, &WrittenTable> =
         tables.iter().map(|written| (csv_path(&written.table.name), written)).collect();
     let mut resources = Vec::new();
     for (path, sum) in sums {
@@ -98,7 +98,7 @@ fn contributors(context: &Context) -> Vec<Value> {
     contributors
 }
 
-fn resource(path: &str, sum: &Sum, media_type: &str, written: Option<&Written>) -> Value {
+fn resource(path: &str, sum: &Sum, media_type: &str, written: Option<&WrittenTable>) -> Value {
     let mut resource = json!({
         "name": name(path),
         "path": path,
@@ -108,7 +108,7 @@ fn resource(path: &str, sum: &Sum, media_type: &str, written: Option<&Written>) 
         "hash": format!("sha256:{}", sum.sha256),
     });
     match written {
-        Some(Written { table, rows }) => {
+        Some(WrittenTable { table, rows }) => {
             resource["type"] = "table".into();
             resource["encoding"] = "utf-8".into();
             resource["name"] = table.name.clone().into();

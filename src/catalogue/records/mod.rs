@@ -14,7 +14,7 @@ use super::error::CatalogueError;
 use super::folder::Folder;
 use super::layout::ZENODO;
 use super::schema;
-use super::tables::Written;
+use super::tables::WrittenTable;
 use context::Context;
 
 /// Writes all records; every other file but the list of hashes must be in the folder already. Returns whether other
@@ -23,7 +23,7 @@ pub(super) fn write(
     folder: &mut Folder,
     about: &About,
     index: &Index,
-    tables: &[Written],
+    tables: &[WrittenTable],
 ) -> Result<bool, CatalogueError> {
     for (path, schema) in schema::files() {
         folder.write(path, schema.as_bytes())?;

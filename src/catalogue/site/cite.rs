@@ -9,7 +9,7 @@ use crate::catalogue::about::{About, Institute, Person};
 use crate::catalogue::bibtex::entry;
 use crate::catalogue::records::licence_record;
 use crate::catalogue::references::{Credit, pruned};
-use crate::store::Stored;
+use crate::store::StoredRevision;
 
 /// The note in the citation of a built-in entry.
 const BUILT_IN: &str = "Built into matdb, not by the publisher of this catalogue";
@@ -30,7 +30,7 @@ pub(super) struct Citation {
 
 impl Citation {
     /// Of a stored revision in a catalogue.
-    pub(super) fn new(about: &About, stored: &Stored) -> Citation {
+    pub(super) fn new(about: &About, stored: &StoredRevision) -> Citation {
         let material = &stored.material;
         let name = cut(&material.name, 200);
         let hash = stored.content_hash.get(..12).unwrap_or(&stored.content_hash);
@@ -72,7 +72,7 @@ impl Citation {
 /// A stored revision for machines.
 fn record(
     about: &About,
-    stored: &Stored,
+    stored: &StoredRevision,
     name: &str,
     creator: Vec<Value>,
     status: Option<String>,

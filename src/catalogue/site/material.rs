@@ -15,7 +15,7 @@ use crate::catalogue::about::About;
 use crate::effects;
 use crate::formats::words::digits;
 use crate::material::{FindingVerdict, Material, Source, SourceKind};
-use crate::store::{RevisionSummary, Stored};
+use crate::store::{RevisionSummary, StoredRevision};
 
 /// A page's context.
 #[derive(Serialize)]
@@ -81,7 +81,7 @@ struct EffectView {
 /// The context of a material's page.
 pub(super) fn page<'a>(
     about: &'a About,
-    stored: &'a Stored,
+    stored: &'a StoredRevision,
     history: &'a [RevisionSummary],
     citation: &'a Citation,
 ) -> Page<'a> {

@@ -27,7 +27,7 @@ use serde_json::json;
 use super::about::About;
 use super::error::CatalogueError;
 use super::folder::Folder;
-use crate::store::{RevisionSummary, Stored};
+use crate::store::{RevisionSummary, StoredRevision};
 
 use cite::Citation;
 use entry::Entry;
@@ -66,7 +66,7 @@ impl<'a> Site<'a> {
     pub(super) fn add(
         &mut self,
         folder: &mut Folder,
-        stored: &Stored,
+        stored: &StoredRevision,
         history: &[RevisionSummary],
     ) -> Result<(), CatalogueError> {
         let slug = stored.material.slug.as_str();

@@ -17,13 +17,16 @@ pub(super) use parquet::parquet_of;
 pub const HAS_PARQUET: bool = cfg!(feature = "parquet");
 
 /// A table that was written, and its number of rows.
-pub(super) struct Written {
+pub(super) struct WrittenTable {
     pub table: Table,
     pub rows: u64,
 }
 
 /// Writes every table, and `tables/units.csv` with the unit of every numeric column.
-pub(super) fn write(folder: &mut Folder, store: &Store) -> Result<Vec<Written>, CatalogueError> {
+pub(super) fn write(
+    folder: &mut Folder,
+    store: &Store,
+) -> Result<Vec<WrittenTable>, CatalogueError> {
     let tables = store.tables()?;
     folder.write("tables/units.csv", &csv::units(&tables))?;
     let mut written = Vec::new();
@@ -31,7 +34,7 @@ pub(super) fn write(folder: &mut Folder, store: &Store) -> Result<Vec<Written>, 
         let rows = csv::write(folder, store, &table, &csv_path(&table.name))?;
         #[cfg(feature = "parquet")]
         parquet::write(folder, store, &table)?;
-        written.push(Written { table, rows });
+        written.push(WrittenTable { table, rows });
     }
     Ok(written)
 }

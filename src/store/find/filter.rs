@@ -1,4 +1,4 @@
-//! Filters: each condition has an index, and one that lets few through is used.
+//! Filters: each condition has an index. The query uses the index of one that few materials match.
 
 use rusqlite::types::Value;
 use rusqlite::{Connection, Result, Row, params_from_iter};
@@ -7,16 +7,16 @@ use crate::material::{Fit, Material, SourceKind};
 use crate::store::record::Summary;
 use crate::store::rows::rows;
 
-/// Which materials are wanted: those of which all holds that is said here.
+/// Conditions on a material, all of which must hold.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Filter {
     /// A frequency within the range for which the numbers are claimed, Hz.
     pub frequency_hz: Option<f64>,
     /// One of its tags.
     pub tag: Option<String>,
-    /// How the numbers that a scene renders came to be.
+    /// Kind of the source of what scenes render.
     pub kind: Option<SourceKind>,
-    /// Kind of stuff.
+    /// Class, such as `polymer`.
     pub class: Option<String>,
     /// Whether it has a model that was fitted to a curve.
     pub fitted: Option<bool>,
@@ -25,8 +25,7 @@ pub struct Filter {
 }
 
 impl Filter {
-    /// Whether it lets a material through that need not be stored: the same as [`Store::find`](crate::store::Store::find) says of the
-    /// current revision of one that is.
+    /// Whether a material matches, stored or not, by the rules of [`Store::find`](crate::store::Store::find).
     pub fn lets_through(&self, material: &Material) -> bool {
         let Filter { frequency_hz, tag, kind, class, fitted, status } = self;
         frequency_hz.is_none_or(|hz| material.frequency_outside_hz(hz) == 0.0)
@@ -38,13 +37,12 @@ impl Filter {
     }
 }
 
-/// So many are read and sorted at once; where no condition lets so few through, a page is read in the
-/// order of names.
+/// Up to this number of matches are read and sorted at once. With more, a page is read in the order of names.
 const FEW: u32 = 500;
 
 const LINE: &str = "slug, name, class, revision, kind, status, curves, observations, fits";
 
-/// Where the highest frequencies of materials are no more different values than this, each is looked at.
+/// Up to this number of different highest frequencies, each is queried by itself.
 const FEW_ENDS: usize = 64;
 
 /// A line of a list.
@@ -62,22 +60,22 @@ pub(super) fn summary(row: &Row) -> Result<Summary> {
     })
 }
 
-/// What a filter says of one thing.
+/// One condition of a filter.
 struct Condition {
     sql: String,
     values: Vec<Value>,
-    /// The table by the index of this condition.
+    /// The table with the index of this condition.
     table: &'static str,
-    /// The condition where it is another one's index that is used.
+    /// The condition in a query by the index of another condition.
     beside: String,
-    /// Whether its index has what it lets through in the order of names.
+    /// Whether its index gives matches in the order of names.
     is_ordered: bool,
 }
 
 impl Condition {
     /// A condition on one column.
     fn plain(sql: &str, table: &'static str, values: Vec<Value>, is_ordered: bool) -> Condition {
-        // The sign before a column keeps SQLite from its index.
+        // A plus before a column stops SQLite from using its index.
         let (sql, beside) = (sql.to_owned(), format!("+{sql}"));
         Condition { sql, values, table, beside, is_ordered }
     }
@@ -87,14 +85,14 @@ fn text(text: &str) -> Vec<Value> {
     vec![Value::Text(text.to_owned())]
 }
 
-/// All that a filter lets through, sorted by name.
+/// All materials that match a filter, sorted by name.
 pub(super) fn all(conn: &Connection, filter: &Filter) -> Result<Vec<Summary>> {
     let conditions = conditions(conn, filter)?;
     let index = rare(conn, &conditions)?.or((!conditions.is_empty()).then_some(0));
     sorted(conn, &conditions, index)
 }
 
-/// The first `most` of them.
+/// The first `most` materials that match a filter, sorted by name.
 pub(super) fn page(conn: &Connection, filter: &Filter, most: u32) -> Result<Vec<Summary>> {
     let conditions = conditions(conn, filter)?;
     if let Some(rare) = rare(conn, &conditions)? {
@@ -109,7 +107,7 @@ pub(super) fn page(conn: &Connection, filter: &Filter, most: u32) -> Result<Vec<
     rows(conn, &sql, params_from_iter(values), summary)
 }
 
-/// How many a filter lets through, `most` at most.
+/// Number of materials that match a filter, at most `most`.
 pub(super) fn count(conn: &Connection, filter: &Filter, most: u32) -> Result<usize> {
     let (from, mut values) = from_rarest(conn, filter)?;
     values.push(Value::Integer(most.into()));
@@ -142,7 +140,7 @@ fn distinct(conn: &Connection, next: &str, most: usize) -> Result<Vec<String>> {
     Ok(values)
 }
 
-/// All conditions, by the index of the one that lets the fewest through.
+/// The clause of all conditions, by the index of the one that the fewest materials match.
 pub(super) fn from_rarest(conn: &Connection, filter: &Filter) -> Result<(String, Vec<Value>)> {
     let conditions = conditions(conn, filter)?;
     let index = rare(conn, &conditions)?.or((!conditions.is_empty()).then_some(0));
@@ -157,12 +155,12 @@ fn sorted(
     let (from, values) = from(conditions, index);
     let sql = format!("SELECT {LINE} {from}");
     let mut found = rows(conn, &sql, params_from_iter(values), summary)?;
-    // Asked for the order, SQLite would go through all of them in it instead of using an index.
+    // With ORDER BY, SQLite would read all materials in order instead of using the index.
     found.sort_by(|a, b| a.slug.cmp(&b.slug));
     Ok(found)
 }
 
-/// Place of the first condition that lets only few through.
+/// Place of the first condition that only few materials match.
 fn rare(conn: &Connection, conditions: &[Condition]) -> Result<Option<usize>> {
     for (place, Condition { sql, values, table, .. }) in conditions.iter().enumerate() {
         let sql =
@@ -176,7 +174,7 @@ fn rare(conn: &Connection, conditions: &[Condition]) -> Result<Option<usize>> {
     Ok(None)
 }
 
-/// All conditions, by the index of one of them.
+/// The clause of all conditions, by the index of one of them.
 fn from(conditions: &[Condition], index: Option<usize>) -> (String, Vec<Value>) {
     let used = index.and_then(|index| conditions.get(index));
     let table = used.map_or("entry", |condition| condition.table);
@@ -200,7 +198,7 @@ fn from(conditions: &[Condition], index: Option<usize>) -> (String, Vec<Value>) 
     (format!("FROM {table}{filter}"), values)
 }
 
-/// What a filter says; what mostly lets the fewest through first.
+/// The conditions of a filter, usually the most selective first.
 fn conditions(conn: &Connection, filter: &Filter) -> Result<Vec<Condition>> {
     let Filter { frequency_hz, tag, kind, class, fitted, status } = filter;
     let beside = "EXISTS (SELECT 1 FROM entry_tag AS t WHERE t.slug = entry.slug AND t.tag = ?)";
@@ -230,8 +228,8 @@ fn conditions(conn: &Connection, filter: &Filter) -> Result<Vec<Condition>> {
     Ok([tag, class, frequency, fitted, status, kind].into_iter().flatten().collect())
 }
 
-/// That a frequency lies within the claimed range. The index finds at once what begins below it only
-/// among those of one highest frequency.
+/// The condition that a frequency lies within the claimed range. The index finds the lower ends directly only for one
+/// highest frequency at a time.
 fn frequency(conn: &Connection, hz: f64) -> Result<Condition> {
     let ends = ends(conn, hz)?;
     let above = match &ends {
@@ -248,7 +246,7 @@ fn frequency(conn: &Connection, hz: f64) -> Result<Condition> {
     })
 }
 
-/// The different highest frequencies of materials from this one on, Hz; `None` when they are many.
+/// The different highest frequencies of materials from this one on, Hz; `None` for more than [`FEW_ENDS`].
 fn ends(conn: &Connection, hz: f64) -> Result<Option<Vec<f64>>> {
     let sql = "SELECT min(frequency_max_hz) FROM entry WHERE frequency_max_hz >= ?1";
     let mut next = conn.prepare_cached(sql)?;

@@ -1,4 +1,4 @@
-//! What scenes render of every material in outline: what a search for the nearest one goes through.
+//! Outlines of the rendered models of all materials, for the search of the nearest one.
 
 use std::collections::BTreeMap;
 
@@ -12,23 +12,23 @@ use crate::store::error::{InFile, StoreError};
 use crate::store::read::rendered_in;
 use crate::store::rows::rows;
 
-/// What scenes render of a material's current revision, in outline.
+/// Outline of the model that scenes render of a material's current revision.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutlineEntry {
     /// Short name.
     pub slug: String,
-    /// Angles of incidence at which it answers, rad: [`Reach::span_rad`](crate::material::Reach::span_rad).
+    /// Its range of incidence angles, rad: [`Reach::span_rad`](crate::material::Reach::span_rad).
     pub theta_rad: [f64; 2],
-    /// Equal exactly for equal models; none where nothing can be rendered.
+    /// Hash of the model; none where there is no model to render.
     pub model_hash: Option<[u8; 16]>,
-    /// Its levels; none where they are not known in outline.
+    /// Its levels; none for a model without an outline.
     pub outline: Option<Outline>,
 }
 
 const COLUMNS: &str = "slug, theta_min_rad, theta_max_rad, model_hash, levels";
 
 impl Store {
-    /// In outline what scenes render of the materials that a filter lets through, sorted by name.
+    /// Outlines of the materials that match a filter, sorted by name.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -62,7 +62,7 @@ fn outlined(row: &Row) -> Result<OutlineEntry> {
     })
 }
 
-/// Writes the line of a material, which is in the lists already, anew.
+/// Writes or replaces the outline of a material that is in the lists.
 pub(crate) fn write(conn: &Connection, line: &OutlineEntry) -> Result<()> {
     let sql = "INSERT OR REPLACE INTO outline
                (slug, theta_min_rad, theta_max_rad, model_hash, levels) VALUES (?1, ?2, ?3, ?4, ?5)";
@@ -72,7 +72,7 @@ pub(crate) fn write(conn: &Connection, line: &OutlineEntry) -> Result<()> {
     conn.prepare_cached(sql)?.execute(values).map(|_| ())
 }
 
-/// The line of a material that renders this, if anything.
+/// The outline of a material with this rendered model.
 pub(crate) fn line(slug: &Slug, model: Option<&Brdf>, theta_rad: [f64; 2]) -> OutlineEntry {
     OutlineEntry {
         slug: slug.to_string(),
@@ -87,12 +87,12 @@ fn model_hash(model: &Brdf) -> Option<[u8; 16]> {
     hash.as_bytes().first_chunk().copied()
 }
 
-/// Writes the lines of everything that an older program stored.
+/// Writes the outlines of all materials, for a file from an older program.
 pub(crate) fn fill(conn: &Connection) -> Result<()> {
     each(conn, |line| write(conn, &line))
 }
 
-/// Materials whose line is not that of what they render.
+/// Materials with another outline than that of their rendered model.
 pub(super) fn stale(conn: &Connection) -> Result<Vec<String>> {
     let mut kept: BTreeMap<String, OutlineEntry> =
         all(conn, &Filter::default())?.into_iter().map(|line| (line.slug.clone(), line)).collect();
@@ -115,12 +115,12 @@ fn is_same(kept: &OutlineEntry, made: &OutlineEntry) -> bool {
     levels && (kept.theta_rad, kept.model_hash) == (made.theta_rad, made.model_hash)
 }
 
-/// The line that each material should have.
+/// Gives `take` the outline that each material should have.
 fn each(conn: &Connection, mut take: impl FnMut(OutlineEntry) -> Result<()>) -> Result<()> {
     let slugs: Vec<Slug> = rows(conn, "SELECT slug FROM material", [], |row| row.get(0))?;
     for slug in slugs {
         let found = match rendered_in(conn, &slug) {
-            // What cannot be read has no line, and must not keep the rest of the file from being read.
+            // An unreadable material has no outline and must not make the whole file unreadable.
             Err(Error::FromSqlConversionFailure(..)) => None,
             found => found?,
         };

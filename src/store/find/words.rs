@@ -1,4 +1,4 @@
-//! Words: the full-text index, and what is done where a word is nearly everywhere.
+//! Full-text search, and its way around very frequent words.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use rusqlite::{Connection, Result, Row, params};
 use crate::material::Slug;
 use crate::store::rows::rows;
 
-/// A material that words were found in.
+/// A material with the words of a search.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Hit {
     /// Short name.
@@ -16,21 +16,21 @@ pub struct Hit {
     pub name: String,
     /// Current revision, from 1.
     pub revision: u32,
-    /// Some words around those that were found, which stand in brackets.
+    /// Text around the found words, which are in brackets.
     pub snippet: String,
     /// `active`, `superseded` or `withdrawn`.
     pub status: String,
-    /// How well it fits (BM25), less is better; comparable only within one search, 0 where not ranked.
+    /// Rank (BM25), smaller is better. Comparable only within one search; 0 where not ranked.
     pub rank: f64,
 }
 
-/// Most words that are looked for; further ones are ignored.
+/// Largest number of words of a search; further ones are ignored.
 const MOST_WORDS: usize = 32;
 
 /// A word in more materials than this is frequent.
 const RARE: u32 = 500;
 
-/// The `most` materials that all these words are found in.
+/// Up to `most` materials that have all these words.
 pub(super) fn search(conn: &Connection, words: &str, most: u32) -> Result<Vec<Hit>> {
     let phrases = phrases(words);
     if phrases.is_empty() {
@@ -42,19 +42,19 @@ pub(super) fn search(conn: &Connection, words: &str, most: u32) -> Result<Vec<Hi
     unranked(conn, words, &phrases, most)
 }
 
-/// Words as the index takes them: each a phrase in quotes.
+/// Words in the syntax of the index: each as a phrase in quotes.
 fn phrases(words: &str) -> Vec<String> {
     let words = words.split(|c: char| c.is_whitespace() || c.is_control() || c == '"');
     let words = words.filter(|word| word.chars().any(char::is_alphanumeric));
     words.take(MOST_WORDS).map(|word| format!("\"{word}\"")).collect()
 }
 
-/// All words, the last also as the beginning of one.
+/// A query of all words, the last also as the beginning of a word.
 fn beginning(phrases: &[String]) -> String {
     phrases.join(" ") + "*"
 }
 
-/// Whether every word alone is in few materials, so that to weigh them takes little.
+/// Whether every word by itself is in few materials, so that ranking is fast.
 fn are_rare(conn: &Connection, phrases: &[String]) -> Result<bool> {
     let last = phrases.last().map(|last| format!("{last}*"));
     for phrase in phrases.iter().chain(&last) {
@@ -68,7 +68,7 @@ fn are_rare(conn: &Connection, phrases: &[String]) -> Result<bool> {
     Ok(true)
 }
 
-/// The best first.
+/// Materials with all words, the best first.
 fn ranked(conn: &Connection, query: &str, most: u32) -> Result<Vec<Hit>> {
     let sql = "
         SELECT search.slug, search.name, revision, status,
@@ -79,7 +79,7 @@ fn ranked(conn: &Connection, query: &str, most: u32) -> Result<Vec<Hit>> {
     rows(conn, sql, params![query, most], hit)
 }
 
-/// Those whose short name begins with the words, then those with the whole words, then all.
+/// Materials whose short name begins with the words, then those with the whole words, then all others.
 fn unranked(conn: &Connection, words: &str, phrases: &[String], most: u32) -> Result<Vec<Hit>> {
     let sql = "
         SELECT search.slug, search.name, revision, status,
@@ -100,10 +100,10 @@ fn unranked(conn: &Connection, words: &str, phrases: &[String], most: u32) -> Re
     Ok(found)
 }
 
-/// Those whose short name begins with the words.
+/// Materials whose short name begins with the words.
 fn called(conn: &Connection, words: &str, most: u32) -> Result<Vec<Hit>> {
     let begin = words.split_whitespace().collect::<Vec<_>>().join("-").to_lowercase();
-    // In ASCII the signs of short names all come before it.
+    // In ASCII, `~` comes after every character of a short name.
     let end = format!("{begin}~");
     let sql = "SELECT slug, name, revision, status FROM entry
                WHERE slug >= ?1 AND slug < ?2 ORDER BY slug LIMIT ?3";

@@ -1,4 +1,4 @@
-//! Rows to what a material is made of and where its numbers come from.
+//! Reads composition and provenance of a material.
 
 use rusqlite::{Connection, OptionalExtension, Result, params};
 
@@ -9,7 +9,7 @@ use crate::material::{
 use crate::measure::AngleStatistics;
 use crate::store::rows::{json, optional_json, rows};
 
-/// Reads what hangs on a revision beside sources, instruments, curves, fits and effects.
+/// Fills in the rows of a revision other than sources, instruments, curves, fits and effects.
 pub(super) fn fill(material: &mut Material, conn: &Connection, revision_id: i64) -> Result<()> {
     material.sessions = sessions(conn, revision_id)?;
     material.permittivities = permittivities(conn, revision_id)?;
@@ -171,7 +171,7 @@ fn findings(conn: &Connection, revision_id: i64) -> Result<Vec<Finding>> {
     })
 }
 
-/// Which command made a revision.
+/// The command that made a revision, with its inputs and origin.
 pub(super) fn activity(conn: &Connection, revision_id: i64) -> Result<Option<Activity>> {
     let sql = "SELECT command FROM activity WHERE revision_id = ?1";
     let command =

@@ -1,4 +1,4 @@
-//! What a material is made of and where its numbers come from, to rows.
+//! Writes composition and provenance of a material.
 
 use rusqlite::{Result, params};
 

@@ -1,63 +1,63 @@
-//! Writing a revision again, into a scratch database: every row that follows from its content must equal the stored
-//! one. The content itself is checked by its hash.
+//! Checks the rows of a revision: they must equal those of the same content in a scratch database. The hash checks the
+//! content itself.
 
 use rusqlite::types::{Value, ValueRef};
 use rusqlite::{Connection, Result, Statement, params};
 
 use super::database::Store;
 use super::error::{InFile, StoreError};
-use super::record::Stored;
+use super::record::StoredRevision;
 use super::tables::{
     Table, follows_from_content, has_statistics, listed, quoted, tables, unit_rows,
 };
 use super::{connect, write};
 
-/// The table of which an older program wrote nothing.
+/// A table that older programs did not fill.
 const STATISTICS: &str = "curve_statistic";
-/// What a sum may differ by on another machine, relative.
+/// Largest difference of a sum on another machine, relative.
 const ROUNDING: f64 = 1e-9;
 
-/// Writes revisions again, into a database of its own.
+/// Compares stored revisions with the same content in a scratch database.
 #[derive(Debug)]
-pub struct Again {
+pub struct RowCheck {
     scratch: Connection,
     tables: Vec<Table>,
 }
 
-/// Rows of a revision that are not what its content gives.
+/// A table in which a revision has other rows than its content gives.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
-    /// The table.
+    /// Name of the table.
     pub table: String,
-    /// The curve, where the table has statistics of curves.
+    /// Name of the curve; none unless the table has statistics of curves.
     pub curve: Option<String>,
 }
 
-impl Again {
+impl RowCheck {
     /// An empty database to write into.
     ///
     /// # Errors
     /// When there is no memory.
-    pub fn new() -> std::result::Result<Again, StoreError> {
+    pub fn new() -> std::result::Result<RowCheck, StoreError> {
         let scratch = connect::in_memory()?;
         let tables =
             tables(&scratch).map_err(|error| StoreError::new(":memory:".as_ref(), error))?;
-        Ok(Again { scratch, tables })
+        Ok(RowCheck { scratch, tables })
     }
 
-    /// Rows of a revision of `store` that differ from what its content gives, the first of each table.
+    /// Every table in which a revision of `store` has other rows than its content gives.
     ///
     /// # Errors
     /// When the file cannot be read.
     pub fn differences(
         &mut self,
         store: &Store,
-        stored: &Stored,
+        stored: &StoredRevision,
     ) -> std::result::Result<Vec<Difference>, StoreError> {
         self.compare(&store.conn, stored).in_file(&store.path)
     }
 
-    /// Whether the file has the units that the program would write.
+    /// Whether the table of units is the one that this program writes.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -66,7 +66,7 @@ impl Again {
             == unit_rows(&self.scratch).in_file(&store.path)?)
     }
 
-    /// The database that revisions are written into, empty between two of them.
+    /// The scratch database, which has the latest schema and no rows but units.
     pub(super) fn scratch(&self) -> &Connection {
         &self.scratch
     }
@@ -74,10 +74,10 @@ impl Again {
     pub(super) fn compare(
         &mut self,
         conn: &Connection,
-        stored: &Stored,
+        stored: &StoredRevision,
     ) -> Result<Vec<Difference>> {
         let tx = self.scratch.transaction()?;
-        // What it would be found by is compared elsewhere, and is not made.
+        // Lists and searches are not written: `find::stale` compares them.
         write::write_alone(&tx, &stored.material)?;
         let new: i64 = tx.query_row("SELECT max(id) FROM revision", [], |row| row.get(0))?;
         let sql = "SELECT revision.id FROM revision JOIN material ON material.id = material_id
@@ -100,7 +100,7 @@ impl Again {
     }
 }
 
-/// Everything but the number of the revision, that of a curve first.
+/// Selects all columns but `revision_id`, `curve` first.
 fn select(table: &Table) -> String {
     let names = table.columns.iter().map(|column| &column.name);
     let mut names: Vec<&String> = names.filter(|name| *name != "revision_id").collect();
@@ -110,7 +110,7 @@ fn select(table: &Table) -> String {
     format!("SELECT {columns} FROM {table} WHERE revision_id = ?1 ORDER BY {order}")
 }
 
-/// The texts of the first row that differs.
+/// The texts in the first row that differs; `None` when all rows are equal.
 fn first_difference(
     (old, old_id): (&mut Statement, i64),
     (new, new_id): (&mut Statement, i64),
