@@ -14,7 +14,7 @@ mod fit;
 mod levels;
 mod link;
 mod material;
-mod plot;
+mod picture;
 mod quantity;
 mod residuals;
 mod script;

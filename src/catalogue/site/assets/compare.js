@@ -144,7 +144,7 @@
       svg.append(draw('path', { class: i ? 'grid' : 'grid zero', d: `M${LEFT} ${y(i * every)}H${WIDTH - RIGHT}` }),
         draw('text', { class: 'tick', x: LEFT - 9, y: Number(y(i * every)) + 6, 'text-anchor': 'end' }, String(i * every).replace('-', '−')));
     }
-    for (let deg = 0; deg <= 90; deg += 15) {
+    for (let deg = 0; deg <= 90; deg += 10) {
       svg.append(draw('path', { class: 'grid', d: `M${x(deg)} ${TOP}V${HEIGHT - BOTTOM}` }),
         draw('text', { class: 'tick', x: x(deg), y: HEIGHT - BOTTOM + 26, 'text-anchor': 'middle' }, String(deg)));
     }
