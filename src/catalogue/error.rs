@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use crate::formats::html::PageError;
 use crate::store::{Store, StoreError};
 
 /// Why a catalogue could not be published or taken over. Nothing has changed then.
@@ -157,14 +158,9 @@ pub enum CatalogueError {
         /// What the system says.
         reason: io::Error,
     },
-    /// A page cannot be made.
-    #[error("cannot make the page {name}: {reason}; please report this")]
-    Page {
-        /// Its template.
-        name: String,
-        /// What the template engine says.
-        reason: String,
-    },
+    /// A page could not be made.
+    #[error(transparent)]
+    Page(#[from] PageError),
 }
 
 impl CatalogueError {

@@ -24,13 +24,12 @@ impl Picture<'_> {
         let (classes, series): (Vec<String>, Vec<Series>) = self.series.into_iter().unzip();
         let plot = Plot {
             title: &self.title,
-            subtitle: "",
             x_label: "angle of incidence, °",
             y_label: self.y_label,
             x_range: Some((0.0, 90.0)),
             y_range: Some(level_range_db(&series)?),
-            equal: false,
             series,
+            ..Plot::default()
         };
         let [least_deg, most_deg] = range_deg(material);
         let page = Inline {

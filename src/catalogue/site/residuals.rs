@@ -25,9 +25,10 @@ pub(super) fn picture(material: &Material, number: usize, fit: &Fit) -> Option<S
     let picture = Picture {
         id: format!("residuals-{number}"),
         title: format!("What the fit {} leaves of the curve {name}", fit.name),
-        description: "Detected levels less the model's, dB; a triangle is a limit less the model's level, \
+        description:
+            "Detected levels less the model's, dB; a triangle is a limit less the model's level, \
                       and the truth lies where it points. A sound fit scatters evenly about 0."
-            .to_owned(),
+                .to_owned(),
         y_label: "point − fit, dB",
         series: drawn,
     };

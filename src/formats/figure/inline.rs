@@ -146,13 +146,11 @@ mod tests {
     fn svg(style: Style, points: Vec<(f64, f64)>) -> Result<String, FigureError> {
         let plot = Plot {
             title: "<b>",
-            subtitle: "",
             x_label: "incidence, °",
             y_label: "σ⁰, dB",
             x_range: Some((0.0, 90.0)),
-            y_range: None,
-            equal: false,
             series: vec![Series { name: String::new(), style, points }],
+            ..Plot::default()
         };
         let classes = ["ink0 is-measured".to_owned()];
         let (description, claimed) = ("x & y\u{1b}", (0.0, 80.0));

@@ -26,7 +26,7 @@ const DASH_PX: f32 = 7.0;
 const GUIDE_INK: Rgb = [140, 140, 140];
 
 /// A plot of any number of series.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Plot<'a> {
     /// First line, bold; may be empty.
     pub title: &'a str,
@@ -346,13 +346,10 @@ mod tests {
     fn plot(series: Vec<Series>) -> Plot<'static> {
         Plot {
             title: "Lobe",
-            subtitle: "",
             x_label: "incidence, °",
             y_label: "σ⁰, dB",
-            x_range: None,
-            y_range: None,
-            equal: false,
             series,
+            ..Plot::default()
         }
     }
 

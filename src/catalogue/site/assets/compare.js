@@ -21,7 +21,6 @@
   };
   const make = (name, attributes, ...inside) => fill(document.createElement(name), attributes, inside);
   const draw = (name, attributes, ...inside) => fill(document.createElementNS(SVG, name), attributes, inside);
-  const signed = (value) => value.toFixed(1).replace('-', '−');
   const badge = (kind, words = kind) => make('span', { class: `badge is-${kind}${words === kind ? '' : ' is-fitted'}` }, words);
   const badges = ({ kind, kind_words: words, status }) => [badge(kind, words ?? kind), ' ', ...(status ? [badge(status), ' '] : [])];
 
