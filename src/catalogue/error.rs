@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use crate::files::FilesError;
+use crate::formats::html::PageError;
 use crate::store::{Store, StoreError};
 
 /// Why a catalogue could not be published or taken over. Nothing has changed then.
@@ -150,14 +151,9 @@ pub enum CatalogueError {
     /// A file or folder cannot be read or written.
     #[error(transparent)]
     Files(#[from] FilesError),
-    /// A page cannot be made.
-    #[error("cannot make the page {name}: {reason}; please report this")]
-    Page {
-        /// Its template.
-        name: String,
-        /// What the template engine says.
-        reason: String,
-    },
+    /// A page could not be made.
+    #[error(transparent)]
+    Page(#[from] PageError),
 }
 
 impl CatalogueError {

@@ -174,7 +174,7 @@ pub fn curve_points(name: &str, observations: &[Observation]) -> Vec<Series> {
         points.push((row.theta_i_rad.to_degrees(), db_from_ratio(sigma0)));
     }
     let mut series = vec![Series { name: name.to_owned(), style: Style::Points, points: seen }];
-    for (points, style, side) in [(below, Style::Below, "below"), (above, Style::Points, "above")] {
+    for (points, style, side) in [(below, Style::Below, "below"), (above, Style::Above, "above")] {
         if !points.is_empty() {
             let name = format!("{name}, {side} the threshold here");
             series.push(Series { name, style, points });

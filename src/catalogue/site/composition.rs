@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::entry::place_of;
 use super::quantity::quantity;
 use crate::effects::find;
-use crate::formats::words::digits;
+use crate::formats::words::{digits, plus_minus};
 use crate::material::{Finding, FindingVerdict, Layer, Material, Permittivity, Session, Status};
 
 /// These parts as the page of a material shows them.
@@ -118,6 +118,7 @@ fn permittivity(material: &Material, entry: &Permittivity) -> PermittivityView {
     }
 }
 
+/// A number that a source states, in the digits that it states, which rounding to its deviation would change.
 fn with_sd(value: f64, sd: Option<f64>) -> String {
     digits(value) + &sd.map_or(String::new(), |sd| format!(" ± {}", digits(sd)))
 }
@@ -148,8 +149,9 @@ fn finding(material: &Material, finding: &Finding) -> FindingView {
         FindingVerdict::NotFound => "looked for, not found",
         FindingVerdict::Unexplained => "there, and no effect explains it",
     };
-    let error = finding.score_difference_sd.map(|sd| format!(" ± {}", digits(sd)));
-    let score = finding.score_difference.map(|gain| digits(gain) + &error.unwrap_or_default());
+    let sd = finding.score_difference_sd;
+    let score = finding.score_difference;
+    let score = score.map(|gain| sd.map_or(digits(gain), |sd| plus_minus(gain, sd)));
     FindingView {
         effect: finding.effect.clone(),
         level: find(&finding.effect).map_or("", |effect| effect.level().as_str()),

@@ -5,10 +5,11 @@ use serde::Serialize;
 use super::bins::{Bin, bins};
 use super::entry::{kind_of, place_of};
 use super::levels::{FAINTEST_DB, Levels, TABLE_DEG, angles_deg, range_deg};
-use super::plot::{Plot, Series, Shape};
+use super::picture::Picture;
 use super::quantity::quantity;
 use super::words::grouped;
 use crate::fit::stored_band;
+use crate::formats::figure::{Series, Style};
 use crate::formats::words::{digits, percent};
 use crate::material::{Censor, Curve, Fit, Instrument, Material, Observation, SourceKind};
 use crate::units::{db_from_ratio, dbm_from_watts};
@@ -55,11 +56,11 @@ pub(super) struct InstrumentView {
 
 /// Everything drawn together, with its legend.
 pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
-    let mut series: Vec<Series> = Vec::new();
+    let mut series: Vec<(String, Series)> = Vec::new();
     let mut samples = Vec::new();
     let curves = material.curves.len();
     for (number, fit) in material.fits.iter().enumerate() {
-        series.extend(band(material, fit, &ink(curves + number)));
+        series.extend(band(material, fit).map(|band| (ink(curves + number), band)));
     }
     for (number, curve) in material.curves.iter().enumerate() {
         let (drawn, named) = points(curve, kind_of(material, &curve.source), &ink(number));
@@ -87,22 +88,22 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
         let kind = word(material.render_kind());
         samples.push(Sample { name, kind, kind_words: None, shape: "line", class, note: "" });
     }
-    let plot = Plot {
+    let picture = Picture {
         id: "curve".to_owned(),
         title: format!("Backscatter of {}", material.name),
         description: description(material),
         y_label: "σ⁰, dB",
-        claimed_deg: range_deg(material),
         series,
     };
-    (plot.svg(), samples)
+    (picture.svg(material), samples)
 }
 
 /// The unbroken pieces of a model's curve.
-fn lines(levels: &Levels, class: &str) -> Vec<Series> {
+fn lines(levels: &Levels, class: &str) -> Vec<(String, Series)> {
     let mut lines = Vec::new();
     for points in levels.line() {
-        lines.push(Series { shape: Shape::Line, class: class.to_owned(), points });
+        let line = Series { name: String::new(), style: Style::Curve, points };
+        lines.push((class.to_owned(), line));
     }
     lines
 }
@@ -145,8 +146,8 @@ pub(super) fn line_word(material: &Material, fit: &Fit) -> &'static str {
 }
 
 /// Detections and bounds of a curve, (°, dB), as three kinds of marks.
-pub(super) fn marks(observations: &[Observation]) -> [(Shape, Vec<(f64, f64)>); 3] {
-    let mut found = [Shape::Dots, Shape::Below, Shape::Above].map(|shape| (shape, Vec::new()));
+pub(super) fn marks(observations: &[Observation]) -> [(Style, Vec<(f64, f64)>); 3] {
+    let mut found = [Style::Points, Style::Below, Style::Above].map(|style| (style, Vec::new()));
     for o in observations.iter().filter(|o| o.is_retro()) {
         let (place, sigma0) = match (o.sigma0, o.threshold_sigma0, o.censor) {
             (Some(sigma0), ..) => (0, sigma0),
@@ -159,18 +160,24 @@ pub(super) fn marks(observations: &[Observation]) -> [(Shape, Vec<(f64, f64)>); 
     found
 }
 
-fn points(curve: &Curve, kind: Option<SourceKind>, ink: &str) -> (Vec<Series>, Vec<Sample>) {
+/// Detections and bounds of a curve, each with its line of the legend.
+fn points(
+    curve: &Curve,
+    kind: Option<SourceKind>,
+    ink: &str,
+) -> (Vec<(String, Series)>, Vec<Sample>) {
     let class = format!("{ink} {}", class_of(kind));
-    let drawn = marks(&curve.observations).into_iter().filter(|(_, points)| !points.is_empty());
-    let drawn: Vec<Series> =
-        drawn.map(|(shape, points)| Series { shape, class: class.clone(), points }).collect();
-    let mut samples = Vec::with_capacity(drawn.len());
-    for series in &drawn {
-        let (shape, note) = match series.shape {
-            Shape::Below => ("below", "no detection: the value lies below"),
-            Shape::Above => ("above", "beyond the instrument: the value lies above"),
+    let (mut drawn, mut samples) = (Vec::new(), Vec::new());
+    for (style, points) in marks(&curve.observations) {
+        if points.is_empty() {
+            continue;
+        }
+        let (shape, note) = match style {
+            Style::Below => ("below", "no detection: the value lies below"),
+            Style::Above => ("above", "beyond the instrument: the value lies above"),
             _ => ("dots", "detections"),
         };
+        drawn.push((class.clone(), Series { name: String::new(), style, points }));
         let (name, class) = (curve.name.clone(), class.clone());
         samples.push(Sample { name, kind: word(kind), kind_words: None, shape, class, note });
     }
@@ -178,7 +185,7 @@ fn points(curve: &Curve, kind: Option<SourceKind>, ink: &str) -> (Vec<Series>, V
 }
 
 /// The 95 % band of a fit that has a report.
-fn band(material: &Material, fit: &Fit, ink: &str) -> Option<Series> {
+fn band(material: &Material, fit: &Fit) -> Option<Series> {
     let (mut points, mut upper) = (Vec::new(), Vec::new());
     for theta_deg in angles_deg(range_deg(material)) {
         let Some(band) = stored_band(fit, theta_deg.to_radians()) else { continue };
@@ -190,7 +197,7 @@ fn band(material: &Material, fit: &Fit, ink: &str) -> Option<Series> {
     }
     // Along the lower end and back along the upper one.
     points.extend(upper.into_iter().rev());
-    (points.len() > 2).then(|| Series { shape: Shape::Band, class: ink.to_owned(), points })
+    (points.len() > 2).then(|| Series { name: String::new(), style: Style::Band, points })
 }
 
 /// A curve in words.

@@ -1,7 +1,7 @@
 //! The site: an index, a page per material, and a page that compares. It works from a folder and from
 //! any web server, and loads nothing from anywhere else.
 //!
-//! Everything that a database says is text to a page: [`templates`] escapes it and takes control characters
+//! Everything that a database says is text to a page: [`Templates`] escapes it and takes control characters
 //! out, [`script`] keeps it inside its quotes and [`link`] decides what may be clicked.
 
 mod bins;
@@ -14,12 +14,11 @@ mod fit;
 mod levels;
 mod link;
 mod material;
-mod plot;
+mod picture;
 mod quantity;
 mod residuals;
 mod script;
 mod table;
-mod templates;
 mod words;
 
 use serde_json::json;
@@ -27,15 +26,25 @@ use serde_json::json;
 use super::about::About;
 use super::error::CatalogueError;
 use super::folder::Folder;
+use crate::formats::html::Templates;
 use crate::store::{RevisionSummary, StoredRevision};
 
 use cite::Citation;
 use entry::Entry;
-use templates::Templates;
 use words::cut;
 
 /// Materials in one file of the search index and on one page of the plain list.
 const PORTION: usize = 500;
+
+/// The pages' templates.
+const TEMPLATES: [(&str, &str); 6] = [
+    ("base.html", include_str!("templates/base.html")),
+    ("parts.html", include_str!("templates/parts.html")),
+    ("index.html", include_str!("templates/index.html")),
+    ("list.html", include_str!("templates/list.html")),
+    ("material.html", include_str!("templates/material.html")),
+    ("compare.html", include_str!("templates/compare.html")),
+];
 
 /// What every page needs besides its own.
 const ASSETS: [(&str, &str); 5] = [
@@ -58,7 +67,7 @@ pub(super) struct Site<'a> {
 impl<'a> Site<'a> {
     /// A site without materials.
     pub(super) fn new(about: &'a About) -> Result<Site<'a>, CatalogueError> {
-        let templates = Templates::new()?;
+        let templates = Templates::new(&TEMPLATES)?;
         Ok(Site { about, templates, waiting: Vec::new(), portions: 0, materials: 0 })
     }
 

@@ -2,9 +2,9 @@
 
 use super::curve::{class_of, marks};
 use super::entry::kind_of;
-use super::levels::range_deg;
-use super::plot::{Plot, Series, Shape};
+use super::picture::Picture;
 use crate::brdf::Scattering;
+use crate::formats::figure::{Series, Style};
 use crate::material::{Fit, Material};
 use crate::units::db_from_ratio;
 
@@ -13,23 +13,24 @@ pub(super) fn picture(material: &Material, number: usize, fit: &Fit) -> Option<S
     let name = fit.curve.as_ref()?;
     let curve = material.curves.iter().find(|curve| curve.name == *name)?;
     let class = format!("ink0 {}", class_of(kind_of(material, &curve.source)));
+    let series = |style, points| Series { name: String::new(), style, points };
     let zero = vec![(0.0, 0.0), (90.0, 0.0)];
-    let mut series = vec![Series { shape: Shape::Line, class: "nothing".to_owned(), points: zero }];
-    for (shape, mut points) in marks(&curve.observations) {
+    let mut drawn = vec![("zero".to_owned(), series(Style::Guide, zero))];
+    for (style, mut points) in marks(&curve.observations) {
         for (theta_deg, level_db) in &mut points {
             *level_db -= db_from_ratio(fit.model.sigma0(theta_deg.to_radians()));
         }
-        series.push(Series { shape, class: class.clone(), points });
+        drawn.push((class.clone(), series(style, points)));
     }
-    let plot = Plot {
+    let picture = Picture {
         id: format!("residuals-{number}"),
         title: format!("What the fit {} leaves of the curve {name}", fit.name),
-        description: "Detected levels less the model's, dB; a triangle is a detection limit less the model's \
-                      level, so the truth lies below it. A sound fit scatters evenly about 0."
-            .to_owned(),
+        description:
+            "Detected levels less the model's, dB; a triangle is a limit less the model's level, \
+                      and the truth lies where it points. A sound fit scatters evenly about 0."
+                .to_owned(),
         y_label: "point − fit, dB",
-        claimed_deg: range_deg(material),
-        series,
+        series: drawn,
     };
-    plot.svg()
+    picture.svg(material)
 }

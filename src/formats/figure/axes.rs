@@ -16,6 +16,11 @@ pub(super) struct Axis<'a> {
 }
 
 impl Axis<'_> {
+    /// Whether a value lies between the ends.
+    pub fn holds(&self, value: f64) -> bool {
+        value >= self.low && value <= self.high
+    }
+
     /// Where a value lies from the low end, 0, to the high end, 1.
     fn share(&self, value: f64) -> f32 {
         ((value - self.low) / (self.high - self.low)) as f32
@@ -24,10 +29,10 @@ impl Axis<'_> {
 
 /// Data area and heading of a page, px.
 pub(super) struct Axes<'a> {
-    x: Axis<'a>,
-    y: Axis<'a>,
-    x_ticks: Vec<Tick>,
-    y_ticks: Vec<Tick>,
+    pub x: Axis<'a>,
+    pub y: Axis<'a>,
+    pub x_ticks: Vec<Tick>,
+    pub y_ticks: Vec<Tick>,
     title: Vec<String>,
     subtitle: Vec<String>,
     pub left: f32,
@@ -44,22 +49,33 @@ impl<'a> Axes<'a> {
         [title, subtitle]: [&str; 2],
         content_width: f32,
     ) -> Axes<'a> {
-        let x_ticks = ticks(x.low, x.high, ticks_along(data_width));
-        let y_ticks = ticks(y.low, y.high, ticks_along(data_height));
-        let y_labels = LINE_SPACING * LABEL_PX + widest(&y_ticks) + TICK_PX + GAP_PX;
+        let wanted = [data_width, data_height].map(ticks_along);
+        let bare = Axes::bare([x, y], [0.0, 0.0, data_width, data_height], wanted);
+        let y_labels = LINE_SPACING * LABEL_PX + widest(&bare.y_ticks) + TICK_PX + GAP_PX;
         let title = wrapped(title, TITLE_PX, Weight::SemiBold, content_width);
         let subtitle = wrapped(subtitle, LABEL_PX, Weight::Regular, content_width);
         let heading =
             LINE_SPACING * (TITLE_PX * title.len() as f32 + LABEL_PX * subtitle.len() as f32);
+        let left = (MARGIN_PX + y_labels).round();
+        let top = (MARGIN_PX + heading + GAP_PX).round();
+        Axes { title, subtitle, left, top, ..bare }
+    }
+
+    /// A data area without a heading, whose axes have about the wanted numbers of ticks.
+    pub fn bare(
+        [x, y]: [Axis<'a>; 2],
+        [left, top, data_width, data_height]: [f32; 4],
+        [x_wanted, y_wanted]: [usize; 2],
+    ) -> Axes<'a> {
         Axes {
             x,
             y,
-            x_ticks,
-            y_ticks,
-            title,
-            subtitle,
-            left: (MARGIN_PX + y_labels).round(),
-            top: (MARGIN_PX + heading + GAP_PX).round(),
+            x_ticks: ticks(x.low, x.high, x_wanted),
+            y_ticks: ticks(y.low, y.high, y_wanted),
+            title: Vec::new(),
+            subtitle: Vec::new(),
+            left,
+            top,
             data_width,
             data_height,
         }

@@ -456,8 +456,8 @@ fn hex([red, green, blue]: Rgb) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
-/// Text that an XML attribute can hold: its signs spelled out, control characters as blanks.
-fn escaped(text: &str) -> String {
+/// Text that XML can hold, in an attribute too: its signs spelled out, control characters as blanks.
+pub(super) fn escaped(text: &str) -> String {
     let clean = text.replace(char::is_control, " ");
     clean.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

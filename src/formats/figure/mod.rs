@@ -1,10 +1,12 @@
-//! Figures for papers: rasters with a colour bar, plots of curves and points, and bars, as PNG and SVG.
+//! Figures: rasters with a colour bar, plots of curves and points, and bars, as PNG and SVG for papers; plots
+//! also as part of a web page, in its colours and fonts.
 
 mod axes;
 mod bars;
 mod colour_bar;
 pub mod drawing;
 mod error;
+mod inline;
 mod plot;
 mod raster;
 mod style;
@@ -13,5 +15,6 @@ pub mod ticks;
 pub use bars::{Bar, Bars};
 pub use colour_bar::Scale;
 pub use error::FigureError;
+pub use inline::Inline;
 pub use plot::{Plot, Series, Style};
 pub use raster::{Figure, beside};

@@ -1,7 +1,7 @@
 //! Curves and points over two axes.
 
 use super::axes::{Axes, Axis};
-use super::drawing::{Anchor, Drawing, Rgb, Shape, Weight, text_width_px};
+use super::drawing::{Anchor, Drawing, Point, Rgb, Shape, Weight, text_width_px};
 use super::error::FigureError;
 use super::style::{DIGIT_HEIGHT, GAP_PX, MARGIN_PX, PALETTE, STROKE_PX, TICK_LABEL_PX, text};
 
@@ -26,7 +26,7 @@ const DASH_PX: f32 = 7.0;
 const GUIDE_INK: Rgb = [140, 140, 140];
 
 /// A plot of any number of series.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Plot<'a> {
     /// First line, bold; may be empty.
     pub title: &'a str,
@@ -66,6 +66,8 @@ pub enum Style {
     Points,
     /// A small triangle that points down: the truth is below.
     Below,
+    /// A small triangle that points up: the truth is above.
+    Above,
     /// The area that the points go round, in a tint of the colour of the other series of its name.
     /// It is not in the legend, takes no colour and does not widen the axes.
     Band,
@@ -108,12 +110,11 @@ impl Plot<'_> {
     /// # Errors
     /// When there is no finite point and no range.
     pub fn drawing(&self) -> Result<Drawing, FigureError> {
-        let x = Axis { label: self.x_label, ..self.axis(self.x_range, |p| p.0)? };
-        let y = Axis { label: self.y_label, ..self.axis(self.y_range, |p| p.1)? };
+        let [x, y] = self.axes()?;
         let data = self.size(x.high - x.low, y.high - y.low);
         let axes = Axes::new([x, y], data, [self.title, self.subtitle], data[0]);
         let mut shapes: Vec<Shape> = std::iter::zip(&self.series, self.colours())
-            .flat_map(|(series, colour)| series.shapes(&axes, [x, y], colour))
+            .flat_map(|(series, colour)| series.shapes(&axes, colour))
             .collect();
         shapes.extend(axes.shapes());
         shapes.extend(self.legend(&axes));
@@ -122,6 +123,13 @@ impl Plot<'_> {
             height_px: (axes.top + axes.height_with_labels() + MARGIN_PX / 2.0).ceil(),
             shapes,
         })
+    }
+
+    /// The two axes, x first.
+    pub(super) fn axes(&self) -> Result<[Axis<'_>; 2], FigureError> {
+        let x = Axis { label: self.x_label, ..self.axis(self.x_range, |p| p.0)? };
+        let y = Axis { label: self.y_label, ..self.axis(self.y_range, |p| p.1)? };
+        Ok([x, y])
     }
 
     /// One colour per series; bands, error bars and dashes have that of the other series of their name.
@@ -192,14 +200,13 @@ impl Plot<'_> {
         let mut shapes = Vec::new();
         for (row, (series, colour)) in named.into_iter().enumerate() {
             let y = top + GAP_PX + (row as f32 + 0.6) * row_px;
-            let ends = [(left, y), (left + SAMPLE_PX, y)];
-            shapes.extend(match series.style {
-                Style::Curve => curve(ends.to_vec(), colour),
-                Style::Guide => guide(ends.to_vec(), colour),
-                Style::Points => square((left + SAMPLE_PX / 2.0, y), POINT_PX, colour),
-                Style::Below => triangle((left + SAMPLE_PX / 2.0, y), POINT_PX, colour),
-                Style::Band | Style::ErrorBars | Style::Beyond => None,
-            });
+            let sample = match series.style {
+                Style::Points | Style::Below | Style::Above => {
+                    Trace::Marks(vec![(left + SAMPLE_PX / 2.0, y)])
+                }
+                _ => Trace::Lines(vec![vec![(left, y), (left + SAMPLE_PX, y)]]),
+            };
+            shapes.extend(series.style.paint(sample, colour, POINT_PX));
             let base = (left + SAMPLE_PX + GAP_PX, y + DIGIT_HEIGHT / 2.0 * TICK_LABEL_PX);
             shapes.push(text(&series.name, base, Anchor::Start, TICK_LABEL_PX));
         }
@@ -225,52 +232,87 @@ impl Plot<'_> {
     }
 }
 
+/// What of a series lies inside the axes, px.
+pub(super) enum Trace {
+    /// Lines, each through its points.
+    Lines(Vec<Vec<Point>>),
+    /// Corners of an area.
+    Area(Vec<Point>),
+    /// Places of marks.
+    Marks(Vec<Point>),
+}
+
 impl Series {
-    fn shapes(&self, axes: &Axes, [x, y]: [Axis; 2], colour: Rgb) -> Vec<Shape> {
-        let visible = |&(px, py): &(f64, f64)| inside(&x, px) && inside(&y, py);
+    /// What of it lies inside the axes, px.
+    pub(super) fn trace(&self, axes: &Axes) -> Trace {
+        let (x, y) = (axes.x, axes.y);
+        let at = |&(px, py): &(f64, f64)| axes.at(px, py);
+        let visible = |&(px, py): &(f64, f64)| x.holds(px) && y.holds(py);
         match self.style {
-            Style::Points | Style::Below => {
-                let side = if self.points.len() > DENSE { DENSE_POINT_PX } else { POINT_PX };
-                let mark = if self.style == Style::Below { triangle } else { square };
-                let seen = self.points.iter().filter(|p| visible(p));
-                seen.flat_map(|&(px, py)| mark(axes.at(px, py), side, colour)).collect()
+            Style::Points | Style::Below | Style::Above => {
+                Trace::Marks(self.points.iter().filter(|p| visible(p)).map(at).collect())
             }
             Style::Band => {
                 let finite = self.points.iter().filter(|p| p.0.is_finite() && p.1.is_finite());
-                let corners: Vec<(f32, f32)> = finite
-                    .map(|&(px, py)| axes.at(px.clamp(x.low, x.high), py.clamp(y.low, y.high)))
-                    .collect();
-                let area = Shape::Area { corners, colour: colour.map(tint) };
-                (self.points.len() > 2).then_some(area).into_iter().collect()
+                let corners = finite
+                    .map(|&(px, py)| axes.at(px.clamp(x.low, x.high), py.clamp(y.low, y.high)));
+                Trace::Area(corners.collect())
             }
             Style::ErrorBars => {
-                let mut bars = Vec::new();
-                for pair in self.points.chunks_exact(2) {
-                    if pair.iter().all(|&(px, py)| inside(&x, px) && py.is_finite()) {
-                        let ends =
-                            pair.iter().map(|&(px, py)| axes.at(px, py.clamp(y.low, y.high)));
-                        bars.extend(curve(ends.collect(), colour));
-                    }
-                }
-                bars
+                let bars = self
+                    .points
+                    .chunks_exact(2)
+                    .filter(|bar| bar.iter().all(|&(px, py)| x.holds(px) && py.is_finite()));
+                let ends = |&(px, py): &(f64, f64)| axes.at(px, py.clamp(y.low, y.high));
+                Trace::Lines(bars.map(|bar| bar.iter().map(ends).collect()).collect())
             }
             Style::Curve | Style::Beyond | Style::Guide => {
-                let line = if self.style == Style::Guide { guide } else { curve };
                 let runs = self.points.chunk_by(|a, b| visible(a) && visible(b));
-                let on_page =
-                    runs.map(|run| run.iter().map(|&(px, py)| axes.at(px, py)).collect::<Vec<_>>());
+                let on_page = runs.map(|run| run.iter().map(at).collect::<Vec<_>>());
                 let lines = on_page.flat_map(|run| match self.style {
                     Style::Beyond => dashes(&run),
                     _ => vec![run],
                 });
-                lines.filter(|run| run.len() > 1).flat_map(|run| line(run, colour)).collect()
+                Trace::Lines(lines.filter(|line| line.len() > 1).collect())
             }
         }
     }
+
+    fn shapes(&self, axes: &Axes, colour: Rgb) -> Vec<Shape> {
+        let side = if self.points.len() > DENSE { DENSE_POINT_PX } else { POINT_PX };
+        self.style.paint(self.trace(axes), colour, side)
+    }
 }
 
-fn curve(points: Vec<(f32, f32)>, colour: Rgb) -> Option<Shape> {
-    Some(Shape::Line { points, colour, thickness_px: CURVE_PX })
+impl Style {
+    /// The shapes of a trace in this style; `side` is that of a mark, px.
+    fn paint(self, trace: Trace, colour: Rgb, side: f32) -> Vec<Shape> {
+        let thickness_px = if self == Style::Guide { STROKE_PX } else { CURVE_PX };
+        match trace {
+            Trace::Lines(lines) => {
+                let line = |points| Shape::Line { points, colour, thickness_px };
+                lines.into_iter().map(line).collect()
+            }
+            Trace::Area(corners) if corners.len() > 2 => {
+                vec![Shape::Area { corners, colour: colour.map(tint) }]
+            }
+            Trace::Area(_) => Vec::new(),
+            Trace::Marks(places) => {
+                let mark = |at| Shape::Area { corners: self.corners(at, side / 2.0), colour };
+                places.into_iter().map(mark).collect()
+            }
+        }
+    }
+
+    /// Corners of the mark around a place.
+    fn corners(self, (x, y): Point, half: f32) -> Vec<Point> {
+        let [left, top, right, bottom] = [x - half, y - half, x + half, y + half];
+        match self {
+            Style::Below => vec![(left, top), (right, top), (x, bottom)],
+            Style::Above => vec![(left, bottom), (right, bottom), (x, top)],
+            _ => vec![(left, top), (right, top), (right, bottom), (left, bottom)],
+        }
+    }
 }
 
 /// Every other piece of a line, each as long as [`DASH_PX`] along it or from one point to the next one.
@@ -292,34 +334,9 @@ fn dashes(points: &[(f32, f32)]) -> Vec<Vec<(f32, f32)>> {
     pieces.into_iter().step_by(2).collect()
 }
 
-fn guide(points: Vec<(f32, f32)>, colour: Rgb) -> Option<Shape> {
-    Some(Shape::Line { points, colour, thickness_px: STROKE_PX })
-}
-
-fn inside(axis: &Axis, value: f64) -> bool {
-    value >= axis.low && value <= axis.high
-}
-
 /// A colour's channel on the way to white.
 fn tint(channel: u8) -> u8 {
     255 - (255 - channel) / 4
-}
-
-fn triangle((x, y): (f32, f32), side: f32, colour: Rgb) -> Option<Shape> {
-    let half = side / 2.0;
-    let corners = vec![(x - half, y - half), (x + half, y - half), (x, y + half)];
-    Some(Shape::Area { corners, colour })
-}
-
-fn square((x, y): (f32, f32), side: f32, colour: Rgb) -> Option<Shape> {
-    let half = side / 2.0;
-    let corners = vec![
-        (x - half, y - half),
-        (x + half, y - half),
-        (x + half, y + half),
-        (x - half, y + half),
-    ];
-    Some(Shape::Area { corners, colour })
 }
 
 #[cfg(test)]
@@ -329,13 +346,10 @@ mod tests {
     fn plot(series: Vec<Series>) -> Plot<'static> {
         Plot {
             title: "Lobe",
-            subtitle: "",
             x_label: "incidence, °",
             y_label: "σ⁰, dB",
-            x_range: None,
-            y_range: None,
-            equal: false,
             series,
+            ..Plot::default()
         }
     }
 

@@ -207,17 +207,11 @@ fn reach(raster: &Raster, [least, most]: [f64; 2], share: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnose::Row;
-    use crate::report::cloud::testing::row;
+    use crate::report::cloud::testing::square;
 
     #[test]
     fn colours_reach_a_round_value_and_small_places_are_within_them() {
-        let mut rows = Vec::new();
-        for i in 0..10_000 {
-            let (xt_m, yt_m) = (0.004 * f64::from(i % 100), 0.004 * f64::from(i / 100));
-            let unknown_db = if xt_m < 0.02 && yt_m < 0.02 { 4.0 } else { 0.2 };
-            rows.push(Row { xt_m, yt_m, unknown_db, ..row() });
-        }
+        let rows = square(|x_m, y_m| if x_m < 0.02 && y_m < 0.02 { 4.0 } else { 0.2 });
         let around = empty(&rows, 0.016);
         let map = filled(&around, &rows, |row| Some(row.unknown_db));
         assert_eq!([MOST, NEARLY_ALL].map(|share| reach(&map, [0.5, 20.0], share)), [0.5, 4.0]);

@@ -73,20 +73,15 @@ pub(super) fn words(places: &[Peak]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::cloud::testing::row;
+    use crate::report::cloud::testing::{row, square};
 
     #[test]
     fn the_strongest_places_are_apart() {
-        let mut rows = Vec::new();
-        for i in 0..10_000 {
-            let (xt_m, yt_m) = (0.004 * f64::from(i % 100), 0.004 * f64::from(i / 100));
-            let unknown_db = match [xt_m, yt_m].map(|at| at < 0.02) {
-                [true, true] => 4.0,
-                [false, true] if xt_m > 0.36 => -3.0,
-                _ => 0.2,
-            };
-            rows.push(Row { xt_m, yt_m, unknown_db, ..row() });
-        }
+        let rows = square(|x_m, y_m| match [x_m, y_m].map(|at| at < 0.02) {
+            [true, true] => 4.0,
+            [false, true] if x_m > 0.36 => -3.0,
+            _ => 0.2,
+        });
         let places = strongest(&rows, 0.016);
         let [first, second] = places[..] else { panic!("{places:?}") };
         assert!(first.db > 3.0 && first.x_m < 0.03 && first.y_m < 0.03, "{first:?}");

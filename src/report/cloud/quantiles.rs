@@ -23,10 +23,8 @@ pub(super) fn picture(report: &Report) -> Result<Picture, FigureError> {
         subtitle: "all chirps that meet the target; silent ones are drawn at random below the threshold",
         x_label: "standard normal quantile",
         y_label: "quantile of z",
-        x_range: None,
-        y_range: None,
-        equal: false,
         series,
+        ..Plot::default()
     };
     Ok(Picture {
         file: "quantiles",

@@ -2,6 +2,13 @@
 
 use crate::diagnose::Row;
 
+/// Shots 4 mm apart in a square of 0.4 m, with what is unknown at each place, dB.
+pub(super) fn square(unknown_db: impl Fn(f64, f64) -> f64) -> Vec<Row> {
+    let at_m = |i: u32| 0.004 * f64::from(i);
+    let places = (0..10_000).map(|i| (at_m(i % 100), at_m(i / 100)));
+    places.map(|(x, y)| Row { xt_m: x, yt_m: y, unknown_db: unknown_db(x, y), ..row() }).collect()
+}
+
 /// A shot with usual values.
 pub(super) fn row() -> Row {
     Row {

@@ -117,13 +117,12 @@ fn plot<'a>(report: &Report, trend: &'a Trend, reach_db: f64) -> Plot<'a> {
     }
     Plot {
         title: trend.covariate.name,
-        subtitle: "",
         x_label: trend.covariate.label,
         y_label: "observed − predicted, dB",
         x_range: (from < to).then_some((from - room, to + room)),
         y_range: Some((-reach_db, reach_db)),
-        equal: false,
         series,
+        ..Plot::default()
     }
 }
 

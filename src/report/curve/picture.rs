@@ -91,16 +91,7 @@ fn levels<'a>(report: &CurveReport, scan: &[CurveRow], title: &'a str) -> Plot<'
         series.push(Series { name: name.to_owned(), style: Style::Curve, points });
     }
     let [x_label, y_label] = labels(report);
-    Plot {
-        title,
-        subtitle: "",
-        x_label,
-        y_label,
-        x_range: None,
-        y_range: None,
-        equal: false,
-        series,
-    }
+    Plot { title, x_label, y_label, series, ..Plot::default() }
 }
 
 fn residuals<'a>(report: &CurveReport, scan: &[CurveRow], reach_db: f64) -> Plot<'a> {
@@ -120,13 +111,10 @@ fn residuals<'a>(report: &CurveReport, scan: &[CurveRow], reach_db: f64) -> Plot
     }
     let [x_label, _] = labels(report);
     Plot {
-        title: "",
-        subtitle: "",
         x_label,
         y_label: "measured − predicted, dB",
-        x_range: None,
         y_range: Some((-reach_db, reach_db)),
-        equal: false,
         series,
+        ..Plot::default()
     }
 }

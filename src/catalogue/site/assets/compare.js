@@ -21,7 +21,6 @@
   };
   const make = (name, attributes, ...inside) => fill(document.createElement(name), attributes, inside);
   const draw = (name, attributes, ...inside) => fill(document.createElementNS(SVG, name), attributes, inside);
-  const signed = (value) => value.toFixed(1).replace('-', '−');
   const badge = (kind, words = kind) => make('span', { class: `badge is-${kind}${words === kind ? '' : ' is-fitted'}` }, words);
   const badges = ({ kind, kind_words: words, status }) => [badge(kind, words ?? kind), ' ', ...(status ? [badge(status), ' '] : [])];
 
@@ -144,7 +143,7 @@
       svg.append(draw('path', { class: i ? 'grid' : 'grid zero', d: `M${LEFT} ${y(i * every)}H${WIDTH - RIGHT}` }),
         draw('text', { class: 'tick', x: LEFT - 9, y: Number(y(i * every)) + 6, 'text-anchor': 'end' }, String(i * every).replace('-', '−')));
     }
-    for (let deg = 0; deg <= 90; deg += 15) {
+    for (let deg = 0; deg <= 90; deg += 10) {
       svg.append(draw('path', { class: 'grid', d: `M${x(deg)} ${TOP}V${HEIGHT - BOTTOM}` }),
         draw('text', { class: 'tick', x: x(deg), y: HEIGHT - BOTTOM + 26, 'text-anchor': 'middle' }, String(deg)));
     }
