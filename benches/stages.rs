@@ -22,6 +22,7 @@ use matdb::fit::{Fit, FitResult, Method};
 use matdb::formats::exr::{self, Packing};
 use matdb::formats::figure::{Figure, Scale};
 use matdb::formats::{MeshFormat, ply};
+use matdb::frames::{Global, Ray};
 use matdb::geometry::{Mesh, Raster};
 use matdb::measure::icp::Motion;
 use matdb::measure::{
@@ -210,11 +211,13 @@ fn power(given: Rendering<'_>) -> Vec<Way<'_>> {
     let paper = Radar::default();
     let (link, paint) = (Link::new(&paper), &given.ready.materials[0].scattering);
     let alone = move || {
-        let power_w = |hit: &Hit| {
+        let power_w = |(axis, hit): (&Ray<Global>, &Option<Hit>)| {
+            let hit = (*hit)?;
             let f_per_sr = paint.retro_per_sr(hit.theta_rad());
-            link.power_w(hit.range_m, hit.cos_theta, f_per_sr)
+            Some(link.power_w(&link.beam.along(axis), hit.range_m, hit.cos_theta, f_per_sr))
         };
-        given.footprints.hits.iter().flatten().map(power_w).collect::<Vec<f64>>()
+        let axes = &given.setup.geometry.chirps.rays;
+        axes.iter().zip(&given.footprints.hits).filter_map(power_w).collect::<Vec<f64>>()
     };
     let paper = move || {
         let geometry = ScanGeometry { radar: &paper, ..given.setup.geometry };

@@ -18,7 +18,8 @@
 //! let paint = matdb::material::builtin::get("mannequin-paint").unwrap()?.scattering()?;
 //! let link = Link::new(&Radar::default());
 //! let theta_rad = 30f64.to_radians();
-//! let power_w = link.power_w(8.0, theta_rad.cos(), paint.retro_per_sr(theta_rad));
+//! let beam = link.beam.towards(0.0, 0.0);
+//! let power_w = link.power_w(&beam, 8.0, theta_rad.cos(), paint.retro_per_sr(theta_rad));
 //! assert!((dbm_from_watts(power_w) + 65.2).abs() < 0.1);
 //! # Ok::<(), matdb::error::Error>(())
 //! ```

@@ -24,7 +24,7 @@ const ROUGH: CookTorrance = CookTorrance {
     shadowing: Shadowing::Separable,
 };
 
-/// 7 dBm − 15 dB + 10·lg(0.196 m²): the default radar at 1 m, f = 1/sr and normal incidence.
+/// 7 dBm − 15 dB + 10·lg(0.196 m²): the radar at 1 m, f = 1/sr and normal incidence.
 fn level_at_one_metre_dbm() -> f64 {
     7.0 - 15.0 + 10.0 * 0.196f64.log10()
 }
@@ -47,7 +47,8 @@ fn echoes(mut mesh: Mesh, turn_rad: f64, surface: &dyn Scattering) -> Vec<Echo> 
     for vertex in &mut mesh.vertices {
         *vertex = turn * *vertex + DVec3::new(0.0, 1.1, 0.0);
     }
-    let radar = Radar::default();
+    let (aperture_m2, system_loss_db) = (Some(0.196), 15.0);
+    let radar = Radar { aperture_m2, system_loss_db, ..Radar::default() };
     let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
     support::echoes(&radar, &chirps, &mesh, surface)
 }

@@ -103,6 +103,19 @@ fn check(scene_name: &str) {
     let radar = &record["radar"];
     assert_eq!(radar["footprint"], "paper");
     let origin = list(&record["frames"]["origin_global_m"]);
+    // The scenes' radar looks along −z from the middle of its target plane, so that x_t and y_t, carried out to
+    // 8 m, are where the axis passes there.
+    let wavelength_m = number(&record["beam"], "wavelength_m");
+    let solid_angle_sr = |xt_m: f64, yt_m: f64, range_m: f64| {
+        let out = 8.0 / range_m;
+        let growth = number(&radar["beam"], "edge_growth") - 1.0;
+        let off_centre = (xt_m.powi(2) + yt_m.powi(2)) * out * out;
+        let w0 = number(&record["beam"], "waist_m")
+            * (1.0 + growth * off_centre / number(&radar["beam"], "edge_m").powi(2));
+        let off_focus_m = range_m - number(&radar["beam"], "focus_m");
+        let w2 = w0 * w0 + (wavelength_m * off_focus_m / (PI * w0)).powi(2);
+        wavelength_m * wavelength_m / (PI * w2)
+    };
     let points = cloud["x"].len();
     assert_eq!(points as u64, record["counts"]["detections"].as_u64().unwrap());
     assert!(points > 1000, "{points} points say little");
@@ -117,7 +130,7 @@ fn check(scene_name: &str) {
         assert!((range_m - cloud["range_m"][i]).abs() < 1e-6);
         let material = &record["materials"][cloud["material"][i] as usize];
         let expected = number(radar, "transmit_power_dbm") - number(radar, "system_loss_db")
-            + 10.0 * (number(radar, "aperture_m2") / range_m.powi(2)).log10()
+            + 10.0 * solid_angle_sr(cloud["xt_m"][i], cloud["yt_m"][i], range_m).log10()
             + 10.0 * f_per_sr(&material["scattering"], theta).log10()
             + 20.0 * theta.cos().log10();
         let power = cloud["power_dbm"][i];

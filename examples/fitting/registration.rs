@@ -112,7 +112,7 @@ fn measured(scene: &Scene, draws: &mut Draws) -> Result<Cloud, Failure> {
     {
         let Some(hit) = seen.map(|seen| seen.hit) else { continue };
         let f_per_sr = paint.retro_per_sr(hit.theta_rad());
-        let power_w = link.power_w(hit.range_m, hit.cos_theta, f_per_sr);
+        let power_w = link.power_w(&link.beam.along(ray), hit.range_m, hit.cos_theta, f_per_sr);
         let range_m = hit.range_m + RANGE_SD_M * normal(draws);
         let point = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
         if power_w >= watts_from_dbm(radar.threshold_dbm) {

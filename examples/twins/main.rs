@@ -57,6 +57,7 @@
 //! √12 times the class, `dropouts` and `ghost-echo` touch 2, 6 and 15 % of the chirps.
 
 pub mod base;
+pub mod beam;
 pub mod case;
 pub mod instrument;
 pub mod noise;

@@ -128,7 +128,7 @@ fn mean(world: &World, seed: u64, base: &Base, acting: &[Acting], sight: &Sight)
     }
     let mut sum = Report { range_m: 0.0, power_w: 0.0 };
     for look in looks.iter().flatten() {
-        let power_w = echo_w(world, base, acting, sight.chirp, look) / looks.len() as f64;
+        let power_w = echo_w(world, base, acting, sight, look) / looks.len() as f64;
         sum.power_w += power_w;
         sum.range_m += power_w * look.range_m;
     }
@@ -149,8 +149,8 @@ fn mean(world: &World, seed: u64, base: &Base, acting: &[Acting], sight: &Sight)
 }
 
 /// Equation (11) at one place.
-fn echo_w(world: &World, base: &Base, acting: &[Acting], chirp: usize, look: &Shot) -> f64 {
-    let tilt: DVec2 = acting.iter().map(|(effect, size)| effect.tilt(*size, chirp)).sum();
+fn echo_w(world: &World, base: &Base, acting: &[Acting], sight: &Sight, look: &Shot) -> f64 {
+    let tilt: DVec2 = acting.iter().map(|(effect, size)| effect.tilt(*size, sight.chirp)).sum();
     let mut look = *look;
     if tilt != DVec2::ZERO {
         let (u, v) = look.normal.any_orthonormal_pair();
@@ -159,8 +159,8 @@ fn echo_w(world: &World, base: &Base, acting: &[Acting], chirp: usize, look: &Sh
     let mut law = base.local();
     acting.iter().for_each(|(effect, size)| effect.surface(*size, &look, &mut law));
     let cos = look.cos_theta().max(0.0);
-    let range2 = look.range_m * look.range_m;
-    world.sent_w * world.aperture_m2 / range2 * cos * cos * law.f_per_sr(cos)
+    let received_sr = world.waist.received_sr(sight.place_m, look.range_m);
+    world.sent_w * received_sr * cos * cos * law.f_per_sr(cos)
 }
 
 /// What the rays of one chirp meet on the target as it really stands.
@@ -173,24 +173,32 @@ fn looks(world: &World, seed: u64, acting: &[Acting], sight: &Sight) -> Vec<Opti
     }
     let forward = sight.ray.direction.xyz();
     let origin = sight.ray.origin.xyz;
-    let traced = |along: DVec3| {
+    let traced = |origin: DVec3, along: DVec3| {
         // The target stands still in its own frame, and the ray moves the other way.
         let back = |v: DVec3, d: &Displacement| d.rotation.transpose() * v;
         let start =
             moved.iter().fold(origin, |o, d| back(o - d.pivot - d.translation_m, d) + d.pivot);
         look(&world.bvh, &ray(start, moved.iter().fold(along, back))?)
     };
-    let Some(diameter_m) = diameter_m else { return vec![traced(forward)] };
+    let Some(diameter_m) = diameter_m else { return vec![traced(origin, forward)] };
     let range_m = sight.look.map_or(8.0, |look| look.range_m);
-    // The intensity exp(−4 ln 2·r²/D²) is a Gaussian of this standard deviation in each direction.
-    let sd = diameter_m / range_m / (8.0 * std::f64::consts::LN_2).sqrt();
+    // What is sent and received alike, exp(−8 ln 2·r²/D²), is a Gaussian of this standard deviation in each
+    // direction.
+    let sd_m = diameter_m / (16.0 * std::f64::consts::LN_2).sqrt();
+    let turn_per_m = world.waist.turn_per_m(sight.place_m, range_m);
     let (u, v) = forward.any_orthonormal_pair();
     let mut random = draws(seed, sight.chirp, Stream::Spot);
     let mut within = |cell: usize| (cell as f64 + random.uniform()) / SPOT_CELLS as f64;
     let aside = |cell: usize| {
-        let radius = sd * (-2.0 * (1.0 - within(cell / SPOT_CELLS)).ln()).sqrt();
+        let radius_m = sd_m * (-2.0 * (1.0 - within(cell / SPOT_CELLS)).ln()).sqrt();
         let (across, along) = (TAU * within(cell % SPOT_CELLS)).sin_cos();
-        forward + radius * (along * u + across * v)
+        radius_m * (along * u + across * v)
     };
-    (0..SPOT_CELLS * SPOT_CELLS).map(aside).map(traced).collect()
+    // The wave runs at right angles to its front, on which all rays have come equally far.
+    let ray = |aside_m: DVec3| {
+        let along = forward + turn_per_m * aside_m;
+        let way_m = range_m + 0.5 * turn_per_m * aside_m.length_squared();
+        (origin + range_m * forward + aside_m - way_m * along.normalize(), along)
+    };
+    (0..SPOT_CELLS * SPOT_CELLS).map(aside).map(ray).map(|(o, along)| traced(o, along)).collect()
 }

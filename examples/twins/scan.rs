@@ -10,6 +10,8 @@ use matdb::trace::Bvh;
 use matdb::units::watts_from_dbm;
 use rayon::prelude::*;
 
+use super::beam::Waist;
+
 /// Streams of random numbers that never share a draw.
 #[derive(Clone, Copy, Debug)]
 pub enum Stream {
@@ -57,6 +59,8 @@ pub struct Sight {
     pub share: f64,
     /// Where it looks in the target plane, from the field's centre, m.
     pub off_centre_m: DVec2,
+    /// The same from the middle of the target plane, m.
+    pub place_m: DVec2,
     /// Turn of the scanning mirror, rad; 0 for a scan without one.
     pub mirror_rad: f64,
     pub look: Option<Shot>,
@@ -70,9 +74,9 @@ pub struct World<'a> {
     pub origin: DVec3,
     /// Middle of all points that are met, m.
     pub middle: DVec3,
-    /// P_t·L, W, and A_eq, m².
+    /// P_t·L, W.
     pub sent_w: f64,
-    pub aperture_m2: f64,
+    pub waist: Waist,
     pub threshold_w: f64,
     pub looks: f64,
     pub noise_w: f64,
@@ -94,6 +98,7 @@ impl<'a> World<'a> {
             ray,
             share: (chirps.time_s[chirp] - ends[0]) / (ends[1] - ends[0]).max(1e-9),
             off_centre_m: targets[chirp] - centre,
+            place_m: targets[chirp],
             mirror_rad: chirps.mirror.get(chirp).map_or(0.0, |angles| angles.phi_rad),
             look: look(&bvh, &ray),
         };
@@ -107,7 +112,7 @@ impl<'a> World<'a> {
             origin: frames.origin().xyz,
             middle,
             sent_w: link.transmit_power_w * link.system_gain_ratio,
-            aperture_m2: link.aperture_m2,
+            waist: Waist::new(scene),
             threshold_w: watts_from_dbm(radar.threshold_dbm),
             looks: radar.speckle.unwrap_or_default().looks,
             noise_w: watts_from_dbm(noise.level_dbm),

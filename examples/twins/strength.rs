@@ -43,8 +43,8 @@ pub fn rms_db(world: &World, seed: u64, base: &Base, acting: &[Acting], stride: 
         .filter_map(|(sight, mean)| {
             let (look, Report { power_w, .. }) = (sight.look?, (*mean)?);
             let (power_w, cos_theta) = (power_w + noise_w, look.cos_theta());
-            let range2 = look.range_m * look.range_m;
-            let watts_per_f = world.sent_w * world.aperture_m2 / range2 * cos_theta * cos_theta;
+            let received_sr = world.waist.received_sr(sight.place_m, look.range_m);
+            let watts_per_f = world.sent_w * received_sr * cos_theta * cos_theta;
             let power_db = 10.0 * power_w.log10();
             (power_w >= world.threshold_w).then_some(Point { cos_theta, watts_per_f, power_db })
         })

@@ -147,7 +147,7 @@ impl MultiBounce {
     pub fn new(world: &World, seed: u64, base: &Base) -> MultiBounce {
         let second = |sight: &Sight| {
             let mut random = draws(seed, sight.chirp, Stream::Bounce);
-            second_segment(world, base, &sight.look?, &mut random)
+            second_segment(world, base, sight, &mut random)
         };
         MultiBounce { second: world.sights.par_iter().map(second).collect() }
     }
@@ -170,7 +170,8 @@ impl Effect for MultiBounce {
 }
 
 /// All that comes back from one lit point by way of a second one.
-fn second_segment(world: &World, base: &Base, a: &Shot, random: &mut Draws) -> Option<Report> {
+fn second_segment(world: &World, base: &Base, sight: &Sight, random: &mut Draws) -> Option<Report> {
+    let a = sight.look.as_ref()?;
     let mut sum = Report { range_m: 0.0, power_w: 0.0 };
     for sample in 0..ONWARD {
         let [to, facet] = onward(base, a, sample % 2 == 0, random);
@@ -185,7 +186,7 @@ fn second_segment(world: &World, base: &Base, a: &Shot, random: &mut Draws) -> O
         let Some((b, range_m)) = returned(world, a, to) else { continue };
         let f = base.bistatic_per_sr(a.normal, a.to_radar, to);
         let g = base.bistatic_per_sr(b.normal, -to, b.to_radar);
-        let received = world.aperture_m2 / (b.range_m * b.range_m) * b.cos_theta();
+        let received = world.waist.received_sr(sight.place_m, b.range_m) * b.cos_theta();
         let power_w =
             world.sent_w * a.cos_theta() * f * cos / density * g * received / ONWARD as f64;
         sum.power_w += power_w;

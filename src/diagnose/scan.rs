@@ -69,7 +69,7 @@ impl MeasuredScene<'_> {
             strays: &matched.strays,
             pose: &poses(scene),
         };
-        Diagnosis { seed, ..Diagnosis::for_spot(radar.spot_diameter_m) }
+        Diagnosis { seed, ..Diagnosis::for_spot(radar.spot_fwhm_m()) }
             .run_with(&subject, effects, notify)
     }
 }

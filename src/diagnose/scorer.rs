@@ -152,7 +152,7 @@ impl Scorer<'_> {
     /// The residual that neighbours share.
     pub fn shared(&self, prediction: &Prediction, z: &[f64]) -> ResidualStructure {
         let sd_db = speckle_sd_db(prediction.receiver.looks);
-        let spot_m = self.problem.stage.geometry.radar.spot_diameter_m;
+        let spot_m = self.problem.stage.geometry.radar.spot_fwhm_m();
         residual::of_neighbours(z, self.problem.shots, spot_m, sd_db, self.folds)
     }
 

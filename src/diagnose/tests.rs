@@ -279,7 +279,8 @@ fn a_target_that_has_moved_far_is_found_by_its_ranges() {
     for (name, m) in way_m {
         let Value { value, sd, .. } = found[name];
         let sd = sd.unwrap();
-        assert!((value - m).abs() < 4.0 * sd && sd < 0.02, "{name}: {:?}", found[name]);
+        // Towards the edge of the field the beam is wider and the echoes are weaker.
+        assert!((value - m).abs() < 4.0 * sd && sd < 0.025, "{name}: {:?}", found[name]);
     }
     // Only the sphere shows a shift along the plate, and the scan passes it in these rows.
     let values: Vec<f64> =

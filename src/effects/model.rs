@@ -311,7 +311,8 @@ impl Model<'_> {
         for (effect, values) in &self.effects {
             f_per_sr = effect.scatter(values, stage, law, shot, f_per_sr);
         }
-        stage.link.power_w(shot.hit.range_m, shot.hit.cos_theta, f_per_sr)
+        let beam = stage.beam(shot);
+        stage.link.power_w(&beam, shot.hit.range_m, shot.hit.cos_theta, f_per_sr)
     }
 
     /// The product of all gains of a shot.

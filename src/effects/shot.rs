@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::frames::{Direction, Global, Pose, Ray, Surface};
-use crate::radar::{Chirps, Link};
+use crate::radar::{Chirps, GaussianBeam, Link};
 use crate::trace::{Hit, ScanGeometry};
 
 /// Facet of a shot that misses the target.
@@ -81,6 +81,13 @@ pub struct Stage<'a> {
     pub grain_of_region: &'a [DVec3],
     /// The pivot of a pose, m, global frame: the [`middle`] of all shots of the scan, even if only some are predicted.
     pub middle: DVec3,
+}
+
+impl Stage<'_> {
+    /// The beam of a shot's chirp.
+    pub fn beam(&self, shot: &Shot) -> GaussianBeam {
+        self.link.beam.towards(shot.xt_m, shot.yt_m)
+    }
 }
 
 /// Mean of the intersections of the shots, m, global frame; the origin without shots.

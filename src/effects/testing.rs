@@ -63,7 +63,9 @@ impl Bench {
     pub(super) fn of(mesh: Mesh) -> Bench {
         let mesh: &'static Mesh = Box::leak(Box::new(mesh));
         let regions = vec![0; mesh.facets.len()];
-        let (bvh, radar, shots) = (Bvh::new(mesh), Radar::default(), Vec::new());
+        // Its rays start 8 m in front of the origin, which is the middle of the field of view.
+        let radar = Radar { primary_focus_m: [0.0, 0.0, 8.0], ..Radar::default() };
+        let (bvh, shots) = (Bvh::new(mesh), Vec::new());
         let chirps = Chirps::default();
         let mut bench = Bench { bvh, radar, chirps, regions, law: paint(lobe()), shots };
         let shots = (0..SIDE * SIDE).filter_map(|chirp| shot(&bench.stage(), chirp)).collect();

@@ -65,8 +65,10 @@ impl Twin {
         let theta_sd_rad = self.theta_sd_deg.to_radians();
         let tilt = draws.complex_gaussian() * std::f64::consts::SQRT_2 * theta_sd_rad;
         let truth_rad = (theta_rad + tilt.re).hypot(tilt.im).min(1.57);
-        let ratio =
-            Link::new(&Radar::default()).power_w(RANGE_M, 1.0, 1.0) / (4.0 * std::f64::consts::PI);
+        // An antenna of 0.196 m² at 8 m and a loss of 15 dB.
+        let radar = Radar { system_loss_db: 15.0, ..Radar::default() };
+        let solid_angle_sr = 0.196 / (RANGE_M * RANGE_M);
+        let ratio = Link::new(&radar).flux_w(1.0) * solid_angle_sr / (4.0 * std::f64::consts::PI);
         let received_w = ratio * self.model.sigma0(truth_rad) * draws.gamma(self.looks);
         let threshold_w = watts_from_dbm(self.threshold_dbm);
         let power_w = received_w.max(threshold_w);

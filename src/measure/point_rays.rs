@@ -68,7 +68,7 @@ fn check_ranges(cloud: &Cloud, point_rays: &[Ray<Global>]) -> Result<(), Registr
 
 /// Most points must lie within half a spot of their chirps' rays.
 fn check_chirps(cloud: &Cloud, radar: &Radar, rays: &ScanRays) -> Result<(), RegistrationError> {
-    let near_m = 0.5 * radar.spot_diameter_m;
+    let near_m = 0.5 * radar.spot_fwhm_m();
     let (mut numbered, mut near) = (0, 0);
     for point in cloud.points().iter().filter(|point| point.chirp.is_some()) {
         numbered += 1;

@@ -97,10 +97,12 @@ struct Reducer<'a> {
     threshold_w: f64,
 }
 
-/// Equation (8) solved for σ⁰ by definition (10), a pure number; `range_m` in m.
-pub fn sigma0(link: &Link, range_m: f64, cos_theta: f64, power_w: f64) -> f64 {
-    let lit_w_per_m2 = link.transmit_power_w * link.system_gain_ratio * link.aperture_m2;
-    let quotient = power_w * 4.0 * PI * range_m * range_m / lit_w_per_m2;
+/// Equation (8) solved for σ⁰ by definition (10), a pure number: for a power received, W, of the beam
+/// along `axis`, from the range, m.
+pub fn sigma0(link: &Link, axis: &Ray<Global>, range_m: f64, cos_theta: f64, power_w: f64) -> f64 {
+    let solid_angle_sr = link.solid_angle_sr(&link.beam.along(axis), range_m);
+    let received_w = link.transmit_power_w * link.system_gain_ratio * solid_angle_sr;
+    let quotient = power_w * 4.0 * PI / received_w;
     match link.footprint {
         Footprint::Paper => quotient,
         Footprint::Projected => quotient * cos_theta,
@@ -177,7 +179,7 @@ impl Reduction {
             link: Link::new(radar),
             target_from_global: radar.frames().global_from_target.inverse(),
             region: self.region,
-            margin_m: self.edge_margin_m.unwrap_or(radar.spot_diameter_m),
+            margin_m: self.edge_margin_m.unwrap_or(radar.spot_fwhm_m()),
             exact_mesh: self.exact_mesh,
             gate_m: GATE_SD * registered.rms_m.max(LEAST_RMS_M),
             threshold_w: watts_from_dbm(radar.threshold_dbm),
@@ -225,7 +227,7 @@ impl Reducer<'_> {
         censored: bool,
     ) -> Observation {
         let Sighting { hit, theta_sd_rad, .. } = *sighting;
-        let sigma0 = sigma0(&self.link, range_m, hit.cos_theta, power_w);
+        let sigma0 = sigma0(&self.link, ray, range_m, hit.cos_theta, power_w);
         let at = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
         let at = (self.target_from_global * at).xyz;
         Observation {
@@ -323,7 +325,7 @@ impl Directions {
         let directions: Vec<DVec3> = chirps.rays.iter().map(|ray| ray.direction.xyz()).collect();
         let tree = Nearest::new(&directions);
         // An eighth of a spot: far below the distance of two chirps of a scan.
-        Directions { directions, tree, near_rad: radar.spot_diameter_m / 8.0 / PATTERN_RANGE_M }
+        Directions { directions, tree, near_rad: radar.spot_fwhm_m() / 8.0 / PATTERN_RANGE_M }
     }
 
     /// The chirp whose ray runs along `ray`.
@@ -475,7 +477,9 @@ mod tests {
         assert!(censored.len() > 50, "{}", censored.len());
         let rightly = censored.iter().filter(|row| {
             let (theta_rad, range_m) = (row.theta_i_rad, row.range_m.unwrap());
-            let power_w = link.power_w(range_m, theta_rad.cos(), f_per_sr(theta_rad));
+            let axis = &measured.chirps.rays[row.chirp.unwrap() as usize];
+            let power_w =
+                link.power_w(&link.beam.along(axis), range_m, theta_rad.cos(), f_per_sr(theta_rad));
             power_w < 1.05 * row.power_w.unwrap()
         });
         // A pose that is off by a hundredth of a degree moves few of them across.
@@ -531,10 +535,13 @@ mod tests {
     #[test]
     fn both_footprints_give_back_f() {
         for footprint in [Footprint::Paper, Footprint::Projected] {
-            let link = Link::new(&Radar { footprint, ..Default::default() });
-            let power_w = link.power_w(8.2, 0.3, 0.07);
+            let radar = Radar { footprint, ..Default::default() };
+            let (link, origin) = (Link::new(&radar), radar.frames().origin());
+            let direction = origin.towards(Point::new(0.1, 1.0, 0.0)).unwrap();
+            let axis = Ray { origin, direction };
+            let power_w = link.power_w(&link.beam.along(&axis), 8.2, 0.3, 0.07);
             let expected = 4.0 * PI * 0.07 * 0.09;
-            assert!((sigma0(&link, 8.2, 0.3, power_w) / expected - 1.0).abs() < 1e-12);
+            assert!((sigma0(&link, &axis, 8.2, 0.3, power_w) / expected - 1.0).abs() < 1e-12);
         }
     }
 }

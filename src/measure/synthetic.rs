@@ -46,7 +46,8 @@ impl Measured {
         let mut points = Vec::new();
         for ((seen, ray), number) in seen.into_iter().zip(&chirps.rays).zip(&chirps.number) {
             let Some(Intersection { hit, .. }) = seen else { continue };
-            let power_w = link.power_w(hit.range_m, hit.cos_theta, f_per_sr(hit.theta_rad()));
+            let f_per_sr = f_per_sr(hit.theta_rad());
+            let power_w = link.power_w(&link.beam.along(ray), hit.range_m, hit.cos_theta, f_per_sr);
             let range_m = hit.range_m + range_sd_m * normal(&mut draws);
             let point = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
             if power_w >= threshold_w {

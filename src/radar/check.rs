@@ -1,5 +1,6 @@
 //! Whether an instrument can exist: every constant against the range in which it has a meaning.
 
+use super::beam::Beam;
 use super::error::{RadarError, in_range};
 use super::preset::PRESETS;
 use super::settings::Radar;
@@ -19,7 +20,7 @@ impl Radar {
             ("centre_frequency_ghz", self.centre_frequency_ghz, (1.0, 1e4)),
             ("bandwidth_ghz", self.bandwidth_ghz, (1e-3, 2.0 * self.centre_frequency_ghz)),
             ("transmit_power_dbm", self.transmit_power_dbm, (-100.0, 100.0)),
-            ("aperture_m2", self.aperture_m2, (1e-9, 1e6)),
+            ("aperture_m2", self.aperture_m2.unwrap_or(1.0), (1e-9, 1e6)),
             ("system_loss_db", self.system_loss_db, (-200.0, 200.0)),
             ("threshold_dbm", self.threshold_dbm, (-300.0, 100.0)),
             ("spot_diameter_m", self.spot_diameter_m, (1e-5, 10.0)),
@@ -39,8 +40,30 @@ impl Radar {
         let parts = self.beam.checks().into_iter().chain(self.optics.checks());
         let parts = parts.chain(self.scan.checks());
         checks.into_iter().chain(parts).try_for_each(in_range)?;
+        self.validate_beam()?;
         self.validate_receiver()?;
         self.f5.as_ref().map_or(Ok(()), |f5| Ok(f5.validate()?))
+    }
+
+    /// A beam has to be wider than its wave, and to be focused in front of its reflector.
+    fn validate_beam(&self) -> Result<(), RadarError> {
+        let (waist_m, wavelength_m) = (self.waist_m(), self.wavelength_m());
+        if waist_m < wavelength_m {
+            // Rounded up to what the message shows.
+            let least_m = (1e6 * self.spot_diameter_m * wavelength_m / waist_m).ceil() / 1e6;
+            return Err(RadarError::NarrowBeam {
+                diameter_m: self.spot_diameter_m,
+                waist_m,
+                wavelength_m,
+                least_m,
+            });
+        }
+        let focus_m = self.beam.focus_m;
+        let reflector_m = Beam::new(self).towards(0.0, 0.0).section(0.0).radius_m;
+        if focus_m < reflector_m {
+            return Err(RadarError::FocusInReflector { focus_m, reflector_m });
+        }
+        Ok(())
     }
 
     fn validate_receiver(&self) -> Result<(), RadarError> {
@@ -68,6 +91,7 @@ impl Radar {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::radar::BeamEntry;
 
     #[test]
     fn a_constant_without_meaning_is_named() {
@@ -75,7 +99,25 @@ mod tests {
         assert!(radar.validate().unwrap_err().to_string().contains("spot_diameter_m = -1"));
         let radar = Radar { alpha_deg: f64::NAN, ..Default::default() };
         assert!(radar.validate().is_err());
+        let radar = Radar { aperture_m2: Some(0.0), ..Default::default() };
+        assert!(radar.validate().unwrap_err().to_string().contains("aperture_m2 = 0"));
         let radar = Radar { preset: "upm".into(), ..Default::default() };
         assert!(radar.validate().unwrap_err().to_string().contains("upm-300ghz"));
+    }
+
+    #[test]
+    fn a_beam_that_cannot_be_is_refused() {
+        let narrow = Radar { spot_diameter_m: 0.001, ..Default::default() };
+        let error = narrow.validate().unwrap_err().to_string();
+        assert!(
+            error.contains("spot_diameter_m = 0.001") && error.contains("0.001177 m"),
+            "{error}"
+        );
+        let near = BeamEntry { focus_m: 0.012, ..Default::default() };
+        let near = Radar { beam: near, ..Default::default() };
+        let error = near.validate().unwrap_err().to_string();
+        assert!(error.contains("beam.focus_m = 0.012"), "{error}");
+        let wide = Radar { spot_diameter_m: 0.001177, ..Default::default() };
+        wide.validate().unwrap();
     }
 }

@@ -28,6 +28,33 @@ pub enum RadarError {
         /// Largest accepted value.
         max: f64,
     },
+    /// A beam as narrow as its wave is long is no beam.
+    #[error(
+        "radar.spot_diameter_m = {diameter_m} gives the beam a waist radius of {:.3} mm, less than the wavelength \
+         of {:.3} mm; give a diameter of {:.6} m or more",
+        1e3 * waist_m, 1e3 * wavelength_m, least_m
+    )]
+    NarrowBeam {
+        /// The spot's diameter, m.
+        diameter_m: f64,
+        /// The beam's waist radius, m.
+        waist_m: f64,
+        /// The wavelength, m.
+        wavelength_m: f64,
+        /// Least possible diameter, m.
+        least_m: f64,
+    },
+    /// The focus lies in the reflector.
+    #[error(
+        "radar.beam.focus_m = {focus_m} lies inside the reflector, where the beam has a radius of {reflector_m:.3} m; \
+         give a longer distance"
+    )]
+    FocusInReflector {
+        /// Distance of the focus from the reflector, m.
+        focus_m: f64,
+        /// The beam's radius at the reflector, m.
+        reflector_m: f64,
+    },
     /// Noise by its law and by a receiver.
     #[error(
         "[radar.noise] and [radar.receiver] both bring thermal noise; remove [radar.noise], the \

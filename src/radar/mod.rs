@@ -17,12 +17,12 @@ mod settings;
 pub mod speckle;
 pub mod window;
 
-pub use beam::Beam;
+pub use beam::{Beam, GaussianBeam, Section, SpotDiameter};
 pub use chirp::{Aliased, Chirp, ChirpEntry, Return};
 pub use error::{F5Error, RadarError};
 pub use f5::F5;
 pub use frames::RadarFrames;
-pub use link::Link;
+pub use link::{Link, SolidAngle};
 pub use mirror::{Mirror, MirrorAngles, Optics};
 pub use noise::Noise;
 pub use preset::PRESETS;

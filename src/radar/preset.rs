@@ -1,5 +1,6 @@
 //! Radar presets.
 
+use super::beam::SpotDiameter;
 use super::chirp::ChirpEntry;
 use super::mirror::Optics;
 use super::scan::pattern::Pattern;
@@ -15,11 +16,12 @@ impl Default for Radar {
             centre_frequency_ghz: 300.0,
             bandwidth_ghz: 27.0,
             transmit_power_dbm: 7.0,
-            aperture_m2: 0.196,
-            system_loss_db: 15.0,
+            aperture_m2: None,
+            system_loss_db: 12.5,
             threshold_dbm: -77.0,
             footprint: Footprint::Paper,
             spot_diameter_m: 0.016,
+            spot_diameter_is: SpotDiameter::default(),
             reflector_centre_m: [0.0, 0.0, 8.0],
             secondary_focus_m: [0.0, 0.0, -8.0],
             tau_deg: 0.0,

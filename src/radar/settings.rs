@@ -9,6 +9,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::beam::SpotDiameter;
 use super::chirp::{Chirp, ChirpEntry};
 use super::error::Check;
 use super::f5::F5;
@@ -32,10 +33,11 @@ pub struct Radar {
     pub bandwidth_ghz: f64,
     /// Transmitted power P_t, dBm. 7: assumed.
     pub transmit_power_dbm: f64,
-    /// Equivalent area of the receiving antenna A_eq, m². 0.196: assumed, a 0.5 m aperture, which
-    /// is λR over the paper's spot diameter.
-    pub aperture_m2: f64,
-    /// Two-way losses and calibration, dB. 15: assumed, so that a painted mannequin's specular peak
+    /// Equivalent area of the receiving antenna A_eq, m², in place of the beam's own λ²R²/(πw²), which
+    /// is 0.110 m² at 8 m. None: the antenna receives by the beam that it sends.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub aperture_m2: Option<f64>,
+    /// Two-way losses and calibration, dB. 12.5: assumed, so that a painted mannequin's specular peak
     /// lands where the paper's figure 9 has it.
     pub system_loss_db: f64,
     /// Detections below this power are discarded, dBm. −77: paper, Sec. V-C.
@@ -44,6 +46,8 @@ pub struct Radar {
     pub footprint: Footprint,
     /// Diameter of the spot at the centre of the field of view, m. 0.016: paper, Sec. II-B.
     pub spot_diameter_m: f64,
+    /// Which width of the beam that is. `one-way-fwhm`: assumed.
+    pub spot_diameter_is: SpotDiameter,
     /// O_c: centre of the main reflector in the target frame, m. (0, 0, 8): assumed to coincide
     /// with the primary focus, 8 m (paper) in front of the target plane.
     pub reflector_centre_m: [f64; 3],
@@ -104,8 +108,7 @@ pub enum Footprint {
 pub struct BeamEntry {
     /// Range at which the beam is focused, m. 8: paper.
     pub focus_m: f64,
-    /// Diameter at `edge_m` from the centre of the field of view, over the one at the centre, at
-    /// the focus. 1.5: assumed.
+    /// Waist at `edge_m` from the centre of the field of view over the one at the centre. 1.5: assumed.
     pub edge_growth: f64,
     /// Distance from the centre at which it has grown so, m. 0.5: assumed, about the corner of the
     /// paper's field of view.

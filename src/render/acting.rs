@@ -84,11 +84,12 @@ impl<'a> Acting<'a> {
         &self,
         path: Path,
         chirp: usize,
+        ray: &Ray<Global>,
         rays: usize,
         facing: Option<Facing>,
         tilts: [f64; 2],
     ) -> Path {
-        let (stage, shot) = (self.stage(), self.traced_shot(chirp, rays, path.hit, facing));
+        let (stage, shot) = (self.stage(), self.traced_shot(chirp, ray, path.hit, facing));
         let with_w =
             tilted(&shot, tilts).map_or(0.0, |shot| self.model.arrived(&stage, &shot).power_w);
         let Some(Facing { azimuth_rad, .. }) = facing else {
@@ -106,11 +107,11 @@ impl<'a> Acting<'a> {
     pub fn instrument_gain(
         &self,
         chirp: usize,
-        rays: usize,
+        ray: &Ray<Global>,
         hit: Hit,
         facing: Option<Facing>,
     ) -> f64 {
-        let (stage, shot) = (self.stage(), self.traced_shot(chirp, rays, hit, facing));
+        let (stage, shot) = (self.stage(), self.traced_shot(chirp, ray, hit, facing));
         let instrument = self.model.effects.iter().filter(|(e, _)| e.level() == Level::Instrument);
         instrument.map(|(effect, values)| effect.gain(values, &stage, &shot)).product()
     }
@@ -154,7 +155,7 @@ impl<'a> Acting<'a> {
         let mut hits = hits.take(footprints.rays_per_chirp);
         let (hit, index) = hits.find_map(|(hit, index)| Some(((*hit)?, index)))?;
         let facing = footprints.facings.get::<usize>(index).copied().flatten();
-        Some(self.traced_shot(chirp, footprints.rays_per_chirp, hit, facing))
+        Some(self.traced_shot(chirp, &self.setup.geometry.chirps.rays[chirp], hit, facing))
     }
 
     fn stage(&self) -> Stage<'_> {
@@ -176,13 +177,14 @@ impl<'a> Acting<'a> {
     }
 
     /// The shot of a ray with a hit on the target where the effects place it.
-    fn traced_shot(&self, chirp: usize, rays: usize, hit: Hit, facing: Option<Facing>) -> Shot {
-        let axis = self.setup.geometry.chirps.rays[chirp];
-        let ray = match axis.origin.towards(hit.point) {
-            Some(direction) if rays > 1 => Ray { direction, ..axis },
-            _ => axis,
-        };
-        let shot = self.shot(chirp, ray, hit, facing);
+    fn traced_shot(
+        &self,
+        chirp: usize,
+        ray: &Ray<Global>,
+        hit: Hit,
+        facing: Option<Facing>,
+    ) -> Shot {
+        let shot = self.shot(chirp, *ray, hit, facing);
         let moved = facing.and_then(|_| self.model.target(&self.stage(), &shot));
         Shot { target: moved.unwrap_or(shot.target), ..shot }
     }

@@ -12,6 +12,7 @@
 
 use std::ops::Range;
 
+use glam::DVec2;
 use rayon::prelude::*;
 
 use super::detect::Detector;
@@ -22,7 +23,7 @@ use super::spot::{self, Spot};
 use super::surface::Surface;
 use crate::frames::{Global, Pose, Ray};
 use crate::geometry::Mesh;
-use crate::radar::{Beam, Detection, Footprint, Link};
+use crate::radar::{Detection, Footprint, Link};
 use crate::trace::{
     Cone, EchoTracer, GpuError, Hit, LocalFrame, RAYS_PER_SHARE, ScanGeometry, Share, TraceError,
     Tracer,
@@ -32,7 +33,7 @@ use crate::trace::{
 const RAYS_PER_TURN: usize = 1 << 20;
 
 /// A share of which the CPU must compute all rays.
-const OPEN: Share = Share { open: u32::MAX, per_sr_m2: 0.0, per_sr_m: 0.0 };
+const OPEN: Share = Share { open: u32::MAX, per_sr: 0.0, m_per_sr: 0.0 };
 
 /// The settings that all scans of a batch share. A batch has single paths to the radar's own antenna, without effects.
 #[derive(Clone, Copy)]
@@ -119,8 +120,9 @@ struct Work<'a> {
     /// The inverse pose of each scan.
     mesh_from_world: Vec<Pose<Global, Global>>,
     link: Link,
-    beam: Beam,
+    /// Rays of a chirp, and where they pass in its spot.
     rays: usize,
+    samples: Vec<DVec2>,
     /// Number of regions, and so of scattering models per scan.
     regions: usize,
     echo_tracer: Option<EchoTracer<'a>>,
@@ -133,8 +135,8 @@ impl<'a> Work<'a> {
             takes,
             mesh_from_world: takes.iter().map(|take| take.target.inverse()).collect(),
             link: Link::new(batch.geometry.radar),
-            beam: Beam::new(batch.geometry.radar),
             rays: batch.rays_per_chirp.max(1),
+            samples: spot::samples(batch.rays_per_chirp.max(1)),
             regions: batch
                 .geometry
                 .region_of_facet
@@ -155,13 +157,12 @@ impl<'a> Work<'a> {
                 .iter()
                 .flat_map(|take| (0..work.regions).map(move |region| law(take, region)))
                 .collect();
-            let samples = spot::samples(work.rays);
             let cosines = match work.link.footprint {
                 Footprint::Paper => 2.0,
                 Footprint::Projected => 1.0,
             };
             let region_of_facet = batch.geometry.region_of_facet;
-            let tracer = held.echo_tracer(region_of_facet, &laws, cosines, &samples);
+            let tracer = held.echo_tracer(region_of_facet, &laws, cosines, &work.samples);
             work.echo_tracer = Some(tracer.map_err(gpu_error)?);
         }
         Ok(work)
@@ -181,9 +182,10 @@ impl<'a> Work<'a> {
             }
         };
         let open = self.open_rays(some.start, &spots, &shares);
+        let of_chirps = spots.iter().zip(shares.chunks(per_chirp));
         let mut sums: Vec<[f64; 2]> =
-            shares.chunks(per_chirp).map(|shares| self.power_and_moment(shares)).collect();
-        for (place, echo) in self.trace_open_rays(some.start, &open)? {
+            of_chirps.map(|(spot, shares)| self.power_and_moment(spot, shares)).collect();
+        for (place, echo) in self.trace_open_rays(some.start, &spots, &open)? {
             sums[place][0] += echo.power_w;
             sums[place][1] += echo.power_w * echo.range_m;
         }
@@ -195,10 +197,11 @@ impl<'a> Work<'a> {
     }
 
     /// Power, W, and power times range, W·m, that the device computed of a chirp.
-    fn power_and_moment(&self, shares: &[Share]) -> [f64; 2] {
-        let per_sr_m2: f64 = shares.iter().map(|share| share.per_sr_m2).sum();
-        let per_sr_m: f64 = shares.iter().map(|share| share.per_sr_m).sum();
-        [per_sr_m2, per_sr_m].map(|sum| self.link.power_w(1.0, 1.0, sum))
+    fn power_and_moment(&self, spot: &Spot, shares: &[Share]) -> [f64; 2] {
+        let w_per_f = self.link.flux_w(1.0) * self.link.solid_angle(&spot.beam).level_sr;
+        let per_sr: f64 = shares.iter().map(|share| share.per_sr).sum();
+        let m_per_sr: f64 = shares.iter().map(|share| share.m_per_sr).sum();
+        [per_sr, m_per_sr].map(|sum| w_per_f * sum)
     }
 
     /// The rays that the device left open, in the frame of the mesh, each with the number of its chirp after `first`.
@@ -215,9 +218,9 @@ impl<'a> Work<'a> {
                 shares[ray / RAYS_PER_SHARE].open >> (ray % RAYS_PER_SHARE) & 1 == 1
             };
             let mesh_from_world = self.mesh_from_world(first + place);
-            (0..self.rays)
-                .filter(is_open)
-                .filter_map(move |ray| Some((place, *mesh_from_world * spot.ray(ray)?)))
+            (0..self.rays).filter(is_open).filter_map(move |ray| {
+                Some((place, *mesh_from_world * spot.ray(self.samples[ray])?))
+            })
         });
         open.collect()
     }
@@ -226,6 +229,7 @@ impl<'a> Work<'a> {
     fn trace_open_rays(
         &self,
         first: usize,
+        spots: &[Spot],
         rays: &[(usize, Ray<Global>)],
     ) -> Result<Vec<(usize, Detection)>, RenderError> {
         let geometry = &self.batch.geometry;
@@ -234,20 +238,21 @@ impl<'a> Work<'a> {
         let echoes = rays.par_iter().zip(hits).filter_map(|((place, ray), hit)| {
             let hit = hit?;
             let take = &self.takes[self.take(first + place)];
-            let power_w = self.power_w(geometry.bvh.mesh(), take, ray, &hit)?;
+            let solid_angle_sr = self.link.solid_angle_sr(&spots[*place].beam, hit.range_m);
+            let power_w = solid_angle_sr * self.w_per_sr(geometry.bvh.mesh(), take, ray, &hit)?;
             Some((*place, Detection { range_m: hit.range_m, power_w }))
         });
         Ok(echoes.collect())
     }
 
-    /// Received power of a ray by equation (11), W; `None` in a region without a surface.
-    fn power_w(&self, mesh: &Mesh, take: &Take, ray: &Ray<Global>, hit: &Hit) -> Option<f64> {
+    /// Equation (11) at a hit for 1 sr of the antenna, W/sr; `None` in a region without a surface.
+    fn w_per_sr(&self, mesh: &Mesh, take: &Take, ray: &Ray<Global>, hit: &Hit) -> Option<f64> {
         let region = self.batch.geometry.region_of_facet[hit.facet as usize];
         let surface = take.surfaces.get(usize::from(region))?;
         let to_radar = -ray.direction.xyz();
         let to_radar = LocalFrame::at_hit(mesh, hit, to_radar, surface.grain).local(to_radar);
         let f_per_sr = surface.scattering.f_per_sr(to_radar, to_radar);
-        Some(self.link.power_w(hit.range_m, hit.cos_theta, f_per_sr))
+        Some(self.link.flux_w(hit.cos_theta) * f_per_sr * hit.cos_theta)
     }
 
     /// The spots of some chirps, in the global frame.
@@ -266,7 +271,7 @@ impl<'a> Work<'a> {
         };
         let spot = |(chirp, range_m): (usize, Option<f64>)| {
             let number = number(chirp);
-            Spot::met(&self.beam, &chirps.rays[number], range_m, number, self.rays)
+            Spot::met(&self.link.beam, &chirps.rays[number], range_m, number)
         };
         Ok(some.into_par_iter().zip(ranges_m).map(spot).collect())
     }
@@ -276,7 +281,9 @@ impl<'a> Work<'a> {
         let mesh_from_world = self.mesh_from_world(chirp);
         Cone {
             axis: *mesh_from_world * spot.axis,
-            across: spot.across().map(|aside| mesh_from_world.rotation() * aside),
+            across_m: spot.across_m.map(|aside_m| mesh_from_world.rotation() * aside_m),
+            section: spot.section,
+            solid_angle: self.link.solid_angle(&spot.beam),
             law: (self.take(chirp) * self.regions) as u32,
         }
     }
@@ -344,7 +351,8 @@ mod tests {
                 rays_per_chirp,
             };
             let found = batch.run(&takes).unwrap();
-            assert!(!bvh.is_built());
+            // The rays of a spot have no common origin.
+            assert_eq!(bvh.is_built(), rays_per_chirp > 1);
             assert_eq!(found.rays, 2 * rays_per_chirp * chirps.rays.len());
             assert_eq!(found.rays_on_processor, found.rays);
             for (take, found) in takes.iter().zip(&found.echoes) {

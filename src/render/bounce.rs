@@ -7,13 +7,13 @@
 //! heuristic of Veach and Guibas 1995, DOI 10.1145/218380.218498), so that the mean is unbiased for
 //! any surface.
 
-use std::f64::consts::{LN_2, PI, TAU};
+use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
 use super::spot::GOLDEN;
 use crate::frames::{Direction, Global, Ray, Surface};
-use crate::radar::Beam;
+use crate::radar::GaussianBeam;
 use crate::radar::random::Key;
 
 /// Exponents of the lobes: half widths at half height of 30°, 9.5° and 3°.
@@ -30,27 +30,27 @@ pub struct Bounce {
 }
 
 impl Bounce {
-    /// How well the radar's antenna sees a second surface at `place`, over how equation (7) sees the
+    /// How well the radar's antenna sees a second surface at `place`, over how equation (11) sees the
     /// spot.
     ///
-    /// The antenna receives as it sends, by the Gaussian g of the spot, and (7) has the mean of that
-    /// over the spot as 1, hence 2g. A single ray stands for the whole spot: then a place at the
-    /// distance d from what the ray hit is seen as the mean over the spot sees it, which is √g(d).
+    /// The antenna receives a radiance as it sends, with λ²·u = λ²/(πw²)·2g, where g = exp(−2r²/w²).
+    /// A single ray stands for the whole spot: then a place at the distance d from what the ray hit is
+    /// seen as the mean of 2g over all that is lit, which is exp(−d²/w²) = √g(d).
     pub(super) fn pattern(
         &self,
-        beam: &Beam,
+        beam: &GaussianBeam,
         axis: &Ray<Global>,
         rays: usize,
         place: DVec3,
     ) -> f64 {
         let to_place = place - axis.origin.xyz;
-        if to_place.dot(axis.direction.xyz()) <= 0.0 {
+        let range_m = to_place.dot(axis.direction.xyz());
+        if range_m <= 0.0 {
             return self.outside_spot;
         }
         let beside_m = to_place.cross(axis.direction.xyz()).length();
-        let spot_m = beam.diameter_along_m(axis, to_place.length());
-        let gaussian = |factor: f64| (-factor * LN_2 * (2.0 * beside_m / spot_m).powi(2)).exp();
-        let inside = if rays == 1 { gaussian(0.5) } else { 2.0 * gaussian(1.0) };
+        let seen = beam.section(range_m).irradiance_ratio(beside_m);
+        let inside = if rays == 1 { seen.sqrt() } else { 2.0 * seen };
         inside.max(self.outside_spot)
     }
 }
@@ -106,8 +106,8 @@ mod tests {
     use super::*;
     use crate::brdf::{CookTorrance, Distribution, Lambert, Scattering, Shadowing};
     use crate::frames::Point;
-    use crate::radar::Radar;
     use crate::radar::random::Purpose;
+    use crate::radar::{Beam, Radar};
 
     fn key(chirp: u64) -> Key {
         Key { seed: 5, chirp, sub_ray: 0, purpose: Purpose::Bounce }
@@ -166,8 +166,9 @@ mod tests {
     #[test]
     fn the_beam_receives_as_it_sends() {
         let radar = Radar::default();
-        let (beam, origin) = (Beam::new(&radar), radar.frames().origin());
+        let origin = radar.frames().origin();
         let axis = Ray { origin, direction: origin.towards(Point::new(0.0, 1.1, 0.0)).unwrap() };
+        let beam = Beam::new(&radar).along(&axis);
         let bounce = Bounce { rays: 1, outside_spot: 1e-3 };
         let seen = |rays, x_m: f64, z_m: f64| {
             bounce.pattern(&beam, &axis, rays, DVec3::new(x_m, 1.1, z_m))
@@ -179,7 +180,7 @@ mod tests {
         // Far off, and behind the radar.
         assert_eq!([seen(64, 0.1, 0.0), seen(64, 0.0, 9.0)], [1e-3, 1e-3]);
         // The mean of 2g over the spot's own Gaussian is 1: rings of equal power.
-        let ring = |i: usize| 0.008 * (-(1.0 - (i as f64 + 0.5) / 1e4).ln() / LN_2).sqrt();
+        let ring = |i: usize| 0.008 * (-(1.0 - (i as f64 + 0.5) / 1e4).log2()).sqrt();
         let mean = (0..10_000).map(|i| seen(64, ring(i), 0.0)).sum::<f64>() / 1e4;
         assert!((mean - 1.0).abs() < 2e-3, "{mean}");
     }

@@ -15,8 +15,8 @@ pub enum Observer {
         number: u32,
         /// Its position.
         position: Point<Global>,
-        /// Equivalent area A_eq, m².
-        aperture_m2: f64,
+        /// Equivalent area A_eq, m²; none for an antenna like the radar's, focused on the same spot.
+        aperture_m2: Option<f64>,
     },
 }
 
@@ -68,7 +68,7 @@ mod tests {
         let target = Point::new(0.1, 1.3, 0.2);
         let axis = Ray { origin, direction: origin.towards(target).unwrap() };
         let position = Point::new(2.0, 1.0, 5.0);
-        let receiver = Observer::Receiver { number: 1, position, aperture_m2: 0.1 };
+        let receiver = Observer::Receiver { number: 1, position, aperture_m2: Some(0.1) };
         let range_m = 0.5 * (origin.distance_m(target) + target.distance_m(position));
         let found = receiver.on_axis(&axis, range_m).unwrap();
         assert!(found.distance_m(target) < 1e-12);

@@ -1,14 +1,14 @@
 //! The paths of power from the radar to an antenna.
 //!
 //! Single path: radar → A → antenna, equation (11) with the bistatic f(i, o). The spot's power P_t falls
-//! on A, and an antenna at the distance R_o receives the share f(i, o)·cos θ_o·A_eq/R_o² of it. The other factor
-//! cos θ_i of the paper is part of [`Link::flux_w`].
+//! on A, and the antenna, which A sees in the solid angle Ω, receives the share f(i, o)·cos θ_o·Ω of it. The
+//! other factor cos θ_i of the paper is part of [`Link::flux_w`].
 //!
 //! Second-order path: radar → A → B → antenna. A scatters the share f_A(i, ω)·cos θ_ω·dω of its power into the
-//! direction ω of B, and the antenna receives the share f_B(−ω, o)·cos θ_o·A_eq/R_o² of that. `bounce.rs` estimates
+//! direction ω of B, and the antenna receives the share f_B(−ω, o)·cos θ_o·Ω of that. `bounce.rs` estimates
 //! the integral over ω. The range is half the path length.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::acting::{Acting, Change};
@@ -16,13 +16,13 @@ use super::bounce::{Bounce, directions};
 use super::observer::Observer;
 use super::path::{Path, sum};
 use super::setup::Setup;
-use super::spot::Footprints;
+use super::spot::{self, Footprints, Spot};
 use super::surface::{Facing, Surface};
 use crate::effects::MeanEcho;
 use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
 use crate::radar::random::{Key, Purpose};
-use crate::radar::{Beam, Detection, Link};
-use crate::trace::{Hit, LocalFrame};
+use crate::radar::{Detection, Link};
+use crate::trace::{Hit, LocalFrame, ScanGeometry};
 
 /// Distance above a surface at which a ray starts, m, so that it does not hit the same surface again. It is far above
 /// the rounding of f64 and far below a wavelength.
@@ -33,7 +33,9 @@ pub(super) struct Paths<'a> {
     setup: &'a Setup<'a>,
     observer: Observer,
     link: Link,
-    beam: Beam,
+    /// The rays of a spot, and the share of the power sent that falls on each.
+    samples: Vec<DVec2>,
+    lit_shares: Vec<f64>,
     footprints: &'a Footprints,
     acting: Option<Acting<'a>>,
     /// The change of each chirp's whole echo by the effects; empty without effects.
@@ -44,7 +46,7 @@ pub(super) struct Paths<'a> {
 struct Emission<'a> {
     paths: &'a Paths<'a>,
     number: usize,
-    axis: &'a Ray<Global>,
+    spot: Spot,
     antenna: DVec3,
     /// Number of rays that share its power.
     rays: usize,
@@ -61,6 +63,8 @@ struct LitPoint<'a> {
     antenna: Direction<Local>,
     /// Distance to the antenna, m.
     antenna_m: f64,
+    /// Solid angle in which the antenna is seen, sr.
+    solid_angle_sr: f64,
 }
 
 impl<'a> Paths<'a> {
@@ -70,13 +74,12 @@ impl<'a> Paths<'a> {
         footprints: &'a Footprints,
         acting: Option<Acting<'a>>,
     ) -> Paths<'a> {
-        let mut link = Link::new(setup.geometry.radar);
-        if let Observer::Receiver { aperture_m2, .. } = observer {
-            link.aperture_m2 = aperture_m2;
-        }
-        let beam = Beam::new(setup.geometry.radar);
+        let link = Link::new(setup.geometry.radar);
+        let samples = spot::samples(footprints.rays_per_chirp);
+        let lit_shares = spot::lit_shares(footprints.rays_per_chirp);
+        let changes = Vec::new();
         let mut paths =
-            Paths { setup, observer, link, beam, footprints, acting, changes: Vec::new() };
+            Paths { setup, observer, link, samples, lit_shares, footprints, acting, changes };
         paths.changes = paths.acting.as_ref().map_or(Vec::new(), |acting| paths.changes_by(acting));
         paths
     }
@@ -105,20 +108,25 @@ impl<'a> Paths<'a> {
         paths.clear();
         let axis = &self.setup.geometry.chirps.rays[number];
         let antenna = self.observer.position(axis.origin.xyz);
-        let sent = Emission { paths: self, number, axis, antenna, rays: hits.len() };
+        let range_m = self.footprints.axis_range_m[number];
+        let spot = Spot::met(&self.link.beam, axis, range_m, number);
+        let sent = Emission { paths: self, number, spot, antenna, rays: hits.len() };
         let tilts = self.acting.as_ref().map_or([0.0; 2], |acting| acting.tilts(number));
-        for (ray, hit) in hits.iter().enumerate() {
-            let Some(hit) = hit else { continue };
-            let facing = sent.facing(ray);
-            let lit = sent.lit_point(*hit, axis.origin.xyz);
+        for (sample, hit) in hits.iter().enumerate() {
+            let Some((hit, ray)) = hit.zip(spot.ray(self.samples[sample])) else { continue };
+            let facing = sent.facing(sample);
+            let lit = sent.lit_by_beam(hit, &ray);
             let bare = sent.direct(&lit);
             let acting = self.acting.as_ref();
-            let direct = acting.map_or(bare, |a| a.direct(bare, number, hits.len(), facing, tilts));
+            let direct = acting.map_or(bare, |acting| {
+                acting.direct(bare, number, &ray, hits.len(), facing, tilts)
+            });
             paths.push(direct);
             if let Some(bounce) = &self.setup.bounce {
-                let gain = acting.map(|a| a.instrument_gain(number, hits.len(), *hit, facing));
-                let flux_w = sent.flux_w(&lit) * gain.unwrap_or(1.0);
-                sent.second_order(&lit, flux_w, direct, bounce, ray, paths);
+                let gain = acting.map(|acting| acting.instrument_gain(number, &ray, hit, facing));
+                let flux_w = self.link.flux_w(lit.hit.cos_theta) * self.lit_shares[sample];
+                let flux_w = flux_w * gain.unwrap_or(1.0);
+                sent.second_order(&lit, flux_w, direct, bounce, sample, paths);
             }
         }
         if let Some(change) = self.changes.get(number).copied().flatten() {
@@ -128,18 +136,63 @@ impl<'a> Paths<'a> {
 }
 
 impl<'a> Emission<'a> {
-    /// The point at a hit of a ray from `source`.
-    fn lit_point(&self, hit: Hit, source: DVec3) -> LitPoint<'a> {
-        let setup = self.paths.setup;
-        let surface =
-            setup.surfaces[usize::from(setup.geometry.region_of_facet[hit.facet as usize])];
-        let to_source = (source - hit.point.xyz).normalize_or(DVec3::Z);
-        let to_antenna = (self.antenna - hit.point.xyz).normalize_or(DVec3::Z);
-        let frame = LocalFrame::at_hit(setup.geometry.bvh.mesh(), &hit, to_source, surface.grain);
-        let here = frame.local(to_source);
-        let antenna = if self.antenna == source { here } else { frame.local(to_antenna) };
-        let antenna_m = self.antenna.distance(hit.point.xyz);
-        LitPoint { hit, surface, frame, source: here, antenna, antenna_m }
+    /// A point that a ray of the radar's beam lights.
+    fn lit_by_beam(&self, hit: Hit, ray: &Ray<Global>) -> LitPoint<'a> {
+        let to_source = -ray.direction.xyz();
+        let (to_antenna, antenna_m) = match self.paths.observer {
+            Observer::Radar => (to_source, hit.range_m),
+            Observer::Receiver { .. } => self.to_antenna(&hit),
+        };
+        self.lit(hit, to_source, to_antenna, antenna_m, hit.range_m)
+    }
+
+    /// A point that another point of the target lights; the antenna sees it in the main lobe of its beam, or
+    /// by a side lobe.
+    fn lit_by_surface(&self, hit: Hit, source: &LitPoint, in_main_lobe: bool) -> LitPoint<'a> {
+        let to_source = (source.hit.point.xyz - hit.point.xyz).normalize_or(DVec3::Z);
+        let Spot { axis, beam, .. } = &self.spot;
+        let (mut to_antenna, antenna_m) = self.to_antenna(&hit);
+        if in_main_lobe {
+            to_antenna = -beam.direction_at(axis, hit.point).xyz();
+        }
+        let along_beam_m = (hit.point.xyz - axis.origin.xyz).dot(axis.direction.xyz());
+        self.lit(hit, to_source, to_antenna, antenna_m, along_beam_m)
+    }
+
+    /// The unit vector from a hit to the antenna, and the distance, m.
+    fn to_antenna(&self, hit: &Hit) -> (DVec3, f64) {
+        let to_antenna = self.antenna - hit.point.xyz;
+        (to_antenna.normalize_or(DVec3::Z), to_antenna.length())
+    }
+
+    fn lit(
+        &self,
+        hit: Hit,
+        to_source: DVec3,
+        to_antenna: DVec3,
+        antenna_m: f64,
+        along_beam_m: f64,
+    ) -> LitPoint<'a> {
+        let ScanGeometry { bvh, region_of_facet, .. } = self.paths.setup.geometry;
+        let region = usize::from(region_of_facet[hit.facet as usize]);
+        let surface = self.paths.setup.surfaces[region];
+        let frame = LocalFrame::at_hit(bvh.mesh(), &hit, to_source, surface.grain);
+        let source = frame.local(to_source);
+        let antenna = if to_antenna == to_source { source } else { frame.local(to_antenna) };
+        let solid_angle_sr = self.solid_angle_sr(antenna_m, along_beam_m);
+        LitPoint { hit, surface, frame, source, antenna, antenna_m, solid_angle_sr }
+    }
+
+    /// Solid angle, sr, in which a point sees the antenna, from its distance and its place along the beam, m.
+    fn solid_angle_sr(&self, antenna_m: f64, along_beam_m: f64) -> f64 {
+        let stated_m2 = match self.paths.observer {
+            Observer::Radar => self.paths.link.aperture_m2,
+            Observer::Receiver { aperture_m2, .. } => aperture_m2,
+        };
+        match stated_m2 {
+            Some(aperture_m2) => aperture_m2 / (antenna_m * antenna_m),
+            None => self.spot.beam.section(along_beam_m).solid_angle_sr(),
+        }
     }
 
     /// The single path by way of a point.
@@ -173,8 +226,9 @@ impl<'a> Emission<'a> {
             let Some(hit) = self.trace_onward(lit, onward) else { continue };
             let (f_per_sr, first_share) =
                 lit.surface.scattering.f_and_specular_share(lit.source, onward);
-            let second = self.lit_point(hit, lit.hit.point.xyz);
-            let seen = weight * self.pattern(bounce, &hit);
+            let pattern = self.pattern(bounce, &hit);
+            let second = self.lit_by_surface(hit, lit, pattern > bounce.outside_spot);
+            let seen = weight * pattern;
             let (received, second_share) = self.received_share(&second);
             let power_w = flux_w * f_per_sr * onward.cos_theta() * seen * received;
             if power_w > 0.0 && self.is_seen(&second) {
@@ -208,11 +262,7 @@ impl<'a> Emission<'a> {
         let (f_per_sr, specular_share) =
             lit.surface.scattering.f_and_specular_share(lit.source, lit.antenna);
         let cos_exit = lit.antenna.cos_theta();
-        let received = if cos_exit > 0.0 {
-            self.paths.link.received_per_w(lit.antenna_m, cos_exit, f_per_sr)
-        } else {
-            0.0
-        };
+        let received = if cos_exit > 0.0 { f_per_sr * cos_exit * lit.solid_angle_sr } else { 0.0 };
         (received, specular_share)
     }
 
@@ -234,7 +284,7 @@ impl<'a> Emission<'a> {
         match self.paths.observer {
             Observer::Receiver { .. } => 1.0,
             Observer::Radar => {
-                bounce.pattern(&self.paths.beam, self.axis, self.rays, hit.point.xyz)
+                bounce.pattern(&self.spot.beam, &self.spot.axis, self.rays, hit.point.xyz)
             }
         }
     }

@@ -203,6 +203,8 @@ fn miss(geometry: &ScanGeometry) -> RenderError {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::{LN_2, PI};
+
     use glam::DVec3;
 
     use super::*;
@@ -229,10 +231,17 @@ mod tests {
         let scan = shaded(&mesh, 1, &lambert);
         assert_eq!(scan.echoes.len(), 18_529);
         for echo in &scan.echoes {
-            // P = 7 − 15 + 10·lg(0.196 · 0.5/π) − 20·lg R + 20·lg cos θ, with R = 8/cos θ.
+            // P = 7 − 12.5 + 10·lg(λ²/(πw²) · 0.5/π) + 20·lg cos θ, with w₀ from 16 mm, half as wide again at
+            // 0.5 m from the centre, and z = R − 8 m from its focus.
+            let wavelength_m = 299_792_458.0 / 300e9;
+            let off_m2 = echo.xt_m.powi(2) + echo.yt_m.powi(2);
+            // The beam aims at the point of its axis at 8 m, which lies in front of the plate.
             let cos = 8.0 / echo.range_m;
-            let expected = -8.0 + 10.0 * (0.196 * 0.5 / std::f64::consts::PI).log10()
-                - 20.0 * echo.range_m.log10()
+            let waist_m = 0.016 / (2.0 * LN_2).sqrt() * (1.0 + 0.5 * off_m2 * cos * cos / 0.25);
+            let zeta = (echo.range_m - 8.0) * wavelength_m / (PI * waist_m * waist_m);
+            let radius_m2 = waist_m * waist_m * (1.0 + zeta * zeta);
+            let expected = -5.5
+                + db_from_ratio(wavelength_m * wavelength_m / (PI * radius_m2) * 0.5 / PI)
                 + 20.0 * cos.log10();
             assert!((dbm_from_watts(echo.power_w) - expected).abs() < 1e-9);
         }
@@ -282,12 +291,14 @@ mod tests {
         mesh.vertices.iter_mut().for_each(|vertex| *vertex += DVec3::new(1.0, 1.1, 0.0));
         let lambert = Lambert { albedo: 0.5 };
         let scan = shaded(&mesh, 400, &lambert);
-        let full_w = scan.echoes.iter().map(|e| e.power_w).fold(0.0, f64::max);
+        let mut whole = solids::plate(4.0, 4.0);
+        whole.vertices.iter_mut().for_each(|vertex| *vertex += DVec3::new(0.0, 1.1, 0.0));
+        let whole = shaded(&whole, 400, &lambert).echoes;
         let on_the_edge: Vec<&Echo> = scan.echoes.iter().filter(|e| e.xt_m.abs() < 3e-4).collect();
         assert!(on_the_edge.len() > 5);
         for echo in on_the_edge {
-            // Off the centre the beam is as bright; only cos θ and R tell, below 0.03 dB.
-            let lost_db = db_from_ratio(full_w / echo.power_w);
+            let whole_w = whole.iter().find(|e| e.chirp == echo.chirp).unwrap().power_w;
+            let lost_db = db_from_ratio(whole_w / echo.power_w);
             assert!((lost_db - 10.0 * 2f64.log10()).abs() < 0.3, "{lost_db}");
         }
     }

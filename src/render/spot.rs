@@ -1,20 +1,21 @@
 //! Sub-rays: equation (7), the integral over the spot, by samples of its Gaussian.
 //!
-//! The integrand of (7) is weighted by the beam's intensity. Sampling that weight itself leaves a
-//! plain mean: P = (1/N)·Σ P_j with each P_j from equation (11). Sample j of N stands at the share
-//! (j + ½)/N of the beam's power from its axis, and at the golden angle from its neighbour, so that
-//! radius and azimuth are both stratified.
+//! The antenna receives as it sends, so that the integrand of (7) is weighted by the square of the
+//! beam's irradiance u, exp(−4r²/w²). Sampling that weight itself leaves a plain mean:
+//! P = (1/N)·Σ P_j with each P_j from equation (11). Sample j of N stands at the share (j + ½)/N of the
+//! weight from the axis, and at the golden angle from its neighbour, so that radius and azimuth are
+//! both stratified. Each ray stands at right angles on the beam's curved wavefront.
 
-use std::f64::consts::{LN_2, TAU};
+use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::edges;
 use super::surface::Facing;
-use crate::frames::{Direction, Global, Ray};
-use crate::radar::Beam;
+use crate::frames::{Global, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
+use crate::radar::{Beam, GaussianBeam, Section};
 use crate::trace::{Hit, ScanGeometry, TraceError};
 
 /// 1/φ: successive multiples of it are spread evenly over 0 to 1.
@@ -30,6 +31,8 @@ pub struct Footprints {
     pub rays_per_chirp: usize,
     /// N entries per chirp; for N = 1 the ray along the beam's axis.
     pub hits: Vec<Option<Hit>>,
+    /// Range, m, at which the axis of each chirp's beam meets the target, and its spot is laid out.
+    pub axis_range_m: Vec<Option<f64>>,
     /// For each chirp the distance in the target plane to the nearest edge in depth, m, at most
     /// three spots.
     pub edge_m: Vec<f64>,
@@ -50,10 +53,10 @@ pub(super) fn trace(
     rays_per_chirp: usize,
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Footprints, TraceError> {
-    let rays = Rays { geometry: *geometry, rays_per_chirp };
-    let hits = rays.intersections(done, |_, _, hit| hit, |hit| *hit)?;
+    let rays = Rays { geometry: *geometry, samples: samples(rays_per_chirp) };
+    let (hits, axis_range_m) = rays.intersections(done, |_, _, hit| hit, |hit| *hit)?;
     let edge_m = edge_distances_m(geometry, &hits, rays_per_chirp);
-    Ok(Footprints { rays_per_chirp, hits, edge_m, facings: Vec::new() })
+    Ok(Footprints { rays_per_chirp, hits, axis_range_m, edge_m, facings: Vec::new() })
 }
 
 /// As [`trace`], but every hit first passes through `place(chirp, ray, hit)`, which may move or drop it.
@@ -63,25 +66,25 @@ pub(super) fn trace_moved(
     done: &(dyn Fn(usize) + Sync),
     place: impl Fn(usize, &Ray<Global>, Option<Hit>) -> Intersection + Sync,
 ) -> Result<Footprints, TraceError> {
-    let rays = Rays { geometry: *geometry, rays_per_chirp };
-    let placed = rays.intersections(done, place, |placed| placed.0)?;
+    let rays = Rays { geometry: *geometry, samples: samples(rays_per_chirp) };
+    let (placed, axis_range_m) = rays.intersections(done, place, |placed| placed.0)?;
     let (hits, mut facings): (Vec<_>, Vec<_>) = placed.into_iter().unzip();
     if facings.iter().all(Option::is_none) {
         facings = Vec::new();
     }
     let edge_m = edge_distances_m(geometry, &hits, rays_per_chirp);
-    Ok(Footprints { rays_per_chirp, hits, edge_m, facings })
+    Ok(Footprints { rays_per_chirp, hits, axis_range_m, edge_m, facings })
 }
 
 /// The rays of a scan.
-#[derive(Clone, Copy)]
 struct Rays<'a> {
     geometry: ScanGeometry<'a>,
-    rays_per_chirp: usize,
+    samples: Vec<DVec2>,
 }
 
 impl Rays<'_> {
-    /// What `place(chirp, ray, hit)` gives for every ray of every chirp; `hit_of` reads its hit.
+    /// What `place(chirp, ray, hit)` gives for every ray of every chirp, and the range on each axis, m;
+    /// `hit_of` reads the hit of a place.
     ///
     /// The rays along the axes come first: their ranges say how wide the spots are.
     fn intersections<T: Default + Send + Sync>(
@@ -89,26 +92,26 @@ impl Rays<'_> {
         done: &(dyn Fn(usize) + Sync),
         place: impl Fn(usize, &Ray<Global>, Option<Hit>) -> T + Sync,
         hit_of: impl Fn(&T) -> Option<Hit> + Sync,
-    ) -> Result<Vec<T>, TraceError> {
+    ) -> Result<(Vec<T>, Vec<Option<f64>>), TraceError> {
         /// Rays that are traced at once: enough to share the walk over the facets, few enough to hold.
         const RAYS_PER_TURN: usize = 1 << 18;
         let axes = &self.geometry.chirps.rays;
         let hits = self.geometry.closest(axes)?;
         let on_axis = axes.par_iter().zip(hits).enumerate();
         let on_axis: Vec<T> = on_axis.map(|(chirp, (ray, hit))| place(chirp, ray, hit)).collect();
-        if self.rays_per_chirp == 1 {
+        let ranges_m: Vec<Option<f64>> =
+            on_axis.iter().map(|placed| hit_of(placed).map(|hit| hit.range_m)).collect();
+        if self.samples.len() == 1 {
             done(axes.len());
-            return Ok(on_axis);
+            return Ok((on_axis, ranges_m));
         }
-        let turn = (RAYS_PER_TURN / self.rays_per_chirp).max(1);
-        let mut all = Vec::with_capacity(axes.len() * self.rays_per_chirp);
-        for (number, on_axis) in on_axis.chunks(turn).enumerate() {
-            let ranges_m: Vec<Option<f64>> =
-                on_axis.iter().map(|placed| hit_of(placed).map(|hit| hit.range_m)).collect();
-            all.extend(self.spots(number * turn, &ranges_m, &place)?);
-            done(on_axis.len());
+        let turn = (RAYS_PER_TURN / self.samples.len()).max(1);
+        let mut all = Vec::with_capacity(axes.len() * self.samples.len());
+        for (number, some_m) in ranges_m.chunks(turn).enumerate() {
+            all.extend(self.spots(number * turn, some_m, &place)?);
+            done(some_m.len());
         }
-        Ok(all)
+        Ok((all, ranges_m))
     }
 
     /// What `place` gives for all rays of the chirps from `first` on, from the ranges on their axes.
@@ -119,12 +122,12 @@ impl Rays<'_> {
         place: impl Fn(usize, &Ray<Global>, Option<Hit>) -> T + Sync,
     ) -> Result<Vec<T>, TraceError> {
         let beam = Beam::new(self.geometry.radar);
-        let count = self.rays_per_chirp;
+        let count = self.samples.len();
         let spots = ranges_m.par_iter().enumerate().flat_map_iter(|(offset, &range_m)| {
             let chirp = first + offset;
             let axis = &self.geometry.chirps.rays[chirp];
-            let spot = Spot::met(&beam, axis, range_m, chirp, count);
-            (0..count).map(move |sample| spot.ray(sample))
+            let spot = Spot::met(&beam, axis, range_m, chirp);
+            self.samples.iter().map(move |&sample| spot.ray(sample))
         });
         let rays: Vec<Option<Ray<Global>>> = spots.collect();
         // The tracer takes only the rays that exist.
@@ -149,74 +152,73 @@ fn edge_distances_m(
     let ScanGeometry { radar, chirps, .. } = geometry;
     let ranges_m = hits.chunks(rays_per_chirp).map(|hits| hits.first()?.map(|hit| hit.range_m));
     let shots: Vec<_> = chirps.target_points_m(&radar.frames()).zip(ranges_m).collect();
-    edges::distances_m(&shots, radar.spot_diameter_m, SPOTS * radar.spot_diameter_m)
+    edges::distances_m(&shots, radar.spot_fwhm_m(), SPOTS * radar.spot_fwhm_m())
 }
 
 /// The rays through the spot of one chirp.
 #[derive(Clone, Copy)]
 pub(super) struct Spot {
     pub axis: Ray<Global>,
-    /// Unit vectors at right angles to the axis.
-    right: DVec3,
-    up: DVec3,
-    /// Diameter over range.
-    tangent: f64,
-    /// Turns the pattern, so that neighbouring chirps do not repeat it.
-    chirp: usize,
-    count: usize,
+    /// The beam along it.
+    pub beam: GaussianBeam,
+    /// The beam where its axis meets the target.
+    pub section: Section,
+    /// Where each coordinate of one of [`samples`] leads from the axis, m.
+    pub across_m: [DVec3; 2],
 }
 
 impl Spot {
-    /// As wide as the beam where its axis meets the target, or at 8 m; a single ray is the axis.
-    pub fn met(
-        beam: &Beam,
-        axis: &Ray<Global>,
-        range_m: Option<f64>,
-        chirp: usize,
-        count: usize,
-    ) -> Spot {
-        let range_m = range_m.unwrap_or(PATTERN_RANGE_M);
-        let tangent = match count {
-            1 => 0.0,
-            _ => beam.diameter_along_m(axis, range_m) / range_m,
-        };
-        Spot::new(axis, tangent, chirp, count)
-    }
-
-    fn new(axis: &Ray<Global>, tangent: f64, chirp: usize, count: usize) -> Spot {
+    /// As wide as the beam where its axis meets the target, or at 8 m. The number of the chirp turns the
+    /// pattern, so that neighbouring chirps do not repeat it.
+    pub fn met(beam: &Beam, axis: &Ray<Global>, range_m: Option<f64>, chirp: usize) -> Spot {
+        let beam = beam.along(axis);
+        let section = beam.section(range_m.unwrap_or(PATTERN_RANGE_M));
         let (right, up) = across(axis.direction.xyz());
-        Spot { axis: *axis, right, up, tangent, chirp, count }
-    }
-
-    /// The ray of a sample.
-    pub fn ray(&self, sample: usize) -> Option<Ray<Global>> {
-        let Spot { axis: Ray { origin, direction }, right, up, tangent, chirp, count } = *self;
-        let radius = 0.5 * tangent * radius(sample, count);
-        let turn = TAU * ((chirp + sample) as f64 * GOLDEN).fract();
-        let aside = radius * (turn.cos() * right + turn.sin() * up);
-        Direction::new(direction.xyz() + aside).map(|direction| Ray { origin, direction })
-    }
-
-    /// What the coordinates of one of [`samples`] add to the axis's unit vector.
-    pub fn across(&self) -> [DVec3; 2] {
-        let Spot { right, up, tangent, chirp, .. } = *self;
         let (sin, cos) = (TAU * (chirp as f64 * GOLDEN).fract()).sin_cos();
-        [cos * right + sin * up, cos * up - sin * right].map(|unit| 0.5 * tangent * unit)
+        let across = [cos * right + sin * up, cos * up - sin * right];
+        Spot { axis: *axis, beam, section, across_m: across.map(|unit| section.radius_m * unit) }
+    }
+
+    /// The ray of one of [`samples`]; the one in the middle is the axis.
+    pub fn ray(&self, sample: DVec2) -> Option<Ray<Global>> {
+        if sample == DVec2::ZERO {
+            return Some(self.axis);
+        }
+        let [right_m, up_m] = self.across_m;
+        self.section.ray(&self.axis, sample.x * right_m + sample.y * up_m)
     }
 }
 
-/// The samples of the first chirp's spot, in halves of its diameter.
+/// The samples of the first chirp's spot, in radii w of the beam; a single one is on the axis.
 pub(super) fn samples(count: usize) -> Vec<DVec2> {
+    if count == 1 {
+        return vec![DVec2::ZERO];
+    }
     let place =
         |sample| radius(sample, count) * DVec2::from_angle(TAU * (sample as f64 * GOLDEN).fract());
     (0..count).map(place).collect()
 }
 
-/// Distance of a sample from the axis, in halves of the spot's diameter.
+/// Distance of a sample from the axis, in radii w of the beam.
 fn radius(sample: usize, count: usize) -> f64 {
-    let share = (sample as f64 + 0.5) / count as f64;
-    // The share of a Gaussian's power within r is 1 − 2^(−(2r/D)²).
-    (-(1.0 - share).ln() / LN_2).sqrt()
+    // The share of the two-way weight exp(−4r²/w²) within r is 1 − exp(−4r²/w²).
+    0.5 * (-(1.0 - share(sample, count)).ln()).sqrt()
+}
+
+/// The share of the two-way weight that lies nearer to the axis than a sample.
+fn share(sample: usize, count: usize) -> f64 {
+    (sample as f64 + 0.5) / count as f64
+}
+
+/// The share of the sent power, one way, that falls on each sample of a spot.
+///
+/// Samples are drawn from the two-way weight u², and light falls by u: their ratio goes as
+/// exp(2r²/w²) = 1/√(1 − share).
+pub(super) fn lit_shares(count: usize) -> Vec<f64> {
+    let ratios: Vec<f64> =
+        (0..count).map(|sample| 1.0 / (1.0 - share(sample, count)).sqrt()).collect();
+    let sum: f64 = ratios.iter().sum();
+    ratios.into_iter().map(|ratio| ratio / sum).collect()
 }
 
 /// Two unit vectors across a third, all at right angles.
@@ -229,53 +231,69 @@ fn across(forward: DVec3) -> (DVec3, DVec3) {
 mod tests {
     use super::*;
     use crate::frames::Point;
+    use crate::radar::Radar;
 
-    fn axis() -> Ray<Global> {
-        let origin = Point::new(0.0, 0.0, 8.0);
-        Ray { origin, direction: origin.towards(Point::new(0.0, 0.0, 0.0)).unwrap() }
+    const RANGE_M: f64 = 8.3;
+
+    /// The spot of a chirp towards the middle of the target plane.
+    fn spot(chirp: usize) -> Spot {
+        let radar = Radar::default();
+        let origin = radar.frames().origin();
+        let direction = origin.towards(Point::new(0.0, 1.1, 0.0)).unwrap();
+        Spot::met(&Beam::new(&radar), &Ray { origin, direction }, Some(RANGE_M), chirp)
     }
 
-    fn radii_m(count: usize) -> Vec<f64> {
-        let spot = Spot::new(&axis(), 0.016 / 8.0, 3, count);
-        (0..count)
-            .map(|sample| {
-                let direction = spot.ray(sample).unwrap().direction.xyz();
-                8.0 * direction.x.hypot(direction.y) / -direction.z
-            })
-            .collect()
+    /// Where a ray passes the plane across the axis at the spot's range, m.
+    fn place_m(spot: &Spot, ray: &Ray<Global>) -> DVec3 {
+        let forward = spot.axis.direction.xyz();
+        let middle = spot.axis.origin.xyz + RANGE_M * forward;
+        let from = ray.origin.xyz - middle;
+        from - from.dot(forward) / ray.direction.xyz().dot(forward) * ray.direction.xyz()
+    }
+
+    fn radii(count: usize) -> Vec<f64> {
+        let spot = spot(3);
+        let radius = |sample| place_m(&spot, &spot.ray(sample).unwrap()).length();
+        samples(count).into_iter().map(|s| radius(s) / spot.section.radius_m).collect()
     }
 
     #[test]
-    fn half_the_power_lies_within_the_spot_s_diameter() {
-        let within = radii_m(1000).iter().filter(|r| **r < 0.008).count();
-        assert_eq!(within, 500);
+    fn half_the_two_way_weight_lies_within_its_half_width() {
+        // exp(−4r²/w²) = ½ at r = w·√(ln 2)/2.
+        let half = 0.5 * std::f64::consts::LN_2.sqrt();
+        assert_eq!(radii(1000).iter().filter(|r| **r < half).count(), 500);
     }
 
     #[test]
-    fn the_samples_have_the_gaussian_s_second_moment() {
-        // ⟨r²⟩ = D²/(4·ln 2) for an intensity that falls to half at D/2.
-        let mean = radii_m(4000).iter().map(|r| r * r).sum::<f64>() / 4000.0;
-        let expected = 0.016f64.powi(2) / (4.0 * LN_2);
-        assert!((mean / expected - 1.0).abs() < 2e-3, "{mean} is not {expected}");
+    fn the_samples_have_the_second_moment_of_the_two_way_weight() {
+        // ⟨r²⟩ = w²/4.
+        let mean = radii(4000).iter().map(|r| r * r).sum::<f64>() / 4000.0;
+        assert!((mean / 0.25 - 1.0).abs() < 2e-3, "{mean}");
+    }
+
+    #[test]
+    fn the_samples_weighed_by_what_lights_them_have_that_of_the_beam() {
+        let shares = lit_shares(4000);
+        assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        // ⟨r²⟩ = w²/2; the singular weight of the outermost ring leaves a few per cent.
+        let mean: f64 = radii(4000).iter().zip(&shares).map(|(r, share)| r * r * share).sum();
+        assert!((mean / 0.5 - 1.0).abs() < 0.1, "{mean}");
     }
 
     #[test]
     fn the_samples_are_centred() {
-        let spot = Spot::new(&axis(), 0.002, 0, 1000);
-        let rays = (0..1000).filter_map(|sample| spot.ray(sample));
-        let sum = rays.fold(DVec3::ZERO, |sum, ray| sum + ray.direction.xyz());
-        assert!((sum / 1000.0).truncate().length() < 0.002 / 100.0);
+        let spot = spot(0);
+        let rays = samples(1000).into_iter().filter_map(|sample| spot.ray(sample));
+        let sum = rays.fold(DVec3::ZERO, |sum, ray| sum + place_m(&spot, &ray));
+        assert!(sum.length() / 1000.0 < spot.section.radius_m / 100.0);
     }
 
     #[test]
-    fn the_samples_are_those_of_the_rays() {
-        let spot = Spot::new(&axis(), 0.002, 12_345, 100);
-        let [right, up] = spot.across();
-        for (number, sample) in samples(100).into_iter().enumerate() {
-            let aside = sample.x * right + sample.y * up;
-            let expected = Direction::<Global>::new(axis().direction.xyz() + aside).unwrap();
-            let found = spot.ray(number).unwrap().direction;
-            assert!(found.xyz().distance(expected.xyz()) < 1e-13);
-        }
+    fn a_single_ray_is_the_axis() {
+        let spot = spot(5);
+        assert_eq!(
+            samples(1).into_iter().map(|s| spot.ray(s)).collect::<Vec<_>>(),
+            [Some(spot.axis)]
+        );
     }
 }

@@ -131,7 +131,8 @@ fn spot_raster(radar: &Radar, field: Field) -> Raster {
         (0..raster.height).flat_map(|row| (0..raster.width).map(move |column| (row, column)));
     let values = pixels
         .map(|(row, column)| {
-            let diameter_m = beam.diameter_m(raster.x_m(column), raster.y_m(row), PATTERN_RANGE_M);
+            let diameter_m =
+                beam.towards(raster.x_m(column), raster.y_m(row)).section(PATTERN_RANGE_M).fwhm_m();
             (1e3 * diameter_m) as f32
         })
         .collect();

@@ -103,7 +103,8 @@ pub struct ReceiverEntry {
     pub name: String,
     /// Where it stands in the global frame, m.
     pub position_m: [f64; 3],
-    /// Equivalent area A_eq, m²; that of the radar when not given.
+    /// Equivalent area A_eq, m²; when not given that of the radar, whose antenna it then is, focused on the
+    /// same spot.
     pub aperture_m2: Option<f64>,
 }
 

@@ -101,7 +101,7 @@ fn check_spot(file: &SceneFile, chirps: usize, path: &Path) -> Result<(), SceneE
 
 /// The given pixel, or a quarter of the spot, m.
 fn pixel_m(file: &SceneFile) -> f64 {
-    file.image.pixel_m.unwrap_or(file.radar.spot_diameter_m / 4.0)
+    file.image.pixel_m.unwrap_or(file.radar.spot_fwhm_m() / 4.0)
 }
 
 /// A pixel shows nothing below a hundredth of the spot, and an image must fit a page and memory.
@@ -113,7 +113,7 @@ fn check_pixel(
 ) -> Result<(), SceneError> {
     const LONGEST_SIDE: f64 = 10_000.0;
     const MOST_PIXELS: f64 = 16e6;
-    let spot_m = radar.spot_diameter_m;
+    let spot_m = radar.spot_fwhm_m();
     let sides_m = chirps.field(&radar.frames()).sides_m();
     let [columns, rows] = sides_m.map(|side_m| ((side_m + spot_m) / pixel_m).ceil());
     let fits = columns.max(rows) <= LONGEST_SIDE && columns * rows <= MOST_PIXELS;

@@ -123,7 +123,7 @@ impl ReadyScene {
     pub fn image(&self, scan: &Scan) -> Raster {
         let radar = self.scene.radar();
         let field = self.scene.chirps.field(&radar.frames());
-        let (spot_m, pixel_m) = (radar.spot_diameter_m, self.scene.pixel_m());
+        let (spot_m, pixel_m) = (radar.spot_fwhm_m(), self.scene.pixel_m());
         power_image(scan, field, spot_m, &self.material_of_region, pixel_m)
     }
 

@@ -74,7 +74,7 @@ impl<'a> Assembly<'a> {
             let observer = Observer::Receiver {
                 number,
                 position: Point::from(DVec3::from_array(receiver.position_m)),
-                aperture_m2: receiver.aperture_m2.unwrap_or(ready.scene.radar().aperture_m2),
+                aperture_m2: receiver.aperture_m2.or(ready.scene.radar().aperture_m2),
             };
             let scan = shade(setup, footprints, observer, advance).map_err(|error| {
                 ready.render_error(&format!("receiver `{}`: ", receiver.name), error)

@@ -33,7 +33,7 @@ const CENTRE: DVec3 = DVec3::new(0.0, 1.1, 0.0);
 
 fn receiver(place: DVec3) -> Observer {
     let position = Point::from(place);
-    Observer::Receiver { number: 1, position, aperture_m2: APERTURE_M2 }
+    Observer::Receiver { number: 1, position, aperture_m2: Some(APERTURE_M2) }
 }
 
 fn scan(

@@ -38,19 +38,21 @@ pub fn echoes(radar: &Radar, mut mesh: Mesh, rays: usize, surface: &dyn Scatteri
     echoes_at(radar, &chirps, &mesh, surface, rays, None, Observer::Radar)
 }
 
-/// The default radar with a raster of chirps.
+/// The default radar with a raster of chirps, a loss of 15 dB and an antenna of 0.196 m², which makes the power
+/// a matter of geometry alone.
 pub fn raster(scan: Raster) -> Radar {
-    Radar { scan: Pattern::Raster(scan), ..Radar::default() }
+    let (aperture_m2, system_loss_db) = (Some(0.196), 15.0);
+    Radar { scan: Pattern::Raster(scan), aperture_m2, system_loss_db, ..Radar::default() }
 }
 
-/// Equation (11) with the default radar's 7 dBm, −15 dB and 0.196 m², W.
+/// Equation (11) with 7 dBm, −15 dB and 0.196 m², W.
 pub fn by_hand_w(range_m: f64, cos_theta: f64, f_per_sr: f64) -> f64 {
     10f64.powf(-0.8) * 1e-3 * 0.196 / (range_m * range_m) * f_per_sr * cos_theta * cos_theta
 }
 
 /// Range and cosine of incidence on a circle of a radius about the origin, for a ray that is
 /// `offset_m` from its axis after 8 m, by the law of sines; `None` beside the circle.
-pub fn on_a_circle(offset_m: f64, radius_m: f64) -> Option<(f64, f64)> {
+fn on_a_circle(offset_m: f64, radius_m: f64) -> Option<(f64, f64)> {
     let sin = offset_m / radius_m;
     let cos = (1.0 - sin * sin).max(0.0).sqrt();
     let range_m = (STAND_OFF_M * STAND_OFF_M - offset_m * offset_m).sqrt() - radius_m * cos;
@@ -201,8 +203,8 @@ fn cylinder_rows() -> Vec<Row> {
 }
 
 pub fn section() -> Section {
-    let plate = "A plate with Lambert's law of albedo 0.5, eight metres from the default radar, against equation (11) \
-                 computed from the ray and the plane. Flat facets are exact, so only rounding is tolerated.";
+    let plate = "A plate with Lambert's law of albedo 0.5, eight metres from the default radar with an antenna of \
+                 0.196 m², against equation (11) computed from the ray and the plane. Flat facets are exact, so only rounding is tolerated.";
     let round = "A sphere and an upright cylinder of 0.2 m radius made of flat facets, at 8 m: the sum of the powers of a raster against the integral of equation (11) over the visible disc or \
                  strip (relative difference). The incidence angle, up to 60°, against asin(offset/radius). Inscribed facets of width e have an error of the \
                  order (e/r)² in power, which is tolerated. The \

@@ -5,15 +5,15 @@ use std::f64::consts::{LN_2, PI};
 use glam::DVec3;
 use matdb::brdf::Lambert;
 use matdb::radar::BeamEntry;
+use matdb::radar::Radar;
 use matdb::radar::scan::Raster;
-use matdb::radar::{Beam, Radar};
 use matdb::render::Echo;
 use matdb::scene::solids::{icosphere, plate};
 use statrs::function::erf::erfc;
 
 use super::page::{Row, Section, Table, Tolerance::Below, Tolerance::Within};
 use super::quadrature::integral;
-use super::solids::{STAND_OFF_M, by_hand_w, echoes, on_a_circle, raster};
+use super::solids::{STAND_OFF_M, by_hand_w, echoes, raster};
 
 /// Each sample on the sphere errs on its own by the normal of its facet, 0.4° in the mean: as
 /// random errors do.
@@ -64,8 +64,8 @@ fn edge_error(rays: usize) -> f64 {
     let shares = shares(&echoes(&line(WIDTH_M), mesh, rays, &CHALK));
     let errors = shares.iter().enumerate().map(|(chirp, share)| {
         let x_m = WIDTH_M * ((chirp as f64 + 0.5) / CHIRPS as f64 - 0.5);
-        // Half the intensity at half the diameter: exp(−ln 2·(2r/D)²).
-        share - 0.5 * erfc(-2.0 * LN_2.sqrt() * x_m / SPOT_M)
+        // The two-way weight exp(−4r²/w²) = exp(−8 ln 2·r²/D²), half the irradiance being at half the diameter.
+        share - 0.5 * erfc(-(8.0 * LN_2).sqrt() * x_m / SPOT_M)
     });
     rms(errors)
 }
@@ -76,16 +76,13 @@ fn sphere_error(rays: usize) -> f64 {
     let radar = line(1e-6);
     let shares = shares(&echoes(&radar, icosphere(RADIUS_M, 5), rays, &CHALK));
     let full_w = by_hand_w(STAND_OFF_M, 1.0, 0.5 / PI);
-    // The beam is as wide as it is where its axis meets the sphere; only its angle counts.
-    let nearest_m = STAND_OFF_M - RADIUS_M;
-    let width = Beam::new(&radar).diameter_m(0.0, 0.0, nearest_m) / nearest_m;
-    let rim = (RADIUS_M / STAND_OFF_M).asin().tan();
-    let exact = integral(64, 0.0, rim, |tangent| {
-        let offset_m = STAND_OFF_M * tangent.atan().sin();
-        let Some((range_m, cos)) = on_a_circle(offset_m, RADIUS_M) else { return 0.0 };
-        let density =
-            4.0 * LN_2 / (PI * width * width) * (-LN_2 * (2.0 * tangent / width).powi(2)).exp();
-        2.0 * PI * tangent * density * by_hand_w(range_m, cos, 0.5 / PI) / full_w
+    // 8 mm from its focus the beam's waist of 13.6 mm has grown by 0.01 %, and its rays are parallel.
+    let waist_m2 = SPOT_M * SPOT_M / (2.0 * LN_2);
+    let exact = integral(64, 0.0, RADIUS_M, |r_m| {
+        let cos = (1.0 - (r_m / RADIUS_M).powi(2)).max(0.0).sqrt();
+        let range_m = STAND_OFF_M - RADIUS_M * cos;
+        let density = 4.0 / (PI * waist_m2) * (-4.0 * r_m * r_m / waist_m2).exp();
+        2.0 * PI * r_m * density * by_hand_w(range_m, cos, 0.5 / PI) / full_w
     });
     rms(shares.iter().map(|share| share / exact - 1.0))
 }
@@ -105,7 +102,7 @@ fn rows(name: &str, expected_order: f64, error: impl Fn(usize) -> f64) -> Vec<Ro
 }
 
 pub fn section() -> Section {
-    let text = "Equation (7) by N rays per chirp against the integral over the Gaussian spot of 16 mm. A straight \
+    let text = "Equation (7) by N rays per chirp against the integral over the two-way weight of a spot of 16 mm. A straight \
     edge under 200 spots up to 2 cm from it: share of the full power, against the error function. A \
     sphere of 8 mm radius in the middle of the spot: relative difference. N evenly spread points miss the area of a figure by \
                 about the root of the number of points near its \

@@ -66,7 +66,8 @@ impl Effect for CoveringLayer {
         let &[loss_db, boundary_m, direction_deg] = values else { return 1.0 };
         let left = ratio_from_db(-loss_db / shot.hit.cos_theta.max(LEAST_COS_THETA));
         let beyond_m = along_m(shot, direction_deg) - boundary_m;
-        1.0 - (1.0 - left) * share_of_spot(beyond_m, stage.geometry.radar.spot_diameter_m)
+        let section = stage.beam(shot).section(shot.hit.range_m);
+        1.0 - (1.0 - left) * share_of_spot(beyond_m, section.two_way_fwhm_m())
     }
 }
 

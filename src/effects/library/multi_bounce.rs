@@ -1,7 +1,7 @@
 //! Echoes by way of a second surface: radar → first hit → second hit → radar.
 //!
 //! The power that leaves the first hit in a direction falls on the second one and is scattered to the radar,
-//! unless something hides it: P₂ = coupling·∫ Φ·f₁(i, ω)·cos θ_ω · f₂·cos θ_o·A_eq/R₂² dω, over fixed
+//! unless something hides it: P₂ = coupling·∫ Φ·f₁(i, ω)·cos θ_ω · f₂·cos θ_o·Ω dω, over fixed
 //! directions, spread by the cosine and by a wide and a narrow lobe, each weighed by their joint density (the
 //! balance heuristic: Veach & Guibas, SIGGRAPH 1995). Its range is half the whole way, and what is
 //! reported is the mean by power.
@@ -109,7 +109,9 @@ fn detour(
     let there = local_frame(stage, &second);
     let way_m = shot.hit.point.distance_m(second.hit.point) + back_m;
     let sent_w = stage.link.flux_w(shot.hit.cos_theta) * o.cos_theta() / density_per_sr;
-    let share = stage.link.received_per_w(back_m, cos_exit, 1.0) / (KINDS * DIRECTIONS) as f64;
+    let along_beam_m = (second.hit.point.xyz - radar.xyz).dot(shot.ray.direction.xyz());
+    let solid_angle_sr = stage.link.solid_angle_sr(&stage.beam(shot), along_beam_m);
+    let share = cos_exit * solid_angle_sr / (KINDS * DIRECTIONS) as f64;
     Some(Detour {
         regions: [shot.region, second.region],
         first: [frame.local(-shot.ray.direction.xyz()), o],

@@ -57,7 +57,8 @@ mod tests {
             let (bare, with) = (bench.bare(), bench.with(&Subsurface, &[0.01, cosine_power]));
             for ((shot, bare), with) in bench.shots.iter().zip(&bare).zip(&with) {
                 let f_per_sr = 0.01 * shot.hit.cos_theta.powf(cosine_power) / (4.0 * PI);
-                let one = bench.stage().link.power_w(shot.hit.range_m, 1.0, f_per_sr);
+                let link = bench.stage().link;
+                let one = link.power_w(&bench.stage().beam(shot), shot.hit.range_m, 1.0, f_per_sr);
                 assert!(db((with.power_w - bare.power_w) / one).abs() < 1e-6);
             }
         }

@@ -39,7 +39,7 @@ pub struct CloudReport<'a> {
 impl<'a> CloudReport<'a> {
     /// Draws the pictures of a diagnosis.
     pub fn new(answer: CloudAnswer<'a>) -> CloudReport<'a> {
-        let spot_m = answer.scene.radar().spot_diameter_m;
+        let spot_m = answer.scene.radar().spot_fwhm_m();
         let (pictures, notices) = pictures::pictures(answer.report, spot_m);
         let peaks = places::strongest(&answer.report.rows, spot_m);
         CloudReport { answer, pictures, peaks, notices }

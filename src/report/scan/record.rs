@@ -9,18 +9,22 @@ use crate::effects::{Level, Model, entry};
 use crate::formats::EffectEntry;
 use crate::geometry::Raster;
 use crate::material::Status;
-use crate::radar::Radar;
+use crate::radar::{Beam, Radar};
 use crate::render::Scan;
 use crate::scene::{MeshReport, Scene};
 use crate::setup::{MaterialRevision, ReadyScene, SceneMaterial, View};
 use crate::units::dbm_from_watts;
 
 /// Version of the layout of `scan.json`; it grows with every change that a reader could trip over.
-const SCHEMA: u32 = 2;
+const SCHEMA: u32 = 3;
 
 /// How to get from the record to a power, for a reader without the program.
-const EQUATION: &str = "power_w = transmit_power_w * 10^(-system_loss_db/10) * aperture_m2 / range_m^2 \
+const EQUATION: &str = "power_w = transmit_power_w * 10^(-system_loss_db/10) * solid_angle_sr \
     * f_per_sr(incidence) * cos(incidence)^n, n = 2 for footprint \"paper\", 1 for \"projected\"; \
+    solid_angle_sr = wavelength_m^2 / (pi * w^2), or aperture_m2 / range_m^2 where the radar states an aperture; \
+    w^2 = w0^2 + (wavelength_m * (range_m - focus_m) / (pi * w0))^2; \
+    w0 = beam.waist_m * (1 + (edge_growth - 1) * r^2 / edge_m^2), r from the middle of the target plane to where \
+    the beam's axis is after 8 m; \
     f_per_sr is the scattering model of the point's material in backscatter; with scene.spot.rays > 1 the power is the \
     mean of this over the rays of the spot, and range and incidence are no longer those of one ray; docs/model.md has receivers elsewhere, \
     second surfaces, speckle and noise";
@@ -34,6 +38,8 @@ pub struct ScanRecord<'a> {
     equation: &'static str,
     scene: Value,
     pub(super) radar: &'a Radar,
+    /// The beam towards the middle of the target plane.
+    beam: Value,
     frames: Value,
     /// What `cloud.ply` holds.
     cloud: &'static str,
@@ -59,7 +65,8 @@ pub struct ReceiverRecord<'a> {
     /// Its name.
     pub name: &'a str,
     position_m: [f64; 3],
-    aperture_m2: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    aperture_m2: Option<f64>,
     pub(super) threshold_dbm: f64,
     noise_dbm: Option<f64>,
     /// What became of the chirps there.
@@ -161,6 +168,7 @@ impl<'a> ScanRecord<'a> {
                 "region": file.region,
             }),
             radar: scene.radar(),
+            beam: beam(scene.radar()),
             frames: frames(scene),
             cloud: if all_hits { "every hit" } else { "detections" },
             meshes: &scene.target.meshes,
@@ -234,7 +242,7 @@ impl<'a> ReceiverRecord<'a> {
         Some(ReceiverRecord {
             name: &receiver.name,
             position_m: receiver.position_m,
-            aperture_m2: receiver.aperture_m2.unwrap_or(scene.radar().aperture_m2),
+            aperture_m2: receiver.aperture_m2.or(scene.radar().aperture_m2),
             threshold_dbm: dbm_from_watts(view.scan.threshold_w),
             noise_dbm: view.scan.noise_w.map(dbm_from_watts),
             counts: Counts::new(scene, &view.scan, image),
@@ -276,6 +284,16 @@ fn effects(model: Option<&Model>) -> Vec<EffectRecord> {
         }
     }
     records
+}
+
+/// What the beam is derived from, in m.
+fn beam(radar: &Radar) -> Value {
+    let beam = Beam::new(radar).towards(0.0, 0.0);
+    json!({
+        "wavelength_m": beam.wavelength_m,
+        "waist_m": beam.waist_m,
+        "rayleigh_m": beam.rayleigh_m(),
+    })
 }
 
 /// The radar's frames: where the global frame has the origin and the target's axes.

@@ -320,7 +320,7 @@ mod tests {
         let answers = device.land(device.launch(&tree, &[[7; 8], [9; 8]]).unwrap()).unwrap();
         assert_eq!(answers, [7, 9], "what is known is not asked");
         let table = device.table(&[0], &[[0.0; 2]], &[[0; 2]], &[[0; 4]]).unwrap();
-        let spots = [[u32::MAX; 16]];
+        let spots = [[u32::MAX; 24]];
         let echoes = device.launch_echoes(&tree, &table, &spots, 1).unwrap();
         assert_eq!(device.land(echoes).unwrap(), [0; 3], "what is known is not asked");
         let flight = device.launch(&tree, &[[7; 8]]).unwrap();

@@ -29,10 +29,10 @@ const NO_TERMS: u32 = u32::MAX;
 pub struct Share {
     /// Rays left to the CPU, one bit each, the lowest for the first ray.
     pub open: u32,
-    /// Sum of f·cosᵃθ/R² over the other rays, 1/(sr·m²).
-    pub per_sr_m2: f64,
-    /// Sum of f·cosᵃθ/R over the other rays, 1/(sr·m).
-    pub per_sr_m: f64,
+    /// Sum of f·cosᵃθ·Ω(R)/level over the other rays, 1/sr, by the chirp's [`SolidAngle`](crate::radar::SolidAngle).
+    pub per_sr: f64,
+    /// Sum of R·f·cosᵃθ·Ω(R)/level over the other rays, m/sr.
+    pub m_per_sr: f64,
 }
 
 /// A mesh in the memory of a graphics processor, with its scattering models and the samples of a spot.
@@ -84,10 +84,7 @@ impl EchoTracer<'_> {
         let GpuMesh { gpu, bvh, tree } = self.held;
         let shares = self.shares();
         let (Some(tree), Some(table)) = (tree, &self.table) else {
-            return Ok(vec![
-                Share { open: 0, per_sr_m2: 0.0, per_sr_m: 0.0 };
-                shares * cones.len()
-            ]);
+            return Ok(vec![Share { open: 0, per_sr: 0.0, m_per_sr: 0.0 }; shares * cones.len()]);
         };
         let boxes = bvh.boxes();
         let most = RAYS_AT_ONCE / self.samples as u64;
@@ -110,10 +107,9 @@ impl EchoTracer<'_> {
 fn share(words: &[u32], radius_m: f64) -> Share {
     let [power, moment] = [words[1], words[2]].map(|word| f64::from(f32::from_bits(word)));
     if !power.is_finite() || !moment.is_finite() {
-        return Share { open: u32::MAX, per_sr_m2: 0.0, per_sr_m: 0.0 };
+        return Share { open: u32::MAX, per_sr: 0.0, m_per_sr: 0.0 };
     }
-    let per_m = 1.0 / radius_m;
-    Share { open: words[0], per_sr_m2: power * per_m * per_m, per_sr_m: moment * per_m }
+    Share { open: words[0], per_sr: power, m_per_sr: moment * radius_m }
 }
 
 /// Packs scattering models: first term and number of terms of each, and all terms. Neither list is empty.
@@ -158,7 +154,8 @@ mod tests {
 
     use super::*;
     use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Mixture, Scattering, Shadowing};
-    use crate::frames::{Direction, Point, Ray};
+    use crate::frames::{Direction, Global, Point, Ray};
+    use crate::radar::{GaussianBeam, Link, Radar, Section};
     use crate::scene::solids;
     use crate::trace::Bvh;
     use crate::trace::gpu::tests::gpu;
@@ -173,20 +170,34 @@ mod tests {
         Brdf::Mixture(Mixture { k: 1e-3, diffuse, specular })
     }
 
-    /// Narrow cones from all directions towards a ball of 0.3 m, some of which miss it.
+    /// The rays of a spot along an axis, laid out in a width, m, where the beam has a section.
+    fn cone(axis: Ray<Global>, width_m: f64, section: Section, law: u32) -> Cone {
+        let (right, up) = axis.direction.xyz().any_orthonormal_pair();
+        let beam = GaussianBeam { wavelength_m: 1e-3, waist_m: 0.004, focus_m: 3.0 };
+        let solid_angle = Link::new(&Radar::default()).solid_angle(&beam);
+        Cone { axis, across_m: [width_m * right, width_m * up], section, solid_angle, law }
+    }
+
+    /// A section at a distance whose wave seems to come from the distance −1/`curvature_per_m` behind.
+    fn section(range_m: f64, curvature_per_m: f64) -> Section {
+        Section { wavelength_m: 1e-3, range_m, radius_m: 0.01, curvature_per_m }
+    }
+
+    /// Narrow cones from all around to a ball of 0.3 m, its rim and what is beside it, of waves that converge,
+    /// spread or do neither.
     fn cones(count: usize) -> Vec<Cone> {
         let turn = |i: usize, step: f64| (i as f64 * step).fract() - 0.5;
-        let cone = |i: usize| {
+        let one = |i: usize| {
             let from =
                 DVec3::new(turn(i, 0.755), turn(i, 0.570), turn(i, 0.382)).normalize_or(DVec3::X);
             let to = 0.7 * DVec3::new(turn(i, 0.618), turn(i, 0.414), turn(i, 0.236));
             let origin = Point::from((0.5 + 9.0 * turn(i, 0.303).abs()) * from);
             let direction = origin.towards(to.into()).unwrap();
-            let (right, up) = direction.xyz().any_orthonormal_pair();
-            let across = [0.003 * right, 0.003 * up];
-            Cone { axis: Ray { origin, direction }, across, law: (i % 4) as u32 }
+            let width_m = 0.003 * (1.0 + 4.0 * turn(i, 0.171).abs());
+            let section = section(origin.xyz.length() - 0.3, [-0.7, 0.0, 0.8][i % 3]);
+            cone(Ray { origin, direction }, width_m, section, (i % 4) as u32)
         };
-        (0..count).map(cone).collect()
+        (0..count).map(one).collect()
     }
 
     /// Relative error of the sum over a share, and how many rays of it were left open.
@@ -204,14 +215,14 @@ mod tests {
                 open += 1;
                 continue;
             }
-            let aside = sample.x * cone.across[0] + sample.y * cone.across[1];
-            let direction = Direction::new(cone.axis.direction.xyz() + aside).unwrap();
-            if let Some(hit) = bvh.closest(&Ray { direction, ..cone.axis }) {
+            let aside_m = sample.x * cone.across_m[0] + sample.y * cone.across_m[1];
+            if let Some(hit) = bvh.closest(&cone.section.ray(&cone.axis, aside_m).unwrap()) {
                 let f_per_sr = law.retro_per_sr(hit.theta_rad());
-                sum += f_per_sr * hit.cos_theta.powi(2) / hit.range_m.powi(2);
+                let solid_angle = cone.solid_angle.at_sr(hit.range_m) / cone.solid_angle.level_sr;
+                sum += f_per_sr * hit.cos_theta.powi(2) * solid_angle;
             }
         }
-        (if sum > 0.0 { (share.per_sr_m2 / sum - 1.0).abs() } else { share.per_sr_m2 }, open)
+        (if sum > 0.0 { (share.per_sr / sum - 1.0).abs() } else { share.per_sr }, open)
     }
 
     #[test]
@@ -241,7 +252,7 @@ mod tests {
                 let (error, left) = compared(share, &bvh, cone, samples, law);
                 assert!(error < TOLERANCE, "{error}: {share:?} of {cone:?}");
                 open += left;
-                lit += u32::from(share.per_sr_m2 > 0.0);
+                lit += u32::from(share.per_sr > 0.0);
             }
         }
         assert!(lit > 1000 && lit < 3900, "{lit}");
@@ -262,14 +273,14 @@ mod tests {
         let origin = Point::new(0.013, 0.021, 5.0);
         let direction = Direction::new(DVec3::NEG_Z).unwrap();
         let of_law = |law| {
-            let cone = Cone { axis: Ray { origin, direction }, across: [DVec3::ZERO; 2], law };
+            let cone = cone(Ray { origin, direction }, 0.0, section(4.7, 0.0), law);
             lit.echoes(&[cone]).unwrap()[0]
         };
         for law in 0..3 {
-            assert_eq!(of_law(law), Share { open: 1, per_sr_m2: 0.0, per_sr_m: 0.0 });
+            assert_eq!(of_law(law), Share { open: 1, per_sr: 0.0, m_per_sr: 0.0 });
         }
         let told = of_law(3);
-        assert!(told.open == 0 && (told.per_sr_m / told.per_sr_m2 - 4.7).abs() < 0.02, "{told:?}");
+        assert!(told.open == 0 && (told.m_per_sr / told.per_sr - 4.7).abs() < 0.02, "{told:?}");
         // A ray along a plate is left open, and one beside it misses.
         let plate = solids::plate(1.0, 1.0);
         let bvh = Bvh::new(&plate);
@@ -280,7 +291,7 @@ mod tests {
             let origin = Point::new(x_m, 0.1, height_m);
             let direction = Direction::new(DVec3::new(-1.0, 0.03, -1e-3)).unwrap();
             let axis = Ray { origin, direction };
-            lit.echoes(&[Cone { axis, across: [DVec3::ZERO; 2], law: 3 }]).unwrap()[0].open
+            lit.echoes(&[cone(axis, 0.0, section(1.0, 0.0), 3)]).unwrap()[0].open
         };
         assert_eq!((from(1e-3, 1.2), from(0.9, 1.2)), (1, 0));
     }

@@ -1,10 +1,10 @@
 // Sums the echoes of the rays of a chirp; one invocation per 32 rays. It is appended to closest.wgsl, which finds
 // their hits.
 //
-// The direction of a ray of the spot is that of the axis plus a small aside, whose rounding is small, too: a slope errs
-// by n more than that of the axis, and the point where the ray starts near the mesh by n more, and by 6 n per radius of
-// the spot's reach there. After the shear along the ray, a corner errs by 22 n, and by 23 n per radius of reach. This
-// stays below 24 n times `size`, which is 1 plus twice the reach.
+// A ray of the spot stands on the wavefront of the beam, beside the axis and with a slope against it. Both are small,
+// and so is their rounding: a slope errs by n more than that of the axis, and the point where the ray starts near the
+// mesh by n more, and by 6 n per radius of the spot's reach there. After the shear along the ray, a corner errs by
+// 22 n, and by 23 n per radius of reach. This stays below 24 n times `size`, which is 1 plus twice the reach.
 //
 // cos θ errs by 6 n, and the range, in radii, by 18 n over cos θ. The CPU computes the rays for which this matters.
 //
@@ -34,17 +34,29 @@ const GGX: u32 = 1u;
 /// A chirp that starts where its axis comes near the mesh.
 struct Spot {
     origin: vec3f,
-    /// Distance from the antenna to `origin` in lengths of `direction`.
-    run: f32,
+    /// Distance from the radar to `origin` along the axis, in radii.
+    start: f32,
     direction: vec3f,
     size: f32,
-    /// The vectors by which the coordinates of a sample are multiplied before they are added to the direction.
+    /// The vectors, in radii, by which the coordinates of a sample are multiplied; their sum leads from the axis to
+    /// the sample's place in the section of the beam where the samples lie.
     right: vec3f,
     /// Number of the scattering model of region 0.
     law: u32,
     up: vec3f,
     /// The answer if it is known in advance, otherwise 0.
     known: u32,
+    /// Distance of a ray from the axis at `origin` over that in the section.
+    spread: f32,
+    /// Curvature of the wavefront, per radius.
+    curvature: f32,
+    /// The antenna's solid angle falls as 1 / (offset + ((R - middle) per_depth)^2).
+    offset: f32,
+    middle: f32,
+    per_depth: f32,
+    unused_a: u32,
+    unused_b: u32,
+    unused_c: u32,
 }
 
 /// level · cosᵃ θ · P(tan² θ / m²) · G1(θ)ˢ.
@@ -64,13 +76,14 @@ struct Term {
 @group(0) @binding(7) var<storage, read> laws: array<vec2u>;
 @group(0) @binding(8) var<storage, read> terms: array<Term>;
 
-/// A ray of a spot, and the length of its direction over that of the axis.
+/// A ray of a spot, and the length of the wave's path to its start, in radii.
 struct Beside {
     ray: Ray,
-    stretch: f32,
+    way: f32,
 }
 
-/// The echo of a ray: f cosᵃ θ / R² in radii, and R. `power` is negative if f32 cannot compute it.
+/// The echo of a ray: f cosᵃ θ times the antenna's solid angle over its level, and R in radii. `power` is negative if
+/// f32 cannot compute it.
 struct Back {
     power: f32,
     range: f32,
@@ -119,7 +132,10 @@ fn came_back(spot: Spot, sample: vec2f) -> Back {
 }
 
 fn beside(spot: Spot, sample: vec2f) -> Beside {
-    let aside = sample.x * spot.right + sample.y * spot.up;
+    let laid_out = sample.x * spot.right + sample.y * spot.up;
+    let beside = spot.spread * laid_out;
+    let slope = spot.curvature * laid_out;
+    let aside = length(spot.direction) * slope;
     let size = abs(spot.direction);
     let is_along = vec3<bool>(
         size.z != 1.0 && size.x == 1.0,
@@ -130,7 +146,8 @@ fn beside(spot: Spot, sample: vec2f) -> Beside {
     let stretch = 1.0 + along;
     // One component stays exactly 1 or -1.
     let direction = spot.direction + (aside - along * spot.direction) / stretch;
-    return Beside(Ray(spot.origin + spot.run * aside, 0u, direction, spot.size), stretch);
+    let way = spot.start + 0.5 * dot(slope, beside);
+    return Beside(Ray(spot.origin + beside, 0u, direction, spot.size), way);
 }
 
 fn scattered(spot: Spot, way: Beside, entry: u32) -> Back {
@@ -141,7 +158,7 @@ fn scattered(spot: Spot, way: Beside, entry: u32) -> Back {
     let towards = dot(ray.direction, normal);
     let cosine = min(abs(towards) / unit, 1.0);
     let depth = dot(corner.xyz - ray.origin, normal) / towards;
-    let range = unit * (spot.run * way.stretch + depth);
+    let range = way.way + unit * depth;
     let law = laws[spot.law + regions[entry]];
     if cosine < GRAZING || cosine * range < GRAZING || law.y == NO_TERMS {
         return Back(-1.0, 0.0);
@@ -159,7 +176,8 @@ fn scattered(spot: Spot, way: Beside, entry: u32) -> Back {
     if sum == 0.0 {
         return Back(select(-1.0, 0.0, is_told), 0.0);
     }
-    return Back(max(sum / (range * range), LEAST), range);
+    let depths = (range - spot.middle) * spot.per_depth;
+    return Back(max(sum / (spot.offset + depths * depths), LEAST), range);
 }
 
 /// Negative if f32 cannot decide whether the value is 0 in f64.

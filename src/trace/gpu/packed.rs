@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
+use crate::radar::{Section, SolidAngle};
 use crate::trace::boxes::Boxes;
 
 /// The rays of a chirp, one per sample of the spot.
@@ -13,9 +14,13 @@ use crate::trace::boxes::Boxes;
 pub struct Cone {
     /// The axis of the beam.
     pub axis: Ray<Global>,
-    /// The two vectors by which the coordinates of a sample are multiplied before they are added to the unit vector
-    /// along the axis.
-    pub across: [DVec3; 2],
+    /// The two vectors, m, by which the coordinates of a sample are multiplied: their sum leads from the axis to
+    /// the sample's place in the section.
+    pub across_m: [DVec3; 2],
+    /// The section of the beam in which the samples lie.
+    pub section: Section,
+    /// The antenna's solid angle along the beam.
+    pub solid_angle: SolidAngle,
     /// Number of the scattering model of region 0; those of the other regions follow.
     pub law: u32,
 }
@@ -37,7 +42,7 @@ pub(super) type Corners = [[f32; 4]; 3];
 pub(super) type Aim = [u32; 8];
 
 /// The rays of a chirp, which start where its axis comes near the mesh.
-pub(super) type Spot = [u32; 16];
+pub(super) type Spot = [u32; 24];
 
 /// Largest distance of a ray's origin, in radii, up to which f64 computes its entry to 2⁻³⁰. The CPU traces others.
 const FARTHEST: f64 = (1u64 << 20) as f64;
@@ -105,33 +110,51 @@ pub(super) fn spots(boxes: &Boxes, cones: &[Cone], reach: f64) -> Vec<Spot> {
 
 /// Packs the rays of a chirp with a known answer.
 fn known_spot(answer: u32) -> Spot {
-    let mut spot = [0; 16];
+    let mut spot = [0; 24];
     spot[15] = answer;
     spot
 }
 
 fn spot(boxes: &Boxes, cone: &Cone, reach: f64) -> Spot {
-    let Cone { axis, across, law } = cone;
+    let Cone { axis, across_m, section, solid_angle, law } = cone;
     let (from_centre, direction) = (axis.origin.xyz - boxes.sphere.centre, axis.direction.xyz());
-    let farthest_m = from_centre.length() + boxes.sphere.radius_m;
-    let widest = across.iter().map(|aside| aside.length()).fold(0.0, f64::max);
-    let margin_m = reach * widest * farthest_m;
+    let per_m = 1.0 / boxes.sphere.radius_m;
+    // A ray that is r from the axis in the section is r·(1 + (R − range)/R_c) from it at the range R.
+    let spread = |range_m: f64| 1.0 + section.curvature_per_m * (range_m - section.range_m);
+    let middle_m = -from_centre.dot(direction);
+    let ends_m = [middle_m - boxes.sphere.radius_m, middle_m + boxes.sphere.radius_m];
+    let widest_m = across_m.iter().map(|aside| aside.length()).fold(0.0, f64::max);
+    let widest = ends_m.map(|end_m| spread(end_m).abs()).into_iter().fold(1.0, f64::max);
+    let margin_m = reach * widest_m * widest;
     let Some(entry_m) = boxes.sphere.entry_within_m(axis, margin_m) else {
         return known_spot(NOTHING);
     };
-    let size = 1.0 + 2.0 * margin_m / boxes.sphere.radius_m;
+    let size = 1.0 + 2.0 * margin_m * per_m;
     if from_centre.length() > FARTHEST * boxes.sphere.radius_m || size > LARGEST {
         return known_spot(UNSURE);
     }
     let start_m = (entry_m - RUN_UP * boxes.sphere.radius_m).max(0.0);
-    let origin = (from_centre + start_m * direction) / boxes.sphere.radius_m;
-    let largest = direction.abs().max_element();
-    let run = (start_m * largest / boxes.sphere.radius_m) as f32;
-    let [x, y, z] = words(origin.as_vec3());
-    let [u, v, w] = words((direction / largest).as_vec3());
-    let [[a, b, c], [d, e, f]] = across.map(|aside| words((aside / largest).as_vec3()));
-    let (run, size) = (run.to_bits(), (size as f32).to_bits());
-    [x, y, z, run, u, v, w, size, a, b, c, *law, d, e, f, UNKNOWN]
+    let word = |value: f64| (value as f32).to_bits();
+    let [x, y, z] = words(((from_centre + start_m * direction) * per_m).as_vec3());
+    // Its largest component becomes 1 or -1, exactly.
+    let [u, v, w] = words((direction / direction.abs().max_element()).as_vec3());
+    let [[a, b, c], [d, e, f]] = across_m.map(|aside_m| words((aside_m * per_m).as_vec3()));
+    let SolidAngle { offset, middle_m, depth_m, .. } = *solid_angle;
+    let curvature = section.curvature_per_m / per_m;
+    let [start, size, spread, curvature, offset, middle, per_depth] = [
+        start_m * per_m,
+        size,
+        spread(start_m),
+        curvature,
+        offset,
+        middle_m * per_m,
+        1.0 / (depth_m * per_m),
+    ]
+    .map(word);
+    [
+        x, y, z, start, u, v, w, size, a, b, c, *law, d, e, f, UNKNOWN, spread, curvature, offset,
+        middle, per_depth, 0, 0, 0,
+    ]
 }
 
 fn words(vector: Vec3) -> [u32; 3] {
@@ -197,11 +220,17 @@ mod tests {
             let origin = Point::from(at + DVec3::new(beside_m, 10.0, 0.0));
             let axis =
                 Ray { origin, direction: crate::frames::Direction::new(DVec3::NEG_Y).unwrap() };
-            spot(
-                bvh.boxes(),
-                &Cone { axis, across: [width * DVec3::X, width * DVec3::Z], law: 7 },
-                2.0,
-            )
+            // Laid out 10 m away, by a wave that spreads from the radar.
+            let section = Section {
+                wavelength_m: 1e-3,
+                range_m: 10.0,
+                radius_m: 10.0 * width,
+                curvature_per_m: 0.1,
+            };
+            let solid_angle =
+                SolidAngle { level_sr: 1.0, offset: 1.0, middle_m: 10.0, depth_m: 0.5 };
+            let across_m = [DVec3::X, DVec3::Z].map(|unit| 10.0 * width * unit);
+            spot(bvh.boxes(), &Cone { axis, across_m, section, solid_angle, law: 7 }, 2.0)
         };
         let near = cone(0.0, 0.001);
         let reach_m = 2.0 * 0.001 * 10.25;
@@ -210,6 +239,9 @@ mod tests {
         assert!((f64::from(f32::from_bits(near[3])) - (40.0 - start)).abs() < 1e-3);
         assert!((f64::from(f32::from_bits(near[7])) - (1.0 + 2.0 * reach_m / 0.25)).abs() < 1e-5);
         assert_eq!((vector(&near[4..7]), near[11], near[15]), (DVec3::NEG_Y, 7, UNKNOWN));
+        let rest = [16, 17, 18, 19, 20].map(|word: usize| f64::from(f32::from_bits(near[word])));
+        let expected = [0.1 * (10.0 - 0.25 * start), 0.025, 1.0, 40.0, 0.5];
+        assert!(rest.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-4), "{rest:?}");
         // Its axis passes the ball, its rim does not.
         assert_eq!(cone(0.26, 0.001)[15], UNKNOWN);
         assert_eq!(cone(0.28, 0.001)[15], NOTHING);
