@@ -3,8 +3,9 @@
 //!
 //! With i = o the half vector is the direction itself, and the wave falls on every facet that answers at
 //! normal incidence. The f of a law without a grain then depends on θ alone:
-//! f(θ) = Σ level·cosᵃθ·P(tan²θ/m²)·G1(θ)ˢ, where P is exp(−x) for Beckmann's slopes and (1 + x)⁻² for
-//! GGX's, and a diffuse term has neither P nor G1.
+//! f(θ) = Σ level·cosᵃθ·P(tan²θ/m²)/m²·G1(θ)ˢ, where P is exp(−x) for Beckmann's slopes and (1 + x)⁻² for
+//! GGX's, and a diffuse term has neither P nor m nor G1. A beam sees no lobe narrower than itself: its divergence δ
+//! takes the place of a smaller m.
 
 use std::f64::consts::PI;
 
@@ -13,7 +14,7 @@ use super::slopes::Distribution;
 /// One term of the sum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Term {
-    /// Its level, 1/sr.
+    /// Its level, 1/sr; for facets that of f·m².
     pub level_per_sr: f64,
     /// Exponent a of cos θ.
     pub cosines: f64,
@@ -40,22 +41,22 @@ impl Term {
 
     /// R·D·G/(4·cos²θ), for the reflectance R at normal incidence. In D and in front of it are cos⁻⁶θ.
     pub(super) fn mirrors(reflectance: f64, facets: Facets) -> Term {
-        let level_per_sr = reflectance / (4.0 * PI * facets.m * facets.m);
-        Term { level_per_sr, cosines: -6.0, facets: Some(facets) }
+        Term { level_per_sr: reflectance / (4.0 * PI), cosines: -6.0, facets: Some(facets) }
     }
 
-    /// Its part of f, 1/sr; zero at grazing incidence.
-    pub(crate) fn per_sr(&self, cos_theta: f64) -> f64 {
+    /// Its part of f, 1/sr, as a beam of the divergence `beam_rad` sees it; zero at grazing incidence.
+    pub(crate) fn per_sr(&self, beam_rad: f64, cos_theta: f64) -> f64 {
         if cos_theta <= GRAZING {
             return 0.0;
         }
         let facets = self.facets.map_or(1.0, |Facets { m, distribution, shadowed }| {
+            let m = m.max(beam_rad);
             let x = (1.0 / (cos_theta * cos_theta) - 1.0) / (m * m);
             let law = match distribution {
                 Distribution::Beckmann => (-x).exp(),
                 Distribution::Ggx => (1.0 + x).powi(-2),
             };
-            law * distribution.g1(cos_theta, m).powi(shadowed.cast_signed())
+            law / (m * m) * distribution.g1(cos_theta, m).powi(shadowed.cast_signed())
         });
         let whole = self.cosines as i32;
         let cosines = if f64::from(whole) == self.cosines {

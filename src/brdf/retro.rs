@@ -16,14 +16,14 @@ impl<'a> Retro<'a> {
         Retro { law, terms: law.backscatter() }
     }
 
-    /// f in exact backscatter towards the radar, 1/sr.
-    pub(crate) fn per_sr(&self, to_radar: Direction<Surface>) -> f64 {
+    /// f in exact backscatter towards the radar, 1/sr, as a beam of the divergence `beam_rad` sees it.
+    pub(crate) fn per_sr(&self, beam_rad: f64, to_radar: Direction<Surface>) -> f64 {
         let cos_theta = to_radar.cos_theta();
         match &self.terms {
             Some(terms) if cos_theta > GRAZING => {
-                terms.iter().map(|term| term.per_sr(cos_theta)).sum()
+                terms.iter().map(|term| term.per_sr(beam_rad, cos_theta)).sum()
             }
-            _ => self.law.f_per_sr(to_radar, to_radar),
+            _ => self.law.seen_by(beam_rad, to_radar, to_radar).0,
         }
     }
 }
@@ -43,10 +43,17 @@ mod tests {
             told += usize::from(retro.terms.is_some());
             for theta_rad in [0.0f64, 0.02, 0.1, 0.4, 0.9, 1.3, 1.55, FRAC_PI_2, 2.0] {
                 let direction = Direction::from_angles(theta_rad, 0.7);
-                let found = retro.per_sr(direction);
-                let expected = model.f_per_sr(direction, direction);
-                let error = (found - expected).abs();
-                assert!(error <= 1e-9 * expected, "{model:?} at {theta_rad}: {found} {expected}");
+                let own = model.f_per_sr(direction, direction);
+                for beam_rad in [0.0, 0.012, 0.3] {
+                    let found = retro.per_sr(beam_rad, direction);
+                    let expected = model.seen_by(beam_rad, direction, direction).0;
+                    let error = (found - expected).abs();
+                    assert!(
+                        error <= 1e-9 * expected,
+                        "{model:?} at {theta_rad}: {found} {expected}"
+                    );
+                    assert!(beam_rad > 0.0 || (own - expected).abs() <= 1e-12 * own, "{model:?}");
+                }
             }
         }
         assert!(told >= 10, "{told}");

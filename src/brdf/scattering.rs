@@ -17,15 +17,18 @@ pub trait Scattering: Sync {
     /// the horizon.
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64;
 
-    /// f(i, o), 1/sr, and the share of it, 0 to 1, that facets reflect like mirrors, rough or not; the
-    /// rest is diffuse. A model without facets, such as a closure or a measured curve, counts as diffuse.
-    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+    /// f(i, o), 1/sr, as a beam of the divergence `beam_rad` (δ, rad, 0 or more) sees it, and the share of it,
+    /// 0 to 1, that facets reflect like mirrors, rough or not; the rest is diffuse.
+    ///
+    /// No lobe is seen narrower than the beam itself, so that a mirror returns at most what it was sent. A model
+    /// without facets, such as a closure or a measured curve, counts as diffuse and is seen as it is.
+    fn seen_by(&self, _beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
         (self.f_per_sr(i, o), 0.0)
     }
 
-    /// The second of [`f_and_specular_share`](Scattering::f_and_specular_share).
+    /// The share of f(i, o), 0 to 1, that facets reflect like mirrors, rough or not.
     fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        self.f_and_specular_share(i, o).1
+        self.seen_by(0.0, i, o).1
     }
 
     /// f in exact backscatter as a sum of closed forms; `None` for a model whose f depends on the azimuth,

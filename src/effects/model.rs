@@ -139,7 +139,8 @@ impl Model<'_> {
         let f_per_sr = cache.scattered.get_or_make((self.laws.clone(), moving), || {
             let laws: Vec<Retro> = self.laws.iter().map(Retro::new).collect();
             of_every(&intersections, |shot, to_radar| {
-                laws.get(usize::from(shot.region)).map_or(0.0, |law| law.per_sr(to_radar))
+                let law = laws.get(usize::from(shot.region));
+                law.map_or(0.0, |law| law.per_sr(stage.beam(shot).divergence_rad(), to_radar))
             })
         });
         let gains = cache.gains.get_or_make(self.keys(|_| true), || {
@@ -294,14 +295,15 @@ impl Model<'_> {
 
     /// Equation (11) with every effect on the surface and the gain.
     fn power_w(&self, stage: &Stage, shot: &Shot) -> f64 {
-        let f_per_sr = self.law_per_sr(shot, shot.to_radar());
+        let f_per_sr = self.law_per_sr(stage, shot);
         self.gain(stage, shot) * self.scattered_w(stage, shot, f_per_sr)
     }
 
     /// f of the scattering model of a shot without effects, 1/sr.
-    fn law_per_sr(&self, shot: &Shot, to_radar: Direction<Surface>) -> f64 {
-        let law = self.laws.get(usize::from(shot.region));
-        law.map_or(0.0, |law| law.f_per_sr(to_radar, to_radar))
+    fn law_per_sr(&self, stage: &Stage, shot: &Shot) -> f64 {
+        let (law, to_radar) = (self.laws.get(usize::from(shot.region)), shot.to_radar());
+        let beam_rad = stage.beam(shot).divergence_rad();
+        law.map_or(0.0, |law| law.seen_by(beam_rad, to_radar, to_radar).0)
     }
 
     /// Equation (11) with every effect on the surface, W.

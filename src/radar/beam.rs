@@ -131,6 +131,11 @@ impl GaussianBeam {
         PI * self.waist_m * self.waist_m / self.wavelength_m
     }
 
+    /// δ₀ = λ/(2π·w₀), rad: the tilt at which a flat mirror returns 1/e, wherever along the beam.
+    pub fn divergence_rad(&self) -> f64 {
+        self.wavelength_m / (2.0 * PI * self.waist_m)
+    }
+
     /// The beam at a distance along its axis from the reflector, m.
     pub fn section(&self, range_m: f64) -> Section {
         let (z_m, rayleigh_m) = (range_m - self.focus_m, self.rayleigh_m());
@@ -168,7 +173,8 @@ pub struct Section {
 }
 
 impl Section {
-    /// δ_w = λ/(2π·w), rad: the tilt at which a flat mirror that fills the beam returns 1/e.
+    /// δ_w = λ/(2π·w), rad: the part of the beam's divergence that is not in the curvature of its wavefront,
+    /// δ₀² = δ_w² + w²/(4R_c²).
     pub fn divergence_rad(&self) -> f64 {
         self.wavelength_m / (2.0 * PI * self.radius_m)
     }

@@ -21,6 +21,7 @@ use super::observer::Observer;
 use super::setup::Setup;
 use super::spot::{self, Spot};
 use super::surface::Surface;
+use crate::brdf::Term;
 use crate::frames::{Global, Pose, Ray};
 use crate::geometry::Mesh;
 use crate::radar::{Detection, Footprint, Link};
@@ -149,13 +150,21 @@ impl<'a> Work<'a> {
             if !std::ptr::eq(held.bvh(), batch.geometry.bvh) {
                 return Err(gpu_error(GpuError::OtherMesh));
             }
+            // The device knows no beam: what may be seen wider than it is, is left to the processor.
+            let axes = batch.geometry.chirps.rays.iter();
+            let beam_rad = axes.map(|axis| work.link.beam.along(axis).divergence_rad());
+            let widest_rad = beam_rad.fold(0.0, f64::max);
+            let is_resolved = |term: &Term| term.facets.is_none_or(|facets| facets.m >= widest_rad);
             let law = |take: &Take, region: usize| match take.surfaces.get(region) {
-                Some(surface) => surface.scattering.backscatter(),
+                Some(surface) => {
+                    surface.scattering.backscatter().filter(|law| law.iter().all(is_resolved))
+                }
                 None => Some(Vec::new()),
             };
             let laws: Vec<_> = takes
                 .iter()
-                .flat_map(|take| (0..work.regions).map(move |region| law(take, region)))
+                .flat_map(|take| (0..work.regions).map(move |region| (take, region)))
+                .map(|(take, region)| law(take, region))
                 .collect();
             let cosines = match work.link.footprint {
                 Footprint::Paper => 2.0,
@@ -238,21 +247,28 @@ impl<'a> Work<'a> {
         let echoes = rays.par_iter().zip(hits).filter_map(|((place, ray), hit)| {
             let hit = hit?;
             let take = &self.takes[self.take(first + place)];
-            let solid_angle_sr = self.link.solid_angle_sr(&spots[*place].beam, hit.range_m);
-            let power_w = solid_angle_sr * self.w_per_sr(geometry.bvh.mesh(), take, ray, &hit)?;
+            let power_w = self.power_w(geometry.bvh.mesh(), take, &spots[*place], ray, &hit)?;
             Some((*place, Detection { range_m: hit.range_m, power_w }))
         });
         Ok(echoes.collect())
     }
 
-    /// Equation (11) at a hit for 1 sr of the antenna, W/sr; `None` in a region without a surface.
-    fn w_per_sr(&self, mesh: &Mesh, take: &Take, ray: &Ray<Global>, hit: &Hit) -> Option<f64> {
+    /// Received power of a ray by equation (11), W; `None` in a region without a surface.
+    fn power_w(
+        &self,
+        mesh: &Mesh,
+        take: &Take,
+        spot: &Spot,
+        ray: &Ray<Global>,
+        hit: &Hit,
+    ) -> Option<f64> {
         let region = self.batch.geometry.region_of_facet[hit.facet as usize];
         let surface = take.surfaces.get(usize::from(region))?;
         let to_radar = -ray.direction.xyz();
         let to_radar = LocalFrame::at_hit(mesh, hit, to_radar, surface.grain).local(to_radar);
-        let f_per_sr = surface.scattering.f_per_sr(to_radar, to_radar);
-        Some(self.link.flux_w(hit.cos_theta) * f_per_sr * hit.cos_theta)
+        let beam_rad = spot.divergence_rad(self.rays, hit.range_m);
+        let (f_per_sr, _) = surface.scattering.seen_by(beam_rad, to_radar, to_radar);
+        Some(self.link.power_w(&spot.beam, hit.range_m, hit.cos_theta, f_per_sr))
     }
 
     /// The spots of some chirps, in the global frame.

@@ -65,6 +65,8 @@ struct LitPoint<'a> {
     antenna_m: f64,
     /// Solid angle in which the antenna is seen, sr.
     solid_angle_sr: f64,
+    /// Divergence of the beam there, rad.
+    beam_rad: f64,
 }
 
 impl<'a> Paths<'a> {
@@ -180,7 +182,8 @@ impl<'a> Emission<'a> {
         let source = frame.local(to_source);
         let antenna = if to_antenna == to_source { source } else { frame.local(to_antenna) };
         let solid_angle_sr = self.solid_angle_sr(antenna_m, along_beam_m);
-        LitPoint { hit, surface, frame, source, antenna, antenna_m, solid_angle_sr }
+        let beam_rad = self.spot.divergence_rad(self.rays, along_beam_m);
+        LitPoint { hit, surface, frame, source, antenna, antenna_m, solid_angle_sr, beam_rad }
     }
 
     /// Solid angle, sr, in which a point sees the antenna, from its distance and its place along the beam, m.
@@ -224,8 +227,7 @@ impl<'a> Emission<'a> {
     ) {
         for (onward, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
             let Some(hit) = self.trace_onward(lit, onward) else { continue };
-            let (f_per_sr, first_share) =
-                lit.surface.scattering.f_and_specular_share(lit.source, onward);
+            let (f_per_sr, first_share) = lit.surface.scattering.seen_by(0.0, lit.source, onward);
             let pattern = self.pattern(bounce, &hit);
             let second = self.lit_by_surface(hit, lit, pattern > bounce.outside_spot);
             let seen = weight * pattern;
@@ -260,7 +262,7 @@ impl<'a> Emission<'a> {
     /// Share of the power on a point that the antenna receives if nothing occludes it, and the specular share of that.
     fn received_share(&self, lit: &LitPoint) -> (f64, f64) {
         let (f_per_sr, specular_share) =
-            lit.surface.scattering.f_and_specular_share(lit.source, lit.antenna);
+            lit.surface.scattering.seen_by(lit.beam_rad, lit.source, lit.antenna);
         let cos_exit = lit.antenna.cos_theta();
         let received = if cos_exit > 0.0 { f_per_sr * cos_exit * lit.solid_angle_sr } else { 0.0 };
         (received, specular_share)

@@ -179,6 +179,15 @@ impl Spot {
         Spot { axis: *axis, beam, section, across_m: across.map(|unit| section.radius_m * unit) }
     }
 
+    /// Divergence of the beam, rad, at a distance along it, m, for a spot of so many rays: many stand on the
+    /// curved wavefront, which is a part of it, and a single one does not.
+    pub fn divergence_rad(&self, rays: usize, range_m: f64) -> f64 {
+        match rays {
+            1 => self.beam.divergence_rad(),
+            _ => self.beam.section(range_m).divergence_rad(),
+        }
+    }
+
     /// The ray of one of [`samples`]; the one in the middle is the axis.
     pub fn ray(&self, sample: DVec2) -> Option<Ray<Global>> {
         if sample == DVec2::ZERO {

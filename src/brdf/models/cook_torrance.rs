@@ -78,6 +78,12 @@ impl CookTorrance {
         self.distribution.d_anisotropic_per_sr(h, [self.m, m_across])
     }
 
+    /// The lobe that a beam of a divergence, rad, sees: as it is, but never narrower than the beam.
+    fn widened(&self, beam_rad: f64) -> CookTorrance {
+        let m_across = self.m_across.map(|m_across| m_across.max(beam_rad));
+        CookTorrance { m: self.m.max(beam_rad), m_across, ..*self }
+    }
+
     /// G1 of one direction, with the roughness in its azimuth.
     fn g1(&self, direction: Direction<Surface>) -> f64 {
         let m = self.m_across.map_or(self.m, |m_across| m_along(direction, [self.m, m_across]));
@@ -111,8 +117,8 @@ impl Scattering for CookTorrance {
         f * d * self.shadowing(i, o) / (4.0 * i.cos_theta() * o.cos_theta())
     }
 
-    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
-        (self.f_per_sr(i, o), 1.0)
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        (self.widened(beam_rad).f_per_sr(i, o), 1.0)
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

@@ -51,12 +51,13 @@ impl Fresnel {
 
 impl Scattering for Fresnel {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        let eps = permittivity(self.eps_real, self.eps_imag);
-        mirror_lobe_per_sr(i, o, self.lobe_rad, |cos| fresnel_reflectance(eps, cos))
+        self.seen_by(0.0, i, o).0
     }
 
-    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
-        (self.f_per_sr(i, o), 1.0)
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        let (eps, lobe_rad) =
+            (permittivity(self.eps_real, self.eps_imag), self.lobe_rad.max(beam_rad));
+        (mirror_lobe_per_sr(i, o, lobe_rad, |cos| fresnel_reflectance(eps, cos)), 1.0)
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

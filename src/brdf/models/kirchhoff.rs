@@ -111,19 +111,25 @@ impl Kirchhoff {
 
     /// The mirror's part of f, 1/sr.
     pub fn coherent_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        self.coherent_seen_by(0.0, i, o)
+    }
+
+    /// The mirror's part of f, 1/sr, as a beam of a divergence, rad, sees it.
+    fn coherent_seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        let lobe_rad = self.lobe_rad.max(beam_rad);
         let q_z = wavenumber_rad_per_m(self.frequency_hz) * (i.cos_theta() + o.cos_theta());
         let kept = (-(q_z * self.rms_height_m).powi(2)).exp();
-        kept * mirror_lobe_per_sr(i, o, self.lobe_rad, |cos| fresnel_reflectance(self.eps(), cos))
+        kept * mirror_lobe_per_sr(i, o, lobe_rad, |cos| fresnel_reflectance(self.eps(), cos))
     }
 }
 
 impl Scattering for Kirchhoff {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        self.incoherent_per_sr(i, o) + self.coherent_per_sr(i, o)
+        self.seen_by(0.0, i, o).0
     }
 
-    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
-        (self.f_per_sr(i, o), 1.0)
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        (self.incoherent_per_sr(i, o) + self.coherent_seen_by(beam_rad, i, o), 1.0)
     }
 }
 

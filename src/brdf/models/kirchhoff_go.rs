@@ -41,15 +41,15 @@ pub struct KirchhoffGo {
 
 impl Scattering for KirchhoffGo {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        let m = std::f64::consts::SQRT_2 * self.rms_slope;
+        self.seen_by(0.0, i, o).0
+    }
+
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        let m = (std::f64::consts::SQRT_2 * self.rms_slope).max(beam_rad);
         let d_per_sr = Distribution::Beckmann.d_per_sr(half_vector(i, o).cos_theta(), m);
         let eps = permittivity(self.eps_real, self.eps_imag);
         let reflectance = fresnel_reflectance(eps, mirror_cosine(i, o));
-        reflectance * d_per_sr / (4.0 * i.cos_theta() * o.cos_theta())
-    }
-
-    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
-        (self.f_per_sr(i, o), 1.0)
+        (reflectance * d_per_sr / (4.0 * i.cos_theta() * o.cos_theta()), 1.0)
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

@@ -128,11 +128,12 @@ fn step_up(boundary: Complex<f64>, from_below: Complex<f64>) -> Complex<f64> {
 
 impl Scattering for Layered {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        mirror_lobe_per_sr(i, o, self.lobe_rad, |cos| self.reflectance_at(cos))
+        self.seen_by(0.0, i, o).0
     }
 
-    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
-        (self.f_per_sr(i, o), 1.0)
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        let lobe_rad = self.lobe_rad.max(beam_rad);
+        (mirror_lobe_per_sr(i, o, lobe_rad, |cos| self.reflectance_at(cos)), 1.0)
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

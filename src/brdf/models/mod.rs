@@ -57,13 +57,14 @@ macro_rules! models {
                 }
             }
 
-            fn f_and_specular_share_above_horizon(
+            fn seen_above_horizon(
                 &self,
+                beam_rad: f64,
                 i: Direction<Surface>,
                 o: Direction<Surface>,
             ) -> (f64, f64) {
                 match self {
-                    $(Brdf::$model(model) => model.f_and_specular_share(i, o),)+
+                    $(Brdf::$model(model) => model.seen_by(beam_rad, i, o),)+
                 }
             }
 
@@ -106,11 +107,8 @@ impl Scattering for Brdf {
         if is_below_horizon(i, o) { 0.0 } else { self.f_above_horizon_per_sr(i, o) }
     }
 
-    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
-        if is_below_horizon(i, o) {
-            return (0.0, 0.0);
-        }
-        self.f_and_specular_share_above_horizon(i, o)
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        if is_below_horizon(i, o) { (0.0, 0.0) } else { self.seen_above_horizon(beam_rad, i, o) }
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

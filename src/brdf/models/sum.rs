@@ -39,8 +39,8 @@ impl<P: ScatteringModel> Scattering for Sum<P> {
         self.parts.iter().map(|part| part.f_per_sr(i, o)).sum()
     }
 
-    fn f_and_specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
-        weighted::f_and_specular_share(self.weighted(), i, o)
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+        weighted::seen_by(self.weighted(), beam_rad, i, o)
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

@@ -132,7 +132,7 @@ fn the_enum_answers_as_the_model_by_itself() {
             let o = Direction::from_angles(theta_o, 0.3 + azimuth);
             let alone = model.model();
             assert_eq!(model.f_per_sr(i, o), alone.f_per_sr(i, o), "{model:?}");
-            let shares = [model.f_and_specular_share(i, o), alone.f_and_specular_share(i, o)];
+            let shares = [model.seen_by(0.02, i, o), alone.seen_by(0.02, i, o)];
             assert_eq!(shares[0], shares[1], "{model:?}");
             assert_eq!(model.specular_share(i, o), alone.specular_share(i, o), "{model:?}");
             assert_eq!(model.sigma0(theta_i), alone.sigma0(theta_i), "{model:?}");

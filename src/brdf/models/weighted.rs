@@ -7,15 +7,16 @@ use crate::frames::{Direction, Surface};
 /// JSON Schema of a part.
 pub(super) const PART_SCHEMA: &str = r##"{"$ref": "#/$defs/model"}"##;
 
-/// f of the parts together, 1/sr, and its specular share.
-pub(super) fn f_and_specular_share<'a, P: Scattering + 'a>(
+/// f of the parts together, 1/sr, as a beam sees it, and its specular share.
+pub(super) fn seen_by<'a, P: Scattering + 'a>(
     parts: impl Iterator<Item = (f64, &'a P)>,
+    beam_rad: f64,
     i: Direction<Surface>,
     o: Direction<Surface>,
 ) -> (f64, f64) {
     let (mut all, mut specular) = (0.0, 0.0);
     for (weight, part) in parts {
-        let (f, share) = part.f_and_specular_share(i, o);
+        let (f, share) = part.seen_by(beam_rad, i, o);
         all += weight * f;
         specular += weight * f * share;
     }

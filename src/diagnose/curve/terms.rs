@@ -87,7 +87,7 @@ macro_rules! described {
 
 /// The diffuse part of a law at a point, 1/sr.
 fn diffuse_per_sr(law: &Brdf, point: &Point) -> f64 {
-    let (f_per_sr, specular_share) = law.f_and_specular_share(point.i, point.o);
+    let (f_per_sr, specular_share) = law.seen_by(0.0, point.i, point.o);
     (1.0 - specular_share) * f_per_sr
 }
 

@@ -39,6 +39,8 @@ struct SpotRay {
     /// Power, W, where f is 1/sr, by its share of the spot.
     watts_per_f: f64,
     region: u16,
+    /// Divergence of the beam that sees it, rad.
+    beam_rad: f64,
 }
 
 impl SpotRay {
@@ -52,12 +54,14 @@ impl SpotRay {
         let HitSurface { region, to_radar, .. } = surface;
         let Hit { range_m, cos_theta, .. } = *hit;
         let watts_per_f = share * stage.link.power_w(beam, range_m, cos_theta, 1.0);
-        SpotRay { range_m, to_radar, watts_per_f, region }
+        // The rays stand on the wavefront, whose curvature is the rest of the divergence.
+        let beam_rad = beam.section(range_m).divergence_rad();
+        SpotRay { range_m, to_radar, watts_per_f, region, beam_rad }
     }
 
-    /// Its power, W, from one region with an f of a direction, 1/sr.
-    fn power_w(&self, region: u16, f: impl Fn(Direction<Surface>) -> f64) -> f64 {
-        if self.region == region { self.watts_per_f * f(self.to_radar) } else { 0.0 }
+    /// Its power, W, from one region with an f of a beam's divergence, rad, and a direction, 1/sr.
+    fn power_w(&self, region: u16, f: impl Fn(f64, Direction<Surface>) -> f64) -> f64 {
+        if self.region == region { self.watts_per_f * f(self.beam_rad, self.to_radar) } else { 0.0 }
     }
 }
 
@@ -83,8 +87,8 @@ struct Sums {
 }
 
 impl Sums {
-    /// Of a region's rays, for f of a direction, 1/sr.
-    fn of((centre, spot): &Spot, region: u16, f: impl Fn(Direction<Surface>) -> f64) -> Sums {
+    /// Of a region's rays, for f of a beam's divergence, rad, and a direction, 1/sr.
+    fn of((centre, spot): &Spot, region: u16, f: impl Fn(f64, Direction<Surface>) -> f64) -> Sums {
         let mut sums = Sums { centre_w: centre.power_w(region, &f), ..Sums::default() };
         for ray in spot {
             let (power_w, longer_m) = (ray.power_w(region, &f), ray.range_m - centre.range_m);
@@ -124,14 +128,14 @@ impl Spots {
         let mut answers = Vec::new();
         for (region, law) in (0..).zip(laws) {
             let Some(terms) = law.backscatter() else {
-                let sums = self.sums(region, |to_radar| law.f_per_sr(to_radar, to_radar));
+                let sums = self.sums(region, |beam_rad, v| law.seen_by(beam_rad, v, v).0);
                 answers.push((1.0, Arc::new(sums)));
                 continue;
             };
             for term in terms {
                 let shape = Term { level_per_sr: 1.0, ..term };
                 let sums = self.sums.get_or_make((region, shape), || {
-                    self.sums(region, |to_radar| shape.per_sr(to_radar.cos_theta()))
+                    self.sums(region, |beam_rad, v| shape.per_sr(beam_rad, v.cos_theta()))
                 });
                 answers.push((term.level_per_sr, sums));
             }
@@ -139,8 +143,8 @@ impl Spots {
         answers
     }
 
-    /// The sums of every spot over the rays of a region, for f of a direction, 1/sr.
-    fn sums(&self, region: u16, f: impl Fn(Direction<Surface>) -> f64 + Sync) -> Vec<Sums> {
+    /// The sums of every spot over the rays of a region, for f of a beam's divergence, rad, and a direction, 1/sr.
+    fn sums(&self, region: u16, f: impl Fn(f64, Direction<Surface>) -> f64 + Sync) -> Vec<Sums> {
         let spots = self.all.par_iter();
         spots
             .map(|spot| spot.as_ref().map_or(Sums::default(), |spot| Sums::of(spot, region, &f)))
@@ -168,6 +172,7 @@ fn spots(stage: &Stage, shots: &[Shot], diameter_m: f64) -> Vec<Option<Spot>> {
         .zip(hits.par_chunks(RAYS))
         .map(|((axis, beam, centre, rays), hits)| {
             let centre = spot_ray(stage, &facets, beam, axis, centre, 1.0)?;
+            let centre = SpotRay { beam_rad: beam.divergence_rad(), ..centre };
             let mut spot = Vec::with_capacity(RAYS);
             for ((ray, hit), place) in rays.iter().zip(hits).zip(PLACES.iter()) {
                 spot.extend(spot_ray(stage, &facets, beam, ray, hit, place.share));
@@ -345,6 +350,7 @@ mod tests {
             to_radar: Direction::from_angles(theta_rad, 0.3),
             watts_per_f: 1e-9,
             region,
+            beam_rad: 0.3 * theta_rad,
         };
         let over_a_border = (ray(0, 0.1), vec![ray(0, 0.2), ray(1, 0.3), ray(1, 0.05)]);
         let all = vec![Some(over_a_border), None, Some((ray(1, 0.2), vec![ray(1, 0.25)]))];
@@ -365,7 +371,10 @@ mod tests {
                     continue;
                 };
                 let fresh = (0..).zip(laws).fold(Sums::default(), |sums, (region, law)| {
-                    sums.and(1.0, &Sums::of(spot, region, |v| law.f_per_sr(v, v)))
+                    sums.and(
+                        1.0,
+                        &Sums::of(spot, region, |beam_rad, v| law.seen_by(beam_rad, v, v).0),
+                    )
                 });
                 for (kept, fresh) in [
                     (kept.centre_w, fresh.centre_w),

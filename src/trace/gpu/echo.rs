@@ -142,7 +142,8 @@ fn pack_term(term: &Term, cosines: f64) -> Option<[u32; 4]> {
         Some(_) => return None,
     };
     let cosines = term.cosines + cosines;
-    let values = [term.level_per_sr, cosines, m].map(|value| value as f32);
+    let level_per_sr = if m > 0.0 { term.level_per_sr / (m * m) } else { term.level_per_sr };
+    let values = [level_per_sr, cosines, m].map(|value| value as f32);
     let is_in_range = cosines.abs() <= MOST_COSINES && values.iter().all(|value| value.is_finite());
     let [level, cosines, m] = values.map(f32::to_bits);
     is_in_range.then_some([level, cosines, m, form])
