@@ -1,0 +1,222 @@
+//! Promise: spot, aperture, wavefront and the lobe of a mirror are of one Gaussian beam, so that levels at
+//! the focus and away from it have their closed forms, and nothing returns more than was sent.
+
+mod support;
+
+use std::f64::consts::{LN_2, PI};
+
+use glam::{DMat3, DVec3};
+use matdb::brdf::{
+    Brdf, CookTorrance, Distribution, Fresnel, KirchhoffGo, Lambert, Layered, Scattering, Shadowing,
+};
+use matdb::geometry::Mesh;
+use matdb::radar::scan::Raster;
+use matdb::radar::{Chirps, Footprint, Pattern, Radar};
+use matdb::render::Observer;
+use matdb::scene::solids;
+
+/// Distances from the focus, m.
+const OFF_FOCUS_M: [f64; 5] = [-0.5, -0.2, 0.0, 0.2, 0.5];
+
+/// Rays of a spot where its mean is judged.
+const RAYS: usize = 4000;
+
+/// The mean over the rays: their tail beyond the outermost is left out.
+const MEAN_DB: f64 = 0.05;
+
+/// The mean over a highlight that only a sixteenth of the rays see, on facets that turn by 2 mrad.
+const HIGHLIGHT_DB: f64 = 0.15;
+
+/// cos θ and G1 within a lobe of the beam's width.
+const LOBE_DB: f64 = 0.01;
+
+/// A metal without loss.
+const MIRROR: Fresnel = Fresnel { eps_real: 1.0, eps_imag: 1e9, lobe_rad: 0.001 };
+
+/// The default radar's beam, by hand from 16 mm and 300 GHz.
+struct Waist {
+    wavelength_m: f64,
+    waist_m: f64,
+}
+
+impl Waist {
+    fn new() -> Waist {
+        Waist { wavelength_m: 299_792_458.0 / 300e9, waist_m: 0.016 / (2.0 * LN_2).sqrt() }
+    }
+
+    /// ζ = z/z_R.
+    fn zeta(&self, z_m: f64) -> f64 {
+        z_m * self.wavelength_m / (PI * self.waist_m * self.waist_m)
+    }
+
+    /// w², m².
+    fn radius_m2(&self, z_m: f64) -> f64 {
+        self.waist_m * self.waist_m * (1.0 + self.zeta(z_m).powi(2))
+    }
+
+    /// δ₀ = λ/(2π·w₀), rad.
+    fn divergence_rad(&self) -> f64 {
+        self.wavelength_m / (2.0 * PI * self.waist_m)
+    }
+}
+
+fn db(ratio: f64) -> f64 {
+    10.0 * ratio.log10()
+}
+
+/// Power received from a mesh about the origin over that sent, for a chirp along the axis of the field of view; the
+/// mesh is turned about y and moved away from the focus.
+fn returned(mut mesh: Mesh, tilt_rad: f64, z_m: f64, rays: usize, law: &dyn Scattering) -> f64 {
+    let turn = DMat3::from_rotation_y(tilt_rad);
+    for vertex in &mut mesh.vertices {
+        // The default radar looks along −z from (0, 1.1, 8).
+        *vertex = turn * *vertex + DVec3::new(0.0, 1.1, -z_m);
+    }
+    let scan = Raster { lines: 1, chirps_per_line: 1, width_m: 1e-6, height_m: 1e-6 };
+    let radar = Radar {
+        transmit_power_dbm: 30.0,
+        system_loss_db: 0.0,
+        threshold_dbm: -300.0,
+        footprint: Footprint::Projected,
+        scan: Pattern::Raster(scan),
+        ..Radar::default()
+    };
+    let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
+    let echoes = support::echoes_at(&radar, &chirps, &mesh, law, rays, None, Observer::Radar);
+    echoes.first().map_or(0.0, |echo| echo.power_w)
+}
+
+fn plate() -> Mesh {
+    solids::plate(2.0, 2.0)
+}
+
+/// A cap of a sphere that touches the origin from behind, in facets of 0.3 mm.
+fn cap(radius_m: f64) -> Mesh {
+    const SIDE: u32 = 267;
+    const STEP_M: f64 = 0.3e-3;
+    let place = |step: u32| (f64::from(step) - 0.5 * f64::from(SIDE - 1)) * STEP_M;
+    let vertex = |number: u32| {
+        let (x, y) = (place(number % SIDE), place(number / SIDE));
+        DVec3::new(x, y, (radius_m * radius_m - x * x - y * y).sqrt() - radius_m)
+    };
+    let cells = (0..SIDE - 1).flat_map(|row| (0..SIDE - 1).map(move |column| row * SIDE + column));
+    let facets = cells.flat_map(|a| [[a, a + 1, a + SIDE + 1], [a, a + SIDE + 1, a + SIDE]]);
+    Mesh {
+        vertices: (0..SIDE * SIDE).map(vertex).collect(),
+        facets: facets.collect(),
+        labels: Vec::new(),
+    }
+}
+
+#[test]
+fn an_extended_diffuse_target_returns_what_the_beam_collects() {
+    let (waist, chalk) = (Waist::new(), Lambert { albedo: 0.5 });
+    for z_m in OFF_FOCUS_M {
+        // P·f·λ²/(π·w²).
+        let solid_angle_sr = waist.wavelength_m.powi(2) / (PI * waist.radius_m2(z_m));
+        let expected_db = db(0.5 / PI * solid_angle_sr);
+        for rays in [1, 64] {
+            let found_db = db(returned(plate(), 0.0, z_m, rays, &chalk));
+            assert!((found_db - expected_db).abs() < LOBE_DB, "{z_m} {rays}: {found_db}");
+        }
+    }
+    let rayleigh_m = PI * waist.waist_m.powi(2) / waist.wavelength_m;
+    let at = |z_m: f64| returned(plate(), 0.0, z_m, 1, &chalk);
+    for side in [-1.0, 1.0] {
+        let fallen_db = db(at(0.0) / at(side * rayleigh_m));
+        assert!((fallen_db - 3.0103).abs() < 1e-3, "{fallen_db}");
+    }
+}
+
+#[test]
+fn a_flat_mirror_returns_all_of_the_beam_that_meets_itself() {
+    let waist = Waist::new();
+    for z_m in OFF_FOCUS_M {
+        for tilt in [0.0, 0.5, 1.0, 1.5] {
+            let tilt_rad: f64 = tilt * waist.divergence_rad();
+            // P·R·exp(−tan²θ/δ₀²)/(1 + ζ²).
+            let share = (-(tilt_rad.tan() / waist.divergence_rad()).powi(2)).exp();
+            let expected_db = db(share / (1.0 + waist.zeta(z_m).powi(2)));
+            for (rays, tolerance_db) in [(1, LOBE_DB), (RAYS, MEAN_DB)] {
+                let found_db = db(returned(plate(), tilt_rad, z_m, rays, &MIRROR));
+                assert!(
+                    (found_db - expected_db).abs() < tolerance_db,
+                    "{z_m} m, {tilt} δ₀, {rays} rays: {found_db} dB is not {expected_db} dB"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_smooth_sphere_returns_its_glint() {
+    let (waist, radius_m) = (Waist::new(), 0.15);
+    for z_m in [-0.2, 0.0, 0.2] {
+        // P·R/(1 + (k·w²/2)²·(1/a + 1/R_c)²), with 1/R_c = z/(z² + z_R²).
+        let rayleigh_m = PI * waist.waist_m.powi(2) / waist.wavelength_m;
+        let curvature_per_m = 1.0 / radius_m + z_m / (z_m * z_m + rayleigh_m * rayleigh_m);
+        let half_kw2 = PI / waist.wavelength_m * waist.radius_m2(z_m);
+        let expected_db = -db(1.0 + (half_kw2 * curvature_per_m).powi(2));
+        let found_db = db(returned(cap(radius_m), 0.0, z_m, RAYS, &MIRROR));
+        assert!(
+            (found_db - expected_db).abs() < HIGHLIGHT_DB,
+            "{z_m} m: {found_db} dB is not {expected_db} dB"
+        );
+    }
+}
+
+#[test]
+fn the_edge_of_a_diffuse_half_plane_takes_half() {
+    let mut half = plate();
+    half.vertices.iter_mut().for_each(|vertex| vertex.x += 1.0);
+    let chalk = Lambert { albedo: 0.5 };
+    for z_m in OFF_FOCUS_M {
+        let share = returned(half.clone(), 0.0, z_m, RAYS, &chalk)
+            / returned(plate(), 0.0, z_m, RAYS, &chalk);
+        assert!((db(share) + 3.0103).abs() < MEAN_DB, "{z_m}: {share}");
+    }
+}
+
+/// Models of facets from smooth to rough.
+fn lobes() -> Vec<Brdf> {
+    let mut all = vec![Brdf::Fresnel(MIRROR)];
+    all.push(Brdf::Layered(Layered {
+        layers: Vec::new(),
+        eps_real: 1.0,
+        eps_imag: 1e9,
+        frequency_hz: 300e9,
+        lobe_rad: 0.001,
+    }));
+    for m in [0.001, 0.005, 0.02, 0.1, 0.4] {
+        let go = KirchhoffGo { rms_slope: m, eps_real: 1.0, eps_imag: 1e9 };
+        all.push(Brdf::KirchhoffGo(go));
+        for distribution in [Distribution::Beckmann, Distribution::Ggx] {
+            for m_across in [None, Some(0.002)] {
+                all.push(Brdf::CookTorrance(CookTorrance {
+                    f_lambda: 1.0,
+                    m,
+                    m_across,
+                    distribution,
+                    shadowing: Shadowing::Correlated,
+                }));
+            }
+        }
+    }
+    all
+}
+
+#[test]
+fn nothing_returns_more_than_was_sent() {
+    for law in lobes() {
+        for z_m in OFF_FOCUS_M {
+            for tilt_rad in [0.0, 0.003, 0.02, 0.2, 1.0] {
+                for rays in [1, 64] {
+                    let share = returned(plate(), tilt_rad, z_m, rays, &law);
+                    assert!(share < 1.0 + 1e-3, "{law:?} {z_m} {tilt_rad} {rays}: {share}");
+                }
+            }
+        }
+        let share = returned(cap(0.1), 0.0, 0.0, 64, &law);
+        assert!(share < 1.0, "{law:?}: {share}");
+    }
+}
