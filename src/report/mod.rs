@@ -34,7 +34,7 @@ pub use neighbours::{Neighbour, NeighbourReport, NeighbourSearch};
 pub use picture::Picture;
 pub use radar::RadarReport;
 pub use scan::{
-    BeatShape, Counts, PowerRange, ReceiverRecord, RegionRecord, RenderFiles, RenderRequest,
-    RenderStage, ScanRecord,
+    BeatShape, Counts, PowerRange, ReceiverRecord, RegionRecord, RenderFiles, RenderProgress,
+    RenderRequest, RenderStage, ScanRecord,
 };
 pub use shell::shell_word;
