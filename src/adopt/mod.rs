@@ -21,7 +21,7 @@ pub use earlier::{Earlier, check_folder};
 pub use fit_storage::{FitStorage, StoredFit};
 pub use fit_subject::FitSubject;
 pub use material_files::{AddedMaterial, NewMaterials, foreign_format};
-pub use measurement::MeasurementStorage;
+pub use measurement::{MeasurementStorage, StoredMeasurement};
 pub use provenance::{activity, add_source, input};
 pub use publication::{Publication, PublicationResult};
 pub use recipients::{

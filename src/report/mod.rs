@@ -29,7 +29,7 @@ pub use material_plot::{
     FigureFormat, appendix_figures, curve_points, fit_layers, incidence_plot, material_plot,
     sweep_plot,
 };
-pub use measurement::{measured_curve_plot, pose_record};
+pub use measurement::{MeasurementReport, MeasurementRequest};
 pub use neighbours::{Neighbour, NeighbourReport, NeighbourSearch};
 pub use picture::Picture;
 pub use radar::RadarReport;
