@@ -5,6 +5,7 @@ mod earlier;
 pub mod admission;
 mod curve;
 mod findings;
+mod fit_request;
 mod fit_storage;
 mod fit_subject;
 mod material_files;
@@ -18,6 +19,7 @@ mod withdrawal;
 
 pub use curve::{AddedCurve, CurveOrigin, add_curve, check_frequency_and_threshold};
 pub use earlier::{Earlier, check_folder};
+pub use fit_request::{CheckedFit, FitMethod, FitOutcome, FitRequest};
 pub use fit_storage::{FitStorage, StoredFit};
 pub use fit_subject::FitSubject;
 pub use material_files::{AddedMaterial, NewMaterials, foreign_format};
