@@ -3,7 +3,9 @@
 
 mod earlier;
 pub mod admission;
+mod catalogue_import;
 mod curve;
+mod database_check;
 mod findings;
 mod fit_request;
 mod fit_storage;
@@ -13,11 +15,14 @@ mod measurement;
 mod provenance;
 mod publication;
 mod recipients;
+mod removal;
 mod request;
 mod scene_after;
 mod withdrawal;
 
+pub use catalogue_import::CatalogueImport;
 pub use curve::{AddedCurve, CurveOrigin, add_curve, check_frequency_and_threshold};
+pub use database_check::{CheckProgress, CheckReport, DatabaseCheck};
 pub use earlier::{Earlier, check_folder};
 pub use fit_request::{CheckedFit, FitMethod, FitOutcome, FitRequest};
 pub use fit_storage::{FitStorage, StoredFit};
@@ -29,6 +34,7 @@ pub use publication::{Publication, PublicationResult};
 pub use recipients::{
     Adoption, Recipient, check_fit_name, find_recipient, pinned_name, replaced_name,
 };
+pub use removal::{Removal, remove_materials};
 pub use request::{CheckedRequest, CloudRequest, as_answer};
 pub use scene_after::{AFTER, MARK, check_beside, name_beside, relocate_files, scene_with_found};
 pub use withdrawal::Withdrawal;
