@@ -7,7 +7,12 @@ mod cloud;
 mod comparison;
 mod curve;
 mod effect;
+mod effect_help;
+mod history;
 mod json;
+mod level_table;
+mod material_export;
+mod material_list;
 mod material_plot;
 mod measurement;
 mod neighbours;
@@ -15,6 +20,7 @@ mod picture;
 mod radar;
 mod residuals;
 mod scan;
+mod search;
 mod shell;
 mod templates;
 mod words;
@@ -24,7 +30,12 @@ pub use choice::{Choice, Measurands, Reason, UntriedEffect, terms_not_asked};
 pub use cloud::{CloudAnswer, CloudReport, NextSteps};
 pub use comparison::Comparison;
 pub use curve::{CurveAnswer, CurveRequest};
+pub use effect_help::EffectHelp;
+pub use history::{RevisionRecord, revision_records};
 pub use json::{Record, json_file};
+pub use level_table::{LevelRow, Sigma0Level, level_rows};
+pub use material_export::{ExportReport, ExportRequest};
+pub use material_list::{MaterialList, MaterialRow, UnknownWord};
 pub use material_plot::{
     FigureFormat, appendix_figures, curve_points, fit_layers, incidence_plot, material_plot,
     sweep_plot,
@@ -37,4 +48,5 @@ pub use scan::{
     BeatShape, Counts, PowerRange, ReceiverRecord, RegionRecord, RenderFiles, RenderProgress,
     RenderRequest, RenderStage, ScanRecord,
 };
+pub use search::{MaterialHit, MaterialSearch};
 pub use shell::shell_word;
