@@ -1,5 +1,6 @@
 //! What goes back into the database: materials of files, measured curves, fits, and the law and the effects that a
-//! diagnosis found; each with its sources and with the command and the files that made it.
+//! diagnosis found; each with its sources and with the command and the files that made it. Also catalogues of others,
+//! and what keeps a database sound: its check, withdrawals and removals.
 
 mod earlier;
 pub mod admission;

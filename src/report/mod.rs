@@ -1,5 +1,6 @@
-//! What a person reads: the page, the pictures, the tables and the words of a diagnosis, the files of a rendering,
-//! plots of materials and fits. Plain values go in and the bytes of files come out; nothing here writes a file.
+//! What a person reads: the page, the pictures, the tables and the words of a diagnosis, the files of a rendering and
+//! of a measurement, plots of materials and fits, lists and histories of a database. Plain values go in; records and
+//! the bytes of files come out. Nothing here writes a file.
 
 mod cannot_tell;
 mod choice;
