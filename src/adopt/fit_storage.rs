@@ -17,8 +17,6 @@ use crate::store::Store;
 pub struct FitStorage {
     /// The material that gets it; `None` for the one whose curve was fitted.
     pub material: Option<String>,
-    /// Name of the fit.
-    pub fit_name: String,
     /// Whether scenes go on to render what they rendered before.
     pub keep_render: bool,
     /// Where the curve of a file comes from.
@@ -52,13 +50,18 @@ struct Target {
 }
 
 impl FitStorage {
-    /// Checks, before anything is fitted, that the fit can be stored; the material with the curve in it.
+    /// Checks, before anything is fitted, that a fit of this name can be stored; the material with the curve in it.
     ///
     /// # Errors
     /// A material that is not known or is another one than the curve's; an origin of the curve that is missing,
     /// stated twice or not enough; a curve that has been revised since; a name that something else has.
-    pub fn check(&self, subject: &FitSubject, store: Option<&Store>) -> Result<Material, Error> {
-        Ok(self.target(subject, store)?.material)
+    pub(super) fn check(
+        &self,
+        subject: &FitSubject,
+        fit_name: &str,
+        store: Option<&Store>,
+    ) -> Result<Material, Error> {
+        Ok(self.target(subject, fit_name, store)?.material)
     }
 
     /// Stores a fit in `database`, with the curve of a file. A fit of the same name is replaced, and stays in the
@@ -66,28 +69,30 @@ impl FitStorage {
     ///
     /// # Errors
     /// As [`check`](Self::check); a database that cannot be written.
-    pub fn save(
+    pub(super) fn save(
         &self,
         subject: &FitSubject,
+        fit_name: &str,
         found: &FitResult,
         database: &Database,
     ) -> Result<StoredFit, Error> {
         let mut store = database.write()?;
         let files: Vec<_> = subject.file.as_deref().into_iter().collect();
         store.record(activity("fit", &files)?);
-        let Target { mut material, curve, source } = self.target(subject, Some(&store))?;
-        let mut fit = found.stored(&self.fit_name, &curve, &source);
+        let Target { mut material, curve, source } =
+            self.target(subject, fit_name, Some(&store))?;
+        let mut fit = found.stored(fit_name, &curve, &source);
         fit.parameter_sources = add_parameter_sources(&mut material, found);
         replace_fit(&mut material, fit);
         let is_open = found.verdict.iter().any(Finding::leaves_the_curve_open);
         if !self.keep_render && !is_open {
-            material.render.clone_from(&self.fit_name);
+            fit_name.clone_into(&mut material.render);
         }
         let added = store.add([&material])?;
         Ok(StoredFit {
             material: material.slug.to_string(),
             revision: added.first().map_or(1, |added| added.revision()),
-            fit: self.fit_name.clone(),
+            fit: fit_name.to_owned(),
             curve,
             render: material.render,
             curve_is_open: is_open,
@@ -95,15 +100,20 @@ impl FitStorage {
         })
     }
 
-    fn target(&self, subject: &FitSubject, store: Option<&Store>) -> Result<Target, Error> {
+    fn target(
+        &self,
+        subject: &FitSubject,
+        fit_name: &str,
+        store: Option<&Store>,
+    ) -> Result<Target, Error> {
         let target = match &subject.found {
             Some(found) => self.target_of_material(subject, found, store)?,
             None => self.target_of_file(subject, store)?,
         };
-        let (material, name) = (&target.material, &self.fit_name);
-        let what = if material.curves.iter().any(|curve| curve.name == *name) {
+        let (material, name) = (&target.material, fit_name);
+        let what = if material.curves.iter().any(|curve| curve.name == name) {
             "a curve"
-        } else if material.fits.iter().any(|fit| fit.name == *name && fit.report.is_none()) {
+        } else if material.fits.iter().any(|fit| fit.name == name && fit.report.is_none()) {
             "a fit that nobody fitted here"
         } else {
             return Ok(target);

@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
+use super::admission;
 use super::curve::{AddedCurve, CurveOrigin, add_curve};
 use super::provenance::{activity, free_key};
 use crate::error::Error;
 use crate::material::{Material, Session, SessionPose};
-use crate::measure::{Curve, RegistrationResult};
+use crate::measure::RegistrationResult;
+use crate::report::MeasurementReport;
 use crate::setup::{Database, find_material};
 use crate::store::Store;
 
@@ -27,6 +29,23 @@ pub struct MeasurementStorage<'a> {
     pub scene: &'a Path,
 }
 
+/// Where a measured curve was stored.
+#[derive(Clone, Debug)]
+pub struct StoredMeasurement {
+    /// The material.
+    pub material: String,
+    /// Its new revision.
+    pub revision: u32,
+    /// Name of the curve.
+    pub curve: String,
+    /// What a person should not overlook.
+    pub notices: Vec<String>,
+}
+
+/// That the circumstances of a measurement are not kept.
+const NO_SESSION: &str = "no session is stored with the curve: --date YYYY-MM-DD, the day of the measurement, keeps \
+                          the pose, what the registration left over and the cloud's hash, too";
+
 impl MeasurementStorage<'_> {
     /// Checks, before anything is computed, that a curve can be stored; the material as it is now.
     ///
@@ -46,40 +65,54 @@ impl MeasurementStorage<'_> {
         Ok(material)
     }
 
-    /// The material with the curve and its session in it, and what was added.
+    /// Checks, before anything is written, that this curve can be stored; what is doubtful about the material with it.
     ///
     /// # Errors
     /// As [`check`](Self::check); a curve that the material has already, a day that is not one.
-    pub fn prepare(
+    pub fn admit(
         &self,
-        curve: &Curve,
-        registered: &RegistrationResult,
+        measured: &MeasurementReport,
+        store: Option<&Store>,
+    ) -> Result<Vec<String>, Error> {
+        let (material, _) = self.prepare(measured, store)?;
+        Ok(admission::doubts(&material))
+    }
+
+    /// Stores the curve.
+    ///
+    /// # Errors
+    /// As [`admit`](Self::admit); a database that cannot be written.
+    pub fn save(
+        &self,
+        measured: &MeasurementReport,
+        database: &Database,
+    ) -> Result<StoredMeasurement, Error> {
+        let mut store = database.write()?;
+        let (material, AddedCurve { curve, .. }) = self.prepare(measured, Some(&store))?;
+        store.record(activity("measure", &[self.cloud, self.scene])?);
+        let added = store.add([&material])?;
+        let notices = match self.date {
+            Some(_) => Vec::new(),
+            None => vec![NO_SESSION.to_owned()],
+        };
+        let revision = added.first().map_or(1, |added| added.revision());
+        Ok(StoredMeasurement { material: self.material.clone(), revision, curve, notices })
+    }
+
+    /// The material with the curve and its session in it, and what was added.
+    fn prepare(
+        &self,
+        measured: &MeasurementReport,
         store: Option<&Store>,
     ) -> Result<(Material, AddedCurve), Error> {
         let mut material = self.check(store)?;
+        let curve = &measured.reduced.curve;
         let added = add_curve(&mut material, &self.curve, curve, &self.origin)?;
         if let Some(date) = &self.date {
-            let session = session(date, self.cloud, registered)?;
+            let session = session(date, self.cloud, &measured.registered)?;
             add_session(&mut material, &added.curve, session)?;
         }
         Ok((material, added))
-    }
-
-    /// Stores the curve; its name and the revision that has it.
-    ///
-    /// # Errors
-    /// As [`prepare`](Self::prepare); a database that cannot be written.
-    pub fn save(
-        &self,
-        curve: &Curve,
-        registered: &RegistrationResult,
-        database: &Database,
-    ) -> Result<(String, u32), Error> {
-        let mut store = database.write()?;
-        let (material, AddedCurve { curve, .. }) = self.prepare(curve, registered, Some(&store))?;
-        store.record(activity("measure", &[self.cloud, self.scene])?);
-        let added = store.add([&material])?;
-        Ok((curve, added.first().map_or(1, |added| added.revision())))
     }
 }
 

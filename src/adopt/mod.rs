@@ -1,10 +1,14 @@
 //! What goes back into the database: materials of files, measured curves, fits, and the law and the effects that a
-//! diagnosis found; each with its sources and with the command and the files that made it.
+//! diagnosis found; each with its sources and with the command and the files that made it. Also catalogues of others,
+//! and what keeps a database sound: its check, withdrawals and removals.
 
 mod earlier;
 pub mod admission;
+mod catalogue_import;
 mod curve;
+mod database_check;
 mod findings;
+mod fit_request;
 mod fit_storage;
 mod fit_subject;
 mod material_files;
@@ -12,21 +16,26 @@ mod measurement;
 mod provenance;
 mod publication;
 mod recipients;
+mod removal;
 mod request;
 mod scene_after;
 mod withdrawal;
 
+pub use catalogue_import::CatalogueImport;
 pub use curve::{AddedCurve, CurveOrigin, add_curve, check_frequency_and_threshold};
+pub use database_check::{CheckProgress, CheckReport, DatabaseCheck};
 pub use earlier::{Earlier, check_folder};
+pub use fit_request::{CheckedFit, FitMethod, FitOutcome, FitRequest};
 pub use fit_storage::{FitStorage, StoredFit};
 pub use fit_subject::FitSubject;
 pub use material_files::{AddedMaterial, NewMaterials, foreign_format};
-pub use measurement::MeasurementStorage;
+pub use measurement::{MeasurementStorage, StoredMeasurement};
 pub use provenance::{activity, add_source, input};
 pub use publication::{Publication, PublicationResult};
 pub use recipients::{
     Adoption, Recipient, check_fit_name, find_recipient, pinned_name, replaced_name,
 };
+pub use removal::{Removal, remove_materials};
 pub use request::{CheckedRequest, CloudRequest, as_answer};
 pub use scene_after::{AFTER, MARK, check_beside, name_beside, relocate_files, scene_with_found};
 pub use withdrawal::Withdrawal;

@@ -1,14 +1,12 @@
 //! `matdb check`.
 
-use serde::Serialize;
+use indicatif::ProgressBar;
 
 use super::console::Console;
 use super::summary::counted;
-use crate::catalogue::{CheckCount, Problem, Refit, StoreCheck};
+use crate::adopt::{CheckProgress, CheckReport, DatabaseCheck};
 use crate::error::Error;
-use crate::material::builtin;
 use crate::setup::Database;
-use crate::store::Repair;
 
 /// Verify the whole database, and fit again what it holds
 #[derive(Debug, clap::Args)]
@@ -24,44 +22,17 @@ pub(super) struct Args {
     repair: bool,
 }
 
-/// What was looked at, and what is wrong.
-#[derive(Serialize)]
-struct Record {
-    revisions: usize,
-    curves: usize,
-    fits: usize,
-    /// What `--repair` has mended, a sentence each.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    repaired: Vec<String>,
-    findings: Vec<Problem>,
-}
-
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
-    let mut repair = Repair::default();
-    if args.repair && db.read()?.is_some() {
-        repair = db.write()?.repair(&builtin::all()?)?;
-    }
-    let Some(store) = db.read()? else {
-        return Err(Error::NoDatabase { path: db.path().to_owned() });
-    };
+    let mut bar = None;
+    let check = DatabaseCheck { repair: args.repair };
+    let report = check.run(db, &mut |progress| match progress {
+        CheckProgress::Begin { revisions } => bar = Some(console.progress("checking", revisions)),
+        CheckProgress::Revision => bar.iter().for_each(|bar| bar.inc(1)),
+    })?;
+    bar.iter().for_each(ProgressBar::finish_and_clear);
     let file = db.path().display().to_string();
-    let revisions = store.list()?.iter().map(|material| material.revision as usize).sum();
-    let progress = console.progress("checking", revisions);
-    let failed = repair.failed.into_iter();
-    let mut findings: Vec<Problem> =
-        failed.map(|problem| Problem { place: file.clone(), problem }).collect();
-    let count = StoreCheck {
-        name: &file,
-        refit: Refit::All,
-        report: &mut |found| findings.push(found),
-        advance: &mut || progress.inc(1),
-    }
-    .run(&store);
-    progress.finish_and_clear();
-    let CheckCount { revisions, curves, fits, .. } = count;
-    let record = Record { revisions, curves, fits, repaired: repair.mended, findings };
-    console.result(&text(&record, &file), &record)?;
-    match record.findings.len() {
+    console.result(&text(&report, &file), &report)?;
+    match report.findings.len() {
         0 => Ok(()),
         count => Err(Error::usage(
             format!("{} wrong in {file}", counted(count, "thing")),
@@ -74,8 +45,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     }
 }
 
-fn text(record: &Record, file: &str) -> String {
-    let Record { revisions, curves, fits, repaired, findings } = record;
+fn text(report: &CheckReport, file: &str) -> String {
+    let CheckReport { revisions, curves, fits, repaired, findings } = report;
     let mut text: String = repaired.iter().map(|what| format!("{file}: {what}\n")).collect();
     text.extend(findings.iter().map(|wrong| format!("{wrong}\n")));
     text += &format!(

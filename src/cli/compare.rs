@@ -2,15 +2,13 @@
 
 use std::path::PathBuf;
 
-use serde_json::{Value, json};
-
 use super::cloud::{CloudArgs, pose};
 use super::console::Console;
 use super::summary::grouped;
 use crate::error::Error;
 use crate::files::write_all;
 use crate::measure::compare::{Agreement, Line};
-use crate::report::{Comparison, json_file};
+use crate::report::Comparison;
 use crate::setup::{Database, ReadyScene};
 
 /// Compare a measured cloud with the rendered scene
@@ -52,15 +50,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let cloud = args.cloud.read(ready.scene.radar())?;
     let comparison = Comparison::new(&ready, &cloud)?;
     let notices = [cloud.notices, ready.notices()].concat();
-    let record = record(args, &comparison.agreement, &notices);
-    let line_plot = comparison.line_plot(line);
-    let files = [
-        ("images.png", comparison.images_png()?),
-        ("line.svg", line_plot.svg()?.into_bytes()),
-        ("line.png", line_plot.png()?),
-        ("error.json", json_file(&record)?),
-    ];
-    write_all(&args.output, &files)?;
+    let record = comparison.record(&args.cloud.cloud, &args.scene, &notices);
+    write_all(&args.output, &comparison.files(line, &record)?)?;
     notices.iter().for_each(|notice| console.notice(notice));
     console.result(&text(args, &comparison.agreement), &record)
 }
@@ -89,16 +80,6 @@ fn line(text: &str) -> Result<Line, Error> {
         line.width_m = 0.02;
     }
     Ok(line)
-}
-
-fn record(args: &Args, agreement: &Agreement, notices: &[String]) -> Value {
-    json!({
-        "schema": 1,
-        "cloud": args.cloud.cloud.display().to_string(),
-        "scene": args.scene.display().to_string(),
-        "pixels": agreement,
-        "notices": notices,
-    })
 }
 
 fn text(args: &Args, agreement: &Agreement) -> String {

@@ -1,13 +1,12 @@
 //! `matdb effects`.
 
-use serde::Serialize;
-
 use super::console::Console;
 use super::summary::table;
-use crate::diagnose::curve::{Term, term, terms};
-use crate::effects::{Effect, EffectParameter, Level, find, library};
+use crate::diagnose::curve::term;
+use crate::effects::{Effect, Level, find, library};
 use crate::error::Error;
 use crate::formats::text::nearest;
+use crate::report::EffectHelp;
 use crate::units::shown;
 
 /// List the physical effects that `diagnose` tries, or explain one
@@ -21,62 +20,11 @@ pub(super) struct Args {
     name: Option<String>,
 }
 
-/// An effect as a script reads it.
-#[derive(Serialize)]
-struct Record {
-    name: &'static str,
-    /// What it is looked for in: `cloud`, `curve`.
-    applies_to: &'static [&'static str],
-    /// None of what has no name.
-    level: Option<Level>,
-    is: &'static str,
-    shows: &'static str,
-    parameters: &'static [EffectParameter],
-}
-
-const UNKNOWN: Record = Record {
-    name: "unknown",
-    applies_to: &["cloud", "curve"],
-    level: None,
-    is: "What no effect in this list does to the data, beside the law and the effects that were found: in a \
-         cloud a smooth term over all covariates and the target plane, in a curve one over an angle, or \
-         neighbouring angles that err to the same side. It names nothing.",
-    shows: "The verdict is `unexplained`; `unexplained` in report.json says with which covariates it goes \
-            and how large it is. Of a cloud the picture unknown-map shows where, and residuals.csv has it \
-            chirp by chirp as unknown_db. It is never stored and never rendered.",
-    parameters: &[],
-};
-
-impl Record {
-    fn of_cloud(effect: &dyn Effect) -> Record {
-        Record {
-            name: effect.name(),
-            applies_to: &["cloud"],
-            level: Some(effect.level()),
-            is: effect.description(),
-            shows: effect.signature(),
-            parameters: effect.parameters(),
-        }
-    }
-
-    fn of_curve(term: &dyn Term) -> Record {
-        Record {
-            name: term.name(),
-            applies_to: &["curve"],
-            level: Some(term.level()),
-            is: term.description(),
-            shows: term.signature(),
-            parameters: term.parameters(),
-        }
-    }
-}
-
 pub(super) fn run(args: &Args, console: &Console) -> Result<(), Error> {
-    let named = library().map(Record::of_cloud).into_iter().chain(terms().map(Record::of_curve));
-    let all: Vec<Record> = named.chain([UNKNOWN]).collect();
+    let all = EffectHelp::all();
     let Some(name) = &args.name else { return console.result(&list(&all), &all) };
     // A name can stand for an effect of a cloud and for another one of a curve.
-    let of_name: Vec<&Record> = all.iter().filter(|record| record.name == name).collect();
+    let of_name: Vec<&EffectHelp> = all.iter().filter(|record| record.name == name).collect();
     if of_name.is_empty() {
         return Err(stranger(name, all.iter().map(|record| record.name)));
     }
@@ -100,7 +48,7 @@ pub(super) fn each_once(names: &[String]) -> impl Iterator<Item = &String> {
 
 fn known(name: &str) -> Result<&'static dyn Effect, Error> {
     find(name).ok_or_else(|| {
-        if name == UNKNOWN.name {
+        if name == EffectHelp::UNKNOWN.name {
             return Error::usage("`unknown` is no effect to try", "leave it out: what no effect explains is always looked for");
         }
         if term(name).is_some() {
@@ -119,7 +67,7 @@ fn stranger(name: &str, known: impl Iterator<Item = &'static str>) -> Error {
     Error::usage(format!("there is no effect `{name}`"), way_out)
 }
 
-fn list(all: &[Record]) -> String {
+fn list(all: &[EffectHelp]) -> String {
     format!(
         "Of a scan, `matdb diagnose CLOUD`:\n{}\nOf a curve, `matdb diagnose --curve FILE`:\n{}\n\
          `matdb effects NAME` says what one is, how it shows, and what its numbers are; `unknown` is\n\
@@ -130,7 +78,7 @@ fn list(all: &[Record]) -> String {
 }
 
 /// The effects that are looked for in a cloud, or in a curve, one a line.
-fn list_of(all: &[Record], what: &str) -> String {
+fn list_of(all: &[EffectHelp], what: &str) -> String {
     let records = all.iter().filter(|record| record.applies_to == [what]);
     let rows = records.map(|record| {
         let level = record.level.map_or("", Level::as_str).to_owned();
@@ -156,7 +104,7 @@ fn short(text: &str) -> String {
     words + "…"
 }
 
-fn entry(record: &Record) -> String {
+fn entry(record: &EffectHelp) -> String {
     let rows = record.parameters.iter().map(|knob| {
         [
             knob.name.to_owned(),
@@ -172,7 +120,7 @@ fn entry(record: &Record) -> String {
             "\n".to_owned() + &table(&["parameter", "unit", "from", "to", "absent or start"], rows)
         }
     };
-    let Record { name, applies_to, is, shows, .. } = record;
+    let EffectHelp { name, applies_to, is, shows, .. } = record;
     let level = record.level.map_or(String::new(), |of| format!("{}, ", of.as_str()));
     let of = applies_to.join(" and of a ");
     format!("{name} ({level}of a {of})\n{is}\n\nHow it shows: {shows}\n{parameters}")

@@ -5,13 +5,11 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use super::console::Console;
-use crate::catalogue::Credit;
-use crate::catalogue::exchange::{self, Export, Subject};
+use crate::catalogue::exchange::{self, Export};
 use crate::error::Error;
 use crate::files::{folder_of, write_all};
-use crate::setup::{
-    Database, MaterialRevision, find_material, later_status_warning, status_warning,
-};
+use crate::report::{ExportReport, ExportRequest};
+use crate::setup::Database;
 
 /// Write a material in another format, and say what that cannot carry
 #[derive(Debug, clap::Args)]
@@ -65,36 +63,16 @@ impl From<Format> for exchange::Format {
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
-    let store = db.read()?;
-    let found = find_material(store.as_ref(), &args.material, "")?;
-    let stored = found.stored(store.as_ref())?;
-    let MaterialRevision { material, revision } = found;
-    let added_at = stored.as_ref().map(|stored| stored.added_at.as_str());
-    let origin = stored.as_ref().and_then(|stored| Credit::of(stored).origin());
-    let curve = args.curve.as_deref();
-    if let Some(name) = curve.filter(|name| material.curves.iter().all(|c| c.name != *name)) {
-        let names: Vec<&str> = material.curves.iter().map(|curve| curve.name.as_str()).collect();
-        return Err(Error::usage(
-            format!("`{}` has no curve `{name}`", args.material),
-            if names.is_empty() {
-                "leave --curve out: its model is written".to_owned()
-            } else {
-                format!("there are: {}", names.join(", "))
-            },
-        ));
-    }
-    let subject = Subject { material: &material, revision, added_at, origin, curve };
-    let Some(name) = args.output.file_name().and_then(|name| name.to_str()) else {
-        return Err(Error::usage(
-            format!("{} names no file", args.output.display()),
-            "name one with -o, such as -o paint.brdf",
-        ));
+    let request = ExportRequest {
+        material: &args.material,
+        format: args.format.into(),
+        curve: args.curve.as_deref(),
+        output: &args.output,
     };
-    let Export { files, lost } = exchange::export(&subject, args.format.into(), name)?;
+    let ExportReport { export: Export { files, lost }, notice } =
+        request.run(db.read()?.as_ref())?;
     write_all(folder_of(&args.output), &files)?;
-    let later = later_status_warning(store.as_ref(), &material.slug, revision)?;
-    let notices = later.or_else(|| status_warning(&material));
-    notices.iter().for_each(|notice| console.notice(notice));
+    notice.iter().for_each(|notice| console.notice(notice));
     let written: Vec<String> = files
         .iter()
         .map(|(name, _)| args.output.with_file_name(name).display().to_string())

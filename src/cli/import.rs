@@ -1,11 +1,11 @@
 //! `matdb import`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::console::Console;
 use super::summary::counted;
-use crate::adopt::activity;
-use crate::catalogue::{Import, ImportSummary, MaterialPlan, Outcome};
+use crate::adopt::CatalogueImport;
+use crate::catalogue::{ImportSummary, MaterialPlan, Outcome};
 use crate::error::Error;
 use crate::setup::Database;
 
@@ -31,31 +31,13 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
-    let import = Import::open(publication(&args.bundle))?;
-    // The database that is asked for may be made by this.
-    let ours = if db.path().exists() { db.read()? } else { None };
-    let materials = import.plan(ours.as_ref(), args.as_prefix.as_deref())?;
-    drop(ours);
-    let is_new = |taken: &MaterialPlan| {
-        matches!(taken.outcome, Outcome::Added { .. } | Outcome::Continued { .. })
+    let import = CatalogueImport {
+        bundle: &args.bundle,
+        prefix: args.as_prefix.as_deref(),
+        dry_run: args.dry_run,
     };
-    if !args.dry_run && materials.iter().any(is_new) {
-        let mut store = db.write()?;
-        import.take(&mut store, &materials, &activity("import", &[&import.database()])?)?;
-    }
-    let imported = ImportSummary { dry_run: args.dry_run, materials };
+    let imported = import.run(db)?;
     console.result(&text(&imported, db), &imported)
-}
-
-/// The publication that a database lies in: it says whose it is, and has its hash.
-fn publication(bundle: &Path) -> &Path {
-    match bundle.parent() {
-        Some(folder) if bundle.ends_with("catalogue.sqlite") && bundle.is_file() => {
-            let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-            if folder.join("SHA256SUMS").is_file() { folder } else { bundle }
-        }
-        _ => bundle,
-    }
 }
 
 fn text(imported: &ImportSummary, db: &Database) -> String {

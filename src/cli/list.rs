@@ -1,15 +1,13 @@
 //! `matdb list`.
 
-use std::collections::BTreeSet;
-
 use super::console::Console;
 use super::curves::kind_of;
 use super::summary::{grouped, table, with_status};
 use crate::error::Error;
-use crate::material::{Material, SourceKind};
+use crate::material::{Slug, SourceKind};
+use crate::report::{MaterialList, MaterialRow, UnknownWord};
 use crate::setup::Database;
-use crate::setup::builtin_not_added;
-use crate::store::{Filter, Store, Summary};
+use crate::store::Filter;
 
 /// List the materials in the database
 #[derive(Debug, clap::Args)]
@@ -28,8 +26,6 @@ pub(super) struct Args {
 
 /// What a person still looks through.
 const SHOWN: u32 = 200;
-/// How many more are counted.
-const MOST_COUNTED: u32 = 10_000;
 
 /// Which materials are wanted; all that is said must hold.
 #[derive(Debug, clap::Args)]
@@ -87,88 +83,59 @@ pub(super) fn frequency(text: &str) -> Result<f64, String> {
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
     let filter = args.filter.filter();
     let store = db.read()?;
-    let limit = args.limit.or((!console.json).then_some(SHOWN));
-    let materials = match (&store, limit) {
-        (None, _) => Vec::new(),
-        (Some(store), Some(most)) => store.page(&filter, most)?,
-        (Some(store), None) => store.find(&filter)?,
-    };
     if console.json {
+        let materials = match (&store, args.limit) {
+            (None, _) => Vec::new(),
+            (Some(store), Some(most)) => store.page(&filter, most)?,
+            (Some(store), None) => store.find(&filter)?,
+        };
         return console.result("", &materials);
     }
-    let built_in = builtin_not_added(store.as_ref())?;
-    let mut text = match (materials.len(), &store) {
-        (0, None) => format!("no material in {} yet\n", db.path().display()),
-        (0, _) if filter == Filter::default() => {
-            format!("no material in {} yet\n", db.path().display())
-        }
-        (0, Some(store)) => {
-            format!(
-                "no such material in {}{}\n",
-                db.path().display(),
-                others(&filter, store, &built_in)?
-            )
-        }
-        _ => table(
-            &["material", "rev", "kind", "class", "curves", "points", "fits", "name"],
-            materials.iter().zip(kinds(store.as_ref(), &materials)?).map(row),
-        ),
-    };
-    let most = MOST_COUNTED.saturating_add(limit.unwrap_or_default());
-    let all = store.as_ref().map_or(Ok(0), |store| store.count(&filter, most))?;
-    if all > materials.len() {
-        let more = grouped(all - materials.len());
-        let more = if all as u64 == u64::from(most) { format!("at least {more}") } else { more };
-        text += &format!(
-            "… and {more} more; narrow with --class, --tag, --kind or --frequency, or see more with \
-             --limit\n",
-        );
-    }
-    let wanted = built_in.iter().filter(|material| filter.lets_through(material));
-    let names: Vec<&str> = wanted.map(|material| material.slug.as_str()).collect();
-    if !names.is_empty() {
-        text += &wrapped("built in, not added:", &names);
-    }
-    console.result(&text, &materials)
+    let list = MaterialList::new(&filter, args.limit.unwrap_or(SHOWN), store.as_ref())?;
+    let is_any = store.is_none() || filter == Filter::default();
+    console.result(&text(&list, is_any, &db.path().display().to_string()), &())
 }
 
-/// Which classes or tags there are, where one is asked for that no material has.
-fn others(filter: &Filter, store: &Store, built_in: &[Material]) -> Result<String, Error> {
-    /// More tags than these are no help.
-    const MOST_TAGS: usize = 100;
-    let mut said = String::new();
-    if let Some(class) = &filter.class {
-        let built_in = built_in.iter().map(|material| material.class.clone());
-        let there: BTreeSet<String> = store.classes()?.into_iter().chain(built_in).collect();
-        if !there.contains(class) {
-            said += &none_of(class, "class", there);
+fn text(list: &MaterialList, is_any: bool, file: &str) -> String {
+    let mut text = match list.rows.as_slice() {
+        [] if is_any => format!("no material in {file} yet\n"),
+        [] => {
+            let unknown: String = list.unknown_words.iter().map(none_of).collect();
+            format!("no such material in {file}{unknown}\n")
         }
+        rows => table(
+            &["material", "rev", "kind", "class", "curves", "points", "fits", "name"],
+            rows.iter().map(row),
+        ),
+    };
+    if list.more > 0 {
+        let at_least = if list.more_at_least { "at least " } else { "" };
+        text += &format!(
+            "… and {at_least}{} more; narrow with --class, --tag, --kind or --frequency, or see more with \
+             --limit\n",
+            grouped(list.more)
+        );
     }
-    if let Some(tag) = &filter.tag {
-        let built_in = built_in.iter().flat_map(|material| material.tags.clone());
-        let alone = Filter { tag: Some(tag.clone()), ..Filter::default() };
-        if store.count(&alone, 1)? == 0 && !built_in.clone().any(|known| known == *tag) {
-            let there = store.tags(MOST_TAGS)?.into_iter().chain(built_in);
-            said += &none_of(tag, "tag", there.collect());
-        }
+    if !list.built_in.is_empty() {
+        text += &wrapped("built in, not added:", &list.built_in);
     }
-    Ok(said)
+    text
 }
 
 /// That no class or tag has a name, and which there are.
-fn none_of(asked: &str, what: &str, there: BTreeSet<String>) -> String {
-    let there = there.into_iter().collect::<Vec<_>>().join(", ");
-    format!("; no {what} is called `{asked}`, there are: {there}")
+fn none_of(UnknownWord { asked, what, known }: &UnknownWord) -> String {
+    let known = known.iter().map(String::as_str).collect::<Vec<_>>().join(", ");
+    format!("; no {what} is called `{asked}`, there are: {known}")
 }
 
 /// Names after a title, on lines that a narrow terminal holds.
-fn wrapped(title: &str, names: &[&str]) -> String {
+fn wrapped(title: &str, names: &[Slug]) -> String {
     const WIDTH: usize = 80;
     let mut lines = vec![title.to_owned()];
     for (number, name) in names.iter().enumerate() {
         let comma = if number + 1 < names.len() { "," } else { "" };
         match lines.last_mut() {
-            Some(line) if line.len() + name.len() + 2 <= WIDTH => {
+            Some(line) if line.len() + name.as_str().len() + 2 <= WIDTH => {
                 *line += &format!(" {name}{comma}")
             }
             _ => lines.push(format!("  {name}{comma}")),
@@ -177,21 +144,11 @@ fn wrapped(title: &str, names: &[&str]) -> String {
     lines.join("\n") + "\n"
 }
 
-/// How what scenes render of each material came to be.
-fn kinds(store: Option<&Store>, materials: &[Summary]) -> Result<Vec<String>, Error> {
-    let mut kinds = Vec::new();
-    for material in materials {
-        let words = store.map_or(Ok(None), |store| store.rendered_words(&material.slug))?;
-        kinds.push(words.unwrap_or_else(|| material.render_kind.as_str().to_owned()));
-    }
-    Ok(kinds)
-}
-
-fn row((m, kind): (&Summary, String)) -> [String; 8] {
+fn row(MaterialRow { summary: m, kind }: &MaterialRow) -> [String; 8] {
     [
         m.slug.to_string(),
         m.revision.to_string(),
-        with_status(&kind, &m.status),
+        with_status(kind, &m.status),
         m.class.clone(),
         m.curves.to_string(),
         m.observations.to_string(),

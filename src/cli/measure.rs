@@ -6,12 +6,12 @@ use super::cloud::{CloudArgs, start};
 use super::console::Console;
 use super::curves::{Circumstances, OWN, kind_of};
 use super::summary::grouped;
-use crate::adopt::{MeasurementStorage, admission};
+use crate::adopt::{MeasurementStorage, StoredMeasurement};
 use crate::error::Error;
 use crate::files::write_all;
 use crate::material::SourceKind;
-use crate::measure::{Curve, Metric, Reduction, ReductionResult, Registration, RegistrationResult};
-use crate::report::{json_file, measured_curve_plot, pose_record};
+use crate::measure::{Curve, Metric, Reduction, Registration};
+use crate::report::{MeasurementReport, MeasurementRequest};
 use crate::scene::Scene;
 use crate::setup::Database;
 
@@ -91,56 +91,28 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         storage.check(db.read()?.as_ref())?;
     }
     let cloud = args.cloud.read(scene.radar())?;
-    let reduction = reduction(args, &scene)?;
-    let (radar, chirps, target) = (scene.radar(), &scene.chirps, &scene.target);
+    let request = MeasurementRequest {
+        cloud_file: &args.cloud.cloud,
+        cloud: &cloud,
+        scene_file: &args.scene,
+        scene: &scene,
+        reduction: reduction(args)?,
+        registration: registration(args)?,
+        region: args.region.as_deref(),
+    };
     let bar = console.spinner("registering");
-    let registered = registration(args)?.run(&target.mesh, radar, chirps, &cloud)?;
+    let measured = request.run()?;
     bar.finish_and_clear();
-    let reduced = reduction.run(target, radar, chirps, &cloud, &registered)?;
-
-    let record = pose_record(&args.cloud.cloud, &args.scene, &registered, &reduced);
     // Refused before anything is written, stored after it.
     if let Some(storage) = &storage {
-        let (material, _) = storage.prepare(&reduced.curve, &registered, db.read()?.as_ref())?;
-        admission::doubts(&material).iter().for_each(|doubt| console.notice(doubt));
+        let doubts = storage.admit(&measured, db.read()?.as_ref())?;
+        doubts.iter().for_each(|doubt| console.notice(doubt));
     }
-    let pose = json_file(&record)?;
-    let svg = measured_curve_plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
-    let files = [("pose.json", pose), ("curve.csv", reduced.curve.write()), ("curve.svg", svg)];
-    write_all(&args.output, &files)?;
-    let stored =
-        storage.map(|storage| storage.save(&reduced.curve, &registered, db)).transpose()?;
-    if stored.is_some() && args.date.is_none() {
-        console.notice(
-            "no session is stored with the curve: --date YYYY-MM-DD, the day of the measurement, keeps the \
-             pose, what the registration left over and the cloud's hash, too",
-        );
-    }
-    let mixed = mixed(args, &scene);
-    let notices =
-        mixed.iter().chain(&cloud.notices).chain(&registered.verdicts).chain(&reduced.notices);
-    notices.for_each(|notice| console.notice(notice));
-    let saved = match (&args.save, stored) {
-        (Some(name), Some((curve, revision))) => {
-            format!("stored the curve as `{curve}` in {name}@{revision}\n")
-        }
-        _ => String::new(),
-    };
-    console.result(&(text(args, &registered, &reduced) + &saved), &record)
-}
-
-/// A sentence when the curve mixes what the scene tells apart.
-fn mixed(args: &Args, scene: &Scene) -> Option<String> {
-    let regions = &scene.target.regions;
-    let first = regions.first()?;
-    let is_mixed = regions.iter().any(|region| region.material != first.material);
-    let names: Vec<&str> = regions.iter().map(|region| region.name.as_str()).collect();
-    (args.region.is_none() && is_mixed).then(|| {
-        format!(
-            "the curve mixes the materials of the scene's regions; choose one with --region: {}",
-            names.join(", ")
-        )
-    })
+    write_all(&args.output, &measured.files)?;
+    let stored = storage.map(|storage| storage.save(&measured, db)).transpose()?;
+    let of_stored = stored.iter().flat_map(|stored| &stored.notices);
+    of_stored.chain(&measured.notices).for_each(|notice| console.notice(notice));
+    console.result(&text(args, &measured, stored.as_ref()), &measured.record)
 }
 
 /// How the curve is to be stored, where it is.
@@ -167,36 +139,19 @@ fn registration(args: &Args) -> Result<Registration, Error> {
     Ok(Registration { start, keep_given: !args.refine, ..registration })
 }
 
-fn reduction(args: &Args, scene: &Scene) -> Result<Reduction, Error> {
-    let region = match &args.region {
-        None => None,
-        Some(name) => Some(region(name, scene)?),
-    };
-    match args.edge_margin {
+fn reduction(args: &Args) -> Result<Reduction, Error> {
+    let (edge_margin_m, exact_mesh) = (args.edge_margin, args.exact_mesh);
+    match edge_margin_m {
         Some(margin_m) if !(0.0..=1.0).contains(&margin_m) => Err(Error::usage(
             format!("--edge-margin {margin_m} is no margin"),
             "give metres from 0 to 1",
         )),
-        edge_margin_m => {
-            let exact_mesh = args.exact_mesh;
-            Ok(Reduction { region, edge_margin_m, exact_mesh, ..Reduction::default() })
-        }
+        _ => Ok(Reduction { edge_margin_m, exact_mesh, ..Reduction::default() }),
     }
 }
 
-fn region(name: &str, scene: &Scene) -> Result<u16, Error> {
-    let regions = scene.target.regions.iter();
-    let names: Vec<&str> = regions.map(|region| region.name.as_str()).collect();
-    let found = names.iter().position(|region| *region == name);
-    found.map(|number| number as u16).ok_or_else(|| {
-        Error::usage(
-            format!("the scene has no region `{name}`"),
-            format!("its regions are: {}", names.join(", ")),
-        )
-    })
-}
-
-fn text(args: &Args, registered: &RegistrationResult, reduced: &ReductionResult) -> String {
+fn text(args: &Args, measured: &MeasurementReport, stored: Option<&StoredMeasurement>) -> String {
+    let MeasurementReport { registered, reduced, .. } = measured;
     let middle = registered.pivot;
     let shift_mm = 1e3 * (middle.xyz - (registered.pose.inverse() * middle).xyz);
     let sd: [f64; 6] = std::array::from_fn(|axis| registered.covariance[axis][axis].sqrt());
@@ -209,12 +164,16 @@ fn text(args: &Args, registered: &RegistrationResult, reduced: &ReductionResult)
     } else {
         ""
     };
+    let saved =
+        stored.map_or(String::new(), |StoredMeasurement { material, revision, curve, .. }| {
+            format!("stored the curve as `{curve}` in {material}@{revision}\n")
+        });
     format!(
         "{kept}pose: {} of {} points on the surface, rms {:.2} mm, known to {:.2} mm and {:.3}° (1 sd)\n\
          shift of the middle of the points: {:.2}, {:.2}, {:.2} mm\n\
          curve: {} detections and {} censored chirps from {:.1}° to {:.1}°\n\
          left out: {} near an edge or another region, {} off the surface or beside it, {} of an unsure facet\n\
-         wrote pose.json, curve.csv and curve.svg to {}\n",
+         wrote pose.json, curve.csv and curve.svg to {}\n{saved}",
         grouped(registered.inliers),
         grouped(registered.points),
         1e3 * registered.rms_m,

@@ -4,10 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::console::Console;
 use super::summary::counted;
-use crate::catalogue::{About, HAS_PARQUET, named_licences, publish};
+use crate::catalogue::{About, publish};
 use crate::error::Error;
 use crate::files::FilesError;
-use crate::material::form::licence_doubt;
 use crate::setup::Database;
 
 /// Publish the database as a catalogue: a static site and open formats
@@ -43,37 +42,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             about.title
         ));
     }
-    if let Some(doubt) = about.licence.as_deref().and_then(licence_doubt) {
-        console.notice(&doubt);
-    }
-    if !HAS_PARQUET {
-        console.notice(
-            "without Parquet tables; `cargo install --path . --features parquet` writes them, too",
-        );
-    }
-    if let ([_, ..], Some(declared)) = (published.undeclared_licences.as_slice(), &about.licence) {
-        console.notice(&format!(
-            "the catalogue is declared to be under {declared}, but materials in it are under {}; name these, too, \
-             in `licence` of --about FILE",
-            named_licences(&published.undeclared_licences)
-        ));
-    }
-    if published.is_without_zenodo {
-        console.notice(
-            "without .zenodo.json: Zenodo takes one licence of SPDX's list, and CC0 for what names none; \
-             choose the licence there by hand",
-        );
-    }
-    if let (true, Some(version)) = (published.is_version_reused, &about.version) {
-        console.notice(&format!(
-            "version {version} stood there with other data; give this one another `version` in --about FILE"
-        ));
-    }
-    if !about.has_authors() {
-        console.notice(
-            "nobody is named as author; name yourselves as [[person]] or [[institute]] in --about FILE",
-        );
-    }
+    published.notices(&about).iter().for_each(|notice| console.notice(notice));
     let text = format!(
         "published {} in {}: {}\n",
         counted(published.materials, "material"),

@@ -7,14 +7,14 @@ use serde_json::json;
 use super::console::Console;
 use super::fit::words::report;
 use super::summary::{counted, table};
-use crate::brdf::Scattering;
 use crate::error::Error;
 use crate::formats::EffectEntry;
 use crate::material::{Fit, Material};
+use crate::report::{LevelRow, Sigma0Level, level_rows};
 use crate::setup::Database;
 use crate::setup::{MaterialRevision, find_material, later_status_warning};
 use crate::store::RevisionSummary;
-use crate::units::{db_from_ratio, range, rounded, shown};
+use crate::units::{range, shown};
 
 /// Show a material: what is known of it, from whom, and how it scatters
 #[derive(Debug, clap::Args)]
@@ -174,17 +174,12 @@ fn source_of(fit: &Fit, path: &str) -> String {
 }
 
 fn curve_table(material: &Material) -> Result<String, Error> {
-    let scattering = material.scattering()?;
-    let reach = material.reach();
-    let levels = [0.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0].map(|theta_deg: f64| {
-        let theta_rad = theta_deg.to_radians();
-        let sigma0_db = db_from_ratio(scattering.sigma0(theta_rad));
-        let level = match reach.below_sigma0(theta_rad) {
-            Some(threshold) => format!("< {:.1}", db_from_ratio(threshold)),
-            None if sigma0_db.is_finite() => format!("{sigma0_db:.1}"),
-            None => "nothing".to_owned(),
+    let rows = level_rows(material)?.map(|LevelRow { theta_deg, level, outside_deg }| {
+        let level = match level {
+            Sigma0Level::BelowDb(threshold_db) => format!("< {threshold_db:.1}"),
+            Sigma0Level::Db(sigma0_db) => format!("{sigma0_db:.1}"),
+            Sigma0Level::Nothing => "nothing".to_owned(),
         };
-        let outside_deg = rounded(reach.outside_rad(theta_rad).to_degrees());
         let said = if outside_deg > 0.0 {
             format!("{}° outside the range", shown(outside_deg))
         } else {
@@ -192,5 +187,5 @@ fn curve_table(material: &Material) -> Result<String, Error> {
         };
         [format!("{theta_deg:.0}°"), level, said]
     });
-    Ok(table(&["incidence", "sigma0 dB", ""], levels.into_iter()))
+    Ok(table(&["incidence", "sigma0 dB", ""], rows.into_iter()))
 }

@@ -1,5 +1,10 @@
 //! A measured cloud and the rendered scene: images side by side, a line scan, and how far they agree.
 
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use super::json::json_file;
 use crate::error::Error;
 use crate::formats::figure::{Figure, Plot, Scale, Series, Style, beside};
 use crate::geometry::Raster;
@@ -44,6 +49,31 @@ impl Comparison {
         }
         let title = scene.file.name.clone();
         Ok(Comparison { title, measured, simulated, images, error, agreement })
+    }
+
+    /// What `error.json` holds: how far both agree, and what a person should not overlook.
+    pub fn record(&self, cloud: &Path, scene: &Path, notices: &[String]) -> Value {
+        json!({
+            "schema": 1,
+            "cloud": cloud.display().to_string(),
+            "scene": scene.display().to_string(),
+            "pixels": self.agreement,
+            "notices": notices,
+        })
+    }
+
+    /// Names and bytes: both images, the line scan, and the record.
+    ///
+    /// # Errors
+    /// A picture that is too large.
+    pub fn files(&self, line: Line, record: &Value) -> Result<[(&'static str, Vec<u8>); 4], Error> {
+        let line_plot = self.line_plot(line);
+        Ok([
+            ("images.png", self.images_png()?),
+            ("line.svg", line_plot.svg()?.into_bytes()),
+            ("line.png", line_plot.png()?),
+            ("error.json", json_file(record)?),
+        ])
     }
 
     /// Both images on one scale, and their difference, as a PNG.

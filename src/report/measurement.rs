@@ -1,15 +1,104 @@
-//! A registered cloud and its curve: `pose.json` and a plot.
+//! A measured cloud that is registered to its scene and reduced to a curve: `pose.json`, the curve and a plot.
 
 use std::path::Path;
 
 use serde_json::{Value, json};
 
+use super::json::json_file;
+use crate::error::Error;
 use crate::formats::figure::{Plot, Series, Style};
-use crate::measure::{Curve, ReductionResult, RegistrationResult};
+use crate::measure::{Cloud, Curve, Reduction, ReductionResult, Registration, RegistrationResult};
+use crate::scene::Scene;
 use crate::units::db_from_ratio;
 
-/// What `pose.json` holds: pose with covariance, how the registration ended, and what became of the points.
-pub fn pose_record(
+/// A measured cloud, the scene that was measured, and what is wanted of them.
+#[derive(Clone, Copy)]
+pub struct MeasurementRequest<'a> {
+    /// The cloud's file, for the record.
+    pub cloud_file: &'a Path,
+    /// The measured cloud.
+    pub cloud: &'a Cloud,
+    /// The scene's file, for the record.
+    pub scene_file: &'a Path,
+    /// The scene that was measured.
+    pub scene: &'a Scene,
+    /// How the cloud is registered to the scene.
+    pub registration: Registration,
+    /// Only the region of this name; all of the scene for `None`.
+    pub region: Option<&'a str>,
+    /// How the registered cloud becomes a curve; its region is that of the name.
+    pub reduction: Reduction,
+}
+
+/// A pose and a curve, and the files that hold them.
+#[derive(Clone, Debug)]
+pub struct MeasurementReport {
+    /// The pose of the target.
+    pub registered: RegistrationResult,
+    /// The curve and what was left out of it.
+    pub reduced: ReductionResult,
+    /// What `pose.json` holds: pose with covariance, how the registration ended, and what became of the points.
+    pub record: Value,
+    /// Names and bytes: `pose.json`, `curve.csv` and `curve.svg`.
+    pub files: [(&'static str, Vec<u8>); 3],
+    /// What a person should not overlook.
+    pub notices: Vec<String>,
+}
+
+impl MeasurementRequest<'_> {
+    /// Registers the cloud, reduces it to a curve and encodes the files.
+    ///
+    /// # Errors
+    /// A region that the scene does not have; what the registration or the reduction refuses.
+    pub fn run(&self) -> Result<MeasurementReport, Error> {
+        let (scene, cloud) = (self.scene, self.cloud);
+        let (target, radar, chirps) = (&scene.target, scene.radar(), &scene.chirps);
+        let region = self.region.map(|name| region_of_name(name, scene)).transpose()?;
+        let registered = self.registration.run(&target.mesh, radar, chirps, cloud)?;
+        let reduction = Reduction { region, ..self.reduction };
+        let reduced = reduction.run(target, radar, chirps, cloud, &registered)?;
+        let record = pose_record(self.cloud_file, self.scene_file, &registered, &reduced);
+        let svg = measured_curve_plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
+        let files = [
+            ("pose.json", json_file(&record)?),
+            ("curve.csv", reduced.curve.write()),
+            ("curve.svg", svg),
+        ];
+        let mut notices = Vec::from_iter(self.mixed_regions());
+        notices.extend([&cloud.notices[..], &registered.verdicts, &reduced.notices].concat());
+        Ok(MeasurementReport { registered, reduced, record, files, notices })
+    }
+
+    /// A sentence when the curve mixes what the scene tells apart.
+    fn mixed_regions(&self) -> Option<String> {
+        let regions = &self.scene.target.regions;
+        let first = regions.first()?;
+        let is_mixed = regions.iter().any(|region| region.material != first.material);
+        (self.region.is_none() && is_mixed).then(|| {
+            format!(
+                "the curve mixes the materials of the scene's regions; choose one with --region: {}",
+                region_names(self.scene).join(", ")
+            )
+        })
+    }
+}
+
+fn region_names(scene: &Scene) -> Vec<&str> {
+    scene.target.regions.iter().map(|region| region.name.as_str()).collect()
+}
+
+fn region_of_name(name: &str, scene: &Scene) -> Result<u16, Error> {
+    let names = region_names(scene);
+    let found = names.iter().position(|region| *region == name);
+    found.map(|number| number as u16).ok_or_else(|| {
+        Error::usage(
+            format!("the scene has no region `{name}`"),
+            format!("its regions are: {}", names.join(", ")),
+        )
+    })
+}
+
+fn pose_record(
     cloud: &Path,
     scene: &Path,
     registered: &RegistrationResult,
@@ -56,7 +145,7 @@ pub fn pose_record(
 }
 
 /// The curve as points: detections, and thresholds of what was not detected.
-pub fn measured_curve_plot<'a>(title: &'a str, curve: &Curve) -> Plot<'a> {
+fn measured_curve_plot<'a>(title: &'a str, curve: &Curve) -> Plot<'a> {
     let (mut detected, mut silent) = (Vec::new(), Vec::new());
     for row in &curve.observations {
         let Some(sigma0) = row.level_sigma0() else { continue };

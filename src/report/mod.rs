@@ -1,5 +1,6 @@
-//! What a person reads: the page, the pictures, the tables and the words of a diagnosis, the files of a rendering,
-//! plots of materials and fits. Plain values go in and the bytes of files come out; nothing here writes a file.
+//! What a person reads: the page, the pictures, the tables and the words of a diagnosis, the files of a rendering and
+//! of a measurement, plots of materials and fits, lists and histories of a database. Plain values go in; records and
+//! the bytes of files come out. Nothing here writes a file.
 
 mod cannot_tell;
 mod choice;
@@ -7,7 +8,12 @@ mod cloud;
 mod comparison;
 mod curve;
 mod effect;
+mod effect_help;
+mod history;
 mod json;
+mod level_table;
+mod material_export;
+mod material_list;
 mod material_plot;
 mod measurement;
 mod neighbours;
@@ -15,6 +21,7 @@ mod picture;
 mod radar;
 mod residuals;
 mod scan;
+mod search;
 mod shell;
 mod templates;
 mod words;
@@ -24,17 +31,23 @@ pub use choice::{Choice, Measurands, Reason, UntriedEffect, terms_not_asked};
 pub use cloud::{CloudAnswer, CloudReport, NextSteps};
 pub use comparison::Comparison;
 pub use curve::{CurveAnswer, CurveRequest};
+pub use effect_help::EffectHelp;
+pub use history::{RevisionRecord, revision_records};
 pub use json::{Record, json_file};
+pub use level_table::{LevelRow, Sigma0Level, level_rows};
+pub use material_export::{ExportReport, ExportRequest};
+pub use material_list::{MaterialList, MaterialRow, UnknownWord};
 pub use material_plot::{
     FigureFormat, appendix_figures, curve_points, fit_layers, incidence_plot, material_plot,
     sweep_plot,
 };
-pub use measurement::{measured_curve_plot, pose_record};
+pub use measurement::{MeasurementReport, MeasurementRequest};
 pub use neighbours::{Neighbour, NeighbourReport, NeighbourSearch};
 pub use picture::Picture;
 pub use radar::RadarReport;
 pub use scan::{
-    BeatShape, Counts, PowerRange, ReceiverRecord, RegionRecord, RenderFiles, RenderRequest,
-    RenderStage, ScanRecord,
+    BeatShape, Counts, PowerRange, ReceiverRecord, RegionRecord, RenderFiles, RenderProgress,
+    RenderRequest, RenderStage, ScanRecord,
 };
+pub use search::{MaterialHit, MaterialSearch};
 pub use shell::shell_word;

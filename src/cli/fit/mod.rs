@@ -10,17 +10,12 @@ use serde::Serialize;
 use super::console::Console;
 use super::curves::{Circumstances, OWN, kind_of};
 use super::plot::write_plot;
-use crate::adopt::{FitStorage, FitSubject, StoredFit, admission};
-use crate::brdf::Brdf;
+use crate::adopt::{FitMethod, FitOutcome, FitRequest, FitStorage, FitSubject, StoredFit};
 use crate::error::Error;
-use crate::fit::coordinates::frequencies;
-use crate::fit::{Fit, FitResult, Method, model, model_names};
-use crate::formats::text::nearest;
-use crate::material::SourceKind;
-use crate::radar::speckle::standard_deviation_db;
+use crate::fit::{FitResult, model_names};
+use crate::material::{Fit, SourceKind};
 use crate::report::{FigureFormat, curve_points, fit_layers, incidence_plot};
-use crate::setup::{Database, find_material};
-use crate::store::Store;
+use crate::setup::Database;
 use crate::units::watts_from_dbm;
 
 const EXAMPLES_AND_METHODS: &str = "Examples:
@@ -129,185 +124,69 @@ struct Record<'a> {
     files: Vec<String>,
 }
 
-pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
-    let store = db.read()?;
-    let subject = FitSubject::open(&args.what, args.curve.as_deref(), store.as_ref())?;
-    let start = start(args, &subject, store.as_ref())?;
-    let fit = settings(args, &subject, &start)?;
-    // A fit takes a while: what prevents its storing or drawing is reported before.
-    args.output.as_deref().map(FigureFormat::of).transpose()?;
-    let fit_name = fit_name(args, &start);
-    let storage = args.save.as_ref().map(|material| storage(args, material, fit_name.clone()));
-    if let Some(storage) = &storage {
-        let material = storage.check(&subject, store.as_ref());
-        let material = material.map_err(|error| how_to_add(error, &subject))?;
-        if subject.file.is_some() {
-            admission::doubts(&material).iter().for_each(|doubt| console.notice(doubt));
+impl From<MethodName> for FitMethod {
+    fn from(name: MethodName) -> FitMethod {
+        match name {
+            MethodName::Mse => FitMethod::Mse,
+            MethodName::Tls => FitMethod::Tls,
+            MethodName::TlsTail => FitMethod::TlsTail,
+            MethodName::Censored => FitMethod::Censored,
         }
     }
-    drop(store);
-    let mut found = fit
-        .run(&start, &subject.curve)
-        .map_err(|error| Error::Fit { curve: subject.label.clone(), error })?;
-    let is_possible = found.model.validate().is_ok();
-    if found.converged && is_possible {
-        found.held_out = found.hold_out(&subject.curve);
-    }
-    let storage = storage.filter(|_| found.converged && is_possible);
-    let saved = storage.map(|storage| storage.save(&subject, &found, db));
-    let stored = found.stored(&fit_name, &subject.curve_name, "");
-    let files = match (&args.output, found.converged) {
-        (Some(path), true) => draw(path, &subject, &stored)?,
+}
+
+pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    let checked = request(args)?.check(db.read()?.as_ref())?;
+    args.output.as_deref().map(FigureFormat::of).transpose()?;
+    checked.notices.iter().for_each(|notice| console.notice(notice));
+    let FitOutcome { subject, result, fit, stored, refusal } = checked.run(db)?;
+    let files = match &args.output {
+        Some(path) if result.converged => draw(path, &subject, &fit)?,
         _ => Vec::new(),
     };
-    let done = saved.as_ref().and_then(|saved| saved.as_ref().ok());
-    let text = words::result(&subject, &stored, done, &files);
-    let sentences = found.verdict.iter().map(ToString::to_string).collect();
-    console.result(&text, &Record { result: &found, sentences, saved: done, files })?;
-    saved.transpose()?;
-    if !found.converged {
-        return Err(Error::NotConverged { curve: subject.label, stop: found.stop.as_str() });
-    }
-    if !is_possible && args.save.is_some() {
-        return Err(Error::usage(
-            format!("{}: nothing is stored, since the fit is out of range", subject.label),
-            "the verdict says what to let go of",
-        ));
-    }
-    Ok(())
+    let saved = stored.as_ref();
+    let text = words::result(&subject, &fit, saved, &files);
+    let sentences = result.verdict.iter().map(ToString::to_string).collect();
+    console.result(&text, &Record { result: &result, sentences, saved, files })?;
+    refusal.map_or(Ok(()), Err)
 }
 
-/// The error with the commands that make the material of a file's curve, where it is that there is no such material.
-fn how_to_add(error: Error, subject: &FitSubject) -> Error {
-    match error {
-        Error::UnknownMaterial { asked_by, name, way_out } if subject.file.is_some() => {
-            let meant = way_out.starts_with("did you mean");
-            let meant = if meant { format!("{way_out} Else ") } else { String::new() };
-            let way_out = format!(
-                "{meant}`matdb add --from {} --name {name} --class CLASS …` makes one of the curve, and then \
-                 `matdb fit {name} --save` stores the fit",
-                subject.wanted
-            );
-            Error::UnknownMaterial { asked_by, name, way_out }
-        }
-        error => error,
-    }
-}
-
-fn storage(args: &Args, material: &Option<String>, fit_name: String) -> FitStorage {
-    FitStorage {
+fn request(args: &Args) -> Result<FitRequest<'_>, Error> {
+    let storage = args.save.as_ref().map(|material| FitStorage {
         material: material.clone(),
-        fit_name,
         keep_render: args.keep_render,
         origin: args.circumstances.origin(args.kind, args.source.as_ref()),
-    }
+    });
+    Ok(FitRequest {
+        what: &args.what,
+        curve: args.curve.as_deref(),
+        model: args.model.as_deref(),
+        method: args.method.into(),
+        alpha: args.alpha,
+        fixed: args.fixed.iter().map(|text| held(text)).collect::<Result<_, _>>()?,
+        looks: args.looks,
+        noise_w: args.noise_dbm.map(watts_from_dbm),
+        theta_sd_rad: args.theta_sd_deg.map(f64::to_radians),
+        level_sd_db: args.level_sd_db,
+        split_rad: args.split_deg.to_radians(),
+        starts: args.starts,
+        seed: args.seed,
+        fit_name: args.fit_name.as_deref(),
+        storage,
+    })
 }
 
-fn fit_name(args: &Args, start: &Brdf) -> String {
-    let method = args.method.to_possible_value().map_or(String::new(), |m| m.get_name().to_owned());
-    let model = args.model.clone().unwrap_or_else(|| model_word(start));
-    args.fit_name.clone().unwrap_or_else(|| format!("{model}-{method}"))
-}
-
-/// The word that files use for a model.
-fn model_word(model: &Brdf) -> String {
-    let value = serde_json::to_value(model).unwrap_or_default();
-    value["model"].as_str().unwrap_or("model").to_owned()
-}
-
-/// The model where the search begins.
-fn start(args: &Args, subject: &FitSubject, store: Option<&Store>) -> Result<Brdf, Error> {
-    let Some(name) = &args.model else {
-        let default = subject.rendered_model().or_else(|| model("mixture"));
-        return default.ok_or_else(|| no_model("mixture"));
+/// A held parameter, `PATH=VALUE`.
+fn held(text: &str) -> Result<(String, f64), Error> {
+    let parts = text.split_once('=').map(|(path, value)| (path, value.trim().parse()));
+    let Some((path, Ok(value))) = parts else {
+        let way_out = "write it as --fix diffuse.alpha=3";
+        return Err(Error::usage(format!("`{text}` is no parameter with a value"), way_out));
     };
-    if let Some(model) = model(name) {
-        return Ok(model);
-    }
-    match find_material(store, name, "--model: ") {
-        Ok(found) => Ok(found.material.scattering()?),
-        Err(Error::UnknownMaterial { .. }) => Err(no_model(name)),
-        Err(error) => Err(error),
-    }
+    Ok((path.to_owned(), value))
 }
 
-fn no_model(name: &str) -> Error {
-    let way_out = match nearest(name, model_names()) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None => {
-            format!("name a material or one of {}", model_names().collect::<Vec<_>>().join(", "))
-        }
-    };
-    Error::usage(format!("there is no model and no material `{name}`"), way_out)
-}
-
-fn settings(args: &Args, subject: &FitSubject, start: &Brdf) -> Result<Fit, Error> {
-    if args.noise_dbm.is_some() && subject.curve.lacks_power() {
-        return Err(Error::usage(
-            format!("{} has no powers that noise could be compared with", subject.label),
-            "leave --noise-dbm out or give the curve a column power_dbm",
-        ));
-    }
-    let fixed = fixed(args, start)?;
-    let tls = Method::Tls {
-        theta_sd_rad: args.theta_sd_deg.map_or(subject.theta_sd_rad(), f64::to_radians),
-        level_sd_db: args.level_sd_db.unwrap_or(standard_deviation_db(1.0)),
-    };
-    let method = match args.method {
-        MethodName::Censored => Method::Censored,
-        MethodName::Mse => Method::Mse { split_rad: args.split_deg.to_radians() },
-        MethodName::Tls | MethodName::TlsTail => tls,
-    };
-    let (looks, noise_w) = (args.looks, args.noise_dbm.map(watts_from_dbm));
-    let (starts, seed) = (args.starts, args.seed);
-    Ok(Fit { method, fixed, bounds: Vec::new(), looks, noise_w, starts, seed })
-}
-
-/// The held parameters, each checked to be one of the model's.
-fn fixed(args: &Args, start: &Brdf) -> Result<Vec<(String, f64)>, Error> {
-    let paths: Vec<String> = start.parameters().into_iter().map(|p| p.path).collect();
-    let alpha = paths.iter().find(|path| *path == "diffuse.alpha" || *path == "alpha");
-    let mut fixed = Vec::new();
-    match (args.alpha, alpha) {
-        (Some(value), Some(path)) => fixed.push((path.clone(), value)),
-        (Some(_), None) => {
-            return Err(Error::usage("this model has no alpha", "leave --alpha out"));
-        }
-        (None, _) if args.method == MethodName::TlsTail => {
-            let way_out = "give it with --alpha, or use --method tls to find it";
-            return Err(Error::usage("tls-tail takes the tail's exponent as given", way_out));
-        }
-        (None, _) => {}
-    }
-    for text in &args.fixed {
-        let parts = text.split_once('=').map(|(path, value)| (path, value.trim().parse()));
-        let Some((path, Ok(value))) = parts else {
-            let way_out = "write it as --fix diffuse.alpha=3";
-            return Err(Error::usage(format!("`{text}` is no parameter with a value"), way_out));
-        };
-        if !paths.iter().any(|known| known == path) {
-            let way_out = format!("there are: {}", paths.join(", "));
-            return Err(Error::usage(format!("the model has no parameter `{path}`"), way_out));
-        }
-        if is_held(path, &fixed) {
-            return Err(Error::usage(format!("`{path}` is held twice"), "hold it once"));
-        }
-        fixed.push((path.to_owned(), value));
-    }
-    let own = frequencies(start);
-    fixed.extend(own.into_iter().filter(|(path, _)| !is_held(path, &fixed)).collect::<Vec<_>>());
-    Ok(fixed)
-}
-
-fn is_held(path: &str, fixed: &[(String, f64)]) -> bool {
-    fixed.iter().any(|(known, _)| known == path)
-}
-
-fn draw(
-    path: &Path,
-    subject: &FitSubject,
-    fit: &crate::material::Fit,
-) -> Result<Vec<String>, Error> {
+fn draw(path: &Path, subject: &FitSubject, fit: &Fit) -> Result<Vec<String>, Error> {
     let points = curve_points(&subject.curve_name, &subject.curve.observations);
     let series = fit_layers(std::slice::from_ref(fit), points);
     let subtitle = format!("{}, with its 95 % band", fit.name);

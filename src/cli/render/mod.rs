@@ -62,7 +62,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     };
     let (chirps, antennas) = (ready.scene.chirps.rays.len(), 1 + ready.scene.file.receiver.len());
     let RenderFiles { record, files } =
-        request.render(&|stage, done| stages.show(stage, done, [chirps, antennas * chirps]))?;
+        request.render(&|progress| stages.show(progress, [chirps, antennas * chirps]))?;
     stages.begin("write", None);
     write_all(&args.output, &files)?;
     report::print(&args.output, &record, stages, console)

@@ -6,7 +6,7 @@ use std::time::Instant;
 use indicatif::ProgressBar;
 
 use crate::cli::console::Console;
-use crate::report::RenderStage;
+use crate::report::{RenderProgress, RenderStage};
 
 /// Stages of a command, of which the last one is running.
 pub(super) struct Stages<'a> {
@@ -41,17 +41,22 @@ impl<'a> Stages<'a> {
     }
 
     /// Shows how far a rendering has come; `chirps` are all that are traced, and all that are received.
-    pub fn show(&self, stage: RenderStage, done: usize, chirps: [usize; 2]) {
-        match (stage, done) {
-            (RenderStage::Trace, 0) => self.begin("trace", Some(("tracing", chirps[0]))),
-            (RenderStage::Power, 0) => self.begin("power", Some(("receiving", chirps[1]))),
-            (RenderStage::Image, _) => self.begin("image", None),
-            (RenderStage::Encode, _) => self.begin("encode", None),
-            _ => {
-                let Ok(running) = self.running.lock() else { return };
-                running.bar.iter().for_each(|bar| bar.inc(done as u64));
-            }
+    pub fn show(&self, progress: RenderProgress, chirps: [usize; 2]) {
+        let stage = match progress {
+            RenderProgress::Begin(stage) => stage,
+            RenderProgress::Chirps(done) => return self.advance(done),
+        };
+        match stage {
+            RenderStage::Trace => self.begin("trace", Some(("tracing", chirps[0]))),
+            RenderStage::Power => self.begin("power", Some(("receiving", chirps[1]))),
+            RenderStage::Image => self.begin("image", None),
+            RenderStage::Encode => self.begin("encode", None),
         }
+    }
+
+    fn advance(&self, chirps: usize) {
+        let Ok(running) = self.running.lock() else { return };
+        running.bar.iter().for_each(|bar| bar.inc(chirps as u64));
     }
 
     /// Ends the last stage; all stages with their times in ms, and the time of all, s.

@@ -11,4 +11,4 @@ mod request;
 pub use beat::BeatShape;
 pub use counts::{Counts, PowerRange, RegionRecord};
 pub use record::{ReceiverRecord, ScanRecord};
-pub use request::{RenderFiles, RenderRequest, RenderStage};
+pub use request::{RenderFiles, RenderProgress, RenderRequest, RenderStage};

@@ -136,7 +136,7 @@ impl<'a> ScanRecord<'a> {
     ///
     /// # Panics
     /// When `views` or `images` is empty.
-    pub fn new(
+    pub(super) fn new(
         ready: &'a ReadyScene,
         model: Option<&Model>,
         views: &[View<'a>],

@@ -40,6 +40,15 @@ pub enum RenderStage {
     Encode,
 }
 
+/// How far a rendering has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RenderProgress {
+    /// This stage begins, and the one before it has ended.
+    Begin(RenderStage),
+    /// The running stage has done this many more chirps.
+    Chirps(usize),
+}
+
 /// The files of a rendering and what they record.
 pub struct RenderFiles<'a> {
     /// What `scan.json` holds.
@@ -56,32 +65,31 @@ impl<'a> RenderRequest<'a> {
         RenderRequest { ready, tracer, gpu: None, all_hits: false, beat: None, packing }
     }
 
-    /// Renders the scene and encodes its files; `progress` hears of every stage with 0 chirps when
-    /// it begins, then with the chirps that are done in addition to those before.
+    /// Renders the scene and encodes its files; `progress` hears of every stage and of the chirps that are done.
     ///
     /// # Errors
     /// What the tracer or the renderer refuses; a picture that is too large.
     pub fn render(
         &self,
-        progress: &(dyn Fn(RenderStage, usize) + Sync),
+        progress: &(dyn Fn(RenderProgress) + Sync),
     ) -> Result<RenderFiles<'a>, Error> {
         let RenderRequest { ready, all_hits, .. } = *self;
-        progress(RenderStage::Trace, 0);
+        progress(RenderProgress::Begin(RenderStage::Trace));
         let assembly = ready.assemble();
         let failed = |error: GpuError| ready.render_error("", RenderError::Tracer(error.into()));
         let gpu_mesh = self.gpu.map(|gpu| gpu.hold(assembly.bvh())).transpose().map_err(failed)?;
         let mut setup = assembly.setup();
         setup.geometry.tracer = gpu_mesh.as_ref().map_or(self.tracer, Tracer::Gpu);
-        let footprints = assembly.trace(&setup, &|chirps| progress(RenderStage::Trace, chirps))?;
+        let done = |chirps| progress(RenderProgress::Chirps(chirps));
+        let footprints = assembly.trace(&setup, &done)?;
 
-        progress(RenderStage::Power, 0);
-        let views =
-            assembly.views(&setup, &footprints, &|chirps| progress(RenderStage::Power, chirps))?;
+        progress(RenderProgress::Begin(RenderStage::Power));
+        let views = assembly.views(&setup, &footprints, &done)?;
 
-        progress(RenderStage::Image, 0);
+        progress(RenderProgress::Begin(RenderStage::Image));
         let images: Vec<Raster> = views.iter().map(|view| ready.image(&view.scan)).collect();
 
-        progress(RenderStage::Encode, 0);
+        progress(RenderProgress::Begin(RenderStage::Encode));
         let record = ScanRecord::new(ready, assembly.model(), &views, &images, all_hits);
         let mut files = encode(all_hits, self.packing, ready, &views, &images, &record)?;
         if let Some(shape) = self.beat {

@@ -1,0 +1,80 @@
+//! The check of a whole database, after a repair where one is wanted.
+
+use serde::Serialize;
+
+use crate::catalogue::{CheckCount, Problem, Refit, StoreCheck};
+use crate::error::Error;
+use crate::material::builtin;
+use crate::setup::Database;
+use crate::store::Repair;
+
+/// How a database is checked.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DatabaseCheck {
+    /// Whether what can be repaired is repaired first.
+    pub repair: bool,
+}
+
+/// How far a check has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CheckProgress {
+    /// The check begins.
+    Begin {
+        /// Number of revisions to be checked.
+        revisions: usize,
+    },
+    /// One more revision was checked.
+    Revision,
+}
+
+/// What was checked, and what is wrong.
+#[derive(Clone, Debug, Serialize)]
+pub struct CheckReport {
+    /// Number of revisions.
+    pub revisions: usize,
+    /// Number of their curves.
+    pub curves: usize,
+    /// Number of fits that were made again.
+    pub fits: usize,
+    /// What was repaired, a sentence each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub repaired: Vec<String>,
+    /// What is wrong, and what could not be repaired.
+    pub findings: Vec<Problem>,
+}
+
+impl DatabaseCheck {
+    /// Checks every revision of the database, and makes every fit again.
+    ///
+    /// # Errors
+    /// A database that is not there, cannot be opened or cannot be written by a repair. What is wrong in it is a
+    /// finding.
+    pub fn run(
+        self,
+        database: &Database,
+        progress: &mut dyn FnMut(CheckProgress),
+    ) -> Result<CheckReport, Error> {
+        let mut repair = Repair::default();
+        if self.repair && database.read()?.is_some() {
+            repair = database.write()?.repair(&builtin::all()?)?;
+        }
+        let Some(store) = database.read()? else {
+            return Err(Error::NoDatabase { path: database.path().to_owned() });
+        };
+        let file = database.path().display().to_string();
+        let revisions = store.list()?.iter().map(|material| material.revision as usize).sum();
+        progress(CheckProgress::Begin { revisions });
+        let mut findings = Vec::new();
+        for problem in repair.failed {
+            findings.push(Problem { place: file.clone(), problem });
+        }
+        let CheckCount { revisions, curves, fits, .. } = StoreCheck {
+            name: &file,
+            refit: Refit::All,
+            report: &mut |found| findings.push(found),
+            advance: &mut || progress(CheckProgress::Revision),
+        }
+        .run(&store);
+        Ok(CheckReport { revisions, curves, fits, repaired: repair.mended, findings })
+    }
+}

@@ -1,0 +1,48 @@
+//! What scenes render of a material at a few angles.
+
+use crate::brdf::Scattering;
+use crate::error::Error;
+use crate::material::Material;
+use crate::units::{db_from_ratio, rounded};
+
+/// What scenes render at an angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LevelRow {
+    /// The incidence, °.
+    pub theta_deg: f64,
+    /// σ⁰ there.
+    pub level: Sigma0Level,
+    /// How far that lies outside the angles for which the material is described, °; 0 within.
+    pub outside_deg: f64,
+}
+
+/// A level of σ⁰.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sigma0Level {
+    /// This many dB.
+    Db(f64),
+    /// Somewhere below this many dB, the threshold of the measurement.
+    BelowDb(f64),
+    /// No echo at all.
+    Nothing,
+}
+
+/// The levels of a material from 0° to 75°.
+///
+/// # Errors
+/// A material whose rendered model is not there.
+pub fn level_rows(material: &Material) -> Result<[LevelRow; 9], Error> {
+    let scattering = material.scattering()?;
+    let reach = material.reach();
+    Ok([0.0, 2.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0, 75.0].map(|theta_deg: f64| {
+        let theta_rad = theta_deg.to_radians();
+        let sigma0_db = db_from_ratio(scattering.sigma0(theta_rad));
+        let level = match reach.below_sigma0(theta_rad) {
+            Some(threshold) => Sigma0Level::BelowDb(db_from_ratio(threshold)),
+            None if sigma0_db.is_finite() => Sigma0Level::Db(sigma0_db),
+            None => Sigma0Level::Nothing,
+        };
+        let outside_deg = rounded(reach.outside_rad(theta_rad).to_degrees());
+        LevelRow { theta_deg, level, outside_deg }
+    }))
+}
