@@ -18,7 +18,7 @@ pub mod speckle;
 pub mod window;
 
 pub use beam::{Beam, GaussianBeam, Section, SpotDiameter};
-pub use chirp::{Aliased, Chirp, ChirpEntry, Return};
+pub use chirp::{AliasError, Chirp, ChirpEntry, Return};
 pub use error::{F5Error, RadarError};
 pub use f5::F5;
 pub use frames::RadarFrames;
