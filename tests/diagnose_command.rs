@@ -193,9 +193,10 @@ fn balanced(html: &str) {
         if VOID.contains(&name) || tag.ends_with('/') {
             continue;
         }
-        match tag.starts_with('/') {
-            true => assert_eq!(open.pop(), Some(name), "{tag}"),
-            false => open.push(name),
+        if tag.starts_with('/') {
+            assert_eq!(open.pop(), Some(name), "{tag}")
+        } else {
+            open.push(name)
         }
     }
     assert!(open.is_empty(), "{open:?}");

@@ -395,9 +395,10 @@ fn what_is_absent_changes_no_byte_of_cloud_and_images() {
         let text = SCENE.replacen("[[mesh]]", &format!("{tables}[[mesh]]"), 1);
         let [bare, with] = [false, true].map(|declare| {
             let folder = tempfile::tempdir().unwrap();
-            let (material, scene) = match declare {
-                true => (absent(&names(&[Level::Material])), absent(&declared)),
-                false => (String::new(), String::new()),
+            let (material, scene) = if declare {
+                (absent(&names(&[Level::Material])), absent(&declared))
+            } else {
+                (String::new(), String::new())
             };
             add_material(folder.path(), "ptfe", &material);
             rendered(folder.path(), &(text.clone() + &scene), "2")
