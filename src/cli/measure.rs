@@ -174,7 +174,7 @@ fn reduction(args: &Args, scene: &Scene) -> Result<Reduction, Error> {
     };
     match args.edge_margin {
         Some(margin_m) if !(0.0..=1.0).contains(&margin_m) => Err(Error::usage(
-            format!("--edge-margin {margin_m} is no margin"),
+            format!("--edge-margin {margin_m} is not a margin"),
             "give metres from 0 to 1",
         )),
         edge_margin_m => {

@@ -70,9 +70,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         ));
     }
     if !about.has_authors() {
-        console.notice(
-            "nobody is named as author; name yourselves as [[person]] or [[institute]] in --about FILE",
-        );
+        console.notice("no author is named; add a [[person]] or an [[institute]] in --about FILE");
     }
     let text = format!(
         "published {} in {}: {}\n",

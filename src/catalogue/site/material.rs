@@ -177,7 +177,9 @@ fn unknown(material: &Material) -> Vec<String> {
     let mut found = gaps(&material.description);
     found.extend(material.unknown.iter().cloned());
     let unexplained = material.findings.iter().filter(|f| f.verdict == FindingVerdict::Unexplained);
-    found.extend(unexplained.map(|f| format!("What goes with {} is not explained.", f.effect)));
+    found.extend(
+        unexplained.map(|f| format!("A residual that depends on {} is not explained.", f.effect)),
+    );
     if !has_measured_curve(material) {
         found.push("This entry holds no measured curve.".to_owned());
     }

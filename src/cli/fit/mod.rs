@@ -283,7 +283,7 @@ fn fixed(args: &Args, start: &Brdf) -> Result<Vec<(String, f64)>, Error> {
         let parts = text.split_once('=').map(|(path, value)| (path, value.trim().parse()));
         let Some((path, Ok(value))) = parts else {
             let way_out = "write it as --fix diffuse.alpha=3";
-            return Err(Error::usage(format!("`{text}` is no parameter with a value"), way_out));
+            return Err(Error::usage(format!("`{text}` is not a parameter with a value"), way_out));
         };
         if !paths.iter().any(|known| known == path) {
             let way_out = format!("there are: {}", paths.join(", "));
