@@ -203,9 +203,10 @@ pub(super) fn samples(count: usize) -> Vec<DVec2> {
     if count == 1 {
         return vec![DVec2::ZERO];
     }
-    let place =
-        |sample| radius(sample, count) * DVec2::from_angle(TAU * (sample as f64 * GOLDEN).fract());
-    (0..count).map(place).collect()
+    let samples = (0..count).map(|sample| {
+        radius(sample, count) * DVec2::from_angle(TAU * (sample as f64 * GOLDEN).fract())
+    });
+    samples.collect()
 }
 
 /// Distance of a sample from the axis, in radii w of the beam.
