@@ -68,7 +68,7 @@ fn main() {
             println!(
                 "{}",
                 serde_json::json!({
-                    "threads": threads, "chirps": chirps.rays.len(), "looks": shots.len(),
+                    "threads": threads, "chirps": chirps.rays.len(), "shots": shots.len(),
                     "traced": traced, "same": same, "law": law, "effect": effect,
                 })
             );

@@ -47,7 +47,6 @@
 //! every name says which.
 
 #![warn(missing_docs)]
-#![deny(clippy::match_bool)]
 
 // The order of these lines is the law: a module uses only modules declared above it
 // (`tests/floors.rs` checks it).

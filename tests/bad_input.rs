@@ -265,7 +265,7 @@ fn materials_that_are_not_there() {
     check(&plot(&["-o", "x.pdf"]), &["x.pdf", ".svg or .png"]);
     check(&plot(&["-o", "x.png", "--sweep", "m=1"]), &["no parameter `m`", "specular.m"]);
     check(&plot(&["-o", "x.png", "--sweep", "specular.m"]), &["names no values"]);
-    check(&plot(&["-o", "x.png", "--sweep", "specular.m=x"]), &["`x` is no number"]);
+    check(&plot(&["-o", "x.png", "--sweep", "specular.m=x"]), &["`x` is not a number"]);
     check(&plot(&["-o", "x.png", "--sweep", "specular.m=5"]), &["specular.m = 5", "0.001 to 2"]);
     assert!(entries(folder.path()).is_empty(), "nothing was created");
 }

@@ -156,8 +156,8 @@ fn the_template_is_accepted_and_shown() {
 #[test]
 fn values_that_only_a_slip_can_give_are_refused() {
     for (from, to, expected) in [
-        ("licence = \"CC-BY-4.0\"", "licence = \"all rights reserved\"", "no SPDX expression"),
-        ("10.1234/example", "https://doi.org/10.1234/example", "is none"),
+        ("licence = \"CC-BY-4.0\"", "licence = \"all rights reserved\"", "not an SPDX expression"),
+        ("10.1234/example", "https://doi.org/10.1234/example", "is not a DOI"),
         ("doi = \"10.1234/example\"", "url = \"javascript:alert(1)\"", "begins with http://"),
         ("bandwidth_ghz = 27", "bandwidth_ghz = 27e9", "begins below 0 Hz"),
         ("thickness_mm = 0.12", "thickness_mm = 120000", "120 m thick"),

@@ -193,9 +193,10 @@ fn balanced(html: &str) {
         if VOID.contains(&name) || tag.ends_with('/') {
             continue;
         }
-        match tag.starts_with('/') {
-            true => assert_eq!(open.pop(), Some(name), "{tag}"),
-            false => open.push(name),
+        if tag.starts_with('/') {
+            assert_eq!(open.pop(), Some(name), "{tag}")
+        } else {
+            open.push(name)
         }
     }
     assert!(open.is_empty(), "{open:?}");
@@ -341,15 +342,15 @@ fn the_library_is_listed_and_every_entry_is_complete() {
                  of: &str,
                  name: &str,
                  says: [&str; 2],
-                 knobs: &[EffectParameter]| {
+                 parameters: &[EffectParameter]| {
         assert!(list.lines().any(|line| line.starts_with(&format!("{name} "))), "{name}");
         let entry = run(&["effects", name]);
         assert!(says.iter().all(|text| entry.contains(text)), "{entry}");
-        for knob in knobs {
-            assert!(entry.contains(knob.name), "{name}: {}", knob.name);
+        for parameter in parameters {
+            assert!(entry.contains(parameter.name), "{name}: {}", parameter.name);
         }
         assert_eq!((&record["name"], &record["applies_to"]), (&name.into(), &json!([of])));
-        assert_eq!(record["parameters"].as_array().unwrap().len(), knobs.len());
+        assert_eq!(record["parameters"].as_array().unwrap().len(), parameters.len());
     };
     let mut rest = records.iter();
     for (effect, record) in library().iter().zip(rest.by_ref()) {

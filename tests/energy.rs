@@ -1,5 +1,5 @@
 //! Promise: what a surface reflects in all directions is at most what it receives, or the model's
-//! documentation says where it is more; and every knob turns the way the paper's figures 16–19 show.
+//! documentation says where it is more; and every parameter acts as the paper's figures 16–19 show.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

@@ -102,7 +102,7 @@ fn nothing_is_extrapolated_and_what_is_missing_is_named() {
     for (from, to, expected) in [
         ("tabulated nk", "tabulated n", "3 numbers in a row"),
         ("tabulated nk", "formula 11", "formula 1 to 9"),
-        ("1000 2.43 0.915", "1000 2.43 x", "line 13: \"x\" is no finite number"),
+        ("1000 2.43 0.915", "1000 2.43 x", "line 13: \"x\" is not a finite number"),
         ("1000 2.43 0.915", "0 2.43 0.915", "line 13: a wavelength must be above 0"),
         ("DATA:", "DOTA:", "there is no DATA"),
         ("292.65", "-5", "cannot be"),

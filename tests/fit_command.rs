@@ -209,8 +209,8 @@ fn bad_input_is_refused_with_a_sentence_and_nothing_is_stored() {
         ("scan.csv --starts 0", "fit.starts = 0"),
         ("scan.csv --looks 0", "fit.looks = 0"),
         ("scan.csv --save", "belongs to no material yet"),
-        ("scan.csv --save ptfe", "nobody has said where scan.csv comes from"),
-        ("scan.csv --save ptfe --kind measured", "nobody has said where"),
+        ("scan.csv --save ptfe", "the source of scan.csv is not stated"),
+        ("scan.csv --save ptfe --kind measured", "the source of scan.csv is not stated"),
         (
             "scan.csv --save my-paint --kind measured --source x",
             "`matdb add --from scan.csv --name my-paint --class CLASS …` makes one of the curve",
@@ -222,7 +222,7 @@ fn bad_input_is_refused_with_a_sentence_and_nothing_is_stored() {
         ),
         (
             "scan.csv --save ptfe --kind measured --source x --licence free/for/all",
-            "--licence is no SPDX expression",
+            "--licence is not an SPDX expression",
         ),
         ("scan.csv --save ptfe@1 --kind measured --source x", "a revision never changes"),
         ("scan.csv -o fit.pdf", "does not end in .svg or .png"),

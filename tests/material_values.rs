@@ -61,7 +61,7 @@ fn each_impossible_value_has_its_sentence() {
         (|m| m.sessions[0].registration_rms_m = Some(-1.0), "the residual of the registration"),
         (
             |m| m.sessions[0].pose.as_mut().unwrap().rotation_rows[0][1] = 1.0,
-            "the pose is no rotation with a shift",
+            "the pose is not a rotation with a shift",
         ),
         (|m| m.curves[0].session = Some("autumn".to_owned()), "refers to a session `autumn`"),
         (|m| m.findings[0].p = Some(1.5), "p is not between 0 and 1"),

@@ -211,7 +211,7 @@ fn clouds_that_cannot_be_used() {
     fs::write(at.join("good.csv"), csv(at, 1, as_is)).unwrap();
     for (more, parts) in [
         (&["--region", "bdy"][..], &["no region `bdy`", "body"][..]),
-        (&["--pose", "1,2"], &["`1,2` is no pose"]),
+        (&["--pose", "1,2"], &["`1,2` is not a pose"]),
         (&["--edge-margin", "7"], &["--edge-margin 7"]),
         (&["--save", "no-such", "--kind", "measured", "--source", "x"], &["no-such"]),
         (

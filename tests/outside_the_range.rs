@@ -134,7 +134,7 @@ fn the_nearest_materials_say_how_far_they_are_from_the_curves_frequency() {
     };
     let said = near(&[]);
     assert!(
-        said.contains("nobody says at which frequency") && !said.contains("GHz outside"),
+        said.contains("the frequency of the curve is not stated") && !said.contains("GHz outside"),
         "{said}"
     );
     let said = near(&["--measured-at", "300"]);

@@ -46,10 +46,8 @@ fn cook_torrance(model: &Value, theta: f64) -> f64 {
     let (cos, tan) = (theta.cos(), theta.tan());
     let d = (-(tan / m).powi(2)).exp() / (PI * m * m * cos.powi(4));
     let a = 1.0 / (m * tan);
-    let g1 = match a < 1.6 {
-        true => (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a),
-        false => 1.0,
-    };
+    let g1 =
+        if a < 1.6 { (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a) } else { 1.0 };
     number(model, "f_lambda") * d * g1 * g1 / (4.0 * cos * cos)
 }
 

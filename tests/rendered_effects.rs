@@ -174,10 +174,11 @@ fn every_effect_changes_every_echo_as_its_model_predicts() {
         let mut felt = 0;
         for start in starts {
             // A search may begin from nothing; a step from there is an effect.
-            let knobs = effect.parameters();
-            let is_absent = start.iter().zip(knobs).all(|(value, knob)| *value == knob.absent);
-            let step = |knob: &EffectParameter| if is_absent { knob.step } else { 0.0 };
-            let values: Vec<f64> = start.iter().zip(knobs).map(|(v, k)| v + step(k)).collect();
+            let parameters = effect.parameters();
+            let is_absent =
+                start.iter().zip(parameters).all(|(value, parameter)| *value == parameter.absent);
+            let step = |parameter: &EffectParameter| if is_absent { parameter.step } else { 0.0 };
+            let values: Vec<f64> = start.iter().zip(parameters).map(|(v, k)| v + step(k)).collect();
             let case = format!("{} at {values:?}", effect.name());
             let effects = one(effect.name(), &values);
             assert!(agrees(&bench, &effects, &case) > 300, "{case}: few shots are left");
@@ -395,9 +396,10 @@ fn what_is_absent_changes_no_byte_of_cloud_and_images() {
         let text = SCENE.replacen("[[mesh]]", &format!("{tables}[[mesh]]"), 1);
         let [bare, with] = [false, true].map(|declare| {
             let folder = tempfile::tempdir().unwrap();
-            let (material, scene) = match declare {
-                true => (absent(&names(&[Level::Material])), absent(&declared)),
-                false => (String::new(), String::new()),
+            let (material, scene) = if declare {
+                (absent(&names(&[Level::Material])), absent(&declared))
+            } else {
+                (String::new(), String::new())
             };
             add_material(folder.path(), "ptfe", &material);
             rendered(folder.path(), &(text.clone() + &scene), "2")

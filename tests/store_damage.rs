@@ -139,9 +139,12 @@ fn scene_of(folder: &Path, material: &str) -> PathBuf {
     let text = fs::read_to_string(support::scene("bench.toml")).unwrap();
     let own: Vec<String> = text
         .lines()
-        .map(|line| match line.trim_start().starts_with("material = ") {
-            true => format!("material = \"{material}\""),
-            false => line.to_owned(),
+        .map(|line| {
+            if line.trim_start().starts_with("material = ") {
+                format!("material = \"{material}\"")
+            } else {
+                line.to_owned()
+            }
         })
         .collect();
     fs::write(&path, own.join("\n")).unwrap();

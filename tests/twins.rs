@@ -48,10 +48,10 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
         let name = entry.file_name().into_string().unwrap();
-        match entry.path().is_dir() {
-            true => found
-                .extend(files(&entry.path()).into_iter().map(|(n, b)| (format!("{name}/{n}"), b))),
-            false => drop(found.insert(name, fs::read(entry.path()).unwrap())),
+        if entry.path().is_dir() {
+            found.extend(files(&entry.path()).into_iter().map(|(n, b)| (format!("{name}/{n}"), b)))
+        } else {
+            drop(found.insert(name, fs::read(entry.path()).unwrap()))
         }
     }
     found

@@ -252,7 +252,7 @@ def reshading(results):
     head = ["", *(f"{threads_of(row['threads'])}, ms" for row in found)]
     return f"""## The same scan again
 
-A new prediction for {grouped(found[0]["looks"])} of {grouped(found[0]["chirps"])} chirps, those on the target, when the geometry stays and hits, angles and
+A new prediction for {grouped(found[0]["shots"])} of {grouped(found[0]["chirps"])} chirps, those on the target, when the geometry stays and hits, angles and
 footprints are reused. By `cargo bench --bench reshade`.
 
 {table(head, rows, right=head[1:])}"""

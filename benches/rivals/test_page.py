@@ -56,7 +56,7 @@ class Page(unittest.TestCase):
         self.assertIn("takes another 0.250 (0.200–0.300) ms", told)
 
     def test_the_slower_change_counts_when_a_scan_is_predicted_again(self):
-        row = {"threads": 1, "chirps": 18529, "looks": 9000, "traced": [3.0] * 3, "same": [0.1] * 3}
+        row = {"threads": 1, "chirps": 18529, "shots": 9000, "traced": [3.0] * 3, "same": [0.1] * 3}
         results = {"reshade": [row | {"law": [0.4, 0.5, 0.6], "effect": [0.9, 1.1, 1.2]}]}
         goal = self.goal(results, "a scan of 18 529 chirps, 9 000 of them")
         self.assertEqual((goal.measured, goal.reached), ("1.10 ms", False))

@@ -81,9 +81,9 @@ impl Sorted {
     }
 }
 
-/// With so many digits, or a dash.
-pub fn digits(value: Option<f64>, digits: usize) -> String {
-    value.map_or("–".into(), |value| format!("{value:.digits$}"))
+/// A number with this many decimals, or a dash.
+pub fn fixed_or_dash(value: Option<f64>, decimals: usize) -> String {
+    value.map_or("–".into(), |value| format!("{value:.decimals$}"))
 }
 
 /// Whole numbers with runs drawn together: 1–4, 7.
@@ -95,9 +95,8 @@ pub fn runs(numbers: &BTreeSet<u64>) -> String {
             _ => runs.push([number, number]),
         }
     }
-    let text = |&[from, to]: &[u64; 2]| match from == to {
-        true => from.to_string(),
-        false => format!("{from}–{to}"),
+    let text = |&[from, to]: &[u64; 2]| {
+        if from == to { from.to_string() } else { format!("{from}–{to}") }
     };
     runs.iter().map(text).collect::<Vec<_>>().join(", ")
 }

@@ -56,9 +56,10 @@ fn in_words(set: &Set, targets: &[Target]) -> String {
         .map(|target| format!("{}, {} instead of {}", target.what, target.reached, target.aim))
         .collect();
     let wrong = set.cases.iter().filter(|case| case.missed()).count();
-    let missed_text = match missed.is_empty() {
-        true => "None was missed.".to_owned(),
-        false => format!("Missed: {}.", missed.join("; ")),
+    let missed_text = if missed.is_empty() {
+        "None was missed.".to_owned()
+    } else {
+        format!("Missed: {}.", missed.join("; "))
     };
     format!(
         "**{}**: {} of {} cases came out as they should, and {} of the {} targets that they can judge are met. \

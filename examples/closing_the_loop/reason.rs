@@ -26,9 +26,12 @@ pub fn reason(label: &Label, run: &Run) -> String {
         Expected::Named => {
             let absent = label.names().into_iter().filter(|name| label.is_pair() && !run.has(name));
             let absent: Vec<&str> = if label.is_pair() { absent.collect() } else { label.names() };
-            let why = |name: &str| match label.is_pair() {
-                true => format!("{name}: {}", of_effect(name, label, run)),
-                false => of_effect(name, label, run),
+            let why = |name: &str| {
+                if label.is_pair() {
+                    format!("{name}: {}", of_effect(name, label, run))
+                } else {
+                    of_effect(name, label, run)
+                }
             };
             absent.into_iter().map(why).collect::<Vec<_>>().join("; ")
         }

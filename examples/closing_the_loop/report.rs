@@ -129,14 +129,18 @@ impl Run {
 
     /// Everything that was said, in few words.
     pub fn said(&self) -> String {
-        let name = |found: &FoundEffect| match found.class.is_empty() {
-            true => found.name.clone(),
-            false => format!("{} (or {})", found.name, found.class.join(", ")),
+        let name = |found: &FoundEffect| {
+            if found.class.is_empty() {
+                found.name.clone()
+            } else {
+                format!("{} (or {})", found.name, found.class.join(", "))
+            }
         };
         let names: Vec<String> = self.found().iter().map(name).collect();
-        match names.is_empty() {
-            true => self.verdict().to_owned(),
-            false => format!("{}: {}", self.verdict(), names.join(" + ")),
+        if names.is_empty() {
+            self.verdict().to_owned()
+        } else {
+            format!("{}: {}", self.verdict(), names.join(" + "))
         }
     }
 }

@@ -163,8 +163,9 @@ fn folders(cases: &Path) -> Result<Vec<PathBuf>, Failure> {
     let mut found = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>, Failure>>()?;
     found.retain(|path| path.join("scene.toml").exists());
     found.sort();
-    match found.is_empty() {
-        true => Err(format!("{}: there are no cases", cases.display()).into()),
-        false => Ok(found),
+    if found.is_empty() {
+        Err(format!("{}: there are no cases", cases.display()).into())
+    } else {
+        Ok(found)
     }
 }

@@ -6,7 +6,7 @@ use matdb::diagnose::Diagnosis;
 use matdb::effects::library;
 
 use super::label::{Expected, Strength};
-use super::numbers::{Share, Sorted, digits, runs};
+use super::numbers::{Share, Sorted, fixed_or_dash, runs};
 use super::page::{Set, listing, table};
 use super::reason::reason;
 use super::report::{NO_ANSWER, NONE, Run};
@@ -82,8 +82,8 @@ fn by_strength(cases: &[Case]) -> String {
             share(&cases, Case::first_or_class).cell(),
             share(&cases, Case::exact).cell(),
             share(&cases, |case| case.run.verdict() == "explained").cell(),
-            digits(mean(&cases, Case::extra), 2),
-            digits(mean(&cases, Case::wrong), 2),
+            fixed_or_dash(mean(&cases, Case::extra), 2),
+            fixed_or_dash(mean(&cases, Case::wrong), 2),
             share(&cases, |case| case.run.first() == NO_ANSWER).count.to_string(),
         ]
     };
@@ -262,12 +262,12 @@ fn errors(cases: &[Case]) -> String {
         vec![
             name.to_owned(),
             errors.len().to_string(),
-            digits(median(&|error| Some(error.before.rmse_db)), 3),
-            digits(median(&|error| Some(error.after.rmse_db)), 3),
-            digits(median(&|error| Some(error.noise_floor_db)), 3),
-            digits(after.median(), 3),
-            digits(after.quantile(0.9), 3),
-            digits(after.worst(), 3),
+            fixed_or_dash(median(&|error| Some(error.before.rmse_db)), 3),
+            fixed_or_dash(median(&|error| Some(error.after.rmse_db)), 3),
+            fixed_or_dash(median(&|error| Some(error.noise_floor_db)), 3),
+            fixed_or_dash(after.median(), 3),
+            fixed_or_dash(after.quantile(0.9), 3),
+            fixed_or_dash(after.worst(), 3),
             worse.count().to_string(),
             percent(median(&|error| error.explained_share)),
             percent(median(&|error| error.after.coverage_90)),
@@ -299,15 +299,15 @@ fn parameters(cases: &[Case]) -> String {
     ];
     let rows = deviations.iter().map(|one| {
         let unit = if one.scale == Scale::Level { "dB" } else { "%" };
-        let off = |value: Option<f64>| format!("{} {unit}", digits(value, 1));
+        let off = |value: Option<f64>| format!("{} {unit}", fixed_or_dash(value, 1));
         vec![
             format!("{} `{}`", one.effect, one.parameter),
             one.off.count().to_string(),
             off(one.off.median()),
             off(one.off.worst()),
             one.in_sd.count().to_string(),
-            digits(one.in_sd.median(), 1),
-            digits(one.in_sd.worst(), 1),
+            fixed_or_dash(one.in_sd.median(), 1),
+            fixed_or_dash(one.in_sd.worst(), 1),
         ]
     });
     format!(
@@ -328,8 +328,8 @@ fn time(cases: &[Case]) -> String {
     };
     format!(
         "`add` and `diagnose` together: median {} s, worst {} s; {} ran at a time{threads}.\n",
-        digits(seconds.median(), 1),
-        digits(seconds.worst(), 1),
+        fixed_or_dash(seconds.median(), 1),
+        fixed_or_dash(seconds.worst(), 1),
         runs(&jobs),
     )
 }
@@ -369,7 +369,7 @@ fn miss(case: &Case) -> Vec<String> {
     vec![
         put_in(case),
         label.strength.map_or("–", Strength::name).to_owned(),
-        digits(label.rms_db, 2),
+        fixed_or_dash(label.rms_db, 2),
         label.seed.to_string(),
         label.geometry.clone(),
         label.case.clone(),
@@ -387,8 +387,5 @@ fn gain(run: &Run, name: &str) -> String {
 }
 
 fn put_in(case: &Case) -> String {
-    match case.label.effects.is_empty() {
-        true => "nothing".into(),
-        false => case.label.names().join(" + "),
-    }
+    if case.label.effects.is_empty() { "nothing".into() } else { case.label.names().join(" + ") }
 }

@@ -1,7 +1,7 @@
 //! What was aimed at, beside what was reached.
 
 use super::label::{Expected, Strength};
-use super::numbers::{Share, Sorted, digits};
+use super::numbers::{Share, Sorted, fixed_or_dash};
 use super::score::{Case, expecting, mean, pairs, share, singles, those};
 
 /// Cases with nothing missing from which the share of false alarms is judged.
@@ -39,9 +39,10 @@ impl Target {
 
     /// Leaves open what too few cases tell.
     fn by_at_least(self, cases: usize, least: usize) -> Target {
-        match (1..least).contains(&cases) {
-            true => Target { met: None, is_too_few: true, ..self },
-            false => self,
+        if (1..least).contains(&cases) {
+            Target { met: None, is_too_few: true, ..self }
+        } else {
+            self
         }
     }
 
@@ -88,7 +89,7 @@ pub fn targets(cases: &[Case]) -> Vec<Target> {
             "≤ 0.10",
             extra,
             0.1,
-            digits(extra, 2),
+            fixed_or_dash(extra, 2),
         ),
         Target::at_most(
             "nothing missing: false alarms, by at least 60 cases",
@@ -108,14 +109,14 @@ pub fn targets(cases: &[Case]) -> Vec<Target> {
             "≤ 1.03",
             middle,
             1.03,
-            digits(middle, 3),
+            fixed_or_dash(middle, 3),
         ),
         Target::at_most(
             "known effects: error after over noise floor, 90th percentile",
             "≤ 1.10",
             most,
             1.10,
-            digits(most, 3),
+            fixed_or_dash(most, 3),
         ),
         Target::at_most(
             "known effects: cases whose error is worse than before",

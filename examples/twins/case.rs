@@ -200,10 +200,12 @@ impl Plan {
     }
 
     fn expected(&self) -> &'static str {
-        match self.effects.iter().all(|name| KNOWN.contains(name)) {
-            true if self.effects.is_empty() => "no-missing-effect",
-            true => "explained",
-            false => "unexplained",
+        if self.effects.is_empty() {
+            "no-missing-effect"
+        } else if self.effects.iter().all(|name| KNOWN.contains(name)) {
+            "explained"
+        } else {
+            "unexplained"
         }
     }
 }

@@ -43,7 +43,7 @@ impl CurveOrigin {
         match (self.kind, &self.title) {
             (Some(kind), Some(title)) => Ok((kind, title)),
             _ => Err(Error::usage(
-                format!("nobody has said where {subject} comes from"),
+                format!("the source of {subject} is not stated"),
                 "state its kind, measured or synthetic, and its source: who, when and how; a measured curve needs \
                  licence, instrument, frequency and threshold, too",
             )),
@@ -59,7 +59,7 @@ impl CurveOrigin {
         if self.licence.as_ref().is_some_and(|licence| !is_licence(licence)) {
             return Err(Error::Detail {
                 detail: Detail::Licence,
-                problem: "is no SPDX expression",
+                problem: "is not an SPDX expression",
                 way_out: "write an SPDX identifier such as CC-BY-4.0, or LicenseRef-proprietary",
             });
         }

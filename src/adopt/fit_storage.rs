@@ -114,7 +114,7 @@ impl FitStorage {
         let what = if material.curves.iter().any(|curve| curve.name == name) {
             "a curve"
         } else if material.fits.iter().any(|fit| fit.name == name && fit.report.is_none()) {
-            "a fit that nobody fitted here"
+            "a fit without a report"
         } else {
             return Ok(target);
         };
@@ -141,7 +141,7 @@ impl FitStorage {
         if self.origin != CurveOrigin::default() {
             return Err(Error::usage(
                 format!("the curve of `{slug}` has a source already"),
-                "leave its kind, its source and what goes with them out",
+                "leave out --kind, --source and the other details of its origin",
             ));
         }
         // The current revision: it may have been revised while the fit ran.

@@ -160,21 +160,21 @@ impl Field {
             None => "—".to_owned(),
             Some(Value::String(text)) => text.clone(),
             Some(value) => match (value.as_f64(), own) {
-                (Some(rad), "rad") => format!("{}°", shown(rounded(rad.to_degrees()))),
-                (Some(hz), "Hz") => format!("{} GHz", shown(rounded(hz / 1e9))),
-                (Some(m), "m") => format!("{} mm", shown(rounded(m * 1e3))),
+                (Some(rad), "rad") => format!("{}°", shown(ten_digits(rad.to_degrees()))),
+                (Some(hz), "Hz") => format!("{} GHz", shown(ten_digits(hz / 1e9))),
+                (Some(m), "m") => format!("{} mm", shown(ten_digits(m * 1e3))),
                 (Some(0.0), "W") => "none".to_owned(),
-                (Some(w), "W") => format!("{} dBm", shown(rounded(dbm_from_watts(w)))),
-                (Some(k), "K") => format!("{} °C", shown(rounded(k - 273.15))),
-                (Some(number), "" | "1") => self.digits(number),
-                (Some(number), unit) => format!("{} {unit}", self.digits(number)),
+                (Some(w), "W") => format!("{} dBm", shown(ten_digits(dbm_from_watts(w)))),
+                (Some(k), "K") => format!("{} °C", shown(ten_digits(k - 273.15))),
+                (Some(number), "" | "1") => self.number(number),
+                (Some(number), unit) => format!("{} {unit}", self.number(number)),
                 (None, _) => value.to_string(),
             },
         }
     }
 
     /// Six significant digits, or all where those are the same before and after.
-    fn digits(&self, number: f64) -> String {
+    fn number(&self, number: f64) -> String {
         let [before, after] = [&self.before, &self.after]
             .map(|value| Some(round_significant(value.as_ref()?.as_f64()?, 6)));
         if before == after { shown(number) } else { significant(number, 6) }
@@ -182,7 +182,7 @@ impl Field {
 }
 
 /// Without what a change of unit leaves in the last digits.
-fn rounded(value: f64) -> f64 {
+fn ten_digits(value: f64) -> f64 {
     round_significant(value, 10)
 }
 

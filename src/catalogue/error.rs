@@ -83,7 +83,7 @@ pub enum CatalogueError {
     },
     /// The materials share no licence, and none was declared for the catalogue.
     #[error(
-        "the materials are under {found}, which is no one licence for the catalogue; nothing was published, \
+        "the materials are under {found}, and the catalogue states no licence of its own; nothing was published, \
          declare one for the catalogue, such as licence = \"{example}\""
     )]
     NoLicence {
@@ -118,8 +118,8 @@ pub enum CatalogueError {
         /// The folder.
         bundle: PathBuf,
     },
-    /// What was named is no catalogue.
-    #[error("{} is no catalogue: {problem}; name a published folder or its catalogue.sqlite", path.display())]
+    /// What was named is not a catalogue.
+    #[error("{} is not a catalogue: {problem}; name a published folder or its catalogue.sqlite", path.display())]
     NoBundle {
         /// What was named.
         path: PathBuf,

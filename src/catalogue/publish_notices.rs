@@ -37,7 +37,7 @@ impl PublishSummary {
         }
         if !about.has_authors() {
             notices.push(
-                "nobody is named as author; name yourselves as [[person]] or [[institute]] in --about FILE"
+                "no author is named; add a [[person]] or an [[institute]] in --about FILE"
                     .to_owned(),
             );
         }

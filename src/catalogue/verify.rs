@@ -140,7 +140,7 @@ fn sums(
     let path = bundle.join(SUMS);
     match fs::symlink_metadata(&path) {
         Ok(found) if !found.is_file() => {
-            return Err(no_bundle(bundle, "its SHA256SUMS is no plain file"));
+            return Err(no_bundle(bundle, "its SHA256SUMS is not a plain file"));
         }
         Ok(found) if found.len() > LARGEST_FILE_BYTES => {
             return Err(no_bundle(bundle, "its SHA256SUMS is larger than 1 GiB"));
@@ -161,7 +161,7 @@ fn sums(
             Some((_, path)) if !is_inside(path) => {
                 problems.push(problem(place(), "names a file outside the folder"));
             }
-            _ => problems.push(problem(place(), "is no hash with a path")),
+            _ => problems.push(problem(place(), "is not a hash with a path")),
         }
     }
     Ok(sums)

@@ -102,7 +102,7 @@ fn pose_numbers(text: &str) -> Result<Pose<Global, Global>, Error> {
         }
     }
     Err(Error::usage(
-        format!("`{text}` is no pose"),
+        format!("`{text}` is not a pose"),
         "write --pose X,Y,Z or X,Y,Z,RX,RY,RZ (m, degrees), `auto`, or a pose.json",
     ))
 }

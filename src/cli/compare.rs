@@ -72,7 +72,7 @@ fn line(text: &str) -> Result<Line, Error> {
     }
     if !is_line || line.y_m.is_nan() {
         return Err(Error::usage(
-            format!("--line {text} is no line"),
+            format!("--line {text} is not a line"),
             "write it as --line y=1.1,width=0.02",
         ));
     }

@@ -80,11 +80,11 @@ fn harmless(text: &str) -> String {
 /// assert!(matdb::cli::readable(&message).ends_with("aaa… (10002 letters)"));
 /// ```
 pub fn readable(text: &str) -> String {
-    harmless(text).split_inclusive(char::is_whitespace).map(shortened).collect()
+    harmless(text).split_inclusive(char::is_whitespace).map(cut_long_word).collect()
 }
 
 /// A word with the white space behind it, cut where it is longer than any name or path is.
-fn shortened(word: &str) -> String {
+fn cut_long_word(word: &str) -> String {
     const LONGEST: usize = 1000;
     const SHOWN: usize = 80;
     match word.chars().count() {

@@ -4,6 +4,7 @@ use super::console::Console;
 use super::summary::{counted, table};
 use crate::catalogue::{CurveChange, Diff, Field, Levels};
 use crate::error::Error;
+use crate::formats::words::shortened;
 use crate::setup::Database;
 use crate::setup::find_material;
 
@@ -61,7 +62,8 @@ fn text<'a>(diff: &Diff, fields: impl Iterator<Item = &'a Field>, names: [&Strin
         return format!("{} and {} say the same\n", names[0], names[1]);
     }
     let mut text = String::new();
-    let mut rows = fields.map(|f| [f.place(), cut(&f.before()), cut(&f.after())]).peekable();
+    let mut rows =
+        fields.map(|f| [f.place(), on_a_line(&f.before()), on_a_line(&f.after())]).peekable();
     if rows.peek().is_some() {
         text += &table(&["field", names[0], names[1]], rows);
     }
@@ -88,11 +90,6 @@ fn words(levels: &Levels) -> String {
 }
 
 /// A text on one line of a table.
-fn cut(text: &str) -> String {
-    const MOST: usize = 48;
-    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    match line.chars().count() {
-        0..=MOST => line,
-        _ => line.chars().take(MOST - 1).chain(['…']).collect(),
-    }
+fn on_a_line(text: &str) -> String {
+    shortened(&text.split_whitespace().collect::<Vec<_>>().join(" "), 48)
 }

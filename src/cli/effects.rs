@@ -49,7 +49,7 @@ pub(super) fn each_once(names: &[String]) -> impl Iterator<Item = &String> {
 fn known(name: &str) -> Result<&'static dyn Effect, Error> {
     find(name).ok_or_else(|| {
         if name == EffectHelp::UNKNOWN.name {
-            return Error::usage("`unknown` is no effect to try", "leave it out: what no effect explains is always looked for");
+            return Error::usage("`unknown` is not an effect to try", "leave it out: what no effect explains is always looked for");
         }
         if term(name).is_some() {
             return Error::usage(format!("`{name}` is an effect of curves and not of clouds"), "give the curve with --curve, or name effects of clouds: `matdb effects` lists them");
@@ -105,13 +105,13 @@ fn short(text: &str) -> String {
 }
 
 fn entry(record: &EffectHelp) -> String {
-    let rows = record.parameters.iter().map(|knob| {
+    let rows = record.parameters.iter().map(|parameter| {
         [
-            knob.name.to_owned(),
-            unit(knob.unit).to_owned(),
-            shown(knob.min),
-            shown(knob.max),
-            shown(knob.absent),
+            parameter.name.to_owned(),
+            unit(parameter.unit).to_owned(),
+            shown(parameter.min),
+            shown(parameter.max),
+            shown(parameter.absent),
         ]
     });
     let parameters = match record.parameters {

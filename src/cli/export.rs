@@ -37,7 +37,7 @@ pub(super) struct Args {
 enum Format {
     /// One curve with its detection limits, in degrees and dB; `matdb add --from` reads it back
     Csv,
-    /// The same in SI units, typed, with units in its metadata
+    /// One curve with its detection limits in SI units, typed, with units in its metadata
     Parquet,
     /// EMPIR universal BRDF (.brdf): one curve, its uncertainty and limits; `matdb add --from` reads it
     UniversalBrdf,

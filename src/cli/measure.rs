@@ -143,7 +143,7 @@ fn reduction(args: &Args) -> Result<Reduction, Error> {
     let (edge_margin_m, exact_mesh) = (args.edge_margin, args.exact_mesh);
     match edge_margin_m {
         Some(margin_m) if !(0.0..=1.0).contains(&margin_m) => Err(Error::usage(
-            format!("--edge-margin {margin_m} is no margin"),
+            format!("--edge-margin {margin_m} is not a margin"),
             "give metres from 0 to 1",
         )),
         _ => Ok(Reduction { edge_margin_m, exact_mesh, ..Reduction::default() }),

@@ -87,12 +87,13 @@ fn text(record: &NeighbourReport, args: &Args) -> String {
     text += &format!("ranked by {by}, at {} angles of the curve\n", record.angles);
     text += &match record.measured_at_ghz {
         Some(ghz) => format!("the curve is of {} GHz\n", shown(ghz)),
-        None => "nobody says at which frequency the curve was measured: --measured-at GHZ does\n"
-            .to_owned(),
+        None => {
+            "the frequency of the curve is not stated: give it by --measured-at GHZ\n".to_owned()
+        }
     };
     text += &match record.noise_db {
         Some(noise) => format!("its repeats scatter: chance alone makes {noise:.1} dB\n"),
-        None => "without repeats at an angle nobody knows what chance makes of it\n".to_owned(),
+        None => "without repeats at an angle the share of chance is not known\n".to_owned(),
     };
     if record.left_out > 0 {
         text += &format!("left out for too little in common: {}\n", record.left_out);

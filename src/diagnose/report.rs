@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
 use super::evidence::{Candidate, Evidence};
 use super::residual::ResidualStructure;
 use super::score::Errors;
 use crate::brdf::Brdf;
 use crate::effects::{Effect, Level, Place, Shot};
-use crate::units::dbm_from_watts;
 
 /// Version of a report as JSON.
 pub const SCHEMA: u32 = 3;
@@ -172,18 +171,16 @@ pub struct MeshPose {
     pub translation_m: [f64; 3],
 }
 
-/// The model that the effects are added to. A part of `report.json`, whose units its fields have when written.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// The model that the effects are added to.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Base {
     /// Parameters of the scattering models, as fitted with the effects.
     pub parameters: Vec<BaseValue>,
     /// Looks of speckle, as declared.
     pub looks: f64,
-    /// Threshold, W, as declared; a report states it as `threshold_dbm`.
-    #[serde(rename = "threshold_dbm", serialize_with = "write_dbm")]
+    /// Threshold, W, as declared.
     pub threshold_w: f64,
-    /// Thermal noise, W, as declared; a report states it as `noise_dbm`, null for a receiver without noise.
-    #[serde(rename = "noise_dbm", serialize_with = "write_dbm_if_positive")]
+    /// Thermal noise, W, as declared; 0 for a receiver without noise.
     pub noise_w: f64,
     /// Standard deviation of a range, m, as declared; 0 where ranges are not used.
     pub range_sd_m: f64,
@@ -191,16 +188,6 @@ pub struct Base {
     pub pose: Vec<MeshPose>,
     /// Whether the final fit converged.
     pub converged: bool,
-}
-
-/// Writes a power in W as its level in dBm.
-fn write_dbm<S: Serializer>(power_w: &f64, to: S) -> Result<S::Ok, S::Error> {
-    to.serialize_f64(dbm_from_watts(*power_w))
-}
-
-/// Writes a power in W as its level in dBm, and 0 as null.
-fn write_dbm_if_positive<S: Serializer>(power_w: &f64, to: S) -> Result<S::Ok, S::Error> {
-    (*power_w > 0.0).then(|| dbm_from_watts(*power_w)).serialize(to)
 }
 
 /// The size from which on an effect was found in data that the base model simulated with it.
@@ -303,6 +290,7 @@ pub struct Report {
     /// Controls of the answer.
     pub controls: Controls,
     /// The model that the effects are added to.
+    #[serde(skip)]
     pub base: Base,
     /// The scattering model of every region as fitted with the effects.
     #[serde(skip)]

@@ -118,6 +118,21 @@ pub fn listed<Name: AsRef<str>>(names: &[Name]) -> String {
     }
 }
 
+/// Text on one line, cut after this many characters, without marks that turn its direction: for titles, whose marks
+/// would turn the text around them, too.
+///
+/// ```
+/// assert_eq!(matdb::formats::words::shortened("first\nsecond", 8), "first se…");
+/// ```
+pub fn shortened(text: &str, most: usize) -> String {
+    let mut line = text
+        .chars()
+        .filter(|c| !matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}'))
+        .map(|c| if c.is_control() { ' ' } else { c });
+    let short: String = line.by_ref().take(most).collect();
+    if line.next().is_some() { short.trim_end().to_owned() + "…" } else { short }
+}
+
 /// Text with a capital first letter.
 pub fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
@@ -174,6 +189,12 @@ mod tests {
         let said = [0, 1, 2000].map(|number| counted(number, "fit"));
         assert_eq!(said, ["0 fits", "1 fit", "2 000 fits"]);
         assert_eq!([percent(0, 9), percent(1, 8), percent(9, 9)], ["none", "12.5 %", "all"]);
+    }
+
+    #[test]
+    fn line_ends_and_marks_of_direction_do_not_reach_a_title() {
+        assert_eq!(shortened("ab\u{202e}cd\nef", 6), "abcd e…");
+        assert_eq!(shortened("abc", 3), "abc");
     }
 
     #[test]

@@ -110,7 +110,7 @@ struct Lattice {
 }
 
 /// A cell that the surface passes through: its place along x, y and z, and its number.
-type Crossed = ([usize; 3], usize);
+type SurfaceCell = ([usize; 3], usize);
 
 impl Lattice {
     /// Centred on the bounds, so that a symmetric body gets a symmetric net.
@@ -180,7 +180,7 @@ impl Lattice {
     }
 
     /// The cells that the surface passes through, by their numbers.
-    fn crossed(&self, distances_m: &[f64]) -> Vec<Crossed> {
+    fn crossed(&self, distances_m: &[f64]) -> Vec<SurfaceCell> {
         let ([nx, ny, nz], [_, sy, sz]) = (self.size, self.strides());
         let is_inside = |corner: usize| distances_m[corner] < 0.0;
         let in_layer = |z: usize| {
@@ -206,7 +206,7 @@ impl Lattice {
     }
 
     /// One vertex per crossed cell, the mean of its edges' crossings.
-    fn vertices(&self, distances_m: &[f64], crossed: &[Crossed]) -> Vec<DVec3> {
+    fn vertices(&self, distances_m: &[f64], crossed: &[SurfaceCell]) -> Vec<DVec3> {
         let [sx, sy, sz] = self.strides();
         let offsets = [0, 1, 2, 3, 4, 5, 6, 7usize]
             .map(|corner| (corner & 1) * sx + (corner >> 1 & 1) * sy + (corner >> 2) * sz);
@@ -218,7 +218,7 @@ impl Lattice {
     }
 
     /// A quad around every crossed lattice edge, right-handed about the outward direction.
-    fn quads(&self, distances_m: &[f64], crossed: &[Crossed]) -> Vec<[u32; 4]> {
+    fn quads(&self, distances_m: &[f64], crossed: &[SurfaceCell]) -> Vec<[u32; 4]> {
         let strides = self.strides();
         let mut vertex_of_cell = vec![NO_VERTEX; distances_m.len()];
         for (vertex, &(_, index)) in (0..).zip(crossed) {

@@ -38,8 +38,8 @@ const LICENCES: [&str; 32] = [
     "etalab-2.0",
 ];
 
-/// A sentence on the first identifier of a licence expression that is none of the usual ones of SPDX's list and no
-/// `LicenseRef-…`; none where all are. The list has others.
+/// A sentence on the first identifier of a licence expression that is neither a usual one of SPDX's list nor a
+/// `LicenseRef-…`; `None` if there is none. The list has others.
 ///
 /// ```
 /// use matdb::material::form::licence_doubt;
@@ -58,7 +58,7 @@ pub fn licence_doubt(text: &str) -> Option<String> {
     let meant = begun.copied().or_else(|| nearest(stranger, LICENCES));
     let meant = meant.map_or(String::new(), |name| format!("; did you mean `{name}`?"));
     Some(format!(
-        "the licence `{stranger}` is none of SPDX's usual identifiers (spdx.org/licenses){meant}"
+        "the licence `{stranger}` is not a usual SPDX identifier (spdx.org/licenses){meant}"
     ))
 }
 

@@ -293,7 +293,7 @@ impl Session {
         check.quarter_turn("the deviation of the normals", self.normal_sd_rad)?;
         check.quarter_turn("the spread over the footprint", self.footprint_sd_rad)?;
         if self.pose.is_some_and(|pose| !pose.is_rigid()) {
-            return Err(value(&place, "the pose is no rotation with a shift", "mend its rows"));
+            return Err(value(&place, "the pose is not a rotation with a shift", "mend its rows"));
         }
         Ok(())
     }

@@ -24,7 +24,7 @@ pub struct Material {
     pub slug: Slug,
     /// Full name.
     pub name: String,
-    /// Kind of stuff: `metal`, `polymer`, `paint`, `tissue`, `textile`, `glass` …
+    /// Class of material: `metal`, `polymer`, `paint`, `tissue`, `textile`, `glass` …
     pub class: String,
     /// What it is and what is not known of it.
     pub description: String,

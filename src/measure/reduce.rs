@@ -427,10 +427,10 @@ fn silent_chirps(
 mod tests {
     use super::*;
     use crate::measure::settings::Registration;
-    use crate::measure::synthetic::{Measured, f_per_sr, mannequin};
+    use crate::measure::synthetic::{SyntheticScan, f_per_sr, mannequin};
     use crate::units::db_from_ratio;
 
-    fn target(measured: &Measured) -> Target {
+    fn target(measured: &SyntheticScan) -> Target {
         let region_of_facet =
             measured.mesh.facets.iter().map(|f| above(measured, f)).collect::<Vec<u16>>();
         let mesh = measured.mesh.clone();
@@ -438,13 +438,16 @@ mod tests {
     }
 
     /// Two regions, below and above 1.1 m.
-    fn above(measured: &Measured, facet: &[u32; 3]) -> u16 {
+    fn above(measured: &SyntheticScan, facet: &[u32; 3]) -> u16 {
         u16::from(measured.mesh.vertices[facet[0] as usize].y > 1.1)
     }
 
-    fn reduce(measured: &Measured, settings: Reduction) -> Result<ReductionResult, ReductionError> {
+    fn reduce(
+        measured: &SyntheticScan,
+        settings: Reduction,
+    ) -> Result<ReductionResult, ReductionError> {
         let registered = measured.register(&Registration::default()).unwrap();
-        let Measured { radar, chirps, cloud, .. } = measured;
+        let SyntheticScan { radar, chirps, cloud, .. } = measured;
         settings.run(&target(measured), radar, chirps, cloud, &registered)
     }
 
@@ -491,7 +494,7 @@ mod tests {
         let measured = mannequin(2e-3, 1);
         let points = measured.cloud.points();
         let points = points.iter().map(|point| CloudPoint { chirp: None, ..*point }).collect();
-        let bare = Measured { cloud: Cloud::new(points).unwrap(), ..measured.clone() };
+        let bare = SyntheticScan { cloud: Cloud::new(points).unwrap(), ..measured.clone() };
         let [told, bare] =
             [&measured, &bare].map(|measured| reduce(measured, Reduction::default()).unwrap());
         let (told, bare) = (told.curve.observations, bare.curve.observations);

@@ -247,13 +247,13 @@ impl RegistrationResult {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::synthetic::{Measured, apart, mannequin, pushed};
+    use crate::measure::synthetic::{SyntheticScan, apart, mannequin, pushed};
 
     /// The pose is known this well at a range noise of 2 mm.
     const NEAR_M: f64 = 0.5e-3;
     const NEAR_RAD: f64 = 0.05 * std::f64::consts::PI / 180.0;
 
-    fn register(settings: Registration, seed: u64) -> (Measured, RegistrationResult) {
+    fn register(settings: Registration, seed: u64) -> (SyntheticScan, RegistrationResult) {
         let measured = mannequin(2e-3, seed);
         let start = Start::Given(pushed(&measured, 0.03, 5f64.to_radians(), seed));
         let found = measured.register(&Registration { start, ..settings }).unwrap();
@@ -318,7 +318,7 @@ mod tests {
 
     #[test]
     fn a_plane_says_what_it_does_not_tell() {
-        let measured = Measured::of(crate::scene::solids::plate(2.0, 2.0), 2e-3, 1);
+        let measured = SyntheticScan::of(crate::scene::solids::plate(2.0, 2.0), 2e-3, 1);
         let found = measured.register(&Registration::default()).unwrap();
         assert_eq!(found.verdicts.len(), 3, "{:?}", found.verdicts);
         for words in ["shift along x", "shift along y", "turn about z"] {
@@ -337,14 +337,14 @@ mod tests {
         assert!(shift_m < NEAR_M && turn_rad < NEAR_RAD, "{shift_m} {turn_rad}");
     }
 
-    fn refused(measured: &Measured, settings: Registration) -> RegistrationError {
+    fn refused(measured: &SyntheticScan, settings: Registration) -> RegistrationError {
         measured.register(&settings).unwrap_err()
     }
 
     #[test]
     fn what_gives_no_pose_gives_a_verdict() {
         let measured = mannequin(2e-3, 4);
-        let few = Measured { cloud: measured.first(20), ..measured.clone() };
+        let few = SyntheticScan { cloud: measured.first(20), ..measured.clone() };
         let error = refused(&few, Registration::default());
         assert_eq!(error, RegistrationError::TooFew { points: 20, least: 50 });
 

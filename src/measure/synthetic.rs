@@ -17,7 +17,7 @@ use crate::units::watts_from_dbm;
 
 /// A mesh where it stood, and its cloud.
 #[derive(Clone)]
-pub struct Measured {
+pub struct SyntheticScan {
     pub mesh: Mesh,
     pub radar: Radar,
     pub chirps: Chirps,
@@ -29,9 +29,9 @@ pub fn f_per_sr(theta_rad: f64) -> f64 {
     0.5 * (-theta_rad / 0.1).exp() + 1.6e-4
 }
 
-impl Measured {
+impl SyntheticScan {
     /// A mesh around the origin or on the floor of the global frame, detected above the threshold.
-    pub fn of(mut mesh: Mesh, range_sd_m: f64, seed: u64) -> Measured {
+    pub fn of(mut mesh: Mesh, range_sd_m: f64, seed: u64) -> SyntheticScan {
         let lowest_m = mesh.vertices.iter().map(|v| v.y).fold(f64::INFINITY, f64::min);
         if lowest_m < 0.0 {
             mesh.vertices.iter_mut().for_each(|v| v.y += 1.1);
@@ -56,7 +56,7 @@ impl Measured {
             }
         }
         let cloud = Cloud::new(points).unwrap();
-        Measured { mesh, radar, chirps, cloud }
+        SyntheticScan { mesh, radar, chirps, cloud }
     }
 
     /// Registers the mesh to its cloud.
@@ -73,7 +73,7 @@ impl Measured {
     }
 
     /// Every n-th point becomes a false alarm: at its ray, but anywhere within a metre.
-    pub fn with_false_alarms(mut self, every: usize, seed: u64) -> Measured {
+    pub fn with_false_alarms(mut self, every: usize, seed: u64) -> SyntheticScan {
         let mut draws = draws(seed, 1);
         let origin = self.radar.frames().origin();
         let mut points = self.cloud.points().to_vec();
@@ -89,8 +89,8 @@ impl Measured {
 }
 
 /// The built-in mannequin.
-pub fn mannequin(range_sd_m: f64, seed: u64) -> Measured {
-    Measured::of(mannequin::mannequin(), range_sd_m, seed)
+pub fn mannequin(range_sd_m: f64, seed: u64) -> SyntheticScan {
+    SyntheticScan::of(mannequin::mannequin(), range_sd_m, seed)
 }
 
 fn draws(seed: u64, sub_ray: u64) -> Draws {
@@ -103,7 +103,12 @@ fn normal(draws: &mut Draws) -> f64 {
 }
 
 /// A rough pose, off by this much in a random direction about the middle of the cloud.
-pub fn pushed(measured: &Measured, off_m: f64, off_rad: f64, seed: u64) -> Pose<Global, Global> {
+pub fn pushed(
+    measured: &SyntheticScan,
+    off_m: f64,
+    off_rad: f64,
+    seed: u64,
+) -> Pose<Global, Global> {
     let mut draws = draws(seed, 2);
     let mut direction =
         || DVec3::from_array([(); 3].map(|()| normal(&mut draws))).normalize_or(DVec3::X);

@@ -19,38 +19,11 @@
 use std::f64::consts::{LN_2, PI, SQRT_2};
 
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
 use super::scan::PATTERN_RANGE_M;
-use super::settings::{BeamEntry, Radar};
+use super::settings::{BeamEntry, Radar, SpotDiameter};
 use crate::frames::{Direction, Global, Point, Pose, Ray, Target};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
-
-/// Which width of the beam at its focus a stated diameter is. The paper does not say which its 1.6 cm is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum SpotDiameter {
-    /// Full width at half maximum of the irradiance, one way: w₀ = D/√(2·ln 2).
-    #[default]
-    #[serde(rename = "one-way-fwhm")]
-    OneWayFwhm,
-    /// Full width at half maximum of the two-way weight u²: w₀ = D/√(ln 2).
-    #[serde(rename = "two-way-fwhm")]
-    TwoWayFwhm,
-    /// Diameter on which the irradiance is 1/e² of that on the axis: w₀ = D/2.
-    #[serde(rename = "1/e2")]
-    InverseE2,
-}
-
-impl SpotDiameter {
-    /// Waist radius w₀ over the diameter D.
-    fn waist_per_diameter(self) -> f64 {
-        match self {
-            SpotDiameter::OneWayFwhm => 1.0 / (2.0 * LN_2).sqrt(),
-            SpotDiameter::TwoWayFwhm => 1.0 / LN_2.sqrt(),
-            SpotDiameter::InverseE2 => 0.5,
-        }
-    }
-}
 
 impl Radar {
     /// Wavelength λ at the centre frequency, m.

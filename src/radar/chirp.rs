@@ -74,7 +74,7 @@ pub struct Return {
      or move what returns it",
     excess_m(*range_m, *max_range_m)
 )]
-pub struct Aliased {
+pub struct AliasError {
     /// Where the return is, m.
     pub range_m: f64,
     /// First range that is ambiguous, m.
@@ -152,7 +152,7 @@ impl Chirp {
     ///
     /// # Errors
     /// When a return lies outside the unambiguous range, by how much.
-    pub fn beat_signal(&self, returns: &[Return]) -> Result<Vec<Complex<f64>>, Aliased> {
+    pub fn beat_signal(&self, returns: &[Return]) -> Result<Vec<Complex<f64>>, AliasError> {
         let mut signal = vec![Complex::ZERO; self.samples];
         for echo in returns {
             self.check_range(echo.range_m)?;
@@ -165,12 +165,12 @@ impl Chirp {
     ///
     /// # Errors
     /// When it lies outside the unambiguous range, by how much.
-    pub fn check_range(&self, range_m: f64) -> Result<(), Aliased> {
+    pub fn check_range(&self, range_m: f64) -> Result<(), AliasError> {
         let max_range_m = self.max_range_m();
         if (0.0..max_range_m).contains(&range_m) {
             return Ok(());
         }
-        Err(Aliased {
+        Err(AliasError {
             range_m,
             max_range_m,
             apparent_range_m: range_m.rem_euclid(max_range_m),

@@ -17,8 +17,8 @@ mod settings;
 pub mod speckle;
 pub mod window;
 
-pub use beam::{Beam, GaussianBeam, Section, SpotDiameter};
-pub use chirp::{Aliased, Chirp, ChirpEntry, Return};
+pub use beam::{Beam, GaussianBeam, Section};
+pub use chirp::{AliasError, Chirp, ChirpEntry, Return};
 pub use error::{F5Error, RadarError};
 pub use f5::F5;
 pub use frames::RadarFrames;
@@ -28,6 +28,6 @@ pub use noise::Noise;
 pub use preset::PRESETS;
 pub use receiver::{Detection, RangeProcessor, Receiver};
 pub use scan::{Chirps, Field, Pattern};
-pub use settings::{BeamEntry, Footprint, Radar};
+pub use settings::{BeamEntry, Footprint, Radar, SpotDiameter};
 pub use speckle::Speckle;
 pub use window::Window;

@@ -1,10 +1,9 @@
 //! Radar presets.
 
-use super::beam::SpotDiameter;
 use super::chirp::ChirpEntry;
 use super::mirror::Optics;
 use super::scan::pattern::Pattern;
-use super::settings::{BeamEntry, Footprint, Radar};
+use super::settings::{BeamEntry, Footprint, Radar, SpotDiameter};
 
 /// Names of the presets.
 pub const PRESETS: [&str; 1] = ["upm-300ghz"];

@@ -7,9 +7,10 @@
 //! The marks in the field docs: **paper** is Ortiz-Jiménez et al., IEEE T-THz Sci. Technol. 2017
 //! (DOI 10.1109/TTHZ.2017.2702590); **assumed** is a value that no publication gives and that we chose.
 
+use std::f64::consts::LN_2;
+
 use serde::{Deserialize, Serialize};
 
-use super::beam::SpotDiameter;
 use super::chirp::{Chirp, ChirpEntry};
 use super::error::Check;
 use super::f5::F5;
@@ -128,6 +129,32 @@ impl BeamEntry {
             ("beam.edge_growth", self.edge_growth, (0.1, 100.0)),
             ("beam.edge_m", self.edge_m, (1e-3, 1e3)),
         ]
+    }
+}
+
+/// Which width of the beam at its focus a stated diameter is. The paper does not say which its 1.6 cm is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SpotDiameter {
+    /// Full width at half maximum of the irradiance, one way: w₀ = D/√(2·ln 2).
+    #[default]
+    #[serde(rename = "one-way-fwhm")]
+    OneWayFwhm,
+    /// Full width at half maximum of the two-way weight u²: w₀ = D/√(ln 2).
+    #[serde(rename = "two-way-fwhm")]
+    TwoWayFwhm,
+    /// Diameter on which the irradiance is 1/e² of that on the axis: w₀ = D/2.
+    #[serde(rename = "1/e2")]
+    InverseE2,
+}
+
+impl SpotDiameter {
+    /// Waist radius w₀ over the diameter D.
+    pub(super) fn waist_per_diameter(self) -> f64 {
+        match self {
+            SpotDiameter::OneWayFwhm => 1.0 / (2.0 * LN_2).sqrt(),
+            SpotDiameter::TwoWayFwhm => 1.0 / LN_2.sqrt(),
+            SpotDiameter::InverseE2 => 0.5,
+        }
     }
 }
 

@@ -125,7 +125,7 @@ mod tests {
         (0..CHIRPS).map(of_chirp).sum::<f64>() / CHIRPS as f64
     }
 
-    /// The same by midpoints.
+    /// ∫ f·cos θ_o dω_o by the midpoint rule.
     fn albedo_by_midpoints(surface: &dyn Scattering, theta_rad: f64) -> f64 {
         const STEPS: usize = 600;
         let source = Direction::from_angles(theta_rad, 0.7);

@@ -6,7 +6,7 @@
 
 use num_complex::Complex;
 
-use super::acting::Acting;
+use super::effect_scan::EffectScan;
 use super::error::RenderError;
 use super::observer::Observer;
 use super::path::{Path, sum};
@@ -51,11 +51,11 @@ impl Detector {
     pub fn new(
         setup: &Setup,
         observer: Observer,
-        acting: Option<&Acting>,
+        effects: Option<&EffectScan>,
     ) -> Result<Detector, RenderError> {
         let radar = setup.geometry.radar;
         let declared = Receiver::declared(radar);
-        let law = acting.map_or(declared, Acting::receiver);
+        let law = effects.map_or(declared, EffectScan::receiver);
         let mut threshold_w = watts_from_dbm(radar.threshold_dbm);
         let kind = match (radar.receiver, radar.speckle, radar.noise) {
             (Some(receiver), speckle, _) => {

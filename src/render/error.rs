@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::radar::{Aliased, Field, RadarError};
+use crate::radar::{AliasError, Field, RadarError};
 use crate::trace::TraceError;
 
 /// Why a scan cannot be rendered.
@@ -36,7 +36,7 @@ pub enum RenderError {
     },
     /// A path is longer than the unambiguous range of the sampling.
     #[error(transparent)]
-    Aliased(#[from] Aliased),
+    Alias(#[from] AliasError),
     /// A receiver adds amplitudes of several paths, whose phases are undeclared.
     #[error(
         "the paths of one chirp reach the receiver with unknown phases, which is speckle; add \

@@ -6,12 +6,12 @@
 //! | the surfaces of the target | `surface.rs` |
 //! | power that arrives at an antenna by single paths | `paths.rs`, equation (11) |
 //! | … and by second-order paths | `bounce.rs` |
-//! | … with declared physical effects | `acting.rs` |
+//! | … with declared physical effects | `effect_scan.rs` |
 //! | detection by the receiver, and the cause of each echo | `detect.rs`, `echo.rs` |
 //! | image and point cloud | `image.rs`, `cloud.rs` |
 //! | many scans at once, on a graphics processor | `batch.rs` |
 
-mod acting;
+mod effect_scan;
 mod batch;
 mod bounce;
 mod cloud;
@@ -39,4 +39,4 @@ pub use observer::Observer;
 pub use scan::{Scan, beat_signals, shade, trace, trace_placed};
 pub use setup::Setup;
 pub use spot::Footprints;
-pub use surface::{Facing, Surface};
+pub use surface::{Orientation, Surface};

@@ -11,13 +11,13 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::acting::{Acting, Change};
 use super::bounce::{Bounce, directions};
+use super::effect_scan::{Change, EffectScan};
 use super::observer::Observer;
 use super::path::{Path, sum};
 use super::setup::Setup;
 use super::spot::{self, Footprints, Spot};
-use super::surface::{Facing, Surface};
+use super::surface::{Orientation, Surface};
 use crate::effects::MeanEcho;
 use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
 use crate::radar::random::{Key, Purpose};
@@ -37,7 +37,7 @@ pub(super) struct Paths<'a> {
     samples: Vec<DVec2>,
     lit_shares: Vec<f64>,
     footprints: &'a Footprints,
-    acting: Option<Acting<'a>>,
+    effects: Option<EffectScan<'a>>,
     /// The change of each chirp's whole echo by the effects; empty without effects.
     changes: Vec<Option<Change>>,
 }
@@ -53,7 +53,7 @@ struct Emission<'a> {
 }
 
 /// An illuminated point of the target.
-struct LitPoint<'a> {
+struct ShadingPoint<'a> {
     hit: Hit,
     surface: Surface<'a>,
     frame: LocalFrame,
@@ -74,28 +74,29 @@ impl<'a> Paths<'a> {
         setup: &'a Setup<'a>,
         observer: Observer,
         footprints: &'a Footprints,
-        acting: Option<Acting<'a>>,
+        effects: Option<EffectScan<'a>>,
     ) -> Paths<'a> {
         let link = Link::new(setup.geometry.radar);
         let samples = spot::samples(footprints.rays_per_chirp);
         let lit_shares = spot::lit_shares(footprints.rays_per_chirp);
         let changes = Vec::new();
         let mut paths =
-            Paths { setup, observer, link, samples, lit_shares, footprints, acting, changes };
-        paths.changes = paths.acting.as_ref().map_or(Vec::new(), |acting| paths.changes_by(acting));
+            Paths { setup, observer, link, samples, lit_shares, footprints, effects, changes };
+        paths.changes =
+            paths.effects.as_ref().map_or(Vec::new(), |effects| paths.changes_by(effects));
         paths
     }
 
     /// The change of every whole echo by the effects. It depends on all echoes of the scan, so that all paths are
     /// computed once more before.
-    fn changes_by(&self, acting: &Acting) -> Vec<Option<Change>> {
+    fn changes_by(&self, effects: &EffectScan) -> Vec<Option<Change>> {
         let chirps = self.footprints.chirps().enumerate();
         let sums = chirps.map(|(chirp, hits)| {
             let paths = self.of_chirp(chirp, hits);
             let Detection { power_w, range_m } = sum(&paths);
             (!paths.is_empty()).then_some(MeanEcho::at_once(power_w, range_m))
         });
-        acting.changes(self.footprints, sums.collect())
+        effects.changes(self.footprints, sums.collect())
     }
 
     /// All paths of a chirp through the hits of its rays, including single paths without power.
@@ -113,19 +114,20 @@ impl<'a> Paths<'a> {
         let range_m = self.footprints.axis_range_m[number];
         let spot = Spot::met(&self.link.beam, axis, range_m, number);
         let sent = Emission { paths: self, number, spot, antenna, rays: hits.len() };
-        let tilts = self.acting.as_ref().map_or([0.0; 2], |acting| acting.tilts(number));
+        let tilts = self.effects.as_ref().map_or([0.0; 2], |effects| effects.tilts(number));
         for (sample, hit) in hits.iter().enumerate() {
             let Some((hit, ray)) = hit.zip(spot.ray(self.samples[sample])) else { continue };
-            let facing = sent.facing(sample);
+            let orientation = sent.orientation(sample);
             let lit = sent.lit_by_beam(hit, &ray);
             let bare = sent.direct(&lit);
-            let acting = self.acting.as_ref();
-            let direct = acting.map_or(bare, |acting| {
-                acting.direct(bare, number, &ray, hits.len(), facing, tilts)
+            let effects = self.effects.as_ref();
+            let direct = effects.map_or(bare, |effects| {
+                effects.direct(bare, number, &ray, hits.len(), orientation, tilts)
             });
             paths.push(direct);
             if let Some(bounce) = &self.setup.bounce {
-                let gain = acting.map(|acting| acting.instrument_gain(number, &ray, hit, facing));
+                let gain =
+                    effects.map(|effects| effects.instrument_gain(number, &ray, hit, orientation));
                 let flux_w = self.link.flux_w(lit.hit.cos_theta) * self.lit_shares[sample];
                 let flux_w = flux_w * gain.unwrap_or(1.0);
                 sent.second_order(&lit, flux_w, direct, bounce, sample, paths);
@@ -139,7 +141,7 @@ impl<'a> Paths<'a> {
 
 impl<'a> Emission<'a> {
     /// A point that a ray of the radar's beam lights.
-    fn lit_by_beam(&self, hit: Hit, ray: &Ray<Global>) -> LitPoint<'a> {
+    fn lit_by_beam(&self, hit: Hit, ray: &Ray<Global>) -> ShadingPoint<'a> {
         let to_source = -ray.direction.xyz();
         let (to_antenna, antenna_m) = match self.paths.observer {
             Observer::Radar => (to_source, hit.range_m),
@@ -150,7 +152,12 @@ impl<'a> Emission<'a> {
 
     /// A point that another point of the target lights; the antenna sees it in the main lobe of its beam, or
     /// by a side lobe.
-    fn lit_by_surface(&self, hit: Hit, source: &LitPoint, in_main_lobe: bool) -> LitPoint<'a> {
+    fn lit_by_surface(
+        &self,
+        hit: Hit,
+        source: &ShadingPoint,
+        in_main_lobe: bool,
+    ) -> ShadingPoint<'a> {
         let to_source = (source.hit.point.xyz - hit.point.xyz).normalize_or(DVec3::Z);
         let Spot { axis, beam, .. } = &self.spot;
         let (mut to_antenna, antenna_m) = self.to_antenna(&hit);
@@ -174,7 +181,7 @@ impl<'a> Emission<'a> {
         to_antenna: DVec3,
         antenna_m: f64,
         along_beam_m: f64,
-    ) -> LitPoint<'a> {
+    ) -> ShadingPoint<'a> {
         let ScanGeometry { bvh, region_of_facet, .. } = self.paths.setup.geometry;
         let region = usize::from(region_of_facet[hit.facet as usize]);
         let surface = self.paths.setup.surfaces[region];
@@ -183,7 +190,7 @@ impl<'a> Emission<'a> {
         let antenna = if to_antenna == to_source { source } else { frame.local(to_antenna) };
         let solid_angle_sr = self.solid_angle_sr(antenna_m, along_beam_m);
         let beam_rad = self.spot.divergence_rad(self.rays, along_beam_m);
-        LitPoint { hit, surface, frame, source, antenna, antenna_m, solid_angle_sr, beam_rad }
+        ShadingPoint { hit, surface, frame, source, antenna, antenna_m, solid_angle_sr, beam_rad }
     }
 
     /// Solid angle, sr, in which a point sees the antenna, from its distance and its place along the beam, m.
@@ -199,7 +206,7 @@ impl<'a> Emission<'a> {
     }
 
     /// The single path by way of a point.
-    fn direct(&self, lit: &LitPoint) -> Path {
+    fn direct(&self, lit: &ShadingPoint) -> Path {
         // Every point that the radar illuminates is visible to it.
         let seen = self.paths.observer == Observer::Radar || self.is_seen(lit);
         let (received, specular_share) = self.received_share(lit);
@@ -218,7 +225,7 @@ impl<'a> Emission<'a> {
     /// Appends the second-order paths by way of a point that receives `flux_w`, W.
     fn second_order(
         &self,
-        lit: &LitPoint,
+        lit: &ShadingPoint,
         flux_w: f64,
         direct: Path,
         bounce: &Bounce,
@@ -243,8 +250,8 @@ impl<'a> Emission<'a> {
     }
 
     /// The orientation of the surface at the hit of a ray, if effects have moved it.
-    fn facing(&self, ray: usize) -> Option<Facing> {
-        self.paths.footprints.facings.get(self.number * self.rays + ray).copied().flatten()
+    fn orientation(&self, ray: usize) -> Option<Orientation> {
+        self.paths.footprints.orientations.get(self.number * self.rays + ray).copied().flatten()
     }
 
     /// The key of the random directions from the hit of a ray. It is the same for all observers, since a surface
@@ -255,12 +262,12 @@ impl<'a> Emission<'a> {
     }
 
     /// Power of one ray on a point, W.
-    fn flux_w(&self, lit: &LitPoint) -> f64 {
+    fn flux_w(&self, lit: &ShadingPoint) -> f64 {
         self.paths.link.flux_w(lit.hit.cos_theta) / self.rays as f64
     }
 
     /// Share of the power on a point that the antenna receives if nothing occludes it, and the specular share of that.
-    fn received_share(&self, lit: &LitPoint) -> (f64, f64) {
+    fn received_share(&self, lit: &ShadingPoint) -> (f64, f64) {
         let (f_per_sr, specular_share) =
             lit.surface.scattering.seen_by(lit.beam_rad, lit.source, lit.antenna);
         let cos_exit = lit.antenna.cos_theta();
@@ -269,14 +276,14 @@ impl<'a> Emission<'a> {
     }
 
     /// The closest hit of a ray from a point.
-    fn trace_onward(&self, lit: &LitPoint, towards: Direction<Local>) -> Option<Hit> {
+    fn trace_onward(&self, lit: &ShadingPoint, towards: Direction<Local>) -> Option<Hit> {
         let origin = Point::from(lit.hit.point.xyz + LIFT_M * lit.frame.normal());
         let direction = Direction::new(lit.frame.world(towards.xyz()))?;
         self.paths.setup.geometry.bvh.closest(&Ray { origin, direction })
     }
 
     /// Whether a point is visible from the antenna.
-    fn is_seen(&self, lit: &LitPoint) -> bool {
+    fn is_seen(&self, lit: &ShadingPoint) -> bool {
         let above = lit.antenna.cos_theta() > 0.0;
         above && self.trace_onward(lit, lit.antenna).is_none_or(|hit| hit.range_m >= lit.antenna_m)
     }

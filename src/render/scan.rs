@@ -2,9 +2,9 @@
 
 use rayon::prelude::*;
 
-use super::acting::{self, Acting};
 use super::detect::{Beats, Detector};
 use super::echo::{Echo, Echoes};
+use super::effect_scan::{self, EffectScan};
 use super::error::RenderError;
 use super::observer::Observer;
 use super::paths::Paths;
@@ -60,11 +60,11 @@ pub fn trace_placed(
 ) -> Result<Footprints, RenderError> {
     let geometry = &setup.geometry;
     let rays = rays_per_chirp.max(1);
-    acting::check(setup, rays, Observer::Radar)?;
-    let footprints = match Acting::new(setup) {
+    effect_scan::check(setup, rays, Observer::Radar)?;
+    let footprints = match EffectScan::new(setup) {
         None => spot::trace(geometry, rays, done),
-        Some(acting) => {
-            spot::trace_moved(geometry, rays, done, |chirp, ray, hit| acting.meet(chirp, ray, hit))
+        Some(effects) => {
+            spot::trace_moved(geometry, rays, done, |chirp, ray, hit| effects.meet(chirp, ray, hit))
         }
     };
     check_hits(footprints?, geometry)
@@ -96,9 +96,9 @@ pub fn shade(
     done: &(dyn Fn(usize) + Sync),
 ) -> Result<Scan, RenderError> {
     check(setup, footprints, observer)?;
-    let acting = Acting::new(setup);
-    let detector = Detector::new(setup, observer, acting.as_ref())?;
-    let paths = Paths::new(setup, observer, footprints, acting);
+    let effects = EffectScan::new(setup);
+    let detector = Detector::new(setup, observer, effects.as_ref())?;
+    let paths = Paths::new(setup, observer, footprints, effects);
     let target_from_global = setup.geometry.radar.frames().global_from_target.inverse();
     let echoes = Echoes { setup, footprints, observer, detector: &detector, target_from_global };
     let rays = footprints.rays_per_chirp.max(1);
@@ -137,9 +137,9 @@ pub fn beat_signals<'a>(
     observer: Observer,
 ) -> Result<impl Iterator<Item = Result<Beats, RenderError>> + use<'a>, RenderError> {
     check(setup, footprints, observer)?;
-    let acting = Acting::new(setup);
-    let detector = Detector::new(setup, observer, acting.as_ref())?;
-    let paths = Paths::new(setup, observer, footprints, acting);
+    let effects = EffectScan::new(setup);
+    let detector = Detector::new(setup, observer, effects.as_ref())?;
+    let paths = Paths::new(setup, observer, footprints, effects);
     let hits = footprints.hits.chunks(footprints.rays_per_chirp.max(1));
     Ok(hits
         .enumerate()
@@ -148,7 +148,7 @@ pub fn beat_signals<'a>(
 
 /// Checks the setup before anything is computed.
 fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(), RenderError> {
-    acting::check(setup, footprints.rays_per_chirp, observer)?;
+    effect_scan::check(setup, footprints.rays_per_chirp, observer)?;
     if let Observer::Receiver { position, .. } = observer
         && is_walled_off(setup, position)
     {

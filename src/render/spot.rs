@@ -12,7 +12,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::edges;
-use super::surface::Facing;
+use super::surface::Orientation;
 use crate::frames::{Global, Ray};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Beam, GaussianBeam, Section};
@@ -22,7 +22,7 @@ use crate::trace::{Hit, ScanGeometry, TraceError};
 pub(super) const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Where a ray meets the target, and how the surface lies there if effects have moved it.
-pub(super) type Intersection = (Option<Hit>, Option<Facing>);
+pub(super) type Intersection = (Option<Hit>, Option<Orientation>);
 
 /// What the rays of every chirp met. Kept, it can be shaded again with other materials.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +37,7 @@ pub struct Footprints {
     /// three spots.
     pub edge_m: Vec<f64>,
     /// How the surface lies at each of `hits` that effects have moved; empty where none do.
-    pub facings: Vec<Option<Facing>>,
+    pub orientations: Vec<Option<Orientation>>,
 }
 
 impl Footprints {
@@ -56,7 +56,7 @@ pub(super) fn trace(
     let rays = Rays { geometry: *geometry, samples: samples(rays_per_chirp) };
     let (hits, axis_range_m) = rays.intersections(done, |_, _, hit| hit, |hit| *hit)?;
     let edge_m = edge_distances_m(geometry, &hits, rays_per_chirp);
-    Ok(Footprints { rays_per_chirp, hits, axis_range_m, edge_m, facings: Vec::new() })
+    Ok(Footprints { rays_per_chirp, hits, axis_range_m, edge_m, orientations: Vec::new() })
 }
 
 /// As [`trace`], but every hit first passes through `place(chirp, ray, hit)`, which may move or drop it.
@@ -68,12 +68,12 @@ pub(super) fn trace_moved(
 ) -> Result<Footprints, TraceError> {
     let rays = Rays { geometry: *geometry, samples: samples(rays_per_chirp) };
     let (placed, axis_range_m) = rays.intersections(done, place, |placed| placed.0)?;
-    let (hits, mut facings): (Vec<_>, Vec<_>) = placed.into_iter().unzip();
-    if facings.iter().all(Option::is_none) {
-        facings = Vec::new();
+    let (hits, mut orientations): (Vec<_>, Vec<_>) = placed.into_iter().unzip();
+    if orientations.iter().all(Option::is_none) {
+        orientations = Vec::new();
     }
     let edge_m = edge_distances_m(geometry, &hits, rays_per_chirp);
-    Ok(Footprints { rays_per_chirp, hits, axis_range_m, edge_m, facings })
+    Ok(Footprints { rays_per_chirp, hits, axis_range_m, edge_m, orientations })
 }
 
 /// The rays of a scan.
@@ -203,9 +203,10 @@ pub(super) fn samples(count: usize) -> Vec<DVec2> {
     if count == 1 {
         return vec![DVec2::ZERO];
     }
-    let place =
-        |sample| radius(sample, count) * DVec2::from_angle(TAU * (sample as f64 * GOLDEN).fract());
-    (0..count).map(place).collect()
+    let samples = (0..count).map(|sample| {
+        radius(sample, count) * DVec2::from_angle(TAU * (sample as f64 * GOLDEN).fract())
+    });
+    samples.collect()
 }
 
 /// Distance of a sample from the axis, in radii w of the beam.

@@ -23,7 +23,7 @@ impl<'a> Surface<'a> {
 
 /// The orientation of the surface at a hit on a target that effects have moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Facing {
+pub struct Orientation {
     /// Unit normal, towards the radar.
     pub normal: DVec3,
     /// Azimuth of the radar about it, from the grain of the region, rad.

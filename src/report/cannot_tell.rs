@@ -72,8 +72,8 @@ fn would_help(error: &DiagnoseError) -> &'static str {
              held-out patches need room."
         }
         DiagnoseError::Unnumbered => {
-            "The chirp number of every point, as column `chirp`: without it nobody knows which chirps \
-             saw nothing."
+            "The chirp number of every point, as column `chirp`: without it the chirps without a \
+             detection are not known."
         }
         DiagnoseError::Unmatched { .. } => "A cloud of the very scan that the scene describes.",
         DiagnoseError::Looks { .. } => {

@@ -96,7 +96,7 @@ pub fn sweep_plot(material: &Material, sweep: &str) -> Result<Vec<Series>, Error
     for text in values.split(',').map(str::trim) {
         let Ok(value) = text.parse() else {
             return Err(Error::usage(
-                format!("`{text}` is no number"),
+                format!("`{text}` is not a number"),
                 "separate numbers by commas",
             ));
         };

@@ -28,7 +28,7 @@ mod words;
 
 pub use cannot_tell::CannotTell;
 pub use choice::{Choice, Measurands, Reason, UntriedEffect, terms_not_asked};
-pub use cloud::{CloudAnswer, CloudReport, NextSteps};
+pub use cloud::{CloudAnswer, CloudRecord, CloudReport, NextSteps};
 pub use comparison::Comparison;
 pub use curve::{CurveAnswer, CurveRequest};
 pub use effect_help::EffectHelp;

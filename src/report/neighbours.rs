@@ -14,7 +14,7 @@ use crate::units::rounded;
 pub struct NeighbourSearch {
     /// Its points.
     pub observations: Vec<Observation>,
-    /// Frequency at which it was measured, Hz; `None` where nobody says.
+    /// Frequency at which it was measured, Hz; `None` where it is not stated.
     pub frequency_hz: Option<f64>,
     /// The material that the curve is of, which is left out, if it is the current revision.
     pub own: Option<Slug>,
@@ -38,7 +38,7 @@ pub struct Neighbour {
     pub status: String,
     /// For which its numbers are claimed.
     pub frequency_ghz: [f64; 2],
-    /// How far the curve's frequency lies outside of these, 0 within; none where nobody says it.
+    /// How far the curve's frequency lies outside of these, 0 within; none where it is not stated.
     pub frequency_outside_ghz: Option<f64>,
     /// How far it is.
     #[serde(flatten)]
@@ -48,7 +48,7 @@ pub struct Neighbour {
 /// The neighbours of a curve, nearest first.
 #[derive(Clone, Debug, Serialize)]
 pub struct NeighbourReport {
-    /// At which the curve was measured; none where nobody says.
+    /// At which the curve was measured; none where it is not stated.
     pub measured_at_ghz: Option<f64>,
     /// Number of the curve's angles.
     pub angles: usize,

@@ -33,7 +33,9 @@ pub fn read_cloud(path: &Path, reading: &CloudReading) -> Result<Cloud, Error> {
 pub fn read_pose(path: &Path) -> Result<Pose<Global, Global>, Error> {
     let file: PoseFile =
         serde_json::from_slice(&read(path)?).map_err(|error| no_pose(path, &error.to_string()))?;
-    file.pose.pose().ok_or_else(|| no_pose(path, "it is no rotation with a shift within 10 km"))
+    file.pose
+        .pose()
+        .ok_or_else(|| no_pose(path, "its pose is not a rotation with a shift within 10 km"))
 }
 
 /// Of a `pose.json`, the part that is read.

@@ -32,7 +32,7 @@ impl MaterialRevision {
 /// `asked_by` opens the error message: who asks, with a colon, or nothing.
 ///
 /// # Errors
-/// A name that nobody knows, with the nearest known one; a revision that is not a whole number; a database
+/// An unknown name, with the nearest known one; a revision that is not a whole number; a database
 /// that cannot be read.
 pub fn find_material(
     store: Option<&Store>,
@@ -53,7 +53,7 @@ pub fn find_material(
     }
 }
 
-/// The error for a name that nobody knows, with the nearest known one; `asked_by` opens its message.
+/// The error for an unknown name, with the nearest known one; `asked_by` opens its message.
 ///
 /// # Errors
 /// A database that cannot be read.
@@ -131,7 +131,7 @@ fn split<'a>(wanted: &'a str, asked_by: &str) -> Result<(&'a str, Option<u32>), 
     let number = revision.parse().map_err(|_| {
         Error::usage(
             format!(
-                "{asked_by}`{wanted}` asks for revision `{revision}`, which is no whole number"
+                "{asked_by}`{wanted}` asks for revision `{revision}`, which is not a whole number"
             ),
             format!("write {name}@1 or just {name}"),
         )

@@ -35,7 +35,7 @@ impl Store {
         let is_added = |one: &&[Option<String>; 4]| !own.iter().any(|own| own[..2] == one[..2]);
         let added = there.iter().filter(is_added);
         Ok(added
-            .map(|one| format!("{0} is none that matdb makes: DROP {0} removes it", named(one)))
+            .map(|one| format!("{0} was not made by matdb: DROP {0} removes it", named(one)))
             .collect())
     }
 

@@ -226,7 +226,7 @@ fn status(row: &Row, column: usize) -> Result<Status> {
         ("superseded", Some(reason), Some(by)) => Ok(Status::Superseded { by, reason }),
         ("withdrawn", Some(reason), None) => Ok(Status::Withdrawn { reason }),
         _ => {
-            let problem = format!("`{word}` with what is beside it is no status");
+            let problem = format!("the status `{word}` does not match its reason and successor");
             Err(Error::FromSqlConversionFailure(column, Type::Text, problem.into()))
         }
     }

@@ -321,7 +321,7 @@ mod tests {
         store.conn.execute_batch("CREATE VIEW more AS SELECT 1").unwrap();
         assert!(!store.has_own_schema().unwrap());
         assert_eq!(store.changed_schema().unwrap(), Vec::<String>::new());
-        let added = "view more is none that matdb makes: DROP view more removes it";
+        let added = "view more was not made by matdb: DROP view more removes it";
         assert_eq!(store.added_objects().unwrap(), [added]);
     }
 }

@@ -149,9 +149,10 @@ fn summary_of_kind(kind: &str, rows: &[&Row]) -> String {
     let most = rows.iter().map(|row| row.share_of_tolerance()).fold(0.0, f64::max);
     let is_worst = |row: &&&Row| row.share_of_tolerance() >= most - SAME_MARGIN;
     let worst = rows.iter().find(is_worst).expect("one of them takes most");
-    match worst.value.abs() < ROUNDING {
-        true => worst.markdown(&format!("all {}: {kind}", rows.len())),
-        false => worst.markdown(&format!("worst of {}, {}", rows.len(), worst.what)),
+    if worst.value.abs() < ROUNDING {
+        worst.markdown(&format!("all {}: {kind}", rows.len()))
+    } else {
+        worst.markdown(&format!("worst of {}, {}", rows.len(), worst.what))
     }
 }
 

@@ -78,7 +78,7 @@ fn of_licences(material: &Material) -> Vec<Slip> {
     for (place, licence) in licences {
         if let Some(text) = licence.filter(|text| !is_licence(text)) {
             slips.push((
-                format!("the licence of {place}, `{text}`, is no SPDX expression"),
+                format!("the licence of {place}, `{text}`, is not an SPDX expression"),
                 LICENCE,
             ));
         }
@@ -92,10 +92,13 @@ fn of_addresses(material: &Material) -> Vec<Slip> {
     let mut slips = Vec::new();
     for source in &material.sources {
         if let Some(doi) = source.doi.as_ref().filter(|doi| !is_doi(doi)) {
-            slips.push((format!("the doi of source `{}`, `{doi}`, is none", source.key), DOI));
+            slips.push((format!("the doi of source `{}`, `{doi}`, is not a DOI", source.key), DOI));
         }
         if let Some(url) = source.url.as_ref().filter(|url| !is_address(url)) {
-            slips.push((format!("the url of source `{}`, `{url}`, is none", source.key), URL));
+            slips.push((
+                format!("the url of source `{}`, `{url}`, is not an address", source.key),
+                URL,
+            ));
         }
     }
     slips

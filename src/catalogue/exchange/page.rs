@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 
 use crate::formats::FormatError;
+use crate::formats::words::shortened;
 
 /// What stands on a page.
 #[derive(Debug, Default)]
@@ -72,7 +73,7 @@ pub(super) fn parse(text: &str) -> Result<Page<'_>, FormatError> {
 fn key(content: &str, line: usize) -> Result<(&str, &str), FormatError> {
     let parts = content.split_once(':').map(|(key, rest)| (key.trim(), rest.trim()));
     parts.filter(|(key, _)| is_key(key)).ok_or_else(|| {
-        let problem = format!("{:?} is no `key: value`", shortened(content));
+        let problem = format!("{:?} is not `key: value`", shortened(content, 40));
         let way_out = "give a data page of refractiveindex.info's database";
         FormatError::at(format!("line {line}"), problem, way_out)
     })
@@ -161,10 +162,6 @@ pub(super) fn number(word: &str, line: usize) -> Result<f64, FormatError> {
     if value.is_finite() {
         return Ok(value);
     }
-    let problem = format!("{:?} is no finite number", shortened(word));
+    let problem = format!("{:?} is not a finite number", shortened(word, 40));
     Err(FormatError::at(format!("line {line}"), problem, "mend the number"))
-}
-
-fn shortened(text: &str) -> String {
-    text.chars().take(40).collect()
 }

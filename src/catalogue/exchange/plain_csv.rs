@@ -30,12 +30,12 @@ pub(super) fn write(subject: &Subject, name: &str) -> Export {
     for point in points.observations.iter() {
         text += &format!(
             "{},{},{},{},{},{}\n",
-            digits(point.theta_i_rad.to_degrees()),
+            fifteen_digits(point.theta_i_rad.to_degrees()),
             level_db(point.sigma0),
             point.censor.as_str(),
             level_db(point.threshold_sigma0),
-            digits(point.theta_r_rad.to_degrees()),
-            digits(point.delta_phi_rad.to_degrees()),
+            fifteen_digits(point.theta_r_rad.to_degrees()),
+            fifteen_digits(point.delta_phi_rad.to_degrees()),
         );
     }
     let lost = format!(
@@ -47,11 +47,11 @@ pub(super) fn write(subject: &Subject, name: &str) -> Export {
 
 /// A level in dB; nothing where there is none.
 fn level_db(level: Option<f64>) -> String {
-    level.map(|ratio| digits(db_from_ratio(ratio))).unwrap_or_default()
+    level.map(|ratio| fifteen_digits(db_from_ratio(ratio))).unwrap_or_default()
 }
 
 /// Fifteen digits, as many as decimals that somebody wrote keep on their way through radians and ratios.
-fn digits(value: f64) -> String {
+fn fifteen_digits(value: f64) -> String {
     shown(round_significant(value, 15) + 0.0)
 }
 

@@ -111,7 +111,7 @@ fn observations(data: &Value) -> Result<Vec<Observation>, FormatError> {
         let is_level = sigma0 > 0.0 && sigma0.is_finite();
         if limit.censor == Censor::None && !is_level {
             let place = format!("data.BRDF, value {}", row + 1);
-            let problem = format!("{value} is no level in dB");
+            let problem = format!("{value} is not a level in dB");
             return Err(FormatError::at(place, problem, "leave the point out, or censor it"));
         }
         let level = (limit.censor == Censor::None).then_some(sigma0);
@@ -208,7 +208,7 @@ fn numbers(data: &Value, key: &str) -> Result<Vec<f64>, FormatError> {
     };
     let found: Option<Vec<f64>> =
         values.iter().map(|value| value.as_f64().filter(|number| number.is_finite())).collect();
-    found.ok_or_else(|| refuse(key, "holds what is no number", "mend the value"))
+    found.ok_or_else(|| refuse(key, "holds something that is not a number", "mend the value"))
 }
 
 fn refuse(key: &str, problem: &str, way_out: &str) -> FormatError {

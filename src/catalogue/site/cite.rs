@@ -4,11 +4,11 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::link::doi_href;
-use super::words::cut;
 use crate::catalogue::about::{About, Institute, Person};
 use crate::catalogue::bibtex::entry;
 use crate::catalogue::records::licence_record;
 use crate::catalogue::references::{Credit, pruned};
+use crate::formats::words::shortened;
 use crate::store::StoredRevision;
 
 /// The note in the citation of a built-in entry.
@@ -32,7 +32,7 @@ impl Citation {
     /// Of a stored revision in a catalogue.
     pub(super) fn new(about: &About, stored: &StoredRevision) -> Citation {
         let material = &stored.material;
-        let name = cut(&material.name, 200);
+        let name = shortened(&material.name, 200);
         let hash = stored.content_hash.get(..12).unwrap_or(&stored.content_hash);
         let what =
             format!("{name} ({}, revision {}, content {hash})", material.slug, stored.revision);
@@ -84,7 +84,7 @@ fn record(
         "@type": "Dataset",
         "name": name,
         "identifier": format!("{}@{}", material.slug, stored.revision),
-        "description": cut(&format!("{name}. {}", material.description), 4000),
+        "description": shortened(&format!("{name}. {}", material.description), 4000),
         "license": licence_record(&material.licence),
         "keywords": material.tags,
         "version": stored.revision.to_string(),
@@ -193,8 +193,8 @@ fn bibtex(
         ("url", url.clone()),
         ("note", note),
     ];
-    let short = fields.map(|(name, value)| (name, value.map(|value| cut(&value, 400))));
-    let authors: Vec<String> = authors.iter().map(|author| cut(author, 400)).collect();
+    let short = fields.map(|(name, value)| (name, value.map(|value| shortened(&value, 400))));
+    let authors: Vec<String> = authors.iter().map(|author| shortened(author, 400)).collect();
     entry("misc", &format!("matdb-{key}"), &authors, short).trim_end().to_owned()
 }
 

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::curve::{line_word, marks, word};
 use super::entry::{kind_of, status_of};
 use super::levels::{Levels, TABLE_DEG, range_deg, tenth};
-use super::words::cut;
+use crate::formats::words::shortened;
 use crate::material::{Curve, Material, SourceKind};
 
 /// Lines, points and a few levels, in ° and dB.
@@ -27,11 +27,11 @@ pub(super) fn data(material: &Material) -> Value {
         TABLE_DEG.map(|deg| levels.as_ref().map_or(String::new(), |levels| levels.text(deg)));
     json!({
         "slug": material.slug,
-        "name": cut(&material.name, 200),
+        "name": shortened(&material.name, 200),
         "kind": material.render_kind().map_or("unknown", SourceKind::as_str),
         "kind_words": material.rendered_words(),
         "status": status_of(material),
-        "render": cut(&material.render, 200),
+        "render": shortened(&material.render, 200),
         "ghz": material.frequency_hz.map(|hz| hz / 1e9),
         "deg": range_deg(material),
         "lines": lines,
@@ -43,7 +43,7 @@ pub(super) fn data(material: &Material) -> Value {
 /// A line; `kind` chooses its style.
 fn line(name: &str, kind: &str, kind_words: Option<String>, levels: &Levels) -> Value {
     json!({
-        "name": cut(name, 200),
+        "name": shortened(name, 200),
         "kind": kind,
         "kind_words": kind_words,
         "pieces": levels.line(),
@@ -53,7 +53,7 @@ fn line(name: &str, kind: &str, kind_words: Option<String>, levels: &Levels) -> 
 fn curve(material: &Material, curve: &Curve) -> Value {
     let [seen, below, above] = marks(&curve.observations).map(|(_, points)| thinned(&points));
     json!({
-        "name": cut(&curve.name, 200),
+        "name": shortened(&curve.name, 200),
         "kind": kind_of(material, &curve.source).map_or("unknown", SourceKind::as_str),
         "seen": seen, "below": below, "above": above,
     })

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::levels::{Levels, SMALL_DEG, range_deg};
-use super::words::cut;
 use crate::formats::html::clean;
+use crate::formats::words::shortened;
 use crate::material::{Material, SourceKind};
 
 /// Longest name and longest description that are searched and shown, characters.
@@ -49,10 +49,10 @@ impl Entry {
         let levels = model.as_ref().map(|model| Levels::rendered(material, model));
         Entry {
             slug: material.slug.to_string(),
-            name: cut(&material.name, NAME),
-            class: cut(&material.class, NAME),
-            tags: material.tags.iter().map(|tag| cut(tag, NAME)).collect(),
-            text: clean(&cut(&material.description, DESCRIPTION)),
+            name: shortened(&material.name, NAME),
+            class: shortened(&material.class, NAME),
+            tags: material.tags.iter().map(|tag| shortened(tag, NAME)).collect(),
+            text: clean(&shortened(&material.description, DESCRIPTION)),
             kind: material.render_kind().map_or("unknown", SourceKind::as_str),
             kind_words: material.rendered_words(),
             status: status_of(material),

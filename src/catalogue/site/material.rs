@@ -10,10 +10,10 @@ use super::fit::{self, FitView};
 use super::levels::{Levels, TABLE_DEG, range_deg};
 use super::link::{self, Link};
 use super::script::inert;
-use super::words::{cut, gaps, meaning};
+use super::words::{gaps, meaning};
 use crate::catalogue::about::About;
 use crate::effects;
-use crate::formats::words::digits;
+use crate::formats::words::{digits, shortened};
 use crate::material::{FindingVerdict, Material, Source, SourceKind};
 use crate::store::{RevisionSummary, StoredRevision};
 
@@ -93,7 +93,7 @@ pub(super) fn page<'a>(
     Page {
         about,
         root: "../",
-        title: cut(&material.name, 80),
+        title: shortened(&material.name, 80),
         material: head(material),
         kind: kind.map_or("unknown", SourceKind::as_str),
         kind_means: match (&rendered, kind) {
@@ -177,7 +177,9 @@ fn unknown(material: &Material) -> Vec<String> {
     let mut found = gaps(&material.description);
     found.extend(material.unknown.iter().cloned());
     let unexplained = material.findings.iter().filter(|f| f.verdict == FindingVerdict::Unexplained);
-    found.extend(unexplained.map(|f| format!("What goes with {} is not explained.", f.effect)));
+    found.extend(
+        unexplained.map(|f| format!("A residual that depends on {} is not explained.", f.effect)),
+    );
     if !has_measured_curve(material) {
         found.push("This entry holds no measured curve.".to_owned());
     }

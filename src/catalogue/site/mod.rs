@@ -27,11 +27,11 @@ use super::about::About;
 use super::error::CatalogueError;
 use super::folder::Folder;
 use crate::formats::html::Templates;
+use crate::formats::words::shortened;
 use crate::store::{RevisionSummary, StoredRevision};
 
 use cite::Citation;
 use entry::Entry;
-use words::cut;
 
 /// Materials in one file of the search index and on one page of the plain list.
 const PORTION: usize = 500;
@@ -105,7 +105,7 @@ impl<'a> Site<'a> {
         let record = script::inert(&cite::catalogue_record(self.about));
         let context = json!({
             "about": self.about, "root": "", "portions": self.portions, "record": record,
-            "materials": self.materials, "angles_deg": levels::SMALL_DEG, "title": cut(&self.about.title, 80),
+            "materials": self.materials, "angles_deg": levels::SMALL_DEG, "title": shortened(&self.about.title, 80),
             "cite": cite::catalogue(self.about), "home": link::to_catalogue(self.about),
         });
         for page in ["index.html", "compare.html"] {
@@ -122,7 +122,7 @@ impl<'a> Site<'a> {
         folder.write(&format!("index/{number}.js"), text.as_bytes())?;
         let context = json!({
             "about": self.about, "root": "../", "entries": entries, "number": number,
-            "before": number - 1, "title": cut(&self.about.title, 80),
+            "before": number - 1, "title": shortened(&self.about.title, 80),
             "after": (entries.len() == PORTION).then_some(number + 1),
         });
         let html = self.templates.page("list.html", &context)?;

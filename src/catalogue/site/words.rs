@@ -5,17 +5,6 @@ use std::borrow::Cow;
 use crate::formats::words::{capitalised, grouped_with};
 use crate::material::SourceKind;
 
-/// Text on one line of at most so many characters, without marks that turn its direction: for titles,
-/// which cannot be kept apart from what surrounds them.
-pub(super) fn cut(text: &str, most: usize) -> String {
-    let mut line = text
-        .chars()
-        .filter(|c| !matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}'))
-        .map(|c| if c.is_control() { ' ' } else { c });
-    let short: String = line.by_ref().take(most).collect();
-    if line.next().is_some() { short.trim_end().to_owned() + "…" } else { short }
-}
-
 /// A count with its thousands apart, which a line cannot break.
 pub(super) fn grouped(count: usize) -> String {
     grouped_with(count, '\u{202f}')
@@ -49,12 +38,6 @@ pub(super) fn gaps(description: &str) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn line_ends_and_marks_of_direction_do_not_reach_a_title() {
-        assert_eq!(cut("ab\u{202e}cd\nef", 6), "abcd e…");
-        assert_eq!(cut("abc", 3), "abc");
-    }
 
     #[test]
     fn what_is_not_known_is_taken_from_the_description() {

@@ -20,7 +20,7 @@ pub(super) struct DetailArgs {
     /// Full name [default: the short one]
     #[arg(long)]
     title: Option<String>,
-    /// Kind of stuff: metal, polymer, paint, tissue, textile, glass …
+    /// Class of material: metal, polymer, paint, tissue, textile, glass …
     #[arg(long)]
     class: Option<String>,
     /// What it is; `Not known: …` says what is not

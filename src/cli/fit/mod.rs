@@ -181,7 +181,7 @@ fn held(text: &str) -> Result<(String, f64), Error> {
     let parts = text.split_once('=').map(|(path, value)| (path, value.trim().parse()));
     let Some((path, Ok(value))) = parts else {
         let way_out = "write it as --fix diffuse.alpha=3";
-        return Err(Error::usage(format!("`{text}` is no parameter with a value"), way_out));
+        return Err(Error::usage(format!("`{text}` is not a parameter with a value"), way_out));
     };
     Ok((path.to_owned(), value))
 }

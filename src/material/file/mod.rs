@@ -116,6 +116,8 @@ struct CurveFile {
     file: String,
 }
 
+/// A fit as a material file states it. [`Fit`] cannot take its place, because the names of that type's fields are part
+/// of the content hash.
 #[derive(Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct FitFile {

@@ -14,7 +14,7 @@ pub const PATTERN_RANGE_M: f64 = 8.0;
 pub struct Chirps {
     /// Number of the chirp: from 0, or as an explicit file gives it.
     pub number: Vec<u32>,
-    /// Time of the chirp, s; 0 throughout where nobody knows.
+    /// Time of the chirp, s; 0 throughout where it is not known.
     pub time_s: Vec<f64>,
     /// Where it looks.
     pub rays: Vec<Ray<Global>>,
@@ -51,7 +51,7 @@ impl Chirps {
         (0..self.rays.len()).map(|index| index as f64 / most).collect()
     }
 
-    /// Whether chirps differ in time, so that what goes with time can be told.
+    /// Whether chirps differ in time, so that a dependence on time can be found.
     pub fn is_timed(&self) -> bool {
         self.time_s.windows(2).any(|pair| pair[0] != pair[1])
     }

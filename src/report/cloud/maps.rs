@@ -12,9 +12,9 @@ use crate::geometry::Raster;
 use crate::report::picture::Picture;
 use crate::units::db_from_ratio;
 
-/// Colours reach as far as this share of the pixels where speckle is among them.
+/// Share of the pixels within the scale of colours on a map with speckle.
 const MOST: f64 = 0.98;
-/// The same where nothing is: few pixels may be all that there is.
+/// Share of the pixels within the scale of colours on a map without speckle, whose structure may be in few pixels.
 const NEARLY_ALL: f64 = 0.999;
 
 /// What a map shows.

@@ -10,6 +10,7 @@ mod pictures;
 mod places;
 mod quantiles;
 mod raster;
+mod record;
 #[cfg(test)]
 mod testing;
 mod text;
@@ -17,14 +18,14 @@ mod trends;
 
 use std::path::Path;
 
-use super::json::{Record, json_file};
+use super::json::json_file;
 use super::picture::Picture;
 use super::residuals;
-use crate::diagnose::Report;
 use crate::error::Error;
 use places::Peak;
 
 pub use answer::{CloudAnswer, NextSteps};
+pub use record::CloudRecord;
 
 /// A report on a cloud with its pictures drawn.
 pub struct CloudReport<'a> {
@@ -69,8 +70,8 @@ impl<'a> CloudReport<'a> {
     }
 
     /// What `report.json` holds.
-    pub fn record(&self) -> Record<'_, Report> {
-        Record { report: self.answer.report, not_tried: self.answer.not_tried }
+    pub fn record(&self) -> CloudRecord<'_> {
+        CloudRecord::new(self.answer.report, self.answer.not_tried)
     }
 
     /// The diagnosis for the terminal; `files` are the names of those that were written to `folder`.

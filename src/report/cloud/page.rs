@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::answer::{CloudAnswer, NextSteps};
 use super::places::{self, Peak};
+use super::record::BaseRecord;
 use crate::diagnose::{BaseValue, Candidate, Control, Controls, Evidence, MeshPose, Report};
 use crate::error::Error;
 use crate::report::choice::{Omission, left_out};
@@ -18,6 +19,7 @@ use crate::scene::Scene;
 struct Page<'a> {
     title: String,
     report: &'a Report,
+    base: BaseRecord<'a>,
     scene: &'a str,
     scene_path: String,
     cloud_path: String,
@@ -74,6 +76,7 @@ pub(super) fn page(
     let context = Page {
         title: format!("{}: {}", scene.file.name, verdict(report.verdict)),
         report,
+        base: BaseRecord::new(&report.base),
         scene: &scene.file.name,
         scene_path: answer.scene_path.display().to_string(),
         cloud_path: answer.cloud_path.display().to_string(),

@@ -69,10 +69,10 @@ pub(super) fn picture(report: &Report) -> Result<Picture, FigureError> {
     }
     Ok(Picture {
         file: "residual-trends",
-        title: "Residual against what it could go with",
+        title: "Residual against the covariates",
         caption: "Mean of observed − predicted power and its standard error in bins of equally many \
                   detections: over the angle, and over what the base model's \
-                  residual goes with most. A model that is right stays at 0. The bars take looks for \
+                  residual depends on most. A model that is right stays at 0. The bars take looks for \
                   independent; where spots overlap they are too short."
             .to_owned(),
         panels,

@@ -22,7 +22,7 @@ pub(super) struct Band<'a> {
 
 impl<'a> Band<'a> {
     pub fn new(picture: &'a Picture, rows: Range<usize>) -> Band<'a> {
-        let [first, end] = [rows.start, rows.end].map(|row| picture.fan.sorted.grid.row_start(row));
+        let [first, end] = [rows.start, rows.end].map(|row| picture.fan.order.grid.row_start(row));
         let count = end - first + LANES;
         let [low, high] = [(); 2].map(|()| vec![f32::NEG_INFINITY; count]);
         Band { picture, rows, first, low, high, facet: vec![NONE; count] }
@@ -60,7 +60,7 @@ impl<'a> Band<'a> {
     /// Tests facets, given in ascending order.
     #[inline(always)]
     fn test_facets(&mut self, facets: impl Iterator<Item = u32>) {
-        let grid = &self.picture.fan.sorted.grid;
+        let grid = &self.picture.fan.order.grid;
         for block in blocks(facets) {
             let patches = self.picture.patches(&block);
             let forms = patches.forms(grid);
@@ -91,8 +91,8 @@ impl<'a> Band<'a> {
     /// whether f32 cannot decide others.
     #[inline(always)]
     fn record(&mut self, facet: u32, form: &Form, place: usize, count: usize) -> bool {
-        let (sorted, own, count) = (&self.picture.fan.sorted, place - self.first, count as f32);
-        let (Some(u), Some(v)) = (lanes(&sorted.u, place), lanes(&sorted.v, place)) else {
+        let (order, own, count) = (&self.picture.fan.order, place - self.first, count as f32);
+        let (Some(u), Some(v)) = (lanes(&order.u, place), lanes(&order.v, place)) else {
             return false;
         };
         let (Some(low), Some(high), Some(best)) = (
@@ -102,8 +102,8 @@ impl<'a> Band<'a> {
         ) else {
             return false;
         };
-        match form.see(u, v, low, count) {
-            Some(seen) => form.record(facet, &seen, Nearest { low, high, facet: best }, count),
+        match form.evaluate(u, v, low, count) {
+            Some(values) => form.record(facet, &values, Nearest { low, high, facet: best }, count),
             None => false,
         }
     }
@@ -112,10 +112,10 @@ impl<'a> Band<'a> {
     #[cold]
     #[inline(never)]
     fn settle(&mut self, facet: u32, form: &Form, cells: Cells) {
-        let sorted = &self.picture.fan.sorted;
+        let order = &self.picture.fan.order;
         for (start, count) in self.blocks(cells) {
             for place in start..start + count.min(LANES) {
-                let (at, own) = ([sorted.u[place], sorted.v[place]], place - self.first);
+                let (at, own) = ([order.u[place], order.v[place]], place - self.first);
                 if self.facet[own] != facet && form.may_meet(at, self.low[own]) {
                     self.decide(facet, place);
                 }
@@ -126,7 +126,7 @@ impl<'a> Band<'a> {
     /// Decides in f64 whether a facet is the nearest of one ray.
     fn decide(&mut self, facet: u32, place: usize) {
         let Picture { fan, mesh, .. } = *self.picture;
-        let ray = &fan.rays[fan.sorted.ray_at[place] as usize];
+        let ray = &fan.rays[fan.order.ray_at[place] as usize];
         let Some(range_m) = Line::new(ray).range_to_facet_m(mesh, facet as usize) else { return };
         let own = place - self.first;
         let so_far = self.facet[own];
@@ -144,7 +144,7 @@ impl<'a> Band<'a> {
     /// The blocks of the rays in some cells: first place, and number of rays from there to the end of the row.
     #[inline(always)]
     fn blocks(&self, cells: Cells) -> impl Iterator<Item = (usize, usize)> + use<'a> {
-        let grid = &self.picture.fan.sorted.grid;
+        let grid = &self.picture.fan.order.grid;
         let Cells { columns: [left, right], rows: [first, last] } = cells;
         (first.max(self.rows.start)..(last + 1).min(self.rows.end)).flat_map(move |row| {
             let [start, end] = grid.places(row, left, right);

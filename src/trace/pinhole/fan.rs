@@ -35,11 +35,11 @@ pub struct Fan<'a> {
     pub(super) origin: DVec3,
     /// Rotates a direction into the frame of the fan.
     pub(super) frame: DMat3,
-    pub(super) sorted: Arc<Sorted>,
+    pub(super) order: Arc<RayOrder>,
 }
 
 /// The rays of a fan in its frame, ordered by cell.
-pub(super) struct Sorted {
+pub(super) struct RayOrder {
     pub grid: Grid,
     /// Coordinates of the rays, ordered by cell, and [`LANES`] more that are read and not used.
     pub u: Vec<f32>,
@@ -125,7 +125,7 @@ impl<'a> Fan<'a> {
         let sum = chunks.iter().map(|(_, sum)| sum).sum::<DVec3>();
         let frame = frame_about(sum.normalize_or(rays[0].direction.xyz()));
         let blocks = rays.par_chunks(LANES).with_min_len(256);
-        let flat: Vec<_> = blocks.map(|rays| widest(Flattening { frame, rays })).collect();
+        let flat: Vec<_> = blocks.map(|rays| widest(RayProjection { frame, rays })).collect();
         let flat = &flat.as_flattened()[..rays.len()];
         let is_wide = |at: &[f32; 2]| at[0].is_nan();
         if let Some(ray) = flat.par_iter().with_min_len(CHUNK).position_first(is_wide) {
@@ -133,20 +133,20 @@ impl<'a> Fan<'a> {
         }
         let mut grid = Grid::over(flat);
         let place_of = grid.sort(flat);
-        let mut sorted = Sorted {
+        let mut order = RayOrder {
             grid,
             u: vec![0.0; rays.len() + LANES],
             v: vec![0.0; rays.len() + LANES],
             ray_at: vec![0; rays.len()],
             place_of,
         };
-        for (&place, ray) in sorted.place_of.iter().zip(0..) {
-            sorted.ray_at[place as usize] = ray;
+        for (&place, ray) in order.place_of.iter().zip(0..) {
+            order.ray_at[place as usize] = ray;
         }
-        let (u, v) = (sorted.u.par_iter_mut(), sorted.v.par_iter_mut());
-        let places = sorted.ray_at.par_iter().zip(u.zip(v)).with_min_len(CHUNK);
+        let (u, v) = (order.u.par_iter_mut(), order.v.par_iter_mut());
+        let places = order.ray_at.par_iter().zip(u.zip(v)).with_min_len(CHUNK);
         places.for_each(|(&ray, (u, v))| [*u, *v] = flat[ray as usize]);
-        Ok(Fan { rays, origin, frame, sorted: Arc::new(sorted) })
+        Ok(Fan { rays, origin, frame, order: Arc::new(order) })
     }
 
     /// The fan of the same rays moved by a pose, without sorting them again. `rays` must be the rays of this fan moved by
@@ -171,7 +171,7 @@ impl<'a> Fan<'a> {
     ) -> Option<Fan<'b>> {
         let origin = rays.first().filter(|_| rays.len() == self.rays.len())?.origin.xyz;
         let frame = self.frame * pose.rotation().transpose();
-        Some(Fan { rays, origin, frame, sorted: Arc::clone(&self.sorted) })
+        Some(Fan { rays, origin, frame, order: Arc::clone(&self.order) })
     }
 }
 
@@ -182,12 +182,12 @@ fn frame_about(axis: DVec3) -> DMat3 {
 }
 
 /// Projects up to [`LANES`] rays to (u, v); NaN for a ray too far from the axis.
-struct Flattening<'a> {
+struct RayProjection<'a> {
     frame: DMat3,
     rays: &'a [Ray<Global>],
 }
 
-impl Wide for Flattening<'_> {
+impl Wide for RayProjection<'_> {
     type Answer = [[f32; 2]; LANES];
 
     #[inline(always)]

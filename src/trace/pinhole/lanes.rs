@@ -34,7 +34,7 @@ pub(super) struct Form {
 }
 
 /// The forms of a facet at a block of rays.
-pub(super) struct Seen {
+pub(super) struct FormValues {
     /// The smallest of the three areas, doubled.
     pub least: Lanes,
     /// Inverse depth, 1/m.
@@ -70,29 +70,29 @@ impl Form {
     /// Evaluates the forms at a block, of which the first `count` rays count. `None` if each of these certainly misses
     /// the facet or has a nearer one.
     #[inline(always)]
-    pub fn see(&self, u: &Lanes, v: &Lanes, low: &Lanes, count: f32) -> Option<Seen> {
-        let mut seen = Seen { least: [0.0; LANES], w: [0.0; LANES] };
+    pub fn evaluate(&self, u: &Lanes, v: &Lanes, low: &Lanes, count: f32) -> Option<FormValues> {
+        let mut values = FormValues { least: [0.0; LANES], w: [0.0; LANES] };
         let mut any = 0;
         for lane in 0..LANES {
             let (least, w) = self.at([u[lane], v[lane]]);
-            seen.least[lane] = least;
-            seen.w[lane] = w;
+            values.least[lane] = least;
+            values.w[lane] = w;
             let maybe = (least >= -self.doubt) & (w + self.w_doubt >= low[lane]);
             any |= u32::from(maybe & ((lane as f32) < count));
         }
-        (any != 0).then_some(seen)
+        (any != 0).then_some(values)
     }
 
     /// Records the facet for the rays of which it is certainly the nearest. Returns whether f32 cannot decide others.
     #[inline(always)]
-    pub fn record(&self, facet: u32, seen: &Seen, nearest: Nearest, count: f32) -> bool {
+    pub fn record(&self, facet: u32, values: &FormValues, nearest: Nearest, count: f32) -> bool {
         let mut any = 0;
         for lane in 0..LANES {
-            let (low, high) = (seen.w[lane] - self.w_doubt, seen.w[lane] + self.w_doubt);
-            let maybe = (seen.least[lane] >= -self.doubt)
+            let (low, high) = (values.w[lane] - self.w_doubt, values.w[lane] + self.w_doubt);
+            let maybe = (values.least[lane] >= -self.doubt)
                 & (high >= nearest.low[lane])
                 & ((lane as f32) < count);
-            let surely = maybe & (seen.least[lane] > self.doubt) & (low > nearest.high[lane]);
+            let surely = maybe & (values.least[lane] > self.doubt) & (low > nearest.high[lane]);
             nearest.low[lane] = if surely { low } else { nearest.low[lane] };
             nearest.high[lane] = if surely { high } else { nearest.high[lane] };
             nearest.facet[lane] = if surely { facet } else { nearest.facet[lane] };

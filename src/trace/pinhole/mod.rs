@@ -71,10 +71,10 @@ impl Fan<'_> {
         let left_out = picture.left_out();
         let bvh = (!left_out.is_empty()).then(|| Bvh::over(mesh, left_out));
         let mut hits = allocate_hits(self.rays.len());
-        let blocks = self.rays.par_chunks(LANES).zip(self.sorted.place_of.par_chunks(LANES));
+        let blocks = self.rays.par_chunks(LANES).zip(self.order.place_of.par_chunks(LANES));
         let blocks = blocks.zip(hits.par_chunks_mut(LANES)).with_min_len(64);
         blocks.for_each(|((rays, places), hits)| {
-            widest(Meeting { mesh, rays, places, nearest: &nearest, hits });
+            widest(BlockIntersection { mesh, rays, places, nearest: &nearest, hits });
             if let Some(bvh) = &bvh {
                 let behind = rays.iter().map(|ray| bvh.closest(ray));
                 hits.iter_mut().zip(behind).for_each(|(hit, other)| *hit = nearer_hit(*hit, other));
@@ -85,7 +85,7 @@ impl Fan<'_> {
 }
 
 /// Computes the hits of up to [`LANES`] rays on the nearest facets at their places.
-struct Meeting<'a> {
+struct BlockIntersection<'a> {
     mesh: &'a Mesh,
     rays: &'a [Ray<Global>],
     places: &'a [u32],
@@ -93,7 +93,7 @@ struct Meeting<'a> {
     hits: &'a mut [Option<Hit>],
 }
 
-impl Wide for Meeting<'_> {
+impl Wide for BlockIntersection<'_> {
     type Answer = ();
 
     #[inline(always)]
@@ -132,7 +132,7 @@ fn nearest_facets(picture: &Picture) -> Vec<u32> {
 
 /// Nearest facets by tasks that test all rays against a part of the facets each.
 fn split_by_facets(picture: &Picture, parts: usize) -> Vec<u32> {
-    let (facets, rows) = (picture.mesh.facets.len(), picture.fan.sorted.grid.rows);
+    let (facets, rows) = (picture.mesh.facets.len(), picture.fan.order.grid.rows);
     let cut = |part: usize| (part * facets / parts) as u32;
     let bands = (0..parts)
         .into_par_iter()
@@ -149,7 +149,7 @@ fn split_by_rays(picture: &Picture, bands: usize) -> Vec<u32> {
         .map(|task| {
             let [first, end] =
                 [task, task + 1].map(|task| (task * FACETS_PER_TASK).min(facets) as u32);
-            widest(Sharing { picture, cuts: &cuts, facets: first..end })
+            widest(BandAssignment { picture, cuts: &cuts, facets: first..end })
         })
         .collect();
     let band = |number: usize| {
@@ -161,7 +161,7 @@ fn split_by_rays(picture: &Picture, bands: usize) -> Vec<u32> {
 
 /// First rows of bands with about equal numbers of rays, and the number of rows as the end of the last.
 fn band_starts(fan: &Fan, bands: usize) -> Vec<usize> {
-    let (grid, rays) = (&fan.sorted.grid, fan.rays.len());
+    let (grid, rays) = (&fan.order.grid, fan.rays.len());
     let mut cuts = vec![0];
     for row in 1..grid.rows {
         if grid.row_start(row) * bands >= cuts.len() * rays {
@@ -173,13 +173,13 @@ fn band_starts(fan: &Fan, bands: usize) -> Vec<usize> {
 }
 
 /// Assigns facets to bands: for every band the facets that reach into it, in ascending order.
-struct Sharing<'a> {
+struct BandAssignment<'a> {
     picture: &'a Picture<'a>,
     cuts: &'a [usize],
     facets: Range<u32>,
 }
 
-impl Wide for Sharing<'_> {
+impl Wide for BandAssignment<'_> {
     type Answer = Vec<Vec<u32>>;
 
     #[inline(always)]

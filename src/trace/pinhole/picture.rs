@@ -43,7 +43,7 @@ impl<'a> Picture<'a> {
                 corner.iter_mut().zip(at).for_each(|(part, at)| part[lane] = at);
             }
         }
-        Patches::new(corners, &self.fan.sorted.grid)
+        Patches::new(corners, &self.fan.order.grid)
     }
 
     /// The facets that are not projected and that rays may hit.
@@ -62,13 +62,13 @@ impl<'a> Picture<'a> {
         }
         // The rays lie in a pyramid. A facet wholly beyond one of its sides is not hit.
         const MARGIN: f64 = 1e-6;
-        let Fan { frame, origin, ref sorted, .. } = *self.fan;
+        let Fan { frame, origin, ref order, .. } = *self.fan;
         let corners = self.mesh.corners(facet as usize).map(|corner| frame * (corner - origin));
         let beyond = |side: &dyn Fn(DVec3) -> f64| {
             corners.iter().all(|&at| side(at) < -MARGIN * at.length())
         };
-        let [u_min, v_min] = sorted.grid.min.map(f64::from);
-        let [u_max, v_max] = sorted.grid.max.map(f64::from);
+        let [u_min, v_min] = order.grid.min.map(f64::from);
+        let [u_max, v_max] = order.grid.max.map(f64::from);
         !(beyond(&|at| at.z)
             || beyond(&|at| at.x - u_min * at.z)
             || beyond(&|at| u_max * at.z - at.x)

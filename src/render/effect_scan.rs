@@ -13,7 +13,7 @@ use super::observer::Observer;
 use super::path::Path;
 use super::setup::Setup;
 use super::spot::{Footprints, Intersection};
-use super::surface::Facing;
+use super::surface::Orientation;
 use crate::brdf::Scattering;
 use crate::effects::{
     Conflict, Level, MeanEcho, Model, PredictionCache, Receiver, Setting, Shot, Stage, middle,
@@ -25,7 +25,7 @@ use crate::radar::random::{Key, Purpose};
 use crate::trace::{Hit, ScanGeometry};
 
 /// The model of a setup, prepared for its scan.
-pub(super) struct Acting<'a> {
+pub(super) struct EffectScan<'a> {
     setup: Setup<'a>,
     model: &'a Model<'a>,
     /// The model without effects.
@@ -39,11 +39,11 @@ pub(super) struct Acting<'a> {
     receiver: Receiver,
 }
 
-impl<'a> Acting<'a> {
+impl<'a> EffectScan<'a> {
     /// `None` for a setup without effects.
-    pub fn new(setup: &Setup<'a>) -> Option<Acting<'a>> {
+    pub fn new(setup: &Setup<'a>) -> Option<EffectScan<'a>> {
         let model = setup.effects?;
-        let mut acting = Acting {
+        let mut effects = EffectScan {
             setup: *setup,
             model,
             bare: Model { effects: Vec::new(), ..model.clone() },
@@ -54,8 +54,8 @@ impl<'a> Acting<'a> {
             progress: setup.geometry.chirps.progress(),
             receiver: model.received(),
         };
-        acting.middle = middle(&acting.shots());
-        Some(acting)
+        effects.middle = middle(&effects.shots());
+        Some(effects)
     }
 
     /// The receiver with the effects on it.
@@ -73,7 +73,7 @@ impl<'a> Acting<'a> {
             Some(placed) if placed == shot => (hit, None),
             Some(placed) if !placed.misses() => {
                 let Shot { hit, normal, azimuth_rad, .. } = placed;
-                (Some(hit), Some(Facing { normal, azimuth_rad }))
+                (Some(hit), Some(Orientation { normal, azimuth_rad }))
             }
             _ => (None, None),
         }
@@ -86,13 +86,13 @@ impl<'a> Acting<'a> {
         chirp: usize,
         ray: &Ray<Global>,
         rays: usize,
-        facing: Option<Facing>,
+        orientation: Option<Orientation>,
         tilts: [f64; 2],
     ) -> Path {
-        let (stage, shot) = (self.stage(), self.traced_shot(chirp, ray, path.hit, facing));
+        let (stage, shot) = (self.stage(), self.traced_shot(chirp, ray, path.hit, orientation));
         let with_w =
             tilted(&shot, tilts).map_or(0.0, |shot| self.model.arrived(&stage, &shot).power_w);
-        let Some(Facing { azimuth_rad, .. }) = facing else {
+        let Some(Orientation { azimuth_rad, .. }) = orientation else {
             // Without a change the path stays the same bit for bit.
             let same = with_w == self.bare.arrived(&stage, &shot).power_w;
             return if same { path } else { Path { power_w: with_w / rays as f64, ..path } };
@@ -109,9 +109,9 @@ impl<'a> Acting<'a> {
         chirp: usize,
         ray: &Ray<Global>,
         hit: Hit,
-        facing: Option<Facing>,
+        orientation: Option<Orientation>,
     ) -> f64 {
-        let (stage, shot) = (self.stage(), self.traced_shot(chirp, ray, hit, facing));
+        let (stage, shot) = (self.stage(), self.traced_shot(chirp, ray, hit, orientation));
         let instrument = self.model.effects.iter().filter(|(e, _)| e.level() == Level::Instrument);
         instrument.map(|(effect, values)| effect.gain(values, &stage, &shot)).product()
     }
@@ -154,8 +154,8 @@ impl<'a> Acting<'a> {
         let hits = footprints.hits.iter().zip(0..).skip(chirp * footprints.rays_per_chirp);
         let mut hits = hits.take(footprints.rays_per_chirp);
         let (hit, index) = hits.find_map(|(hit, index)| Some(((*hit)?, index)))?;
-        let facing = footprints.facings.get::<usize>(index).copied().flatten();
-        Some(self.traced_shot(chirp, &self.setup.geometry.chirps.rays[chirp], hit, facing))
+        let orientation = footprints.orientations.get::<usize>(index).copied().flatten();
+        Some(self.traced_shot(chirp, &self.setup.geometry.chirps.rays[chirp], hit, orientation))
     }
 
     fn stage(&self) -> Stage<'_> {
@@ -182,17 +182,23 @@ impl<'a> Acting<'a> {
         chirp: usize,
         ray: &Ray<Global>,
         hit: Hit,
-        facing: Option<Facing>,
+        orientation: Option<Orientation>,
     ) -> Shot {
-        let shot = self.shot(chirp, *ray, hit, facing);
-        let moved = facing.and_then(|_| self.model.target(&self.stage(), &shot));
+        let shot = self.shot(chirp, *ray, hit, orientation);
+        let moved = orientation.and_then(|_| self.model.target(&self.stage(), &shot));
         Shot { target: moved.unwrap_or(shot.target), ..shot }
     }
 
-    /// The shot of a ray with a hit. Without `facing` the surface lies as the mesh has it.
-    fn shot(&self, chirp: usize, ray: Ray<Global>, hit: Hit, facing: Option<Facing>) -> Shot {
+    /// The shot of a ray with a hit. Without `orientation` the surface lies as the mesh has it.
+    fn shot(
+        &self,
+        chirp: usize,
+        ray: Ray<Global>,
+        hit: Hit,
+        orientation: Option<Orientation>,
+    ) -> Shot {
         let missed = self.missed_shot(chirp, ray);
-        let Some(Facing { normal, azimuth_rad }) = facing else {
+        let Some(Orientation { normal, azimuth_rad }) = orientation else {
             return shot_at(&self.stage(), &missed, hit);
         };
         let region = self.setup.geometry.region_of_facet[hit.facet as usize];
