@@ -196,7 +196,7 @@ fn clouds_that_cannot_be_used() {
     let once = csv(at, 1, as_is);
     let twice = format!("{once}{}", once.split_once('\n').unwrap().1);
     refuse("doubled.csv", &twice, &["share a chirp", "one detection per chirp"]);
-    refuse("few.csv", &csv(at, 1000, as_is), &["11 points", "50"]);
+    refuse("few.csv", &csv(at, 900, as_is), &["11 points", "50"]);
     refuse("watts.csv", &csv(at, 10, watts), &["watts", "unit"]);
     refuse("far.csv", &csv(at, 10, far), &["overlap"]);
     refuse("nan.csv", "x_m,y_m,z_m,power_dbm\n0,1,0,nan\n", &["line 2", "power_dbm"]);
