@@ -195,7 +195,8 @@ impl Term for FresnelGrowth {
         "The lobe's level is not the reflectance of its facets: at normal incidence they reflect level_db \
          less, and towards grazing everything (another index of refraction).",
         "The specular level rises more steeply (above 0) or less (below 0) from one incidence to \
-         the next than its level says. In backscatter the wave meets facets at normal incidence, and the term does not show.",
+         the next than its level says. In backscatter the wave meets facets at normal incidence, and the \
+         term does not show.",
         EffectParameter::new("level_db", "dB", [-30.0, 30.0], 0.0, 0.2),
     );
 
