@@ -32,7 +32,7 @@
 //! |---|---|
 //! | [`units`], [`frames`], [`geometry`] | numbers with units, coordinate frames as types, plain meshes and rasters |
 //! | [`files`], [`mod@formats`], [`brdf`], [`radar`] | all files or none; bytes to plain data and back; how surfaces scatter; the instrument |
-//! | [`material`], [`scene`], [`trace`] | what is known of a surface; what is looked at; closest hits |
+//! | [`material`], [`scene`], [`trace`] | what is known of a surface; what is looked at; closest intersections |
 //! | [`effects`] | physical effects beyond the paper's model, one file each |
 //! | [`render`] | scan × target × materials → detections, image, cloud |
 //! | [`measure`], [`fit`] | a measured cloud → pose → curve; a curve → parameters |
@@ -72,3 +72,8 @@ pub mod setup;
 pub mod report;
 pub mod adopt;
 pub mod cli;
+
+/// Runs the examples of the book's page about the library.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/rust-library.md")]
+struct RustLibraryPage;

@@ -46,7 +46,7 @@ def waits_for_scans(results):
         yield ["`matdb render scenes/mannequin.toml`, from start to end", ms(median(found["render"]))]
     for threads in [1, 2]:
         if mine := ours(of_workload(results.get("trace", []), "paper", threads)):
-            yield [f"its {grouped(mine['rays'])} closest hits, {threads_of(threads)}", ms(median(mine["total"]))]
+            yield [f"its {grouped(mine['rays'])} closest intersections, {threads_of(threads)}", ms(median(mine["total"]))]
     if found := results.get("reshade"):
         yield [f"its powers again with another effect, {threads_of(found[-1]['threads'])}", ms(median(found[-1]["effect"]))]
     if times_s := [row["diagnose_s"] for row in results.get("diagnosis", [])]:

@@ -172,7 +172,7 @@ fn text(args: &Args, measured: &MeasurementReport, stored: Option<&StoredMeasure
         "{kept}pose: {} of {} points on the surface, rms {:.2} mm, known to {:.2} mm and {:.3}° (1 sd)\n\
          shift of the middle of the points: {:.2}, {:.2}, {:.2} mm\n\
          curve: {} detections and {} censored chirps from {:.1}° to {:.1}°\n\
-         left out: {} near an edge or another region, {} off the surface or beside it, {} of an unsure facet\n\
+         left out: {} near an edge or another region, {} off the surface or beside it, {} whose facet is uncertain\n\
          wrote pose.json, curve.csv and curve.svg to {}\n{saved}",
         grouped(registered.inliers),
         grouped(registered.points),

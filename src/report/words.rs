@@ -71,7 +71,7 @@ pub(super) fn value(value: &Value) -> String {
     let Value { value, sd, unit } = value;
     let number = match sd {
         Some(sd) => plus_minus(*value, *sd),
-        None => format!("{} (deviation not told)", digits(*value)),
+        None => format!("{} (standard deviation unknown)", digits(*value)),
     };
     in_unit(number, unit)
 }
@@ -176,7 +176,7 @@ mod tests {
     fn a_number_has_its_deviation_and_its_unit() {
         let shown = |sd, unit| value(&Value { value: 1.5, sd, unit });
         assert_eq!(shown(Some(0.25), "deg"), "1.50 ± 0.25 °");
-        assert_eq!(shown(None, "1"), "1.5 (deviation not told)");
+        assert_eq!(shown(None, "1"), "1.5 (standard deviation unknown)");
     }
 
     #[test]

@@ -115,7 +115,7 @@ impl Term for DiffuseLobe {
         "The diffuse part is a broad lobe (equation (15)) where the law is flat: facets of many slopes, \
          or rough layers below the surface.",
         "The level falls with the angle between the normal and the direction midway between source and \
-         receiver, smoothly and at all incidences alike. Limb darkening goes with both angles apart.",
+         receiver, smoothly and at all incidences alike. Limb darkening depends on each of the two angles.",
         EffectParameter::new("alpha", "1", [0.0, 50.0], 0.0, 0.1),
     );
 
@@ -192,10 +192,11 @@ impl Term for FresnelGrowth {
     described!(
         "fresnel-growth",
         Material,
-        "The lobe's level is not the reflectance of its facets: they reflect so many dB less at normal \
-         incidence, and all towards grazing (another index of refraction).",
+        "The lobe's level is not the reflectance of its facets: at normal incidence they reflect level_db \
+         less, and towards grazing everything (another index of refraction).",
         "The specular level rises more steeply (above 0) or less (below 0) from one incidence to \
-         the next than its level says. In backscatter facets are met at right angles, and it does not show.",
+         the next than its level says. In backscatter the wave meets facets at normal incidence, and the \
+         term does not show.",
         EffectParameter::new("level_db", "dB", [-30.0, 30.0], 0.0, 0.2),
     );
 
@@ -252,7 +253,7 @@ impl Term for ThinFilm {
         "A flat film of index 1.5 interferes with itself: the lobes ripple with the path through it. The \
          thickness is optical, in wavelengths.",
         "Maxima and minima that crowd towards grazing angles. No other term goes up and down more than \
-         once. Thicknesses that put the same number of ripples over the angles cannot be told apart.",
+         once. Thicknesses with the same number of ripples over the angles cannot be distinguished.",
         EffectParameter::new("visibility", "1", [-0.95, 0.95], 0.0, 0.02),
         EffectParameter::new("thickness", "1", [0.1, 20.0], 1.0, 0.01),
     );
@@ -281,10 +282,10 @@ impl Term for Opposition {
     described!(
         "opposition",
         Material,
-        "More comes straight back than to the sides: no grain's shadow is seen from the source, and waves \
-         that go one way round and the other interfere.",
+        "More comes straight back than to the sides: the source sees no grain's shadow, and waves on a \
+         path and on its reverse interfere.",
         "A peak about the direction of the source at every incidence, where the detector does not hide \
-         it. A backscatter curve is all peak and does not show it.",
+         it. A backscatter curve lies in the peak and does not show it.",
         EffectParameter::new("height", "1", [0.0, 3.0], 0.0, 0.02),
         EffectParameter::new("width_deg", "deg", [0.5, 30.0], 5.0, 0.2),
     );
@@ -307,7 +308,7 @@ impl Term for AngleOffset {
         "angle-offset",
         Instrument,
         "The receiver stands at another angle than the file says, or the sample is tilted by half as \
-         much: everything is seen from so much further off the normal.",
+         much: every angle is off by offset_deg.",
         "The peaks of all incidences are shifted to the same side by the same angle, and each flank errs \
          by its slope.",
         EffectParameter::new("offset_deg", "deg", [-10.0, 10.0], 0.0, 0.1),

@@ -23,8 +23,8 @@ const ABOUT: About = About {
     level: Level::Scene,
     description: "Part of the target is covered, as by clothing, which the wave crosses twice: a loss that \
          grows with the way through the layer, as 1/cos θ, on the far side of a straight line across \
-         the field of view. The line lies so far from the field's centre, in a direction counted \
-         from x_t towards y_t, and the layer beyond it.",
+         the field of view. The line lies boundary_m from the field's centre, in a direction counted \
+         from x_t towards y_t, and the layer lies beyond it.",
     signature: "The power drops at a line and stays low on one side, more so at large angles. A foreign \
          patch has a closed outline and the same offset at all angles; a gain over the field and a \
          drift change without an edge. A layer over everything cannot be told from the calibration.",

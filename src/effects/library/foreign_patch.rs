@@ -61,9 +61,9 @@ fn span(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
 const ABOUT: About = About {
     name: "foreign-patch",
     level: Level::Scene,
-    description: "A round place on the target is of another material, that returns more or less by so many \
-         dB. Its centre is on the surface where the field of view has these x_t and y_t; its radius is the \
-         straight way from there, over the edge of which it fades as under a spot of that diameter.",
+    description: "A round place on the target is of another material and returns level_db more than the rest. \
+         Its centre is on the surface at the given x_t and y_t of the field of view. The radius is the straight \
+         distance from the centre. Its edge is as soft as one seen by a spot of the diameter fade_m.",
     signature: "The residual has one compact spot on the surface, at any angle, with a sharp outline. A \
          covering layer ends at a straight line and its loss grows with the angle; multiple bounces \
          brighten places too, but concave ones, and with longer ranges.",

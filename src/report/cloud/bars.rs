@@ -31,7 +31,7 @@ pub(super) fn ranking(report: &Report) -> Result<Picture, FigureError> {
     let added = if report.effects.is_empty() { "" } else { " Blue ones were added in the end." };
     let placebo = match guide {
         Some(_) => {
-            " The line is the gain of a random smooth field with as many numbers as one of those, but at most six; the \
+            " The line is the gain of a random smooth field with as many parameters as the effect (six at most); the \
              largest where they differ."
         }
         None => "",
