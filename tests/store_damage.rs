@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use matdb::brdf::{Brdf, Lambert, MOST_LEVELS, MOST_MODELS, Mixture, Sum};
 use matdb::material::{Material, builtin};
-use matdb::store::{Added, Store, StoreError};
+use matdb::store::{Addition, Store, StoreError};
 use rusqlite::Connection;
 use support::database::{contents, is_sound, sound};
 use support::{matdb, refused};
@@ -300,7 +300,7 @@ fn mending_a_revision_of_an_old_program_leaves_its_neighbours_sound() {
     let slug = store.list().unwrap()[0].slug.clone();
     let stored = store.get(&slug, None).unwrap().unwrap();
     tamper(&path, "UPDATE source SET title = 'other' WHERE revision_id = 2");
-    assert_eq!(store.add([&stored.material]).unwrap(), [Added::Repaired(stored.revision)]);
+    assert_eq!(store.add([&stored.material]).unwrap(), [Addition::Repaired(stored.revision)]);
     drop(store);
     let output = matdb(folder.path()).args(["check", "--json"]).output().unwrap();
     let text = String::from_utf8_lossy(&output.stdout);
@@ -327,7 +327,7 @@ fn what_is_not_at_hand_is_left_and_named_and_what_is_sound_is_mended_around_it()
     assert!(record["repaired"].as_array().unwrap().len() >= 3, "{record}");
     // Whoever has the content brings it back, under the number, date and maker that it had.
     let before = Store::open_existing(&path).unwrap().unwrap().history(&own.slug).unwrap();
-    assert_eq!(Store::open(&path).unwrap().add([&own]).unwrap(), [Added::Repaired(1)]);
+    assert_eq!(Store::open(&path).unwrap().add([&own]).unwrap(), [Addition::Repaired(1)]);
     assert_eq!(Store::open_existing(&path).unwrap().unwrap().history(&own.slug).unwrap(), before);
     assert_eq!(contents(&path), [own, ptfe]);
     matdb(folder.path()).arg("check").assert().success();

@@ -12,7 +12,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use matdb::material::{Activity, Input, Material, Origin};
-use matdb::store::{Added, Store};
+use matdb::store::{Addition, Store};
 use rusqlite::Connection;
 use rusqlite::functions::FunctionFlags;
 use support::database::{
@@ -99,7 +99,7 @@ fn files_of_every_schema_open_and_become_the_newest() {
         let old = folder.path().join("old.sqlite");
         fs::write(&old, fs::read(fixtures().join(&file)).unwrap()).unwrap();
         let mut store = Store::open(&old).unwrap();
-        assert_eq!(store.add([&held(&file)[2]]).unwrap(), [Added::Unchanged(1)]);
+        assert_eq!(store.add([&held(&file)[2]]).unwrap(), [Addition::Unchanged(1)]);
         drop(store);
         assert_eq!(contents(&old), held(&file));
         assert_eq!(schema(&old), schema(&fresh));

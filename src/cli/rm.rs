@@ -7,7 +7,7 @@ use super::summary::counted;
 use crate::error::Error;
 use crate::formats::text::nearest;
 use crate::setup::Database;
-use crate::store::{Removed, Store};
+use crate::store::{Removal, Store};
 
 /// Remove materials from the database, with all their revisions
 #[derive(Debug, clap::Args)]
@@ -38,7 +38,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let removed = db.write()?.remove(&slugs)?;
     let (mut lines, mut records) = (String::new(), Vec::new());
     for (name, removed) in std::iter::zip(&args.names, removed) {
-        let revisions = removed.map_or(0, |Removed { revisions }| revisions);
+        let revisions = removed.map_or(0, |Removal { revisions }| revisions);
         lines += &format!(
             "removed {name}, {}, from {}\n",
             counted(revisions as usize, "revision"),

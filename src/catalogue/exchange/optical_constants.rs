@@ -9,9 +9,9 @@
 //! other than the temperature, HTML.
 
 use super::detail::Detail;
+use super::details::{Details, file_name, missing};
 use super::dispersion::{Formula, formula};
 use super::error::ExchangeError;
-use super::given::{Given, file_name, missing};
 use super::page::{Block, Page, parse};
 use crate::brdf::{Brdf, Fresnel};
 use crate::formats::FormatError;
@@ -45,7 +45,7 @@ impl Constants {
 }
 
 /// Makes a material of a page.
-pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
+pub(super) fn read(file: &str, bytes: &[u8], given: &Details) -> Result<Material, ExchangeError> {
     let page = text(bytes).and_then(parse);
     let page = page.map_err(|error| ExchangeError::in_file(file, error))?;
     let known = page.is_cc0.then(|| "CC0-1.0".to_owned());
@@ -196,7 +196,7 @@ struct Entry {
     constants: Vec<Constants>,
 }
 
-fn material(file: &str, page: &Page, given: &Given, entry: Entry) -> Material {
+fn material(file: &str, page: &Page, given: &Details, entry: Entry) -> Material {
     let Entry { slug, class, licence, wanted_hz, nearest, constants } = entry;
     let [eps_real, eps_imag] = nearest.permittivity();
     let permittivities = constants.iter().map(|at| {
@@ -274,7 +274,7 @@ fn material(file: &str, page: &Page, given: &Given, entry: Entry) -> Material {
     }
 }
 
-fn optical_source(file: &str, page: &Page, given: &Given, licence: String) -> Source {
+fn optical_source(file: &str, page: &Page, given: &Details, licence: String) -> Source {
     let name = file_name(file);
     let references = plain(&page.references);
     let title = match (&given.source, references.is_empty()) {
