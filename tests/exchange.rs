@@ -95,6 +95,12 @@ fn nothing_is_extrapolated_and_what_is_missing_is_named() {
     let far = Details { frequency_hz: Some(30e9), ..given() };
     let message = water(WATER, &far).unwrap_err();
     assert!(message.contains("ask for the frequency 149.89623 GHz"));
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("water.yml"), WATER).unwrap();
+    let add = ["add", "--from", "water.yml", "--name", "water", "--class", "liquid"];
+    let message = refused(matdb(folder.path()).args(add).args(["--frequency", "30"]));
+    assert!(message.contains("(--frequency 149.89623)"), "{message}");
+    matdb(folder.path()).args(add).args(["--frequency", "149.89623"]).assert().success();
     let message = water(&WATER.replace("CC0", "CC9"), &Details::default()).unwrap_err();
     for detail in ["name (my-paint)", "class (paint)", "licence (CC-BY-4.0)"] {
         assert!(message.contains(detail), "{message}");

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use matdb::brdf::{Brdf, Lambert, MOST_LEVELS, MOST_MODELS, Mixture, Sum};
-use matdb::material::{Material, builtin};
+use matdb::material::{Activity, Input, Material, builtin};
 use matdb::store::{Addition, Store, StoreError};
 use rusqlite::Connection;
 use support::database::{contents, is_sound, sound};
@@ -272,6 +272,45 @@ fn a_material_whose_row_is_lost_comes_back_with_all_that_was_measured() {
         .query_row("SELECT count(*) FROM observation", [], |row| row.get(0))
         .unwrap();
     assert!(left > 0);
+}
+
+#[test]
+fn a_material_whose_name_is_taken_does_not_keep_the_others_from_coming_back() {
+    let (folder, path) = database(&["ptfe", "glass", "mannequin-paint"]);
+    tamper(
+        &path,
+        "DELETE FROM material WHERE slug <> 'glass'; DELETE FROM entry WHERE slug = 'glass';
+         UPDATE entry SET slug = 'glass' WHERE slug = 'ptfe'",
+    );
+    let output = matdb(folder.path()).args(["check", "--repair", "--json"]).output().unwrap();
+    let record: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let text = record.to_string();
+    assert!(text.contains("`mannequin-paint` has its row again"), "{text}");
+    assert!(text.contains("another material has its name, `glass`"), "{text}");
+    assert!(!text.contains("UNIQUE"), "{text}");
+    for name in ["glass", "mannequin-paint"] {
+        matdb(folder.path()).args(["show", name]).assert().success();
+    }
+}
+
+#[test]
+fn a_repeated_revision_was_made_by_the_repair() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("matdb.sqlite");
+    let own = sound("own");
+    let mut store = Store::open(&path).unwrap();
+    let by = |command: &str| Activity { command: command.to_owned(), ..Activity::default() };
+    store.add_made(&[(own.clone(), by("measure"))]).unwrap();
+    store.add_made(&[(support::database::change(own.clone()), by("fit"))]).unwrap();
+    tamper(&path, "DELETE FROM revision WHERE number = 2");
+    store.repair(&[]).unwrap();
+    let [first, last] =
+        [Some(1), None].map(|number| store.get(&own.slug, number).unwrap().unwrap());
+    assert_eq!((last.revision, &last.material), (3, &own));
+    let Some(Activity { command, inputs, origin }) = last.activity else { panic!("no activity") };
+    assert_eq!((command.as_str(), origin), ("check --repair", None));
+    assert_eq!(inputs, [Input { name: "own@1".to_owned(), hash: first.content_hash }]);
+    assert_eq!(first.activity, Some(by("measure")));
 }
 
 #[test]

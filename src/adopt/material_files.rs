@@ -11,7 +11,7 @@ use crate::catalogue::Diff;
 use crate::catalogue::exchange::{Details, Foreign};
 use crate::effects::Level;
 use crate::error::Error;
-use crate::files::{FilesError, read_small};
+use crate::files::{FilesError, WayOut, read_small};
 use crate::material::{Activity, Input, Material, Slug, builtin, file};
 use crate::scene::read_regular;
 use crate::setup::{Database, resolve_effects, unknown_material};
@@ -212,8 +212,8 @@ fn suggest_tables(error: FilesError) -> FilesError {
     if error.reason.kind() != ErrorKind::FileTooLarge {
         return error;
     }
-    let way_out = "put points into a CSV file that a [[curve]] names, and shorten texts";
-    FilesError { way_out, ..error }
+    let words = "put points into a CSV file that a [[curve]] names, and shorten texts";
+    FilesError { way_out: WayOut::Words(words), ..error }
 }
 
 fn activity(inputs: Vec<Input>) -> Activity {

@@ -14,6 +14,8 @@ use crate::store::{Addition, Store};
 
 /// Name of the fit that holds a refitted law.
 const FIT: &str = "diagnosed";
+/// Opens the message of a material that is not there any more.
+const ASKED_BY: &str = "storing what was found: ";
 
 /// A diagnosis whose findings go into the materials of its scene.
 #[derive(Clone, Copy)]
@@ -99,7 +101,7 @@ impl Adoption<'_> {
         for number in self.candidates().filter(|&number| self.region(number).is_some()) {
             let slug = &self.ready.materials[number].found.material.slug;
             let MaterialRevision { mut material, revision } =
-                find_material(Some(store), slug.as_str(), "--add: ")?;
+                find_material(Some(store), slug.as_str(), ASKED_BY)?;
             if revision.is_none() {
                 materials.push(material.clone());
             }
@@ -129,7 +131,7 @@ impl Adoption<'_> {
     ) -> Result<Vec<Material>, Error> {
         let slug = &self.ready.materials[recipient.number].found.material.slug;
         let MaterialRevision { material, revision } =
-            find_material(Some(store), slug.as_str(), "--add: ")?;
+            find_material(Some(store), slug.as_str(), ASKED_BY)?;
         let first = revision.is_none().then(|| material.clone());
         let last = self.with_found(material, recipient, title)?;
         Ok(first.into_iter().chain([last]).collect())

@@ -6,7 +6,7 @@ use super::console::Console;
 use super::summary::counted;
 use crate::catalogue::{About, HAS_PARQUET, named_licences, publish};
 use crate::error::Error;
-use crate::files::FilesError;
+use crate::files::{FilesError, WayOut};
 use crate::material::form::licence_doubt;
 use crate::setup::Database;
 
@@ -88,7 +88,7 @@ fn about(path: &Path) -> Result<About, Error> {
         verb: "read",
         path: path.to_owned(),
         reason,
-        way_out: "check the path of --about",
+        way_out: WayOut::Words("check the path of --about"),
     })?;
     Ok(About::parse(&path.display().to_string(), &text)?)
 }

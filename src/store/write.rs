@@ -8,6 +8,7 @@ use rusqlite::{
 };
 use serde::Serialize;
 
+use super::error::is_damage;
 use super::find::outline::{self, OutlineEntry};
 use super::record::{Addition, Removal};
 use super::rows::rows;
@@ -108,15 +109,30 @@ impl<'a> MaterialWriter<'a> {
     }
 }
 
-/// Writes the rows of `fit_number` for the fits that an older program stored.
-pub(super) fn fill_numbers(tx: &Transaction) -> Result<()> {
-    let sql = "SELECT DISTINCT revision_id FROM fit WHERE report IS NOT NULL";
-    let revisions: Vec<i64> = rows(tx, sql, [], |row| row.get(0))?;
-    revisions.into_iter().try_for_each(|revision_id| match read::fits(tx, revision_id) {
-        // An unreadable fit must not make the whole file unreadable.
-        Err(Error::FromSqlConversionFailure(..)) => Ok(()),
-        fits => fits?.iter().try_for_each(|fit| Rows { tx, revision_id }.numbers(fit)),
-    })
+/// Brings the fits that an older program stored to schema 11: the values of their parameters in `fit_parameter` alone,
+/// their numbers in `fit_number`. Fits of a damaged revision stay as they are, so that the rest of the file can be read.
+pub(super) fn bring_fits_to_one_value(tx: &Transaction) -> Result<()> {
+    for revision_id in rows(tx, "SELECT id FROM revision", [], |row| row.get(0))? {
+        tx.execute_batch("SAVEPOINT fits")?;
+        match bring_to_one_value(tx, revision_id) {
+            Ok(()) => tx.execute_batch("RELEASE fits")?,
+            Err(error) if is_damage(&error) => {
+                tx.execute_batch("ROLLBACK TO fits; RELEASE fits")?;
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+fn bring_to_one_value(tx: &Transaction, revision_id: i64) -> Result<()> {
+    law::remove_copies(tx, revision_id)?;
+    let fits = match read::fits(tx, revision_id) {
+        // What was brought to one value is sound; the numbers need all fits.
+        Err(error) if is_damage(&error) => return Ok(()),
+        fits => fits?,
+    };
+    fits.iter().try_for_each(|fit| Rows { tx, revision_id }.numbers(fit))
 }
 
 /// Removes materials with all their rows, all or none.

@@ -61,9 +61,8 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Details) -> Result<Material
         return Err(missing(file, &details));
     };
     let wanted_hz = given.frequency_hz.unwrap_or(USUAL_HZ);
-    let (nearest, constants) = constants(&page)
-        .and_then(|constants| around(constants, wanted_hz))
-        .map_err(|error| ExchangeError::in_file(file, error))?;
+    let constants = constants(&page).map_err(|error| ExchangeError::in_file(file, error))?;
+    let (nearest, constants) = around(file, constants, wanted_hz)?;
     let entry = Entry { slug, class, licence, wanted_hz, nearest, constants };
     Ok(material(file, &page, given, entry))
 }
@@ -110,25 +109,21 @@ fn constants(page: &Page) -> Result<Vec<Constants>, FormatError> {
 
 /// The constants within reach of a frequency, and the nearest of them.
 fn around(
+    file: &str,
     mut all: Vec<Constants>,
     wanted_hz: f64,
-) -> Result<(Constants, Vec<Constants>), FormatError> {
+) -> Result<(Constants, Vec<Constants>), ExchangeError> {
     all.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     let away = |c: &Constants| (c.frequency_hz - wanted_hz).abs();
     let nearest = all.iter().copied().min_by(|a, b| away(a).total_cmp(&away(b)));
     let Some(nearest) = nearest else {
         let problem = "n and k are nowhere known together";
-        return Err(FormatError::at("DATA", problem, "name a page with both"));
+        let error = FormatError::at("DATA", problem, "name a page with both");
+        return Err(ExchangeError::in_file(file, error));
     };
     if away(&nearest) > REACH * wanted_hz {
-        let [near, away, wanted] =
-            [nearest.frequency_hz, away(&nearest), wanted_hz].map(|hz| hz / 1e9);
-        let problem = format!(
-            "the tabulated frequency nearest to {wanted} GHz is {near:.5} GHz, {away:.5} GHz away, \
-             and nothing is extrapolated"
-        );
-        let way_out = format!("ask for the frequency {near:.5} GHz, or name another page");
-        return Err(FormatError::at("DATA", problem, way_out));
+        let (file, nearest_hz) = (file.to_owned(), nearest.frequency_hz);
+        return Err(ExchangeError::FarFrequency { file, wanted_hz, nearest_hz });
     }
     all.retain(|c| away(c) <= REACH * wanted_hz);
     Ok((nearest, all))
