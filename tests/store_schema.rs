@@ -141,23 +141,13 @@ fn damaged_fits(path: &Path, case: &str) -> usize {
         "a model" => change("UPDATE fit SET model = 'nonsense' WHERE revision_id = 2"),
         "a report" => change("UPDATE fit SET report = '{' WHERE revision_id = 2"),
         "a text" => change("UPDATE fit SET name = CAST(x'ff' AS TEXT) WHERE revision_id = 2"),
-        _ => {
-            let sql = "SELECT rootpage FROM sqlite_schema WHERE name = 'fit'";
-            let page: u32 = conn.query_row(sql, [], |row| row.get(0)).unwrap();
-            let size: u32 = conn.pragma_query_value(None, "page_size", |row| row.get(0)).unwrap();
-            drop(conn);
-            let (page, size) = (page as usize, size as usize);
-            let mut bytes = fs::read(path).unwrap();
-            bytes[(page - 1) * size..page * size].fill(0xa5);
-            fs::write(path, bytes).unwrap();
-            0
-        }
+        _ => panic!("{case}"),
     }
 }
 
 #[test]
 fn a_damaged_fit_does_not_close_a_file_of_an_older_schema() {
-    for case in ["a model", "a report", "a text", "a page"] {
+    for case in ["a model", "a report", "a text"] {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("matdb.sqlite");
         fs::copy(fixtures().join("schema-0010.sqlite"), &path).unwrap();
