@@ -1,9 +1,9 @@
--- Why: the value of a fitted parameter was stored three times: in `fit_parameter`, in the JSON of
--- `fit.model` and in `fit_estimate`. The three could disagree. Now `fit_parameter` alone has it. `fit.model`
--- keeps the structure of the model, with null in the place of every parameter. `fit_estimate` is a view.
+-- Why: the value of a parameter of a fit's model was stored twice, in `fit_parameter` and in the JSON of
+-- `fit.model`, and shown a third time by the table `fit_estimate`. They could disagree. Now `fit_parameter` has it.
+-- `fit.model` keeps the structure of the model, with null in the place of every parameter. `fit_estimate` is a view.
 --
--- `fit.report` stays as it is: it is the record of what a fit found, and the content hash covers it apart from
--- the model, which may have been changed since.
+-- `fit.report` stays as it is, with the values that the fit found in `estimates`: it is the record of the fit, and
+-- the content hash covers it apart from the model, which may have been changed since.
 --
 -- The program takes a value out of `fit.model` only where `fit_parameter` has the same one. Where they
 -- disagree, it leaves both: `matdb check` reports the revision, and `matdb check --repair` keeps the value

@@ -12,7 +12,7 @@ use std::fs;
 use std::path::Path;
 
 use matdb::brdf::{Brdf, CookTorrance, Distribution, Lambert, Mixture, Scattering, Shadowing};
-use matdb::catalogue::exchange::{Foreign, Format, Given, Subject, export};
+use matdb::catalogue::exchange::{Details, Foreign, Format, Subject, export};
 use matdb::material::{Censor, Material, SourceKind, builtin};
 use proptest::prelude::*;
 use proptest::sample::Index;
@@ -52,15 +52,15 @@ fn bare(material: &Material) -> Subject<'_> {
     Subject { material, revision: Some(3), added_at, origin: None, curve: None }
 }
 
-fn given() -> Given {
-    Given {
+fn given() -> Details {
+    Details {
         slug: Some("water".parse().unwrap()),
         class: Some("liquid".to_owned()),
-        ..Given::default()
+        ..Details::default()
     }
 }
 
-fn water(text: &str, given: &Given) -> Result<Material, String> {
+fn water(text: &str, given: &Details) -> Result<Material, String> {
     Foreign::OpticalConstants.read("water.yml", text.as_bytes(), given).map_err(|e| e.to_string())
 }
 
@@ -92,10 +92,16 @@ fn a_page_of_optical_constants_becomes_a_half_space() {
 
 #[test]
 fn nothing_is_extrapolated_and_what_is_missing_is_named() {
-    let far = Given { frequency_hz: Some(30e9), ..given() };
+    let far = Details { frequency_hz: Some(30e9), ..given() };
     let message = water(WATER, &far).unwrap_err();
     assert!(message.contains("ask for the frequency 149.89623 GHz"));
-    let message = water(&WATER.replace("CC0", "CC9"), &Given::default()).unwrap_err();
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("water.yml"), WATER).unwrap();
+    let add = ["add", "--from", "water.yml", "--name", "water", "--class", "liquid"];
+    let message = refused(matdb(folder.path()).args(add).args(["--frequency", "30"]));
+    assert!(message.contains("(--frequency 149.89623)"), "{message}");
+    matdb(folder.path()).args(add).args(["--frequency", "149.89623"]).assert().success();
+    let message = water(&WATER.replace("CC0", "CC9"), &Details::default()).unwrap_err();
     for detail in ["name (my-paint)", "class (paint)", "licence (CC-BY-4.0)"] {
         assert!(message.contains(detail), "{message}");
     }
@@ -111,7 +117,7 @@ fn nothing_is_extrapolated_and_what_is_missing_is_named() {
         assert!(message.starts_with("water.yml: ") && message.contains(expected), "{message}");
     }
     let only_n = "DATA:\n  - type: tabulated n\n    data: |\n        1000 1.5\n";
-    let cc0 = Given { licence: Some("CC0-1.0".to_owned()), ..given() };
+    let cc0 = Details { licence: Some("CC0-1.0".to_owned()), ..given() };
     assert!(water(only_n, &cc0).unwrap_err().contains("n once and k once"));
 }
 
@@ -134,7 +140,7 @@ fn dispersion_formulas_are_theirs() {
              {coefficients}\n  - type: tabulated k\n    data: |\n        2 0.5\n        4 0.5\n"
         );
         let given =
-            Given { licence: Some("CC0-1.0".to_owned()), frequency_hz: Some(150e12), ..given() };
+            Details { licence: Some("CC0-1.0".to_owned()), frequency_hz: Some(150e12), ..given() };
         let material = water(&page, &given).unwrap();
         let found = (material.permittivities[0].real + 0.25).sqrt();
         assert!((found - expected).abs() < 1e-12, "formula {formula}: {found} is not {expected}");
@@ -181,7 +187,7 @@ fn a_curve_survives_csv_and_universal_brdf() {
         [(Format::Csv, Foreign::Csv), (Format::UniversalBrdf, Foreign::UniversalBrdf)]
     {
         let text = text(&bare(&material), format);
-        let given = Given {
+        let given = Details {
             licence: Some("CC0-1.0".to_owned()),
             source: Some("bench".to_owned()),
             kind: Some(SourceKind::Measured),
@@ -601,7 +607,7 @@ proptest! {
             let at = index.index(bytes.len());
             bytes[at] = byte;
         }
-        let given = Given {
+        let given = Details {
             licence: Some("CC0-1.0".to_owned()),
             source: Some("bench".to_owned()),
             kind: Some(SourceKind::Synthetic),

@@ -4,7 +4,7 @@ mod support;
 
 use std::path::Path;
 
-use matdb::store::{Added, Store};
+use matdb::store::{Addition, Store};
 use support::database::{child, contents, given, is_sound, sample};
 
 const WRITERS: usize = 4;
@@ -14,7 +14,7 @@ fn write(path: &Path, writer: usize) {
     let mut store = Store::open(path).unwrap();
     for number in 0..MATERIALS {
         let material = sample(&format!("of-{writer}-{number}"));
-        assert_eq!(store.add([&material]).unwrap(), [Added::New]);
+        assert_eq!(store.add([&material]).unwrap(), [Addition::New]);
         assert_eq!(store.get(&material.slug, None).unwrap().unwrap().material, material);
     }
 }
@@ -72,6 +72,6 @@ fn the_same_material_added_twice_at_once_is_there_once() {
         [scope.spawn(add), scope.spawn(add)].map(|thread| thread.join().unwrap())
     });
     let mut added = [first, second];
-    added.sort_by_key(|added| *added != Added::New);
-    assert_eq!(added, [Added::New, Added::Unchanged(1)]);
+    added.sort_by_key(|added| *added != Addition::New);
+    assert_eq!(added, [Addition::New, Addition::Unchanged(1)]);
 }

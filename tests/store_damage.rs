@@ -8,8 +8,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use matdb::brdf::{Brdf, Lambert, MOST_LEVELS, MOST_MODELS, Mixture, Sum};
-use matdb::material::{Material, builtin};
-use matdb::store::{Added, Store, StoreError};
+use matdb::material::{Activity, Input, Material, builtin};
+use matdb::store::{Addition, Store, StoreError};
 use rusqlite::Connection;
 use support::database::{contents, is_sound, sound};
 use support::{matdb, refused};
@@ -278,6 +278,43 @@ fn a_material_whose_row_is_lost_comes_back_with_all_that_was_measured() {
 }
 
 #[test]
+fn a_material_whose_name_is_taken_does_not_keep_the_others_from_coming_back() {
+    let (folder, path) = database(&["ptfe", "glass", "mannequin-paint"]);
+    tamper(
+        &path,
+        "DELETE FROM material WHERE slug <> 'glass'; DELETE FROM entry WHERE slug = 'glass';
+         UPDATE entry SET slug = 'glass' WHERE slug = 'ptfe'",
+    );
+    let output = matdb(folder.path()).args(["check", "--repair", "--json"]).output().unwrap();
+    let record: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let text = record.to_string();
+    assert!(text.contains("`mannequin-paint` has its row again"), "{text}");
+    assert!(text.contains("another material has its name, `glass`"), "{text}");
+    assert!(!text.contains("UNIQUE"), "{text}");
+    for name in ["glass", "mannequin-paint"] {
+        matdb(folder.path()).args(["show", name]).assert().success();
+    }
+}
+
+#[test]
+fn a_repeated_revision_was_made_by_the_repair() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("matdb.sqlite");
+    let own = sound("own");
+    let mut store = Store::open(&path).unwrap();
+    let fit = Activity { command: "fit".to_owned(), ..Activity::default() };
+    store.add_made(&[(own.clone(), fit.clone())]).unwrap();
+    tamper(&path, "UPDATE material SET current_revision = 2");
+    store.repair(&[]).unwrap();
+    let [first, last] = [1, 3].map(|number| store.get(&own.slug, Some(number)).unwrap().unwrap());
+    assert_eq!(last.material, own);
+    let Some(Activity { command, inputs, origin }) = last.activity else { panic!("no activity") };
+    assert_eq!((command.as_str(), origin), ("check --repair", None));
+    assert_eq!(inputs, [Input { name: "own@1".to_owned(), hash: first.content_hash }]);
+    assert_eq!(first.activity, Some(fit));
+}
+
+#[test]
 fn one_bad_name_does_not_keep_the_rest_from_being_mended() {
     let (folder, path) = database(&["ptfe", "glass"]);
     tamper(
@@ -303,7 +340,7 @@ fn mending_a_revision_of_an_old_program_leaves_its_neighbours_sound() {
     let slug = store.list().unwrap()[0].slug.clone();
     let stored = store.get(&slug, None).unwrap().unwrap();
     tamper(&path, "UPDATE source SET title = 'other' WHERE revision_id = 2");
-    assert_eq!(store.add([&stored.material]).unwrap(), [Added::Repaired(stored.revision)]);
+    assert_eq!(store.add([&stored.material]).unwrap(), [Addition::Repaired(stored.revision)]);
     drop(store);
     let output = matdb(folder.path()).args(["check", "--json"]).output().unwrap();
     let text = String::from_utf8_lossy(&output.stdout);
@@ -330,7 +367,7 @@ fn what_is_not_at_hand_is_left_and_named_and_what_is_sound_is_mended_around_it()
     assert!(record["repaired"].as_array().unwrap().len() >= 3, "{record}");
     // Whoever has the content brings it back, under the number, date and maker that it had.
     let before = Store::open_existing(&path).unwrap().unwrap().history(&own.slug).unwrap();
-    assert_eq!(Store::open(&path).unwrap().add([&own]).unwrap(), [Added::Repaired(1)]);
+    assert_eq!(Store::open(&path).unwrap().add([&own]).unwrap(), [Addition::Repaired(1)]);
     assert_eq!(Store::open_existing(&path).unwrap().unwrap().history(&own.slug).unwrap(), before);
     assert_eq!(contents(&path), [own, ptfe]);
     matdb(folder.path()).arg("check").assert().success();

@@ -12,7 +12,7 @@ use matdb::material::{
     Slug, Source, SourceKind, Status, builtin,
 };
 use matdb::measure::statistics::by_angle;
-use matdb::store::{Added, Store};
+use matdb::store::{Addition, Store};
 use proptest::collection::{btree_map, vec};
 use proptest::option;
 use proptest::prelude::*;
@@ -406,7 +406,7 @@ fn every_built_in_material_comes_back_as_it_was() {
     let materials: Vec<_> = builtin::names().map(|n| builtin::get(n).unwrap().unwrap()).collect();
     let mut store = Store::open(&path).unwrap();
     for material in &materials {
-        assert_eq!(store.add([material]).unwrap(), [Added::New]);
+        assert_eq!(store.add([material]).unwrap(), [Addition::New]);
         same(&store, material);
     }
     drop(store);
@@ -430,9 +430,9 @@ fn every_material_that_is_valid_comes_back_as_it_was() {
         material.validate().unwrap();
         let mut store = store.borrow_mut();
         store.remove([&material.slug]).unwrap();
-        assert_eq!(store.add([&material]).unwrap(), [Added::New]);
+        assert_eq!(store.add([&material]).unwrap(), [Addition::New]);
         same(&store, &material);
-        assert_eq!(store.add([&material]).unwrap(), [Added::Unchanged(1)]);
+        assert_eq!(store.add([&material]).unwrap(), [Addition::Unchanged(1)]);
         Ok(())
     };
     TestRunner::default().run(&material(), check).unwrap();
@@ -445,10 +445,10 @@ fn revisions_are_kept_and_removed_together() {
     let first = builtin::get("cotton").unwrap().unwrap();
     let mut second = first.clone();
     second.curves[0].observations[3].sigma0 = Some(0.25);
-    assert_eq!(store.add([&first]).unwrap(), [Added::New]);
-    assert_eq!(store.add([&second]).unwrap(), [Added::Revision(2)]);
-    assert_eq!(store.add([&second]).unwrap(), [Added::Unchanged(2)]);
-    assert_eq!(store.add([&first]).unwrap(), [Added::Revision(3)]);
+    assert_eq!(store.add([&first]).unwrap(), [Addition::New]);
+    assert_eq!(store.add([&second]).unwrap(), [Addition::Revision(2)]);
+    assert_eq!(store.add([&second]).unwrap(), [Addition::Unchanged(2)]);
+    assert_eq!(store.add([&first]).unwrap(), [Addition::Revision(3)]);
     for (revision, material) in [(1, &first), (2, &second), (3, &first)] {
         let stored = store.get(&first.slug, Some(revision)).unwrap().unwrap();
         assert_eq!((stored.revision, &stored.material), (revision, material));
@@ -459,7 +459,7 @@ fn revisions_are_kept_and_removed_together() {
     assert_eq!(store.remove([&first.slug]).unwrap()[0].unwrap().revisions, 3);
     assert!(store.remove([&first.slug]).unwrap()[0].is_none());
     assert!(store.list().unwrap().is_empty());
-    assert_eq!(store.add([&second]).unwrap(), [Added::New]);
+    assert_eq!(store.add([&second]).unwrap(), [Addition::New]);
 }
 
 #[test]
@@ -495,10 +495,10 @@ fn a_revision_knows_which_command_made_it_of_what() {
     let activity = Activity { command: "import".to_owned(), inputs, origin: Some(origin) };
     store.record(activity.clone());
     let second = Material { finish: Some("washed".to_owned()), ..first.clone() };
-    assert_eq!(store.add([&second]).unwrap(), [Added::Revision(2)]);
+    assert_eq!(store.add([&second]).unwrap(), [Addition::Revision(2)]);
     // It says nothing of the material, so it makes no revision.
     store.record(Activity::default());
-    assert_eq!(store.add([&second]).unwrap(), [Added::Unchanged(2)]);
+    assert_eq!(store.add([&second]).unwrap(), [Addition::Unchanged(2)]);
     let of = |number| store.get(&first.slug, Some(number)).unwrap().unwrap().activity;
     assert_eq!((of(1), of(2)), (None, Some(activity)));
 }

@@ -12,7 +12,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use matdb::material::{Activity, Input, Material, Origin};
-use matdb::store::{Added, Store};
+use matdb::store::{Addition, Store};
 use rusqlite::Connection;
 use rusqlite::functions::FunctionFlags;
 use support::database::{
@@ -99,7 +99,7 @@ fn files_of_every_schema_open_and_become_the_newest() {
         let old = folder.path().join("old.sqlite");
         fs::write(&old, fs::read(fixtures().join(&file)).unwrap()).unwrap();
         let mut store = Store::open(&old).unwrap();
-        assert_eq!(store.add([&held(&file)[2]]).unwrap(), [Added::Unchanged(1)]);
+        assert_eq!(store.add([&held(&file)[2]]).unwrap(), [Addition::Unchanged(1)]);
         drop(store);
         assert_eq!(contents(&old), held(&file));
         assert_eq!(schema(&old), schema(&fresh));
@@ -125,6 +125,57 @@ fn files_of_every_schema_are_read_as_they_are_and_not_changed() {
             .assert()
             .success();
         assert!(fs::read(&old).unwrap() == before, "{file} was written to");
+    }
+}
+
+/// Damage of the fits of a file of schema 10; the number of its materials that stay readable.
+fn damaged_fits(path: &Path, case: &str) -> usize {
+    let conn = Connection::open(path).unwrap();
+    let alone = "PRAGMA journal_mode = delete; PRAGMA ignore_check_constraints = on; PRAGMA foreign_keys = off";
+    conn.execute_batch(alone).unwrap();
+    let change = |sql: &str| {
+        conn.execute(sql, []).unwrap();
+        1
+    };
+    match case {
+        "a model" => change("UPDATE fit SET model = 'nonsense' WHERE revision_id = 2"),
+        "a report" => change("UPDATE fit SET report = '{' WHERE revision_id = 2"),
+        "a text" => change("UPDATE fit SET name = CAST(x'ff' AS TEXT) WHERE revision_id = 2"),
+        _ => panic!("{case}"),
+    }
+}
+
+#[test]
+fn a_damaged_fit_does_not_close_a_file_of_an_older_schema() {
+    for case in ["a model", "a report", "a text"] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("matdb.sqlite");
+        fs::copy(fixtures().join("schema-0010.sqlite"), &path).unwrap();
+        let readable = damaged_fits(&path, case);
+        let before = fs::read(&path).unwrap();
+        let run = |line: &str| {
+            let output = support::matdb(folder.path()).args(line.split(' ')).output().unwrap();
+            (output.status.success(), String::from_utf8_lossy(&output.stdout).into_owned())
+        };
+        assert!(run("list").0, "{case}");
+        assert!(fs::read(&path).unwrap() == before, "{case}: a reader has written");
+        let message = support::refused(support::matdb(folder.path()).args(["show", "paint"]));
+        assert!(message.contains("is damaged") && message.contains("check --repair"), "{message}");
+        for command in ["check", "check --repair"] {
+            let (is_sound, text) = run(command);
+            assert!(!is_sound && text.contains("paint@2"), "{case}, {command}: {text}");
+        }
+        let store = Store::open(&path).unwrap();
+        let shown = ["paint", "primer"].map(|slug| store.get(&slug.parse().unwrap(), None).is_ok());
+        assert_eq!(shown.iter().filter(|is| **is).count(), readable, "{case}");
+        // What cannot be read stays for whoever can mend it.
+        let conn = Connection::open(&path).unwrap();
+        let count = |table: &str| -> i64 {
+            let sql = format!("SELECT count(*) FROM {table} NOT INDEXED");
+            conn.query_row(&sql, [], |row| row.get(0)).unwrap()
+        };
+        assert!(count("fit_parameter") > 0, "{case}");
+        assert!(readable == 0 || count("fit") == 3, "{case}");
     }
 }
 
@@ -228,9 +279,6 @@ fn the_database_itself_refuses_what_a_material_may_not_be() {
         "UPDATE layer SET thickness_m = 0",
         "UPDATE layer SET source = 'other'",
         "UPDATE effect SET source = 'other'",
-        "UPDATE fit_estimate SET sd = -1",
-        "UPDATE fit_estimate SET high_95 = low_95 - 1",
-        "UPDATE fit_estimate SET identified = 2",
         "UPDATE fit_number SET fit = 'other'",
         "UPDATE fit_number SET at_bound = 2",
         "UPDATE fit_number SET chosen_by = 'chance'",

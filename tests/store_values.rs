@@ -1,5 +1,5 @@
-//! Promise: the value of a parameter of a fit is stored once, in `fit_parameter`. Everything else that shows it is
-//! derived, to the last bit. A file from before, which had three copies, loses none: where they agree, two are
+//! Promise: the value of a parameter of a model is stored once, in `fit_parameter`. Whatever shows the model is
+//! derived from it, to the last bit. Only `fit.report` has the values that a fit once found, as its record. A file from before, which had three copies, loses none: where they agree, two are
 //! removed; where they disagree, all stay until the content hash decides.
 
 mod support;
@@ -255,6 +255,18 @@ fn a_value_that_is_sound_only_in_the_structure_is_kept_and_comes_back_by_repair(
 }
 
 #[test]
+fn a_value_is_taken_from_the_structure_of_one_fit_and_from_the_row_of_another() {
+    let whole = contents(&old_file("").1);
+    let other_structure = OTHER_STRUCTURE.replace("'five'", "'stated'");
+    let (_folder, path) = old_file(&[OTHER_ROW, &other_structure].concat());
+    drop(Store::open(&path).unwrap());
+    let mended = repair(&path);
+    assert!(mended.len() == 1 && mended[0].contains("in `fit.model` of `five`:"), "{mended:?}");
+    assert_eq!(contents(&path), whole);
+    assert_eq!(problems(&path), [""; 0]);
+}
+
+#[test]
 fn where_no_copy_is_what_was_stored_all_of_them_stay() {
     let (folder, path) = old_file(&[OTHER_ROW, OTHER_STRUCTURE].concat());
     repair(&path);
@@ -270,6 +282,22 @@ fn an_estimate_that_disagrees_with_the_content_is_derived_from_the_content() {
     let count = "SELECT count(*) FROM fit_estimate WHERE value = 9 OR sd = 9";
     assert_eq!(raw_rows(&path, count), [[Value::Integer(0)]]);
     assert_eq!(problems(&path), [""; 0]);
+}
+
+#[test]
+fn a_report_that_was_changed_is_not_what_was_stored() {
+    for change in [
+        "'$.estimates[0].sd', -1",
+        "'$.estimates[0].interval_95[0]', 9",
+        "'$.estimates[0].value', 9",
+    ] {
+        let (_folder, path) = old_file("");
+        drop(Store::open(&path).unwrap());
+        let sql =
+            format!("UPDATE fit SET report = json_set(report, {change}) WHERE name = 'lobes'");
+        Connection::open(&path).unwrap().execute_batch(&sql).unwrap();
+        assert_eq!(problems(&path), [NOT_AS_STORED], "{change}");
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::brdf::Brdf;
 use crate::error::Error;
-use crate::files::{FilesError, read_small};
+use crate::files::{FilesError, WayOut, read_small};
 use crate::material;
 use crate::measure::Curve;
 use crate::setup::{MaterialRevision, find_material};
@@ -50,7 +50,7 @@ impl FitSubject {
     fn of_file(path: &Path, curve: Option<&str>) -> Result<FitSubject, Error> {
         let label = path.display().to_string();
         let bytes = read_small(path).map_err(|error| FilesError {
-            way_out: "check the path, or name a material",
+            way_out: WayOut::Words("check the path, or name a material"),
             ..error
         })?;
         let points = Curve::read(&bytes)

@@ -8,14 +8,14 @@ use std::path::{Path, PathBuf};
 use super::admission;
 use super::provenance::input;
 use crate::catalogue::Diff;
-use crate::catalogue::exchange::{Foreign, Given};
+use crate::catalogue::exchange::{Details, Foreign};
 use crate::effects::Level;
 use crate::error::Error;
-use crate::files::{FilesError, read_small};
+use crate::files::{FilesError, WayOut, read_small};
 use crate::material::{Activity, Input, Material, Slug, builtin, file};
 use crate::scene::read_regular;
 use crate::setup::{Database, resolve_effects, unknown_material};
-use crate::store::{Added, Store};
+use crate::store::{Addition, Store};
 
 /// Name of a material's file in its folder.
 const FILE: &str = "material.toml";
@@ -35,7 +35,7 @@ pub struct AddedMaterial {
     /// Its name.
     pub slug: Slug,
     /// What storing it did.
-    pub added: Added,
+    pub added: Addition,
     /// How it differs from the revision before, where it is a new one.
     pub differs: Option<String>,
     /// A sentence on a material that was withdrawn or superseded before and is active again.
@@ -52,7 +52,7 @@ impl NewMaterials {
     pub fn read(
         names: &[String],
         files: &[PathBuf],
-        given: &Given,
+        given: &Details,
         database: &Database,
     ) -> Result<NewMaterials, Error> {
         let mut new = NewMaterials::default();
@@ -104,15 +104,15 @@ impl NewMaterials {
 }
 
 impl AddedMaterial {
-    fn new(material: &Material, added: Added, store: &Store) -> AddedMaterial {
+    fn new(material: &Material, added: Addition, store: &Store) -> AddedMaterial {
         let slug = material.slug.clone();
         let before = match added {
             // It is stored by now: a revision before that cannot be read is not an error.
-            Added::Revision(number) => {
+            Addition::Revision(number) => {
                 let before = store.revision_before(&slug, number).ok().flatten();
                 before.and_then(|before| store.get(&slug, Some(before)).ok().flatten())
             }
-            Added::New | Added::Unchanged(_) | Added::Repaired(_) => None,
+            Addition::New | Addition::Unchanged(_) | Addition::Repaired(_) => None,
         };
         let Some(before) = before else {
             return AddedMaterial { slug, added, differs: None, notice: None };
@@ -200,7 +200,7 @@ fn read_material(path: &Path) -> Result<(Material, Vec<Input>), Error> {
 }
 
 /// Reads a file in a foreign format.
-fn read_foreign(format: Foreign, path: &Path, given: &Given) -> Result<(Material, Input), Error> {
+fn read_foreign(format: Foreign, path: &Path, given: &Details) -> Result<(Material, Input), Error> {
     let bytes = read_small(path).map_err(suggest_tables)?;
     let material = format.read(&path.display().to_string(), &bytes, given)?;
     admission::check(&material, path)?;
@@ -212,8 +212,8 @@ fn suggest_tables(error: FilesError) -> FilesError {
     if error.reason.kind() != ErrorKind::FileTooLarge {
         return error;
     }
-    let way_out = "put points into a CSV file that a [[curve]] names, and shorten texts";
-    FilesError { way_out, ..error }
+    let words = "put points into a CSV file that a [[curve]] names, and shorten texts";
+    FilesError { way_out: WayOut::Words(words), ..error }
 }
 
 fn activity(inputs: Vec<Input>) -> Activity {

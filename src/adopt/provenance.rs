@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::files::FilesError;
+use crate::files::{FilesError, WayOut};
 use crate::material::{Activity, Citation, Input, Material, Source, SourceKind};
 
 /// A file that was read: its name without its folder, and the BLAKE3 hash of its bytes.
@@ -22,7 +22,7 @@ pub fn activity(command: &str, paths: &[&Path]) -> Result<Activity, FilesError> 
             verb: "read",
             path: (*path).to_owned(),
             reason,
-            way_out: "leave the command's files where they are while it runs",
+            way_out: WayOut::Words("leave the command's files where they are while it runs"),
         })?;
         inputs.push(input(path, &bytes));
     }

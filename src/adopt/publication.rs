@@ -12,7 +12,7 @@ use crate::formats::words::listed;
 use crate::material::{Activity, Material, file};
 use crate::report::{CloudAnswer, CloudReport, NextSteps, shell_word};
 use crate::scene::SceneFile;
-use crate::store::{Added, Store};
+use crate::store::{Addition, Store};
 
 /// First line of a material's file.
 const FOUND: &str = "# A material with what `matdb diagnose` found in it.\n";
@@ -260,9 +260,9 @@ impl<'a> Publication<'a> {
 /// The materials at these places with what adding them did.
 fn at_places<'a>(
     materials: &'a [Material],
-    added: &'a [Added],
+    added: &'a [Addition],
     places: &'a [usize],
-) -> impl Iterator<Item = (&'a Material, Added)> {
+) -> impl Iterator<Item = (&'a Material, Addition)> {
     places.iter().filter_map(|&place| Some((materials.get(place)?, *added.get(place)?)))
 }
 

@@ -10,10 +10,12 @@ use crate::error::Error;
 use crate::formats::EffectEntry;
 use crate::material::{Fit, Material, Slug, SourceKind};
 use crate::setup::{MaterialRevision, ReadyScene, SceneMaterial, find_material};
-use crate::store::{Added, Store};
+use crate::store::{Addition, Store};
 
 /// Name of the fit that holds a refitted law.
 const FIT: &str = "diagnosed";
+/// Opens the message of a material that is not there any more.
+const ASKED_BY: &str = "storing what was found: ";
 
 /// A diagnosis whose findings go into the materials of its scene.
 #[derive(Clone, Copy)]
@@ -99,7 +101,7 @@ impl Adoption<'_> {
         for number in self.candidates().filter(|&number| self.region(number).is_some()) {
             let slug = &self.ready.materials[number].found.material.slug;
             let MaterialRevision { mut material, revision } =
-                find_material(Some(store), slug.as_str(), "--add: ")?;
+                find_material(Some(store), slug.as_str(), ASKED_BY)?;
             if revision.is_none() {
                 materials.push(material.clone());
             }
@@ -129,7 +131,7 @@ impl Adoption<'_> {
     ) -> Result<Vec<Material>, Error> {
         let slug = &self.ready.materials[recipient.number].found.material.slug;
         let MaterialRevision { material, revision } =
-            find_material(Some(store), slug.as_str(), "--add: ")?;
+            find_material(Some(store), slug.as_str(), ASKED_BY)?;
         let first = revision.is_none().then(|| material.clone());
         let last = self.with_found(material, recipient, title)?;
         Ok(first.into_iter().chain([last]).collect())
@@ -234,19 +236,19 @@ impl Adoption<'_> {
 }
 
 /// A material's name with the revision that adding it made current.
-pub fn pinned_name(material: &Material, added: Added) -> String {
+pub fn pinned_name(material: &Material, added: Addition) -> String {
     format!("{}@{}", material.slug, added.revision())
 }
 
 /// A material's name with the revision before the added one, where that is a new one.
-pub fn replaced_name(material: &Material, added: Added, store: &Store) -> Option<String> {
+pub fn replaced_name(material: &Material, added: Addition, store: &Store) -> Option<String> {
     match added {
         // It is stored by now: a revision before that cannot be read is not an error.
-        Added::Revision(new) => {
+        Addition::Revision(new) => {
             let before = store.revision_before(&material.slug, new).ok().flatten()?;
             Some(format!("{}@{before}", material.slug))
         }
-        Added::New | Added::Unchanged(_) | Added::Repaired(_) => None,
+        Addition::New | Addition::Unchanged(_) | Addition::Repaired(_) => None,
     }
 }
 
@@ -287,6 +289,6 @@ mod tests {
         let added = store.add([&ptfe]).unwrap()[0];
         assert_eq!(pinned_name(&ptfe, added), "ptfe@10");
         assert_eq!(replaced_name(&ptfe, added, &store).as_deref(), Some("ptfe@1"));
-        assert_eq!(replaced_name(&ptfe, Added::New, &store), None);
+        assert_eq!(replaced_name(&ptfe, Addition::New, &store), None);
     }
 }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::error::Error;
 use crate::formats::text::nearest;
 use crate::setup::Database;
-use crate::store::{Removed, Store};
+use crate::store::{self, Store};
 
 /// A material that was removed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -40,7 +40,7 @@ pub fn remove_materials(names: &[String], database: &Database) -> Result<Vec<Rem
     drop(known);
     let mut removals = Vec::new();
     for (slug, removed) in std::iter::zip(names, database.write()?.remove(&slugs)?) {
-        let revisions = removed.map_or(0, |Removed { revisions }| revisions);
+        let revisions = removed.map_or(0, |store::Removal { revisions }| revisions);
         removals.push(Removal { revisions, slug: slug.clone() });
     }
     Ok(removals)

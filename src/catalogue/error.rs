@@ -16,8 +16,7 @@ pub enum CatalogueError {
     Store(#[from] StoreError),
     /// The database or what was made of it is damaged.
     #[error(
-        "{} is damaged: {problem}; nothing was published, `matdb check` lists all damage and `matdb check \
-         --repair` mends what can be",
+        "{} is damaged: {problem}; nothing was published, a check lists all damage and a repair mends what can be",
         database.display()
     )]
     Damaged {

@@ -13,7 +13,7 @@ use super::read::{about, is_newer};
 use super::verify::{database, verify};
 use crate::effects::{Level, resolve};
 use crate::material::{Activity, Material, Origin, Slug};
-use crate::store::{Added, RevisionSummary, Store, StoreError, StoredRevision};
+use crate::store::{Addition, RevisionSummary, Store, StoreError, StoredRevision};
 
 /// Another laboratory's catalogue that was [verified](super::verify()) and may be imported.
 #[derive(Debug)]
@@ -244,7 +244,7 @@ impl Import {
             let material = Material { slug: taken.name.clone(), ..stored.material };
             Ok((material, Some(by)))
         });
-        let expected: BTreeMap<&Slug, Added> =
+        let expected: BTreeMap<&Slug, Addition> =
             plan.iter().filter_map(|taken| Some((&taken.name, taken.outcome.first()?))).collect();
         let mut last: Option<Slug> = None;
         ours.add_each_made(made, |material, added| {
@@ -321,10 +321,10 @@ impl Import {
 
 impl Outcome {
     /// The expected result of adding the first revision, if any is added.
-    fn first(&self) -> Option<Added> {
+    fn first(&self) -> Option<Addition> {
         match self {
-            Outcome::Added { .. } => Some(Added::New),
-            Outcome::Continued { after, .. } => Some(Added::Revision(after + 1)),
+            Outcome::Added { .. } => Some(Addition::New),
+            Outcome::Continued { after, .. } => Some(Addition::Revision(after + 1)),
             Outcome::Unchanged | Outcome::Conflict { .. } => None,
         }
     }

@@ -11,7 +11,7 @@ use crate::adopt::NewMaterials;
 use crate::error::Error;
 use crate::material::builtin;
 use crate::setup::Database;
-use crate::store::Added;
+use crate::store::Addition;
 
 /// Put materials into the database: built-in ones or your own
 #[derive(Debug, clap::Args)]
@@ -66,10 +66,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     for material in new.store(db)? {
         let (slug, revision) = (&material.slug, material.added.revision());
         let what = match material.added {
-            Added::New => "added",
-            Added::Revision(_) => "revised",
-            Added::Unchanged(_) => "unchanged",
-            Added::Repaired(_) => "repaired",
+            Addition::New => "added",
+            Addition::Revision(_) => "revised",
+            Addition::Unchanged(_) => "unchanged",
+            Addition::Repaired(_) => "repaired",
         };
         lines += &format!("{what} {slug}, revision {revision}, in {}\n", db.path().display());
         material.notice.iter().for_each(|notice| console.notice(notice));

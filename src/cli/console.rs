@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::files::FilesError;
+use crate::files::{FilesError, WayOut};
 use crate::material::is_turning;
 
 /// How much a command says.
@@ -109,7 +109,7 @@ fn written(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), E
             verb: "write",
             path: PathBuf::from("standard output"),
             reason,
-            way_out: "make room or redirect it elsewhere",
+            way_out: WayOut::Words("make room or redirect it elsewhere"),
         }
         .into()),
         _ => Ok(()),

@@ -5,7 +5,8 @@ use crate::catalogue::CatalogueError;
 use crate::catalogue::exchange::{Detail, ExchangeError};
 use crate::diagnose::curve::CurveDiagnoseError;
 use crate::error::Error;
-use crate::files::FilesError;
+use crate::files::{FilesError, WayOut};
+use crate::store::StoreError;
 
 /// An error as the program shows it: one sentence, with the flags that lead out of it.
 pub fn message(error: &Error) -> String {
@@ -17,13 +18,20 @@ pub fn message(error: &Error) -> String {
         Error::Detail { detail, problem, way_out } => {
             format!("--{} {problem}; {way_out}", detail.noun())
         }
-        Error::Files(files) if files.way_out == FilesError::OTHER_FOLDER => format!("{error} (-o)"),
+        Error::Exchange(ExchangeError::FarFrequency { nearest_hz, .. }) => {
+            format!("{error} (--frequency {:.5})", nearest_hz / 1e9)
+        }
+        Error::Files(FilesError { way_out: WayOut::OtherFolder, .. }) => format!("{error} (-o)"),
         Error::NoDatabase { .. } => format!("{error} (--db, $MATDB)"),
         Error::NotConverged { .. } => format!("{error} (--fix, --starts, --model)"),
         Error::CurveDiagnosis { error: CurveDiagnoseError::Noiseless, .. } => {
             format!("{error} (--noise-db)")
         }
         Error::Catalogue(CatalogueError::NoLicence { .. }) => format!("{error} (--about FILE)"),
+        Error::Store(StoreError::Corrupt { .. })
+        | Error::Catalogue(
+            CatalogueError::Damaged { .. } | CatalogueError::Store(StoreError::Corrupt { .. }),
+        ) => format!("{error} (`matdb check`, `matdb check --repair`)"),
         error => error.to_string(),
     };
     readable(&text)
@@ -47,5 +55,79 @@ pub(super) fn or_else(error: Error, way_out: &str) -> Error {
             Error::Usage { problem, way_out: format!("{first}, or {way_out}") }
         }
         error => error,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+    use std::path::{Path, PathBuf};
+
+    use super::*;
+
+    fn files(way_out: WayOut) -> Error {
+        let reason = io::Error::other("full");
+        Error::Files(FilesError {
+            way_out,
+            ..FilesError::unwritable("write", Path::new("out"), reason)
+        })
+    }
+
+    #[test]
+    fn a_message_ends_with_the_flags_that_lead_out_of_it() {
+        let file = || "water.yml".to_owned();
+        let damaged =
+            || StoreError::Corrupt { file: "a.sqlite".into(), problem: "torn".to_owned() };
+        let far = ExchangeError::FarFrequency {
+            file: file(),
+            wanted_hz: 30e9,
+            nearest_hz: 149.896_229e9,
+        };
+        let missing =
+            ExchangeError::Missing { file: file(), missing: vec![Detail::Class, Detail::Source] };
+        let no_licence =
+            CatalogueError::NoLicence { found: "two".to_owned(), example: "CC0-1.0".to_owned() };
+        let no_publication = CatalogueError::Damaged {
+            database: PathBuf::from("a.sqlite"),
+            problem: "torn".to_owned(),
+        };
+        let noiseless =
+            Error::CurveDiagnosis { curve: file(), error: CurveDiagnoseError::Noiseless };
+        let check = "a repair mends what can be (`matdb check`, `matdb check --repair`)";
+        for (error, end) in [
+            (files(WayOut::OtherFolder), "choose another folder (-o)"),
+            (files(WayOut::Words("leave it out")), "; leave it out"),
+            (Error::NoDatabase { path: PathBuf::from("a.sqlite") }, "makes one (--db, $MATDB)"),
+            (
+                Error::NotConverged { curve: file(), stop: "lost" },
+                "another model (--fix, --starts, --model)",
+            ),
+            (noiseless, " (--noise-db)"),
+            (Error::Exchange(far), "name another page (--frequency 149.89623)"),
+            (
+                Error::Exchange(missing),
+                "; add --class paint, --source \"who measured it, where, when\"",
+            ),
+            (
+                Error::Missing { what: "a curve", missing: vec![Detail::Threshold] },
+                "; add --threshold -77",
+            ),
+            (Error::Catalogue(no_licence), "licence = \"CC0-1.0\" (--about FILE)"),
+            (Error::Catalogue(no_publication), check),
+            (
+                Error::Store(damaged()),
+                "brings back the rest (`matdb check`, `matdb check --repair`)",
+            ),
+            (
+                Error::Catalogue(CatalogueError::Store(damaged())),
+                "brings back the rest (`matdb check`, `matdb check --repair`)",
+            ),
+        ] {
+            let text = message(&error);
+            assert!(text.ends_with(end), "{text}");
+        }
+        let detail =
+            Error::Detail { detail: Detail::Frequency, problem: "cannot be", way_out: "mend it" };
+        assert_eq!(message(&detail), "--frequency cannot be; mend it");
     }
 }

@@ -6,7 +6,7 @@ use super::console::Console;
 use super::summary::counted;
 use crate::catalogue::{About, publish};
 use crate::error::Error;
-use crate::files::FilesError;
+use crate::files::{FilesError, WayOut};
 use crate::setup::Database;
 
 /// Publish the database as a catalogue: a static site and open formats
@@ -57,7 +57,7 @@ fn about(path: &Path) -> Result<About, Error> {
         verb: "read",
         path: path.to_owned(),
         reason,
-        way_out: "check the path of --about",
+        way_out: WayOut::Words("check the path of --about"),
     })?;
     Ok(About::parse(&path.display().to_string(), &text)?)
 }

@@ -6,7 +6,7 @@ mod path;
 mod read;
 mod set;
 
-pub use error::FilesError;
+pub use error::{FilesError, WayOut};
 pub use new_folder::{FolderContent, NewFolder, replacement_obstacle};
 pub use path::folder_of;
 pub use read::{LARGEST_SMALL_FILE_BYTES, read_small};

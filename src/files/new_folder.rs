@@ -40,7 +40,7 @@ impl NewFolder {
     /// Nothing can be written next to the target.
     pub fn new(target: &Path, content: FolderContent) -> Result<NewFolder, FilesError> {
         NewFolder::create(target, content)
-            .map_err(|reason| FilesError::unwritable("create", folder_of(target), reason))
+            .map_err(|reason| FilesError::unwritable("create a folder next to", target, reason))
     }
 
     fn create(target: &Path, content: FolderContent) -> io::Result<NewFolder> {
@@ -100,7 +100,8 @@ impl NewFolder {
                 let _ = fs::rename(&aside, target);
                 return Err(reason);
             }
-            fs::remove_dir_all(&aside)?;
+            // The target is replaced by now; the next program to write it removes what remains here.
+            let _ = fs::remove_dir_all(&aside);
         }
         // The names are there whether or not the disk knows them already.
         let _ = File::open(folder_of(target)).and_then(|folder| folder.sync_all());
@@ -244,6 +245,16 @@ mod tests {
         let mut left = names(root.path());
         left.retain(|name| *name != running.path().file_name().unwrap().to_string_lossy());
         assert_eq!(left, [of_other.path().file_name().unwrap().to_string_lossy()]);
+    }
+
+    #[test]
+    fn a_folder_that_cannot_be_made_is_named_by_its_target() {
+        let root = tempfile::tempdir().unwrap();
+        fs::write(root.path().join("file"), "").unwrap();
+        let target = root.path().join("file/site");
+        let message = NewFolder::new(&target, CONTENT).unwrap_err().to_string();
+        let expected = format!("cannot create a folder next to {}: ", target.display());
+        assert!(message.starts_with(&expected), "{message}");
     }
 
     #[test]

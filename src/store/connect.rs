@@ -14,7 +14,7 @@ use rusqlite_migration::{M, Migrations};
 use super::error::{InFile, StoreError};
 use super::find::outline;
 use super::rows::rows;
-use super::{law, write};
+use super::write;
 use crate::files::folder_of;
 
 /// "matd" in the file's header.
@@ -42,8 +42,7 @@ fn schemas() -> [M<'static>; LATEST] {
         M::up(include_str!("../../migrations/0009_held_out.sql")),
         M::up(include_str!("../../migrations/0010_four_letters.sql")),
         M::up_with_hook(include_str!("../../migrations/0011_one_value.sql"), |tx: &Transaction| {
-            law::remove_copies(tx)?;
-            Ok(write::fill_numbers(tx)?)
+            Ok(write::bring_fits_to_one_value(tx)?)
         }),
     ]
 }

@@ -2,13 +2,20 @@
 
 use rusqlite::{Connection, Result};
 
+use super::error::{is_damage, reason};
 use super::find::stale;
 use super::rows::rows;
 
 /// Every problem of a file as a sentence: damaged pages, references to missing rows, and rows of lists and searches
 /// that differ from their material.
 pub(super) fn damage(conn: &Connection) -> Result<Vec<String>> {
-    let found = rows(conn, "PRAGMA integrity_check", [], |row| row.get::<_, String>(0))?;
+    let found = match rows(conn, "PRAGMA integrity_check", [], |row| row.get::<_, String>(0)) {
+        // It evaluates the CHECK of every row, and a text that is not JSON ends it.
+        Err(error) if is_damage(&error) => {
+            vec![format!("pages and rows cannot be checked to the end: {}", reason(&error))]
+        }
+        found => found?,
+    };
     let dangling = rows(conn, "PRAGMA foreign_key_check", [], |row| {
         let (table, parent): (String, String) = (row.get(0)?, row.get(2)?);
         Ok(format!("a row of `{table}` refers to a row of `{parent}` that is not there"))

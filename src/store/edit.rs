@@ -2,7 +2,7 @@
 
 use super::database::Store;
 use super::error::{InFile, StoreError};
-use super::record::{Added, Removed};
+use super::record::{Addition, Removal};
 use super::write;
 use crate::material::{Activity, Material, Slug};
 
@@ -20,7 +20,7 @@ impl Store {
     pub fn add<'a>(
         &mut self,
         materials: impl IntoIterator<Item = &'a Material>,
-    ) -> Result<Vec<Added>, StoreError> {
+    ) -> Result<Vec<Addition>, StoreError> {
         self.add_if(materials, |added| Ok(added.to_vec()))
     }
 
@@ -32,7 +32,7 @@ impl Store {
     pub fn add_if<'a, T, E: From<StoreError>>(
         &mut self,
         materials: impl IntoIterator<Item = &'a Material>,
-        then: impl FnOnce(&[Added]) -> Result<T, E>,
+        then: impl FnOnce(&[Addition]) -> Result<T, E>,
     ) -> Result<T, E> {
         let activity = self.activity.clone();
         let made = materials.into_iter().map(|material| (material, activity.as_ref()));
@@ -43,7 +43,7 @@ impl Store {
     ///
     /// # Errors
     /// As [`Store::add`].
-    pub fn add_made(&mut self, made: &[(Material, Activity)]) -> Result<Vec<Added>, StoreError> {
+    pub fn add_made(&mut self, made: &[(Material, Activity)]) -> Result<Vec<Addition>, StoreError> {
         let made: Vec<_> = made.iter().map(|(material, by)| (material, Some(by))).collect();
         self.add_all(&made, |added| Ok(added.to_vec()))
     }
@@ -51,7 +51,7 @@ impl Store {
     fn add_all<T, E: From<StoreError>>(
         &mut self,
         made: &[(&Material, Option<&Activity>)],
-        then: impl FnOnce(&[Added]) -> Result<T, E>,
+        then: impl FnOnce(&[Addition]) -> Result<T, E>,
     ) -> Result<T, E> {
         for (material, _) in made {
             check(material)?;
@@ -59,7 +59,7 @@ impl Store {
         let Store { conn, path, .. } = self;
         let tx = conn.transaction().in_file(path)?;
         let mut adding = write::MaterialWriter::new(&tx);
-        let added: Result<Vec<Added>, _> =
+        let added: Result<Vec<Addition>, _> =
             made.iter().map(|(material, activity)| adding.add(material, *activity)).collect();
         let added = added.and_then(|added| adding.finish().map(|()| added)).in_file(path)?;
         let done = then(&added)?;
@@ -75,7 +75,7 @@ impl Store {
     pub fn add_each<E: From<StoreError>>(
         &mut self,
         materials: impl IntoIterator<Item = Result<Material, E>>,
-        then: impl FnMut(&Material, Added) -> Result<(), E>,
+        then: impl FnMut(&Material, Addition) -> Result<(), E>,
     ) -> Result<(), E> {
         let activity = self.activity.clone();
         let made = materials.into_iter().map(|material| Ok((material?, activity.clone())));
@@ -89,7 +89,7 @@ impl Store {
     pub fn add_each_made<E: From<StoreError>>(
         &mut self,
         made: impl IntoIterator<Item = Result<(Material, Option<Activity>), E>>,
-        mut then: impl FnMut(&Material, Added) -> Result<(), E>,
+        mut then: impl FnMut(&Material, Addition) -> Result<(), E>,
     ) -> Result<(), E> {
         let Store { conn, path, .. } = self;
         let tx = conn.transaction().in_file(path)?;
@@ -111,7 +111,7 @@ impl Store {
     pub fn remove<'a>(
         &mut self,
         slugs: impl IntoIterator<Item = &'a Slug>,
-    ) -> Result<Vec<Option<Removed>>, StoreError> {
+    ) -> Result<Vec<Option<Removal>>, StoreError> {
         let slugs: Vec<&Slug> = slugs.into_iter().collect();
         write::remove(&mut self.conn, &slugs).in_file(&self.path)
     }

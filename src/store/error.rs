@@ -58,8 +58,7 @@ pub enum StoreError {
     },
     /// The file contradicts itself.
     #[error(
-        "{} is damaged: {problem}; `matdb check` lists all damage, `matdb check --repair` mends what can be, \
-         a copy of the file brings back the rest",
+        "{} is damaged: {problem}; a check lists all damage, a repair mends what can be, a copy of the file brings back the rest",
         file.display()
     )]
     Corrupt {
@@ -165,32 +164,64 @@ impl StoreError {
             StoreError::Corrupt { file: file.clone(), problem }
         };
         let failure = match &error {
-            SqliteFailure(failure, _) => failure,
             SqlInputError { msg, .. } => return corrupt(msg.clone()),
-            FromSqlConversionFailure(..)
-            | InvalidColumnType(..)
-            | Utf8Error(..)
-            | IntegralValueOutOfRange(..) => return corrupt(error.to_string()),
+            error if is_damage(error) => return corrupt(error.to_string()),
+            SqliteFailure(failure, _) => failure,
             ToSqlConversionFailure(reason) => {
                 return StoreError::NotReadable { problem: reason.to_string(), file: file.clone() };
             }
             _ => return StoreError::Sqlite { file, error },
         };
         match failure.code {
-            // A damaged row may claim to be huge, a damaged schema may no longer suit our SQL, and
-            // what a valid material violates is not a constraint of ours.
-            ErrorCode::DatabaseCorrupt
-            | ErrorCode::OutOfMemory
-            | ErrorCode::Unknown
-            | ErrorCode::ConstraintViolation => corrupt(error.to_string()),
             ErrorCode::NotADatabase => StoreError::Foreign { file },
             ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked => StoreError::Busy { file },
             ErrorCode::ReadOnly => StoreError::read_only(path),
             ErrorCode::DiskFull => StoreError::Full { file },
-            ErrorCode::CannotOpen => StoreError::Open { file, reason: reason(path) },
+            ErrorCode::CannotOpen => StoreError::Open { file, reason: obstacle(path) },
             ErrorCode::SystemIoFailure => StoreError::Disk { file, error },
             _ => StoreError::Sqlite { file, error },
         }
+    }
+}
+
+/// Whether an error comes from damage in the file.
+pub(super) fn is_damage(error: &rusqlite::Error) -> bool {
+    use rusqlite::Error::*;
+    match error {
+        // A damaged row may claim to be huge, a damaged schema may no longer suit our SQL, and what a valid material
+        // violates is not a constraint of ours.
+        SqliteFailure(failure, _) => matches!(
+            failure.code,
+            ErrorCode::DatabaseCorrupt
+                | ErrorCode::OutOfMemory
+                | ErrorCode::Unknown
+                | ErrorCode::ConstraintViolation
+        ),
+        SqlInputError { .. }
+        | FromSqlConversionFailure(..)
+        | InvalidColumnType(..)
+        | Utf8Error(..)
+        | IntegralValueOutOfRange(..) => true,
+        _ => false,
+    }
+}
+
+/// Why a step failed, without the file: in our own words where those of SQLite would say nothing to a user.
+pub(super) fn reason(error: &rusqlite::Error) -> String {
+    use rusqlite::Error::{FromSqlConversionFailure, SqliteFailure};
+    match error {
+        SqliteFailure(failure, said) => match (failure.code, said.as_deref()) {
+            (ErrorCode::DatabaseCorrupt, None | Some("database disk image is malformed")) => {
+                "pages of the file are damaged".to_owned()
+            }
+            (ErrorCode::ConstraintViolation, _) => {
+                "what would be written contradicts other rows of the file".to_owned()
+            }
+            (_, Some(said)) => said.to_owned(),
+            _ => error.to_string(),
+        },
+        FromSqlConversionFailure(_, _, problem) => problem.to_string(),
+        _ => error.to_string(),
     }
 }
 
@@ -226,7 +257,7 @@ fn way_to_write(path: &Path) -> String {
 
 /// Why a file cannot be opened. SQLite does not say, and to try it ourselves would drop the locks
 /// that other connections of this process hold, so this only looks.
-fn reason(path: &Path) -> io::Error {
+fn obstacle(path: &Path) -> io::Error {
     match (fs::metadata(path), fs::metadata(folder_of(path))) {
         (_, Err(reason)) => reason,
         (Err(reason), _) if reason.kind() != io::ErrorKind::NotFound => reason,

@@ -75,16 +75,12 @@ pub(super) fn left_in_structure(
     Ok(models)
 }
 
-/// Takes the values out of every `fit.model` of which `fit_parameter` has the same ones.
-pub(super) fn remove_copies(tx: &Transaction) -> Result<()> {
-    let revisions: Vec<i64> =
-        rows(tx, "SELECT DISTINCT revision_id FROM fit", [], |row| row.get(0))?;
-    for revision_id in revisions {
-        for (fit, model) in left_in_structure(tx, revision_id)? {
-            if values_in_rows(tx, revision_id, &fit)? == values(&model) {
-                let sql = "UPDATE fit SET model = ?1 WHERE revision_id = ?2 AND name = ?3";
-                tx.prepare_cached(sql)?.execute(params![structure(&model)?, revision_id, fit])?;
-            }
+/// Takes the values out of every `fit.model` of a revision of which `fit_parameter` has the same ones.
+pub(super) fn remove_copies(tx: &Transaction, revision_id: i64) -> Result<()> {
+    for (fit, model) in left_in_structure(tx, revision_id)? {
+        if values_in_rows(tx, revision_id, &fit)? == values(&model) {
+            let sql = "UPDATE fit SET model = ?1 WHERE revision_id = ?2 AND name = ?3";
+            tx.prepare_cached(sql)?.execute(params![structure(&model)?, revision_id, fit])?;
         }
     }
     Ok(())

@@ -6,12 +6,12 @@
 //!
 //! ```
 //! use matdb::material::builtin;
-//! use matdb::store::{Added, Store};
+//! use matdb::store::{Addition, Store};
 //! # let folder = tempfile::tempdir().unwrap();
 //! # let path = folder.path().join("materials.sqlite");
 //! let paint = builtin::get("mannequin-paint").unwrap().unwrap();
 //! let mut store = Store::open(&path).unwrap();
-//! assert_eq!(store.add([&paint]).unwrap(), [Added::New]);
+//! assert_eq!(store.add([&paint]).unwrap(), [Addition::New]);
 //! assert_eq!(store.get(&paint.slug, None).unwrap().unwrap().material, paint);
 //! ```
 
@@ -37,7 +37,7 @@ mod write;
 pub use database::Store;
 pub use error::StoreError;
 pub use find::{Filter, Hit, OutlineEntry};
-pub use record::{Added, Removed, RevisionSummary, StoredRevision, Summary};
+pub use record::{Addition, Removal, RevisionSummary, StoredRevision, Summary};
 pub use repair::Repair;
 pub use row_check::{Difference, RowCheck};
 pub use tables::{Cell, Column, ColumnKind, Reference, Table};

@@ -4,7 +4,7 @@ use crate::material::{Activity, Material, Slug, SourceKind};
 
 /// Result of adding a material.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Added {
+pub enum Addition {
     /// The material is new and has revision 1.
     New,
     /// It differs from the current revision and is now the revision of this number.
@@ -15,12 +15,14 @@ pub enum Added {
     Repaired(u32),
 }
 
-impl Added {
+impl Addition {
     /// The revision that is current now, from 1.
     pub fn revision(self) -> u32 {
         match self {
-            Added::New => 1,
-            Added::Revision(number) | Added::Unchanged(number) | Added::Repaired(number) => number,
+            Addition::New => 1,
+            Addition::Revision(number)
+            | Addition::Unchanged(number)
+            | Addition::Repaired(number) => number,
         }
     }
 }
@@ -81,7 +83,7 @@ pub struct Summary {
 
 /// Result of [`Store::remove`](crate::store::Store::remove).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Removed {
+pub struct Removal {
     /// Number of revisions.
     pub revisions: u32,
 }

@@ -4,13 +4,17 @@ use rusqlite::{Connection, Result, Transaction, params};
 
 use super::damage::damage;
 use super::database::Store;
-use super::error::{InFile, StoreError};
+use super::error::{InFile, StoreError, reason};
 use super::record::StoredRevision;
 use super::row_check::RowCheck;
 use super::rows::rows;
 use super::tables::{schema, unit_rows};
 use super::{law, read, write};
-use crate::material::{Material, Slug};
+use crate::brdf::Brdf;
+use crate::material::{Activity, Input, Material, Slug};
+
+/// Fits of a revision with values in `fit.model` that are tried one by one; further ones are tried together.
+const MOST_TRIED_APART: usize = 10;
 
 /// Result of [`Store::repair`], a sentence each.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -46,7 +50,9 @@ fn repair(conn: &mut Connection, row_check: &mut RowCheck, at_hand: &[Material])
     repair.attempt(&tx, "tables, indexes and views", || own_schema(&tx, row_check))?;
     repair.attempt(&tx, "indexes", || tx.execute_batch("REINDEX").map(|()| Vec::new()))?;
     repair.attempt(&tx, "units of columns", || units(&tx, row_check))?;
-    repair.attempt(&tx, "materials without a row", || lost_materials(&tx))?;
+    for lost in lost_materials(&tx)? {
+        repair.attempt(&tx, &lost.slug, || lost_material(&tx, &lost))?;
+    }
     repair.attempt(&tx, "lists", || unreachable_lines(&tx))?;
     let mut slugs = Vec::new();
     let named: Vec<String> = rows(&tx, "SELECT slug FROM material", [], |row| row.get(0))?;
@@ -83,7 +89,7 @@ impl Repair {
                 tx.execute_batch("RELEASE step")
             }
             Err(error) => {
-                self.failed.push(format!("{what} cannot be mended: {error}"));
+                self.failed.push(format!("{what} cannot be mended: {}", reason(&error)));
                 tx.execute_batch("ROLLBACK TO step; RELEASE step")
             }
         }
@@ -127,31 +133,45 @@ fn units(tx: &Transaction, row_check: &RowCheck) -> Result<Vec<String>> {
     Ok(vec!["units of columns were written anew".to_owned()])
 }
 
-/// Restores lost rows of materials, by the name and the number in the lists.
-fn lost_materials(tx: &Transaction) -> Result<Vec<String>> {
+/// A material that has revisions but no row of its own, as the lists have it.
+struct LostMaterial {
+    id: i64,
+    slug: String,
+    revision: u32,
+}
+
+fn lost_materials(tx: &Transaction) -> Result<Vec<LostMaterial>> {
     let sql = "SELECT material_id, slug, revision FROM entry
                WHERE material_id NOT IN (SELECT id FROM material)
                AND material_id IN (SELECT material_id FROM revision)";
-    let lost: Vec<(i64, String, u32)> =
-        rows(tx, sql, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
-    let mut mended = Vec::new();
-    for (id, name, number) in lost {
-        tx.execute_batch("SAVEPOINT lost")?;
-        tx.execute(
-            "INSERT INTO material (id, slug, current_revision) VALUES (?1, ?2, ?3)",
-            params![id, name, number],
-        )?;
-        // The hash covers the name: a wrong name is not restored.
-        let slug = name.parse::<Slug>().ok();
-        let stored = slug.and_then(|slug| read::get_in(tx, &slug, None).ok().flatten());
-        if stored.is_some_and(|stored| stored.material.content_hash() == stored.content_hash) {
-            mended.push(format!("`{name}` has its row again"));
-            tx.execute_batch("RELEASE lost")?;
-        } else {
-            tx.execute_batch("ROLLBACK TO lost; RELEASE lost")?;
-        }
+    rows(tx, sql, [], |row| {
+        Ok(LostMaterial { id: row.get(0)?, slug: row.get(1)?, revision: row.get(2)? })
+    })
+}
+
+/// Restores the lost row of a material.
+fn lost_material(tx: &Transaction, lost: &LostMaterial) -> Result<Vec<String>> {
+    let LostMaterial { id, slug, revision } = lost;
+    let sql = "SELECT EXISTS (SELECT 1 FROM material NOT INDEXED WHERE slug = ?1)";
+    if tx.query_row(sql, [slug], |row| row.get(0))? {
+        return Err(read::damaged(format!(
+            "another material has its name, `{slug}`; remove that one, then repair again"
+        )));
     }
-    Ok(mended)
+    tx.execute_batch("SAVEPOINT lost")?;
+    tx.execute(
+        "INSERT INTO material (id, slug, current_revision) VALUES (?1, ?2, ?3)",
+        params![id, slug, revision],
+    )?;
+    // The hash covers the name: a wrong name is not restored.
+    let name = slug.parse::<Slug>().ok();
+    let stored = name.and_then(|name| read::get_in(tx, &name, None).ok().flatten());
+    if stored.is_some_and(|stored| stored.material.content_hash() == stored.content_hash) {
+        tx.execute_batch("RELEASE lost")?;
+        return Ok(vec![format!("`{slug}` has its row again")]);
+    }
+    tx.execute_batch("ROLLBACK TO lost; RELEASE lost")?;
+    Ok(Vec::new())
 }
 
 /// Removes rows of lists and searches without a material or revision.
@@ -181,9 +201,15 @@ fn lost_current_revision(tx: &Transaction, slug: &Slug) -> Result<Vec<String>> {
     for number in numbers {
         let stored = read::get_in(tx, slug, Some(number)).ok().flatten();
         let sound = stored.filter(|stored| stored.material.content_hash() == stored.content_hash);
-        if let Some(StoredRevision { material, activity, .. }) = sound {
-            let added =
-                write::MaterialWriter::new(tx).add(&material, activity.as_ref())?.revision();
+        if let Some(StoredRevision { material, activity, content_hash, .. }) = sound {
+            let repeated = Input { name: format!("{slug}@{number}"), hash: content_hash };
+            let by = Activity {
+                command: "check --repair".to_owned(),
+                inputs: vec![repeated],
+                // Whoever answers for the content answers for its repetition.
+                origin: activity.and_then(|activity| activity.origin),
+            };
+            let added = write::MaterialWriter::new(tx).add(&material, Some(&by))?.revision();
             return Ok(vec![format!(
                 "`{slug}` has lost its revision {lost}; revision {added} repeats revision {number}"
             )]);
@@ -215,12 +241,11 @@ fn revisions(
                 }
                 continue;
             }
-            let by_structure = with_values_of_structure(tx, id, stored.material)?;
-            if by_structure.content_hash() == hash {
+            if let Some((by_structure, fits)) = by_structure(tx, id, &stored.material, &hash)? {
                 write::rewrite(tx, id, &by_structure)?;
                 mended.push(format!(
-                    "{place} was written anew with the values in `fit.model`: its hash covers them, and not those \
-                     in `fit_parameter`"
+                    "{place} was written anew with the values in `fit.model` of {fits}: its hash covers them, and not \
+                     those in `fit_parameter`"
                 ));
                 continue;
             }
@@ -233,18 +258,36 @@ fn revisions(
     Ok(mended)
 }
 
-/// A revision with the values that migration 11 has left in `fit.model` instead of those in `fit_parameter`.
-fn with_values_of_structure(
+/// The content of this hash that some fits of a revision give with the values that migration 11 has left in
+/// `fit.model` instead of those in `fit_parameter`, and the names of those fits; `None` where no choice gives it.
+fn by_structure(
     tx: &Transaction,
     revision_id: i64,
-    mut material: Material,
-) -> Result<Material> {
-    for (name, model) in law::left_in_structure(tx, revision_id)? {
-        for fit in material.fits.iter_mut().filter(|fit| fit.name == name) {
-            fit.model = model.clone();
+    material: &Material,
+    hash: &str,
+) -> Result<Option<(Material, String)>> {
+    let left = law::left_in_structure(tx, revision_id)?;
+    let mut disagreeing: Vec<(usize, Brdf)> = Vec::new();
+    for (place, fit) in material.fits.iter().enumerate() {
+        let model = left.iter().find(|(name, model)| *name == fit.name && *model != fit.model);
+        disagreeing.extend(model.map(|(_, model)| (place, model.clone())));
+    }
+    let bits = disagreeing.len().min(MOST_TRIED_APART);
+    // The hash covers the whole revision, so every choice must be tried.
+    for choice in 1_usize..1 << bits {
+        let (mut candidate, mut names) = (material.clone(), Vec::new());
+        for (bit, (place, model)) in disagreeing.iter().enumerate() {
+            if choice >> bit.min(MOST_TRIED_APART - 1) & 1 == 1 {
+                let fit = &mut candidate.fits[*place];
+                fit.model = model.clone();
+                names.push(format!("`{}`", fit.name));
+            }
+        }
+        if candidate.content_hash() == hash {
+            return Ok(Some((candidate, names.join(", "))));
         }
     }
-    Ok(material)
+    Ok(None)
 }
 
 /// Rebuilds lists and searches. A material that cannot be read keeps its rows there.

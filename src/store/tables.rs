@@ -95,8 +95,8 @@ impl Store {
                 (0..table.columns.len()).map(|index| cell(row.get_ref(index)?)).collect();
             let mut cells = cells.in_file(&self.path)?;
             let model = model(&self.conn, table, &cells).in_file(&self.path)?;
-            if let (Some(model), Some(cell)) = (&model, cells.get_mut(MODEL)) {
-                *cell = Cell::Text(model);
+            if let Some((place, model)) = &model {
+                cells[*place] = Cell::Text(model);
             }
             take(&cells)?;
         }
@@ -139,15 +139,19 @@ fn readable_tables(conn: &Connection) -> Result<Vec<Table>> {
     Ok(tables)
 }
 
-/// Place of the column `model` in the table `fit`.
-const MODEL: usize = 3;
-
-/// The model of a row of `fit` as JSON with the values of its parameters; `None` for other tables.
-fn model(conn: &Connection, table: &Table, cells: &[Cell]) -> Result<Option<String>> {
-    match (table.name.as_str(), cells) {
-        ("fit", [Cell::Integer(revision_id), _, Cell::Text(fit), Cell::Text(structure), ..]) => {
-            let (model, _) = law::read(conn, *revision_id, fit, structure)?;
-            law::text(&model).map(Some)
+/// The model of a row of `fit` as JSON with the values of its parameters, and the place of its column; `None` for
+/// other tables.
+fn model(conn: &Connection, table: &Table, cells: &[Cell]) -> Result<Option<(usize, String)>> {
+    if table.name != "fit" {
+        return Ok(None);
+    }
+    let places = ["revision_id", "name", "model"]
+        .map(|name| table.columns.iter().position(|column| column.name == name));
+    let [Some(revision_id), Some(name), Some(model)] = places else { return Ok(None) };
+    match (cells[revision_id], cells[name], cells[model]) {
+        (Cell::Integer(revision_id), Cell::Text(fit), Cell::Text(structure)) => {
+            let (law, _) = law::read(conn, revision_id, fit, structure)?;
+            Ok(Some((model, law::text(&law)?)))
         }
         _ => Ok(None),
     }
@@ -288,6 +292,21 @@ mod tests {
         };
         store.rows(material, &mut take).unwrap();
         assert_eq!(ids, (1..=builtin::names().count() as i64).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn the_model_of_a_fit_has_its_values_in_whatever_order_the_columns_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = filled(&folder.path().join("a.sqlite"));
+        let mut table = table(&store.conn, "fit".to_owned()).unwrap();
+        table.columns.reverse();
+        let model = table.columns.iter().position(|column| column.name == "model").unwrap();
+        let take = |cells: &[Cell]| -> Result<(), StoreError> {
+            let Cell::Text(text) = cells[model] else { panic!("{cells:?}") };
+            serde_json::from_str::<crate::brdf::Brdf>(text).unwrap();
+            Ok(())
+        };
+        store.rows(&table, take).unwrap();
     }
 
     #[test]

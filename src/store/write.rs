@@ -8,8 +8,9 @@ use rusqlite::{
 };
 use serde::Serialize;
 
+use super::error::is_damage;
 use super::find::outline::{self, OutlineEntry};
-use super::record::{Added, Removed};
+use super::record::{Addition, Removal};
 use super::rows::rows;
 use super::tables::{follows_from_content, has_statistics, tables};
 use super::{law, read};
@@ -39,25 +40,25 @@ impl<'a> MaterialWriter<'a> {
     /// Adds a material, or a revision of it, with its activity, and reads it back.
     /// Does not add the content of the current revision again. Rewrites its rows where they are damaged: the stored
     /// hash shows that they had this content.
-    pub fn add(&mut self, material: &Material, activity: Option<&Activity>) -> Result<Added> {
+    pub fn add(&mut self, material: &Material, activity: Option<&Activity>) -> Result<Addition> {
         let tx = self.tx;
         let content_hash = material.content_hash();
         let (added, material_id) = match current(tx, &material.slug)? {
             Some(current) if is_intact(tx, material, &current, &content_hash) => {
-                return Ok(Added::Unchanged(current.number));
+                return Ok(Addition::Unchanged(current.number));
             }
             Some(Current { material_id, number, content_hash: Some((revision_id, stored)) })
                 if stored == content_hash =>
             {
                 rewrite(tx, revision_id, material)?;
-                (Added::Repaired(number), material_id)
+                (Addition::Repaired(number), material_id)
             }
             Some(current) => {
                 let number = next_number(tx, &current)?;
                 let made = revision(tx, material, number, &content_hash, activity)?;
-                (Added::Revision(number), made)
+                (Addition::Revision(number), made)
             }
-            None => (Added::New, revision(tx, material, 1, &content_hash, activity)?),
+            None => (Addition::New, revision(tx, material, 1, &content_hash, activity)?),
         };
         read_back(tx, material, &content_hash)?;
         self.queue(material_id, material)?;
@@ -108,26 +109,41 @@ impl<'a> MaterialWriter<'a> {
     }
 }
 
-/// Writes the rows of `fit_number` for the fits that an older program stored.
-pub(super) fn fill_numbers(tx: &Transaction) -> Result<()> {
-    let sql = "SELECT DISTINCT revision_id FROM fit WHERE report IS NOT NULL";
-    let revisions: Vec<i64> = rows(tx, sql, [], |row| row.get(0))?;
-    revisions.into_iter().try_for_each(|revision_id| match read::fits(tx, revision_id) {
-        // An unreadable fit must not make the whole file unreadable.
-        Err(Error::FromSqlConversionFailure(..)) => Ok(()),
-        fits => fits?.iter().try_for_each(|fit| Rows { tx, revision_id }.numbers(fit)),
-    })
+/// Brings the fits that an older program stored to schema 11: the values of their parameters in `fit_parameter` alone,
+/// their numbers in `fit_number`. Fits of a damaged revision stay as they are, so that the rest of the file can be read.
+pub(super) fn bring_fits_to_one_value(tx: &Transaction) -> Result<()> {
+    for revision_id in rows(tx, "SELECT id FROM revision", [], |row| row.get(0))? {
+        tx.execute_batch("SAVEPOINT fits")?;
+        match bring_to_one_value(tx, revision_id) {
+            Ok(()) => tx.execute_batch("RELEASE fits")?,
+            Err(error) if is_damage(&error) => {
+                tx.execute_batch("ROLLBACK TO fits; RELEASE fits")?;
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+fn bring_to_one_value(tx: &Transaction, revision_id: i64) -> Result<()> {
+    law::remove_copies(tx, revision_id)?;
+    let fits = match read::fits(tx, revision_id) {
+        // What was brought to one value is sound; the numbers need all fits.
+        Err(error) if is_damage(&error) => return Ok(()),
+        fits => fits?,
+    };
+    fits.iter().try_for_each(|fit| Rows { tx, revision_id }.numbers(fit))
 }
 
 /// Removes materials with all their rows, all or none.
-pub(super) fn remove(conn: &mut Connection, slugs: &[&Slug]) -> Result<Vec<Option<Removed>>> {
+pub(super) fn remove(conn: &mut Connection, slugs: &[&Slug]) -> Result<Vec<Option<Removal>>> {
     let tx = conn.transaction()?;
     let removed = slugs.iter().map(|slug| remove_one(&tx, slug)).collect::<Result<_>>()?;
     tx.commit()?;
     Ok(removed)
 }
 
-fn remove_one(tx: &Transaction, slug: &Slug) -> Result<Option<Removed>> {
+fn remove_one(tx: &Transaction, slug: &Slug) -> Result<Option<Removal>> {
     // Without an index, a damaged material can be removed, too.
     let sql = "SELECT id FROM material NOT INDEXED WHERE slug = ?1";
     let found = tx.query_row(sql, [slug.as_str()], |row| row.get::<_, i64>(0)).optional()?;
@@ -135,7 +151,7 @@ fn remove_one(tx: &Transaction, slug: &Slug) -> Result<Option<Removed>> {
     let count = "SELECT count(*) FROM revision NOT INDEXED WHERE material_id = ?1";
     let revisions = tx.query_row(count, [material_id], |row| row.get(0))?;
     tx.execute("DELETE FROM material WHERE id = ?1", [material_id])?;
-    Ok(Some(Removed { revisions }))
+    Ok(Some(Removal { revisions }))
 }
 
 /// The current revision of a material.

@@ -17,6 +17,23 @@ pub enum ExchangeError {
         /// What is wrong.
         error: FormatError,
     },
+    /// No frequency of the file is near the wanted one.
+    #[error(
+        "{file}: DATA: the tabulated frequency nearest to {} GHz is {:.5} GHz, {:.5} GHz away, and nothing is \
+         extrapolated; ask for the frequency {:.5} GHz, or name another page",
+        wanted_hz / 1e9,
+        nearest_hz / 1e9,
+        (nearest_hz - wanted_hz).abs() / 1e9,
+        nearest_hz / 1e9
+    )]
+    FarFrequency {
+        /// The file.
+        file: String,
+        /// The wanted frequency, Hz.
+        wanted_hz: f64,
+        /// The nearest one in the file, Hz.
+        nearest_hz: f64,
+    },
     /// The file was read, but makes an impossible material.
     #[error("{file}: {error}")]
     Material {

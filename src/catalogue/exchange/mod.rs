@@ -17,7 +17,7 @@ mod dispersion;
 mod error;
 mod export_files;
 mod detail;
-mod given;
+mod details;
 mod mitsuba;
 mod open_material;
 mod optical_constants;
@@ -33,9 +33,9 @@ mod universal_brdf_in;
 use crate::material::Material;
 
 pub use detail::Detail;
+pub use details::Details;
 pub use error::ExchangeError;
 pub use export_files::Export;
-pub use given::Given;
 pub use subject::Subject;
 
 /// A format that a material can be written in.
@@ -100,7 +100,12 @@ impl Foreign {
     ///
     /// # Errors
     /// When the bytes do not follow the format, or neither they nor `given` state what an entry needs.
-    pub fn read(self, file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
+    pub fn read(
+        self,
+        file: &str,
+        bytes: &[u8],
+        given: &Details,
+    ) -> Result<Material, ExchangeError> {
         let mut material = match self {
             Foreign::OpticalConstants => optical_constants::read(file, bytes, given),
             Foreign::Csv => plain_csv::read(file, bytes, given),

@@ -9,9 +9,9 @@
 //! other than the temperature, HTML.
 
 use super::detail::Detail;
+use super::details::{Details, file_name, missing};
 use super::dispersion::{Formula, formula};
 use super::error::ExchangeError;
-use super::given::{Given, file_name, missing};
 use super::page::{Block, Page, parse};
 use crate::brdf::{Brdf, Fresnel};
 use crate::formats::FormatError;
@@ -45,7 +45,7 @@ impl Constants {
 }
 
 /// Makes a material of a page.
-pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
+pub(super) fn read(file: &str, bytes: &[u8], given: &Details) -> Result<Material, ExchangeError> {
     let page = text(bytes).and_then(parse);
     let page = page.map_err(|error| ExchangeError::in_file(file, error))?;
     let known = page.is_cc0.then(|| "CC0-1.0".to_owned());
@@ -61,9 +61,8 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
         return Err(missing(file, &details));
     };
     let wanted_hz = given.frequency_hz.unwrap_or(USUAL_HZ);
-    let (nearest, constants) = constants(&page)
-        .and_then(|constants| around(constants, wanted_hz))
-        .map_err(|error| ExchangeError::in_file(file, error))?;
+    let constants = constants(&page).map_err(|error| ExchangeError::in_file(file, error))?;
+    let (nearest, constants) = around(file, constants, wanted_hz)?;
     let entry = Entry { slug, class, licence, wanted_hz, nearest, constants };
     Ok(material(file, &page, given, entry))
 }
@@ -110,25 +109,21 @@ fn constants(page: &Page) -> Result<Vec<Constants>, FormatError> {
 
 /// The constants within reach of a frequency, and the nearest of them.
 fn around(
+    file: &str,
     mut all: Vec<Constants>,
     wanted_hz: f64,
-) -> Result<(Constants, Vec<Constants>), FormatError> {
+) -> Result<(Constants, Vec<Constants>), ExchangeError> {
     all.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     let away = |c: &Constants| (c.frequency_hz - wanted_hz).abs();
     let nearest = all.iter().copied().min_by(|a, b| away(a).total_cmp(&away(b)));
     let Some(nearest) = nearest else {
         let problem = "n and k are nowhere known together";
-        return Err(FormatError::at("DATA", problem, "name a page with both"));
+        let error = FormatError::at("DATA", problem, "name a page with both");
+        return Err(ExchangeError::in_file(file, error));
     };
     if away(&nearest) > REACH * wanted_hz {
-        let [near, away, wanted] =
-            [nearest.frequency_hz, away(&nearest), wanted_hz].map(|hz| hz / 1e9);
-        let problem = format!(
-            "the tabulated frequency nearest to {wanted} GHz is {near:.5} GHz, {away:.5} GHz away, \
-             and nothing is extrapolated"
-        );
-        let way_out = format!("ask for the frequency {near:.5} GHz, or name another page");
-        return Err(FormatError::at("DATA", problem, way_out));
+        let (file, nearest_hz) = (file.to_owned(), nearest.frequency_hz);
+        return Err(ExchangeError::FarFrequency { file, wanted_hz, nearest_hz });
     }
     all.retain(|c| away(c) <= REACH * wanted_hz);
     Ok((nearest, all))
@@ -196,7 +191,7 @@ struct Entry {
     constants: Vec<Constants>,
 }
 
-fn material(file: &str, page: &Page, given: &Given, entry: Entry) -> Material {
+fn material(file: &str, page: &Page, given: &Details, entry: Entry) -> Material {
     let Entry { slug, class, licence, wanted_hz, nearest, constants } = entry;
     let [eps_real, eps_imag] = nearest.permittivity();
     let permittivities = constants.iter().map(|at| {
@@ -274,7 +269,7 @@ fn material(file: &str, page: &Page, given: &Given, entry: Entry) -> Material {
     }
 }
 
-fn optical_source(file: &str, page: &Page, given: &Given, licence: String) -> Source {
+fn optical_source(file: &str, page: &Page, given: &Details, licence: String) -> Source {
     let name = file_name(file);
     let references = plain(&page.references);
     let title = match (&given.source, references.is_empty()) {

@@ -7,9 +7,9 @@
 use std::path::Path;
 
 use super::detail::Detail;
+use super::details::{Details, file_name, missing};
 use super::error::ExchangeError;
 use super::export_files::Export;
-use super::given::{Given, file_name, missing};
 use super::subject::{Points, Subject};
 use crate::formats::FormatError;
 use crate::formats::words::round_significant;
@@ -66,7 +66,7 @@ pub(super) fn describe(points: &Points) -> String {
 }
 
 /// Makes a material of a curve.
-pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
+pub(super) fn read(file: &str, bytes: &[u8], given: &Details) -> Result<Material, ExchangeError> {
     let points = file::points(bytes).map_err(|error| ExchangeError::in_file(file, error))?;
     let observations: Vec<Observation> = points.into_iter().map(|(_, point)| point).collect();
     if observations.is_empty() {
@@ -74,7 +74,7 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, 
             FormatError::at("line 1", "no row follows the header", "add the curve's points");
         return Err(ExchangeError::in_file(file, empty));
     }
-    let Given { slug, class, licence, source, kind, instrument, frequency_hz, .. } = given;
+    let Details { slug, class, licence, source, kind, instrument, frequency_hz, .. } = given;
     // A curve of unstated kind may be measured.
     let is_measured = kind.is_none_or(|kind| kind == SourceKind::Measured);
     let has_threshold = !is_measured
@@ -127,7 +127,7 @@ pub(super) struct SingleCurve {
 }
 
 /// A material that is one curve.
-pub(super) fn of_curve(file: &str, given: &Given, single: SingleCurve) -> Material {
+pub(super) fn of_curve(file: &str, given: &Details, single: SingleCurve) -> Material {
     let SingleCurve { slug, class, licence, title, kind, hz, instrument, observations } = single;
     let stem = Path::new(file_name(file)).file_stem().unwrap_or_default().to_string_lossy();
     let name = given.curve.clone().unwrap_or(stem.into_owned());

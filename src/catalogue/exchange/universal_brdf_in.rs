@@ -8,8 +8,8 @@ use std::f64::consts::PI;
 use serde_json::Value;
 
 use super::detail::Detail;
+use super::details::{Details, missing};
 use super::error::ExchangeError;
-use super::given::{Given, missing};
 use super::plain_csv::{RADAR, SingleCurve, of_curve};
 use super::universal_brdf::{CENSOR, OURS, THRESHOLD};
 use crate::formats::FormatError;
@@ -17,7 +17,7 @@ use crate::material::{Censor, Instrument, Material, Observation, SourceKind};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Makes a material of a file.
-pub(super) fn read(file: &str, bytes: &[u8], given: &Given) -> Result<Material, ExchangeError> {
+pub(super) fn read(file: &str, bytes: &[u8], given: &Details) -> Result<Material, ExchangeError> {
     let (json, observations, wavelength_m) =
         parse(bytes).map_err(|error| ExchangeError::in_file(file, error))?;
     let metadata = &json["metadata"];

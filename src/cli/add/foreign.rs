@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::adopt::{check_frequency_and_threshold, foreign_format};
-use crate::catalogue::exchange::Given;
+use crate::catalogue::exchange::Details;
 use crate::cli::curves::kind_of;
 use crate::cli::list::KINDS;
 use crate::error::Error;
@@ -74,11 +74,11 @@ impl DetailArgs {
     }
 
     /// The flags as plain values.
-    pub fn given(&self) -> Result<Given, Error> {
+    pub fn given(&self) -> Result<Details, Error> {
         let frequency_hz = self.frequency.map(|ghz| ghz * 1e9);
         let threshold_w = self.threshold.map(watts_from_dbm);
         check_frequency_and_threshold(frequency_hz, threshold_w)?;
-        Ok(Given {
+        Ok(Details {
             slug: self.name.clone(),
             name: self.title.clone(),
             class: self.class.clone(),

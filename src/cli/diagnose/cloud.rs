@@ -13,7 +13,7 @@ use crate::cli::console::Console;
 use crate::cli::effects::chosen;
 use crate::diagnose::{DiagnoseError, Report};
 use crate::error::Error;
-use crate::files::{Placement, folder_of, write_all};
+use crate::files::{FilesError, Placement, WayOut, folder_of, write_all};
 use crate::formats::words::listed;
 use crate::report::{CannotTell, shell_word};
 use crate::setup::{Database, USUAL_DATABASE};
@@ -83,7 +83,7 @@ fn publish(
         let mut store = db.write()?;
         let (published, written) = publication.store(&mut store, |files, beside| {
             let folders = [(request.folder, files), (folder_of(request.scene), beside)];
-            Placement::new(&folders).map_err(Error::from)
+            Placement::new(&folders).map_err(|error| of_scene(error, request.scene, beside).into())
         })?;
         written.keep();
         published
@@ -104,6 +104,18 @@ fn publish(
         text += &stored(&publication, &published, request, db.path());
     }
     console.result(&text, &publication.report().record())
+}
+
+/// The error of a file; one next to the scene is not in the folder that a person can choose.
+fn of_scene(error: FilesError, scene: &Path, beside: &[(String, Vec<u8>)]) -> FilesError {
+    let is_beside = beside.iter().any(|(name, _)| error.path == folder_of(scene).join(name));
+    match error.way_out {
+        WayOut::OtherFolder if is_beside || error.path == folder_of(scene) => FilesError {
+            way_out: WayOut::Words("make room there, or diagnose a copy of the scene elsewhere"),
+            ..error
+        },
+        _ => error,
+    }
 }
 
 /// Writes why nothing can be said; the error is the way out.

@@ -1,7 +1,7 @@
 //! `beat.npy`: the sampled beat signals, for those who bring their own receiver.
 
 use crate::error::Error;
-use crate::files::FilesError;
+use crate::files::{FilesError, WayOut};
 use crate::formats::npy;
 use crate::render::{Footprints, RenderError, Setup, beat_signals};
 use crate::scene::Scene;
@@ -62,7 +62,8 @@ impl BeatShape {
         match written {
             Ok(()) => Ok((name, bytes)),
             Err(reason) => {
-                let (verb, path, way_out) = ("encode", name.into(), "leave the beat signals out");
+                let (verb, path, way_out) =
+                    ("encode", name.into(), WayOut::Words("leave the beat signals out"));
                 Err(FilesError { verb, path, reason, way_out }.into())
             }
         }

@@ -6,7 +6,7 @@ use crate::material::{Material, Slug, SourceKind};
 
 /// What a person states about a foreign file; what is none must be in the file.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Given {
+pub struct Details {
     /// Short name of the material.
     pub slug: Option<Slug>,
     /// Full name; by default the short one.
@@ -37,7 +37,7 @@ pub struct Given {
     pub threshold_w: Option<f64>,
 }
 
-impl Given {
+impl Details {
     /// Adds the description, tags, authors and year, which no foreign file holds.
     pub(super) fn complete(&self, material: &mut Material) {
         material.description = self.description.clone().unwrap_or(material.description.clone());
