@@ -14,7 +14,7 @@ use rusqlite_migration::{M, Migrations};
 use super::error::{InFile, StoreError};
 use super::find::outline;
 use super::rows::rows;
-use super::write;
+use super::{law, write};
 use crate::files::folder_of;
 
 /// "matd" in the file's header.
@@ -24,7 +24,8 @@ const APPLICATION_ID: i64 = 0x6d61_7464;
 const LATEST: usize = 11;
 
 /// Every migration, oldest first. Append only: users have files of every schema.
-fn schemas() -> [M<'static>; LATEST] {
+/// Of the revisions in `torn`, the hooks read no fit.
+fn schemas(torn: Vec<i64>) -> [M<'static>; LATEST] {
     [
         M::up(include_str!("../../migrations/0001_materials.sql")),
         M::up(include_str!("../../migrations/0002_fits.sql")),
@@ -41,9 +42,10 @@ fn schemas() -> [M<'static>; LATEST] {
         M::up(include_str!("../../migrations/0008_origin_author.sql")),
         M::up(include_str!("../../migrations/0009_held_out.sql")),
         M::up(include_str!("../../migrations/0010_four_letters.sql")),
-        M::up_with_hook(include_str!("../../migrations/0011_one_value.sql"), |tx: &Transaction| {
-            Ok(write::bring_fits_to_one_value(tx)?)
-        }),
+        M::up_with_hook(
+            include_str!("../../migrations/0011_one_value.sql"),
+            move |tx: &Transaction| Ok(write::bring_fits_to_one_value(tx, &torn)?),
+        ),
     ]
 }
 
@@ -387,7 +389,8 @@ fn migrate(path: &Path, conn: &mut Connection) -> Result<(), StoreError> {
     if schema_of(path, conn)? == 0 {
         make(path, conn)?;
     }
-    let outcome = Migrations::new(schemas().into()).to_latest(conn);
+    let torn = law::on_damaged_pages(conn).in_file(path)?;
+    let outcome = Migrations::new(schemas(torn).into()).to_latest(conn);
     // Another program may have migrated the file while this one waited.
     if schema_of(path, conn)? == LATEST {
         return Ok(());
@@ -417,7 +420,7 @@ mod tests {
     fn migrated() -> Connection {
         let mut conn = Connection::open_in_memory().unwrap();
         configure(&conn).unwrap();
-        Migrations::new(schemas().into()).to_latest(&mut conn).unwrap();
+        Migrations::new(schemas(Vec::new()).into()).to_latest(&mut conn).unwrap();
         conn
     }
 

@@ -7,7 +7,7 @@ mod words;
 use rusqlite::{Connection, OptionalExtension, Result, Transaction, TransactionBehavior};
 
 use super::database::Store;
-use super::error::{InFile, StoreError};
+use super::error::{InFile, StoreError, is_damage};
 use super::read::{current_revision, damaged};
 use super::record::Summary;
 use super::rows::rows;
@@ -69,12 +69,16 @@ impl Store {
     }
 
     /// Kind of the rendered model in words, as [`Material::rendered_words`](crate::material::Material::rendered_words)
-    /// gives it. Does not read the rest of the material.
+    /// gives it, or that it is damaged. Does not read the rest of the material.
     ///
     /// # Errors
     /// When the file cannot be read.
     pub fn rendered_words(&self, slug: &Slug) -> Result<Option<String>, StoreError> {
-        words_of(&self.conn, slug).in_file(&self.path)
+        match words_of(&self.conn, slug) {
+            // A list shows the other materials.
+            Err(error) if is_damage(&error) => Ok(Some("damaged".to_owned())),
+            words => words.in_file(&self.path),
+        }
     }
 
     /// The `most` materials that all these words are found in, the best first; the last word may be the

@@ -111,8 +111,9 @@ impl<'a> MaterialWriter<'a> {
 
 /// Brings the fits that an older program stored to schema 11: the values of their parameters in `fit_parameter` alone,
 /// their numbers in `fit_number`. Fits of a damaged revision stay as they are, so that the rest of the file can be read.
-pub(super) fn bring_fits_to_one_value(tx: &Transaction) -> Result<()> {
-    for revision_id in rows(tx, "SELECT id FROM revision", [], |row| row.get(0))? {
+pub(super) fn bring_fits_to_one_value(tx: &Transaction, torn: &[i64]) -> Result<()> {
+    let revisions: Vec<i64> = rows(tx, "SELECT id FROM revision", [], |row| row.get(0))?;
+    for revision_id in revisions.into_iter().filter(|id| !torn.contains(id)) {
         tx.execute_batch("SAVEPOINT fits")?;
         match bring_to_one_value(tx, revision_id) {
             Ok(()) => tx.execute_batch("RELEASE fits")?,
