@@ -76,7 +76,7 @@ def reshading(results):
     for threads in [1, 2]:
         row = next((row for row in results.get("reshade", []) if row["threads"] == threads), None)
         slowest = row and max(median(row["law"]), median(row["effect"]))
-        chirps = f"a scan of {grouped(row['chirps'])} chirps, {grouped(row['looks'])} of them on the target," if row else "a scan"
+        chirps = f"a scan of {grouped(row['chirps'])} chirps, {grouped(row['shots'])} of them on the target," if row else "a scan"
         work = f"{chirps} again with another law or effect, {threads} thread{'s' * (threads > 1)}"
         yield at_most(work, 1, "ms", slowest)
 
