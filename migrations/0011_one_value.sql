@@ -9,7 +9,7 @@
 -- disagree, it leaves both: `matdb check` reports the revision, and `matdb check --repair` keeps the value
 -- that the content hash covers.
 
-DROP TABLE fit_estimate;
+DROP TABLE IF EXISTS fit_estimate;
 
 -- Made of the model and `fit.report` when a revision is added: every parameter of the model, then what else was
 -- found, such as S and R. `estimate` is NULL for a number that was not searched for.
