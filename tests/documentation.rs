@@ -3,6 +3,7 @@
 
 mod support;
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
@@ -51,9 +52,18 @@ fn every_command_of_the_readme_runs() {
     copy(&root().join("scenes"), &folder.path().join("scenes"));
     let commands = commands();
     assert_eq!(commands.len(), 6, "one to start with and five to go on with: {commands:?}");
+    let page = read(MODEL_THAT_MISSES);
+    let mut outputs = outputs(&page);
     for arguments in commands {
-        matdb(folder.path()).args(&arguments).assert().success();
+        let output = matdb(folder.path()).args(&arguments).assert().success().get_output().clone();
+        if let Some((_, lines)) = outputs.remove_entry(&format!("matdb {}", arguments.join(" "))) {
+            assert_printed(&output.stdout, &lines);
+        }
     }
+    assert!(
+        outputs.is_empty(),
+        "{MODEL_THAT_MISSES} shows what the README does not run: {outputs:?}"
+    );
     for (report, verdict, names) in
         [("nothing", "no-missing-effect", vec![]), ("why", "explained", vec!["foreign-patch"])]
     {
@@ -128,6 +138,22 @@ fn the_readme_names_the_test_command_and_files_that_exist() {
     }
 }
 
+const MODEL_THAT_MISSES: &str = "docs/why-does-my-model-miss.md";
+
+/// The lines that a page says its commands print, by the command in the block before them. Times and hashes differ.
+fn outputs(page: &str) -> BTreeMap<String, Vec<String>> {
+    let blocks: Vec<&str> = page.split("```").skip(1).step_by(2).collect();
+    let mut outputs = BTreeMap::new();
+    for pair in blocks.windows(2) {
+        let command = pair[0].strip_prefix("sh\n").and_then(|block| block.lines().last());
+        if let Some((command, text)) = command.zip(pair[1].strip_prefix("text\n")) {
+            let lasting = text.lines().filter(|line| !line.starts_with("wrote "));
+            outputs.insert(command.to_owned(), lasting.map(str::to_owned).collect());
+        }
+    }
+    outputs
+}
+
 /// The commands of a tutorial, and the lines that it says they print. Times and hashes differ.
 fn tutorial(page: &str) -> (String, Vec<String>) {
     let text = read(page);
@@ -169,17 +195,26 @@ fn the_tutorial_from_a_cloud_to_a_material_runs() {
     assert_printed(&output.stdout, &lines);
 }
 
-/// What the README runs as well is not run again.
+/// What the README runs as well is run and compared with the page by the README's test.
 #[test]
 fn the_tutorial_of_a_model_that_misses_runs() {
     let folder = clone();
-    let (script, _) = tutorial("docs/why-does-my-model-miss.md");
+    let (script, _) = tutorial(MODEL_THAT_MISSES);
     let readme = read("README.md");
     let is_new = |line: &&str| !line.contains("diagnose") || !readme.contains(&format!("{line} "));
     let script: Vec<&str> = script.lines().filter(is_new).collect();
     assert_eq!(script.len(), 5, "{script:?}");
     let output = run_shell(folder.path(), &script.join("\n")).success().get_output().clone();
     assert_printed(&output.stdout, &["nothing is missing".to_owned()]);
+    // With `--add` a diagnosis finds the same as without.
+    let page = read(MODEL_THAT_MISSES);
+    for (command, lines) in outputs(&page) {
+        if script.contains(&format!("{command} --add").as_str()) {
+            assert_printed(&output.stdout, &lines);
+            return;
+        }
+    }
+    panic!("{MODEL_THAT_MISSES} shows nothing that a command with --add prints");
 }
 
 #[test]
