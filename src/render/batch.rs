@@ -3,8 +3,8 @@
 //! With [`Tracer::Gpu`] the mesh and its hierarchy stay on the device. It traces the rays
 //! of whole chirps, evaluates equation (11) for each and sums over the spot, equation (7), for many scans at
 //! a time. The CPU computes in f64 the rays that the device leaves open: rays near an edge, and rays on scattering
-//! models that are not a sum of [`Term`](crate::brdf::Term)s. With any other tracer it computes all rays. Poses, spots and the
-//! receiver are always computed on the CPU, in f64.
+//! models that are not a sum of [`Term`](crate::brdf::Term)s or have a lobe narrower than the beam. With any other
+//! tracer it computes all rays. Poses, spots and the receiver are always computed on the CPU, in f64.
 //!
 //! A mean power of the device is within 0.02 dB of the renderer's. Its range is within 1.1·10⁻⁶ of the range plus the
 //! target's radius over cos θ. Powers below the smallest f32, about −350 dBm with the paper's radar, are only known
