@@ -16,7 +16,7 @@ use filter::summary;
 
 pub use filter::Filter;
 pub use outline::OutlineEntry;
-pub use words::Hit;
+pub use words::Match;
 
 impl Store {
     /// The current revisions of the materials that match a filter, sorted by name.
@@ -90,7 +90,7 @@ impl Store {
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn search(&self, words: &str, most: u32) -> Result<Vec<Hit>, StoreError> {
+    pub fn search(&self, words: &str, most: u32) -> Result<Vec<Match>, StoreError> {
         words::search(&self.conn, words, most).in_file(&self.path)
     }
 }
