@@ -28,4 +28,4 @@ pub use outline::{DEGREES, Outline};
 pub use parameter::{Parameter, ParameterError, Visitor};
 pub(crate) use retro::Retro;
 pub use scattering::{Scattering, ScatteringModel, Seen};
-pub use slopes::Distribution;
+pub use slopes::{Distribution, VIEWING_RAD};

@@ -10,7 +10,7 @@ use super::backscatter::{Facets, Term};
 use super::kind::Key;
 use super::parameter::{Visitor, visit_number};
 use super::scattering::half_vector;
-use super::slopes::Distribution;
+use super::slopes::{Distribution, SlopeMatrix};
 use crate::frames::{Direction, Surface};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
@@ -107,30 +107,38 @@ pub(super) fn wavenumber_rad_per_m(frequency_hz: f64) -> f64 {
     std::f64::consts::TAU * frequency_hz / SPEED_OF_LIGHT_M_PER_S
 }
 
-/// f of a mirror seen with a finite angular width: R·D(h)·G/(4·cos θ_i·cos θ_o), 1/sr.
+/// f of a mirror as a beam of a divergence, rad, sees it: R·D(h)·G/(4·cos θ_i·cos θ_o), 1/sr.
 ///
-/// `reflectance` maps cos of the angle between the directions and h to R. D is Beckmann's with
-/// m = `lobe_rad`, and Smith's G keeps the energy at grazing incidence.
+/// `reflectance` maps cos of the angle between the directions and h to R. D is Beckmann's with the beam's own slopes
+/// and those of the lobe, and Smith's G keeps the energy of a wide lobe at grazing incidence.
 pub(super) fn mirror_lobe_per_sr(
     i: Direction<Surface>,
     o: Direction<Surface>,
     lobe_rad: f64,
+    beam_rad: f64,
     reflectance: impl Fn(f64) -> f64,
 ) -> f64 {
-    let h = half_vector(i, o);
-    let law = Distribution::Beckmann;
-    let d_per_sr = law.d_per_sr(h.cos_theta(), lobe_rad);
+    let facets = mirror_facets(lobe_rad);
+    let (law, own_m) = (facets.distribution, facets.m_without_beam(beam_rad));
+    let beam = SlopeMatrix::of_beam(beam_rad, i, o);
+    let d_per_sr = law.d_seen_per_sr(half_vector(i, o), [own_m, own_m], beam);
     if d_per_sr == 0.0 {
         return 0.0;
     }
-    let g = law.g1(i.cos_theta(), lobe_rad) * law.g1(o.cos_theta(), lobe_rad);
+    let m = facets.shadowing_m(beam_rad);
+    let g = law.g1(i.cos_theta(), m) * law.g1(o.cos_theta(), m);
     reflectance(mirror_cosine(i, o)) * d_per_sr * g / (4.0 * i.cos_theta() * o.cos_theta())
 }
 
 /// [`mirror_lobe_per_sr`] in backscatter, for the reflectance at normal incidence.
 pub(super) fn mirror_lobe(lobe_rad: f64, reflectance: f64) -> Term {
+    Term::mirrors(reflectance, mirror_facets(lobe_rad))
+}
+
+/// The facets of a mirror whose lobe is stated as the beam and the surface make it.
+fn mirror_facets(lobe_rad: f64) -> Facets {
     let distribution = Distribution::Beckmann;
-    Term::mirrors(reflectance, Facets { m: lobe_rad, distribution, shadowed: 2 })
+    Facets { m: lobe_rad, distribution, shadowed: 2, includes_beam: true }
 }
 
 /// Cosine of the angle at which a facet mirrors i into o, √((1 + i·o)/2): the same from both ends.

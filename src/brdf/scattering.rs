@@ -19,8 +19,9 @@ pub trait Scattering: Sync {
 
     /// f(i, o) as a beam of the divergence `beam_rad` (δ, rad, 0 or more) sees it, and how it is made up.
     ///
-    /// No lobe is seen narrower than the beam itself, so that a mirror returns at most what it was sent. A model
-    /// without facets, such as a closure or a measured curve, counts as diffuse and is seen as it is.
+    /// A lobe is seen convolved with the beam's own, so that a mirror returns at most what it was sent. A model without
+    /// a lobe is diffuse and is seen as it is; so are a closure and a measured curve, which includes the beam that it
+    /// was measured with. Without a beam, δ = 0, this is [`f_per_sr`](Self::f_per_sr).
     fn seen_by(&self, _beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         Seen::diffuse(self.f_per_sr(i, o))
     }

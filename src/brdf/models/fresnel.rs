@@ -55,9 +55,9 @@ impl Scattering for Fresnel {
     }
 
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
-        let (eps, lobe_rad) =
-            (permittivity(self.eps_real, self.eps_imag), self.lobe_rad.max(beam_rad));
-        Seen::mirror(mirror_lobe_per_sr(i, o, lobe_rad, |cos| fresnel_reflectance(eps, cos)))
+        let eps = permittivity(self.eps_real, self.eps_imag);
+        let reflectance = |cos| fresnel_reflectance(eps, cos);
+        Seen::mirror(mirror_lobe_per_sr(i, o, self.lobe_rad, beam_rad, reflectance))
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

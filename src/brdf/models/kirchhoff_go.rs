@@ -17,7 +17,7 @@ use crate::brdf::permittivity::{
     EPS_IMAG, EPS_REAL, fresnel_reflectance, mirror_cosine, permittivity, visit_permittivity,
 };
 use crate::brdf::scattering::{Scattering, ScatteringModel, Seen, half_vector};
-use crate::brdf::slopes::Distribution;
+use crate::brdf::slopes::{Distribution, SlopeMatrix};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -47,7 +47,8 @@ impl Scattering for KirchhoffGo {
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         let m = std::f64::consts::SQRT_2 * self.rms_slope;
         let law = Distribution::Beckmann;
-        let d_per_sr = law.d_per_sr(half_vector(i, o).cos_theta(), m.max(beam_rad));
+        let beam = SlopeMatrix::of_beam(beam_rad, i, o);
+        let d_per_sr = law.d_seen_per_sr(half_vector(i, o), [m, m], beam);
         let eps = permittivity(self.eps_real, self.eps_imag);
         let reflectance = fresnel_reflectance(eps, mirror_cosine(i, o));
         let f_per_sr = reflectance * d_per_sr / (4.0 * i.cos_theta() * o.cos_theta());
@@ -56,7 +57,8 @@ impl Scattering for KirchhoffGo {
 
     fn backscatter(&self) -> Option<Vec<Term>> {
         let m = std::f64::consts::SQRT_2 * self.rms_slope;
-        let facets = Facets { m, distribution: Distribution::Beckmann, shadowed: 0 };
+        let distribution = Distribution::Beckmann;
+        let facets = Facets { m, distribution, shadowed: 0, includes_beam: false };
         let eps = permittivity(self.eps_real, self.eps_imag);
         Some(vec![Term::mirrors(fresnel_reflectance(eps, 1.0), facets)])
     }

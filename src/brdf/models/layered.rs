@@ -132,8 +132,8 @@ impl Scattering for Layered {
     }
 
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
-        let lobe_rad = self.lobe_rad.max(beam_rad);
-        Seen::mirror(mirror_lobe_per_sr(i, o, lobe_rad, |cos| self.reflectance_at(cos)))
+        let reflectance = |cos| self.reflectance_at(cos);
+        Seen::mirror(mirror_lobe_per_sr(i, o, self.lobe_rad, beam_rad, reflectance))
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {
