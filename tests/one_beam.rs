@@ -7,7 +7,8 @@ use std::f64::consts::{LN_2, PI};
 
 use glam::{DMat3, DVec3};
 use matdb::brdf::{
-    Brdf, CookTorrance, Distribution, Fresnel, KirchhoffGo, Lambert, Layered, Scattering, Shadowing,
+    BlinnPhong, Brdf, CookTorrance, Correlation, Directive, Distribution, Fresnel, Kirchhoff,
+    KirchhoffGo, Lambert, Layered, Scattering, Shadowing, VIEWING_RAD,
 };
 use matdb::geometry::Mesh;
 use matdb::radar::scan::Raster;
@@ -31,7 +32,7 @@ const HIGHLIGHT_DB: f64 = 0.15;
 const LOBE_DB: f64 = 0.01;
 
 /// A metal without loss.
-const MIRROR: Fresnel = Fresnel { eps_real: 1.0, eps_imag: 1e9, lobe_rad: 0.001 };
+const MIRROR: Fresnel = Fresnel { eps_real: 1.0, eps_imag: 1e9, lobe_rad: None };
 
 /// The default radar's beam, by hand from 16 mm and 300 GHz.
 struct Waist {
@@ -165,6 +166,63 @@ fn a_smooth_sphere_returns_its_glint() {
     }
 }
 
+/// Metal facets of Beckmann's law.
+fn facets(m: f64) -> CookTorrance {
+    CookTorrance {
+        f_lambda: 1.0,
+        m,
+        m_across: None,
+        distribution: Distribution::Beckmann,
+        shadowing: Shadowing::Separable,
+    }
+}
+
+#[test]
+fn a_rough_plate_returns_its_lobe_widened_by_the_beam() {
+    let waist = Waist::new();
+    let delta2 = waist.divergence_rad().powi(2);
+    for (m, rays) in [(0.001, 1), (0.005, 1), (0.02, 1), (0.1, 1), (0.005, RAYS), (0.02, RAYS)] {
+        for z_m in OFF_FOCUS_M {
+            for tilt_rad in [0.0f64, 0.01, 0.02] {
+                // P·F·G·δ_w²/m_eff²·exp(−tan²θ/m_eff²)/cos⁵θ with m_eff² = m² + δ₀² for a plate, and G = 1.
+                let seen2 = m * m + delta2;
+                let share = delta2 / (1.0 + waist.zeta(z_m).powi(2)) / seen2
+                    * (-tilt_rad.tan().powi(2) / seen2).exp()
+                    / tilt_rad.cos().powi(5);
+                let found = returned(plate(), tilt_rad, z_m, rays, &facets(m));
+                let error_db = db(found / share);
+                assert!(
+                    error_db.abs() < if rays == 1 { 1e-3 } else { MEAN_DB },
+                    "m = {m}, {z_m} m, {tilt_rad}, {rays} rays: {error_db} dB"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rough_sphere_returns_the_sum_of_roughness_beam_and_curvature() {
+    let (waist, radius_m) = (Waist::new(), 0.15);
+    for (m, z_m) in [(0.02, -0.2), (0.02, 0.0), (0.05, 0.0), (0.05, 0.2)] {
+        // P·F·δ_w²/(m² + δ_w² + (w²/4)·(1/a + 1/R_c)²).
+        let rayleigh_m = PI * waist.waist_m.powi(2) / waist.wavelength_m;
+        let curvature_per_m = 1.0 / radius_m + z_m / (z_m * z_m + rayleigh_m * rayleigh_m);
+        let radius2 = waist.radius_m2(z_m);
+        let delta2 = (waist.wavelength_m / (2.0 * PI)).powi(2) / radius2;
+        let matrix = m * m + delta2 + 0.25 * radius2 * curvature_per_m.powi(2);
+        let found_db = db(returned(cap(radius_m), 0.0, z_m, RAYS, &facets(m)) * matrix / delta2);
+        assert!(found_db.abs() < HIGHLIGHT_DB, "m = {m}, {z_m} m: {found_db} dB");
+    }
+}
+
+#[test]
+fn a_smooth_mirror_is_drawn_as_the_default_radar_sees_it() {
+    assert!((VIEWING_RAD / Waist::new().divergence_rad() - 1.0).abs() < 1e-3);
+    let up = matdb::frames::Direction::from_angles(0.0, 0.0);
+    let seen = MIRROR.seen_by(VIEWING_RAD, up, up).f_per_sr;
+    assert!((MIRROR.retro_per_sr(0.0) / seen - 1.0).abs() < 1e-12);
+}
+
 #[test]
 fn the_edge_of_a_diffuse_half_plane_takes_half() {
     let mut half = plate();
@@ -185,8 +243,26 @@ fn lobes() -> Vec<Brdf> {
         eps_real: 1.0,
         eps_imag: 1e9,
         frequency_hz: 300e9,
-        lobe_rad: 0.001,
+        lobe_rad: None,
     }));
+    // A lobe may be as narrow as the beam wherever it comes from. Blinn and Phong's reflects at most what it receives up
+    // to this level.
+    let alpha = 1000.0;
+    all.push(Brdf::BlinnPhong(BlinnPhong { r_s: (alpha + 4.0) / (4.0 * alpha), alpha }));
+    all.push(Brdf::Directive(Directive { s: 1.0, alpha_r: 200.0, lambda: 1.0, alpha_i: 1.0 }));
+    for correlation in [Correlation::Gaussian, Correlation::Exponential] {
+        for (rms_height_m, lobe_rad) in [(2e-5, None), (8e-5, Some(0.001)), (3e-4, None)] {
+            all.push(Brdf::Kirchhoff(Kirchhoff {
+                rms_height_m,
+                correlation_length_m: 0.1,
+                correlation,
+                eps_real: 1.0,
+                eps_imag: 1e9,
+                frequency_hz: 300e9,
+                lobe_rad,
+            }));
+        }
+    }
     for m in [0.001, 0.005, 0.02, 0.1, 0.4] {
         let go = KirchhoffGo { rms_slope: m, eps_real: 1.0, eps_imag: 1e9 };
         all.push(Brdf::KirchhoffGo(go));

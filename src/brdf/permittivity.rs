@@ -8,7 +8,7 @@ use nalgebra::Complex;
 
 use super::backscatter::{Facets, Term};
 use super::kind::Key;
-use super::parameter::{Visitor, visit_number};
+use super::parameter::{Visitor, visit_number, visit_quantity};
 use super::scattering::half_vector;
 use super::slopes::{Distribution, SlopeMatrix};
 use crate::frames::{Direction, Surface};
@@ -89,12 +89,13 @@ pub(super) fn unpolarised(amplitude: impl Fn(Polarisation) -> Complex<f64>) -> f
 }
 
 /// Range of the lobe width of a mirror, rad.
-pub(super) const LOBE_RANGE_RAD: (f64, f64) = (0.001, 0.5);
+const LOBE_RANGE_RAD: (f64, f64) = (0.001, 0.5);
 
-/// A Gaussian beam of waist w returns exp(−(δ/δ₀)²) of its power from a mirror tilted by δ, with
-/// δ₀ = λ/(2πw): 0.020 rad for a spot 2w = 16 mm across at λ = 1 mm.
-pub(super) fn default_lobe_rad() -> f64 {
-    0.02
+/// Calls the visitor for the width of a mirror's lobe, where it is stated.
+pub(super) fn visit_lobe(visitor: &mut Visitor, prefix: &str, lobe_rad: &mut Option<f64>) {
+    if let Some(lobe_rad) = lobe_rad {
+        visit_quantity(visitor, prefix, "lobe_rad", "rad", LOBE_RANGE_RAD, lobe_rad);
+    }
 }
 
 /// Frequency of a model that gives none.
@@ -114,7 +115,7 @@ pub(super) fn wavenumber_rad_per_m(frequency_hz: f64) -> f64 {
 pub(super) fn mirror_lobe_per_sr(
     i: Direction<Surface>,
     o: Direction<Surface>,
-    lobe_rad: f64,
+    lobe_rad: Option<f64>,
     beam_rad: f64,
     reflectance: impl Fn(f64) -> f64,
 ) -> f64 {
@@ -131,14 +132,18 @@ pub(super) fn mirror_lobe_per_sr(
 }
 
 /// [`mirror_lobe_per_sr`] in backscatter, for the reflectance at normal incidence.
-pub(super) fn mirror_lobe(lobe_rad: f64, reflectance: f64) -> Term {
+pub(super) fn mirror_lobe(lobe_rad: Option<f64>, reflectance: f64) -> Term {
     Term::mirrors(reflectance, mirror_facets(lobe_rad))
 }
 
-/// The facets of a mirror whose lobe is stated as the beam and the surface make it.
-fn mirror_facets(lobe_rad: f64) -> Facets {
-    let distribution = Distribution::Beckmann;
-    Facets { m: lobe_rad, distribution, shadowed: 2, includes_beam: true }
+/// The facets of a mirror: of a lobe stated as beam and surface make it, or of a smooth one.
+fn mirror_facets(lobe_rad: Option<f64>) -> Facets {
+    Facets {
+        m: lobe_rad.unwrap_or(0.0),
+        distribution: Distribution::Beckmann,
+        shadowed: 2,
+        includes_beam: lobe_rad.is_some(),
+    }
 }
 
 /// Cosine of the angle at which a facet mirrors i into o, √((1 + i·o)/2): the same from both ends.

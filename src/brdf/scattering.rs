@@ -102,6 +102,11 @@ pub trait ScatteringModel: Scattering {
         false
     }
 
+    /// Whether it has a smooth mirror, a delta in direction: f holds it as [`VIEWING_RAD`](super::VIEWING_RAD) wide.
+    fn has_smooth_mirror(&self) -> bool {
+        false
+    }
+
     /// ε′ and ε″ of the outermost medium, where they are parameters.
     fn permittivity(&self) -> Option<[f64; 2]> {
         None

@@ -29,9 +29,8 @@ use crate::brdf::backscatter::UNSEEN;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_quantity};
 use crate::brdf::permittivity::{
-    EPS_IMAG, EPS_REAL, LOBE_RANGE_RAD, default_frequency_hz, default_lobe_rad,
-    fresnel_reflectance, mirror_cosine, mirror_lobe_per_sr, permittivity, visit_permittivity,
-    wavenumber_rad_per_m,
+    EPS_IMAG, EPS_REAL, default_frequency_hz, fresnel_reflectance, mirror_cosine,
+    mirror_lobe_per_sr, permittivity, visit_lobe, visit_permittivity, wavenumber_rad_per_m,
 };
 use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
 use crate::brdf::slopes::over_exponential;
@@ -46,11 +45,12 @@ pub(super) const KIND: Kind = Kind {
         EPS_REAL,
         EPS_IMAG,
         Key::number("frequency_hz"),
-        Key::number("lobe_rad"),
+        Key::number("lobe_rad").optional(),
     ],
     starts: &[(
         "kirchhoff",
-        r#"{"model": "kirchhoff", "rms_height_m": 5e-5, "correlation_length_m": 5e-4, "eps_real": 3}"#,
+        r#"{"model": "kirchhoff", "rms_height_m": 5e-5, "correlation_length_m": 5e-4, "eps_real": 3,
+            "lobe_rad": 0.02}"#,
     )],
 };
 
@@ -73,9 +73,10 @@ pub struct Kirchhoff {
     /// Frequency, 10 GHz to 1 THz.
     #[serde(default = "default_frequency_hz")]
     pub frequency_hz: f64,
-    /// Width of the coherent mirror's lobe, 0.001 to 0.5 rad, as in `fresnel`.
-    #[serde(default = "default_lobe_rad")]
-    pub lobe_rad: f64,
+    /// Width of the mirror's lobe as the radar sees it, 0.001 to 0.5 rad, the beam included; absent for a smooth
+    /// mirror, whose lobe is the beam's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lobe_rad: Option<f64>,
 }
 
 /// How the heights at two places depend on their distance r.
@@ -155,11 +156,15 @@ impl ScatteringModel for Kirchhoff {
             ("rms_height_m", "m", HEIGHT_RANGE_M, &mut self.rms_height_m),
             ("correlation_length_m", "m", LENGTH_RANGE_M, &mut self.correlation_length_m),
             ("frequency_hz", "Hz", FREQUENCY_RANGE_HZ, &mut self.frequency_hz),
-            ("lobe_rad", "rad", LOBE_RANGE_RAD, &mut self.lobe_rad),
         ] {
             visit_quantity(visitor, prefix, name, unit, range, slot);
         }
+        visit_lobe(visitor, prefix, &mut self.lobe_rad);
         visit_permittivity(visitor, prefix, &mut self.eps_real, &mut self.eps_imag);
+    }
+
+    fn has_smooth_mirror(&self) -> bool {
+        self.lobe_rad.is_none()
     }
 
     fn permittivity(&self) -> Option<[f64; 2]> {
@@ -259,7 +264,7 @@ mod tests {
             eps_real: 4.67,
             eps_imag: 5.0,
             frequency_hz: 300e9,
-            lobe_rad: 0.02,
+            lobe_rad: Some(0.02),
         }
     }
 
@@ -323,7 +328,7 @@ mod tests {
         }
         let oblique = (60f64.to_radians(), 50e-6);
         let tilted = (-(wavenumber_rad_per_m(300e9) * oblique.1).powi(2)).exp();
-        let wide = |s_m| Kirchhoff { lobe_rad: 0.5, ..rough(s_m, 1e-3) };
+        let wide = |s_m| Kirchhoff { lobe_rad: Some(0.5), ..rough(s_m, 1e-3) };
         let direction = retro(oblique.0);
         let found = wide(oblique.1).coherent_per_sr(direction, direction)
             / wide(0.0).coherent_per_sr(direction, direction);
@@ -332,7 +337,7 @@ mod tests {
 
     #[test]
     fn a_flat_surface_is_the_mirror() {
-        let mirror = Fresnel { eps_real: 4.67, eps_imag: 5.0, lobe_rad: 0.02 };
+        let mirror = Fresnel { eps_real: 4.67, eps_imag: 5.0, lobe_rad: Some(0.02) };
         for theta_rad in [0.0, 0.01, 0.05] {
             let expected = mirror.retro_per_sr(theta_rad);
             assert_eq!(rough(0.0, 1e-3).retro_per_sr(theta_rad), expected);

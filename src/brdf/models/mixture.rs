@@ -83,6 +83,10 @@ impl<P: ScatteringModel> ScatteringModel for Mixture<P> {
         self.specular.f_lambda().or_else(|| self.diffuse.f_lambda())
     }
 
+    fn has_smooth_mirror(&self) -> bool {
+        self.weighted().any(|(weight, part)| weight > 0.0 && part.has_smooth_mirror())
+    }
+
     fn has_curve(&self) -> bool {
         self.diffuse.has_curve() || self.specular.has_curve()
     }

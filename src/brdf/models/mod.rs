@@ -133,6 +133,10 @@ impl ScatteringModel for Brdf {
         self.model().is_smooth()
     }
 
+    fn has_smooth_mirror(&self) -> bool {
+        self.model().has_smooth_mirror()
+    }
+
     fn permittivity(&self) -> Option<[f64; 2]> {
         self.model().permittivity()
     }

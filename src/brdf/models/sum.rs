@@ -59,6 +59,10 @@ impl<P: ScatteringModel> ScatteringModel for Sum<P> {
         self.parts.iter().find_map(P::f_lambda)
     }
 
+    fn has_smooth_mirror(&self) -> bool {
+        self.weighted().any(|(weight, part)| weight > 0.0 && part.has_smooth_mirror())
+    }
+
     fn has_curve(&self) -> bool {
         self.parts.iter().any(P::has_curve)
     }
