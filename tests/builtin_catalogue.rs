@@ -47,7 +47,9 @@ fn reflectance(entry: &Permittivity) -> f64 {
 fn used(material: &Material) -> Vec<&String> {
     let fits = material.fits.iter();
     let parameters = fits.clone().flat_map(|f| f.parameter_sources.iter().map(|(_, key)| key));
-    let permittivities = material.permittivities.iter().map(|entry| &entry.source);
+    let entries = material.permittivities.iter();
+    let frequencies = entries.clone().filter_map(|entry| entry.frequency_source.as_ref());
+    let permittivities = entries.map(|entry| &entry.source).chain(frequencies);
     let curves = material.curves.iter().map(|curve| &curve.source);
     let roughness = material.roughness.iter().map(|roughness| &roughness.source);
     fits.map(|f| &f.source)

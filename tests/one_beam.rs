@@ -13,7 +13,7 @@ use matdb::brdf::{
 use matdb::geometry::Mesh;
 use matdb::radar::scan::Raster;
 use matdb::radar::{Chirps, Footprint, Pattern, Radar};
-use matdb::render::Observer;
+use matdb::render::{Bounce, Observer};
 use matdb::scene::solids;
 
 /// Distances from the focus, m.
@@ -67,7 +67,19 @@ fn db(ratio: f64) -> f64 {
 
 /// Power received from a mesh about the origin over that sent, for a chirp along the axis of the field of view; the
 /// mesh is turned about y and moved away from the focus.
-fn returned(mut mesh: Mesh, tilt_rad: f64, z_m: f64, rays: usize, law: &dyn Scattering) -> f64 {
+fn returned(mesh: Mesh, tilt_rad: f64, z_m: f64, rays: usize, law: &dyn Scattering) -> f64 {
+    returned_by(mesh, tilt_rad, z_m, rays, law, None)
+}
+
+/// As [`returned`], with second-order paths.
+fn returned_by(
+    mut mesh: Mesh,
+    tilt_rad: f64,
+    z_m: f64,
+    rays: usize,
+    law: &dyn Scattering,
+    bounce: Option<Bounce>,
+) -> f64 {
     let turn = DMat3::from_rotation_y(tilt_rad);
     for vertex in &mut mesh.vertices {
         // The default radar looks along −z from (0, 1.1, 8).
@@ -83,7 +95,7 @@ fn returned(mut mesh: Mesh, tilt_rad: f64, z_m: f64, rays: usize, law: &dyn Scat
         ..Radar::default()
     };
     let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
-    let echoes = support::echoes_at(&radar, &chirps, &mesh, law, rays, None, Observer::Radar);
+    let echoes = support::echoes_at(&radar, &chirps, &mesh, law, rays, bounce, Observer::Radar);
     echoes.first().map_or(0.0, |echo| echo.power_w)
 }
 
@@ -212,6 +224,47 @@ fn a_rough_sphere_returns_the_sum_of_roughness_beam_and_curvature() {
         let matrix = m * m + delta2 + 0.25 * radius2 * curvature_per_m.powi(2);
         let found_db = db(returned(cap(radius_m), 0.0, z_m, RAYS, &facets(m)) * matrix / delta2);
         assert!(found_db.abs() < HIGHLIGHT_DB, "m = {m}, {z_m} m: {found_db} dB");
+    }
+}
+
+/// Two wings at right angles, open towards the radar, whose edge lies the given distance aside.
+fn corner(aside_m: f64) -> Mesh {
+    const WING_M: f64 = 0.2;
+    let line = |x: f64, z: f64| [-WING_M, WING_M].map(|y| DVec3::new(x + aside_m, y, z));
+    let [a, b] = line(0.0, 0.0);
+    let [c, d] = line(WING_M, WING_M);
+    let [e, f] = line(-WING_M, WING_M);
+    let facets = vec![[0, 2, 1], [1, 2, 3], [0, 1, 4], [1, 5, 4]];
+    Mesh { vertices: vec![a, b, c, d, e, f], facets, labels: Vec::new() }
+}
+
+/// How a corner of two mirrors answers a chirp: by no single path, but by two mirrors in turn.
+#[test]
+fn a_corner_of_two_mirrors_returns_what_a_mirror_does() {
+    let waist = Waist::new();
+    let bounce = Some(Bounce { rays: 8, outside_spot: 0.0 });
+    for (law, m) in [(Brdf::Fresnel(MIRROR), 0.0), (Brdf::CookTorrance(facets(0.004)), 0.004)] {
+        for z_m in [0.0, 0.3] {
+            for aside in [0.0, 0.25, 0.5] {
+                // P·R₁R₂·exp(−4s²/w²)·δ_w²/(m₁² + m₂² + δ₀²) at the edge's distance s aside.
+                let radius2 = waist.radius_m2(z_m);
+                let aside_m = aside * radius2.sqrt();
+                let delta2 = waist.divergence_rad().powi(2);
+                let share = (-4.0 * aside * aside).exp() * delta2
+                    / (1.0 + waist.zeta(z_m).powi(2))
+                    / (2.0 * m * m + delta2);
+                for (rays, tolerance_db) in [(1, 0.05), (RAYS, HIGHLIGHT_DB)] {
+                    // A single ray needs the edge beside it.
+                    let aside_m = if rays == 1 { aside_m.max(1e-5) } else { aside_m };
+                    let found = returned_by(corner(aside_m), 0.0, z_m, rays, &law, bounce);
+                    let error_db = db(found / share);
+                    assert!(
+                        error_db.abs() < tolerance_db,
+                        "m = {m}, {z_m} m, {aside} w, {rays} rays: {error_db} dB"
+                    );
+                }
+            }
+        }
     }
 }
 

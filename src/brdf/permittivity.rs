@@ -9,7 +9,7 @@ use nalgebra::Complex;
 use super::backscatter::{Facets, Term};
 use super::kind::Key;
 use super::parameter::{Visitor, visit_number, visit_quantity};
-use super::scattering::half_vector;
+use super::scattering::{NARROW_M, NarrowLobe, half_vector};
 use super::slopes::{Distribution, SlopeMatrix};
 use crate::frames::{Direction, Surface};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -134,6 +134,16 @@ pub(super) fn mirror_lobe_per_sr(
 /// [`mirror_lobe_per_sr`] in backscatter, for the reflectance at normal incidence.
 pub(super) fn mirror_lobe(lobe_rad: Option<f64>, reflectance: f64) -> Term {
     Term::mirrors(reflectance, mirror_facets(lobe_rad))
+}
+
+/// Whether a mirror's lobe is too narrow for a path to meet by chance.
+pub(super) fn is_narrow(lobe_rad: Option<f64>) -> bool {
+    lobe_rad.is_none_or(|lobe_rad| lobe_rad <= NARROW_M)
+}
+
+/// The lobe of a mirror, if it is narrow. A stated one is mostly the beam's, so that the mirror itself counts as smooth.
+pub(super) fn narrow_mirror(lobe_rad: Option<f64>, share: f64) -> Vec<NarrowLobe> {
+    if is_narrow(lobe_rad) { vec![NarrowLobe { share, m: 0.0 }] } else { Vec::new() }
 }
 
 /// The facets of a mirror: of a lobe stated as beam and surface make it, or of a smooth one.

@@ -31,6 +31,17 @@ pub trait Scattering: Sync {
         self.seen_by(0.0, i, o).specular_share
     }
 
+    /// The lobes in which a surface that is lit from `i` sends power on like a mirror, too narrow for a path to meet by
+    /// chance: those with a roughness up to [`NARROW_M`].
+    fn narrow_lobes(&self, _i: Direction<Surface>) -> Vec<NarrowLobe> {
+        Vec::new()
+    }
+
+    /// f(i, o) apart from the narrow lobes.
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        self.seen_by(0.0, i, o)
+    }
+
     /// f in exact backscatter as a sum of closed forms; `None` for a model whose f depends on the azimuth,
     /// or that has no such sum.
     fn backscatter(&self) -> Option<Vec<Term>> {
@@ -47,6 +58,19 @@ pub trait Scattering: Sync {
     fn sigma0(&self, theta_rad: f64) -> f64 {
         4.0 * std::f64::consts::PI * self.retro_per_sr(theta_rad) * theta_rad.cos().powi(2)
     }
+}
+
+/// Largest roughness of a lobe that a path follows in the direction of the mirror alone: below the divergence of a
+/// beam, which its roughness then joins.
+pub const NARROW_M: f64 = 0.01;
+
+/// A lobe about the direction of the mirror.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NarrowLobe {
+    /// Share of the power in it, 0 to 1.
+    pub share: f64,
+    /// Roughness m; 0 for a smooth mirror.
+    pub m: f64,
 }
 
 /// What a beam sees of a surface in one pair of directions.

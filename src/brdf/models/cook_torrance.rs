@@ -17,7 +17,9 @@ use serde::{Deserialize, Serialize};
 use crate::brdf::backscatter::{Facets, Term};
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_number};
-use crate::brdf::scattering::{Scattering, ScatteringModel, Seen, half_vector};
+use crate::brdf::scattering::{
+    NARROW_M, NarrowLobe, Scattering, ScatteringModel, Seen, half_vector,
+};
 use crate::brdf::slopes::{Distribution, SlopeMatrix};
 use crate::frames::{Direction, Surface};
 
@@ -75,6 +77,10 @@ impl CookTorrance {
         [self.m, self.m_across.unwrap_or(self.m)]
     }
 
+    fn is_narrow(&self) -> bool {
+        self.axes().into_iter().all(|m| m <= NARROW_M)
+    }
+
     /// G1 of one direction, with the roughness in its azimuth.
     fn g1(&self, direction: Direction<Surface>) -> f64 {
         let m = self.m_across.map_or(self.m, |m_across| m_along(direction, [self.m, m_across]));
@@ -112,6 +118,19 @@ impl Scattering for CookTorrance {
         let f = self.fresnel(o.xyz().dot(h.xyz()));
         let f_per_sr = f * d * self.shadowing(i, o) / (4.0 * i.cos_theta() * o.cos_theta());
         Seen::facets(f_per_sr, beam_rad, self.axes())
+    }
+
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        if !self.is_narrow() {
+            return Vec::new();
+        }
+        let share = self.fresnel(i.cos_theta()) * self.shadowing(i, i.mirrored());
+        let [m, m_across] = self.axes();
+        vec![NarrowLobe { share, m: (m * m_across).sqrt() }]
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if self.is_narrow() { Seen::default() } else { self.seen_by(0.0, i, o) }
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

@@ -17,10 +17,10 @@ use crate::brdf::backscatter::Term;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::Visitor;
 use crate::brdf::permittivity::{
-    EPS_IMAG, EPS_REAL, fresnel_reflectance, mirror_lobe, mirror_lobe_per_sr, permittivity,
-    visit_lobe, visit_permittivity,
+    EPS_IMAG, EPS_REAL, fresnel_reflectance, is_narrow, mirror_lobe, mirror_lobe_per_sr,
+    narrow_mirror, permittivity, visit_lobe, visit_permittivity,
 };
-use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
+use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -60,6 +60,15 @@ impl Scattering for Fresnel {
         let eps = permittivity(self.eps_real, self.eps_imag);
         let reflectance = |cos| fresnel_reflectance(eps, cos);
         Seen::mirror(mirror_lobe_per_sr(i, o, self.lobe_rad, beam_rad, reflectance))
+    }
+
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        let eps = permittivity(self.eps_real, self.eps_imag);
+        narrow_mirror(self.lobe_rad, fresnel_reflectance(eps, i.cos_theta()))
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if is_narrow(self.lobe_rad) { Seen::default() } else { self.seen_by(0.0, i, o) }
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

@@ -29,10 +29,11 @@ use crate::brdf::backscatter::UNSEEN;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_quantity};
 use crate::brdf::permittivity::{
-    EPS_IMAG, EPS_REAL, default_frequency_hz, fresnel_reflectance, mirror_cosine,
-    mirror_lobe_per_sr, permittivity, visit_lobe, visit_permittivity, wavenumber_rad_per_m,
+    EPS_IMAG, EPS_REAL, default_frequency_hz, fresnel_reflectance, is_narrow, mirror_cosine,
+    mirror_lobe_per_sr, narrow_mirror, permittivity, visit_lobe, visit_permittivity,
+    wavenumber_rad_per_m,
 };
-use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
+use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use crate::brdf::slopes::over_exponential;
 use crate::frames::{Direction, Surface};
 
@@ -147,6 +148,19 @@ impl Scattering for Kirchhoff {
         let f_per_sr = self.incoherent_seen_by(beam_rad, i, o) + coherent_per_sr;
         let coherent_share = if f_per_sr > 0.0 { coherent_per_sr / f_per_sr } else { 0.0 };
         Seen { f_per_sr, specular_share: 1.0, coherent_share }
+    }
+
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        let q_z = 2.0 * wavenumber_rad_per_m(self.frequency_hz) * i.cos_theta();
+        let kept = (-(q_z * self.rms_height_m).powi(2)).exp();
+        narrow_mirror(self.lobe_rad, kept * fresnel_reflectance(self.eps(), i.cos_theta()))
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if !is_narrow(self.lobe_rad) {
+            return self.seen_by(0.0, i, o);
+        }
+        Seen { specular_share: 1.0, ..Seen::diffuse(self.incoherent_per_sr(i, o)) }
     }
 }
 

@@ -16,7 +16,9 @@ use crate::brdf::parameter::{Visitor, visit_number};
 use crate::brdf::permittivity::{
     EPS_IMAG, EPS_REAL, fresnel_reflectance, mirror_cosine, permittivity, visit_permittivity,
 };
-use crate::brdf::scattering::{Scattering, ScatteringModel, Seen, half_vector};
+use crate::brdf::scattering::{
+    NARROW_M, NarrowLobe, Scattering, ScatteringModel, Seen, half_vector,
+};
 use crate::brdf::slopes::{Distribution, SlopeMatrix};
 use crate::frames::{Direction, Surface};
 
@@ -39,13 +41,19 @@ pub struct KirchhoffGo {
     pub eps_imag: f64,
 }
 
+impl KirchhoffGo {
+    fn m(&self) -> f64 {
+        std::f64::consts::SQRT_2 * self.rms_slope
+    }
+}
+
 impl Scattering for KirchhoffGo {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         self.seen_by(0.0, i, o).f_per_sr
     }
 
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
-        let m = std::f64::consts::SQRT_2 * self.rms_slope;
+        let m = self.m();
         let law = Distribution::Beckmann;
         let beam = SlopeMatrix::of_beam(beam_rad, i, o);
         let d_per_sr = law.d_seen_per_sr(half_vector(i, o), [m, m], beam);
@@ -55,8 +63,21 @@ impl Scattering for KirchhoffGo {
         Seen::facets(f_per_sr, beam_rad, [m, m])
     }
 
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        let m = self.m();
+        if m > NARROW_M {
+            return Vec::new();
+        }
+        let eps = permittivity(self.eps_real, self.eps_imag);
+        vec![NarrowLobe { share: fresnel_reflectance(eps, i.cos_theta()), m }]
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if self.m() <= NARROW_M { Seen::default() } else { self.seen_by(0.0, i, o) }
+    }
+
     fn backscatter(&self) -> Option<Vec<Term>> {
-        let m = std::f64::consts::SQRT_2 * self.rms_slope;
+        let m = self.m();
         let distribution = Distribution::Beckmann;
         let facets = Facets { m, distribution, shadowed: 0, includes_beam: false };
         let eps = permittivity(self.eps_real, self.eps_imag);

@@ -18,11 +18,11 @@ use crate::brdf::backscatter::Term;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_quantity};
 use crate::brdf::permittivity::{
-    EPS_IMAG, EPS_REAL, Polarisation, default_frequency_hz, interface, mirror_lobe,
-    mirror_lobe_per_sr, normal_wavenumber, permittivity, unpolarised, visit_lobe,
+    EPS_IMAG, EPS_REAL, Polarisation, default_frequency_hz, interface, is_narrow, mirror_lobe,
+    mirror_lobe_per_sr, narrow_mirror, normal_wavenumber, permittivity, unpolarised, visit_lobe,
     visit_permittivity, wavenumber_rad_per_m,
 };
-use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
+use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -135,6 +135,14 @@ impl Scattering for Layered {
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         let reflectance = |cos| self.reflectance_at(cos);
         Seen::mirror(mirror_lobe_per_sr(i, o, self.lobe_rad, beam_rad, reflectance))
+    }
+
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        narrow_mirror(self.lobe_rad, self.reflectance_at(i.cos_theta()))
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if is_narrow(self.lobe_rad) { Seen::default() } else { self.seen_by(0.0, i, o) }
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

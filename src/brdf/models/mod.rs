@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::backscatter::Term;
 use super::kind::Kind;
 use super::parameter::{Parameter, ParameterError, Visitor};
-use super::scattering::{Scattering, ScatteringModel, Seen};
+use super::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
 
 pub use cook_torrance::Shadowing;
@@ -112,6 +112,18 @@ impl Scattering for Brdf {
             Seen::default()
         } else {
             self.seen_above_horizon(beam_rad, i, o)
+        }
+    }
+
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        self.model().narrow_lobes(i)
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if is_below_horizon(i, o) {
+            Seen::default()
+        } else {
+            self.model().apart_from_narrow_lobes(i, o)
         }
     }
 
