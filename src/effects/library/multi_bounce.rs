@@ -138,9 +138,9 @@ fn returned(laws: &[Brdf], detours: &[Detour]) -> Option<MeanEcho> {
 const ABOUT: About = About {
     name: "multi-bounce",
     level: Level::Scene,
-    description: "Part of the wave goes on from the first surface to a second one and returns from there. 0 dB \
-         is the power that the two scattering laws give when the antenna sees the second surface as well as \
-         the first.",
+    description: "Part of the wave goes on from the first surface to a second one and returns from there. At \
+         0 dB its power is what the two scattering models give if the antenna receives the second surface with the \
+         same gain as the first; coupling_db is added to it.",
     signature: "Places that face another surface, as in corners and under arms, are too bright and too far \
          away. A foreign patch is bright without a longer range, and a wrong pose is off in range \
          without being bright; convex targets never show this.",
