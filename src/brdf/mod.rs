@@ -27,5 +27,5 @@ pub use models::*;
 pub use outline::{DEGREES, Outline};
 pub use parameter::{Parameter, ParameterError, Visitor};
 pub(crate) use retro::Retro;
-pub use scattering::{Scattering, ScatteringModel};
+pub use scattering::{Scattering, ScatteringModel, Seen};
 pub use slopes::Distribution;

@@ -267,7 +267,7 @@ impl<'a> Work<'a> {
         let to_radar = -ray.direction.xyz();
         let to_radar = LocalFrame::at_hit(mesh, hit, to_radar, surface.grain).local(to_radar);
         let beam_rad = spot.divergence_rad(self.rays, hit.range_m);
-        let (f_per_sr, _) = surface.scattering.seen_by(beam_rad, to_radar, to_radar);
+        let f_per_sr = surface.scattering.seen_by(beam_rad, to_radar, to_radar).f_per_sr;
         Some(self.link.power_w(&spot.beam, hit.range_m, hit.cos_theta, f_per_sr))
     }
 

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::brdf::backscatter::{Facets, Term};
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_number};
-use crate::brdf::scattering::{Scattering, ScatteringModel, half_vector};
+use crate::brdf::scattering::{Scattering, ScatteringModel, Seen, half_vector};
 use crate::brdf::slopes::Distribution;
 use crate::frames::{Direction, Surface};
 
@@ -117,8 +117,9 @@ impl Scattering for CookTorrance {
         f * d * self.shadowing(i, o) / (4.0 * i.cos_theta() * o.cos_theta())
     }
 
-    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
-        (self.widened(beam_rad).f_per_sr(i, o), 1.0)
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        let f_per_sr = self.widened(beam_rad).f_per_sr(i, o);
+        Seen::facets(f_per_sr, beam_rad, [self.m, self.m_across.unwrap_or(self.m)])
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

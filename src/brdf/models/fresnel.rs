@@ -19,7 +19,7 @@ use crate::brdf::permittivity::{
     EPS_IMAG, EPS_REAL, LOBE_RANGE_RAD, default_lobe_rad, fresnel_reflectance, mirror_lobe,
     mirror_lobe_per_sr, permittivity, visit_permittivity,
 };
-use crate::brdf::scattering::{Scattering, ScatteringModel};
+use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -51,13 +51,13 @@ impl Fresnel {
 
 impl Scattering for Fresnel {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        self.seen_by(0.0, i, o).0
+        self.seen_by(0.0, i, o).f_per_sr
     }
 
-    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         let (eps, lobe_rad) =
             (permittivity(self.eps_real, self.eps_imag), self.lobe_rad.max(beam_rad));
-        (mirror_lobe_per_sr(i, o, lobe_rad, |cos| fresnel_reflectance(eps, cos)), 1.0)
+        Seen::mirror(mirror_lobe_per_sr(i, o, lobe_rad, |cos| fresnel_reflectance(eps, cos)))
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

@@ -32,7 +32,7 @@ use crate::brdf::permittivity::{
     fresnel_reflectance, mirror_cosine, mirror_lobe_per_sr, permittivity, visit_permittivity,
     wavenumber_rad_per_m,
 };
-use crate::brdf::scattering::{Scattering, ScatteringModel};
+use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -125,11 +125,14 @@ impl Kirchhoff {
 
 impl Scattering for Kirchhoff {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        self.seen_by(0.0, i, o).0
+        self.seen_by(0.0, i, o).f_per_sr
     }
 
-    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
-        (self.incoherent_per_sr(i, o) + self.coherent_seen_by(beam_rad, i, o), 1.0)
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        let coherent_per_sr = self.coherent_seen_by(beam_rad, i, o);
+        let f_per_sr = self.incoherent_per_sr(i, o) + coherent_per_sr;
+        let coherent_share = if f_per_sr > 0.0 { coherent_per_sr / f_per_sr } else { 0.0 };
+        Seen { f_per_sr, specular_share: 1.0, coherent_share }
     }
 }
 

@@ -16,7 +16,7 @@ use crate::brdf::parameter::{Visitor, visit_number};
 use crate::brdf::permittivity::{
     EPS_IMAG, EPS_REAL, fresnel_reflectance, mirror_cosine, permittivity, visit_permittivity,
 };
-use crate::brdf::scattering::{Scattering, ScatteringModel, half_vector};
+use crate::brdf::scattering::{Scattering, ScatteringModel, Seen, half_vector};
 use crate::brdf::slopes::Distribution;
 use crate::frames::{Direction, Surface};
 
@@ -41,15 +41,17 @@ pub struct KirchhoffGo {
 
 impl Scattering for KirchhoffGo {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        self.seen_by(0.0, i, o).0
+        self.seen_by(0.0, i, o).f_per_sr
     }
 
-    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
-        let m = (std::f64::consts::SQRT_2 * self.rms_slope).max(beam_rad);
-        let d_per_sr = Distribution::Beckmann.d_per_sr(half_vector(i, o).cos_theta(), m);
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        let m = std::f64::consts::SQRT_2 * self.rms_slope;
+        let law = Distribution::Beckmann;
+        let d_per_sr = law.d_per_sr(half_vector(i, o).cos_theta(), m.max(beam_rad));
         let eps = permittivity(self.eps_real, self.eps_imag);
         let reflectance = fresnel_reflectance(eps, mirror_cosine(i, o));
-        (reflectance * d_per_sr / (4.0 * i.cos_theta() * o.cos_theta()), 1.0)
+        let f_per_sr = reflectance * d_per_sr / (4.0 * i.cos_theta() * o.cos_theta());
+        Seen::facets(f_per_sr, beam_rad, [m, m])
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

@@ -22,7 +22,7 @@ use crate::brdf::permittivity::{
     interface, mirror_lobe, mirror_lobe_per_sr, normal_wavenumber, permittivity, unpolarised,
     visit_permittivity, wavenumber_rad_per_m,
 };
-use crate::brdf::scattering::{Scattering, ScatteringModel};
+use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -128,12 +128,12 @@ fn step_up(boundary: Complex<f64>, from_below: Complex<f64>) -> Complex<f64> {
 
 impl Scattering for Layered {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        self.seen_by(0.0, i, o).0
+        self.seen_by(0.0, i, o).f_per_sr
     }
 
-    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         let lobe_rad = self.lobe_rad.max(beam_rad);
-        (mirror_lobe_per_sr(i, o, lobe_rad, |cos| self.reflectance_at(cos)), 1.0)
+        Seen::mirror(mirror_lobe_per_sr(i, o, lobe_rad, |cos| self.reflectance_at(cos)))
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

@@ -9,7 +9,7 @@ use super::weighted;
 use crate::brdf::backscatter::Term;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_number};
-use crate::brdf::scattering::{Scattering, ScatteringModel};
+use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -59,7 +59,7 @@ impl<P: ScatteringModel> Scattering for Mixture<P> {
         self.k * self.diffuse.f_per_sr(i, o) + (1.0 - self.k) * self.specular.f_per_sr(i, o)
     }
 
-    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         weighted::seen_by(self.weighted(), beam_rad, i, o)
     }
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::backscatter::Term;
 use super::kind::Kind;
 use super::parameter::{Parameter, ParameterError, Visitor};
-use super::scattering::{Scattering, ScatteringModel};
+use super::scattering::{Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
 
 pub use cook_torrance::Shadowing;
@@ -62,7 +62,7 @@ macro_rules! models {
                 beam_rad: f64,
                 i: Direction<Surface>,
                 o: Direction<Surface>,
-            ) -> (f64, f64) {
+            ) -> Seen {
                 match self {
                     $(Brdf::$model(model) => model.seen_by(beam_rad, i, o),)+
                 }
@@ -107,8 +107,12 @@ impl Scattering for Brdf {
         if is_below_horizon(i, o) { 0.0 } else { self.f_above_horizon_per_sr(i, o) }
     }
 
-    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
-        if is_below_horizon(i, o) { (0.0, 0.0) } else { self.seen_above_horizon(beam_rad, i, o) }
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if is_below_horizon(i, o) {
+            Seen::default()
+        } else {
+            self.seen_above_horizon(beam_rad, i, o)
+        }
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

@@ -9,7 +9,7 @@ use super::weighted;
 use crate::brdf::backscatter::Term;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::Visitor;
-use crate::brdf::scattering::{Scattering, ScatteringModel};
+use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -39,7 +39,7 @@ impl<P: ScatteringModel> Scattering for Sum<P> {
         self.parts.iter().map(|part| part.f_per_sr(i, o)).sum()
     }
 
-    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> (f64, f64) {
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         weighted::seen_by(self.weighted(), beam_rad, i, o)
     }
 
