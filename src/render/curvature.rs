@@ -6,12 +6,10 @@
 
 use glam::{DVec2, DVec3};
 
+use super::edges::{Frame, is_across, spacing_m};
 use super::spot::Footprints;
 use crate::radar::Beam;
 use crate::trace::{Hit, LocalFrame, ScanGeometry};
-
-/// Steepest slope of a surface across the beam; beyond it two hits lie on both sides of an edge.
-const STEEPEST: f64 = 2.0;
 
 /// Cells are at least this many mean spacings of the scan wide, so that neighbours have hits.
 const SPACINGS_PER_CELL: f64 = 2.0;
@@ -24,9 +22,6 @@ pub struct SpotTilt {
     /// Divergence δ of the beam there, rad.
     pub beam_rad: f64,
 }
-
-/// Region and cell of the target plane.
-type Cell = (u16, i32, i32);
 
 /// Where the first ray of a chirp meets the target.
 #[derive(Clone, Copy)]
@@ -42,59 +37,72 @@ struct Place<'a> {
 ///
 /// Tilts across an edge in depth are left out; across a crease of the surface they are large, but few.
 pub fn spot_tilts(geometry: &ScanGeometry, footprints: &Footprints) -> Vec<Vec<SpotTilt>> {
-    let side_m = cell_m(geometry);
-    let mut places = Vec::new();
     let frames = geometry.radar.frames();
-    let aims = geometry.chirps.target_points_m(&frames).enumerate();
-    for ((chirp, aim_m), hits) in aims.zip(footprints.hits.chunks(footprints.rays_per_chirp)) {
-        let Some(hit) = hits.first().and_then(Option::as_ref) else { continue };
-        let [column, row] = (aim_m / side_m).floor().to_array().map(|number| number as i32);
-        let region = geometry.region_of_facet[hit.facet as usize];
-        places.push(((region, column, row), Place { chirp, aim_m, hit }));
-    }
-    // Sorted, not hashed: the order does not depend on the run.
-    places.sort_unstable_by_key(|(cell, place)| (*cell, place.chirp));
-    places.dedup_by_key(|(cell, _)| *cell);
+    let hits = footprints.hits.chunks(footprints.rays_per_chirp).map(|hits| hits[0].as_ref());
+    let aims = geometry.chirps.target_points_m(&frames);
+    let looks: Vec<(DVec2, Option<f64>)> =
+        aims.zip(&footprints.axis_range_m).map(|(aim_m, range_m)| (aim_m, *range_m)).collect();
 
-    let beam = Beam::new(geometry.radar);
+    // The first hit of each cell.
+    let side_m = geometry.radar.waist_m().max(SPACINGS_PER_CELL * spacing_m(&looks));
+    let frame = Frame::around(looks.iter().map(|look| look.0), side_m);
+    let mut places: Vec<Option<Place>> = vec![None; frame.columns * frame.rows];
+    for ((chirp, &(aim_m, _)), hit) in looks.iter().enumerate().zip(hits) {
+        if let (Some(cell), Some(hit)) = (frame.number_at(aim_m), hit) {
+            places[cell].get_or_insert(Place { chirp, aim_m, hit });
+        }
+    }
+
+    let spots = Spots { geometry, beam: Beam::new(geometry.radar) };
     let regions = geometry.region_of_facet.iter().max().map_or(0, |last| usize::from(*last) + 1);
     let mut tilts = vec![Vec::new(); regions];
-    for ((region, column, row), here) in &places {
-        for neighbour in [(*region, column + 1, *row), (*region, *column, row + 1)] {
-            let there = places.binary_search_by_key(&neighbour, |(cell, _): &(Cell, Place)| *cell);
-            let Ok(there) = there else { continue };
-            tilts[usize::from(*region)].extend(tilt(geometry, &beam, here, &places[there].1));
+    for column in 0..frame.columns as i32 {
+        for row in 0..frame.rows as i32 {
+            let place_at = |column, row| frame.number(column, row).and_then(|cell| places[cell]);
+            let Some(here) = place_at(column, row) else { continue };
+            for there in [place_at(column + 1, row), place_at(column, row + 1)] {
+                let tilt = there.and_then(|there| spots.tilt(&here, &there));
+                tilts[spots.region(&here)].extend(tilt);
+            }
         }
     }
     tilts
 }
 
-/// Side of the cells, m: a radius of the spot, or more for a scan that steps farther.
-fn cell_m(geometry: &ScanGeometry) -> f64 {
-    let [width_m, height_m] = geometry.chirps.field(&geometry.radar.frames()).sides_m();
-    let chirps = geometry.chirps.rays.len() as f64;
-    // Of a scan over an area, and of one along a line.
-    let spacing_m = (width_m * height_m / chirps).sqrt().max(width_m.max(height_m) / chirps);
-    geometry.radar.waist_m().max(SPACINGS_PER_CELL * spacing_m)
+/// The target under the spots of a beam.
+struct Spots<'a> {
+    geometry: &'a ScanGeometry<'a>,
+    beam: Beam,
 }
 
-/// The tilt between two hits; `None` where an edge in depth lies between them.
-fn tilt(geometry: &ScanGeometry, beam: &Beam, here: &Place, there: &Place) -> Option<SpotTilt> {
-    let apart_m = here.hit.point.distance_m(there.hit.point);
-    let deeper_m = (here.hit.range_m - there.hit.range_m).abs();
-    if apart_m == 0.0 || deeper_m > STEEPEST * here.aim_m.distance(there.aim_m) {
-        return None;
+impl Spots<'_> {
+    /// The tilt between two hits; `None` where another region begins or an edge in depth lies between them.
+    fn tilt(&self, here: &Place, there: &Place) -> Option<SpotTilt> {
+        let radar = self.geometry.radar;
+        let [look, other] = [here, there].map(|place| (place.aim_m, Some(place.hit.range_m)));
+        let apart_m = here.hit.point.distance_m(there.hit.point);
+        if self.region(here) != self.region(there)
+            || is_across(look, other, radar.spot_fwhm_m())
+            || apart_m == 0.0
+        {
+            return None;
+        }
+        let angle_rad = self.normal(here).angle_between(self.normal(there));
+        let beam = self.beam.along(&self.geometry.chirps.rays[here.chirp]);
+        let radius_m = beam.section(here.hit.range_m).radius_m;
+        let tilt_rad = angle_rad * radius_m / apart_m;
+        Some(SpotTilt { tilt_rad, beam_rad: beam.divergence_rad() })
     }
-    let angle_rad = normal(geometry, here).angle_between(normal(geometry, there));
-    let beam = beam.along(&geometry.chirps.rays[here.chirp]);
-    let radius_m = beam.section(here.hit.range_m).radius_m;
-    Some(SpotTilt { tilt_rad: angle_rad * radius_m / apart_m, beam_rad: beam.divergence_rad() })
-}
 
-/// The normal on the side of the radar.
-fn normal(geometry: &ScanGeometry, place: &Place) -> DVec3 {
-    let to_source = -geometry.chirps.rays[place.chirp].direction.xyz();
-    LocalFrame::at_hit(geometry.bvh.mesh(), place.hit, to_source, DVec3::X).normal()
+    fn region(&self, place: &Place) -> usize {
+        usize::from(self.geometry.region_of_facet[place.hit.facet as usize])
+    }
+
+    /// The normal on the side of the radar.
+    fn normal(&self, place: &Place) -> DVec3 {
+        let to_source = -self.geometry.chirps.rays[place.chirp].direction.xyz();
+        LocalFrame::at_hit(self.geometry.bvh.mesh(), place.hit, to_source, DVec3::X).normal()
+    }
 }
 
 #[cfg(test)]
