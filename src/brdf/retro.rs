@@ -23,7 +23,7 @@ impl<'a> Retro<'a> {
             Some(terms) if cos_theta > GRAZING => {
                 terms.iter().map(|term| term.per_sr(beam_rad, cos_theta)).sum()
             }
-            _ => self.law.seen_by(beam_rad, to_radar, to_radar).0,
+            _ => self.law.seen_by(beam_rad, to_radar, to_radar).f_per_sr,
         }
     }
 }
@@ -46,7 +46,7 @@ mod tests {
                 let own = model.f_per_sr(direction, direction);
                 for beam_rad in [0.0, 0.012, 0.3] {
                     let found = retro.per_sr(beam_rad, direction);
-                    let expected = model.seen_by(beam_rad, direction, direction).0;
+                    let expected = model.seen_by(beam_rad, direction, direction).f_per_sr;
                     let error = (found - expected).abs();
                     assert!(
                         error <= 1e-9 * expected,

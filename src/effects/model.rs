@@ -303,7 +303,7 @@ impl Model<'_> {
     fn law_per_sr(&self, stage: &Stage, shot: &Shot) -> f64 {
         let (law, to_radar) = (self.laws.get(usize::from(shot.region)), shot.to_radar());
         let beam_rad = stage.beam(shot).divergence_rad();
-        law.map_or(0.0, |law| law.seen_by(beam_rad, to_radar, to_radar).0)
+        law.map_or(0.0, |law| law.seen_by(beam_rad, to_radar, to_radar).f_per_sr)
     }
 
     /// Equation (11) with every effect on the surface, W.

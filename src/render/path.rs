@@ -18,6 +18,8 @@ pub(super) struct Path {
     pub azimuth_rad: f64,
     /// Share of the power that is specular at every surface of the path, 0 to 1.
     pub specular_share: f64,
+    /// Share of the power, 0 to 1, that comes back in one phase from the whole spot and does not speckle.
+    pub coherent_share: f64,
 }
 
 /// Total power, and the mean range weighted by power; without power, the plain mean of the ranges.

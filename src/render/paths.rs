@@ -18,6 +18,7 @@ use super::path::{Path, sum};
 use super::setup::Setup;
 use super::spot::{self, Footprints, Spot};
 use super::surface::{Orientation, Surface};
+use crate::brdf::{NarrowLobe, Seen};
 use crate::effects::MeanEcho;
 use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
 use crate::radar::random::{Key, Purpose};
@@ -67,6 +68,24 @@ struct ShadingPoint<'a> {
     solid_angle_sr: f64,
     /// Divergence of the beam there, rad.
     beam_rad: f64,
+}
+
+/// Power on its way to a second surface.
+struct Onward {
+    direction: Direction<Local>,
+    /// Its share of the power on the first surface.
+    share: f64,
+    /// What the first surface scatters.
+    first: Seen,
+    /// Roughness of a lobe that the direction stands for.
+    m: f64,
+}
+
+impl ShadingPoint<'_> {
+    /// Share of the power on the point that the antenna receives if nothing occludes it.
+    fn received_share(&self, scattered: Seen) -> f64 {
+        self.antenna.cos_theta().max(0.0) * scattered.f_per_sr * self.solid_angle_sr
+    }
 }
 
 impl<'a> Paths<'a> {
@@ -150,15 +169,9 @@ impl<'a> Emission<'a> {
         self.lit(hit, to_source, to_antenna, antenna_m, hit.range_m)
     }
 
-    /// A point that another point of the target lights; the antenna sees it in the main lobe of its beam, or
+    /// A point that another point of the target lights from `to_source`; the antenna sees it in the main lobe of its beam, or
     /// by a side lobe.
-    fn lit_by_surface(
-        &self,
-        hit: Hit,
-        source: &ShadingPoint,
-        in_main_lobe: bool,
-    ) -> ShadingPoint<'a> {
-        let to_source = (source.hit.point.xyz - hit.point.xyz).normalize_or(DVec3::Z);
+    fn lit_by_surface(&self, hit: Hit, to_source: DVec3, in_main_lobe: bool) -> ShadingPoint<'a> {
         let Spot { axis, beam, .. } = &self.spot;
         let (mut to_antenna, antenna_m) = self.to_antenna(&hit);
         if in_main_lobe {
@@ -209,8 +222,8 @@ impl<'a> Emission<'a> {
     fn direct(&self, lit: &ShadingPoint) -> Path {
         // Every point that the radar illuminates is visible to it.
         let seen = self.paths.observer == Observer::Radar || self.is_seen(lit);
-        let (received, specular_share) = self.received_share(lit);
-        let share = if seen { received } else { 0.0 };
+        let scattered = self.scattered(lit);
+        let share = if seen { lit.received_share(scattered) } else { 0.0 };
         let [x, y, _] = lit.source.xyz().to_array();
         Path {
             range_m: 0.5 * (lit.hit.range_m + lit.antenna_m),
@@ -218,8 +231,27 @@ impl<'a> Emission<'a> {
             hit: lit.hit,
             surfaces: 1,
             azimuth_rad: y.atan2(x),
-            specular_share,
+            specular_share: scattered.specular_share,
+            coherent_share: scattered.coherent_share,
         }
+    }
+
+    /// Where a lit point sends power: into directions drawn at random, and exactly into that of the mirror by lobes
+    /// that are too narrow to be drawn.
+    fn onward(&self, lit: &ShadingPoint, bounce: &Bounce, ray: usize) -> Vec<Onward> {
+        let law = lit.surface.scattering;
+        let mut all = Vec::with_capacity(bounce.rays);
+        for (direction, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
+            let first = law.apart_from_narrow_lobes(lit.source, direction);
+            let share = first.f_per_sr * direction.cos_theta() * weight;
+            all.push(Onward { direction, share, first, m: 0.0 });
+        }
+        for NarrowLobe { share, m } in law.narrow_lobes(lit.source) {
+            let direction = lit.source.mirrored();
+            all.push(Onward { direction, share, first: Seen::mirror(0.0), m });
+        }
+        all.retain(|onward| onward.share > 0.0);
+        all
     }
 
     /// Appends the second-order paths by way of a point that receives `flux_w`, W.
@@ -232,19 +264,29 @@ impl<'a> Emission<'a> {
         ray: usize,
         paths: &mut Vec<Path>,
     ) {
-        for (onward, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
-            let Some(hit) = self.trace_onward(lit, onward) else { continue };
-            let (f_per_sr, first_share) = lit.surface.scattering.seen_by(0.0, lit.source, onward);
+        for Onward { direction, share, first, m } in self.onward(lit, bounce, ray) {
+            let Some(hit) = self.trace_onward(lit, direction) else { continue };
             let pattern = self.pattern(bounce, &hit);
-            let second = self.lit_by_surface(hit, lit, pattern > bounce.outside_spot);
-            let seen = weight * pattern;
-            let (received, second_share) = self.received_share(&second);
-            let power_w = flux_w * f_per_sr * onward.cos_theta() * seen * received;
+            let to_first = -lit.frame.world(direction.xyz());
+            let in_main_lobe = pattern > bounce.outside_spot;
+            let mut second = self.lit_by_surface(hit, to_first, in_main_lobe);
+            // The beam's width counts once, here: exp(−ε²/4δ²) for the angle ε to its wavefront.
+            let beam_rad = second.beam_rad;
+            second.beam_rad = beam_rad.hypot(m);
+            let last = self.scattered(&second);
+            let power_w = flux_w * share * pattern * second.received_share(last);
             if power_w > 0.0 && self.is_seen(&second) {
                 let path_m = lit.hit.range_m + hit.range_m + second.antenna_m;
-                let specular_share = first_share * second_share;
-                let (range_m, surfaces) = (0.5 * path_m, 2);
-                paths.push(Path { range_m, power_w, surfaces, specular_share, ..direct });
+                paths.push(Path {
+                    range_m: 0.5 * path_m,
+                    power_w,
+                    surfaces: 2,
+                    specular_share: first.specular_share * last.specular_share,
+                    coherent_share: first.coherent_share
+                        * last.coherent_share
+                        * (beam_rad / second.beam_rad).powi(2),
+                    ..direct
+                });
             }
         }
     }
@@ -266,13 +308,9 @@ impl<'a> Emission<'a> {
         self.paths.link.flux_w(lit.hit.cos_theta) / self.rays as f64
     }
 
-    /// Share of the power on a point that the antenna receives if nothing occludes it, and the specular share of that.
-    fn received_share(&self, lit: &ShadingPoint) -> (f64, f64) {
-        let (f_per_sr, specular_share) =
-            lit.surface.scattering.seen_by(lit.beam_rad, lit.source, lit.antenna);
-        let cos_exit = lit.antenna.cos_theta();
-        let received = if cos_exit > 0.0 { f_per_sr * cos_exit * lit.solid_angle_sr } else { 0.0 };
-        (received, specular_share)
+    /// What a point scatters towards the antenna.
+    fn scattered(&self, lit: &ShadingPoint) -> Seen {
+        lit.surface.scattering.seen_by(lit.beam_rad, lit.source, lit.antenna)
     }
 
     /// The closest hit of a ray from a point.

@@ -1,26 +1,42 @@
 //! Weighted parts that add up in power, for models that are made of others.
 
 use crate::brdf::backscatter::Term;
-use crate::brdf::scattering::Scattering;
+use crate::brdf::scattering::{NarrowLobe, Scattering, Seen};
 use crate::frames::{Direction, Surface};
 
 /// JSON Schema of a part.
 pub(super) const PART_SCHEMA: &str = r##"{"$ref": "#/$defs/model"}"##;
 
-/// f of the parts together, 1/sr, as a beam sees it, and its specular share.
-pub(super) fn seen_by<'a, P: Scattering + 'a>(
+/// What is seen of the parts together.
+pub(super) fn combined<'a, P: Scattering + 'a>(
     parts: impl Iterator<Item = (f64, &'a P)>,
-    beam_rad: f64,
-    i: Direction<Surface>,
-    o: Direction<Surface>,
-) -> (f64, f64) {
-    let (mut all, mut specular) = (0.0, 0.0);
+    of_part: impl Fn(&P) -> Seen,
+) -> Seen {
+    let mut all = Seen::default();
     for (weight, part) in parts {
-        let (f, share) = part.seen_by(beam_rad, i, o);
-        all += weight * f;
-        specular += weight * f * share;
+        let seen = of_part(part);
+        let f_per_sr = weight * seen.f_per_sr;
+        all.f_per_sr += f_per_sr;
+        all.specular_share += f_per_sr * seen.specular_share;
+        all.coherent_share += f_per_sr * seen.coherent_share;
     }
-    (all, if all > 0.0 { specular / all } else { 0.0 })
+    if all.f_per_sr > 0.0 {
+        all.specular_share /= all.f_per_sr;
+        all.coherent_share /= all.f_per_sr;
+    }
+    all
+}
+
+/// The narrow lobes of the parts.
+pub(super) fn narrow_lobes<'a, P: Scattering + 'a>(
+    parts: impl Iterator<Item = (f64, &'a P)>,
+    i: Direction<Surface>,
+) -> Vec<NarrowLobe> {
+    let lobes = parts.flat_map(|(weight, part)| {
+        let weighted = move |lobe: NarrowLobe| NarrowLobe { share: weight * lobe.share, ..lobe };
+        part.narrow_lobes(i).into_iter().map(weighted)
+    });
+    lobes.collect()
 }
 
 /// The closed forms of the parts in backscatter; `None` when one of them has none.

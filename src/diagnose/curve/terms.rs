@@ -5,7 +5,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::points::Point;
-use crate::brdf::{Brdf, CookTorrance, Distribution, Scattering, Shadowing};
+use crate::brdf::{Brdf, CookTorrance, Distribution, Scattering, Seen, Shadowing};
 use crate::effects::{EffectParameter, Level};
 use crate::frames::{Direction, Surface};
 
@@ -87,7 +87,7 @@ macro_rules! described {
 
 /// The diffuse part of a law at a point, 1/sr.
 fn diffuse_per_sr(law: &Brdf, point: &Point) -> f64 {
-    let (f_per_sr, specular_share) = law.seen_by(0.0, point.i, point.o);
+    let Seen { f_per_sr, specular_share, .. } = law.seen_by(0.0, point.i, point.o);
     (1.0 - specular_share) * f_per_sr
 }
 

@@ -128,7 +128,7 @@ impl Spots {
         let mut answers = Vec::new();
         for (region, law) in (0..).zip(laws) {
             let Some(terms) = law.backscatter() else {
-                let sums = self.sums(region, |beam_rad, v| law.seen_by(beam_rad, v, v).0);
+                let sums = self.sums(region, |beam_rad, v| law.seen_by(beam_rad, v, v).f_per_sr);
                 answers.push((1.0, Arc::new(sums)));
                 continue;
             };
@@ -373,7 +373,7 @@ mod tests {
                 let fresh = (0..).zip(laws).fold(Sums::default(), |sums, (region, law)| {
                     sums.and(
                         1.0,
-                        &Sums::of(spot, region, |beam_rad, v| law.seen_by(beam_rad, v, v).0),
+                        &Sums::of(spot, region, |beam_rad, v| law.seen_by(beam_rad, v, v).f_per_sr),
                     )
                 });
                 for (kept, fresh) in [
