@@ -77,7 +77,7 @@ impl ReadyScene {
     /// noise: a draw of speckle would add an error to that of a measurement, or hide it. `pose` moves the target.
     ///
     /// # Errors
-    /// As [`open`](Self::open).
+    /// A scene, material or effect that cannot be loaded, by its file and place.
     pub fn open_mean(
         path: &Path,
         pose: Pose<Global, Global>,
