@@ -29,8 +29,8 @@ use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_quantity};
 use crate::brdf::permittivity::{
     EPS_IMAG, EPS_REAL, LOBE_RANGE_RAD, default_frequency_hz, default_lobe_rad,
-    fresnel_reflectance, mirror_cosine, mirror_lobe_per_sr, permittivity, visit_permittivity,
-    wavenumber_rad_per_m,
+    fresnel_reflectance, half_space_amplitudes, mirror_cosine, mirror_lobe_per_sr, permittivity,
+    visit_permittivity, wavenumber_rad_per_m,
 };
 use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
@@ -126,6 +126,10 @@ impl Kirchhoff {
 impl Scattering for Kirchhoff {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         self.seen_by(0.0, i, o).f_per_sr
+    }
+
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        half_space_amplitudes(permittivity(self.eps_real, self.eps_imag), mirror_cosine(i, o))
     }
 
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {

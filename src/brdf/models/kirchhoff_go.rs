@@ -8,13 +8,15 @@
 //! correlation it is √2·s/l. The frequency enters only by ε. Without shadowing a metal
 //! reflects 0.91 to 1 of what it receives up to 60° (slopes to 0.4), but 1.18 at 75° and slope 0.4.
 
+use num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
 use crate::brdf::backscatter::{Facets, Term};
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_number};
 use crate::brdf::permittivity::{
-    EPS_IMAG, EPS_REAL, fresnel_reflectance, mirror_cosine, permittivity, visit_permittivity,
+    EPS_IMAG, EPS_REAL, fresnel_reflectance, half_space_amplitudes, mirror_cosine, permittivity,
+    visit_permittivity,
 };
 use crate::brdf::scattering::{Scattering, ScatteringModel, Seen, half_vector};
 use crate::brdf::slopes::Distribution;
@@ -52,6 +54,10 @@ impl Scattering for KirchhoffGo {
         let reflectance = fresnel_reflectance(eps, mirror_cosine(i, o));
         let f_per_sr = reflectance * d_per_sr / (4.0 * i.cos_theta() * o.cos_theta());
         Seen::facets(f_per_sr, beam_rad, [m, m])
+    }
+
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        half_space_amplitudes(permittivity(self.eps_real, self.eps_imag), mirror_cosine(i, o))
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

@@ -18,9 +18,9 @@ use crate::brdf::backscatter::Term;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_quantity};
 use crate::brdf::permittivity::{
-    EPS_IMAG, EPS_REAL, LOBE_RANGE_RAD, Polarisation, default_frequency_hz, default_lobe_rad,
-    interface, mirror_lobe, mirror_lobe_per_sr, normal_wavenumber, permittivity, unpolarised,
-    visit_permittivity, wavenumber_rad_per_m,
+    BOTH, EPS_IMAG, EPS_REAL, LOBE_RANGE_RAD, Polarisation, default_frequency_hz, default_lobe_rad,
+    interface, mirror_cosine, mirror_lobe, mirror_lobe_per_sr, normal_wavenumber, permittivity,
+    unpolarised, visit_permittivity, wavenumber_rad_per_m,
 };
 use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
@@ -134,6 +134,10 @@ impl Scattering for Layered {
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         let lobe_rad = self.lobe_rad.max(beam_rad);
         Seen::mirror(mirror_lobe_per_sr(i, o, lobe_rad, |cos| self.reflectance_at(cos)))
+    }
+
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        BOTH.map(|polarisation| self.amplitude(polarisation, mirror_cosine(i, o)))
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {
