@@ -92,7 +92,9 @@ impl<'a> RenderRequest<'a> {
         let images: Vec<Raster> = views.iter().map(|view| ready.image(&view.scan)).collect();
 
         progress(RenderProgress::Begin(RenderStage::Encode));
-        let record = ScanRecord::new(ready, assembly.model(), &views, &crossed, &images, all_hits);
+        let validity = ready.validity(&setup, &footprints);
+        let record =
+            ScanRecord::new(ready, assembly.model(), &views, &crossed, &images, validity, all_hits);
         let mut files = encode(all_hits, self.packing, ready, &views, &images, &record)?;
         let images: Vec<Raster> = crossed.iter().map(|view| ready.image(&view.scan)).collect();
         files.extend(encode(all_hits, self.packing, ready, &crossed, &images, &record)?);
