@@ -82,6 +82,13 @@ pub(super) fn fresnel_reflectance(eps: Complex<f64>, cos_theta: f64) -> f64 {
     unpolarised(|polarisation| interface(polarisation, outside, inside))
 }
 
+/// The amplitudes r_s and r_p that a half space reflects.
+pub(super) fn half_space_amplitudes(eps: Complex<f64>, cos_theta: f64) -> [Complex<f64>; 2] {
+    let outside = (Complex::from(1.0), Complex::from(cos_theta));
+    let inside = (eps, normal_wavenumber(eps, cos_theta));
+    BOTH.map(|polarisation| interface(polarisation, outside, inside))
+}
+
 /// Mean over both polarisations of |r|², held to at most 1 against rounding.
 pub(super) fn unpolarised(amplitude: impl Fn(Polarisation) -> Complex<f64>) -> f64 {
     let sum: f64 = BOTH.into_iter().map(|polarisation| amplitude(polarisation).norm_sqr()).sum();

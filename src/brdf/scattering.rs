@@ -1,5 +1,7 @@
 //! The interface of scattering models.
 
+use num_complex::Complex;
+
 use super::backscatter::Term;
 use super::parameter::Visitor;
 use super::validity::Condition;
@@ -30,6 +32,18 @@ pub trait Scattering: Sync {
     /// The share of f(i, o), 0 to 1, that facets reflect like mirrors, rough or not.
     fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         self.seen_by(0.0, i, o).specular_share
+    }
+
+    /// The amplitudes r_s and r_p at which the facets that mirror i into o reflect a field across the plane of
+    /// incidence and one in it; only their ratio counts. At normal incidence they are equal.
+    ///
+    /// Those of a perfect conductor unless the model knows its permittivity.
+    fn facet_amplitudes(
+        &self,
+        _i: Direction<Surface>,
+        _o: Direction<Surface>,
+    ) -> [Complex<f64>; 2] {
+        [Complex::from(-1.0); 2]
     }
 
     /// The lobes in which a surface that is lit from `i` sends power on like a mirror, too narrow for a path to meet by

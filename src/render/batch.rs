@@ -347,7 +347,7 @@ mod tests {
         let ball = solids::icosphere(0.3, 3);
         let (bvh, region_of_facet) = (Bvh::new(&ball), vec![0; ball.facets.len()]);
         let law = brushed();
-        let surfaces = [Surface { scattering: &law, grain: DVec3::new(1.0, 2.0, 0.0) }];
+        let surfaces = [Surface { grain: DVec3::new(1.0, 2.0, 0.0), ..Surface::new(&law) }];
         let pose = |turn_rad| Pose::from_euler_xyz(turn_rad, DVec3::new(0.02, 1.1, 0.4));
         let takes = [DVec3::ZERO, DVec3::new(0.3, -0.8, 0.5)].map(|turn_rad| Take {
             target: pose(turn_rad),

@@ -22,6 +22,7 @@ mod echo;
 mod edges;
 mod error;
 mod image;
+mod jones;
 mod observer;
 mod path;
 mod paths;

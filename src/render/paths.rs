@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 use super::bounce::{Bounce, directions};
 use super::effect_scan::{Change, EffectScan};
+use super::jones::Field;
 use super::observer::Observer;
 use super::path::{Path, sum};
 use super::setup::Setup;
@@ -22,7 +23,7 @@ use crate::brdf::{NarrowLobe, Seen};
 use crate::effects::MeanEcho;
 use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
 use crate::radar::random::{Key, Purpose};
-use crate::radar::{Detection, Link};
+use crate::radar::{Channel, Detection, Link};
 use crate::trace::{Hit, LocalFrame, ScanGeometry};
 
 /// Distance above a surface at which a ray starts, m, so that it does not hit the same surface again. It is far above
@@ -223,7 +224,8 @@ impl<'a> Emission<'a> {
         // Every point that the radar illuminates is visible to it.
         let seen = self.paths.observer == Observer::Radar || self.is_seen(lit);
         let scattered = self.scattered(lit);
-        let share = if seen { lit.received_share(scattered) } else { 0.0 };
+        let polarised = self.polarised_share(scattered.specular_share, &[lit]);
+        let share = if seen { lit.received_share(scattered) * polarised } else { 0.0 };
         let [x, y, _] = lit.source.xyz().to_array();
         Path {
             range_m: 0.5 * (lit.hit.range_m + lit.antenna_m),
@@ -274,14 +276,16 @@ impl<'a> Emission<'a> {
             let beam_rad = second.beam_rad;
             second.beam_rad = beam_rad.hypot(m);
             let last = self.scattered(&second);
-            let power_w = flux_w * share * pattern * second.received_share(last);
+            let specular_share = first.specular_share * last.specular_share;
+            let polarised = self.polarised_share(specular_share, &[lit, &second]);
+            let power_w = flux_w * share * pattern * second.received_share(last) * polarised;
             if power_w > 0.0 && self.is_seen(&second) {
                 let path_m = lit.hit.range_m + hit.range_m + second.antenna_m;
                 paths.push(Path {
                     range_m: 0.5 * path_m,
                     power_w,
                     surfaces: 2,
-                    specular_share: first.specular_share * last.specular_share,
+                    specular_share,
                     coherent_share: first.coherent_share
                         * last.coherent_share
                         * (beam_rad / second.beam_rad).powi(2),
@@ -306,6 +310,47 @@ impl<'a> Emission<'a> {
     /// Power of one ray on a point, W.
     fn flux_w(&self, lit: &ShadingPoint) -> f64 {
         self.paths.link.flux_w(lit.hit.cos_theta) / self.rays as f64
+    }
+
+    /// Share of the power by way of some points that the antenna's channel receives. Its specular part keeps
+    /// the polarisation that the facets give it. The diffuse part is co-polar, and what is depolarised adds to it.
+    fn polarised_share(&self, specular_share: f64, points: &[&ShadingPoint]) -> f64 {
+        let channel = self.paths.setup.channel;
+        let diffuse = match channel {
+            Channel::CoPolar => 1.0,
+            Channel::CrossPolar => {
+                let shares = points.iter().map(|lit| lit.surface.depolarised_share);
+                let largest = shares.fold(0.0, f64::max);
+                largest / (1.0 - largest)
+            }
+        };
+        let is_straight_back = self.paths.observer == Observer::Radar && points.len() == 1;
+        let specular = match channel {
+            _ if specular_share == 0.0 => 0.0,
+            Channel::CoPolar if is_straight_back => 1.0,
+            Channel::CrossPolar if is_straight_back => 0.0,
+            _ => self.specular_power(points, channel),
+        };
+        specular_share * specular + (1.0 - specular_share) * diffuse
+    }
+
+    /// Share of the power of a specular path by way of some points that a channel of the antenna receives.
+    fn specular_power(&self, points: &[&ShadingPoint], channel: Channel) -> f64 {
+        let polarisation = self.paths.setup.geometry.radar.polarisation;
+        let Some(first) = points.first() else { return 0.0 };
+        let mut along = -first.frame.world(first.source.xyz());
+        let mut field = Field::linear(polarisation.field(along));
+        for (place, lit) in points.iter().enumerate() {
+            let exit = match points.get(place + 1) {
+                Some(next) => lit.frame.local(-next.frame.world(next.source.xyz())),
+                None => lit.antenna,
+            };
+            let amplitudes = lit.surface.scattering.facet_amplitudes(lit.source, exit);
+            let onward = lit.frame.world(exit.xyz());
+            field = field.reflected(along, onward, amplitudes);
+            along = onward;
+        }
+        field.power_along(polarisation.received(-along, channel))
     }
 
     /// What a point scatters towards the antenna.

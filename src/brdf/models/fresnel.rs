@@ -11,14 +11,15 @@
 //! 4.67 − j5.00 (−6.2 dB), aluminium −1.9·10⁴ − j2.2·10⁶ (−0.008 dB). A thick piece is meant: an echo
 //! from the far side needs `layered`.
 
+use num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
 use crate::brdf::backscatter::Term;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::Visitor;
 use crate::brdf::permittivity::{
-    EPS_IMAG, EPS_REAL, fresnel_reflectance, is_narrow, mirror_lobe, mirror_lobe_per_sr,
-    narrow_mirror, permittivity, visit_lobe, visit_permittivity,
+    EPS_IMAG, EPS_REAL, fresnel_reflectance, half_space_amplitudes, is_narrow, mirror_cosine,
+    mirror_lobe, mirror_lobe_per_sr, narrow_mirror, permittivity, visit_lobe, visit_permittivity,
 };
 use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
@@ -71,6 +72,10 @@ impl Scattering for Fresnel {
         if is_narrow(self.lobe_rad) { Seen::default() } else { self.seen_by(0.0, i, o) }
     }
 
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        half_space_amplitudes(permittivity(self.eps_real, self.eps_imag), mirror_cosine(i, o))
+    }
+
     fn backscatter(&self) -> Option<Vec<Term>> {
         Some(vec![mirror_lobe(self.lobe_rad, self.reflectance(0.0))])
     }
@@ -100,7 +105,6 @@ mod tests {
     use super::*;
     use crate::brdf::permittivity::{Polarisation, interface, normal_wavenumber};
     use crate::units::db_from_ratio;
-    use nalgebra::Complex;
 
     fn smooth(eps_real: f64, eps_imag: f64) -> Fresnel {
         Fresnel { eps_real, eps_imag, lobe_rad: Some(0.02) }

@@ -30,9 +30,9 @@ use crate::brdf::backscatter::UNSEEN;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_quantity};
 use crate::brdf::permittivity::{
-    EPS_IMAG, EPS_REAL, default_frequency_hz, fresnel_reflectance, is_narrow, mirror_cosine,
-    mirror_lobe_per_sr, narrow_mirror, permittivity, visit_lobe, visit_permittivity,
-    wavenumber_rad_per_m,
+    EPS_IMAG, EPS_REAL, default_frequency_hz, fresnel_reflectance, half_space_amplitudes,
+    is_narrow, mirror_cosine, mirror_lobe_per_sr, narrow_mirror, permittivity, visit_lobe,
+    visit_permittivity, wavenumber_rad_per_m,
 };
 use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use crate::brdf::slopes::over_exponential;
@@ -143,6 +143,10 @@ impl Kirchhoff {
 impl Scattering for Kirchhoff {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         self.seen_by(0.0, i, o).f_per_sr
+    }
+
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        half_space_amplitudes(permittivity(self.eps_real, self.eps_imag), mirror_cosine(i, o))
     }
 
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {

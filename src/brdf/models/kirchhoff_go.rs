@@ -11,13 +11,15 @@
 
 use std::f64::consts::{SQRT_2, TAU};
 
+use num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
 use crate::brdf::backscatter::{Facets, Term};
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_number};
 use crate::brdf::permittivity::{
-    EPS_IMAG, EPS_REAL, fresnel_reflectance, mirror_cosine, permittivity, visit_permittivity,
+    EPS_IMAG, EPS_REAL, fresnel_reflectance, half_space_amplitudes, mirror_cosine, permittivity,
+    visit_permittivity,
 };
 use crate::brdf::scattering::{
     NARROW_M, NarrowLobe, Scattering, ScatteringModel, Seen, half_vector,
@@ -65,6 +67,10 @@ impl Scattering for KirchhoffGo {
         let reflectance = fresnel_reflectance(eps, mirror_cosine(i, o));
         let f_per_sr = reflectance * d_per_sr / (4.0 * i.cos_theta() * o.cos_theta());
         Seen::facets(f_per_sr, beam_rad, [m, m])
+    }
+
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        half_space_amplitudes(permittivity(self.eps_real, self.eps_imag), mirror_cosine(i, o))
     }
 
     fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {

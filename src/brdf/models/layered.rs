@@ -18,9 +18,9 @@ use crate::brdf::backscatter::Term;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_quantity};
 use crate::brdf::permittivity::{
-    EPS_IMAG, EPS_REAL, Polarisation, default_frequency_hz, interface, is_narrow, mirror_lobe,
-    mirror_lobe_per_sr, narrow_mirror, normal_wavenumber, permittivity, unpolarised, visit_lobe,
-    visit_permittivity, wavenumber_rad_per_m,
+    BOTH, EPS_IMAG, EPS_REAL, Polarisation, default_frequency_hz, interface, is_narrow,
+    mirror_cosine, mirror_lobe, mirror_lobe_per_sr, narrow_mirror, normal_wavenumber, permittivity,
+    unpolarised, visit_lobe, visit_permittivity, wavenumber_rad_per_m,
 };
 use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
@@ -143,6 +143,10 @@ impl Scattering for Layered {
 
     fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         if is_narrow(self.lobe_rad) { Seen::default() } else { self.seen_by(0.0, i, o) }
+    }
+
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        BOTH.map(|polarisation| self.amplitude(polarisation, mirror_cosine(i, o)))
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

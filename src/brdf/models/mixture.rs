@@ -3,6 +3,7 @@
 //! A monostatic measurement does not determine k apart from the levels of the two parts: it determines
 //! only the products k·r_s and (1 − k)·f_λ.
 
+use num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
 use super::weighted;
@@ -69,6 +70,10 @@ impl<P: ScatteringModel> Scattering for Mixture<P> {
 
     fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         weighted::combined(self.weighted(), |part| part.apart_from_narrow_lobes(i, o))
+    }
+
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        weighted::facet_amplitudes(self.weighted(), i, o)
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

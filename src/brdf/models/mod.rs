@@ -4,6 +4,7 @@
 pub(super) mod tests;
 mod weighted;
 
+use num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
 use super::backscatter::Term;
@@ -114,6 +115,10 @@ impl Scattering for Brdf {
         } else {
             self.seen_above_horizon(beam_rad, i, o)
         }
+    }
+
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        self.model().facet_amplitudes(i, o)
     }
 
     fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {

@@ -3,6 +3,7 @@
 //! The parts have no weights: each carries its own level. The energy of the sum is the sum of the
 //! energies, so the caller must avoid parts that together reflect more than 1.
 
+use num_complex::Complex;
 use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 use super::weighted;
@@ -49,6 +50,10 @@ impl<P: ScatteringModel> Scattering for Sum<P> {
 
     fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         weighted::combined(self.weighted(), |part| part.apart_from_narrow_lobes(i, o))
+    }
+
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        weighted::facet_amplitudes(self.weighted(), i, o)
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

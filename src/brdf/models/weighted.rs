@@ -1,7 +1,10 @@
 //! Weighted parts that add up in power, for models that are made of others.
 
+use num_complex::Complex;
+
 use crate::brdf::backscatter::Term;
 use crate::brdf::scattering::{NarrowLobe, Scattering, Seen};
+use crate::brdf::slopes::VIEWING_RAD;
 use crate::frames::{Direction, Surface};
 
 /// JSON Schema of a part.
@@ -25,6 +28,23 @@ pub(super) fn combined<'a, P: Scattering + 'a>(
         all.coherent_share /= all.f_per_sr;
     }
     all
+}
+
+/// The amplitudes of the facets of the part that mirrors most.
+pub(super) fn facet_amplitudes<'a, P: Scattering + 'a>(
+    parts: impl Iterator<Item = (f64, &'a P)>,
+    i: Direction<Surface>,
+    o: Direction<Surface>,
+) -> [Complex<f64>; 2] {
+    let mut most = (0.0, [Complex::from(-1.0); 2]);
+    for (weight, part) in parts {
+        let seen = part.seen_by(VIEWING_RAD, i, o);
+        let mirrored = weight * seen.f_per_sr * seen.specular_share;
+        if mirrored > most.0 {
+            most = (mirrored, part.facet_amplitudes(i, o));
+        }
+    }
+    most.1
 }
 
 /// The narrow lobes of the parts.

@@ -59,6 +59,9 @@ pub struct ScanRecord<'a> {
     /// Where a model is used outside of what its derivation allows.
     pub(super) validity: Vec<ValidityWarning>,
     pub(super) receivers: Vec<ReceiverRecord<'a>>,
+    /// What the antennas received across the polarisation that was sent; empty if they do not.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cross_polar: Vec<CrossPolarRecord<'a>>,
     #[serde(skip)]
     pub(super) ready: &'a ReadyScene,
 }
@@ -75,6 +78,16 @@ pub struct ReceiverRecord<'a> {
     noise_dbm: Option<f64>,
     /// What became of the chirps there.
     pub counts: Counts,
+    power_dbm: Option<PowerRange>,
+}
+
+/// What an antenna received across the polarisation that was sent.
+#[derive(Serialize)]
+struct CrossPolarRecord<'a> {
+    /// The receiver; `null` for the radar.
+    receiver: Option<&'a str>,
+    /// Detections at or above the antenna's threshold.
+    detections: usize,
     power_dbm: Option<PowerRange>,
 }
 
@@ -135,8 +148,8 @@ impl OutsideTheta {
 }
 
 impl<'a> ScanRecord<'a> {
-    /// The record of a rendering. `views` and `images` are those of the radar and then of every receiver;
-    /// `all_hits` says that the clouds hold echoes below the threshold, too.
+    /// The record of a rendering. `views` and `images` are those of the radar and then of every receiver,
+    /// `crossed` those of the cross-polar channel; `all_hits` says that the clouds hold echoes below the threshold, too.
     ///
     /// # Panics
     /// When `views` or `images` is empty.
@@ -144,6 +157,7 @@ impl<'a> ScanRecord<'a> {
         ready: &'a ReadyScene,
         model: Option<&Model>,
         views: &[View<'a>],
+        crossed: &[View<'a>],
         images: &[Raster],
         validity: Vec<ValidityWarning>,
         all_hits: bool,
@@ -192,6 +206,7 @@ impl<'a> ScanRecord<'a> {
             receivers: std::iter::zip(views, images)
                 .filter_map(|(view, image)| ReceiverRecord::new(scene, view, image))
                 .collect(),
+            cross_polar: crossed.iter().map(CrossPolarRecord::new).collect(),
             ready,
         }
     }
@@ -254,6 +269,16 @@ impl<'a> ReceiverRecord<'a> {
             counts: Counts::new(scene, &view.scan, image),
             power_dbm: PowerRange::new(&view.scan),
         })
+    }
+}
+
+impl<'a> CrossPolarRecord<'a> {
+    fn new(view: &View<'a>) -> CrossPolarRecord<'a> {
+        CrossPolarRecord {
+            receiver: view.receiver.map(|receiver| receiver.name.as_str()),
+            detections: view.scan.detections().count(),
+            power_dbm: PowerRange::new(&view.scan),
+        }
     }
 }
 
