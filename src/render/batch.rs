@@ -72,11 +72,14 @@ impl Batch<'_> {
     /// Renders all scans, in their order.
     ///
     /// # Errors
-    /// When the radar has a receiver that works on beat signals, the tracer does not accept the rays, or the graphics
+    /// When the radar has a receiver that works on beat signals, a surface lets the wave pass on, the tracer does not accept the rays, or the graphics
     /// processor holds another mesh, fails, or has too little memory for the materials of the scans.
     pub fn run(&self, takes: &[Take]) -> Result<Takes, RenderError> {
         if self.geometry.radar.receiver.is_some() {
             return Err(RenderError::Signals);
+        }
+        if takes.iter().any(|take| take.surfaces.iter().any(|surface| surface.sheet.is_some())) {
+            return Err(RenderError::Sheets);
         }
         let work = Work::new(self, takes)?;
         let chirps = self.geometry.chirps.rays.len();
@@ -354,7 +357,7 @@ mod tests {
         let ball = solids::icosphere(0.3, 3);
         let (bvh, region_of_facet) = (Bvh::new(&ball), vec![0; ball.facets.len()]);
         let law = brushed();
-        let surfaces = [Surface { scattering: &law, grain: DVec3::new(1.0, 2.0, 0.0) }];
+        let surfaces = [Surface { grain: DVec3::new(1.0, 2.0, 0.0), ..Surface::new(&law) }];
         let pose = |turn_rad| Pose::from_euler_xyz(turn_rad, DVec3::new(0.02, 1.1, 0.4));
         let takes = [DVec3::ZERO, DVec3::new(0.3, -0.8, 0.5)].map(|turn_rad| Take {
             target: pose(turn_rad),

@@ -1,9 +1,13 @@
 //! The input of a rendering.
 
 use super::bounce::Bounce;
+use super::sheet::Sheet;
 use super::surface::Surface;
 use crate::effects::Model;
 use crate::trace::ScanGeometry;
+
+/// Sheets that a ray passes where nothing else is stated: two garments, front and back.
+pub const MOST_SHEETS: usize = 4;
 
 /// A scan, the materials of its target, and how it is rendered.
 #[derive(Clone, Copy)]
@@ -17,6 +21,8 @@ pub struct Setup<'a> {
     /// Physical effects on the radar's own echoes. The model must have the scattering models of `surfaces`, and the
     /// receiver that the radar [declares](crate::effects::Receiver::declared).
     pub effects: Option<&'a Model<'a>>,
+    /// Largest number of sheets that a ray passes; it ends at the next one.
+    pub most_sheets: usize,
     /// Seed of everything random.
     pub seed: u64,
 }
@@ -24,6 +30,18 @@ pub struct Setup<'a> {
 impl<'a> Setup<'a> {
     /// A rendering as in the paper: single paths, no effects, seed 0.
     pub fn new(geometry: ScanGeometry<'a>, surfaces: &'a [Surface<'a>]) -> Setup<'a> {
-        Setup { geometry, surfaces, bounce: None, effects: None, seed: 0 }
+        let most_sheets = MOST_SHEETS;
+        Setup { geometry, surfaces, bounce: None, effects: None, most_sheets, seed: 0 }
+    }
+
+    /// Whether a region lets a part of the wave through.
+    pub(super) fn has_sheets(&self) -> bool {
+        self.surfaces.iter().any(|surface| surface.sheet.is_some())
+    }
+
+    /// The sheet that a facet belongs to; `None` where nothing passes.
+    pub(super) fn sheet(&self, facet: u32) -> Option<&'a Sheet> {
+        let region = self.geometry.region_of_facet[facet as usize];
+        self.surfaces[usize::from(region)].sheet
     }
 }

@@ -56,6 +56,9 @@ pub struct ScanRecord<'a> {
     pub(super) power_dbm: Option<PowerRange>,
     image: Value,
     pub(super) receivers: Vec<ReceiverRecord<'a>>,
+    /// Rays that end at a sheet, because they have passed as many as they may.
+    #[serde(skip)]
+    pub(super) rays_ended: usize,
     #[serde(skip)]
     pub(super) ready: &'a ReadyScene,
 }
@@ -133,7 +136,8 @@ impl OutsideTheta {
 
 impl<'a> ScanRecord<'a> {
     /// The record of a rendering. `views` and `images` are those of the radar and then of every receiver;
-    /// `all_hits` says that the clouds hold echoes below the threshold, too.
+    /// `all_hits` says that the clouds hold echoes below the threshold, too, and `rays_ended` how many rays could have
+    /// passed further sheets.
     ///
     /// # Panics
     /// When `views` or `images` is empty.
@@ -143,6 +147,7 @@ impl<'a> ScanRecord<'a> {
         views: &[View<'a>],
         images: &[Raster],
         all_hits: bool,
+        rays_ended: usize,
     ) -> ScanRecord<'a> {
         let scene = &ready.scene;
         let file = &scene.file;
@@ -183,10 +188,11 @@ impl<'a> ScanRecord<'a> {
             }),
             materials,
             effects: effects(model),
-            regions: regions(scene, &ready.material_of_region, scan),
+            regions: regions(ready, scan),
             receivers: std::iter::zip(views, images)
                 .filter_map(|(view, image)| ReceiverRecord::new(scene, view, image))
                 .collect(),
+            rays_ended,
             ready,
         }
     }
