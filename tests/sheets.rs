@@ -21,7 +21,7 @@ use num_complex::Complex;
 use support::{matdb, read_cloud, refused};
 
 const SPEED_OF_LIGHT_M_PER_S: f64 = 299_792_458.0;
-const METAL: Fresnel = Fresnel { eps_real: 1.0, eps_imag: 1e9, lobe_rad: 0.001 };
+const METAL: Fresnel = Fresnel { eps_real: 1.0, eps_imag: 1e9, lobe_rad: None };
 
 /// The table over the angle, the search for the peak, and echoes between sheets that the renderer leaves out.
 const LEVEL_DB: f64 = 0.02;
@@ -176,7 +176,7 @@ fn out_of_focus(z_m: f64) -> f64 {
 
 /// The sheet of a layer whose lobe is the beam's.
 fn sheet(layer: Layer) -> Sheet {
-    let smooth = Brdf::Fresnel(Fresnel { lobe_rad: 0.001, ..METAL });
+    let smooth = Brdf::Fresnel(Fresnel { lobe_rad: None, ..METAL });
     Sheet::of_thickness(&smooth, layer.thickness_m, layer.eps, &Radar::default())
 }
 
@@ -302,7 +302,7 @@ fn passed(cos: f64, transmitted: &dyn Fn(f64) -> Complex<f64>) -> (f64, f64) {
 
 #[test]
 fn the_receiver_reports_what_it_is_asked_for() {
-    let (cloth, glass) = (sheet(CLOTH), Fresnel { eps_real: 1.5, eps_imag: 0.0, lobe_rad: 0.001 });
+    let (cloth, glass) = (sheet(CLOTH), Fresnel { eps_real: 1.5, eps_imag: 0.0, lobe_rad: None });
     let stage = Stage::new()
         .plate(-0.1, 0.0, Surface::of_sheet(&cloth))
         .plate(0.0, 0.0, Surface::new(&METAL))

@@ -9,6 +9,7 @@
 //! | … and by second-order paths | `bounce.rs` |
 //! | … with declared physical effects | `effect_scan.rs` |
 //! | echoes that part in range | `returns.rs` |
+//! | how far the target tilts within the spots | `curvature.rs` |
 //! | detection by the receiver, and the cause of each echo | `detect.rs`, `echo.rs` |
 //! | image and point cloud | `image.rs`, `cloud.rs` |
 //! | many scans at once, on a graphics processor | `batch.rs` |
@@ -18,6 +19,7 @@ mod batch;
 mod behind;
 mod bounce;
 mod cloud;
+mod curvature;
 mod detect;
 mod echo;
 mod edges;
@@ -36,6 +38,7 @@ mod surface;
 pub use batch::{Batch, Take, Takes};
 pub use bounce::Bounce;
 pub use cloud::cloud_table;
+pub use curvature::{SpotTilt, spot_tilts};
 pub use detect::Beats;
 pub use echo::{Echo, Truth};
 pub use error::RenderError;

@@ -23,7 +23,7 @@ use super::setup::Setup;
 use super::sheet::Passage;
 use super::spot::{self, Footprints, Spot};
 use super::surface::{Orientation, Surface};
-use crate::brdf::Seen;
+use crate::brdf::{NarrowLobe, Seen};
 use crate::effects::MeanEcho;
 use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
 use crate::radar::random::{Key, Purpose};
@@ -71,6 +71,19 @@ struct ShadingPoint<'a> {
     solid_angle_sr: f64,
     /// Divergence of the beam there, rad.
     beam_rad: f64,
+    /// The sheets on the way of the ray that illuminates it.
+    inward: Passage,
+}
+
+/// Power on its way to a second surface.
+struct Onward {
+    direction: Direction<Local>,
+    /// Its share of the power on the first surface.
+    share: f64,
+    /// What the first surface scatters.
+    first: Seen,
+    /// Roughness of a lobe that the direction stands for.
+    m: f64,
 }
 
 impl ShadingPoint<'_> {
@@ -163,8 +176,8 @@ impl<'a> Emission<'a> {
         paths: &mut Vec<Path>,
     ) {
         let orientation = self.orientation(sample);
-        let lit = self.lit_by_beam(hit, ray);
-        let bare = self.direct(&lit, inward);
+        let lit = ShadingPoint { inward, ..self.lit_by_beam(hit, ray) };
+        let bare = self.direct(&lit);
         let effects = self.paths.effects.as_ref();
         let direct = effects.map_or(bare, |effects| {
             effects.direct(bare, self.number, ray, self.rays, orientation, self.tilts)
@@ -175,7 +188,7 @@ impl<'a> Emission<'a> {
                 effects.map(|effects| effects.instrument_gain(self.number, ray, hit, orientation));
             let flux_w = self.paths.link.flux_w(hit.cos_theta) * self.paths.lit_shares[sample];
             let flux_w = flux_w * gain.unwrap_or(1.0);
-            self.second_order(&lit, inward, flux_w, direct, bounce, sample, paths);
+            self.second_order(&lit, flux_w, direct, bounce, sample, paths);
         }
     }
 
@@ -189,15 +202,9 @@ impl<'a> Emission<'a> {
         self.lit(hit, to_source, to_antenna, antenna_m, hit.range_m)
     }
 
-    /// A point that another point of the target lights; the antenna sees it in the main lobe of its beam, or
+    /// A point that another point of the target lights from `to_source`; the antenna sees it in the main lobe of its beam, or
     /// by a side lobe.
-    fn lit_by_surface(
-        &self,
-        hit: Hit,
-        source: &ShadingPoint,
-        in_main_lobe: bool,
-    ) -> ShadingPoint<'a> {
-        let to_source = (source.hit.point.xyz - hit.point.xyz).normalize_or(DVec3::Z);
+    fn lit_by_surface(&self, hit: Hit, to_source: DVec3, in_main_lobe: bool) -> ShadingPoint<'a> {
         let Spot { axis, beam, .. } = &self.spot;
         let (mut to_antenna, antenna_m) = self.to_antenna(&hit);
         if in_main_lobe {
@@ -229,7 +236,18 @@ impl<'a> Emission<'a> {
         let antenna = if to_antenna == to_source { source } else { frame.local(to_antenna) };
         let solid_angle_sr = self.solid_angle_sr(antenna_m, along_beam_m);
         let beam_rad = self.spot.divergence_rad(self.rays, along_beam_m);
-        ShadingPoint { hit, surface, frame, source, antenna, antenna_m, solid_angle_sr, beam_rad }
+        let inward = Passage::FREE;
+        ShadingPoint {
+            hit,
+            surface,
+            frame,
+            source,
+            antenna,
+            antenna_m,
+            solid_angle_sr,
+            beam_rad,
+            inward,
+        }
     }
 
     /// Solid angle, sr, in which a point sees the antenna, from its distance and its place along the beam, m.
@@ -244,14 +262,14 @@ impl<'a> Emission<'a> {
         }
     }
 
-    /// The single path by way of a point that the radar illuminates by the way `inward`.
-    fn direct(&self, lit: &ShadingPoint, inward: Passage) -> Path {
+    /// The single path by way of a point.
+    fn direct(&self, lit: &ShadingPoint) -> Path {
         let outward = match self.paths.observer {
             // It is visible to the radar by the same way.
-            Observer::Radar => Some(inward),
+            Observer::Radar => Some(lit.inward),
             Observer::Receiver { .. } => self.way_out(lit),
         };
-        let way = inward.then(outward.unwrap_or(Passage::FREE));
+        let way = lit.inward.then(outward.unwrap_or(Passage::FREE));
         let scattered = self.scattered(lit);
         let share = if outward.is_some() { lit.received_share(scattered) } else { 0.0 };
         let [x, y, _] = lit.source.xyz().to_array();
@@ -260,7 +278,7 @@ impl<'a> Emission<'a> {
             range_m: 0.5 * (lit.hit.range_m + lit.antenna_m) + apparent_m,
             power_w: self.flux_w(lit) * share * way.power_ratio(),
             hit: lit.hit,
-            sheets: inward.sheets,
+            sheets: lit.inward.sheets,
             surfaces: 1,
             azimuth_rad: y.atan2(x),
             specular_share: scattered.specular_share,
@@ -268,40 +286,62 @@ impl<'a> Emission<'a> {
         }
     }
 
+    /// Where a lit point sends power: into directions drawn at random, and exactly into that of the mirror by lobes
+    /// that are too narrow to be drawn.
+    fn onward(&self, lit: &ShadingPoint, bounce: &Bounce, ray: usize) -> Vec<Onward> {
+        let law = lit.surface.scattering;
+        let mut all = Vec::with_capacity(bounce.rays);
+        for (direction, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
+            let first = law.apart_from_narrow_lobes(lit.source, direction);
+            let share = first.f_per_sr * direction.cos_theta() * weight;
+            all.push(Onward { direction, share, first, m: 0.0 });
+        }
+        for NarrowLobe { share, m } in law.narrow_lobes(lit.source) {
+            let direction = lit.source.mirrored();
+            all.push(Onward { direction, share, first: Seen::mirror(0.0), m });
+        }
+        all.retain(|onward| onward.share > 0.0);
+        all
+    }
+
     /// Appends the second-order paths by way of a point that receives `flux_w`, W.
     fn second_order(
         &self,
         lit: &ShadingPoint,
-        inward: Passage,
         flux_w: f64,
         direct: Path,
         bounce: &Bounce,
         ray: usize,
         paths: &mut Vec<Path>,
     ) {
-        for (onward, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
+        for Onward { direction, share, first, m } in self.onward(lit, bounce, ray) {
             let Some(Way { hit: Some(hit), passage }) =
-                self.trace_onward(lit, onward, f64::INFINITY)
+                self.trace_onward(lit, direction, f64::INFINITY)
             else {
                 continue;
             };
-            let first = lit.surface.scattering.seen_by(0.0, lit.source, onward);
             let pattern = self.pattern(bounce, &hit);
-            let second = self.lit_by_surface(hit, lit, pattern > bounce.outside_spot);
+            let to_first = -lit.frame.world(direction.xyz());
+            let in_main_lobe = pattern > bounce.outside_spot;
+            let mut second = self.lit_by_surface(hit, to_first, in_main_lobe);
+            // The beam's width counts once, here: exp(−ε²/4δ²) for the angle ε to its wavefront.
+            let beam_rad = second.beam_rad;
+            second.beam_rad = beam_rad.hypot(m);
             let last = self.scattered(&second);
-            let onward_share = first.f_per_sr * onward.cos_theta() * weight;
-            let power_w = flux_w * onward_share * pattern * second.received_share(last);
+            let power_w = flux_w * share * pattern * second.received_share(last);
             if power_w > 0.0
                 && let Some(outward) = self.way_out(&second)
             {
-                let way = inward.then(passage).then(outward);
+                let way = lit.inward.then(passage).then(outward);
                 let path_m = lit.hit.range_m + hit.range_m + second.antenna_m + way.delay_m();
                 paths.push(Path {
                     range_m: 0.5 * path_m,
                     power_w: power_w * way.power_ratio(),
                     surfaces: 2,
                     specular_share: first.specular_share * last.specular_share,
-                    coherent_share: first.coherent_share * last.coherent_share,
+                    coherent_share: first.coherent_share
+                        * last.coherent_share
+                        * (beam_rad / second.beam_rad).powi(2),
                     ..direct
                 });
             }

@@ -13,7 +13,7 @@
 
 use nalgebra::Complex;
 
-use crate::brdf::{Brdf, Layer, Layered, Polarisation, Scattering, Seen};
+use crate::brdf::{Brdf, Layer, Layered, NarrowLobe, Polarisation, Scattering, Seen};
 use crate::frames::{Direction, Surface};
 use crate::radar::Radar;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -199,6 +199,26 @@ impl Scattering for Sheet {
         }
         for law in &self.others {
             all = all.and(law.seen_by(beam_rad, i, o));
+        }
+        all
+    }
+
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        let mut lobes = Vec::new();
+        if self.is_mirror {
+            lobes.extend(self.stack.narrow_lobes_with(self.reflectance(i.cos_theta())));
+        }
+        lobes.extend(self.others.iter().flat_map(|law| law.narrow_lobes(i)));
+        lobes
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        let mut all = Seen::default();
+        if self.is_mirror && !self.stack.is_narrow() && i.cos_theta() > 0.0 && o.cos_theta() > 0.0 {
+            all = self.stack.seen_with(0.0, i, o, |cos| self.reflectance(cos));
+        }
+        for law in &self.others {
+            all = all.and(law.apart_from_narrow_lobes(i, o));
         }
         all
     }

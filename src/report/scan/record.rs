@@ -12,7 +12,7 @@ use crate::material::Status;
 use crate::radar::{Beam, Radar};
 use crate::render::Scan;
 use crate::scene::{MeshReport, Scene};
-use crate::setup::{MaterialRevision, ReadyScene, SceneMaterial, View};
+use crate::setup::{MaterialRevision, ReadyScene, SceneMaterial, ValidityWarning, View};
 use crate::units::dbm_from_watts;
 
 /// Version of the layout of `scan.json`; it grows with every change that a reader could trip over.
@@ -25,8 +25,9 @@ const EQUATION: &str = "power_w = transmit_power_w * 10^(-system_loss_db/10) * s
     w^2 = w0^2 + (wavelength_m * (range_m - focus_m) / (pi * w0))^2; \
     w0 = beam.waist_m * (1 + (edge_growth - 1) * r^2 / edge_m^2), r from the middle of the target plane to where \
     the beam's axis is after 8 m; \
-    f_per_sr is the scattering model of the point's material in backscatter, with wavelength_m / (2 pi w0) in place of \
-    a smaller m or lobe_rad; with scene.spot.rays > 1 the power is the \
+    f_per_sr is the scattering model of the point's material in backscatter, its lobe convolved with the beam's slopes \
+    exp(-s^2 / delta^2), delta = wavelength_m / (2 pi w0): m^2 + delta^2 in place of m^2 in D of beckmann, and delta in \
+    place of a lobe_rad that is smaller or missing; with scene.spot.rays > 1 the power is the \
     mean of this over the rays of the spot, and range and incidence are no longer those of one ray; docs/model.md has receivers elsewhere, \
     second surfaces, speckle and noise";
 
@@ -55,6 +56,8 @@ pub struct ScanRecord<'a> {
     pub(super) counts: Counts,
     pub(super) power_dbm: Option<PowerRange>,
     image: Value,
+    /// Where a model is used outside of what its derivation allows.
+    pub(super) validity: Vec<ValidityWarning>,
     pub(super) receivers: Vec<ReceiverRecord<'a>>,
     /// Rays that end at a sheet, because they have passed as many as they may.
     #[serde(skip)]
@@ -146,6 +149,7 @@ impl<'a> ScanRecord<'a> {
         model: Option<&Model>,
         views: &[View<'a>],
         images: &[Raster],
+        validity: Vec<ValidityWarning>,
         all_hits: bool,
         rays_ended: usize,
     ) -> ScanRecord<'a> {
@@ -186,6 +190,7 @@ impl<'a> ScanRecord<'a> {
                 "width": image.width, "height": image.height, "pixel_m": image.pixel_m,
                 "x_min_m": image.x_min_m, "y_min_m": image.y_min_m,
             }),
+            validity,
             materials,
             effects: effects(model),
             regions: regions(ready, scan),

@@ -90,8 +90,16 @@ impl<'a> RenderRequest<'a> {
         let images: Vec<Raster> = views.iter().map(|view| ready.image(&view.scan)).collect();
 
         progress(RenderProgress::Begin(RenderStage::Encode));
-        let record =
-            ScanRecord::new(ready, assembly.model(), &views, &images, all_hits, footprints.ended);
+        let validity = ready.validity(&setup, &footprints);
+        let record = ScanRecord::new(
+            ready,
+            assembly.model(),
+            &views,
+            &images,
+            validity,
+            all_hits,
+            footprints.ended,
+        );
         let mut files = encode(all_hits, self.packing, ready, &views, &images, &record)?;
         if let Some(shape) = self.beat {
             for view in &views {
