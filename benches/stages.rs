@@ -281,7 +281,8 @@ fn files(given: Rendering<'_>) -> Vec<Way<'_>> {
         |raster: &Raster, packing| exr::write_packed(raster, &[], packing).expect("a picture");
     let cloud = move || {
         let echoes: Vec<&Echo> = given.scan.detections().collect();
-        ply::write_table(&cloud_table(&echoes, &[0], &["body"], &["paint"])).expect("a cloud")
+        ply::write_table(&cloud_table(&echoes, &[0], &["body"], &["paint"], false))
+            .expect("a cloud")
     };
     let written = [exr(&raster, Packing::Zip16), png(&raster), cloud()];
     let folder = tempfile::tempdir().expect("a temporary folder");

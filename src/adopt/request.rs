@@ -203,6 +203,11 @@ fn check_predicted(scene: &Scene, path: &Path) -> Result<(), Error> {
         )
     } else if radar.receiver.is_some() {
         ("a range receiver", "replace [radar.receiver] by [radar.noise] and [radar.speckle]")
+    } else if scene.target.transmits() {
+        (
+            "what lies behind a region that transmits",
+            "replace the sheet by [[effect]] `covering-layer`",
+        )
     } else if !scene.file.receiver.is_empty() {
         ("other antennas", "remove [[receiver]]; a diagnosis is of the radar's own echoes")
     } else {

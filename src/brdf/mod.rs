@@ -27,6 +27,7 @@ pub use kind::{Key, Kind};
 pub use models::*;
 pub use outline::{DEGREES, Outline};
 pub use parameter::{Parameter, ParameterError, Visitor};
+pub use permittivity::Polarisation;
 pub(crate) use retro::Retro;
 pub use scattering::{NARROW_M, NarrowLobe, Scattering, ScatteringModel, Seen};
 pub use slopes::{Distribution, VIEWING_RAD};

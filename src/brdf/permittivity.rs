@@ -45,14 +45,18 @@ pub(super) fn visit_permittivity(
 }
 
 /// The electric field's direction: across the plane of incidence (s) or in it (p).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Polarisation {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Polarisation {
+    /// Across the plane of incidence.
     S,
+    /// In the plane of incidence.
     P,
 }
 
-/// Both, in equal shares: unpolarised incidence.
-pub(super) const BOTH: [Polarisation; 2] = [Polarisation::S, Polarisation::P];
+impl Polarisation {
+    /// Both, in equal shares: unpolarised incidence.
+    pub const BOTH: [Polarisation; 2] = [Polarisation::S, Polarisation::P];
+}
 
 /// √(ε − sin²θ) on the branch that decays downwards.
 pub(super) fn normal_wavenumber(eps: Complex<f64>, cos_theta: f64) -> Complex<f64> {
@@ -86,12 +90,13 @@ pub(super) fn fresnel_reflectance(eps: Complex<f64>, cos_theta: f64) -> f64 {
 pub(super) fn half_space_amplitudes(eps: Complex<f64>, cos_theta: f64) -> [Complex<f64>; 2] {
     let outside = (Complex::from(1.0), Complex::from(cos_theta));
     let inside = (eps, normal_wavenumber(eps, cos_theta));
-    BOTH.map(|polarisation| interface(polarisation, outside, inside))
+    Polarisation::BOTH.map(|polarisation| interface(polarisation, outside, inside))
 }
 
 /// Mean over both polarisations of |r|², held to at most 1 against rounding.
 pub(super) fn unpolarised(amplitude: impl Fn(Polarisation) -> Complex<f64>) -> f64 {
-    let sum: f64 = BOTH.into_iter().map(|polarisation| amplitude(polarisation).norm_sqr()).sum();
+    let powers = Polarisation::BOTH.map(|polarisation| amplitude(polarisation).norm_sqr());
+    let sum: f64 = powers.into_iter().sum();
     (sum / 2.0).min(1.0)
 }
 

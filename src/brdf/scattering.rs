@@ -111,6 +111,23 @@ impl Seen {
         Seen { f_per_sr, specular_share: 1.0, coherent_share: 1.0 }
     }
 
+    /// This return and another one, which add up in power.
+    pub fn and(self, other: Seen) -> Seen {
+        let f_per_sr = self.f_per_sr + other.f_per_sr;
+        let share = |own: f64, of_other: f64| {
+            if f_per_sr > 0.0 {
+                (own * self.f_per_sr + of_other * other.f_per_sr) / f_per_sr
+            } else {
+                0.0
+            }
+        };
+        Seen {
+            f_per_sr,
+            specular_share: share(self.specular_share, other.specular_share),
+            coherent_share: share(self.coherent_share, other.coherent_share),
+        }
+    }
+
     /// The return of facets with a roughness along and across their grain. Of their lobe, which is as wide as the
     /// surface's and the beam's together, the beam's own part δ²/m_eff² is coherent: all of it without
     /// roughness, 5 % at m = 0.05 for δ = 0.0117 rad.

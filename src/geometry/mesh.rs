@@ -212,6 +212,27 @@ impl Mesh {
         (a + b + c) / 3.0
     }
 
+    /// Unit normals at the vertices, the mean over the facets that meet there by their areas; zero where no facet does.
+    /// They point outwards where facets run anticlockwise seen from outside.
+    pub fn vertex_normals(&self) -> Vec<DVec3> {
+        let mut normals = vec![DVec3::ZERO; self.vertices.len()];
+        for (number, facet) in self.facets.iter().enumerate() {
+            let normal = self.area_normal(number);
+            facet.iter().for_each(|&vertex| normals[vertex as usize] += normal);
+        }
+        normals.into_iter().map(DVec3::normalize_or_zero).collect()
+    }
+
+    /// A mesh of some of the facets, in this order, with their labels. It keeps all vertices.
+    pub fn only(mut self, facets: &[usize]) -> Mesh {
+        self.facets = facets.iter().map(|&facet| self.facets[facet]).collect();
+        for labels in &mut self.labels {
+            let names = facets.iter().map(|&facet| labels.name_of_facet[facet]);
+            labels.name_of_facet = names.collect();
+        }
+        self
+    }
+
     /// Whether a facet has no area: repeated or collinear corners.
     ///
     /// The bound is relative to the longest edge, so that small and large meshes are judged alike.
@@ -289,6 +310,24 @@ mod tests {
         }
         let expected = MeshError::NotFinite { vertex: 30_000, x: 1.0, y: f64::INFINITY, z: 1.0 };
         assert_eq!(stray.validate(), Err(expected));
+    }
+
+    #[test]
+    fn some_facets_keep_their_labels_and_normals_are_those_of_the_facets() {
+        let mesh = Mesh {
+            vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::ONE],
+            facets: vec![[0, 1, 2], [1, 3, 2]],
+            labels: vec![FacetLabels::from_names("part", ["arm", "leg"])],
+        };
+        let leg = mesh.clone().only(&[1]);
+        assert_eq!(
+            (leg.facets.as_slice(), leg.labels[0].name_of_facet.as_slice()),
+            (&[[1, 3, 2]][..], &[1][..])
+        );
+        let normals = leg.vertex_normals();
+        assert_eq!(normals[0], DVec3::ZERO);
+        assert!(normals[3].dot(mesh.area_normal(1).normalize()) > 1.0 - 1e-12);
+        assert!(mesh.vertex_normals()[0].distance(DVec3::Z) < 1e-12);
     }
 
     #[test]

@@ -90,6 +90,18 @@ impl Material {
         curve.tabulated().map(Brdf::Tabulated)
     }
 
+    /// ε′ and ε″ at the frequency nearest to this one, Hz: of the only substance that has a permittivity, or of the one
+    /// whose key is the material's own name. `None` for any other material.
+    pub fn permittivity_near(&self, frequency_hz: f64) -> Option<[f64; 2]> {
+        let first = self.permittivities.first()?;
+        let is_own = |entry: &&Permittivity| entry.key == self.slug.as_str();
+        let is_only = self.permittivities.iter().all(|entry| entry.key == first.key);
+        let entries = self.permittivities.iter().filter(|entry| is_only || is_own(entry));
+        let distance_hz = |entry: &&Permittivity| (entry.frequency_hz - frequency_hz).abs();
+        let nearest = entries.min_by(|a, b| distance_hz(a).total_cmp(&distance_hz(b)))?;
+        Some([nearest.real, nearest.imaginary])
+    }
+
     /// The source of the numbers that a scene renders.
     pub fn render_kind(&self) -> Option<SourceKind> {
         let fits = self.fits.iter().map(|f| (&f.name, &f.source));

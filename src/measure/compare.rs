@@ -41,6 +41,7 @@ pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
     for (number, point) in cloud.points().iter().enumerate() {
         let in_target = target_from_global * point.point;
         echoes.push(Echo {
+            rank: 1,
             chirp: point.chirp.unwrap_or(number as u32),
             point: point.point,
             range_m: point.range_m.unwrap_or(origin.distance_m(point.point)),

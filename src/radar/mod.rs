@@ -30,6 +30,6 @@ pub use polarisation::{Channel, Polarisation};
 pub use preset::PRESETS;
 pub use receiver::{Detection, RangeProcessor, Receiver};
 pub use scan::{Chirps, Field, Pattern};
-pub use settings::{BeamEntry, Footprint, Radar, SpotDiameter};
+pub use settings::{BeamEntry, Footprint, Radar, Returns, SpotDiameter};
 pub use speckle::Speckle;
 pub use window::Window;

@@ -4,7 +4,7 @@ use super::chirp::ChirpEntry;
 use super::mirror::Optics;
 use super::polarisation::Polarisation;
 use super::scan::pattern::Pattern;
-use super::settings::{BeamEntry, Footprint, Radar, SpotDiameter};
+use super::settings::{BeamEntry, Footprint, Radar, Returns, SpotDiameter};
 
 /// Names of the presets.
 pub const PRESETS: [&str; 1] = ["upm-300ghz"];
@@ -19,6 +19,7 @@ impl Default for Radar {
             aperture_m2: None,
             system_loss_db: 12.5,
             threshold_dbm: -77.0,
+            returns: Returns::default(),
             footprint: Footprint::Paper,
             spot_diameter_m: 0.016,
             spot_diameter_is: SpotDiameter::default(),

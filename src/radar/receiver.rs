@@ -76,6 +76,7 @@ pub struct RangeProcessor {
     noise_per_sample_w: f64,
     noise_per_bin_w: f64,
     threshold_w: f64,
+    side_lobe_ratio: f64,
 }
 
 impl Default for Receiver {
@@ -156,6 +157,7 @@ impl RangeProcessor {
             gate_bins,
             noise_per_bin_w,
             threshold_w,
+            side_lobe_ratio: receiver.window.side_lobe_ratio(),
         })
     }
 
@@ -221,13 +223,28 @@ impl RangeProcessor {
         Some(self.interpolate(profile_w, self.strongest_peak(profile_w)?))
     }
 
+    /// Every peak of a profile in the gate at or above the threshold, the nearest first. What could be a side lobe of the
+    /// strongest, from its window, is left out.
+    pub fn peaks(&self, profile_w: &[f64]) -> Vec<Detection> {
+        /// Side lobes are seen between the bins, and add up with what else is there.
+        const MARGIN: f64 = 1.25;
+        let Some(strongest) = self.peak(profile_w) else { return Vec::new() };
+        let side_lobe_w = MARGIN * self.side_lobe_ratio * strongest.power_w;
+        let least_w = self.threshold_w.max(side_lobe_w);
+        let peaks = self.bins_of_peaks(profile_w).map(|k| self.interpolate(profile_w, k));
+        peaks.filter(|peak| peak.power_w >= least_w).collect()
+    }
+
     fn strongest_peak(&self, profile_w: &[f64]) -> Option<usize> {
+        self.bins_of_peaks(profile_w).max_by(|&a, &b| profile_w[a].total_cmp(&profile_w[b]))
+    }
+
+    fn bins_of_peaks(&self, profile_w: &[f64]) -> impl Iterator<Item = usize> {
         let [first, last] = self.gate_bins;
-        let peaks = (first..=last).filter(|&k| {
+        (first..=last).filter(|&k| {
             let [before, after] = neighbours(profile_w, k);
             profile_w[k] >= before && profile_w[k] > after
-        });
-        peaks.max_by(|&a, &b| profile_w[a].total_cmp(&profile_w[b]))
+        })
     }
 
     /// Top of the parabola through the logarithms of a peak and its neighbours.
@@ -340,6 +357,21 @@ mod tests {
             [error_um, db_from_ratio(found.power_w / POWER_W).abs()]
         });
         errors.fold([0.0, 0.0], |[a, b], [x, y]| [f64::max(a, x), f64::max(b, y)])
+    }
+
+    #[test]
+    fn two_returns_are_two_peaks_and_a_side_lobe_is_none() {
+        let chirp = Chirp { samples: 256, ..SHORT };
+        let processor = RangeProcessor::new(&NOISELESS, &chirp, -100.0, 1).unwrap();
+        let peaks = |returns: &[Return]| {
+            processor.peaks(&processor.profile_w(&chirp.beat_signal(returns).unwrap()))
+        };
+        let ranges_m = |found: &[Detection]| found.iter().map(|d| d.range_m).collect::<Vec<_>>();
+        // At −31.5 dB the first side lobe of Hann's window is far above the threshold.
+        assert_eq!(peaks(&[echo(0.5)]).len(), 1);
+        let weak = Return { amplitude_sqrt_w: echo(0.0).amplitude_sqrt_w * 0.1, ..echo(0.53) };
+        let found = ranges_m(&peaks(&[echo(0.5), weak]));
+        assert!(found.len() == 2 && (found[1] - 0.53).abs() < 1e-3, "{found:?}");
     }
 
     #[test]

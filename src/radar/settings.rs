@@ -20,6 +20,7 @@ use super::polarisation::Polarisation;
 use super::receiver::Receiver;
 use super::scan::pattern::{self, Pattern};
 use super::speckle::Speckle;
+use super::window::Window;
 use crate::formats::EffectEntry;
 
 /// An instrument. The default is `upm-300ghz`, the imaging radar of the Universidad Politécnica de
@@ -44,6 +45,9 @@ pub struct Radar {
     pub system_loss_db: f64,
     /// Detections below this power are discarded, dBm. −77: paper, Sec. V-C.
     pub threshold_dbm: f64,
+    /// Which echoes of a chirp are reported where several part in range. `strongest`: paper, one point per chirp.
+    #[serde(skip_serializing_if = "Returns::is_strongest")]
+    pub returns: Returns,
     /// How a tilted surface spreads the spot. `paper`: equation (11).
     pub footprint: Footprint,
     /// Diameter of the spot at the centre of the field of view, m. 0.016: paper, Sec. II-B.
@@ -93,6 +97,25 @@ pub struct Radar {
     /// Where the rays go.
     #[serde(deserialize_with = "pattern::read")]
     pub scan: Pattern,
+}
+
+/// Which echoes of a chirp a receiver reports, where several part in range.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Returns {
+    /// The strongest.
+    #[default]
+    Strongest,
+    /// The nearest at or above the threshold.
+    First,
+    /// Every one.
+    All,
+}
+
+impl Returns {
+    fn is_strongest(&self) -> bool {
+        *self == Returns::Strongest
+    }
 }
 
 /// How a tilted surface spreads the spot.
@@ -162,6 +185,17 @@ impl SpotDiameter {
 }
 
 impl Radar {
+    /// The window before the Fourier transform: the receiver's, or Hann's.
+    pub fn window(&self) -> Window {
+        self.receiver.map_or(Window::Hann, |receiver| receiver.window)
+    }
+
+    /// Distance in range at which two echoes part, m: the peak of one lies on the first zero of the other. It is 11.1 mm
+    /// for 27 GHz and Hann's window.
+    pub fn range_cell_m(&self) -> f64 {
+        self.window().first_zero_bins() * self.chirp().range_resolution_m()
+    }
+
     /// The sweep, in SI.
     pub fn chirp(&self) -> Chirp {
         Chirp {

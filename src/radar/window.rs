@@ -8,6 +8,8 @@ use std::f64::consts::{PI, TAU};
 
 use serde::{Deserialize, Serialize};
 
+use crate::units::ratio_from_db;
+
 /// A window. Each row of the table is coherent gain, noise bandwidth and half-power width in bins,
 /// and the highest sidelobe in dB.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,6 +49,22 @@ impl Window {
     fn sample(self, angle_rad: f64) -> f64 {
         let terms = self.coefficients().iter().enumerate();
         terms.map(|(k, a)| a * (k as f64 * (angle_rad + PI)).cos()).sum()
+    }
+
+    /// Offset of the first zero of the transform from its top, in bins, for many samples.
+    pub fn first_zero_bins(self) -> f64 {
+        self.coefficients().len() as f64
+    }
+
+    /// Power of the highest side lobe over that of the main lobe, rounded up.
+    pub fn side_lobe_ratio(self) -> f64 {
+        let level_db = match self {
+            Window::Rectangular => -13.0,
+            Window::Hann => -31.0,
+            Window::Hamming => -42.0,
+            Window::BlackmanHarris => -91.0,
+        };
+        ratio_from_db(level_db)
     }
 
     /// Full width of the main lobe at half power, in bins, for many samples.
@@ -125,6 +143,21 @@ mod tests {
             assert!((noise_bandwidth_bins(&samples) - bandwidth).abs() < ROUNDING, "{window:?}");
             let found = window.half_power_width_bins();
             assert!((found - width).abs() < ROUNDING, "{window:?}: {found}");
+        }
+    }
+
+    #[test]
+    fn no_side_lobe_is_higher_than_stated_and_none_begins_before_the_first_zero() {
+        for window in Window::ALL {
+            let top = window.transform(0.0).powi(2);
+            let power = |bins: f64| window.transform(bins).powi(2) / top;
+            let zero = window.first_zero_bins();
+            assert!(window.transform(zero).abs() < 1e-15, "{window:?}");
+            assert!((0..1000).all(|k| window.transform(1e-3 * f64::from(k) * zero) > 0.0));
+            let lobes = (0..20_000).map(|k| power(zero + 1e-3 * f64::from(k)));
+            let highest = lobes.fold(0.0, f64::max);
+            let stated = window.side_lobe_ratio();
+            assert!(highest < stated && highest > 0.6 * stated, "{window:?}: {highest}");
         }
     }
 

@@ -70,11 +70,14 @@ impl Batch<'_> {
     /// Renders all scans, in their order.
     ///
     /// # Errors
-    /// When the radar has a receiver that works on beat signals, the tracer does not accept the rays, or the graphics
+    /// When the radar has a receiver that works on beat signals, a surface lets the wave pass on, the tracer does not accept the rays, or the graphics
     /// processor holds another mesh, fails, or has too little memory for the materials of the scans.
     pub fn run(&self, takes: &[Take]) -> Result<Takes, RenderError> {
         if self.geometry.radar.receiver.is_some() {
             return Err(RenderError::Signals);
+        }
+        if takes.iter().any(|take| take.surfaces.iter().any(|surface| surface.sheet.is_some())) {
+            return Err(RenderError::Sheets);
         }
         let work = Work::new(self, takes)?;
         let chirps = self.geometry.chirps.rays.len();

@@ -7,12 +7,15 @@ use crate::units::dbm_from_watts;
 /// The table of a point cloud: position in the global frame (double), then the measured values and the true cause of
 /// each point. The cause of a false alarm is NaN, or −1 for whole numbers.
 ///
-/// The names of `regions` and `materials` are written into the header.
+/// The names of `regions` and `materials` are written into the header. With `several`, for a radar that reports or a target
+/// that gives several echoes per chirp, there are three columns more: the echo's rank, and the sheets in front of and the
+/// true range of what caused it.
 pub fn cloud_table(
     echoes: &[&Echo],
     material_of_region: &[u16],
     regions: &[&str],
     materials: &[&str],
+    several: bool,
 ) -> Table {
     let column = |name: &str, scalar: Scalar, value: &dyn Fn(&Echo) -> f64| Column {
         name: name.to_owned(),
@@ -26,7 +29,7 @@ pub fn cloud_table(
         column(name, Scalar::Int, &|echo| echo.truth.as_ref().map_or(-1, value) as f64)
     };
     let material = |t: &Truth| material_of_region[usize::from(t.region)].into();
-    let columns = vec![
+    let mut columns = vec![
         column("x", Scalar::Double, &|e| e.point.xyz.x),
         column("y", Scalar::Double, &|e| e.point.xyz.y),
         column("z", Scalar::Double, &|e| e.point.xyz.z),
@@ -45,6 +48,11 @@ pub fn cloud_table(
         number("region", &|t| t.region.into()),
         number("material", &material),
     ];
+    if several {
+        columns.push(column("rank", Scalar::Int, &|e| e.rank.into()));
+        columns.push(number("sheets", &|t| t.sheets.into()));
+        columns.push(known("true_range_m", &|t| t.hit.range_m));
+    }
     let named = |kind: &'static str| {
         move |(number, name): (usize, &&str)| format!("{kind} {number} {name}")
     };

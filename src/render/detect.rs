@@ -3,6 +3,9 @@
 //! There are three kinds of receiver. Without settings it is exact, as in the paper: powers add, and the range is the
 //! mean weighted by power. With speckle or noise, power and range are drawn from their distributions. With a
 //! `[radar.receiver]` every path becomes a tone of the beat signal, and range and power are read from its spectrum.
+//!
+//! A chirp has one echo, unless its rays pass a sheet or the radar says which `returns` it reports: then
+//! `returns.rs` parts them, and each has draws of its own.
 
 use num_complex::Complex;
 
@@ -10,11 +13,12 @@ use super::effect_scan::EffectScan;
 use super::error::RenderError;
 use super::observer::Observer;
 use super::path::{Path, sum};
+use super::returns::{Seen, choose, separate};
 use super::setup::Setup;
 use crate::effects::{Receiver, SaturationCurve};
 use crate::radar::noise::measured_w;
 use crate::radar::random::{Draws, Key, Purpose};
-use crate::radar::{Chirp, Detection, RangeProcessor, Return, Speckle};
+use crate::radar::{Chirp, Detection, RangeProcessor, Return, Returns, Speckle};
 use crate::units::watts_from_dbm;
 
 /// The sampled beat signals of one chirp, √W, one per look.
@@ -27,6 +31,9 @@ pub(super) struct Detector {
     kind: Kind,
     threshold_w: f64,
     saturation: SaturationCurve,
+    returns: Returns,
+    /// Distance at which echoes part, m.
+    cell_m: f64,
 }
 
 /// The kinds of receiver.
@@ -80,6 +87,8 @@ impl Detector {
             kind,
             threshold_w,
             saturation: law.saturating(),
+            returns: radar.returns,
+            cell_m: radar.range_cell_m(),
         })
     }
 
@@ -98,21 +107,60 @@ impl Detector {
         (noise_w > 0.0).then_some(noise_w)
     }
 
-    /// The range and power that the receiver measures of a chirp, also below the threshold; `None` without any.
-    pub fn observe(&self, chirp: usize, paths: &[Path]) -> Result<Option<Detection>, RenderError> {
+    /// Replaces the contents of `seen` by what the receiver measures of a chirp, also below the threshold, and may sort
+    /// its paths.
+    pub fn observe(
+        &self,
+        chirp: usize,
+        paths: &mut [Path],
+        seen: &mut Vec<Seen>,
+    ) -> Result<(), RenderError> {
+        seen.clear();
+        let whole = 0..paths.len();
         match &self.kind {
             Kind::Beat(beat) => {
-                let peak = beat.processor.peak(&self.mean_profile_w(beat, chirp, paths)?);
+                let profile_w = self.mean_profile_w(beat, chirp, paths)?;
+                let mut peaks = match self.returns {
+                    Returns::Strongest => Vec::new(),
+                    Returns::First | Returns::All => beat.processor.peaks(&profile_w),
+                };
+                if peaks.is_empty() {
+                    peaks.extend(beat.processor.peak(&profile_w));
+                }
                 let mean_w = paths.iter().map(|path| path.power_w).sum();
-                Ok(peak.map(|peak| self.saturate(mean_w, peak)))
+                seen.extend(peaks.into_iter().map(|peak| {
+                    let detection = self.saturate(mean_w, peak);
+                    Seen { detection, paths: whole.clone() }
+                }));
             }
-            _ if paths.is_empty() => Ok(None),
-            _ => Ok(Some(self.measure_mean(chirp, sum(paths)))),
+            _ if paths.is_empty() => {}
+            _ if self.parts(paths) => {
+                for (number, places) in (0..).zip(separate(paths, self.cell_m)) {
+                    let detection = self.measure(chirp, number, sum(&paths[places.clone()]));
+                    seen.push(Seen { detection, paths: places });
+                }
+            }
+            _ => {
+                let detection = self.measure_mean(chirp, sum(paths));
+                seen.push(Seen { detection, paths: whole });
+            }
         }
+        choose(seen, self.returns, self.threshold_w);
+        Ok(())
+    }
+
+    /// Whether the echoes of these paths part in range: those of rays that pass a sheet do.
+    fn parts(&self, paths: &[Path]) -> bool {
+        self.returns != Returns::Strongest || paths.iter().any(|path| path.sheets > 0)
     }
 
     /// The range and power that a receiver without beat signals measures of a chirp with this mean.
     pub fn measure_mean(&self, chirp: usize, mean: Detection) -> Detection {
+        self.measure(chirp, 0, mean)
+    }
+
+    /// As [`measure_mean`](Self::measure_mean), for one of several echoes of a chirp, by its number.
+    fn measure(&self, chirp: usize, number: u64, mean: Detection) -> Detection {
         let Kind::Laws { law, speckle, range_sd_m } = &self.kind else {
             return self.saturate(mean.power_w, mean);
         };
@@ -121,10 +169,10 @@ impl Detector {
             // Without an echo there is no range to measure.
             return mean;
         }
-        let mut draws = self.draws(chirp, Purpose::Speckle);
+        let mut draws = self.draws_of(chirp, number, Purpose::Speckle);
         let linear_w = measured_w(power_w, law.noise_w, *speckle, &mut draws);
         let power_w = self.saturation.passed_w(power_w + law.noise_w, linear_w);
-        let error_m = range_sd_m * self.draws(chirp, Purpose::Range).gaussian();
+        let error_m = range_sd_m * self.draws_of(chirp, number, Purpose::Range).gaussian();
         Detection { range_m: range_m + error_m, power_w }
     }
 
@@ -188,7 +236,15 @@ impl Detector {
     }
 
     fn draws(&self, chirp: usize, purpose: Purpose) -> Draws {
-        Key { seed: self.seed, chirp: chirp as u64, sub_ray: self.observer, purpose }.draws()
+        self.draws_of(chirp, 0, purpose)
+    }
+
+    /// Draws for one echo of a chirp, by its number.
+    fn draws_of(&self, chirp: usize, number: u64, purpose: Purpose) -> Draws {
+        // Observers are far fewer.
+        const ECHOES_FROM_BIT: u32 = 32;
+        let sub_ray = self.observer | number << ECHOES_FROM_BIT;
+        Key { seed: self.seed, chirp: chirp as u64, sub_ray, purpose }.draws()
     }
 }
 

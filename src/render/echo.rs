@@ -3,13 +3,14 @@
 use super::detect::Detector;
 use super::observer::Observer;
 use super::path::Path;
+use super::returns::Seen;
 use super::setup::Setup;
 use super::spot::Footprints;
 use crate::frames::{Global, Point, Pose, Target};
 use crate::radar::Detection;
 use crate::trace::Hit;
 
-/// The echo of one chirp.
+/// An echo of one chirp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Echo {
     /// Chirp number, from 0 or as an explicit scan gives it.
@@ -24,6 +25,8 @@ pub struct Echo {
     pub yt_m: f64,
     /// Received power, W; 0 without an echo.
     pub power_w: f64,
+    /// Its place among the echoes of its chirp by power: 1 for the strongest.
+    pub rank: u16,
     /// The cause; `None` for a false alarm.
     pub truth: Option<Truth>,
 }
@@ -40,11 +43,14 @@ pub struct Truth {
     pub theta_sd_rad: f64,
     /// Azimuth of the radar about the facet's normal, from the grain of its region, rad.
     pub azimuth_rad: f64,
+    /// Number of sheets that the radar's ray passes before the first surface: 0 for what lies in front.
+    pub sheets: u8,
     /// Number of surfaces on the path: 1 for a single path, 2 for a second-order one.
     pub surfaces: u8,
     /// Share of the power that is specular at every surface of the path, 0 to 1.
     pub specular_share: f64,
-    /// Distance in the target plane to the nearest edge in depth, m, at most three spots.
+    /// Distance in the target plane to the nearest edge in depth, m, at most three spots. Behind sheets it is that of what
+    /// lies there.
     pub edge_m: f64,
 }
 
@@ -58,8 +64,29 @@ pub(super) struct Echoes<'a> {
 }
 
 impl Echoes<'_> {
-    /// The echo of a chirp: of one that hits the target, however weak, or a false alarm. `None` for any other chirp.
-    pub fn echo(
+    /// Appends the echoes of a chirp, of its paths and of what the receiver has seen of them.
+    pub fn append(
+        &self,
+        chirp: usize,
+        hits: &[Option<Hit>],
+        paths: &[Path],
+        seen: &[Seen],
+        found: &mut Vec<Echo>,
+    ) {
+        if seen.is_empty() {
+            found.extend(self.echo(chirp, hits, paths, None));
+        }
+        let first = found.len();
+        for Seen { detection, paths: places } in seen {
+            found.extend(self.echo(chirp, hits, &paths[places.clone()], Some(*detection)));
+        }
+        if seen.len() > 1 {
+            rank(&mut found[first..]);
+        }
+    }
+
+    /// An echo of a chirp: of one that hits the target, however weak, or a false alarm. `None` for any other chirp.
+    fn echo(
         &self,
         chirp: usize,
         hits: &[Option<Hit>],
@@ -85,20 +112,38 @@ impl Echoes<'_> {
             xt_m: in_target.xyz.x,
             yt_m: in_target.xyz.y,
             power_w: seen.map_or(0.0, |seen| seen.power_w),
+            rank: 1,
             truth: cause.map(|path| self.truth(chirp, hits, path)),
         })
     }
 
     fn truth(&self, chirp: usize, hits: &[Option<Hit>], path: &Path) -> Truth {
+        // What lies behind sheets has hits of its own.
+        let behind = usize::from(path.sheets).checked_sub(1);
+        let behind = behind.map(|number| &self.footprints.behind[number]);
+        let hits = behind
+            .map_or(hits, |behind| &behind.hits[chirp * hits.len()..(chirp + 1) * hits.len()]);
+        let edge_m = behind.map_or(&self.footprints.edge_m, |behind| &behind.edge_m);
         Truth {
             hit: path.hit,
             region: self.setup.geometry.region_of_facet[path.hit.facet as usize],
             theta_sd_rad: theta_sd_rad(hits),
+            sheets: path.sheets,
             azimuth_rad: path.azimuth_rad,
             surfaces: path.surfaces,
             specular_share: path.specular_share,
-            edge_m: self.footprints.edge_m[chirp],
+            edge_m: edge_m[chirp],
         }
+    }
+}
+
+/// Numbers echoes from the strongest.
+fn rank(echoes: &mut [Echo]) {
+    let powers: Vec<f64> = echoes.iter().map(|echo| echo.power_w).collect();
+    let mut by_power: Vec<usize> = (0..echoes.len()).collect();
+    by_power.sort_by(|&a, &b| powers[b].total_cmp(&powers[a]));
+    for (rank, place) in (1..).zip(by_power) {
+        echoes[place].rank = rank;
     }
 }
 

@@ -94,8 +94,15 @@ impl<'a> EffectScan<'a> {
             tilted(&shot, tilts).map_or(0.0, |shot| self.model.arrived(&stage, &shot).power_w);
         let Some(Orientation { azimuth_rad, .. }) = orientation else {
             // Without a change the path stays the same bit for bit.
-            let same = with_w == self.bare.arrived(&stage, &shot).power_w;
-            return if same { path } else { Path { power_w: with_w / rays as f64, ..path } };
+            let bare_w = self.bare.arrived(&stage, &shot).power_w;
+            return if with_w == bare_w {
+                path
+            } else if self.setup.has_sheets() && bare_w > 0.0 {
+                // The model knows no sheets: what it changes is a factor.
+                Path { power_w: path.power_w * (with_w / bare_w), ..path }
+            } else {
+                Path { power_w: with_w / rays as f64, ..path }
+            };
         };
         let retro = Direction::<Surface>::from_angles(shot.hit.theta_rad(), azimuth_rad);
         let law = self.model.laws.get(usize::from(shot.region));
@@ -249,8 +256,8 @@ fn tilted(shot: &Shot, [along, across]: [f64; 2]) -> Option<Shot> {
 /// Refuses effects that would be counted twice, and effects at a separate receiver.
 pub(super) fn check(setup: &Setup, rays: usize, observer: Observer) -> Result<(), RenderError> {
     let Some(model) = setup.effects else { return Ok(()) };
-    for (effect, _) in &model.effects {
-        let effect = effect.about();
+    for (acting, values) in &model.effects {
+        let effect = acting.about();
         if observer != Observer::Radar {
             return Err(RenderError::Effect {
                 effect: effect.name,
@@ -263,6 +270,13 @@ pub(super) fn check(setup: &Setup, rays: usize, observer: Observer) -> Result<()
                 effect: effect.name,
                 problem: "acts on the co-polar echoes, and nothing says what it does to the cross-polar ones",
                 way_out: "remove radar.polarisation.receive, or the effect",
+            });
+        }
+        if setup.has_sheets() && (acting.moves() || acting.survey_key(values).is_some()) {
+            return Err(RenderError::Effect {
+                effect: effect.name,
+                problem: "follows rays to the first surface, and some regions let them pass on",
+                way_out: "remove the effect, or `transmits` and `thickness_m` of the regions",
             });
         }
         let conflict = effect.conflicts.iter().find(|conflict| match conflict.with {

@@ -56,6 +56,12 @@ pub enum RenderError {
          by one"
     )]
     Signals,
+    /// A surface lets the wave pass on, and a batch sees only what lies in front.
+    #[error(
+        "a batch of scans sees the first surface only, and a region lets the wave pass on; remove its `transmits` or \
+         `thickness_m`, or render the scans one by one"
+    )]
+    Sheets,
     /// An effect would be counted twice, or is undefined for this scan.
     #[error("effect `{effect}` {problem}; {way_out}")]
     Effect {

@@ -48,7 +48,7 @@ struct Pixel {
 ///
 /// A pixel is the mean of the detections whose spots cover it, each with a Gaussian weight whose full width at half
 /// maximum is the spot's diameter. Power is averaged in watts. `material` is the index of the material of the nearest
-/// detection, and `count` the number of detections. The grid covers `field`, the field of view at 8 m, and a margin of
+/// detection, and `count` the number of detections. Of several echoes of one chirp the strongest is drawn. The grid covers `field`, the field of view at 8 m, and a margin of
 /// half a spot.
 pub fn power_image(
     scan: &Scan,
@@ -59,7 +59,7 @@ pub fn power_image(
 ) -> Raster {
     let mut raster = grid(field, spot_m, pixel_m);
     let mut pixels = vec![Pixel::default(); raster.width * raster.height];
-    let detections: Vec<&Echo> = scan.detections().collect();
+    let detections: Vec<&Echo> = scan.detections().filter(|echo| echo.rank == 1).collect();
     let splats = detections.par_iter();
     let splats: Vec<Splat> =
         splats.map(|&echo| Splat::new(echo, &raster, spot_m, material_of_region)).collect();
@@ -190,12 +190,13 @@ mod tests {
             region: 0,
             theta_sd_rad: 0.0,
             azimuth_rad: 0.0,
+            sheets: 0,
             surfaces: 1,
             specular_share: 0.0,
             edge_m: 0.0,
         };
         let power_w = watts_from_dbm(power_dbm);
-        Echo { chirp: 0, point, range_m: 8.0, xt_m, yt_m, power_w, truth: Some(truth) }
+        Echo { chirp: 0, point, range_m: 8.0, xt_m, yt_m, power_w, rank: 1, truth: Some(truth) }
     }
 
     fn image(echoes: Vec<Echo>) -> Raster {
@@ -255,6 +256,16 @@ mod tests {
         assert!((raster.y_m(row) - 0.002).abs() < 1e-12);
         let value = raster.channel("power_dbm").unwrap()[row * raster.width + column];
         assert!((f64::from(value) + 42.967).abs() < 1e-3, "{value}");
+    }
+
+    #[test]
+    fn of_several_echoes_of_a_chirp_the_strongest_is_drawn() {
+        let weaker = Echo { rank: 2, ..echo(0.0, 0.0, -60.0) };
+        let raster = image(vec![weaker, echo(0.0, 0.0, -40.0)]);
+        let drawn = raster.channel("power_dbm").unwrap().iter().filter(|value| value.is_finite());
+        assert!(
+            drawn.clone().count() > 0 && drawn.clone().all(|value| (value + 40.0).abs() < 1e-4)
+        );
     }
 
     #[test]

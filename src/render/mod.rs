@@ -4,9 +4,11 @@
 //! |---|---|
 //! | intersections of the rays of each chirp with the target | `spot.rs`, equation (7) |
 //! | the surfaces of the target | `surface.rs` |
+//! | what the target lets through | `sheet.rs` |
 //! | power that arrives at an antenna by single paths | `paths.rs`, equation (11) |
 //! | … and by second-order paths | `bounce.rs` |
 //! | … with declared physical effects | `effect_scan.rs` |
+//! | echoes that part in range | `returns.rs` |
 //! | how far the target tilts within the spots | `curvature.rs` |
 //! | detection by the receiver, and the cause of each echo | `detect.rs`, `echo.rs` |
 //! | image and point cloud | `image.rs`, `cloud.rs` |
@@ -14,6 +16,7 @@
 
 mod effect_scan;
 mod batch;
+mod behind;
 mod bounce;
 mod cloud;
 mod curvature;
@@ -26,8 +29,10 @@ mod jones;
 mod observer;
 mod path;
 mod paths;
+mod returns;
 mod scan;
 mod setup;
+mod sheet;
 mod spot;
 mod surface;
 
@@ -41,6 +46,7 @@ pub use error::RenderError;
 pub use image::{CHANNELS, power_image};
 pub use observer::Observer;
 pub use scan::{Scan, beat_signals, shade, trace, trace_placed};
-pub use setup::Setup;
-pub use spot::Footprints;
+pub use setup::{MOST_SHEETS, Setup};
+pub use sheet::Sheet;
+pub use spot::{Behind, Footprints};
 pub use surface::{Orientation, Surface};

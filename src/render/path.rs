@@ -6,12 +6,14 @@ use crate::trace::Hit;
 /// A path from the radar to the antenna.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Path {
-    /// Half of the path's length, m.
+    /// Half of the path's length, with what sheets on it seem to add, m.
     pub range_m: f64,
     /// Mean power that arrives, W, as the share of one ray of the spot.
     pub power_w: f64,
-    /// Intersection with the first surface.
+    /// Intersection with the first surface that scatters on the path.
     pub hit: Hit,
+    /// Number of sheets that the radar's ray passes before the first surface.
+    pub sheets: u8,
     /// Number of surfaces on the path, 1 or 2.
     pub surfaces: u8,
     /// Azimuth of the source about the normal of the first surface, from its grain, rad.

@@ -7,16 +7,21 @@
 //! Second-order path: radar → A → B → antenna. A scatters the share f_A(i, ω)·cos θ_ω·dω of its power into the
 //! direction ω of B, and the antenna receives the share f_B(−ω, o)·cos θ_o·Ω of that. `bounce.rs` estimates
 //! the integral over ω. The range is half the path length.
+//!
+//! Where a path crosses sheets, it loses power and seems longer by what `sheet.rs` says. A sheet is also a surface: every
+//! ray has a single path from each sheet that it meets, and from what lies behind.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::behind::{LIFT_M, Way, follow};
 use super::bounce::{Bounce, directions};
 use super::effect_scan::{Change, EffectScan};
 use super::jones::Field;
 use super::observer::Observer;
 use super::path::{Path, sum};
 use super::setup::Setup;
+use super::sheet::Passage;
 use super::spot::{self, Footprints, Spot};
 use super::surface::{Orientation, Surface};
 use crate::brdf::{NarrowLobe, Seen};
@@ -25,10 +30,6 @@ use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
 use crate::radar::random::{Key, Purpose};
 use crate::radar::{Channel, Detection, Link};
 use crate::trace::{Hit, LocalFrame, ScanGeometry};
-
-/// Distance above a surface at which a ray starts, m, so that it does not hit the same surface again. It is far above
-/// the rounding of f64 and far below a wavelength.
-const LIFT_M: f64 = 1e-7;
 
 /// Computes the paths of a scan to one antenna.
 pub(super) struct Paths<'a> {
@@ -52,6 +53,8 @@ struct Emission<'a> {
     antenna: DVec3,
     /// Number of rays that share its power.
     rays: usize,
+    /// Tangents of the tilts of all normals by the effects.
+    tilts: [f64; 2],
 }
 
 /// An illuminated point of the target.
@@ -69,6 +72,8 @@ struct ShadingPoint<'a> {
     solid_angle_sr: f64,
     /// Divergence of the beam there, rad.
     beam_rad: f64,
+    /// The sheets on the way of the ray that illuminates it.
+    inward: Passage,
 }
 
 /// Power on its way to a second surface.
@@ -86,6 +91,13 @@ impl ShadingPoint<'_> {
     /// Share of the power on the point that the antenna receives if nothing occludes it.
     fn received_share(&self, scattered: Seen) -> f64 {
         self.antenna.cos_theta().max(0.0) * scattered.f_per_sr * self.solid_angle_sr
+    }
+
+    /// Range of the echo of a sheet behind its outer face, m: that of what it reflects like a mirror.
+    fn echo_behind_m(&self, scattered: Seen) -> f64 {
+        let Some(sheet) = self.surface.sheet else { return 0.0 };
+        let half = (self.source.xyz() + self.antenna.xyz()).normalize_or(DVec3::Z);
+        sheet.echo_behind_m(half.dot(self.source.xyz())) * scattered.specular_share
     }
 }
 
@@ -133,24 +145,19 @@ impl<'a> Paths<'a> {
         let antenna = self.observer.position(axis.origin.xyz);
         let range_m = self.footprints.axis_range_m[number];
         let spot = Spot::met(&self.link.beam, axis, range_m, number);
-        let sent = Emission { paths: self, number, spot, antenna, rays: hits.len() };
         let tilts = self.effects.as_ref().map_or([0.0; 2], |effects| effects.tilts(number));
+        let sent = Emission { paths: self, number, spot, antenna, rays: hits.len(), tilts };
         for (sample, hit) in hits.iter().enumerate() {
             let Some((hit, ray)) = hit.zip(spot.ray(self.samples[sample])) else { continue };
-            let orientation = sent.orientation(sample);
-            let lit = sent.lit_by_beam(hit, &ray);
-            let bare = sent.direct(&lit);
-            let effects = self.effects.as_ref();
-            let direct = effects.map_or(bare, |effects| {
-                effects.direct(bare, number, &ray, hits.len(), orientation, tilts)
-            });
-            paths.push(direct);
-            if let Some(bounce) = &self.setup.bounce {
-                let gain =
-                    effects.map(|effects| effects.instrument_gain(number, &ray, hit, orientation));
-                let flux_w = self.link.flux_w(lit.hit.cos_theta) * self.lit_shares[sample];
-                let flux_w = flux_w * gain.unwrap_or(1.0);
-                sent.second_order(&lit, flux_w, direct, bounce, sample, paths);
+            sent.scatter(hit, Passage::FREE, &ray, sample, paths);
+            // Behind every sheet that the ray meets lies something else, or nothing.
+            let (mut front, mut inward) = (hit, Passage::FREE);
+            for behind in &self.footprints.behind {
+                let Some(sheet) = self.setup.sheet(front.facet) else { break };
+                let Some(hit) = behind.hits[number * hits.len() + sample] else { break };
+                inward = inward.then(sheet.passage(front.cos_theta));
+                sent.scatter(hit, inward, &ray, sample, paths);
+                front = hit;
             }
         }
         if let Some(change) = self.changes.get(number).copied().flatten() {
@@ -160,6 +167,32 @@ impl<'a> Paths<'a> {
 }
 
 impl<'a> Emission<'a> {
+    /// Appends the paths by way of the hit of a ray, which comes by the way `inward`.
+    fn scatter(
+        &self,
+        hit: Hit,
+        inward: Passage,
+        ray: &Ray<Global>,
+        sample: usize,
+        paths: &mut Vec<Path>,
+    ) {
+        let orientation = self.orientation(sample);
+        let lit = ShadingPoint { inward, ..self.lit_by_beam(hit, ray) };
+        let bare = self.direct(&lit);
+        let effects = self.paths.effects.as_ref();
+        let direct = effects.map_or(bare, |effects| {
+            effects.direct(bare, self.number, ray, self.rays, orientation, self.tilts)
+        });
+        paths.push(direct);
+        if let Some(bounce) = &self.paths.setup.bounce {
+            let gain =
+                effects.map(|effects| effects.instrument_gain(self.number, ray, hit, orientation));
+            let flux_w = self.paths.link.flux_w(hit.cos_theta) * self.paths.lit_shares[sample];
+            let flux_w = flux_w * gain.unwrap_or(1.0);
+            self.second_order(&lit, flux_w, direct, bounce, sample, paths);
+        }
+    }
+
     /// A point that a ray of the radar's beam lights.
     fn lit_by_beam(&self, hit: Hit, ray: &Ray<Global>) -> ShadingPoint<'a> {
         let to_source = -ray.direction.xyz();
@@ -204,7 +237,18 @@ impl<'a> Emission<'a> {
         let antenna = if to_antenna == to_source { source } else { frame.local(to_antenna) };
         let solid_angle_sr = self.solid_angle_sr(antenna_m, along_beam_m);
         let beam_rad = self.spot.divergence_rad(self.rays, along_beam_m);
-        ShadingPoint { hit, surface, frame, source, antenna, antenna_m, solid_angle_sr, beam_rad }
+        let inward = Passage::FREE;
+        ShadingPoint {
+            hit,
+            surface,
+            frame,
+            source,
+            antenna,
+            antenna_m,
+            solid_angle_sr,
+            beam_rad,
+            inward,
+        }
     }
 
     /// Solid angle, sr, in which a point sees the antenna, from its distance and its place along the beam, m.
@@ -221,16 +265,22 @@ impl<'a> Emission<'a> {
 
     /// The single path by way of a point.
     fn direct(&self, lit: &ShadingPoint) -> Path {
-        // Every point that the radar illuminates is visible to it.
-        let seen = self.paths.observer == Observer::Radar || self.is_seen(lit);
+        let outward = match self.paths.observer {
+            // It is visible to the radar by the same way.
+            Observer::Radar => Some(lit.inward),
+            Observer::Receiver { .. } => self.way_out(lit),
+        };
+        let way = lit.inward.then(outward.unwrap_or(Passage::FREE));
         let scattered = self.scattered(lit);
         let polarised = self.polarised_share(scattered.specular_share, &[lit]);
-        let share = if seen { lit.received_share(scattered) * polarised } else { 0.0 };
+        let share = if outward.is_some() { lit.received_share(scattered) * polarised } else { 0.0 };
         let [x, y, _] = lit.source.xyz().to_array();
+        let apparent_m = 0.5 * way.delay_m() + lit.echo_behind_m(scattered);
         Path {
-            range_m: 0.5 * (lit.hit.range_m + lit.antenna_m),
-            power_w: self.flux_w(lit) * share,
+            range_m: 0.5 * (lit.hit.range_m + lit.antenna_m) + apparent_m,
+            power_w: self.flux_w(lit) * share * way.power_ratio(),
             hit: lit.hit,
+            sheets: lit.inward.sheets,
             surfaces: 1,
             azimuth_rad: y.atan2(x),
             specular_share: scattered.specular_share,
@@ -267,7 +317,11 @@ impl<'a> Emission<'a> {
         paths: &mut Vec<Path>,
     ) {
         for Onward { direction, share, first, m } in self.onward(lit, bounce, ray) {
-            let Some(hit) = self.trace_onward(lit, direction) else { continue };
+            let Some(Way { hit: Some(hit), passage }) =
+                self.trace_onward(lit, direction, f64::INFINITY)
+            else {
+                continue;
+            };
             let pattern = self.pattern(bounce, &hit);
             let to_first = -lit.frame.world(direction.xyz());
             let in_main_lobe = pattern > bounce.outside_spot;
@@ -279,11 +333,14 @@ impl<'a> Emission<'a> {
             let specular_share = first.specular_share * last.specular_share;
             let polarised = self.polarised_share(specular_share, &[lit, &second]);
             let power_w = flux_w * share * pattern * second.received_share(last) * polarised;
-            if power_w > 0.0 && self.is_seen(&second) {
-                let path_m = lit.hit.range_m + hit.range_m + second.antenna_m;
+            if power_w > 0.0
+                && let Some(outward) = self.way_out(&second)
+            {
+                let way = lit.inward.then(passage).then(outward);
+                let path_m = lit.hit.range_m + hit.range_m + second.antenna_m + way.delay_m();
                 paths.push(Path {
                     range_m: 0.5 * path_m,
-                    power_w,
+                    power_w: power_w * way.power_ratio(),
                     surfaces: 2,
                     specular_share,
                     coherent_share: first.coherent_share
@@ -358,17 +415,26 @@ impl<'a> Emission<'a> {
         lit.surface.scattering.seen_by(lit.beam_rad, lit.source, lit.antenna)
     }
 
-    /// The closest hit of a ray from a point.
-    fn trace_onward(&self, lit: &ShadingPoint, towards: Direction<Local>) -> Option<Hit> {
+    /// The way of a ray from a point to the first surface nearer than `until_m` that stops it; `None` without a
+    /// direction.
+    fn trace_onward(
+        &self,
+        lit: &ShadingPoint,
+        towards: Direction<Local>,
+        until_m: f64,
+    ) -> Option<Way> {
         let origin = Point::from(lit.hit.point.xyz + LIFT_M * lit.frame.normal());
         let direction = Direction::new(lit.frame.world(towards.xyz()))?;
-        self.paths.setup.geometry.bvh.closest(&Ray { origin, direction })
+        Some(follow(self.paths.setup, Ray { origin, direction }, until_m))
     }
 
-    /// Whether a point is visible from the antenna.
-    fn is_seen(&self, lit: &ShadingPoint) -> bool {
-        let above = lit.antenna.cos_theta() > 0.0;
-        above && self.trace_onward(lit, lit.antenna).is_none_or(|hit| hit.range_m >= lit.antenna_m)
+    /// The way from a point to the antenna; `None` where something stands between.
+    fn way_out(&self, lit: &ShadingPoint) -> Option<Passage> {
+        if lit.antenna.cos_theta() <= 0.0 {
+            return None;
+        }
+        let way = self.trace_onward(lit, lit.antenna, lit.antenna_m)?;
+        way.hit.is_none().then_some(way.passage)
     }
 
     /// Gain of the antenna towards a second surface, relative to that towards the spot. It is 1 for a separate receiver.

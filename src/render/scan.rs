@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::behind::trace_behind;
 use super::detect::{Beats, Detector};
 use super::echo::{Echo, Echoes};
 use super::effect_scan::{self, EffectScan};
@@ -21,7 +22,8 @@ pub struct Scan {
     pub chirps: usize,
     /// Number of chirps that hit the target.
     pub hits: usize,
-    /// The echoes of all chirps that hit the target, of any power, and false alarms, in the order of transmission.
+    /// The echoes of all chirps that hit the target, of any power, and false alarms, in the order of transmission, those
+    /// of one chirp by range.
     pub echoes: Vec<Echo>,
     /// Echoes below this power are not detected, W.
     pub threshold_w: f64,
@@ -49,7 +51,7 @@ pub fn trace(
     check_hits(spot::trace(geometry, rays_per_chirp.max(1), done)?, geometry)
 }
 
-/// As [`trace`], with the target where the effects of the setup place it.
+/// As [`trace`], with the target where the effects of the setup place it, and with what lies behind its sheets.
 ///
 /// # Errors
 /// When no ray hits the mesh, when the tracer does not accept the rays or fails, or when an effect would be counted
@@ -68,7 +70,11 @@ pub fn trace_placed(
             spot::trace_moved(geometry, rays, done, |chirp, ray, hit| effects.meet(chirp, ray, hit))
         }
     };
-    check_hits(footprints?, geometry)
+    let mut footprints = check_hits(footprints?, geometry)?;
+    if setup.has_sheets() {
+        trace_behind(setup, &mut footprints);
+    }
+    Ok(footprints)
 }
 
 /// Fails if no ray of a scan hits the target.
@@ -82,7 +88,7 @@ fn check_hits(footprints: Footprints, geometry: &ScanGeometry) -> Result<Footpri
 /// Rays per task of shading. With second-order paths every chirp is a task.
 const RAYS_PER_TASK: usize = 256;
 
-/// Computes the echoes at an antenna from the hits of [`trace`], or of [`trace_placed`] for a setup with effects. `done`
+/// Computes the echoes at an antenna from the hits of [`trace`], or of [`trace_placed`] for a setup with effects or sheets. `done`
 /// is called repeatedly with the number of chirps that were finished since the last call.
 ///
 /// The result does not depend on the number of threads.
@@ -108,11 +114,12 @@ pub fn shade(
     let echoes = tasks.map(|(task, hits)| {
         let chirps = hits.chunks(rays);
         let count = chirps.len();
-        let (mut of_chirp, mut found) = (Vec::new(), Vec::with_capacity(count));
+        let (mut of_chirp, mut seen) = (Vec::new(), Vec::new());
+        let mut found = Vec::with_capacity(count);
         for (chirp, hits) in (task * per_task..).zip(chirps) {
             paths.fill(chirp, hits, &mut of_chirp);
-            let seen = detector.observe(chirp, &of_chirp)?;
-            found.extend(echoes.echo(chirp, hits, &of_chirp, seen));
+            detector.observe(chirp, &mut of_chirp, &mut seen)?;
+            echoes.append(chirp, hits, &of_chirp, &seen, &mut found);
         }
         done(count);
         Ok(found)

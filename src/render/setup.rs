@@ -1,10 +1,14 @@
 //! The input of a rendering.
 
 use super::bounce::Bounce;
+use super::sheet::Sheet;
 use super::surface::Surface;
 use crate::effects::Model;
 use crate::radar::Channel;
 use crate::trace::ScanGeometry;
+
+/// Sheets that a ray passes where nothing else is stated: two garments, front and back.
+pub const MOST_SHEETS: usize = 4;
 
 /// A scan, the materials of its target, and how it is rendered.
 #[derive(Clone, Copy)]
@@ -20,6 +24,8 @@ pub struct Setup<'a> {
     pub effects: Option<&'a Model<'a>>,
     /// The polarisation that the antennas receive.
     pub channel: Channel,
+    /// Largest number of sheets that a ray passes; it ends at the next one.
+    pub most_sheets: usize,
     /// Seed of everything random.
     pub seed: u64,
 }
@@ -33,7 +39,19 @@ impl<'a> Setup<'a> {
             bounce: None,
             effects: None,
             channel: Channel::CoPolar,
+            most_sheets: MOST_SHEETS,
             seed: 0,
         }
+    }
+
+    /// Whether a region lets a part of the wave through.
+    pub(super) fn has_sheets(&self) -> bool {
+        self.surfaces.iter().any(|surface| surface.sheet.is_some())
+    }
+
+    /// The sheet that a facet belongs to; `None` where nothing passes.
+    pub(super) fn sheet(&self, facet: u32) -> Option<&'a Sheet> {
+        let region = self.geometry.region_of_facet[facet as usize];
+        self.surfaces[usize::from(region)].sheet
     }
 }

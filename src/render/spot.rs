@@ -38,6 +38,19 @@ pub struct Footprints {
     pub edge_m: Vec<f64>,
     /// How the surface lies at each of `hits` that effects have moved; empty where none do.
     pub orientations: Vec<Option<Orientation>>,
+    /// What the rays meet behind one sheet, behind two, and so on; empty where nothing lets them through.
+    pub behind: Vec<Behind>,
+    /// Number of rays that end at a sheet, because they have passed as many as they may.
+    pub ended: usize,
+}
+
+/// What the rays of every chirp meet behind a number of sheets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Behind {
+    /// N entries per chirp, as those in front.
+    pub hits: Vec<Option<Hit>>,
+    /// For each chirp the distance in the target plane to the nearest edge in depth of what lies here, m.
+    pub edge_m: Vec<f64>,
 }
 
 impl Footprints {
@@ -56,7 +69,8 @@ pub(super) fn trace(
     let rays = Rays { geometry: *geometry, samples: samples(rays_per_chirp) };
     let (hits, axis_range_m) = rays.intersections(done, |_, _, hit| hit, |hit| *hit)?;
     let edge_m = edge_distances_m(geometry, &hits, rays_per_chirp);
-    Ok(Footprints { rays_per_chirp, hits, axis_range_m, edge_m, orientations: Vec::new() })
+    let (orientations, behind) = (Vec::new(), Vec::new());
+    Ok(Footprints { rays_per_chirp, hits, axis_range_m, edge_m, orientations, behind, ended: 0 })
 }
 
 /// As [`trace`], but every hit first passes through `place(chirp, ray, hit)`, which may move or drop it.
@@ -73,7 +87,8 @@ pub(super) fn trace_moved(
         orientations = Vec::new();
     }
     let edge_m = edge_distances_m(geometry, &hits, rays_per_chirp);
-    Ok(Footprints { rays_per_chirp, hits, axis_range_m, edge_m, orientations })
+    let behind = Vec::new();
+    Ok(Footprints { rays_per_chirp, hits, axis_range_m, edge_m, orientations, behind, ended: 0 })
 }
 
 /// The rays of a scan.
@@ -143,7 +158,7 @@ impl Rays<'_> {
 }
 
 /// Distance of every chirp to the nearest edge in depth, m, by its first ray, which is the nearest to its axis.
-fn edge_distances_m(
+pub(super) fn edge_distances_m(
     geometry: &ScanGeometry,
     hits: &[Option<Hit>],
     rays_per_chirp: usize,

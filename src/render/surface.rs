@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::sheet::Sheet;
 use crate::brdf::Scattering;
 
 /// The surface of the facets of one region.
@@ -15,12 +16,19 @@ pub struct Surface<'a> {
     /// Direction of its grain in the global frame, of any length. On a facet it is projected along the normal. Azimuths
     /// count from it, and `m` of an anisotropic model is the roughness along it.
     pub grain: DVec3,
+    /// The sheet, where the surface lets a part of the wave through. It then is the scattering model, too.
+    pub sheet: Option<&'a Sheet>,
 }
 
 impl<'a> Surface<'a> {
     /// A surface whose grain is the y axis, upwards.
     pub fn new(scattering: &'a dyn Scattering) -> Surface<'a> {
-        Surface { scattering, depolarised_share: 0.0, grain: DVec3::Y }
+        Surface { scattering, depolarised_share: 0.0, grain: DVec3::Y, sheet: None }
+    }
+
+    /// A sheet whose grain is the y axis, upwards.
+    pub fn of_sheet(sheet: &'a Sheet) -> Surface<'a> {
+        Surface { sheet: Some(sheet), ..Surface::new(sheet) }
     }
 }
 

@@ -49,10 +49,19 @@ impl MeasurementRequest<'_> {
     /// Registers the cloud, reduces it to a curve and encodes the files.
     ///
     /// # Errors
-    /// A region that the scene does not have; what the registration or the reduction refuses.
+    /// A region that transmits, or that the scene does not have; what the registration or the reduction refuses.
     pub fn run(&self) -> Result<MeasurementReport, Error> {
         let (scene, cloud) = (self.scene, self.cloud);
         let (target, radar, chirps) = (&scene.target, scene.radar(), &scene.chirps);
+        if target.transmits() {
+            let problem = format!(
+                "{}: a region transmits, and a measurement sees only what lies in front",
+                self.scene_file.display()
+            );
+            let way_out =
+                "measure with a scene without that region, or without its thickness_m or transmits";
+            return Err(Error::usage(problem, way_out));
+        }
         let region = self.region.map(|name| region_of_name(name, scene)).transpose()?;
         let registered = self.registration.run(&target.mesh, radar, chirps, cloud)?;
         let reduction = Reduction { region, ..self.reduction };

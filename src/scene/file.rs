@@ -49,6 +49,9 @@ pub struct SceneFile {
     /// Antennas beside the radar's own that listen to the same scan.
     #[serde(default, deserialize_with = "antennas")]
     pub receiver: Vec<ReceiverEntry>,
+    /// How far rays go on through regions that let a part of the wave through.
+    #[serde(default, skip_serializing_if = "TransmissionEntry::is_usual")]
+    pub transmission: TransmissionEntry,
     /// How detections become an image.
     #[serde(default)]
     pub image: ImageEntry,
@@ -108,6 +111,26 @@ pub struct ReceiverEntry {
     pub aperture_m2: Option<f64>,
 }
 
+/// How far rays go on through sheets, the regions that let a part of the wave through.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TransmissionEntry {
+    /// Largest number of sheets that a ray passes, 1 to 16. 4: assumed, two garments in front of a body and two behind.
+    pub sheets: usize,
+}
+
+impl Default for TransmissionEntry {
+    fn default() -> Self {
+        TransmissionEntry { sheets: 4 }
+    }
+}
+
+impl TransmissionEntry {
+    fn is_usual(&self) -> bool {
+        *self == TransmissionEntry::default()
+    }
+}
+
 /// How detections become an image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -136,6 +159,12 @@ pub struct MeshEntry {
     /// Shift after the turns, m.
     #[serde(default)]
     pub translation_m: [f64; 3],
+    /// Moves the surface outwards by this distance along its normals, m, once it is placed: cloth over a body.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset_m: Option<f64>,
+    /// Keeps only the facets whose centroid then lies in this box of the global frame.
+    #[serde(default, rename = "box", skip_serializing_if = "Option::is_none")]
+    pub within_box: Option<BoxEntry>,
 }
 
 /// A named set of facets and its material. All given selectors must hold; none given selects all.
@@ -146,6 +175,12 @@ pub struct RegionEntry {
     pub name: String,
     /// Material, `NAME` or `NAME@REVISION`.
     pub material: String,
+    /// The region is a sheet of its material, of this thickness, m, and lets a part of the wave through.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thickness_m: Option<f64>,
+    /// Whether the wave passes through: the material's law then is a stack of layers with air behind it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub transmits: bool,
     /// Direction of the grain in the global frame, of any length; upwards when not given. It is
     /// projected onto each facet; `m` of an anisotropic model is along it, azimuth counts from it.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -52,6 +52,7 @@ impl Scene {
             return Err(SceneError::Value { file: path.to_owned(), place, problem, way_out });
         }
         check_spot(&file, chirps.rays.len(), path)?;
+        check_transmission(&file, path)?;
         receivers::check(&file, path)?;
         check_pixel(pixel_m, &file.radar, &chirps, path)?;
         file.image.pixel_m = Some(pixel_m);
@@ -97,6 +98,20 @@ fn check_spot(file: &SceneFile, chirps: usize, path: &Path) -> Result<(), SceneE
         return Err(refuse("bounce.outside_spot_db", problem, "give a value from -200 to 0"));
     }
     Ok(())
+}
+
+/// Every sheet costs a ray and an echo.
+fn check_transmission(file: &SceneFile, path: &Path) -> Result<(), SceneError> {
+    let sheets = file.transmission.sheets;
+    if (1..=16).contains(&sheets) {
+        return Ok(());
+    }
+    Err(SceneError::Value {
+        file: path.to_owned(),
+        place: "transmission.sheets".to_owned(),
+        problem: format!("{sheets} sheets on the way of a ray"),
+        way_out: "give 1 to 16; without a region that transmits, leave the table out".to_owned(),
+    })
 }
 
 /// The given pixel, or a quarter of the spot, m.

@@ -6,7 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::error::SceneError;
-use super::file::{MeshEntry, SceneFile};
+use super::file::{BoxEntry, MeshEntry, SceneFile};
 use super::read::read;
 use super::regions::{MeshSpan, assign};
 use super::{mannequin, solids};
@@ -40,6 +40,10 @@ pub struct Region {
     pub grain: DVec3,
     /// Share of its diffuse return across the polarisation that was sent, 0 to 1/2.
     pub depolarised_share: f64,
+    /// Thickness of the sheet of its material that it is, m.
+    pub thickness_m: Option<f64>,
+    /// Whether it is a sheet of the layers that its material's law has.
+    pub transmits: bool,
     /// Facets it holds after later regions took theirs.
     pub facets: usize,
 }
@@ -68,6 +72,9 @@ pub struct MeshReport {
 /// No coordinate may be farther out than this, m; beyond, f32 would blur a radar's target.
 const FARTHEST_M: f64 = 1e5;
 
+/// A surface that is moved farther along its normals would cross itself.
+const MOST_OFFSET_M: f64 = 1.0;
+
 /// Built-in meshes. Cuboid, plate and sphere are of unit size: give them a `size_m`.
 pub const BUILTIN_MESHES: [&str; 4] = ["mannequin", "cuboid", "plate", "sphere"];
 
@@ -85,7 +92,7 @@ impl Target {
                 return Err(value(path, &place, "is defined twice", "rename one"));
             }
             let (loaded, file_blake3) = load_mesh(entry, path)?;
-            let placed = place(loaded, entry, path)?;
+            let placed = cut(place(loaded, entry, path)?, entry, path)?;
             let at = |error| SceneError::Mesh { file: PathBuf::from(&entry.file), error };
             meshes.push(report(&placed, entry, file_blake3, mesh.facets.len()).map_err(at)?);
             match meshes.len() {
@@ -100,7 +107,15 @@ impl Target {
         let regions = count_regions(file, &region_of_facet);
         check_grains(file, path)?;
         check_depolarised_shares(file, path)?;
+        check_sheets(file, path)?;
         Ok(Target { mesh, meshes, regions, region_of_facet })
+    }
+}
+
+impl Target {
+    /// Whether a region lets a part of the wave through.
+    pub fn transmits(&self) -> bool {
+        self.regions.iter().any(|region| region.transmits || region.thickness_m.is_some())
     }
 }
 
@@ -138,6 +153,29 @@ fn check_depolarised_shares(file: &SceneFile, path: &Path) -> Result<(), SceneEr
     Ok(())
 }
 
+/// A sheet has a thickness, by its own or by its material's law.
+fn check_sheets(file: &SceneFile, path: &Path) -> Result<(), SceneError> {
+    const MOST_M: f64 = 0.1;
+    for region in &file.region {
+        let refuse = |problem: &str, way_out: &str| {
+            value(path, &format!("region `{}`", region.name), problem, way_out)
+        };
+        let Some(thickness_m) = region.thickness_m else { continue };
+        if !(thickness_m > 0.0 && thickness_m <= MOST_M) {
+            let problem = format!(
+                "has thickness_m = {thickness_m}, which is not above 0 and at most {MOST_M}"
+            );
+            return Err(refuse(&problem, "give it in metres; 0.0005 is a shirt"));
+        }
+        if region.transmits {
+            let problem = "has both thickness_m and transmits";
+            let way_out = "keep thickness_m for a sheet of one material, transmits for a law with layers of its own";
+            return Err(refuse(problem, way_out));
+        }
+    }
+    Ok(())
+}
+
 fn count_regions(file: &SceneFile, region_of_facet: &[u16]) -> Vec<Region> {
     let mut facets = vec![0; file.region.len()];
     for &region in region_of_facet {
@@ -149,6 +187,8 @@ fn count_regions(file: &SceneFile, region_of_facet: &[u16]) -> Vec<Region> {
             material: entry.material.clone(),
             grain: entry.grain.map_or(DVec3::Y, DVec3::from_array),
             depolarised_share: entry.depolarised_share,
+            thickness_m: entry.thickness_m,
+            transmits: entry.transmits,
             facets,
         })
         .collect()
@@ -229,6 +269,37 @@ fn place(mut mesh: Mesh, entry: &MeshEntry, scene: &Path) -> Result<Mesh, SceneE
             Err(refuse("placement", &problem, "check scale, size_m and translation_m"))
         }
     }
+}
+
+/// Moves a placed mesh outwards along its normals, and cuts away what lies outside of a box.
+fn cut(mut mesh: Mesh, entry: &MeshEntry, scene: &Path) -> Result<Mesh, SceneError> {
+    let refuse = |key: &str, problem: &str, way_out: &str| {
+        value(scene, &format!("mesh `{}`: {key}", entry.name), problem, way_out)
+    };
+    if let Some(offset_m) = entry.offset_m {
+        if !(offset_m.abs() <= MOST_OFFSET_M) {
+            let problem = format!("{offset_m} m is not within {MOST_OFFSET_M} m");
+            return Err(refuse("offset_m", &problem, "cloth lies some millimetres above a body"));
+        }
+        let normals = mesh.vertex_normals();
+        let moved = mesh.vertices.par_iter_mut().zip(normals);
+        moved.for_each(|(vertex, normal)| *vertex += offset_m * normal);
+    }
+    let Some(BoxEntry { min_m, max_m }) = entry.within_box else { return Ok(mesh) };
+    let (min, max) = (DVec3::from(min_m), DVec3::from(max_m));
+    if !min.cmple(max).all() {
+        let problem = "min_m is not below max_m";
+        return Err(refuse("box", problem, "swap the coordinates"));
+    }
+    let is_within = |facet: usize| {
+        let centroid = mesh.centroid(facet);
+        centroid.cmpge(min).all() && centroid.cmple(max).all()
+    };
+    let kept: Vec<usize> = (0..mesh.facets.len()).filter(|&facet| is_within(facet)).collect();
+    if kept.is_empty() {
+        return Err(refuse("box", "the box holds no facet of the mesh", "move or widen it"));
+    }
+    Ok(mesh.only(&kept))
 }
 
 fn extent(mesh: &Mesh) -> DVec3 {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::materials::{MaterialRevision, find_material, status_warning};
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, ScatteringModel};
 use crate::effects::{EffectList, Level, Model, Receiver, SceneEffects, resolve};
 use crate::error::Error;
 use crate::formats::EffectEntry;
@@ -11,8 +11,8 @@ use crate::frames::{Global, Point, Pose};
 use crate::geometry::Raster;
 use crate::material::Material;
 use crate::radar::{Channel, Radar};
-use crate::render::{Bounce, RenderError, Scan, Setup, Surface, power_image};
-use crate::scene::Scene;
+use crate::render::{Bounce, RenderError, Scan, Setup, Sheet, Surface, power_image};
+use crate::scene::{Region, Scene};
 use crate::store::Store;
 use crate::trace::{Bvh, ScanGeometry};
 use crate::units::{range, ratio_from_db, rounded, shown};
@@ -43,6 +43,8 @@ pub struct ReadyScene {
     pub material_of_region: Vec<u16>,
     /// Effects of the scene, of its radar and of its materials.
     pub effects: SceneEffects,
+    /// For every region the sheet that it is; `None` where nothing passes.
+    pub sheets: Vec<Option<Sheet>>,
 }
 
 /// What [`Setup`] borrows besides the scene: the hierarchy over the mesh, a surface per region and the
@@ -70,7 +72,11 @@ impl ReadyScene {
     pub fn new(scene: Scene, path: &Path, store: Option<&Store>) -> Result<ReadyScene, Error> {
         let (materials, material_of_region) = find_materials(&scene, path, store)?;
         let effects = find_effects(&scene, path, &materials, &material_of_region)?;
-        Ok(ReadyScene { scene, path: path.to_owned(), materials, material_of_region, effects })
+        let sheets = Vec::new();
+        let path = path.to_owned();
+        let mut ready = ReadyScene { scene, path, materials, material_of_region, effects, sheets };
+        ready.sheets = ready.find_sheets()?;
+        Ok(ready)
     }
 
     /// As [`open`](Self::open), of a scene that renders the mean power of its radar, without receiver, speckle and
@@ -105,11 +111,13 @@ impl ReadyScene {
 
     /// Prepares what the renderer borrows; it builds the hierarchy over the mesh.
     pub fn assemble(&self) -> Assembly<'_> {
-        let surfaces = std::iter::zip(&self.scene.target.regions, self.of_regions())
-            .map(|(region, material)| Surface {
-                scattering: &material.scattering,
-                depolarised_share: region.depolarised_share,
-                grain: region.grain,
+        let regions = self.scene.target.regions.iter().zip(&self.sheets);
+        let surfaces = std::iter::zip(regions, self.of_regions())
+            .map(|((region, sheet), material)| {
+                let opaque = Surface::new(&material.scattering);
+                let surface = sheet.as_ref().map_or(opaque, Surface::of_sheet);
+                let depolarised_share = region.depolarised_share;
+                Surface { grain: region.grain, depolarised_share, ..surface }
             })
             .collect();
         Assembly {
@@ -145,6 +153,7 @@ impl ReadyScene {
             }
         }
         if is_chosen {
+            self.sheets = self.find_sheets()?;
             return Ok(());
         }
         Err(Error::usage(
@@ -175,6 +184,20 @@ impl ReadyScene {
         }
     }
 
+    /// The sheet of every region that transmits.
+    fn find_sheets(&self) -> Result<Vec<Option<Sheet>>, Error> {
+        let regions = self.scene.target.regions.iter().zip(self.of_regions());
+        let sheets = regions.map(|(region, material)| {
+            let at = |(problem, way_out): (String, &str)| {
+                let Region { name, material, .. } = region;
+                let place = format!("{}: region `{name}`", self.path.display());
+                Error::usage(format!("{place}: material `{material}` {problem}"), way_out)
+            };
+            sheet(region, material, self.scene.radar()).map_err(at)
+        });
+        sheets.collect()
+    }
+
     /// The material of every region.
     fn of_regions(&self) -> impl Iterator<Item = &SceneMaterial> {
         self.material_of_region.iter().map(|&material| &self.materials[usize::from(material)])
@@ -199,6 +222,7 @@ impl<'a> Assembly<'a> {
             }),
             effects: self.model.as_ref(),
             channel: Channel::CoPolar,
+            most_sheets: scene.file.transmission.sheets,
             seed: scene.file.seed,
         }
     }
@@ -257,6 +281,38 @@ fn find_materials(
         of_region.push(known.unwrap_or(materials.len() - 1) as u16);
     }
     Ok((materials, of_region))
+}
+
+/// The sheet that a region is, if any; what is wrong with its material and what to do.
+fn sheet(
+    region: &Region,
+    material: &SceneMaterial,
+    radar: &Radar,
+) -> Result<Option<Sheet>, (String, &'static str)> {
+    const WAY_OUT: &str = "give the region thickness_m, or the material a `layered` law with layers and, behind them, \
+                           air: eps_real = 1 and eps_imag = 0";
+    let law = &material.scattering;
+    if region.transmits {
+        let sheet = Sheet::of_law(law, radar);
+        let problem =
+            || ("is not rendered by layers in air, and lets nothing pass".to_owned(), WAY_OUT);
+        return sheet.map(Some).ok_or_else(problem);
+    }
+    let Some(thickness_m) = region.thickness_m else { return Ok(None) };
+    if matches!(law, Brdf::Layered(_)) {
+        let problem = "has layers of its own thickness".to_owned();
+        return Err((problem, "write transmits = true in place of thickness_m"));
+    }
+    let of_material =
+        || material.found.material.permittivity_near(radar.centre_frequency_ghz * 1e9);
+    let Some(permittivity) = law.permittivity().or_else(of_material) else {
+        let problem = "has no permittivity, which a sheet needs".to_owned();
+        return Err((
+            problem,
+            "give it a [[permittivity]] whose key is its name, or take a material that has one",
+        ));
+    };
+    Ok(Some(Sheet::of_thickness(law, thickness_m, permittivity, radar)))
 }
 
 /// The effects of a scene, of its radar and of its materials.

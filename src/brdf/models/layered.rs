@@ -5,6 +5,7 @@
 //! amplitude of the boundary, from the substrate up, for both polarisations. It is what the
 //! characteristic matrix gives (Born & Wolf, *Principles of Optics*, 7th ed., §1.6; Macleod,
 //! *Thin-Film Optical Filters*, ch. 2), but holds for thick lossy layers too, where the matrix overflows.
+//! The transmitted amplitude follows in the same pass, t ← (1 + ρ)·t·e^{−jδ}/(1 + ρ·r·e^{−2jδ}).
 //!
 //! Paint is 20–200 µm of ε = 2.5 to 4 with ε″ = 0.05 to 0.3, cloth 0.2–2 mm of ε = 1.2 to 2; a quarter
 //! wave at 300 GHz is 250 µm/√ε. Layers are taken as endless, even within the wavelength, and coherent:
@@ -18,9 +19,9 @@ use crate::brdf::backscatter::Term;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_quantity};
 use crate::brdf::permittivity::{
-    BOTH, EPS_IMAG, EPS_REAL, Polarisation, default_frequency_hz, interface, is_narrow,
-    mirror_cosine, mirror_lobe, mirror_lobe_per_sr, narrow_mirror, normal_wavenumber, permittivity,
-    unpolarised, visit_lobe, visit_permittivity, wavenumber_rad_per_m,
+    EPS_IMAG, EPS_REAL, Polarisation, default_frequency_hz, interface, is_narrow, mirror_cosine,
+    mirror_lobe, mirror_lobe_per_sr, narrow_mirror, normal_wavenumber, permittivity, unpolarised,
+    visit_lobe, visit_permittivity, wavenumber_rad_per_m,
 };
 use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
@@ -97,21 +98,109 @@ impl Layered {
         unpolarised(|polarisation| self.amplitude(polarisation, cos_theta))
     }
 
-    /// r from the substrate up.
+    /// The amplitude reflected at the frequency of the model.
     fn amplitude(&self, polarisation: Polarisation, cos_theta: f64) -> Complex<f64> {
-        let k0_rad_per_m = wavenumber_rad_per_m(self.frequency_hz);
+        self.amplitudes(polarisation, cos_theta, self.frequency_hz).reflected
+    }
+
+    /// What the layers reflect and transmit of a plane wave at a frequency, from the substrate up. The layers have the
+    /// same permittivity at every frequency.
+    pub fn amplitudes(
+        &self,
+        polarisation: Polarisation,
+        cos_theta: f64,
+        frequency_hz: f64,
+    ) -> Amplitudes {
+        let k0_rad_per_m = wavenumber_rad_per_m(frequency_hz);
         let mut below = medium(self.eps_real, self.eps_imag, cos_theta);
-        let mut r = Complex::from(0.0);
+        let mut from_below = Amplitudes { reflected: 0.0.into(), transmitted: 1.0.into() };
+        // e^{−2jδ} and e^{−jδ} of the layer that lies between.
         let mut there_and_back = Complex::from(1.0);
+        let mut down = Complex::from(1.0);
         for layer in self.layers.iter().rev() {
             let above = medium(layer.eps_real, layer.eps_imag, cos_theta);
-            r = step_up(interface(polarisation, above, below), r * there_and_back);
+            let boundary = interface(polarisation, above, below);
+            from_below = from_below.above(boundary, there_and_back, down);
             let delta = above.1 * (k0_rad_per_m * layer.thickness_m);
             there_and_back = (Complex::new(0.0, -2.0) * delta).exp();
+            down = (Complex::new(0.0, -1.0) * delta).exp();
             below = above;
         }
         let outside = (Complex::from(1.0), Complex::from(cos_theta));
-        step_up(interface(polarisation, outside, below), r * there_and_back)
+        from_below.above(interface(polarisation, outside, below), there_and_back, down)
+    }
+
+    /// A single layer in air: a sheet that lets a part of the wave through.
+    pub fn sheet(thickness_m: f64, [eps_real, eps_imag]: [f64; 2]) -> Layered {
+        Layered {
+            layers: vec![Layer { thickness_m, eps_real, eps_imag }],
+            eps_real: 1.0,
+            eps_imag: 0.0,
+            frequency_hz: default_frequency_hz(),
+            lobe_rad: None,
+        }
+    }
+
+    /// Whether there is air behind the layers, as in front of them.
+    pub fn is_in_air(&self) -> bool {
+        self.eps_real == 1.0 && self.eps_imag == 0.0
+    }
+
+    /// Thickness of all layers together, m.
+    pub fn thickness_m(&self) -> f64 {
+        self.layers.iter().map(|layer| layer.thickness_m).sum()
+    }
+
+    /// What a beam sees, with a reflectance of the caller's: a function of cos ψ, where ψ is the angle at which the
+    /// facets that answer are met.
+    pub fn seen_with(
+        &self,
+        beam_rad: f64,
+        i: Direction<Surface>,
+        o: Direction<Surface>,
+        reflectance: impl Fn(f64) -> f64,
+    ) -> Seen {
+        Seen::mirror(mirror_lobe_per_sr(i, o, self.lobe_rad, beam_rad, reflectance))
+    }
+
+    /// The lobes that are too narrow for a path to meet by chance, with a reflectance of the caller's.
+    pub fn narrow_lobes_with(&self, reflectance: f64) -> Vec<NarrowLobe> {
+        narrow_mirror(self.lobe_rad, reflectance)
+    }
+
+    /// Whether the mirror's lobe is one of those.
+    pub fn is_narrow(&self) -> bool {
+        is_narrow(self.lobe_rad)
+    }
+}
+
+/// Complex amplitudes of the electric field along the layers, over that of the wave that falls on them. The phase of
+/// what is reflected refers to the outer face, that of what is transmitted to the face of the substrate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Amplitudes {
+    /// r.
+    pub reflected: Complex<f64>,
+    /// t; with air behind the layers |t|² is the power that passes.
+    pub transmitted: Complex<f64>,
+}
+
+impl Amplitudes {
+    /// Those above a boundary with the layer over them, from those of all below.
+    fn above(
+        self,
+        boundary: Complex<f64>,
+        there_and_back: Complex<f64>,
+        down: Complex<f64>,
+    ) -> Amplitudes {
+        let returned = self.reflected * there_and_back;
+        let sum = 1.0 + boundary * returned;
+        if sum.norm_sqr() == 0.0 {
+            return Amplitudes { reflected: boundary, transmitted: 0.0.into() };
+        }
+        Amplitudes {
+            reflected: (boundary + returned) / sum,
+            transmitted: (1.0 + boundary) * self.transmitted * down / sum,
+        }
     }
 }
 
@@ -121,32 +210,25 @@ fn medium(eps_real: f64, eps_imag: f64, cos_theta: f64) -> (Complex<f64>, Comple
     (eps, normal_wavenumber(eps, cos_theta))
 }
 
-/// Reflection above a boundary from that of the boundary and that of all below it.
-fn step_up(boundary: Complex<f64>, from_below: Complex<f64>) -> Complex<f64> {
-    let sum = 1.0 + boundary * from_below;
-    if sum.norm_sqr() == 0.0 { boundary } else { (boundary + from_below) / sum }
-}
-
 impl Scattering for Layered {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         self.seen_by(0.0, i, o).f_per_sr
     }
 
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
-        let reflectance = |cos| self.reflectance_at(cos);
-        Seen::mirror(mirror_lobe_per_sr(i, o, self.lobe_rad, beam_rad, reflectance))
+        self.seen_with(beam_rad, i, o, |cos| self.reflectance_at(cos))
     }
 
     fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
-        narrow_mirror(self.lobe_rad, self.reflectance_at(i.cos_theta()))
+        self.narrow_lobes_with(self.reflectance_at(i.cos_theta()))
     }
 
     fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
-        if is_narrow(self.lobe_rad) { Seen::default() } else { self.seen_by(0.0, i, o) }
+        if self.is_narrow() { Seen::default() } else { self.seen_by(0.0, i, o) }
     }
 
     fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
-        BOTH.map(|polarisation| self.amplitude(polarisation, mirror_cosine(i, o)))
+        Polarisation::BOTH.map(|polarisation| self.amplitude(polarisation, mirror_cosine(i, o)))
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {
@@ -236,11 +318,96 @@ mod tests {
     fn the_recursion_is_the_product_of_matrices() {
         let model = coated(&[(130e-6, 2.6, 0.1), (400e-6, 1.5, 0.02), (50e-6, 9.0, 1.0)]);
         for cos in ANGLES_RAD.map(f64::cos) {
-            for polarisation in crate::brdf::permittivity::BOTH {
+            for polarisation in Polarisation::BOTH {
                 let found = model.amplitude(polarisation, cos).norm();
                 let expected = by_matrices(&model, polarisation, cos).norm();
                 assert!((found - expected).abs() < 1e-12, "{polarisation:?} {cos}");
             }
+        }
+    }
+
+    /// The share of the power that a single layer in air turns to heat: ∫ k₀·ε″·|E|² dz/cos θ over the field in it,
+    /// which the textbook's matrix carries up from its lower face, in slices.
+    fn heated(layer: Layer, polarisation: Polarisation, cos: f64, t: Complex<f64>) -> f64 {
+        const SLICES: usize = 4000;
+        let eps = permittivity(layer.eps_real, layer.eps_imag);
+        let p = normal_wavenumber(eps, cos);
+        let eta = match polarisation {
+            Polarisation::S => p,
+            Polarisation::P => eps / p,
+        };
+        let below = match polarisation {
+            Polarisation::S => Complex::from(cos),
+            Polarisation::P => Complex::from(1.0 / cos),
+        };
+        let k0 = wavenumber_rad_per_m(300e9);
+        let step_m = layer.thickness_m / SLICES as f64;
+        let j = Complex::new(0.0, 1.0);
+        let density = |slice: usize| {
+            let delta = p * (k0 * step_m * (slice as f64 + 0.5));
+            let electric = t * (delta.cos() + j * delta.sin() / eta * below);
+            let magnetic = t * (j * eta * delta.sin() + delta.cos() * below);
+            let across = match polarisation {
+                Polarisation::S => 0.0,
+                // The field along the normal: k_x·H/ε.
+                Polarisation::P => (1.0 - cos * cos) * (magnetic / eps).norm_sqr(),
+            };
+            k0 * layer.eps_imag * (electric.norm_sqr() + across)
+        };
+        (0..SLICES).map(density).sum::<f64>() * step_m / below.re
+    }
+
+    #[test]
+    fn what_is_neither_reflected_nor_transmitted_turns_to_heat() {
+        for (thickness_m, eps) in [(5e-4, [1.6, 0.08]), (3e-3, [2.6, 0.3]), (1e-4, [-3.0, 2.0])] {
+            let sheet = Layered::sheet(thickness_m, eps);
+            for cos in ANGLES_RAD.map(f64::cos) {
+                for polarisation in Polarisation::BOTH {
+                    let Amplitudes { reflected, transmitted } =
+                        sheet.amplitudes(polarisation, cos, 300e9);
+                    let heat = heated(sheet.layers[0], polarisation, cos, transmitted);
+                    let sum = reflected.norm_sqr() + transmitted.norm_sqr() + heat;
+                    assert!((sum - 1.0).abs() < 1e-5, "{eps:?} {cos} {polarisation:?}: {sum}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn without_loss_reflected_and_transmitted_power_are_all() {
+        let mut model = coated(&[(130e-6, 2.6, 0.0), (4e-3, 1.5, 0.0), (50e-6, 9.0, 0.0)]);
+        (model.eps_real, model.eps_imag) = (1.0, 0.0);
+        for step in 0..100 {
+            let frequency_hz = 286.5e9 + 0.27e9 * f64::from(step);
+            for cos in ANGLES_RAD.map(f64::cos) {
+                for polarisation in Polarisation::BOTH {
+                    let Amplitudes { reflected, transmitted } =
+                        model.amplitudes(polarisation, cos, frequency_hz);
+                    let sum = reflected.norm_sqr() + transmitted.norm_sqr();
+                    assert!((sum - 1.0).abs() < 1e-12, "{frequency_hz} {cos}: {sum}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_sheet_transmits_as_the_sum_of_its_inner_echoes() {
+        // Airy: t = Σ τ·(ρ²)ᵐ·τ′·e^{−j(2m + 1)δ}, with Fresnel's ρ and τ = 1 + ρ of each face.
+        let (thickness_m, eps, cos) = (8e-3, [2.56, 0.01], 0.8f64);
+        let inside = medium(eps[0], eps[1], cos);
+        let outside = (Complex::from(1.0), Complex::from(cos));
+        for polarisation in Polarisation::BOTH {
+            let into = interface(polarisation, outside, inside);
+            let delta = inside.1 * (wavenumber_rad_per_m(300e9) * thickness_m);
+            let once = (Complex::new(0.0, -1.0) * delta).exp();
+            let mut expected = Complex::from(0.0);
+            let mut wave = (1.0 + into) * (1.0 - into) * once;
+            for _ in 0..60 {
+                expected += wave;
+                wave *= into * into * once * once;
+            }
+            let found = Layered::sheet(thickness_m, eps).amplitudes(polarisation, cos, 300e9);
+            assert!((found.transmitted - expected).norm() < 1e-12, "{polarisation:?}");
         }
     }
 
@@ -283,7 +450,7 @@ mod tests {
             for theta_rad in ANGLES_RAD {
                 let lossless = Layered { eps_imag: 0.0, ..coated(&layers) };
                 for model in [lossless, coated(&layers)] {
-                    for polarisation in crate::brdf::permittivity::BOTH {
+                    for polarisation in Polarisation::BOTH {
                         let r = model.amplitude(polarisation, theta_rad.cos()).norm_sqr();
                         assert!(r <= 1.0 + 1e-12, "{thickness_m} {theta_rad}: {r}");
                     }

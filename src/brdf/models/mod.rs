@@ -16,7 +16,7 @@ use crate::frames::{Direction, Surface};
 
 pub use cook_torrance::Shadowing;
 pub use kirchhoff::Correlation;
-pub use layered::Layer;
+pub use layered::{Amplitudes, Layer};
 pub use tabulated::TabulatedError;
 
 /// Levels of models in models that can be stored; deeper ones could not be read everywhere.

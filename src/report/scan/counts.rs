@@ -2,9 +2,11 @@
 
 use serde::Serialize;
 
+use crate::brdf::Layered;
 use crate::geometry::Raster;
-use crate::render::Scan;
+use crate::render::{Scan, Sheet};
 use crate::scene::Scene;
+use crate::setup::ReadyScene;
 use crate::units::dbm_from_watts;
 
 /// A region of the target.
@@ -14,6 +16,9 @@ pub struct RegionRecord<'a> {
     pub name: &'a str,
     /// Index into `materials`.
     pub material: u16,
+    /// Its layers in air, where it lets a part of the wave through.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sheet: Option<&'a Layered>,
     /// Its facets.
     pub facets: usize,
     /// Chirps that meet it.
@@ -85,15 +90,13 @@ impl PowerRange {
 }
 
 /// The regions of a scene with what the radar received of them.
-pub(super) fn regions<'a>(
-    scene: &'a Scene,
-    material_of_region: &[u16],
-    scan: &Scan,
-) -> Vec<RegionRecord<'a>> {
-    let mut regions: Vec<RegionRecord> = std::iter::zip(&scene.target.regions, material_of_region)
-        .map(|(region, &material)| RegionRecord {
+pub(super) fn regions<'a>(ready: &'a ReadyScene, scan: &Scan) -> Vec<RegionRecord<'a>> {
+    let regions = ready.scene.target.regions.iter().zip(&ready.sheets);
+    let mut regions: Vec<RegionRecord> = std::iter::zip(regions, &ready.material_of_region)
+        .map(|((region, sheet), &material)| RegionRecord {
             name: &region.name,
             material,
+            sheet: sheet.as_ref().map(Sheet::stack),
             facets: region.facets,
             hits: 0,
             detections: 0,

@@ -7,7 +7,7 @@ use crate::formats::figure::{Figure, Scale};
 use crate::formats::ply;
 use crate::formats::words::grouped;
 use crate::geometry::Raster;
-use crate::radar::Channel;
+use crate::radar::{Channel, Returns};
 use crate::render::{Echo, cloud_table};
 use crate::scene::Scene;
 use crate::setup::{ReadyScene, View};
@@ -26,11 +26,12 @@ pub(super) fn encode(
     let regions: Vec<&str> = scene.target.regions.iter().map(|r| r.name.as_str()).collect();
     let materials = record.material_names();
     let materials: Vec<&str> = materials.iter().map(String::as_str).collect();
+    let several = scene.target.transmits() || scene.radar().returns != Returns::Strongest;
     let exr = |image| exr::write_packed(image, &exr_attributes(image, &materials), packing);
     let cloud = |view: &View| {
         let echoes: Vec<&Echo> =
             if all { view.scan.echoes.iter().collect() } else { view.scan.detections().collect() };
-        let table = cloud_table(&echoes, &ready.material_of_region, &regions, &materials);
+        let table = cloud_table(&echoes, &ready.material_of_region, &regions, &materials, several);
         ply::write_table(&table)
     };
     let mut files = Vec::new();

@@ -28,11 +28,24 @@ impl ScanRecord<'_> {
                 notices.push(format!("later regions took all facets of region `{name}`"));
             }
         }
+        notices.extend(self.ended());
         notices.extend(outside_image(self.counts));
         notices.extend(self.power_dbm.and_then(|power_dbm| too_strong(self.radar, power_dbm)));
         notices.extend(self.ready.notices());
         notices.extend(self.validity.iter().map(ToString::to_string));
         notices
+    }
+
+    /// Rays that could have passed further sheets.
+    fn ended(&self) -> Option<String> {
+        let most = self.ready.scene.file.transmission.sheets;
+        (self.rays_ended > 0).then(|| {
+            format!(
+                "{} rays end at a sheet, since they have passed {most}; a larger transmission.sheets shows what lies \
+                 behind",
+                self.rays_ended
+            )
+        })
     }
 
     /// Detections at angles for which their material makes no claim.

@@ -62,6 +62,9 @@ pub struct ScanRecord<'a> {
     /// What the antennas received across the polarisation that was sent; empty if they do not.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     cross_polar: Vec<CrossPolarRecord<'a>>,
+    /// Rays that end at a sheet, because they have passed as many as they may.
+    #[serde(skip)]
+    pub(super) rays_ended: usize,
     #[serde(skip)]
     pub(super) ready: &'a ReadyScene,
 }
@@ -149,7 +152,8 @@ impl OutsideTheta {
 
 impl<'a> ScanRecord<'a> {
     /// The record of a rendering. `views` and `images` are those of the radar and then of every receiver,
-    /// `crossed` those of the cross-polar channel; `all_hits` says that the clouds hold echoes below the threshold, too.
+    /// `crossed` those of the cross-polar channel; `all_hits` says that the clouds hold echoes below the threshold, too,
+    /// and `rays_ended` how many rays could have passed further sheets.
     ///
     /// # Panics
     /// When `views` or `images` is empty.
@@ -161,6 +165,7 @@ impl<'a> ScanRecord<'a> {
         images: &[Raster],
         validity: Vec<ValidityWarning>,
         all_hits: bool,
+        rays_ended: usize,
     ) -> ScanRecord<'a> {
         let scene = &ready.scene;
         let file = &scene.file;
@@ -202,11 +207,12 @@ impl<'a> ScanRecord<'a> {
             validity,
             materials,
             effects: effects(model),
-            regions: regions(scene, &ready.material_of_region, scan),
+            regions: regions(ready, scan),
             receivers: std::iter::zip(views, images)
                 .filter_map(|(view, image)| ReceiverRecord::new(scene, view, image))
                 .collect(),
             cross_polar: crossed.iter().map(CrossPolarRecord::new).collect(),
+            rays_ended,
             ready,
         }
     }

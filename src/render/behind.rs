@@ -1,0 +1,106 @@
+//! What rays meet behind sheets: they go straight on, since a thin sheet does not refract them.
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::setup::Setup;
+use super::sheet::Passage;
+use super::spot::{Behind, Footprints, Spot, edge_distances_m, samples};
+use crate::frames::{Direction, Global, Point, Ray};
+use crate::radar::Beam;
+use crate::trace::{Hit, ScanGeometry};
+
+/// Distance from a surface at which a ray starts, m, so that it does not hit the same surface again. It is far above
+/// the rounding of f64 and far below a wavelength.
+pub(super) const LIFT_M: f64 = 1e-7;
+
+/// Adds to the footprints what lies behind the sheets that their rays meet.
+pub(super) fn trace_behind(setup: &Setup, footprints: &mut Footprints) {
+    let geometry = &setup.geometry;
+    let count = footprints.rays_per_chirp;
+    let rays = SpotRays::new(geometry, &*footprints);
+    for _ in 0..setup.most_sheets {
+        let front = footprints.behind.last().map_or(&footprints.hits, |behind| &behind.hits);
+        let through: Vec<(usize, Hit, Ray<Global>)> = front
+            .par_iter()
+            .enumerate()
+            .filter_map(|(number, hit)| {
+                let hit = (*hit)?;
+                setup.sheet(hit.facet)?;
+                Some((number, hit, onward(&hit, rays.direction(number)?)))
+            })
+            .collect();
+        let onward: Vec<Ray<Global>> = through.iter().map(|(.., ray)| *ray).collect();
+        let mut hits = vec![None; front.len()];
+        for ((number, front, _), hit) in through.iter().zip(geometry.bvh.closest_of_each(&onward)) {
+            let from_radar =
+                |hit: Hit| Hit { range_m: front.range_m + LIFT_M + hit.range_m, ..hit };
+            hits[*number] = hit.map(from_radar);
+        }
+        if hits.iter().all(Option::is_none) {
+            return;
+        }
+        let edge_m = edge_distances_m(geometry, &hits, count);
+        footprints.behind.push(Behind { hits, edge_m });
+    }
+    let last = footprints.behind.last().map_or(&footprints.hits, |behind| &behind.hits);
+    footprints.ended = last.iter().flatten().filter(|hit| setup.sheet(hit.facet).is_some()).count();
+}
+
+/// The ray that goes on behind a hit.
+pub(super) fn onward(hit: &Hit, direction: Direction<Global>) -> Ray<Global> {
+    Ray { origin: Point::from(hit.point.xyz + LIFT_M * direction.xyz()), direction }
+}
+
+/// The rays of all chirps, by the numbers of their hits.
+struct SpotRays<'a> {
+    axes: &'a [Ray<Global>],
+    beam: Beam,
+    axis_range_m: Vec<Option<f64>>,
+    samples: Vec<DVec2>,
+}
+
+impl<'a> SpotRays<'a> {
+    fn new(geometry: &ScanGeometry<'a>, footprints: &Footprints) -> SpotRays<'a> {
+        SpotRays {
+            axes: &geometry.chirps.rays,
+            beam: Beam::new(geometry.radar),
+            axis_range_m: footprints.axis_range_m.clone(),
+            samples: samples(footprints.rays_per_chirp),
+        }
+    }
+
+    fn direction(&self, number: usize) -> Option<Direction<Global>> {
+        let (chirp, sample) = (number / self.samples.len(), number % self.samples.len());
+        let spot = Spot::met(&self.beam, &self.axes[chirp], self.axis_range_m[chirp], chirp);
+        Some(spot.ray(self.samples[sample])?.direction)
+    }
+}
+
+/// Where a ray ends.
+pub(super) struct Way {
+    /// The surface that it meets; `None` where it gets as far as it should.
+    pub hit: Option<Hit>,
+    /// The sheets on the way.
+    pub passage: Passage,
+}
+
+/// Follows a ray through sheets to the first surface nearer than `until_m` that stops it.
+pub(super) fn follow(setup: &Setup, mut ray: Ray<Global>, until_m: f64) -> Way {
+    let (mut passage, mut passed_m) = (Passage::FREE, 0.0);
+    loop {
+        let hit = setup.geometry.bvh.closest(&ray);
+        let hit = hit.map(|hit| Hit { range_m: passed_m + hit.range_m, ..hit });
+        let Some(hit) = hit.filter(|hit| hit.range_m < until_m) else {
+            return Way { hit: None, passage };
+        };
+        match setup.sheet(hit.facet) {
+            Some(sheet) if usize::from(passage.sheets) < setup.most_sheets => {
+                passage = passage.then(sheet.passage(hit.cos_theta));
+                passed_m = hit.range_m + LIFT_M;
+                ray = onward(&hit, ray.direction);
+            }
+            _ => return Way { hit: Some(hit), passage },
+        }
+    }
+}
