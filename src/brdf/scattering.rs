@@ -2,6 +2,7 @@
 
 use super::backscatter::Term;
 use super::parameter::Visitor;
+use super::validity::Condition;
 use crate::frames::{Direction, Surface};
 
 /// Anything that scatters. A closure `Fn(i, o) -> f` is one, so a caller's own model needs no type.
@@ -144,6 +145,19 @@ pub trait ScatteringModel: Scattering {
     /// Whether it is a measured curve or has one as a part.
     fn has_curve(&self) -> bool {
         false
+    }
+
+    /// Width of its narrowest lobe about the normal, rad: the tilt at which the echo of a mirror's lobe has fallen
+    /// to 1/e; `None` for a model without lobes, or with measured ones.
+    fn lobe_rad(&self) -> Option<f64> {
+        let terms = self.backscatter().unwrap_or_default();
+        terms.iter().filter_map(|term| Some(term.facets?.m)).min_by(f64::total_cmp)
+    }
+
+    /// What its derivation asks of a surface at a wavelength, m; `rms_height_m` is what is known of the surface's
+    /// height, for a model without that parameter.
+    fn conditions(&self, _wavelength_m: f64, _rms_height_m: Option<f64>) -> Vec<Condition> {
+        Vec::new()
     }
 }
 

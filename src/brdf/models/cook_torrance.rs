@@ -153,6 +153,10 @@ impl ScatteringModel for CookTorrance {
         }
     }
 
+    fn lobe_rad(&self) -> Option<f64> {
+        Some(self.m_across.map_or(self.m, |m_across| self.m.min(m_across)))
+    }
+
     fn f_lambda(&self) -> Option<f64> {
         Some(self.f_lambda)
     }

@@ -100,6 +100,11 @@ impl ScatteringModel for Directive {
         visit_number(visitor, prefix, "lambda", (0.0, 1.0), &mut self.lambda);
         visit_number(visitor, prefix, "alpha_i", ALPHA_RANGE, &mut self.alpha_i);
     }
+
+    /// At the tilt θ of the surface ψ_R is 2θ, and the lobe cos²ᵅθ, about exp(−α·θ²).
+    fn lobe_rad(&self) -> Option<f64> {
+        (self.lambda > 0.0).then(|| 1.0 / self.alpha_r.sqrt())
+    }
 }
 
 /// The lobe of α as a beam sees it. With ψ = 2θ it is cos²ᵅθ.

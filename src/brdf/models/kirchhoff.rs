@@ -16,14 +16,15 @@
 //!
 //! At 300 GHz (k = 6.28 rad/mm) painted or anodised metal has s = 0.5–5 µm and coarse grit 36–280 µm
 //! (Grossman 2017, IEEE Trans. THz Sci. Technol. 7(5)); cast or blasted 5–50 µm is assumed; l is 0.1–3 mm.
-//! The theory wants k·l > 6 and a radius of curvature beyond λ (for Gaussian correlation l² > 2.8·s·λ); exponential correlation has no
+//! The theory asks for k·l ≥ 6, and for Gaussian correlation for a radius of curvature beyond λ (l² ≥ 2.76·s·λ) and an
+//! rms slope of 0.25 at most (`conditions`); exponential correlation has no
 //! curvature, and its results are a convention of the field. There is no shadowing: a metal
 //! with s = 0.3 mm, l = 2 mm reflects at most what it receives up to 60°, but at 75° 1.04 (Gaussian) to
 //! 1.40 (exponential) times that. Rough exponential surfaces lose up to half at normal incidence.
 
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{PI, SQRT_2, TAU};
 
 use crate::brdf::backscatter::UNSEEN;
 use crate::brdf::kind::{Key, Kind};
@@ -35,6 +36,7 @@ use crate::brdf::permittivity::{
 };
 use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use crate::brdf::slopes::over_exponential;
+use crate::brdf::validity::{Bound, Condition, ULABY, kirchhoff_conditions, length_condition};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -183,6 +185,35 @@ impl ScatteringModel for Kirchhoff {
 
     fn permittivity(&self) -> Option<[f64; 2]> {
         Some([self.eps_real, self.eps_imag])
+    }
+
+    /// That of its coherent part.
+    fn lobe_rad(&self) -> Option<f64> {
+        Some(self.lobe_rad.unwrap_or(0.0))
+    }
+
+    /// At its own frequency. Exponential correlation has neither slope nor curvature, so that only its length has
+    /// a limit; a flat surface is the mirror, which has none.
+    fn conditions(&self, _wavelength_m: f64, _rms_height_m: Option<f64>) -> Vec<Condition> {
+        let (s_m, l_m) = (self.rms_height_m, self.correlation_length_m);
+        let wavelength_m = TAU / wavenumber_rad_per_m(self.frequency_hz);
+        if s_m == 0.0 {
+            return Vec::new();
+        }
+        if self.correlation == Correlation::Exponential {
+            return vec![length_condition(KIND.name, wavelength_m, l_m)];
+        }
+        let mut conditions = kirchhoff_conditions(KIND.name, wavelength_m, s_m, l_m).to_vec();
+        conditions.push(Condition {
+            model: KIND.name,
+            quantity: "the rms slope √2·s/l",
+            unit: "1",
+            value: SQRT_2 * s_m / l_m,
+            bound: Bound::AtMost,
+            limit: 0.25,
+            source: ULABY,
+        });
+        conditions
     }
 }
 
@@ -358,6 +389,25 @@ mod tests {
             let nearly = rough(1e-9, 1e-3).retro_per_sr(theta_rad);
             assert!((nearly - expected).abs() < 1e-6 * expected);
         }
+    }
+
+    #[test]
+    fn its_conditions_are_those_of_kirchhoff_s_approximation() {
+        // k = 6.2875 rad/mm and λ = 0.9993 mm: k·l = 3.14, l²/(s·λ) = 5.00, slope 0.141.
+        let found = rough(50e-6, 0.5e-3).conditions(1.0, None);
+        let values = [3.14, 5.00, 0.141];
+        assert_eq!(found.len(), values.len());
+        for (condition, value) in std::iter::zip(&found, values) {
+            assert!((condition.value / value - 1.0).abs() < 5e-3, "{condition:?}");
+        }
+        assert_eq!([0, 1, 2].map(|number| found[number].is_met()), [false, true, true]);
+        // k·l = 12.6, l²/(s·λ) = 6.67, slope 0.424.
+        let steep = rough(0.6e-3, 2e-3).conditions(1.0, None);
+        assert_eq!([0, 1, 2].map(|number| steep[number].is_met()), [true, true, false]);
+        let exponential = Kirchhoff { correlation: Correlation::Exponential, ..rough(50e-6, 1e-3) };
+        let found = exponential.conditions(1.0, None);
+        assert!(found.len() == 1 && found[0].is_met(), "{found:?}");
+        assert!(rough(0.0, 1e-5).conditions(1.0, None).is_empty());
     }
 
     #[test]

@@ -7,6 +7,9 @@
 //! Spizzichino 1963, ch. 5). The rms slope runs from 0.01 (polished) to 0.5 (grit); with Gaussian
 //! correlation it is √2·s/l. The frequency enters only by ε. Without shadowing a metal
 //! reflects 0.91 to 1 of what it receives up to 60° (slopes to 0.4), but 1.18 at 75° and slope 0.4.
+//! The limit is that of a large rms height s, (2k·s·cos θ)² ≥ 10 (`conditions`).
+
+use std::f64::consts::{SQRT_2, TAU};
 
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +23,7 @@ use crate::brdf::scattering::{
     NARROW_M, NarrowLobe, Scattering, ScatteringModel, Seen, half_vector,
 };
 use crate::brdf::slopes::{Distribution, SlopeMatrix};
+use crate::brdf::validity::{Bound, Condition, ULABY, kirchhoff_conditions};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -94,12 +98,47 @@ impl ScatteringModel for KirchhoffGo {
     fn permittivity(&self) -> Option<[f64; 2]> {
         Some([self.eps_real, self.eps_imag])
     }
+
+    /// Those of the rays' limit at normal incidence, where they are easiest met, for a surface of a known height
+    /// with Gaussian correlation: l is √2·s over the slope.
+    fn conditions(&self, wavelength_m: f64, rms_height_m: Option<f64>) -> Vec<Condition> {
+        let Some(s_m) = rms_height_m else { return Vec::new() };
+        let l_m = SQRT_2 * s_m / self.rms_slope;
+        let phase_rad = 2.0 * TAU / wavelength_m * s_m;
+        let mut conditions = vec![Condition {
+            model: KIND.name,
+            quantity: "(2·k·s)²",
+            unit: "1",
+            value: phase_rad * phase_rad,
+            bound: Bound::AtLeast,
+            limit: 10.0,
+            source: ULABY,
+        }];
+        // A smooth surface breaks the one above, and has no curvature.
+        if s_m > 0.0 {
+            conditions.extend(kirchhoff_conditions(KIND.name, wavelength_m, s_m, l_m));
+        }
+        conditions
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::brdf::{CookTorrance, Shadowing};
+
+    #[test]
+    fn the_limit_of_rays_wants_a_height_beyond_the_wavelength() {
+        let model = KirchhoffGo { rms_slope: 0.2, eps_real: 3.0, eps_imag: 0.0 };
+        assert!(model.conditions(1e-3, None).is_empty());
+        // 2·k·s is 1.26 and 3.77 rad; l²/(s·λ) = 2·s/(slope²·λ) is 5 and 15; k·l = 4.4 and 13.3.
+        for (s_m, is_met) in [(0.1e-3, [false, false, true]), (0.3e-3, [true, true, true])] {
+            let found = model.conditions(1e-3, Some(s_m));
+            assert_eq!([0, 1, 2].map(|number| found[number].is_met()), is_met, "{found:?}");
+        }
+        let smooth = model.conditions(1e-3, Some(0.0));
+        assert!(smooth.len() == 1 && !smooth[0].is_met());
+    }
 
     #[test]
     fn it_is_the_formula_and_cook_torrance_without_shadowing() {

@@ -10,6 +10,7 @@ use super::backscatter::Term;
 use super::kind::Kind;
 use super::parameter::{Parameter, ParameterError, Visitor};
 use super::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
+use super::validity::Condition;
 use crate::frames::{Direction, Surface};
 
 pub use cook_torrance::Shadowing;
@@ -159,6 +160,22 @@ impl ScatteringModel for Brdf {
 
     fn has_curve(&self) -> bool {
         self.model().has_curve()
+    }
+
+    fn lobe_rad(&self) -> Option<f64> {
+        let parts = self.parts();
+        if parts.is_empty() {
+            return self.model().lobe_rad();
+        }
+        parts.into_iter().filter_map(Brdf::lobe_rad).min_by(f64::total_cmp)
+    }
+
+    fn conditions(&self, wavelength_m: f64, rms_height_m: Option<f64>) -> Vec<Condition> {
+        let mut conditions = self.model().conditions(wavelength_m, rms_height_m);
+        for part in self.parts() {
+            conditions.extend(part.conditions(wavelength_m, rms_height_m));
+        }
+        conditions
     }
 }
 

@@ -14,8 +14,9 @@ use crate::adopt::{FitMethod, FitOutcome, FitRequest, FitStorage, FitSubject, St
 use crate::error::Error;
 use crate::fit::{FitResult, model_names};
 use crate::material::{Fit, SourceKind};
+use crate::radar::Radar;
 use crate::report::{FigureFormat, curve_points, fit_layers, incidence_plot};
-use crate::setup::Database;
+use crate::setup::{Database, unmet_conditions, unmet_sentence};
 use crate::units::watts_from_dbm;
 
 const EXAMPLES_AND_METHODS: &str = "Examples:
@@ -140,6 +141,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     args.output.as_deref().map(FigureFormat::of).transpose()?;
     checked.notices.iter().for_each(|notice| console.notice(notice));
     let FitOutcome { subject, result, fit, stored, refusal } = checked.run(db)?;
+    let material = subject.found.as_ref().map(|found| &found.material);
+    for condition in unmet_conditions(&fit.model, Radar::default().wavelength_m(), material) {
+        console.notice(&unmet_sentence(&condition));
+    }
     let files = match &args.output {
         Some(path) if result.converged => draw(path, &subject, &fit)?,
         _ => Vec::new(),

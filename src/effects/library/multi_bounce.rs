@@ -175,9 +175,9 @@ fn returned(laws: &[Brdf], detours: &[Detour]) -> Option<MeanEcho> {
 const ABOUT: About = About {
     name: "multi-bounce",
     level: Level::Scene,
-    description: "Part of the wave goes on from the first surface to a second one and returns from there. 0 dB \
-         is the power that the two scattering laws and the pattern of the antenna give: its beam, and side lobes \
-         of -20 dB.",
+    description: "Part of the wave goes on from the first surface to a second one and returns from there. At \
+         0 dB its power is what the two scattering models and the antenna's pattern give: its beam, and side lobes \
+         of -20 dB; coupling_db is added to it.",
     signature: "Places that face another surface, as in corners and under arms, are too bright and too far \
          away. A foreign patch is bright without a longer range, and a wrong pose is off in range \
          without being bright; convex targets never show this.",

@@ -12,7 +12,7 @@ use crate::material::Status;
 use crate::radar::{Beam, Radar};
 use crate::render::Scan;
 use crate::scene::{MeshReport, Scene};
-use crate::setup::{MaterialRevision, ReadyScene, SceneMaterial, View};
+use crate::setup::{MaterialRevision, ReadyScene, SceneMaterial, ValidityWarning, View};
 use crate::units::dbm_from_watts;
 
 /// Version of the layout of `scan.json`; it grows with every change that a reader could trip over.
@@ -56,6 +56,8 @@ pub struct ScanRecord<'a> {
     pub(super) counts: Counts,
     pub(super) power_dbm: Option<PowerRange>,
     image: Value,
+    /// Where a model is used outside of what its derivation allows.
+    pub(super) validity: Vec<ValidityWarning>,
     pub(super) receivers: Vec<ReceiverRecord<'a>>,
     #[serde(skip)]
     pub(super) ready: &'a ReadyScene,
@@ -143,6 +145,7 @@ impl<'a> ScanRecord<'a> {
         model: Option<&Model>,
         views: &[View<'a>],
         images: &[Raster],
+        validity: Vec<ValidityWarning>,
         all_hits: bool,
     ) -> ScanRecord<'a> {
         let scene = &ready.scene;
@@ -182,6 +185,7 @@ impl<'a> ScanRecord<'a> {
                 "width": image.width, "height": image.height, "pixel_m": image.pixel_m,
                 "x_min_m": image.x_min_m, "y_min_m": image.y_min_m,
             }),
+            validity,
             materials,
             effects: effects(model),
             regions: regions(scene, &ready.material_of_region, scan),

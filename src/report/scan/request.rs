@@ -90,7 +90,8 @@ impl<'a> RenderRequest<'a> {
         let images: Vec<Raster> = views.iter().map(|view| ready.image(&view.scan)).collect();
 
         progress(RenderProgress::Begin(RenderStage::Encode));
-        let record = ScanRecord::new(ready, assembly.model(), &views, &images, all_hits);
+        let validity = ready.validity(&setup, &footprints);
+        let record = ScanRecord::new(ready, assembly.model(), &views, &images, validity, all_hits);
         let mut files = encode(all_hits, self.packing, ready, &views, &images, &record)?;
         if let Some(shape) = self.beat {
             for view in &views {
