@@ -2,12 +2,12 @@
 
 mod support;
 
-use std::f64::consts::PI;
+use std::f64::consts::{LN_2, PI};
 
 use glam::DVec3;
 use matdb::brdf::{CookTorrance, Distribution, Lambert, Scattering, Shadowing};
 use matdb::geometry::Mesh;
-use matdb::radar::{Chirps, Radar};
+use matdb::radar::{BeamEntry, Chirps, Radar};
 use matdb::render::Echo;
 use matdb::scene::solids;
 use matdb::units::dbm_from_watts;
@@ -35,10 +35,14 @@ fn expected_dbm(range_m: f64, theta_rad: f64, f_per_sr: f64) -> f64 {
         + 20.0 * theta_rad.cos().log10()
 }
 
-/// Equations (13) and (14) with Beckmann's D, written out for i = o; G1 is 1 below 64° for m = 0.3.
+/// Equations (13) and (14) with Beckmann's D, written out for i = o; G1 is 1 below 64° for m = 0.3. The beam of 16 mm at
+/// half its intensity, w₀ = 16 mm/√(2·ln 2), adds δ² = (λ/(2π·w₀))² to m².
 fn rough_by_hand_per_sr(theta_rad: f64) -> f64 {
+    let wavelength_m = 299_792_458.0 / 300e9;
+    let delta_rad = wavelength_m * (2.0 * LN_2).sqrt() / (2.0 * PI * 0.016);
+    let seen2 = 0.09 + delta_rad * delta_rad;
     let (tan2, cos2) = (theta_rad.tan().powi(2), theta_rad.cos().powi(2));
-    let d = (-tan2 / 0.09).exp() / (PI * 0.09 * cos2 * cos2);
+    let d = (-tan2 / seen2).exp() / (PI * seen2 * cos2 * cos2);
     0.2 * d / (4.0 * cos2)
 }
 
@@ -48,7 +52,9 @@ fn echoes(mut mesh: Mesh, turn_rad: f64, surface: &dyn Scattering) -> Vec<Echo> 
         *vertex = turn * *vertex + DVec3::new(0.0, 1.1, 0.0);
     }
     let (aperture_m2, system_loss_db) = (Some(0.196), 15.0);
-    let radar = Radar { aperture_m2, system_loss_db, ..Radar::default() };
+    // The same beam all over the field of view.
+    let beam = BeamEntry { edge_growth: 1.0, ..Radar::default().beam };
+    let radar = Radar { aperture_m2, system_loss_db, beam, ..Radar::default() };
     let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
     support::echoes(&radar, &chirps, &mesh, surface)
 }

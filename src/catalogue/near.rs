@@ -337,7 +337,7 @@ mod tests {
             builtin::names().map(|name| builtin::get(name).unwrap().unwrap()).collect();
         for own in &materials {
             let scattering = own.scattering().unwrap();
-            let degrees = [1.0, 3.0, 5.0, 8.0, 12.0, 20.0, 30.0, 40.0];
+            let degrees = [0.2, 0.5, 1.0, 3.0, 5.0, 8.0, 12.0, 20.0, 30.0, 40.0];
             let level = |deg: f64| db_from_ratio(scattering.sigma0(deg.to_radians()));
             let points = degrees.map(|deg| (deg, level(deg))).into_iter();
             let points: Vec<_> = points.filter(|(_, level)| *level > -100.0).collect();

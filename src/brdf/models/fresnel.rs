@@ -147,6 +147,31 @@ mod tests {
         assert_eq!(smooth(0.0, 0.0).reflectance(0.0), 1.0);
     }
 
+    /// A receiver where the mirror sends its power gets all that is reflected, and at the angle ε beside it
+    /// exp(−ε²/4δ²) of it, in the plane of incidence and across.
+    #[test]
+    fn a_receiver_in_the_mirror_s_direction_gets_what_it_reflects() {
+        let (delta_rad, aside_rad) = (0.0117f64, 0.01f64);
+        let model = Fresnel { lobe_rad: None, ..smooth(2.07, 0.0) };
+        let fallen = (-(0.5 * aside_rad / delta_rad).powi(2)).exp();
+        for theta_rad in [0.0, 0.6, 1.2] {
+            let i = Direction::from_angles(theta_rad, 0.3);
+            let o = i.mirrored();
+            let received = |o: Direction<Surface>| {
+                let f_per_sr = model.seen_by(delta_rad, i, o).f_per_sr;
+                f_per_sr * o.cos_theta() * 4.0 * std::f64::consts::PI * delta_rad * delta_rad
+            };
+            let expected = model.reflectance(theta_rad);
+            assert!((received(o) / expected - 1.0).abs() < 1e-9, "{theta_rad}");
+            let across = i.xyz().cross(o.xyz()).try_normalize().unwrap_or(glam::DVec3::X);
+            for aside in [across, o.xyz().cross(across)] {
+                let found = received(Direction::new(o.xyz() + aside_rad * aside).unwrap());
+                // cos θ_o and R change by a few per cent.
+                assert!((found / expected / fallen - 1.0).abs() < 0.05, "{theta_rad}: {found}");
+            }
+        }
+    }
+
     #[test]
     fn the_lobe_falls_to_1_over_e_at_its_width() {
         let model = smooth(2.07, 0.0);

@@ -168,6 +168,27 @@ fn models_of_facets_are_specular_by_themselves() {
     }
 }
 
+/// A path meets the rest of a law at random, and its narrow lobes in the mirror's direction: nothing is met twice.
+#[test]
+fn narrow_lobes_and_the_rest_make_the_law() {
+    let (i, o) = (Direction::from_angles(0.2, 0.0), Direction::from_angles(0.3, 2.0));
+    let mirror = || Brdf::Fresnel(Fresnel { eps_real: 4.67, eps_imag: 5.0, lobe_rad: None });
+    let chalk = Lambert { albedo: 0.6 };
+    let (k, diffuse) = (0.25, Box::new(Brdf::Lambert(chalk)));
+    let glazed = Brdf::Mixture(Mixture { k, diffuse, specular: Box::new(mirror()) });
+    let rest = glazed.apart_from_narrow_lobes(i, o).f_per_sr;
+    assert!((rest - 0.25 * chalk.f_per_sr(i, o)).abs() < 1e-15, "{rest}");
+    let Brdf::Fresnel(alone) = mirror() else { panic!("not the mirror") };
+    let lobes = glazed.narrow_lobes(i);
+    let share = lobes.iter().map(|lobe| lobe.share).sum::<f64>();
+    assert!((share - 0.75 * alone.reflectance(0.2)).abs() < 1e-12, "{lobes:?}");
+    for model in every_model() {
+        let (rest, all) = (model.apart_from_narrow_lobes(i, o), model.seen_by(0.0, i, o));
+        let has_narrow = !model.narrow_lobes(i).is_empty();
+        assert!(if has_narrow { rest.f_per_sr < all.f_per_sr } else { rest == all }, "{model:?}");
+    }
+}
+
 /// The keys of a kind are those that its models are written with, in that order.
 #[test]
 fn every_kind_has_its_name_and_its_keys() {
