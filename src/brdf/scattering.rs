@@ -20,8 +20,9 @@ pub trait Scattering: Sync {
 
     /// f(i, o) as a beam of the divergence `beam_rad` (δ, rad, 0 or more) sees it, and how it is made up.
     ///
-    /// No lobe is seen narrower than the beam itself, so that a mirror returns at most what it was sent. A model
-    /// without facets, such as a closure or a measured curve, counts as diffuse and is seen as it is.
+    /// A lobe is seen convolved with the beam's own, so that a mirror returns at most what it was sent. A model without
+    /// a lobe is diffuse and is seen as it is; so are a closure and a measured curve, which includes the beam that it
+    /// was measured with. Without a beam, δ = 0, this is [`f_per_sr`](Self::f_per_sr).
     fn seen_by(&self, _beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         Seen::diffuse(self.f_per_sr(i, o))
     }
@@ -29,6 +30,17 @@ pub trait Scattering: Sync {
     /// The share of f(i, o), 0 to 1, that facets reflect like mirrors, rough or not.
     fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         self.seen_by(0.0, i, o).specular_share
+    }
+
+    /// The lobes in which a surface that is lit from `i` sends power on like a mirror, too narrow for a path to meet by
+    /// chance: those with a roughness up to [`NARROW_M`].
+    fn narrow_lobes(&self, _i: Direction<Surface>) -> Vec<NarrowLobe> {
+        Vec::new()
+    }
+
+    /// f(i, o) apart from the narrow lobes.
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        self.seen_by(0.0, i, o)
     }
 
     /// f in exact backscatter as a sum of closed forms; `None` for a model whose f depends on the azimuth,
@@ -47,6 +59,19 @@ pub trait Scattering: Sync {
     fn sigma0(&self, theta_rad: f64) -> f64 {
         4.0 * std::f64::consts::PI * self.retro_per_sr(theta_rad) * theta_rad.cos().powi(2)
     }
+}
+
+/// Largest roughness of a lobe that a path follows in the direction of the mirror alone: below the divergence of a
+/// beam, which its roughness then joins.
+pub const NARROW_M: f64 = 0.01;
+
+/// A lobe about the direction of the mirror.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NarrowLobe {
+    /// Share of the power in it, 0 to 1.
+    pub share: f64,
+    /// Roughness m; 0 for a smooth mirror.
+    pub m: f64,
 }
 
 /// What a beam sees of a surface in one pair of directions.
@@ -99,6 +124,11 @@ pub trait ScatteringModel: Scattering {
 
     /// Whether the surface is smooth: all that it reflects is the lobe of a mirror.
     fn is_smooth(&self) -> bool {
+        false
+    }
+
+    /// Whether it has a smooth mirror, a delta in direction: f holds it as [`VIEWING_RAD`](super::VIEWING_RAD) wide.
+    fn has_smooth_mirror(&self) -> bool {
         false
     }
 

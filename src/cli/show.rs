@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::formats::EffectEntry;
 use crate::material::{Fit, Material};
 use crate::radar::Radar;
-use crate::report::{LevelRow, Sigma0Level, level_rows};
+use crate::report::{LevelRow, Sigma0Level, drawn_words, level_rows};
 use crate::setup::Database;
 use crate::setup::{
     MaterialRevision, find_material, later_status_warning, unmet_conditions, unmet_sentence,
@@ -195,5 +195,6 @@ fn curve_table(material: &Material) -> Result<String, Error> {
         };
         [format!("{theta_deg:.0}°"), level, said]
     });
-    Ok(table(&["incidence", "sigma0 dB", ""], rows.into_iter()))
+    let table = table(&["incidence", "sigma0 dB", ""], rows.into_iter());
+    Ok(drawn_words(material)?.map_or(table.clone(), |words| format!("{table}{words}\n")))
 }

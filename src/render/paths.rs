@@ -18,7 +18,7 @@ use super::path::{Path, sum};
 use super::setup::Setup;
 use super::spot::{self, Footprints, Spot};
 use super::surface::{Orientation, Surface};
-use crate::brdf::Seen;
+use crate::brdf::{NarrowLobe, Seen};
 use crate::effects::MeanEcho;
 use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
 use crate::radar::random::{Key, Purpose};
@@ -68,6 +68,17 @@ struct ShadingPoint<'a> {
     solid_angle_sr: f64,
     /// Divergence of the beam there, rad.
     beam_rad: f64,
+}
+
+/// Power on its way to a second surface.
+struct Onward {
+    direction: Direction<Local>,
+    /// Its share of the power on the first surface.
+    share: f64,
+    /// What the first surface scatters.
+    first: Seen,
+    /// Roughness of a lobe that the direction stands for.
+    m: f64,
 }
 
 impl ShadingPoint<'_> {
@@ -158,15 +169,9 @@ impl<'a> Emission<'a> {
         self.lit(hit, to_source, to_antenna, antenna_m, hit.range_m)
     }
 
-    /// A point that another point of the target lights; the antenna sees it in the main lobe of its beam, or
+    /// A point that another point of the target lights from `to_source`; the antenna sees it in the main lobe of its beam, or
     /// by a side lobe.
-    fn lit_by_surface(
-        &self,
-        hit: Hit,
-        source: &ShadingPoint,
-        in_main_lobe: bool,
-    ) -> ShadingPoint<'a> {
-        let to_source = (source.hit.point.xyz - hit.point.xyz).normalize_or(DVec3::Z);
+    fn lit_by_surface(&self, hit: Hit, to_source: DVec3, in_main_lobe: bool) -> ShadingPoint<'a> {
         let Spot { axis, beam, .. } = &self.spot;
         let (mut to_antenna, antenna_m) = self.to_antenna(&hit);
         if in_main_lobe {
@@ -231,6 +236,24 @@ impl<'a> Emission<'a> {
         }
     }
 
+    /// Where a lit point sends power: into directions drawn at random, and exactly into that of the mirror by lobes
+    /// that are too narrow to be drawn.
+    fn onward(&self, lit: &ShadingPoint, bounce: &Bounce, ray: usize) -> Vec<Onward> {
+        let law = lit.surface.scattering;
+        let mut all = Vec::with_capacity(bounce.rays);
+        for (direction, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
+            let first = law.apart_from_narrow_lobes(lit.source, direction);
+            let share = first.f_per_sr * direction.cos_theta() * weight;
+            all.push(Onward { direction, share, first, m: 0.0 });
+        }
+        for NarrowLobe { share, m } in law.narrow_lobes(lit.source) {
+            let direction = lit.source.mirrored();
+            all.push(Onward { direction, share, first: Seen::mirror(0.0), m });
+        }
+        all.retain(|onward| onward.share > 0.0);
+        all
+    }
+
     /// Appends the second-order paths by way of a point that receives `flux_w`, W.
     fn second_order(
         &self,
@@ -241,14 +264,17 @@ impl<'a> Emission<'a> {
         ray: usize,
         paths: &mut Vec<Path>,
     ) {
-        for (onward, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
-            let Some(hit) = self.trace_onward(lit, onward) else { continue };
-            let first = lit.surface.scattering.seen_by(0.0, lit.source, onward);
+        for Onward { direction, share, first, m } in self.onward(lit, bounce, ray) {
+            let Some(hit) = self.trace_onward(lit, direction) else { continue };
             let pattern = self.pattern(bounce, &hit);
-            let second = self.lit_by_surface(hit, lit, pattern > bounce.outside_spot);
+            let to_first = -lit.frame.world(direction.xyz());
+            let in_main_lobe = pattern > bounce.outside_spot;
+            let mut second = self.lit_by_surface(hit, to_first, in_main_lobe);
+            // The beam's width counts once, here: exp(−ε²/4δ²) for the angle ε to its wavefront.
+            let beam_rad = second.beam_rad;
+            second.beam_rad = beam_rad.hypot(m);
             let last = self.scattered(&second);
-            let onward_share = first.f_per_sr * onward.cos_theta() * weight;
-            let power_w = flux_w * onward_share * pattern * second.received_share(last);
+            let power_w = flux_w * share * pattern * second.received_share(last);
             if power_w > 0.0 && self.is_seen(&second) {
                 let path_m = lit.hit.range_m + hit.range_m + second.antenna_m;
                 paths.push(Path {
@@ -256,7 +282,9 @@ impl<'a> Emission<'a> {
                     power_w,
                     surfaces: 2,
                     specular_share: first.specular_share * last.specular_share,
-                    coherent_share: first.coherent_share * last.coherent_share,
+                    coherent_share: first.coherent_share
+                        * last.coherent_share
+                        * (beam_rad / second.beam_rad).powi(2),
                     ..direct
                 });
             }

@@ -26,14 +26,16 @@ use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, SQRT_2, TAU};
 
+use crate::brdf::backscatter::UNSEEN;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_quantity};
 use crate::brdf::permittivity::{
-    EPS_IMAG, EPS_REAL, LOBE_RANGE_RAD, default_frequency_hz, default_lobe_rad,
-    fresnel_reflectance, mirror_cosine, mirror_lobe_per_sr, permittivity, visit_permittivity,
+    EPS_IMAG, EPS_REAL, default_frequency_hz, fresnel_reflectance, is_narrow, mirror_cosine,
+    mirror_lobe_per_sr, narrow_mirror, permittivity, visit_lobe, visit_permittivity,
     wavenumber_rad_per_m,
 };
-use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
+use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
+use crate::brdf::slopes::over_exponential;
 use crate::brdf::validity::{Bound, Condition, ULABY, kirchhoff_conditions, length_condition};
 use crate::frames::{Direction, Surface};
 
@@ -46,11 +48,12 @@ pub(super) const KIND: Kind = Kind {
         EPS_REAL,
         EPS_IMAG,
         Key::number("frequency_hz"),
-        Key::number("lobe_rad"),
+        Key::number("lobe_rad").optional(),
     ],
     starts: &[(
         "kirchhoff",
-        r#"{"model": "kirchhoff", "rms_height_m": 5e-5, "correlation_length_m": 5e-4, "eps_real": 3}"#,
+        r#"{"model": "kirchhoff", "rms_height_m": 5e-5, "correlation_length_m": 5e-4, "eps_real": 3,
+            "lobe_rad": 0.02}"#,
     )],
 };
 
@@ -73,9 +76,10 @@ pub struct Kirchhoff {
     /// Frequency, 10 GHz to 1 THz.
     #[serde(default = "default_frequency_hz")]
     pub frequency_hz: f64,
-    /// Width of the coherent mirror's lobe, 0.001 to 0.5 rad, as in `fresnel`.
-    #[serde(default = "default_lobe_rad")]
-    pub lobe_rad: f64,
+    /// Width of the mirror's lobe as the radar sees it, 0.001 to 0.5 rad, the beam included; absent for a smooth
+    /// mirror, whose lobe is the beam's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lobe_rad: Option<f64>,
 }
 
 /// How the heights at two places depend on their distance r.
@@ -101,11 +105,22 @@ impl Kirchhoff {
 
     /// The diffuse part of f, 1/sr.
     pub fn incoherent_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        self.incoherent_seen_by(0.0, i, o)
+    }
+
+    /// The diffuse part of f, 1/sr, as a beam of a divergence, rad, sees it: the beam adds (q_z·δ)²/4 to n/l².
+    fn incoherent_seen_by(
+        &self,
+        beam_rad: f64,
+        i: Direction<Surface>,
+        o: Direction<Surface>,
+    ) -> f64 {
         let k_rad_per_m = wavenumber_rad_per_m(self.frequency_hz);
         let q = (i.xyz() + o.xyz()) * k_rad_per_m;
         let across = q.truncate().length() * self.correlation_length_m;
+        let beam = (0.5 * q.z * beam_rad * self.correlation_length_m).powi(2);
         let spectrum_m2 = self.correlation_length_m.powi(2)
-            * self.correlation.series((q.z * self.rms_height_m).powi(2), across);
+            * self.correlation.series((q.z * self.rms_height_m).powi(2), across, beam);
         let reflectance = fresnel_reflectance(self.eps(), mirror_cosine(i, o));
         let sigma0 = reflectance * (q.length_squared() / q.z).powi(2) / (4.0 * PI) * spectrum_m2;
         sigma0 / (4.0 * PI * i.cos_theta() * o.cos_theta())
@@ -118,10 +133,10 @@ impl Kirchhoff {
 
     /// The mirror's part of f, 1/sr, as a beam of a divergence, rad, sees it.
     fn coherent_seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        let lobe_rad = self.lobe_rad.max(beam_rad);
         let q_z = wavenumber_rad_per_m(self.frequency_hz) * (i.cos_theta() + o.cos_theta());
         let kept = (-(q_z * self.rms_height_m).powi(2)).exp();
-        kept * mirror_lobe_per_sr(i, o, lobe_rad, |cos| fresnel_reflectance(self.eps(), cos))
+        let reflectance = |cos| fresnel_reflectance(self.eps(), cos);
+        kept * mirror_lobe_per_sr(i, o, self.lobe_rad, beam_rad, reflectance)
     }
 }
 
@@ -132,9 +147,22 @@ impl Scattering for Kirchhoff {
 
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         let coherent_per_sr = self.coherent_seen_by(beam_rad, i, o);
-        let f_per_sr = self.incoherent_per_sr(i, o) + coherent_per_sr;
+        let f_per_sr = self.incoherent_seen_by(beam_rad, i, o) + coherent_per_sr;
         let coherent_share = if f_per_sr > 0.0 { coherent_per_sr / f_per_sr } else { 0.0 };
         Seen { f_per_sr, specular_share: 1.0, coherent_share }
+    }
+
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        let q_z = 2.0 * wavenumber_rad_per_m(self.frequency_hz) * i.cos_theta();
+        let kept = (-(q_z * self.rms_height_m).powi(2)).exp();
+        narrow_mirror(self.lobe_rad, kept * fresnel_reflectance(self.eps(), i.cos_theta()))
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if !is_narrow(self.lobe_rad) {
+            return self.seen_by(0.0, i, o);
+        }
+        Seen { specular_share: 1.0, ..Seen::diffuse(self.incoherent_per_sr(i, o)) }
     }
 }
 
@@ -144,11 +172,15 @@ impl ScatteringModel for Kirchhoff {
             ("rms_height_m", "m", HEIGHT_RANGE_M, &mut self.rms_height_m),
             ("correlation_length_m", "m", LENGTH_RANGE_M, &mut self.correlation_length_m),
             ("frequency_hz", "Hz", FREQUENCY_RANGE_HZ, &mut self.frequency_hz),
-            ("lobe_rad", "rad", LOBE_RANGE_RAD, &mut self.lobe_rad),
         ] {
             visit_quantity(visitor, prefix, name, unit, range, slot);
         }
+        visit_lobe(visitor, prefix, &mut self.lobe_rad);
         visit_permittivity(visitor, prefix, &mut self.eps_real, &mut self.eps_imag);
+    }
+
+    fn has_smooth_mirror(&self) -> bool {
+        self.lobe_rad.is_none()
     }
 
     fn permittivity(&self) -> Option<[f64; 2]> {
@@ -157,7 +189,7 @@ impl ScatteringModel for Kirchhoff {
 
     /// That of its coherent part.
     fn lobe_rad(&self) -> Option<f64> {
-        Some(self.lobe_rad)
+        Some(self.lobe_rad.unwrap_or(0.0))
     }
 
     /// At its own frequency. Exponential correlation has neither slope nor curvature, so that only its length has
@@ -189,40 +221,53 @@ impl ScatteringModel for Kirchhoff {
 const LEAST_TERM_LN: f64 = -40.0;
 
 impl Correlation {
-    /// e^{−g} Σ gⁿ/n! · W_n/l², `across` being q_t·l.
+    /// e^{−g} Σ gⁿ/n! · W_n/l², `across` being q_t·l and `beam` (q_z·δ·l/2)².
     ///
     /// The terms rise to one maximum and fall from there. They are taken as logarithms, relative to
     /// the largest, so that neither gⁿ nor n! nor e^{−g} can overflow or vanish on the way.
-    fn series(self, g: f64, across: f64) -> f64 {
+    fn series(self, g: f64, across: f64, beam: f64) -> f64 {
         if g <= 0.0 {
             return 0.0;
         }
-        let peak = first_fall(|n| self.term_ln(n + 1, g, across) <= self.term_ln(n, g, across));
-        let peak_ln = self.term_ln(peak, g, across);
-        peak_ln.exp()
-            * (self.shares(peak..u32::MAX, peak_ln, g, across)
-                + self.shares((1..peak).rev(), peak_ln, g, across))
-    }
-
-    /// Sum of the terms n, relative to the peak, up to the first that is too small to count.
-    fn shares(self, n: impl Iterator<Item = u32>, peak_ln: f64, g: f64, across: f64) -> f64 {
-        let shares_ln = n.map(|n| self.term_ln(n, g, across) - peak_ln);
-        shares_ln.take_while(|share_ln| *share_ln > LEAST_TERM_LN).map(f64::exp).sum()
-    }
-
-    /// ln of the term n of the series.
-    fn term_ln(self, n: u32, g: f64, across: f64) -> f64 {
-        let n_real = f64::from(n);
-        n_real * g.ln() - g - ln_factorial(n) + self.spectrum_ln(n_real, across)
+        // ln of the term n of the series.
+        let term_ln = |n: u32| {
+            let n_real = f64::from(n);
+            n_real * g.ln() - g - ln_factorial(n) + self.spectrum_ln(n_real, across, beam)
+        };
+        let peak = first_fall(|n| term_ln(n + 1) <= term_ln(n));
+        let peak_ln = term_ln(peak);
+        // Each side of the peak up to the first term that is too small to count.
+        let up = shares((peak..u32::MAX).map(|n| term_ln(n) - peak_ln));
+        let down = shares((1..peak).rev().map(|n| term_ln(n) - peak_ln));
+        peak_ln.exp() * (up + down)
     }
 
     /// ln(W_n/l²).
-    fn spectrum_ln(self, n: f64, across: f64) -> f64 {
+    fn spectrum_ln(self, n: f64, across: f64, beam: f64) -> f64 {
+        let across2 = across * across;
         match self {
-            Correlation::Gaussian => (PI / n).ln() - across * across / (4.0 * n),
-            Correlation::Exponential => (TAU * n).ln() - 1.5 * (n * n + across * across).ln(),
+            Correlation::Gaussian => (PI / (n + beam)).ln() - across2 / (4.0 * (n + beam)),
+            Correlation::Exponential if beam < UNSEEN * (n * n + across2) => {
+                (TAU * n).ln() - 1.5 * (n * n + across2).ln()
+            }
+            Correlation::Exponential => seen_exponential(n, across2, beam).ln(),
         }
     }
+}
+
+/// W_n/l² of exp(−n·r/l) as a beam sees it: a mixture of Gaussians exp(−v·r²/l²) of v = n²/4t, each with the weight
+/// e^{−t}/√(πt), to which the beam adds its own.
+fn seen_exponential(n: f64, across2: f64, beam: f64) -> f64 {
+    let gaussian = |t: f64| {
+        let width = n * n / (4.0 * t) + beam;
+        (PI / t).sqrt() / width * (-across2 / (4.0 * width)).exp()
+    };
+    over_exponential(gaussian)
+}
+
+/// Sum of shares given as logarithms, up to the first that is too small to count.
+fn shares(shares_ln: impl Iterator<Item = f64>) -> f64 {
+    shares_ln.take_while(|share_ln| *share_ln > LEAST_TERM_LN).map(f64::exp).sum()
 }
 
 /// The first n ≥ 1 from which `falls` holds, for a condition that stays true once it is.
@@ -264,7 +309,7 @@ mod tests {
             eps_real: 4.67,
             eps_imag: 5.0,
             frequency_hz: 300e9,
-            lobe_rad: 0.02,
+            lobe_rad: Some(0.02),
         }
     }
 
@@ -289,9 +334,9 @@ mod tests {
                     let (mut weight, mut plain) = ((-g).exp(), 0.0);
                     for n in 1..400 {
                         weight *= g / f64::from(n);
-                        plain += weight * correlation.spectrum_ln(f64::from(n), across).exp();
+                        plain += weight * correlation.spectrum_ln(f64::from(n), across, 0.0).exp();
                     }
-                    let found = correlation.series(g, across);
+                    let found = correlation.series(g, across, 0.0);
                     assert!((found - plain).abs() < 1e-11 * plain, "{correlation:?} {g} {across}");
                 }
             }
@@ -328,7 +373,7 @@ mod tests {
         }
         let oblique = (60f64.to_radians(), 50e-6);
         let tilted = (-(wavenumber_rad_per_m(300e9) * oblique.1).powi(2)).exp();
-        let wide = |s_m| Kirchhoff { lobe_rad: 0.5, ..rough(s_m, 1e-3) };
+        let wide = |s_m| Kirchhoff { lobe_rad: Some(0.5), ..rough(s_m, 1e-3) };
         let direction = retro(oblique.0);
         let found = wide(oblique.1).coherent_per_sr(direction, direction)
             / wide(0.0).coherent_per_sr(direction, direction);
@@ -337,7 +382,7 @@ mod tests {
 
     #[test]
     fn a_flat_surface_is_the_mirror() {
-        let mirror = Fresnel { eps_real: 4.67, eps_imag: 5.0, lobe_rad: 0.02 };
+        let mirror = Fresnel { eps_real: 4.67, eps_imag: 5.0, lobe_rad: Some(0.02) };
         for theta_rad in [0.0, 0.01, 0.05] {
             let expected = mirror.retro_per_sr(theta_rad);
             assert_eq!(rough(0.0, 1e-3).retro_per_sr(theta_rad), expected);

@@ -19,8 +19,10 @@ use crate::brdf::parameter::{Visitor, visit_number};
 use crate::brdf::permittivity::{
     EPS_IMAG, EPS_REAL, fresnel_reflectance, mirror_cosine, permittivity, visit_permittivity,
 };
-use crate::brdf::scattering::{Scattering, ScatteringModel, Seen, half_vector};
-use crate::brdf::slopes::Distribution;
+use crate::brdf::scattering::{
+    NARROW_M, NarrowLobe, Scattering, ScatteringModel, Seen, half_vector,
+};
+use crate::brdf::slopes::{Distribution, SlopeMatrix};
 use crate::brdf::validity::{Bound, Condition, ULABY, kirchhoff_conditions};
 use crate::frames::{Direction, Surface};
 
@@ -43,24 +45,45 @@ pub struct KirchhoffGo {
     pub eps_imag: f64,
 }
 
+impl KirchhoffGo {
+    fn m(&self) -> f64 {
+        std::f64::consts::SQRT_2 * self.rms_slope
+    }
+}
+
 impl Scattering for KirchhoffGo {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         self.seen_by(0.0, i, o).f_per_sr
     }
 
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
-        let m = SQRT_2 * self.rms_slope;
+        let m = self.m();
         let law = Distribution::Beckmann;
-        let d_per_sr = law.d_per_sr(half_vector(i, o).cos_theta(), m.max(beam_rad));
+        let beam = SlopeMatrix::of_beam(beam_rad, i, o);
+        let d_per_sr = law.d_seen_per_sr(half_vector(i, o), [m, m], beam);
         let eps = permittivity(self.eps_real, self.eps_imag);
         let reflectance = fresnel_reflectance(eps, mirror_cosine(i, o));
         let f_per_sr = reflectance * d_per_sr / (4.0 * i.cos_theta() * o.cos_theta());
         Seen::facets(f_per_sr, beam_rad, [m, m])
     }
 
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        let m = self.m();
+        if m > NARROW_M {
+            return Vec::new();
+        }
+        let eps = permittivity(self.eps_real, self.eps_imag);
+        vec![NarrowLobe { share: fresnel_reflectance(eps, i.cos_theta()), m }]
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if self.m() <= NARROW_M { Seen::default() } else { self.seen_by(0.0, i, o) }
+    }
+
     fn backscatter(&self) -> Option<Vec<Term>> {
-        let m = SQRT_2 * self.rms_slope;
-        let facets = Facets { m, distribution: Distribution::Beckmann, shadowed: 0 };
+        let m = self.m();
+        let distribution = Distribution::Beckmann;
+        let facets = Facets { m, distribution, shadowed: 0, includes_beam: false };
         let eps = permittivity(self.eps_real, self.eps_imag);
         Some(vec![Term::mirrors(fresnel_reflectance(eps, 1.0), facets)])
     }

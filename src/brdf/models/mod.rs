@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::backscatter::Term;
 use super::kind::Kind;
 use super::parameter::{Parameter, ParameterError, Visitor};
-use super::scattering::{Scattering, ScatteringModel, Seen};
+use super::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use super::validity::Condition;
 use crate::frames::{Direction, Surface};
 
@@ -116,6 +116,18 @@ impl Scattering for Brdf {
         }
     }
 
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        self.model().narrow_lobes(i)
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if is_below_horizon(i, o) {
+            Seen::default()
+        } else {
+            self.model().apart_from_narrow_lobes(i, o)
+        }
+    }
+
     fn backscatter(&self) -> Option<Vec<Term>> {
         self.model().backscatter()
     }
@@ -132,6 +144,10 @@ impl ScatteringModel for Brdf {
 
     fn is_smooth(&self) -> bool {
         self.model().is_smooth()
+    }
+
+    fn has_smooth_mirror(&self) -> bool {
+        self.model().has_smooth_mirror()
     }
 
     fn permittivity(&self) -> Option<[f64; 2]> {

@@ -25,8 +25,9 @@ const EQUATION: &str = "power_w = transmit_power_w * 10^(-system_loss_db/10) * s
     w^2 = w0^2 + (wavelength_m * (range_m - focus_m) / (pi * w0))^2; \
     w0 = beam.waist_m * (1 + (edge_growth - 1) * r^2 / edge_m^2), r from the middle of the target plane to where \
     the beam's axis is after 8 m; \
-    f_per_sr is the scattering model of the point's material in backscatter, with wavelength_m / (2 pi w0) in place of \
-    a smaller m or lobe_rad; with scene.spot.rays > 1 the power is the \
+    f_per_sr is the scattering model of the point's material in backscatter, its lobe convolved with the beam's slopes \
+    exp(-s^2 / delta^2), delta = wavelength_m / (2 pi w0): m^2 + delta^2 in place of m^2 in D of beckmann, and delta in \
+    place of a lobe_rad that is smaller or missing; with scene.spot.rays > 1 the power is the \
     mean of this over the rays of the spot, and range and incidence are no longer those of one ray; docs/model.md has receivers elsewhere, \
     second surfaces, speckle and noise";
 
