@@ -178,11 +178,13 @@ pub trait ScatteringModel: Scattering {
         false
     }
 
-    /// Width of its narrowest lobe about the normal, rad: the tilt at which the echo of a mirror's lobe has fallen
-    /// to 1/e; `None` for a model without lobes, or with measured ones.
-    fn lobe_rad(&self) -> Option<f64> {
+    /// Width of its narrowest lobe about the normal as a beam of the divergence `beam_rad` sees it, rad: the tilt at
+    /// which the echo has fallen to 1/e; `None` for a model without lobes, or with measured ones.
+    fn lobe_rad(&self, beam_rad: f64) -> Option<f64> {
         let terms = self.backscatter().unwrap_or_default();
-        terms.iter().filter_map(|term| Some(term.facets?.m)).min_by(f64::total_cmp)
+        let facets = terms.iter().filter_map(|term| term.facets);
+        let seen_rad = facets.map(|facets| facets.m_without_beam(beam_rad).hypot(beam_rad));
+        seen_rad.min_by(f64::total_cmp)
     }
 
     /// What its derivation asks of a surface at a wavelength, m; `rms_height_m` is what is known of the surface's

@@ -100,17 +100,14 @@ impl ReadyScene {
         used: &SceneMaterial,
         tilts: &[Vec<SpotTilt>],
     ) -> Option<ValidityWarning> {
-        let lobe_rad = used.scattering.lobe_rad()?;
         let mut regions = Vec::new();
         let mut worst: Option<Condition> = None;
         for region in self.regions_of(number) {
-            let Some(condition) = tilts.get(region).and_then(|tilts| flatness(tilts, lobe_rad))
+            let tilts = tilts.get(region).map_or(&[][..], Vec::as_slice);
+            let Some(condition) = flatness(tilts, &used.scattering).filter(|one| !one.is_met())
             else {
                 continue;
             };
-            if condition.is_met() {
-                continue;
-            }
             regions.push(self.region_name(region));
             if worst
                 .is_none_or(|worst| condition.value * worst.limit > worst.value * condition.limit)
@@ -149,18 +146,17 @@ fn has_spot_effect(setup: &Setup) -> bool {
 ///
 /// A surface of the curvature H answers a spot of the radius w by a lobe of m_eff² + (w·H/2)², which a single ray does
 /// not see: with w·H = m_eff its peak on a ball is 10·lg(5/4) = 1 dB too strong.
-fn flatness(tilts: &[SpotTilt], lobe_rad: f64) -> Option<Condition> {
-    let mut tilts: Vec<(f64, f64)> =
-        tilts.iter().map(|tilt| (tilt.tilt_rad, lobe_rad.hypot(tilt.beam_rad))).collect();
-    tilts.sort_by(|a, b| (a.0 * b.1).total_cmp(&(b.0 * a.1)));
-    let (value, limit) = *tilts.get(3 * tilts.len().saturating_sub(1) / 4)?;
+fn flatness(tilts: &[SpotTilt], scattering: &Brdf) -> Option<Condition> {
+    let mut tilts = tilts.to_vec();
+    tilts.sort_by(|a, b| a.tilt_rad.total_cmp(&b.tilt_rad));
+    let upper_quartile = tilts.get(3 * tilts.len().saturating_sub(1) / 4)?;
     Some(Condition {
         model: "one ray per spot",
         quantity: "a tilt over one radius of the spot",
         unit: "rad",
-        value,
+        value: upper_quartile.tilt_rad,
         bound: Bound::AtMost,
-        limit,
+        limit: scattering.lobe_rad(upper_quartile.beam_rad)?,
         source: ONE_RAY,
     })
 }

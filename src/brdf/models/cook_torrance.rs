@@ -153,8 +153,8 @@ impl ScatteringModel for CookTorrance {
         }
     }
 
-    fn lobe_rad(&self) -> Option<f64> {
-        Some(self.m_across.map_or(self.m, |m_across| self.m.min(m_across)))
+    fn lobe_rad(&self, beam_rad: f64) -> Option<f64> {
+        Some(self.m.min(self.m_across.unwrap_or(self.m)).hypot(beam_rad))
     }
 
     fn f_lambda(&self) -> Option<f64> {

@@ -102,8 +102,8 @@ impl ScatteringModel for Directive {
     }
 
     /// At the tilt θ of the surface ψ_R is 2θ, and the lobe cos²ᵅθ, about exp(−α·θ²).
-    fn lobe_rad(&self) -> Option<f64> {
-        (self.lambda > 0.0).then(|| 1.0 / self.alpha_r.sqrt())
+    fn lobe_rad(&self, beam_rad: f64) -> Option<f64> {
+        (self.lambda > 0.0).then(|| (1.0 / self.alpha_r.sqrt()).hypot(beam_rad))
     }
 }
 

@@ -192,8 +192,8 @@ impl ScatteringModel for Kirchhoff {
     }
 
     /// That of its coherent part.
-    fn lobe_rad(&self) -> Option<f64> {
-        Some(self.lobe_rad.unwrap_or(0.0))
+    fn lobe_rad(&self, beam_rad: f64) -> Option<f64> {
+        Some(self.lobe_rad.unwrap_or(beam_rad).max(beam_rad))
     }
 
     /// At its own frequency. Exponential correlation has neither slope nor curvature, so that only its length has
@@ -397,9 +397,9 @@ mod tests {
 
     #[test]
     fn its_conditions_are_those_of_kirchhoff_s_approximation() {
-        // k = 6.2875 rad/mm and λ = 0.9993 mm: k·l = 3.14, l²/(s·λ) = 5.00, slope 0.141.
+        // k = 6.2875 rad/mm and λ = 0.9993 mm: k·l = 3.144, l²/(s·λ) = 5.003, slope 0.1414.
         let found = rough(50e-6, 0.5e-3).conditions(1.0, None);
-        let values = [3.14, 5.00, 0.141];
+        let values = [3.144, 5.003, 0.1414];
         assert_eq!(found.len(), values.len());
         for (condition, value) in std::iter::zip(&found, values) {
             assert!((condition.value / value - 1.0).abs() < 5e-3, "{condition:?}");

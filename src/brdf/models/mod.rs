@@ -167,12 +167,12 @@ impl ScatteringModel for Brdf {
         self.model().has_curve()
     }
 
-    fn lobe_rad(&self) -> Option<f64> {
+    fn lobe_rad(&self, beam_rad: f64) -> Option<f64> {
         let parts = self.parts();
         if parts.is_empty() {
-            return self.model().lobe_rad();
+            return self.model().lobe_rad(beam_rad);
         }
-        parts.into_iter().filter_map(Brdf::lobe_rad).min_by(f64::total_cmp)
+        parts.into_iter().filter_map(|part| part.lobe_rad(beam_rad)).min_by(f64::total_cmp)
     }
 
     fn conditions(&self, wavelength_m: f64, rms_height_m: Option<f64>) -> Vec<Condition> {
