@@ -330,6 +330,10 @@ fn instruments_that_cannot_work() {
             &["radar.speckle.looks = 2.5", "whole"],
         ),
         (format!("{receiver}[radar.noise]\n"), &["[radar.noise]", "remove"]),
+        (
+            "[radar.noise]\nlevel_dbm = -90\ngate_cells = 9\n".to_owned(),
+            &["level_dbm", "gate_cells", "remove one"],
+        ),
         (format!("{receiver}gate_m = [9, 7]\n"), &["receiver.gate_m[1] = 7", "from 9"]),
         (format!("{receiver}[radar.chirp]\nduration_s = 1.0\n"), &["chirp.duration_s = 1"]),
         ("[bounce]\nrays = 0\n".to_owned(), &["bounce.rays", "1 to 10 000"]),

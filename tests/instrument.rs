@@ -129,6 +129,19 @@ fn noise_adds_its_power_and_its_range_error() {
 }
 
 #[test]
+fn noise_without_a_level_is_the_floor_that_the_threshold_implies() {
+    let noise_dbm = |keys: &str| {
+        let (scan, _) = render(&format!("[radar.noise]\n{keys}"));
+        scan["noise_dbm"].as_f64().unwrap()
+    };
+    // −77 − 10·lg ln(n·10⁶).
+    for (keys, expected_dbm) in [("", -88.404), ("gate_cells = 100\n", -89.653)] {
+        assert!((noise_dbm(keys) - expected_dbm).abs() < 1e-3, "{keys}");
+    }
+    assert!((noise_dbm("level_dbm = -112\n") + 112.0).abs() < 1e-9);
+}
+
+#[test]
 fn the_range_receiver_reads_range_and_power_of_a_single_ray() {
     let (_, exact) = render("");
     let (_, found) = render("[radar.receiver]\ntemperature_k = 0\n[radar.chirp]\nsamples = 2048\n");
