@@ -154,6 +154,12 @@ pub enum Error {
         /// The nearest name or how to add it.
         way_out: String,
     },
+    /// A material without a curve.
+    #[error("`{material}` has no curve; name another material, or give the file of a curve")]
+    NoCurve {
+        /// The material.
+        material: String,
+    },
     /// A database that was named and is not there.
     #[error("there is no database {}; check its path, `matdb add NAME` makes one", path.display())]
     NoDatabase {

@@ -127,6 +127,12 @@ impl Direction<Surface> {
         Direction { xyz, frame: PhantomData }
     }
 
+    /// The direction in which a mirror reflects this one.
+    pub fn mirrored(&self) -> Self {
+        let DVec3 { x, y, z } = self.xyz;
+        Direction { xyz: DVec3::new(-x, -y, z), frame: PhantomData }
+    }
+
     /// Cosine of the angle to the surface normal.
     pub fn cos_theta(&self) -> f64 {
         self.xyz.z

@@ -244,10 +244,82 @@ fn a_full_disk_leaves_the_database_as_it_was() {
     let folder = tempfile::tempdir().unwrap();
     matdb(folder.path()).args(["add", "ptfe", "-q"]).assert().success();
     let run = on_a_full_disk(folder.path(), 1, "add --all");
-    assert_eq!(run.status.code(), Some(1), "{}", String::from_utf8_lossy(&run.stderr));
+    let message = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert_eq!(run.status.code(), Some(1), "{message}");
+    check(&message, &["matdb.sqlite", "if the disk or its quota is full, make room there"]);
     let listed = matdb(folder.path()).args(["list", "--json"]).output().unwrap();
     let listed: serde_json::Value = serde_json::from_slice(&listed.stdout).unwrap();
     assert_eq!(listed.as_array().unwrap().len(), 1);
+}
+
+/// Runs the program on a named pipe `pipe.csv`.
+#[cfg(unix)]
+fn on_a_pipe(folder: &Path, writer: &str, arguments: &str) -> std::process::Output {
+    let program = assert_cmd::cargo::cargo_bin("matdb");
+    let script = format!("mkfifo pipe.csv; {writer}; exec '{}' {arguments}", program.display());
+    let mut shell = std::process::Command::new("bash");
+    shell.current_dir(folder).env_remove("MATDB").args(["-c", &script]).output().unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_that_no_program_writes_to_is_refused_and_any_other_is_read() {
+    let curve = "{ echo theta_deg,sigma0_db; for t in {1..40}; do echo $t,-$t; done; }";
+    let scene = scene("human.toml").display().to_string();
+    let refused = [
+        "fit pipe.csv".to_owned(),
+        "near --curve pipe.csv".to_owned(),
+        "add --from pipe.csv --name own --class paint --kind synthetic --source us".to_owned(),
+        format!("measure pipe.csv --scene '{scene}' -o out"),
+        "publish site --about pipe.csv".to_owned(),
+    ];
+    std::thread::scope(|threads| {
+        for arguments in &refused {
+            threads.spawn(move || {
+                let folder = tempfile::tempdir().unwrap();
+                matdb(folder.path()).args(["add", "ptfe", "-q"]).assert().success();
+                let run = on_a_pipe(folder.path(), "true", arguments);
+                let message = String::from_utf8_lossy(&run.stderr).into_owned();
+                assert_eq!(run.status.code(), Some(1), "{message}");
+                check(&message, &["pipe.csv: it is a pipe, and no program writes to it; "]);
+                assert_eq!(message.lines().count(), 1, "{message}");
+                assert_eq!(entries(folder.path()), ["matdb.sqlite", "pipe.csv"]);
+            });
+        }
+    });
+    for (writer, path) in [
+        (format!("{curve} > pipe.csv &"), "pipe.csv".to_owned()),
+        (format!("{{ sleep 1; {curve} > pipe.csv; }} &"), "pipe.csv".to_owned()),
+        ("true;".to_owned(), format!("<({curve})")),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let run =
+            on_a_pipe(folder.path(), &format!("{writer} true"), &format!("near --curve {path}"));
+        assert!(run.status.success(), "{writer}: {}", String::from_utf8_lossy(&run.stderr));
+    }
+}
+
+#[test]
+fn messages_about_flags_name_them() {
+    let folder = tempfile::tempdir().unwrap();
+    matdb(folder.path()).args(["add", "ptfe", "-q"]).assert().success();
+    for (arguments, parts) in [
+        (&["withdraw", "ptfe", "--reason", " "][..], ["--reason is empty; ", "in a sentence"]),
+        (
+            &["withdraw", "ptfe", "--reason", "x", "--superseded-by", "ptfe"],
+            ["--superseded-by names the material that is withdrawn; ", "name another one"],
+        ),
+        (&["near", "--material", "ptfe"], ["`ptfe` has no curve; ", "(--curve FILE)"]),
+    ] {
+        check(&refused(matdb(folder.path()).args(arguments)), &parts);
+    }
+    for arguments in ["list --limit -3", "near --material ptfe --limit -3", "fit ptfe --seed -3"] {
+        let run = matdb(folder.path()).args(arguments.split(' ')).output().unwrap();
+        let message = String::from_utf8(run.stderr).unwrap();
+        assert!(!run.status.success(), "{arguments}");
+        check(&message, &["error: invalid value '-3' for '--"]);
+    }
+    assert_eq!(entries(folder.path()), ["matdb.sqlite"]);
 }
 
 #[test]

@@ -7,8 +7,10 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::path::Path;
 
-use matdb::brdf::{Brdf, Fresnel, Parameter, Scattering};
+use matdb::brdf::{Brdf, Fresnel, Parameter, Scattering, VIEWING_RAD};
+
 use matdb::catalogue::references;
+use matdb::frames::Direction;
 use matdb::material::{Fit, Material, Permittivity, Source, SourceKind, builtin};
 use support::{matdb, root};
 
@@ -38,14 +40,16 @@ fn source_of<'a>(fit: &'a Fit, path: &str) -> &'a str {
 /// Reflectance at normal incidence, 0 to 1.
 fn reflectance(entry: &Permittivity) -> f64 {
     let Permittivity { real: eps_real, imaginary: eps_imag, .. } = *entry;
-    Fresnel { eps_real, eps_imag, lobe_rad: 0.02 }.reflectance(0.0)
+    Fresnel { eps_real, eps_imag, lobe_rad: None }.reflectance(0.0)
 }
 
 /// Keys of the sources that some number refers to.
 fn used(material: &Material) -> Vec<&String> {
     let fits = material.fits.iter();
     let parameters = fits.clone().flat_map(|f| f.parameter_sources.iter().map(|(_, key)| key));
-    let permittivities = material.permittivities.iter().map(|entry| &entry.source);
+    let entries = material.permittivities.iter();
+    let frequencies = entries.clone().filter_map(|entry| entry.frequency_source.as_ref());
+    let permittivities = entries.map(|entry| &entry.source).chain(frequencies);
     let curves = material.curves.iter().map(|curve| &curve.source);
     let roughness = material.roughness.iter().map(|roughness| &roughness.source);
     fits.map(|f| &f.source)
@@ -77,6 +81,30 @@ fn each_is_sound_and_renders_a_finite_level_all_over_its_range() {
             assert!(sigma0 > 0.0 && sigma0.is_finite(), "{} {theta_rad}: {sigma0}", material.slug);
         }
     }
+}
+
+/// A facing flat piece returns the reflectance of a smooth surface, and no entry more than it receives. Printed as a
+/// table with `--nocapture`.
+#[test]
+fn a_facing_flat_piece_returns_at_most_what_it_receives() {
+    let up = Direction::from_angles(0.0, 0.0);
+    // P_r = P·f·4π·δ².
+    let share = 4.0 * PI * VIEWING_RAD * VIEWING_RAD;
+    let mut smooth = 0;
+    for material in all() {
+        let law = material.scattering().unwrap();
+        let returned = share * law.seen_by(VIEWING_RAD, up, up).f_per_sr;
+        println!("| `{}` | {:.1} dB |", material.slug, 10.0 * returned.log10());
+        assert!(returned < 1.0, "{} {returned}", material.slug);
+        let reflectance = match &law {
+            Brdf::Fresnel(mirror) => mirror.reflectance(0.0),
+            Brdf::Layered(film) => film.reflectance(0.0),
+            _ => continue,
+        };
+        assert!(near(returned, reflectance, 1e-9), "{} {returned}", material.slug);
+        smooth += 1;
+    }
+    assert!(smooth >= 20, "{smooth}");
 }
 
 #[test]

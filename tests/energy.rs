@@ -93,7 +93,7 @@ fn a_sum_reflects_what_its_parts_do() {
 fn smooth_surfaces_reflect_their_reflectance_in_all() {
     /// What the finite lobe and the quadrature change, as a share of the incident power.
     const SLACK: f64 = 0.002;
-    let (lobe_rad, frequency_hz) = (0.05, 300e9);
+    let (lobe_rad, frequency_hz) = (Some(0.05), 300e9);
     for (eps_real, eps_imag) in [(2.07, 0.0011), (4.67, 5.0), METAL] {
         let layers = vec![Layer { thickness_m: 2e-4, eps_real: 2.6, eps_imag: 0.1 }];
         let bare = Fresnel { eps_real, eps_imag, lobe_rad };
@@ -121,7 +121,7 @@ fn kirchhoff_without_shadowing_keeps_energy_up_to_60_degrees_and_breaks_it_beyon
         eps_real,
         eps_imag,
         frequency_hz: 300e9,
-        lobe_rad: 0.05,
+        lobe_rad: Some(0.05),
     };
     for theta_deg in [0.0, 30.0, 60.0] {
         for rms_slope in [0.1, 0.2, 0.4] {

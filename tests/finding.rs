@@ -350,7 +350,7 @@ fn a_withdrawn_material_stays_with_its_reason_and_is_found_by_it() {
     let history = json(folder, &["history", "ptfe"]);
     assert_eq!(history[2]["activity"]["command"], "withdraw");
     let said = refused(matdb(folder).args(["withdraw", "hdpe", "--reason", " "]));
-    assert!(said.contains("gives no reason"), "{said}");
+    assert!(said.contains("--reason is empty; say in a sentence why"), "{said}");
 }
 
 /// A curve of a built-in material, so many dB higher, as a file.

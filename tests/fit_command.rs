@@ -209,8 +209,20 @@ fn bad_input_is_refused_with_a_sentence_and_nothing_is_stored() {
         ("scan.csv --starts 0", "fit.starts = 0"),
         ("scan.csv --looks 0", "fit.looks = 0"),
         ("scan.csv --save", "belongs to no material yet"),
-        ("scan.csv --save ptfe", "the source of scan.csv is not stated"),
-        ("scan.csv --save ptfe --kind measured", "the source of scan.csv is not stated"),
+        (
+            "scan.csv --save ptfe",
+            "a curve that is stored needs more; add --kind measured, --source \"who measured it, where, when\", \
+             --licence CC-BY-4.0, --instrument \"name of the radar\", --frequency 300, --threshold -77",
+        ),
+        (
+            "scan.csv --save ptfe --kind synthetic",
+            "a curve that is stored needs more; add --source \"who measured it, where, when\"",
+        ),
+        ("scan.csv --alpha -3", "diffuse.alpha = -3 is out of range"),
+        ("scan.csv --looks -3", "fit.looks = -3"),
+        ("scan.csv --split-deg -3 --method mse", "split"),
+        ("scan.csv --theta-sd-deg -3 --method tls", "theta_sd"),
+        ("scan.csv --level-sd-db -3 --method tls", "level_sd"),
         (
             "scan.csv --save my-paint --kind measured --source x",
             "`matdb add --from scan.csv --name my-paint --class CLASS …` makes one of the curve",

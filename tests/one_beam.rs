@@ -7,12 +7,13 @@ use std::f64::consts::{LN_2, PI};
 
 use glam::{DMat3, DVec3};
 use matdb::brdf::{
-    Brdf, CookTorrance, Distribution, Fresnel, KirchhoffGo, Lambert, Layered, Scattering, Shadowing,
+    BlinnPhong, Brdf, CookTorrance, Correlation, Directive, Distribution, Fresnel, Kirchhoff,
+    KirchhoffGo, Lambert, Layered, Scattering, Shadowing, VIEWING_RAD,
 };
 use matdb::geometry::Mesh;
 use matdb::radar::scan::Raster;
 use matdb::radar::{Chirps, Footprint, Pattern, Radar};
-use matdb::render::Observer;
+use matdb::render::{Bounce, Observer};
 use matdb::scene::solids;
 
 /// Distances from the focus, m.
@@ -31,7 +32,7 @@ const HIGHLIGHT_DB: f64 = 0.15;
 const LOBE_DB: f64 = 0.01;
 
 /// A metal without loss.
-const MIRROR: Fresnel = Fresnel { eps_real: 1.0, eps_imag: 1e9, lobe_rad: 0.001 };
+const MIRROR: Fresnel = Fresnel { eps_real: 1.0, eps_imag: 1e9, lobe_rad: None };
 
 /// The default radar's beam, by hand from 16 mm and 300 GHz.
 struct Waist {
@@ -66,7 +67,19 @@ fn db(ratio: f64) -> f64 {
 
 /// Power received from a mesh about the origin over that sent, for a chirp along the axis of the field of view; the
 /// mesh is turned about y and moved away from the focus.
-fn returned(mut mesh: Mesh, tilt_rad: f64, z_m: f64, rays: usize, law: &dyn Scattering) -> f64 {
+fn returned(mesh: Mesh, tilt_rad: f64, z_m: f64, rays: usize, law: &dyn Scattering) -> f64 {
+    returned_by(mesh, tilt_rad, z_m, rays, law, None)
+}
+
+/// As [`returned`], with second-order paths.
+fn returned_by(
+    mut mesh: Mesh,
+    tilt_rad: f64,
+    z_m: f64,
+    rays: usize,
+    law: &dyn Scattering,
+    bounce: Option<Bounce>,
+) -> f64 {
     let turn = DMat3::from_rotation_y(tilt_rad);
     for vertex in &mut mesh.vertices {
         // The default radar looks along −z from (0, 1.1, 8).
@@ -82,7 +95,7 @@ fn returned(mut mesh: Mesh, tilt_rad: f64, z_m: f64, rays: usize, law: &dyn Scat
         ..Radar::default()
     };
     let chirps = Chirps::draw(&radar, |_| Err("no file".to_owned())).unwrap();
-    let echoes = support::echoes_at(&radar, &chirps, &mesh, law, rays, None, Observer::Radar);
+    let echoes = support::echoes_at(&radar, &chirps, &mesh, law, rays, bounce, Observer::Radar);
     echoes.first().map_or(0.0, |echo| echo.power_w)
 }
 
@@ -165,6 +178,104 @@ fn a_smooth_sphere_returns_its_glint() {
     }
 }
 
+/// Metal facets of Beckmann's law.
+fn facets(m: f64) -> CookTorrance {
+    CookTorrance {
+        f_lambda: 1.0,
+        m,
+        m_across: None,
+        distribution: Distribution::Beckmann,
+        shadowing: Shadowing::Separable,
+    }
+}
+
+#[test]
+fn a_rough_plate_returns_its_lobe_widened_by_the_beam() {
+    let waist = Waist::new();
+    let delta2 = waist.divergence_rad().powi(2);
+    for (m, rays) in [(0.001, 1), (0.005, 1), (0.02, 1), (0.1, 1), (0.005, RAYS), (0.02, RAYS)] {
+        for z_m in OFF_FOCUS_M {
+            for tilt_rad in [0.0f64, 0.01, 0.02] {
+                // P·F·G·δ_w²/m_eff²·exp(−tan²θ/m_eff²)/cos⁵θ with m_eff² = m² + δ₀² for a plate, and G = 1.
+                let seen2 = m * m + delta2;
+                let share = delta2 / (1.0 + waist.zeta(z_m).powi(2)) / seen2
+                    * (-tilt_rad.tan().powi(2) / seen2).exp()
+                    / tilt_rad.cos().powi(5);
+                let found = returned(plate(), tilt_rad, z_m, rays, &facets(m));
+                let error_db = db(found / share);
+                assert!(
+                    error_db.abs() < if rays == 1 { 1e-3 } else { MEAN_DB },
+                    "m = {m}, {z_m} m, {tilt_rad}, {rays} rays: {error_db} dB"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_rough_sphere_returns_the_sum_of_roughness_beam_and_curvature() {
+    let (waist, radius_m) = (Waist::new(), 0.15);
+    for (m, z_m) in [(0.02, -0.2), (0.02, 0.0), (0.05, 0.0), (0.05, 0.2)] {
+        // P·F·δ_w²/(m² + δ_w² + (w²/4)·(1/a + 1/R_c)²).
+        let rayleigh_m = PI * waist.waist_m.powi(2) / waist.wavelength_m;
+        let curvature_per_m = 1.0 / radius_m + z_m / (z_m * z_m + rayleigh_m * rayleigh_m);
+        let radius2 = waist.radius_m2(z_m);
+        let delta2 = (waist.wavelength_m / (2.0 * PI)).powi(2) / radius2;
+        let matrix = m * m + delta2 + 0.25 * radius2 * curvature_per_m.powi(2);
+        let found_db = db(returned(cap(radius_m), 0.0, z_m, RAYS, &facets(m)) * matrix / delta2);
+        assert!(found_db.abs() < HIGHLIGHT_DB, "m = {m}, {z_m} m: {found_db} dB");
+    }
+}
+
+/// Two wings at right angles, open towards the radar, whose edge lies the given distance aside.
+fn corner(aside_m: f64) -> Mesh {
+    const WING_M: f64 = 0.2;
+    let line = |x: f64, z: f64| [-WING_M, WING_M].map(|y| DVec3::new(x + aside_m, y, z));
+    let [a, b] = line(0.0, 0.0);
+    let [c, d] = line(WING_M, WING_M);
+    let [e, f] = line(-WING_M, WING_M);
+    let facets = vec![[0, 2, 1], [1, 2, 3], [0, 1, 4], [1, 5, 4]];
+    Mesh { vertices: vec![a, b, c, d, e, f], facets, labels: Vec::new() }
+}
+
+/// How a corner of two mirrors answers a chirp: by no single path, but by two mirrors in turn.
+#[test]
+fn a_corner_of_two_mirrors_returns_what_a_mirror_does() {
+    let waist = Waist::new();
+    let bounce = Some(Bounce { rays: 8, outside_spot: 0.0 });
+    for (law, m) in [(Brdf::Fresnel(MIRROR), 0.0), (Brdf::CookTorrance(facets(0.004)), 0.004)] {
+        for z_m in [0.0, 0.3] {
+            for aside in [0.0, 0.25, 0.5] {
+                // P·R₁R₂·exp(−4s²/w²)·δ_w²/(m₁² + m₂² + δ₀²) at the edge's distance s aside.
+                let radius2 = waist.radius_m2(z_m);
+                let aside_m = aside * radius2.sqrt();
+                let delta2 = waist.divergence_rad().powi(2);
+                let share = (-4.0 * aside * aside).exp() * delta2
+                    / (1.0 + waist.zeta(z_m).powi(2))
+                    / (2.0 * m * m + delta2);
+                for (rays, tolerance_db) in [(1, 0.05), (RAYS, HIGHLIGHT_DB)] {
+                    // A single ray needs the edge beside it.
+                    let aside_m = if rays == 1 { aside_m.max(1e-5) } else { aside_m };
+                    let found = returned_by(corner(aside_m), 0.0, z_m, rays, &law, bounce);
+                    let error_db = db(found / share);
+                    assert!(
+                        error_db.abs() < tolerance_db,
+                        "m = {m}, {z_m} m, {aside} w, {rays} rays: {error_db} dB"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_smooth_mirror_is_drawn_as_the_default_radar_sees_it() {
+    assert!((VIEWING_RAD / Waist::new().divergence_rad() - 1.0).abs() < 1e-3);
+    let up = matdb::frames::Direction::from_angles(0.0, 0.0);
+    let seen = MIRROR.seen_by(VIEWING_RAD, up, up).f_per_sr;
+    assert!((MIRROR.retro_per_sr(0.0) / seen - 1.0).abs() < 1e-12);
+}
+
 #[test]
 fn the_edge_of_a_diffuse_half_plane_takes_half() {
     let mut half = plate();
@@ -185,8 +296,26 @@ fn lobes() -> Vec<Brdf> {
         eps_real: 1.0,
         eps_imag: 1e9,
         frequency_hz: 300e9,
-        lobe_rad: 0.001,
+        lobe_rad: None,
     }));
+    // A lobe may be as narrow as the beam wherever it comes from. Blinn and Phong's reflects at most what it receives up
+    // to this level.
+    let alpha = 1000.0;
+    all.push(Brdf::BlinnPhong(BlinnPhong { r_s: (alpha + 4.0) / (4.0 * alpha), alpha }));
+    all.push(Brdf::Directive(Directive { s: 1.0, alpha_r: 200.0, lambda: 1.0, alpha_i: 1.0 }));
+    for correlation in [Correlation::Gaussian, Correlation::Exponential] {
+        for (rms_height_m, lobe_rad) in [(2e-5, None), (8e-5, Some(0.001)), (3e-4, None)] {
+            all.push(Brdf::Kirchhoff(Kirchhoff {
+                rms_height_m,
+                correlation_length_m: 0.1,
+                correlation,
+                eps_real: 1.0,
+                eps_imag: 1e9,
+                frequency_hz: 300e9,
+                lobe_rad,
+            }));
+        }
+    }
     for m in [0.001, 0.005, 0.02, 0.1, 0.4] {
         let go = KirchhoffGo { rms_slope: m, eps_real: 1.0, eps_imag: 1e9 };
         all.push(Brdf::KirchhoffGo(go));

@@ -16,18 +16,23 @@ fn number(value: &Value, key: &str) -> f64 {
     value[key].as_f64().unwrap_or_else(|| panic!("{key} is missing in {value}"))
 }
 
-/// f in backscatter from a model's JSON, 1/sr.
-fn f_per_sr(model: &Value, theta: f64) -> f64 {
+/// f in backscatter from a model's JSON, 1/sr, as a beam of the divergence `delta`, rad, sees it.
+fn f_per_sr(model: &Value, theta: f64, delta: f64) -> f64 {
     match model["model"].as_str().unwrap() {
         "lambert" => number(model, "albedo") / PI,
         "blinn-phong" => {
-            let alpha = number(model, "alpha");
-            number(model, "r_s") * (alpha + 2.0) / (2.0 * PI) * theta.cos().powf(alpha)
+            // The lobe cosᵅ has the slopes m² = 2/α, to which δ² is added.
+            let (alpha, wider) =
+                (number(model, "alpha"), 1.0 + 0.5 * number(model, "alpha") * delta * delta);
+            number(model, "r_s") * (alpha + 2.0) / (2.0 * PI) * theta.cos().powf(alpha / wider)
+                / wider
         }
-        "cook-torrance" => cook_torrance(model, theta),
+        "cook-torrance" => cook_torrance(model, theta, delta),
         "mixture" => {
             let k = number(model, "k");
-            k * f_per_sr(&model["diffuse"], theta) + (1.0 - k) * f_per_sr(&model["specular"], theta)
+            let [diffuse, specular] =
+                ["diffuse", "specular"].map(|part| f_per_sr(&model[part], theta, delta));
+            k * diffuse + (1.0 - k) * specular
         }
         "tabulated" => {
             let sigma0_db =
@@ -38,13 +43,14 @@ fn f_per_sr(model: &Value, theta: f64) -> f64 {
     }
 }
 
-/// F·D·G/(4 cos²θ) with i = o = h: F = f_λ.
-fn cook_torrance(model: &Value, theta: f64) -> f64 {
+/// F·D·G/(4 cos²θ) with i = o = h: F = f_λ. The beam widens D alone.
+fn cook_torrance(model: &Value, theta: f64, delta: f64) -> f64 {
     assert_eq!(model["distribution"], "beckmann");
     assert_eq!(model["shadowing"], "separable");
     let m = number(model, "m");
     let (cos, tan) = (theta.cos(), theta.tan());
-    let d = (-(tan / m).powi(2)).exp() / (PI * m * m * cos.powi(4));
+    let seen2 = m * m + delta * delta;
+    let d = (-tan * tan / seen2).exp() / (PI * seen2 * cos.powi(4));
     let a = 1.0 / (m * tan);
     let g1 =
         if a < 1.6 { (3.535 * a + 2.181 * a * a) / (1.0 + 2.276 * a + 2.577 * a * a) } else { 1.0 };
@@ -104,12 +110,14 @@ fn check(scene_name: &str) {
     // The scenes' radar looks along −z from the middle of its target plane, so that x_t and y_t, carried out to
     // 8 m, are where the axis passes there.
     let wavelength_m = number(&record["beam"], "wavelength_m");
-    let solid_angle_sr = |xt_m: f64, yt_m: f64, range_m: f64| {
+    let waist_m = |xt_m: f64, yt_m: f64, range_m: f64| {
         let out = 8.0 / range_m;
         let growth = number(&radar["beam"], "edge_growth") - 1.0;
         let off_centre = (xt_m.powi(2) + yt_m.powi(2)) * out * out;
-        let w0 = number(&record["beam"], "waist_m")
-            * (1.0 + growth * off_centre / number(&radar["beam"], "edge_m").powi(2));
+        number(&record["beam"], "waist_m")
+            * (1.0 + growth * off_centre / number(&radar["beam"], "edge_m").powi(2))
+    };
+    let solid_angle_sr = |w0: f64, range_m: f64| {
         let off_focus_m = range_m - number(&radar["beam"], "focus_m");
         let w2 = w0 * w0 + (wavelength_m * off_focus_m / (PI * w0)).powi(2);
         wavelength_m * wavelength_m / (PI * w2)
@@ -127,9 +135,11 @@ fn check(scene_name: &str) {
             .sqrt();
         assert!((range_m - cloud["range_m"][i]).abs() < 1e-6);
         let material = &record["materials"][cloud["material"][i] as usize];
+        let w0 = waist_m(cloud["xt_m"][i], cloud["yt_m"][i], range_m);
         let expected = number(radar, "transmit_power_dbm") - number(radar, "system_loss_db")
-            + 10.0 * solid_angle_sr(cloud["xt_m"][i], cloud["yt_m"][i], range_m).log10()
-            + 10.0 * f_per_sr(&material["scattering"], theta).log10()
+            + 10.0 * solid_angle_sr(w0, range_m).log10()
+            + 10.0
+                * f_per_sr(&material["scattering"], theta, wavelength_m / (2.0 * PI * w0)).log10()
             + 20.0 * theta.cos().log10();
         let power = cloud["power_dbm"][i];
         assert!((power - expected).abs() < POWER_DB, "point {i}: {power} is not {expected}");

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 use matdb::store::Store;
 use serde_json::Value;
-use support::database::{bytes, contents, sample, sound, with_effects};
+use support::database::{bytes, contents, refitted, sample, sound, with_effects};
 use support::json_schema::problems;
 use support::{entries, matdb, refused, root};
 
@@ -91,7 +91,7 @@ fn every_json_file_is_as_its_schema_says() {
     let folder = laboratory();
     matdb(folder.path()).args(["add", "--all", "-q"]).assert().success();
     let mut store = Store::open(folder.path().join("matdb.sqlite")).unwrap();
-    store.add([&with_effects("reported")]).unwrap();
+    store.add([&refitted(with_effects("reported"))]).unwrap();
     publish(folder.path());
     let site = folder.path().join("site");
     let mut checked = 0;
@@ -547,6 +547,18 @@ fn a_fit_that_does_not_follow_from_its_curve_is_seen() {
             "{said}"
         );
     }
+}
+
+#[test]
+fn a_fit_that_nobody_could_verify_is_not_published() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    // A database whose fits have reports that their curves of three rows cannot give.
+    fs::copy(root().join("tests/fixtures/schema-0002.sqlite"), at.join("matdb.sqlite")).unwrap();
+    let message = refused(matdb(at).args(["publish", "site"]));
+    assert!(message.contains("fit `stated`: 2 detections cannot give 4 unknowns"), "{message}");
+    assert!(message.contains("nothing was published, as nobody could verify it"), "{message}");
+    assert_eq!(entries(at), ["matdb.sqlite"]);
 }
 
 /// The statement of a migration that begins like this.

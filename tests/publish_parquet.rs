@@ -9,7 +9,7 @@ use std::fs::{self, File};
 use matdb::store::Store;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
-use support::database::{sample, with_effects};
+use support::database::{refitted, sample, with_effects};
 use support::matdb;
 
 fn text(field: &Field) -> String {
@@ -26,7 +26,7 @@ fn text(field: &Field) -> String {
 fn every_table_says_what_its_csv_says() {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Store::open(folder.path().join("matdb.sqlite")).unwrap();
-    store.add([&sample("paint"), &with_effects("primer")]).unwrap();
+    store.add([&sample("paint"), &refitted(with_effects("primer"))]).unwrap();
     drop(store);
     matdb(folder.path()).args(["publish", "site", "-q"]).assert().success();
     let tables = folder.path().join("site/tables");

@@ -110,7 +110,7 @@ impl Bench {
     }
 
     fn render(&self, model: &Model, rays: usize) -> Result<Vec<Echo>, RenderError> {
-        let surface = |(law, grain)| Surface { scattering: law as &Brdf, grain };
+        let surface = |(law, grain)| Surface { grain, ..Surface::new(law as &Brdf) };
         let surfaces: Vec<Surface> =
             std::iter::zip(&self.laws, self.grains()).map(surface).collect();
         let paper = Setup::new(self.geometry(), &surfaces);

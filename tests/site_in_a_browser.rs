@@ -12,7 +12,7 @@ use matdb::material::{Material, SourceKind, builtin};
 use matdb::store::Store;
 use serde_json::json;
 use support::browser::{Browser, ENTER, SPACE, TAB};
-use support::database::{fitted, sample};
+use support::database::{fitted, refitted, sample};
 use support::server::serve;
 
 const COUNT: &str = "return document.getElementById('count').textContent";
@@ -53,7 +53,7 @@ fn site() -> Site {
     let root = tempfile::tempdir().unwrap();
     let mut materials: Vec<Material> =
         BUILT_IN.iter().map(|name| builtin::get(name).unwrap().unwrap()).collect();
-    let mut measured = fitted("measured-plate");
+    let mut measured = refitted(fitted("measured-plate"));
     measured.name = "Plate on the bench".to_owned();
     let source = measured.curves[0].source.clone();
     let source = measured.sources.iter_mut().find(|known| known.key == source).unwrap();

@@ -439,3 +439,48 @@ fn what_cannot_be_read_back_is_not_stored() {
     assert!(message.contains("`glass`") && message.contains("nothing was stored"), "{message}");
     assert_eq!(contents(&path).len(), 1);
 }
+
+/// Overwrites the first page of a table or an index.
+fn tear(path: &Path, name: &str) {
+    let conn = Connection::open(path).unwrap();
+    conn.pragma_update(None, "journal_mode", "delete").unwrap();
+    let sql = "SELECT rootpage FROM sqlite_schema WHERE name = ?1";
+    let page: u32 = conn.query_row(sql, [name], |row| row.get(0)).unwrap();
+    let size: u32 = conn.pragma_query_value(None, "page_size", |row| row.get(0)).unwrap();
+    drop(conn);
+    let (page, size) = (page as usize, size as usize);
+    let mut bytes = fs::read(path).unwrap();
+    bytes[(page - 1) * size..page * size].fill(0xff);
+    fs::write(path, bytes).unwrap();
+}
+
+#[test]
+fn a_damaged_page_is_beyond_repair_and_what_can_still_be_done_is_said() {
+    for torn in ["entry_tag_tag", "unit", "search_data"] {
+        let (folder, path) = database(&["cotton"]);
+        tear(&path, torn);
+        let message = refused(matdb(folder.path()).args(["check", "--repair"]));
+        assert!(message.contains("no repair mends that"), "{torn}: {message}");
+        assert!(message.contains("restore the file from a copy"), "{torn}: {message}");
+        assert!(!message.contains("check --repair"), "{torn}: {message}");
+        // What the message offers works.
+        matdb(folder.path()).arg("list").assert().success();
+        let export = ["export", "cotton", "--as", "csv", "-o", "cotton.csv"];
+        matdb(folder.path()).args(export).assert().success();
+    }
+}
+
+#[test]
+fn a_whole_revision_is_shown_though_the_current_one_is_damaged() {
+    let (folder, path) = database(&["cotton"]);
+    let withdraw = ["withdraw", "cotton", "--reason", "Measured again."];
+    matdb(folder.path()).args(withdraw).assert().success();
+    tamper(&path, "UPDATE revision SET name = 'another' WHERE number = 2");
+    refused(matdb(folder.path()).args(["show", "cotton"]));
+    for command in [&["show", "cotton@1"][..], &["cite", "cotton@1"]] {
+        let run = matdb(folder.path()).args(command).output().unwrap();
+        let notices = String::from_utf8(run.stderr).unwrap();
+        assert!(run.status.success() && !run.stdout.is_empty(), "{notices}");
+        assert!(notices.contains("the current revision of `cotton` is damaged: "), "{notices}");
+    }
+}

@@ -191,6 +191,54 @@ fn a_damaged_fit_does_not_close_a_file_of_an_older_schema() {
 }
 
 #[test]
+fn what_others_have_made_in_the_way_of_a_newer_schema_is_named() {
+    let refers = "CREATE TABLE mine (r, f, p, FOREIGN KEY (r, f, p)
+                      REFERENCES fit_estimate (revision_id, fit, position));
+                  INSERT INTO mine SELECT revision_id, fit, position FROM fit_estimate";
+    for (sql, drop_it, problem, remedy) in [
+        (
+            "CREATE TABLE Fit_Number (a)",
+            "DROP TABLE Fit_Number",
+            "matdb needs the name of the table `Fit_Number`, which it has not made",
+            "rename or remove the table `Fit_Number` in another program",
+        ),
+        (
+            "CREATE VIEW fit_number AS SELECT 1 AS a",
+            "DROP VIEW fit_number",
+            "matdb needs the name of the view `fit_number`, which it has not made",
+            "rename or remove the view `fit_number` in another program",
+        ),
+        (
+            refers,
+            "DROP TABLE mine",
+            "the table `mine`, which matdb has not made, refers to `fit_estimate`",
+            "rename or remove the table `mine` in another program",
+        ),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("matdb.sqlite");
+        fs::copy(fixtures().join("schema-0010.sqlite"), &path).unwrap();
+        let conn = Connection::open(&path).unwrap();
+        conn.execute_batch(sql).unwrap();
+        drop(conn);
+        let before = schema(&path);
+        for command in ["list", "add ptfe", "check", "check --repair"] {
+            let arguments = command.split(' ');
+            let message = support::refused(support::matdb(folder.path()).args(arguments));
+            let wanted = format!("cannot be brought up to date: {problem}; {remedy}");
+            assert!(message.contains(&wanted), "{command}: {message}");
+            assert!(!message.contains("damaged"), "{command}: {message}");
+            assert_eq!(schema(&path), before, "{command}");
+        }
+        let conn = Connection::open(&path).unwrap();
+        conn.execute_batch(drop_it).unwrap();
+        drop(conn);
+        support::matdb(folder.path()).args(["add", "ptfe", "-q"]).assert().success();
+        assert!(support::database::is_sound(&path), "{sql}");
+    }
+}
+
+#[test]
 fn the_newest_schema_has_its_file() {
     let folder = tempfile::tempdir().unwrap();
     let (fresh, kept) = (folder.path().join("fresh.sqlite"), folder.path().join("kept.sqlite"));

@@ -115,7 +115,7 @@ fn models() -> Vec<(&'static str, Brdf)> {
     let sum = |parts| Brdf::Sum(Sum { parts });
     let diffuse = Box::new(Brdf::BlinnPhong(BlinnPhong { r_s: 0.1, alpha: 1.0 }));
     let paper = Mixture { k: 0.5, diffuse, specular: Box::new(lobe(Distribution::Beckmann, 0.3)) };
-    let mirror = Fresnel { eps_real: 2.5, eps_imag: 0.0, lobe_rad: 0.3 };
+    let mirror = Fresnel { eps_real: 2.5, eps_imag: 0.0, lobe_rad: Some(0.3) };
     use Distribution::{Beckmann, Ggx};
     vec![
         ("Lambert", lambert()),
@@ -219,7 +219,7 @@ fn constants(path: &Path) -> Result<String, Failure> {
     let (mut count, mut largest_db) = (0, 0.0_f64);
     for record in records(path)? {
         let (n, k) = (number(&record, "n_300ghz")?, number(&record, "k_300ghz")?);
-        let smooth = Fresnel { eps_real: n * n - k * k, eps_imag: 2.0 * n * k, lobe_rad: 0.02 };
+        let smooth = Fresnel { eps_real: n * n - k * k, eps_imag: 2.0 * n * k, lobe_rad: None };
         let found_db = db_from_ratio(smooth.reflectance(0.0));
         largest_db = largest_db.max((found_db - number(&record, "normal_reflectance_db")?).abs());
         count += 1;

@@ -38,16 +38,22 @@ impl CurveOrigin {
     /// Kind and title of the source.
     ///
     /// # Errors
-    /// One of them is not stated; `subject` names the curve.
-    pub(super) fn source(&self, subject: &str) -> Result<(SourceKind, &str), Error> {
-        match (self.kind, &self.title) {
-            (Some(kind), Some(title)) => Ok((kind, title)),
-            _ => Err(Error::usage(
-                format!("the source of {subject} is not stated"),
-                "state its kind, measured or synthetic, and its source: who, when and how; a measured curve needs \
-                 licence, instrument, frequency and threshold, too",
-            )),
+    /// One of them is not stated; the error lists all that a curve of this kind lacks in `material`.
+    pub(super) fn source(&self, material: &Material) -> Result<(SourceKind, &str), Error> {
+        if let (Some(kind), Some(title)) = (self.kind, &self.title) {
+            return Ok((kind, title));
         }
+        let mut missing = Vec::new();
+        if self.kind.is_none() {
+            missing.push(Detail::Kind);
+        }
+        if self.title.is_none() {
+            missing.push(Detail::Source);
+        }
+        // The example of a kind is `measured`, which asks for the rest.
+        let kind = self.kind.or(Some(SourceKind::Measured));
+        missing.extend(CurveOrigin { kind, ..self.clone() }.missing(material));
+        Err(Error::Missing { what: "a curve that is stored", missing })
     }
 
     /// Checks what is stated before anything is computed for it.
@@ -164,7 +170,7 @@ pub fn add_curve(
     curve: &measure::Curve,
     origin: &CurveOrigin,
 ) -> Result<AddedCurve, Error> {
-    let (kind, title) = origin.source(&format!("the curve `{name}`"))?;
+    let (kind, title) = origin.source(material)?;
     origin.check(material)?;
     let source = add_source(material, kind, title, name, origin.licence.as_deref());
     if let Some(known) = same_points(material, curve) {

@@ -6,7 +6,7 @@ use crate::catalogue::{CheckCount, Problem, Refit, StoreCheck};
 use crate::error::Error;
 use crate::material::builtin;
 use crate::setup::Database;
-use crate::store::Repair;
+use crate::store::{Repair, StoreError};
 
 /// How a database is checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -47,9 +47,23 @@ impl DatabaseCheck {
     /// Checks every revision of the database, and makes every fit again.
     ///
     /// # Errors
-    /// A database that is not there, cannot be opened or cannot be written by a repair. What is wrong in it is a
-    /// finding.
+    /// A database that is not there, cannot be opened or cannot be written by a repair, or whose pages are damaged beyond
+    /// repair. What else is wrong in it is a finding.
     pub fn run(
+        self,
+        database: &Database,
+        progress: &mut dyn FnMut(CheckProgress),
+    ) -> Result<CheckReport, Error> {
+        self.check(database, progress).map_err(|error| match error {
+            // Damage that ends a repair or a check is not a reason to try them again.
+            Error::Store(StoreError::Corrupt { file, problem }) => {
+                Error::Store(StoreError::BeyondRepair { file, problem })
+            }
+            error => error,
+        })
+    }
+
+    fn check(
         self,
         database: &Database,
         progress: &mut dyn FnMut(CheckProgress),

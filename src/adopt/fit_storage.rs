@@ -68,7 +68,7 @@ impl FitStorage {
     /// earlier revisions.
     ///
     /// # Errors
-    /// As [`check`](Self::check); a database that cannot be written.
+    /// A material, an origin or a name with which the fit cannot be stored; a database that cannot be written.
     pub(super) fn save(
         &self,
         subject: &FitSubject,
@@ -174,7 +174,6 @@ impl FitStorage {
                 "give the bare name; the fit becomes a new revision",
             ));
         }
-        self.origin.source(&subject.label)?;
         let mut material = find_material(store, name, "")?.material;
         let AddedCurve { curve, source } =
             add_curve(&mut material, &subject.curve_name, &subject.curve, &self.origin)?;

@@ -59,8 +59,8 @@ impl MeasurementStorage<'_> {
                 "give the bare name; the curve becomes part of a new revision",
             ));
         }
-        self.origin.source(&self.cloud.display().to_string())?;
         let material = find_material(store, name, "")?.material;
+        self.origin.source(&material)?;
         self.origin.check(&material)?;
         Ok(material)
     }
@@ -68,7 +68,8 @@ impl MeasurementStorage<'_> {
     /// Checks, before anything is written, that this curve can be stored; what is doubtful about the material with it.
     ///
     /// # Errors
-    /// As [`check`](Self::check); a curve that the material has already, a day that is not one.
+    /// A material that is not known, or a revision; an origin that is missing or not enough; a curve that the material
+    /// has already; a day that is not one.
     pub fn admit(
         &self,
         measured: &MeasurementReport,
@@ -81,7 +82,8 @@ impl MeasurementStorage<'_> {
     /// Stores the curve.
     ///
     /// # Errors
-    /// As [`admit`](Self::admit); a database that cannot be written.
+    /// A material or an origin with which the curve cannot be stored; a curve that the material has already; a database
+    /// that cannot be written.
     pub fn save(
         &self,
         measured: &MeasurementReport,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::files::{FilesError, WayOut};
+use crate::files::{FilesError, WayOut, read_whole};
 use crate::material::{Activity, Citation, Input, Material, Source, SourceKind};
 
 /// A file that was read: its name without its folder, and the BLAKE3 hash of its bytes.
@@ -18,11 +18,9 @@ pub fn input(path: &Path, bytes: &[u8]) -> Input {
 pub fn activity(command: &str, paths: &[&Path]) -> Result<Activity, FilesError> {
     let mut inputs = Vec::new();
     for path in paths {
-        let bytes = std::fs::read(path).map_err(|reason| FilesError {
-            verb: "read",
-            path: (*path).to_owned(),
-            reason,
+        let bytes = read_whole(path).map_err(|error| FilesError {
             way_out: WayOut::Words("leave the command's files where they are while it runs"),
+            ..error
         })?;
         inputs.push(input(path, &bytes));
     }

@@ -4,12 +4,12 @@
 //! With i = o the half vector is the direction itself, and the wave falls on every facet that answers at
 //! normal incidence. The f of a law without a grain then depends on θ alone:
 //! f(θ) = Σ level·cosᵃθ·P(tan²θ/m²)/m²·G1(θ)ˢ, where P is exp(−x) for Beckmann's slopes and (1 + x)⁻² for
-//! GGX's, and a diffuse term has neither P nor m nor G1. A beam sees no lobe narrower than itself: its divergence δ
-//! takes the place of a smaller m.
+//! GGX's, and a diffuse term has neither P nor m nor G1. A beam sees the law of the slopes convolved with its own
+//! (`slopes.rs`), and so a lobe cosᵃθ with the variance of its own slopes, 1/a, larger by δ²/2.
 
 use std::f64::consts::PI;
 
-use super::slopes::Distribution;
+use super::slopes::{Distribution, VIEWING_RAD};
 
 /// One term of the sum.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,12 +25,31 @@ pub struct Term {
 /// Slopes of facets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facets {
-    /// Roughness m.
+    /// Roughness m; 0 for a smooth mirror, which without a beam is drawn as [`VIEWING_RAD`] wide.
     pub m: f64,
     /// Law of the slopes.
     pub distribution: Distribution,
     /// How often shadowing counts, the exponent s of Smith's G1: 0, 1 or 2.
     pub shadowed: u32,
+    /// Whether m is that of the beam and the surface together: the lobe is then not widened again, and is only never
+    /// narrower than the beam.
+    pub includes_beam: bool,
+}
+
+impl Facets {
+    /// Roughness of the surface, without the beam of a divergence δ, rad.
+    pub(crate) fn m_without_beam(&self, beam_rad: f64) -> f64 {
+        if self.includes_beam {
+            (self.m * self.m - beam_rad * beam_rad).max(0.0).sqrt()
+        } else {
+            self.shadowing_m(beam_rad)
+        }
+    }
+
+    /// Roughness for shadowing.
+    pub(crate) fn shadowing_m(&self, beam_rad: f64) -> f64 {
+        if self.m == 0.0 && beam_rad == 0.0 { VIEWING_RAD } else { self.m }
+    }
 }
 
 impl Term {
@@ -49,24 +68,42 @@ impl Term {
         if cos_theta <= GRAZING {
             return 0.0;
         }
-        let facets = self.facets.map_or(1.0, |Facets { m, distribution, shadowed }| {
-            let m = m.max(beam_rad);
-            let x = (1.0 / (cos_theta * cos_theta) - 1.0) / (m * m);
-            let law = match distribution {
-                Distribution::Beckmann => (-x).exp(),
-                Distribution::Ggx => (1.0 + x).powi(-2),
-            };
-            law / (m * m) * distribution.g1(cos_theta, m).powi(shadowed.cast_signed())
+        let facets = self.facets.map_or(1.0, |facets| {
+            let Facets { distribution, shadowed, .. } = facets;
+            let slope2 = 1.0 / (cos_theta * cos_theta) - 1.0;
+            let m2 = facets.m_without_beam(beam_rad).powi(2);
+            let seen = distribution.g1(cos_theta, facets.shadowing_m(beam_rad));
+            PI * distribution.density(slope2, m2, beam_rad * beam_rad)
+                * seen.powi(shadowed.cast_signed())
         });
-        let whole = self.cosines as i32;
-        let cosines = if f64::from(whole) == self.cosines {
+        let (cosines, share) = match self.facets {
+            Some(_) => (self.cosines, 1.0),
+            None => seen_cosines(self.cosines, beam_rad),
+        };
+        let whole = cosines as i32;
+        let power = if f64::from(whole) == cosines {
             cos_theta.powi(whole)
         } else {
-            cos_theta.powf(self.cosines)
+            cos_theta.powf(cosines)
         };
-        self.level_per_sr * cosines * facets
+        self.level_per_sr * share * power * facets
     }
 }
+
+/// The exponent of a lobe cosᵃ of the half vector as a beam sees it, and its level over that of the lobe. The lobe is
+/// near a Gaussian of slopes with m² = 2/a, to which δ² is added. A lobe that is wider than the beam by a factor
+/// of 100 is seen as it is.
+pub(super) fn seen_cosines(cosines: f64, beam_rad: f64) -> (f64, f64) {
+    let widened = 0.5 * cosines * beam_rad * beam_rad;
+    if widened < UNSEEN {
+        (cosines, 1.0)
+    } else {
+        (cosines / (1.0 + widened), 1.0 / (1.0 + widened))
+    }
+}
+
+/// δ²/m² below which a beam changes f by less than this share.
+pub(super) const UNSEEN: f64 = 1e-4;
 
 /// Cosine of the angle from the normal below which powers of it overflow.
 pub(super) const GRAZING: f64 = 1e-6;

@@ -20,6 +20,7 @@ mod permittivity;
 mod retro;
 mod scattering;
 mod slopes;
+mod validity;
 
 pub use backscatter::{Facets, Term};
 pub use kind::{Key, Kind};
@@ -27,5 +28,6 @@ pub use models::*;
 pub use outline::{DEGREES, Outline};
 pub use parameter::{Parameter, ParameterError, Visitor};
 pub(crate) use retro::Retro;
-pub use scattering::{Scattering, ScatteringModel, Seen};
-pub use slopes::Distribution;
+pub use scattering::{NARROW_M, NarrowLobe, Scattering, ScatteringModel, Seen};
+pub use slopes::{Distribution, VIEWING_RAD};
+pub use validity::{Bound, Condition};

@@ -8,9 +8,9 @@ use nalgebra::Complex;
 
 use super::backscatter::{Facets, Term};
 use super::kind::Key;
-use super::parameter::{Visitor, visit_number};
-use super::scattering::half_vector;
-use super::slopes::Distribution;
+use super::parameter::{Visitor, visit_number, visit_quantity};
+use super::scattering::{NARROW_M, NarrowLobe, half_vector};
+use super::slopes::{Distribution, SlopeMatrix};
 use crate::frames::{Direction, Surface};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
@@ -82,6 +82,13 @@ pub(super) fn fresnel_reflectance(eps: Complex<f64>, cos_theta: f64) -> f64 {
     unpolarised(|polarisation| interface(polarisation, outside, inside))
 }
 
+/// The amplitudes r_s and r_p that a half space reflects.
+pub(super) fn half_space_amplitudes(eps: Complex<f64>, cos_theta: f64) -> [Complex<f64>; 2] {
+    let outside = (Complex::from(1.0), Complex::from(cos_theta));
+    let inside = (eps, normal_wavenumber(eps, cos_theta));
+    BOTH.map(|polarisation| interface(polarisation, outside, inside))
+}
+
 /// Mean over both polarisations of |r|², held to at most 1 against rounding.
 pub(super) fn unpolarised(amplitude: impl Fn(Polarisation) -> Complex<f64>) -> f64 {
     let sum: f64 = BOTH.into_iter().map(|polarisation| amplitude(polarisation).norm_sqr()).sum();
@@ -89,12 +96,13 @@ pub(super) fn unpolarised(amplitude: impl Fn(Polarisation) -> Complex<f64>) -> f
 }
 
 /// Range of the lobe width of a mirror, rad.
-pub(super) const LOBE_RANGE_RAD: (f64, f64) = (0.001, 0.5);
+const LOBE_RANGE_RAD: (f64, f64) = (0.001, 0.5);
 
-/// A Gaussian beam of waist w returns exp(−(δ/δ₀)²) of its power from a mirror tilted by δ, with
-/// δ₀ = λ/(2πw): 0.020 rad for a spot 2w = 16 mm across at λ = 1 mm.
-pub(super) fn default_lobe_rad() -> f64 {
-    0.02
+/// Calls the visitor for the width of a mirror's lobe, where it is stated.
+pub(super) fn visit_lobe(visitor: &mut Visitor, prefix: &str, lobe_rad: &mut Option<f64>) {
+    if let Some(lobe_rad) = lobe_rad {
+        visit_quantity(visitor, prefix, "lobe_rad", "rad", LOBE_RANGE_RAD, lobe_rad);
+    }
 }
 
 /// Frequency of a model that gives none.
@@ -107,30 +115,52 @@ pub(super) fn wavenumber_rad_per_m(frequency_hz: f64) -> f64 {
     std::f64::consts::TAU * frequency_hz / SPEED_OF_LIGHT_M_PER_S
 }
 
-/// f of a mirror seen with a finite angular width: R·D(h)·G/(4·cos θ_i·cos θ_o), 1/sr.
+/// f of a mirror as a beam of a divergence, rad, sees it: R·D(h)·G/(4·cos θ_i·cos θ_o), 1/sr.
 ///
-/// `reflectance` maps cos of the angle between the directions and h to R. D is Beckmann's with
-/// m = `lobe_rad`, and Smith's G keeps the energy at grazing incidence.
+/// `reflectance` maps cos of the angle between the directions and h to R. D is Beckmann's with the beam's own slopes
+/// and those of the lobe, and Smith's G keeps the energy of a wide lobe at grazing incidence.
 pub(super) fn mirror_lobe_per_sr(
     i: Direction<Surface>,
     o: Direction<Surface>,
-    lobe_rad: f64,
+    lobe_rad: Option<f64>,
+    beam_rad: f64,
     reflectance: impl Fn(f64) -> f64,
 ) -> f64 {
-    let h = half_vector(i, o);
-    let law = Distribution::Beckmann;
-    let d_per_sr = law.d_per_sr(h.cos_theta(), lobe_rad);
+    let facets = mirror_facets(lobe_rad);
+    let (law, own_m) = (facets.distribution, facets.m_without_beam(beam_rad));
+    let beam = SlopeMatrix::of_beam(beam_rad, i, o);
+    let d_per_sr = law.d_seen_per_sr(half_vector(i, o), [own_m, own_m], beam);
     if d_per_sr == 0.0 {
         return 0.0;
     }
-    let g = law.g1(i.cos_theta(), lobe_rad) * law.g1(o.cos_theta(), lobe_rad);
+    let m = facets.shadowing_m(beam_rad);
+    let g = law.g1(i.cos_theta(), m) * law.g1(o.cos_theta(), m);
     reflectance(mirror_cosine(i, o)) * d_per_sr * g / (4.0 * i.cos_theta() * o.cos_theta())
 }
 
 /// [`mirror_lobe_per_sr`] in backscatter, for the reflectance at normal incidence.
-pub(super) fn mirror_lobe(lobe_rad: f64, reflectance: f64) -> Term {
-    let distribution = Distribution::Beckmann;
-    Term::mirrors(reflectance, Facets { m: lobe_rad, distribution, shadowed: 2 })
+pub(super) fn mirror_lobe(lobe_rad: Option<f64>, reflectance: f64) -> Term {
+    Term::mirrors(reflectance, mirror_facets(lobe_rad))
+}
+
+/// Whether a mirror's lobe is too narrow for a path to meet by chance.
+pub(super) fn is_narrow(lobe_rad: Option<f64>) -> bool {
+    lobe_rad.is_none_or(|lobe_rad| lobe_rad <= NARROW_M)
+}
+
+/// The lobe of a mirror, if it is narrow. A stated one is mostly the beam's, so that the mirror itself counts as smooth.
+pub(super) fn narrow_mirror(lobe_rad: Option<f64>, share: f64) -> Vec<NarrowLobe> {
+    if is_narrow(lobe_rad) { vec![NarrowLobe { share, m: 0.0 }] } else { Vec::new() }
+}
+
+/// The facets of a mirror: of a lobe stated as beam and surface make it, or of a smooth one.
+fn mirror_facets(lobe_rad: Option<f64>) -> Facets {
+    Facets {
+        m: lobe_rad.unwrap_or(0.0),
+        distribution: Distribution::Beckmann,
+        shadowed: 2,
+        includes_beam: lobe_rad.is_some(),
+    }
 }
 
 /// Cosine of the angle at which a facet mirrors i into o, √((1 + i·o)/2): the same from both ends.

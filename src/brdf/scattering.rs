@@ -1,7 +1,10 @@
 //! The interface of scattering models.
 
+use num_complex::Complex;
+
 use super::backscatter::Term;
 use super::parameter::Visitor;
+use super::validity::Condition;
 use crate::frames::{Direction, Surface};
 
 /// Anything that scatters. A closure `Fn(i, o) -> f` is one, so a caller's own model needs no type.
@@ -19,8 +22,9 @@ pub trait Scattering: Sync {
 
     /// f(i, o) as a beam of the divergence `beam_rad` (δ, rad, 0 or more) sees it, and how it is made up.
     ///
-    /// No lobe is seen narrower than the beam itself, so that a mirror returns at most what it was sent. A model
-    /// without facets, such as a closure or a measured curve, counts as diffuse and is seen as it is.
+    /// A lobe is seen convolved with the beam's own, so that a mirror returns at most what it was sent. A model without
+    /// a lobe is diffuse and is seen as it is; so are a closure and a measured curve, which includes the beam that it
+    /// was measured with. Without a beam, δ = 0, this is [`f_per_sr`](Self::f_per_sr).
     fn seen_by(&self, _beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         Seen::diffuse(self.f_per_sr(i, o))
     }
@@ -28,6 +32,29 @@ pub trait Scattering: Sync {
     /// The share of f(i, o), 0 to 1, that facets reflect like mirrors, rough or not.
     fn specular_share(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
         self.seen_by(0.0, i, o).specular_share
+    }
+
+    /// The amplitudes r_s and r_p at which the facets that mirror i into o reflect a field across the plane of
+    /// incidence and one in it; only their ratio counts. At normal incidence they are equal.
+    ///
+    /// Those of a perfect conductor unless the model knows its permittivity.
+    fn facet_amplitudes(
+        &self,
+        _i: Direction<Surface>,
+        _o: Direction<Surface>,
+    ) -> [Complex<f64>; 2] {
+        [Complex::from(-1.0); 2]
+    }
+
+    /// The lobes in which a surface that is lit from `i` sends power on like a mirror, too narrow for a path to meet by
+    /// chance: those with a roughness up to [`NARROW_M`].
+    fn narrow_lobes(&self, _i: Direction<Surface>) -> Vec<NarrowLobe> {
+        Vec::new()
+    }
+
+    /// f(i, o) apart from the narrow lobes.
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        self.seen_by(0.0, i, o)
     }
 
     /// f in exact backscatter as a sum of closed forms; `None` for a model whose f depends on the azimuth,
@@ -46,6 +73,19 @@ pub trait Scattering: Sync {
     fn sigma0(&self, theta_rad: f64) -> f64 {
         4.0 * std::f64::consts::PI * self.retro_per_sr(theta_rad) * theta_rad.cos().powi(2)
     }
+}
+
+/// Largest roughness of a lobe that a path follows in the direction of the mirror alone: below the divergence of a
+/// beam, which its roughness then joins.
+pub const NARROW_M: f64 = 0.01;
+
+/// A lobe about the direction of the mirror.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NarrowLobe {
+    /// Share of the power in it, 0 to 1.
+    pub share: f64,
+    /// Roughness m; 0 for a smooth mirror.
+    pub m: f64,
 }
 
 /// What a beam sees of a surface in one pair of directions.
@@ -101,6 +141,11 @@ pub trait ScatteringModel: Scattering {
         false
     }
 
+    /// Whether it has a smooth mirror, a delta in direction: f holds it as [`VIEWING_RAD`](super::VIEWING_RAD) wide.
+    fn has_smooth_mirror(&self) -> bool {
+        false
+    }
+
     /// ε′ and ε″ of the outermost medium, where they are parameters.
     fn permittivity(&self) -> Option<[f64; 2]> {
         None
@@ -114,6 +159,19 @@ pub trait ScatteringModel: Scattering {
     /// Whether it is a measured curve or has one as a part.
     fn has_curve(&self) -> bool {
         false
+    }
+
+    /// Width of its narrowest lobe about the normal, rad: the tilt at which the echo of a mirror's lobe has fallen
+    /// to 1/e; `None` for a model without lobes, or with measured ones.
+    fn lobe_rad(&self) -> Option<f64> {
+        let terms = self.backscatter().unwrap_or_default();
+        terms.iter().filter_map(|term| Some(term.facets?.m)).min_by(f64::total_cmp)
+    }
+
+    /// What its derivation asks of a surface at a wavelength, m; `rms_height_m` is what is known of the surface's
+    /// height, for a model without that parameter.
+    fn conditions(&self, _wavelength_m: f64, _rms_height_m: Option<f64>) -> Vec<Condition> {
+        Vec::new()
     }
 }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::about::About;
 use super::api::{Entry, Index};
 use super::error::CatalogueError;
-use super::folder::{Folder, Sum};
+use super::folder::{Checksum, Folder};
 use super::layout::{ABOUT, DATABASE};
 use super::licence::licence_of_all;
 use super::site::Site;
@@ -19,8 +19,8 @@ pub(super) fn rebuilt(
     store: &Store,
     about: &About,
     published: &Path,
-    database: Sum,
-) -> Result<BTreeMap<String, Sum>, CatalogueError> {
+    database: Checksum,
+) -> Result<BTreeMap<String, Checksum>, CatalogueError> {
     let mut folder = Folder::hashed(published, BTreeMap::from([(DATABASE.to_owned(), database)]))?;
     write_contents(&mut folder, store, about, |_| ())?;
     Ok(folder.sums().clone())

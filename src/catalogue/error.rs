@@ -25,6 +25,18 @@ pub enum CatalogueError {
         /// The first thing that is wrong.
         problem: String,
     },
+    /// Something in the database would be refused in the publication by whoever verifies it.
+    #[error(
+        "{}: {problem}; nothing was published, as nobody could verify it: make that fit again, or add the \
+         material without it",
+        database.display()
+    )]
+    NotVerifiable {
+        /// The database.
+        database: PathBuf,
+        /// The first thing that is wrong.
+        problem: String,
+    },
     /// The database has tables, indexes or views of somebody else, which a publication would pass on.
     #[error("in {} {added}; nothing was published, as a publication has no tables of others", database.display())]
     Added {

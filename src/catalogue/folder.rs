@@ -16,7 +16,7 @@ use crate::files::{FilesError, NewFolder, replacement_obstacle};
 
 /// A file of a publication.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Sum {
+pub struct Checksum {
     /// SHA-256, hexadecimal.
     pub sha256: String,
     /// Its length.
@@ -28,7 +28,7 @@ pub struct Sum {
 pub struct Folder {
     target: PathBuf,
     place: Place,
-    sums: BTreeMap<String, Sum>,
+    sums: BTreeMap<String, Checksum>,
 }
 
 /// Where files go before they are in their place.
@@ -92,7 +92,7 @@ impl Folder {
     /// When there is no room for temporary files.
     pub(super) fn hashed(
         published: &Path,
-        sums: BTreeMap<String, Sum>,
+        sums: BTreeMap<String, Checksum>,
     ) -> Result<Folder, CatalogueError> {
         let folder = tempfile::tempdir()
             .map_err(|reason| FilesError::unwritable("write", &std::env::temp_dir(), reason))?;
@@ -159,7 +159,7 @@ impl Folder {
     }
 
     /// Hash and length of every file so far, by path.
-    pub fn sums(&self) -> &BTreeMap<String, Sum> {
+    pub fn sums(&self) -> &BTreeMap<String, Checksum> {
         &self.sums
     }
 
@@ -206,7 +206,7 @@ fn stranger(target: &Path) -> io::Result<Option<String>> {
 }
 
 /// Hash and length of the rest of a file.
-pub(super) fn hashed(mut file: impl Read) -> io::Result<Sum> {
+pub(super) fn hashed(mut file: impl Read) -> io::Result<Checksum> {
     let mut sink = HashingWriter { out: io::sink(), hash: Sha256::new(), bytes: 0 };
     io::copy(&mut file, &mut sink)?;
     Ok(sink.sum())
@@ -215,14 +215,17 @@ pub(super) fn hashed(mut file: impl Read) -> io::Result<Sum> {
 fn write_hashed(
     place: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> io::Result<Sum> {
+) -> io::Result<Checksum> {
     if let Some(folder) = place.parent() {
         fs::create_dir_all(folder)?;
     }
     hash(BufWriter::new(File::create(place)?), write)
 }
 
-fn hash(out: impl Write, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<Sum> {
+fn hash(
+    out: impl Write,
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> io::Result<Checksum> {
     let mut out = HashingWriter { out, hash: Sha256::new(), bytes: 0 };
     write(&mut out)?;
     out.flush()?;
@@ -237,9 +240,9 @@ struct HashingWriter<W> {
 }
 
 impl<W> HashingWriter<W> {
-    fn sum(self) -> Sum {
+    fn sum(self) -> Checksum {
         let sha256 = self.hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-        Sum { sha256, bytes: self.bytes }
+        Checksum { sha256, bytes: self.bytes }
     }
 }
 

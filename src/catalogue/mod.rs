@@ -37,7 +37,7 @@ pub use about::{About, AboutError};
 pub use check_store::{CheckCount, Refit, StoreCheck};
 pub use diff::{CurveChange, Diff, Field, Levels};
 pub use error::CatalogueError;
-pub use folder::{Folder, Sum};
+pub use folder::{Checksum, Folder};
 pub use import::{Import, ImportSummary, MaterialPlan, Outcome};
 pub use near::{Distance, Probe, Rank};
 pub use nearest::Nearest;

@@ -31,7 +31,7 @@ pub struct PublishSummary {
 /// An earlier publication there is replaced. `progress` gets the number of materials done.
 ///
 /// # Errors
-/// When the database cannot be read or is damaged, its materials share no licence and `about` declares none, the
+/// When the database cannot be read or is damaged, a current fit does not follow from its curve, its materials share no licence and `about` declares none, the
 /// folder holds anything else, or something cannot be written.
 pub fn publish(
     store: &Store,
@@ -56,7 +56,10 @@ pub fn publish(
     };
     folder.keep_if(|staged| match check_staged(staged, store)?.into_iter().next() {
         None => Ok(()),
-        Some(found) => Err(CatalogueError::damaged(store, found.to_string())),
+        Some(found) => Err(CatalogueError::NotVerifiable {
+            database: store.path().to_owned(),
+            problem: found.to_string(),
+        }),
     })?;
     Ok(published)
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use super::about::About;
 use super::api::Index;
 use super::contents::rebuilt;
-use super::folder::Sum;
+use super::folder::Checksum;
 use super::layout::{ABOUT, DATABASE, INDEX};
 use super::problem::{Problem, problem};
 use super::read::read;
@@ -57,10 +57,10 @@ pub(super) fn check_rebuilt(
 }
 
 /// The hash and the size of the database.
-fn database_sum(bundle: &Path, sums: &BTreeMap<String, String>) -> Result<Sum, Problem> {
+fn database_sum(bundle: &Path, sums: &BTreeMap<String, String>) -> Result<Checksum, Problem> {
     let found = fs::metadata(bundle.join(DATABASE)).map_err(|reason| problem(DATABASE, reason))?;
     let sha256 = sums.get(DATABASE).cloned().unwrap_or_default();
-    Ok(Sum { sha256, bytes: found.len() })
+    Ok(Checksum { sha256, bytes: found.len() })
 }
 
 /// Number of wrong files that are named one by one.

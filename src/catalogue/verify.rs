@@ -67,7 +67,7 @@ pub fn verify(bundle: &Path) -> Result<Verification, CatalogueError> {
     }
     match database(&bundle.join(DATABASE)) {
         Ok(store) => {
-            verified.checked = check_content(bundle, &store, &sums, Refit::Current, problems);
+            verified.checked = check_content(bundle, &store, &sums, problems);
             // What is wrong already would be found wrong again in every file made of it.
             if problems.is_empty() {
                 verified.notes = check_rebuilt(bundle, &store, &sums, problems);
@@ -79,12 +79,12 @@ pub fn verify(bundle: &Path) -> Result<Verification, CatalogueError> {
 }
 
 /// What is wrong with a publication before it takes its place: its files, read from the disk, against their hashes
-/// and against its database. Fits are not made again, and no file is: both have just been.
+/// and against its database, and current fits against their curves. No file is made again: all have just been.
 pub(super) fn check_staged(bundle: &Path, store: &Store) -> Result<Vec<Problem>, CatalogueError> {
     let mut problems = Vec::new();
     let sums = sums(bundle, &mut problems)?;
     check_files(bundle, &sums, &mut problems)?;
-    check_content(bundle, store, &sums, Refit::None, &mut problems);
+    check_content(bundle, store, &sums, &mut problems);
     Ok(problems)
 }
 
@@ -224,13 +224,12 @@ fn check_content(
     bundle: &Path,
     store: &Store,
     sums: &BTreeMap<String, String>,
-    refit: Refit,
     problems: &mut Vec<Problem>,
 ) -> CheckCount {
     let mut entries = Vec::new();
     let check = StoreCheck {
         name: DATABASE,
-        refit,
+        refit: Refit::Current,
         report: &mut |found| problems.push(found),
         advance: &mut || (),
     };

@@ -29,7 +29,7 @@ pub(super) struct Circumstances {
     #[arg(long, value_name = "TEXT", requires = "save")]
     instrument: Option<String>,
     /// Centre frequency of a new instrument
-    #[arg(long, value_name = "GHZ", requires = "save")]
+    #[arg(long, value_name = "GHZ", requires = "save", allow_negative_numbers = true)]
     frequency: Option<f64>,
     /// Least power that counts as a detection with a new instrument
     #[arg(long, value_name = "DBM", requires = "save", allow_negative_numbers = true)]

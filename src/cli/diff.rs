@@ -16,7 +16,7 @@ use crate::setup::find_material;
   matdb diff my-paint@1 my-paint --all          every number of every fit, too
   matdb diff my-paint@1 my-paint --json | jq '.fields[].path'
 
-Curves are compared at the angles that both have, in dB: the second less the first.")]
+Curves are compared at the angles that both have, in dB: the second minus the first.")]
 pub(super) struct Args {
     /// NAME or NAME@REVISION
     before: String,

@@ -22,12 +22,16 @@ pub fn message(error: &Error) -> String {
             format!("{error} (--frequency {:.5})", nearest_hz / 1e9)
         }
         Error::Files(FilesError { way_out: WayOut::OtherFolder, .. }) => format!("{error} (-o)"),
+        Error::NoCurve { .. } => format!("{error} (--curve FILE)"),
         Error::NoDatabase { .. } => format!("{error} (--db, $MATDB)"),
         Error::NotConverged { .. } => format!("{error} (--fix, --starts, --model)"),
         Error::CurveDiagnosis { error: CurveDiagnoseError::Noiseless, .. } => {
             format!("{error} (--noise-db)")
         }
         Error::Catalogue(CatalogueError::NoLicence { .. }) => format!("{error} (--about FILE)"),
+        Error::Store(StoreError::BeyondRepair { .. }) => {
+            format!("{error} (`matdb list`, `matdb export`)")
+        }
         Error::Store(StoreError::Corrupt { .. })
         | Error::Catalogue(
             CatalogueError::Damaged { .. } | CatalogueError::Store(StoreError::Corrupt { .. }),
@@ -98,6 +102,7 @@ mod tests {
             (files(WayOut::OtherFolder), "choose another folder (-o)"),
             (files(WayOut::Words("leave it out")), "; leave it out"),
             (Error::NoDatabase { path: PathBuf::from("a.sqlite") }, "makes one (--db, $MATDB)"),
+            (Error::NoCurve { material: "ptfe".to_owned() }, "the file of a curve (--curve FILE)"),
             (
                 Error::NotConverged { curve: file(), stop: "lost" },
                 "another model (--fix, --starts, --model)",

@@ -20,7 +20,7 @@ pub(super) struct Args {
     #[command(flatten)]
     filter: FilterArgs,
     /// How many to show at most [default: 200, with --json all]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     limit: Option<u32>,
 }
 

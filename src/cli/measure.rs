@@ -46,7 +46,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "NAME")]
     region: Option<String>,
     /// Leave out what is nearer than this to an edge or another region, m [default: a spot]
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
     edge_margin: Option<f64>,
     /// The target is the facets of the mesh, as in a rendered cloud: their normals have no error
     #[arg(long)]
@@ -63,14 +63,14 @@ pub(super) struct Args {
     /// Who measured or made the cloud, when and how
     #[arg(long, value_name = "TITLE")]
     source: Option<String>,
-    #[command(flatten)]
-    circumstances: Circumstances,
     /// Day of the measurement, YYYY-MM-DD: with it pose, registration and the cloud's hash are stored as a session
     #[arg(long, value_name = "DAY", requires = "save")]
     date: Option<String>,
     /// Folder to write; created if needed
     #[arg(long, short, value_name = "DIR")]
     output: PathBuf,
+    #[command(flatten)]
+    circumstances: Circumstances,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]

@@ -56,6 +56,7 @@ pub struct Cli {
 
 /// What every command understands.
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "For every command")]
 struct Options {
     /// Database file; created by the first `add` [default: matdb.sqlite]
     #[arg(long, env = "MATDB", global = true, value_name = "FILE")]
@@ -132,5 +133,48 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
         Command::Import(args) => import::run(args, db, &console),
         Command::Export(args) => export::run(args, db, &console),
         Command::Completions(args) => completions::run(args, Cli::command()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::any::TypeId;
+
+    use super::*;
+
+    /// Otherwise clap takes `-3` for a flag and proposes to write `-- -3`.
+    #[test]
+    fn a_negative_number_is_a_value_of_every_flag_that_takes_a_number() {
+        let numbers = [
+            TypeId::of::<f64>(),
+            TypeId::of::<u16>(),
+            TypeId::of::<u32>(),
+            TypeId::of::<u64>(),
+            TypeId::of::<usize>(),
+        ];
+        let mut seen = 0;
+        for command in Cli::command().get_subcommands() {
+            for flag in command.get_opts() {
+                if numbers.iter().any(|number| flag.get_value_parser().type_id() == *number) {
+                    let name = format!("{} --{}", command.get_name(), flag.get_id());
+                    assert!(flag.is_allow_negative_numbers_set(), "{name}");
+                    seen += 1;
+                }
+            }
+        }
+        assert!(seen > 10, "{seen}");
+    }
+
+    #[test]
+    fn only_what_concerns_a_measured_curve_stands_under_its_heading() {
+        let of_stored_curve = Some("For a measured curve that is stored");
+        for command in ["fit", "measure"] {
+            let cli = Cli::command();
+            let command = cli.find_subcommand(command).unwrap();
+            let flags =
+                command.get_opts().filter(|flag| flag.get_help_heading() == of_stored_curve);
+            let names: Vec<&str> = flags.map(|flag| flag.get_id().as_str()).collect();
+            assert_eq!(names, ["licence", "instrument", "frequency", "threshold"]);
+        }
     }
 }

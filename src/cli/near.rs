@@ -14,7 +14,7 @@ use crate::setup::Database;
 use crate::store::Store;
 use crate::units::{range, shown};
 
-/// Find the known materials that a measured curve is nearest to
+/// Find the materials nearest to a measured curve
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb near --curve curve.csv --measured-at 300   a curve of 300 GHz
@@ -39,7 +39,7 @@ pub(super) struct Args {
     #[arg(long)]
     shape: bool,
     /// How many to show at most
-    #[arg(long, default_value_t = 10, value_name = "N")]
+    #[arg(long, default_value_t = 10, value_name = "N", allow_negative_numbers = true)]
     limit: usize,
     #[command(flatten)]
     filter: FilterArgs,

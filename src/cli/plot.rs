@@ -8,7 +8,9 @@ use super::console::Console;
 use crate::error::Error;
 use crate::files::{folder_of, write_all};
 use crate::formats::figure::Plot;
-use crate::report::{FigureFormat, appendix_figures, incidence_plot, material_plot, sweep_plot};
+use crate::report::{
+    FigureFormat, appendix_figures, drawn_words, incidence_plot, material_plot, sweep_plot,
+};
 use crate::setup::{Database, MaterialRevision, find_material};
 
 /// Draw how a material scatters, and what its parameters do
@@ -49,6 +51,8 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
             };
             let kind = material.render_kind().map_or("of unknown origin", |kind| kind.as_str());
             let kind = material.rendered_words().unwrap_or_else(|| kind.to_owned());
+            let kind = [Some(kind), drawn_words(&material)?].into_iter().flatten();
+            let kind = kind.collect::<Vec<String>>().join(", ");
             write_plot(&args.output, &incidence_plot(&material.name, &kind, series))?
         }
     };

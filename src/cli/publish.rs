@@ -1,19 +1,22 @@
 //! `matdb publish`.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use super::console::Console;
 use super::summary::counted;
 use crate::catalogue::{About, publish};
 use crate::error::Error;
-use crate::files::{FilesError, WayOut};
+use crate::files::{FilesError, WayOut, read_small};
 use crate::setup::Database;
 
 /// Publish the database as a catalogue: a static site and open formats
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   matdb publish site                           every material of the database
-  matdb publish site --about about.toml        with your title, names, licence and address")]
+  matdb publish site --about about.toml        with your title, names, licence and address
+
+Fits of current revisions are made again: nothing is published that `matdb verify` would refuse.")]
 pub(super) struct Args {
     /// Folder to write; an earlier publication there is replaced
     folder: PathBuf,
@@ -53,11 +56,13 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 }
 
 fn about(path: &Path) -> Result<About, Error> {
-    let text = std::fs::read_to_string(path).map_err(|reason| FilesError {
-        verb: "read",
-        path: path.to_owned(),
-        reason,
+    let text = read_small(path).and_then(|bytes| {
+        String::from_utf8(bytes)
+            .map_err(|error| FilesError::unreadable(path, io::Error::other(error.utf8_error())))
+    });
+    let text = text.map_err(|error| FilesError {
         way_out: WayOut::Words("check the path of --about"),
+        ..error
     })?;
     Ok(About::parse(&path.display().to_string(), &text)?)
 }

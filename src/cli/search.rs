@@ -20,7 +20,7 @@ pub(super) struct Args {
     #[arg(required = true)]
     words: Vec<String>,
     /// How many to show at most
-    #[arg(long, default_value_t = 20, value_name = "N")]
+    #[arg(long, default_value_t = 20, value_name = "N", allow_negative_numbers = true)]
     limit: u32,
 }
 

@@ -10,9 +10,12 @@ use super::summary::{counted, table};
 use crate::error::Error;
 use crate::formats::EffectEntry;
 use crate::material::{Fit, Material};
-use crate::report::{LevelRow, Sigma0Level, level_rows};
+use crate::radar::Radar;
+use crate::report::{LevelRow, Sigma0Level, drawn_words, level_rows};
 use crate::setup::Database;
-use crate::setup::{MaterialRevision, find_material, later_status_warning};
+use crate::setup::{
+    MaterialRevision, find_material, later_status_warning, unmet_conditions, unmet_sentence,
+};
 use crate::store::RevisionSummary;
 use crate::units::{range, shown};
 
@@ -85,6 +88,11 @@ fn describe(material: &Material, origin: &str) -> Result<String, Error> {
                 "a monostatic measurement tells only (1 − k)·f_lambda = {specular:.3e} and \
                  k·r_s = {diffuse:.3e}; k, f_lambda and r_s by themselves are a convention\n"
             );
+        }
+        for condition in
+            unmet_conditions(&fit.model, Radar::default().wavelength_m(), Some(material))
+        {
+            text += &format!("outside of its derivation: {}\n", unmet_sentence(&condition));
         }
         text += &fit.report.as_ref().map_or(String::new(), report);
     }
@@ -187,5 +195,6 @@ fn curve_table(material: &Material) -> Result<String, Error> {
         };
         [format!("{theta_deg:.0}°"), level, said]
     });
-    Ok(table(&["incidence", "sigma0 dB", ""], rows.into_iter()))
+    let table = table(&["incidence", "sigma0 dB", ""], rows.into_iter());
+    Ok(drawn_words(material)?.map_or(table.clone(), |words| format!("{table}{words}\n")))
 }

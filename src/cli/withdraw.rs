@@ -21,12 +21,19 @@ pub(super) struct Args {
     /// Why, in a sentence
     #[arg(long, value_name = "TEXT")]
     reason: String,
-    /// The better one that has taken its place
+    /// The material that replaces it
     #[arg(long, value_name = "NAME")]
     superseded_by: Option<String>,
 }
 
 pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), Error> {
+    if args.reason.trim().is_empty() {
+        return Err(Error::usage("--reason is empty", "say in a sentence why"));
+    }
+    if args.superseded_by.as_ref() == Some(&args.name) {
+        let problem = "--superseded-by names the material that is withdrawn";
+        return Err(Error::usage(problem, "name another one, or leave it out"));
+    }
     let withdrawal = Withdrawal {
         name: args.name.clone(),
         reason: args.reason.clone(),

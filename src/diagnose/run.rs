@@ -37,7 +37,7 @@ impl Diagnosis {
     /// As [`Diagnosis::run`]; `notify` receives a few words about each step.
     ///
     /// # Errors
-    /// As [`Diagnosis::run`].
+    /// When the data are too few for an answer, or a declaration has no meaning.
     pub fn run_with(
         &self,
         subject: &Subject,

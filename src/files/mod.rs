@@ -9,5 +9,5 @@ mod set;
 pub use error::{FilesError, WayOut};
 pub use new_folder::{FolderContent, NewFolder, replacement_obstacle};
 pub use path::folder_of;
-pub use read::{LARGEST_SMALL_FILE_BYTES, read_small};
+pub use read::{LARGEST_SMALL_FILE_BYTES, read_small, read_whole};
 pub use set::{FolderFiles, Placement, write_all};

@@ -43,7 +43,7 @@ impl Placement {
     /// Writes files into several folders as [`write_all`] does into one: all of them or none.
     ///
     /// # Errors
-    /// As [`write_all`].
+    /// The first file or folder that cannot be written; a database, which is not written over.
     pub fn new<Name: AsRef<str> + Sync>(
         folders: &[FolderFiles<Name>],
     ) -> Result<Placement, FilesError> {
@@ -52,7 +52,7 @@ impl Placement {
         for (folder, files) in folders {
             placement.created.splice(0..0, create_folder(folder)?);
             // A disk takes several at once; of several errors the first file's is reported.
-            let prepared: Vec<io::Result<Pending>> = files
+            let prepared: Vec<io::Result<NewFile>> = files
                 .par_iter()
                 .map(|(name, bytes)| prepare(folder, name.as_ref(), bytes))
                 .collect();
@@ -65,7 +65,7 @@ impl Placement {
             }
         }
         // Bytes that a device or another program has read cannot be taken back, so it gets them last.
-        pending.sort_by_key(|(_, file)| matches!(file, Pending::Stream(..)));
+        pending.sort_by_key(|(_, file)| matches!(file, NewFile::Stream(..)));
         for (path, file) in pending {
             let replaced =
                 file.place().map_err(|reason| FilesError::unwritable("write", &path, reason))?;
@@ -111,8 +111,8 @@ fn remove_empty(folders: &[PathBuf]) {
     }
 }
 
-/// A file that waits for its place.
-enum Pending<'a> {
+/// A file before it is in its place.
+enum NewFile<'a> {
     /// A whole file next to its place.
     Whole(NamedTempFile, PathBuf),
     /// Bytes for a device or a pipe, which stays what it is.
@@ -120,10 +120,10 @@ enum Pending<'a> {
 }
 
 /// Writes a file next to its place, unless a device is there.
-fn prepare<'a>(folder: &Path, name: &str, bytes: &'a [u8]) -> io::Result<Pending<'a>> {
+fn prepare<'a>(folder: &Path, name: &str, bytes: &'a [u8]) -> io::Result<NewFile<'a>> {
     let path = folder.join(name);
     if path.metadata().is_ok_and(|found| !found.is_file() && !found.is_dir()) {
-        return Ok(Pending::Stream(bytes, path));
+        return Ok(NewFile::Stream(bytes, path));
     }
     let path = follow_link(path)?;
     if is_database(&path) {
@@ -139,7 +139,7 @@ fn prepare<'a>(folder: &Path, name: &str, bytes: &'a [u8]) -> io::Result<Pending
     let mut file = builder.tempfile_in(path.parent().unwrap_or(folder))?;
     file.write_all(bytes)?;
     file.as_file().sync_data()?;
-    Ok(Pending::Whole(file, path))
+    Ok(NewFile::Whole(file, path))
 }
 
 /// The path that a file is written to: a link stays, and the file that it leads to is replaced.
@@ -158,12 +158,12 @@ fn is_database(path: &Path) -> bool {
     read.is_ok() && head == *MAGIC
 }
 
-impl Pending<'_> {
+impl NewFile<'_> {
     /// Puts the file in its place; what was there is kept under a temporary name.
     fn place(self) -> io::Result<Option<Replacement>> {
         let (file, path) = match self {
-            Pending::Whole(file, path) => (file, path),
-            Pending::Stream(bytes, path) => {
+            NewFile::Whole(file, path) => (file, path),
+            NewFile::Stream(bytes, path) => {
                 std::fs::File::options().write(true).open(path)?.write_all(bytes)?;
                 return Ok(None);
             }

@@ -131,7 +131,7 @@ pub fn write(raster: &Raster, attributes: &[(String, Attribute)]) -> Result<Vec<
 /// As [`write()`], with a choice of the packing.
 ///
 /// # Errors
-/// As [`write()`].
+/// When the raster contradicts itself, or a name is given twice or cannot be written.
 pub fn write_packed(
     raster: &Raster,
     attributes: &[(String, Attribute)],

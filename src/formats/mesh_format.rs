@@ -35,8 +35,7 @@ impl MeshFormat {
     /// Reads a whole file and checks that the mesh can be used. Coordinates stay in the file's unit.
     ///
     /// # Errors
-    ///
-    /// See the format's `read_mesh`; and [`FormatError::Mesh`] when the mesh has no facets or a
+    /// When the bytes are not a file of the format, by their place; [`FormatError::Mesh`] when the mesh has no facets or a
     /// vertex that is not finite.
     pub fn read(self, bytes: &[u8]) -> Result<Mesh, FormatError> {
         let mesh = match self {

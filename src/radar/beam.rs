@@ -121,6 +121,22 @@ impl GaussianBeam {
         }
     }
 
+    /// How well the antenna sees a place, over how equation (11) sees the spot of the beam along `axis`.
+    ///
+    /// The antenna receives a radiance as it sends, with λ²·u = λ²/(πw²)·2g, where g = exp(−2r²/w²). A single ray stands
+    /// for the whole spot: then a place at the distance d from what the ray hit is seen as the mean of 2g over
+    /// all that is lit, which is exp(−d²/w²) = √g(d).
+    pub fn pattern(&self, axis: &Ray<Global>, rays: usize, place: Point<Global>) -> f64 {
+        let to_place = place.xyz - axis.origin.xyz;
+        let range_m = to_place.dot(axis.direction.xyz());
+        if range_m <= 0.0 {
+            return 0.0;
+        }
+        let beside_m = to_place.cross(axis.direction.xyz()).length();
+        let seen = self.section(range_m).irradiance_ratio(beside_m);
+        if rays == 1 { seen.sqrt() } else { 2.0 * seen }
+    }
+
     /// The direction in which the wave of the beam along `axis` passes a point near it: at right angles
     /// to the wavefront there.
     pub fn direction_at(&self, axis: &Ray<Global>, point: Point<Global>) -> Direction<Global> {

@@ -38,6 +38,7 @@ impl Radar {
             ("chirp_period_s", self.chirp_period_s, (1e-9, 3600.0)),
         ];
         let parts = self.beam.checks().into_iter().chain(self.optics.checks());
+        let parts = parts.chain(self.polarisation.checks());
         let parts = parts.chain(self.scan.checks());
         checks.into_iter().chain(parts).try_for_each(in_range)?;
         self.validate_beam()?;

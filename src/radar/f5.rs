@@ -57,7 +57,7 @@ pub struct Domain {
 
 /// Distance between the polynomial and the exact optics in the target plane.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct FitError {
+pub struct F5Deviation {
     /// Largest, mm.
     pub worst_mm: f64,
     /// Root of the mean square, mm.
@@ -126,7 +126,7 @@ impl F5 {
     ///
     /// # Errors
     /// When the beam leaves the optics backwards somewhere in the domain.
-    pub fn error(&self, mirror: &Mirror, domain: Domain) -> Result<FitError, F5Error> {
+    pub fn error(&self, mirror: &Mirror, domain: Domain) -> Result<F5Deviation, F5Error> {
         let samples = domain.samples(20, 90, 12);
         let exact = exact_points(mirror, &samples)?;
         let squares_mm2: Vec<f64> = std::iter::zip(&samples, &exact)
@@ -135,7 +135,7 @@ impl F5 {
                 1e6 * ((x - exact[0]).powi(2) + (y - exact[1]).powi(2))
             })
             .collect();
-        Ok(FitError {
+        Ok(F5Deviation {
             worst_mm: squares_mm2.iter().copied().fold(0.0, f64::max).sqrt(),
             rms_mm: (squares_mm2.iter().sum::<f64>() / squares_mm2.len() as f64).sqrt(),
         })

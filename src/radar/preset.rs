@@ -2,6 +2,7 @@
 
 use super::chirp::ChirpEntry;
 use super::mirror::Optics;
+use super::polarisation::Polarisation;
 use super::scan::pattern::Pattern;
 use super::settings::{BeamEntry, Footprint, Radar, SpotDiameter};
 
@@ -32,6 +33,7 @@ impl Default for Radar {
             speckle: None,
             noise: None,
             effect: Vec::new(),
+            polarisation: Polarisation::default(),
             beam: BeamEntry::default(),
             optics: Optics::default(),
             f5: None,

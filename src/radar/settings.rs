@@ -16,6 +16,7 @@ use super::error::Check;
 use super::f5::F5;
 use super::mirror::Optics;
 use super::noise::Noise;
+use super::polarisation::Polarisation;
 use super::receiver::Receiver;
 use super::scan::pattern::{self, Pattern};
 use super::speckle::Speckle;
@@ -72,6 +73,8 @@ pub struct Radar {
     /// From the beat signal to a range and a power. None, the paper's: both are exact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub receiver: Option<Receiver>,
+    /// What the antennas send and receive.
+    pub polarisation: Polarisation,
     /// Speckle of the echoes. None, the paper's: there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speckle: Option<Speckle>,

@@ -3,8 +3,7 @@
 //! With [`Tracer::Gpu`] the mesh and its hierarchy stay on the device. It traces the rays
 //! of whole chirps, evaluates equation (11) for each and sums over the spot, equation (7), for many scans at
 //! a time. The CPU computes in f64 the rays that the device leaves open: rays near an edge, and rays on scattering
-//! models that are not a sum of [`Term`](crate::brdf::Term)s or have a lobe narrower than the beam. With any other
-//! tracer it computes all rays. Poses, spots and the receiver are always computed on the CPU, in f64.
+//! models that are not a sum of [`Term`](crate::brdf::Term)s. With any other tracer it computes all rays. Poses, spots and the receiver are always computed on the CPU, in f64.
 //!
 //! A mean power of the device is within 0.02 dB of the renderer's. Its range is within 1.1·10⁻⁶ of the range plus the
 //! target's radius over cos θ. Powers below the smallest f32, about −350 dBm with the paper's radar, are only known
@@ -21,7 +20,6 @@ use super::observer::Observer;
 use super::setup::Setup;
 use super::spot::{self, Spot};
 use super::surface::Surface;
-use crate::brdf::Term;
 use crate::frames::{Global, Pose, Ray};
 use crate::geometry::Mesh;
 use crate::radar::{Detection, Footprint, Link};
@@ -150,15 +148,8 @@ impl<'a> Work<'a> {
             if !std::ptr::eq(held.bvh(), batch.geometry.bvh) {
                 return Err(gpu_error(GpuError::OtherMesh));
             }
-            // The device knows no beam: what may be seen wider than it is, is left to the processor.
-            let axes = batch.geometry.chirps.rays.iter();
-            let beam_rad = axes.map(|axis| work.link.beam.along(axis).divergence_rad());
-            let widest_rad = beam_rad.fold(0.0, f64::max);
-            let is_resolved = |term: &Term| term.facets.is_none_or(|facets| facets.m >= widest_rad);
             let law = |take: &Take, region: usize| match take.surfaces.get(region) {
-                Some(surface) => {
-                    surface.scattering.backscatter().filter(|law| law.iter().all(is_resolved))
-                }
+                Some(surface) => surface.scattering.backscatter(),
                 None => Some(Vec::new()),
             };
             let laws: Vec<_> = takes
@@ -300,6 +291,8 @@ impl<'a> Work<'a> {
             across_m: spot.across_m.map(|aside_m| mesh_from_world.rotation() * aside_m),
             section: spot.section,
             solid_angle: self.link.solid_angle(&spot.beam),
+            beam: spot.beam,
+            on_wavefront: self.rays > 1,
             law: (self.take(chirp) * self.regions) as u32,
         }
     }
@@ -354,7 +347,7 @@ mod tests {
         let ball = solids::icosphere(0.3, 3);
         let (bvh, region_of_facet) = (Bvh::new(&ball), vec![0; ball.facets.len()]);
         let law = brushed();
-        let surfaces = [Surface { scattering: &law, grain: DVec3::new(1.0, 2.0, 0.0) }];
+        let surfaces = [Surface { grain: DVec3::new(1.0, 2.0, 0.0), ..Surface::new(&law) }];
         let pose = |turn_rad| Pose::from_euler_xyz(turn_rad, DVec3::new(0.02, 1.1, 0.4));
         let takes = [DVec3::ZERO, DVec3::new(0.3, -0.8, 0.5)].map(|turn_rad| Take {
             target: pose(turn_rad),

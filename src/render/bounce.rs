@@ -5,7 +5,8 @@
 //! the cosine law, which suits diffuse ones, and a sixth each of three lobes cosᵉ about the mirror's
 //! direction, from a broad to a narrow one. Every ω is weighted by the whole mixture (the balance
 //! heuristic of Veach and Guibas 1995, DOI 10.1145/218380.218498), so that the mean is unbiased for
-//! any surface.
+//! any surface. A lobe too narrow for that is followed in the mirror's direction alone: what it lacks in width
+//! joins the beam's at the second surface.
 
 use std::f64::consts::{PI, TAU};
 
@@ -30,12 +31,7 @@ pub struct Bounce {
 }
 
 impl Bounce {
-    /// How well the radar's antenna sees a second surface at `place`, over how equation (11) sees the
-    /// spot.
-    ///
-    /// The antenna receives a radiance as it sends, with λ²·u = λ²/(πw²)·2g, where g = exp(−2r²/w²).
-    /// A single ray stands for the whole spot: then a place at the distance d from what the ray hit is
-    /// seen as the mean of 2g over all that is lit, which is exp(−d²/w²) = √g(d).
+    /// How well the radar's antenna sees a second surface at `place`, over how equation (11) sees the spot.
     pub(super) fn pattern(
         &self,
         beam: &GaussianBeam,
@@ -43,15 +39,7 @@ impl Bounce {
         rays: usize,
         place: DVec3,
     ) -> f64 {
-        let to_place = place - axis.origin.xyz;
-        let range_m = to_place.dot(axis.direction.xyz());
-        if range_m <= 0.0 {
-            return self.outside_spot;
-        }
-        let beside_m = to_place.cross(axis.direction.xyz()).length();
-        let seen = beam.section(range_m).irradiance_ratio(beside_m);
-        let inside = if rays == 1 { seen.sqrt() } else { 2.0 * seen };
-        inside.max(self.outside_spot)
+        beam.pattern(axis, rays, place.into()).max(self.outside_spot)
     }
 }
 

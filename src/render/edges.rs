@@ -70,7 +70,7 @@ fn thin_out(chirps: &[(DVec2, Option<f64>)], side_m: f64) -> Vec<(DVec2, Option<
 }
 
 /// Whether an edge lies between two chirps.
-fn is_across(a: (DVec2, Option<f64>), b: (DVec2, Option<f64>), spot_m: f64) -> bool {
+pub(super) fn is_across(a: (DVec2, Option<f64>), b: (DVec2, Option<f64>), spot_m: f64) -> bool {
     match (a.1, b.1) {
         (Some(here_m), Some(there_m)) => {
             (here_m - there_m).abs() > spot_m + STEEPEST * a.0.distance(b.0)
@@ -81,7 +81,7 @@ fn is_across(a: (DVec2, Option<f64>), b: (DVec2, Option<f64>), spot_m: f64) -> b
 }
 
 /// Mean spacing of the chirps, m: the side of a square with a chirp's share of the area, or its share of a line.
-fn spacing_m(chirps: &[(DVec2, Option<f64>)]) -> f64 {
+pub(super) fn spacing_m(chirps: &[(DVec2, Option<f64>)]) -> f64 {
     let min = chirps.iter().fold(DVec2::INFINITY, |min, chirp| min.min(chirp.0));
     let max = chirps.iter().fold(DVec2::NEG_INFINITY, |max, chirp| max.max(chirp.0));
     let (sides_m, count) = ((max - min).max(DVec2::splat(1e-6)), chirps.len().max(1) as f64);
@@ -89,17 +89,17 @@ fn spacing_m(chirps: &[(DVec2, Option<f64>)]) -> f64 {
 }
 
 /// A rectangle of square cells.
-struct Frame {
+pub(super) struct Frame {
     side_m: f64,
     /// The corner of least x and y, m.
     corner: DVec2,
-    columns: usize,
-    rows: usize,
+    pub columns: usize,
+    pub rows: usize,
 }
 
 impl Frame {
     /// The smallest rectangle of cells with side `side_m` around points; points that are not finite do not count.
-    fn around(points: impl Iterator<Item = DVec2>, side_m: f64) -> Frame {
+    pub fn around(points: impl Iterator<Item = DVec2>, side_m: f64) -> Frame {
         let bounds = points.filter(|point| point.is_finite()).fold(None, |bounds, point| {
             let (least, most): (DVec2, DVec2) = bounds.unwrap_or((point, point));
             Some((least.min(point), most.max(point)))
@@ -118,13 +118,13 @@ impl Frame {
     }
 
     /// Number of the cell that contains a point; `None` outside.
-    fn number_at(&self, point: DVec2) -> Option<usize> {
+    pub fn number_at(&self, point: DVec2) -> Option<usize> {
         let [column, row] = self.cell(point);
         point.is_finite().then(|| self.number(column, row))?
     }
 
     /// Number of a cell, counted column after column; `None` outside.
-    fn number(&self, column: i32, row: i32) -> Option<usize> {
+    pub fn number(&self, column: i32, row: i32) -> Option<usize> {
         let within = |at: i32, count: usize| usize::try_from(at).ok().filter(|&at| at < count);
         Some(within(column, self.columns)? * self.rows + within(row, self.rows)?)
     }

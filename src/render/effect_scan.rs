@@ -20,8 +20,8 @@ use crate::effects::{
     shot_at, tilted_cos_theta,
 };
 use crate::frames::{Direction, Global, Ray, Surface};
-use crate::radar::Link;
 use crate::radar::random::{Key, Purpose};
+use crate::radar::{Channel, Link};
 use crate::trace::{Hit, ScanGeometry};
 
 /// The model of a setup, prepared for its scan.
@@ -256,6 +256,13 @@ pub(super) fn check(setup: &Setup, rays: usize, observer: Observer) -> Result<()
                 effect: effect.name,
                 problem: "acts on the radar's own echoes, and nothing says what it does at another antenna",
                 way_out: "remove [[receiver]], or the effect",
+            });
+        }
+        if setup.channel == Channel::CrossPolar {
+            return Err(RenderError::Effect {
+                effect: effect.name,
+                problem: "acts on the co-polar echoes, and nothing says what it does to the cross-polar ones",
+                way_out: "remove radar.polarisation.receive, or the effect",
             });
         }
         let conflict = effect.conflicts.iter().find(|conflict| match conflict.with {

@@ -7,6 +7,7 @@
 //! | power that arrives at an antenna by single paths | `paths.rs`, equation (11) |
 //! | … and by second-order paths | `bounce.rs` |
 //! | … with declared physical effects | `effect_scan.rs` |
+//! | how far the target tilts within the spots | `curvature.rs` |
 //! | detection by the receiver, and the cause of each echo | `detect.rs`, `echo.rs` |
 //! | image and point cloud | `image.rs`, `cloud.rs` |
 //! | many scans at once, on a graphics processor | `batch.rs` |
@@ -15,11 +16,13 @@ mod effect_scan;
 mod batch;
 mod bounce;
 mod cloud;
+mod curvature;
 mod detect;
 mod echo;
 mod edges;
 mod error;
 mod image;
+mod jones;
 mod observer;
 mod path;
 mod paths;
@@ -31,6 +34,7 @@ mod surface;
 pub use batch::{Batch, Take, Takes};
 pub use bounce::Bounce;
 pub use cloud::cloud_table;
+pub use curvature::{SpotTilt, spot_tilts};
 pub use detect::Beats;
 pub use echo::{Echo, Truth};
 pub use error::RenderError;

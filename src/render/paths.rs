@@ -13,16 +13,17 @@ use rayon::prelude::*;
 
 use super::bounce::{Bounce, directions};
 use super::effect_scan::{Change, EffectScan};
+use super::jones::Field;
 use super::observer::Observer;
 use super::path::{Path, sum};
 use super::setup::Setup;
 use super::spot::{self, Footprints, Spot};
 use super::surface::{Orientation, Surface};
-use crate::brdf::Seen;
+use crate::brdf::{NarrowLobe, Seen};
 use crate::effects::MeanEcho;
 use crate::frames::{Direction, Global, Point, Ray, Surface as Local};
 use crate::radar::random::{Key, Purpose};
-use crate::radar::{Detection, Link};
+use crate::radar::{Channel, Detection, Link};
 use crate::trace::{Hit, LocalFrame, ScanGeometry};
 
 /// Distance above a surface at which a ray starts, m, so that it does not hit the same surface again. It is far above
@@ -68,6 +69,17 @@ struct ShadingPoint<'a> {
     solid_angle_sr: f64,
     /// Divergence of the beam there, rad.
     beam_rad: f64,
+}
+
+/// Power on its way to a second surface.
+struct Onward {
+    direction: Direction<Local>,
+    /// Its share of the power on the first surface.
+    share: f64,
+    /// What the first surface scatters.
+    first: Seen,
+    /// Roughness of a lobe that the direction stands for.
+    m: f64,
 }
 
 impl ShadingPoint<'_> {
@@ -158,15 +170,9 @@ impl<'a> Emission<'a> {
         self.lit(hit, to_source, to_antenna, antenna_m, hit.range_m)
     }
 
-    /// A point that another point of the target lights; the antenna sees it in the main lobe of its beam, or
+    /// A point that another point of the target lights from `to_source`; the antenna sees it in the main lobe of its beam, or
     /// by a side lobe.
-    fn lit_by_surface(
-        &self,
-        hit: Hit,
-        source: &ShadingPoint,
-        in_main_lobe: bool,
-    ) -> ShadingPoint<'a> {
-        let to_source = (source.hit.point.xyz - hit.point.xyz).normalize_or(DVec3::Z);
+    fn lit_by_surface(&self, hit: Hit, to_source: DVec3, in_main_lobe: bool) -> ShadingPoint<'a> {
         let Spot { axis, beam, .. } = &self.spot;
         let (mut to_antenna, antenna_m) = self.to_antenna(&hit);
         if in_main_lobe {
@@ -218,7 +224,8 @@ impl<'a> Emission<'a> {
         // Every point that the radar illuminates is visible to it.
         let seen = self.paths.observer == Observer::Radar || self.is_seen(lit);
         let scattered = self.scattered(lit);
-        let share = if seen { lit.received_share(scattered) } else { 0.0 };
+        let polarised = self.polarised_share(scattered.specular_share, &[lit]);
+        let share = if seen { lit.received_share(scattered) * polarised } else { 0.0 };
         let [x, y, _] = lit.source.xyz().to_array();
         Path {
             range_m: 0.5 * (lit.hit.range_m + lit.antenna_m),
@@ -231,6 +238,24 @@ impl<'a> Emission<'a> {
         }
     }
 
+    /// Where a lit point sends power: into directions drawn at random, and exactly into that of the mirror by lobes
+    /// that are too narrow to be drawn.
+    fn onward(&self, lit: &ShadingPoint, bounce: &Bounce, ray: usize) -> Vec<Onward> {
+        let law = lit.surface.scattering;
+        let mut all = Vec::with_capacity(bounce.rays);
+        for (direction, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
+            let first = law.apart_from_narrow_lobes(lit.source, direction);
+            let share = first.f_per_sr * direction.cos_theta() * weight;
+            all.push(Onward { direction, share, first, m: 0.0 });
+        }
+        for NarrowLobe { share, m } in law.narrow_lobes(lit.source) {
+            let direction = lit.source.mirrored();
+            all.push(Onward { direction, share, first: Seen::mirror(0.0), m });
+        }
+        all.retain(|onward| onward.share > 0.0);
+        all
+    }
+
     /// Appends the second-order paths by way of a point that receives `flux_w`, W.
     fn second_order(
         &self,
@@ -241,22 +266,29 @@ impl<'a> Emission<'a> {
         ray: usize,
         paths: &mut Vec<Path>,
     ) {
-        for (onward, weight) in directions(lit.source, bounce.rays, self.key(ray)) {
-            let Some(hit) = self.trace_onward(lit, onward) else { continue };
-            let first = lit.surface.scattering.seen_by(0.0, lit.source, onward);
+        for Onward { direction, share, first, m } in self.onward(lit, bounce, ray) {
+            let Some(hit) = self.trace_onward(lit, direction) else { continue };
             let pattern = self.pattern(bounce, &hit);
-            let second = self.lit_by_surface(hit, lit, pattern > bounce.outside_spot);
+            let to_first = -lit.frame.world(direction.xyz());
+            let in_main_lobe = pattern > bounce.outside_spot;
+            let mut second = self.lit_by_surface(hit, to_first, in_main_lobe);
+            // The beam's width counts once, here: exp(−ε²/4δ²) for the angle ε to its wavefront.
+            let beam_rad = second.beam_rad;
+            second.beam_rad = beam_rad.hypot(m);
             let last = self.scattered(&second);
-            let onward_share = first.f_per_sr * onward.cos_theta() * weight;
-            let power_w = flux_w * onward_share * pattern * second.received_share(last);
+            let specular_share = first.specular_share * last.specular_share;
+            let polarised = self.polarised_share(specular_share, &[lit, &second]);
+            let power_w = flux_w * share * pattern * second.received_share(last) * polarised;
             if power_w > 0.0 && self.is_seen(&second) {
                 let path_m = lit.hit.range_m + hit.range_m + second.antenna_m;
                 paths.push(Path {
                     range_m: 0.5 * path_m,
                     power_w,
                     surfaces: 2,
-                    specular_share: first.specular_share * last.specular_share,
-                    coherent_share: first.coherent_share * last.coherent_share,
+                    specular_share,
+                    coherent_share: first.coherent_share
+                        * last.coherent_share
+                        * (beam_rad / second.beam_rad).powi(2),
                     ..direct
                 });
             }
@@ -278,6 +310,47 @@ impl<'a> Emission<'a> {
     /// Power of one ray on a point, W.
     fn flux_w(&self, lit: &ShadingPoint) -> f64 {
         self.paths.link.flux_w(lit.hit.cos_theta) / self.rays as f64
+    }
+
+    /// Share of the power by way of some points that the antenna's channel receives. Its specular part keeps
+    /// the polarisation that the facets give it. The diffuse part is co-polar, and what is depolarised adds to it.
+    fn polarised_share(&self, specular_share: f64, points: &[&ShadingPoint]) -> f64 {
+        let channel = self.paths.setup.channel;
+        let diffuse = match channel {
+            Channel::CoPolar => 1.0,
+            Channel::CrossPolar => {
+                let shares = points.iter().map(|lit| lit.surface.depolarised_share);
+                let largest = shares.fold(0.0, f64::max);
+                largest / (1.0 - largest)
+            }
+        };
+        let is_straight_back = self.paths.observer == Observer::Radar && points.len() == 1;
+        let specular = match channel {
+            _ if specular_share == 0.0 => 0.0,
+            Channel::CoPolar if is_straight_back => 1.0,
+            Channel::CrossPolar if is_straight_back => 0.0,
+            _ => self.specular_power(points, channel),
+        };
+        specular_share * specular + (1.0 - specular_share) * diffuse
+    }
+
+    /// Share of the power of a specular path by way of some points that a channel of the antenna receives.
+    fn specular_power(&self, points: &[&ShadingPoint], channel: Channel) -> f64 {
+        let polarisation = self.paths.setup.geometry.radar.polarisation;
+        let Some(first) = points.first() else { return 0.0 };
+        let mut along = -first.frame.world(first.source.xyz());
+        let mut field = Field::linear(polarisation.field(along));
+        for (place, lit) in points.iter().enumerate() {
+            let exit = match points.get(place + 1) {
+                Some(next) => lit.frame.local(-next.frame.world(next.source.xyz())),
+                None => lit.antenna,
+            };
+            let amplitudes = lit.surface.scattering.facet_amplitudes(lit.source, exit);
+            let onward = lit.frame.world(exit.xyz());
+            field = field.reflected(along, onward, amplitudes);
+            along = onward;
+        }
+        field.power_along(polarisation.received(-along, channel))
     }
 
     /// What a point scatters towards the antenna.

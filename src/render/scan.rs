@@ -52,7 +52,8 @@ pub fn trace(
 /// As [`trace`], with the target where the effects of the setup place it.
 ///
 /// # Errors
-/// As [`trace`], and when an effect would be counted twice.
+/// When no ray hits the mesh, when the tracer does not accept the rays or fails, or when an effect would be counted
+/// twice.
 pub fn trace_placed(
     setup: &Setup,
     rays_per_chirp: usize,
@@ -130,7 +131,8 @@ pub fn shade(
 /// `[radar.receiver]`.
 ///
 /// # Errors
-/// As [`shade`]: from this function, or from the iterator for a chirp with a path that is too long.
+/// When the antenna stands inside the target, a receiver gets several paths of undeclared phases, or an effect would be
+/// counted twice. The iterator gives an error for a chirp with a path that is too long for the sampling.
 pub fn beat_signals<'a>(
     setup: &'a Setup<'a>,
     footprints: &'a Footprints,

@@ -1,6 +1,6 @@
 //! What scenes render of a material at a few angles.
 
-use crate::brdf::Scattering;
+use crate::brdf::{Scattering, ScatteringModel, VIEWING_RAD};
 use crate::error::Error;
 use crate::material::Material;
 use crate::units::{db_from_ratio, rounded};
@@ -25,6 +25,17 @@ pub enum Sigma0Level {
     BelowDb(f64),
     /// No echo at all.
     Nothing,
+}
+
+/// How wide the smooth mirror of what a material renders is drawn; `None` without one.
+///
+/// # Errors
+/// A material whose rendered model is not there.
+pub fn drawn_words(material: &Material) -> Result<Option<String>, Error> {
+    let has_mirror = material.scattering()?.has_smooth_mirror();
+    Ok(has_mirror.then(|| {
+        format!("smooth mirror drawn {VIEWING_RAD} rad wide, as the default radar's beam")
+    }))
 }
 
 /// The levels of a material from 0° to 75°.

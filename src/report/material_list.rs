@@ -61,8 +61,11 @@ impl MaterialList {
             unknown_words: Vec::new(),
         };
         let Some(store) = store else { return Ok(list) };
-        for summary in store.page(filter, most)? {
-            let words = store.rendered_words(&summary.slug)?;
+        let page = store.page(filter, most)?;
+        let slugs: Vec<Slug> = page.iter().map(|summary| summary.slug.clone()).collect();
+        let mut words = store.rendered_words(&slugs)?;
+        for summary in page {
+            let words = words.remove(&summary.slug);
             let kind = words.unwrap_or_else(|| summary.render_kind.as_str().to_owned());
             list.rows.push(MaterialRow { summary, kind });
         }

@@ -34,7 +34,7 @@ pub use curve::{CurveAnswer, CurveRequest};
 pub use effect_help::EffectHelp;
 pub use history::{RevisionRecord, revision_records};
 pub use json::{Record, json_file};
-pub use level_table::{LevelRow, Sigma0Level, level_rows};
+pub use level_table::{LevelRow, Sigma0Level, drawn_words, level_rows};
 pub use material_export::{ExportReport, ExportRequest};
 pub use material_list::{MaterialList, MaterialRow, UnknownWord};
 pub use material_plot::{

@@ -75,7 +75,7 @@ impl NeighbourSearch {
         let current = store.map(|store| store.summary(&material.slug)).transpose()?.flatten();
         let is_current = current.map(|current| current.revision) == revision;
         let Some(curve) = material.longest_curve() else {
-            return Err(Error::usage(format!("`{name}` has no curve"), "give the file of one"));
+            return Err(Error::NoCurve { material: name.to_owned() });
         };
         let instrument =
             material.instruments.iter().find(|own| Some(&own.key) == curve.instrument.as_ref());

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::formats::figure::{Figure, Plot, Scale, Series, Style};
 use crate::geometry::Raster;
 use crate::geometry::raster::Channel;
-use crate::radar::f5::{Domain, FitError};
+use crate::radar::f5::{Domain, F5Deviation};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Beam, Chirps, F5, Field, Radar};
 use crate::scene::{SceneError, SceneFile, read_regular, read_text};
@@ -25,7 +25,7 @@ pub struct RadarReport {
     /// The polynomial of equation (1).
     pub f5: F5,
     /// How far it is from the exact mirror, mm.
-    pub f5_error: FitError,
+    pub f5_error: F5Deviation,
 }
 
 impl RadarReport {

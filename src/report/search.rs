@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::setup::{Database, store_of_not_added};
-use crate::store::{Hit, Store};
+use crate::store::{Match, Store};
 
 /// What is looked for.
 #[derive(Clone, Copy, Debug)]
@@ -20,7 +20,7 @@ pub struct MaterialSearch<'a> {
 pub struct MaterialHit {
     /// The material and the text around the words.
     #[serde(flatten)]
-    pub hit: Hit,
+    pub hit: Match,
     /// Where it is: `database` or `built-in`.
     pub origin: &'static str,
 }

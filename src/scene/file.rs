@@ -150,6 +150,10 @@ pub struct RegionEntry {
     /// projected onto each facet; `m` of an anisotropic model is along it, azimuth counts from it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub grain: Option<[f64; 3]>,
+    /// Share of its diffuse return that comes back across the polarisation that was sent, 0 to 0.5; 0.5
+    /// is an echo without any polarisation left. The law is the co-polar return: this adds to it.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub depolarised_share: f64,
     /// Only facets of this mesh.
     pub mesh: Option<String>,
     /// Only facets labelled so by the file: `{ part = "head" }`, `{ usemtl = "skin" }`,
@@ -163,6 +167,10 @@ pub struct RegionEntry {
     pub sphere: Option<SphereEntry>,
     /// Only facets whose centroid lies on the side of a plane that its normal points to.
     pub half_space: Option<HalfSpaceEntry>,
+}
+
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
 }
 
 /// The value of a facet label.

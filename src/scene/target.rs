@@ -38,6 +38,8 @@ pub struct Region {
     pub material: String,
     /// Direction of its grain in the global frame, of any length.
     pub grain: DVec3,
+    /// Share of its diffuse return across the polarisation that was sent, 0 to 1/2.
+    pub depolarised_share: f64,
     /// Facets it holds after later regions took theirs.
     pub facets: usize,
 }
@@ -97,6 +99,7 @@ impl Target {
             .map_err(|error| SceneError::Region { file: path.to_owned(), error })?;
         let regions = count_regions(file, &region_of_facet);
         check_grains(file, path)?;
+        check_depolarised_shares(file, path)?;
         Ok(Target { mesh, meshes, regions, region_of_facet })
     }
 }
@@ -123,6 +126,18 @@ fn check_grains(file: &SceneFile, path: &Path) -> Result<(), SceneError> {
     }
 }
 
+fn check_depolarised_shares(file: &SceneFile, path: &Path) -> Result<(), SceneError> {
+    for region in &file.region {
+        if !(0.0..=0.5).contains(&region.depolarised_share) {
+            let place = format!("region `{}`", region.name);
+            let problem = format!("has depolarised_share = {}", region.depolarised_share);
+            let way_out = "give 0 to 0.5, which is an echo without any polarisation left";
+            return Err(value(path, &place, &problem, way_out));
+        }
+    }
+    Ok(())
+}
+
 fn count_regions(file: &SceneFile, region_of_facet: &[u16]) -> Vec<Region> {
     let mut facets = vec![0; file.region.len()];
     for &region in region_of_facet {
@@ -133,6 +148,7 @@ fn count_regions(file: &SceneFile, region_of_facet: &[u16]) -> Vec<Region> {
             name: entry.name.clone(),
             material: entry.material.clone(),
             grain: entry.grain.map_or(DVec3::Y, DVec3::from_array),
+            depolarised_share: entry.depolarised_share,
             facets,
         })
         .collect()

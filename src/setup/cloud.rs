@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 use serde::Deserialize;
 
 use crate::error::Error;
-use crate::files::FilesError;
+use crate::files::read_whole;
 use crate::frames::{Global, Pose};
 use crate::measure::{Cloud, CloudFormat, CloudReading};
 
@@ -22,7 +22,7 @@ pub fn read_cloud(path: &Path, reading: &CloudReading) -> Result<Cloud, Error> {
             "convert or rename the cloud",
         ));
     };
-    let cloud = reading.read(format, &read(path)?);
+    let cloud = reading.read(format, &read_whole(path)?);
     cloud.map_err(|error| Error::Cloud { file: path.to_owned(), error })
 }
 
@@ -31,8 +31,8 @@ pub fn read_cloud(path: &Path, reading: &CloudReading) -> Result<Cloud, Error> {
 /// # Errors
 /// A file that cannot be read, or has no pose.
 pub fn read_pose(path: &Path) -> Result<Pose<Global, Global>, Error> {
-    let file: PoseFile =
-        serde_json::from_slice(&read(path)?).map_err(|error| no_pose(path, &error.to_string()))?;
+    let file: PoseFile = serde_json::from_slice(&read_whole(path)?)
+        .map_err(|error| no_pose(path, &error.to_string()))?;
     file.pose
         .pose()
         .ok_or_else(|| no_pose(path, "its pose is not a rotation with a shift within 10 km"))
@@ -70,8 +70,4 @@ fn no_pose(path: &Path, problem: &str) -> Error {
         format!("{}: {problem}", path.display()),
         "give a pose.json that `matdb measure` wrote",
     )
-}
-
-fn read(path: &Path) -> Result<Vec<u8>, FilesError> {
-    std::fs::read(path).map_err(|reason| FilesError::unreadable(path, reason))
 }

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::formats::text::nearest;
 use crate::material::{Material, Slug, builtin};
-use crate::store::{Store, StoredRevision};
+use crate::store::{Store, StoreError, StoredRevision};
 
 /// A material and where it was found.
 #[derive(Clone, Debug)]
@@ -106,7 +106,8 @@ pub fn status_warning(material: &Material) -> Option<String> {
     Some(format!("`{}` is {}", material.slug, material.status.sentence()?))
 }
 
-/// A sentence on a revision of a material that a later revision withdraws or supersedes.
+/// A sentence on a revision of a material that a later revision withdraws or supersedes, or of which the current
+/// revision is damaged.
 ///
 /// # Errors
 /// A database that cannot be read.
@@ -116,7 +117,13 @@ pub fn later_status_warning(
     revision: Option<u32>,
 ) -> Result<Option<String>, Error> {
     let (Some(store), Some(revision)) = (store, revision) else { return Ok(None) };
-    let Some(current) = store.get(slug, None)?.filter(|current| revision < current.revision) else {
+    let current = match store.get(slug, None) {
+        Err(StoreError::Corrupt { problem, .. }) => {
+            return Ok(Some(format!("the current revision of `{slug}` is damaged: {problem}")));
+        }
+        current => current?,
+    };
+    let Some(current) = current.filter(|current| revision < current.revision) else {
         return Ok(None);
     };
     let warning = status_warning(&current.material);

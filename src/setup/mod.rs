@@ -17,6 +17,7 @@ mod cloud;
 mod database;
 mod materials;
 mod scene;
+mod validity;
 mod view;
 
 pub use cloud::{read_cloud, read_pose};
@@ -26,4 +27,5 @@ pub use materials::{
     store_of_not_added, unknown_material,
 };
 pub use scene::{Assembly, ReadyScene, SceneMaterial, resolve_effects};
+pub use validity::{ValidityWarning, unmet_conditions, unmet_sentence};
 pub use view::View;

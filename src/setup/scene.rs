@@ -10,7 +10,7 @@ use crate::formats::EffectEntry;
 use crate::frames::{Global, Point, Pose};
 use crate::geometry::Raster;
 use crate::material::Material;
-use crate::radar::Radar;
+use crate::radar::{Channel, Radar};
 use crate::render::{Bounce, RenderError, Scan, Setup, Surface, power_image};
 use crate::scene::Scene;
 use crate::store::Store;
@@ -77,7 +77,7 @@ impl ReadyScene {
     /// noise: a draw of speckle would add an error to that of a measurement, or hide it. `pose` moves the target.
     ///
     /// # Errors
-    /// As [`open`](Self::open).
+    /// A scene, material or effect that cannot be loaded, by its file and place.
     pub fn open_mean(
         path: &Path,
         pose: Pose<Global, Global>,
@@ -108,6 +108,7 @@ impl ReadyScene {
         let surfaces = std::iter::zip(&self.scene.target.regions, self.of_regions())
             .map(|(region, material)| Surface {
                 scattering: &material.scattering,
+                depolarised_share: region.depolarised_share,
                 grain: region.grain,
             })
             .collect();
@@ -197,6 +198,7 @@ impl<'a> Assembly<'a> {
                 outside_spot: ratio_from_db(bounce.outside_spot_db),
             }),
             effects: self.model.as_ref(),
+            channel: Channel::CoPolar,
             seed: scene.file.seed,
         }
     }

@@ -5,6 +5,8 @@ use glam::DVec3;
 use super::scene::Assembly;
 use crate::error::Error;
 use crate::frames::Point;
+use crate::radar::Channel;
+use crate::radar::polarisation::Receive;
 use crate::render::{Footprints, Observer, Scan, Setup, shade, trace_placed};
 use crate::scene::file::ReceiverEntry;
 
@@ -14,16 +16,23 @@ pub struct View<'a> {
     pub receiver: Option<&'a ReceiverEntry>,
     /// The antenna as the renderer takes it.
     pub observer: Observer,
+    /// The polarisation that it receives.
+    pub channel: Channel,
     /// Its echoes.
     pub scan: Scan,
 }
 
 impl View<'_> {
-    /// Name of a file: `power.png` for the radar, `power-NAME.png` for a receiver.
+    /// Name of a file: `power.png` for the radar, `power-NAME.png` for a receiver, with `cross-` in front for
+    /// the cross-polar channel.
     pub fn file_name(&self, stem: &str, extension: &str) -> String {
+        let channel = match self.channel {
+            Channel::CoPolar => "",
+            Channel::CrossPolar => "cross-",
+        };
         match self.receiver {
-            None => format!("{stem}.{extension}"),
-            Some(receiver) => format!("{stem}-{}.{extension}", receiver.name),
+            None => format!("{channel}{stem}.{extension}"),
+            Some(receiver) => format!("{channel}{stem}-{}.{extension}", receiver.name),
         }
     }
 }
@@ -57,6 +66,25 @@ impl<'a> Assembly<'a> {
             .map_err(|error| self.ready().render_error("", error))
     }
 
+    /// The views of the cross-polar channel, in the order of [`views`](Self::views); none if the radar does not
+    /// receive it.
+    ///
+    /// # Errors
+    /// What the renderer refuses, with the scene's file and the receiver that it is about.
+    pub fn cross_polar_views(
+        &self,
+        setup: &Setup,
+        footprints: &Footprints,
+        advance: &(dyn Fn(usize) + Sync),
+    ) -> Result<Vec<View<'a>>, Error> {
+        match self.ready().scene.radar().polarisation.receive {
+            Receive::CoPolar => Ok(Vec::new()),
+            Receive::Both => {
+                self.views(&Setup { channel: Channel::CrossPolar, ..*setup }, footprints, advance)
+            }
+        }
+    }
+
     /// The radar's own view first, then those of the receivers; `advance` hears of chirps as they are done.
     ///
     /// # Errors
@@ -69,7 +97,8 @@ impl<'a> Assembly<'a> {
     ) -> Result<Vec<View<'a>>, Error> {
         let ready = self.ready();
         let scan = self.shade(setup, footprints, advance)?;
-        let mut views = vec![View { receiver: None, observer: Observer::Radar, scan }];
+        let channel = setup.channel;
+        let mut views = vec![View { receiver: None, observer: Observer::Radar, channel, scan }];
         for (number, receiver) in (1u32..).zip(&ready.scene.file.receiver) {
             let observer = Observer::Receiver {
                 number,
@@ -79,7 +108,7 @@ impl<'a> Assembly<'a> {
             let scan = shade(setup, footprints, observer, advance).map_err(|error| {
                 ready.render_error(&format!("receiver `{}`: ", receiver.name), error)
             })?;
-            views.push(View { receiver: Some(receiver), observer, scan });
+            views.push(View { receiver: Some(receiver), observer, channel, scan });
         }
         Ok(views)
     }

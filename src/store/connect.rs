@@ -395,10 +395,53 @@ fn migrate(path: &Path, conn: &mut Connection) -> Result<(), StoreError> {
     if schema_of(path, conn)? == LATEST {
         return Ok(());
     }
-    outcome.map_err(|error| match error {
-        rusqlite_migration::Error::RusqliteError { err, .. } => StoreError::new(path, err),
-        error => StoreError::Migration { file: path.to_owned(), error },
+    outcome.map_err(|error| match (obstacle(path, conn), error) {
+        (Ok(Some(obstacle)), _) => obstacle,
+        (_, rusqlite_migration::Error::RusqliteError { err, .. }) => StoreError::new(path, err),
+        (_, error) => StoreError::Migration { file: path.to_owned(), error },
     })
+}
+
+/// The error for a file of an older schema with a table, index or view of somebody else that has a name of the latest
+/// schema, or refers to a table that is not one any more.
+fn obstacle(path: &Path, conn: &Connection) -> Result<Option<StoreError>, StoreError> {
+    let error = |object: &str, problem| {
+        let (file, object) = (path.to_owned(), object.to_owned());
+        Some(StoreError::InTheWay { file, object, problem })
+    };
+    let mut old = Connection::open_in_memory().in_file(path)?;
+    configure(&old).in_file(path)?;
+    let file = path.to_owned();
+    let migrations = Migrations::new(schemas(Vec::new()).into());
+    let made = migrations.to_version(&mut old, schema_of(path, conn)?);
+    made.map_err(|error| StoreError::Migration { file, error })?;
+    let (old, latest) = (names(&old).in_file(path)?, names(&in_memory()?).in_file(path)?);
+    let has = |objects: &[[String; 2]], wanted: &str| {
+        objects.iter().any(|[_, name]| name.eq_ignore_ascii_case(wanted))
+    };
+    for [kind, name] in names(conn).in_file(path)?.iter().filter(|[_, name]| !has(&old, name)) {
+        let object = format!("the {kind} `{name}`");
+        if has(&latest, name) {
+            let problem = format!("matdb needs the name of {object}, which it has not made");
+            return Ok(error(&object, problem));
+        }
+        let sql = "SELECT \"table\" FROM pragma_foreign_key_list(?1)";
+        let parents: Vec<String> = rows(conn, sql, [name], |row| row.get(0)).in_file(path)?;
+        for parent in parents {
+            let is_table = latest.iter().any(|[kind, name]| *name == parent && kind == "table");
+            if has(&old, &parent) && !is_table {
+                let problem = format!("{object}, which matdb has not made, refers to `{parent}`");
+                return Ok(error(&object, problem));
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// Kind and name of every object of a schema.
+fn names(conn: &Connection) -> rusqlite::Result<Vec<[String; 2]>> {
+    let sql = "SELECT type, name FROM sqlite_schema ORDER BY rowid";
+    rows(conn, sql, [], |row| Ok([row.get(0)?, row.get(1)?]))
 }
 
 /// Creates the tables of the latest schema in an empty file, unless another program has done so.

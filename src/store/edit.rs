@@ -1,4 +1,4 @@
-//! MaterialWriter and removing materials.
+//! Adding and removing materials.
 
 use super::database::Store;
 use super::error::{InFile, StoreError};
@@ -28,7 +28,7 @@ impl Store {
     /// undo itself when it is dropped, since committing may still fail.
     ///
     /// # Errors
-    /// As [`Store::add`], and those of `then`.
+    /// When a material is not [valid](Material::validate), or the file cannot be written; an error of `then`.
     pub fn add_if<'a, T, E: From<StoreError>>(
         &mut self,
         materials: impl IntoIterator<Item = &'a Material>,
@@ -42,7 +42,7 @@ impl Store {
     /// Adds materials as [`Store::add`] does, each with the command that made it and its inputs.
     ///
     /// # Errors
-    /// As [`Store::add`].
+    /// When a material is not [valid](Material::validate), or the file cannot be written.
     pub fn add_made(&mut self, made: &[(Material, Activity)]) -> Result<Vec<Addition>, StoreError> {
         let made: Vec<_> = made.iter().map(|(material, by)| (material, Some(by))).collect();
         self.add_all(&made, |added| Ok(added.to_vec()))
@@ -71,7 +71,7 @@ impl Store {
     /// gets the answer for each; an error of `then` or of `materials` undoes everything.
     ///
     /// # Errors
-    /// As [`Store::add`], those of `then` and of `materials`.
+    /// When a material is not [valid](Material::validate), or the file cannot be written; an error of `then` or of `materials`.
     pub fn add_each<E: From<StoreError>>(
         &mut self,
         materials: impl IntoIterator<Item = Result<Material, E>>,
@@ -85,7 +85,7 @@ impl Store {
     /// Adds materials as [`Store::add_each`] does, each with the command that made it and its inputs.
     ///
     /// # Errors
-    /// As [`Store::add_each`].
+    /// When a material is not [valid](Material::validate), or the file cannot be written; an error of `then` or of `made`.
     pub fn add_each_made<E: From<StoreError>>(
         &mut self,
         made: impl IntoIterator<Item = Result<(Material, Option<Activity>), E>>,

@@ -67,6 +67,30 @@ pub enum StoreError {
         /// What was noticed.
         problem: String,
     },
+    /// Its pages are damaged, so that neither a check nor a repair comes to its end.
+    #[error(
+        "{} is damaged, and no repair mends that: {problem}; restore the file from a copy, or export what can still be read",
+        file.display()
+    )]
+    BeyondRepair {
+        /// The file.
+        file: PathBuf,
+        /// What was noticed.
+        problem: String,
+    },
+    /// An object that is not of matdb keeps the schema from being brought up to date; the file is as it was.
+    #[error(
+        "{} cannot be brought up to date: {problem}; rename or remove {object} in another program",
+        file.display()
+    )]
+    InTheWay {
+        /// The file.
+        file: PathBuf,
+        /// Kind and name of the object.
+        object: String,
+        /// Why it is in the way.
+        problem: String,
+    },
     /// Somebody has added a trigger, which would run whenever the program writes; it was not touched.
     #[error(
         "{} has a trigger `{name}` that matdb has not made and that would run whenever it writes; remove it in \
@@ -115,7 +139,7 @@ pub enum StoreError {
         reason: io::Error,
     },
     /// Reading or writing failed underneath.
-    #[error("cannot read or write {}: {error}; check the disk and its quota", file.display())]
+    #[error("cannot read or write {}: {error}; if the disk or its quota is full, make room there, else check the disk", file.display())]
     Disk {
         /// The file.
         file: PathBuf,

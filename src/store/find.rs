@@ -4,6 +4,8 @@ mod filter;
 pub(super) mod outline;
 mod words;
 
+use std::collections::BTreeMap;
+
 use rusqlite::{Connection, OptionalExtension, Result, Transaction, TransactionBehavior};
 
 use super::database::Store;
@@ -16,7 +18,7 @@ use filter::summary;
 
 pub use filter::Filter;
 pub use outline::OutlineEntry;
-pub use words::Hit;
+pub use words::Match;
 
 impl Store {
     /// The current revisions of the materials that match a filter, sorted by name.
@@ -68,17 +70,27 @@ impl Store {
         one(&self.conn, slug).in_file(&self.path)
     }
 
-    /// Kind of the rendered model in words, as [`Material::rendered_words`](crate::material::Material::rendered_words)
-    /// gives it, or that it is damaged. Does not read the rest of the material.
+    /// Kinds of the rendered models of materials in words, as
+    /// [`Material::rendered_words`](crate::material::Material::rendered_words) gives them, or that they are damaged. Does
+    /// not read the rest of the materials. Those without such words are left out.
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn rendered_words(&self, slug: &Slug) -> Result<Option<String>, StoreError> {
-        match words_of(&self.conn, slug) {
-            // A list shows the other materials.
-            Err(error) if is_damage(&error) => Ok(Some("damaged".to_owned())),
-            words => words.in_file(&self.path),
+    pub fn rendered_words(&self, slugs: &[Slug]) -> Result<BTreeMap<Slug, String>, StoreError> {
+        let mut words = match words_of(&self.conn, slugs) {
+            Err(error) if is_damage(&error) => BTreeMap::new(),
+            words => return words.in_file(&self.path),
+        };
+        // A list shows the other materials, so that each is read by itself.
+        for slug in slugs {
+            match words_of(&self.conn, std::slice::from_ref(slug)) {
+                Err(error) if is_damage(&error) => {
+                    words.insert(slug.clone(), "damaged".to_owned());
+                }
+                found => words.extend(found.in_file(&self.path)?),
+            }
         }
+        Ok(words)
     }
 
     /// The `most` materials that all these words are found in, the best first; the last word may be the
@@ -90,7 +102,7 @@ impl Store {
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn search(&self, words: &str, most: u32) -> Result<Vec<Hit>, StoreError> {
+    pub fn search(&self, words: &str, most: u32) -> Result<Vec<Match>, StoreError> {
         words::search(&self.conn, words, most).in_file(&self.path)
     }
 }
@@ -106,19 +118,19 @@ fn one(conn: &Connection, slug: &Slug) -> Result<Option<Summary>> {
     Ok(found)
 }
 
-fn words_of(conn: &Connection, slug: &Slug) -> Result<Option<String>> {
-    let sql = "SELECT fit.estimator, source.kind
-               FROM material
+fn words_of(conn: &Connection, slugs: &[Slug]) -> Result<BTreeMap<Slug, String>> {
+    let wanted = serde_json::json!(slugs).to_string();
+    let sql = "SELECT slug, fit.estimator, source.kind
+               FROM json_each(?1) CROSS JOIN material ON slug = json_each.value
                JOIN revision ON material_id = material.id AND number = current_revision
                JOIN fit ON fit.revision_id = revision.id AND fit.name = render
                JOIN curve ON curve.revision_id = revision.id AND curve.name = fit.curve
-               JOIN source ON source.revision_id = revision.id AND source.key = curve.source
-               WHERE slug = ?1";
-    let found = conn.prepare_cached(sql)?.query_row([slug.as_str()], |row| {
-        let (estimator, kind): (String, SourceKind) = (row.get(0)?, row.get(1)?);
-        Ok(kind.words_beside(estimator != Fit::STATED))
-    });
-    found.optional()
+               JOIN source ON source.revision_id = revision.id AND source.key = curve.source";
+    let found: Vec<(Slug, String)> = rows(conn, sql, [wanted], |row| {
+        let (estimator, kind): (String, SourceKind) = (row.get(1)?, row.get(2)?);
+        Ok((row.get(0)?, kind.words_beside(estimator != Fit::STATED)))
+    })?;
+    Ok(found.into_iter().collect())
 }
 
 /// Materials whose rows in lists, searches or outlines differ from their current revision.

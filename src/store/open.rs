@@ -24,7 +24,7 @@ impl Store {
     /// up to date in memory and stays as it is until somebody [opens](Store::open) it for writing.
     ///
     /// # Errors
-    /// As [`Store::open`].
+    /// When the file belongs to another program, is newer than this program, damaged or locked, or cannot be read.
     pub fn open_existing(path: impl AsRef<Path>) -> Result<Option<Store>, StoreError> {
         let path = path.as_ref().to_owned();
         let conn = connect::readable(&path)?;
@@ -35,7 +35,7 @@ impl Store {
     /// read nor changed. `None` when there is no file or nothing in it.
     ///
     /// # Errors
-    /// As [`Store::open`].
+    /// When the file belongs to another program, is newer than this program, damaged, or cannot be read.
     pub fn open_frozen(path: impl AsRef<Path>) -> Result<Option<Store>, StoreError> {
         let path = path.as_ref().to_owned();
         let conn = connect::frozen(&path)?;

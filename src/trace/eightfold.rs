@@ -284,16 +284,23 @@ impl Aim {
         }
     }
 
+    /// The face of every box of a node across an axis at which the ray enters the box.
+    #[inline(always)]
+    fn entry_face<'a>(&self, node: &'a Node, axis: usize) -> &'a Lanes {
+        if self.per[axis] < 0.0 { &node.high[axis] } else { &node.low[axis] }
+    }
+
+    /// The face of every box of a node across an axis at which the ray leaves the box.
+    #[inline(always)]
+    fn exit_face<'a>(&self, node: &'a Node, axis: usize) -> &'a Lanes {
+        if self.per[axis] < 0.0 { &node.low[axis] } else { &node.high[axis] }
+    }
+
     /// Marks the boxes that the ray enters before `limit`, m, and returns the distance of each entry, m.
     #[inline(always)]
     fn boxes(&self, node: &Node, limit: f32) -> (Marks, Lanes) {
-        // The faces at which the ray enters and leaves.
-        let is_turned = self.per.map(|per| per < 0.0);
-        let sides: [[&Lanes; 2]; 3] = std::array::from_fn(|axis| {
-            let (low, high) = (&node.low[axis], &node.high[axis]);
-            if is_turned[axis] { [high, low] } else { [low, high] }
-        });
-        let [first, last] = [0, 1].map(|side| sides.map(|sides| sides[side]));
+        let first: [&Lanes; 3] = std::array::from_fn(|axis| self.entry_face(node, axis));
+        let last: [&Lanes; 3] = std::array::from_fn(|axis| self.exit_face(node, axis));
         let ([x, y, z], [per_x, per_y, per_z]) = (self.origin, self.per);
         let (mut near, mut within) = ([0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {

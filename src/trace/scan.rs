@@ -35,7 +35,7 @@ impl<'a> ScanGeometry<'a> {
     /// Traces rays with the tracer of the scan: the closest hit of each, in their order.
     ///
     /// # Errors
-    /// As [`Tracer::closest`].
+    /// When the rays do not suit the tracer, or when the graphics processor fails or holds another hierarchy.
     pub fn closest(&self, rays: &[Ray<Global>]) -> Result<Vec<Option<Hit>>, TraceError> {
         self.tracer.closest(self.bvh, rays)
     }

@@ -227,6 +227,32 @@ pub fn sound(slug: &str) -> Material {
     material
 }
 
+/// A material with sixty more points and the fit that the program makes of them, so that anybody can verify it.
+pub fn refitted(mut material: Material) -> Material {
+    let points = (3..63).map(|chirp: u32| {
+        let theta_rad = 0.02 * f64::from(chirp - 3);
+        let mean = 4.0 * (-(theta_rad / 0.07).powi(2)).exp() + 0.02 * theta_rad.cos().powi(3);
+        let scatter = 0.4 + 0.1 * f64::from((chirp * 7) % 13);
+        Observation {
+            theta_sd_rad: Some(0.01),
+            power_w: Some(1e-10),
+            range_m: Some(8.0),
+            chirp: Some(chirp),
+            ..observation(theta_rad, Some(mean * scatter), Censor::None)
+        }
+    });
+    material.curves[0].observations.extend(points);
+    let curve = matdb::measure::Curve::from_observations(&material.curves[0].observations).unwrap();
+    let fixed = vec![("diffuse.alpha".to_owned(), 3.0)];
+    let fit = matdb::fit::Fit { fixed, looks: Some(1.0), starts: 1, ..matdb::fit::Fit::default() };
+    let found = fit.run(&material.fits[0].model, &curve).unwrap();
+    let stored = &material.fits[0];
+    let sources = stored.parameter_sources.clone();
+    material.fits[0] = found.stored(&stored.name, &material.curves[0].name, &stored.source);
+    material.fits[0].parameter_sources = sources;
+    material
+}
+
 fn report() -> FitReport {
     let estimate = |name: &str, sd: Option<f64>| Estimate {
         name: name.to_owned(),

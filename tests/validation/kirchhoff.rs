@@ -35,7 +35,7 @@ fn rough(kh: f64, correlation_length_m: f64, correlation: Correlation) -> Kirchh
         eps_real: MIRROR,
         eps_imag: 0.0,
         frequency_hz: 300e9,
-        lobe_rad: 0.5,
+        lobe_rad: Some(0.5),
     }
 }
 

@@ -107,7 +107,11 @@ const MODELS: [Entry; 33] = [
             {"model":"cook-torrance","f_lambda":1,"m":0.3}]}"#,
         Some(MIXED),
     ),
-    ("metal, lobe 0.02 rad", r#"{"model":"fresnel","eps_real":1,"eps_imag":1e9}"#, None),
+    (
+        "metal, lobe 0.02 rad",
+        r#"{"model":"fresnel","eps_real":1,"eps_imag":1e9,"lobe_rad":0.02}"#,
+        None,
+    ),
     (
         "water, lobe 0.1 rad",
         r#"{"model":"fresnel","eps_real":4.67,"eps_imag":5,"lobe_rad":0.1}"#,

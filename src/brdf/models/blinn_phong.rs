@@ -3,15 +3,17 @@
 //! r_s sets the level, α the decay: 0 is Lambertian, larger values fall off faster. In backscatter
 //! n·h = cos θ. The model does not keep energy: at normal incidence it reflects 1 to 4 times r_s as α
 //! goes from 0 to infinity, less at grazing incidence, so that r_s up to 1/4 is safe for any α.
+//!
+//! A beam adds δ² to the lobe's width m² = 2/α: 0.3 dB at α = 1000 for δ = 0.0117 rad, and nothing for broad lobes.
 
 use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use crate::brdf::backscatter::Term;
+use crate::brdf::backscatter::{Term, seen_cosines};
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_number};
-use crate::brdf::scattering::{Scattering, ScatteringModel, half_vector};
+use crate::brdf::scattering::{Scattering, ScatteringModel, Seen, half_vector};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -32,8 +34,13 @@ pub struct BlinnPhong {
 
 impl Scattering for BlinnPhong {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        self.seen_by(0.0, i, o).f_per_sr
+    }
+
+    fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         let n_h = half_vector(i, o).cos_theta();
-        self.r_s * (self.alpha + 2.0) / TAU * n_h.powf(self.alpha)
+        let (alpha, share) = seen_cosines(self.alpha, beam_rad);
+        Seen::diffuse(self.r_s * (self.alpha + 2.0) / TAU * share * n_h.powf(alpha))
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {

@@ -17,8 +17,10 @@ use serde::{Deserialize, Serialize};
 use crate::brdf::backscatter::{Facets, Term};
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_number};
-use crate::brdf::scattering::{Scattering, ScatteringModel, Seen, half_vector};
-use crate::brdf::slopes::Distribution;
+use crate::brdf::scattering::{
+    NARROW_M, NarrowLobe, Scattering, ScatteringModel, Seen, half_vector,
+};
+use crate::brdf::slopes::{Distribution, SlopeMatrix};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -70,18 +72,13 @@ pub enum Shadowing {
 }
 
 impl CookTorrance {
-    /// D(h), facet normals per steradian.
-    fn d_per_sr(&self, h: Direction<Surface>) -> f64 {
-        let Some(m_across) = self.m_across else {
-            return self.distribution.d_per_sr(h.cos_theta(), self.m);
-        };
-        self.distribution.d_anisotropic_per_sr(h, [self.m, m_across])
+    /// Roughness along x and along y.
+    fn axes(&self) -> [f64; 2] {
+        [self.m, self.m_across.unwrap_or(self.m)]
     }
 
-    /// The lobe that a beam of a divergence, rad, sees: as it is, but never narrower than the beam.
-    fn widened(&self, beam_rad: f64) -> CookTorrance {
-        let m_across = self.m_across.map(|m_across| m_across.max(beam_rad));
-        CookTorrance { m: self.m.max(beam_rad), m_across, ..*self }
+    fn is_narrow(&self) -> bool {
+        self.axes().into_iter().all(|m| m <= NARROW_M)
     }
 
     /// G1 of one direction, with the roughness in its azimuth.
@@ -111,15 +108,29 @@ impl CookTorrance {
 
 impl Scattering for CookTorrance {
     fn f_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        let h = half_vector(i, o);
-        let d = self.d_per_sr(h);
-        let f = self.fresnel(o.xyz().dot(h.xyz()));
-        f * d * self.shadowing(i, o) / (4.0 * i.cos_theta() * o.cos_theta())
+        self.seen_by(0.0, i, o).f_per_sr
     }
 
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
-        let f_per_sr = self.widened(beam_rad).f_per_sr(i, o);
-        Seen::facets(f_per_sr, beam_rad, [self.m, self.m_across.unwrap_or(self.m)])
+        let h = half_vector(i, o);
+        let beam = SlopeMatrix::of_beam(beam_rad, i, o);
+        let d = self.distribution.d_seen_per_sr(h, self.axes(), beam);
+        let f = self.fresnel(o.xyz().dot(h.xyz()));
+        let f_per_sr = f * d * self.shadowing(i, o) / (4.0 * i.cos_theta() * o.cos_theta());
+        Seen::facets(f_per_sr, beam_rad, self.axes())
+    }
+
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        if !self.is_narrow() {
+            return Vec::new();
+        }
+        let share = self.fresnel(i.cos_theta()) * self.shadowing(i, i.mirrored());
+        let [m, m_across] = self.axes();
+        vec![NarrowLobe { share, m: (m * m_across).sqrt() }]
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if self.is_narrow() { Seen::default() } else { self.seen_by(0.0, i, o) }
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {
@@ -127,7 +138,8 @@ impl Scattering for CookTorrance {
             Shadowing::Separable => 2,
             Shadowing::Correlated => 1,
         };
-        let facets = Facets { m: self.m, distribution: self.distribution, shadowed };
+        let (m, distribution) = (self.m, self.distribution);
+        let facets = Facets { m, distribution, shadowed, includes_beam: false };
         self.m_across.is_none().then(|| vec![Term::mirrors(self.f_lambda, facets)])
     }
 }
@@ -139,6 +151,10 @@ impl ScatteringModel for CookTorrance {
         if let Some(m_across) = &mut self.m_across {
             visit_number(visitor, prefix, "m_across", (0.001, 2.0), m_across);
         }
+    }
+
+    fn lobe_rad(&self) -> Option<f64> {
+        Some(self.m_across.map_or(self.m, |m_across| self.m.min(m_across)))
     }
 
     fn f_lambda(&self) -> Option<f64> {

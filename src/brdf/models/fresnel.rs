@@ -2,30 +2,32 @@
 //!
 //! R is Fresnel's reflectance of unpolarised waves at the angle ψ of the mirroring facet (Born & Wolf,
 //! *Principles of Optics*, 7th ed., §1.5.2 and §14.2). A perfect mirror is a delta in direction; a
-//! radar sees it as wide as its beam, D: Beckmann's law with `lobe_rad` as m, the tilt at which the
-//! echo has fallen to 1/e (default 0.02 rad: a Gaussian spot of 16 mm at 1 mm wavelength). What is
-//! reflected in all directions is R(θ_i) within 0.002 for lobes up to 0.05 rad, θ_i up to 75°.
+//! radar sees it as wide as its beam, D: Beckmann's law with the beam's divergence δ as m, the tilt at which the echo
+//! has fallen to 1/e. Without a radar it is drawn [`VIEWING_RAD`](crate::brdf::VIEWING_RAD) wide. Where `lobe_rad`
+//! is stated, as by a fit to a radar's curve, it is that of beam and surface together: m = `lobe_rad`, and no less
+//! than δ. What is reflected in all directions is R(θ_i) within 0.002 for lobes up to 0.05 rad, θ_i up to 75°.
 //!
 //! At 300 GHz: PTFE ε = 2.07 − j0.0011 (R = −14.9 dB at normal incidence), glass 5.8 − j0.3, water
 //! 4.67 − j5.00 (−6.2 dB), aluminium −1.9·10⁴ − j2.2·10⁶ (−0.008 dB). A thick piece is meant: an echo
 //! from the far side needs `layered`.
 
+use num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
 use crate::brdf::backscatter::Term;
 use crate::brdf::kind::{Key, Kind};
-use crate::brdf::parameter::{Visitor, visit_quantity};
+use crate::brdf::parameter::Visitor;
 use crate::brdf::permittivity::{
-    EPS_IMAG, EPS_REAL, LOBE_RANGE_RAD, default_lobe_rad, fresnel_reflectance, mirror_lobe,
-    mirror_lobe_per_sr, permittivity, visit_permittivity,
+    EPS_IMAG, EPS_REAL, fresnel_reflectance, half_space_amplitudes, is_narrow, mirror_cosine,
+    mirror_lobe, mirror_lobe_per_sr, narrow_mirror, permittivity, visit_lobe, visit_permittivity,
 };
-use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
+use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
     name: "fresnel",
-    keys: &[EPS_REAL, EPS_IMAG, Key::number("lobe_rad")],
-    starts: &[("fresnel", r#"{"model": "fresnel", "eps_real": 3}"#)],
+    keys: &[EPS_REAL, EPS_IMAG, Key::number("lobe_rad").optional()],
+    starts: &[("fresnel", r#"{"model": "fresnel", "eps_real": 3, "lobe_rad": 0.02}"#)],
 };
 
 /// A smooth dielectric or metal.
@@ -37,9 +39,10 @@ pub struct Fresnel {
     /// ε″ ≥ 0, relative to vacuum: the loss.
     #[serde(default)]
     pub eps_imag: f64,
-    /// Width of the mirror's lobe, 0.001 to 0.5 rad.
-    #[serde(default = "default_lobe_rad")]
-    pub lobe_rad: f64,
+    /// Width of the mirror's lobe as the radar sees it, 0.001 to 0.5 rad, the beam included; absent for a smooth
+    /// mirror, whose lobe is the beam's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lobe_rad: Option<f64>,
 }
 
 impl Fresnel {
@@ -55,9 +58,22 @@ impl Scattering for Fresnel {
     }
 
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
-        let (eps, lobe_rad) =
-            (permittivity(self.eps_real, self.eps_imag), self.lobe_rad.max(beam_rad));
-        Seen::mirror(mirror_lobe_per_sr(i, o, lobe_rad, |cos| fresnel_reflectance(eps, cos)))
+        let eps = permittivity(self.eps_real, self.eps_imag);
+        let reflectance = |cos| fresnel_reflectance(eps, cos);
+        Seen::mirror(mirror_lobe_per_sr(i, o, self.lobe_rad, beam_rad, reflectance))
+    }
+
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        let eps = permittivity(self.eps_real, self.eps_imag);
+        narrow_mirror(self.lobe_rad, fresnel_reflectance(eps, i.cos_theta()))
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if is_narrow(self.lobe_rad) { Seen::default() } else { self.seen_by(0.0, i, o) }
+    }
+
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        half_space_amplitudes(permittivity(self.eps_real, self.eps_imag), mirror_cosine(i, o))
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {
@@ -68,12 +84,15 @@ impl Scattering for Fresnel {
 impl ScatteringModel for Fresnel {
     fn visit_parameters(&mut self, prefix: &str, visitor: &mut Visitor) {
         visit_permittivity(visitor, prefix, &mut self.eps_real, &mut self.eps_imag);
-        let slot = &mut self.lobe_rad;
-        visit_quantity(visitor, prefix, "lobe_rad", "rad", LOBE_RANGE_RAD, slot);
+        visit_lobe(visitor, prefix, &mut self.lobe_rad);
     }
 
     fn is_smooth(&self) -> bool {
         true
+    }
+
+    fn has_smooth_mirror(&self) -> bool {
+        self.lobe_rad.is_none()
     }
 
     fn permittivity(&self) -> Option<[f64; 2]> {
@@ -86,10 +105,9 @@ mod tests {
     use super::*;
     use crate::brdf::permittivity::{Polarisation, interface, normal_wavenumber};
     use crate::units::db_from_ratio;
-    use nalgebra::Complex;
 
     fn smooth(eps_real: f64, eps_imag: f64) -> Fresnel {
-        Fresnel { eps_real, eps_imag, lobe_rad: 0.02 }
+        Fresnel { eps_real, eps_imag, lobe_rad: Some(0.02) }
     }
 
     #[test]

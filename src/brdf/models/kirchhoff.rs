@@ -16,23 +16,27 @@
 //!
 //! At 300 GHz (k = 6.28 rad/mm) painted or anodised metal has s = 0.5–5 µm and coarse grit 36–280 µm
 //! (Grossman 2017, IEEE Trans. THz Sci. Technol. 7(5)); cast or blasted 5–50 µm is assumed; l is 0.1–3 mm.
-//! The theory wants k·l > 6 and a radius of curvature beyond λ (for Gaussian correlation l² > 2.8·s·λ); exponential correlation has no
+//! The theory asks for k·l ≥ 6, and for Gaussian correlation for a radius of curvature beyond λ (l² ≥ 2.76·s·λ) and an
+//! rms slope of 0.25 at most (`conditions`); exponential correlation has no
 //! curvature, and its results are a convention of the field. There is no shadowing: a metal
 //! with s = 0.3 mm, l = 2 mm reflects at most what it receives up to 60°, but at 75° 1.04 (Gaussian) to
 //! 1.40 (exponential) times that. Rough exponential surfaces lose up to half at normal incidence.
 
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{PI, SQRT_2, TAU};
 
+use crate::brdf::backscatter::UNSEEN;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_quantity};
 use crate::brdf::permittivity::{
-    EPS_IMAG, EPS_REAL, LOBE_RANGE_RAD, default_frequency_hz, default_lobe_rad,
-    fresnel_reflectance, mirror_cosine, mirror_lobe_per_sr, permittivity, visit_permittivity,
-    wavenumber_rad_per_m,
+    EPS_IMAG, EPS_REAL, default_frequency_hz, fresnel_reflectance, half_space_amplitudes,
+    is_narrow, mirror_cosine, mirror_lobe_per_sr, narrow_mirror, permittivity, visit_lobe,
+    visit_permittivity, wavenumber_rad_per_m,
 };
-use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
+use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
+use crate::brdf::slopes::over_exponential;
+use crate::brdf::validity::{Bound, Condition, ULABY, kirchhoff_conditions, length_condition};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -44,11 +48,12 @@ pub(super) const KIND: Kind = Kind {
         EPS_REAL,
         EPS_IMAG,
         Key::number("frequency_hz"),
-        Key::number("lobe_rad"),
+        Key::number("lobe_rad").optional(),
     ],
     starts: &[(
         "kirchhoff",
-        r#"{"model": "kirchhoff", "rms_height_m": 5e-5, "correlation_length_m": 5e-4, "eps_real": 3}"#,
+        r#"{"model": "kirchhoff", "rms_height_m": 5e-5, "correlation_length_m": 5e-4, "eps_real": 3,
+            "lobe_rad": 0.02}"#,
     )],
 };
 
@@ -71,9 +76,10 @@ pub struct Kirchhoff {
     /// Frequency, 10 GHz to 1 THz.
     #[serde(default = "default_frequency_hz")]
     pub frequency_hz: f64,
-    /// Width of the coherent mirror's lobe, 0.001 to 0.5 rad, as in `fresnel`.
-    #[serde(default = "default_lobe_rad")]
-    pub lobe_rad: f64,
+    /// Width of the mirror's lobe as the radar sees it, 0.001 to 0.5 rad, the beam included; absent for a smooth
+    /// mirror, whose lobe is the beam's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lobe_rad: Option<f64>,
 }
 
 /// How the heights at two places depend on their distance r.
@@ -99,11 +105,22 @@ impl Kirchhoff {
 
     /// The diffuse part of f, 1/sr.
     pub fn incoherent_per_sr(&self, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+        self.incoherent_seen_by(0.0, i, o)
+    }
+
+    /// The diffuse part of f, 1/sr, as a beam of a divergence, rad, sees it: the beam adds (q_z·δ)²/4 to n/l².
+    fn incoherent_seen_by(
+        &self,
+        beam_rad: f64,
+        i: Direction<Surface>,
+        o: Direction<Surface>,
+    ) -> f64 {
         let k_rad_per_m = wavenumber_rad_per_m(self.frequency_hz);
         let q = (i.xyz() + o.xyz()) * k_rad_per_m;
         let across = q.truncate().length() * self.correlation_length_m;
+        let beam = (0.5 * q.z * beam_rad * self.correlation_length_m).powi(2);
         let spectrum_m2 = self.correlation_length_m.powi(2)
-            * self.correlation.series((q.z * self.rms_height_m).powi(2), across);
+            * self.correlation.series((q.z * self.rms_height_m).powi(2), across, beam);
         let reflectance = fresnel_reflectance(self.eps(), mirror_cosine(i, o));
         let sigma0 = reflectance * (q.length_squared() / q.z).powi(2) / (4.0 * PI) * spectrum_m2;
         sigma0 / (4.0 * PI * i.cos_theta() * o.cos_theta())
@@ -116,10 +133,10 @@ impl Kirchhoff {
 
     /// The mirror's part of f, 1/sr, as a beam of a divergence, rad, sees it.
     fn coherent_seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> f64 {
-        let lobe_rad = self.lobe_rad.max(beam_rad);
         let q_z = wavenumber_rad_per_m(self.frequency_hz) * (i.cos_theta() + o.cos_theta());
         let kept = (-(q_z * self.rms_height_m).powi(2)).exp();
-        kept * mirror_lobe_per_sr(i, o, lobe_rad, |cos| fresnel_reflectance(self.eps(), cos))
+        let reflectance = |cos| fresnel_reflectance(self.eps(), cos);
+        kept * mirror_lobe_per_sr(i, o, self.lobe_rad, beam_rad, reflectance)
     }
 }
 
@@ -128,11 +145,28 @@ impl Scattering for Kirchhoff {
         self.seen_by(0.0, i, o).f_per_sr
     }
 
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        half_space_amplitudes(permittivity(self.eps_real, self.eps_imag), mirror_cosine(i, o))
+    }
+
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
         let coherent_per_sr = self.coherent_seen_by(beam_rad, i, o);
-        let f_per_sr = self.incoherent_per_sr(i, o) + coherent_per_sr;
+        let f_per_sr = self.incoherent_seen_by(beam_rad, i, o) + coherent_per_sr;
         let coherent_share = if f_per_sr > 0.0 { coherent_per_sr / f_per_sr } else { 0.0 };
         Seen { f_per_sr, specular_share: 1.0, coherent_share }
+    }
+
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        let q_z = 2.0 * wavenumber_rad_per_m(self.frequency_hz) * i.cos_theta();
+        let kept = (-(q_z * self.rms_height_m).powi(2)).exp();
+        narrow_mirror(self.lobe_rad, kept * fresnel_reflectance(self.eps(), i.cos_theta()))
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if !is_narrow(self.lobe_rad) {
+            return self.seen_by(0.0, i, o);
+        }
+        Seen { specular_share: 1.0, ..Seen::diffuse(self.incoherent_per_sr(i, o)) }
     }
 }
 
@@ -142,15 +176,48 @@ impl ScatteringModel for Kirchhoff {
             ("rms_height_m", "m", HEIGHT_RANGE_M, &mut self.rms_height_m),
             ("correlation_length_m", "m", LENGTH_RANGE_M, &mut self.correlation_length_m),
             ("frequency_hz", "Hz", FREQUENCY_RANGE_HZ, &mut self.frequency_hz),
-            ("lobe_rad", "rad", LOBE_RANGE_RAD, &mut self.lobe_rad),
         ] {
             visit_quantity(visitor, prefix, name, unit, range, slot);
         }
+        visit_lobe(visitor, prefix, &mut self.lobe_rad);
         visit_permittivity(visitor, prefix, &mut self.eps_real, &mut self.eps_imag);
+    }
+
+    fn has_smooth_mirror(&self) -> bool {
+        self.lobe_rad.is_none()
     }
 
     fn permittivity(&self) -> Option<[f64; 2]> {
         Some([self.eps_real, self.eps_imag])
+    }
+
+    /// That of its coherent part.
+    fn lobe_rad(&self) -> Option<f64> {
+        Some(self.lobe_rad.unwrap_or(0.0))
+    }
+
+    /// At its own frequency. Exponential correlation has neither slope nor curvature, so that only its length has
+    /// a limit; a flat surface is the mirror, which has none.
+    fn conditions(&self, _wavelength_m: f64, _rms_height_m: Option<f64>) -> Vec<Condition> {
+        let (s_m, l_m) = (self.rms_height_m, self.correlation_length_m);
+        let wavelength_m = TAU / wavenumber_rad_per_m(self.frequency_hz);
+        if s_m == 0.0 {
+            return Vec::new();
+        }
+        if self.correlation == Correlation::Exponential {
+            return vec![length_condition(KIND.name, wavelength_m, l_m)];
+        }
+        let mut conditions = kirchhoff_conditions(KIND.name, wavelength_m, s_m, l_m).to_vec();
+        conditions.push(Condition {
+            model: KIND.name,
+            quantity: "the rms slope √2·s/l",
+            unit: "1",
+            value: SQRT_2 * s_m / l_m,
+            bound: Bound::AtMost,
+            limit: 0.25,
+            source: ULABY,
+        });
+        conditions
     }
 }
 
@@ -158,40 +225,53 @@ impl ScatteringModel for Kirchhoff {
 const LEAST_TERM_LN: f64 = -40.0;
 
 impl Correlation {
-    /// e^{−g} Σ gⁿ/n! · W_n/l², `across` being q_t·l.
+    /// e^{−g} Σ gⁿ/n! · W_n/l², `across` being q_t·l and `beam` (q_z·δ·l/2)².
     ///
     /// The terms rise to one maximum and fall from there. They are taken as logarithms, relative to
     /// the largest, so that neither gⁿ nor n! nor e^{−g} can overflow or vanish on the way.
-    fn series(self, g: f64, across: f64) -> f64 {
+    fn series(self, g: f64, across: f64, beam: f64) -> f64 {
         if g <= 0.0 {
             return 0.0;
         }
-        let peak = first_fall(|n| self.term_ln(n + 1, g, across) <= self.term_ln(n, g, across));
-        let peak_ln = self.term_ln(peak, g, across);
-        peak_ln.exp()
-            * (self.shares(peak..u32::MAX, peak_ln, g, across)
-                + self.shares((1..peak).rev(), peak_ln, g, across))
-    }
-
-    /// Sum of the terms n, relative to the peak, up to the first that is too small to count.
-    fn shares(self, n: impl Iterator<Item = u32>, peak_ln: f64, g: f64, across: f64) -> f64 {
-        let shares_ln = n.map(|n| self.term_ln(n, g, across) - peak_ln);
-        shares_ln.take_while(|share_ln| *share_ln > LEAST_TERM_LN).map(f64::exp).sum()
-    }
-
-    /// ln of the term n of the series.
-    fn term_ln(self, n: u32, g: f64, across: f64) -> f64 {
-        let n_real = f64::from(n);
-        n_real * g.ln() - g - ln_factorial(n) + self.spectrum_ln(n_real, across)
+        // ln of the term n of the series.
+        let term_ln = |n: u32| {
+            let n_real = f64::from(n);
+            n_real * g.ln() - g - ln_factorial(n) + self.spectrum_ln(n_real, across, beam)
+        };
+        let peak = first_fall(|n| term_ln(n + 1) <= term_ln(n));
+        let peak_ln = term_ln(peak);
+        // Each side of the peak up to the first term that is too small to count.
+        let up = shares((peak..u32::MAX).map(|n| term_ln(n) - peak_ln));
+        let down = shares((1..peak).rev().map(|n| term_ln(n) - peak_ln));
+        peak_ln.exp() * (up + down)
     }
 
     /// ln(W_n/l²).
-    fn spectrum_ln(self, n: f64, across: f64) -> f64 {
+    fn spectrum_ln(self, n: f64, across: f64, beam: f64) -> f64 {
+        let across2 = across * across;
         match self {
-            Correlation::Gaussian => (PI / n).ln() - across * across / (4.0 * n),
-            Correlation::Exponential => (TAU * n).ln() - 1.5 * (n * n + across * across).ln(),
+            Correlation::Gaussian => (PI / (n + beam)).ln() - across2 / (4.0 * (n + beam)),
+            Correlation::Exponential if beam < UNSEEN * (n * n + across2) => {
+                (TAU * n).ln() - 1.5 * (n * n + across2).ln()
+            }
+            Correlation::Exponential => seen_exponential(n, across2, beam).ln(),
         }
     }
+}
+
+/// W_n/l² of exp(−n·r/l) as a beam sees it: a mixture of Gaussians exp(−v·r²/l²) of v = n²/4t, each with the weight
+/// e^{−t}/√(πt), to which the beam adds its own.
+fn seen_exponential(n: f64, across2: f64, beam: f64) -> f64 {
+    let gaussian = |t: f64| {
+        let width = n * n / (4.0 * t) + beam;
+        (PI / t).sqrt() / width * (-across2 / (4.0 * width)).exp()
+    };
+    over_exponential(gaussian)
+}
+
+/// Sum of shares given as logarithms, up to the first that is too small to count.
+fn shares(shares_ln: impl Iterator<Item = f64>) -> f64 {
+    shares_ln.take_while(|share_ln| *share_ln > LEAST_TERM_LN).map(f64::exp).sum()
 }
 
 /// The first n ≥ 1 from which `falls` holds, for a condition that stays true once it is.
@@ -233,7 +313,7 @@ mod tests {
             eps_real: 4.67,
             eps_imag: 5.0,
             frequency_hz: 300e9,
-            lobe_rad: 0.02,
+            lobe_rad: Some(0.02),
         }
     }
 
@@ -258,9 +338,9 @@ mod tests {
                     let (mut weight, mut plain) = ((-g).exp(), 0.0);
                     for n in 1..400 {
                         weight *= g / f64::from(n);
-                        plain += weight * correlation.spectrum_ln(f64::from(n), across).exp();
+                        plain += weight * correlation.spectrum_ln(f64::from(n), across, 0.0).exp();
                     }
-                    let found = correlation.series(g, across);
+                    let found = correlation.series(g, across, 0.0);
                     assert!((found - plain).abs() < 1e-11 * plain, "{correlation:?} {g} {across}");
                 }
             }
@@ -297,7 +377,7 @@ mod tests {
         }
         let oblique = (60f64.to_radians(), 50e-6);
         let tilted = (-(wavenumber_rad_per_m(300e9) * oblique.1).powi(2)).exp();
-        let wide = |s_m| Kirchhoff { lobe_rad: 0.5, ..rough(s_m, 1e-3) };
+        let wide = |s_m| Kirchhoff { lobe_rad: Some(0.5), ..rough(s_m, 1e-3) };
         let direction = retro(oblique.0);
         let found = wide(oblique.1).coherent_per_sr(direction, direction)
             / wide(0.0).coherent_per_sr(direction, direction);
@@ -306,13 +386,32 @@ mod tests {
 
     #[test]
     fn a_flat_surface_is_the_mirror() {
-        let mirror = Fresnel { eps_real: 4.67, eps_imag: 5.0, lobe_rad: 0.02 };
+        let mirror = Fresnel { eps_real: 4.67, eps_imag: 5.0, lobe_rad: Some(0.02) };
         for theta_rad in [0.0, 0.01, 0.05] {
             let expected = mirror.retro_per_sr(theta_rad);
             assert_eq!(rough(0.0, 1e-3).retro_per_sr(theta_rad), expected);
             let nearly = rough(1e-9, 1e-3).retro_per_sr(theta_rad);
             assert!((nearly - expected).abs() < 1e-6 * expected);
         }
+    }
+
+    #[test]
+    fn its_conditions_are_those_of_kirchhoff_s_approximation() {
+        // k = 6.2875 rad/mm and λ = 0.9993 mm: k·l = 3.14, l²/(s·λ) = 5.00, slope 0.141.
+        let found = rough(50e-6, 0.5e-3).conditions(1.0, None);
+        let values = [3.14, 5.00, 0.141];
+        assert_eq!(found.len(), values.len());
+        for (condition, value) in std::iter::zip(&found, values) {
+            assert!((condition.value / value - 1.0).abs() < 5e-3, "{condition:?}");
+        }
+        assert_eq!([0, 1, 2].map(|number| found[number].is_met()), [false, true, true]);
+        // k·l = 12.6, l²/(s·λ) = 6.67, slope 0.424.
+        let steep = rough(0.6e-3, 2e-3).conditions(1.0, None);
+        assert_eq!([0, 1, 2].map(|number| steep[number].is_met()), [true, true, false]);
+        let exponential = Kirchhoff { correlation: Correlation::Exponential, ..rough(50e-6, 1e-3) };
+        let found = exponential.conditions(1.0, None);
+        assert!(found.len() == 1 && found[0].is_met(), "{found:?}");
+        assert!(rough(0.0, 1e-5).conditions(1.0, None).is_empty());
     }
 
     #[test]

@@ -18,11 +18,11 @@ use crate::brdf::backscatter::Term;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_quantity};
 use crate::brdf::permittivity::{
-    EPS_IMAG, EPS_REAL, LOBE_RANGE_RAD, Polarisation, default_frequency_hz, default_lobe_rad,
-    interface, mirror_lobe, mirror_lobe_per_sr, normal_wavenumber, permittivity, unpolarised,
-    visit_permittivity, wavenumber_rad_per_m,
+    BOTH, EPS_IMAG, EPS_REAL, Polarisation, default_frequency_hz, interface, is_narrow,
+    mirror_cosine, mirror_lobe, mirror_lobe_per_sr, narrow_mirror, normal_wavenumber, permittivity,
+    unpolarised, visit_lobe, visit_permittivity, wavenumber_rad_per_m,
 };
-use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
+use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -32,7 +32,7 @@ pub(super) const KIND: Kind = Kind {
         EPS_REAL,
         EPS_IMAG,
         Key::number("frequency_hz"),
-        Key::number("lobe_rad"),
+        Key::number("lobe_rad").optional(),
     ],
     starts: &[],
 };
@@ -65,9 +65,10 @@ pub struct Layered {
     /// Frequency, 10 GHz to 10 THz.
     #[serde(default = "default_frequency_hz")]
     pub frequency_hz: f64,
-    /// Width of the mirror's lobe, 0.001 to 0.5 rad.
-    #[serde(default = "default_lobe_rad")]
-    pub lobe_rad: f64,
+    /// Width of the mirror's lobe as the radar sees it, 0.001 to 0.5 rad, the beam included; absent for a smooth
+    /// mirror, whose lobe is the beam's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lobe_rad: Option<f64>,
 }
 
 /// One homogeneous layer.
@@ -132,8 +133,20 @@ impl Scattering for Layered {
     }
 
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
-        let lobe_rad = self.lobe_rad.max(beam_rad);
-        Seen::mirror(mirror_lobe_per_sr(i, o, lobe_rad, |cos| self.reflectance_at(cos)))
+        let reflectance = |cos| self.reflectance_at(cos);
+        Seen::mirror(mirror_lobe_per_sr(i, o, self.lobe_rad, beam_rad, reflectance))
+    }
+
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        narrow_mirror(self.lobe_rad, self.reflectance_at(i.cos_theta()))
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if is_narrow(self.lobe_rad) { Seen::default() } else { self.seen_by(0.0, i, o) }
+    }
+
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        BOTH.map(|polarisation| self.amplitude(polarisation, mirror_cosine(i, o)))
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {
@@ -152,12 +165,15 @@ impl ScatteringModel for Layered {
         visit_permittivity(visitor, prefix, &mut self.eps_real, &mut self.eps_imag);
         let slot = &mut self.frequency_hz;
         visit_quantity(visitor, prefix, "frequency_hz", "Hz", FREQUENCY_RANGE_HZ, slot);
-        let slot = &mut self.lobe_rad;
-        visit_quantity(visitor, prefix, "lobe_rad", "rad", LOBE_RANGE_RAD, slot);
+        visit_lobe(visitor, prefix, &mut self.lobe_rad);
     }
 
     fn is_smooth(&self) -> bool {
         true
+    }
+
+    fn has_smooth_mirror(&self) -> bool {
+        self.lobe_rad.is_none()
     }
 
     fn permittivity(&self) -> Option<[f64; 2]> {
@@ -182,12 +198,12 @@ mod tests {
             eps_real: GLASS,
             eps_imag: 0.3,
             frequency_hz: 300e9,
-            lobe_rad: 0.02,
+            lobe_rad: Some(0.02),
         }
     }
 
     fn bare(eps_real: f64, eps_imag: f64) -> Fresnel {
-        Fresnel { eps_real, eps_imag, lobe_rad: 0.02 }
+        Fresnel { eps_real, eps_imag, lobe_rad: Some(0.02) }
     }
 
     fn wavelength_m() -> f64 {

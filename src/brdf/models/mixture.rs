@@ -3,13 +3,14 @@
 //! A monostatic measurement does not determine k apart from the levels of the two parts: it determines
 //! only the products k·r_s and (1 − k)·f_λ.
 
+use num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
 use super::weighted;
 use crate::brdf::backscatter::Term;
 use crate::brdf::kind::{Key, Kind};
 use crate::brdf::parameter::{Visitor, visit_number};
-use crate::brdf::scattering::{Scattering, ScatteringModel, Seen};
+use crate::brdf::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
 use crate::frames::{Direction, Surface};
 
 pub(super) const KIND: Kind = Kind {
@@ -60,7 +61,19 @@ impl<P: ScatteringModel> Scattering for Mixture<P> {
     }
 
     fn seen_by(&self, beam_rad: f64, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
-        weighted::seen_by(self.weighted(), beam_rad, i, o)
+        weighted::combined(self.weighted(), |part| part.seen_by(beam_rad, i, o))
+    }
+
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        weighted::narrow_lobes(self.weighted(), i)
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        weighted::combined(self.weighted(), |part| part.apart_from_narrow_lobes(i, o))
+    }
+
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        weighted::facet_amplitudes(self.weighted(), i, o)
     }
 
     fn backscatter(&self) -> Option<Vec<Term>> {
@@ -81,6 +94,10 @@ impl<P: ScatteringModel> ScatteringModel for Mixture<P> {
 
     fn f_lambda(&self) -> Option<f64> {
         self.specular.f_lambda().or_else(|| self.diffuse.f_lambda())
+    }
+
+    fn has_smooth_mirror(&self) -> bool {
+        self.weighted().any(|(weight, part)| weight > 0.0 && part.has_smooth_mirror())
     }
 
     fn has_curve(&self) -> bool {

@@ -4,12 +4,14 @@
 pub(super) mod tests;
 mod weighted;
 
+use num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
 use super::backscatter::Term;
 use super::kind::Kind;
 use super::parameter::{Parameter, ParameterError, Visitor};
-use super::scattering::{Scattering, ScatteringModel, Seen};
+use super::scattering::{NarrowLobe, Scattering, ScatteringModel, Seen};
+use super::validity::Condition;
 use crate::frames::{Direction, Surface};
 
 pub use cook_torrance::Shadowing;
@@ -115,6 +117,22 @@ impl Scattering for Brdf {
         }
     }
 
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        self.model().facet_amplitudes(i, o)
+    }
+
+    fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
+        self.model().narrow_lobes(i)
+    }
+
+    fn apart_from_narrow_lobes(&self, i: Direction<Surface>, o: Direction<Surface>) -> Seen {
+        if is_below_horizon(i, o) {
+            Seen::default()
+        } else {
+            self.model().apart_from_narrow_lobes(i, o)
+        }
+    }
+
     fn backscatter(&self) -> Option<Vec<Term>> {
         self.model().backscatter()
     }
@@ -133,6 +151,10 @@ impl ScatteringModel for Brdf {
         self.model().is_smooth()
     }
 
+    fn has_smooth_mirror(&self) -> bool {
+        self.model().has_smooth_mirror()
+    }
+
     fn permittivity(&self) -> Option<[f64; 2]> {
         self.model().permittivity()
     }
@@ -143,6 +165,22 @@ impl ScatteringModel for Brdf {
 
     fn has_curve(&self) -> bool {
         self.model().has_curve()
+    }
+
+    fn lobe_rad(&self) -> Option<f64> {
+        let parts = self.parts();
+        if parts.is_empty() {
+            return self.model().lobe_rad();
+        }
+        parts.into_iter().filter_map(Brdf::lobe_rad).min_by(f64::total_cmp)
+    }
+
+    fn conditions(&self, wavelength_m: f64, rms_height_m: Option<f64>) -> Vec<Condition> {
+        let mut conditions = self.model().conditions(wavelength_m, rms_height_m);
+        for part in self.parts() {
+            conditions.extend(part.conditions(wavelength_m, rms_height_m));
+        }
+        conditions
     }
 }
 

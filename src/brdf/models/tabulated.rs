@@ -1,7 +1,8 @@
 //! A measured curve σ⁰(θ), used as it is: f = σ⁰/(4π cos²θ), equation (10) solved for f.
 //!
-//! Between the points σ⁰ is interpolated in dB over θ by the monotone cubic of Fritsch and Carlson
-//! (SIAM J. Numer. Anal. 17 (1980) 238), which never overshoots the data. Outside the points the
+//! Between the points σ⁰ is interpolated in dB over θ by a monotone cubic, which never overshoots the data. Its
+//! slopes are the weighted harmonic means of Fritsch and Butland (SIAM J. Sci. Stat. Comput. 5 (1984) 300),
+//! at the ends those of the end intervals. Outside the points the
 //! end values are held, but from `silent_from_deg` on, where the data lie below the threshold, nothing
 //! comes back. f·cos²θ then stays finite, but f itself grows without bound towards grazing incidence
 //! and can exceed what energy allows there. A monostatic curve says nothing of other directions; away from backscatter
@@ -222,7 +223,7 @@ fn monotone_slopes(x: &[f64], y: &[f64]) -> Vec<f64> {
             slopes.push(0.0);
             continue;
         }
-        // Fritsch and Butland's weighted harmonic mean for unequal steps.
+        // Fritsch and Butland's weighted harmonic mean for unequal steps; 0 at an extremum, above.
         let (left, right) = (x[i] - x[i - 1], x[i + 1] - x[i]);
         let (w1, w2) = (2.0 * right + left, right + 2.0 * left);
         slopes.push((w1 + w2) / (w1 / before + w2 / after));

@@ -43,17 +43,18 @@ pub(in crate::brdf) fn every_model() -> Vec<Brdf> {
 }
 
 fn smooth_models() -> Vec<Brdf> {
-    let (eps_real, eps_imag, lobe_rad) = (4.67, 5.0, 0.1);
+    let (eps_real, eps_imag, lobe_rad) = (4.67, 5.0, Some(0.1));
     let layers = vec![Layer { thickness_m: 3e-4, eps_real: 2.6, eps_imag: 0.1 }];
     let frequency_hz = 300e9;
     vec![
         Brdf::Fresnel(Fresnel { eps_real, eps_imag, lobe_rad }),
         Brdf::Layered(Layered { layers, eps_real, eps_imag, frequency_hz, lobe_rad }),
+        Brdf::Fresnel(Fresnel { eps_real, eps_imag, lobe_rad: None }),
     ]
 }
 
 fn rough_models() -> Vec<Brdf> {
-    let (eps_real, eps_imag, lobe_rad, frequency_hz) = (4.67, 5.0, 0.1, 300e9);
+    let (eps_real, eps_imag, lobe_rad, frequency_hz) = (4.67, 5.0, Some(0.1), 300e9);
     let kirchhoff = |rms_height_m, correlation| {
         let correlation_length_m = 1e-3;
         Brdf::Kirchhoff(Kirchhoff {
@@ -142,6 +143,8 @@ fn the_enum_answers_as_the_model_by_itself() {
         assert_eq!(model.permittivity(), model.model().permittivity(), "{model:?}");
         assert_eq!(model.f_lambda(), model.model().f_lambda(), "{model:?}");
         assert_eq!(model.has_curve(), model.model().has_curve(), "{model:?}");
+        let mirrors = [model.has_smooth_mirror(), model.model().has_smooth_mirror()];
+        assert_eq!(mirrors[0], mirrors[1], "{model:?}");
     }
 }
 

@@ -1,10 +1,11 @@
-//! Mitsuba 3 BSDF as XML (checked with Mitsuba 3.9.1): `diffuse`, `roughconductor`, `blendbsdf`.
+//! Mitsuba 3 BSDF as XML (checked with Mitsuba 3.9.1): `diffuse`, `conductor`, `roughconductor`, `blendbsdf`.
 //!
 //! Mitsuba's α is our m for both laws of slopes (√2 times the rms slope for Beckmann's), its G is
 //! Smith's G1(i)·G1(o), α_u lies along x, and its `eval` is f·cos θ_o. Polarisation is ignored: `eta` and
 //! `k` are the parts of √ε, and a reflectivity f_λ becomes the real index with the same normal
 //! reflectance, `eta` = (1 + √f_λ)/(1 − √f_λ), so that Fresnel stands in for Schlick: backscatter, where
-//! facets are seen along their normals, is the same. `roughconductor` is used for dielectrics, too:
+//! facets are seen along their normals, is the same. `conductor` is a smooth mirror, a delta as here. Both it and
+//! `roughconductor` are used for dielectrics, too:
 //! nothing is seen through a material that is a half space.
 //!
 //! Models without a counterpart (Blinn–Phong, curves, Kirchhoff, lobes, layers, sums, correlated
@@ -79,7 +80,10 @@ fn bsdf(model: &Brdf, attributes: &str, depth: usize, text: &mut String) {
             ("diffuse", vec![("spectrum", "reflectance", albedo.to_string())])
         }
         Brdf::CookTorrance(facets) => ("roughconductor", facet_values(facets)),
-        Brdf::Fresnel(mirror) => ("roughconductor", mirror_values(mirror)),
+        Brdf::Fresnel(mirror) => match mirror.lobe_rad {
+            None => ("conductor", mirror_index(mirror).to_vec()),
+            Some(lobe_rad) => ("roughconductor", mirror_values(mirror, lobe_rad)),
+        },
         // Mitsuba's weight is that of the second part.
         Brdf::Mixture(mixture) => ("blendbsdf", vec![("float", "weight", mixture.k.to_string())]),
         // `counterpart` returns no other model.
@@ -114,13 +118,17 @@ fn facet_values(facets: &CookTorrance) -> Vec<Value> {
     values
 }
 
-fn mirror_values(mirror: &Fresnel) -> Vec<Value> {
+fn mirror_values(mirror: &Fresnel, lobe_rad: f64) -> Vec<Value> {
     let mut values = vec![
         ("string", "distribution", "beckmann".to_owned()),
-        ("float", "alpha", mirror.lobe_rad.to_string()),
+        ("float", "alpha", lobe_rad.to_string()),
     ];
-    values.extend(index_values(Complex::new(mirror.eps_real, mirror.eps_imag).sqrt()));
+    values.extend(mirror_index(mirror));
     values
+}
+
+fn mirror_index(mirror: &Fresnel) -> [Value; 2] {
+    index_values(Complex::new(mirror.eps_real, mirror.eps_imag).sqrt())
 }
 
 fn law(distribution: Distribution) -> &'static str {
@@ -149,7 +157,7 @@ fn counterpart(model: &Brdf, angles: &[f64]) -> Brdf {
         Brdf::KirchhoffGo(slopes) => Brdf::Fresnel(Fresnel {
             eps_real: slopes.eps_real,
             eps_imag: slopes.eps_imag,
-            lobe_rad: SQRT_2 * slopes.rms_slope,
+            lobe_rad: Some(SQRT_2 * slopes.rms_slope),
         }),
         Brdf::Mixture(Mixture { k, diffuse, specular }) => Brdf::Mixture(Mixture {
             k: *k,
@@ -223,7 +231,7 @@ fn schlick_miss_db(model: &Brdf) -> f64 {
     match model {
         Brdf::CookTorrance(facets) => {
             let Some(n) = index(facets.f_lambda) else { return 0.0 };
-            let mirror = Fresnel { eps_real: n * n, eps_imag: 0.0, lobe_rad: 0.02 };
+            let mirror = Fresnel { eps_real: n * n, eps_imag: 0.0, lobe_rad: None };
             let mut worst_db = 0.0f64;
             for degree in 0..=60 {
                 let psi = f64::from(degree) * PI / 180.0;

@@ -26,8 +26,6 @@ const OPTICAL_CONSTANTS: &str = "optical-constants";
 const USUAL_HZ: f64 = 300e9;
 /// Half width of the band of frequencies that are kept, over the wanted frequency.
 const REACH: f64 = 1.0 / 3.0;
-/// Width of the mirror's lobe: a spot of 16 mm at 1 mm wavelength, rad.
-const LOBE_RAD: f64 = 0.02;
 
 /// n and k at a frequency.
 #[derive(Clone, Copy, Debug)]
@@ -234,20 +232,18 @@ fn material(file: &str, page: &Page, given: &Details, entry: Entry) -> Material 
                 SourceKind::Modelled,
                 "Fresnel's reflectance of a smooth half space",
             ),
-            source("chosen", SourceKind::Synthetic, "Chosen by matdb; nobody measured it"),
         ],
         instruments: Vec::new(),
         curves: Vec::new(),
         fits: vec![Fit {
             name: "half-space".to_owned(),
-            model: Brdf::Fresnel(Fresnel { eps_real, eps_imag, lobe_rad: LOBE_RAD }),
+            model: Brdf::Fresnel(Fresnel { eps_real, eps_imag, lobe_rad: None }),
             estimator: "stated".to_owned(),
             curve: None,
             source: "half-space".to_owned(),
             parameter_sources: vec![
                 ("eps_imag".to_owned(), OPTICAL_CONSTANTS.to_owned()),
                 ("eps_real".to_owned(), OPTICAL_CONSTANTS.to_owned()),
-                ("lobe_rad".to_owned(), "chosen".to_owned()),
             ],
             covariance: None,
             report: None,

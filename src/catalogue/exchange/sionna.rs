@@ -281,7 +281,7 @@ fn best_pattern(
     angles: &[f64],
 ) -> Option<Best> {
     let [eps_real, eps_imag] = [substance.eps_real, substance.eps_imag];
-    let mirror = Fresnel { eps_real, eps_imag, lobe_rad: 0.02 };
+    let mirror = Fresnel { eps_real, eps_imag, lobe_rad: None };
     let mut targets = Vec::with_capacity(angles.len());
     for &angle in angles {
         let wanted_per_sr = part.retro_per_sr(model, angle);

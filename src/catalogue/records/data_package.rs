@@ -9,7 +9,7 @@ use super::citation::{doi_url, insert};
 use super::context::Context;
 use crate::catalogue::about::About;
 use crate::catalogue::api::Index;
-use crate::catalogue::folder::Sum;
+use crate::catalogue::folder::Checksum;
 use crate::catalogue::layout::{csv_path, listed_media_type};
 use crate::catalogue::tables::WrittenTable;
 use crate::catalogue::units::unit;
@@ -20,7 +20,7 @@ pub(super) fn package(
     context: &Context,
     index: &Index,
     tables: &[WrittenTable],
-    sums: &BTreeMap<String, Sum>,
+    sums: &BTreeMap<String, Checksum>,
 ) -> Value {
     let about = context.about;
     let schemas: BTreeMap<String, &WrittenTable> =
@@ -98,7 +98,7 @@ fn contributors(context: &Context) -> Vec<Value> {
     contributors
 }
 
-fn resource(path: &str, sum: &Sum, media_type: &str, written: Option<&WrittenTable>) -> Value {
+fn resource(path: &str, sum: &Checksum, media_type: &str, written: Option<&WrittenTable>) -> Value {
     let mut resource = json!({
         "name": name(path),
         "path": path,

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::citation::{doi_url, insert, orcid_url};
 use super::context::Context;
-use crate::catalogue::folder::Sum;
+use crate::catalogue::folder::Checksum;
 use crate::catalogue::layout::{MATERIALS, listed_media_type};
 use crate::material::form::alternative_licences;
 
@@ -67,7 +67,7 @@ fn common(context: &Context) -> Value {
 }
 
 /// `dataset.jsonld`.
-pub(super) fn dataset(context: &Context, sums: &BTreeMap<String, Sum>) -> Value {
+pub(super) fn dataset(context: &Context, sums: &BTreeMap<String, Checksum>) -> Value {
     let mut record = common(context);
     record["@context"] = "https://schema.org/".into();
     if let Some(licence) = &context.about.licence {
@@ -89,7 +89,7 @@ pub(super) fn dataset(context: &Context, sums: &BTreeMap<String, Sum>) -> Value 
 }
 
 /// A file in `dataset.jsonld`, if it is listed.
-fn download(path: &str, sum: &Sum) -> Option<Value> {
+fn download(path: &str, sum: &Checksum) -> Option<Value> {
     Some(json!({
         "@type": "DataDownload",
         "contentUrl": path,
@@ -100,7 +100,7 @@ fn download(path: &str, sum: &Sum) -> Option<Value> {
 }
 
 /// `ro-crate-metadata.json`.
-pub(super) fn crate_metadata(context: &Context, sums: &BTreeMap<String, Sum>) -> Value {
+pub(super) fn crate_metadata(context: &Context, sums: &BTreeMap<String, Checksum>) -> Value {
     let files: Vec<Value> = sums.iter().filter_map(|(path, sum)| crate_file(path, sum)).collect();
     let people = people(context);
     let mut parts = ids(&files);
@@ -138,7 +138,7 @@ pub(super) fn crate_metadata(context: &Context, sums: &BTreeMap<String, Sum>) ->
 }
 
 /// A file in `ro-crate-metadata.json`, if it is listed.
-fn crate_file(path: &str, sum: &Sum) -> Option<Value> {
+fn crate_file(path: &str, sum: &Checksum) -> Option<Value> {
     Some(json!({
         "@id": path,
         "@type": "File",

@@ -42,7 +42,7 @@ pub(super) struct DetailArgs {
     #[arg(long = "author", value_name = "NAME")]
     authors: Vec<String>,
     /// Year of it
-    #[arg(long, value_name = "YYYY")]
+    #[arg(long, value_name = "YYYY", allow_negative_numbers = true)]
     year: Option<u16>,
     /// Origin of the numbers
     #[arg(long, value_parser = kind_of(KINDS))]
@@ -51,7 +51,7 @@ pub(super) struct DetailArgs {
     #[arg(long, value_name = "TEXT")]
     instrument: Option<String>,
     /// Frequency of a curve, or of optical constants [default of these: 300]
-    #[arg(long, value_name = "GHZ")]
+    #[arg(long, value_name = "GHZ", allow_negative_numbers = true)]
     frequency: Option<f64>,
     /// Least power that counts as a detection
     #[arg(long, value_name = "DBM", allow_negative_numbers = true)]

@@ -32,7 +32,7 @@ pub struct Args {
     #[arg(long, value_name = "MODEL", requires = "curve")]
     pub model: Option<String>,
     /// Noise of a curve's levels, dB [default: from repeats, the file, or neighbouring angles]
-    #[arg(long, value_name = "DB", requires = "curve")]
+    #[arg(long, value_name = "DB", requires = "curve", allow_negative_numbers = true)]
     pub noise_db: Option<f64>,
     /// Try only these effects [default: all]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
@@ -45,7 +45,7 @@ pub struct Args {
     #[arg(long, value_name = "NAME", conflicts_with = "curve")]
     pub material: Option<String>,
     /// Seed of folds and of everything random
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     pub seed: u64,
     /// Folder to write; created if needed
     #[arg(long, short, value_name = "DIR")]

@@ -14,8 +14,9 @@ use crate::adopt::{FitMethod, FitOutcome, FitRequest, FitStorage, FitSubject, St
 use crate::error::Error;
 use crate::fit::{FitResult, model_names};
 use crate::material::{Fit, SourceKind};
+use crate::radar::Radar;
 use crate::report::{FigureFormat, curve_points, fit_layers, incidence_plot};
-use crate::setup::Database;
+use crate::setup::{Database, unmet_conditions, unmet_sentence};
 use crate::units::watts_from_dbm;
 
 const EXAMPLES_AND_METHODS: &str = "Examples:
@@ -58,31 +59,31 @@ pub(super) struct Args {
     #[arg(long, value_enum, default_value = "censored")]
     method: MethodName,
     /// Hold diffuse.alpha at this; tls-tail needs it
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
     alpha: Option<f64>,
     /// Hold a parameter; may be repeated
     #[arg(long = "fix", value_name = "PATH=VALUE")]
     fixed: Vec<String>,
     /// Looks of the speckle, 0.1 to 10000 [default: found by the fit]
-    #[arg(long, value_name = "L")]
+    #[arg(long, value_name = "L", allow_negative_numbers = true)]
     looks: Option<f64>,
     /// Thermal noise in each chirp, dBm [default: none]
     #[arg(long, value_name = "X", allow_negative_numbers = true)]
     noise_dbm: Option<f64>,
-    /// Deviation of the angle for tls, degrees [default: that of the curve]
-    #[arg(long, value_name = "X")]
+    /// Standard deviation of the angle for tls, degrees [default: that of the curve]
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
     theta_sd_deg: Option<f64>,
-    /// Deviation of the level for tls, dB [default: that of speckle of one look]
-    #[arg(long, value_name = "X")]
+    /// Standard deviation of the level for tls, dB [default: that of speckle of one look]
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
     level_sd_db: Option<f64>,
     /// Angle between the specular and the diffuse piece of mse, degrees
-    #[arg(long, value_name = "X", default_value_t = 6.0)]
+    #[arg(long, value_name = "X", default_value_t = 6.0, allow_negative_numbers = true)]
     split_deg: f64,
     /// Points that the search starts from
-    #[arg(long, value_name = "N", default_value_t = 4)]
+    #[arg(long, value_name = "N", default_value_t = 4, allow_negative_numbers = true)]
     starts: usize,
     /// Seed of the starts and of the residuals of missing chirps
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     seed: u64,
     /// Store the fit, and a file's curve with it, in the material NAME, which must exist
     #[arg(long, value_name = "NAME", num_args = 0..=1)]
@@ -99,11 +100,11 @@ pub(super) struct Args {
     /// Who measured or made a file's curve, when and how
     #[arg(long, value_name = "TITLE", requires = "save")]
     source: Option<String>,
-    #[command(flatten)]
-    circumstances: Circumstances,
     /// Draw points, fit and 95 % band: a .svg or .png file
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    circumstances: Circumstances,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -140,6 +141,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     args.output.as_deref().map(FigureFormat::of).transpose()?;
     checked.notices.iter().for_each(|notice| console.notice(notice));
     let FitOutcome { subject, result, fit, stored, refusal } = checked.run(db)?;
+    let material = subject.found.as_ref().map(|found| &found.material);
+    for condition in unmet_conditions(&fit.model, Radar::default().wavelength_m(), material) {
+        console.notice(&unmet_sentence(&condition));
+    }
     let files = match &args.output {
         Some(path) if result.converged => draw(path, &subject, &fit)?,
         _ => Vec::new(),

@@ -1,16 +1,18 @@
 //! Echoes by way of a second surface: radar → first hit → second hit → radar.
 //!
 //! The power that leaves the first hit in a direction falls on the second one and is scattered to the radar,
-//! unless something hides it: P₂ = coupling·∫ Φ·f₁(i, ω)·cos θ_ω · f₂·cos θ_o·Ω dω, over fixed
+//! unless something hides it: P₂ = coupling·∫ Φ·f₁(i, ω)·cos θ_ω · f₂·cos θ_o·Ω·A dω, over fixed
 //! directions, spread by the cosine and by a wide and a narrow lobe, each weighed by their joint density (the
-//! balance heuristic: Veach & Guibas, SIGGRAPH 1995). Its range is half the whole way, and what is
-//! reported is the mean by power.
+//! balance heuristic: Veach & Guibas, SIGGRAPH 1995), and exactly in the direction of the mirror where f₁ has a lobe
+//! too narrow for them. A is how well the antenna sees the second hit beside the first, as with `[bounce]`: the
+//! beam's own pattern, and side lobes below it. The range is half the whole way, and what is reported is the mean
+//! by power.
 
 use std::f64::consts::PI;
 
 use rayon::prelude::*;
 
-use crate::brdf::{Brdf, Distribution, Scattering};
+use crate::brdf::{Brdf, Distribution, NarrowLobe, Scattering};
 use crate::effects::echo::MeanEcho;
 use crate::effects::effect::{About, Conflict, Effect, EffectParameter, Level, Setting, Survey};
 use crate::effects::intersection::{local_frame, shot_along};
@@ -29,6 +31,8 @@ const DIRECTIONS: usize = 24;
 /// Roughnesses of the lobes that directions are spread over, whatever the law's: rays can then be traced
 /// once for all laws.
 const LOBES: [f64; 2] = [0.25, 0.08];
+/// Power by way of a surface outside the spot, over one inside: the side lobes that `[bounce]` assumes, too.
+const OUTSIDE_SPOT: f64 = 0.01;
 /// The cosine and the lobes.
 const KINDS: usize = 1 + LOBES.len();
 /// A ray starts this far from its surface, m, so that the surface does not block it.
@@ -69,54 +73,85 @@ struct Detour {
     /// Into and out of each of them.
     first: [Direction<Surface>; 2],
     second: [Direction<Surface>; 2],
-    /// Power received, W, where both f are 1/sr, as one of all directions.
-    watts_per_f2: f64,
+    /// Whether it leaves the first surface exactly as from a mirror.
+    is_mirrored: bool,
+    /// Power received, W, where the second f is 1/sr and the first one, too; of a mirrored path where the first surface
+    /// sends on all that it receives.
+    watts: f64,
+    /// Divergence of the beam at the second surface, rad.
+    beam_rad: f64,
     /// Half the whole way, m.
     range_m: f64,
 }
 
 impl Detour {
     fn power_w(&self, laws: &[Brdf]) -> f64 {
-        let mut power_w = self.watts_per_f2;
-        for (region, [i, o]) in std::iter::zip(self.regions, [self.first, self.second]) {
-            power_w *= laws.get(usize::from(region)).map_or(0.0, |law| law.f_per_sr(i, o));
+        let [first, second] = self.regions.map(|region| laws.get(usize::from(region)));
+        let (Some(first), Some(second)) = (first, second) else { return 0.0 };
+        let [i, o] = self.first;
+        if !self.is_mirrored {
+            return self.watts
+                * first.apart_from_narrow_lobes(i, o).f_per_sr
+                * self.received_per_sr(second, 0.0);
+        }
+        let mut power_w = 0.0;
+        for NarrowLobe { share, m } in first.narrow_lobes(i) {
+            power_w += self.watts * share * self.received_per_sr(second, m);
         }
         power_w
     }
+
+    /// f of the second surface, 1/sr, as the beam sees it by way of a lobe of the roughness m.
+    fn received_per_sr(&self, law: &Brdf, m: f64) -> f64 {
+        let [i, o] = self.second;
+        law.seen_by(self.beam_rad.hypot(m), i, o).f_per_sr
+    }
 }
 
-/// The path of a ray from the first surface to a second one that the radar sees.
+/// The path of a ray from the first surface to a second one that the radar sees. The density is that of the
+/// directions, 1/sr; `None` for the direction of the mirror.
 fn detour(
     stage: &Stage,
     shot: &Shot,
     frame: &LocalFrame,
     o: Direction<Surface>,
-    density_per_sr: f64,
+    density_per_sr: Option<f64>,
 ) -> Option<Detour> {
     let onward = frame.world(o.xyz());
     let start = shot.hit.point.xyz + CLEARANCE_M * shot.normal;
     let ray = Ray { origin: Point::from(start), direction: Direction::new(onward)? };
     let second = shot_along(stage, shot, ray)?;
     let radar = shot.ray.origin;
-    let back = second.hit.point.towards(radar)?;
+    let to_radar = second.hit.point.towards(radar)?;
+    let beam = stage.beam(shot);
+    let pattern = beam.pattern(&shot.ray, 1, second.hit.point);
+    // In the main lobe the antenna sees along the normal of its wavefront.
+    let back = match pattern > OUTSIDE_SPOT {
+        true => -beam.direction_at(&shot.ray, second.hit.point),
+        false => to_radar,
+    };
     let cos_exit = second.normal.dot(back.xyz());
     let back_m = second.hit.point.distance_m(radar);
-    let sight = Ray { origin: radar, direction: -back };
+    let sight = Ray { origin: radar, direction: -to_radar };
     let hidden = stage.geometry.bvh.closest(&sight).is_some_and(|hit| hit.range_m < back_m - 1e-5);
     if cos_exit <= 0.0 || hidden {
         return None;
     }
     let there = local_frame(stage, &second);
     let way_m = shot.hit.point.distance_m(second.hit.point) + back_m;
-    let sent_w = stage.link.flux_w(shot.hit.cos_theta) * o.cos_theta() / density_per_sr;
+    let sent_sr = density_per_sr
+        .map_or(1.0, |density_per_sr| o.cos_theta() / density_per_sr / (KINDS * DIRECTIONS) as f64);
+    let sent_w = stage.link.flux_w(shot.hit.cos_theta) * sent_sr;
     let along_beam_m = (second.hit.point.xyz - radar.xyz).dot(shot.ray.direction.xyz());
-    let solid_angle_sr = stage.link.solid_angle_sr(&stage.beam(shot), along_beam_m);
-    let share = cos_exit * solid_angle_sr / (KINDS * DIRECTIONS) as f64;
+    let solid_angle_sr = stage.link.solid_angle_sr(&beam, along_beam_m);
+    let share = cos_exit * solid_angle_sr * pattern.max(OUTSIDE_SPOT);
     Some(Detour {
         regions: [shot.region, second.region],
         first: [frame.local(-shot.ray.direction.xyz()), o],
         second: [there.local(-onward), there.local(back.xyz())],
-        watts_per_f2: sent_w * share,
+        is_mirrored: density_per_sr.is_none(),
+        watts: sent_w * share,
+        beam_rad: beam.divergence_rad(),
         range_m: (shot.hit.range_m + way_m) / 2.0,
     })
 }
@@ -126,7 +161,9 @@ fn detours(stage: &Stage, shot: &Shot) -> Vec<Detour> {
     let Some(shot) = &shot_along(stage, shot, shot.ray) else { return Vec::new() };
     let frame = local_frame(stage, shot);
     let i = frame.local(-shot.ray.direction.xyz());
-    onward(i).filter_map(|(o, density)| detour(stage, shot, &frame, o, density)).collect()
+    let drawn = onward(i).map(|(o, density_per_sr)| (o, Some(density_per_sr)));
+    let all = drawn.chain([(i.mirrored(), None)]);
+    all.filter_map(|(o, density_per_sr)| detour(stage, shot, &frame, o, density_per_sr)).collect()
 }
 
 /// Power, W, and range, m, of all that a chirp returns by way of a second surface.
@@ -138,9 +175,9 @@ fn returned(laws: &[Brdf], detours: &[Detour]) -> Option<MeanEcho> {
 const ABOUT: About = About {
     name: "multi-bounce",
     level: Level::Scene,
-    description: "Part of the wave goes on from the first surface to a second one and returns from there. 0 dB \
-         is the power that the two scattering laws give when the antenna sees the second surface as well as \
-         the first.",
+    description: "Part of the wave goes on from the first surface to a second one and returns from there. At \
+         0 dB its power is what the two scattering models and the antenna's pattern give: its beam, and side lobes \
+         of -20 dB; coupling_db is added to it.",
     signature: "Places that face another surface, as in corners and under arms, are too bright and too far \
          away. A foreign patch is bright without a longer range, and a wrong pose is off in range \
          without being bright; convex targets never show this.",

@@ -18,7 +18,6 @@ pub(crate) struct ThinFilm;
 const USUAL_F_LAMBDA: f64 = 0.11;
 /// Beyond these a substrate reflects nothing, or all, and a ratio means nothing.
 const F_LAMBDA_RANGE: [f64; 2] = [1e-3, 0.999];
-const LOBE_RAD: f64 = 0.02;
 const MOST_THETA_RAD: f64 = 1.55;
 
 /// Less than any solid has.
@@ -41,8 +40,8 @@ fn reflectances(
 ) -> [f64; 2] {
     let theta_rad = theta_rad.min(MOST_THETA_RAD);
     let layers = vec![Layer { thickness_m, eps_real: index * index, eps_imag: 0.0 }];
-    let coated = Layered { layers, eps_real, eps_imag: 0.0, frequency_hz, lobe_rad: LOBE_RAD };
-    let bare = Fresnel { eps_real, eps_imag: 0.0, lobe_rad: LOBE_RAD };
+    let coated = Layered { layers, eps_real, eps_imag: 0.0, frequency_hz, lobe_rad: None };
+    let bare = Fresnel { eps_real, eps_imag: 0.0, lobe_rad: None };
     [coated.reflectance(theta_rad), bare.reflectance(theta_rad)]
 }
 

@@ -3,7 +3,8 @@
 use super::drawing::{Anchor, Shape, Text, Weight};
 use super::style::{
     DIGIT_HEIGHT, GAP_PX, INK, LABEL_PX, LINE_SPACING, MARGIN_PX, QUIET_INK, STROKE_PX,
-    TICK_LABEL_PX, TICK_PX, TITLE_PX, frame, line, text, ticks_along, upward, widest, wrapped,
+    TICK_LABEL_PX, TICK_PX, TITLE_PX, frame, line, text, ticks_along, ticks_up, upward, widest,
+    wrapped,
 };
 use super::ticks::{Tick, ticks};
 
@@ -49,7 +50,7 @@ impl<'a> Axes<'a> {
         [title, subtitle]: [&str; 2],
         content_width: f32,
     ) -> Axes<'a> {
-        let wanted = [data_width, data_height].map(ticks_along);
+        let wanted = [ticks_along(data_width), ticks_up(data_height)];
         let bare = Axes::bare([x, y], [0.0, 0.0, data_width, data_height], wanted);
         let y_labels = LINE_SPACING * LABEL_PX + widest(&bare.y_ticks) + TICK_PX + GAP_PX;
         let title = wrapped(title, TITLE_PX, Weight::SemiBold, content_width);

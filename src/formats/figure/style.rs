@@ -49,6 +49,11 @@ pub(super) fn upward(text: &str, (x, y): (f32, f32)) -> Shape {
     Shape::Text(Text { text, at, anchor, size_px: LABEL_PX, weight, colour: INK, upwards: true })
 }
 
+/// How many ticks suit a vertical axis of this length: their labels stand one above the other.
+pub(super) fn ticks_up(length_px: f32) -> usize {
+    (length_px / 60.0) as usize
+}
+
 /// How many ticks suit an axis of this length.
 pub(super) fn ticks_along(length_px: f32) -> usize {
     (length_px / 95.0) as usize

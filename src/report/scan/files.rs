@@ -1,4 +1,4 @@
-//! The files of a rendering, as bytes: three for each antenna, and the record.
+//! The files of a rendering, as bytes: three for each antenna and polarisation that it receives.
 
 use super::record::ScanRecord;
 use crate::error::Error;
@@ -7,13 +7,13 @@ use crate::formats::figure::{Figure, Scale};
 use crate::formats::ply;
 use crate::formats::words::grouped;
 use crate::geometry::Raster;
+use crate::radar::Channel;
 use crate::render::{Echo, cloud_table};
-use crate::report::json::json_file;
 use crate::scene::Scene;
 use crate::setup::{ReadyScene, View};
 use crate::units::dbm_from_watts;
 
-/// Encodes every file of a rendering; `all` puts hits below the threshold into the clouds, too.
+/// Encodes image and cloud of every view; `all` puts hits below the threshold into the clouds, too.
 pub(super) fn encode(
     all: bool,
     packing: Packing,
@@ -41,7 +41,6 @@ pub(super) fn encode(
         files.push((view.file_name("power", "png"), figure?));
         files.push((view.file_name("cloud", "ply"), cloud?));
     }
-    files.push(("scan.json".to_owned(), json_file(record)?));
     Ok(files)
 }
 
@@ -63,10 +62,13 @@ fn exr_attributes(image: &Raster, materials: &[&str]) -> Vec<(String, Attribute)
 
 fn power_figure(scene: &Scene, view: &View, image: &Raster) -> Result<Vec<u8>, Error> {
     let scan = &view.scan;
-    let antenna = match view.receiver {
-        None => scene.radar().preset.clone(),
-        Some(receiver) => format!("{}, receiver {}", scene.radar().preset, receiver.name),
-    };
+    let mut antenna = scene.radar().preset.clone();
+    if let Some(receiver) = view.receiver {
+        antenna.push_str(&format!(", receiver {}", receiver.name));
+    }
+    if view.channel == Channel::CrossPolar {
+        antenna.push_str(", cross-polar");
+    }
     let threshold_dbm = (10.0 * dbm_from_watts(scan.threshold_w)).round() / 10.0;
     let subtitle = format!(
         "{antenna}, {} of {} chirps ≥ {} dBm",

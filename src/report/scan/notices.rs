@@ -31,6 +31,7 @@ impl ScanRecord<'_> {
         notices.extend(outside_image(self.counts));
         notices.extend(self.power_dbm.and_then(|power_dbm| too_strong(self.radar, power_dbm)));
         notices.extend(self.ready.notices());
+        notices.extend(self.validity.iter().map(ToString::to_string));
         notices
     }
 

@@ -12,7 +12,7 @@ use crate::material::Status;
 use crate::radar::{Beam, Radar};
 use crate::render::Scan;
 use crate::scene::{MeshReport, Scene};
-use crate::setup::{MaterialRevision, ReadyScene, SceneMaterial, View};
+use crate::setup::{MaterialRevision, ReadyScene, SceneMaterial, ValidityWarning, View};
 use crate::units::dbm_from_watts;
 
 /// Version of the layout of `scan.json`; it grows with every change that a reader could trip over.
@@ -25,8 +25,9 @@ const EQUATION: &str = "power_w = transmit_power_w * 10^(-system_loss_db/10) * s
     w^2 = w0^2 + (wavelength_m * (range_m - focus_m) / (pi * w0))^2; \
     w0 = beam.waist_m * (1 + (edge_growth - 1) * r^2 / edge_m^2), r from the middle of the target plane to where \
     the beam's axis is after 8 m; \
-    f_per_sr is the scattering model of the point's material in backscatter, with wavelength_m / (2 pi w0) in place of \
-    a smaller m or lobe_rad; with scene.spot.rays > 1 the power is the \
+    f_per_sr is the scattering model of the point's material in backscatter, its lobe convolved with the beam's slopes \
+    exp(-s^2 / delta^2), delta = wavelength_m / (2 pi w0): m^2 + delta^2 in place of m^2 in D of beckmann, and delta in \
+    place of a lobe_rad that is smaller or missing; with scene.spot.rays > 1 the power is the \
     mean of this over the rays of the spot, and range and incidence are no longer those of one ray; docs/model.md has receivers elsewhere, \
     second surfaces, speckle and noise";
 
@@ -55,7 +56,12 @@ pub struct ScanRecord<'a> {
     pub(super) counts: Counts,
     pub(super) power_dbm: Option<PowerRange>,
     image: Value,
+    /// Where a model is used outside of what its derivation allows.
+    pub(super) validity: Vec<ValidityWarning>,
     pub(super) receivers: Vec<ReceiverRecord<'a>>,
+    /// What the antennas received across the polarisation that was sent; empty if they do not.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    cross_polar: Vec<CrossPolarRecord<'a>>,
     #[serde(skip)]
     pub(super) ready: &'a ReadyScene,
 }
@@ -72,6 +78,16 @@ pub struct ReceiverRecord<'a> {
     noise_dbm: Option<f64>,
     /// What became of the chirps there.
     pub counts: Counts,
+    power_dbm: Option<PowerRange>,
+}
+
+/// What an antenna received across the polarisation that was sent.
+#[derive(Serialize)]
+struct CrossPolarRecord<'a> {
+    /// The receiver; `null` for the radar.
+    receiver: Option<&'a str>,
+    /// Detections at or above the antenna's threshold.
+    detections: usize,
     power_dbm: Option<PowerRange>,
 }
 
@@ -132,8 +148,8 @@ impl OutsideTheta {
 }
 
 impl<'a> ScanRecord<'a> {
-    /// The record of a rendering. `views` and `images` are those of the radar and then of every receiver;
-    /// `all_hits` says that the clouds hold echoes below the threshold, too.
+    /// The record of a rendering. `views` and `images` are those of the radar and then of every receiver,
+    /// `crossed` those of the cross-polar channel; `all_hits` says that the clouds hold echoes below the threshold, too.
     ///
     /// # Panics
     /// When `views` or `images` is empty.
@@ -141,7 +157,9 @@ impl<'a> ScanRecord<'a> {
         ready: &'a ReadyScene,
         model: Option<&Model>,
         views: &[View<'a>],
+        crossed: &[View<'a>],
         images: &[Raster],
+        validity: Vec<ValidityWarning>,
         all_hits: bool,
     ) -> ScanRecord<'a> {
         let scene = &ready.scene;
@@ -181,12 +199,14 @@ impl<'a> ScanRecord<'a> {
                 "width": image.width, "height": image.height, "pixel_m": image.pixel_m,
                 "x_min_m": image.x_min_m, "y_min_m": image.y_min_m,
             }),
+            validity,
             materials,
             effects: effects(model),
             regions: regions(scene, &ready.material_of_region, scan),
             receivers: std::iter::zip(views, images)
                 .filter_map(|(view, image)| ReceiverRecord::new(scene, view, image))
                 .collect(),
+            cross_polar: crossed.iter().map(CrossPolarRecord::new).collect(),
             ready,
         }
     }
@@ -249,6 +269,16 @@ impl<'a> ReceiverRecord<'a> {
             counts: Counts::new(scene, &view.scan, image),
             power_dbm: PowerRange::new(&view.scan),
         })
+    }
+}
+
+impl<'a> CrossPolarRecord<'a> {
+    fn new(view: &View<'a>) -> CrossPolarRecord<'a> {
+        CrossPolarRecord {
+            receiver: view.receiver.map(|receiver| receiver.name.as_str()),
+            detections: view.scan.detections().count(),
+            power_dbm: PowerRange::new(&view.scan),
+        }
     }
 }
 

@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::formats::exr::Packing;
 use crate::geometry::Raster;
 use crate::render::RenderError;
+use crate::report::json::json_file;
 use crate::setup::ReadyScene;
 use crate::trace::{Gpu, GpuError, Tracer};
 
@@ -85,13 +86,19 @@ impl<'a> RenderRequest<'a> {
 
         progress(RenderProgress::Begin(RenderStage::Power));
         let views = assembly.views(&setup, &footprints, &done)?;
+        let crossed = assembly.cross_polar_views(&setup, &footprints, &done)?;
 
         progress(RenderProgress::Begin(RenderStage::Image));
         let images: Vec<Raster> = views.iter().map(|view| ready.image(&view.scan)).collect();
 
         progress(RenderProgress::Begin(RenderStage::Encode));
-        let record = ScanRecord::new(ready, assembly.model(), &views, &images, all_hits);
+        let validity = ready.validity(&setup, &footprints);
+        let record =
+            ScanRecord::new(ready, assembly.model(), &views, &crossed, &images, validity, all_hits);
         let mut files = encode(all_hits, self.packing, ready, &views, &images, &record)?;
+        let images: Vec<Raster> = crossed.iter().map(|view| ready.image(&view.scan)).collect();
+        files.extend(encode(all_hits, self.packing, ready, &crossed, &images, &record)?);
+        files.push(("scan.json".to_owned(), json_file(&record)?));
         if let Some(shape) = self.beat {
             for view in &views {
                 files.push(shape.encode(ready, &setup, &footprints, view)?);

@@ -9,7 +9,7 @@ use crate::store::rows::rows;
 
 /// A material with the words of a search.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Hit {
+pub struct Match {
     /// Short name.
     pub slug: Slug,
     /// Full name.
@@ -31,7 +31,7 @@ const MOST_WORDS: usize = 32;
 const RARE: u32 = 500;
 
 /// Up to `most` materials that have all these words.
-pub(super) fn search(conn: &Connection, words: &str, most: u32) -> Result<Vec<Hit>> {
+pub(super) fn search(conn: &Connection, words: &str, most: u32) -> Result<Vec<Match>> {
     let phrases = phrases(words);
     if phrases.is_empty() {
         return Ok(Vec::new());
@@ -69,7 +69,7 @@ fn are_rare(conn: &Connection, phrases: &[String]) -> Result<bool> {
 }
 
 /// Materials with all words, the best first.
-fn ranked(conn: &Connection, query: &str, most: u32) -> Result<Vec<Hit>> {
+fn ranked(conn: &Connection, query: &str, most: u32) -> Result<Vec<Match>> {
     let sql = "
         SELECT search.slug, search.name, revision, status,
             snippet(search, -1, '[', ']', '…', 12), rank
@@ -80,7 +80,7 @@ fn ranked(conn: &Connection, query: &str, most: u32) -> Result<Vec<Hit>> {
 }
 
 /// Materials whose short name begins with the words, then those with the whole words, then all others.
-fn unranked(conn: &Connection, words: &str, phrases: &[String], most: u32) -> Result<Vec<Hit>> {
+fn unranked(conn: &Connection, words: &str, phrases: &[String], most: u32) -> Result<Vec<Match>> {
     let sql = "
         SELECT search.slug, search.name, revision, status,
             snippet(search, -1, '[', ']', '…', 12), 0.0
@@ -101,7 +101,7 @@ fn unranked(conn: &Connection, words: &str, phrases: &[String], most: u32) -> Re
 }
 
 /// Materials whose short name begins with the words.
-fn called(conn: &Connection, words: &str, most: u32) -> Result<Vec<Hit>> {
+fn called(conn: &Connection, words: &str, most: u32) -> Result<Vec<Match>> {
     let begin = words.split_whitespace().collect::<Vec<_>>().join("-").to_lowercase();
     // In ASCII, `~` comes after every character of a short name.
     let end = format!("{begin}~");
@@ -112,12 +112,12 @@ fn called(conn: &Connection, words: &str, most: u32) -> Result<Vec<Hit>> {
         let rest = slug.as_str().strip_prefix(&begin).unwrap_or_default();
         let snippet = format!("[{begin}]{rest}");
         let (name, revision, status) = (row.get(1)?, row.get(2)?, row.get(3)?);
-        Ok(Hit { slug, name, revision, status, snippet, rank: 0.0 })
+        Ok(Match { slug, name, revision, status, snippet, rank: 0.0 })
     })
 }
 
-fn hit(row: &Row) -> Result<Hit> {
-    Ok(Hit {
+fn hit(row: &Row) -> Result<Match> {
+    Ok(Match {
         slug: row.get(0)?,
         name: row.get(1)?,
         revision: row.get(2)?,

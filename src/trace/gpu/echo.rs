@@ -16,10 +16,11 @@ use crate::brdf::{Distribution, Facets, Term};
 /// Rays per invocation, and so per [`Share`].
 pub const RAYS_PER_SHARE: usize = 32;
 
-/// Least roughness m of facets that f32 can evaluate.
-const LEAST_M: f64 = 1e-3;
 /// Largest power of the cosine that f32 can evaluate.
 const MOST_COSINES: f64 = 1100.0;
+
+/// Marks a term of facets, as in the shader.
+const FACETS: u32 = 16;
 
 /// Number of terms that marks a scattering model without terms, as in the shader.
 const NO_TERMS: u32 = u32::MAX;
@@ -135,15 +136,14 @@ fn pack_laws(laws: &[Option<Vec<Term>>], cosines: f64) -> (Vec<[u32; 2]>, Vec<[u
 /// Packs a term; `None` for one that f32 cannot evaluate.
 fn pack_term(term: &Term, cosines: f64) -> Option<[u32; 4]> {
     let (m, form) = match term.facets {
-        None => (0.0, 0),
-        Some(Facets { m, distribution, shadowed }) if m >= LEAST_M => {
-            (m, u32::from(distribution == Distribution::Ggx) | shadowed << 1)
+        None => (term.cosines, 0),
+        Some(Facets { m, distribution, shadowed, includes_beam }) => {
+            let law = u32::from(distribution == Distribution::Ggx);
+            (m, law | shadowed << 1 | u32::from(includes_beam) << 3 | FACETS)
         }
-        Some(_) => return None,
     };
     let cosines = term.cosines + cosines;
-    let level_per_sr = if m > 0.0 { term.level_per_sr / (m * m) } else { term.level_per_sr };
-    let values = [level_per_sr, cosines, m].map(|value| value as f32);
+    let values = [term.level_per_sr, cosines, m].map(|value| value as f32);
     let is_in_range = cosines.abs() <= MOST_COSINES && values.iter().all(|value| value.is_finite());
     let [level, cosines, m] = values.map(f32::to_bits);
     is_in_range.then_some([level, cosines, m, form])
@@ -176,7 +176,8 @@ mod tests {
         let (right, up) = axis.direction.xyz().any_orthonormal_pair();
         let beam = GaussianBeam { wavelength_m: 1e-3, waist_m: 0.004, focus_m: 3.0 };
         let solid_angle = Link::new(&Radar::default()).solid_angle(&beam);
-        Cone { axis, across_m: [width_m * right, width_m * up], section, solid_angle, law }
+        let across_m = [width_m * right, width_m * up];
+        Cone { axis, across_m, section, solid_angle, beam, on_wavefront: true, law }
     }
 
     /// A section at a distance whose wave seems to come from the distance −1/`curvature_per_m` behind.
@@ -218,7 +219,9 @@ mod tests {
             }
             let aside_m = sample.x * cone.across_m[0] + sample.y * cone.across_m[1];
             if let Some(hit) = bvh.closest(&cone.section.ray(&cone.axis, aside_m).unwrap()) {
-                let f_per_sr = law.retro_per_sr(hit.theta_rad());
+                let to_radar = Direction::from_angles(hit.theta_rad(), 0.0);
+                let beam_rad = cone.beam.section(hit.range_m).divergence_rad();
+                let f_per_sr = law.seen_by(beam_rad, to_radar, to_radar).f_per_sr;
                 let solid_angle = cone.solid_angle.at_sr(hit.range_m) / cone.solid_angle.level_sr;
                 sum += f_per_sr * hit.cos_theta.powi(2) * solid_angle;
             }
@@ -266,7 +269,8 @@ mod tests {
         let ball = solids::icosphere(0.3, 2);
         let bvh = Bvh::new(&ball);
         let held = gpu.hold(&bvh).unwrap();
-        let narrow = Facets { m: 1e-4, distribution: Distribution::Ggx, shadowed: 1 };
+        let distribution = Distribution::Ggx;
+        let narrow = Facets { m: 1e-4, distribution, shadowed: 1, includes_beam: false };
         let term = |facets, cosines| Some(vec![Term { level_per_sr: 1.0, cosines, facets }]);
         let laws = [None, term(Some(narrow), 0.0), term(None, 1e4), term(None, 0.0)];
         let regions = vec![0; ball.facets.len()];
@@ -275,6 +279,9 @@ mod tests {
         let direction = Direction::new(DVec3::NEG_Z).unwrap();
         let of_law = |law| {
             let cone = cone(Ray { origin, direction }, 0.0, section(4.7, 0.0), law);
+            // The beam, too, is narrower than f32 can resolve.
+            let beam = GaussianBeam { waist_m: 1.0, ..cone.beam };
+            let cone = Cone { beam, ..cone };
             lit.echoes(&[cone]).unwrap()[0]
         };
         for law in 0..3 {

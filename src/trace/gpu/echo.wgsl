@@ -23,13 +23,23 @@ const GONE: f32 = 750.0;
 /// Rays per invocation, one bit each.
 const SHARE: u32 = 32u;
 
-/// Roughness in place of the 0 of a diffuse term, to avoid a division by zero.
-const LEAST_M: f32 = 1e-3;
+/// Square of the least width of a lobe that f32 can evaluate.
+const LEAST_WIDTH2: f32 = 1e-6;
+
+/// As in slopes.rs and backscatter.rs.
+const MOST_OF_SERIES: f32 = 0.03;
+const STEP_LN: f32 = 0.8;
+const MOST_T: f32 = 14.0;
+const STEPS: u32 = 32u;
+const UNSEEN: f32 = 1e-4;
 
 /// Number of terms of a scattering model without terms.
 const NO_TERMS: u32 = 0xffffffffu;
 
 const GGX: u32 = 1u;
+const SHADOWED: u32 = 6u;
+const INCLUDES_BEAM: u32 = 8u;
+const FACETS: u32 = 16u;
 
 /// A chirp that starts where its axis comes near the mesh.
 struct Spot {
@@ -54,18 +64,20 @@ struct Spot {
     offset: f32,
     middle: f32,
     per_depth: f32,
-    unused_a: u32,
-    unused_b: u32,
-    unused_c: u32,
+    /// The beam's divergence squared is beam2 / (1 + ((R - focus) per_rayleigh)^2).
+    beam2: f32,
+    focus: f32,
+    per_rayleigh: f32,
 }
 
-/// level · cosᵃ θ · P(tan² θ / m²) · G1(θ)ˢ.
+/// level · cosᵃ θ · P(tan² θ) · G1(θ)ˢ, where the beam widens P, and cosᵃ θ of a diffuse term.
 struct Term {
     level: f32,
     cosines: f32,
-    /// Roughness m; 0 for a diffuse term.
+    /// Roughness m; of a diffuse term the part of `cosines` that the beam widens.
     m: f32,
-    /// The distribution P in bit 0, and s from bit 1 on.
+    /// The distribution P in bit 0, s in bits 1 and 2, whether m includes the beam in bit 3, and whether the term is of
+    /// facets in bit 4.
     form: u32,
 }
 
@@ -166,10 +178,12 @@ fn scattered(spot: Spot, way: Beside, entry: u32) -> Back {
     // 1 - cos² θ would suffer from cancellation.
     let across = cross(ray.direction, normal) / unit;
     let tangent = sqrt(dot(across, across)) / cosine;
+    let zeta = (range - spot.focus) * spot.per_rayleigh;
+    let beam2 = spot.beam2 / (1.0 + zeta * zeta);
     var sum = 0.0;
     var is_told = true;
     for (var term = law.x; term < law.x + law.y; term++) {
-        let one = told(terms[term], cosine, tangent);
+        let one = told(terms[term], cosine, tangent, beam2);
         is_told = is_told && one >= 0.0;
         sum += max(one, 0.0);
     }
@@ -181,27 +195,69 @@ fn scattered(spot: Spot, way: Beside, entry: u32) -> Back {
 }
 
 /// Negative if f32 cannot decide whether the value is 0 in f64.
-fn told(term: Term, cosine: f32, tangent: f32) -> f32 {
-    let slope = tangent / max(term.m, LEAST_M);
-    let is_diffuse = term.m == 0.0;
-    let is_ggx = (term.form & 1u) == GGX;
-    let lost = select(select(slope * slope, 0.0, is_ggx), -term.cosines * log(cosine), is_diffuse);
-    if term.level == 0.0 || lost > GONE {
+fn told(term: Term, cosine: f32, tangent: f32, beam2: f32) -> f32 {
+    if term.level == 0.0 {
+        return 0.0;
+    }
+    let is_diffuse = (term.form & FACETS) == 0u;
+    let is_ggx = (term.form & GGX) == GGX;
+    let slope2 = tangent * tangent;
+    let lobe = 0.5 * term.m * beam2;
+    let widened = select(lobe, 0.0, lobe < UNSEEN);
+    let cosines = term.cosines - select(0.0, term.m * widened / (1.0 + widened), is_diffuse);
+    let includes_beam = (term.form & INCLUDES_BEAM) != 0u;
+    let m2 = max(term.m * term.m - select(0.0, beam2, includes_beam), 0.0);
+    if !is_diffuse && m2 + beam2 < LEAST_WIDTH2 {
+        return -1.0;
+    }
+    let lost = select(
+        select(slope2 / (m2 + beam2), 0.0, is_ggx),
+        -cosines * log(cosine),
+        is_diffuse,
+    );
+    if lost > GONE {
         return 0.0;
     }
     if lost > FAINT {
         return -1.0;
     }
-    let level = term.level * pow(cosine, term.cosines);
+    let level = term.level * pow(cosine, cosines);
     if is_diffuse {
-        return max(level, LEAST);
+        return max(level / (1.0 + widened), LEAST);
     }
-    let wide = 1.0 / (1.0 + slope * slope);
-    let law = select(exp(-slope * slope), wide * wide, is_ggx);
+    var law = exp(-lost) / (m2 + beam2);
+    if is_ggx {
+        law = density_ggx(slope2, m2, beam2);
+    }
     let seen = select(seen_beckmann(term.m * tangent), seen_ggx(term.m * tangent), is_ggx);
-    let shadowed = term.form >> 1u;
+    let shadowed = (term.form & SHADOWED) >> 1u;
     let together = select(1.0, seen, shadowed >= 1u) * select(1.0, seen, shadowed >= 2u);
     return max(level * law * together, LEAST);
+}
+
+/// π times GGX's density of slopes as the beam widens it: `Distribution::density` of slopes.rs.
+fn density_ggx(slope2: f32, m2: f32, beam2: f32) -> f32 {
+    let sum2 = m2 + slope2;
+    let small = beam2 / sum2;
+    if small <= MOST_OF_SERIES {
+        let steep = slope2 / sum2;
+        let first = 2.0 - 6.0 * steep;
+        let second = 6.0 + steep * (60.0 * steep - 48.0);
+        let third = 24.0 + steep * (steep * (1080.0 - 840.0 * steep) - 360.0);
+        return m2 / (sum2 * sum2) * (1.0 - small * (first - small * (second - small * third)));
+    }
+    var sum = 0.0;
+    for (var step = 0u; step < STEPS; step++) {
+        let t = MOST_T * exp(-STEP_LN * f32(step));
+        let width2 = m2 / t + beam2;
+        let exponent = slope2 / width2;
+        let term = STEP_LN * t * exp(-t) * exp(-exponent) / width2;
+        sum += term;
+        if exponent < 0.5 && term < 1e-4 * sum {
+            break;
+        }
+    }
+    return sum;
 }
 
 /// Smith's shadowing function G1 of m tan θ.

@@ -49,7 +49,7 @@ impl Gpu {
     /// As [`new`](Self::new), with buffers of at most `buffer_bytes`: for smaller meshes and fewer rays per call.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// When there is no adapter, or the program was built without the feature `gpu`.
     pub fn limited(buffer_bytes: u64) -> Result<Gpu, GpuError> {
         Device::open(buffer_bytes).map(|device| Gpu { device })
     }
@@ -96,7 +96,7 @@ impl<'a> GpuMesh<'a> {
     /// The answers of the device alone, without a decision in f64.
     ///
     /// # Errors
-    /// As [`closest`](Self::closest).
+    /// When the device stops working or has no memory for the rays.
     pub fn answers(&self, rays: &[Ray<Global>]) -> Result<Vec<Answer>, GpuError> {
         self.map_answers(rays, |_, answer| answer)
     }

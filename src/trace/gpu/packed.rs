@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::frames::{Global, Ray};
 use crate::geometry::Mesh;
-use crate::radar::{Section, SolidAngle};
+use crate::radar::{GaussianBeam, Section, SolidAngle};
 use crate::trace::boxes::Boxes;
 
 /// The rays of a chirp, one per sample of the spot.
@@ -21,6 +21,10 @@ pub struct Cone {
     pub section: Section,
     /// The antenna's solid angle along the beam.
     pub solid_angle: SolidAngle,
+    /// The beam, whose divergence widens lobes.
+    pub beam: GaussianBeam,
+    /// Whether the rays stand on the curved wavefront, which is then a part of the divergence.
+    pub on_wavefront: bool,
     /// Number of the scattering model of region 0; those of the other regions follow.
     pub law: u32,
 }
@@ -116,7 +120,7 @@ fn known_spot(answer: u32) -> Spot {
 }
 
 fn spot(boxes: &Boxes, cone: &Cone, reach: f64) -> Spot {
-    let Cone { axis, across_m, section, solid_angle, law } = cone;
+    let Cone { axis, across_m, section, solid_angle, beam, on_wavefront, law } = cone;
     let (from_centre, direction) = (axis.origin.xyz - boxes.sphere.centre, axis.direction.xyz());
     let per_m = 1.0 / boxes.sphere.radius_m;
     // A ray that is r from the axis in the section is r·(1 + (R − range)/R_c) from it at the range R.
@@ -141,7 +145,8 @@ fn spot(boxes: &Boxes, cone: &Cone, reach: f64) -> Spot {
     let [[a, b, c], [d, e, f]] = across_m.map(|aside_m| words((aside_m * per_m).as_vec3()));
     let SolidAngle { offset, middle_m, depth_m, .. } = *solid_angle;
     let curvature = section.curvature_per_m / per_m;
-    let [start, size, spread, curvature, offset, middle, per_depth] = [
+    let per_rayleigh = if *on_wavefront { 1.0 / (beam.rayleigh_m() * per_m) } else { 0.0 };
+    let [start, size, spread, curvature, offset, middle, per_depth, beam2, focus, per_rayleigh] = [
         start_m * per_m,
         size,
         spread(start_m),
@@ -149,11 +154,36 @@ fn spot(boxes: &Boxes, cone: &Cone, reach: f64) -> Spot {
         offset,
         middle_m * per_m,
         1.0 / (depth_m * per_m),
+        beam.divergence_rad().powi(2),
+        beam.focus_m * per_m,
+        per_rayleigh,
     ]
     .map(word);
     [
-        x, y, z, start, u, v, w, size, a, b, c, *law, d, e, f, UNKNOWN, spread, curvature, offset,
-        middle, per_depth, 0, 0, 0,
+        x,
+        y,
+        z,
+        start,
+        u,
+        v,
+        w,
+        size,
+        a,
+        b,
+        c,
+        *law,
+        d,
+        e,
+        f,
+        UNKNOWN,
+        spread,
+        curvature,
+        offset,
+        middle,
+        per_depth,
+        beam2,
+        focus,
+        per_rayleigh,
     ]
 }
 
@@ -230,7 +260,10 @@ mod tests {
             let solid_angle =
                 SolidAngle { level_sr: 1.0, offset: 1.0, middle_m: 10.0, depth_m: 0.5 };
             let across_m = [DVec3::X, DVec3::Z].map(|unit| 10.0 * width * unit);
-            spot(bvh.boxes(), &Cone { axis, across_m, section, solid_angle, law: 7 }, 2.0)
+            let beam = GaussianBeam { wavelength_m: 1e-3, waist_m: 0.01, focus_m: 9.0 };
+            let on_wavefront = true;
+            let cone = Cone { axis, across_m, section, solid_angle, beam, on_wavefront, law: 7 };
+            spot(bvh.boxes(), &cone, 2.0)
         };
         let near = cone(0.0, 0.001);
         let reach_m = 2.0 * 0.001 * 10.25;
@@ -239,8 +272,11 @@ mod tests {
         assert!((f64::from(f32::from_bits(near[3])) - (40.0 - start)).abs() < 1e-3);
         assert!((f64::from(f32::from_bits(near[7])) - (1.0 + 2.0 * reach_m / 0.25)).abs() < 1e-5);
         assert_eq!((vector(&near[4..7]), near[11], near[15]), (DVec3::NEG_Y, 7, UNKNOWN));
-        let rest = [16, 17, 18, 19, 20].map(|word: usize| f64::from(f32::from_bits(near[word])));
-        let expected = [0.1 * (10.0 - 0.25 * start), 0.025, 1.0, 40.0, 0.5];
+        let rest = [16, 17, 18, 19, 20, 21, 22, 23]
+            .map(|word: usize| f64::from(f32::from_bits(near[word])));
+        // δ₀ = 1 mm/(2π·10 mm), z_R = π·(10 mm)²/1 mm = 0.314 m.
+        let first = [0.1 * (10.0 - 0.25 * start), 0.025, 1.0, 40.0, 0.5];
+        let expected = first.into_iter().chain([2.533e-4, 36.0, 0.7958]);
         assert!(rest.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-4), "{rest:?}");
         // Its axis passes the ball, its rim does not.
         assert_eq!(cone(0.26, 0.001)[15], UNKNOWN);
