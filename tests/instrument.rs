@@ -156,6 +156,22 @@ fn the_range_receiver_reads_range_and_power_of_a_single_ray() {
 }
 
 #[test]
+fn leakage_is_what_a_receiver_without_a_gate_sees() {
+    let ranges_m = |gate: &str| {
+        let tables = format!(
+            "[radar.receiver]\ntemperature_k = 0\n{gate}[radar.receiver.leakage]\npower_dbm = -30\n\
+             range_m = 1.0\n[radar.chirp]\nsamples = 2048\n"
+        );
+        let (_, cloud) = render(&tables);
+        cloud("cloud.ply")["range_m"].clone()
+    };
+    let (open, gated) = (ranges_m(""), ranges_m("gate_m = [7, 9]\n"));
+    assert_eq!((open.len(), gated.len()), (2000, 2000));
+    assert!(open.iter().all(|range_m| (range_m - 1.0).abs() < 1e-4));
+    assert!(gated.iter().all(|range_m| (range_m - 8.0).abs() < 0.02));
+}
+
+#[test]
 fn false_alarms_come_as_often_as_asked_and_have_no_cause() {
     // The plate is replaced by a sliver that only a few chirps meet.
     let folder = tempfile::tempdir().unwrap();

@@ -16,6 +16,7 @@ pub mod receiver;
 pub mod scan;
 mod settings;
 pub mod speckle;
+pub mod transmitter;
 pub mod window;
 
 pub use beam::{Beam, GaussianBeam, Section};
@@ -32,4 +33,5 @@ pub use receiver::{Detection, RangeProcessor, Receiver};
 pub use scan::{Chirps, Field, Pattern};
 pub use settings::{BeamEntry, Footprint, Radar, SpotDiameter};
 pub use speckle::Speckle;
+pub use transmitter::{Leakage, PhaseNoise, SweepRipple};
 pub use window::Window;

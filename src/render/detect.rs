@@ -164,7 +164,7 @@ impl Detector {
         (0..beat.looks).map(move |_| {
             let returns: Vec<Return> =
                 tones.iter().map(|&sum| beat.echo(sum, &mut phases)).collect();
-            let mut signal = beat.chirp.beat_signal(&returns)?;
+            let mut signal = beat.processor.beat_signal(&returns, &mut noise)?;
             beat.processor.add_noise(&mut signal, &mut noise);
             Ok(signal)
         })
