@@ -13,6 +13,7 @@ pub mod polarisation;
 mod preset;
 pub mod random;
 pub mod receiver;
+pub mod reference;
 pub mod scan;
 mod settings;
 pub mod speckle;
