@@ -18,7 +18,7 @@ use crate::formats::html::PageError;
 use crate::material::MaterialError;
 use crate::material::file::FileError;
 use crate::measure::curve::ObservationError;
-use crate::measure::{CloudError, ReductionError, RegistrationError};
+use crate::measure::{CalibrationError, CloudError, ReductionError, RegistrationError};
 use crate::radar::{F5Error, RadarError};
 use crate::render::RenderError;
 use crate::scene::SceneError;
@@ -95,6 +95,14 @@ pub enum Error {
     /// There is no pose.
     #[error(transparent)]
     Registration(#[from] RegistrationError),
+    /// A cloud does not calibrate a radar.
+    #[error("{}: {error}", file.display())]
+    Calibration {
+        /// The cloud's file.
+        file: PathBuf,
+        /// What is wrong.
+        error: CalibrationError,
+    },
     /// There is no curve.
     #[error(transparent)]
     Reduction(#[from] ReductionError),

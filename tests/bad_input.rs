@@ -402,6 +402,18 @@ fn instruments_that_cannot_work() {
             &["radar.speckle.looks = 2.5", "whole"],
         ),
         (format!("{receiver}[radar.noise]\n"), &["[radar.noise]", "remove"]),
+        (
+            "[radar.noise]\nlevel_dbm = -90\ngate_cells = 9\n".to_owned(),
+            &["level_dbm", "gate_cells", "remove one"],
+        ),
+        (
+            format!("{receiver}[radar.receiver.leakage]\npower_dbm = -30\nrange_m = 30\n"),
+            &["receiver.leakage.range_m = 30", "22.7"],
+        ),
+        (
+            format!("{receiver}[radar.receiver.phase_noise]\nlevel_dbc_per_hz = -80\n"),
+            &["phase_noise", "offset_hz"],
+        ),
         (format!("{receiver}gate_m = [9, 7]\n"), &["receiver.gate_m[1] = 7", "from 9"]),
         (format!("{receiver}[radar.chirp]\nduration_s = 1.0\n"), &["chirp.duration_s = 1"]),
         ("[bounce]\nrays = 0\n".to_owned(), &["bounce.rays", "1 to 10 000"]),

@@ -341,6 +341,7 @@ fn every_command_has_help_with_an_example() {
     for command in [
         "render",
         "radar",
+        "calibrate",
         "measure",
         "compare",
         "diagnose",

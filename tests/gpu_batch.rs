@@ -226,7 +226,8 @@ fn every_scan_has_its_own_material_and_seed() {
     let Some(gpu) = adapter(u64::MAX) else { return };
     let mut bench = Bench::ball(0.3, 4, builtin("ptfe"));
     bench.radar.speckle = Some(Speckle { looks: 3.0, ..Default::default() });
-    bench.radar.noise = Some(Noise { level_dbm: -95.0, range_sd_m: 0.002 });
+    bench.radar.noise =
+        Some(Noise { level_dbm: Some(-95.0), range_sd_m: 0.002, ..Noise::default() });
     let laws = ["aluminium", "mannequin-paint", "garment", "water-25c", "cotton", "human-skin"];
     let laws = laws.map(builtin);
     let surfaces = laws.each_ref().map(|law| [Surface::new(law)]);

@@ -129,6 +129,19 @@ fn noise_adds_its_power_and_its_range_error() {
 }
 
 #[test]
+fn noise_without_a_level_is_the_floor_that_the_threshold_implies() {
+    let noise_dbm = |keys: &str| {
+        let (scan, _) = render(&format!("[radar.noise]\n{keys}"));
+        scan["noise_dbm"].as_f64().unwrap()
+    };
+    // −77 − 10·lg ln(n·10⁶).
+    for (keys, expected_dbm) in [("", -88.404), ("gate_cells = 100\n", -89.653)] {
+        assert!((noise_dbm(keys) - expected_dbm).abs() < 1e-3, "{keys}");
+    }
+    assert!((noise_dbm("level_dbm = -112\n") + 112.0).abs() < 1e-9);
+}
+
+#[test]
 fn the_range_receiver_reads_range_and_power_of_a_single_ray() {
     let (_, exact) = render("");
     let (_, found) = render("[radar.receiver]\ntemperature_k = 0\n[radar.chirp]\nsamples = 2048\n");
@@ -140,6 +153,22 @@ fn the_range_receiver_reads_range_and_power_of_a_single_ray() {
     for (a, b) in std::iter::zip(&exact["power_dbm"], &found["power_dbm"]) {
         assert!((a - b).abs() < 0.015, "{a} {b}");
     }
+}
+
+#[test]
+fn leakage_is_what_a_receiver_without_a_gate_sees() {
+    let ranges_m = |gate: &str| {
+        let tables = format!(
+            "[radar.receiver]\ntemperature_k = 0\n{gate}[radar.receiver.leakage]\npower_dbm = -30\n\
+             range_m = 1.0\n[radar.chirp]\nsamples = 2048\n"
+        );
+        let (_, cloud) = render(&tables);
+        cloud("cloud.ply")["range_m"].clone()
+    };
+    let (open, gated) = (ranges_m(""), ranges_m("gate_m = [7, 9]\n"));
+    assert_eq!((open.len(), gated.len()), (2000, 2000));
+    assert!(open.iter().all(|range_m| (range_m - 1.0).abs() < 1e-4));
+    assert!(gated.iter().all(|range_m| (range_m - 8.0).abs() < 0.02));
 }
 
 #[test]

@@ -121,7 +121,7 @@ fn shown(value: f64) -> String {
 
 fn trip(scene: &Scene, seed: u64) -> Result<Trip, Failure> {
     let quiet = Radar { speckle: None, noise: None, ..scene.radar().clone() };
-    let noise = Noise { range_sd_m: RANGE_SD_M, ..Noise::default() };
+    let noise = Noise { level_dbm: Some(-112.0), range_sd_m: RANGE_SD_M, ..Noise::default() };
     let speckle = Speckle { looks: LOOKS, coherent_ratio: 0.0 };
     let noisy = Radar { speckle: Some(speckle), noise: Some(noise), ..quiet.clone() };
     let mesh = &scene.target.mesh;
@@ -137,7 +137,7 @@ fn trip(scene: &Scene, seed: u64) -> Result<Trip, Failure> {
     let registered = registration.run(mesh, &noisy, &scene.chirps, &cloud)?;
     let reduction = Reduction { exact_mesh: true, ..Reduction::default() };
     let reduced = reduction.run(&scene.target, &noisy, &scene.chirps, &cloud, &registered)?;
-    let fit = Fit { noise_w: Some(watts_from_dbm(noise.level_dbm)), ..Fit::default() };
+    let fit = Fit { noise_w: Some(noisy.noise_w()), ..Fit::default() };
     let found = fit.run(&start(), &reduced.curve)?;
 
     let moved = moved(mesh, &registered.pose);

@@ -115,7 +115,7 @@ impl<'a> World<'a> {
             waist: Waist::new(scene),
             threshold_w: watts_from_dbm(radar.threshold_dbm),
             looks: radar.speckle.unwrap_or_default().looks,
-            noise_w: watts_from_dbm(noise.level_dbm),
+            noise_w: radar.noise_w(),
             range_sd_m: noise.range_sd_m,
             has_mirror: !chirps.mirror.is_empty(),
             bvh,

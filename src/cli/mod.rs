@@ -1,6 +1,7 @@
 //! The command line: one command per file. Flags die here; the library takes plain values.
 
 mod add;
+mod calibrate;
 mod check;
 mod cite;
 mod cloud;
@@ -76,6 +77,7 @@ struct Options {
 enum Command {
     Render(render::Args),
     Radar(radar::Args),
+    Calibrate(calibrate::Args),
     Measure(measure::Args),
     Compare(compare::Args),
     Diagnose(diagnose::Args),
@@ -111,6 +113,7 @@ pub fn run(cli: &Cli) -> Result<(), Error> {
     match &cli.command {
         Command::Render(args) => render::run(args, db, &console),
         Command::Radar(args) => radar::run(args, &console),
+        Command::Calibrate(args) => calibrate::run(args, db, &console),
         Command::Measure(args) => measure::run(args, db, &console),
         Command::Compare(args) => compare::run(args, db, &console),
         Command::Diagnose(args) => diagnose::run(args, db, &console),

@@ -2,7 +2,6 @@
 
 use super::ceiling::{Ceiling, SaturationCurve};
 use crate::radar::Radar;
-use crate::units::watts_from_dbm;
 
 /// The distribution of received powers about their mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +31,7 @@ impl Receiver {
     pub fn declared(radar: &Radar) -> Receiver {
         Receiver {
             looks: radar.speckle.map_or(f64::INFINITY, |speckle| speckle.looks),
-            noise_w: radar.noise.map_or(0.0, |noise| watts_from_dbm(noise.level_dbm)),
+            noise_w: radar.noise_w(),
             ..Receiver::LINEAR
         }
     }

@@ -146,3 +146,101 @@ pub enum ReductionError {
         points: usize,
     },
 }
+
+/// Why a cloud does not calibrate a radar.
+#[derive(Debug, Error, PartialEq)]
+pub enum CalibrationError {
+    /// Cloud, radar and scan do not belong together.
+    #[error(transparent)]
+    Cloud(#[from] ReductionError),
+    /// There is no point.
+    #[error("the cloud has no points; check that the radar detected the target")]
+    Nothing,
+    /// The peak hardly passes the threshold.
+    #[error(
+        "the strongest point has {peak_dbm:.1} dBm, and the radar's threshold is {} dBm: a calibration needs {} dBm or \
+         more; bring the target nearer to the focus or face it to the radar", rounded(*threshold_dbm), rounded(*least_dbm)
+    )]
+    Weak {
+        /// Power of the strongest point, dBm.
+        peak_dbm: f64,
+        /// The threshold, dBm.
+        threshold_dbm: f64,
+        /// Least power that is enough, dBm.
+        least_dbm: f64,
+    },
+    /// The strongest point is not on the target.
+    #[error(
+        "the strongest point, at a range of {range_m:.3} m, is {} the {target} of the scene; give the scene the target's \
+         place, or check that the cloud is of this scene", distance(*off_m)
+    )]
+    Elsewhere {
+        /// What the target is.
+        target: &'static str,
+        /// Range of the strongest point, m.
+        range_m: f64,
+        /// Distance from the target, m; infinite where the ray misses it.
+        off_m: f64,
+    },
+    /// The radar sees the corner from outside.
+    #[error(
+        "the corner of the scene is turned away: the radar does not look into it; turn it with rotation_deg, it opens \
+         towards +z"
+    )]
+    TurnedAway,
+    /// Too few points near the peak.
+    #[error(
+        "{points} points lie on the {target} within {within_db:.0} dB of the peak, and a calibration needs {least}; measure \
+         with a finer scan, or check that the cloud is of this scene"
+    )]
+    Few {
+        /// What the target is.
+        target: &'static str,
+        /// Points near the peak.
+        points: usize,
+        /// Least number.
+        least: usize,
+        /// What counts as near, dB.
+        within_db: f64,
+    },
+    /// The powers are not those of the target.
+    #[error(
+        "the powers scatter by {rms_db:.1} dB about the return of a {target}; is this the cloud of a smooth metal {target} \
+         and nothing else?"
+    )]
+    OtherReturn {
+        /// What the target is.
+        target: &'static str,
+        /// Root mean square of the residuals, dB.
+        rms_db: f64,
+    },
+    /// The powers fall off as no beam of this radar makes them.
+    #[error(
+        "as the return of a {target} the powers need a beam {ratio:.2} times as wide as the radar's; is it another target, \
+         or radar.spot_diameter_m of another radar?"
+    )]
+    OtherWidth {
+        /// What the target is.
+        target: &'static str,
+        /// Waist over that of the scene's radar.
+        ratio: f64,
+    },
+    /// Chirps that should have seen the target did not.
+    #[error(
+        "{detected} of {expected} chirps near the peak of the {target} have a point; is this the cloud of this scene, and \
+         complete?"
+    )]
+    Holes {
+        /// What the target is.
+        target: &'static str,
+        /// Chirps with a point.
+        detected: usize,
+        /// Chirps that the target answers.
+        expected: usize,
+    },
+}
+
+/// A distance as a person would say it.
+fn distance(off_m: f64) -> String {
+    if off_m.is_finite() { format!("{:.0} mm off", 1e3 * off_m) } else { "beside".to_owned() }
+}

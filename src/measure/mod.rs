@@ -1,8 +1,10 @@
 //! From a measured cloud to a curve of a material: pose, angles of incidence, σ⁰.
 //!
 //! [`Cloud`] holds the measured points and powers. [`Registration`] finds the pose of the mesh, [`Incidence`]
-//! gives the point and the angle at which each ray hits it, and [`Reduction`] converts powers to σ⁰.
+//! gives the point and the angle at which each ray hits it, and [`Reduction`] converts powers to σ⁰. [`Calibration`]
+//! finds the radar's loss from the cloud of a target whose return is known.
 
+pub mod calibrate;
 pub mod cloud;
 pub mod cloud_file;
 mod coarse;
@@ -26,10 +28,11 @@ mod synthetic;
 mod uncertainty;
 mod view;
 
+pub use calibrate::{Calibration, CalibrationResult, Estimate};
 pub use cloud::{Cloud, CloudError, CloudPoint};
 pub use cloud_file::{CloudFormat, CloudReading, PowerUnit};
 pub use curve::Curve;
-pub use error::{ReductionError, RegistrationError};
+pub use error::{CalibrationError, ReductionError, RegistrationError};
 pub use incidence::{Incidence, Sighting};
 pub use reduce::{Exclusions, Reduction, ReductionResult};
 pub use register::{RegistrationResult, Stop};

@@ -384,7 +384,7 @@ impl Assignment {
 }
 
 /// The threshold of the scene must be that of the measurement, or silence means something else.
-fn check_threshold(radar: &Radar, cloud: &Cloud) -> Result<(), ReductionError> {
+pub(super) fn check_threshold(radar: &Radar, cloud: &Cloud) -> Result<(), ReductionError> {
     // A file may round its powers by this ratio, 0.05 dB.
     const ROUNDING: f64 = 0.988_553;
     let threshold_w = watts_from_dbm(radar.threshold_dbm);

@@ -73,6 +73,9 @@ impl Radar {
             receiver.validate()?;
             let far_m = receiver.gate_m.map_or(0.0, |[_, far_m]| far_m);
             in_range(("receiver.gate_m[1]", far_m, (0.0, self.chirp().max_range_m())))?;
+            let leakage_m = receiver.leakage.map_or(0.0, |leakage| leakage.range_m);
+            let max_range_m = self.chirp().max_range_m();
+            in_range(("receiver.leakage.range_m", leakage_m, (0.0, max_range_m)))?;
             in_range(("chirp.duration_s", self.chirp.duration_s, (1e-9, self.chirp_period_s)))?;
         }
         self.speckle.map_or(Ok(()), |speckle| speckle.validate())?;

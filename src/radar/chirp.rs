@@ -8,7 +8,8 @@
 //!
 //! The third term is the residual video phase. It is kept: it is part of the exact phase, and costs
 //! nothing. What is left out is the part τ/T of the sweep in which sent and received chirp do not
-//! overlap (5·10⁻⁴ at 8 m and 100 µs), curvature of the sweep, and phase noise.
+//! overlap (5·10⁻⁴ at 8 m and 100 µs). Curvature of the sweep and phase noise are in
+//! [`transmitter`](super::transmitter).
 //!
 //! Sampling is complex (I and Q). All of 0 … N/T is then usable, and the unambiguous range is
 //! cN/2B; real sampling would halve it and add the noise of the image band.

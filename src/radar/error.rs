@@ -61,6 +61,20 @@ pub enum RadarError {
          receiver's is set by radar.receiver.noise_figure_db"
     )]
     NoiseTwice,
+    /// A level of noise beside what a level follows from.
+    #[error(
+        "[radar.noise] has level_dbm and {key}, and each says how strong the noise is; remove one: without level_dbm the \
+         level follows from radar.threshold_dbm"
+    )]
+    NoiseLevelTwice {
+        /// The other key.
+        key: &'static str,
+    },
+    /// A gate by its cells and by its length.
+    #[error(
+        "[radar.noise] has gate_cells and gate_length_m, and both say how long the gate is; remove one"
+    )]
+    GateTwice,
     /// A receiver averages a whole number of looks.
     #[error(
         "radar.speckle.looks = {looks} cannot be made of beat signals; give a whole number from 1 \

@@ -13,9 +13,11 @@ pub mod polarisation;
 mod preset;
 pub mod random;
 pub mod receiver;
+pub mod reference;
 pub mod scan;
 mod settings;
 pub mod speckle;
+pub mod transmitter;
 pub mod window;
 
 pub use beam::{Beam, GaussianBeam, Section};
@@ -32,4 +34,5 @@ pub use receiver::{Detection, RangeProcessor, Receiver};
 pub use scan::{Chirps, Field, Pattern};
 pub use settings::{BeamEntry, Footprint, Radar, Returns, SpotDiameter};
 pub use speckle::Speckle;
+pub use transmitter::{Leakage, PhaseNoise, SweepRipple};
 pub use window::Window;

@@ -21,9 +21,10 @@ use num_complex::Complex;
 use rustfft::{Fft, FftPlanner};
 use serde::{Deserialize, Serialize};
 
-use super::chirp::Chirp;
+use super::chirp::{AliasError, Chirp, Return};
 use super::error::{RadarError, in_range};
 use super::random::Draws;
+use super::transmitter::{Leakage, PhaseNoise, SweepRipple, Transmitter};
 use super::window::{self, Window};
 use crate::units::{ratio_from_db, watts_from_dbm};
 
@@ -54,6 +55,15 @@ pub struct Receiver {
     /// assumed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gate_m: Option<[f64; 2]>,
+    /// Leakage of the transmitter into the receiver. None: assumed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub leakage: Option<Leakage>,
+    /// Phase noise of the transmitter. None: assumed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phase_noise: Option<PhaseNoise>,
+    /// A sweep that is not linear. None: assumed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sweep_ripple: Option<SweepRipple>,
 }
 
 /// What a chirp gives.
@@ -68,6 +78,7 @@ pub struct Detection {
 /// A receiver made ready for one kind of chirp. Any number of threads can share it.
 #[derive(Clone)]
 pub struct RangeProcessor {
+    transmitter: Transmitter,
     window: Vec<f64>,
     transform: Arc<dyn Fft<f64>>,
     bin_m: f64,
@@ -88,6 +99,9 @@ impl Default for Receiver {
             temperature_k: 290.0,
             false_alarm_probability: None,
             gate_m: None,
+            leakage: None,
+            phase_noise: None,
+            sweep_ripple: None,
         }
     }
 }
@@ -111,7 +125,10 @@ impl Receiver {
                 (1e-15, 0.5),
             ),
         ];
-        checks.into_iter().try_for_each(in_range)
+        checks.into_iter().try_for_each(in_range)?;
+        self.leakage.map_or(Ok(()), |leakage| leakage.validate())?;
+        self.phase_noise.map_or(Ok(()), |noise| noise.validate())?;
+        self.sweep_ripple.map_or(Ok(()), |ripple| ripple.validate())
     }
 }
 
@@ -148,7 +165,9 @@ impl RangeProcessor {
                 noise_per_bin_w * threshold_over_noise(probability, crossings, looks.max(1))
             }
         };
+        let Receiver { leakage, phase_noise, sweep_ripple, .. } = *receiver;
         Ok(RangeProcessor {
+            transmitter: Transmitter::new(*chirp, leakage, phase_noise, sweep_ripple),
             transform: FftPlanner::new().plan_fft_forward(length),
             resolution_m: receiver.window.half_power_width_bins() * chirp.range_resolution_m(),
             noise_per_sample_w: density_w_per_hz * chirp.sample_rate_hz(),
@@ -179,6 +198,18 @@ impl RangeProcessor {
     /// Half-power width of a return in range: c/2B, broadened by the window, m.
     pub fn resolution_m(&self) -> f64 {
         self.resolution_m
+    }
+
+    /// The beat signal of the returns of one chirp, √W, with the faults of the transmitter.
+    ///
+    /// # Errors
+    /// When a return or the leakage lies outside the unambiguous range, by how much.
+    pub fn beat_signal(
+        &self,
+        returns: &[Return],
+        draws: &mut Draws,
+    ) -> Result<Vec<Complex<f64>>, AliasError> {
+        self.transmitter.beat_signal(returns, draws)
     }
 
     /// Adds the thermal noise of one chirp to its beat signal.
@@ -305,7 +336,6 @@ fn threshold_over_noise(probability: f64, crossings: f64, looks: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::radar::chirp::Return;
     use crate::radar::random::{Key, Purpose};
     use crate::units::{db_from_ratio, dbm_from_watts};
 
@@ -324,6 +354,9 @@ mod tests {
         temperature_k: 0.0,
         false_alarm_probability: None,
         gate_m: None,
+        leakage: None,
+        phase_noise: None,
+        sweep_ripple: None,
     };
 
     fn processor(receiver: &Receiver, chirp: &Chirp) -> RangeProcessor {

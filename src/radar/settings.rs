@@ -22,6 +22,7 @@ use super::scan::pattern::{self, Pattern};
 use super::speckle::Speckle;
 use super::window::Window;
 use crate::formats::EffectEntry;
+use crate::units::watts_from_dbm;
 
 /// An instrument. The default is `upm-300ghz`, the imaging radar of the Universidad Politécnica de
 /// Madrid that the paper describes.
@@ -194,6 +195,14 @@ impl Radar {
     /// for 27 GHz and Hann's window.
     pub fn range_cell_m(&self) -> f64 {
         self.window().first_zero_bins() * self.chirp().range_resolution_m()
+    }
+
+    /// Mean noise power in the cell of an echo by `[radar.noise]`, W; 0 without it.
+    pub fn noise_w(&self) -> f64 {
+        let looks = self.speckle.map_or(1.0, |speckle| speckle.looks);
+        let (threshold_w, cell_m) =
+            (watts_from_dbm(self.threshold_dbm), self.chirp().range_resolution_m());
+        self.noise.map_or(0.0, |noise| noise.level_w(threshold_w, cell_m, looks))
     }
 
     /// The sweep, in SI.

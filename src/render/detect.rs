@@ -18,7 +18,7 @@ use super::setup::Setup;
 use crate::effects::{Receiver, SaturationCurve};
 use crate::radar::noise::measured_w;
 use crate::radar::random::{Draws, Key, Purpose};
-use crate::radar::{Chirp, Detection, RangeProcessor, Return, Returns, Speckle};
+use crate::radar::{Chirp, Detection, Noise, RangeProcessor, Return, Returns, Speckle};
 use crate::units::watts_from_dbm;
 
 /// The sampled beat signals of one chirp, √W, one per look.
@@ -39,7 +39,7 @@ pub(super) struct Detector {
 /// The kinds of receiver.
 enum Kind {
     Exact,
-    Laws { law: Receiver, speckle: Option<Speckle>, range_sd_m: f64 },
+    Laws { law: Receiver, speckle: Option<Speckle>, noise: Noise },
     Beat(Beat),
 }
 
@@ -77,7 +77,7 @@ impl Detector {
                 Kind::Laws {
                     speckle: law.looks.is_finite().then_some(speckled),
                     law,
-                    range_sd_m: noise.map_or(0.0, |noise| noise.range_sd_m),
+                    noise: noise.unwrap_or(Noise { range_sd_m: 0.0, ..Noise::default() }),
                 }
             }
         };
@@ -161,7 +161,7 @@ impl Detector {
 
     /// As [`measure_mean`](Self::measure_mean), for one of several echoes of a chirp, by its number.
     fn measure(&self, chirp: usize, number: u64, mean: Detection) -> Detection {
-        let Kind::Laws { law, speckle, range_sd_m } = &self.kind else {
+        let Kind::Laws { law, speckle, noise } = &self.kind else {
             return self.saturate(mean.power_w, mean);
         };
         let Detection { range_m, power_w } = mean;
@@ -170,9 +170,9 @@ impl Detector {
             return mean;
         }
         let mut draws = self.draws_of(chirp, number, Purpose::Speckle);
-        let linear_w = measured_w(power_w, law.noise_w, *speckle, &mut draws);
+        let linear_w = measured_w(power_w, law.noise_w, noise.added, *speckle, &mut draws);
         let power_w = self.saturation.passed_w(power_w + law.noise_w, linear_w);
-        let error_m = range_sd_m * self.draws_of(chirp, number, Purpose::Range).gaussian();
+        let error_m = noise.range_sd_m * self.draws_of(chirp, number, Purpose::Range).gaussian();
         Detection { range_m: range_m + error_m, power_w }
     }
 
@@ -212,7 +212,7 @@ impl Detector {
         (0..beat.looks).map(move |_| {
             let returns: Vec<Return> =
                 tones.iter().map(|&sum| beat.echo(sum, &mut phases)).collect();
-            let mut signal = beat.chirp.beat_signal(&returns)?;
+            let mut signal = beat.processor.beat_signal(&returns, &mut noise)?;
             beat.processor.add_noise(&mut signal, &mut noise);
             Ok(signal)
         })

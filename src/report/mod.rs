@@ -2,6 +2,7 @@
 //! of a measurement, plots of materials and fits, lists and histories of a database. Plain values go in; records and
 //! the bytes of files come out. Nothing here writes a file.
 
+mod calibration;
 mod cannot_tell;
 mod choice;
 mod cloud;
@@ -26,6 +27,7 @@ mod shell;
 mod templates;
 mod words;
 
+pub use calibration::CalibrationReport;
 pub use cannot_tell::CannotTell;
 pub use choice::{Choice, Measurands, Reason, UntriedEffect, terms_not_asked};
 pub use cloud::{CloudAnswer, CloudRecord, CloudReport, NextSteps};

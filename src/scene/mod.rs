@@ -1,11 +1,13 @@
 //! What the radar looks at: meshes, where they stand, and which facets are made of what.
 
+pub mod builtin;
 mod error;
 pub mod file;
 mod load;
 pub mod mannequin;
 mod read;
 mod receivers;
+mod reference;
 pub mod regions;
 pub mod solids;
 mod target;
@@ -15,5 +17,6 @@ pub use file::SceneFile;
 pub use load::Scene;
 pub(crate) use read::read_regular;
 pub use read::read_text;
+pub use reference::{ReferenceShape, ReferenceTarget};
 pub use regions::RegionError;
 pub use target::{BUILTIN_MESHES, MeshReport, Region, Target};

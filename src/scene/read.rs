@@ -2,17 +2,36 @@
 
 use std::path::Path;
 
+use super::builtin;
 use super::error::SceneError;
 use crate::formats::FormatError;
+use crate::formats::text::nearest;
 
-/// Reads a scene file's text.
+/// Reads a scene file's text, or that of a built-in scene, `builtin:NAME`.
 pub fn read_text(path: &Path) -> Result<String, SceneError> {
+    if let Some(name) = path.to_str().and_then(|path| path.strip_prefix("builtin:")) {
+        return builtin::text(name).map(str::to_owned).ok_or_else(|| unknown(path, name));
+    }
     String::from_utf8(read(path, "")?).map_err(|error| {
         let place = format!("byte {}", error.utf8_error().valid_up_to());
         let way_out = "a scene is a text file in UTF-8; were cloud and scene swapped?";
         let error = FormatError::at(place, "the text is not UTF-8", way_out);
         SceneError::Format { file: path.to_owned(), error }
     })
+}
+
+fn unknown(path: &Path, name: &str) -> SceneError {
+    let names = builtin::SCENES.map(|(name, _)| name);
+    let way_out = match nearest(name, names) {
+        Some(near) => format!("did you mean `builtin:{near}`?"),
+        None => format!("the built-in scenes are builtin:{}", names.join(", builtin:")),
+    };
+    SceneError::Value {
+        file: path.to_owned(),
+        place: "the scene".to_owned(),
+        problem: "is not built in".to_owned(),
+        way_out,
+    }
 }
 
 /// Reads a whole file that another one names: a pipe would never end, and a device has no size to trust. What a person

@@ -128,6 +128,53 @@ pub fn plate(width_m: f64, height_m: f64) -> Mesh {
     Mesh { vertices: vertices.into(), facets: vec![[0, 1, 2], [0, 2, 3]], labels: Vec::new() }
 }
 
+/// A square patch of a sphere about the origin, around +z, that reaches `half_angle_rad` from there along x and y.
+///
+/// Its facets turn by about `step_rad` from one to the next. A radar's beam sees the glint of a smooth sphere only on
+/// facets that turn by less than half its divergence, which a whole sphere would have by the million.
+///
+/// ```
+/// let front = matdb::scene::solids::sphere_cap(0.1, 0.1, 0.05);
+/// assert_eq!(front.facets.len(), 32);
+/// ```
+pub fn sphere_cap(radius_m: f64, half_angle_rad: f64, step_rad: f64) -> Mesh {
+    let cells = (2.0 * half_angle_rad / step_rad).ceil().max(1.0) as u32;
+    let mut mesh = Mesh::default();
+    for row in 0..=cells {
+        for column in 0..=cells {
+            let [x_rad, y_rad] = [column, row]
+                .map(|node| half_angle_rad * (2.0 * f64::from(node) / f64::from(cells) - 1.0));
+            let direction = DVec3::new(x_rad.tan(), y_rad.tan(), 1.0).normalize();
+            mesh.vertices.push(radius_m * direction);
+        }
+    }
+    for row in 0..cells {
+        for column in 0..cells {
+            let a = row * (cells + 1) + column;
+            let (b, d) = (a + 1, a + cells + 1);
+            mesh.facets.extend([[a, b, d + 1], [a, d + 1, d]]);
+        }
+    }
+    mesh
+}
+
+/// Three triangles at right angles, open towards +z: a trihedral corner reflector. Vertex 0 is its apex, at the origin;
+/// the others are the ends of its three legs, the first of them upwards (+y).
+///
+/// ```
+/// let corner = matdb::scene::solids::trihedral(0.1);
+/// assert_eq!(corner.facets.len(), 3);
+/// ```
+pub fn trihedral(leg_m: f64) -> Mesh {
+    let (across_m, along_m) = (leg_m * (2.0f64 / 3.0).sqrt(), leg_m / 3f64.sqrt());
+    let mut vertices = vec![DVec3::ZERO];
+    for azimuth_deg in [90.0f64, 210.0, 330.0] {
+        let (sin, cos) = azimuth_deg.to_radians().sin_cos();
+        vertices.push(DVec3::new(across_m * cos, across_m * sin, along_m));
+    }
+    Mesh { vertices, facets: vec![[0, 1, 2], [0, 2, 3], [0, 3, 1]], labels: Vec::new() }
+}
+
 #[cfg(test)]
 mod tests {
     use std::f64::consts::PI;
@@ -186,6 +233,35 @@ mod tests {
         for (coarse, fine) in relative_errors(3).into_iter().zip(relative_errors(4)) {
             assert!(fine > 0.0 && fine < 5e-3, "{fine}");
             assert!((3.8..4.2).contains(&(coarse / fine)), "{coarse} {fine}");
+        }
+    }
+
+    #[test]
+    fn a_cap_lies_on_its_sphere_and_turns_by_its_step() {
+        let (half_angle_rad, step_rad) = (0.4, 0.01);
+        let cap = sphere_cap(0.2, half_angle_rad, step_rad);
+        assert!(cap.vertices.iter().all(|v| (v.length() / 0.2 - 1.0).abs() < ROUNDING));
+        for facet in 0..cap.facets.len() {
+            let outwards = cap.centroid(facet).normalize();
+            let off_rad = cap.area_normal(facet).normalize().dot(outwards).min(1.0).acos();
+            assert!(off_rad < step_rad, "{facet}: {off_rad}");
+        }
+        let edge = cap.vertices.iter().map(|v| (v.x / v.z).atan()).fold(0.0, f64::max);
+        assert!((edge - half_angle_rad).abs() < ROUNDING);
+    }
+
+    #[test]
+    fn a_trihedral_has_right_angles_and_faces_the_radar() {
+        let corner = trihedral(0.1);
+        let legs = [1, 2, 3].map(|end| corner.vertices[end] - corner.vertices[0]);
+        for (one, other) in [(0, 1), (1, 2), (2, 0)] {
+            assert!(legs[one].dot(legs[other]).abs() < 1e-15);
+            assert!((legs[one].length() - 0.1).abs() < 1e-15);
+        }
+        // Every plate is seen at arccos(1/√3) from straight ahead.
+        for facet in 0..3 {
+            let cos = corner.area_normal(facet).normalize().z;
+            assert!((cos - 1.0 / 3f64.sqrt()).abs() < ROUNDING, "{facet}: {cos}");
         }
     }
 

@@ -75,8 +75,10 @@ const FARTHEST_M: f64 = 1e5;
 /// A surface that is moved farther along its normals would cross itself.
 const MOST_OFFSET_M: f64 = 1.0;
 
-/// Built-in meshes. Cuboid, plate and sphere are of unit size: give them a `size_m`.
-pub const BUILTIN_MESHES: [&str; 4] = ["mannequin", "cuboid", "plate", "sphere"];
+/// Built-in meshes. Cuboid, plate and sphere are of unit size: give them a `size_m`. The sphere's cap is of unit
+/// diameter and the trihedral has legs of 1 m: give them a `scale`.
+pub const BUILTIN_MESHES: [&str; 6] =
+    ["mannequin", "cuboid", "plate", "sphere", "sphere-cap", "trihedral"];
 
 impl Target {
     /// Loads, places and joins the meshes of a scene, and assigns its regions.
@@ -231,6 +233,8 @@ fn builtin(name: &str) -> Option<Mesh> {
         "cuboid" => Some(solids::cuboid(DVec3::ONE, 1.0)),
         "plate" => Some(solids::plate(1.0, 1.0)),
         "sphere" => Some(solids::icosphere(0.5, 5)),
+        "sphere-cap" => Some(solids::sphere_cap(0.5, 0.5, 5e-3)),
+        "trihedral" => Some(solids::trihedral(1.0)),
         _ => None,
     }
 }

@@ -41,6 +41,9 @@ const QUIET: Receiver = Receiver {
     temperature_k: 0.0,
     false_alarm_probability: None,
     gate_m: None,
+    leakage: None,
+    phase_noise: None,
+    sweep_ripple: None,
 };
 
 /// c/2B by hand: 299 792 458/54e9 m.

@@ -18,6 +18,7 @@ impl ScanRecord<'_> {
                 ));
             }
         }
+        notices.extend(self.unfollowed());
         notices.extend(silent(self.radar, "", self.counts, self.threshold_dbm));
         for ReceiverRecord { name, counts, threshold_dbm, .. } in &self.receivers {
             let antenna = format!(" at receiver `{name}`");
@@ -46,6 +47,19 @@ impl ScanRecord<'_> {
                 self.rays_ended
             )
         })
+    }
+
+    /// Corners, which return over three surfaces.
+    fn unfollowed(&self) -> Vec<String> {
+        let corners = self.meshes.iter().filter(|mesh| mesh.file == "builtin:trihedral");
+        let tell = |mesh: &MeshReport| {
+            format!(
+                "mesh `{}` returns over three surfaces, and a rendering follows two at most: its echo is missing here; \
+                 `matdb calibrate` knows it in closed form",
+                mesh.name
+            )
+        };
+        corners.map(tell).collect()
     }
 
     /// Detections at angles for which their material makes no claim.
