@@ -79,6 +79,7 @@ fn diagnosed(scene: &Path, cloud: &Cloud) -> Result<Report, Failure> {
     let ready = ReadyScene::open(scene, None)?;
     let model = ready.model();
     let measured = MeasuredScene {
+        includes_beam: &ready.includes_beam(),
         scene: &ready.scene,
         cloud,
         laws: &ready.laws(),

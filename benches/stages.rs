@@ -417,7 +417,7 @@ fn drawn(curve: &Curve, number: u64) -> Curve {
     let mut draws = Key { seed: number, chirp: 0, sub_ray: 0, purpose: Purpose::Bootstrap }.draws();
     let count = curve.observations.len();
     let row = |_| curve.observations[(count as f64 * draws.uniform()) as usize];
-    Curve { observations: (0..count).map(row).collect() }
+    Curve { observations: (0..count).map(row).collect(), ..Curve::default() }
 }
 
 /// Where a fit starts.

@@ -95,6 +95,7 @@ fn material(number: usize) -> Material {
         source: material.sources[0].key.clone(),
         instrument: None,
         session: None,
+        illumination: Default::default(),
         observations: (0..ROWS).map(observation).collect(),
     }];
     material

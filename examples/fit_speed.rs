@@ -43,7 +43,8 @@ fn drawn(curve: &Curve, number: u64) -> Curve {
         (mixed ^ (mixed >> 31)) as usize
     };
     let rows = &curve.observations;
-    Curve { observations: rows.iter().map(|_| rows[next() % rows.len()]).collect() }
+    let observations = rows.iter().map(|_| rows[next() % rows.len()]).collect();
+    Curve { observations, ..Curve::default() }
 }
 
 /// Milliseconds of all refits, each from what the curve itself gave, and how many of them converged.

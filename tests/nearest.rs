@@ -3,7 +3,7 @@
 
 use matdb::brdf::{Brdf, Tabulated};
 use matdb::catalogue::{Distance, Nearest, Probe, Rank};
-use matdb::material::{Curve, Material, Observation, Slug, builtin};
+use matdb::material::{Curve, Illumination, Material, Observation, Slug, builtin};
 use matdb::radar::random::{Draws, Key, Purpose};
 use matdb::store::{Filter, Store};
 use matdb::units::ratio_from_db;
@@ -42,8 +42,14 @@ fn material(number: usize) -> Material {
         let mut observations: Vec<Observation> = points.iter().map(level).collect();
         observations.push(at(50.0, -40.0, false));
         let source = material.sources[0].key.clone();
-        let (name, instrument, session) = ("scan".to_owned(), None, None);
-        material.curves = vec![Curve { name, source, instrument, session, observations }];
+        material.curves = vec![Curve {
+            name: "scan".to_owned(),
+            source,
+            instrument: None,
+            session: None,
+            illumination: Illumination::default(),
+            observations,
+        }];
         material.render = "scan".to_owned();
         return material;
     }

@@ -98,6 +98,7 @@ impl Bench {
             geometry: self.geometry(),
             link: Link::new(radar),
             grain_of_region: &grains,
+            includes_beam: &[],
             middle: DVec3::ZERO,
         };
         let shots = diagnose::trace_shots(&stage).unwrap();

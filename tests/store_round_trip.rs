@@ -7,11 +7,12 @@ use matdb::brdf::{
 use matdb::formats::EffectEntry;
 use matdb::material::{
     Activity, Censor, Citation, Covariance, CrossValidation, Curve, Estimate, Finding,
-    FindingVerdict, Fit, FitReport, FixedNumber, Geometry, Goodness, Input, Instrument, Layer,
-    Making, Material, Observation, Origin, Permittivity, Roughness, Scale, Session, SessionPose,
-    Slug, Source, SourceKind, Status, builtin,
+    FindingVerdict, Fit, FitReport, FixedNumber, Geometry, Goodness, Illumination, Input,
+    Instrument, Layer, Lobes, Making, Material, Observation, Origin, Permittivity, Roughness,
+    Scale, Session, SessionPose, Slug, Source, SourceKind, Status, builtin,
 };
 use matdb::measure::statistics::by_angle;
+use matdb::radar::Footprint;
 use matdb::store::{Addition, Store};
 use proptest::collection::{btree_map, vec};
 use proptest::option;
@@ -272,6 +273,7 @@ prop_compose! {
     fn fit()(
         model in model(), estimator in text(), own_source in vec(any::<bool>(), 16),
         scale in option::of(vec(-1e3f64..1e3, 16)), report in option::of(report()),
+        is_of_surface in any::<bool>(),
     ) -> Fit {
         let mut paths: Vec<String> = model.parameters().into_iter().map(|p| p.path).collect();
         let covariance = scale.filter(|_| !paths.is_empty()).map(|scale| covariance(&paths, &scale));
@@ -279,7 +281,8 @@ prop_compose! {
         let own = std::iter::zip(paths, own_source).filter(|(_, own)| *own);
         let parameter_sources = own.map(|(path, _)| (path, String::new())).collect();
         let (name, curve, source) = (String::new(), None, String::new());
-        Fit { name, model, estimator, curve, source, parameter_sources, covariance, report }
+        let lobes = if is_of_surface { Lobes::Surface } else { Lobes::RadarAndSurface };
+        Fit { name, model, estimator, curve, source, lobes, parameter_sources, covariance, report }
     }
 }
 
@@ -292,9 +295,12 @@ fn covariance(paths: &[String], scale: &[f64]) -> Covariance {
 }
 
 fn curve() -> impl Strategy<Value = Curve> {
-    vec(observation(), 1..20).prop_map(|observations| {
+    let footprint = option::of(select(vec![Footprint::Paper, Footprint::Projected]));
+    let illumination = (footprint, option::of(1e-4f64..0.5))
+        .prop_map(|(footprint, beam_rad)| Illumination { footprint, beam_rad });
+    (vec(observation(), 1..20), illumination).prop_map(|(observations, illumination)| {
         let (name, source) = (String::new(), String::new());
-        Curve { name, source, instrument: None, session: None, observations }
+        Curve { name, source, instrument: None, session: None, illumination, observations }
     })
 }
 

@@ -16,10 +16,10 @@ use matdb::store::{Addition, Store};
 use rusqlite::Connection;
 use rusqlite::functions::FunctionFlags;
 use support::database::{
-    attributed, change, complete, contents, fitted, placed, sample, with_effects,
+    attributed, change, complete, contents, fitted, lit, placed, sample, with_effects,
 };
 
-const NEWEST: &str = "schema-0011.sqlite";
+const NEWEST: &str = "schema-0012.sqlite";
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures")
@@ -45,7 +45,8 @@ fn held(file: &str) -> [Material; 3] {
         "schema-0003.sqlite" => with_effects,
         "schema-0004.sqlite" | "schema-0005.sqlite" | "schema-0006.sqlite" => complete,
         "schema-0007.sqlite" | "schema-0008.sqlite" => attributed,
-        _ => placed,
+        "schema-0009.sqlite" | "schema-0010.sqlite" | "schema-0011.sqlite" => placed,
+        _ => lit,
     };
     let mut held = [make("paint"), change(make("paint")), make("primer")];
     if file < "schema-0008.sqlite" {
@@ -338,6 +339,12 @@ fn the_database_itself_refuses_what_a_material_may_not_be() {
         "UPDATE layer SET thickness_m = 0",
         "UPDATE layer SET source = 'other'",
         "UPDATE effect SET source = 'other'",
+        "UPDATE curve_illumination SET footprint = 'flat'",
+        "UPDATE curve_illumination SET beam_rad = 0",
+        "UPDATE curve_illumination SET footprint = NULL, beam_rad = NULL",
+        "UPDATE curve_illumination SET curve = 'other'",
+        "UPDATE fit_lobes SET lobes = 'radar-and-surface'",
+        "UPDATE fit_lobes SET fit = 'other'",
         "UPDATE fit_number SET fit = 'other'",
         "UPDATE fit_number SET at_bound = 2",
         "UPDATE fit_number SET chosen_by = 'chance'",

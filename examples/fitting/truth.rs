@@ -50,7 +50,8 @@ impl Case {
     /// No two cases and seeds share a draw.
     pub fn curve(&self, seed: u64) -> Curve {
         let seed = seed + 1_000_000 * self.looks as u64 + 100_000 * self.theta_sd_deg as u64;
-        Curve { observations: (0..CHIRPS).map(|chirp| self.row(&truth(), seed, chirp)).collect() }
+        let observations = (0..CHIRPS).map(|chirp| self.row(&truth(), seed, chirp)).collect();
+        Curve { observations, ..Curve::default() }
     }
 
     fn row(&self, truth: &Brdf, seed: u64, chirp: u32) -> Observation {

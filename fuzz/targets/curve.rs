@@ -1,8 +1,8 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use matdb::material::file::observations;
+use matdb::material::file::points;
 
 fuzz_target!(|bytes: &[u8]| {
-    let _ = observations(bytes);
+    let _ = points(bytes);
 });

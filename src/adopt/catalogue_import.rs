@@ -34,7 +34,18 @@ impl CatalogueImport<'_> {
             let mut store = database.write()?;
             import.take(&mut store, &materials, &activity("import", &[&import.database()])?)?;
         }
-        Ok(ImportSummary { dry_run: self.dry_run, materials })
+        let unstated = import.without_footprint(&materials)?;
+        let notices = Vec::from_iter(unstated.first().map(|first| {
+            let others = match unstated.len() - 1 {
+                0 => String::new(),
+                more => format!(" (and {more} more)"),
+            };
+            format!(
+                "the footprint with which it was reduced is not stated of the curve of {first}{others}: its levels \
+                 are compared as they are"
+            )
+        }));
+        Ok(ImportSummary { dry_run: self.dry_run, materials, notices })
     }
 }
 

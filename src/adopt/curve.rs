@@ -198,6 +198,7 @@ pub fn add_curve(
         source: source.clone(),
         instrument: origin.add_instrument(material),
         session: None,
+        illumination: curve.illumination,
         observations: curve.observations.clone(),
     };
     let gaps = admission::missing(material, &curve);
@@ -213,9 +214,10 @@ pub fn add_curve(
 
 /// The curve of a material that has these points.
 fn same_points<'a>(material: &'a Material, curve: &measure::Curve) -> Option<&'a Curve> {
-    material.curves.iter().find(|known| {
-        measure::Curve::from_observations(&known.observations).is_ok_and(|known| known == *curve)
-    })
+    material
+        .curves
+        .iter()
+        .find(|known| measure::Curve::of_material(known).is_ok_and(|known| known == *curve))
 }
 
 /// The curve or the fit of a material that has this name, in words.

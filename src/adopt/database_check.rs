@@ -1,12 +1,15 @@
 //! The check of a whole database, after a repair where one is wanted.
 
+use std::collections::HashMap;
+
 use serde::Serialize;
 
+use crate::brdf::Excess;
 use crate::catalogue::{CheckCount, Problem, Refit, StoreCheck};
 use crate::error::Error;
-use crate::material::builtin;
+use crate::material::{Lobes, builtin};
 use crate::setup::Database;
-use crate::store::{Repair, StoreError};
+use crate::store::{Filter, OutlineEntry, Repair, Store, StoreError};
 
 /// How a database is checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,6 +39,11 @@ pub struct CheckReport {
     pub curves: usize,
     /// Number of fits that were made again.
     pub fits: usize,
+    /// Materials of which scenes render lobes of the surface alone.
+    pub surface_lobes: usize,
+    /// What a person should not overlook, and is not wrong with the database.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notices: Vec<String>,
     /// What was repaired, a sentence each.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub repaired: Vec<String>,
@@ -89,6 +97,31 @@ impl DatabaseCheck {
             advance: &mut || progress(CheckProgress::Revision),
         }
         .run(&store);
-        Ok(CheckReport { revisions, curves, fits, repaired: repair.mended, findings })
+        let outlines = store.outlines(&Filter::default()).unwrap_or_default();
+        let is_of_surface = |line: &&OutlineEntry| line.lobes == Lobes::Surface;
+        Ok(CheckReport {
+            revisions,
+            curves,
+            fits,
+            surface_lobes: outlines.iter().filter(is_of_surface).count(),
+            notices: too_much(&store, &outlines),
+            repaired: repair.mended,
+            findings,
+        })
     }
+}
+
+/// Materials of which scenes render a law that reflects more than it receives, a sentence each. What cannot be read is
+/// a finding already.
+fn too_much(store: &Store, outlines: &[OutlineEntry]) -> Vec<String> {
+    let mut known: HashMap<(Option<[u8; 16]>, [u64; 2]), Option<Excess>> = HashMap::new();
+    let mut notices = Vec::new();
+    for OutlineEntry { slug, model_hash, theta_rad, .. } in outlines {
+        let of_law = known.entry((*model_hash, theta_rad.map(f64::to_bits))).or_insert_with(|| {
+            let (law, theta_rad) = store.rendered(&slug.parse().ok()?).ok()??;
+            Excess::of(&law, theta_rad)
+        });
+        notices.extend(of_law.map(|excess| format!("the law of `{slug}` {}", excess.words())));
+    }
+    notices
 }

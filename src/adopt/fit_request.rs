@@ -181,7 +181,8 @@ impl<'a> FitRequest<'a> {
         };
         let FitRequest { looks, noise_w, starts, seed, .. } = *self;
         let fixed = self.held(start)?;
-        Ok(Fit { method, fixed, bounds: Vec::new(), looks, noise_w, starts, seed })
+        let beam_rad = subject.curve.illumination.beam_rad;
+        Ok(Fit { method, fixed, bounds: Vec::new(), looks, beam_rad, noise_w, starts, seed })
     }
 
     /// The held parameters, each checked to be one of the model's: those that are named, and the model's frequencies.

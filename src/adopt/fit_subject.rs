@@ -80,7 +80,7 @@ impl FitSubject {
             return Err(no_curve(found.material.slug.as_str(), curve, curves));
         };
         let label = format!("{wanted}, curve {}", chosen.name);
-        let points = Curve::from_observations(&chosen.observations)
+        let points = Curve::of_material(chosen)
             .map_err(|error| Error::Observation { curve: label.clone(), error })?;
         Ok(FitSubject {
             wanted: wanted.to_owned(),

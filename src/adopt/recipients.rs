@@ -211,6 +211,7 @@ impl Adoption<'_> {
             estimator: FIT.to_owned(),
             curve: None,
             source: key.clone(),
+            lobes: self.ready.materials[recipient.number].lobes,
             parameter_sources: Vec::new(),
             covariance: None,
             report: None,

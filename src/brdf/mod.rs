@@ -11,6 +11,7 @@
 //! assert!((chalk.sigma0(60f64.to_radians()) - 0.8).abs() < 1e-12);
 //! ```
 
+mod albedo;
 mod backscatter;
 mod kind;
 mod models;
@@ -20,8 +21,10 @@ mod permittivity;
 mod retro;
 mod scattering;
 mod slopes;
+mod through_beam;
 mod validity;
 
+pub use albedo::{Excess, albedo};
 pub use backscatter::{Facets, Term};
 pub use kind::{Key, Kind};
 pub use models::*;
@@ -31,4 +34,5 @@ pub use permittivity::Polarisation;
 pub(crate) use retro::Retro;
 pub use scattering::{NARROW_M, NarrowLobe, Scattering, ScatteringModel, Seen};
 pub use slopes::{Distribution, VIEWING_RAD};
+pub use through_beam::ThroughBeam;
 pub use validity::{Bound, Condition};

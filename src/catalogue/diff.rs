@@ -8,8 +8,9 @@ use serde_json::Value;
 use super::leaves::{Leaf, leaves};
 use super::units::ENDINGS;
 use crate::brdf::{Brdf, Scattering};
-use crate::formats::words::{round_significant, significant};
+use crate::formats::words::{listed, round_significant, significant};
 use crate::material::{Curve, Material, Observation};
+use crate::radar::Footprint;
 use crate::units::{db_from_ratio, dbm_from_watts, shown};
 
 /// What differs.
@@ -21,6 +22,9 @@ pub struct Diff {
     pub curves: Vec<CurveChange>,
     /// Levels of the rendered models at every degree of the common range; none where either has none there.
     pub rendered: Option<Levels>,
+    /// What a person should know of the levels.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notices: Vec<String>,
 }
 
 /// A field that differs.
@@ -69,6 +73,7 @@ impl Diff {
             fields: fields(before, after),
             curves: curves(before, after),
             rendered: rendered(before, after),
+            notices: footprints(before, after),
         }
     }
 
@@ -247,9 +252,35 @@ fn curves(before: &Material, after: &Material) -> Vec<CurveChange> {
     changes
 }
 
-/// How a curve differs; none where its points are the same.
+/// Sentences on curves that were not reduced with one form of the footprint before and after, each kind once.
+fn footprints(before: &Material, after: &Material) -> Vec<String> {
+    let (mut other, mut one_sided) = (Vec::new(), Vec::new());
+    for curve in &after.curves {
+        let Some(old) = before.curves.iter().find(|old| old.name == curve.name) else { continue };
+        match (old.illumination.footprint, curve.illumination.footprint) {
+            (Some(old), Some(new)) if old != new => other.push(curve.name.clone()),
+            (Some(_), None) | (None, Some(_)) => one_sided.push(curve.name.clone()),
+            _ => {}
+        }
+    }
+    [
+        (other, "another footprint before and after: levels before are converted to that after"),
+        (one_sided, "a stated footprint on one side only: levels are compared as they are"),
+    ]
+    .into_iter()
+    .filter(|(names, _)| !names.is_empty())
+    .map(|(names, what)| format!("{} has {what}", listed(&names)))
+    .collect()
+}
+
+/// How a curve differs; none where its points and the form of its footprint are the same.
 fn curve_change(name: &str, old: Option<&Curve>, new: Option<&Curve>) -> Option<CurveChange> {
-    if old.zip(new).is_some_and(|(old, new)| old.observations == new.observations) {
+    let is_same = |old: &Curve, new: &Curve| {
+        let [old_form, new_form] = [old, new].map(|curve| curve.illumination.footprint);
+        old.observations == new.observations
+            && (old_form == new_form || old_form.is_none() || new_form.is_none())
+    };
+    if old.zip(new).is_some_and(|(old, new)| is_same(old, new)) {
         return None;
     }
     let limits = changed(old, new, |point| point.threshold_sigma0);
@@ -267,18 +298,25 @@ fn changed(
     new: Option<&Curve>,
     of: fn(&Observation) -> Option<f64>,
 ) -> Option<Levels> {
-    let (old, new) = (by_angle(old?, of), by_angle(new?, of));
+    let (old, new) = (old?, new?);
+    let footprint = new.illumination.footprint;
+    let (old, new) = (by_angle(old, footprint, of), by_angle(new, footprint, of));
     let pairs = old.into_iter().filter_map(|(angle, level)| Some(new.get(&angle)? - level));
     levels(&pairs.collect::<Vec<_>>())
 }
 
-/// Mean of `of` over the backscatter at each angle, averaged in linear power, dB. The key is the angle in nrad, which
-/// rounding does not change.
-fn by_angle(curve: &Curve, of: fn(&Observation) -> Option<f64>) -> BTreeMap<u64, f64> {
+/// Mean of `of` over the backscatter at each angle, averaged in linear power, dB, as a form of the footprint makes it.
+/// The key is the angle in nrad, which rounding does not change.
+fn by_angle(
+    curve: &Curve,
+    footprint: Option<Footprint>,
+    of: fn(&Observation) -> Option<f64>,
+) -> BTreeMap<u64, f64> {
     const PER_RAD: f64 = 1e9;
     let mut sums: BTreeMap<u64, (f64, f64)> = BTreeMap::new();
     for point in curve.observations.iter().filter(|o| o.is_retro()) {
         if let Some(sigma0) = of(point) {
+            let sigma0 = sigma0 * curve.illumination.factor_to(footprint, point.theta_i_rad.cos());
             let sum = sums.entry((point.theta_i_rad * PER_RAD).round() as u64).or_default();
             *sum = (sum.0 + sigma0, sum.1 + 1.0);
         }
@@ -291,7 +329,14 @@ fn rendered(before: &Material, after: &Material) -> Option<Levels> {
     let low_rad = before.theta_rad[0].max(after.theta_rad[0]);
     let high_rad = before.theta_rad[1].min(after.theta_rad[1]);
     let degrees = low_rad.to_degrees().ceil() as u32..=high_rad.to_degrees().floor() as u32;
-    let differences = degrees.map(|deg| level_db(&new, deg) - level_db(&old, deg));
+    let [lit, after_lit] = [before, after].map(|material| {
+        material.rendered_curve().map(|curve| curve.illumination).unwrap_or_default()
+    });
+    let factor_db = |deg: u32| {
+        let cos_theta = f64::from(deg).to_radians().cos();
+        db_from_ratio(lit.factor_to(after_lit.footprint, cos_theta))
+    };
+    let differences = degrees.map(|deg| level_db(&new, deg) - level_db(&old, deg) - factor_db(deg));
     levels(&differences.filter(|difference| difference.is_finite()).collect::<Vec<_>>())
 }
 

@@ -68,6 +68,9 @@ pub struct ImportSummary {
     pub dry_run: bool,
     /// Every material of their catalogue.
     pub materials: Vec<MaterialPlan>,
+    /// What a person should not overlook.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notices: Vec<String>,
 }
 
 impl Import {
@@ -255,6 +258,22 @@ impl Import {
             last = Some(material.slug.clone());
             Ok(())
         })
+    }
+
+    /// Curves of what is added whose form of the footprint is not stated, each with its material.
+    ///
+    /// # Errors
+    /// When their database cannot be read.
+    pub fn without_footprint(&self, plan: &[MaterialPlan]) -> Result<Vec<String>, CatalogueError> {
+        let mut unstated = Vec::new();
+        for MaterialPlan { slug, name, outcome } in plan {
+            let is_new = outcome.first().is_some();
+            let stored = if is_new { self.theirs.get(slug, None)? } else { None };
+            let curves = stored.into_iter().flat_map(|stored| stored.material.curves);
+            let curves = curves.filter(|curve| curve.illumination.footprint.is_none());
+            unstated.extend(curves.map(|curve| format!("`{name}`, `{}`", curve.name)));
+        }
+        Ok(unstated)
     }
 
     /// Numbers of their revisions that are added, oldest first.

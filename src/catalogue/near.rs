@@ -9,9 +9,11 @@
 
 use serde::Serialize;
 
-use crate::brdf::{Brdf, DEGREES, Outline, Scattering};
-use crate::material::{Censor, Observation};
+use crate::brdf::{Brdf, DEGREES, Outline, Scattering, ThroughBeam};
+use crate::frames::{Direction, Surface};
+use crate::material::{Censor, Illumination, Lobes, Observation};
 use crate::measure::statistics::by_angle;
+use crate::radar::Footprint;
 use crate::units::db_from_ratio;
 
 /// Least number of common angles with an echo; half of the curve's angles must be common, too.
@@ -26,6 +28,7 @@ pub struct Probe {
     /// Lowest level of the curve, dB: an upper bound for a material without an echo.
     floor_db: f64,
     noise_db: Option<f64>,
+    illumination: Illumination,
 }
 
 /// The curve at one angle, or within one degree.
@@ -92,7 +95,36 @@ impl Probe {
         let levels = bins.iter().flat_map(|bin| bin.level_db).filter(|level| level.is_finite());
         let floor_db = levels.min_by(f64::total_cmp)?;
         let has_echo = bins.iter().any(|bin| bin.level_db[0].is_finite());
-        has_echo.then(|| Probe { bins, floor_db, noise_db: noise_db(&repeats) })
+        let illumination = Illumination::default();
+        has_echo.then(|| Probe { bins, floor_db, noise_db: noise_db(&repeats), illumination })
+    }
+
+    /// The same curve, of which it is known how its target was lit. A material is then compared as this footprint
+    /// would have reduced it and as this beam sees it.
+    pub fn lit(self, illumination: Illumination) -> Probe {
+        Probe { illumination, ..self }
+    }
+
+    /// Whether a material with these lobes is another one to the beam of this curve.
+    pub(super) fn widens(&self, lobes: Lobes) -> bool {
+        lobes == Lobes::Surface && self.illumination.beam_rad.is_some()
+    }
+
+    /// The [`distance`](Probe::distance) of what was reduced in this form of the footprint and has these lobes.
+    pub(super) fn distance_of(
+        &self,
+        law: &Brdf,
+        theta_rad: [f64; 2],
+        footprint: Option<Footprint>,
+        lobes: Lobes,
+    ) -> Option<Distance> {
+        let beam_rad = if self.widens(lobes) { self.illumination.beam_rad } else { None };
+        let own = Illumination { footprint, beam_rad };
+        let seen = ThroughBeam { law, beam_rad: beam_rad.unwrap_or(0.0) };
+        let reduced = |i: Direction<Surface>, o: Direction<Surface>| {
+            own.factor_to(self.illumination.footprint, i.cos_theta()) * seen.f_per_sr(i, o)
+        };
+        self.distance(&reduced, theta_rad)
     }
 
     /// Number of angles, or of degrees, at which the curve says something.
@@ -108,7 +140,7 @@ impl Probe {
 
     /// The distance to what scenes render of a material whose numbers are claimed for these angles of
     /// incidence, rad; `None` when too few angles are common.
-    pub fn distance(&self, scattering: &Brdf, [low, high]: [f64; 2]) -> Option<Distance> {
+    pub fn distance(&self, scattering: &dyn Scattering, [low, high]: [f64; 2]) -> Option<Distance> {
         let common = self.common([low, high])?;
         let mut silent = 0;
         let mut pairs = Vec::with_capacity(common.len());
@@ -134,12 +166,13 @@ impl Probe {
         })
     }
 
-    /// A distance, dB, that [`Probe::distance`] of a model with this outline is not below; `None` where
-    /// there is none.
+    /// A distance, dB, that [`Probe::distance`] of a model with this outline, which was reduced in this form of the
+    /// footprint, is not below; `None` where there is none.
     pub(super) fn at_least(
         &self,
         outline: &Outline,
         theta_rad: [f64; 2],
+        footprint: Option<Footprint>,
         rank: Rank,
     ) -> Option<f64> {
         // More than what the sums of many squares lose.
@@ -147,17 +180,24 @@ impl Probe {
         let common = self.common(theta_rad)?;
         let mut sums = Gaps::default();
         for bin in &common {
-            sums.add(bin.level_db, self.ends_db(outline, bin));
+            sums.add(bin.level_db, self.ends_db(outline, footprint, bin));
         }
         Some(sums.least_db(rank, common.len()) - ROUNDING_DB)
     }
 
     /// Least and greatest level that stands for a material at an angle, dB.
-    fn ends_db(&self, outline: &Outline, bin: &Bin) -> [f64; 2] {
+    fn ends_db(&self, outline: &Outline, footprint: Option<Footprint>, bin: &Bin) -> [f64; 2] {
         let [low, high] = match outline.ends_db(bin.first_degree..=bin.last_degree) {
             Some(ends) => ends,
             None => return [self.floor_db; 2],
         };
+        let own = Illumination { footprint, beam_rad: None };
+        // The factor of a footprint rises or falls throughout.
+        let [first_db, last_db] = [bin.first_degree, bin.last_degree + 1].map(|degree| {
+            let cos_theta = (degree as f64).to_radians().cos();
+            db_from_ratio(own.factor_to(self.illumination.footprint, cos_theta))
+        });
+        let (low, high) = (low + first_db.min(last_db), high + first_db.max(last_db));
         // Where it may be silent, the floor may stand for it.
         if low.is_finite() { [low, high] } else { [low, high.max(self.floor_db)] }
     }

@@ -9,7 +9,8 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 
 use super::near::{Distance, Probe, Rank};
-use crate::material::Slug;
+use crate::material::{Lobes, Slug};
+use crate::radar::Footprint;
 use crate::store::{Filter, OutlineEntry, Store, StoreError};
 
 /// The materials that a curve is nearest to.
@@ -65,8 +66,10 @@ impl Probe {
     fn least_db(&self, line: &OutlineEntry, rank: Rank) -> Option<f64> {
         match (&line.model_hash, &line.outline) {
             (None, _) => None,
+            // An outline is that of the surface and not of what a beam sees.
+            _ if self.widens(line.lobes) => Some(f64::NEG_INFINITY),
             (_, None) => Some(f64::NEG_INFINITY),
-            (_, Some(outline)) => self.at_least(outline, line.theta_rad, rank),
+            (_, Some(outline)) => self.at_least(outline, line.theta_rad, line.footprint, rank),
         }
     }
 
@@ -77,20 +80,22 @@ impl Probe {
         line: &OutlineEntry,
         known: &mut HashMap<Likeness, Option<Distance>>,
     ) -> Result<Option<Distance>, StoreError> {
-        let likeness = (line.model_hash, line.theta_rad.map(f64::to_bits));
+        let OutlineEntry { model_hash, theta_rad, footprint, lobes, .. } = *line;
+        let likeness = (model_hash, theta_rad.map(f64::to_bits), footprint, lobes);
         if let Some(distance) = known.get(&likeness) {
             return Ok(*distance);
         }
         let Ok(slug) = line.slug.parse() else { return Ok(None) };
         let rendered = store.rendered(&slug)?;
-        let distance = rendered.and_then(|(model, theta_rad)| self.distance(&model, theta_rad));
+        let distance = rendered
+            .and_then(|(law, theta_rad)| self.distance_of(&law, theta_rad, footprint, lobes));
         known.insert(likeness, distance);
         Ok(distance)
     }
 }
 
-/// Equal exactly for materials of equal model and range.
-type Likeness = (Option<[u8; 16]>, [u64; 2]);
+/// Equal exactly for materials of equal model, range, footprint and lobes.
+type Likeness = (Option<[u8; 16]>, [u64; 2], Option<Footprint>, Lobes);
 
 /// The nearest so far, with their places in the order of names.
 struct Best {

@@ -23,7 +23,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "SCENE")]
     scene: PathBuf,
     /// Use points within this of the peak, dB
-    #[arg(long, value_name = "DB", default_value_t = Calibration::default().within_db)]
+    #[arg(long, value_name = "DB", allow_negative_numbers = true, default_value_t = Calibration::default().within_db)]
     within: f64,
 }
 

@@ -31,6 +31,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     })?;
     bar.iter().for_each(ProgressBar::finish_and_clear);
     let file = db.path().display().to_string();
+    report.notices.iter().for_each(|notice| console.notice(notice));
     console.result(&text(&report, &file), &report)?;
     match report.findings.len() {
         0 => Ok(()),
@@ -46,7 +47,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
 }
 
 fn text(report: &CheckReport, file: &str) -> String {
-    let CheckReport { revisions, curves, fits, repaired, findings } = report;
+    let CheckReport { revisions, curves, fits, surface_lobes, repaired, findings, .. } = report;
     let mut text: String = repaired.iter().map(|what| format!("{file}: {what}\n")).collect();
     text.extend(findings.iter().map(|wrong| format!("{wrong}\n")));
     text += &format!(
@@ -56,5 +57,9 @@ fn text(report: &CheckReport, file: &str) -> String {
         counted(*fits, "fit"),
         if findings.is_empty() { "all is well" } else { "see above" }
     );
+    if *surface_lobes > 0 {
+        let materials = counted(*surface_lobes, "material");
+        text += &format!("of {materials} scenes render lobes of the surface alone\n");
+    }
     text
 }

@@ -47,9 +47,10 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     if let Some(name) = &args.fit {
         ready.choose_fit(name)?;
     }
+    let unstated = ready.check_footprints()?;
     let cloud = args.cloud.read(ready.scene.radar())?;
     let comparison = Comparison::new(&ready, &cloud)?;
-    let notices = [cloud.notices, ready.notices()].concat();
+    let notices = [cloud.notices, ready.notices(), Vec::from_iter(unstated)].concat();
     let record = comparison.record(&args.cloud.cloud, &args.scene, &notices);
     write_all(&args.output, &comparison.files(line, &record)?)?;
     notices.iter().for_each(|notice| console.notice(notice));

@@ -32,6 +32,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let before = find_material(store.as_ref(), &args.before, "")?.material;
     let after = find_material(store.as_ref(), &args.after, "")?.material;
     let diff = Diff::new(&before, &after);
+    diff.notices.iter().for_each(|notice| console.notice(notice));
     let names = [&args.before, &args.after];
     let text = if args.all {
         text(&diff, diff.fields.iter(), names)

@@ -37,6 +37,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
         dry_run: args.dry_run,
     };
     let imported = import.run(db)?;
+    imported.notices.iter().for_each(|notice| console.notice(notice));
     console.result(&text(&imported, db), &imported)
 }
 

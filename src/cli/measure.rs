@@ -172,6 +172,7 @@ fn text(args: &Args, measured: &MeasurementReport, stored: Option<&StoredMeasure
         "{kept}pose: {} of {} points on the surface, rms {:.2} mm, known to {:.2} mm and {:.3}° (1 sd)\n\
          shift of the middle of the points: {:.2}, {:.2}, {:.2} mm\n\
          curve: {} detections and {} censored chirps from {:.1}° to {:.1}°\n\
+         reduced with {}; {}\n\
          left out: {} near an edge or another region, {} off the surface or beside it, {} whose facet is uncertain\n\
          wrote pose.json, curve.csv and curve.svg to {}\n{saved}",
         grouped(registered.inliers),
@@ -186,6 +187,8 @@ fn text(args: &Args, measured: &MeasurementReport, stored: Option<&StoredMeasure
         grouped(curve.observations.len() - detected),
         angles_deg(curve).fold(f64::INFINITY, f64::min),
         angles_deg(curve).fold(0.0, f64::max),
+        curve.illumination.footprint_words(),
+        curve.illumination.beam_words(),
         grouped(left_out.near_edge + left_out.silent_near_edge),
         grouped(left_out.missed + left_out.off_surface),
         grouped(left_out.unsure_of_facet),

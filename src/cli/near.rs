@@ -50,6 +50,7 @@ pub(super) fn run(args: &Args, db: &Database, console: &Console) -> Result<(), E
     let search = search(args, store.as_ref())?;
     let rank = if args.shape { Rank::Shape } else { Rank::Level };
     let report = search.run(store.as_ref(), &args.filter.filter(), rank, args.limit)?;
+    report.notices.iter().for_each(|notice| console.notice(notice));
     console.result(&text(&report, args), &report)
 }
 
@@ -62,7 +63,8 @@ fn search(args: &Args, store: Option<&Store>) -> Result<NeighbourSearch, Error> 
     };
     let curve = Curve::read(&read_small(path)?)
         .map_err(|error| Error::CurveFile { file: path.clone(), error })?;
-    Ok(NeighbourSearch { observations: curve.observations, frequency_hz, own: None })
+    let Curve { observations, illumination } = curve;
+    Ok(NeighbourSearch { observations, illumination, frequency_hz, own: None })
 }
 
 fn text(record: &NeighbourReport, args: &Args) -> String {
@@ -80,7 +82,7 @@ fn text(record: &NeighbourReport, args: &Args) -> String {
                 "angles",
                 "notes",
             ],
-            found.iter().map(|near| row(near, record.angles)),
+            found.iter().map(|near| row(near, record)),
         ),
     };
     let by = if args.shape { "shape, its level left open" } else { "level and shape" };
@@ -101,7 +103,8 @@ fn text(record: &NeighbourReport, args: &Args) -> String {
     text
 }
 
-fn row(near: &Neighbour, angles: usize) -> [String; 9] {
+fn row(near: &Neighbour, record: &NeighbourReport) -> [String; 9] {
+    let angles = record.angles;
     let Distance { rms_db, rms_shape_db, offset_db, common_angles, above_bound, silent, .. } =
         near.distance;
     let mut notes = Vec::new();
@@ -113,6 +116,11 @@ fn row(near: &Neighbour, angles: usize) -> [String; 9] {
     }
     if silent > 0 {
         notes.push(format!("no echo at {silent}: at least so far"));
+    }
+    if let (Some(own), Some(theirs)) = (record.footprint, near.footprint)
+        && own != theirs
+    {
+        notes.push(format!("converted to footprint {}", own.as_str()));
     }
     if near.status != "active" {
         notes.push(near.status.clone());

@@ -140,7 +140,7 @@ impl Model<'_> {
             let laws: Vec<Retro> = self.laws.iter().map(Retro::new).collect();
             of_every(&intersections, |shot, to_radar| {
                 let law = laws.get(usize::from(shot.region));
-                law.map_or(0.0, |law| law.per_sr(stage.beam(shot).divergence_rad(), to_radar))
+                law.map_or(0.0, |law| law.per_sr(stage.widening_of_shot_rad(shot), to_radar))
             })
         });
         let gains = cache.gains.get_or_make(self.keys(|_| true), || {
@@ -302,7 +302,7 @@ impl Model<'_> {
     /// f of the scattering model of a shot without effects, 1/sr.
     fn law_per_sr(&self, stage: &Stage, shot: &Shot) -> f64 {
         let (law, to_radar) = (self.laws.get(usize::from(shot.region)), shot.to_radar());
-        let beam_rad = stage.beam(shot).divergence_rad();
+        let beam_rad = stage.widening_of_shot_rad(shot);
         law.map_or(0.0, |law| law.seen_by(beam_rad, to_radar, to_radar).f_per_sr)
     }
 

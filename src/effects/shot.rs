@@ -79,6 +79,9 @@ pub struct Stage<'a> {
     pub link: Link,
     /// Direction of the grain of every region, global frame.
     pub grain_of_region: &'a [DVec3],
+    /// Whether the lobes of a region include the beam that saw them, and no beam widens them again; they do not in a
+    /// region beyond the last.
+    pub includes_beam: &'a [bool],
     /// The pivot of a pose, m, global frame: the [`middle`] of all shots of the scan, even if only some are predicted.
     pub middle: DVec3,
 }
@@ -87,6 +90,17 @@ impl Stage<'_> {
     /// The beam of a shot's chirp.
     pub fn beam(&self, shot: &Shot) -> GaussianBeam {
         self.link.beam.towards(shot.xt_m, shot.yt_m)
+    }
+
+    /// How far a beam of a divergence, rad, widens the lobes of a region, rad.
+    pub(crate) fn widening_rad(&self, region: u16, divergence_rad: f64) -> f64 {
+        let includes_beam = self.includes_beam.get(usize::from(region)).copied();
+        if includes_beam.unwrap_or(false) { 0.0 } else { divergence_rad }
+    }
+
+    /// How far the beam of a shot widens the lobes that it meets, rad.
+    pub(crate) fn widening_of_shot_rad(&self, shot: &Shot) -> f64 {
+        self.widening_rad(shot.region, self.beam(shot).divergence_rad())
     }
 }
 

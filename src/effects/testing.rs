@@ -4,9 +4,10 @@ use glam::DVec3;
 
 use super::intersection::shot_along;
 use super::{
-    Effect, EffectParameter, MeanEcho, Model, Prediction, Receiver, Shot, Stage, library, middle,
+    Effect, EffectParameter, MeanEcho, Model, Prediction, Receiver, Shot, Stage, find, library,
+    middle,
 };
-use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Shadowing};
+use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Scattering, Shadowing};
 use crate::frames::{Point, Ray};
 use crate::geometry::Mesh;
 use crate::radar::{Chirps, Link, Radar};
@@ -78,6 +79,7 @@ impl Bench {
             geometry: ScanGeometry::new(&self.radar, &self.chirps, &self.bvh, &self.regions),
             link: Link::new(&self.radar),
             grain_of_region: &GRAIN,
+            includes_beam: &[],
             middle: middle(&self.shots),
         }
     }
@@ -223,6 +225,31 @@ fn searches_begin_within_the_ranges_and_where_there_is_an_effect() {
             felt |= bench.predict(vec![(effect, there)]) != bare;
         }
         assert!(felt, "{}", effect.name());
+    }
+}
+
+#[test]
+fn no_beam_widens_a_lobe_that_includes_one() {
+    let law = Brdf::CookTorrance(CookTorrance { m: 0.004, ..lobe() });
+    let bench = Bench { law, ..Bench::plate() };
+    let (own_stage, receiver) = (bench.stage(), Receiver::LINEAR);
+    let stage = Stage { includes_beam: &[true], ..own_stage };
+    for name in [None, Some("finite-spot")] {
+        let effect = name.and_then(find).map(|effect| (effect as &dyn Effect, vec![0.016]));
+        let laws = vec![bench.law.clone()];
+        let model = Model { laws, receiver, effects: Vec::from_iter(effect) };
+        let echoes = |stage| model.predict(stage, &bench.shots).arrived;
+        let (own, with_beam) = (echoes(&own_stage), echoes(&stage));
+        // The shot at the middle of the plate meets it at normal incidence.
+        let middle = bench.shots.iter().position(|shot| shot.hit.cos_theta > 1.0 - 1e-9).unwrap();
+        let ratio = with_beam[middle].unwrap().power_w / own[middle].unwrap().power_w;
+        let v = bench.shots[middle].to_radar();
+        let beam_rad = own_stage.beam(&bench.shots[middle]).divergence_rad();
+        let expected = bench.law.f_per_sr(v, v) / bench.law.seen_by(beam_rad, v, v).f_per_sr;
+        assert!(expected > 4.0, "{expected}");
+        // Off the axis of a spot the narrow lobe falls more.
+        let least = if name.is_none() { expected * (1.0 - 1e-9) } else { 1.0 };
+        assert!((least..expected * (1.0 + 1e-9)).contains(&ratio), "{name:?}: {ratio}");
     }
 }
 

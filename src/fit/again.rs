@@ -2,11 +2,12 @@
 
 mod compare;
 
+use super::coordinates::LOOKS;
 use super::error::FitError;
 use super::models::{model, model_names};
 use super::settings::{Fit, Method};
 use crate::brdf::Brdf;
-use crate::material::{self, FitReport, FixedNumber, Material};
+use crate::material::{self, BEAM, FitReport, FixedNumber, Material};
 use crate::measure::curve::Curve;
 
 /// Estimators of fits that this program made.
@@ -28,7 +29,10 @@ pub fn settings(report: &FitReport) -> Option<Fit> {
         if let Some(path) = name.strip_suffix(".min") {
             let max = given(report, &format!("{path}.max"));
             bounds.extend(max.map(|max| (path.to_owned(), [*value, max])));
-        } else if !name.ends_with(".max") && !name.starts_with("method.") && name != "looks" {
+        } else if !name.ends_with(".max")
+            && !name.starts_with("method.")
+            && ![LOOKS, BEAM].contains(&name.as_str())
+        {
             fixed.push((name.clone(), *value));
         }
     }
@@ -36,7 +40,8 @@ pub fn settings(report: &FitReport) -> Option<Fit> {
         method,
         fixed,
         bounds,
-        looks: given(report, "looks"),
+        looks: given(report, LOOKS),
+        beam_rad: given(report, BEAM),
         noise_w: Some(report.noise_w).filter(|noise_w| *noise_w > 0.0),
         starts: report.starts as usize,
         seed: report.seed,
@@ -57,10 +62,13 @@ pub fn lacks_report(fit: &material::Fit) -> bool {
 pub fn problems(material: &Material, fit: &material::Fit) -> Option<Vec<String>> {
     fit.report.as_ref()?;
     let curve = material.curves.iter().find(|curve| Some(&curve.name) == fit.curve.as_ref())?;
-    let curve = match Curve::from_observations(&curve.observations) {
+    let curve = match Curve::of_material(curve) {
         Ok(curve) => curve,
         Err(error) => return Some(vec![error.to_string()]),
     };
+    if fit.beam_rad().is_some_and(|beam_rad| curve.illumination.beam_rad != Some(beam_rad)) {
+        return Some(vec!["its beam is not that of its curve".to_owned()]);
+    }
     let found = differences(fit, &curve).unwrap_or_else(|error| vec![error.to_string()]);
     if found.is_empty() {
         return Some(found);
@@ -101,6 +109,9 @@ fn differences_from(
     curve: &Curve,
 ) -> Result<Vec<String>, FitError> {
     let Some(report) = &stored.report else { return Ok(Vec::new()) };
+    if stored.lobes.is_of_both() == stored.beam_rad().is_some() {
+        return Ok(vec!["it does not have the lobes that its report says".to_owned()]);
+    }
     let Some(fit) = settings(report) else {
         let method = &report.method;
         return Ok(vec![format!("the report does not say how the fit `{method}` was made")]);
@@ -148,8 +159,14 @@ mod tests {
         let source = material.sources[0].key.clone();
         let stored = found.stored("pieces", "scan", &source);
         let observations = curve.observations.clone();
-        let (name, instrument, session) = ("scan".to_owned(), None, None);
-        material.curves = vec![material::Curve { name, source, instrument, session, observations }];
+        material.curves = vec![material::Curve {
+            name: "scan".to_owned(),
+            source,
+            instrument: None,
+            session: None,
+            illumination: curve.illumination,
+            observations,
+        }];
         assert_ne!(differences(&stored, &curve), Ok(Vec::new()), "the end is no start");
         assert_eq!(problems(&material, &stored), Some(Vec::new()));
     }
@@ -174,6 +191,7 @@ mod tests {
             source,
             instrument: None,
             session: None,
+            illumination: curve.illumination,
             observations: curve.observations,
         });
         material

@@ -8,7 +8,8 @@
 use nalgebra::DVector;
 
 use super::error::FitError;
-use crate::brdf::{Brdf, Mixture, Parameter};
+use super::table::Table;
+use crate::brdf::{Brdf, Mixture, Parameter, ThroughBeam};
 
 /// Name of the specular level S = (1 − k)·f_λ.
 pub(crate) const SPECULAR_LEVEL: &str = "S";
@@ -135,6 +136,8 @@ pub(crate) struct Coordinates {
     /// k of the mixture whose levels are searched as products.
     gauge: Option<f64>,
     looks: f64,
+    /// Divergence of the beam that sees the model, rad.
+    beam_rad: f64,
 }
 
 /// The frequencies in a law: they belong to the radar, so that a fit must not search them.
@@ -176,7 +179,12 @@ impl Coordinates {
         for (name, range) in bounds {
             narrow(&mut list, name, *range)?;
         }
-        Ok(Coordinates { list, base, gauge, looks: looks.unwrap_or(1.0) })
+        Ok(Coordinates { list, base, gauge, looks: looks.unwrap_or(1.0), beam_rad: 0.0 })
+    }
+
+    /// The same coordinates of a model that a beam of this divergence sees, rad.
+    pub fn seen_by(self, beam_rad: f64) -> Coordinates {
+        Coordinates { beam_rad, ..self }
     }
 
     /// Number of coordinates.
@@ -238,6 +246,11 @@ impl Coordinates {
             set_levels(&mut model, k, levels);
         }
         model
+    }
+
+    /// ln σ⁰ of the model at a point of the search, as the beam sees it.
+    pub(super) fn table(&self, at: &DVector<f64>) -> Table {
+        Table::new(&ThroughBeam { law: &self.model(at), beam_rad: self.beam_rad })
     }
 
     /// The chosen k, where backscatter does not determine it; `None` for a model without such a gauge.

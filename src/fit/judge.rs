@@ -1,12 +1,13 @@
 //! The findings on a fit, from its rows, its numbers and their uncertainty.
 
 use super::coordinates::{DIFFUSE_LEVEL, SPECULAR_LEVEL};
+use super::interval::DEVIATE_95;
 use super::result::FitResult;
 use super::search::SearchResult;
 use super::settings::Method;
 use super::uncertainty::Uncertainty;
 use super::verdict::Finding;
-use crate::brdf::{Brdf, ParameterError};
+use crate::brdf::{Brdf, Excess, ParameterError};
 use crate::formats::words::significant;
 use crate::material::{Estimate, Observation};
 
@@ -38,6 +39,10 @@ pub(super) fn judge(
     }
     findings.extend(judge_rows(result, rows));
     findings.extend(judge_numbers(result, found));
+    if let Some(beam_rad) = result.fit.beam_rad {
+        judge_widths(result, found, beam_rad, &mut findings);
+    }
+    findings.extend(judge_energy(result, rows));
     if let Err(ParameterError { path, value, .. }) = range {
         let value = significant(value, 4);
         let held = result.fit.fixed.iter().map(|(path, _)| path.clone()).collect();
@@ -81,6 +86,48 @@ fn judge_rows(result: &FitResult, rows: &[Observation]) -> Vec<Finding> {
         findings.push(Finding::CensoredIgnored { censored, rows: rows.len() });
     }
     findings
+}
+
+/// Replaces what is said of the width of a lobe that the beam does not resolve: one within its error of zero.
+fn judge_widths(
+    result: &FitResult,
+    found: &SearchResult,
+    beam_rad: f64,
+    findings: &mut Vec<Finding>,
+) {
+    for name in result.model.lobe_widths() {
+        let place = result.estimates.iter().position(|estimate| estimate.name == name);
+        let Some((place, coordinate)) =
+            place.and_then(|place| Some((place, result.coordinates.list.get(place)?)))
+        else {
+            continue;
+        };
+        let Estimate { value, sd, interval_95, .. } = result.estimates[place];
+        let is_open_below = found.profiles.get(place).is_some_and(|ends| {
+            ends.is_some_and(|[low, _]| low.open && coordinate.value(low.at) == coordinate.min)
+        });
+        let is_within_its_error = sd.is_some_and(|sd| value < DEVIATE_95 * sd);
+        let is_unseen = sd.is_none() && (value == coordinate.min || value < beam_rad);
+        if !(is_open_below || is_within_its_error || is_unseen) {
+            continue;
+        }
+        findings.retain(|finding| match finding {
+            Finding::AtBound { name: of, value } | Finding::OpenInterval { name: of, value } => {
+                *of != name || *value != coordinate.min
+            }
+            Finding::Unconstrained { name: of } => *of != name,
+            _ => true,
+        });
+        let below = interval_95.map(|[_, high]| high);
+        findings.push(Finding::NotResolved { name, below, beam_rad });
+    }
+}
+
+/// That the model reflects more than it receives at an angle of the rows.
+fn judge_energy(result: &FitResult, rows: &[Observation]) -> Option<Finding> {
+    let last_rad = rows.iter().map(|row| row.theta_i_rad).fold(0.0, f64::max);
+    let Excess { theta_rad, albedo } = Excess::of(&result.model, [0.0, last_rad])?;
+    Some(Finding::TooMuch { theta_deg: theta_rad.to_degrees(), albedo })
 }
 
 /// Which numbers the data do not determine, or only with others.

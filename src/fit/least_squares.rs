@@ -62,7 +62,7 @@ impl<'a> Squares<'a> {
 
     /// ½Σ of squared residuals of detected rows, scaled by the deviations.
     pub fn local(&self, at: &DVector<f64>) -> Local {
-        let table = Table::new(&self.coordinates.model(at));
+        let table = self.coordinates.table(at);
         let by_coordinate = derivatives(self.coordinates, at, &table);
         let parts: Vec<Local> = self
             .levels

@@ -85,7 +85,7 @@ impl<'a> Likelihood<'a> {
     }
 
     fn tables(&self, at: &DVector<f64>) -> Tables {
-        let ln_sigma0 = Table::new(&self.coordinates.model(at));
+        let ln_sigma0 = self.coordinates.table(at);
         let by_coordinate = derivatives(self.coordinates, at, &ln_sigma0);
         Tables { ln_sigma0, by_coordinate, law: GammaLaw::new(self.coordinates.looks(at)) }
     }
@@ -98,7 +98,7 @@ impl<'a> Likelihood<'a> {
 
     /// ln of the probability of a lower power than that of the row, for each row.
     pub fn ln_below(&self, at: &DVector<f64>) -> Vec<f64> {
-        let table = Table::new(&self.coordinates.model(at));
+        let table = self.coordinates.table(at);
         let law = GammaLaw::new(self.coordinates.looks(at));
         self.chirps.iter().map(|chirp| chirp.ln_below(&table, &law)).collect()
     }

@@ -8,9 +8,9 @@ use super::interval::DEVIATE_95;
 use super::minimise::Stop;
 use super::sensitivity::derivatives;
 use super::settings::Fit;
-use super::table::{Place, Table};
+use super::table::Place;
 use super::verdict::Finding;
-use crate::brdf::{Brdf, Scattering};
+use crate::brdf::{Brdf, Scattering, ThroughBeam};
 use crate::material::{CrossValidation, Estimate, Goodness};
 
 /// A 95 % band of the fitted mean σ⁰.
@@ -74,18 +74,19 @@ pub struct FitResult {
 }
 
 impl FitResult {
-    /// The fitted mean σ⁰ at an angle with its 95 % band, by the delta method on ln σ⁰.
+    /// The fitted mean σ⁰ at an angle, as the beam of the curve sees it, with its 95 % band, by the delta method on ln σ⁰.
     ///
     /// Directions that the data do not determine and numbers at a bound do not widen it.
     pub fn band(&self, theta_rad: f64) -> Band {
         let place = Place::new(theta_rad);
-        let here = Table::new(&self.model);
+        let here = self.coordinates.table(&self.at);
         let by = derivatives(&self.coordinates, &self.at, &here);
         let slopes = by.iter().map(|table| table.as_ref().map_or(0.0, |table| table.at(&place)));
         let slopes = DVector::from_iterator(self.at.len(), slopes);
         let variance = slopes.dot(&(&self.covariance_searched * &slopes));
         let factor = (DEVIATE_95 * variance.max(0.0).sqrt()).exp();
-        let mid = self.model.sigma0(theta_rad);
+        let beam_rad = self.fit.beam_rad.unwrap_or(0.0);
+        let mid = ThroughBeam { law: &self.model, beam_rad }.sigma0(theta_rad);
         Band { low: mid / factor, mid, high: mid * factor }
     }
 

@@ -22,7 +22,8 @@ impl Fit {
             Method::Censored => self.looks,
             Method::Mse { .. } | Method::Tls { .. } => Some(self.looks.unwrap_or(1.0)),
         };
-        let coordinates = Coordinates::new(start, &self.fixed, &self.bounds, looks)?;
+        let coordinates = Coordinates::new(start, &self.fixed, &self.bounds, looks)?
+            .seen_by(self.beam_rad.unwrap_or(0.0));
         let unknowns = coordinates.len();
         if coordinates.list.iter().all(|c| c.name == LOOKS) {
             return Err(FitError::NothingFree);
@@ -260,7 +261,8 @@ mod tests {
         let curve = Twin { rows: 40, ..Twin::default() }.curve(1);
         let refused = |curve: &Curve| quick().run(&start(), curve).unwrap_err();
         assert_eq!(refused(&Curve::default()), FitError::Empty);
-        let few = Curve { observations: curve.detected().take(3).copied().collect() };
+        let detected = curve.detected().take(3).copied().collect();
+        let few = Curve { observations: detected, ..Curve::default() };
         assert_eq!(refused(&few), FitError::TooFewRows { detected: 3, unknowns: 5 });
         let mut censored = curve.clone();
         for row in &mut censored.observations {

@@ -26,7 +26,7 @@ pub(super) fn derivatives(
             let step = if at[index] + STEP > upper[index] { -STEP } else { STEP };
             let mut there = at.clone();
             there[index] += step;
-            Some(Table::new(&coordinates.model(&there)).difference(here, step))
+            Some(coordinates.table(&there).difference(here, step))
         })
         .collect()
 }

@@ -39,6 +39,10 @@ pub struct Fit {
     pub bounds: Vec<(String, [f64; 2])>,
     /// Looks L of the speckle, from 0.1 to 1e4; `None` to estimate them. Least squares does not use them.
     pub looks: Option<f64>,
+    /// Divergence of the beam with which the curve was measured, rad, from 10⁻⁶ to π/2: the model is then that of the
+    /// surface alone, and the beam widens its lobes. `None`: they are those of radar and surface together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub beam_rad: Option<f64>,
     /// Mean thermal power in each chirp, W, 0 or more; none for a receiver without noise. Least squares
     /// does not use it.
     pub noise_w: Option<f64>,
@@ -56,6 +60,7 @@ impl Default for Fit {
             fixed,
             bounds,
             looks: None,
+            beam_rad: None,
             noise_w: None,
             starts: 4,
             seed: 0,
@@ -77,6 +82,7 @@ impl Fit {
         };
         let settings = [
             ("looks", self.looks.unwrap_or(1.0), 0.1, 1e4),
+            ("beam_rad", self.beam_rad.unwrap_or(1e-6), 1e-6, QUARTER),
             ("noise_w", self.noise_w.unwrap_or(0.0), 0.0, 1e3),
             ("starts", self.starts as f64, 1.0, 1000.0),
         ];

@@ -1,10 +1,11 @@
 //! A fit as a material stores it, and the 95 % band of a stored fit.
 
+use super::coordinates::LOOKS;
 use super::interval::DEVIATE_95;
 use super::result::{Band, FitResult};
 use super::settings::Method;
-use crate::brdf::{Brdf, Scattering};
-use crate::material::{self, Covariance, Estimate, FitReport, FixedNumber};
+use crate::brdf::{Brdf, Scattering, ThroughBeam};
+use crate::material::{self, BEAM, Covariance, Estimate, FitReport, FixedNumber, Lobes};
 
 /// Relative step of a difference quotient.
 const STEP: f64 = 1e-4;
@@ -31,6 +32,11 @@ impl FitResult {
             estimator: self.method_name().to_owned(),
             curve: Some(curve.to_owned()),
             source: source.to_owned(),
+            lobes: if self.fit.beam_rad.is_some() {
+                Lobes::Surface
+            } else {
+                Lobes::RadarAndSurface
+            },
             parameter_sources: Vec::new(),
             covariance: self.parameter_covariance(),
             report: Some(self.report()),
@@ -99,11 +105,13 @@ impl FitResult {
             Method::Censored => Vec::new(),
         };
         let settings = settings.into_iter().map(|(name, value)| (name.to_owned(), value));
-        let looks = self.looks.and(self.fit.looks).map(|looks| ("looks".to_owned(), looks));
+        let looks = self.looks.and(self.fit.looks).map(|looks| (LOOKS.to_owned(), looks));
+        let beam = self.fit.beam_rad.map(|beam_rad| (BEAM.to_owned(), beam_rad));
         let bounds = self.fit.bounds.iter().flat_map(|(name, [min, max])| {
             [(format!("{name}.min"), *min), (format!("{name}.max"), *max)]
         });
         let all = self.fit.fixed.iter().cloned().chain(bounds).chain(settings).chain(looks);
+        let all = all.chain(beam);
         all.map(|(name, value)| FixedNumber { name, value }).collect()
     }
 }
@@ -113,25 +121,26 @@ fn count(number: usize) -> u32 {
     u32::try_from(number).unwrap_or(u32::MAX)
 }
 
-/// The 95 % band of a stored fit at an angle (rad), by the delta method on ln σ⁰; `None` for a fit
-/// without a report. The derivatives are difference quotients of the stored model.
+/// The 95 % band of a stored fit at an angle (rad), as the beam of its curve sees it, by the delta method on ln σ⁰;
+/// `None` for a fit without a report. The derivatives are difference quotients of the stored model.
 pub fn stored_band(fit: &material::Fit, theta_rad: f64) -> Option<Band> {
     let report = fit.report.as_ref()?;
+    let beam_rad = fit.beam_rad().unwrap_or(0.0);
     let slopes: Vec<f64> = report
         .estimates
         .iter()
-        .map(|e| if e.sd.is_some() { slope(&fit.model, e, theta_rad) } else { 0.0 })
+        .map(|e| if e.sd.is_some() { slope(&fit.model, e, beam_rad, theta_rad) } else { 0.0 })
         .collect();
     let terms = report.covariance.iter().zip(&slopes).flat_map(|(row, a)| {
         row.iter().zip(&slopes).map(move |(covariance, b)| a * b * covariance)
     });
     let factor = (DEVIATE_95 * terms.sum::<f64>().max(0.0).sqrt()).exp();
-    let mid = fit.model.sigma0(theta_rad);
+    let mid = ThroughBeam { law: &fit.model, beam_rad }.sigma0(theta_rad);
     Some(Band { low: mid / factor, mid, high: mid * factor })
 }
 
 /// d ln σ⁰ / d estimate; 0 for an estimate that is not a parameter of the model, such as the looks.
-fn slope(model: &Brdf, estimate: &Estimate, theta_rad: f64) -> f64 {
+fn slope(model: &Brdf, estimate: &Estimate, beam_rad: f64, theta_rad: f64) -> f64 {
     // S is proportional to f_λ and R to r_s while k stays.
     let path = match estimate.name.as_str() {
         "S" => "specular.f_lambda",
@@ -147,7 +156,7 @@ fn slope(model: &Brdf, estimate: &Estimate, theta_rad: f64) -> f64 {
     let [below, above] = ends.map(|value| {
         let mut moved = model.clone();
         moved.set_parameter(path, value);
-        moved.sigma0(theta_rad).ln()
+        ThroughBeam { law: &moved, beam_rad }.sigma0(theta_rad).ln()
     });
     let slope = (above - below) / ((ends[1] - ends[0]) * scale);
     if slope.is_finite() { slope } else { 0.0 }

@@ -54,7 +54,8 @@ impl Default for Twin {
 impl Twin {
     /// A curve of this truth.
     pub fn curve(&self, seed: u64) -> Curve {
-        Curve { observations: (0..self.rows as u32).map(|chirp| self.row(seed, chirp)).collect() }
+        let observations = (0..self.rows as u32).map(|chirp| self.row(seed, chirp)).collect();
+        Curve { observations, ..Curve::default() }
     }
 
     fn row(&self, seed: u64, chirp: u32) -> Observation {

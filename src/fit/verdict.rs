@@ -5,6 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::minimise::Stop;
+use crate::brdf::Excess;
 use crate::formats::words::{listed, significant};
 
 /// A finding on a fit that limits its use.
@@ -82,6 +83,22 @@ pub enum Finding {
         problem: String,
         /// The fixed parameters.
         held: Vec<String>,
+    },
+    /// The width of a lobe is within its error of zero: the beam is too wide to see it.
+    NotResolved {
+        /// Name of the width.
+        name: String,
+        /// Upper end of its 95 % interval, where the data give one.
+        below: Option<f64>,
+        /// Divergence of the beam, rad.
+        beam_rad: f64,
+    },
+    /// The fitted model reflects more than it receives.
+    TooMuch {
+        /// The incidence at which it reflects most, degrees.
+        theta_deg: f64,
+        /// What it reflects there in all, over what it receives.
+        albedo: f64,
     },
     /// The fitted distribution does not explain the rows.
     PoorFit {
@@ -164,6 +181,17 @@ impl fmt::Display for Finding {
                     write!(f, "let go of {}, or ", listed(held))?;
                 }
                 write!(f, "check the calibration of the radar")
+            }
+            Finding::NotResolved { name, below, beam_rad } => {
+                write!(f, "{name} is not resolved by this radar: it is within its error of zero")?;
+                if let Some(below) = below {
+                    write!(f, ", below {}", significant(*below, 2))?;
+                }
+                write!(f, ", where the beam has a divergence of {} rad", significant(*beam_rad, 3))
+            }
+            Finding::TooMuch { theta_deg, albedo } => {
+                let excess = Excess { theta_rad: theta_deg.to_radians(), albedo: *albedo };
+                write!(f, "the model {}; nothing is cut off", excess.words())
             }
             Finding::PoorFit { ks_distance, limit } => write!(
                 f,

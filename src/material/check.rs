@@ -6,6 +6,7 @@ use super::curve::{Censor, Curve, Observation};
 use super::error::{MaterialError, dangling, value};
 use super::fit::{Covariance, Fit};
 use super::instrument::Instrument;
+use super::number_check::NumberCheck;
 use super::provenance::{Session, Source};
 use super::revision::Material;
 use crate::formats::EffectEntry;
@@ -70,6 +71,8 @@ impl Material {
         refers(&place, "an instrument", curve.instrument.as_ref(), instruments)?;
         let sessions = self.sessions.iter().map(|s| &s.key);
         refers(&place, "a session", curve.session.as_ref(), sessions)?;
+        NumberCheck::new(&place)
+            .positive("the divergence of the beam", curve.illumination.beam_rad)?;
         if curve.observations.is_empty() {
             return Err(value(&place, "has no observation", "give it at least one row"));
         }

@@ -1,9 +1,11 @@
 //! Scattering curves and their points.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::error::{MaterialError, value};
 use crate::brdf::Tabulated;
+use crate::formats::words::significant;
+use crate::radar::Footprint;
 
 /// A scattering curve: observations in the order of the file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -17,8 +19,80 @@ pub struct Curve {
     /// Key of the session in which it was measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub session: Option<String>,
+    /// How the target was lit, as far as it is stated.
+    #[serde(flatten)]
+    pub illumination: Illumination,
     /// The points.
     pub observations: Vec<Observation>,
+}
+
+/// How a target was lit while a curve was measured, as far as that is stated: what its levels and the widths of its
+/// lobes depend on besides the surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Illumination {
+    /// The form of the footprint with which powers became σ⁰.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub footprint: Option<Footprint>,
+    /// Divergence of the beam on the target δ_w = λ/(2π·w), rad, above 0, with w the radius on which the field has
+    /// fallen to 1/e.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub beam_rad: Option<f64>,
+}
+
+impl Illumination {
+    /// Factor on a σ⁰ of this curve, at the cosine of an incidence, to what another form of the footprint makes of
+    /// the same power; 1 where one of the two forms is not stated.
+    pub fn factor_to(&self, other: Option<Footprint>, cos_theta: f64) -> f64 {
+        match (self.footprint, other) {
+            (Some(own), Some(other)) => own.factor_to(other, cos_theta),
+            _ => 1.0,
+        }
+    }
+
+    /// What this and another statement about one curve say together; none where they contradict each other.
+    pub fn and(self, other: Illumination) -> Option<Illumination> {
+        let both = Illumination {
+            footprint: self.footprint.or(other.footprint),
+            beam_rad: self.beam_rad.or(other.beam_rad),
+        };
+        let other_first = Illumination {
+            footprint: other.footprint.or(self.footprint),
+            beam_rad: other.beam_rad.or(self.beam_rad),
+        };
+        (both == other_first).then_some(both)
+    }
+
+    /// The columns of a CSV in which it is stated: what to add to its header, and to every row.
+    pub fn columns(&self) -> [String; 2] {
+        let footprint = self.footprint.map(|footprint| footprint.as_str().to_owned());
+        // A thousandth of the narrowest beam of a radar.
+        let beam = self.beam_rad.map(|beam_rad| format!("{beam_rad:.6}"));
+        let mut columns = [String::new(), String::new()];
+        for (name, value) in [("footprint", footprint), ("beam_rad", beam)] {
+            if let Some(value) = value {
+                columns[0] += &format!(",{name}");
+                columns[1] += &format!(",{value}");
+            }
+        }
+        columns
+    }
+
+    /// The form of the footprint in words.
+    pub fn footprint_words(&self) -> &'static str {
+        match self.footprint {
+            Some(Footprint::Paper) => "footprint paper (cos² of the incidence)",
+            Some(Footprint::Projected) => "footprint projected (cos of the incidence once)",
+            None => "footprint not stated",
+        }
+    }
+
+    /// The beam in words.
+    pub fn beam_words(&self) -> String {
+        match self.beam_rad {
+            Some(beam_rad) => format!("beam of {} mrad", significant(1e3 * beam_rad, 4)),
+            None => "beam not stated".to_owned(),
+        }
+    }
 }
 
 /// One point of a curve. In backscatter θ_r = θ_i and Δφ = 0.
@@ -54,7 +128,7 @@ pub struct Observation {
 }
 
 /// What an observation says of the true value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Censor {
     /// It was measured.

@@ -17,6 +17,9 @@ pub struct Fit {
     pub estimator: String,
     /// The curve that was fitted, if one was.
     pub curve: Option<String>,
+    /// Whose lobes the model has.
+    #[serde(skip_serializing_if = "Lobes::is_of_both")]
+    pub lobes: Lobes,
     /// Key of the source of every parameter that has none of its own.
     pub source: String,
     /// Parameters with a source of their own, by path, sorted.
@@ -26,6 +29,43 @@ pub struct Fit {
     /// What a fit of the curve said of itself; none for values that were stated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub report: Option<FitReport>,
+}
+
+/// Name of the divergence of the beam among the numbers that a fit was given.
+pub const BEAM: &str = "beam_rad";
+
+/// Whose lobes a model has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Lobes {
+    /// Of radar and surface together, as they were seen: a beam must not widen them again.
+    #[default]
+    RadarAndSurface,
+    /// Of the surface alone: every beam sees them wider, by its own divergence.
+    Surface,
+}
+
+impl Lobes {
+    /// The word that files and the database use.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Lobes::RadarAndSurface => "radar-and-surface",
+            Lobes::Surface => "surface",
+        }
+    }
+
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Lobes::RadarAndSurface => "lobes of radar and surface together",
+            Lobes::Surface => "lobes of the surface alone",
+        }
+    }
+
+    /// Whether they are of radar and surface together.
+    pub fn is_of_both(&self) -> bool {
+        *self == Lobes::RadarAndSurface
+    }
 }
 
 /// Covariance of some of a model's parameters.
@@ -84,6 +124,18 @@ impl ChosenBy {
 impl Fit {
     /// The [`estimator`](Fit::estimator) of values that were not fitted.
     pub const STATED: &str = "stated";
+
+    /// Divergence of the beam with which the curve was fitted, rad; none for a fit without one, or without a report.
+    pub fn beam_rad(&self) -> Option<f64> {
+        let given = &self.report.as_ref()?.given;
+        given.iter().find(|given| given.name == BEAM).map(|given| given.value)
+    }
+
+    /// Whose lobes the model has, in words; none of a model without a lobe.
+    pub fn lobes_words(&self) -> Option<&'static str> {
+        let has_lobe = !self.model.lobe_widths().is_empty();
+        has_lobe.then(|| self.lobes.words())
+    }
 
     /// Whether its values come of its curve.
     pub fn is_fitted(&self) -> bool {

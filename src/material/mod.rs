@@ -25,10 +25,10 @@ mod texts;
 
 pub use bidirectional::{is_turning, turns_the_line};
 pub use composition::{Layer, Permittivity, Roughness};
-pub use curve::{Censor, Curve, Observation};
+pub use curve::{Censor, Curve, Illumination, Observation};
 pub use error::MaterialError;
 pub use finding::{Finding, FindingVerdict};
-pub use fit::{ChosenBy, Covariance, Fit, FitNumber};
+pub use fit::{BEAM, ChosenBy, Covariance, Fit, FitNumber, Lobes};
 pub use instrument::{Geometry, Instrument, Scale};
 pub use provenance::{
     Activity, Citation, Input, Making, Origin, Session, SessionPose, Source, SourceKind,

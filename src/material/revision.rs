@@ -9,7 +9,7 @@ use super::composition::{Layer, Permittivity, Roughness};
 use super::curve::Curve;
 use super::error::{MaterialError, dangling};
 use super::finding::Finding;
-use super::fit::Fit;
+use super::fit::{Fit, Lobes};
 use super::instrument::Instrument;
 use super::provenance::{Session, Source, SourceKind};
 use super::slug::Slug;
@@ -81,7 +81,7 @@ impl Material {
     /// # Errors
     /// When `render` names nothing, or a curve that cannot be interpolated.
     pub fn scattering(&self) -> Result<Brdf, MaterialError> {
-        if let Some(fit) = self.fits.iter().find(|f| f.name == self.render) {
+        if let Some(fit) = self.rendered_fit() {
             return Ok(fit.model.clone());
         }
         let Some(curve) = self.curves.iter().find(|c| c.name == self.render) else {
@@ -100,6 +100,39 @@ impl Material {
         let distance_hz = |entry: &&Permittivity| (entry.frequency_hz - frequency_hz).abs();
         let nearest = entries.min_by(|a, b| distance_hz(a).total_cmp(&distance_hz(b)))?;
         Some([nearest.real, nearest.imaginary])
+    }
+
+    /// The fit that a scene renders; none where it renders a curve.
+    pub fn rendered_fit(&self) -> Option<&Fit> {
+        self.fits.iter().find(|fit| fit.name == self.render)
+    }
+
+    /// The curve that a scene renders, or that what it renders belongs to; none for a model without a curve.
+    pub fn rendered_curve(&self) -> Option<&Curve> {
+        self.curve_behind(&self.render)
+    }
+
+    /// The curve of this name, or the one that the fit of this name belongs to.
+    pub fn curve_behind(&self, name: &str) -> Option<&Curve> {
+        let fit = self.fits.iter().find(|fit| fit.name == name);
+        let name = match fit {
+            Some(fit) => fit.curve.as_ref()?,
+            None => name,
+        };
+        self.curves.iter().find(|curve| curve.name == name)
+    }
+
+    /// Whose lobes a scene renders. A curve has those of its radar in it.
+    pub fn rendered_lobes(&self) -> Lobes {
+        self.rendered_fit().map_or(Lobes::RadarAndSurface, |fit| fit.lobes)
+    }
+
+    /// Divergence, rad, of the beam through which a fit describes its curve: that of the curve where the lobes are
+    /// those of the surface alone, else 0.
+    pub fn beam_rad(&self, fit: &Fit) -> f64 {
+        let curve = self.curves.iter().find(|curve| Some(&curve.name) == fit.curve.as_ref());
+        let beam_rad = curve.and_then(|curve| curve.illumination.beam_rad);
+        if fit.lobes.is_of_both() { 0.0 } else { beam_rad.unwrap_or(0.0) }
     }
 
     /// The source of the numbers that a scene renders.
@@ -121,7 +154,7 @@ impl Material {
     /// The [`kind_words`](Material::kind_words) of what scenes render; `None` of a curve, and of a model without
     /// one.
     pub fn rendered_words(&self) -> Option<String> {
-        self.kind_words(self.fits.iter().find(|fit| fit.name == self.render)?)
+        self.kind_words(self.rendered_fit()?)
     }
 
     /// The curve with the most points, the first of several.

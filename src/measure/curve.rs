@@ -1,18 +1,20 @@
 //! A backscatter curve: one observation per chirp that hit, or should have hit, a material.
 //!
-//! As CSV: `theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored,xt_m,yt_m`. σ⁰ is that of
-//! equation (10), 4π·f·cos²θ, so that a curve belongs to the material and not to the radar. A chirp
-//! that should have been detected and was not is a row with `censored` = 1: its power and its σ⁰
-//! are those that it stayed below.
+//! As CSV: `theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored,xt_m,yt_m,footprint,beam_rad`.
+//! σ⁰ is that of equation (10), 4π·f·cos²θ. It belongs to the material once it is known with which form of the
+//! footprint powers became f (`footprint`) and how wide the beam was (`beam_rad`): these are the same in every row,
+//! and left out where they are not stated. A chirp that should have been detected and was not is a row with
+//! `censored` = 1: its power and its σ⁰ are those that it stayed below.
 
 use thiserror::Error;
 
 use crate::formats::FormatError;
-use crate::material::file::points;
-use crate::material::{Censor, Observation};
+use crate::material;
+use crate::material::file::{Points, points};
+use crate::material::{Censor, Illumination, Observation};
 use crate::units::{db_from_ratio, dbm_from_watts};
 
-/// Columns of a curve file, in order.
+/// Columns of a curve file, in order; those of its [`Illumination`] follow where they are stated.
 pub const COLUMNS: [&str; 9] = [
     "theta_deg",
     "theta_sd_deg",
@@ -31,6 +33,8 @@ pub struct Curve {
     /// One per chirp. Those that [`Curve::read`] and [`Curve::from_observations`] give leave out nothing but
     /// the place on the target.
     pub observations: Vec<Observation>,
+    /// How the target was lit, as far as it is stated.
+    pub illumination: Illumination,
 }
 
 /// Why an observation does not belong in a backscatter curve.
@@ -59,13 +63,14 @@ pub enum ObservationError {
 }
 
 impl Curve {
-    /// The curve of a material's observations. What an observation leaves out is as in [`Curve::read`].
+    /// A material's curve. What an observation leaves out is as in [`Curve::read`].
     ///
     /// # Errors
     /// The first observation that is not in a backscatter curve.
-    pub fn from_observations(observations: &[Observation]) -> Result<Curve, ObservationError> {
-        let completed = observations.iter().enumerate().map(|(index, o)| complete(index, o));
-        Ok(Curve { observations: completed.collect::<Result<_, _>>()? })
+    pub fn of_material(curve: &material::Curve) -> Result<Curve, ObservationError> {
+        let completed = curve.observations.iter().enumerate();
+        let observations: Result<_, _> = completed.map(|(index, o)| complete(index, o)).collect();
+        Ok(Curve { observations: observations?, illumination: curve.illumination })
     }
 
     /// Whether no observation has a power of its own, but σ⁰ in its place.
@@ -79,8 +84,9 @@ impl Curve {
     /// # Errors
     /// The first cell that cannot be used, with its line and column, and rows that are not backscatter.
     pub fn read(bytes: &[u8]) -> Result<Curve, FormatError> {
+        let Points { rows, illumination } = points(bytes)?;
         let mut observations = Vec::new();
-        for (index, (line, point)) in points(bytes)?.iter().enumerate() {
+        for (index, (line, point)) in rows.iter().enumerate() {
             observations.push(complete(index, point).map_err(|error| {
                 let problem = match error {
                     ObservationError::Bistatic { .. } => "the row is bistatic",
@@ -92,19 +98,20 @@ impl Curve {
                 FormatError::at(format!("line {line}"), problem, "leave it out here")
             })?);
         }
-        Ok(Curve { observations })
+        Ok(Curve { observations, illumination })
     }
 
     /// The curve as a file's bytes.
     pub fn write(&self) -> Vec<u8> {
-        let mut text = COLUMNS.join(",") + "\n";
+        let [names, lit] = self.illumination.columns();
+        let mut text = format!("{}{names}\n", COLUMNS.join(","));
         for (index, o) in self.observations.iter().enumerate() {
             let sigma0 = o.level_sigma0().unwrap_or(f64::NAN);
             let [xt_m, yt_m] = o.target_m.map_or_else(Default::default, |place| {
                 place.map(|metres| format!("{:.5}", metres + 0.0))
             });
             text += &format!(
-                "{:.4},{:.4},{:.3},{:.3},{:.5},{},{},{xt_m},{yt_m}\n",
+                "{:.4},{:.4},{:.3},{:.3},{:.5},{},{},{xt_m},{yt_m}{lit}\n",
                 o.theta_i_rad.to_degrees(),
                 o.theta_sd_rad.unwrap_or(0.0).to_degrees(),
                 dbm_from_watts(o.power_w.unwrap_or(sigma0)),
@@ -154,6 +161,7 @@ fn complete(index: usize, o: &Observation) -> Result<Observation, ObservationErr
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::radar::Footprint;
 
     #[test]
     fn a_curve_survives_its_file() {
@@ -163,6 +171,16 @@ mod tests {
         let curve = Curve::read(text.as_bytes()).unwrap();
         assert_eq!(curve.detected().count(), 1);
         assert!((curve.observations[0].theta_i_rad - 12.5f64.to_radians()).abs() < 1e-15);
+        assert_eq!(String::from_utf8(curve.write()).unwrap(), text);
+    }
+
+    #[test]
+    fn a_curve_keeps_how_its_target_was_lit() {
+        let text = "theta_deg,theta_sd_deg,power_dbm,sigma0_db,range_m,chirp,censored,xt_m,yt_m,footprint,beam_rad\n\
+                    12.5000,0.3000,-55.250,-9.125,8.01250,17,0,-0.01250,0.20000,projected,0.011704\n";
+        let curve = Curve::read(text.as_bytes()).unwrap();
+        let lit = Illumination { footprint: Some(Footprint::Projected), beam_rad: Some(0.011704) };
+        assert_eq!(curve.illumination, lit);
         assert_eq!(String::from_utf8(curve.write()).unwrap(), text);
     }
 
@@ -194,13 +212,23 @@ mod tests {
                      12.5,0.3,-55.25,-9.1,8.0,17,0\n60,0.3,-77,-30,8.1,18,1\n";
         let curve = Curve::read(text).unwrap();
         let kept = curve.observations.clone();
+        let of = |observations: Vec<Observation>| {
+            Curve::of_material(&material::Curve {
+                name: "scan".to_owned(),
+                source: "bench".to_owned(),
+                instrument: None,
+                session: None,
+                illumination: curve.illumination,
+                observations,
+            })
+        };
         assert_eq!((kept[1].sigma0, kept[1].level_sigma0()), (None, Some(1e-3)));
-        assert_eq!(Curve::from_observations(&kept), Ok(curve));
+        assert_eq!(of(kept.clone()), Ok(curve.clone()));
         let bistatic = Observation { delta_phi_rad: 1.0, ..kept[0] };
-        let refused = Curve::from_observations(&[kept[0], bistatic]);
+        let refused = of(vec![kept[0], bistatic]);
         assert_eq!(refused, Err(ObservationError::Bistatic { point: 2 }));
         let above = Observation { censor: Censor::Right, ..kept[1] };
-        let refused = Curve::from_observations(&[above]);
+        let refused = of(vec![above]);
         assert_eq!(refused, Err(ObservationError::AboveRange { point: 1 }));
     }
 

@@ -21,7 +21,7 @@ use super::nearest::Nearest;
 use super::point_rays::rays_to_points;
 use super::register::RegistrationResult;
 use crate::frames::{Global, Point, Pose, Ray, Target as TargetFrame};
-use crate::material::Observation;
+use crate::material::{Illumination, Observation};
 use crate::radar::scan::PATTERN_RANGE_M;
 use crate::radar::{Chirps, Footprint, Link, Radar};
 use crate::scene::Target;
@@ -103,9 +103,21 @@ pub fn sigma0(link: &Link, axis: &Ray<Global>, range_m: f64, cos_theta: f64, pow
     let solid_angle_sr = link.solid_angle_sr(&link.beam.along(axis), range_m);
     let received_w = link.transmit_power_w * link.system_gain_ratio * solid_angle_sr;
     let quotient = power_w * 4.0 * PI / received_w;
-    match link.footprint {
-        Footprint::Paper => quotient,
-        Footprint::Projected => quotient * cos_theta,
+    quotient * Footprint::Paper.factor_to(link.footprint, cos_theta)
+}
+
+/// The form of the footprint that was taken, and the root mean square of the beam's divergence on the target: its
+/// square adds to that of a lobe's slopes. The beam widens away from the focus and from the middle of the field.
+fn illumination(link: &Link, rows: &[Observation]) -> Illumination {
+    let divergence_rad = |row: &Observation| {
+        let [xt_m, yt_m] = row.target_m?;
+        Some(link.beam.towards(xt_m, yt_m).section(row.range_m?).divergence_rad())
+    };
+    let squares: Vec<f64> = rows.iter().filter_map(divergence_rad).map(|rad| rad * rad).collect();
+    let beam_rad = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
+    Illumination {
+        footprint: Some(link.footprint),
+        beam_rad: Some(beam_rad).filter(|rad| *rad > 0.0),
     }
 }
 
@@ -150,7 +162,9 @@ impl Reduction {
                  wrong; name the part that was kept with a region"
             ));
         }
-        Ok(ReductionResult { curve: Curve { observations: rows }, left_out, notices })
+        let illumination = illumination(&reducer.link, &rows);
+        let curve = Curve { observations: rows, illumination };
+        Ok(ReductionResult { curve, left_out, notices })
     }
 
     fn check_region(&self, target: &Target) -> Result<(), ReductionError> {
@@ -533,6 +547,32 @@ mod tests {
             measured.cloud.points().iter().filter_map(|point| point.chirp).collect();
         let mut silent = reduced.curve.observations.iter().filter(|row| row.is_censored());
         assert!(silent.all(|row| !numbers.contains(&row.chirp.unwrap())));
+    }
+
+    #[test]
+    fn the_curve_says_how_its_target_was_lit() {
+        let measured = mannequin(2e-3, 1);
+        let lit = reduce(&measured, Reduction::default()).unwrap().curve.illumination;
+        assert_eq!(lit.footprint, Some(Footprint::Paper));
+        // λ/(2π·13.589 mm) at the centre and at the focus; the spot grows to 1.5 times that 0.5 m away.
+        let beam_rad = lit.beam_rad.unwrap();
+        assert!((0.6 * 0.011704..0.011704).contains(&beam_rad), "{beam_rad}");
+    }
+
+    #[test]
+    fn one_power_reduced_in_both_forms_differs_by_the_cosine() {
+        let at = |footprint| {
+            let radar = Radar { footprint, ..Default::default() };
+            let (link, origin) = (Link::new(&radar), radar.frames().origin());
+            let axis =
+                Ray { origin, direction: origin.towards(Point::new(0.1, 1.0, 0.0)).unwrap() };
+            sigma0(&link, &axis, 8.2, 0.5, 1e-9)
+        };
+        let ratio = at(Footprint::Projected) / at(Footprint::Paper);
+        assert!((ratio - 0.5).abs() < 1e-12, "3 dB at 60°: {ratio}");
+        let there = Footprint::Paper.factor_to(Footprint::Projected, 0.5);
+        let back = Footprint::Projected.factor_to(Footprint::Paper, 0.5);
+        assert_eq!((there, there * back), (0.5, 1.0));
     }
 
     #[test]

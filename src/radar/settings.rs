@@ -120,7 +120,7 @@ impl Returns {
 }
 
 /// How a tilted surface spreads the spot.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Footprint {
     /// Equation (11) as the paper has it, with cos²θ.
@@ -128,6 +128,26 @@ pub enum Footprint {
     Paper,
     /// The lit area grows as 1/cos θ, which leaves cos θ once.
     Projected,
+}
+
+impl Footprint {
+    /// The word that files and the database use.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Footprint::Paper => "paper",
+            Footprint::Projected => "projected",
+        }
+    }
+
+    /// Factor on a σ⁰ that was reduced in this form to what another form makes of the same power. The paper's takes
+    /// the power for f·cos²θ and the projected for f·cos θ, so that σ⁰ = 4π·f·cos²θ differs by cos θ.
+    pub fn factor_to(self, other: Footprint, cos_theta: f64) -> f64 {
+        match (self, other) {
+            (Footprint::Paper, Footprint::Projected) => cos_theta,
+            (Footprint::Projected, Footprint::Paper) => 1.0 / cos_theta,
+            _ => 1.0,
+        }
+    }
 }
 
 /// How the spot grows, as scene files write it.

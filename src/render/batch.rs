@@ -20,6 +20,7 @@ use super::observer::Observer;
 use super::setup::Setup;
 use super::spot::{self, Spot};
 use super::surface::Surface;
+use crate::brdf::Term;
 use crate::frames::{Global, Pose, Ray};
 use crate::geometry::Mesh;
 use crate::radar::{Detection, Footprint, Link};
@@ -151,8 +152,11 @@ impl<'a> Work<'a> {
             if !std::ptr::eq(held.bvh(), batch.geometry.bvh) {
                 return Err(gpu_error(GpuError::OtherMesh));
             }
+            let axes = batch.geometry.chirps.rays.iter();
+            let beam_rad = axes.map(|axis| work.link.beam.along(axis).divergence_rad());
+            let widest_rad = beam_rad.fold(0.0, f64::max);
             let law = |take: &Take, region: usize| match take.surfaces.get(region) {
-                Some(surface) => surface.scattering.backscatter(),
+                Some(surface) => device_terms(surface, widest_rad),
                 None => Some(Vec::new()),
             };
             let laws: Vec<_> = takes
@@ -260,7 +264,7 @@ impl<'a> Work<'a> {
         let surface = take.surfaces.get(usize::from(region))?;
         let to_radar = -ray.direction.xyz();
         let to_radar = LocalFrame::at_hit(mesh, hit, to_radar, surface.grain).local(to_radar);
-        let beam_rad = spot.divergence_rad(self.rays, hit.range_m);
+        let beam_rad = surface.widening_rad(spot.divergence_rad(self.rays, hit.range_m));
         let f_per_sr = surface.scattering.seen_by(beam_rad, to_radar, to_radar).f_per_sr;
         Some(self.link.power_w(&spot.beam, hit.range_m, hit.cos_theta, f_per_sr))
     }
@@ -310,6 +314,22 @@ impl<'a> Work<'a> {
     }
 }
 
+/// The law of a surface as a device takes it, which widens every lobe by the beam; `None` where that is not how the
+/// surface is seen, or the law is no sum of terms.
+fn device_terms(surface: &Surface, widest_rad: f64) -> Option<Vec<Term>> {
+    /// Change of a diffuse term, as a share of it, that is within the precision of a device.
+    const SMALL: f64 = 1e-3;
+    let mut terms = surface.scattering.backscatter()?;
+    for term in terms.iter_mut().filter(|_| surface.includes_beam) {
+        match &mut term.facets {
+            Some(facets) if facets.m >= widest_rad => facets.includes_beam = true,
+            None if 0.5 * term.cosines * widest_rad * widest_rad < SMALL => {}
+            _ => return None,
+        }
+    }
+    Some(terms)
+}
+
 fn gpu_error(error: GpuError) -> RenderError {
     TraceError::from(error).into()
 }
@@ -331,7 +351,8 @@ mod tests {
     fn brushed() -> Brdf {
         Brdf::CookTorrance(CookTorrance {
             f_lambda: 0.5,
-            m: 0.2,
+            // Narrower than the beam.
+            m: 0.006,
             m_across: Some(0.6),
             distribution: Distribution::Ggx,
             shadowing: Shadowing::Correlated,
@@ -350,11 +371,14 @@ mod tests {
         let ball = solids::icosphere(0.3, 3);
         let (bvh, region_of_facet) = (Bvh::new(&ball), vec![0; ball.facets.len()]);
         let law = brushed();
-        let surfaces = [Surface { grain: DVec3::new(1.0, 2.0, 0.0), ..Surface::new(&law) }];
+        let grain = DVec3::new(1.0, 2.0, 0.0);
+        let own = [Surface { grain, ..Surface::new(&law) }];
+        let with_beam = own.map(|surface| Surface { includes_beam: true, ..surface });
         let pose = |turn_rad| Pose::from_euler_xyz(turn_rad, DVec3::new(0.02, 1.1, 0.4));
-        let takes = [DVec3::ZERO, DVec3::new(0.3, -0.8, 0.5)].map(|turn_rad| Take {
-            target: pose(turn_rad),
-            surfaces: &surfaces,
+        let turns_rad = [DVec3::ZERO, DVec3::new(0.3, -0.8, 0.5)];
+        let takes: [Take; 2] = std::array::from_fn(|number| Take {
+            target: pose(turns_rad[number]),
+            surfaces: [&own, &with_beam][number],
             seed: 3,
         });
         for rays_per_chirp in [1, 40] {
@@ -372,8 +396,8 @@ mod tests {
                 mesh.vertices
                     .iter_mut()
                     .for_each(|vertex| *vertex = (take.target * Point::from(*vertex)).xyz);
-                let grain = take.target.rotation() * surfaces[0].grain;
-                let surfaces = [Surface { grain, ..surfaces[0] }];
+                let grain = take.target.rotation() * grain;
+                let surfaces = [Surface { grain, ..take.surfaces[0] }];
                 let bvh = Bvh::new(&mesh);
                 let geometry = ScanGeometry::new(&radar, &chirps, &bvh, &region_of_facet);
                 let footprints = trace(&geometry, rays_per_chirp, &|_| {}).unwrap();

@@ -412,7 +412,7 @@ impl<'a> Emission<'a> {
 
     /// What a point scatters towards the antenna.
     fn scattered(&self, lit: &ShadingPoint) -> Seen {
-        lit.surface.scattering.seen_by(lit.beam_rad, lit.source, lit.antenna)
+        lit.surface.seen_by(lit.beam_rad, lit.source, lit.antenna)
     }
 
     /// The way of a ray from a point to the first surface nearer than `until_m` that stops it; `None` without a

@@ -3,7 +3,8 @@
 use glam::DVec3;
 
 use super::sheet::Sheet;
-use crate::brdf::Scattering;
+use crate::brdf::{Scattering, Seen};
+use crate::frames::{Direction, Surface as Local};
 
 /// The surface of the facets of one region.
 #[derive(Clone, Copy)]
@@ -13,6 +14,8 @@ pub struct Surface<'a> {
     /// Share of its diffuse return, 0 to 1/2, that comes back across the polarisation that was sent. The law is
     /// what comes back in that polarisation, so that this share adds to it.
     pub depolarised_share: f64,
+    /// Whether its lobes include the beam that saw them, so that no beam widens them again.
+    pub includes_beam: bool,
     /// Direction of its grain in the global frame, of any length. On a facet it is projected along the normal. Azimuths
     /// count from it, and `m` of an anisotropic model is the roughness along it.
     pub grain: DVec3,
@@ -21,14 +24,35 @@ pub struct Surface<'a> {
 }
 
 impl<'a> Surface<'a> {
-    /// A surface whose grain is the y axis, upwards.
+    /// A surface with its own lobes, whose grain is the y axis, upwards.
     pub fn new(scattering: &'a dyn Scattering) -> Surface<'a> {
-        Surface { scattering, depolarised_share: 0.0, grain: DVec3::Y, sheet: None }
+        Surface {
+            scattering,
+            depolarised_share: 0.0,
+            includes_beam: false,
+            grain: DVec3::Y,
+            sheet: None,
+        }
     }
 
     /// A sheet whose grain is the y axis, upwards.
     pub fn of_sheet(sheet: &'a Sheet) -> Surface<'a> {
         Surface { sheet: Some(sheet), ..Surface::new(sheet) }
+    }
+
+    /// How far a beam of a divergence, rad, widens its lobes, rad.
+    pub(super) fn widening_rad(&self, divergence_rad: f64) -> f64 {
+        if self.includes_beam { 0.0 } else { divergence_rad }
+    }
+
+    /// What a beam of a divergence, rad, sees of it.
+    pub(super) fn seen_by(&self, beam_rad: f64, i: Direction<Local>, o: Direction<Local>) -> Seen {
+        let seen = self.scattering.seen_by(beam_rad, i, o);
+        if !self.includes_beam {
+            return seen;
+        }
+        // The beam has its part in the lobe already, and that part is coherent.
+        Seen { f_per_sr: self.scattering.f_per_sr(i, o), ..seen }
     }
 }
 

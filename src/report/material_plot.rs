@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use crate::brdf::{BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Scattering, Shadowing};
+use crate::brdf::{
+    BlinnPhong, Brdf, CookTorrance, Distribution, Mixture, Scattering, Shadowing, ThroughBeam,
+};
 use crate::error::Error;
 use crate::fit::stored_band;
 use crate::formats::figure::{FigureError, Plot, Series, Style};
@@ -156,7 +158,11 @@ pub fn appendix_figures() -> Result<Vec<(String, Vec<u8>)>, Error> {
 
 /// Bands of fits below points below curves of fits, so that each can be seen.
 pub fn fit_layers(fits: &[Fit], points: Vec<Series>) -> Vec<Series> {
-    let curves = fits.iter().map(|fit| model_curve(&fit.name, &fit.model));
+    let curves = fits.iter().map(|fit| {
+        // As the beam of the points sees it.
+        let beam_rad = fit.beam_rad().unwrap_or(0.0);
+        model_curve(&fit.name, &ThroughBeam { law: &fit.model, beam_rad })
+    });
     fits.iter().filter_map(band).chain(points).chain(curves).collect()
 }
 

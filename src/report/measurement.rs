@@ -141,6 +141,8 @@ fn pose_record(
         "curve": {
             "detected": detected,
             "censored": reduced.curve.observations.len() - detected,
+            "footprint": reduced.curve.illumination.footprint,
+            "beam_rad": reduced.curve.illumination.beam_rad,
             "left_out": {
                 "missed": left_out.missed,
                 "off_surface": left_out.off_surface,

@@ -4,7 +4,9 @@ use serde::Serialize;
 
 use crate::catalogue::{Distance, Nearest, Probe, Rank};
 use crate::error::Error;
-use crate::material::{Observation, Slug};
+use crate::formats::words::listed;
+use crate::material::{Illumination, Observation, Slug};
+use crate::radar::Footprint;
 use crate::setup::{MaterialRevision, find_material, store_of_not_added};
 use crate::store::{Filter, Store};
 use crate::units::rounded;
@@ -14,6 +16,8 @@ use crate::units::rounded;
 pub struct NeighbourSearch {
     /// Its points.
     pub observations: Vec<Observation>,
+    /// How its target was lit, as far as it is stated.
+    pub illumination: Illumination,
     /// Frequency at which it was measured, Hz; `None` where it is not stated.
     pub frequency_hz: Option<f64>,
     /// The material that the curve is of, which is left out, if it is the current revision.
@@ -40,6 +44,12 @@ pub struct Neighbour {
     pub frequency_ghz: [f64; 2],
     /// How far the curve's frequency lies outside of these, 0 within; none where it is not stated.
     pub frequency_outside_ghz: Option<f64>,
+    /// Whether what scenes render of it is a curve or belongs to one.
+    #[serde(skip)]
+    pub is_of_a_curve: bool,
+    /// Form of the footprint of that curve; none where it is not stated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub footprint: Option<Footprint>,
     /// How far it is.
     #[serde(flatten)]
     pub distance: Distance,
@@ -50,6 +60,12 @@ pub struct Neighbour {
 pub struct NeighbourReport {
     /// At which the curve was measured; none where it is not stated.
     pub measured_at_ghz: Option<f64>,
+    /// Form of the footprint with which the curve was reduced; none where it is not stated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub footprint: Option<Footprint>,
+    /// What a person should not overlook.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notices: Vec<String>,
     /// Number of the curve's angles.
     pub angles: usize,
     /// The distance to the true material that chance alone makes, dB.
@@ -81,6 +97,7 @@ impl NeighbourSearch {
             material.instruments.iter().find(|own| Some(&own.key) == curve.instrument.as_ref());
         Ok(NeighbourSearch {
             observations: curve.observations.clone(),
+            illumination: curve.illumination,
             frequency_hz: measured_at_hz.or(instrument.map(|own| own.centre_frequency_hz)),
             own: is_current.then(|| material.slug.clone()),
         })
@@ -105,8 +122,11 @@ impl NeighbourSearch {
                 "give a curve with detections below that range",
             ));
         };
+        let probe = probe.lit(self.illumination);
         let built_in = store_of_not_added(store)?;
         let mut report = NeighbourReport {
+            footprint: self.illumination.footprint,
+            notices: Vec::new(),
             measured_at_ghz: self.frequency_hz.map(|hz| rounded(hz / 1e9)),
             angles: probe.angles(),
             noise_db: probe.noise_db(),
@@ -130,7 +150,25 @@ impl NeighbourSearch {
             distance.then_with(|| a.slug.cmp(&b.slug))
         });
         report.materials.truncate(limit);
+        report.notices.extend(self.one_sided(&report.materials));
         Ok(report)
+    }
+
+    /// That the footprint is stated of only one of the two sides that are compared.
+    fn one_sided(&self, found: &[Neighbour]) -> Option<String> {
+        let is_stated = self.illumination.footprint.is_some();
+        let others = found.iter().filter(|near| near.is_of_a_curve);
+        let others = others.filter(|near| near.footprint.is_some() != is_stated);
+        let names: Vec<String> = others.map(|near| near.slug.to_string()).collect();
+        let (own, theirs) =
+            if is_stated { ("states", "no curve of") } else { ("does not state", "the curve of") };
+        (!names.is_empty()).then(|| {
+            format!(
+                "the curve {own} the footprint with which it was reduced, {theirs} {} does: these levels are \
+                 compared as they are, which is worth 3 dB at 60°",
+                listed(&names)
+            )
+        })
     }
 
     fn neighbour(
@@ -144,6 +182,7 @@ impl NeighbourSearch {
             return Ok(None);
         };
         let material = stored.material;
+        let curve = material.rendered_curve();
         let outside_hz = self.frequency_hz.map(|hz| material.frequency_outside_hz(hz));
         Ok(Some(Neighbour {
             slug: summary.slug,
@@ -154,6 +193,8 @@ impl NeighbourSearch {
             status: summary.status,
             frequency_ghz: material.frequency_hz.map(|hz| rounded(hz / 1e9)),
             frequency_outside_ghz: outside_hz.map(|hz| rounded(hz / 1e9)),
+            is_of_a_curve: curve.is_some(),
+            footprint: curve.and_then(|curve| curve.illumination.footprint),
             distance,
         }))
     }

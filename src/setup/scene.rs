@@ -3,14 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use super::materials::{MaterialRevision, find_material, status_warning};
-use crate::brdf::{Brdf, ScatteringModel};
+use crate::brdf::{Brdf, Excess, ScatteringModel};
 use crate::effects::{EffectList, Level, Model, Receiver, SceneEffects, resolve};
 use crate::error::Error;
 use crate::formats::EffectEntry;
+use crate::formats::words::{listed, significant};
 use crate::frames::{Global, Point, Pose};
 use crate::geometry::Raster;
-use crate::material::Material;
-use crate::radar::{Channel, Radar};
+use crate::material::{Curve, Lobes, Material};
+use crate::radar::{Beam, Channel, Radar};
 use crate::render::{Bounce, RenderError, Scan, Setup, Sheet, Surface, power_image};
 use crate::scene::{Region, Scene};
 use crate::store::Store;
@@ -24,8 +25,12 @@ pub struct SceneMaterial {
     pub name: String,
     /// The material and its revision.
     pub found: MaterialRevision,
+    /// Name of the fit or the curve that is rendered.
+    pub rendered: String,
     /// The law that is rendered.
     pub scattering: Brdf,
+    /// Whose lobes the law has.
+    pub lobes: Lobes,
     /// The effects that the material declares.
     pub effects: EffectList,
 }
@@ -54,6 +59,20 @@ pub struct Assembly<'a> {
     bvh: Bvh<'a>,
     surfaces: Vec<Surface<'a>>,
     model: Option<Model<'a>>,
+}
+
+impl SceneMaterial {
+    /// Whether its lobes include the beam that saw them. A smooth mirror has no lobe of its own, and a law that is one
+    /// says itself whether its width is that of a beam.
+    fn includes_beam(&self) -> bool {
+        let is_mirror = self.scattering.is_smooth() || self.scattering.has_smooth_mirror();
+        self.lobes.is_of_both() && !is_mirror
+    }
+
+    /// The curve that is rendered, or that the rendered law belongs to.
+    fn curve(&self) -> Option<&Curve> {
+        self.found.material.curve_behind(&self.rendered)
+    }
 }
 
 impl ReadyScene {
@@ -103,6 +122,11 @@ impl ReadyScene {
         self.of_regions().map(|material| material.scattering.clone()).collect()
     }
 
+    /// Whether the lobes of every region include the beam that saw them.
+    pub fn includes_beam(&self) -> Vec<bool> {
+        self.of_regions().map(SceneMaterial::includes_beam).collect()
+    }
+
     /// The effects on the laws of the scene; `None` when it declares none.
     pub fn model(&self) -> Option<Model<'_>> {
         let receiver = Receiver::declared(self.scene.radar());
@@ -114,7 +138,10 @@ impl ReadyScene {
         let regions = self.scene.target.regions.iter().zip(&self.sheets);
         let surfaces = std::iter::zip(regions, self.of_regions())
             .map(|((region, sheet), material)| {
-                let opaque = Surface::new(&material.scattering);
+                let opaque = Surface {
+                    includes_beam: material.includes_beam(),
+                    ..Surface::new(&material.scattering)
+                };
                 let surface = sheet.as_ref().map_or(opaque, Surface::of_sheet);
                 let depolarised_share = region.depolarised_share;
                 Surface { grain: region.grain, depolarised_share, ..surface }
@@ -147,7 +174,9 @@ impl ReadyScene {
             for fit in &material.found.material.fits {
                 known.push(fit.name.as_str());
                 if fit.name == name {
+                    material.rendered = fit.name.clone();
                     material.scattering = fit.model.clone();
+                    material.lobes = fit.lobes;
                     is_chosen = true;
                 }
             }
@@ -162,7 +191,66 @@ impl ReadyScene {
         ))
     }
 
-    /// Sentences on materials that are withdrawn or superseded, or make no claim at the radar's frequency.
+    /// Refuses materials whose numbers come from powers with another form of the footprint than the scene's. That it is
+    /// not stated of some is a sentence.
+    ///
+    /// # Errors
+    /// A material with another form.
+    pub fn check_footprints(&self) -> Result<Option<String>, Error> {
+        if let Some(problem) =
+            self.materials.iter().find_map(|material| self.other_footprint(material))
+        {
+            let form = self.scene.radar().footprint.as_str();
+            return Err(Error::usage(
+                format!("{}: {problem}", self.path.display()),
+                format!("change `footprint` under [radar], or measure the curve again with {form}"),
+            ));
+        }
+        let unstated = self.materials.iter().filter(|material| {
+            let curve = material.curve();
+            curve.is_some_and(|curve| curve.illumination.footprint.is_none())
+        });
+        let names: Vec<String> = unstated.map(|material| format!("`{}`", material.name)).collect();
+        Ok((!names.is_empty()).then(|| {
+            format!(
+                "the footprint with which it was reduced is not stated of the curve of {}: taken for that of the scene",
+                listed(&names)
+            )
+        }))
+    }
+
+    /// That a material's numbers come from powers with another form of the footprint than the scene's.
+    fn other_footprint(&self, material: &SceneMaterial) -> Option<String> {
+        let (own, scene) =
+            (material.curve()?.illumination.footprint?, self.scene.radar().footprint);
+        (own != scene).then(|| {
+            format!(
+                "the curve of `{}` was reduced with footprint {}, the scene has footprint {}: levels differ by \
+                 cos θ, 3 dB at 60°",
+                material.name,
+                own.as_str(),
+                scene.as_str()
+            )
+        })
+    }
+
+    /// That a material's lobe is said to include a beam and is narrower than the one of the scene.
+    fn too_narrow(&self, material: &SceneMaterial) -> Option<String> {
+        let beam_rad = Beam::new(self.scene.radar()).towards(0.0, 0.0).divergence_rad();
+        let lobe_rad = material.scattering.lobe_rad(0.0).filter(|_| material.includes_beam())?;
+        (lobe_rad < beam_rad).then(|| {
+            format!(
+                "the lobe of `{}` is taken as that of radar and surface together, and is narrower than this radar's \
+                 beam: {} rad is below {}; lobes = \"surface\" in its [[fit]] says that it is the surface's own",
+                material.name,
+                significant(lobe_rad, 3),
+                significant(beam_rad, 3)
+            )
+        })
+    }
+
+    /// Sentences on materials that are withdrawn or superseded, make no claim at the radar's frequency, were reduced
+    /// with another footprint than the scene's, have a narrower lobe than its beam, or reflect more than they receive.
     pub fn notices(&self) -> Vec<String> {
         let mut notices = Vec::new();
         for SceneMaterial { found, .. } in &self.materials {
@@ -170,6 +258,11 @@ impl ReadyScene {
         }
         for SceneMaterial { found, .. } in &self.materials {
             notices.extend(extrapolation_warning(&found.material, self.scene.radar()));
+        }
+        for material in &self.materials {
+            notices.extend(self.other_footprint(material));
+            notices.extend(self.too_narrow(material));
+            notices.extend(too_much(material));
         }
         notices
     }
@@ -273,6 +366,8 @@ fn find_materials(
             let effects = resolve_effects(&found.material.effects, Level::Material, place)?;
             materials.push(SceneMaterial {
                 name: region.material.clone(),
+                rendered: found.material.render.clone(),
+                lobes: found.material.rendered_lobes(),
                 found,
                 scattering,
                 effects,
@@ -332,6 +427,12 @@ fn find_effects(
         effects.add_to_regions(material.effects.clone(), &on);
     }
     Ok(effects)
+}
+
+/// That a material reflects more than it receives at an angle that it is described for.
+fn too_much(material: &SceneMaterial) -> Option<String> {
+    let excess = Excess::of(&material.scattering, material.found.material.theta_rad)?;
+    Some(format!("the law of `{}` {}; nothing is cut off", material.name, excess.words()))
 }
 
 /// That a material makes no claim at the radar's frequency.

@@ -21,32 +21,55 @@ use crate::files::folder_of;
 const APPLICATION_ID: i64 = 0x6d61_7464;
 
 /// The latest schema.
-const LATEST: usize = 11;
+const LATEST: usize = 12;
 
 /// Every migration, oldest first. Append only: users have files of every schema.
-/// Of the revisions in `torn`, the hooks read no fit.
-fn schemas(torn: Vec<i64>) -> [M<'static>; LATEST] {
+/// `fill` computes what older programs did not store. It runs at the latest schema, the only one that this program
+/// reads and writes.
+fn schemas(fill: Backlog) -> [M<'static>; LATEST] {
     [
         M::up(include_str!("../../migrations/0001_materials.sql")),
         M::up(include_str!("../../migrations/0002_fits.sql")),
         M::up(include_str!("../../migrations/0003_effects.sql")),
         M::up(include_str!("../../migrations/0004_catalogue.sql")),
         M::up(include_str!("../../migrations/0005_search.sql")),
-        M::up_with_hook(include_str!("../../migrations/0006_outline.sql"), |tx: &Transaction| {
-            Ok(outline::fill(tx)?)
-        }),
-        M::up_with_hook(
-            include_str!("../../migrations/0007_attribution.sql"),
-            |tx: &Transaction| Ok(outline::fill(tx)?),
-        ),
+        M::up(include_str!("../../migrations/0006_outline.sql")),
+        M::up(include_str!("../../migrations/0007_attribution.sql")),
         M::up(include_str!("../../migrations/0008_origin_author.sql")),
         M::up(include_str!("../../migrations/0009_held_out.sql")),
         M::up(include_str!("../../migrations/0010_four_letters.sql")),
+        M::up(include_str!("../../migrations/0011_one_value.sql")),
         M::up_with_hook(
-            include_str!("../../migrations/0011_one_value.sql"),
-            move |tx: &Transaction| Ok(write::bring_fits_to_one_value(tx, &torn)?),
+            include_str!("../../migrations/0012_beam_of_a_curve.sql"),
+            move |tx: &Transaction| Ok(fill.run(tx)?),
         ),
     ]
+}
+
+/// What a file of an older schema lacks and this program computes.
+#[derive(Clone)]
+struct Backlog {
+    /// The schema of the file.
+    schema: usize,
+    /// Revisions on damaged pages, of which no fit is read.
+    torn: Vec<i64>,
+}
+
+impl Backlog {
+    /// First schema whose fits keep each value once.
+    const ONE_VALUE: usize = 11;
+    /// First schema whose outlines end where a curve's points do.
+    const OUTLINES: usize = 7;
+
+    fn run(&self, tx: &Transaction) -> rusqlite::Result<()> {
+        if self.schema < Backlog::ONE_VALUE {
+            write::bring_fits_to_one_value(tx, &self.torn)?;
+        }
+        if self.schema < Backlog::OUTLINES {
+            outline::fill(tx)?;
+        }
+        Ok(())
+    }
 }
 
 /// The latest schema in one step, equal to all migrations of an empty file. One step is faster, since SQLite parses
@@ -389,8 +412,11 @@ fn migrate(path: &Path, conn: &mut Connection) -> Result<(), StoreError> {
     if schema_of(path, conn)? == 0 {
         make(path, conn)?;
     }
-    let torn = law::on_damaged_pages(conn).in_file(path)?;
-    let outcome = Migrations::new(schemas(torn).into()).to_latest(conn);
+    let backlog = Backlog {
+        schema: schema_of(path, conn)?,
+        torn: law::on_damaged_pages(conn).in_file(path)?,
+    };
+    let outcome = Migrations::new(schemas(backlog).into()).to_latest(conn);
     // Another program may have migrated the file while this one waited.
     if schema_of(path, conn)? == LATEST {
         return Ok(());
@@ -412,7 +438,7 @@ fn obstacle(path: &Path, conn: &Connection) -> Result<Option<StoreError>, StoreE
     let mut old = Connection::open_in_memory().in_file(path)?;
     configure(&old).in_file(path)?;
     let file = path.to_owned();
-    let migrations = Migrations::new(schemas(Vec::new()).into());
+    let migrations = Migrations::new(schemas(Backlog { schema: LATEST, torn: Vec::new() }).into());
     let made = migrations.to_version(&mut old, schema_of(path, conn)?);
     made.map_err(|error| StoreError::Migration { file, error })?;
     let (old, latest) = (names(&old).in_file(path)?, names(&in_memory()?).in_file(path)?);
@@ -463,7 +489,8 @@ mod tests {
     fn migrated() -> Connection {
         let mut conn = Connection::open_in_memory().unwrap();
         configure(&conn).unwrap();
-        Migrations::new(schemas(Vec::new()).into()).to_latest(&mut conn).unwrap();
+        let backlog = Backlog { schema: 0, torn: Vec::new() };
+        Migrations::new(schemas(backlog).into()).to_latest(&mut conn).unwrap();
         conn
     }
 

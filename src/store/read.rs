@@ -15,7 +15,10 @@ use super::record::{RevisionSummary, StoredRevision};
 use super::rows::{json, optional_json, rows};
 use crate::brdf::Brdf;
 use crate::formats::EffectEntry;
-use crate::material::{Covariance, Curve, Fit, Material, Observation, Origin, Reach, Slug, Status};
+use crate::material::{
+    Covariance, Curve, Fit, Illumination, Lobes, Material, Observation, Origin, Reach, Slug, Status,
+};
+use crate::radar::Footprint;
 
 /// Every revision of a material, oldest first.
 pub(super) fn history(conn: &Connection, slug: &Slug) -> Result<Vec<RevisionSummary>> {
@@ -126,6 +129,19 @@ pub(super) fn get_in(
     Ok(Some(stored))
 }
 
+/// What scenes render of a material's current revision.
+#[derive(Clone, Debug)]
+pub(super) struct Rendered {
+    /// The model; none where the rendered curve cannot be interpolated.
+    pub model: Option<Brdf>,
+    /// Its range of incidence, rad.
+    pub theta_rad: [f64; 2],
+    /// Form of the footprint of the curve that it is, or that it was fitted to.
+    pub footprint: Option<Footprint>,
+    /// Whose lobes the model has.
+    pub lobes: Lobes,
+}
+
 /// The model that scenes render of the current revision, and its range of angles, rad.
 pub(super) fn rendered(conn: &Connection, slug: &Slug) -> Result<Option<(Brdf, [f64; 2])>> {
     let tx = Transaction::new_unchecked(conn, TransactionBehavior::Deferred)?;
@@ -133,35 +149,42 @@ pub(super) fn rendered(conn: &Connection, slug: &Slug) -> Result<Option<(Brdf, [
     if found.is_none() {
         check_absent(&tx, slug)?;
     }
-    Ok(found.and_then(|(model, theta_rad)| Some((model?, theta_rad))))
+    Ok(found.and_then(|found| Some((found.model?, found.theta_rad))))
 }
 
-/// As [`rendered`], within a transaction. No model where the rendered curve cannot be interpolated.
-pub(super) fn rendered_in(
-    conn: &Connection,
-    slug: &Slug,
-) -> Result<Option<(Option<Brdf>, [f64; 2])>> {
+/// What scenes render of the current revision, within a transaction.
+pub(super) fn rendered_in(conn: &Connection, slug: &Slug) -> Result<Option<Rendered>> {
+    // A fit without a curve joins nothing: no curve has the name of a fit.
     let sql = "
-        SELECT revision.id, render, theta_min_rad, theta_max_rad, model
+        SELECT revision.id, render, theta_min_rad, theta_max_rad, model, footprint, lobes
         FROM material JOIN revision ON material_id = material.id AND number = current_revision
-        LEFT JOIN fit ON revision_id = revision.id AND fit.name = render
+        LEFT JOIN fit ON fit.revision_id = revision.id AND fit.name = render
+        LEFT JOIN fit_lobes ON fit_lobes.revision_id = revision.id AND fit_lobes.fit = render
+        LEFT JOIN curve_illumination AS lit
+            ON lit.revision_id = revision.id AND lit.curve = coalesce(fit.curve, render)
         WHERE slug = ?1";
     let found = conn
         .prepare_cached(sql)?
         .query_row([slug.as_str()], |row| {
             let (revision_id, render): (i64, String) = (row.get(0)?, row.get(1)?);
-            let structure: Option<String> = row.get(4)?;
-            Ok((revision_id, render, [row.get(2)?, row.get(3)?], structure))
+            let rendered = Rendered {
+                model: None,
+                theta_rad: [row.get(2)?, row.get(3)?],
+                footprint: row.get(5)?,
+                lobes: row.get::<_, Option<Lobes>>(6)?.unwrap_or_default(),
+            };
+            Ok((revision_id, render, row.get::<_, Option<String>>(4)?, rendered))
         })
         .optional()?;
-    let Some((revision_id, render, theta_rad, structure)) = found else { return Ok(None) };
+    let Some((revision_id, render, structure, rendered)) = found else { return Ok(None) };
     if let Some(structure) = structure {
         let (model, _) = law::read(conn, revision_id, &render, &structure)?;
-        return Ok(Some((Some(model), theta_rad)));
+        return Ok(Some(Rendered { model: Some(model), ..rendered }));
     }
     let curve = curves(conn, revision_id, Some(&render))?.pop();
     let model = curve.as_ref().and_then(|curve| curve.tabulated().ok()).map(Brdf::Tabulated);
-    Ok(Some((model, Reach::new(theta_rad, curve.as_ref()).span_rad())))
+    let theta_rad = Reach::new(rendered.theta_rad, curve.as_ref()).span_rad();
+    Ok(Some(Rendered { model, theta_rad, ..rendered }))
 }
 
 /// A revision's own row, or that of the current one, and its number in the file.
@@ -235,9 +258,11 @@ fn status(row: &Row, column: usize) -> Result<Status> {
 /// Curves of a revision, or the one of this name.
 fn curves(conn: &Connection, revision_id: i64, only: Option<&str>) -> Result<Vec<Curve>> {
     let sql = "
-        SELECT name, source, instrument, session FROM curve
+        SELECT name, source, instrument, session, footprint, beam_rad FROM curve
         LEFT JOIN curve_session
             ON curve_session.revision_id = curve.revision_id AND curve_session.curve = name
+        LEFT JOIN curve_illumination AS lit
+            ON lit.revision_id = curve.revision_id AND lit.curve = name
         WHERE curve.revision_id = ?1 AND name = coalesce(?2, name) ORDER BY position";
     rows(conn, sql, params![revision_id, only], |row| {
         let name: String = row.get(0)?;
@@ -247,6 +272,7 @@ fn curves(conn: &Connection, revision_id: i64, only: Option<&str>) -> Result<Vec
             source: row.get(1)?,
             instrument: row.get(2)?,
             session: row.get(3)?,
+            illumination: Illumination { footprint: row.get(4)?, beam_rad: row.get(5)? },
             observations,
         })
     })
@@ -274,8 +300,9 @@ fn observations(conn: &Connection, revision_id: i64, curve: &str) -> Result<Vec<
 }
 
 pub(super) fn fits(conn: &Connection, revision_id: i64) -> Result<Vec<Fit>> {
-    let sql = "SELECT name, model, estimator, curve, source, report FROM fit
-               WHERE revision_id = ?1 ORDER BY position";
+    let sql = "SELECT name, model, estimator, curve, source, report, lobes FROM fit
+               LEFT JOIN fit_lobes ON fit_lobes.revision_id = fit.revision_id AND fit = name
+               WHERE fit.revision_id = ?1 ORDER BY position";
     rows(conn, sql, [revision_id], |row| {
         let name: String = row.get(0)?;
         let structure: String = row.get(1)?;
@@ -287,6 +314,7 @@ pub(super) fn fits(conn: &Connection, revision_id: i64) -> Result<Vec<Fit>> {
             estimator: row.get(2)?,
             curve: row.get(3)?,
             source: row.get(4)?,
+            lobes: row.get::<_, Option<Lobes>>(6)?.unwrap_or_default(),
             parameter_sources,
             covariance,
             report: optional_json(row, 5)?,

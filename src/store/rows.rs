@@ -6,7 +6,8 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde::de::value::{Error as WordError, StrDeserializer};
 
-use crate::material::{Censor, FindingVerdict, Geometry, Making, Scale, Slug, SourceKind};
+use crate::material::{Censor, FindingVerdict, Geometry, Lobes, Making, Scale, Slug, SourceKind};
+use crate::radar::Footprint;
 
 /// All rows of a query.
 pub(super) fn rows<T>(
@@ -51,4 +52,4 @@ macro_rules! words {
     };
 }
 
-words!(Censor, FindingVerdict, Geometry, Making, Scale, Slug, SourceKind);
+words!(Censor, FindingVerdict, Footprint, Geometry, Lobes, Making, Scale, Slug, SourceKind);

@@ -316,7 +316,7 @@ CREATE TABLE outline (
     theta_max_rad REAL NOT NULL,
     model_hash    BLOB CHECK (length(model_hash) = 16),             -- NULL: nothing can be rendered
     levels        BLOB CHECK (length(levels) = 180)                 -- NULL: not known
-) STRICT, WITHOUT ROWID;
+, footprint TEXT, lobes TEXT) STRICT, WITHOUT ROWID;
 
 CREATE TABLE layer (
     revision_id  INTEGER NOT NULL REFERENCES revision (id) ON DELETE CASCADE,
@@ -388,43 +388,6 @@ CREATE TABLE origin_author (
     PRIMARY KEY (revision_id, position)
 ) STRICT, WITHOUT ROWID;
 
-CREATE VIEW v_curves AS
-SELECT slug, number AS revision, curve.name AS curve, source.kind AS kind,
-    theta_i_rad * 57.29577951308232 AS theta_i_deg, theta_r_rad * 57.29577951308232 AS theta_r_deg,
-    delta_phi_rad * 57.29577951308232 AS delta_phi_deg, theta_sd_rad * 57.29577951308232 AS theta_sd_deg,
-    10 * log10(sigma0) AS sigma0_db, censor, 10 * log10(threshold_sigma0) AS threshold_db, xt_m, yt_m
-FROM material JOIN revision ON material_id = material.id AND number = current_revision
-JOIN curve ON curve.revision_id = revision.id
-JOIN source ON source.revision_id = revision.id AND source.key = curve.source
-JOIN observation
-    ON observation.revision_id = revision.id AND observation.curve = curve.name;
-
-CREATE VIEW v_fits AS
-SELECT slug, number AS revision, fit.name AS fit, estimator, fit.curve AS curve,
-    fit.name = render AS is_rendered, p.path AS path, p.value AS value, p.unit AS unit,
-    coalesce(e.sd, p.sd) AS sd, low_95, high_95, chosen_by, at_bound, identified,
-    coalesce(p.source, fit.source) AS source, source.kind AS kind,
-    json_extract(report, '$.held_out.folds') AS held_out_folds,
-    json_extract(report, '$.held_out.score') AS held_out_score,
-    json_extract(report, '$.held_out.score_sd') AS held_out_score_sd,
-    json_extract(report, '$.held_out.rms_db') AS held_out_rms_db
-FROM material JOIN revision ON material_id = material.id AND number = current_revision
-JOIN fit ON fit.revision_id = revision.id
-JOIN fit_parameter AS p ON p.revision_id = revision.id AND p.fit = fit.name
-LEFT JOIN fit_estimate AS e ON e.revision_id = revision.id AND e.fit = fit.name AND e.name = p.path
-JOIN source ON source.revision_id = revision.id AND source.key = coalesce(p.source, fit.source)
-UNION ALL
-SELECT slug, number, fit.name, estimator, fit.curve, fit.name = render, e.name, e.value, e.unit, e.sd,
-    low_95, high_95, chosen_by, at_bound, identified, fit.source, source.kind,
-    json_extract(report, '$.held_out.folds'), json_extract(report, '$.held_out.score'),
-    json_extract(report, '$.held_out.score_sd'), json_extract(report, '$.held_out.rms_db')
-FROM material JOIN revision ON material_id = material.id AND number = current_revision
-JOIN fit ON fit.revision_id = revision.id
-JOIN fit_estimate AS e ON e.revision_id = revision.id AND e.fit = fit.name
-JOIN source ON source.revision_id = revision.id AND source.key = fit.source
-WHERE NOT EXISTS (SELECT 1 FROM fit_parameter AS p
-    WHERE p.revision_id = e.revision_id AND p.fit = e.fit AND p.path = e.name);
-
 CREATE VIEW v_findings AS
 SELECT slug, number AS revision, effect, verdict, fit_before, fit_after, gain, placebo_gain, p,
     score_difference, score_difference_sd, size_db, rms_before_db, rms_after_db, confusable_with,
@@ -464,11 +427,74 @@ FROM fit_number AS n
 JOIN fit ON fit.revision_id = n.revision_id AND fit.name = n.fit
 LEFT JOIN fit_parameter AS p ON p.revision_id = n.revision_id AND p.fit = n.fit AND p.path = n.name;
 
+CREATE TABLE curve_illumination (
+    revision_id INTEGER NOT NULL,
+    curve       TEXT    NOT NULL,
+    footprint   TEXT    CHECK (footprint IN ('paper', 'projected')),  -- NULL: not stated
+    beam_rad    REAL    CHECK (beam_rad > 0),                         -- NULL: not stated
+    PRIMARY KEY (revision_id, curve),
+    CHECK (footprint IS NOT NULL OR beam_rad IS NOT NULL),
+    FOREIGN KEY (revision_id, curve) REFERENCES curve (revision_id, name) ON DELETE CASCADE
+) STRICT, WITHOUT ROWID;
+
+CREATE TABLE fit_lobes (
+    revision_id INTEGER NOT NULL,
+    fit         TEXT    NOT NULL,
+    lobes       TEXT    NOT NULL CHECK (lobes = 'surface'),           -- no row: of radar and surface together
+    PRIMARY KEY (revision_id, fit),
+    FOREIGN KEY (revision_id, fit) REFERENCES fit (revision_id, name) ON DELETE CASCADE
+) STRICT, WITHOUT ROWID;
+
+CREATE VIEW v_curves AS
+SELECT slug, number AS revision, curve.name AS curve, source.kind AS kind,
+    theta_i_rad * 57.29577951308232 AS theta_i_deg, theta_r_rad * 57.29577951308232 AS theta_r_deg,
+    delta_phi_rad * 57.29577951308232 AS delta_phi_deg, theta_sd_rad * 57.29577951308232 AS theta_sd_deg,
+    10 * log10(sigma0) AS sigma0_db, censor, 10 * log10(threshold_sigma0) AS threshold_db, xt_m, yt_m,
+    footprint, beam_rad
+FROM material JOIN revision ON material_id = material.id AND number = current_revision
+JOIN curve ON curve.revision_id = revision.id
+JOIN source ON source.revision_id = revision.id AND source.key = curve.source
+JOIN observation
+    ON observation.revision_id = revision.id AND observation.curve = curve.name
+LEFT JOIN curve_illumination AS i ON i.revision_id = revision.id AND i.curve = curve.name;
+
+CREATE VIEW v_fits AS
+SELECT slug, number AS revision, fit.name AS fit, estimator, fit.curve AS curve,
+    fit.name = render AS is_rendered, p.path AS path, p.value AS value, p.unit AS unit,
+    coalesce(e.sd, p.sd) AS sd, low_95, high_95, chosen_by, at_bound, identified,
+    coalesce(p.source, fit.source) AS source, source.kind AS kind,
+    json_extract(report, '$.held_out.folds') AS held_out_folds,
+    json_extract(report, '$.held_out.score') AS held_out_score,
+    json_extract(report, '$.held_out.score_sd') AS held_out_score_sd,
+    json_extract(report, '$.held_out.rms_db') AS held_out_rms_db,
+    coalesce(lobes, 'radar-and-surface') AS lobes
+FROM material JOIN revision ON material_id = material.id AND number = current_revision
+JOIN fit ON fit.revision_id = revision.id
+JOIN fit_parameter AS p ON p.revision_id = revision.id AND p.fit = fit.name
+LEFT JOIN fit_estimate AS e ON e.revision_id = revision.id AND e.fit = fit.name AND e.name = p.path
+LEFT JOIN fit_lobes AS l ON l.revision_id = revision.id AND l.fit = fit.name
+JOIN source ON source.revision_id = revision.id AND source.key = coalesce(p.source, fit.source)
+UNION ALL
+SELECT slug, number, fit.name, estimator, fit.curve, fit.name = render, e.name, e.value, e.unit, e.sd,
+    low_95, high_95, chosen_by, at_bound, identified, fit.source, source.kind,
+    json_extract(report, '$.held_out.folds'), json_extract(report, '$.held_out.score'),
+    json_extract(report, '$.held_out.score_sd'), json_extract(report, '$.held_out.rms_db'),
+    coalesce(lobes, 'radar-and-surface')
+FROM material JOIN revision ON material_id = material.id AND number = current_revision
+JOIN fit ON fit.revision_id = revision.id
+JOIN fit_estimate AS e ON e.revision_id = revision.id AND e.fit = fit.name
+LEFT JOIN fit_lobes AS l ON l.revision_id = revision.id AND l.fit = fit.name
+JOIN source ON source.revision_id = revision.id AND source.key = fit.source
+WHERE NOT EXISTS (SELECT 1 FROM fit_parameter AS p
+    WHERE p.revision_id = e.revision_id AND p.fit = e.fit AND p.path = e.name);
+
 INSERT INTO unit VALUES ('aperture_m', 'm', 'diameter of the antenna');
 
 INSERT INTO unit VALUES ('at_bound', '1', '1: the search stopped at an end of the number''s range');
 
 INSERT INTO unit VALUES ('bandwidth_hz', 'Hz', 'bandwidth of the instrument');
+
+INSERT INTO unit VALUES ('beam_rad', 'rad', 'divergence lambda/(2 pi w) of the beam that a curve was measured with');
 
 INSERT INTO unit VALUES ('calibration_sd_factor', '1', 'one standard deviation of the level, as a factor');
 

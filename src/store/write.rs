@@ -15,8 +15,9 @@ use super::rows::rows;
 use super::tables::{follows_from_content, has_statistics, tables};
 use super::{law, read};
 use crate::formats::EffectEntry;
-use crate::material::{Activity, Covariance, Curve, Fit, Material, Slug};
+use crate::material::{Activity, Covariance, Curve, Fit, Illumination, Material, Slug};
 use crate::measure::statistics::by_angle;
+use crate::radar::Footprint;
 
 /// Number of materials whose rows in lists and searches are written together.
 const AT_ONCE: usize = 500;
@@ -68,8 +69,13 @@ impl<'a> MaterialWriter<'a> {
     /// Queues a material for lists and searches.
     pub fn queue(&mut self, material_id: i64, material: &Material) -> Result<()> {
         self.waiting.push(material_id);
-        let (model, reach) = (material.scattering().ok(), material.reach());
-        self.outlines.push(outline::line(&material.slug, model.as_ref(), reach.span_rad()));
+        let rendered = read::Rendered {
+            model: material.scattering().ok(),
+            theta_rad: material.reach().span_rad(),
+            footprint: material.rendered_curve().and_then(|curve| curve.illumination.footprint),
+            lobes: material.rendered_lobes(),
+        };
+        self.outlines.push(outline::line(&material.slug, &rendered));
         if self.waiting.len() >= AT_ONCE {
             self.write_lists()?;
         }
@@ -313,7 +319,7 @@ impl Rows<'_> {
     }
 
     fn curve(&self, position: u32, curve: &Curve) -> Result<()> {
-        let Curve { name, source, instrument, session, observations } = curve;
+        let Curve { name, source, instrument, session, illumination, observations } = curve;
         self.insert(
             "INSERT INTO curve (revision_id, position, name, source, instrument)
              VALUES (?1, ?2, ?3, ?4, ?5)",
@@ -323,6 +329,14 @@ impl Rows<'_> {
             self.insert(
                 "INSERT INTO curve_session (revision_id, curve, session) VALUES (?1, ?2, ?3)",
                 params![self.revision_id, name, session],
+            )?;
+        }
+        if *illumination != Illumination::default() {
+            let Illumination { footprint, beam_rad } = illumination;
+            self.insert(
+                "INSERT INTO curve_illumination (revision_id, curve, footprint, beam_rad)
+                 VALUES (?1, ?2, ?3, ?4)",
+                params![self.revision_id, name, footprint.map(Footprint::as_str), beam_rad],
             )?;
         }
         let mut insert = self.tx.prepare_cached(
@@ -364,6 +378,12 @@ impl Rows<'_> {
              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
             params![self.revision_id, position, name, model, estimator, curve, source, report],
         )?;
+        if !fit.lobes.is_of_both() {
+            self.insert(
+                "INSERT INTO fit_lobes (revision_id, fit, lobes) VALUES (?1, ?2, ?3)",
+                params![self.revision_id, name, fit.lobes.as_str()],
+            )?;
+        }
         self.parameters(fit)?;
         self.numbers(fit)?;
         fit.covariance.as_ref().map_or(Ok(()), |covariance| self.covariance(name, covariance))

@@ -7,9 +7,10 @@ use std::process::Command;
 use matdb::formats::EffectEntry;
 use matdb::material::{
     Censor, Citation, Covariance, CrossValidation, Curve, Estimate, Finding, FindingVerdict,
-    FitReport, FixedNumber, Geometry, Goodness, Instrument, Layer, Making, Material, Observation,
-    Permittivity, Roughness, Scale, Session, SessionPose, Status, file,
+    FitReport, FixedNumber, Geometry, Goodness, Illumination, Instrument, Layer, Lobes, Making,
+    Material, Observation, Permittivity, Roughness, Scale, Session, SessionPose, Status, file,
 };
+use matdb::radar::Footprint;
 use matdb::store::Store;
 
 /// A built-in material as the first schema's file holds it, whatever became of it since.
@@ -39,7 +40,8 @@ pub fn sample(slug: &str) -> Material {
     ];
     let instrument = Some("bench".to_owned());
     let name = "scan".to_owned();
-    material.curves = vec![Curve { name, source, instrument, session: None, observations }];
+    let (session, illumination) = (None, Illumination::default());
+    material.curves = vec![Curve { name, source, instrument, session, illumination, observations }];
     let path = material.fits[0].model.parameters()[0].path.clone();
     material.fits[0].covariance =
         Some(Covariance { parameters: vec![path], matrix: vec![vec![0.01]] });
@@ -219,6 +221,15 @@ pub fn placed(slug: &str) -> Material {
     material
 }
 
+/// The same with the beam of its curve, and a fit of the surface's own lobes.
+pub fn lit(slug: &str) -> Material {
+    let mut material = placed(slug);
+    material.curves[0].illumination =
+        Illumination { footprint: Some(Footprint::Projected), beam_rad: Some(0.0117) };
+    material.fits[0].lobes = Lobes::Surface;
+    material
+}
+
 /// The same with its model stated beside the curve, as nobody made that fit, so that everything in it holds.
 pub fn sound(slug: &str) -> Material {
     let mut material = with_effects(slug);
@@ -242,7 +253,7 @@ pub fn refitted(mut material: Material) -> Material {
         }
     });
     material.curves[0].observations.extend(points);
-    let curve = matdb::measure::Curve::from_observations(&material.curves[0].observations).unwrap();
+    let curve = matdb::measure::Curve::of_material(&material.curves[0]).unwrap();
     let fixed = vec![("diffuse.alpha".to_owned(), 3.0)];
     let fit = matdb::fit::Fit { fixed, looks: Some(1.0), starts: 1, ..matdb::fit::Fit::default() };
     let found = fit.run(&material.fits[0].model, &curve).unwrap();

@@ -194,6 +194,15 @@ impl Brdf {
         found
     }
 
+    /// Paths of the parameters that are widths of lobes, as tangents or in rad.
+    pub fn lobe_widths(&self) -> Vec<String> {
+        const NAMES: [&str; 4] = ["m", "m_across", "rms_slope", "lobe_rad"];
+        let paths = self.parameters().into_iter().map(|parameter| parameter.path);
+        paths
+            .filter(|path| path.rsplit('.').next().is_some_and(|name| NAMES.contains(&name)))
+            .collect()
+    }
+
     /// Sets one parameter by its path; `false` when the model has none of that path.
     pub fn set_parameter(&mut self, path: &str, value: f64) -> bool {
         let mut known = false;

@@ -16,7 +16,7 @@ use super::page::{Block, Page, parse};
 use crate::brdf::{Brdf, Fresnel};
 use crate::formats::FormatError;
 use crate::material::{
-    Citation, Fit, Making, Material, Permittivity, Slug, Source, SourceKind, Status,
+    Citation, Fit, Lobes, Making, Material, Permittivity, Slug, Source, SourceKind, Status,
 };
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
@@ -241,6 +241,7 @@ fn material(file: &str, page: &Page, given: &Details, entry: Entry) -> Material 
             estimator: "stated".to_owned(),
             curve: None,
             source: "half-space".to_owned(),
+            lobes: Lobes::RadarAndSurface,
             parameter_sources: vec![
                 ("eps_imag".to_owned(), OPTICAL_CONSTANTS.to_owned()),
                 ("eps_real".to_owned(), OPTICAL_CONSTANTS.to_owned()),

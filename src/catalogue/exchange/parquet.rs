@@ -25,10 +25,14 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeErr
         real("range_m"),
         real("xt_m"),
         real("yt_m"),
+        Column { name: "footprint".to_owned(), kind: ColumnKind::Text, required: false },
+        real("beam_rad"),
     ];
     let table =
         Table { name: "observation".to_owned(), columns, key: Vec::new(), references: Vec::new() };
     let cell = |value: Option<f64>| value.map_or(Cell::Null, Cell::Real);
+    let lit = points.curve.map(|curve| curve.illumination).unwrap_or_default();
+    let footprint = lit.footprint.map_or(Cell::Null, |form| Cell::Text(form.as_str()));
     let rows = points.observations.iter().map(|point| {
         vec![
             Cell::Real(point.theta_i_rad),
@@ -42,6 +46,8 @@ pub(super) fn write(subject: &Subject, name: &str) -> Result<Export, ExchangeErr
             cell(point.range_m),
             cell(point.target_m.map(|[xt_m, _]| xt_m)),
             cell(point.target_m.map(|[_, yt_m]| yt_m)),
+            footprint,
+            cell(lit.beam_rad),
         ]
     });
     let about = format!("{}\n{} GHz", subject.about().join("\n"), points.frequency_hz / 1e9);

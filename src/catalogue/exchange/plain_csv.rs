@@ -1,6 +1,6 @@
 //! One material's curve as CSV, the columns that a `material.toml` refers to: `theta_deg`, `sigma0_db`,
-//! `censor`, `threshold_db`, `theta_r_deg`, `delta_phi_deg`. Lines that start with `#` describe the curve and its
-//! source; the reader skips those at the head.
+//! `censor`, `threshold_db`, `theta_r_deg`, `delta_phi_deg`, and `footprint` and `beam_rad` where they are stated.
+//! Lines that start with `#` describe the curve and its source; the reader skips those at the head.
 //!
 //! Lost: everything but the curve, and of its points the angle's deviation, power, range, chirp and place.
 
@@ -14,7 +14,8 @@ use super::subject::{Points, Subject};
 use crate::formats::FormatError;
 use crate::formats::words::round_significant;
 use crate::material::{
-    Citation, Curve, Instrument, Material, Observation, Slug, Source, SourceKind, Status, file,
+    Citation, Curve, Illumination, Instrument, Material, Observation, Slug, Source, SourceKind,
+    Status, file,
 };
 use crate::units::{db_from_ratio, shown};
 
@@ -26,10 +27,12 @@ pub(super) fn write(subject: &Subject, name: &str) -> Export {
     let points = subject.points();
     let mut text: String = subject.about().iter().map(|line| format!("# {line}\n")).collect();
     text += &format!("# {}, at {} GHz\n", describe(&points), points.frequency_hz / 1e9);
-    text += "theta_deg,sigma0_db,censor,threshold_db,theta_r_deg,delta_phi_deg\n";
+    let lit = points.curve.map(|curve| curve.illumination).unwrap_or_default();
+    let [names, lit] = lit.columns();
+    text += &format!("theta_deg,sigma0_db,censor,threshold_db,theta_r_deg,delta_phi_deg{names}\n");
     for point in points.observations.iter() {
         text += &format!(
-            "{},{},{},{},{},{}\n",
+            "{},{},{},{},{},{}{lit}\n",
             fifteen_digits(point.theta_i_rad.to_degrees()),
             level_db(point.sigma0),
             point.censor.as_str(),
@@ -68,7 +71,8 @@ pub(super) fn describe(points: &Points) -> String {
 /// Makes a material of a curve.
 pub(super) fn read(file: &str, bytes: &[u8], given: &Details) -> Result<Material, ExchangeError> {
     let points = file::points(bytes).map_err(|error| ExchangeError::in_file(file, error))?;
-    let observations: Vec<Observation> = points.into_iter().map(|(_, point)| point).collect();
+    let illumination = points.illumination;
+    let observations: Vec<Observation> = points.rows.into_iter().map(|(_, point)| point).collect();
     if observations.is_empty() {
         let empty =
             FormatError::at("line 1", "no row follows the header", "add the curve's points");
@@ -108,7 +112,17 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Details) -> Result<Material
         threshold_w: given.threshold_w,
         ..Instrument::default()
     });
-    let single = SingleCurve { slug, class, licence, title, kind, hz, instrument, observations };
+    let single = SingleCurve {
+        slug,
+        class,
+        licence,
+        title,
+        kind,
+        hz,
+        instrument,
+        illumination,
+        observations,
+    };
     Ok(of_curve(file, given, single))
 }
 
@@ -123,12 +137,14 @@ pub(super) struct SingleCurve {
     /// Frequency, Hz.
     pub hz: f64,
     pub instrument: Option<Instrument>,
+    pub illumination: Illumination,
     pub observations: Vec<Observation>,
 }
 
 /// A material that is one curve.
 pub(super) fn of_curve(file: &str, given: &Details, single: SingleCurve) -> Material {
-    let SingleCurve { slug, class, licence, title, kind, hz, instrument, observations } = single;
+    let SingleCurve { slug, class, licence, title, kind, hz, instrument, .. } = single;
+    let SingleCurve { illumination, observations, .. } = single;
     let stem = Path::new(file_name(file)).file_stem().unwrap_or_default().to_string_lossy();
     let name = given.curve.clone().unwrap_or(stem.into_owned());
     let angles_rad = observations.iter().map(|point| point.theta_i_rad);
@@ -159,6 +175,7 @@ pub(super) fn of_curve(file: &str, given: &Details, single: SingleCurve) -> Mate
             source: name,
             instrument: instrument.as_ref().map(|instrument| instrument.key.clone()),
             session: None,
+            illumination,
             observations,
         }],
         instruments: instrument.into_iter().collect(),

@@ -151,13 +151,23 @@ impl<'a> Subject<'a> {
         let material = self.material;
         let [low_ghz, high_ghz] = material.frequency_hz.map(|hz| hz / 1e9);
         let [low_deg, high_deg] = material.theta_rad.map(f64::to_degrees);
+        let lobes = material.rendered_fit().and_then(|fit| fit.lobes_words());
+        let lobes = lobes.map_or(String::new(), |words| format!("{words}; "));
         let mut lines = vec![
             self.title(),
             format!("content {}", material.content_hash()),
-            format!("the rendered numbers are {}; licence {}", self.kind(), material.licence),
+            format!(
+                "the rendered numbers are {}; {lobes}licence {}",
+                self.kind(),
+                material.licence
+            ),
             format!("claimed from {low_ghz} to {high_ghz} GHz, {low_deg:.3} to {high_deg:.3} deg"),
         ];
         lines.extend(self.origin.map(|origin| format!("from {}", origin.credit())));
+        lines.extend(self.points().curve.map(|curve| {
+            let lit = curve.illumination;
+            format!("curve `{}`: {}; {}", curve.name, lit.footprint_words(), lit.beam_words())
+        }));
         lines.extend(self.sources().iter().map(|source| format!("source, {source}")));
         lines.extend(material.unknown.iter().map(|sentence| format!("not known: {sentence}")));
         lines.extend(material.status.sentence());

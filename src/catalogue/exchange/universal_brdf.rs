@@ -96,6 +96,7 @@ fn metadata(subject: &Subject, points: &Points) -> Value {
             "source": points.source.map(|source| one_line(&source.titled())),
             "licence_of_source": points.source.and_then(|source| source.licence.clone()),
             "instrument": points.instrument,
+            "illumination": points.curve.map(|curve| curve.illumination),
         } },
     })
 }

@@ -13,7 +13,7 @@ use super::error::ExchangeError;
 use super::plain_csv::{RADAR, SingleCurve, of_curve};
 use super::universal_brdf::{CENSOR, OURS, THRESHOLD};
 use crate::formats::FormatError;
-use crate::material::{Censor, Instrument, Material, Observation, SourceKind};
+use crate::material::{Censor, Illumination, Instrument, Material, Observation, SourceKind};
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
 
 /// Makes a material of a file.
@@ -62,7 +62,20 @@ pub(super) fn read(file: &str, bytes: &[u8], given: &Details) -> Result<Material
         threshold_w,
         ..Instrument::default()
     });
-    let single = SingleCurve { slug, class, licence, title, kind, hz, instrument, observations };
+    // Another program's f is stated as f, without the form in which it was reduced.
+    let illumination: Option<Illumination> =
+        serde_json::from_value(ours["illumination"].clone()).ok().flatten();
+    let single = SingleCurve {
+        slug,
+        class,
+        licence,
+        title,
+        kind,
+        hz,
+        instrument,
+        illumination: illumination.unwrap_or_default(),
+        observations,
+    };
     Ok(of_curve(file, given, single))
 }
 

@@ -56,6 +56,7 @@ fn median(points: &[&Observation]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::material::Illumination;
 
     fn point(theta_deg: f64, sigma0: Option<f64>) -> Observation {
         Observation::backscatter(theta_deg.to_radians(), sigma0, Some(0.01))
@@ -68,6 +69,7 @@ mod tests {
             source: "s".into(),
             instrument: None,
             session: None,
+            illumination: Illumination::default(),
             observations,
         })
     }

@@ -8,6 +8,7 @@ use super::levels::{FAINTEST_DB, Levels, TABLE_DEG, angles_deg, range_deg};
 use super::picture::Picture;
 use super::quantity::quantity;
 use super::words::grouped;
+use crate::brdf::ThroughBeam;
 use crate::fit::stored_band;
 use crate::formats::figure::{Series, Style};
 use crate::formats::words::{digits, percent};
@@ -41,6 +42,8 @@ pub(super) struct CurveView {
     /// How many points, and how many of them are only bounds.
     count: String,
     instrument: Option<InstrumentView>,
+    /// The form of the footprint and the beam.
+    lit: String,
     bins: Vec<Bin>,
     /// Points that are not backscatter and so not in the picture.
     bistatic: Option<String>,
@@ -69,7 +72,9 @@ pub(super) fn picture(material: &Material) -> (Option<String>, Vec<Sample>) {
     }
     for (number, fit) in material.fits.iter().enumerate() {
         let class = format!("{} is-{}", ink(curves + number), line_word(material, fit));
-        series.extend(lines(&Levels::stated(material, &fit.model), &class));
+        // Next to its curve a fit is drawn as the beam of the curve sees it.
+        let seen = ThroughBeam { law: &fit.model, beam_rad: material.beam_rad(fit) };
+        series.extend(lines(&Levels::stated(material, &seen), &class));
         samples.push(Sample {
             name: fit.name.clone(),
             kind: word(kind_of(material, &fit.source)),
@@ -212,6 +217,11 @@ pub(super) fn view(material: &Material, curve: &Curve) -> CurveView {
         source_place: place_of(material, &curve.source),
         count: count(&curve.observations),
         instrument: instrument.map(instrument_view),
+        lit: format!(
+            "{}; {}",
+            curve.illumination.footprint_words(),
+            curve.illumination.beam_words()
+        ),
         bins: bins(curve),
         bistatic: (bistatic > 0).then(|| grouped(bistatic)),
     }

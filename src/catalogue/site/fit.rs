@@ -27,6 +27,8 @@ pub(super) struct FitView {
     model: String,
     method: String,
     curve: Option<String>,
+    /// Whose lobes it has; none of a model without a lobe.
+    lobes: Option<&'static str>,
     is_fitted: bool,
     is_rendered: bool,
     parameters: Vec<ParameterView>,
@@ -82,6 +84,7 @@ pub(super) fn view(material: &Material, number: usize, fit: &Fit) -> FitView {
         model: model_name(fit),
         method: method(&fit.estimator),
         curve: fit.curve.clone(),
+        lobes: fit.lobes_words(),
         is_fitted: fit.is_fitted(),
         is_rendered: fit.name == material.render,
         has_values: !parameters.is_empty(),

@@ -3,7 +3,7 @@
 use super::curve::{class_of, marks};
 use super::entry::kind_of;
 use super::picture::Picture;
-use crate::brdf::Scattering;
+use crate::brdf::{Scattering, ThroughBeam};
 use crate::formats::figure::{Series, Style};
 use crate::material::{Fit, Material};
 use crate::units::db_from_ratio;
@@ -14,11 +14,12 @@ pub(super) fn picture(material: &Material, number: usize, fit: &Fit) -> Option<S
     let curve = material.curves.iter().find(|curve| curve.name == *name)?;
     let class = format!("ink0 {}", class_of(kind_of(material, &curve.source)));
     let series = |style, points| Series { name: String::new(), style, points };
+    let seen = ThroughBeam { law: &fit.model, beam_rad: material.beam_rad(fit) };
     let zero = vec![(0.0, 0.0), (90.0, 0.0)];
     let mut drawn = vec![("zero".to_owned(), series(Style::Guide, zero))];
     for (style, mut points) in marks(&curve.observations) {
         for (theta_deg, level_db) in &mut points {
-            *level_db -= db_from_ratio(fit.model.sigma0(theta_deg.to_radians()));
+            *level_db -= db_from_ratio(seen.sigma0(theta_deg.to_radians()));
         }
         drawn.push((class.clone(), series(style, points)));
     }

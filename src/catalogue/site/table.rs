@@ -4,12 +4,13 @@ use std::io;
 
 use crate::catalogue::error::CatalogueError;
 use crate::files::FilesError;
-use crate::material::{Material, SourceKind};
+use crate::material::{Illumination, Material, SourceKind};
+use crate::radar::Footprint;
 use crate::units::{db_from_ratio, dbm_from_watts};
 
 use super::entry::kind_of;
 
-const COLUMNS: [&str; 14] = [
+const COLUMNS: [&str; 16] = [
     "curve",
     "kind",
     "theta_deg",
@@ -24,6 +25,8 @@ const COLUMNS: [&str; 14] = [
     "chirp",
     "xt_m",
     "yt_m",
+    "footprint",
+    "beam_rad",
 ];
 
 /// Every point in a row; a cell without a value is empty.
@@ -33,6 +36,8 @@ pub(super) fn csv(material: &Material) -> Result<Vec<u8>, CatalogueError> {
     out.write_record(COLUMNS).map_err(failed)?;
     for curve in &material.curves {
         let kind = kind_of(material, &curve.source).map_or("unknown", SourceKind::as_str);
+        let Illumination { footprint, beam_rad } = curve.illumination;
+        let footprint = footprint.map(Footprint::as_str).unwrap_or_default();
         for o in &curve.observations {
             let record = [
                 curve.name.clone(),
@@ -49,6 +54,8 @@ pub(super) fn csv(material: &Material) -> Result<Vec<u8>, CatalogueError> {
                 o.chirp.map_or(String::new(), |chirp| chirp.to_string()),
                 cell(o.target_m.map(|[xt_m, _]| xt_m + 0.0), 6),
                 cell(o.target_m.map(|[_, yt_m]| yt_m + 0.0), 6),
+                footprint.to_owned(),
+                cell(beam_rad, 6),
             ];
             out.write_record(record).map_err(failed)?;
         }

@@ -21,6 +21,9 @@ pub(super) fn result(
         grouped(rows),
         grouped(censored)
     );
+    let lit = subject.curve.illumination;
+    let lobes = fit.lobes_words().map_or(String::new(), |words| format!("; {words}"));
+    text += &format!("{}; {}{lobes}\n", lit.footprint_words(), lit.beam_words());
     text += &fit.report.as_ref().map_or(String::new(), report);
     if let Some(saved) = saved {
         let open = if saved.curve_is_open { ", since this fit leaves the curve open" } else { "" };

@@ -39,7 +39,7 @@ struct SpotRay {
     /// Power, W, where f is 1/sr, by its share of the spot.
     watts_per_f: f64,
     region: u16,
-    /// Divergence of the beam that sees it, rad.
+    /// How far the beam that sees it widens its lobes, rad.
     beam_rad: f64,
 }
 
@@ -55,7 +55,7 @@ impl SpotRay {
         let Hit { range_m, cos_theta, .. } = *hit;
         let watts_per_f = share * stage.link.power_w(beam, range_m, cos_theta, 1.0);
         // The rays stand on the wavefront, whose curvature is the rest of the divergence.
-        let beam_rad = beam.section(range_m).divergence_rad();
+        let beam_rad = stage.widening_rad(region, beam.section(range_m).divergence_rad());
         SpotRay { range_m, to_radar, watts_per_f, region, beam_rad }
     }
 
@@ -172,7 +172,8 @@ fn spots(stage: &Stage, shots: &[Shot], diameter_m: f64) -> Vec<Option<Spot>> {
         .zip(hits.par_chunks(RAYS))
         .map(|((axis, beam, centre, rays), hits)| {
             let centre = spot_ray(stage, &facets, beam, axis, centre, 1.0)?;
-            let centre = SpotRay { beam_rad: beam.divergence_rad(), ..centre };
+            let beam_rad = stage.widening_rad(centre.region, beam.divergence_rad());
+            let centre = SpotRay { beam_rad, ..centre };
             let mut spot = Vec::with_capacity(RAYS);
             for ((ray, hit), place) in rays.iter().zip(hits).zip(PLACES.iter()) {
                 spot.extend(spot_ray(stage, &facets, beam, ray, hit, place.share));

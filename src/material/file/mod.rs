@@ -15,10 +15,10 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::composition::{Layer, Permittivity, Roughness};
-use super::curve::Curve;
-use super::error::MaterialError;
+use super::curve::{Curve, Illumination};
+use super::error::{MaterialError, value};
 use super::finding::Finding;
-use super::fit::{Covariance, Fit};
+use super::fit::{Covariance, Fit, Lobes};
 use super::instrument::Instrument;
 use super::provenance::{Session, Source};
 use super::revision::Material;
@@ -27,7 +27,8 @@ use super::status::Status;
 use crate::brdf::Brdf;
 use crate::formats::text::{from_toml, to_toml};
 use crate::formats::{EffectEntry, FormatError};
-pub use points::points;
+use crate::radar::Footprint;
+pub use points::{Points, points};
 
 use composition::{LayerFile, PermittivityFile, RoughnessFile};
 use provenance::{InstrumentFile, SessionFile, SourceFile};
@@ -113,6 +114,8 @@ struct CurveFile {
     source: String,
     instrument: Option<String>,
     session: Option<String>,
+    footprint: Option<Footprint>,
+    beam_rad: Option<f64>,
     file: String,
 }
 
@@ -126,6 +129,8 @@ struct FitFile {
     estimator: String,
     curve: Option<String>,
     source: String,
+    #[serde(default, skip_serializing_if = "Lobes::is_of_both")]
+    lobes: Lobes,
     scattering: Brdf,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     parameter_source: BTreeMap<String, String>,
@@ -192,13 +197,18 @@ fn read_curve(
         csv: entry.file.clone(),
         reason,
     })?;
-    let points = points(&bytes).map_err(|error| {
-        let csv = Path::new(file).with_file_name(&entry.file);
-        FileError::Format { file: csv.display().to_string(), error }
-    })?;
-    let observations = points.into_iter().map(|(_, point)| point).collect();
-    let CurveFile { name, source, instrument, session, .. } = entry;
-    Ok(Curve { name, source, instrument, session, observations })
+    let csv = Path::new(file).with_file_name(&entry.file);
+    let points = points(&bytes)
+        .map_err(|error| FileError::Format { file: csv.display().to_string(), error })?;
+    let CurveFile { name, source, instrument, session, footprint, beam_rad, .. } = entry;
+    let stated = Illumination { footprint, beam_rad };
+    let Some(illumination) = points.illumination.and(stated) else {
+        let problem = "states another footprint or beam than its [[curve]]";
+        let error = value(&csv.display().to_string(), problem, "state each once, or the same");
+        return Err(FileError::Material { file: file.to_owned(), error });
+    };
+    let observations = points.rows.into_iter().map(|(_, point)| point).collect();
+    Ok(Curve { name, source, instrument, session, illumination, observations })
 }
 
 /// Writes a material file. Curves stay out of it, since they stand in files of their own, and so do the
@@ -241,6 +251,7 @@ impl From<Fit> for FitFile {
             estimator: fit.estimator,
             curve: fit.curve,
             source: fit.source,
+            lobes: fit.lobes,
             scattering: fit.model,
             parameter_source: fit.parameter_sources.into_iter().collect(),
             covariance: fit.covariance,
@@ -256,6 +267,7 @@ impl From<FitFile> for Fit {
             estimator: entry.estimator,
             curve: entry.curve,
             source: entry.source,
+            lobes: entry.lobes,
             parameter_sources: entry.parameter_source.into_iter().collect(),
             covariance: entry.covariance,
             report: None,

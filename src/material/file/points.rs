@@ -2,11 +2,12 @@
 
 use crate::formats::FormatError;
 use crate::formats::csv::{Table, without_head};
-use crate::material::curve::{Censor, Observation};
+use crate::material::curve::{Censor, Illumination, Observation};
+use crate::radar::Footprint;
 use crate::units::{ratio_from_db, watts_from_dbm};
 
 const REQUIRED: [&str; 2] = ["theta_deg", "sigma0_db"];
-const OPTIONAL: [&str; 13] = [
+const OPTIONAL: [&str; 15] = [
     "censor",
     "threshold_db",
     "theta_r_deg",
@@ -18,6 +19,8 @@ const OPTIONAL: [&str; 13] = [
     "censored",
     "xt_m",
     "yt_m",
+    "footprint",
+    "beam_rad",
     "curve",
     "kind",
 ];
@@ -33,35 +36,62 @@ const RANGES_M: (f64, f64) = (0.0, 1e6);
 /// Places on a target that are no slip, m.
 const PLACES_M: (f64, f64) = (-1e6, 1e6);
 
-/// Reads a curve's CSV: each point behind the number of its line. Lines of `#` at the head are left alone.
+/// Divergences of beams that are no slip, rad.
+const BEAMS_RAD: (f64, f64) = (1e-6, std::f64::consts::FRAC_PI_2);
+
+/// The CSV of a curve.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Points {
+    /// Each point behind the number of its line.
+    pub rows: Vec<(usize, Observation)>,
+    /// How the target was lit, as far as the columns `footprint` and `beam_rad` state it.
+    pub illumination: Illumination,
+}
+
+/// Reads a curve's CSV. Lines of `#` at the head are left alone.
 ///
 /// Where nothing was detected, `censor` is `left` and `threshold_db` the σ⁰ that it stayed below; `censored`
 /// = 1, as `matdb measure` writes, says the same of the level in `sigma0_db`.
 ///
 /// # Errors
 /// The first cell that cannot be used, with its line and column.
-pub fn points(bytes: &[u8]) -> Result<Vec<(usize, Observation)>, FormatError> {
+pub fn points(bytes: &[u8]) -> Result<Points, FormatError> {
     let table = Table::read(&without_head(bytes), &REQUIRED, &OPTIONAL)?;
-    one_curve(&table)?;
-    (0..table.len()).map(|row| Ok((table.line(row), point(&table, row)?))).collect()
-}
-
-/// Refuses a table of several curves, as that of a published page may be.
-fn one_curve(table: &Table) -> Result<(), FormatError> {
-    for row in 1..table.len() {
-        if curve_name(table, row) != curve_name(table, 0) {
-            return Err(FormatError::at(
-                format!("line {}, column curve", table.line(row)),
-                "another curve begins here",
-                "keep the rows of one",
-            ));
-        }
+    one_of(&table, "curve", "another curve begins here")?;
+    one_of(&table, "footprint", "the rows above have another footprint")?;
+    one_of(&table, "beam_rad", "the rows above have another beam")?;
+    let mut rows = Vec::with_capacity(table.len());
+    for row in 0..table.len() {
+        rows.push((table.line(row), point(&table, row)?));
     }
-    Ok(())
+    Ok(Points { rows, illumination: illumination(&table)? })
 }
 
-fn curve_name(table: &Table, row: usize) -> Option<&str> {
-    table.cell(row, "curve").map(|cell| cell.text)
+/// Refuses a table with two values of a column that belongs to the curve: that of a published page may have several
+/// curves.
+fn one_of(table: &Table, column: &str, problem: &str) -> Result<(), FormatError> {
+    let text = |row| table.cell(row, column).map(|cell| cell.text);
+    match (1..table.len()).find(|row| text(*row) != text(0)) {
+        None => Ok(()),
+        Some(row) => Err(FormatError::at(
+            format!("line {}, column {column}", table.line(row)),
+            problem,
+            "keep the rows of one curve",
+        )),
+    }
+}
+
+/// What the columns of the whole curve say, by its first row.
+fn illumination(table: &Table) -> Result<Illumination, FormatError> {
+    let footprint = match table.cell(0, "footprint") {
+        None => None,
+        Some(cell) => Some(match cell.text {
+            "paper" => Footprint::Paper,
+            "projected" => Footprint::Projected,
+            _ => return Err(cell.refuse("write paper or projected, or leave it empty")),
+        }),
+    };
+    Ok(Illumination { footprint, beam_rad: table.number_within(0, "beam_rad", BEAMS_RAD)? })
 }
 
 fn point(table: &Table, row: usize) -> Result<Observation, FormatError> {
@@ -168,7 +198,8 @@ mod tests {
     const HEADER: &str = "theta_deg,sigma0_db,censor,threshold_db,censored\n";
 
     fn read(row: &str) -> Result<Vec<(usize, Observation)>, String> {
-        points(format!("# head\n{HEADER}{row}\n").as_bytes()).map_err(|error| error.to_string())
+        let read = points(format!("# head\n{HEADER}{row}\n").as_bytes());
+        read.map(|points| points.rows).map_err(|error| error.to_string())
     }
 
     #[test]
@@ -203,8 +234,8 @@ mod tests {
     #[test]
     fn a_place_has_two_coordinates_or_none() {
         let read = |row: &str| points(format!("theta_deg,sigma0_db,xt_m,yt_m\n{row}\n").as_bytes());
-        assert_eq!(read("10,-3,0.1,-0.2").unwrap()[0].1.target_m, Some([0.1, -0.2]));
-        assert_eq!(read("10,-3,,").unwrap()[0].1.target_m, None);
+        assert_eq!(read("10,-3,0.1,-0.2").unwrap().rows[0].1.target_m, Some([0.1, -0.2]));
+        assert_eq!(read("10,-3,,").unwrap().rows[0].1.target_m, None);
         for (row, column) in [("10,-3,0.1,", "yt_m"), ("10,-3,,0.1", "xt_m")] {
             let said = read(row).unwrap_err().to_string();
             assert!(
@@ -215,10 +246,30 @@ mod tests {
     }
 
     #[test]
+    fn how_the_target_was_lit_is_one_statement_for_all_rows() {
+        let read = |rows: &str| {
+            let text = format!("theta_deg,sigma0_db,footprint,beam_rad\n{rows}");
+            points(text.as_bytes()).map(|points| points.illumination).map_err(|e| e.to_string())
+        };
+        let lit = read("10,-3,projected,0.0117\n20,-4,projected,0.0117\n").unwrap();
+        assert_eq!((lit.footprint, lit.beam_rad), (Some(Footprint::Projected), Some(0.0117)));
+        assert_eq!(read("10,-3,,\n"), Ok(Illumination::default()));
+        for (rows, said) in [
+            ("10,-3,flat,\n", "line 2, column footprint: `flat` is not accepted here; write paper"),
+            ("10,-3,,0\n", "line 2, column beam_rad: `0` is not accepted here; give a value from"),
+            ("10,-3,,\n20,-4,paper,\n", "line 3, column footprint: the rows above have another"),
+            ("10,-3,,0.01\n20,-4,,0.02\n", "line 3, column beam_rad: the rows above have another"),
+        ] {
+            let error = read(rows).unwrap_err();
+            assert!(error.starts_with(said), "{error}");
+        }
+    }
+
+    #[test]
     fn a_published_table_is_read_when_it_has_one_curve() {
         let read =
             |rows: &str| points(format!("curve,kind,theta_deg,sigma0_db\n{rows}").as_bytes());
-        assert_eq!(read("scan,measured,10,-3\nscan,measured,20,-4\n").unwrap().len(), 2);
+        assert_eq!(read("scan,measured,10,-3\nscan,measured,20,-4\n").unwrap().rows.len(), 2);
         let said = read("scan,measured,10,-3\nother,measured,20,-4\n").unwrap_err().to_string();
         assert!(
             said.starts_with("line 3, column curve: another curve begins here; keep"),

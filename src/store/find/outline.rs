@@ -6,10 +6,11 @@ use rusqlite::{Connection, Error, Result, Row, params, params_from_iter};
 
 use super::filter::{self, Filter};
 use crate::brdf::{Brdf, Outline};
-use crate::material::Slug;
+use crate::material::{Lobes, Slug};
+use crate::radar::Footprint;
 use crate::store::database::Store;
 use crate::store::error::{InFile, StoreError};
-use crate::store::read::rendered_in;
+use crate::store::read::{Rendered, rendered_in};
 use crate::store::rows::rows;
 
 /// Outline of the model that scenes render of a material's current revision.
@@ -23,9 +24,13 @@ pub struct OutlineEntry {
     pub model_hash: Option<[u8; 16]>,
     /// Its levels; none for a model without an outline.
     pub outline: Option<Outline>,
+    /// Form of the footprint of the curve that it is, or that it was fitted to; none where that is not stated.
+    pub footprint: Option<Footprint>,
+    /// Whose lobes the model has.
+    pub lobes: Lobes,
 }
 
-const COLUMNS: &str = "slug, theta_min_rad, theta_max_rad, model_hash, levels";
+const COLUMNS: &str = "slug, theta_min_rad, theta_max_rad, model_hash, levels, footprint, lobes";
 
 impl Store {
     /// Outlines of the materials that match a filter, sorted by name.
@@ -59,26 +64,40 @@ fn outlined(row: &Row) -> Result<OutlineEntry> {
         theta_rad: [row.get(1)?, row.get(2)?],
         model_hash: row.get(3)?,
         outline: levels.and_then(Outline::from_bytes),
+        footprint: row.get(5)?,
+        lobes: row.get::<_, Option<Lobes>>(6)?.unwrap_or_default(),
     })
 }
 
 /// Writes or replaces the outline of a material that is in the lists.
 pub(crate) fn write(conn: &Connection, line: &OutlineEntry) -> Result<()> {
     let sql = "INSERT OR REPLACE INTO outline
-               (slug, theta_min_rad, theta_max_rad, model_hash, levels) VALUES (?1, ?2, ?3, ?4, ?5)";
+               (slug, theta_min_rad, theta_max_rad, model_hash, levels, footprint, lobes)
+               VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)";
     let [theta_min_rad, theta_max_rad] = line.theta_rad;
     let levels = line.outline.as_ref().map(Outline::to_bytes);
-    let values = params![line.slug, theta_min_rad, theta_max_rad, line.model_hash, levels];
+    let values = params![
+        line.slug,
+        theta_min_rad,
+        theta_max_rad,
+        line.model_hash,
+        levels,
+        line.footprint.map(Footprint::as_str),
+        Some(line.lobes).filter(|lobes| !lobes.is_of_both()).map(Lobes::as_str),
+    ];
     conn.prepare_cached(sql)?.execute(values).map(|_| ())
 }
 
-/// The outline of a material with this rendered model.
-pub(crate) fn line(slug: &Slug, model: Option<&Brdf>, theta_rad: [f64; 2]) -> OutlineEntry {
+/// The outline of a material of which this is rendered.
+pub(crate) fn line(slug: &Slug, rendered: &Rendered) -> OutlineEntry {
+    let model = rendered.model.as_ref();
     OutlineEntry {
         slug: slug.to_string(),
-        theta_rad,
+        theta_rad: rendered.theta_rad,
         model_hash: model.and_then(model_hash),
         outline: model.and_then(Outline::new),
+        footprint: rendered.footprint,
+        lobes: rendered.lobes,
     }
 }
 
@@ -112,7 +131,9 @@ fn is_same(kept: &OutlineEntry, made: &OutlineEntry) -> bool {
         (Some(kept), Some(made)) => kept.is_like(made),
         (kept, made) => kept == made,
     };
-    levels && (kept.theta_rad, kept.model_hash) == (made.theta_rad, made.model_hash)
+    levels
+        && (kept.theta_rad, kept.model_hash) == (made.theta_rad, made.model_hash)
+        && (kept.footprint, kept.lobes) == (made.footprint, made.lobes)
 }
 
 /// Gives `take` the outline that each material should have.
@@ -124,8 +145,8 @@ fn each(conn: &Connection, mut take: impl FnMut(OutlineEntry) -> Result<()>) -> 
             Err(Error::FromSqlConversionFailure(..)) => None,
             found => found?,
         };
-        if let Some((model, theta_rad)) = found {
-            take(line(&slug, model.as_ref(), theta_rad))?;
+        if let Some(rendered) = found {
+            take(line(&slug, &rendered))?;
         }
     }
     Ok(())
