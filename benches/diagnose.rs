@@ -79,7 +79,7 @@ fn diagnosed(scene: &Path, cloud: &Cloud) -> Result<Report, Failure> {
     let ready = ReadyScene::open(scene, None)?;
     let model = ready.model();
     let measured = MeasuredScene {
-        includes_beam: &ready.includes_beam(),
+        seen_lobe_rad: &ready.seen_lobe_rad(),
         scene: &ready.scene,
         cloud,
         laws: &ready.laws(),

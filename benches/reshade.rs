@@ -32,7 +32,7 @@ fn main() {
         geometry: assembly.setup().geometry,
         link: Link::new(radar),
         grain_of_region: &[DVec3::Y],
-        includes_beam: &[],
+        seen_lobe_rad: &[],
         middle: DVec3::ZERO,
     };
     let shots = diagnose::trace_shots(&stage).expect("chirps that meet the target");

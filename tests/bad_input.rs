@@ -412,7 +412,7 @@ fn instruments_that_cannot_work() {
         ),
         (
             format!("{receiver}[radar.receiver.phase_noise]\nlevel_dbc_per_hz = -80\n"),
-            &["phase_noise", "offset_hz"],
+            &["line 3", "missing field `offset_hz`"],
         ),
         (format!("{receiver}gate_m = [9, 7]\n"), &["receiver.gate_m[1] = 7", "from 9"]),
         (format!("{receiver}[radar.chirp]\nduration_s = 1.0\n"), &["chirp.duration_s = 1"]),

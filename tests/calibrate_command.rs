@@ -94,11 +94,11 @@ fn the_text_says_what_was_seen_and_what_follows() {
 
 #[test]
 fn a_sphere_gives_loss_and_spot() {
-    let more = raster(16, 0.06) + "[spot]\nrays = 1500\n";
+    let more = raster(16, 0.06) + "[spot]\nrays = 6000\n";
     let mesh = "file = \"builtin:sphere-cap\"\nscale = 0.2\ntranslation_m = [0.002, 1.1, -0.1]";
     let folder = rendered(&more, mesh);
     let found = calibrated(folder.path(), "out/cloud.ply", "scene.toml");
-    // Facets that turn by 5 mrad, and a spot of finitely many rays.
+    // Facets that turn by 2.5 mrad, and a spot of finitely many rays.
     check(&found, 0.25, 0.02);
     assert_eq!(found["shown"], "spot");
 }
@@ -165,8 +165,8 @@ fn what_does_not_calibrate_is_refused() {
     write("deaf.toml", &scene(&deaf, PLATE));
     let rough = scene(&raster(60, 0.4), PLATE).replace("\"steel\"", "\"aluminium\"");
     write("rough.toml", &rough);
-    // Paper in place of the mirror, which a radar sees alike everywhere.
-    write("paper.toml", &scene(&raster(60, 0.4), PLATE).replace("\"steel\"", "\"garment\""));
+    // A diffuse reference in place of the mirror, which a radar sees alike everywhere.
+    write("paper.toml", &scene(&raster(60, 0.4), PLATE).replace("\"steel\"", "\"spectralon\""));
     matdb(at).args(["render", "-q", "paper.toml", "-o", "paper"]).assert().success();
     let mannequin = support::scene("mannequin.toml").display().to_string();
     let good = "out/cloud.ply";

@@ -98,7 +98,7 @@ impl Bench {
             geometry: self.geometry(),
             link: Link::new(radar),
             grain_of_region: &grains,
-            includes_beam: &[],
+            seen_lobe_rad: &[],
             middle: DVec3::ZERO,
         };
         let shots = diagnose::trace_shots(&stage).unwrap();

@@ -151,7 +151,7 @@ impl CheckedRequest<'_> {
             scene: &self.ready.scene,
             cloud,
             laws: &self.ready.laws(),
-            includes_beam: &self.ready.includes_beam(),
+            seen_lobe_rad: &self.ready.seen_lobe_rad(),
             declared_effects: model.as_ref().map_or(&[][..], |model| &model.effects),
         };
         measured.diagnose(self.request.seed, &self.choice.tried, hear)

@@ -35,4 +35,5 @@ pub(crate) use retro::Retro;
 pub use scattering::{NARROW_M, NarrowLobe, Scattering, ScatteringModel, Seen};
 pub use slopes::{Distribution, VIEWING_RAD};
 pub use through_beam::ThroughBeam;
+pub(crate) use through_beam::widening_rad;
 pub use validity::{Bound, Condition};

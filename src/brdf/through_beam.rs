@@ -20,3 +20,12 @@ impl Scattering for ThroughBeam<'_> {
         self.law.seen_by(self.beam_rad, i, o).f_per_sr
     }
 }
+
+/// How far a beam of a divergence δ, rad, widens lobes, rad. Lobes that include the beam that saw them,
+/// with the narrowest of this width, are not widened again, and are only never narrower than the beam.
+pub(crate) fn widening_rad(seen_lobe_rad: Option<f64>, divergence_rad: f64) -> f64 {
+    match seen_lobe_rad {
+        None => divergence_rad,
+        Some(lobe_rad) => (divergence_rad * divergence_rad - lobe_rad * lobe_rad).max(0.0).sqrt(),
+    }
+}

@@ -27,8 +27,8 @@ pub struct MeasuredScene<'a> {
     pub cloud: &'a Cloud,
     /// Scattering model of each region, where the refit begins.
     pub laws: &'a [Brdf],
-    /// Whether the lobes of a region include the beam that saw them.
-    pub includes_beam: &'a [bool],
+    /// Width of the narrowest lobe of a region whose lobes include the beam that saw them, rad.
+    pub seen_lobe_rad: &'a [Option<f64>],
     /// Effects that the scene declares, at fixed values.
     pub declared_effects: &'a [(&'a dyn Effect, Vec<f64>)],
 }
@@ -44,7 +44,7 @@ impl MeasuredScene<'_> {
         effects: &[&dyn Effect],
         notify: &(dyn Fn(&str) + Sync),
     ) -> Result<Report, DiagnoseError> {
-        let MeasuredScene { scene, cloud, laws, includes_beam, declared_effects } = *self;
+        let MeasuredScene { scene, cloud, laws, seen_lobe_rad, declared_effects } = *self;
         let radar = scene.radar();
         // Every chirp against the target.
         let bvh = Bvh::new(&scene.target.mesh);
@@ -53,7 +53,7 @@ impl MeasuredScene<'_> {
             geometry: ScanGeometry::new(radar, &scene.chirps, &bvh, &scene.target.region_of_facet),
             link: Link::new(radar),
             grain_of_region: &grain_of_region,
-            includes_beam,
+            seen_lobe_rad,
             middle: glam::DVec3::ZERO,
         };
         let shots = trace_shots(&stage)?;

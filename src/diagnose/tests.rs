@@ -144,7 +144,7 @@ impl Bench {
             geometry: ScanGeometry::new(radar, chirps, bvh, regions),
             link: Link::new(radar),
             grain_of_region: &[DVec3::Y],
-            includes_beam: &[],
+            seen_lobe_rad: &[],
             middle: DVec3::new(0.0, 1.1, 0.0),
         }
     }

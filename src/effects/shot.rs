@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use crate::brdf::widening_rad;
 use crate::frames::{Direction, Global, Pose, Ray, Surface};
 use crate::radar::{Chirps, GaussianBeam, Link};
 use crate::trace::{Hit, ScanGeometry};
@@ -79,9 +80,9 @@ pub struct Stage<'a> {
     pub link: Link,
     /// Direction of the grain of every region, global frame.
     pub grain_of_region: &'a [DVec3],
-    /// Whether the lobes of a region include the beam that saw them, and no beam widens them again; they do not in a
-    /// region beyond the last.
-    pub includes_beam: &'a [bool],
+    /// Width of the narrowest lobe of a region whose lobes include the beam that saw them, rad; none, also in a region
+    /// beyond the last, where they are the surface's own.
+    pub seen_lobe_rad: &'a [Option<f64>],
     /// The pivot of a pose, m, global frame: the [`middle`] of all shots of the scan, even if only some are predicted.
     pub middle: DVec3,
 }
@@ -94,8 +95,8 @@ impl Stage<'_> {
 
     /// How far a beam of a divergence, rad, widens the lobes of a region, rad.
     pub(crate) fn widening_rad(&self, region: u16, divergence_rad: f64) -> f64 {
-        let includes_beam = self.includes_beam.get(usize::from(region)).copied();
-        if includes_beam.unwrap_or(false) { 0.0 } else { divergence_rad }
+        let seen_lobe_rad = self.seen_lobe_rad.get(usize::from(region)).copied().flatten();
+        widening_rad(seen_lobe_rad, divergence_rad)
     }
 
     /// How far the beam of a shot widens the lobes that it meets, rad.

@@ -79,7 +79,7 @@ impl Bench {
             geometry: ScanGeometry::new(&self.radar, &self.chirps, &self.bvh, &self.regions),
             link: Link::new(&self.radar),
             grain_of_region: &GRAIN,
-            includes_beam: &[],
+            seen_lobe_rad: &[],
             middle: middle(&self.shots),
         }
     }
@@ -233,7 +233,7 @@ fn no_beam_widens_a_lobe_that_includes_one() {
     let law = Brdf::CookTorrance(CookTorrance { m: 0.004, ..lobe() });
     let bench = Bench { law, ..Bench::plate() };
     let (own_stage, receiver) = (bench.stage(), Receiver::LINEAR);
-    let stage = Stage { includes_beam: &[true], ..own_stage };
+    let stage = Stage { seen_lobe_rad: &[Some(0.0117)], ..own_stage };
     for name in [None, Some("finite-spot")] {
         let effect = name.and_then(find).map(|effect| (effect as &dyn Effect, vec![0.016]));
         let laws = vec![bench.law.clone()];

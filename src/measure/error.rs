@@ -1,5 +1,6 @@
 //! Why the registration or the reduction of a cloud fails.
 
+use super::exclusions::Exclusions;
 use thiserror::Error;
 
 use crate::units::{dbm_from_watts, rounded};
@@ -103,20 +104,12 @@ pub enum ReductionError {
     Cloud(#[from] RegistrationError),
     /// No detection became a row.
     #[error(
-        "no detection became a row: {missed} miss the target, {off_surface} lie off its surface, \
-         {other_region} are of other regions and {near_edge} near an edge; choose another region or a \
-         smaller edge margin"
+        "no detection became a row: {} miss the target, {} lie off its surface, {} are of other regions, {} near an \
+         edge and {} on a facet that the pose leaves uncertain; choose another region, a smaller edge margin or a \
+         target whose shape tells its pose",
+        .0.missed, .0.off_surface, .0.other_region, .0.near_edge, .0.unsure_of_facet
     )]
-    NoRows {
-        /// See [`Exclusions`](super::Exclusions).
-        missed: usize,
-        /// See [`Exclusions`](super::Exclusions).
-        off_surface: usize,
-        /// See [`Exclusions`](super::Exclusions).
-        other_region: usize,
-        /// See [`Exclusions`](super::Exclusions).
-        near_edge: usize,
-    },
+    NoRows(Exclusions),
     /// The radar of the scene could not have detected this.
     #[error(
         "{below} of {points} powers lie below the scene's threshold of {} dBm, the weakest \

@@ -16,6 +16,7 @@ use rayon::prelude::*;
 use super::cloud::{Cloud, CloudPoint};
 use super::curve::Curve;
 use super::error::ReductionError;
+use super::exclusions::Exclusions;
 use super::incidence::{Incidence, Sighting};
 use super::nearest::Nearest;
 use super::point_rays::rays_to_points;
@@ -52,24 +53,6 @@ pub struct ReductionResult {
     pub left_out: Exclusions,
     /// Notices for the user.
     pub notices: Vec<String>,
-}
-
-/// Detections and silent chirps that did not become rows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Exclusions {
-    /// Detections whose ray misses the target.
-    pub missed: usize,
-    /// Detections farther from the surface than five times the registration's range error.
-    pub off_surface: usize,
-    /// Detections of another region.
-    pub other_region: usize,
-    /// Detections near a silhouette, a step or another region.
-    pub near_edge: usize,
-    /// Silent chirps near one of these.
-    pub silent_near_edge: usize,
-    /// Detections and silent chirps whose facet is uncertain within the errors of the pose; for an exact
-    /// mesh only.
-    pub unsure_of_facet: usize,
 }
 
 /// A hundredth of the points may contradict the scene before the cloud is refused.
@@ -148,8 +131,7 @@ impl Reduction {
         let mut left_out = Exclusions::default();
         let mut rows = detected(&reducer, cloud, &point_rays, &assignment, &mut left_out);
         if rows.is_empty() {
-            let Exclusions { missed, off_surface, other_region, near_edge, .. } = left_out;
-            return Err(ReductionError::NoRows { missed, off_surface, other_region, near_edge });
+            return Err(ReductionError::NoRows(left_out));
         }
         let detections = rows.len();
         rows.extend(silent(&reducer, chirps, &assignment, &mut left_out));

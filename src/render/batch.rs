@@ -320,7 +320,7 @@ fn device_terms(surface: &Surface, widest_rad: f64) -> Option<Vec<Term>> {
     /// Change of a diffuse term, as a share of it, that is within the precision of a device.
     const SMALL: f64 = 1e-3;
     let mut terms = surface.scattering.backscatter()?;
-    for term in terms.iter_mut().filter(|_| surface.includes_beam) {
+    for term in terms.iter_mut().filter(|_| surface.seen_lobe_rad.is_some()) {
         match &mut term.facets {
             Some(facets) if facets.m >= widest_rad => facets.includes_beam = true,
             None if 0.5 * term.cosines * widest_rad * widest_rad < SMALL => {}
@@ -373,7 +373,8 @@ mod tests {
         let law = brushed();
         let grain = DVec3::new(1.0, 2.0, 0.0);
         let own = [Surface { grain, ..Surface::new(&law) }];
-        let with_beam = own.map(|surface| Surface { includes_beam: true, ..surface });
+        let with_beam =
+            own.map(|surface| Surface { seen_lobe_rad: Some(f64::INFINITY), ..surface });
         let pose = |turn_rad| Pose::from_euler_xyz(turn_rad, DVec3::new(0.02, 1.1, 0.4));
         let turns_rad = [DVec3::ZERO, DVec3::new(0.3, -0.8, 0.5)];
         let takes: [Take; 2] = std::array::from_fn(|number| Take {

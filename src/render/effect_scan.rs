@@ -32,7 +32,7 @@ pub(super) struct EffectScan<'a> {
     bare: Model<'a>,
     link: Link,
     grain_of_region: Vec<DVec3>,
-    includes_beam: Vec<bool>,
+    seen_lobe_rad: Vec<Option<f64>>,
     middle: DVec3,
     /// Point of every chirp's ray at 8 m in the target frame, m.
     places: Vec<DVec2>,
@@ -50,7 +50,7 @@ impl<'a> EffectScan<'a> {
             bare: Model { effects: Vec::new(), ..model.clone() },
             link: Link::new(setup.geometry.radar),
             grain_of_region: setup.surfaces.iter().map(|surface| surface.grain).collect(),
-            includes_beam: setup.surfaces.iter().map(|surface| surface.includes_beam).collect(),
+            seen_lobe_rad: setup.surfaces.iter().map(|surface| surface.seen_lobe_rad).collect(),
             middle: DVec3::ZERO,
             places: setup.geometry.chirps.target_points_m(&setup.geometry.radar.frames()).collect(),
             progress: setup.geometry.chirps.progress(),
@@ -172,7 +172,7 @@ impl<'a> EffectScan<'a> {
             geometry: self.setup.geometry,
             link: self.link,
             grain_of_region: &self.grain_of_region,
-            includes_beam: &self.includes_beam,
+            seen_lobe_rad: &self.seen_lobe_rad,
             middle: self.middle,
         }
     }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use super::sheet::Sheet;
-use crate::brdf::{Scattering, Seen};
+use crate::brdf::{Scattering, Seen, widening_rad};
 use crate::frames::{Direction, Surface as Local};
 
 /// The surface of the facets of one region.
@@ -14,8 +14,9 @@ pub struct Surface<'a> {
     /// Share of its diffuse return, 0 to 1/2, that comes back across the polarisation that was sent. The law is
     /// what comes back in that polarisation, so that this share adds to it.
     pub depolarised_share: f64,
-    /// Whether its lobes include the beam that saw them, so that no beam widens them again.
-    pub includes_beam: bool,
+    /// Width of its narrowest lobe, rad, where its lobes include the beam that saw them, so that no beam widens them again;
+    /// none where they are its own. Infinite without a lobe.
+    pub seen_lobe_rad: Option<f64>,
     /// Direction of its grain in the global frame, of any length. On a facet it is projected along the normal. Azimuths
     /// count from it, and `m` of an anisotropic model is the roughness along it.
     pub grain: DVec3,
@@ -29,7 +30,7 @@ impl<'a> Surface<'a> {
         Surface {
             scattering,
             depolarised_share: 0.0,
-            includes_beam: false,
+            seen_lobe_rad: None,
             grain: DVec3::Y,
             sheet: None,
         }
@@ -42,17 +43,18 @@ impl<'a> Surface<'a> {
 
     /// How far a beam of a divergence, rad, widens its lobes, rad.
     pub(super) fn widening_rad(&self, divergence_rad: f64) -> f64 {
-        if self.includes_beam { 0.0 } else { divergence_rad }
+        widening_rad(self.seen_lobe_rad, divergence_rad)
     }
 
     /// What a beam of a divergence, rad, sees of it.
     pub(super) fn seen_by(&self, beam_rad: f64, i: Direction<Local>, o: Direction<Local>) -> Seen {
         let seen = self.scattering.seen_by(beam_rad, i, o);
-        if !self.includes_beam {
+        if self.seen_lobe_rad.is_none() {
             return seen;
         }
         // The beam has its part in the lobe already, and that part is coherent.
-        Seen { f_per_sr: self.scattering.f_per_sr(i, o), ..seen }
+        let widening_rad = self.widening_rad(beam_rad);
+        Seen { f_per_sr: self.scattering.seen_by(widening_rad, i, o).f_per_sr, ..seen }
     }
 }
 

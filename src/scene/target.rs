@@ -233,7 +233,7 @@ fn builtin(name: &str) -> Option<Mesh> {
         "cuboid" => Some(solids::cuboid(DVec3::ONE, 1.0)),
         "plate" => Some(solids::plate(1.0, 1.0)),
         "sphere" => Some(solids::icosphere(0.5, 5)),
-        "sphere-cap" => Some(solids::sphere_cap(0.5, 0.5, 5e-3)),
+        "sphere-cap" => Some(solids::sphere_cap(0.5, 0.25, 2.5e-3)),
         "trihedral" => Some(solids::trihedral(1.0)),
         _ => None,
     }

@@ -62,11 +62,12 @@ pub struct Assembly<'a> {
 }
 
 impl SceneMaterial {
-    /// Whether its lobes include the beam that saw them. A smooth mirror has no lobe of its own, and a law that is one
-    /// says itself whether its width is that of a beam.
-    fn includes_beam(&self) -> bool {
+    /// Width of its narrowest lobe, rad, where its lobes include the beam that saw them; infinite without a lobe. A
+    /// smooth mirror has no lobe of its own, and a law that is one says itself whether its width is that of a beam.
+    fn seen_lobe_rad(&self) -> Option<f64> {
         let is_mirror = self.scattering.is_smooth() || self.scattering.has_smooth_mirror();
-        self.lobes.is_of_both() && !is_mirror
+        let includes_beam = self.lobes.is_of_both() && !is_mirror;
+        includes_beam.then(|| self.scattering.lobe_rad(0.0).unwrap_or(f64::INFINITY))
     }
 
     /// The curve that is rendered, or that the rendered law belongs to.
@@ -122,9 +123,10 @@ impl ReadyScene {
         self.of_regions().map(|material| material.scattering.clone()).collect()
     }
 
-    /// Whether the lobes of every region include the beam that saw them.
-    pub fn includes_beam(&self) -> Vec<bool> {
-        self.of_regions().map(SceneMaterial::includes_beam).collect()
+    /// Width of the narrowest lobe of every region whose lobes include the beam that saw them, rad; none where they are
+    /// the surface's own.
+    pub fn seen_lobe_rad(&self) -> Vec<Option<f64>> {
+        self.of_regions().map(SceneMaterial::seen_lobe_rad).collect()
     }
 
     /// The effects on the laws of the scene; `None` when it declares none.
@@ -139,7 +141,7 @@ impl ReadyScene {
         let surfaces = std::iter::zip(regions, self.of_regions())
             .map(|((region, sheet), material)| {
                 let opaque = Surface {
-                    includes_beam: material.includes_beam(),
+                    seen_lobe_rad: material.seen_lobe_rad(),
                     ..Surface::new(&material.scattering)
                 };
                 let surface = sheet.as_ref().map_or(opaque, Surface::of_sheet);
@@ -237,11 +239,11 @@ impl ReadyScene {
     /// That a material's lobe is said to include a beam and is narrower than the one of the scene.
     fn too_narrow(&self, material: &SceneMaterial) -> Option<String> {
         let beam_rad = Beam::new(self.scene.radar()).towards(0.0, 0.0).divergence_rad();
-        let lobe_rad = material.scattering.lobe_rad(0.0).filter(|_| material.includes_beam())?;
+        let lobe_rad = material.seen_lobe_rad()?;
         (lobe_rad < beam_rad).then(|| {
             format!(
                 "the lobe of `{}` is taken as that of radar and surface together, and is narrower than this radar's \
-                 beam: {} rad is below {}; lobes = \"surface\" in its [[fit]] says that it is the surface's own",
+                 beam: {} rad is below {}, and is seen as wide as that; lobes = \"surface\" in its [[fit]] says that it is the surface's own",
                 material.name,
                 significant(lobe_rad, 3),
                 significant(beam_rad, 3)

@@ -1,7 +1,7 @@
 //! Compares a stored fit with a new one: the model that is rendered, the numbers and their uncertainty, and the
 //! sentences. The tolerances follow from the new fit alone.
 
-use crate::brdf::{Brdf, Scattering};
+use crate::brdf::{Brdf, Scattering, ThroughBeam};
 use crate::fit::coordinates::{DIFFUSE_LEVEL, LOOKS, SPECULAR_LEVEL};
 use crate::fit::interval::DEVIATE_95;
 use crate::fit::result::FitResult;
@@ -138,12 +138,13 @@ fn level(stored: &material::Fit, found: &FitResult, curve: &Curve) -> Option<Str
     }
     // As many directions as numbers, each as far off as a number may be.
     let directions = (found.estimates.len() as f64).sqrt();
+    let seen = ThroughBeam { law: &stored.model, beam_rad: stored.beam_rad().unwrap_or(0.0) };
     for angle in 0..=ANGLES {
         let theta_rad = low_rad + (high_rad - low_rad) * f64::from(angle) / f64::from(ANGLES);
         let band = found.band(theta_rad);
         let sd = (band.high / band.mid).ln() / DEVIATE_95;
         let step = SAME_NUMBER_SD * directions * sd + SAME_LEVEL_DB * NEPER_PER_DB;
-        if !is_near(stored.model.sigma0(theta_rad).ln(), band.mid.ln(), step) {
+        if !is_near(seen.sigma0(theta_rad).ln(), band.mid.ln(), step) {
             let theta_deg = theta_rad.to_degrees();
             return Some(format!(
                 "its model has another level at {theta_deg:.1}° than that of a new fit"
