@@ -2,14 +2,14 @@
 
 use super::echo::{Echo, Truth};
 use crate::formats::ply::{Column, Scalar, Table};
-use crate::units::dbm_from_watts;
+use crate::units::{db_from_ratio, dbm_from_watts};
 
 /// The table of a point cloud: position in the global frame (double), then the measured values and the true cause of
 /// each point. The cause of a false alarm is NaN, or −1 for whole numbers.
 ///
 /// The names of `regions` and `materials` are written into the header. With `several`, for a radar that reports or a target
-/// that gives several echoes per chirp, there are three columns more: the echo's rank, and the sheets in front of and the
-/// true range of what caused it.
+/// that gives several echoes per chirp, there are four columns more: the echo's rank, and the sheets in front of what caused it, what they let through, and
+/// its true range.
 pub fn cloud_table(
     echoes: &[&Echo],
     material_of_region: &[u16],
@@ -51,6 +51,7 @@ pub fn cloud_table(
     if several {
         columns.push(column("rank", Scalar::Int, &|e| e.rank.into()));
         columns.push(number("sheets", &|t| t.sheets.into()));
+        columns.push(known("passed_db", &|t| db_from_ratio(t.passed_share)));
         columns.push(known("true_range_m", &|t| t.hit.range_m));
     }
     let named = |kind: &'static str| {

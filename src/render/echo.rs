@@ -45,6 +45,8 @@ pub struct Truth {
     pub azimuth_rad: f64,
     /// Number of sheets that the radar's ray passes before the first surface: 0 for what lies in front.
     pub sheets: u8,
+    /// Share of the power, 0 to 1, that the sheets on the path let through, there and back.
+    pub passed_share: f64,
     /// Number of surfaces on the path: 1 for a single path, 2 for a second-order one.
     pub surfaces: u8,
     /// Share of the power that is specular at every surface of the path, 0 to 1.
@@ -129,6 +131,7 @@ impl Echoes<'_> {
             region: self.setup.geometry.region_of_facet[path.hit.facet as usize],
             theta_sd_rad: theta_sd_rad(hits),
             sheets: path.sheets,
+            passed_share: path.passed_share,
             azimuth_rad: path.azimuth_rad,
             surfaces: path.surfaces,
             specular_share: path.specular_share,

@@ -191,6 +191,7 @@ mod tests {
             theta_sd_rad: 0.0,
             azimuth_rad: 0.0,
             sheets: 0,
+            passed_share: 1.0,
             surfaces: 1,
             specular_share: 0.0,
             edge_m: 0.0,

@@ -14,6 +14,8 @@ pub(super) struct Path {
     pub hit: Hit,
     /// Number of sheets that the radar's ray passes before the first surface.
     pub sheets: u8,
+    /// Share of the power, 0 to 1, that all sheets on the path let through.
+    pub passed_share: f64,
     /// Number of surfaces on the path, 1 or 2.
     pub surfaces: u8,
     /// Azimuth of the source about the normal of the first surface, from its grain, rad.

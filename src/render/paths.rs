@@ -209,7 +209,10 @@ impl<'a> Emission<'a> {
         let Spot { axis, beam, .. } = &self.spot;
         let (mut to_antenna, antenna_m) = self.to_antenna(&hit);
         if in_main_lobe {
-            to_antenna = -beam.direction_at(axis, hit.point).xyz();
+            // A single ray stands for the whole spot: its divergence holds the wavefront's curvature already.
+            let wave =
+                if self.rays == 1 { axis.direction } else { beam.direction_at(axis, hit.point) };
+            to_antenna = -wave.xyz();
         }
         let along_beam_m = (hit.point.xyz - axis.origin.xyz).dot(axis.direction.xyz());
         self.lit(hit, to_source, to_antenna, antenna_m, along_beam_m)
@@ -281,6 +284,7 @@ impl<'a> Emission<'a> {
             power_w: self.flux_w(lit) * share * way.power_ratio(),
             hit: lit.hit,
             sheets: lit.inward.sheets,
+            passed_share: way.power_ratio(),
             surfaces: 1,
             azimuth_rad: y.atan2(x),
             specular_share: scattered.specular_share,
@@ -341,6 +345,7 @@ impl<'a> Emission<'a> {
                 paths.push(Path {
                     range_m: 0.5 * path_m,
                     power_w: power_w * way.power_ratio(),
+                    passed_share: way.power_ratio(),
                     surfaces: 2,
                     specular_share,
                     coherent_share: first.coherent_share

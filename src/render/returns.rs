@@ -75,6 +75,7 @@ mod tests {
             power_w,
             hit,
             sheets,
+            passed_share: 1.0,
             surfaces: 1,
             azimuth_rad: 0.0,
             specular_share: 0.0,

@@ -62,12 +62,17 @@ pub struct Assembly<'a> {
 }
 
 impl SceneMaterial {
-    /// Width of its narrowest lobe, rad, where its lobes include the beam that saw them; infinite without a lobe. A
-    /// smooth mirror has no lobe of its own, and a law that is one says itself whether its width is that of a beam.
+    /// Width of its narrowest lobe, rad, where its lobes include the beam that saw them; infinite without a lobe.
     fn seen_lobe_rad(&self) -> Option<f64> {
-        let is_mirror = self.scattering.is_smooth() || self.scattering.has_smooth_mirror();
-        let includes_beam = self.lobes.is_of_both() && !is_mirror;
+        let includes_beam = self.rendered_lobes().is_of_both();
         includes_beam.then(|| self.scattering.lobe_rad(0.0).unwrap_or(f64::INFINITY))
+    }
+
+    /// Whose lobes its law has. A smooth mirror has no lobe of its own, and a law that is one says itself whether its width
+    /// is that of a beam.
+    pub fn rendered_lobes(&self) -> Lobes {
+        let is_mirror = self.scattering.is_smooth() || self.scattering.has_smooth_mirror();
+        if is_mirror { Lobes::Surface } else { self.lobes }
     }
 
     /// The curve that is rendered, or that the rendered law belongs to.

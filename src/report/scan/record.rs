@@ -8,7 +8,7 @@ use crate::brdf::Brdf;
 use crate::effects::{Level, Model, entry};
 use crate::formats::EffectEntry;
 use crate::geometry::Raster;
-use crate::material::Status;
+use crate::material::{Lobes, Status};
 use crate::radar::{Beam, Radar};
 use crate::render::Scan;
 use crate::scene::{MeshReport, Scene};
@@ -27,7 +27,9 @@ const EQUATION: &str = "power_w = transmit_power_w * 10^(-system_loss_db/10) * s
     the beam's axis is after 8 m; \
     f_per_sr is the scattering model of the point's material in backscatter, its lobe convolved with the beam's slopes \
     exp(-s^2 / delta^2), delta = wavelength_m / (2 pi w0): m^2 + delta^2 in place of m^2 in D of beckmann, and delta in \
-    place of a lobe_rad that is smaller or missing; with scene.spot.rays > 1 the power is the \
+    place of a lobe_rad that is smaller or missing; a material whose lobes are \"radar-and-surface\" is seen as it is where \
+    its narrowest lobe is at least delta wide, and widened to delta where it is not; with several returns passed_db of \
+    the cloud adds to the level; with scene.spot.rays > 1 the power is the \
     mean of this over the rays of the spot, and range and incidence are no longer those of one ray; docs/model.md has receivers elsewhere, \
     second surfaces, speckle and noise";
 
@@ -114,6 +116,8 @@ pub(super) struct MaterialRecord<'a> {
     /// How far the farthest of them lies outside.
     pub theta_outside_deg: f64,
     scattering: &'a Brdf,
+    /// Whose lobes the model has, as they are rendered.
+    lobes: Lobes,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     effects: Vec<EffectEntry>,
 }
@@ -306,6 +310,7 @@ impl<'a> MaterialRecord<'a> {
             detections_outside_theta: outside.detections,
             theta_outside_deg: outside.most_rad.to_degrees(),
             scattering: &used.scattering,
+            lobes: used.rendered_lobes(),
             effects: effects.collect(),
         }
     }
