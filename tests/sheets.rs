@@ -457,7 +457,7 @@ fn a_batch_refuses_sheets() {
     let bvh = Bvh::new(&stage.mesh);
     let geometry = ScanGeometry::new(&radar, &chirps, &bvh, &stage.region_of_facet);
     let target = matdb::frames::Pose::new(glam::DMat3::IDENTITY, DVec3::ZERO);
-    let take = Take { target, surfaces: &stage.surfaces, seed: 0 };
+    let take = Take { target, surfaces: &stage.surfaces, seed: 0, noise_seed: None };
     let refused = Batch { geometry, rays_per_chirp: 1 }.run(&[take]);
     assert_eq!(refused, Err(RenderError::Sheets));
 }

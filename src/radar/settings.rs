@@ -82,6 +82,10 @@ pub struct Radar {
     /// Speckle of the echoes. None, the paper's: there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speckle: Option<Speckle>,
+    /// Whether the phase of each echo is reported, too: a column of the cloud and two channels of the image. The paper
+    /// does not use it.
+    #[serde(skip_serializing_if = "is_off")]
+    pub phases: bool,
     /// Thermal noise and range error without a beat signal; a receiver has its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<Noise>,
@@ -111,6 +115,11 @@ pub enum Returns {
     First,
     /// Every one.
     All,
+}
+
+/// What serde leaves out.
+fn is_off(on: &bool) -> bool {
+    !*on
 }
 
 impl Returns {

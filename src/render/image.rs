@@ -197,7 +197,17 @@ mod tests {
             edge_m: 0.0,
         };
         let power_w = watts_from_dbm(power_dbm);
-        Echo { chirp: 0, point, range_m: 8.0, xt_m, yt_m, power_w, rank: 1, truth: Some(truth) }
+        Echo {
+            chirp: 0,
+            point,
+            range_m: 8.0,
+            xt_m,
+            yt_m,
+            power_w,
+            phase_rad: None,
+            rank: 1,
+            truth: Some(truth),
+        }
     }
 
     fn image(echoes: Vec<Echo>) -> Raster {

@@ -37,6 +37,9 @@ pub struct SceneFile {
     /// Seed of everything random.
     #[serde(default)]
     pub seed: u64,
+    /// Seed of what a repeated scan of the same target draws anew, its noise and errors of ranges; `seed` when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_seed: Option<u64>,
     /// The instrument.
     #[serde(default)]
     pub radar: Radar,

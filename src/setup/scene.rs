@@ -11,7 +11,7 @@ use crate::formats::words::{listed, significant};
 use crate::frames::{Global, Point, Pose};
 use crate::geometry::Raster;
 use crate::material::{Curve, Lobes, Material};
-use crate::radar::{Beam, Channel, Radar};
+use crate::radar::{Beam, Channel, Radar, SpeckleForm};
 use crate::render::{Bounce, RenderError, Scan, Setup, Sheet, Surface, power_image};
 use crate::scene::{Region, Scene};
 use crate::store::Store;
@@ -323,7 +323,9 @@ impl<'a> Assembly<'a> {
             effects: self.model.as_ref(),
             channel: Channel::CoPolar,
             most_sheets: scene.file.transmission.sheets,
+            speckle: (!scene.file.receiver.is_empty()).then_some(SpeckleForm::Scatterers),
             seed: scene.file.seed,
+            noise_seed: scene.file.noise_seed,
         }
     }
 
