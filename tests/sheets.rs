@@ -397,7 +397,7 @@ fn a_second_surface_behind_cloth_loses_the_same() {
         }
         stage
     };
-    let bounce = Bounce { rays: 256, outside_spot: 0.1 };
+    let bounce = Bounce { rays: 256, outside_spot: 0.1, in_phase: false };
     let all_w = |covered: bool, bounce| -> f64 {
         let echoes = build(covered).echoes(&radar(Returns::All), 16, bounce, Observer::Radar);
         echoes.iter().map(|echo| echo.power_w).sum()

@@ -154,6 +154,43 @@ fn the_contrast_is_that_of_the_looks() {
     }
 }
 
+/// A scene of a plate of a diffuse material under a line scan.
+const LINES: &str = "seed = 0\n[radar]\nthreshold_dbm = -300\n[radar.beam]\nedge_growth = 1\n[radar.speckle]\n\
+                     [radar.scan]\npattern = \"raster\"\nlines = 12\nchirps_per_line = 41\nwidth_m = 0.27179\nheight_m = 1.1\n\
+                     [[mesh]]\nname = \"plate\"\nfile = \"builtin:plate\"\nsize_m = [1.6, 1.6, 0]\ntranslation_m = [0, 1.1, 0]\n\
+                     [[region]]\nname = \"all\"\nmaterial = \"spectralon\"\n";
+
+#[test]
+fn a_rendered_scan_shows_the_lag_correlations() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut lines = Vec::new();
+    for seed in 0..SEEDS {
+        let text = LINES.replace("seed = 0", &format!("seed = {seed}"));
+        std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+        let out = format!("out{seed}");
+        support::matdb(folder.path())
+            .args(["render", "-q", "scene.toml", "-o", &out])
+            .assert()
+            .success();
+        let cloud = support::read_cloud(&folder.path().join(out).join("cloud.ply"));
+        let powers_w: Vec<f64> =
+            cloud["power_dbm"].iter().map(|dbm| 10f64.powf(0.1 * dbm)).collect();
+        assert_eq!(powers_w.len(), 12 * 41);
+        lines.extend(powers_w.chunks(41).map(<[f64]>::to_vec));
+    }
+    // Neighbours are half a waist apart: 13.589 mm/2 by 40 steps.
+    for lag in 0..5 {
+        let pairs: Vec<[f64; 2]> = lines
+            .iter()
+            .flat_map(|line| (0..41 - lag).step_by(5).map(|i| [line[i], line[i + lag]]))
+            .collect();
+        let [found, error] = correlation(&pairs);
+        let d = 0.5 * lag as f64;
+        let expected = (-2.0 * d * d).exp();
+        assert!((found - expected).abs() < 4.0 * error, "{d} w0: {found} is not {expected}");
+    }
+}
+
 /// sd/mean of the power of one chirp over a thousand seeds.
 fn contrast_over_seeds(law: &dyn Scattering, form: SpeckleForm, rays: usize) -> f64 {
     let one = Raster { lines: 1, chirps_per_line: 1, width_m: 1e-6, height_m: 1e-6 };

@@ -19,7 +19,7 @@ use super::noise::Noise;
 use super::polarisation::Polarisation;
 use super::receiver::Receiver;
 use super::scan::pattern::{self, Pattern};
-use super::speckle::Speckle;
+use super::speckle::{Speckle, SpeckleForm};
 use super::window::Window;
 use crate::formats::EffectEntry;
 use crate::units::watts_from_dbm;
@@ -232,6 +232,17 @@ impl Radar {
         let (threshold_w, cell_m) =
             (watts_from_dbm(self.threshold_dbm), self.chirp().range_resolution_m());
         self.noise.map_or(0.0, |noise| noise.level_w(threshold_w, cell_m, looks))
+    }
+
+    /// The form of its speckle, for a scan that several antennas see or not, with several paths per chirp or not.
+    pub fn speckle_form(&self, several_antennas: bool, several_paths: bool) -> SpeckleForm {
+        let has_beats = self.receiver.is_some() && several_paths;
+        let usual = if self.phases || several_antennas || has_beats {
+            SpeckleForm::Scatterers
+        } else {
+            SpeckleForm::Law
+        };
+        self.speckle.and_then(|speckle| speckle.form).unwrap_or(usual)
     }
 
     /// The sweep, in SI.

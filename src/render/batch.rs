@@ -284,9 +284,8 @@ impl<'a> Work<'a> {
         let surface = self.takes[take].surfaces.get(usize::from(region))?;
         let to_radar = -ray.direction.xyz();
         let to_radar = LocalFrame::at_hit(mesh, hit, to_radar, surface.grain).local(to_radar);
-        let beam_rad = surface.widening_rad(spot.divergence_rad(self.rays, hit.range_m));
-        let Seen { f_per_sr, coherent_share, .. } =
-            surface.scattering.seen_by(beam_rad, to_radar, to_radar);
+        let beam_rad = spot.divergence_rad(self.rays, hit.range_m);
+        let Seen { f_per_sr, coherent_share, .. } = surface.seen_by(beam_rad, to_radar, to_radar);
         let power_w = self.link.power_w(&spot.beam, hit.range_m, hit.cos_theta, f_per_sr);
         let coherent_w = if self.returns_wave(take, usize::from(region)) {
             power_w * coherent_share

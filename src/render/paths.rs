@@ -370,20 +370,30 @@ impl<'a> Emission<'a> {
                 && let Some(outward) = self.way_out(&second)
             {
                 let way = lit.inward.then(passage).then(outward);
+                let coherent_share = first.coherent_share
+                    * last.coherent_share
+                    * (beam_rad / second.beam_rad).powi(2);
+                let enhancement = self.enhancement(bounce, coherent_share);
                 let path_m = lit.hit.range_m + hit.range_m + second.antenna_m + way.delay_m();
                 paths.push(Path {
                     range_m: 0.5 * path_m,
-                    power_w: power_w * way.power_ratio(),
+                    power_w: power_w * way.power_ratio() * enhancement,
                     passed_share: way.power_ratio(),
                     delay_m: 0.5 * way.delay_m(),
                     surfaces: 2,
                     specular_share,
-                    coherent_share: first.coherent_share
-                        * last.coherent_share
-                        * (beam_rad / second.beam_rad).powi(2),
+                    coherent_share: coherent_share / enhancement,
                     ..direct
                 });
             }
+        }
+    }
+
+    /// Factor on a second-order path by the one that goes round its surfaces the other way.
+    fn enhancement(&self, bounce: &Bounce, coherent_share: f64) -> f64 {
+        match (self.paths.observer, self.paths.setup.channel) {
+            (Observer::Radar, Channel::CoPolar) => bounce.enhancement(coherent_share),
+            _ => 1.0,
         }
     }
 

@@ -27,9 +27,8 @@ pub struct Setup<'a> {
     pub channel: Channel,
     /// Largest number of sheets that a ray passes; it ends at the next one.
     pub most_sheets: usize,
-    /// How speckle is made where the radar does not say: scatterers for several antennas that see one target. `None`, as
-    /// [`Speckle::form`](crate::radar::Speckle::form) says.
-    pub speckle: Option<SpeckleForm>,
+    /// Whether several antennas see this target in one scan, so that they should see the same scatterers.
+    pub several_antennas: bool,
     /// Seed of all that is fixed to the target: the scatterers of its surface, and the directions of second-order paths.
     pub seed: u64,
     /// Seed of what every scan draws anew: noise, errors of ranges, and speckle of the form `independent`; `seed` when `None`.
@@ -46,7 +45,7 @@ impl<'a> Setup<'a> {
             effects: None,
             channel: Channel::CoPolar,
             most_sheets: MOST_SHEETS,
-            speckle: None,
+            several_antennas: false,
             seed: 0,
             noise_seed: None,
         }
@@ -59,14 +58,8 @@ impl<'a> Setup<'a> {
 
     /// The form of its speckle, for so many rays per chirp.
     pub(super) fn speckle_form(&self, rays: usize) -> SpeckleForm {
-        let radar = self.geometry.radar;
-        let is_several = rays > 1 || self.bounce.is_some();
-        let usual = if radar.phases || (radar.receiver.is_some() && is_several) {
-            SpeckleForm::Scatterers
-        } else {
-            SpeckleForm::Law
-        };
-        radar.speckle.and_then(|speckle| speckle.form).or(self.speckle).unwrap_or(usual)
+        let several_paths = rays > 1 || self.bounce.is_some();
+        self.geometry.radar.speckle_form(self.several_antennas, several_paths)
     }
 
     /// Whether a surface returns a part of its echo in one wave.

@@ -93,11 +93,20 @@ pub struct BounceEntry {
     /// let through, both senses of the path together. −20: assumed; side lobes are not published.
     /// Receivers see the whole target alike.
     pub outside_spot_db: f64,
+    /// Whether the two ways round a pair of surfaces, which are as long as each other, add in phase at the radar: twice the
+    /// power of what is not coherent. Off: as in the paper, powers add.
+    #[serde(skip_serializing_if = "is_off")]
+    pub in_phase: bool,
+}
+
+/// What serde leaves out.
+fn is_off(on: &bool) -> bool {
+    !*on
 }
 
 impl Default for BounceEntry {
     fn default() -> Self {
-        BounceEntry { rays: 64, outside_spot_db: -20.0 }
+        BounceEntry { rays: 64, outside_spot_db: -20.0, in_phase: false }
     }
 }
 
