@@ -222,7 +222,7 @@ fn measure_states_how_its_curve_was_lit() {
 fn ball(folder: &Path, name: &str, rays: usize) {
     let mut scene = format!(
         "[radar.scan]\npattern = \"raster\"\nlines = 80\nchirps_per_line = 80\nwidth_m = 0.4\nheight_m = 0.4\n\
-         [spot]\nrays = {rays}\n"
+         [spot]\nrays = {rays}\n[radar.speckle]\nlooks = 16\nform = \"independent\"\n"
     );
     for (mesh, shape) in [
         ("ball", "sphere\"\nsize_m = [0.3, 0.3, 0.3]\ntranslation_m = [-0.03, 1.1, -0.15]"),
@@ -252,15 +252,15 @@ fn a_fit_of_a_curved_target_finds_the_surfaces_own_lobe() {
             at,
             "measure out/cloud.ply --scene scene.toml --region ball --exact-mesh -o measured",
         );
-        let fit = json(at, "fit measured/curve.csv --model mixture --looks 100 --starts 1");
+        let fit = json(at, "fit measured/curve.csv --model mixture --looks 16 --starts 1");
         let estimates = fit["estimates"].as_array().unwrap();
         let m = estimates.iter().find(|estimate| estimate["name"] == "specular.m").unwrap();
         (m["value"].as_f64().unwrap(), said.matches("curved within the spot").count(), said)
     };
-    // Facets of 7 mm, and what remains of the rays: a twentieth of m.
+    // Four deviations, and a twentieth of m for facets of 7 mm and the rays of a spot.
     for rays in [1, 32] {
         let (m, said, text) = found(rays, rays);
-        assert!((m / M - 1.0).abs() < 0.05, "{rays} rays: {m}");
+        assert!((m / M - 1.0).abs() < 0.1, "{rays} rays: {m}");
         assert_eq!(said, 1, "{text}");
         assert_eq!(text.contains("write rays = 16 under [spot]"), rays == 1, "{text}");
     }
