@@ -14,7 +14,7 @@ use super::path::Path;
 use super::setup::Setup;
 use super::spot::{Footprints, Intersection};
 use super::surface::Orientation;
-use crate::brdf::Scattering;
+use crate::brdf::{Scattering, Seen};
 use crate::effects::{
     Conflict, Level, MeanEcho, Model, PredictionCache, Receiver, Setting, Shot, Stage, middle,
     shot_at, tilted_cos_theta,
@@ -108,8 +108,15 @@ impl<'a> EffectScan<'a> {
         };
         let retro = Direction::<Surface>::from_angles(shot.hit.theta_rad(), azimuth_rad);
         let law = self.model.laws.get(usize::from(shot.region));
-        let specular_share = law.map_or(0.0, |law| law.specular_share(retro, retro));
-        Path { power_w: with_w / rays as f64, azimuth_rad, specular_share, ..path }
+        let beam = stage.beam(&shot);
+        let beam_rad = match rays {
+            1 => beam.divergence_rad(),
+            _ => beam.section(shot.hit.range_m).divergence_rad(),
+        };
+        let seen = law.map(|law| law.seen_by(beam_rad, retro, retro));
+        let Seen { specular_share, coherent_share, .. } = seen.unwrap_or_default();
+        let power_w = with_w / rays as f64;
+        Path { power_w, azimuth_rad, specular_share, coherent_share, ..path }
     }
 
     /// Gain of the effects of the instrument on the power of one ray of a chirp, as a ratio.
