@@ -30,7 +30,7 @@ use matdb::measure::{
     Start,
 };
 use matdb::radar::random::{Key, Purpose};
-use matdb::radar::{Link, Radar};
+use matdb::radar::{Link, Radar, Speckle, SpeckleForm};
 use matdb::render::{
     Echo, Footprints, Observer, Scan, Setup, cloud_table, power_image, shade, trace_placed,
 };
@@ -226,8 +226,25 @@ fn power(given: Rendering<'_>) -> Vec<Way<'_>> {
     vec![
         Way::new("law and link alone", alone, |powers_w| format!("{} hits", powers_w.len())),
         Way::new("paper's receiver", paper, echoes),
-        Way::new("speckle and noise", || shaded(given.setup, given.footprints), echoes),
+        Way::new("noise", speckled(given, None), echoes),
+        Way::new(
+            "noise, independent speckle",
+            speckled(given, Some(SpeckleForm::Independent)),
+            echoes,
+        ),
+        Way::new("noise, speckle by its law", speckled(given, Some(SpeckleForm::Law)), echoes),
+        Way::new("noise, scatterers", speckled(given, Some(SpeckleForm::Scatterers)), echoes),
     ]
+}
+
+/// The echoes with noise, and with a single look of speckle of a form.
+fn speckled(given: Rendering<'_>, form: Option<SpeckleForm>) -> impl Fn() -> Scan + '_ {
+    let mut radar = given.setup.geometry.radar.clone();
+    radar.speckle = form.map(|form| Speckle { looks: 1.0, form: Some(form) });
+    move || {
+        let geometry = ScanGeometry { radar: &radar, ..given.setup.geometry };
+        shaded(&Setup { geometry, ..*given.setup }, given.footprints)
+    }
 }
 
 fn echoes(scan: &Scan) -> String {

@@ -34,7 +34,7 @@ fn main() -> Answer<()> {
     let take = |scan: usize| {
         let turn_rad = DVec3::new(0.0, turn_deg(scan).to_radians(), 0.0);
         let target = Pose::from_euler_xyz(turn_rad, DVec3::ZERO);
-        Take { target, surfaces: setup.surfaces, seed: scan as u64 }
+        Take { target, surfaces: setup.surfaces, seed: scan as u64, noise_seed: None }
     };
     let takes: Vec<Take> = (0..scans).map(take).collect();
 

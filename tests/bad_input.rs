@@ -394,8 +394,20 @@ fn instruments_that_cannot_work() {
         (format!("{receiver}[spot]\nrays = 4\n"), &["[radar.speckle]", "looks"]),
         (format!("{receiver}[bounce]\n"), &["[radar.speckle]", "[bounce]"]),
         (
-            format!("{receiver}[radar.speckle]\ncoherent_ratio = 2\n[spot]\nrays = 4\n"),
-            &["radar.speckle.coherent_ratio", "spot.rays = 1"],
+            "[radar.speckle]\ncoherent_ratio = 2\n".to_owned(),
+            &["coherent_ratio is no longer a key", "follows from the material"],
+        ),
+        (
+            format!("{receiver}[radar.speckle]\nform = \"law\"\n[spot]\nrays = 4\n"),
+            &["radar.speckle.form = \"law\"", "set form = \"scatterers\"", "spot.rays = 1"],
+        ),
+        (
+            "[radar]\nphases = true\n[radar.speckle]\nlooks = 4\n".to_owned(),
+            &["radar.phases = true", "radar.speckle.looks = 4 has no phase"],
+        ),
+        (
+            "[radar.speckle]\nlooks = 2.5\n".to_owned(),
+            &["radar.speckle.looks = 2.5", "a whole number from 1 to 256", "independent"],
         ),
         (
             format!("{receiver}[radar.speckle]\nlooks = 2.5\n"),

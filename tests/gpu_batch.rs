@@ -200,7 +200,7 @@ fn every_scene_in_every_pose() {
     for scene in ["mannequin.toml", "human.toml", "showcase.toml"] {
         let bench = Bench::of(scene, 6001);
         let surfaces = surfaces(&bench.laws);
-        let take = |target| Take { target, surfaces: &surfaces, seed: 0 };
+        let take = |target| Take { target, surfaces: &surfaces, seed: 0, noise_seed: None };
         let found = bench.compared(&gpu, &poses().map(take), 1);
         let closed =
             bench.laws.iter().all(|law| matdb::brdf::Scattering::backscatter(law).is_some());
@@ -213,7 +213,7 @@ fn every_spot_is_averaged() {
     let Some(gpu) = adapter(u64::MAX) else { return };
     let bench = Bench::of("mannequin.toml", 701);
     let surfaces = surfaces(&bench.laws);
-    let take = |target| Take { target, surfaces: &surfaces, seed: 0 };
+    let take = |target| Take { target, surfaces: &surfaces, seed: 0, noise_seed: None };
     // One share of rays and a part of one, and more.
     for rays in [2, 32, 75] {
         let found = bench.compared(&gpu, &poses().map(take), rays);
@@ -236,7 +236,7 @@ fn every_scan_has_its_own_material_and_seed() {
         .zip(1..)
         .flat_map(|(surfaces, seed)| {
             [pose([5.0, 0.0, 0.0], [0.0; 3]), pose([0.0; 3], [0.05, -0.1, 0.3])]
-                .map(|target| Take { target, surfaces, seed })
+                .map(|target| Take { target, surfaces, seed, noise_seed: None })
         })
         .collect();
     let found = bench.compared(&gpu, &takes, 5);
@@ -258,7 +258,7 @@ fn a_law_with_a_grain_is_the_processor_s() {
     };
     let bench = Bench::ball(0.3, 3, Brdf::CookTorrance(brushed));
     let surfaces = surfaces(&bench.laws);
-    let take = |target| Take { target, surfaces: &surfaces, seed: 0 };
+    let take = |target| Take { target, surfaces: &surfaces, seed: 0, noise_seed: None };
     let found = bench.compared(&gpu, &[take(pose([0.0, 0.0, 70.0], [1.1, 0.7, 0.0]))], 3);
     let hits = found.echoes[0].iter().flatten().count();
     assert!(found.rays_on_processor > 2 * hits, "{} {hits}", found.rays_on_processor);
@@ -269,7 +269,7 @@ fn a_target_that_is_smaller_than_the_spot_is_the_processor_s() {
     let Some(gpu) = adapter(u64::MAX) else { return };
     let bench = Bench::ball(0.004, 2, builtin("ptfe"));
     let surfaces = surfaces(&bench.laws);
-    let take = Take { target: Pose::NONE, surfaces: &surfaces, seed: 0 };
+    let take = Take { target: Pose::NONE, surfaces: &surfaces, seed: 0, noise_seed: None };
     let found = bench.together(&gpu, &[take], 64).unwrap();
     let bvh = Bvh::new(&bench.mesh);
     let expected = bench.traced(&bvh, Tracer::Automatic, &[take], 64).unwrap();
@@ -282,7 +282,7 @@ fn what_is_more_than_a_buffer_takes_turns_or_is_refused_with_the_number() {
     let (Some(gpu), Some(small)) = (adapter(u64::MAX), adapter(4096)) else { return };
     let bench = Bench::ball(0.4, 0, builtin("ptfe"));
     let surfaces = surfaces(&bench.laws);
-    let take = Take { target: Pose::NONE, surfaces: &surfaces, seed: 0 };
+    let take = Take { target: Pose::NONE, surfaces: &surfaces, seed: 0, noise_seed: None };
     let (all, in_turns) =
         (bench.together(&gpu, &[take; 3], 40), bench.together(&small, &[take; 3], 40));
     assert_eq!(all.unwrap(), in_turns.unwrap());
@@ -304,7 +304,7 @@ fn what_a_batch_cannot_do_is_refused() {
     let Some(gpu) = adapter(u64::MAX) else { return };
     let mut bench = Bench::ball(0.3, 1, builtin("ptfe"));
     let surfaces = surfaces(&bench.laws);
-    let take = Take { target: Pose::NONE, surfaces: &surfaces, seed: 0 };
+    let take = Take { target: Pose::NONE, surfaces: &surfaces, seed: 0, noise_seed: None };
     let [one, other] = [Bvh::new(&bench.mesh), Bvh::new(&bench.mesh)];
     let held = gpu.hold(&one).unwrap();
     let refused = bench.traced(&other, Tracer::Gpu(&held), &[take], 1);

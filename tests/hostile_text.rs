@@ -185,7 +185,8 @@ fn render(text: &str) {
     let surfaces: Vec<Surface> =
         scene.target.regions.iter().map(|_| Surface::new(&lambert)).collect();
     let regions = &scene.target.region_of_facet;
-    let bounce = scene.file.bounce.map(|b| Bounce { rays: b.rays, outside_spot: 0.1 });
+    let bounce =
+        scene.file.bounce.map(|b| Bounce { rays: b.rays, outside_spot: 0.1, in_phase: false });
     let geometry = ScanGeometry::new(scene.radar(), &scene.chirps, &bvh, regions);
     let paper = Setup::new(geometry, &surfaces);
     let mut effects = SceneEffects::default();

@@ -242,7 +242,7 @@ fn corner(aside_m: f64) -> Mesh {
 #[test]
 fn a_corner_of_two_mirrors_returns_what_a_mirror_does() {
     let waist = Waist::new();
-    let bounce = Some(Bounce { rays: 8, outside_spot: 0.0 });
+    let bounce = Some(Bounce { rays: 8, outside_spot: 0.0, in_phase: false });
     for (law, m) in [(Brdf::Fresnel(MIRROR), 0.0), (Brdf::CookTorrance(facets(0.004)), 0.004)] {
         for z_m in [0.0, 0.3] {
             for aside in [0.0, 0.25, 0.5] {

@@ -42,7 +42,7 @@ fn received(law: &dyn Scattering, polarisation: Polarisation, channel: Channel) 
     let geometry = ScanGeometry::new(&radar, &chirps, &bvh, &regions);
     let footprints = trace(&geometry, 64, &|_| {}).unwrap();
     let surfaces = [Surface::new(law)];
-    let bounce = Some(Bounce { rays: 4000, outside_spot: 1e-2 });
+    let bounce = Some(Bounce { rays: 4000, outside_spot: 1e-2, in_phase: false });
     let setup = Setup { bounce, channel, ..Setup::new(geometry, &surfaces) };
     let scan = shade(&setup, &footprints, Observer::Radar, &|_| {}).unwrap();
     let [echo] = &scan.echoes[..] else { panic!("one chirp has one echo: {:?}", scan.echoes) };

@@ -397,7 +397,7 @@ fn a_second_surface_behind_cloth_loses_the_same() {
         }
         stage
     };
-    let bounce = Bounce { rays: 256, outside_spot: 0.1 };
+    let bounce = Bounce { rays: 256, outside_spot: 0.1, in_phase: false };
     let all_w = |covered: bool, bounce| -> f64 {
         let echoes = build(covered).echoes(&radar(Returns::All), 16, bounce, Observer::Radar);
         echoes.iter().map(|echo| echo.power_w).sum()
@@ -457,7 +457,7 @@ fn a_batch_refuses_sheets() {
     let bvh = Bvh::new(&stage.mesh);
     let geometry = ScanGeometry::new(&radar, &chirps, &bvh, &stage.region_of_facet);
     let target = matdb::frames::Pose::new(glam::DMat3::IDENTITY, DVec3::ZERO);
-    let take = Take { target, surfaces: &stage.surfaces, seed: 0 };
+    let take = Take { target, surfaces: &stage.surfaces, seed: 0, noise_seed: None };
     let refused = Batch { geometry, rays_per_chirp: 1 }.run(&[take]);
     assert_eq!(refused, Err(RenderError::Sheets));
 }

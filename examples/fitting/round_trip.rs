@@ -8,7 +8,7 @@ use matdb::measure::icp::Motion;
 use matdb::measure::{Cloud, CloudPoint, Reduction, Registration};
 use matdb::radar::random::{Key, Purpose};
 use matdb::radar::speckle::standard_deviation_db;
-use matdb::radar::{Noise, Radar, Speckle};
+use matdb::radar::{Noise, Radar, Speckle, SpeckleForm};
 use matdb::render::{Echo, Observer, Setup, Surface, shade, trace};
 use matdb::scene::Scene;
 use matdb::trace::{Bvh, ScanGeometry};
@@ -122,7 +122,7 @@ fn shown(value: f64) -> String {
 fn trip(scene: &Scene, seed: u64) -> Result<Trip, Failure> {
     let quiet = Radar { speckle: None, noise: None, ..scene.radar().clone() };
     let noise = Noise { level_dbm: Some(-112.0), range_sd_m: RANGE_SD_M, ..Noise::default() };
-    let speckle = Speckle { looks: LOOKS, coherent_ratio: 0.0 };
+    let speckle = Speckle { looks: LOOKS, form: Some(SpeckleForm::Independent) };
     let noisy = Radar { speckle: Some(speckle), noise: Some(noise), ..quiet.clone() };
     let mesh = &scene.target.mesh;
     let echoes = rendered(scene, &noisy, mesh, &truth(), seed)?;

@@ -197,11 +197,6 @@ fn check_predicted(scene: &Scene, path: &Path) -> Result<(), Error> {
         ("several rays in a spot", "set spot.rays = 1 and declare [[radar.effect]] `finite-spot`")
     } else if scene.file.bounce.is_some() {
         ("a second bounce", "replace [bounce] by [[effect]] `multi-bounce`")
-    } else if radar.speckle.is_some_and(|speckle| speckle.coherent_ratio > 0.0) {
-        (
-            "a coherent share of an echo",
-            "leave `coherent_ratio` under [radar.speckle] at 0 and state the `looks` that scatter as much",
-        )
     } else if radar.receiver.is_some() {
         ("a range receiver", "replace [radar.receiver] by [radar.noise] and [radar.speckle]")
     } else if scene.target.transmits() {

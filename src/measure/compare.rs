@@ -48,6 +48,7 @@ pub fn measured_scan(radar: &Radar, chirps: &Chirps, cloud: &Cloud) -> Scan {
             xt_m: in_target.xyz.x,
             yt_m: in_target.xyz.y,
             power_w: point.power_w,
+            phase_rad: None,
             truth: None,
         });
     }

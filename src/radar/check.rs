@@ -4,7 +4,7 @@ use super::beam::Beam;
 use super::error::{RadarError, in_range};
 use super::preset::PRESETS;
 use super::settings::Radar;
-use super::speckle::Speckle;
+use super::speckle::{Speckle, SpeckleForm};
 
 impl Radar {
     /// Checks every constant against the range in which it has a meaning.
@@ -67,6 +67,19 @@ impl Radar {
         Ok(())
     }
 
+    /// One look of one field has a phase, and an average of several has none.
+    fn validate_phases(&self) -> Result<(), RadarError> {
+        match self.speckle {
+            Some(Speckle { looks, .. }) if self.phases && looks != 1.0 => {
+                Err(RadarError::PhaseOfLooks { looks })
+            }
+            Some(Speckle { form: Some(SpeckleForm::Independent), .. }) if self.phases => {
+                Err(RadarError::PhaseOfDraws)
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn validate_receiver(&self) -> Result<(), RadarError> {
         self.chirp().validate()?;
         if let Some(receiver) = self.receiver {
@@ -85,10 +98,11 @@ impl Radar {
         }
         match (self.receiver, self.speckle) {
             (Some(_), Some(Speckle { looks, .. })) if looks.fract() != 0.0 || looks > 1e4 => {
-                Err(RadarError::PartialLook { looks })
+                return Err(RadarError::PartialLook { looks });
             }
-            _ => Ok(()),
+            _ => {}
         }
+        self.validate_phases()
     }
 }
 

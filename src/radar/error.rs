@@ -75,6 +75,17 @@ pub enum RadarError {
         "[radar.noise] has gate_cells and gate_length_m, and both say how long the gate is; remove one"
     )]
     GateTwice,
+    /// Looks that are fields of their own are whole numbers.
+    #[error(
+        "radar.speckle.looks = {looks} is no number of fields; give a whole number from 1 to {most}, or \
+         form = \"independent\", whose looks need not be whole"
+    )]
+    PartOfAField {
+        /// The looks asked for.
+        looks: f64,
+        /// The most that there can be.
+        most: f64,
+    },
     /// A receiver averages a whole number of looks.
     #[error(
         "radar.speckle.looks = {looks} cannot be made of beat signals; give a whole number from 1 \
@@ -84,6 +95,20 @@ pub enum RadarError {
         /// The looks asked for.
         looks: f64,
     },
+    /// The phase of an average of powers.
+    #[error(
+        "radar.phases = true, and an average over radar.speckle.looks = {looks} has no phase; set looks = 1"
+    )]
+    PhaseOfLooks {
+        /// The looks.
+        looks: f64,
+    },
+    /// The phase of a power that is drawn from its law.
+    #[error(
+        "radar.phases = true, and speckle of the form \"independent\" is a law of powers without phases; set \
+         radar.speckle.form = \"scatterers\" or \"law\""
+    )]
+    PhaseOfDraws,
     /// Equation (1) cannot be fitted.
     #[error(transparent)]
     F5(#[from] F5Error),

@@ -17,7 +17,7 @@ use statrs::function::gamma::gamma_ur;
 
 use super::error::{RadarError, in_range};
 use super::random::Draws;
-use super::speckle::Speckle;
+use super::speckle::IndependentSpeckle;
 use crate::units::watts_from_dbm;
 
 /// Noise of a detection.
@@ -141,30 +141,32 @@ fn threshold_over_noise(probability: f64, looks: f64) -> f64 {
     high
 }
 
-/// A power, W, as it is measured: `mean_w` with its speckle, in noise of mean `noise_w`.
+/// A power, W, in noise of mean `noise_w` that joins it once.
+pub fn in_noise_w(power_w: f64, noise_w: f64, draws: &mut Draws) -> f64 {
+    (power_w.sqrt() + draws.complex_gaussian() * noise_w.sqrt()).norm_sqr()
+}
+
+/// A power, W, as it is measured: `mean_w` with speckle that is drawn anew, in noise of mean `noise_w`.
 pub fn measured_w(
     mean_w: f64,
     noise_w: f64,
     added: Addition,
-    speckle: Option<Speckle>,
+    speckle: Option<IndependentSpeckle>,
     draws: &mut Draws,
 ) -> f64 {
-    let in_noise_w = |power_w: f64, draws: &mut Draws| {
-        (power_w.sqrt() + draws.complex_gaussian() * noise_w.sqrt()).norm_sqr()
-    };
-    let Some(speckle) = speckle else { return in_noise_w(mean_w, draws) };
+    let Some(speckle) = speckle else { return in_noise_w(mean_w, noise_w, draws) };
     if added == Addition::AfterLooks {
         let echo_w = mean_w * speckle.intensity_factor(draws);
-        return in_noise_w(echo_w, draws);
+        return in_noise_w(echo_w, noise_w, draws);
     }
-    let Speckle { looks, coherent_ratio } = speckle;
+    let IndependentSpeckle { looks, coherent_ratio } = speckle;
     // Diffuse echo and noise are one Gaussian; beside it the coherent part keeps its power.
     let coherent_w = mean_w * coherent_ratio / (1.0 + coherent_ratio);
     let gaussian_w = mean_w - coherent_w + noise_w;
     if gaussian_w <= 0.0 {
         return coherent_w;
     }
-    let together = Speckle { looks, coherent_ratio: coherent_w / gaussian_w };
+    let together = IndependentSpeckle { looks, coherent_ratio: coherent_w / gaussian_w };
     (coherent_w + gaussian_w) * together.intensity_factor(draws)
 }
 
@@ -176,7 +178,12 @@ mod tests {
     const COUNT: u64 = 40_000;
 
     /// Mean and standard deviation of measured powers.
-    fn moments(mean_w: f64, noise_w: f64, added: Addition, speckle: Option<Speckle>) -> [f64; 2] {
+    fn moments(
+        mean_w: f64,
+        noise_w: f64,
+        added: Addition,
+        speckle: Option<IndependentSpeckle>,
+    ) -> [f64; 2] {
         let mut draws = Key { seed: 3, chirp: 0, sub_ray: 0, purpose: Purpose::Noise }.draws();
         let powers: Vec<f64> =
             (0..COUNT).map(|_| measured_w(mean_w, noise_w, added, speckle, &mut draws)).collect();
@@ -192,8 +199,8 @@ mod tests {
     fn powers_add_and_spread_as_their_laws_say() {
         // Rice: variance N² + 2PN. Gamma: (P + N)²/L. With a coherent part C: (G² + 2CG)/L. Noise after the
         // looks: N² + 2PN + P²/L.
-        let developed = |looks| Some(Speckle { looks, coherent_ratio: 0.0 });
-        let partial = Some(Speckle { looks: 4.0, coherent_ratio: 1.0 });
+        let developed = |looks| Some(IndependentSpeckle { looks, coherent_ratio: 0.0 });
+        let partial = Some(IndependentSpeckle { looks: 4.0, coherent_ratio: 1.0 });
         for (added, speckle, sd) in [
             (BEFORE, None, (0.25f64 + 2.0 * 0.5).sqrt()),
             (AFTER, None, (0.25f64 + 2.0 * 0.5).sqrt()),
@@ -214,7 +221,7 @@ mod tests {
     fn without_noise_and_speckle_a_power_stays_as_it_is() {
         let [mean, deviation] = moments(2.0, 0.0, BEFORE, None);
         assert!((mean - 2.0).abs() < 1e-12 && deviation < 1e-12);
-        let silent = Some(Speckle::default());
+        let silent = Some(IndependentSpeckle { looks: 1.0, coherent_ratio: 0.0 });
         assert_eq!(moments(0.0, 0.0, BEFORE, silent), [0.0, 0.0]);
     }
 
@@ -275,7 +282,7 @@ mod tests {
                 ..Noise::default()
             };
             let noise_w = noise.level_w(THRESHOLD_W, CELL_M, looks);
-            let speckle = Some(Speckle { looks, coherent_ratio: 0.0 });
+            let speckle = Some(IndependentSpeckle { looks, coherent_ratio: 0.0 });
             let is_alarm = |gate: &u64| {
                 let key = Key { seed: 4, chirp: *gate, sub_ray: 0, purpose: Purpose::Noise };
                 let mut draws = key.draws();

@@ -32,6 +32,7 @@ impl Default for Radar {
             chirp: ChirpEntry::default(),
             receiver: None,
             speckle: None,
+            phases: false,
             noise: None,
             effect: Vec::new(),
             polarisation: Polarisation::default(),

@@ -32,6 +32,10 @@ pub enum Purpose {
     Tilt = 8,
     /// Blocks of a bootstrap.
     Bootstrap = 9,
+    /// Amplitudes of the scatterers of a surface.
+    Scatterers = 10,
+    /// Places of these scatterers.
+    Placement = 11,
 }
 
 /// Names one stream of draws.

@@ -224,13 +224,29 @@ impl RangeProcessor {
     ///
     /// A signal of another length than the chirp's is cut or filled with silence.
     pub fn profile_w(&self, signal: &[Complex<f64>]) -> Vec<f64> {
+        self.spectrum(signal).iter().map(Complex::norm_sqr).collect()
+    }
+
+    /// The spectrum over range, √W, whose squares are [`profile_w`](Self::profile_w).
+    pub fn spectrum(&self, signal: &[Complex<f64>]) -> Vec<Complex<f64>> {
         let mut spectrum = vec![Complex::ZERO; self.transform.len()];
         for (bin, (sample, weight)) in spectrum.iter_mut().zip(signal.iter().zip(&self.window)) {
             *bin = sample * weight;
         }
         self.transform.process(&mut spectrum);
         let gain: f64 = self.window.iter().sum();
-        spectrum.iter().map(|x| x.norm_sqr() / (gain * gain)).collect()
+        spectrum.iter_mut().for_each(|x| *x /= gain);
+        spectrum
+    }
+
+    /// Phase of the beat in the middle of the sweep at a peak of a spectrum, rad, −π to π.
+    ///
+    /// Samples count from the start of the sweep, half a turn before its middle for every natural bin of range.
+    pub fn phase_rad(&self, spectrum: &[Complex<f64>], range_m: f64) -> f64 {
+        let bin = (range_m / self.bin_m).round().max(0.0) as usize;
+        let natural = bin as f64 * self.window.len() as f64 / spectrum.len() as f64;
+        let start = Complex::cis(std::f64::consts::PI * natural);
+        spectrum.get(bin).map_or(0.0, |at_peak| (at_peak * start).arg())
     }
 
     /// The strongest peak in the gate, if it reaches the threshold.

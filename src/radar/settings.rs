@@ -19,7 +19,7 @@ use super::noise::Noise;
 use super::polarisation::Polarisation;
 use super::receiver::Receiver;
 use super::scan::pattern::{self, Pattern};
-use super::speckle::Speckle;
+use super::speckle::{Speckle, SpeckleForm};
 use super::window::Window;
 use crate::formats::EffectEntry;
 use crate::units::watts_from_dbm;
@@ -82,6 +82,10 @@ pub struct Radar {
     /// Speckle of the echoes. None, the paper's: there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub speckle: Option<Speckle>,
+    /// Whether the phase of each echo is reported, too: a column of the cloud and two channels of the image. The paper
+    /// does not use it.
+    #[serde(skip_serializing_if = "is_off")]
+    pub phases: bool,
     /// Thermal noise and range error without a beat signal; a receiver has its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<Noise>,
@@ -111,6 +115,11 @@ pub enum Returns {
     First,
     /// Every one.
     All,
+}
+
+/// What serde leaves out.
+fn is_off(on: &bool) -> bool {
+    !*on
 }
 
 impl Returns {
@@ -223,6 +232,17 @@ impl Radar {
         let (threshold_w, cell_m) =
             (watts_from_dbm(self.threshold_dbm), self.chirp().range_resolution_m());
         self.noise.map_or(0.0, |noise| noise.level_w(threshold_w, cell_m, looks))
+    }
+
+    /// The form of its speckle, for a scan that several antennas see or not, with several paths per chirp or not.
+    pub fn speckle_form(&self, several_antennas: bool, several_paths: bool) -> SpeckleForm {
+        let has_beats = self.receiver.is_some() && several_paths;
+        let usual = if self.phases || several_antennas || has_beats {
+            SpeckleForm::Scatterers
+        } else {
+            SpeckleForm::Law
+        };
+        self.speckle.and_then(|speckle| speckle.form).unwrap_or(usual)
     }
 
     /// The sweep, in SI.

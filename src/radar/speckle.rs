@@ -5,56 +5,125 @@
 //! 10/ln 10 · (ψ(L) − ln L) and a standard deviation of 10/ln 10 · √ψ′(L). With a coherent part K
 //! times as strong as the diffuse one, the phasor is √(K/(K+1)) + z/√(K+1) with z circular Gaussian,
 //! and its intensity Rician. Every factor has the mean 1.
+//!
+//! The scatterers are fixed to the surface. Chirps whose spots overlap see the same ones, so that their
+//! speckle is alike: `render/speckle` has the forms of that field.
 
-use num_complex::Complex;
 use serde::{Deserialize, Serialize};
 
 use super::error::{RadarError, in_range};
 use super::random::Draws;
 
-/// Statistics of a speckled return. The default is fully developed speckle in a single look.
+/// Speckle of the echoes. The default is that of a single look.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[serde(try_from = "SpeckleEntry")]
 pub struct Speckle {
-    /// Independent looks L averaged in one detection, from 0.1 to 1e6; not necessarily whole.
-    /// 1: assumed; the paper averages no chirps.
+    /// Independent looks L averaged in one detection. A whole number from 1 to [`MOST_FIELDS`], each look a field of its
+    /// own, as another frequency or another pose would have; from 0.1 to 1e6, not necessarily whole, for
+    /// [`SpeckleForm::Independent`]. 1: assumed; the paper averages no chirps.
     pub looks: f64,
-    /// K: power of the coherent part over that of the diffuse part, from 0 to 1e9. 0: assumed.
-    pub coherent_ratio: f64,
+    /// How the field is made. None: [`SpeckleForm::Scatterers`] for a radar that reports phases and for a scene with
+    /// receivers elsewhere or several paths in a beat signal, [`SpeckleForm::Law`] for any other.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub form: Option<SpeckleForm>,
+}
+
+/// How the speckle of neighbouring chirps is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SpeckleForm {
+    /// A Gaussian field over the target plane with the beam's correlation, exp(−d²/w₀²) between the amplitudes of chirps
+    /// that aim d apart. As right as scatterers for a single antenna and fast.
+    Law,
+    /// Scatterers on the facets, whose waves add up with their phases: also right between antennas, poses and frequencies.
+    Scatterers,
+    /// Drawn anew for every chirp. Neighbours that share most of their spots then have nothing in common, so that images
+    /// look smoother and fits seem surer than any measurement.
+    Independent,
+}
+
+impl SpeckleForm {
+    /// The word that a scene uses.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            SpeckleForm::Law => "law",
+            SpeckleForm::Scatterers => "scatterers",
+            SpeckleForm::Independent => "independent",
+        }
+    }
+}
+
+/// Largest number of looks that are fields. Their mean has a contrast of 6 %.
+pub const MOST_FIELDS: f64 = 256.0;
+
+/// The table as written.
+#[derive(Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct SpeckleEntry {
+    looks: f64,
+    form: Option<SpeckleForm>,
+    coherent_ratio: f64,
+}
+
+impl Default for SpeckleEntry {
+    fn default() -> Self {
+        let Speckle { looks, form } = Speckle::default();
+        SpeckleEntry { looks, form, coherent_ratio: 0.0 }
+    }
+}
+
+impl TryFrom<SpeckleEntry> for Speckle {
+    type Error = &'static str;
+
+    fn try_from(entry: SpeckleEntry) -> Result<Speckle, Self::Error> {
+        if entry.coherent_ratio != 0.0 {
+            return Err(
+                "coherent_ratio is no longer a key: how much of an echo is coherent follows from the \
+                        material, all of a smooth surface's and nothing of a diffuse one's; remove it",
+            );
+        }
+        Ok(Speckle { looks: entry.looks, form: entry.form })
+    }
 }
 
 impl Default for Speckle {
     fn default() -> Self {
-        Speckle { looks: 1.0, coherent_ratio: 0.0 }
+        Speckle { looks: 1.0, form: None }
     }
 }
 
 impl Speckle {
-    /// Checks every setting against the range in which it has a meaning.
+    /// Checks the number of looks against the range in which it has a meaning.
     ///
     /// # Errors
-    /// The first setting out of range, by name.
+    /// A number of looks out of range, or one that is no number of fields.
     pub fn validate(&self) -> Result<(), RadarError> {
-        let checks = [
-            ("speckle.looks", self.looks, (0.1, 1e6)),
-            ("speckle.coherent_ratio", self.coherent_ratio, (0.0, 1e9)),
-        ];
-        checks.into_iter().try_for_each(in_range)
+        let looks = self.looks;
+        match self.form {
+            Some(SpeckleForm::Independent) => in_range(("speckle.looks", looks, (0.1, 1e6))),
+            _ if looks.fract() == 0.0 && (1.0..=MOST_FIELDS).contains(&looks) => Ok(()),
+            _ => Err(RadarError::PartOfAField { looks, most: MOST_FIELDS }),
+        }
     }
+}
 
-    /// Factor on a power, of mean 1.
+/// Speckle that is drawn anew for every echo.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IndependentSpeckle {
+    /// Looks L, above 0, not necessarily whole.
+    pub looks: f64,
+    /// K: power of the coherent part over that of the diffuse part, 0 or above.
+    pub coherent_ratio: f64,
+}
+
+impl IndependentSpeckle {
+    /// Factor on a power, of mean 1: the mean of L intensities |√K + z|²/(1 + K), drawn at once.
     ///
-    /// The mean of L intensities |√K + z|² is a Gamma variate whose shape is L plus a Poisson count
-    /// of mean LK; with K = 0 it is the Gamma(L, 1/L) of developed speckle.
+    /// It is a Gamma variate whose shape is L plus a Poisson count of mean LK; with K = 0 it is the Gamma(L, 1/L) of
+    /// developed speckle.
     pub fn intensity_factor(&self, draws: &mut Draws) -> f64 {
         let shape = self.looks + draws.poisson(self.looks * self.coherent_ratio);
         shape * draws.gamma(shape) / (self.looks * (1.0 + self.coherent_ratio))
-    }
-
-    /// Factor on an amplitude, of mean square 1: one look, whatever [`looks`](Self::looks) says.
-    pub fn phasor(&self, draws: &mut Draws) -> Complex<f64> {
-        let diffuse = 1.0 / (1.0 + self.coherent_ratio);
-        (1.0 - diffuse).sqrt() + draws.complex_gaussian() * diffuse.sqrt()
     }
 
     /// Standard deviation of the intensity over its mean, √((1 + 2K)/L)/(1 + K); 1/√L without a
@@ -145,10 +214,12 @@ mod tests {
     #[test]
     fn samples_have_the_stated_decibels_and_contrast() {
         for (looks, ..) in PUBLISHED_DB {
-            let speckle = Speckle { looks, ..Speckle::default() };
             let mut draws = draws(looks as u64);
-            let factors: Vec<f64> =
-                (0..COUNT).map(|_| speckle.intensity_factor(&mut draws)).collect();
+            let factors: Vec<f64> = (0..COUNT)
+                .map(|_| {
+                    IndependentSpeckle { looks, coherent_ratio: 0.0 }.intensity_factor(&mut draws)
+                })
+                .collect();
             let levels_db: Vec<f64> = factors.iter().map(|&x| db_from_ratio(x)).collect();
             let [mean_db, deviation_db] = mean_and_deviation(&levels_db);
             let bound_db = 5.0 * standard_deviation_db(looks) / (COUNT as f64).sqrt();
@@ -163,28 +234,35 @@ mod tests {
 
     #[test]
     fn a_coherent_part_calms_the_speckle() {
-        for coherent_ratio in [0.0, 0.5, 4.0, 100.0] {
+        for ratio in [0.0, 0.5, 4.0, 100.0] {
             for looks in [1.0, 2.5] {
-                let speckle = Speckle { looks, coherent_ratio };
+                let speckle = IndependentSpeckle { looks, coherent_ratio: ratio };
                 let mut draws = draws(100);
                 let factors: Vec<f64> =
                     (0..COUNT).map(|_| speckle.intensity_factor(&mut draws)).collect();
                 let [mean, deviation] = mean_and_deviation(&factors);
-                let bound = 5.0 * speckle.contrast() / (COUNT as f64).sqrt();
-                assert!((mean - 1.0).abs() < bound, "{speckle:?}: {mean}");
-                assert!((deviation / speckle.contrast() - 1.0).abs() < 0.05, "{speckle:?}");
+                let expected = speckle.contrast();
+                assert!(
+                    (mean - 1.0).abs() < 5.0 * expected / (COUNT as f64).sqrt(),
+                    "{ratio}: {mean}"
+                );
+                assert!((deviation / expected - 1.0).abs() < 0.05, "{looks} {ratio}");
             }
         }
     }
 
     #[test]
-    fn phasors_and_intensities_follow_one_law() {
-        let speckle = Speckle { looks: 1.0, coherent_ratio: 3.0 };
+    fn drawn_at_once_or_look_by_look_is_one_law() {
+        let (looks, ratio) = (3, 2f64);
         let (mut some, mut other) = (draws(1), draws(2));
-        let mut powers: Vec<f64> =
-            (0..COUNT).map(|_| speckle.phasor(&mut some).norm_sqr()).collect();
+        let of_a_look = |draws: &mut Draws| (ratio.sqrt() + draws.complex_gaussian()).norm_sqr();
+        let mut powers: Vec<f64> = (0..COUNT)
+            .map(|_| (0..looks).map(|_| of_a_look(&mut some)).sum::<f64>())
+            .map(|sum| sum / (f64::from(looks) * (1.0 + ratio)))
+            .collect();
+        let at_once = IndependentSpeckle { looks: f64::from(looks), coherent_ratio: ratio };
         let mut factors: Vec<f64> =
-            (0..COUNT).map(|_| speckle.intensity_factor(&mut other)).collect();
+            (0..COUNT).map(|_| at_once.intensity_factor(&mut other)).collect();
         powers.sort_by(f64::total_cmp);
         factors.sort_by(f64::total_cmp);
         // Two-sample Kolmogorov–Smirnov: 1.95·√(2/n) is passed once in a thousand.
@@ -198,10 +276,27 @@ mod tests {
     }
 
     #[test]
-    fn a_setting_without_meaning_is_named() {
-        let error = Speckle { looks: 0.0, ..Speckle::default() }.validate().unwrap_err();
-        assert!(error.to_string().contains("speckle.looks = 0"), "{error}");
-        assert!(Speckle { coherent_ratio: -1.0, ..Speckle::default() }.validate().is_err());
-        Speckle::default().validate().unwrap();
+    fn looks_are_fields_unless_they_are_independent() {
+        let of = |looks, form| Speckle { looks, form }.validate();
+        for form in [None, Some(SpeckleForm::Law), Some(SpeckleForm::Scatterers)] {
+            of(4.0, form).unwrap();
+            for looks in [0.0, 2.5, 257.0, f64::NAN] {
+                let error = of(looks, form).unwrap_err().to_string();
+                assert!(
+                    error.contains("radar.speckle.looks") && error.contains("independent"),
+                    "{error}"
+                );
+            }
+        }
+        of(2.5, Some(SpeckleForm::Independent)).unwrap();
+        assert!(of(0.0, Some(SpeckleForm::Independent)).is_err());
+    }
+
+    #[test]
+    fn the_share_that_was_stated_is_now_the_material_s() {
+        let read = |text: &str| toml::from_str::<Speckle>(text);
+        assert_eq!(read("looks = 2\ncoherent_ratio = 0").unwrap().looks, 2.0);
+        let error = read("coherent_ratio = 3").unwrap_err().to_string();
+        assert!(error.contains("follows from the material"), "{error}");
     }
 }

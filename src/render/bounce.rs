@@ -28,9 +28,20 @@ pub struct Bounce {
     /// Power by way of a surface outside the spot, over one inside, as a ratio: what the side lobes
     /// of the radar's own beam let through, both senses of the path together.
     pub outside_spot: f64,
+    /// Whether the ways radar → A → B → radar and radar → B → A → radar add in phase, which doubles the power of what is
+    /// not coherent.
+    pub in_phase: bool,
 }
 
 impl Bounce {
+    /// Factor on the power of a path, of which a share is coherent, that reaches the radar in the polarisation that was sent.
+    ///
+    /// The way back round the same pair is as long, so that both amplitudes are equal (coherent backscatter; Akkermans,
+    /// Wolf and Maynard 1986, DOI 10.1103/PhysRevLett.56.1471). The coherent part is one wave already.
+    pub(super) fn enhancement(&self, coherent_share: f64) -> f64 {
+        if self.in_phase { 2.0 - coherent_share } else { 1.0 }
+    }
+
     /// How well the radar's antenna sees a second surface at `place`, over how equation (11) sees the spot.
     pub(super) fn pattern(
         &self,
@@ -157,7 +168,7 @@ mod tests {
         let origin = radar.frames().origin();
         let axis = Ray { origin, direction: origin.towards(Point::new(0.0, 1.1, 0.0)).unwrap() };
         let beam = Beam::new(&radar).along(&axis);
-        let bounce = Bounce { rays: 1, outside_spot: 1e-3 };
+        let bounce = Bounce { rays: 1, outside_spot: 1e-3, in_phase: false };
         let seen = |rays, x_m: f64, z_m: f64| {
             bounce.pattern(&beam, &axis, rays, DVec3::new(x_m, 1.1, z_m))
         };

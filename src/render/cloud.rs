@@ -48,6 +48,10 @@ pub fn cloud_table(
         number("region", &|t| t.region.into()),
         number("material", &material),
     ];
+    if echoes.iter().any(|echo| echo.phase_rad.is_some()) {
+        let phase_rad = |echo: &Echo| echo.phase_rad.unwrap_or(f64::NAN);
+        columns.push(column("phase_rad", Scalar::Double, &phase_rad));
+    }
     if several {
         columns.push(column("rank", Scalar::Int, &|e| e.rank.into()));
         columns.push(number("sheets", &|t| t.sheets.into()));

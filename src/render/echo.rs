@@ -1,13 +1,12 @@
 //! An echo and its cause.
 
-use super::detect::Detector;
+use super::detect::{Detector, Measured};
 use super::observer::Observer;
 use super::path::Path;
 use super::returns::Seen;
 use super::setup::Setup;
 use super::spot::Footprints;
 use crate::frames::{Global, Point, Pose, Target};
-use crate::radar::Detection;
 use crate::trace::Hit;
 
 /// An echo of one chirp.
@@ -25,6 +24,8 @@ pub struct Echo {
     pub yt_m: f64,
     /// Received power, W; 0 without an echo.
     pub power_w: f64,
+    /// Phase of its beat in the middle of the sweep, rad, −π to π; none where the radar reports no phases.
+    pub phase_rad: Option<f64>,
     /// Its place among the echoes of its chirp by power: 1 for the strongest.
     pub rank: u16,
     /// The cause; `None` for a false alarm.
@@ -61,7 +62,7 @@ pub(super) struct Echoes<'a> {
     pub setup: &'a Setup<'a>,
     pub footprints: &'a Footprints,
     pub observer: Observer,
-    pub detector: &'a Detector,
+    pub detector: &'a Detector<'a>,
     pub target_from_global: Pose<Target, Global>,
 }
 
@@ -79,8 +80,8 @@ impl Echoes<'_> {
             found.extend(self.echo(chirp, hits, paths, None));
         }
         let first = found.len();
-        for Seen { detection, paths: places } in seen {
-            found.extend(self.echo(chirp, hits, &paths[places.clone()], Some(*detection)));
+        for Seen { measured, paths: places } in seen {
+            found.extend(self.echo(chirp, hits, &paths[places.clone()], Some(*measured)));
         }
         if seen.len() > 1 {
             rank(&mut found[first..]);
@@ -93,8 +94,10 @@ impl Echoes<'_> {
         chirp: usize,
         hits: &[Option<Hit>],
         paths: &[Path],
-        seen: Option<Detection>,
+        seen: Option<Measured>,
     ) -> Option<Echo> {
+        let phase_rad = seen.and_then(|seen| seen.phase_rad);
+        let seen = seen.map(|seen| seen.detection);
         let detected = seen.filter(|seen| seen.power_w >= self.detector.threshold_w());
         let reach_m = self.detector.reach_m();
         let near = |path: &&Path| match (detected, reach_m) {
@@ -114,6 +117,7 @@ impl Echoes<'_> {
             xt_m: in_target.xyz.x,
             yt_m: in_target.xyz.y,
             power_w: seen.map_or(0.0, |seen| seen.power_w),
+            phase_rad,
             rank: 1,
             truth: cause.map(|path| self.truth(chirp, hits, path)),
         })

@@ -44,12 +44,39 @@ pub enum RenderError {
          [bounce]"
     )]
     Phases,
-    /// A coherent part of speckle is declared, which is defined for one path only.
+    /// The law of speckle has one amplitude per chirp, and a receiver of beat signals sees several ranges.
     #[error(
-        "radar.speckle.coherent_ratio is that of a whole echo and cannot be shared out among several \
-         paths; set it to 0, or set spot.rays = 1 and remove [bounce]"
+        "radar.speckle.form = \"law\" has one amplitude per chirp, and the paths of one chirp reach the [radar.receiver] from \
+         several ranges; set form = \"scatterers\", or set spot.rays = 1 and remove [bounce]"
     )]
-    Coherent,
+    LawOfTones,
+    /// The field of the speckle would not fit into memory.
+    #[error(
+        "the speckle of this scan is too large a field: its rays aim too far apart for the width of the beam, or \
+         radar.speckle.looks is too large; set radar.speckle.form = \"independent\""
+    )]
+    SpeckleField,
+    /// Scatterers are placed as one antenna sees them.
+    #[error(
+        "radar.speckle.form = \"scatterers\" needs a radar that stays in its place, and the rays of this scan start from places \
+         further apart than its beam's waist; set form = \"law\""
+    )]
+    ScattererOrigins,
+    /// Scatterers for so large a target would not fit into memory.
+    #[error(
+        "the target has room for {count} scatterers, three on the beam's waist; leave out meshes that the scan does not \
+         need, or set radar.speckle.form = \"law\""
+    )]
+    ScattererCount {
+        /// Number of scatterers.
+        count: usize,
+    },
+    /// A batch does not place scatterers.
+    #[error(
+        "a batch of scans has the speckle of the law; remove radar.speckle.form = \"scatterers\" and radar.phases, or render the \
+         scans one by one"
+    )]
+    BatchScatterers,
     /// A receiver needs beat signals, which a batch does not compute.
     #[error(
         "a batch of scans has no beat signals for a [radar.receiver]; remove it, or render the scans one \

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use num_complex::Complex;
 use rayon::prelude::*;
 
 use super::echo::Echo;
@@ -41,6 +42,8 @@ struct Pixel {
     known_weight: f64,
     nearest_weight: f64,
     material: Option<u16>,
+    /// Of the nearest detection, √W.
+    amplitude: Option<Complex<f64>>,
     count: u32,
 }
 
@@ -48,7 +51,7 @@ struct Pixel {
 ///
 /// A pixel is the mean of the detections whose spots cover it, each with a Gaussian weight whose full width at half
 /// maximum is the spot's diameter. Power is averaged in watts. `material` is the index of the material of the nearest
-/// detection, and `count` the number of detections. Of several echoes of one chirp the strongest is drawn. The grid covers `field`, the field of view at 8 m, and a margin of
+/// detection; with phases, `real_sqrt_w` and `imaginary_sqrt_w` are its amplitude, √W. `count` is the number of detections. Of several echoes of one chirp the strongest is drawn. The grid covers `field`, the field of view at 8 m, and a margin of
 /// half a spot.
 pub fn power_image(
     scan: &Scan,
@@ -76,7 +79,8 @@ pub fn power_image(
             }
         }
     });
-    raster.channels = channels(&pixels);
+    let with_phases = detections.iter().any(|echo| echo.phase_rad.is_some());
+    raster.channels = channels(&pixels, with_phases);
     raster
 }
 
@@ -154,11 +158,18 @@ impl Pixel {
         if weight > self.nearest_weight {
             self.nearest_weight = weight;
             self.material = splat.material;
+            let echo = splat.echo;
+            self.amplitude =
+                echo.phase_rad.map(|phase_rad| Complex::from_polar(echo.power_w.sqrt(), phase_rad));
         }
     }
 }
 
-fn channels(pixels: &[Pixel]) -> Vec<Channel> {
+/// The channels of a nearest detection's amplitude, for scans with phases.
+const AMPLITUDE: [(&str, fn(Complex<f64>) -> f64); 2] =
+    [("real_sqrt_w", |amplitude| amplitude.re), ("imaginary_sqrt_w", |amplitude| amplitude.im)];
+
+fn channels(pixels: &[Pixel], with_phases: bool) -> Vec<Channel> {
     let values: [fn(&Pixel) -> f64; 5] = [
         |p| dbm_from_watts(p.power_w / p.weight),
         |p| p.range_m / p.weight,
@@ -170,6 +181,12 @@ fn channels(pixels: &[Pixel]) -> Vec<Channel> {
     for (name, value) in CHANNELS.into_iter().zip(values) {
         let values = pixels.iter().map(|p| if p.count == 0 { f32::NAN } else { value(p) as f32 });
         channels.push(Channel { name: name.to_owned(), values: values.collect() });
+    }
+    if with_phases {
+        for (name, part) in AMPLITUDE {
+            let values = pixels.iter().map(|p| p.amplitude.map_or(f32::NAN, |a| part(a) as f32));
+            channels.push(Channel { name: name.to_owned(), values: values.collect() });
+        }
     }
     channels
 }
@@ -197,7 +214,17 @@ mod tests {
             edge_m: 0.0,
         };
         let power_w = watts_from_dbm(power_dbm);
-        Echo { chirp: 0, point, range_m: 8.0, xt_m, yt_m, power_w, rank: 1, truth: Some(truth) }
+        Echo {
+            chirp: 0,
+            point,
+            range_m: 8.0,
+            xt_m,
+            yt_m,
+            power_w,
+            phase_rad: None,
+            rank: 1,
+            truth: Some(truth),
+        }
     }
 
     fn image(echoes: Vec<Echo>) -> Raster {

@@ -8,9 +8,12 @@
 //! | power that arrives at an antenna by single paths | `paths.rs`, equation (11) |
 //! | … and by second-order paths | `bounce.rs` |
 //! | … with declared physical effects | `effect_scan.rs` |
+//! | the wave of a mirror that the spot reaches beyond | `coherent.rs` |
+//! | speckle, a field fixed to the surface | `speckle/` |
 //! | echoes that part in range | `returns.rs` |
 //! | how far the target tilts within the spots | `curvature.rs` |
 //! | detection by the receiver, and the cause of each echo | `detect.rs`, `echo.rs` |
+//! | tones of a beat signal | `tones.rs` |
 //! | image and point cloud | `image.rs`, `cloud.rs` |
 //! | many scans at once, on a graphics processor | `batch.rs` |
 
@@ -19,6 +22,7 @@ mod batch;
 mod behind;
 mod bounce;
 mod cloud;
+mod coherent;
 mod curvature;
 mod detect;
 mod echo;
@@ -33,8 +37,10 @@ mod returns;
 mod scan;
 mod setup;
 mod sheet;
+mod speckle;
 mod spot;
 mod surface;
+mod tones;
 
 pub use batch::{Batch, Take, Takes};
 pub use bounce::Bounce;

@@ -1,5 +1,9 @@
 //! A path from the radar to an antenna, and the sum over several.
 
+use std::f64::consts::TAU;
+
+use num_complex::Complex;
+
 use crate::radar::Detection;
 use crate::trace::Hit;
 
@@ -16,6 +20,10 @@ pub(super) struct Path {
     pub sheets: u8,
     /// Share of the power, 0 to 1, that all sheets on the path let through.
     pub passed_share: f64,
+    /// What sheets on the path seem to add to its range, m.
+    pub delay_m: f64,
+    /// Number of the smooth piece of the target that the hit lies on.
+    pub piece: u32,
     /// Number of surfaces on the path, 1 or 2.
     pub surfaces: u8,
     /// Azimuth of the source about the normal of the first surface, from its grain, rad.
@@ -24,6 +32,76 @@ pub(super) struct Path {
     pub specular_share: f64,
     /// Share of the power, 0 to 1, that comes back in one phase from the whole spot and does not speckle.
     pub coherent_share: f64,
+}
+
+/// The paths of one echo, added up over all that is known of their phases.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Arrival {
+    /// Mean power over all phases, and the mean range.
+    pub mean: Detection,
+    /// Power of the part that speckles, W.
+    pub incoherent_w: f64,
+    /// Amplitude of the rest, √W, with the phase of a beat over that of an echo from the mean range.
+    pub coherent: Complex<f64>,
+}
+
+impl Arrival {
+    /// An echo of a mean power and range of which one piece returns `coherent_w` in phase.
+    pub fn of_one_piece(mean: Detection, coherent_w: f64) -> Arrival {
+        let coherent = Complex::from(coherent_w.max(0.0).sqrt());
+        Arrival { mean, incoherent_w: (mean.power_w - coherent_w).max(0.0), coherent }
+    }
+
+    /// The sum of some paths. The coherent parts of the rays on one smooth piece are one wave, from their mean range.
+    pub fn of(paths: &[Path], wavelength_m: f64) -> Arrival {
+        let mean = sum(paths);
+        if let [path] = paths {
+            return Arrival::of_one_piece(mean, path.power_w * path.coherent_share);
+        }
+        let waves = waves(paths).into_iter().map(|Detection { range_m, power_w }| {
+            let phase_rad = 2.0 * TAU / wavelength_m * (range_m - mean.range_m);
+            Complex::from_polar(power_w.sqrt(), phase_rad)
+        });
+        let coherent = waves.sum();
+        let incoherent_w =
+            paths.iter().map(|path| path.power_w * (1.0 - path.coherent_share)).sum();
+        Arrival { mean, incoherent_w, coherent }
+    }
+
+    /// Amplitude of the mean power, √W, where nothing else is known of its phase.
+    pub fn steady(&self) -> Complex<f64> {
+        Complex::from(self.mean.power_w.sqrt())
+    }
+}
+
+/// The waves of some paths: the coherent parts of those by way of one smooth piece, with their mean range.
+pub(super) fn waves(paths: &[Path]) -> Vec<Detection> {
+    let mut pieces: Vec<(Surfaces, Detection)> = Vec::new();
+    for path in paths {
+        let power_w = path.power_w * path.coherent_share;
+        if power_w == 0.0 {
+            continue;
+        }
+        let place = pieces.iter().position(|(surfaces, _)| *surfaces == path.surfaces());
+        let place = place.unwrap_or_else(|| {
+            pieces.push((path.surfaces(), Detection { range_m: 0.0, power_w: 0.0 }));
+            pieces.len() - 1
+        });
+        let wave = &mut pieces[place].1;
+        wave.power_w += power_w;
+        // The mean by small steps keeps the precision of a range.
+        wave.range_m += (path.range_m - wave.range_m) * (power_w / wave.power_w);
+    }
+    pieces.into_iter().map(|(_, wave)| wave).collect()
+}
+
+/// The surfaces that a path goes by, as far as they tell waves apart.
+type Surfaces = (u32, u8, u8);
+
+impl Path {
+    fn surfaces(&self) -> Surfaces {
+        (self.piece, self.surfaces, self.sheets)
+    }
 }
 
 /// Total power, and the mean range weighted by power; without power, the plain mean of the ranges.

@@ -16,6 +16,7 @@ use rayon::prelude::*;
 
 use super::behind::{LIFT_M, Way, follow};
 use super::bounce::{Bounce, directions};
+use super::coherent::{RayPath, SpotRays, smooth_pieces};
 use super::effect_scan::{Change, EffectScan};
 use super::jones::Field;
 use super::observer::Observer;
@@ -41,6 +42,8 @@ pub(super) struct Paths<'a> {
     lit_shares: Vec<f64>,
     footprints: &'a Footprints,
     effects: Option<EffectScan<'a>>,
+    /// The smooth piece that each facet belongs to; empty where no spot can reach beyond what returns a wave.
+    pieces: Vec<u32>,
     /// The change of each chirp's whole echo by the effects; empty without effects.
     changes: Vec<Option<Change>>,
 }
@@ -111,9 +114,25 @@ impl<'a> Paths<'a> {
         let link = Link::new(setup.geometry.radar);
         let samples = spot::samples(footprints.rays_per_chirp);
         let lit_shares = spot::lit_shares(footprints.rays_per_chirp);
-        let changes = Vec::new();
-        let mut paths =
-            Paths { setup, observer, link, samples, lit_shares, footprints, effects, changes };
+        let pieces = match footprints.rays_per_chirp {
+            1 => Vec::new(),
+            _ if setup.has_waves() => {
+                let geometry = &setup.geometry;
+                smooth_pieces(geometry.bvh.mesh(), geometry.region_of_facet)
+            }
+            _ => Vec::new(),
+        };
+        let mut paths = Paths {
+            setup,
+            observer,
+            link,
+            samples,
+            lit_shares,
+            footprints,
+            effects,
+            pieces,
+            changes: Vec::new(),
+        };
         paths.changes =
             paths.effects.as_ref().map_or(Vec::new(), |effects| paths.changes_by(effects));
         paths
@@ -147,8 +166,11 @@ impl<'a> Paths<'a> {
         let spot = Spot::met(&self.link.beam, axis, range_m, number);
         let tilts = self.effects.as_ref().map_or([0.0; 2], |effects| effects.tilts(number));
         let sent = Emission { paths: self, number, spot, antenna, rays: hits.len(), tilts };
+        let has_pieces = !self.pieces.is_empty();
+        let mut direct = Vec::new();
         for (sample, hit) in hits.iter().enumerate() {
             let Some((hit, ray)) = hit.zip(spot.ray(self.samples[sample])) else { continue };
+            direct.extend(has_pieces.then_some(RayPath { ray: sample, place: paths.len() }));
             sent.scatter(hit, Passage::FREE, &ray, sample, paths);
             // Behind every sheet that the ray meets lies something else, or nothing.
             let (mut front, mut inward) = (hit, Passage::FREE);
@@ -156,9 +178,14 @@ impl<'a> Paths<'a> {
                 let Some(sheet) = self.setup.sheet(front.facet) else { break };
                 let Some(hit) = behind.hits[number * hits.len() + sample] else { break };
                 inward = inward.then(sheet.passage(front.cos_theta));
+                direct.extend(has_pieces.then_some(RayPath { ray: sample, place: paths.len() }));
                 sent.scatter(hit, inward, &ray, sample, paths);
                 front = hit;
             }
+        }
+        if has_pieces {
+            let rays = SpotRays { places: &self.samples, lit_shares: &self.lit_shares };
+            rays.cut_waves(&direct, paths);
         }
         if let Some(change) = self.changes.get(number).copied().flatten() {
             change.apply(paths);
@@ -285,6 +312,8 @@ impl<'a> Emission<'a> {
             hit: lit.hit,
             sheets: lit.inward.sheets,
             passed_share: way.power_ratio(),
+            delay_m: apparent_m,
+            piece: self.paths.pieces.get(lit.hit.facet as usize).copied().unwrap_or(0),
             surfaces: 1,
             azimuth_rad: y.atan2(x),
             specular_share: scattered.specular_share,
@@ -341,19 +370,30 @@ impl<'a> Emission<'a> {
                 && let Some(outward) = self.way_out(&second)
             {
                 let way = lit.inward.then(passage).then(outward);
+                let coherent_share = first.coherent_share
+                    * last.coherent_share
+                    * (beam_rad / second.beam_rad).powi(2);
+                let enhancement = self.enhancement(bounce, coherent_share);
                 let path_m = lit.hit.range_m + hit.range_m + second.antenna_m + way.delay_m();
                 paths.push(Path {
                     range_m: 0.5 * path_m,
-                    power_w: power_w * way.power_ratio(),
+                    power_w: power_w * way.power_ratio() * enhancement,
                     passed_share: way.power_ratio(),
+                    delay_m: 0.5 * way.delay_m(),
                     surfaces: 2,
                     specular_share,
-                    coherent_share: first.coherent_share
-                        * last.coherent_share
-                        * (beam_rad / second.beam_rad).powi(2),
+                    coherent_share: coherent_share / enhancement,
                     ..direct
                 });
             }
+        }
+    }
+
+    /// Factor on a second-order path by the one that goes round its surfaces the other way.
+    fn enhancement(&self, bounce: &Bounce, coherent_share: f64) -> f64 {
+        match (self.paths.observer, self.paths.setup.channel) {
+            (Observer::Radar, Channel::CoPolar) => bounce.enhancement(coherent_share),
+            _ => 1.0,
         }
     }
 

@@ -5,13 +5,14 @@
 
 use std::ops::Range;
 
+use super::detect::Measured;
 use super::path::{Path, sum};
-use crate::radar::{Detection, Returns};
+use crate::radar::Returns;
 
 /// A detection, and the paths that may have caused it, by their places in the list of a chirp.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Seen {
-    pub detection: Detection,
+    pub measured: Measured,
     pub paths: Range<usize>,
 }
 
@@ -47,10 +48,10 @@ pub(super) fn separate(paths: &mut [Path], cell_m: f64) -> Vec<Range<usize>> {
 /// Keeps the echoes that a receiver reports; `seen` has them by range.
 pub(super) fn choose(seen: &mut Vec<Seen>, returns: Returns, threshold_w: f64) {
     let strongest = |seen: &[Seen]| {
-        let powers = seen.iter().map(|seen| seen.detection.power_w).enumerate();
+        let powers = seen.iter().map(|seen| seen.measured.detection.power_w).enumerate();
         powers.reduce(|a, b| if b.1 > a.1 { b } else { a }).map(|(place, _)| place)
     };
-    let is_detected = |seen: &Seen| seen.detection.power_w >= threshold_w;
+    let is_detected = |seen: &Seen| seen.measured.detection.power_w >= threshold_w;
     let kept = match returns {
         Returns::All => return,
         Returns::First => seen.iter().position(is_detected).or_else(|| strongest(seen)),
@@ -66,6 +67,7 @@ pub(super) fn choose(seen: &mut Vec<Seen>, returns: Returns, threshold_w: f64) {
 mod tests {
     use super::*;
     use crate::frames::Point;
+    use crate::radar::Detection;
     use crate::trace::Hit;
 
     fn path(sheets: u8, range_m: f64, power_w: f64) -> Path {
@@ -76,6 +78,8 @@ mod tests {
             hit,
             sheets,
             passed_share: 1.0,
+            delay_m: 0.0,
+            piece: 0,
             surfaces: 1,
             azimuth_rad: 0.0,
             specular_share: 0.0,
@@ -117,12 +121,14 @@ mod tests {
 
     #[test]
     fn a_receiver_reports_the_strongest_the_first_or_all() {
-        let seen =
-            |power_w: f64| Seen { detection: Detection { range_m: 8.0, power_w }, paths: 0..1 };
+        let seen = |power_w: f64| Seen {
+            measured: Measured { detection: Detection { range_m: 8.0, power_w }, phase_rad: None },
+            paths: 0..1,
+        };
         let powers = |returns| {
             let mut echoes = vec![seen(0.1), seen(2.0), seen(3.0)];
             choose(&mut echoes, returns, 1.0);
-            echoes.iter().map(|echo| echo.detection.power_w).collect::<Vec<_>>()
+            echoes.iter().map(|echo| echo.measured.detection.power_w).collect::<Vec<_>>()
         };
         assert_eq!(powers(Returns::Strongest), [3.0]);
         assert_eq!(powers(Returns::First), [2.0]);

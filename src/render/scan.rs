@@ -12,7 +12,7 @@ use super::paths::Paths;
 use super::setup::Setup;
 use super::spot::{self, Footprints};
 use crate::frames::{Global, Point};
-use crate::radar::Field;
+use crate::radar::{Field, SpeckleForm};
 use crate::trace::{ScanGeometry, winding_number};
 
 /// The echoes of one scan at one antenna.
@@ -104,7 +104,7 @@ pub fn shade(
 ) -> Result<Scan, RenderError> {
     check(setup, footprints, observer)?;
     let effects = EffectScan::new(setup);
-    let detector = Detector::new(setup, observer, effects.as_ref())?;
+    let detector = Detector::new(setup, observer, effects.as_ref(), footprints)?;
     let paths = Paths::new(setup, observer, footprints, effects);
     let target_from_global = setup.geometry.radar.frames().global_from_target.inverse();
     let echoes = Echoes { setup, footprints, observer, detector: &detector, target_from_global };
@@ -147,7 +147,7 @@ pub fn beat_signals<'a>(
 ) -> Result<impl Iterator<Item = Result<Beats, RenderError>> + use<'a>, RenderError> {
     check(setup, footprints, observer)?;
     let effects = EffectScan::new(setup);
-    let detector = Detector::new(setup, observer, effects.as_ref())?;
+    let detector = Detector::new(setup, observer, effects.as_ref(), footprints)?;
     let paths = Paths::new(setup, observer, footprints, effects);
     let hits = footprints.hits.chunks(footprints.rays_per_chirp.max(1));
     Ok(hits
@@ -167,10 +167,10 @@ fn check(setup: &Setup, footprints: &Footprints, observer: Observer) -> Result<(
     if setup.geometry.radar.receiver.is_some()
         && (footprints.rays_per_chirp > 1 || setup.bounce.is_some())
     {
-        return match setup.geometry.radar.speckle {
-            None => Err(RenderError::Phases),
-            Some(speckle) if speckle.coherent_ratio > 0.0 => Err(RenderError::Coherent),
-            Some(_) => Ok(()),
+        return match (setup.geometry.radar.speckle, setup.speckle_form(footprints.rays_per_chirp)) {
+            (None, _) => Err(RenderError::Phases),
+            (Some(_), SpeckleForm::Law) => Err(RenderError::LawOfTones),
+            (Some(_), SpeckleForm::Scatterers | SpeckleForm::Independent) => Ok(()),
         };
     }
     Ok(())

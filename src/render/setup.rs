@@ -4,7 +4,8 @@ use super::bounce::Bounce;
 use super::sheet::Sheet;
 use super::surface::Surface;
 use crate::effects::Model;
-use crate::radar::Channel;
+use crate::frames::Direction;
+use crate::radar::{Beam, Channel, SpeckleForm};
 use crate::trace::ScanGeometry;
 
 /// Sheets that a ray passes where nothing else is stated: two garments, front and back.
@@ -26,8 +27,12 @@ pub struct Setup<'a> {
     pub channel: Channel,
     /// Largest number of sheets that a ray passes; it ends at the next one.
     pub most_sheets: usize,
-    /// Seed of everything random.
+    /// Whether several antennas see this target in one scan, so that they should see the same scatterers.
+    pub several_antennas: bool,
+    /// Seed of all that is fixed to the target: the scatterers of its surface, and the directions of second-order paths.
     pub seed: u64,
+    /// Seed of what every scan draws anew: noise, errors of ranges, and speckle of the form `independent`; `seed` when `None`.
+    pub noise_seed: Option<u64>,
 }
 
 impl<'a> Setup<'a> {
@@ -40,13 +45,30 @@ impl<'a> Setup<'a> {
             effects: None,
             channel: Channel::CoPolar,
             most_sheets: MOST_SHEETS,
+            several_antennas: false,
             seed: 0,
+            noise_seed: None,
         }
     }
 
     /// Whether a region lets a part of the wave through.
     pub(super) fn has_sheets(&self) -> bool {
         self.surfaces.iter().any(|surface| surface.sheet.is_some())
+    }
+
+    /// The form of its speckle, for so many rays per chirp.
+    pub(super) fn speckle_form(&self, rays: usize) -> SpeckleForm {
+        let several_paths = rays > 1 || self.bounce.is_some();
+        self.geometry.radar.speckle_form(self.several_antennas, several_paths)
+    }
+
+    /// Whether a surface returns a part of its echo in one wave.
+    pub(super) fn has_waves(&self) -> bool {
+        let beam_rad = Beam::new(self.geometry.radar).towards(0.0, 0.0).divergence_rad();
+        let facing = Direction::from_angles(0.0, 0.0);
+        let mut seen =
+            self.surfaces.iter().map(|surface| surface.seen_by(beam_rad, facing, facing));
+        seen.any(|seen| seen.coherent_share > 0.0)
     }
 
     /// The sheet that a facet belongs to; `None` where nothing passes.

@@ -37,6 +37,9 @@ pub struct SceneFile {
     /// Seed of everything random.
     #[serde(default)]
     pub seed: u64,
+    /// Seed of what a repeated scan of the same target draws anew, its noise and errors of ranges; `seed` when not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise_seed: Option<u64>,
     /// The instrument.
     #[serde(default)]
     pub radar: Radar,
@@ -90,11 +93,20 @@ pub struct BounceEntry {
     /// let through, both senses of the path together. −20: assumed; side lobes are not published.
     /// Receivers see the whole target alike.
     pub outside_spot_db: f64,
+    /// Whether the two ways round a pair of surfaces, which are as long as each other, add in phase at the radar: twice the
+    /// power of what is not coherent. Off: as in the paper, powers add.
+    #[serde(skip_serializing_if = "is_off")]
+    pub in_phase: bool,
+}
+
+/// What serde leaves out.
+fn is_off(on: &bool) -> bool {
+    !*on
 }
 
 impl Default for BounceEntry {
     fn default() -> Self {
-        BounceEntry { rays: 64, outside_spot_db: -20.0 }
+        BounceEntry { rays: 64, outside_spot_db: -20.0, in_phase: false }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::formats::words::{listed, significant};
 use crate::frames::{Global, Point, Pose};
 use crate::geometry::Raster;
 use crate::material::{Curve, Lobes, Material};
-use crate::radar::{Beam, Channel, Radar};
+use crate::radar::{Beam, Channel, Radar, SpeckleForm};
 use crate::render::{Bounce, RenderError, Scan, Setup, Sheet, Surface, power_image};
 use crate::scene::{Region, Scene};
 use crate::store::Store;
@@ -60,6 +60,10 @@ pub struct Assembly<'a> {
     surfaces: Vec<Surface<'a>>,
     model: Option<Model<'a>>,
 }
+
+/// What a law of speckle gets wrong for several antennas.
+const INDEPENDENT_ANTENNAS: &str = "radar.speckle.form = \"law\" gives every antenna a field of its own, and antennas near each other see in \
+                                    truth the same one: form = \"scatterers\" has that";
 
 impl SceneMaterial {
     /// Width of its narrowest lobe, rad, where its lobes include the beam that saw them; infinite without a lobe.
@@ -266,12 +270,23 @@ impl ReadyScene {
         for SceneMaterial { found, .. } in &self.materials {
             notices.extend(extrapolation_warning(&found.material, self.scene.radar()));
         }
+        if self.speckle_form() == Some(SpeckleForm::Law) && !self.scene.file.receiver.is_empty() {
+            notices.push(INDEPENDENT_ANTENNAS.to_owned());
+        }
         for material in &self.materials {
             notices.extend(self.other_footprint(material));
             notices.extend(self.too_narrow(material));
             notices.extend(too_much(material));
         }
         notices
+    }
+
+    /// How its speckle is made; none without speckle.
+    pub fn speckle_form(&self) -> Option<SpeckleForm> {
+        let (file, radar) = (&self.scene.file, self.scene.radar());
+        let several_paths = file.spot.rays > 1 || file.bounce.is_some();
+        let form = radar.speckle_form(!file.receiver.is_empty(), several_paths);
+        radar.speckle.map(|_| form)
     }
 
     /// An error of the renderer with the scene's file; `antenna` names the receiver that it is about, with a
@@ -319,11 +334,14 @@ impl<'a> Assembly<'a> {
             bounce: scene.file.bounce.map(|bounce| Bounce {
                 rays: bounce.rays,
                 outside_spot: ratio_from_db(bounce.outside_spot_db),
+                in_phase: bounce.in_phase,
             }),
             effects: self.model.as_ref(),
             channel: Channel::CoPolar,
             most_sheets: scene.file.transmission.sheets,
+            several_antennas: !scene.file.receiver.is_empty(),
             seed: scene.file.seed,
+            noise_seed: scene.file.noise_seed,
         }
     }
 

@@ -1,7 +1,7 @@
 //! From beat signal to detection, and speckle, against theory.
 
 use matdb::radar::random::{Draws, Key, Purpose};
-use matdb::radar::{Chirp, RangeProcessor, Receiver, Return, Speckle, Window};
+use matdb::radar::{Chirp, IndependentSpeckle, RangeProcessor, Receiver, Return, Window};
 use num_complex::Complex;
 use rayon::prelude::*;
 
@@ -176,7 +176,7 @@ fn noise_rows() -> Vec<Row> {
 
 const FACTORS: usize = 40_000;
 
-fn factors(speckle: Speckle) -> Vec<f64> {
+fn factors(speckle: IndependentSpeckle) -> Vec<f64> {
     let mut draws = draws(speckle.looks as u64, Purpose::Speckle);
     (0..FACTORS).map(|_| speckle.intensity_factor(&mut draws)).collect()
 }
@@ -198,7 +198,7 @@ fn speckle_rows() -> Vec<Row> {
     let root = (FACTORS as f64).sqrt();
     let mut rows = Vec::new();
     for (looks, offset_db, deviation_db) in SPECKLE_DB {
-        let factors = factors(Speckle { looks, coherent_ratio: 0.0 });
+        let factors = factors(IndependentSpeckle { looks, coherent_ratio: 0.0 });
         let contrast = deviation(&factors) / mean(&factors);
         // The deviation of an exponential's contrast is 1/√n, that of calmer laws is less.
         let allowed = around(1.0 / looks.sqrt(), SIGMAS / root);
@@ -212,7 +212,7 @@ fn speckle_rows() -> Vec<Row> {
         let what = format!("L = {looks}: standard deviation of the decibels");
         rows.push(Row::new(what, deviation(&levels_db), allowed).digits(3).unit("dB"));
     }
-    let calm = factors(Speckle { looks: 1.0, coherent_ratio: 4.0 });
+    let calm = factors(IndependentSpeckle { looks: 1.0, coherent_ratio: 4.0 });
     // √(1 + 2K)/(1 + K) with K = 4.
     let what = "L = 1, coherent part four times the diffuse: contrast";
     rows.push(Row::new(what, deviation(&calm) / mean(&calm), around(0.6, SIGMAS / root)).digits(3));

@@ -131,7 +131,7 @@ fn second_over_first(a_m: f64, albedo: f64) -> f64 {
 /// Largest relative difference of what the second wing adds.
 fn dihedral_error() -> f64 {
     let chalk = Lambert { albedo: 0.7 };
-    let bounce = Some(Bounce { rays: 10_000, outside_spot: 1.0 });
+    let bounce = Some(Bounce { rays: 10_000, outside_spot: 1.0, in_phase: false });
     let [one, both] =
         [None, bounce].map(|bounce| scan(&line(), dihedral(), &chalk, 1, bounce, Observer::Radar));
     assert_eq!((one.len(), both.len()), (12, 12));
@@ -156,7 +156,7 @@ fn mirror() -> CookTorrance {
 /// Largest difference between the range of a corner of mirrors and that of its edge, mm.
 fn corner_range_error_mm() -> f64 {
     let mirror = mirror();
-    let bounce = Some(Bounce { rays: 10_000, outside_spot: 1.0 });
+    let bounce = Some(Bounce { rays: 10_000, outside_spot: 1.0, in_phase: false });
     let echoes = scan(&line(), dihedral(), &mirror, 1, bounce, Observer::Radar);
     let edge_m = |echo: &Echo| STAND_OFF_M * (echo.point.xyz.x / STAND_OFF_M).atan().cos();
     let error_mm = |echo: &Echo| 1e3 * (echo.range_m - edge_m(echo)).abs();
@@ -170,7 +170,7 @@ fn corner_within_the_spot() -> f64 {
     let mirror = mirror();
     let radar = raster(Raster { lines: 1, chirps_per_line: 1, width_m: 1e-6, height_m: 1e-6 });
     let [none, all] = [0.0, 1.0].map(|outside_spot| {
-        let bounce = Some(Bounce { rays: 2000, outside_spot });
+        let bounce = Some(Bounce { rays: 2000, outside_spot, in_phase: false });
         let echoes = scan(&radar, dihedral(), &mirror, 400, bounce, Observer::Radar);
         echoes[0].power_w
     });

@@ -9,7 +9,7 @@ use crate::effects::{Level, Model, entry};
 use crate::formats::EffectEntry;
 use crate::geometry::Raster;
 use crate::material::{Lobes, Status};
-use crate::radar::{Beam, Radar};
+use crate::radar::{Beam, Radar, SpeckleForm};
 use crate::render::Scan;
 use crate::scene::{MeshReport, Scene};
 use crate::setup::{MaterialRevision, ReadyScene, SceneMaterial, ValidityWarning, View};
@@ -44,6 +44,9 @@ pub struct ScanRecord<'a> {
     pub(super) radar: &'a Radar,
     /// The beam towards the middle of the target plane.
     beam: Value,
+    /// How the speckle was made; nothing without speckle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    speckle_form: Option<SpeckleForm>,
     frames: Value,
     /// What `cloud.ply` holds.
     cloud: &'static str,
@@ -190,6 +193,7 @@ impl<'a> ScanRecord<'a> {
             scene: json!({
                 "name": file.name,
                 "seed": file.seed,
+                "noise_seed": file.noise_seed.unwrap_or(file.seed),
                 "spot": file.spot,
                 "bounce": file.bounce,
                 "mesh": file.mesh,
@@ -197,6 +201,7 @@ impl<'a> ScanRecord<'a> {
             }),
             radar: scene.radar(),
             beam: beam(scene.radar()),
+            speckle_form: ready.speckle_form(),
             frames: frames(scene),
             cloud: if all_hits { "every hit" } else { "detections" },
             meshes: &scene.target.meshes,

@@ -1,0 +1,212 @@
+//! Speckle as a law: a Gaussian field over the focal surface with the beam's own correlation.
+//!
+//! Two beams of the waist w₀ that pass their foci d apart see amplitudes with the correlation exp(−d²/w₀²), however far
+//! from the focus the surface lies, since their overlap does not change along the way. Convolving white noise with
+//! exp(−2d²/w₀²), the amplitude of the two-way weight at the waist, gives just that.
+
+use num_complex::Complex;
+use rayon::prelude::*;
+
+use super::identity::Identity;
+use crate::radar::random::Purpose;
+
+/// Distance beyond which the kernel is cut off, in waists: 0.6 % of its middle.
+const REACH: f64 = 1.6;
+/// Nodes per waist. At two the field's power is the same at and between the nodes to 1e-4.
+const NODES_PER_WAIST: f64 = 2.0;
+/// Nodes on a side of a block, whose noise has one key.
+const BLOCK: i64 = 32;
+/// Most values of a lattice, 2 GiB.
+const MOST_VALUES: f64 = 134_217_728.0;
+
+/// Where a chirp's beam passes its focus, in the target frame, m, and its waist there, m.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Aim {
+    pub at_m: [f64; 2],
+    pub waist_m: f64,
+}
+
+/// Complex noise of unit variance on a square lattice, one value per look at each node.
+pub(super) struct Lattice {
+    spacing_m: f64,
+    /// Node of the lower left corner, counted from the origin of the target plane.
+    first: [i64; 2],
+    /// Nodes along x and y.
+    size: [usize; 2],
+    looks: usize,
+    values: Vec<Complex<f64>>,
+}
+
+impl Lattice {
+    /// The lattice under all aims; `None` where it would be larger than memory should hold.
+    pub fn new(aims: &[Aim], identity: Identity, looks: usize) -> Option<Lattice> {
+        let least_m = aims.iter().map(|aim| aim.waist_m).fold(f64::INFINITY, f64::min);
+        let spacing_m = least_m / NODES_PER_WAIST;
+        let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        for Aim { at_m, waist_m } in aims {
+            for (end, at_m) in ends.iter_mut().zip(at_m) {
+                let reach = [at_m - REACH * waist_m, at_m + REACH * waist_m];
+                let [low, high] = reach.map(|m| (m / spacing_m).floor());
+                *end = [end[0].min(low), end[1].max(high + 1.0)];
+            }
+        }
+        let sides = ends.map(|[low, high]| high - low + 1.0);
+        // Also a side that is no number is too large.
+        if !(sides[0] * sides[1] * looks as f64 <= MOST_VALUES) {
+            return None;
+        }
+        let (first, size) = (ends.map(|end| end[0] as i64), sides.map(|side| side as usize));
+        let mut lattice = Lattice { spacing_m, first, size, looks, values: Vec::new() };
+        lattice.fill(identity);
+        Some(lattice)
+    }
+
+    /// Draws the noise of every block, which is the same whatever else the lattice covers.
+    fn fill(&mut self, identity: Identity) {
+        let [width, height] = self.size.map(|size| size as i64);
+        let [left, low] = self.first;
+        let columns = left.div_euclid(BLOCK)..=(left + width - 1).div_euclid(BLOCK);
+        let row_length = width as usize * self.looks;
+        let mut values = vec![Complex::ZERO; row_length * height as usize];
+        // Rows of blocks begin at multiples of a block; the first may be cut.
+        let cut = (BLOCK - low.rem_euclid(BLOCK)).min(height) as usize * row_length;
+        let (top, rest) = values.split_at_mut(cut);
+        let mut bands: Vec<&mut [Complex<f64>]> = vec![top];
+        bands.extend(rest.chunks_mut(row_length * BLOCK as usize));
+        bands.into_par_iter().enumerate().for_each(|(number, band)| {
+            let row = low.div_euclid(BLOCK) + number as i64;
+            let from = (low - row * BLOCK).max(0);
+            let rows = (band.len() / row_length) as i64;
+            for column in columns.clone() {
+                for look in 0..self.looks {
+                    let mut draws = identity.draws(Purpose::Scatterers, [column, row], look);
+                    for place in 0..BLOCK * BLOCK {
+                        let value = draws.complex_gaussian();
+                        let x = column * BLOCK + place % BLOCK - left;
+                        let y = place / BLOCK - from;
+                        if (0..width).contains(&x) && (0..rows).contains(&y) {
+                            band[(y * width + x) as usize * self.looks + look] = value;
+                        }
+                    }
+                }
+            }
+        });
+        self.values = values;
+    }
+
+    /// Replaces `amplitudes` by the field at an aim, one value of unit variance per look.
+    pub fn amplitudes(&self, aim: &Aim, amplitudes: &mut Vec<Complex<f64>>) {
+        amplitudes.clear();
+        amplitudes.resize(self.looks, Complex::ZERO);
+        let [across, along] = [0, 1].map(|axis| self.weights(aim, axis));
+        for (row, y_weight) in along.nodes() {
+            let start = (row * self.size[0] + across.first) * self.looks;
+            let nodes = self.values[start..].chunks_exact(self.looks);
+            for (x_weight, node) in across.weights().iter().zip(nodes) {
+                let weight = x_weight * y_weight;
+                amplitudes.iter_mut().zip(node).for_each(|(sum, value)| *sum += weight * value);
+            }
+        }
+        let norm = 1.0 / (across.square_sum() * along.square_sum()).sqrt();
+        amplitudes.iter_mut().for_each(|amplitude| *amplitude *= norm);
+    }
+
+    /// The kernel exp(−2d²/w₀²) along one axis.
+    fn weights(&self, aim: &Aim, axis: usize) -> Weights {
+        let (at_m, reach_m) = (aim.at_m[axis], REACH * aim.waist_m);
+        let low = ((at_m - reach_m) / self.spacing_m).ceil() as i64;
+        let high = ((at_m + reach_m) / self.spacing_m).floor() as i64;
+        let mut weights = Weights { first: (low - self.first[axis]) as usize, ..Weights::EMPTY };
+        for node in (low..=high).take(MOST_NODES) {
+            let off = (node as f64 * self.spacing_m - at_m) / aim.waist_m;
+            weights.values[weights.count] = (-2.0 * off * off).exp();
+            weights.count += 1;
+        }
+        weights
+    }
+}
+
+/// Most nodes of the kernel along an axis: a beam twenty times as wide as the narrowest one of its scan.
+const MOST_NODES: usize = 128;
+
+/// Weights of the nodes along an axis.
+struct Weights {
+    first: usize,
+    count: usize,
+    values: [f64; MOST_NODES],
+}
+
+impl Weights {
+    const EMPTY: Weights = Weights { first: 0, count: 0, values: [0.0; MOST_NODES] };
+
+    fn weights(&self) -> &[f64] {
+        &self.values[..self.count]
+    }
+
+    fn nodes(&self) -> impl Iterator<Item = (usize, f64)> {
+        (self.first..).zip(self.weights().iter().copied())
+    }
+
+    fn square_sum(&self) -> f64 {
+        self.weights().iter().map(|weight| weight * weight).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WAIST_M: f64 = 0.0136;
+
+    fn aim(x_m: f64, y_m: f64) -> Aim {
+        Aim { at_m: [x_m, y_m], waist_m: WAIST_M }
+    }
+
+    fn identity(surface: u64) -> Identity {
+        Identity { seed: 7, surface }
+    }
+
+    /// The field at an aim, of a lattice under some aims.
+    fn field(lattice: &Lattice, aim: &Aim) -> Vec<Complex<f64>> {
+        let mut amplitudes = Vec::new();
+        lattice.amplitudes(aim, &mut amplitudes);
+        amplitudes
+    }
+
+    #[test]
+    fn amplitudes_of_beams_d_apart_have_the_correlation_of_the_beams() {
+        let shares = [0.0, 0.3, 0.7, 1.0, 1.5];
+        let pairs: Vec<[Aim; 2]> = (0..40)
+            .flat_map(|i| (0..40).map(move |j| [0.07 * f64::from(i), 0.067 * f64::from(j)]))
+            .flat_map(|[x, y]| shares.map(|share| [aim(x, y), aim(x + share * WAIST_M, y)]))
+            .collect();
+        let all: Vec<Aim> = pairs.iter().flatten().copied().collect();
+        let lattice = Lattice::new(&all, identity(1), 2).unwrap();
+        for (place, share) in shares.iter().enumerate() {
+            let (mut found, mut count) = (Complex::ZERO, 0.0);
+            for pair in pairs.iter().skip(place).step_by(shares.len()) {
+                let [a, b] = [field(&lattice, &pair[0]), field(&lattice, &pair[1])];
+                found += std::iter::zip(a, b).map(|(a, b)| a * b.conj()).sum::<Complex<f64>>();
+                count += 2.0;
+            }
+            let (found, expected) = (found / count, (-share * share).exp());
+            assert!((found - expected).norm() < 4.0 / f64::sqrt(count), "{share}: {found}");
+        }
+    }
+
+    #[test]
+    fn the_field_is_the_surface_s_and_not_the_scan_s() {
+        let (near, far) = (aim(0.013, -0.021), aim(0.9, 0.8));
+        let small = Lattice::new(&[near], identity(1), 3).unwrap();
+        let large = Lattice::new(&[near, far, aim(-0.7, -0.4)], identity(1), 3).unwrap();
+        assert_eq!(field(&small, &near), field(&large, &near));
+        let other = Lattice::new(&[near], identity(2), 3).unwrap();
+        assert_ne!(field(&small, &near), field(&other, &near));
+    }
+
+    #[test]
+    fn a_lattice_beyond_memory_is_none() {
+        assert!(Lattice::new(&[aim(0.0, 0.0), aim(1e4, 1e4)], identity(1), 1).is_none());
+        assert!(Lattice::new(&[aim(0.0, 0.0), aim(1e300, 0.0)], identity(1), 1).is_none());
+    }
+}
