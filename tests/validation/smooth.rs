@@ -12,7 +12,7 @@ use super::stage::{Aim, Keys, MIRROR, Stage, graded, part, part_at, plate};
 
 /// Whether the amplitudes of a mirror's visible part add before they are squared. Until then half a mirror returns
 /// half the power of a whole one. Set this, and the rows must pass.
-const EDGES_ADD_AMPLITUDES: bool = false;
+const EDGES_ADD_AMPLITUDES: bool = true;
 
 /// Whether a spot whose axis misses the target is as wide as the beam where its other rays meet the target. Until then it
 /// is as wide as at 8 m. Set this, and the rows must pass.
