@@ -93,6 +93,28 @@ fn the_text_says_what_was_seen_and_what_follows() {
 }
 
 #[test]
+fn effects_that_the_scene_declares_are_named_since_a_calibration_leaves_them_out() {
+    let folder = rendered(&raster(60, 0.4), PLATE);
+    let run = |scene: &str| {
+        let run = ["calibrate", "out/cloud.ply", "--scene", scene];
+        let output = matdb(folder.path()).args(run).output().unwrap();
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let effects = "[[radar.effect]]\nname = \"drift\"\nslope_db = 1\n".to_owned();
+    let more = effects + "[[radar.effect]]\nname = \"compression\"\nsaturation_dbm = 30\n";
+    fs::write(folder.path().join("effects.toml"), scene(&(raster(60, 0.4) + &more), PLATE))
+        .unwrap();
+    let said = run("effects.toml");
+    assert_eq!(
+        said.matches("declares drift and compression, which a calibration leaves out").count(),
+        1,
+        "{said}"
+    );
+    assert!(!run("scene.toml").contains("leaves out"));
+}
+
+#[test]
 fn a_sphere_gives_loss_and_spot() {
     let more = raster(16, 0.06) + "[spot]\nrays = 6000\n";
     let mesh = "file = \"builtin:sphere-cap\"\nscale = 0.2\ntranslation_m = [0.002, 1.1, -0.1]";
@@ -159,6 +181,7 @@ fn what_does_not_calibrate_is_refused() {
     let header = "x_m,y_m,z_m,power_dbm\n";
     write("empty.csv", header);
     write("nan.csv", &format!("{header}0,1.1,0,nan\n"));
+    write("one.csv", &format!("{header}0,1.1,0,-5\n"));
     write("stretched.toml", &scene("", "file = \"builtin:trihedral\"\nsize_m = [0.1, 0.1, 0.2]"));
     write("elsewhere.toml", &scene(&raster(60, 0.4), &PLATE.replace("1.1, 0]", "1.1, 0.5]")));
     let deaf = format!("[radar]\nthreshold_dbm = 20\n{}", raster(60, 0.4));
@@ -173,6 +196,11 @@ fn what_does_not_calibrate_is_refused() {
     for (cloud, scene, parts) in [
         ("empty.csv", "scene.toml", &["empty.csv", "no points"][..]),
         ("nan.csv", "scene.toml", &["nan.csv", "finite"]),
+        (
+            "one.csv",
+            "scene.toml",
+            &["one.csv", "the plate has 1 point within 20 dB", "a calibration needs 8"],
+        ),
         ("paper/cloud.ply", "scene.toml", &["paper/cloud.ply", "plate"]),
         (good, "elsewhere.toml", &["mm off the plate", "place"]),
         (good, "deaf.toml", &["threshold of 20 dBm", "radar.threshold_dbm"]),
@@ -180,7 +208,7 @@ fn what_does_not_calibrate_is_refused() {
         (good, "stretched.toml", &["mesh `target`", "`scale`"]),
         (good, &mannequin, &["calibration target", "builtin:calibration-plate"]),
         (good, "builtin:calibration-plat", &["did you mean `builtin:calibration-plate`?"]),
-        (good, "builtin:calibration-sphere", &[good, "sphere"]),
+        (good, "builtin:calibration-sphere", &[good, "ray of their chirp", "the radar's scan"]),
     ] {
         let text = refused(matdb(at).args(["calibrate", cloud, "--scene", scene]));
         assert!(parts.iter().all(|part| text.contains(part)), "{scene}: {text}");

@@ -218,6 +218,65 @@ fn measure_states_how_its_curve_was_lit() {
     }
 }
 
+/// A ball of 0.15 m between cuboids that hold its pose, seen with so many rays per spot.
+fn ball(folder: &Path, name: &str, rays: usize) {
+    let mut scene = format!(
+        "[radar.scan]\npattern = \"raster\"\nlines = 80\nchirps_per_line = 80\nwidth_m = 0.4\nheight_m = 0.4\n\
+         [spot]\nrays = {rays}\n[radar.speckle]\nlooks = 16\nform = \"independent\"\n"
+    );
+    for (mesh, shape) in [
+        ("ball", "sphere\"\nsize_m = [0.3, 0.3, 0.3]\ntranslation_m = [-0.03, 1.1, -0.15]"),
+        (
+            "brick",
+            "cuboid\"\nsize_m = [0.1, 0.3, 0.1]\ntranslation_m = [0.18, 1.1, -0.15]\nrotation_deg = [10, 20, 30]",
+        ),
+    ] {
+        scene += &format!("[[mesh]]\nname = \"{mesh}\"\nfile = \"builtin:{shape}\n");
+        scene += &format!("[[region]]\nname = \"{mesh}\"\nmesh = \"{mesh}\"\nmaterial = \"own\"\n");
+    }
+    fs::write(folder.join(name), scene).unwrap();
+}
+
+/// A radar sees a ball's lobe wider by the curvature within its spot, w/2a = 0.045 rad, which is as much as the roughness.
+#[test]
+fn a_fit_of_a_curved_target_finds_the_surfaces_own_lobe() {
+    const M: f64 = 0.05;
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    stated(at, "own", "lobes = \"surface\"", &toml_law(M));
+    let found = |rays: usize, measured_with: usize| {
+        ball(at, "scene.toml", rays);
+        run(at, "render -q scene.toml -o out");
+        ball(at, "scene.toml", measured_with);
+        let (_, said) = run(
+            at,
+            "measure out/cloud.ply --scene scene.toml --region ball --exact-mesh -o measured",
+        );
+        let fit = json(at, "fit measured/curve.csv --model mixture --looks 16 --starts 1");
+        let estimates = fit["estimates"].as_array().unwrap();
+        let m = estimates.iter().find(|estimate| estimate["name"] == "specular.m").unwrap();
+        (m["value"].as_f64().unwrap(), said.matches("curved within the spot").count(), said)
+    };
+    // Four deviations, and a twentieth of m for facets of 7 mm and the rays of a spot.
+    for rays in [1, 32] {
+        let (m, said, text) = found(rays, rays);
+        assert!((m / M - 1.0).abs() < 0.1, "{rays} rays: {m}");
+        assert_eq!(said, 1, "{text}");
+        assert_eq!(text.contains("write rays = 16 under [spot]"), rays == 1, "{text}");
+    }
+    // Without its curvature the target seems rougher: √(m² + (w/2a)²) = 0.0675.
+    let (m, _, _) = found(32, 1);
+    assert!((m / 0.0675 - 1.0).abs() < 0.05, "{m}");
+}
+
+/// A lobe of this width over a diffuse floor, as a `material.toml` states it.
+fn toml_law(m: f64) -> String {
+    format!(
+        "{{ model = \"mixture\", k = 0.1, specular = {{ model = \"cook-torrance\", f_lambda = 0.2, m = {m} }}, \
+         diffuse = {{ model = \"blinn-phong\", r_s = 0.1, alpha = 3 }} }}"
+    )
+}
+
 /// A lobe of this width over a diffuse floor.
 fn lobe(m: f64) -> Brdf {
     let text = format!(

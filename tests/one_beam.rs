@@ -103,19 +103,25 @@ fn plate() -> Mesh {
     solids::plate(2.0, 2.0)
 }
 
-/// A cap of a sphere that touches the origin from behind, in facets of 0.3 mm.
+/// A cap of a sphere that touches the origin from behind, in facets of 0.3 mm; with a radius below 0 from in front, so
+/// that it is a bowl.
 fn cap(radius_m: f64) -> Mesh {
-    const SIDE: u32 = 267;
-    const STEP_M: f64 = 0.3e-3;
-    let place = |step: u32| (f64::from(step) - 0.5 * f64::from(SIDE - 1)) * STEP_M;
+    cap_of(radius_m, 267)
+}
+
+/// As [`cap`], of so many vertices along its side of 80 mm.
+fn cap_of(radius_m: f64, side: u32) -> Mesh {
+    const SIDE_M: f64 = 0.08;
+    let place = |step: u32| (f64::from(step) / f64::from(side - 1) - 0.5) * SIDE_M;
     let vertex = |number: u32| {
-        let (x, y) = (place(number % SIDE), place(number / SIDE));
-        DVec3::new(x, y, (radius_m * radius_m - x * x - y * y).sqrt() - radius_m)
+        let (x, y) = (place(number % side), place(number / side));
+        let depth_m = radius_m.abs() - (radius_m * radius_m - x * x - y * y).sqrt();
+        DVec3::new(x, y, -depth_m.copysign(radius_m))
     };
-    let cells = (0..SIDE - 1).flat_map(|row| (0..SIDE - 1).map(move |column| row * SIDE + column));
-    let facets = cells.flat_map(|a| [[a, a + 1, a + SIDE + 1], [a, a + SIDE + 1, a + SIDE]]);
+    let cells = (0..side - 1).flat_map(|row| (0..side - 1).map(move |column| row * side + column));
+    let facets = cells.flat_map(|a| [[a, a + 1, a + side + 1], [a, a + side + 1, a + side]]);
     Mesh {
-        vertices: (0..SIDE * SIDE).map(vertex).collect(),
+        vertices: (0..side * side).map(vertex).collect(),
         facets: facets.collect(),
         labels: Vec::new(),
     }
@@ -345,7 +351,27 @@ fn nothing_returns_more_than_was_sent() {
                 }
             }
         }
-        let share = returned(cap(0.1), 0.0, 0.0, 64, &law);
-        assert!(share < 1.0, "{law:?}: {share}");
+        // A ball, and a bowl that focuses: from far too deep to nearly flat.
+        for radius_m in [0.1, -0.1, -0.4, -2.0] {
+            for z_m in [-0.5, 0.0, 0.5] {
+                for rays in [1, 64] {
+                    let share = returned(cap_of(radius_m, 54), 0.0, z_m, rays, &law);
+                    assert!(share < 1.0 + 1e-3, "{law:?} {radius_m} {z_m} {rays}: {share}");
+                }
+            }
+        }
     }
+}
+
+/// A bowl of the wavefront's own curvature sends every ray back on itself, and returns all of the beam where a plate
+/// returns 1/(1 + ζ²) of it.
+#[test]
+fn a_bowl_that_fits_the_wavefront_returns_all_of_the_beam() {
+    let (waist, z_m) = (Waist::new(), 0.5);
+    let rayleigh_m = PI * waist.waist_m.powi(2) / waist.wavelength_m;
+    let radius_m = -(z_m + rayleigh_m * rayleigh_m / z_m);
+    let bowl_db = db(returned(cap(radius_m), 0.0, z_m, RAYS, &MIRROR));
+    assert!((-MEAN_DB..1e-3).contains(&bowl_db), "{bowl_db} dB");
+    let plate_db = db(returned(plate(), 0.0, z_m, RAYS, &MIRROR));
+    assert!((plate_db + db(1.0 + waist.zeta(z_m).powi(2))).abs() < MEAN_DB, "{plate_db} dB");
 }

@@ -91,8 +91,9 @@ impl Term {
 }
 
 /// The exponent of a lobe cosᵃ of the half vector as a beam sees it, and its level over that of the lobe. The lobe is
-/// near a Gaussian of slopes with m² = 2/a, to which δ² is added. A lobe that is wider than the beam by a factor
-/// of 100 is seen as it is.
+/// near a Gaussian of slopes with m² = 2/a, to which δ² is added. That is the convolution within 0.06 dB down to 37 dB below
+/// the peak, for a beam up to a quarter as wide as the lobe. A lobe that is wider than the beam by a factor of 100 is
+/// seen as it is.
 pub(super) fn seen_cosines(cosines: f64, beam_rad: f64) -> (f64, f64) {
     let widened = 0.5 * cosines * beam_rad * beam_rad;
     if widened < UNSEEN {
@@ -107,3 +108,43 @@ pub(super) const UNSEEN: f64 = 1e-4;
 
 /// Cosine of the angle from the normal below which powers of it overflow.
 pub(super) const GRAZING: f64 = 1e-6;
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::units::db_from_ratio;
+
+    /// ∫ cosᵃ(s′)·K(s − s′) d²s′ over slopes about s, in polar coordinates by the midpoint rule.
+    fn convolved(cosines: f64, slope: f64, beam_rad: f64) -> f64 {
+        let (rings, turns) = (400, 180);
+        let width = 7.0 * beam_rad / f64::from(rings);
+        let mut sum = 0.0;
+        for ring in 0..rings {
+            let r = (f64::from(ring) + 0.5) * width;
+            let kernel = (-(r / beam_rad).powi(2)).exp() / (PI * beam_rad * beam_rad);
+            for turn in 0..turns {
+                let azimuth = (f64::from(turn) + 0.5) * TAU / f64::from(turns);
+                let slope2 = r * r + slope * slope - 2.0 * r * slope * azimuth.cos();
+                let lobe = (1.0 + slope2).powf(-0.5 * cosines);
+                sum += kernel * lobe * r * width * TAU / f64::from(turns);
+            }
+        }
+        sum
+    }
+
+    #[test]
+    fn a_lobe_of_cosines_is_seen_nearly_as_its_convolution() {
+        const BEAM_RAD: f64 = 0.0117;
+        for cosines in [10.0, 100.0, 1000.0] {
+            for widths in [0.0, 1.0, 2.0, 3.0] {
+                let slope: f64 = widths * (2.0f64 / cosines).sqrt();
+                let (seen, share) = seen_cosines(cosines, BEAM_RAD);
+                let found = share * (1.0 + slope * slope).powf(-0.5 * seen);
+                let error_db = db_from_ratio(found / convolved(cosines, slope, BEAM_RAD));
+                assert!(error_db.abs() < 0.06, "{cosines} {widths}: {error_db} dB");
+            }
+        }
+    }
+}

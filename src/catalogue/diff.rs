@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::leaves::{Leaf, leaves};
 use super::units::ENDINGS;
-use crate::brdf::{Brdf, Scattering};
+use crate::brdf::{Scattering, ThroughBeam};
 use crate::formats::words::{listed, round_significant, significant};
 use crate::material::{Curve, Material, Observation};
 use crate::radar::Footprint;
@@ -336,11 +336,15 @@ fn rendered(before: &Material, after: &Material) -> Option<Levels> {
         let cos_theta = f64::from(deg).to_radians().cos();
         db_from_ratio(lit.factor_to(after_lit.footprint, cos_theta))
     };
+    // Lobes of the surface alone are narrower than those that its curve shows.
+    let [beam_rad, after_beam_rad] = [before, after].map(Material::rendered_beam_rad);
+    let [old, new] =
+        [ThroughBeam { law: &old, beam_rad }, ThroughBeam { law: &new, beam_rad: after_beam_rad }];
     let differences = degrees.map(|deg| level_db(&new, deg) - level_db(&old, deg) - factor_db(deg));
     levels(&differences.filter(|difference| difference.is_finite()).collect::<Vec<_>>())
 }
 
-fn level_db(model: &Brdf, deg: u32) -> f64 {
+fn level_db(model: &ThroughBeam, deg: u32) -> f64 {
     db_from_ratio(model.sigma0(f64::from(deg).to_radians()))
 }
 

@@ -33,8 +33,9 @@ pub struct Illumination {
     /// The form of the footprint with which powers became σ⁰.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub footprint: Option<Footprint>,
-    /// Divergence of the beam on the target δ_w = λ/(2π·w), rad, above 0, with w the radius on which the field has
-    /// fallen to 1/e.
+    /// What the illumination adds to the width of a lobe, rad, above 0: a smooth mirror of the target's shape shows a
+    /// lobe of this width, to 1/e. It is the divergence δ₀ = λ/(2π·w₀) of the beam on a flat target, and
+    /// √(δ_w² + (w²/4)·(H + 1/R_c)²) on one of the curvature H, with δ_w = λ/(2π·w) of the spot's radius w.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub beam_rad: Option<f64>,
 }

@@ -135,6 +135,12 @@ impl Material {
         if fit.lobes.is_of_both() { 0.0 } else { beam_rad.unwrap_or(0.0) }
     }
 
+    /// The [`beam_rad`](Self::beam_rad) of the fit that scenes render; 0 where they render a curve.
+    pub fn rendered_beam_rad(&self) -> f64 {
+        let rendered = self.fits.iter().find(|fit| fit.name == self.render);
+        rendered.map_or(0.0, |fit| self.beam_rad(fit))
+    }
+
     /// The source of the numbers that a scene renders.
     pub fn render_kind(&self) -> Option<SourceKind> {
         let fits = self.fits.iter().map(|f| (&f.name, &f.source));

@@ -3,6 +3,7 @@
 use super::exclusions::Exclusions;
 use thiserror::Error;
 
+use crate::formats::words::counted;
 use crate::units::{dbm_from_watts, rounded};
 
 /// Why a registration fails.
@@ -183,8 +184,8 @@ pub enum CalibrationError {
     TurnedAway,
     /// Too few points near the peak.
     #[error(
-        "{points} points lie on the {target} within {within_db:.0} dB of the peak, and a calibration needs {least}; measure \
-         with a finer scan, or check that the cloud is of this scene"
+        "the {target} has {} within {within_db:.0} dB of the peak, and a calibration needs {least}; measure with a finer \
+         scan, or check that the cloud is of this scene", counted(*points, "point")
     )]
     Few {
         /// What the target is.

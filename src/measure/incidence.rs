@@ -95,9 +95,16 @@ impl<'a> Incidence<'a> {
         })
     }
 
+    /// The normal on the radar's side where a ray meets a region; `None` where it meets another one, or none.
+    pub(super) fn normal_in(&self, ray: &Ray<Global>, region: u16) -> Option<DVec3> {
+        let Intersection { hit, normal } = self.tracer.intersect(&self.registered.pose, ray)?;
+        (self.region(&hit) == Some(region)).then_some(normal)
+    }
+
     fn region(&self, hit: &Hit) -> Option<u16> {
         self.target.region_of_facet.get(hit.facet as usize).copied()
     }
+
     /// The intersections of eight rays from the origin of a ray to a circle about a point, across the beam.
     fn around(
         &self,
@@ -119,29 +126,9 @@ impl<'a> Incidence<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frames::Pose;
     use crate::geometry::Mesh;
-    use crate::measure::register::Stop;
+    use crate::measure::synthetic::exact;
     use crate::scene::solids;
-
-    /// A pose that is known exactly.
-    fn exact() -> RegistrationResult {
-        RegistrationResult {
-            pose: Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO),
-            covariance: [[0.0; 6]; 6],
-            pivot: Point::new(0.0, 0.0, 0.0),
-            kept: false,
-            rms_m: 0.0,
-            widened: 1.0,
-            inliers: 1,
-            points: 1,
-            scans: 1,
-            iterations: 1,
-            stop: Stop::Still,
-            converged: true,
-            verdicts: vec![],
-        }
-    }
 
     fn target(mesh: Mesh) -> Target {
         let region_of_facet = vec![0; mesh.facets.len()];

@@ -28,6 +28,7 @@ pub mod statistics;
 mod synthetic;
 mod uncertainty;
 mod view;
+mod widening;
 
 pub use calibrate::{Calibration, CalibrationResult, Estimate};
 pub use cloud::{Cloud, CloudError, CloudPoint};

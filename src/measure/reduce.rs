@@ -21,6 +21,8 @@ use super::incidence::{Incidence, Sighting};
 use super::nearest::Nearest;
 use super::point_rays::rays_to_points;
 use super::register::RegistrationResult;
+use super::widening::{CurveWidening, Widening};
+use crate::formats::words::significant;
 use crate::frames::{Global, Point, Pose, Ray, Target as TargetFrame};
 use crate::material::{Illumination, Observation};
 use crate::radar::scan::PATTERN_RANGE_M;
@@ -42,6 +44,10 @@ pub struct Reduction {
     /// The target is the facets of the mesh, as in a simulation, and not a smooth surface that they
     /// approximate: their normals have no error.
     pub exact_mesh: bool,
+    /// The echoes are of whole spots, as those of a radar and of a rendering with several rays per spot. The curvature of the
+    /// target within the spot then widens its lobes, and is a part of the curve's beam. Otherwise they are of single
+    /// rays, to which every target is flat.
+    pub of_spots: bool,
 }
 
 /// A curve and what was left out of it.
@@ -60,7 +66,7 @@ const TOLERATED: usize = 100;
 
 /// A row from a detection or a silent chirp, or the reason why there is none.
 enum Fate {
-    Row(Observation),
+    Row(Observation, Widening),
     Missed,
     OffSurface,
     OtherRegion,
@@ -89,20 +95,8 @@ pub fn sigma0(link: &Link, axis: &Ray<Global>, range_m: f64, cos_theta: f64, pow
     quotient * Footprint::Paper.factor_to(link.footprint, cos_theta)
 }
 
-/// The form of the footprint that was taken, and the root mean square of the beam's divergence on the target: its
-/// square adds to that of a lobe's slopes. The beam widens away from the focus and from the middle of the field.
-fn illumination(link: &Link, rows: &[Observation]) -> Illumination {
-    let divergence_rad = |row: &Observation| {
-        let [xt_m, yt_m] = row.target_m?;
-        Some(link.beam.towards(xt_m, yt_m).section(row.range_m?).divergence_rad())
-    };
-    let squares: Vec<f64> = rows.iter().filter_map(divergence_rad).map(|rad| rad * rad).collect();
-    let beam_rad = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
-    Illumination {
-        footprint: Some(link.footprint),
-        beam_rad: Some(beam_rad).filter(|rad| *rad > 0.0),
-    }
-}
+/// A target whose curvature makes lobes wider by this factor is named.
+const CURVED: f64 = 1.5;
 
 impl Reduction {
     /// The curve of a cloud that `radar` measured with `chirps`, and that `registered` ties to
@@ -144,9 +138,38 @@ impl Reduction {
                  wrong; name the part that was kept with a region"
             ));
         }
-        let illumination = illumination(&reducer.link, &rows);
-        let curve = Curve { observations: rows, illumination };
+        let (observations, widenings): (Vec<_>, Vec<_>) = rows.into_iter().unzip();
+        let widening = CurveWidening::of(&widenings);
+        notices.extend(widening.and_then(|widening| self.curvature(&widening)));
+        let beam_rad = widening.map(|widening| self.beam_rad(&widening));
+        let illumination = Illumination { footprint: Some(radar.footprint), beam_rad };
+        let curve = Curve { observations, illumination };
         Ok(ReductionResult { curve, left_out, notices })
+    }
+
+    /// The divergence of the beam that the lobes of the curve include, rad.
+    fn beam_rad(&self, widening: &CurveWidening) -> f64 {
+        if self.of_spots { widening.curved_rad } else { widening.flat_rad }
+    }
+
+    /// A sentence on a target that is curved within the spot.
+    fn curvature(&self, widening: &CurveWidening) -> Option<String> {
+        let CurveWidening { flat_rad, curved_rad } = *widening;
+        let [flat, curved] = [flat_rad, curved_rad].map(|rad| significant(rad, 3));
+        (curved_rad > CURVED * flat_rad).then(|| {
+            if self.of_spots {
+                format!(
+                    "the target is curved within the spot: its beam_rad of {curved} holds that, beside the {flat} rad of \
+                     the beam itself"
+                )
+            } else {
+                format!(
+                    "the target is curved within the spot: a radar sees its lobes wider by {curved} rad, and not by the \
+                     {flat} rad of single rays, which a fit would take for the roughness of the surface; write rays = 16 \
+                     under [spot], unless the cloud is a rendering with single rays"
+                )
+            }
+        })
     }
 
     fn check_region(&self, target: &Target) -> Result<(), ReductionError> {
@@ -210,7 +233,7 @@ impl Reducer<'_> {
         if !self.is_sure(ray, &sighting) {
             return Fate::Unsure;
         }
-        Fate::Row(self.row(ray, &sighting, range_m, point.power_w, chirp, false))
+        self.row(ray, &sighting, range_m, point.power_w, chirp, false)
     }
 
     fn row(
@@ -221,19 +244,20 @@ impl Reducer<'_> {
         power_w: f64,
         chirp: u32,
         censored: bool,
-    ) -> Observation {
+    ) -> Fate {
         let Sighting { hit, theta_sd_rad, .. } = *sighting;
         let sigma0 = sigma0(&self.link, ray, range_m, hit.cos_theta, power_w);
         let at = Point::from(ray.origin.xyz + range_m * ray.direction.xyz());
         let at = (self.target_from_global * at).xyz;
-        Observation {
+        let observation = Observation {
             theta_sd_rad: Some(theta_sd_rad),
             power_w: Some(power_w),
             range_m: Some(range_m),
             chirp: Some(chirp),
             target_m: Some([at.x, at.y]),
             ..Observation::of_level(hit.theta_rad(), sigma0, censored)
-        }
+        };
+        Fate::Row(observation, Widening::of(&self.incidence, &self.link.beam, ray, sighting))
     }
 }
 
@@ -243,7 +267,7 @@ fn detected(
     point_rays: &[Ray<Global>],
     assignment: &Assignment,
     left_out: &mut Exclusions,
-) -> Vec<Observation> {
+) -> Vec<(Observation, Widening)> {
     let fates: Vec<Fate> = cloud
         .points()
         .par_iter()
@@ -254,7 +278,7 @@ fn detected(
     let mut rows = Vec::new();
     for fate in fates {
         match fate {
-            Fate::Row(row) => rows.push(row),
+            Fate::Row(row, widening) => rows.push((row, widening)),
             Fate::Missed => left_out.missed += 1,
             Fate::OffSurface => left_out.off_surface += 1,
             Fate::OtherRegion => left_out.other_region += 1,
@@ -271,7 +295,7 @@ fn silent(
     chirps: &Chirps,
     assignment: &Assignment,
     left_out: &mut Exclusions,
-) -> Vec<Observation> {
+) -> Vec<(Observation, Widening)> {
     let fates: Vec<Option<Fate>> = assignment
         .silent
         .par_iter()
@@ -286,13 +310,13 @@ fn silent(
                 return Some(Fate::Unsure);
             }
             let range_m = sighting.hit.range_m;
-            Some(Fate::Row(reducer.row(ray, &sighting, range_m, reducer.threshold_w, chirp, true)))
+            Some(reducer.row(ray, &sighting, range_m, reducer.threshold_w, chirp, true))
         })
         .collect();
     let mut rows = Vec::new();
     for fate in fates.into_iter().flatten() {
         match fate {
-            Fate::Row(row) => rows.push(row),
+            Fate::Row(row, widening) => rows.push((row, widening)),
             Fate::Unsure => left_out.unsure_of_facet += 1,
             _ => left_out.silent_near_edge += 1,
         }

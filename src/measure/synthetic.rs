@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::cloud::{Cloud, CloudPoint};
 use super::error::RegistrationError;
 use super::icp::Motion;
-use super::register::RegistrationResult;
+use super::register::{RegistrationResult, Stop};
 use super::settings::Registration;
 use super::tracer::{Intersection, RaySet, Tracer};
 use crate::frames::{Global, Point, Pose};
@@ -14,6 +14,25 @@ use crate::radar::random::{Draws, Key, Purpose};
 use crate::radar::{Chirps, Link, Radar};
 use crate::scene::mannequin;
 use crate::units::watts_from_dbm;
+
+/// A pose that is known exactly.
+pub fn exact() -> RegistrationResult {
+    RegistrationResult {
+        pose: Pose::from_euler_xyz(DVec3::ZERO, DVec3::ZERO),
+        covariance: [[0.0; 6]; 6],
+        pivot: Point::new(0.0, 0.0, 0.0),
+        kept: false,
+        rms_m: 0.0,
+        widened: 1.0,
+        inliers: 1,
+        points: 1,
+        scans: 1,
+        iterations: 1,
+        stop: Stop::Still,
+        converged: true,
+        verdicts: vec![],
+    }
+}
 
 /// A mesh where it stood, and its cloud.
 #[derive(Clone)]

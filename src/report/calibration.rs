@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use crate::brdf::{Brdf, Scattering, ScatteringModel};
 use crate::error::Error;
+use crate::formats::words::{listed, significant};
 use crate::frames::Direction;
 use crate::measure::{Calibration, CalibrationResult, Cloud, Estimate};
 use crate::radar::{Beam, Radar};
@@ -24,6 +25,8 @@ pub struct CalibrationReport<'a> {
     pub points: usize,
     /// What was found.
     pub result: CalibrationResult,
+    /// Effects that the scene declares, which the returns of targets do without.
+    pub effects: Vec<String>,
 }
 
 /// A difference of the beam below this share is not worth a change, whatever its significance.
@@ -60,7 +63,10 @@ impl<'a> CalibrationReport<'a> {
         let result = calibration
             .run(&target.shape, reflectance, radar, &scene.chirps, cloud)
             .map_err(|error| Error::Calibration { file: file.to_owned(), error })?;
-        Ok(CalibrationReport { radar, target, reflectance, points: cloud.points().len(), result })
+        let entries = radar.effect.iter().chain(&scene.file.effect);
+        let effects = entries.map(|entry| entry.name.clone()).collect();
+        let points = cloud.points().len();
+        Ok(CalibrationReport { radar, target, reflectance, points, result, effects })
     }
 
     /// The spot's diameter in the scene's own convention, m.
@@ -104,6 +110,12 @@ impl<'a> CalibrationReport<'a> {
                 "the cloud shows another beam than the scene: give it radar.spot_diameter_m = {:.5} as well; the loss was \
                  found with that beam",
                 self.spot_diameter_m().value
+            ));
+        }
+        if !self.effects.is_empty() {
+            notices.push(format!(
+                "the scene declares {}, which a calibration leaves out: what it changes is in the loss and the beam",
+                listed(&self.effects)
             ));
         }
         notices
@@ -151,19 +163,19 @@ impl<'a> CalibrationReport<'a> {
         };
         format!(
             "{} `{}` at {range_m:.3} m: {used} points within {within_db:.0} dB of the peak, residuals {rms_db:.2} dB rms\n\
-             system_loss_db   {:.3} ± {:.3} dB; the scene has {}\n\
-             spot diameter    {:.3} ± {:.3} mm; the scene has {:.3} ({of_spot})\n\
-             divergence       {:.3} ± {:.3} mrad; the scene has {:.3} ({of_divergence})\n",
+             system_loss_db   {:.3} ± {} dB; the scene has {}\n\
+             spot diameter    {:.3} ± {} mm; the scene has {:.3} ({of_spot})\n\
+             divergence       {:.3} ± {} mrad; the scene has {:.3} ({of_divergence})\n",
             self.target.shape.name(),
             self.target.name,
             system_loss_db.value,
-            system_loss_db.sd,
+            significant(system_loss_db.sd, 2),
             self.radar.system_loss_db,
             1e3 * spot.value,
-            1e3 * spot.sd,
+            significant(1e3 * spot.sd, 2),
             1e3 * self.radar.spot_diameter_m,
             1e3 * divergence.value,
-            1e3 * divergence.sd,
+            significant(1e3 * divergence.sd, 2),
             1e3 * self.scene_divergence_rad(),
         )
     }

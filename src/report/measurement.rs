@@ -5,6 +5,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::json::json_file;
+use crate::effects::{Setting, find};
 use crate::error::Error;
 use crate::formats::figure::{Plot, Series, Style};
 use crate::measure::{Cloud, Curve, Reduction, ReductionResult, Registration, RegistrationResult};
@@ -26,7 +27,8 @@ pub struct MeasurementRequest<'a> {
     pub registration: Registration,
     /// Only the region of this name; all of the scene for `None`.
     pub region: Option<&'a str>,
-    /// How the registered cloud becomes a curve; its region is that of the name.
+    /// How the registered cloud becomes a curve; its region is that of the name, and whether echoes are of whole spots is
+    /// the scene's.
     pub reduction: Reduction,
 }
 
@@ -64,7 +66,7 @@ impl MeasurementRequest<'_> {
         }
         let region = self.region.map(|name| region_of_name(name, scene)).transpose()?;
         let registered = self.registration.run(&target.mesh, radar, chirps, cloud)?;
-        let reduction = Reduction { region, ..self.reduction };
+        let reduction = Reduction { region, of_spots: sees_spots(scene), ..self.reduction };
         let reduced = reduction.run(target, radar, chirps, cloud, &registered)?;
         let record = pose_record(self.cloud_file, self.scene_file, &registered, &reduced);
         let svg = measured_curve_plot(&scene.file.name, &reduced.curve).svg()?.into_bytes();
@@ -90,6 +92,16 @@ impl MeasurementRequest<'_> {
             )
         })
     }
+}
+
+/// Whether a rendering of a scene sees whole spots: by several rays, or by an effect that stands for them.
+fn sees_spots(scene: &Scene) -> bool {
+    let entries = scene.file.radar.effect.iter();
+    let mut effects = entries.filter_map(|entry| find(&entry.name));
+    scene.file.spot.rays > 1
+        || effects.any(|effect| {
+            effect.about().conflicts.iter().any(|conflict| conflict.with == Setting::SeveralRays)
+        })
 }
 
 fn region_names(scene: &Scene) -> Vec<&str> {
