@@ -6,20 +6,28 @@
 mod support;
 
 mod validation {
+    pub mod between_the_parts;
     pub mod chirp_chain;
+    pub mod echoes_of_sheets;
+    pub mod fixture;
     pub mod kirchhoff;
     pub mod microfacet;
     pub mod other_paths;
     pub mod page;
+    pub mod passive;
     pub mod quadrature;
     pub mod reciprocity_energy;
+    pub mod rough;
+    pub mod smooth;
     pub mod solids;
+    pub mod stage;
     pub mod sub_rays;
 }
 
 use validation::page::{self, Row, Section};
 use validation::{
-    chirp_chain, kirchhoff, microfacet, other_paths, reciprocity_energy, solids, sub_rays,
+    between_the_parts, chirp_chain, kirchhoff, microfacet, other_paths, reciprocity_energy, solids,
+    sub_rays,
 };
 
 const PAGE: &str = "docs/validation.md";
@@ -33,6 +41,7 @@ fn sections() -> Vec<Section> {
         kirchhoff::section(),
         sub_rays::section(),
         chirp_chain::section(),
+        between_the_parts::section(),
     ]
 }
 

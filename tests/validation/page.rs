@@ -184,7 +184,7 @@ const HEAD: &str = "| what | found | tolerance |\n|---|---|---|\n";
 fn introduction() -> String {
     format!(
         "This page compares what the code computes with closed forms, published figures, limits that two models must \
-         share, and another renderer. It checks the code, not whether a model suits a material; nothing here is \
+         share, another renderer, and an integral of physical optics. It checks the code, not whether a model suits a material; nothing here is \
          measured. Generated: `tests/validation.rs` computes every number and fails when one leaves its tolerance or \
          changes; {COMMAND}. Where a table has many rows of one kind, the page shows the one that takes most of its \
          tolerance. `{ROWS}` has every row."

@@ -227,7 +227,7 @@ fn worst_asymmetry(model: &Brdf, seed: u64) -> f64 {
 
 /// ∫ f cos θ_o dω_o over the hemisphere: panels that narrow towards the mirror direction, where
 /// lobes are as narrow as cos θ_i across, and towards the horizon. Every model here is even in azimuth.
-fn albedo(model: &Brdf, theta_i_rad: f64, nodes: usize) -> f64 {
+pub fn albedo(model: &Brdf, theta_i_rad: f64, nodes: usize) -> f64 {
     let i = Direction::from_angles(theta_i_rad, 0.0);
     let mut theta_edges = graded_edges((0.0, FRAC_PI_2), theta_i_rad, 4e-3);
     theta_edges.extend(graded_edges((0.0, FRAC_PI_2), FRAC_PI_2, 0.01));
