@@ -19,6 +19,7 @@ use matdb::units::dbm_from_watts;
 use serde_json::Value;
 use support::{echoes, entries, matdb};
 use twins::case::{Outcome, Plan};
+use twins::noise::Grain;
 use twins::physics::Class;
 use twins::scenes::Geometry;
 
@@ -33,6 +34,7 @@ fn plan(effects: &[&'static str], class: Option<Class>, geometry: Geometry) -> P
         class,
         geometry,
         chirps: CHIRPS,
+        grain: Grain::Field,
     }
 }
 
@@ -83,6 +85,38 @@ fn the_same_seed_gives_the_same_bytes() {
     let [one, two] = [(); 2].map(|()| tempfile::tempdir().unwrap());
     assert_eq!(label(&plan, one.path()), label(&plan, two.path()));
     assert!(files(one.path()) == files(two.path()));
+}
+
+#[test]
+fn one_thread_and_two_give_the_same_bytes() {
+    let plan = plan(&["motion"], Some(Class::Moderate), Geometry::TorsoAndArm);
+    let [one, two] = [1, 2].map(|threads| {
+        let out = tempfile::tempdir().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| label(&plan, out.path()));
+        files(out.path())
+    });
+    assert!(one == two);
+}
+
+#[test]
+fn speckle_drawn_anew_changes_the_powers_alone() {
+    let field = plan(&["drift"], Some(Class::Weak), Geometry::WavyPanel);
+    let independent = Plan { grain: Grain::Independent, ..field.clone() };
+    let [one, two] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    let mut labels = [label(&field, one.path()), label(&independent, two.path())];
+    assert_eq!(labels[0]["speckle"], "field");
+    assert_eq!(labels[1]["speckle"], "independent");
+    for label in &mut labels {
+        label["speckle"] = Value::Null;
+        label["detections"] = Value::Null;
+    }
+    assert_eq!(labels[0], labels[1]);
+    let [one, two] = [one, two].map(|out| files(&out.path().join("cases")));
+    assert!(one.keys().eq(two.keys()));
+    for (name, bytes) in one {
+        assert_eq!(two[&name] == bytes, !name.ends_with("cloud.csv"), "{name}");
+    }
 }
 
 #[test]
