@@ -21,6 +21,7 @@ use twins::noise::{Grain, observe, shares};
 use twins::physics::{Acting, Displacement, Effect, means};
 use twins::scan::{Sight, World};
 use twins::scatterers::{Scatterers, places};
+use twins::target::overlap;
 
 /// Seeds over which an estimate is averaged: 1/√N of it is its standard error.
 const SEEDS: u64 = 25;
@@ -353,4 +354,21 @@ fn lobes_are_as_wide_as_the_beam_shows_them() {
             }
         }
     }
+}
+
+#[test]
+fn a_second_surface_is_seen_as_far_as_two_spots_overlap() {
+    const STEP_M: f64 = 0.001;
+    let spot_m2 = WAIST_M * WAIST_M;
+    let steps = || (-60..=60).map(|step| STEP_M * f64::from(step));
+    let overlapping = |aside_m: f64| {
+        let u = |x: f64, y: f64| (-2.0 * (x * x + y * y) / spot_m2).exp();
+        let row = |y: f64| steps().map(|x| u(x, y) * u(x + aside_m, y)).sum::<f64>();
+        steps().map(row).sum::<f64>()
+    };
+    for aside_m in [0.0, 0.005, 0.0136, 0.02] {
+        let expected = overlapping(aside_m) / overlapping(0.0);
+        assert!((overlap(aside_m * aside_m, spot_m2) / expected - 1.0).abs() < 1e-6, "{aside_m}");
+    }
+    assert_eq!(overlap(0.04, spot_m2), 0.01);
 }
