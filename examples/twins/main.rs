@@ -49,7 +49,7 @@
 //! | `noise-floor` | a higher N in the phasors | N |
 //! | `covering-layer` | −loss/cos θ dB on one side of a plane that cuts the target | two-way loss |
 //! | `anisotropy` | D with slopes m√q along a grain and m/√q across, G1 with m in the radar's azimuth | q |
-//! | `thin-film` | a share c of each spot coated: specular × (1 − c + c·R_film(θ)/R_bare(θ)), diffuse × (1 − c + c·((1 − R_film)/(1 − R_bare))²), R by characteristic matrices at 300 GHz, not averaged over the sweep; on a base law with m of 0.35 to 0.7 | c |
+//! | `thin-film` | a share c of each spot coated: specular × (1 − c + c·R_film(0)/R_bare(0)), diffuse × (1 − c + c·R_film(θ)/R_bare(θ)), R by characteristic matrices at 300 GHz, not averaged over the sweep | c |
 //! | `multi-bounce` | 512 rays onward from each hit, half by the cosine and half by the lobe, weighted by their density; f bistatic at both points; the second is seen by the antenna when nothing hides it, with exp(−s²/w²) for a distance s across the beam, at least the −20 dB of its side lobes; range half the whole way, the reported one the mean by power | coupling |
 //! | `pose` | the mesh shifted and turned about the middle of the lit points, rays traced against it | shift, with a turn in proportion |
 //! | `motion` | the mesh shifted by two slow sines of time | amplitude |
