@@ -16,6 +16,7 @@ const SCENE: &str = "
 seed = 11
 [radar.speckle]
 looks = 4
+form = \"independent\"
 [radar.noise]
 level_dbm = -100
 range_sd_m = 0.002

@@ -275,7 +275,11 @@ fn several_rays_of_a_spot_have_the_gain_of_one() {
     for (bare, with) in std::iter::zip(bare, with) {
         let progress = f64::from(bare.chirp) / (24.0 * 24.0 - 1.0);
         let expected_db = 3.0 * (progress - 0.5);
-        assert!((db_from_ratio(with.power_w / bare.power_w) - expected_db).abs() < POWER_DB);
+        let found_db = db_from_ratio(with.power_w / bare.power_w);
+        assert!(
+            (found_db - expected_db).abs() < POWER_DB,
+            "{found_db} is not {expected_db}: {bare:?}"
+        );
         assert!((with.range_m - bare.range_m).abs() < RANGE_M);
     }
 }

@@ -31,6 +31,7 @@ pub use models::*;
 pub use outline::{DEGREES, Outline};
 pub use parameter::{Parameter, ParameterError, Visitor};
 pub use permittivity::Polarisation;
+pub(crate) use permittivity::mirror_cosine;
 pub(crate) use retro::Retro;
 pub use scattering::{NARROW_M, NarrowLobe, Scattering, ScatteringModel, Seen};
 pub use slopes::{Distribution, VIEWING_RAD};

@@ -169,6 +169,6 @@ fn mirror_facets(lobe_rad: Option<f64>) -> Facets {
 }
 
 /// Cosine of the angle at which a facet mirrors i into o, √((1 + i·o)/2): the same from both ends.
-pub(super) fn mirror_cosine(i: Direction<Surface>, o: Direction<Surface>) -> f64 {
+pub(crate) fn mirror_cosine(i: Direction<Surface>, o: Direction<Surface>) -> f64 {
     ((1.0 + i.xyz().dot(o.xyz())) / 2.0).clamp(0.0, 1.0).sqrt()
 }

@@ -277,9 +277,10 @@ impl RangeProcessor {
         const MARGIN: f64 = 1.25;
         let Some(strongest) = self.peak(profile_w) else { return Vec::new() };
         let side_lobe_w = MARGIN * self.side_lobe_ratio * strongest.power_w;
-        let least_w = self.threshold_w.max(side_lobe_w);
-        let peaks = self.bins_of_peaks(profile_w).map(|k| self.interpolate(profile_w, k));
-        peaks.filter(|peak| peak.power_w >= least_w).collect()
+        // A side lobe is so narrow that a neighbour may fall on its zero, and the parabola then lies far above it.
+        let bins = self.bins_of_peaks(profile_w).filter(|&k| profile_w[k] >= side_lobe_w);
+        let peaks = bins.map(|k| self.interpolate(profile_w, k));
+        peaks.filter(|peak| peak.power_w >= self.threshold_w).collect()
     }
 
     fn strongest_peak(&self, profile_w: &[f64]) -> Option<usize> {

@@ -4,7 +4,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::setup::Setup;
-use super::sheet::Passage;
+use super::sheet::{Passage, Sheet};
 use super::spot::{Behind, Footprints, Spot, edge_distances_m, samples};
 use crate::frames::{Direction, Global, Point, Ray};
 use crate::radar::Beam;
@@ -52,6 +52,18 @@ pub(super) fn onward(hit: &Hit, direction: Direction<Global>) -> Ray<Global> {
     Ray { origin: Point::from(hit.point.xyz + LIFT_M * direction.xyz()), direction }
 }
 
+/// The way of a ray through the sheet that it hits.
+pub(super) fn passage(
+    setup: &Setup,
+    sheet: &Sheet,
+    hit: &Hit,
+    direction: Direction<Global>,
+) -> Passage {
+    let along = direction.xyz();
+    let normal = setup.geometry.bvh.mesh().area_normal(hit.facet as usize).normalize_or(along);
+    sheet.passage(along, normal)
+}
+
 /// The rays of all chirps, by the numbers of their hits.
 struct SpotRays<'a> {
     axes: &'a [Ray<Global>],
@@ -87,20 +99,20 @@ pub(super) struct Way {
 
 /// Follows a ray through sheets to the first surface nearer than `until_m` that stops it.
 pub(super) fn follow(setup: &Setup, mut ray: Ray<Global>, until_m: f64) -> Way {
-    let (mut passage, mut passed_m) = (Passage::FREE, 0.0);
+    let (mut way, mut passed_m) = (Passage::FREE, 0.0);
     loop {
         let hit = setup.geometry.bvh.closest(&ray);
         let hit = hit.map(|hit| Hit { range_m: passed_m + hit.range_m, ..hit });
         let Some(hit) = hit.filter(|hit| hit.range_m < until_m) else {
-            return Way { hit: None, passage };
+            return Way { hit: None, passage: way };
         };
         match setup.sheet(hit.facet) {
-            Some(sheet) if usize::from(passage.sheets) < setup.most_sheets => {
-                passage = passage.then(sheet.passage(hit.cos_theta));
+            Some(sheet) if usize::from(way.sheets) < setup.most_sheets => {
+                way = way.then(passage(setup, sheet, &hit, ray.direction));
                 passed_m = hit.range_m + LIFT_M;
                 ray = onward(&hit, ray.direction);
             }
-            _ => return Way { hit: Some(hit), passage },
+            _ => return Way { hit: Some(hit), passage: way },
         }
     }
 }

@@ -118,7 +118,7 @@ impl SpotRays<'_> {
         here.iter().for_each(|ray| is_here[ray.ray] = true);
         let compared: Vec<&RayPath> =
             here.iter().step_by(here.len().div_ceil(COMPARED).max(1)).collect();
-        let (mut seen, mut all) = ([0.0; 2], [0.0; 2]);
+        let (mut seen, mut missed) = ([0.0; 2], [0.0; 2]);
         for ray in here {
             let shares = [self.lit_shares[ray.ray], 1.0].map(|share| share * level(ray));
             (0..2).for_each(|i| seen[i] += shares[i]);
@@ -128,12 +128,13 @@ impl SpotRays<'_> {
             let distance =
                 |other: &RayPath| self.places[ray].distance_squared(self.places[other.ray]);
             let nearest = compared.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-            let missed = nearest.map_or(0.0, |nearest| level(nearest));
-            let shares = [self.lit_shares[ray], 1.0].map(|share| share * missed);
-            (0..2).for_each(|i| all[i] += shares[i]);
+            let there = nearest.map_or(0.0, |nearest| level(nearest));
+            let shares = [self.lit_shares[ray], 1.0].map(|share| share * there);
+            (0..2).for_each(|i| missed[i] += shares[i]);
         }
-        let [a, b] = [0, 1].map(|i| seen[i] / (seen[i] + all[i]));
-        a * a / b
+        let [a, b] = [0, 1].map(|i| seen[i] / (seen[i] + missed[i]));
+        // Powers near the smallest number leave none.
+        if a > 0.0 && b > 0.0 { a * a / b } else { 1.0 }
     }
 }
 

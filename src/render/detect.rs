@@ -17,20 +17,17 @@ use super::effect_scan::EffectScan;
 use super::error::RenderError;
 use super::observer::Observer;
 use super::path::{Arrival, Path, sum};
-use super::returns::{Seen, choose, separate};
+use super::returns::{Measured, Seen, choose, separate};
 use super::setup::Setup;
-use super::speckle::{Cell, EVERYWHERE, Field, Law};
+use super::speckle::{Cell, EVERYWHERE, Field, Fluctuation, Law};
 use super::spot::Footprints;
-use super::tones::{Beat, Waves};
+use super::tones::{Beat, Beats, Waves};
 use crate::effects::{Receiver, SaturationCurve};
 use crate::frames::{Global, Pose};
 use crate::radar::noise::{Addition, in_noise_w, measured_w};
 use crate::radar::random::{Draws, Key, Purpose};
 use crate::radar::{Detection, IndependentSpeckle, Noise, RangeProcessor, Returns, SpeckleForm};
 use crate::units::watts_from_dbm;
-
-/// The sampled beat signals of one chirp, √W, one per look.
-pub type Beats = Vec<Vec<Complex<f64>>>;
 
 /// A receiver prepared for a scan.
 pub(super) struct Detector<'a> {
@@ -53,24 +50,6 @@ enum Kind {
     Exact,
     Laws { law: Receiver, noise: Noise },
     Beat(Beat),
-}
-
-/// What the incoherent part of an echo is multiplied by.
-pub(super) enum Fluctuation<'a> {
-    /// Nothing.
-    None,
-    /// Draws of their own for every echo, over this many looks.
-    Independent(f64),
-    /// The field of the scatterers.
-    Field(Field<'a>),
-}
-
-/// An echo as a receiver measures it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Measured {
-    pub detection: Detection,
-    /// Phase of its beat, rad, −π to π; none where it is not asked for.
-    pub phase_rad: Option<f64>,
 }
 
 impl<'a> Detector<'a> {

@@ -1,9 +1,9 @@
 //! An echo and its cause.
 
-use super::detect::{Detector, Measured};
+use super::detect::Detector;
 use super::observer::Observer;
 use super::path::Path;
-use super::returns::Seen;
+use super::returns::{Measured, Seen};
 use super::setup::Setup;
 use super::spot::Footprints;
 use crate::frames::{Global, Point, Pose, Target};

@@ -14,7 +14,7 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::behind::{LIFT_M, Way, follow};
+use super::behind::{LIFT_M, Way, follow, passage};
 use super::bounce::{Bounce, directions};
 use super::coherent::{RayPath, SpotRays, smooth_pieces};
 use super::effect_scan::{Change, EffectScan};
@@ -22,7 +22,7 @@ use super::jones::Field;
 use super::observer::Observer;
 use super::path::{Path, sum};
 use super::setup::Setup;
-use super::sheet::Passage;
+use super::sheet::{Passage, passed_share};
 use super::spot::{self, Footprints, Spot};
 use super::surface::{Orientation, Surface};
 use crate::brdf::{NarrowLobe, Seen};
@@ -79,6 +79,14 @@ struct ShadingPoint<'a> {
     inward: Passage,
 }
 
+/// What a channel of the antenna receives of the power on a path.
+struct Polarised {
+    /// Share of the power.
+    share: f64,
+    /// Share that the sheets on the path let through.
+    passed: f64,
+}
+
 /// Power on its way to a second surface.
 struct Onward {
     direction: Direction<Local>,
@@ -102,6 +110,11 @@ impl ShadingPoint<'_> {
         let half = (self.source.xyz() + self.antenna.xyz()).normalize_or(DVec3::Z);
         sheet.echo_behind_m(half.dot(self.source.xyz())) * scattered.specular_share
     }
+}
+
+/// By how much sheets lengthen some ways, m.
+fn delay_m(ways: &[Passage]) -> f64 {
+    ways.iter().map(|way| way.delay_m()).sum()
 }
 
 impl<'a> Paths<'a> {
@@ -177,7 +190,7 @@ impl<'a> Paths<'a> {
             for behind in &self.footprints.behind {
                 let Some(sheet) = self.setup.sheet(front.facet) else { break };
                 let Some(hit) = behind.hits[number * hits.len() + sample] else { break };
-                inward = inward.then(sheet.passage(front.cos_theta));
+                inward = inward.then(passage(self.setup, sheet, &front, ray.direction));
                 direct.extend(has_pieces.then_some(RayPath { ray: sample, place: paths.len() }));
                 sent.scatter(hit, inward, &ray, sample, paths);
                 front = hit;
@@ -297,21 +310,22 @@ impl<'a> Emission<'a> {
     fn direct(&self, lit: &ShadingPoint) -> Path {
         let outward = match self.paths.observer {
             // It is visible to the radar by the same way.
-            Observer::Radar => Some(lit.inward),
+            Observer::Radar => Some(lit.inward.reversed()),
             Observer::Receiver { .. } => self.way_out(lit),
         };
-        let way = lit.inward.then(outward.unwrap_or(Passage::FREE));
+        let ways = [lit.inward, outward.unwrap_or(Passage::FREE)];
         let scattered = self.scattered(lit);
-        let polarised = self.polarised_share(scattered.specular_share, &[lit]);
-        let share = if outward.is_some() { lit.received_share(scattered) * polarised } else { 0.0 };
+        let polarised = self.polarised_share(scattered.specular_share, &[lit], &ways);
+        let share =
+            if outward.is_some() { lit.received_share(scattered) * polarised.share } else { 0.0 };
         let [x, y, _] = lit.source.xyz().to_array();
-        let apparent_m = 0.5 * way.delay_m() + lit.echo_behind_m(scattered);
+        let apparent_m = 0.5 * delay_m(&ways) + lit.echo_behind_m(scattered);
         Path {
             range_m: 0.5 * (lit.hit.range_m + lit.antenna_m) + apparent_m,
-            power_w: self.flux_w(lit) * share * way.power_ratio(),
+            power_w: self.flux_w(lit) * share,
             hit: lit.hit,
             sheets: lit.inward.sheets,
-            passed_share: way.power_ratio(),
+            passed_share: polarised.passed,
             delay_m: apparent_m,
             piece: self.paths.pieces.get(lit.hit.facet as usize).copied().unwrap_or(0),
             surfaces: 1,
@@ -364,22 +378,26 @@ impl<'a> Emission<'a> {
             second.beam_rad = beam_rad.hypot(m);
             let last = self.scattered(&second);
             let specular_share = first.specular_share * last.specular_share;
-            let polarised = self.polarised_share(specular_share, &[lit, &second]);
-            let power_w = flux_w * share * pattern * second.received_share(last) * polarised;
+            let power_w = flux_w * share * pattern * second.received_share(last);
             if power_w > 0.0
                 && let Some(outward) = self.way_out(&second)
             {
-                let way = lit.inward.then(passage).then(outward);
+                let ways = [lit.inward, passage, outward];
+                let polarised = self.polarised_share(specular_share, &[lit, &second], &ways);
+                if polarised.share == 0.0 {
+                    continue;
+                }
                 let coherent_share = first.coherent_share
                     * last.coherent_share
                     * (beam_rad / second.beam_rad).powi(2);
                 let enhancement = self.enhancement(bounce, coherent_share);
-                let path_m = lit.hit.range_m + hit.range_m + second.antenna_m + way.delay_m();
+                let delay_m = delay_m(&ways);
+                let path_m = lit.hit.range_m + hit.range_m + second.antenna_m + delay_m;
                 paths.push(Path {
                     range_m: 0.5 * path_m,
-                    power_w: power_w * way.power_ratio() * enhancement,
-                    passed_share: way.power_ratio(),
-                    delay_m: 0.5 * way.delay_m(),
+                    power_w: power_w * polarised.share * enhancement,
+                    passed_share: polarised.passed,
+                    delay_m: 0.5 * delay_m,
                     surfaces: 2,
                     specular_share,
                     coherent_share: coherent_share / enhancement,
@@ -414,45 +432,67 @@ impl<'a> Emission<'a> {
         self.paths.link.flux_w(lit.hit.cos_theta) / self.rays as f64
     }
 
-    /// Share of the power by way of some points that the antenna's channel receives. Its specular part keeps
-    /// the polarisation that the facets give it. The diffuse part is co-polar, and what is depolarised adds to it.
-    fn polarised_share(&self, specular_share: f64, points: &[&ShadingPoint]) -> f64 {
+    /// What the antenna's channel receives of the power by way of some points; the ways lead to, between and from
+    /// them. The specular part keeps the polarisation that facets and sheets give it. The diffuse part is co-polar, and
+    /// what is depolarised adds to it.
+    fn polarised_share(
+        &self,
+        specular_share: f64,
+        points: &[&ShadingPoint],
+        ways: &[Passage],
+    ) -> Polarised {
         let channel = self.paths.setup.channel;
-        let diffuse = match channel {
-            Channel::CoPolar => 1.0,
+        let is_straight_back = self.paths.observer == Observer::Radar && points.len() == 1;
+        let is_free = ways.iter().all(|way| way.sheets == 0);
+        let depolarised = match channel {
+            Channel::CoPolar => 0.0,
             Channel::CrossPolar => {
                 let shares = points.iter().map(|lit| lit.surface.depolarised_share);
                 let largest = shares.fold(0.0, f64::max);
                 largest / (1.0 - largest)
             }
         };
-        let is_straight_back = self.paths.observer == Observer::Radar && points.len() == 1;
-        let specular = match channel {
-            _ if specular_share == 0.0 => 0.0,
-            Channel::CoPolar if is_straight_back => 1.0,
-            Channel::CrossPolar if is_straight_back => 0.0,
-            _ => self.specular_power(points, channel),
+        // Straight back a facet, and a diffuse surface, keep the field.
+        if is_straight_back && is_free {
+            let kept = if channel == Channel::CoPolar { 1.0 } else { 0.0 };
+            return Polarised { share: kept + (1.0 - specular_share) * depolarised, passed: 1.0 };
+        }
+        let Some((first, last)) = points.first().zip(points.last()) else {
+            return Polarised { share: 0.0, passed: 1.0 };
         };
-        specular_share * specular + (1.0 - specular_share) * diffuse
+        let antenna = self.paths.setup.geometry.radar.polarisation;
+        let sent = antenna.field(-first.frame.world(first.source.xyz()));
+        let received = antenna.received(-last.frame.world(last.antenna.xyz()), channel);
+        let passed = passed_share(sent, received, ways);
+        let depolarised = depolarised * passed;
+        if is_straight_back {
+            let field = ways.iter().fold(Field::linear(sent), |field, way| way.pass(field));
+            let kept = field.power_along(received);
+            let passed = if channel == Channel::CoPolar { kept } else { passed };
+            return Polarised { share: kept + (1.0 - specular_share) * depolarised, passed };
+        }
+        let specular = if specular_share > 0.0 {
+            self.specular_field(sent, points, ways).power_along(received)
+        } else {
+            0.0
+        };
+        let diffuse = if channel == Channel::CoPolar { passed } else { depolarised };
+        Polarised { share: specular_share * specular + (1.0 - specular_share) * diffuse, passed }
     }
 
-    /// Share of the power of a specular path by way of some points that a channel of the antenna receives.
-    fn specular_power(&self, points: &[&ShadingPoint], channel: Channel) -> f64 {
-        let polarisation = self.paths.setup.geometry.radar.polarisation;
-        let Some(first) = points.first() else { return 0.0 };
-        let mut along = -first.frame.world(first.source.xyz());
-        let mut field = Field::linear(polarisation.field(along));
-        for (place, lit) in points.iter().enumerate() {
+    /// The field of a specular path by way of some points, of unit power where it was sent along `sent`.
+    fn specular_field(&self, sent: DVec3, points: &[&ShadingPoint], ways: &[Passage]) -> Field {
+        let mut field = Field::linear(sent);
+        for (place, (lit, way)) in points.iter().zip(ways).enumerate() {
             let exit = match points.get(place + 1) {
                 Some(next) => lit.frame.local(-next.frame.world(next.source.xyz())),
                 None => lit.antenna,
             };
             let amplitudes = lit.surface.scattering.facet_amplitudes(lit.source, exit);
-            let onward = lit.frame.world(exit.xyz());
-            field = field.reflected(along, onward, amplitudes);
-            along = onward;
+            let [from, to] = [-lit.source.xyz(), exit.xyz()].map(|local| lit.frame.world(local));
+            field = way.pass(field).reflected(from, to, amplitudes);
         }
-        field.power_along(polarisation.received(-along, channel))
+        ways.last().map_or(field, |way| way.pass(field))
     }
 
     /// What a point scatters towards the antenna.

@@ -5,9 +5,16 @@
 
 use std::ops::Range;
 
-use super::detect::Measured;
 use super::path::{Path, sum};
-use crate::radar::Returns;
+use crate::radar::{Detection, Returns};
+
+/// An echo as a receiver measures it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Measured {
+    pub detection: Detection,
+    /// Phase of its beat, rad, −π to π; none where it is not asked for.
+    pub phase_rad: Option<f64>,
+}
 
 /// A detection, and the paths that may have caused it, by their places in the list of a chirp.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,7 +74,6 @@ pub(super) fn choose(seen: &mut Vec<Seen>, returns: Returns, threshold_w: f64) {
 mod tests {
     use super::*;
     use crate::frames::Point;
-    use crate::radar::Detection;
     use crate::trace::Hit;
 
     fn path(sheets: u8, range_m: f64, power_w: f64) -> Path {

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::behind::trace_behind;
-use super::detect::{Beats, Detector};
+use super::detect::Detector;
 use super::echo::{Echo, Echoes};
 use super::effect_scan::{self, EffectScan};
 use super::error::RenderError;
@@ -11,6 +11,7 @@ use super::observer::Observer;
 use super::paths::Paths;
 use super::setup::Setup;
 use super::spot::{self, Footprints};
+use super::tones::Beats;
 use crate::frames::{Global, Point};
 use crate::radar::{Field, SpeckleForm};
 use crate::trace::{ScanGeometry, winding_number};

@@ -5,15 +5,19 @@
 //!
 //! - The echo of the sheet itself is the highest peak of |Σ w·r(f)·e^{2jkx}/Σ w|² over the range x. The mean of |r|²
 //!   would count the echoes of both faces together: −9.96 dB in place of −12.9 dB for 8 mm of n = 1.6.
-//! - On the way through, the power is T, the highest peak of |Σ w·t(f)·e^{jk(cos θ·d + x)}/Σ w|², and the echoes of what
-//!   lies behind seem x farther away each way, (√(n² − sin²θ) − cos θ)·d for a thin sheet. There and back the power is
-//!   T². A ray goes straight on.
+//! - On the way through, the amplitudes are the Σ w·t(f)·e^{jk(cos θ·d + x)}/Σ w of s and p, at the x of the highest
+//!   peak of their power, and the echoes of what lies behind seem x farther away each way, (√(n² − sin²θ) − cos θ)·d for
+//!   a thin sheet. There and back the amplitude of s or p is squared. A ray goes straight on.
 //!
 //! Both are tabulated over the angle of incidence.
 
+use glam::DVec3;
 use nalgebra::Complex;
 
-use crate::brdf::{Brdf, Layer, Layered, NarrowLobe, Polarisation, Scattering, Seen};
+use super::jones::{Field, Filter};
+use crate::brdf::{
+    Brdf, Layer, Layered, NarrowLobe, Polarisation, Scattering, Seen, mirror_cosine,
+};
 use crate::frames::{Direction, Surface};
 use crate::radar::Radar;
 use crate::units::SPEED_OF_LIGHT_M_PER_S;
@@ -37,19 +41,21 @@ pub struct Sheet {
 struct Row {
     /// Power of its own echo, unpolarised.
     reflectance: f64,
+    /// Amplitudes of that echo in the polarisations s and p.
+    reflected: [Complex<f64>; 2],
     /// Range of that echo behind the outer face, m.
     echo_behind_m: f64,
-    /// Power that passes, one way, of the polarisations s and p.
-    transmittance: [f64; 2],
+    /// Amplitudes that pass, one way, of the polarisations s and p. That of s is real: only their ratio counts.
+    transmitted: [Complex<f64>; 2],
     /// Apparent lengthening of one way, m.
     delay_m: f64,
 }
 
-/// The sheets on a way: the share of the power that passes all of them, and by how much they lengthen it.
+/// The sheets on a straight way: what they do to a field, and by how much they lengthen it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Passage {
-    /// Share of the power of the polarisations s and p.
-    transmittance: [f64; 2],
+    /// `None` without sheets.
+    filter: Option<Filter>,
     delay_m: f64,
     /// Number of sheets.
     pub sheets: u8,
@@ -57,29 +63,53 @@ pub(super) struct Passage {
 
 impl Passage {
     /// A way without sheets.
-    pub const FREE: Passage = Passage { transmittance: [1.0; 2], delay_m: 0.0, sheets: 0 };
+    pub const FREE: Passage = Passage { filter: None, delay_m: 0.0, sheets: 0 };
 
-    /// This way and then another, which meets its sheets in the same plane of incidence.
+    /// This way and then another in the same direction.
     pub fn then(self, onward: Passage) -> Passage {
-        let [s, p] = self.transmittance;
-        let [onward_s, onward_p] = onward.transmittance;
+        let filter = match (self.filter, onward.filter) {
+            (Some(first), Some(second)) => Some(first.then(second)),
+            (first, second) => first.or(second),
+        };
         Passage {
-            transmittance: [s * onward_s, p * onward_p],
+            filter,
             delay_m: self.delay_m + onward.delay_m,
             sheets: self.sheets.saturating_add(onward.sheets),
         }
     }
 
+    /// The same way back.
+    pub fn reversed(self) -> Passage {
+        Passage { filter: self.filter.map(Filter::reversed), ..self }
+    }
+
+    /// A field at the end of the way.
+    pub fn pass(self, field: Field) -> Field {
+        self.filter.map_or(field, |filter| field.through(filter))
+    }
+
+    /// Share of the power of a field along a unit vector that passes.
+    fn passed_along(self, field: DVec3) -> f64 {
+        self.filter.map_or(1.0, |filter| Field::linear(field).through(filter).power())
+    }
+
     /// Share of unpolarised power that passes.
-    pub fn power_ratio(self) -> f64 {
-        let [s, p] = self.transmittance;
-        0.5 * (s + p)
+    fn power_ratio(self) -> f64 {
+        self.filter.map_or(1.0, Filter::power_ratio)
     }
 
     /// Apparent lengthening of the way, m.
     pub fn delay_m(self) -> f64 {
         self.delay_m
     }
+}
+
+/// Share of the power that passes the ways to, between and from diffuse surfaces, for an antenna that sends and receives
+/// fields along unit vectors.
+pub(super) fn passed_share(sent: DVec3, received: DVec3, ways: &[Passage]) -> f64 {
+    let [first, between @ .., last] = ways else { return 1.0 };
+    let between: f64 = between.iter().map(|way| way.power_ratio()).product();
+    first.passed_along(sent) * between * last.reversed().passed_along(received)
 }
 
 impl Sheet {
@@ -132,14 +162,16 @@ impl Sheet {
         &self.stack
     }
 
-    /// The way through the sheet at an angle of incidence.
-    pub(super) fn passage(&self, cos_theta: f64) -> Passage {
-        let (row, next, share) = self.rows_at(cos_theta);
-        let [s, p] = [0, 1].map(|polarisation| {
-            mix(row.transmittance[polarisation], next.transmittance[polarisation], share)
+    /// The way through the sheet along a unit vector, where its unit normal is this.
+    pub(super) fn passage(&self, along: DVec3, normal: DVec3) -> Passage {
+        let (row, next, share) = self.rows_at(along.dot(normal).abs());
+        let transmitted = [0, 1].map(|polarisation| {
+            let [from, to] = [row, next].map(|row| row.transmitted[polarisation]);
+            from + (to - from) * share
         });
+        let filter = Filter::of_sheet(along, normal, transmitted);
         let delay_m = mix(row.delay_m, next.delay_m, share);
-        Passage { transmittance: [s, p], delay_m, sheets: 1 }
+        Passage { filter: Some(filter), delay_m, sheets: 1 }
     }
 
     /// Share of the power that the stack reflects, unpolarised, as the radar reads it.
@@ -154,9 +186,13 @@ impl Sheet {
         if !self.is_mirror {
             return 0.0;
         }
-        // The peak may jump from one face to the other: there is nothing in between.
+        self.nearest_row(cos_theta).echo_behind_m
+    }
+
+    /// The row of the table next to an angle: the peak may jump from one face to the other, and nothing lies between.
+    fn nearest_row(&self, cos_theta: f64) -> &Row {
         let (row, next, share) = self.rows_at(cos_theta);
-        if share < 0.5 { row.echo_behind_m } else { next.echo_behind_m }
+        if share < 0.5 { row } else { next }
     }
 
     /// The rows of the table around an angle, and the share of the second.
@@ -180,6 +216,11 @@ fn in_air(law: &Brdf) -> Option<&Layered> {
     }
 }
 
+/// Power of both polarisations together.
+fn power([s, p]: [Complex<f64>; 2]) -> f64 {
+    s.norm_sqr() + p.norm_sqr()
+}
+
 fn mix(a: f64, b: f64, share: f64) -> f64 {
     a + share * (b - a)
 }
@@ -201,6 +242,13 @@ impl Scattering for Sheet {
             all = all.and(law.seen_by(beam_rad, i, o));
         }
         all
+    }
+
+    fn facet_amplitudes(&self, i: Direction<Surface>, o: Direction<Surface>) -> [Complex<f64>; 2] {
+        match self.others.first() {
+            Some(law) if !self.is_mirror => law.facet_amplitudes(i, o),
+            _ => self.nearest_row(mirror_cosine(i, o)).reflected,
+        }
     }
 
     fn narrow_lobes(&self, i: Direction<Surface>) -> Vec<NarrowLobe> {
@@ -237,8 +285,8 @@ struct Sweep {
 
 /// The highest peak of a transform over the sweep.
 struct Peak {
-    /// Its power in the polarisations s and p.
-    powers: [f64; 2],
+    /// Its amplitudes in the polarisations s and p.
+    amplitudes: [Complex<f64>; 2],
     /// Its place, m of one way.
     at_m: f64,
 }
@@ -284,18 +332,20 @@ impl Sweep {
             beyond_air.collect::<Vec<_>>()
         });
         let (echo, passed) = (self.peak(&reflected), self.peak(&transmitted));
+        let [t_s, t_p] = passed.amplitudes;
         Row {
-            reflectance: 0.5 * (echo.powers[0] + echo.powers[1]),
+            reflectance: 0.5 * power(echo.amplitudes),
+            reflected: echo.amplitudes,
             // There and back are one range.
             echo_behind_m: 0.5 * echo.at_m,
-            transmittance: passed.powers,
+            transmitted: [t_s.norm().into(), t_p * Complex::cis(-t_s.arg())],
             delay_m: passed.at_m,
         }
     }
 
     /// The highest peak of the transform of two polarisations together.
     fn peak(&self, waves: &[Vec<Complex<f64>>; 2]) -> Peak {
-        let power = |at_m: f64| self.powers(waves, at_m).into_iter().sum::<f64>();
+        let power = |at_m: f64| power(self.amplitudes(waves, at_m));
         let places =
             (-16..=(self.reach_m / self.step_m) as i32).map(|n| f64::from(n) * self.step_m);
         let highest = |a: (f64, f64), b: (f64, f64)| if b.1 > a.1 { b } else { a };
@@ -310,11 +360,11 @@ impl Sweep {
             at_m += shift.clamp(-1.0, 1.0) * step_m;
             step_m /= 8.0;
         }
-        Peak { powers: self.powers(waves, at_m), at_m }
+        Peak { amplitudes: self.amplitudes(waves, at_m), at_m }
     }
 
-    /// |Σ w·a(k)·e^{jkx}|² of both polarisations.
-    fn powers(&self, waves: &[Vec<Complex<f64>>; 2], at_m: f64) -> [f64; 2] {
+    /// Σ w·a(k)·e^{jkx} of both polarisations.
+    fn amplitudes(&self, waves: &[Vec<Complex<f64>>; 2], at_m: f64) -> [Complex<f64>; 2] {
         let mut sums = [Complex::from(0.0); 2];
         let [s, p] = waves;
         let (first, second) = (self.wavenumbers_rad_per_m[0], self.wavenumbers_rad_per_m[1]);
@@ -326,6 +376,6 @@ impl Sweep {
             sums[1] += weighted * p;
             turned *= turn;
         }
-        sums.map(|sum| sum.norm_sqr())
+        sums
     }
 }

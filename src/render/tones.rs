@@ -6,12 +6,14 @@
 
 use num_complex::Complex;
 
-use super::detect::{Beats, Fluctuation};
 use super::error::RenderError;
 use super::path::{Arrival, Path, sum, waves as coherent_waves};
-use super::speckle::{Cell, EVERYWHERE, Field, Scatterers};
+use super::speckle::{Cell, EVERYWHERE, Field, Fluctuation, Scatterers};
 use crate::radar::random::Draws;
 use crate::radar::{Chirp, Detection, RangeProcessor, Return};
+
+/// The sampled beat signals of one chirp, √W, one per look.
+pub type Beats = Vec<Vec<Complex<f64>>>;
 
 /// Tones nearer than this share of a range cell are one.
 const PART_OF_A_CELL: f64 = 1.0 / 16.0;

@@ -38,12 +38,18 @@ fn text(folder: &Path, record: &ScanRecord, total_s: f64) -> String {
         }),
     );
     let receivers: String = record.receivers().iter().map(receiver).collect();
+    let crossed = record.cross_polar_detections().map_or(String::new(), |count| {
+        format!(
+            "cross-polar: {} detections, in files whose names start with cross-\n",
+            grouped(count)
+        )
+    });
     let more = match record.receivers() {
         [] => "",
         _ => ", and the same of each receiver,",
     };
     format!(
-        "{regions}{} chirps, {}\n{receivers}wrote power.exr, power.png, cloud.ply and scan.json{more} to {} in \
+        "{regions}{} chirps, {}\n{receivers}{crossed}wrote power.exr, power.png, cloud.ply and scan.json{more} to {} in \
          {total_s:.2} s\n",
         grouped(record.counts().chirps),
         counted(record.counts()),

@@ -31,6 +31,16 @@ pub(super) enum Field<'a> {
     Scatterers(Scatterers<'a>),
 }
 
+/// What the incoherent part of an echo is multiplied by.
+pub(super) enum Fluctuation<'a> {
+    /// Nothing.
+    None,
+    /// Draws of their own for every echo, over this many looks.
+    Independent(f64),
+    /// The field of the scatterers.
+    Field(Field<'a>),
+}
+
 impl<'a> Field<'a> {
     /// The field that the radar's speckle declares, for what the rays of a scan meet.
     ///

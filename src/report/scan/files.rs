@@ -8,7 +8,7 @@ use crate::formats::ply;
 use crate::formats::words::grouped;
 use crate::geometry::Raster;
 use crate::radar::{Channel, Returns};
-use crate::render::{Echo, cloud_table};
+use crate::render::{Echo, Scan, cloud_table};
 use crate::scene::Scene;
 use crate::setup::{ReadyScene, View};
 use crate::units::dbm_from_watts;
@@ -61,6 +61,12 @@ fn exr_attributes(image: &Raster, materials: &[&str]) -> Vec<(String, Attribute)
     .collect()
 }
 
+/// Number of chirps with a detection, of which a chirp may have several.
+fn detected_chirps(scan: &Scan) -> usize {
+    let chirps: Vec<u32> = scan.detections().map(|echo| echo.chirp).collect();
+    chirps.chunk_by(|a, b| a == b).count()
+}
+
 fn power_figure(scene: &Scene, view: &View, image: &Raster) -> Result<Vec<u8>, Error> {
     let scan = &view.scan;
     let mut antenna = scene.radar().preset.clone();
@@ -73,7 +79,7 @@ fn power_figure(scene: &Scene, view: &View, image: &Raster) -> Result<Vec<u8>, E
     let threshold_dbm = (10.0 * dbm_from_watts(scan.threshold_w)).round() / 10.0;
     let subtitle = format!(
         "{antenna}, {} of {} chirps ≥ {} dBm",
-        grouped(scan.detections().count()),
+        grouped(detected_chirps(scan)),
         grouped(scan.chirps),
         threshold_dbm.to_string().replace('-', "−")
     );

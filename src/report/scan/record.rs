@@ -231,6 +231,11 @@ impl<'a> ScanRecord<'a> {
         &self.receivers
     }
 
+    /// Number of the radar's detections across the polarisation that was sent; `None` if it does not receive them.
+    pub fn cross_polar_detections(&self) -> Option<usize> {
+        self.cross_polar.first().map(|crossed| crossed.detections)
+    }
+
     /// What the radar received of every region.
     pub fn regions(&self) -> &[RegionRecord<'a>] {
         &self.regions
