@@ -5,6 +5,7 @@
 #[allow(dead_code)]
 mod twins;
 
+use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 use std::fs;
@@ -20,6 +21,7 @@ use twins::noise::{Grain, observe, shares};
 use twins::physics::{Acting, Displacement, Effect, means};
 use twins::scan::{Sight, World};
 use twins::scatterers::{Scatterers, places};
+use twins::target::overlap;
 
 /// Seeds over which an estimate is averaged: 1/√N of it is its standard error.
 const SEEDS: u64 = 25;
@@ -170,7 +172,8 @@ fn what_facets_mirror_together_does_not_speckle() {
     let smooth = Base { m: delta, k: 0.0, f_lambda: 0.1, ..DIFFUSE };
     let seen = Local { beam_slope: delta, ..smooth.local() };
     for cos in [1.0, 0.9998, 0.999] {
-        assert!((seen.mirrored_per_sr(cos) / seen.f_per_sr(cos) - 0.5).abs() < 1e-12);
+        let [speckled, mirrored] = seen.parts_per_sr(cos);
+        assert!((mirrored / speckled - 1.0).abs() < 1e-12);
     }
     // A constant and a circular Gaussian of half the power each: 1 − ½².
     assert_near(variance(&smooth, 1.0), 0.75, 0.1, "half mirrored");
@@ -256,21 +259,22 @@ fn a_moved_target_has_moved_its_speckle() {
 #[test]
 fn only_scatterers_that_are_seen_count_and_each_range_cell_for_itself() {
     const SPACING_M: f64 = 0.0045;
-    // A plate half of which hides behind another.
-    let (behind, front) = ([0.0, 0.0, 0.0, 0.4], [0.15, 0.0, 0.1, 0.3]);
+    // A plate half of which hides behind another, less than a spot and more than two range cells in front.
+    const FRONT_M: f64 = 0.02;
+    let (behind, front) = ([0.0, 0.0, 0.0, 0.4], [0.15, 0.0, FRONT_M, 0.3]);
     let beams = || (-8..=8).map(|step| [0.01 * f64::from(step), 0.0]);
     let both = scene(&[front, behind], beams());
     let world = World::new(&both, &both.target.mesh);
     let seen = Scatterers::new(&world, 1, &DIFFUSE, &[], SPACING_M, 1).seen;
     for scatterer in &seen {
         let DVec3 { x, y, z } = scatterer.point;
-        let on_front = z > 0.1 - 1e-9;
+        let on_front = z > FRONT_M - 2e-6;
         // Seen from 8 m, the edge of the front at x = 0 hides what is beyond x = 0 at z = 0.
         let shown = x < 1e-6 || (y - HEIGHT_M).abs() > 0.15;
         assert!(on_front || (z > -2e-6 && shown), "{:?}", scatterer.point);
     }
     let [on_front, on_behind] = [true, false]
-        .map(|front| seen.iter().filter(|s| (s.point.z > 0.05) == front).count() as f64);
+        .map(|front| seen.iter().filter(|s| (s.point.z > 0.5 * FRONT_M) == front).count() as f64);
     let each_m2 = SPACING_M * SPACING_M;
     assert!((on_front * each_m2 / 0.09 - 1.0).abs() < 0.01, "{on_front}");
     // Half of it, and strips above and below the front.
@@ -297,6 +301,9 @@ fn scatterers_lie_evenly_whatever_the_size_of_the_facets() {
         .filter(|place| place.z > -1e-9)
         .collect();
     // In squares of 36 scatterers: their number varies by far less than the 6 of Poisson's law.
+    // And not on a lattice.
+    let columns: BTreeSet<i64> = places.iter().map(|place| (1e9 * place.x) as i64).collect();
+    assert!(columns.len() > places.len() - 5, "{} of {}", columns.len(), places.len());
     let mut counts = [[0.0; 16]; 16];
     for place in places {
         let [x, y] = [place.x, place.y - HEIGHT_M].map(|at| ((at + 0.24) / 0.03).floor());
@@ -347,4 +354,21 @@ fn lobes_are_as_wide_as_the_beam_shows_them() {
             }
         }
     }
+}
+
+#[test]
+fn a_second_surface_is_seen_as_far_as_two_spots_overlap() {
+    const STEP_M: f64 = 0.001;
+    let spot_m2 = WAIST_M * WAIST_M;
+    let steps = || (-60..=60).map(|step| STEP_M * f64::from(step));
+    let overlapping = |aside_m: f64| {
+        let u = |x: f64, y: f64| (-2.0 * (x * x + y * y) / spot_m2).exp();
+        let row = |y: f64| steps().map(|x| u(x, y) * u(x + aside_m, y)).sum::<f64>();
+        steps().map(row).sum::<f64>()
+    };
+    for aside_m in [0.0, 0.005, 0.0136, 0.02] {
+        let expected = overlapping(aside_m) / overlapping(0.0);
+        assert!((overlap(aside_m * aside_m, spot_m2) / expected - 1.0).abs() < 1e-6, "{aside_m}");
+    }
+    assert_eq!(overlap(0.04, spot_m2), 0.01);
 }

@@ -105,25 +105,26 @@ impl Base {
 impl Local {
     /// f(θ) in backscatter, 1/sr.
     pub fn f_per_sr(&self, cos_theta: f64) -> f64 {
-        if cos_theta <= 1e-6 {
-            return 0.0;
-        }
-        let cos2 = cos_theta * cos_theta;
-        let diffuse = self.diffuse * (self.alpha + 2.0) / (2.0 * PI) * cos_theta.powf(self.alpha);
-        let volume = self.sigma0_volume / (4.0 * PI * cos2);
-        self.gain * (diffuse + volume) + self.lobe_per_sr(cos_theta)
+        self.parts_per_sr(cos_theta).iter().sum()
     }
 
-    /// The part of f of which all facets in the spot answer as one mirror, 1/sr: δ²/m² of the lobe as the
-    /// beam sees it. It does not speckle.
-    pub fn mirrored_per_sr(&self, cos_theta: f64) -> f64 {
+    /// f(θ) in two parts, 1/sr: what speckles, and what all facets in the spot return together as one mirror
+    /// does, δ²/m² of the lobe as the beam sees it.
+    pub fn parts_per_sr(&self, cos_theta: f64) -> [f64; 2] {
+        if cos_theta <= 1e-6 {
+            return [0.0; 2];
+        }
+        let diffuse = self.diffuse * (self.alpha + 2.0) / (2.0 * PI) * cos_theta.powf(self.alpha);
+        let volume = self.sigma0_volume / (4.0 * PI * cos_theta * cos_theta);
         let delta2 = self.beam_slope * self.beam_slope;
         let [along2, across2] = self.m.map(|m| m * m + delta2);
-        delta2 / (along2 * across2).sqrt() * self.lobe_per_sr(cos_theta)
+        let mirrored = delta2 / (along2 * across2).sqrt();
+        let lobe = self.lobe_per_sr(cos_theta);
+        [self.gain * (diffuse + volume) + (1.0 - mirrored) * lobe, mirrored * lobe]
     }
 
     fn lobe_per_sr(&self, cos_theta: f64) -> f64 {
-        if cos_theta <= 1e-6 || self.specular <= 0.0 {
+        if self.specular <= 0.0 {
             return 0.0;
         }
         let (cos2, tan) = (cos_theta * cos_theta, tan(cos_theta));

@@ -14,8 +14,8 @@ use super::scatterers::Scatterers;
 
 /// Scatterers per waist and direction: a spot then holds some 60.
 const PER_WAIST: f64 = 3.0;
-/// Beyond so many radii w the amplitude is below 0.2 % of that on the axis.
-const REACH: f64 = 1.75;
+/// Beyond so many radii w the amplitude is below 1.2 % of that on the axis, and adds 1e-4 of the power.
+const REACH: f64 = 1.5;
 
 /// The scatterers of a target and the radar that looks at them.
 pub struct Field<'a> {

@@ -202,11 +202,8 @@ fn part(world: &World, base: &Base, acting: &[Acting], sight: &Sight, look: &Sho
     let cos = look.cos_theta().max(0.0);
     let received_sr = world.waist.received_sr(sight.place_m, look.range_m);
     let watts_per_f = world.sent_w * received_sr * cos * cos;
-    Part {
-        range_m: look.range_m,
-        power_w: watts_per_f * law.f_per_sr(cos),
-        mirrored_w: watts_per_f * law.mirrored_per_sr(cos),
-    }
+    let [speckled_w, mirrored_w] = law.parts_per_sr(cos).map(|f| watts_per_f * f);
+    Part { range_m: look.range_m, power_w: speckled_w + mirrored_w, mirrored_w }
 }
 
 /// The base law at one place, as the effects change it and as a beam of these slopes sees it.
@@ -218,8 +215,9 @@ fn law(base: &Base, acting: &[Acting], look: &Shot, beam_slope: f64) -> Local {
 
 /// The part of f that speckles, 1/sr, in the middle of the field.
 pub fn incoherent_per_sr(world: &World, base: &Base, acting: &[Acting], look: &Shot) -> f64 {
-    let law = law(base, acting, look, world.waist.slope(DVec2::ZERO));
-    law.f_per_sr(look.cos_theta()) - law.mirrored_per_sr(look.cos_theta())
+    let [speckled, _] =
+        law(base, acting, look, world.waist.slope(DVec2::ZERO)).parts_per_sr(look.cos_theta());
+    speckled
 }
 
 /// Mean range of those that fill the range cell with the most power, m; cells count from the nearest.

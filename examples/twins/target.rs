@@ -201,13 +201,16 @@ fn second_segment(world: &World, base: &Base, sight: &Sight, random: &mut Draws)
 /// Level of the antenna's side lobes, which see what lies outside the spot.
 const SIDE_LOBES: f64 = 0.01;
 
-/// λ²/(π·w²) for what reaches the antenna from a second surface, sr. Spots u about A and about its image at
-/// B overlap by exp(−s²/w²) for a distance s across the beam.
+/// λ²/(π·w²) for what reaches the antenna from a second surface, sr.
 fn received_sr(world: &World, sight: &Sight, a: &Shot, b: &Shot) -> f64 {
     let across_m2 = (b.point - a.point).reject_from(sight.ray.direction.xyz()).length_squared();
     let spot_m2 = world.waist.towards(sight.place_m).radius_m2(b.range_m);
-    let weight = (-across_m2 / spot_m2).exp().max(SIDE_LOBES);
-    weight * world.waist.received_sr(sight.place_m, b.range_m)
+    overlap(across_m2, spot_m2) * world.waist.received_sr(sight.place_m, b.range_m)
+}
+
+/// How much a spot u overlaps with one that lies aside, ∫ u(r)·u(r + s) over ∫ u², with the side lobes.
+pub fn overlap(aside_m2: f64, spot_m2: f64) -> f64 {
+    (-aside_m2 / spot_m2).exp().max(SIDE_LOBES)
 }
 
 /// A direction away from A and the facet normal that would mirror the radar's ray into it.
