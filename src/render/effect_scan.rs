@@ -91,7 +91,8 @@ impl<'a> EffectScan<'a> {
         orientation: Option<Orientation>,
         tilts: [f64; 2],
     ) -> Path {
-        let (stage, shot) = (self.stage(), self.traced_shot(chirp, ray, path.hit, orientation));
+        let stage = Stage { on_wavefront: rays > 1, ..self.stage() };
+        let shot = self.traced_shot(chirp, ray, path.hit, orientation);
         let with_w =
             tilted(&shot, tilts).map_or(0.0, |shot| self.model.arrived(&stage, &shot).power_w);
         let Some(Orientation { azimuth_rad, .. }) = orientation else {
@@ -108,11 +109,7 @@ impl<'a> EffectScan<'a> {
         };
         let retro = Direction::<Surface>::from_angles(shot.hit.theta_rad(), azimuth_rad);
         let law = self.model.laws.get(usize::from(shot.region));
-        let beam = stage.beam(&shot);
-        let beam_rad = match rays {
-            1 => beam.divergence_rad(),
-            _ => beam.section(shot.hit.range_m).divergence_rad(),
-        };
+        let beam_rad = stage.divergence_rad(&shot);
         let seen = law.map(|law| law.seen_by(beam_rad, retro, retro));
         let Seen { specular_share, coherent_share, .. } = seen.unwrap_or_default();
         let power_w = with_w / rays as f64;
@@ -180,6 +177,7 @@ impl<'a> EffectScan<'a> {
             link: self.link,
             grain_of_region: &self.grain_of_region,
             seen_lobe_rad: &self.seen_lobe_rad,
+            on_wavefront: false,
             middle: self.middle,
         }
     }
