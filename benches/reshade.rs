@@ -33,6 +33,7 @@ fn main() {
         link: Link::new(radar),
         grain_of_region: &[DVec3::Y],
         seen_lobe_rad: &[],
+        on_wavefront: false,
         middle: DVec3::ZERO,
     };
     let shots = diagnose::trace_shots(&stage).expect("chirps that meet the target");

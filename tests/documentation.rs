@@ -82,6 +82,18 @@ fn every_command_of_the_readme_runs() {
 }
 
 #[test]
+fn the_picture_of_concealed_plates_is_what_its_scene_makes() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = root().join("scenes/concealed-object.toml");
+    matdb(folder.path()).args(["render", "-q", "-o", "out"]).arg(scene).assert().success();
+    let made = fs::read(folder.path().join("out/power.png")).unwrap();
+    assert!(
+        made == fs::read(root().join("docs/concealed-object.png")).unwrap(),
+        "the picture is not what the scene makes; copy out/power.png over it"
+    );
+}
+
+#[test]
 fn a_curve_gets_from_csv_to_a_folder_for_a_web_server_as_the_docs_say() {
     let folder = tempfile::tempdir().unwrap();
     let page = read("docs/publishing.md");

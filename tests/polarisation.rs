@@ -127,7 +127,12 @@ fn the_cross_polar_cloud_is_written_when_asked_for_with_the_depolarised_share() 
     render(&scene("", ""), "co").success();
     assert!(!folder.path().join("co/cross-cloud.ply").exists());
     let both = "polarisation.receive = \"both\"";
-    render(&scene(both, "depolarised_share = 0.2"), "both").success();
+    let rendered = render(&scene(both, "depolarised_share = 0.2"), "both").success();
+    let summary = String::from_utf8(rendered.get_output().stdout.clone()).unwrap();
+    assert!(
+        summary.contains("cross-polar: ") && summary.contains("start with cross-"),
+        "{summary}"
+    );
     let co = powers_dbm(&folder.path().join("co/cloud.ply"));
     assert_eq!(co, powers_dbm(&folder.path().join("both/cloud.ply")));
     let crossed = powers_dbm(&folder.path().join("both/cross-cloud.ply"));
@@ -163,5 +168,26 @@ fn what_is_no_polarisation_is_refused_by_name() {
         let message = String::from_utf8(output.stderr).unwrap();
         assert!(message.contains(expected), "{radar}{region}: {message}");
         assert!(!folder.path().join("out").exists());
+    }
+}
+
+#[test]
+fn a_curve_measured_across_the_polarisation_that_was_sent_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = include_str!("../src/cli/add/template.toml");
+    std::fs::write(folder.path().join("scan.csv"), "theta_deg,sigma0_db\n0,5\n20,-10\n").unwrap();
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, scene("", "").replace("human-skin", "my-paint")).unwrap();
+    for (received, is_named) in [("V", false), ("H", true)] {
+        let stated = format!("\nreceive_polarisation = \"{received}\"");
+        let text = text.replace("\nreceive_polarisation = \"V\"", &stated);
+        std::fs::write(folder.path().join("material.toml"), text).unwrap();
+        let add = ["add", "--from", "material.toml"];
+        support::matdb(folder.path()).args(add).assert().success();
+        let run =
+            support::matdb(folder.path()).args(["render", "scene.toml", "-o", "out"]).assert();
+        let said = String::from_utf8(run.success().get_output().stderr.clone()).unwrap();
+        let notice = "curve `scan` of `my-paint` was measured across the polarisation";
+        assert_eq!(said.contains(notice), is_named, "{said}");
     }
 }

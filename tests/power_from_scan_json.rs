@@ -125,6 +125,7 @@ fn check(scene_name: &str) {
     let points = cloud["x"].len();
     assert_eq!(points as u64, record["counts"]["detections"].as_u64().unwrap());
     assert!(points > 1000, "{points} points say little");
+    let mut together = 0;
     for i in 0..points {
         let theta = cloud["incidence_deg"][i].to_radians();
         let range_m = ["x", "y", "z"]
@@ -146,11 +147,17 @@ fn check(scene_name: &str) {
             + 10.0 * f_per_sr(&material["scattering"], theta, delta).log10()
             + 20.0 * theta.cos().log10();
         let power = cloud["power_dbm"][i];
-        assert!((power - expected).abs() < POWER_DB, "point {i}: {power} is not {expected}");
+        if cloud.contains_key("sheets") && power > expected + POWER_DB {
+            // What lies within a range cell behind a sheet is one echo with it.
+            together += 1;
+        } else {
+            assert!((power - expected).abs() < POWER_DB, "point {i}: {power} is not {expected}");
+        }
         assert!(power >= number(radar, "threshold_dbm"));
         let region = &record["regions"][cloud["region"][i] as usize];
         assert_eq!(region["material"].as_f64().unwrap(), cloud["material"][i]);
     }
+    assert!(50 * together < points, "{together} of {points} points are echoes of two surfaces");
 }
 
 #[test]

@@ -99,6 +99,7 @@ impl Bench {
             link: Link::new(radar),
             grain_of_region: &grains,
             seen_lobe_rad: &[],
+            on_wavefront: false,
             middle: DVec3::ZERO,
         };
         let shots = diagnose::trace_shots(&stage).unwrap();

@@ -589,11 +589,24 @@ fn add_rag(folder: &Path) {
     matdb(folder).args(["add", "--from", "rag.toml"]).assert().success();
 }
 
+/// A film of a name of its own with a key of its layer replaced; what `add` says of it.
+fn add_film(folder: &Path, from: &str, to: &str) -> std::process::Output {
+    let text = std::fs::read_to_string(support::root().join("materials/kapton/material.toml"));
+    let text = text.unwrap().replace("\"kapton\"\nname", "\"film\"\nname").replace(from, to);
+    std::fs::write(folder.join("film.toml"), text).unwrap();
+    matdb(folder).args(["add", "--from", "film.toml"]).output().unwrap()
+}
+
 #[test]
 fn what_cannot_transmit_is_refused_in_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
     add_rag(folder.path());
+    let gain = add_film(folder.path(), "eps_imag = 0.02181", "eps_imag = -0.02");
+    let gain = String::from_utf8(gain.stderr).unwrap();
+    assert!(gain.contains("layers.0.eps_imag = -0.02 is out of range"), "{gain}");
+    assert!(add_film(folder.path(), "thickness_m = 125e-6", "thickness_m = 0").status.success());
     for (before, material, more, expected) in [
+        ("", "film", "transmits = true", "layers in air with a thickness above 0"),
         ("", "ptfe", "thickness_m = -0.001", "has thickness_m = -0.001"),
         ("", "ptfe", "thickness_m = 0", "has thickness_m = 0"),
         ("", "ptfe", "thickness_m = 0.3", "at most 0.1"),

@@ -45,6 +45,8 @@ pub struct Local {
     pub sigma0_volume: f64,
     /// Two-way loss of whatever lies above, as a ratio.
     pub gain: f64,
+    /// Width δ of the slopes over which the beam averages the lobe, as a tangent.
+    pub beam_slope: f64,
 }
 
 impl Base {
@@ -77,11 +79,13 @@ impl Base {
             alpha: self.alpha,
             sigma0_volume: 0.0,
             gain: 1.0,
+            beam_slope: 0.0,
         }
     }
 
-    /// f(i, o), 1/sr, for unit vectors away from a surface with normal n.
-    pub fn bistatic_per_sr(&self, n: DVec3, i: DVec3, o: DVec3) -> f64 {
+    /// f(i, o), 1/sr, for unit vectors away from a surface with normal n, its lobe seen by a beam of the
+    /// slopes `beam_slope`, or 0 for the surface's own.
+    pub fn bistatic_per_sr(&self, [n, i, o]: [DVec3; 3], beam_slope: f64) -> f64 {
         let (cos_i, cos_o) = (n.dot(i), n.dot(o));
         let Some(h) = (i + o).try_normalize() else { return 0.0 };
         if cos_i <= 0.0 || cos_o <= 0.0 {
@@ -90,7 +94,9 @@ impl Base {
         let cos_h = n.dot(h).clamp(0.0, 1.0);
         let fresnel = self.f_lambda + (1.0 - self.f_lambda) * (1.0 - o.dot(h).abs()).powi(5);
         let g = self.slopes.g1(tan(cos_i), self.m) * self.slopes.g1(tan(cos_o), self.m);
-        let specular = fresnel * self.slopes.d_per_sr(cos_h, self.m) * g / (4.0 * cos_i * cos_o);
+        let tan2 = [tan(cos_h).powi(2), 0.0];
+        let d = self.slopes.seen_density(tan2, [self.m; 2], beam_slope) / cos_h.powi(4).max(1e-12);
+        let specular = fresnel * d * g / (4.0 * cos_i * cos_o);
         let diffuse = self.r_s * (self.alpha + 2.0) / (2.0 * PI) * cos_h.powf(self.alpha);
         self.k * diffuse + (1.0 - self.k) * specular
     }
@@ -99,21 +105,46 @@ impl Base {
 impl Local {
     /// f(θ) in backscatter, 1/sr.
     pub fn f_per_sr(&self, cos_theta: f64) -> f64 {
+        self.parts_per_sr(cos_theta).iter().sum()
+    }
+
+    /// f(θ) in two parts, 1/sr: what speckles, and what all facets in the spot return together as one mirror
+    /// does, δ²/m² of the lobe as the beam sees it.
+    pub fn parts_per_sr(&self, cos_theta: f64) -> [f64; 2] {
         if cos_theta <= 1e-6 {
+            return [0.0; 2];
+        }
+        let diffuse = self.diffuse * (self.alpha + 2.0) / (2.0 * PI) * cos_theta.powf(self.alpha);
+        let volume = self.sigma0_volume / (4.0 * PI * cos_theta * cos_theta);
+        let delta2 = self.beam_slope * self.beam_slope;
+        let [along2, across2] = self.m.map(|m| m * m + delta2);
+        let mirrored = delta2 / (along2 * across2).sqrt();
+        let lobe = self.lobe_per_sr(cos_theta);
+        [self.gain * (diffuse + volume) + (1.0 - mirrored) * lobe, mirrored * lobe]
+    }
+
+    fn lobe_per_sr(&self, cos_theta: f64) -> f64 {
+        if self.specular <= 0.0 {
             return 0.0;
         }
         let (cos2, tan) = (cos_theta * cos_theta, tan(cos_theta));
         let [along, across] = self.m;
         let share = self.cos2_azimuth;
-        let slope2 = tan * tan * (share / (along * along) + (1.0 - share) / (across * across));
-        let d = self.slopes.law(slope2) / (PI * along * across * cos2 * cos2);
+        let tan2 = [tan * tan * share, tan * tan * (1.0 - share)];
+        let d = self.slopes.seen_density(tan2, self.m, self.beam_slope) / (cos2 * cos2);
         let m = (along * along * share + across * across * (1.0 - share)).sqrt();
         let g = self.slopes.g1(tan, m).powf(self.shadowings);
-        let specular = self.specular * d * g / (4.0 * cos2);
-        let diffuse = self.diffuse * (self.alpha + 2.0) / (2.0 * PI) * cos_theta.powf(self.alpha);
-        self.gain * (specular + diffuse + self.sigma0_volume / (4.0 * PI * cos2))
+        self.gain * self.specular * d * g / (4.0 * cos2)
     }
 }
+
+/// Roots of the Laguerre polynomial L₃ of order 1 and the weights of its Gauss rule, for ∫ y·e⁻ʸ·g(y) dy.
+/// Against a sum of 400 000 steps the rule below errs by 2e-6 for m = 0.08 and by 5e-5 for m = 0.05.
+const LAGUERRE: [[f64; 2]; 3] = [
+    [0.935_822_227_524_087_7, 0.588_681_481_039_660_4],
+    [3.305_407_289_332_279, 0.391_216_059_222_309_9],
+    [7.758_770_483_143_634, 0.020_102_459_738_030_53],
+];
 
 impl Slopes {
     fn law(self, slope2: f64) -> f64 {
@@ -126,6 +157,33 @@ impl Slopes {
     /// Facet normals per steradian.
     pub fn d_per_sr(self, cos: f64, m: f64) -> f64 {
         self.law((tan(cos) / m).powi(2)) / (PI * m * m * cos.powi(4).max(1e-12))
+    }
+
+    /// Density of the slopes, convolved with the beam's exp(−s²/δ²)/(π·δ²), at the squared tangents along
+    /// and across the grain.
+    fn seen_density(self, tan2: [f64; 2], m: [f64; 2], beam_slope: f64) -> f64 {
+        let (delta2, m2) = (beam_slope * beam_slope, m.map(|m| m * m));
+        let slope2 = |v: [f64; 2]| tan2[0] / v[0] + tan2[1] / v[1];
+        match self {
+            Slopes::Beckmann => {
+                let seen = m2.map(|m2| m2 + delta2);
+                self.law(slope2(seen)) / (PI * (seen[0] * seen[1]).sqrt())
+            }
+            Slopes::Ggx if beam_slope == 0.0 => {
+                self.law(slope2(m2)) / (PI * (m2[0] * m2[1]).sqrt())
+            }
+            // GGX is a mixture of Beckmann's laws with m²/t in place of m², t weighted by e⁻ᵗ. Each is
+            // convolved exactly, and y = t·(1 + s²/m²) is left to the Gauss rule.
+            Slopes::Ggx => {
+                let stretch = 1.0 + slope2(m2);
+                let law = |[y, weight]: [f64; 2]| {
+                    let t = y / stretch;
+                    let seen = m2.map(|m2| m2 + delta2 * t);
+                    weight * (y - t - t * slope2(seen)).exp() / (seen[0] * seen[1]).sqrt()
+                };
+                LAGUERRE.into_iter().map(law).sum::<f64>() / (PI * stretch * stretch)
+            }
+        }
     }
 
     /// tan² of a facet's slope, of a uniform draw: facets as often as D·cos says.

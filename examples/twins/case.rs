@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use super::base::Base;
 use super::instrument::{Compression, Drift, FovGain, NoiseFloor, Speckle};
-use super::noise::observe;
+use super::noise::{Grain, observe};
 use super::physics::{Acting, Class, Effect, means};
 use super::scan::{Stream, World, draws};
 use super::scenes::{Declared, Geometry, files};
@@ -84,6 +84,8 @@ pub struct Plan {
     pub class: Option<Class>,
     pub geometry: Geometry,
     pub chirps: usize,
+    /// Where speckle comes from: two plans that differ in nothing else have the same name and truth.
+    pub grain: Grain,
 }
 
 /// What became of a plan.
@@ -169,7 +171,7 @@ impl Plan {
         let acting: Vec<Acting> = effects.iter().map(|(e, size)| (e.as_ref(), *size)).collect();
         let truth = material(base, &acting);
         let means = means(world, seed, &truth, &acting, 1);
-        let detections = observe(world, seed, &means, &acting);
+        let detections = observe(world, seed, &truth, &means, &acting, self.grain);
         fs::write(folder.join("cloud.csv"), write::cloud(&detections))?;
         let start = truth.misjudged(&mut draws(seed, 0, Stream::Start));
         fs::create_dir_all(folder.join("material"))?;
@@ -193,6 +195,7 @@ impl Plan {
             "expected_verdict": self.expected(),
             "rms_db": rms_db(world, seed, base, &acting, 1),
             "base": truth,
+            "speckle": self.grain,
             "chirps": world.sights.len(),
             "on_target": world.sights.iter().filter(|sight| sight.look.is_some()).count(),
             "detections": detections.len(),

@@ -1,6 +1,6 @@
 //! Sealed twins: scans with an effect that the scene does not declare, to try a diagnosis on.
 //!
-//!     cargo run --release --example twins -- --out DIR --seeds 1..5 [--only NAME] [--chirps N]
+//!     cargo run --release --example twins -- --out DIR --seeds 1..5 [--only NAME] [--chirps N] [--independent]
 //!
 //! `DIR/cases/NAME/` is what a user would have: `scene.toml` with its meshes and rays, `material/` to
 //! `matdb add --from`, and `cloud.csv`. `DIR/labels/NAME.json` is the truth, in a tree of its own; the
@@ -14,24 +14,43 @@
 //!
 //! # What is simulated
 //!
-//! Without an effect a chirp has the mean P = P_t·L·A_eq/R²·cos²θ·f(θ) (equation 11) of the one facet
-//! that its ray meets, with f of equations (12) to (15). The parameters are drawn for every case; the
-//! material starts each wrong by up to ±30 %. The looks are 4 to 8 random phasors a√P + w√N, averaged;
-//! what lies below −77 dBm is not there; the range has a Gaussian error. A chirp that meets nothing
-//! stays silent, however high the noise.
+//! Without an effect a chirp has the mean P = P_t·L·Ω·cos²θ·f(θ) (equation 11) of the one facet that its
+//! ray meets, with Ω = λ²/(πw²) of a Gaussian beam and f of equations (12) to (15). The parameters are drawn
+//! for every case; the material starts each wrong by up to ±30 %. They are the surface's own: the beam shows
+//! its lobe convolved with exp(−s²/δ²)/(πδ²), δ = λ/(2πw₀) for one ray and λ/(2πw) for the rays of a spot.
+//! What lies below −77 dBm is not there; the range has a Gaussian error. A chirp that meets nothing stays
+//! silent, however high the noise.
+//!
+//! Speckle is a field that is fixed to the surface. Scatterers lie on the facets, one per (w₀/3)², each with
+//! a complex Gaussian amplitude a for every look, by seed and number. A chirp receives
+//! √P·Σ a·g·e^{iφ}/√Σ g² with g = √(f·cos²θ)·exp(−2r²/w²) and the beam's own phase φ = 2k(z + r²/(2R_c)) −
+//! 2·arctan(z/z_R). Neighbouring chirps therefore share speckle: fields d apart correlate by exp(−d²/w₀²).
+//! Scatterers that the radar does not see do not count, and each counts as the range transform with a Hann
+//! window shows it in the cell of the echo: what lies two cells c/2B away is not in it. Across a slope the
+//! cell is smaller than the spot, and so are the grains. The share δ²/(m² + δ²) of a lobe is coherent and
+//! does not speckle. The looks are 4 to 8 phasors, echo and noise, whose powers are averaged; noise is
+//! independent per chirp. With `--independent` every chirp draws its speckle anew; names, truths and means of
+//! the cases stay the same, so that two studies can be compared case by case.
+//!
+//! A target that is moved (`pose`, `motion`) has moved its scatterers, to fractions of a wave. Four things
+//! are simpler than they are: which scatterers are hidden, and how bright each is, is judged in the middle of
+//! the scan; `angle-error` tilts the mean alone; an echo by a second surface speckles with a set of
+//! amplitudes of its own, seen by the beam where it first meets the surface, and is not parted from the
+//! direct echo in range; a chirp with no scatterer in its beam, at the rim of a target, draws its speckle
+//! anew. Gains, compression and drift act on the mean.
 //!
 //! | effect | what is done | size |
 //! |---|---|---|
 //! | `subsurface` | σ⁰ + σ_v, that is f + σ_v/(4π cos²θ) | σ_v |
-//! | `speckle` | Gamma of fewer looks | L |
+//! | `speckle` | fewer looks; a part of a look has a smaller share in the average | L |
 //! | `fov-gain` | −edge_db·(ρ/0.5 m)² dB at distance ρ from the field's centre | edge_db |
 //! | `angle-error` | each chirp's normal n + a·u + b·v with Gaussian a, b | their sd |
-//! | `finite-spot` | 256 rays over a Gaussian footprint, one in each cell of equal power, powers averaged, misses count as nothing | diameter at half the intensity |
+//! | `finite-spot` | 256 rays over a Gaussian footprint, one in each cell of equal power, powers averaged, misses count as nothing; the grains of the speckle grow with a spot wider than the declared one; the cell is that of most power | diameter at half the intensity |
 //! | `noise-floor` | a higher N in the phasors | N |
 //! | `covering-layer` | −loss/cos θ dB on one side of a plane that cuts the target | two-way loss |
 //! | `anisotropy` | D with slopes m√q along a grain and m/√q across, G1 with m in the radar's azimuth | q |
-//! | `thin-film` | a share c of each spot coated: specular × (1 − c + c·R_film(θ)/R_bare(θ)), diffuse × (1 − c + c·((1 − R_film)/(1 − R_bare))²), R by characteristic matrices at 300 GHz, not averaged over the sweep; on a base law with m of 0.35 to 0.7 | c |
-//! | `multi-bounce` | 512 rays onward from each hit, half by the cosine and half by the lobe, weighted by their density; f bistatic at both points; the second is seen by the antenna when nothing hides it; range half the whole way, the reported one the mean by power | coupling |
+//! | `thin-film` | a share c of each spot coated: specular × (1 − c + c·R_film(0)/R_bare(0)), diffuse × (1 − c + c·R_film(θ)/R_bare(θ)), R by characteristic matrices at 300 GHz, not averaged over the sweep | c |
+//! | `multi-bounce` | 512 rays onward from each hit, half by the cosine and half by the lobe, weighted by their density; f bistatic at both points; the second is seen by the antenna when nothing hides it, with exp(−s²/w²) for a distance s across the beam, at least the −20 dB of its side lobes; range half the whole way, the reported one the mean by power | coupling |
 //! | `pose` | the mesh shifted and turned about the middle of the lit points, rays traced against it | shift, with a turn in proportion |
 //! | `motion` | the mesh shifted by two slow sines of time | amplitude |
 //! | `compression` | P/(1 + (P/P_sat)^p)^(1/p), p = 1 or 2 | 1/P_sat |
@@ -42,7 +61,7 @@
 //! Not in any library: `mirror-ripple` (gain periodic in the mirror's turn), `standing-wave` (gain
 //! periodic in range), `image-azimuth` (cos 2ψ in the image plane), `rope-shadow` (a stripe of loss),
 //! `coarse-steps` (powers in steps of dB), `dropouts` (bursts of lost chirps), `ghost-echo` (a share of
-//! detections weaker and at a longer range), `log-normal-speckle` (Gaussian in dB, wider than declared).
+//! detections weaker and at a longer range), `log-normal-speckle` (Gaussian in dB, wider than declared: a real texture of the scatterers).
 //!
 //! # How strong
 //!
@@ -59,11 +78,13 @@
 pub mod base;
 pub mod beam;
 pub mod case;
+pub mod field;
 pub mod instrument;
 pub mod noise;
 pub mod physics;
 pub mod refit;
 pub mod scan;
+pub mod scatterers;
 pub mod scenes;
 pub mod strength;
 pub mod surface;
@@ -78,6 +99,7 @@ use std::time::Instant;
 use clap::Parser;
 
 use case::{KNOWN, Outcome, PAIRS, Plan, UNKNOWN};
+use noise::Grain;
 use physics::Class;
 use scenes::Geometry;
 
@@ -96,6 +118,9 @@ struct Args {
     /// Chirps per scan
     #[arg(long, default_value_t = 18_529, value_parser = clap::value_parser!(u32).range(500..=200_000))]
     chirps: u32,
+    /// Draw speckle anew for every chirp instead of from scatterers on the surface
+    #[arg(long)]
+    independent: bool,
 }
 
 fn seeds(text: &str) -> Result<std::ops::Range<u64>, String> {
@@ -109,14 +134,14 @@ const COMPLETE: usize = 5;
 
 /// All cases of a seed: every effect in every class, the pairs, and nothing missing. Geometries take
 /// turns from seed to seed.
-pub fn plans(seed: u64, chirps: usize) -> Vec<Plan> {
+pub fn plans(seed: u64, chirps: usize, grain: Grain) -> Vec<Plan> {
     let mut plans = Vec::new();
     let mut add = |effects: &[&'static str], class: Option<Class>| {
         let number = plans.len();
         let turn = (seed as usize).wrapping_add(number + number / 4) % Geometry::ALL.len();
         let geometry = Geometry::ALL[turn];
         let effects = effects.to_vec();
-        plans.push(Plan { seed, number, attempt: 0, effects, class, geometry, chirps });
+        plans.push(Plan { seed, number, attempt: 0, effects, class, geometry, chirps, grain });
     };
     for name in KNOWN.iter().chain(&UNKNOWN) {
         Class::ALL.iter().for_each(|&class| add(&[name], Some(class)));
@@ -175,9 +200,10 @@ fn wanted(plan: &Plan, only: Option<&str>) -> bool {
 #[allow(dead_code)] // The test that includes this file calls the parts.
 fn main() -> Result<(), Box<dyn Error>> {
     let args = Args::parse();
+    let grain = if args.independent { Grain::Independent } else { Grain::Field };
     for seed in args.seeds.clone() {
         let mut missed = Vec::new();
-        let mut plans = plans(seed, args.chirps as usize);
+        let mut plans = plans(seed, args.chirps as usize, grain);
         plans.retain(|plan| wanted(plan, args.only.as_deref()));
         if plans.is_empty() {
             return Err("no case has such a name; give an effect, `pairs` or `nothing`".into());

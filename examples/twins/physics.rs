@@ -55,6 +55,31 @@ pub struct Displacement {
     pub pivot: DVec3,
 }
 
+impl Displacement {
+    /// Where a point of the displaced target is in its own frame.
+    pub fn undo(&self, at: DVec3) -> DVec3 {
+        self.undo_turn(at - self.pivot - self.translation_m) + self.pivot
+    }
+
+    /// The same for a direction.
+    pub fn undo_turn(&self, along: DVec3) -> DVec3 {
+        self.rotation.transpose() * along
+    }
+}
+
+/// The echo of one chirp before it fluctuates.
+#[derive(Clone, Copy, Debug)]
+pub struct Echo {
+    /// Mean power, and the range that is reported.
+    pub report: Report,
+    /// Share of the power that facets return together, as a mirror does. It does not fluctuate.
+    pub mirrored: f64,
+    /// Share of the power that comes by way of a second surface.
+    pub bounced: f64,
+    /// Middle of the range cell that returns most, m.
+    pub cell_m: f64,
+}
+
 /// Something the base law does not know. Each hook is a place where physics can act; `size` is the
 /// number that the calibration turns, and more of it means more effect.
 pub trait Effect: Sync {
@@ -107,85 +132,148 @@ pub type Acting<'a> = (&'a dyn Effect, f64);
 /// angle. Placed freely, so few would scatter by more than a weak effect changes.
 const SPOT_CELLS: usize = 16;
 
-/// Mean power without thermal noise, and range, of every `stride`-th chirp; `None` where nothing is
-/// met.
+/// Mean echo without thermal noise of every `stride`-th chirp; `None` where nothing is met.
 pub fn means(
     world: &World,
     seed: u64,
     base: &Base,
     acting: &[Acting],
     stride: usize,
-) -> Vec<Option<Report>> {
+) -> Vec<Option<Echo>> {
     let chirps: Vec<&Sight> = world.sights.iter().step_by(stride).collect();
     chirps.into_par_iter().map(|sight| mean(world, seed, base, acting, sight)).collect()
 }
 
-fn mean(world: &World, seed: u64, base: &Base, acting: &[Acting], sight: &Sight) -> Option<Report> {
+fn mean(world: &World, seed: u64, base: &Base, acting: &[Acting], sight: &Sight) -> Option<Echo> {
     let looks = looks(world, seed, acting, sight);
-    let met = looks.iter().flatten().count();
-    if met == 0 {
-        return None;
-    }
-    let mut sum = Report { range_m: 0.0, power_w: 0.0 };
-    for look in looks.iter().flatten() {
-        let power_w = echo_w(world, base, acting, sight, look) / looks.len() as f64;
+    let parts: Vec<Part> =
+        looks.iter().flatten().map(|look| part(world, base, acting, sight, look)).collect();
+    let cell_m = brightest_cell_m(world, &parts)?;
+    let (mut sum, mut mirrored_w, mut bounced_w) =
+        (Report { range_m: 0.0, power_w: 0.0 }, 0.0, 0.0);
+    for part in &parts {
+        let power_w = part.power_w / looks.len() as f64;
         sum.power_w += power_w;
-        sum.range_m += power_w * look.range_m;
+        sum.range_m += power_w * part.range_m;
+        mirrored_w += part.mirrored_w / looks.len() as f64;
     }
     for (effect, size) in acting {
         if let Some(detour) = effect.detour(*size, sight.chirp) {
             sum.power_w += detour.power_w;
             sum.range_m += detour.power_w * detour.range_m;
+            bounced_w += detour.power_w;
         }
     }
     if sum.power_w <= 0.0 {
         return None;
     }
+    let (mirrored, bounced) = (mirrored_w / sum.power_w, bounced_w / sum.power_w);
     sum.range_m /= sum.power_w;
     for (effect, size) in acting {
         sum.power_w = effect.receive_w(*size, sight, sum);
     }
-    Some(sum)
+    Some(Echo { report: sum, mirrored, bounced, cell_m })
+}
+
+/// What one ray of a spot returns, as if it were the only one.
+struct Part {
+    range_m: f64,
+    power_w: f64,
+    /// What of it does not speckle.
+    mirrored_w: f64,
 }
 
 /// Equation (11) at one place.
-fn echo_w(world: &World, base: &Base, acting: &[Acting], sight: &Sight, look: &Shot) -> f64 {
+fn part(world: &World, base: &Base, acting: &[Acting], sight: &Sight, look: &Shot) -> Part {
     let tilt: DVec2 = acting.iter().map(|(effect, size)| effect.tilt(*size, sight.chirp)).sum();
     let mut look = *look;
     if tilt != DVec2::ZERO {
         let (u, v) = look.normal.any_orthonormal_pair();
         look.normal = (look.normal + tilt.x * u + tilt.y * v).normalize();
     }
-    let mut law = base.local();
-    acting.iter().for_each(|(effect, size)| effect.surface(*size, &look, &mut law));
+    // Rays that stand on the curved wavefront meet a lobe as wide as the beam is here; a single one, which
+    // stands for all of them, as it is at the waist.
+    let beam_slope = if spot_diameter_m(acting).is_some() {
+        world.waist.slope_at(sight.place_m, look.range_m)
+    } else {
+        world.waist.slope(sight.place_m)
+    };
+    let law = law(base, acting, &look, beam_slope);
     let cos = look.cos_theta().max(0.0);
     let received_sr = world.waist.received_sr(sight.place_m, look.range_m);
-    world.sent_w * received_sr * cos * cos * law.f_per_sr(cos)
+    let watts_per_f = world.sent_w * received_sr * cos * cos;
+    let [speckled_w, mirrored_w] = law.parts_per_sr(cos).map(|f| watts_per_f * f);
+    Part { range_m: look.range_m, power_w: speckled_w + mirrored_w, mirrored_w }
+}
+
+/// The base law at one place, as the effects change it and as a beam of these slopes sees it.
+fn law(base: &Base, acting: &[Acting], look: &Shot, beam_slope: f64) -> Local {
+    let mut law = Local { beam_slope, ..base.local() };
+    acting.iter().for_each(|(effect, size)| effect.surface(*size, look, &mut law));
+    law
+}
+
+/// The part of f that speckles, 1/sr, in the middle of the field.
+pub fn incoherent_per_sr(world: &World, base: &Base, acting: &[Acting], look: &Shot) -> f64 {
+    let [speckled, _] =
+        law(base, acting, look, world.waist.slope(DVec2::ZERO)).parts_per_sr(look.cos_theta());
+    speckled
+}
+
+/// Mean range of those that fill the range cell with the most power, m; cells count from the nearest.
+fn brightest_cell_m(world: &World, parts: &[Part]) -> Option<f64> {
+    let nearest_m = parts.iter().map(|part| part.range_m).reduce(f64::min)?;
+    let mut cells: Vec<Report> = Vec::new();
+    for part in parts {
+        let cell = ((part.range_m - nearest_m) / world.range_cell_m) as usize;
+        if cells.len() <= cell {
+            cells.resize(cell + 1, Report { range_m: 0.0, power_w: 0.0 });
+        }
+        cells[cell].power_w += part.power_w;
+        cells[cell].range_m += part.power_w * part.range_m;
+    }
+    let brightest = cells.iter().max_by(|a, b| a.power_w.total_cmp(&b.power_w))?;
+    if brightest.power_w > 0.0 {
+        Some(brightest.range_m / brightest.power_w)
+    } else {
+        Some(nearest_m)
+    }
+}
+
+/// How the effects move the target under a chirp.
+pub fn moves(acting: &[Acting], sight: &Sight) -> Vec<Displacement> {
+    acting.iter().filter_map(|(effect, size)| effect.displacement(*size, sight)).collect()
+}
+
+/// Diameter at half the intensity over which a chirp averages, m.
+pub fn spot_diameter_m(acting: &[Acting]) -> Option<f64> {
+    acting.iter().find_map(|(effect, size)| effect.spot_diameter_m(*size))
+}
+
+/// Origin and direction of a chirp's ray in the frame of the target, which stands still there.
+pub fn into_target(acting: &[Acting], sight: &Sight) -> [DVec3; 2] {
+    let ray = [sight.ray.origin.xyz, sight.ray.direction.xyz()];
+    moves(acting, sight)
+        .iter()
+        .fold(ray, |[at, along], moved| [moved.undo(at), moved.undo_turn(along)])
 }
 
 /// What the rays of one chirp meet on the target as it really stands.
 fn looks(world: &World, seed: u64, acting: &[Acting], sight: &Sight) -> Vec<Option<Shot>> {
-    let moved: Vec<Displacement> =
-        acting.iter().filter_map(|(effect, size)| effect.displacement(*size, sight)).collect();
-    let diameter_m = acting.iter().find_map(|(effect, size)| effect.spot_diameter_m(*size));
+    let diameter_m = spot_diameter_m(acting);
+    let moved = moves(acting, sight);
     if moved.is_empty() && diameter_m.is_none() {
         return vec![sight.look];
     }
-    let forward = sight.ray.direction.xyz();
-    let origin = sight.ray.origin.xyz;
-    let traced = |origin: DVec3, along: DVec3| {
-        // The target stands still in its own frame, and the ray moves the other way.
-        let back = |v: DVec3, d: &Displacement| d.rotation.transpose() * v;
-        let start =
-            moved.iter().fold(origin, |o, d| back(o - d.pivot - d.translation_m, d) + d.pivot);
-        look(&world.bvh, &ray(start, moved.iter().fold(along, back))?)
+    let [origin, forward] = into_target(acting, sight);
+    let Some(diameter_m) = diameter_m else {
+        return vec![ray(origin, forward).and_then(|ray| look(&world.bvh, &ray))];
     };
-    let Some(diameter_m) = diameter_m else { return vec![traced(origin, forward)] };
     let range_m = sight.look.map_or(8.0, |look| look.range_m);
     // What is sent and received alike, exp(−8 ln 2·r²/D²), is a Gaussian of this standard deviation in each
     // direction.
     let sd_m = diameter_m / (16.0 * std::f64::consts::LN_2).sqrt();
-    let turn_per_m = world.waist.turn_per_m(sight.place_m, range_m);
+    let turn_per_m = world.waist.towards(sight.place_m).turn_per_m(range_m);
     let (u, v) = forward.any_orthonormal_pair();
     let mut random = draws(seed, sight.chirp, Stream::Spot);
     let mut within = |cell: usize| (cell as f64 + random.uniform()) / SPOT_CELLS as f64;
@@ -195,10 +283,13 @@ fn looks(world: &World, seed: u64, acting: &[Acting], sight: &Sight) -> Vec<Opti
         radius_m * (along * u + across * v)
     };
     // The wave runs at right angles to its front, on which all rays have come equally far.
-    let ray = |aside_m: DVec3| {
+    let bent = |aside_m: DVec3| {
         let along = forward + turn_per_m * aside_m;
         let way_m = range_m + 0.5 * turn_per_m * aside_m.length_squared();
-        (origin + range_m * forward + aside_m - way_m * along.normalize(), along)
+        ray(origin + range_m * forward + aside_m - way_m * along.normalize(), along)
     };
-    (0..SPOT_CELLS * SPOT_CELLS).map(aside).map(ray).map(|(o, along)| traced(o, along)).collect()
+    (0..SPOT_CELLS * SPOT_CELLS)
+        .map(aside)
+        .map(|aside_m| look(&world.bvh, &bent(aside_m)?))
+        .collect()
 }

@@ -16,6 +16,8 @@ pub struct Point {
     /// Power per f, W·sr: P_t·L·A_eq/R²·cos²θ.
     pub watts_per_f: f64,
     pub power_db: f64,
+    /// Width of the beam's slopes, as a tangent.
+    pub beam_slope: f64,
 }
 
 /// ln S, ln m, ln R, α.
@@ -108,11 +110,12 @@ fn expand(
     let (wider, steeper) = (moved(1), moved(3));
     let (mut cost, mut normal, mut slope) = (0.0, Matrix4::zeros(), Vector4::zeros());
     for point in points {
-        let cos = point.cos_theta;
-        let (s, d) = (specular.f_per_sr(cos), diffuse.f_per_sr(cos));
+        let (cos, beam_slope) = (point.cos_theta, point.beam_slope);
+        let s = Local { beam_slope, ..specular }.f_per_sr(cos);
+        let d = diffuse.f_per_sr(cos);
         let total_w = point.watts_per_f * (s + d) + floor.noise_w;
         let per_f = DB_PER_NEPER * point.watts_per_f / total_w;
-        let by_m = (Local { diffuse: 0.0, ..wider }.f_per_sr(cos) - s) / STEP;
+        let by_m = (Local { diffuse: 0.0, beam_slope, ..wider }.f_per_sr(cos) - s) / STEP;
         let by_alpha = (Local { specular: 0.0, ..steeper }.f_per_sr(cos) - d) / STEP;
         let j = Vector4::new(s, by_m, d, by_alpha) * per_f;
         let r = point.power_db - DB_PER_NEPER * total_w.max(floor.threshold_w).ln();

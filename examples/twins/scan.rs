@@ -10,7 +10,7 @@ use matdb::trace::Bvh;
 use matdb::units::watts_from_dbm;
 use rayon::prelude::*;
 
-use super::beam::Waist;
+use super::beam::{METRES_AT_ONE_GHZ, Waist};
 
 /// Streams of random numbers that never share a draw.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +26,8 @@ pub enum Stream {
     Geometry,
     Start,
     Report,
+    Place,
+    Scatterer,
 }
 
 /// The draws of a seed, a chirp and a purpose.
@@ -81,6 +83,8 @@ pub struct World<'a> {
     pub looks: f64,
     pub noise_w: f64,
     pub range_sd_m: f64,
+    /// c/2B, m.
+    pub range_cell_m: f64,
     pub has_mirror: bool,
 }
 
@@ -117,9 +121,15 @@ impl<'a> World<'a> {
             looks: radar.speckle.unwrap_or_default().looks,
             noise_w: radar.noise_w(),
             range_sd_m: noise.range_sd_m,
+            range_cell_m: 0.5 * METRES_AT_ONE_GHZ / radar.bandwidth_ghz,
             has_mirror: !chirps.mirror.is_empty(),
             bvh,
         }
+    }
+
+    /// The chirp half way through the scan.
+    pub fn middle_of_scan(&self) -> Option<&Sight> {
+        self.sights.get(self.sights.len() / 2)
     }
 }
 

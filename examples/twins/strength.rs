@@ -4,7 +4,7 @@
 //! threshold, once all four identified parameters are refitted to the noise-free means.
 
 use super::base::Base;
-use super::physics::{Acting, Class, Effect, Report, means};
+use super::physics::{Acting, Class, Echo, Effect, means};
 use super::refit::{Floor, Point, rms_left_db};
 use super::scan::World;
 
@@ -41,12 +41,14 @@ pub fn rms_db(world: &World, seed: u64, base: &Base, acting: &[Acting], stride: 
     let noise_w = thermal_w(world, acting);
     let points: Vec<Point> = std::iter::zip(world.sights.iter().step_by(stride), &means)
         .filter_map(|(sight, mean)| {
-            let (look, Report { power_w, .. }) = (sight.look?, (*mean)?);
-            let (power_w, cos_theta) = (power_w + noise_w, look.cos_theta());
+            let (look, Echo { report, .. }) = (sight.look?, (*mean)?);
+            let (power_w, cos_theta) = (report.power_w + noise_w, look.cos_theta());
             let received_sr = world.waist.received_sr(sight.place_m, look.range_m);
             let watts_per_f = world.sent_w * received_sr * cos_theta * cos_theta;
             let power_db = 10.0 * power_w.log10();
-            (power_w >= world.threshold_w).then_some(Point { cos_theta, watts_per_f, power_db })
+            let beam_slope = world.waist.slope(sight.place_m);
+            let point = Point { cos_theta, watts_per_f, power_db, beam_slope };
+            (power_w >= world.threshold_w).then_some(point)
         })
         .collect();
     let floor = Floor { noise_w: world.noise_w, threshold_w: world.threshold_w };

@@ -101,11 +101,9 @@ impl Effect for Anisotropy {
     }
 }
 
-/// A coating on a share of every spot: interference in the specular part, and in what passes the
-/// coating twice on its way to the diffuse part and back.
+/// A coating on a share of every spot: interference in the specular part, whose facets are met at normal incidence, and
+/// in the diffuse part, which comes from fine unevenness of the same surface.
 pub struct ThinFilm {
-    /// Roughness of the base law: a narrow lobe has no room for a ripple.
-    m: f64,
     index: f64,
     thickness_m: f64,
     substrate: f64,
@@ -117,14 +115,13 @@ impl ThinFilm {
     pub fn new(random: &mut Draws, base: &Base) -> ThinFilm {
         let index = 1.3 + 0.5 * random.uniform();
         let thickness_m = 2e-3 + 4e-3 * random.uniform();
-        let m = 0.35 + 0.35 * random.uniform();
         let root = base.f_lambda.sqrt();
         let substrate = (1.0 + root) / (1.0 - root);
         let at = |tenth: i32| {
             let theta_rad = (0.1 * f64::from(tenth)).to_radians();
             [thickness_m, 0.0].map(|d| reflectance(theta_rad, index, d, substrate))
         };
-        ThinFilm { m, index, thickness_m, substrate, table: (0..900).map(at).collect() }
+        ThinFilm { index, thickness_m, substrate, table: (0..900).map(at).collect() }
     }
 }
 
@@ -143,17 +140,15 @@ impl Effect for ThinFilm {
             "coated_share": size,
         })
     }
-    fn material(&self, _: f64, base: &mut Base) {
-        base.m = self.m;
-    }
     fn surface(&self, size: f64, look: &Shot, law: &mut Local) {
         let tenth = 10.0 * look.cos_theta().clamp(-1.0, 1.0).acos().to_degrees();
         let low = (tenth as usize).min(self.table.len() - 2);
         let part = (tenth - low as f64).clamp(0.0, 1.0);
         let at = |n: usize| self.table[low][n] * (1.0 - part) + self.table[low + 1][n] * part;
-        let [film, bare] = [at(0), at(1)];
-        law.specular *= 1.0 - size + size * film / bare;
-        law.diffuse *= 1.0 - size + size * ((1.0 - film) / (1.0 - bare)).powi(2);
+        // Facets send back what they meet at normal incidence; fine unevenness is lit at the angle of the surface.
+        let [film_on_facet, bare_facet] = self.table[0];
+        law.specular *= 1.0 - size + size * film_on_facet / bare_facet;
+        law.diffuse *= 1.0 - size + size * at(0) / at(1);
     }
 }
 

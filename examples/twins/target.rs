@@ -158,7 +158,7 @@ impl Effect for MultiBounce {
         "multi-bounce"
     }
     fn sizes(&self) -> [f64; 2] {
-        [1e-5, 2.0]
+        [1e-3, 1e3]
     }
     fn parameters(&self, size: f64) -> Value {
         json!({ "coupling_db": 10.0 * size.log10() })
@@ -184,9 +184,11 @@ fn second_segment(world: &World, base: &Base, sight: &Sight, random: &mut Draws)
             / (4.0 * a.to_radar.dot(facet).max(1e-6));
         let density = 0.5 * (cos / PI + lobe);
         let Some((b, range_m)) = returned(world, a, to) else { continue };
-        let f = base.bistatic_per_sr(a.normal, a.to_radar, to);
-        let g = base.bistatic_per_sr(b.normal, -to, b.to_radar);
-        let received = world.waist.received_sr(sight.place_m, b.range_m) * b.cos_theta();
+        // The antenna's width counts once per path, where it leaves the second surface.
+        let f = base.bistatic_per_sr([a.normal, a.to_radar, to], 0.0);
+        let beam_slope = world.waist.slope(sight.place_m);
+        let g = base.bistatic_per_sr([b.normal, -to, b.to_radar], beam_slope);
+        let received = received_sr(world, sight, a, &b) * b.cos_theta();
         let power_w =
             world.sent_w * a.cos_theta() * f * cos / density * g * received / ONWARD as f64;
         sum.power_w += power_w;
@@ -194,6 +196,21 @@ fn second_segment(world: &World, base: &Base, sight: &Sight, random: &mut Draws)
     }
     let Report { range_m, power_w } = sum;
     (power_w > 0.0).then(|| Report { range_m: range_m / power_w, power_w })
+}
+
+/// Level of the antenna's side lobes, which see what lies outside the spot.
+const SIDE_LOBES: f64 = 0.01;
+
+/// λ²/(π·w²) for what reaches the antenna from a second surface, sr.
+fn received_sr(world: &World, sight: &Sight, a: &Shot, b: &Shot) -> f64 {
+    let across_m2 = (b.point - a.point).reject_from(sight.ray.direction.xyz()).length_squared();
+    let spot_m2 = world.waist.towards(sight.place_m).radius_m2(b.range_m);
+    overlap(across_m2, spot_m2) * world.waist.received_sr(sight.place_m, b.range_m)
+}
+
+/// How much a spot u overlaps with one that lies aside, ∫ u(r)·u(r + s) over ∫ u², with the side lobes.
+pub fn overlap(aside_m2: f64, spot_m2: f64) -> f64 {
+    (-aside_m2 / spot_m2).exp().max(SIDE_LOBES)
 }
 
 /// A direction away from A and the facet normal that would mirror the radar's ray into it.

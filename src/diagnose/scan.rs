@@ -54,6 +54,7 @@ impl MeasuredScene<'_> {
             link: Link::new(radar),
             grain_of_region: &grain_of_region,
             seen_lobe_rad,
+            on_wavefront: false,
             middle: glam::DVec3::ZERO,
         };
         let shots = trace_shots(&stage)?;

@@ -145,6 +145,7 @@ impl Bench {
             link: Link::new(radar),
             grain_of_region: &[DVec3::Y],
             seen_lobe_rad: &[],
+            on_wavefront: false,
             middle: DVec3::new(0.0, 1.1, 0.0),
         }
     }

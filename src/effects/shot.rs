@@ -83,6 +83,9 @@ pub struct Stage<'a> {
     /// Width of the narrowest lobe of a region whose lobes include the beam that saw them, rad; none, also in a region
     /// beyond the last, where they are the surface's own.
     pub seen_lobe_rad: &'a [Option<f64>],
+    /// Whether shots are rays on the beam's curved wavefront, several in a spot: its curvature then is no part of the divergence
+    /// that widens lobes. A single ray along the axis stands for the whole beam.
+    pub on_wavefront: bool,
     /// The pivot of a pose, m, global frame: the [`middle`] of all shots of the scan, even if only some are predicted.
     pub middle: DVec3,
 }
@@ -101,7 +104,17 @@ impl Stage<'_> {
 
     /// How far the beam of a shot widens the lobes that it meets, rad.
     pub(crate) fn widening_of_shot_rad(&self, shot: &Shot) -> f64 {
-        self.widening_rad(shot.region, self.beam(shot).divergence_rad())
+        self.widening_rad(shot.region, self.divergence_rad(shot))
+    }
+
+    /// Divergence of the beam at a shot, rad.
+    pub(crate) fn divergence_rad(&self, shot: &Shot) -> f64 {
+        let beam = self.beam(shot);
+        if self.on_wavefront {
+            beam.section(shot.hit.range_m).divergence_rad()
+        } else {
+            beam.divergence_rad()
+        }
     }
 }
 

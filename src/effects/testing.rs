@@ -80,6 +80,7 @@ impl Bench {
             link: Link::new(&self.radar),
             grain_of_region: &GRAIN,
             seen_lobe_rad: &[],
+            on_wavefront: false,
             middle: middle(&self.shots),
         }
     }

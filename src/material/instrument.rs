@@ -67,6 +67,23 @@ pub struct Instrument {
     pub looks_method: Option<String>,
 }
 
+impl Instrument {
+    /// Whether it is stated to receive the polarisation across the one that it sends: H and V, or VH in one word. Other
+    /// words, such as those of circular polarisations, are not judged.
+    pub fn is_cross_polar(&self) -> bool {
+        let both = self.transmit_polarisation.as_deref().zip(self.receive_polarisation.as_deref());
+        let [sent, received] = match (both, self.polarisation.as_deref()) {
+            (Some((sent, received)), _) => [sent, received].map(str::to_uppercase),
+            (None, Some(word)) if word.len() == 2 && word.is_ascii() => {
+                let (sent, received) = word.split_at(1);
+                [sent, received].map(str::to_uppercase)
+            }
+            _ => return false,
+        };
+        matches!((sent.as_str(), received.as_str()), ("H", "V") | ("V", "H"))
+    }
+}
+
 /// Where source and receiver stand to each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -132,5 +149,28 @@ impl Instrument {
             return Err(value(&place, "searches no range bin", "mend range_bins or leave it out"));
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_instrument_is_cross_polar_where_it_says_so() {
+        let word = |word: &str| Instrument {
+            polarisation: Some(word.to_owned()),
+            ..Instrument::default()
+        };
+        assert!(["VH", "hv"].iter().all(|stated| word(stated).is_cross_polar()));
+        assert!(["VV", "HH", "circular", "×H", ""].iter().all(|s| !word(s).is_cross_polar()));
+        let sent = Some("V".to_owned());
+        let received = |field: &str| Instrument {
+            transmit_polarisation: sent.clone(),
+            receive_polarisation: Some(field.to_owned()),
+            ..word("VV")
+        };
+        assert!(received("H").is_cross_polar() && !received("v").is_cross_polar());
+        assert!(!Instrument { transmit_polarisation: sent, ..word("VV") }.is_cross_polar());
     }
 }

@@ -14,7 +14,7 @@ use super::path::Path;
 use super::setup::Setup;
 use super::spot::{Footprints, Intersection};
 use super::surface::Orientation;
-use crate::brdf::Scattering;
+use crate::brdf::{Scattering, Seen};
 use crate::effects::{
     Conflict, Level, MeanEcho, Model, PredictionCache, Receiver, Setting, Shot, Stage, middle,
     shot_at, tilted_cos_theta,
@@ -91,7 +91,8 @@ impl<'a> EffectScan<'a> {
         orientation: Option<Orientation>,
         tilts: [f64; 2],
     ) -> Path {
-        let (stage, shot) = (self.stage(), self.traced_shot(chirp, ray, path.hit, orientation));
+        let stage = Stage { on_wavefront: rays > 1, ..self.stage() };
+        let shot = self.traced_shot(chirp, ray, path.hit, orientation);
         let with_w =
             tilted(&shot, tilts).map_or(0.0, |shot| self.model.arrived(&stage, &shot).power_w);
         let Some(Orientation { azimuth_rad, .. }) = orientation else {
@@ -108,8 +109,11 @@ impl<'a> EffectScan<'a> {
         };
         let retro = Direction::<Surface>::from_angles(shot.hit.theta_rad(), azimuth_rad);
         let law = self.model.laws.get(usize::from(shot.region));
-        let specular_share = law.map_or(0.0, |law| law.specular_share(retro, retro));
-        Path { power_w: with_w / rays as f64, azimuth_rad, specular_share, ..path }
+        let beam_rad = stage.divergence_rad(&shot);
+        let seen = law.map(|law| law.seen_by(beam_rad, retro, retro));
+        let Seen { specular_share, coherent_share, .. } = seen.unwrap_or_default();
+        let power_w = with_w / rays as f64;
+        Path { power_w, azimuth_rad, specular_share, coherent_share, ..path }
     }
 
     /// Gain of the effects of the instrument on the power of one ray of a chirp, as a ratio.
@@ -173,6 +177,7 @@ impl<'a> EffectScan<'a> {
             link: self.link,
             grain_of_region: &self.grain_of_region,
             seen_lobe_rad: &self.seen_lobe_rad,
+            on_wavefront: false,
             middle: self.middle,
         }
     }

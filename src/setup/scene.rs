@@ -269,6 +269,7 @@ impl ReadyScene {
         }
         for SceneMaterial { found, .. } in &self.materials {
             notices.extend(extrapolation_warning(&found.material, self.scene.radar()));
+            notices.extend(polarisation_warning(&found.material));
         }
         if self.speckle_form() == Some(SpeckleForm::Law) && !self.scene.file.receiver.is_empty() {
             notices.push(INDEPENDENT_ANTENNAS.to_owned());
@@ -414,9 +415,8 @@ fn sheet(
     let law = &material.scattering;
     if region.transmits {
         let sheet = Sheet::of_law(law, radar);
-        let problem =
-            || ("is not rendered by layers in air, and lets nothing pass".to_owned(), WAY_OUT);
-        return sheet.map(Some).ok_or_else(problem);
+        let problem = "is not rendered by layers in air with a thickness above 0";
+        return sheet.map(Some).ok_or_else(|| (problem.to_owned(), WAY_OUT));
     }
     let Some(thickness_m) = region.thickness_m else { return Ok(None) };
     if matches!(law, Brdf::Layered(_)) {
@@ -461,6 +461,20 @@ fn too_much(material: &SceneMaterial) -> Option<String> {
 }
 
 /// That a material makes no claim at the radar's frequency.
+/// A curve that was measured across the polarisation that was sent says nothing of what a scene takes it for.
+fn polarisation_warning(material: &Material) -> Option<String> {
+    let curve = material.rendered_curve()?;
+    let key = curve.instrument.as_ref()?;
+    let instrument = material.instruments.iter().find(|instrument| instrument.key == *key)?;
+    instrument.is_cross_polar().then(|| {
+        format!(
+            "curve `{}` of `{}` was measured across the polarisation that was sent; it is rendered as the co-polar return \
+             that a law stands for",
+            curve.name, material.slug
+        )
+    })
+}
+
 fn extrapolation_warning(material: &Material, radar: &Radar) -> Option<String> {
     let frequency_ghz = radar.centre_frequency_ghz;
     let outside_ghz = material.frequency_outside_hz(frequency_ghz * 1e9) / 1e9;

@@ -1,14 +1,16 @@
 //! A film over a share of every spot: its interference changes the reflectance of the surface.
 //!
-//! With R the reflectance at θ of the film on the substrate, by the characteristic matrix at the centre
-//! frequency, and R₀ that of the bare substrate, the specular part of f is multiplied by
-//! 1 − c + c·R/R₀. So is the part of the diffuse return that comes from the rough surface itself; the
-//! part from below crosses the film twice and is multiplied by 1 − c + c·((1 − R)/(1 − R₀))².
+//! R is the reflectance of the film on the substrate, by the characteristic matrix at the centre frequency, and R₀ that
+//! of the bare substrate. The specular part of f is multiplied by 1 − c + c·R/R₀ at the angle at which its facets are met,
+//! as in `layered`: facets send the wave back where they face the radar, so that this part does not swing with θ. So is,
+//! at θ, the part of the diffuse return that comes from unevenness far smaller than the wavelength on the surface
+//! itself. The part from below crosses the film twice and is multiplied by 1 − c + c·((1 − R)/(1 − R₀))², at θ.
 //! The substrate is lossless. Its index is the one that gives f_λ, n = (1 + √f_λ)/(1 − √f_λ), times a
-//! ratio, since backscatter alone does not determine f_λ. R is that of a film as flat as the surface is on
-//! average, so that the ripple in θ shows.
+//! ratio, since backscatter alone does not determine f_λ.
 
-use crate::brdf::{Brdf, Fresnel, Layer, Layered, Scattering, ScatteringModel};
+use crate::brdf::{
+    Brdf, Fresnel, Layer, Layered, Scattering, ScatteringModel, mirror_cosine,
+};
 use crate::effects::effect::{About, Effect, EffectParameter, Level};
 use crate::effects::shot::{Shot, Stage};
 
@@ -50,8 +52,8 @@ const ABOUT: About = About {
     level: Level::Material,
     description: "A coating of this thickness and refractive index covers a share of the surface; what it \
          reflects at its two sides interferes, and raises or lowers the echo by the angle.",
-    signature: "The residual swings with the angle, with no other covariate; a diffuse return from below swings \
-         against the specular part. A film much thinner than a wavelength only shifts the levels, \
+    signature: "The residual of the diffuse part swings with the angle, with no other covariate; the specular part is \
+         raised or lowered at all angles alike. A diffuse return from below swings against one of the surface. A film much thinner than a wavelength only shifts the levels, \
          which the base law absorbs; another frequency moves the swings, which tells it from a wrong \
          shape of the lobe.",
     parameters: &[
@@ -102,19 +104,22 @@ impl Effect for ThinFilm {
         if coverage == 0.0 {
             return f_per_sr;
         }
-        let theta_rad = shot.hit.theta_rad();
+        let retro = shot.to_radar();
         let frequency_hz = stage.geometry.radar.centre_frequency_ghz * 1e9;
+        let eps_real = substrate(law, substrate_ratio);
         let [film, bare] = reflectances(
             [thickness_m, index],
-            substrate(law, substrate_ratio),
+            eps_real,
             frequency_hz,
-            theta_rad,
+            mirror_cosine(retro, retro).acos(),
         );
-        let retro = shot.to_radar();
-        let share = law.specular_share(retro, retro);
         let specular = film / bare.max(1e-9);
+        let theta_rad = shot.hit.theta_rad();
+        let [film, bare] =
+            reflectances([thickness_m, index], eps_real, frequency_hz, theta_rad);
         let crossed = ((1.0 - film) / (1.0 - bare).max(1e-9)).powi(2);
-        let diffuse = from_below * crossed + (1.0 - from_below) * specular;
+        let diffuse = from_below * crossed + (1.0 - from_below) * film / bare.max(1e-9);
+        let share = law.specular_share(retro, retro);
         f_per_sr * (1.0 - coverage + coverage * (share * specular + (1.0 - share) * diffuse))
     }
 }
@@ -177,5 +182,22 @@ mod tests {
         assert!(factor_of([1.0, quarter_m, 2f64.sqrt(), 0.0, ratio], &law, 0.0) < 1e-20);
         let lost = factor_of([1.0, quarter_m, 2f64.sqrt(), 0.5, ratio], &law, 0.0);
         assert!((lost - 0.5 / (8.0f64 / 9.0).powi(2)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_lobe_of_a_rough_coated_surface_is_that_of_the_layered_model() {
+        let (thickness_m, index, eps_real) = (4e-4, 1.6, 5.8);
+        let lobe_rad = Some(0.3);
+        let bare = Fresnel { eps_real, eps_imag: 0.0, lobe_rad };
+        let layers = vec![Layer { thickness_m, eps_real: index * index, eps_imag: 0.0 }];
+        let coated = Layered { layers, eps_real, eps_imag: 0.0, frequency_hz: 300e9, lobe_rad };
+        // The law has no f_λ: the ratio gives the substrate's index.
+        let law = Brdf::Fresnel(bare);
+        let ratio = eps_real.sqrt() / substrate(&law, 1.0).sqrt();
+        for theta_rad in [0.0, 0.2, 0.5, 0.8] {
+            let factor = factor_of([1.0, thickness_m, index, 0.3, ratio], &law, theta_rad);
+            let expected = coated.retro_per_sr(theta_rad) / bare.retro_per_sr(theta_rad);
+            assert!((factor / expected - 1.0).abs() < 1e-9, "{theta_rad}: {factor} {expected}");
+        }
     }
 }
