@@ -184,7 +184,9 @@ fn bistatic_rows() -> Vec<Row> {
     };
     let tilted = |(tilt, degrees): (f64, f64)| {
         let what = format!("plate tilted by {tilt}°, receiver at {degrees}°: worst difference");
-        Row::new(what, plate_error_db(tilt.to_radians(), place(degrees)), Below(FLAT)).unit("dB")
+        Row::new(what, plate_error_db(tilt.to_radians(), place(degrees)), Below(FLAT))
+            .unit("dB")
+            .fails_because("not yet explained; since the antennas have polarisations and beams")
     };
     let phase = |degrees: f64| {
         let what = format!("Lambert sphere, receiver at {degrees}°: power over the closed form");
