@@ -88,6 +88,7 @@ fn the_text_says_what_was_seen_and_what_follows() {
         (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
     assert!(text.starts_with("plate `target` at 8.0"), "{text}");
     assert!(text.contains("system_loss_db   14.2"), "{text}");
+    assert!(!text.contains("± 0.000"), "{text}");
     assert!(text.contains("the scene has 16.000 (follows from it)"), "{text}");
     assert!(notes.contains("radar.spot_diameter_m = 0.027"), "{notes}");
 }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::brdf::{Brdf, Scattering, ScatteringModel};
 use crate::error::Error;
-use crate::formats::words::{listed, significant};
+use crate::formats::words::listed;
 use crate::frames::Direction;
 use crate::measure::{Calibration, CalibrationResult, Cloud, Estimate};
 use crate::radar::{Beam, Radar};
@@ -163,22 +163,27 @@ impl<'a> CalibrationReport<'a> {
         };
         format!(
             "{} `{}` at {range_m:.3} m: {used} points within {within_db:.0} dB of the peak, residuals {rms_db:.2} dB rms\n\
-             system_loss_db   {:.3} ± {} dB; the scene has {}\n\
-             spot diameter    {:.3} ± {} mm; the scene has {:.3} ({of_spot})\n\
-             divergence       {:.3} ± {} mrad; the scene has {:.3} ({of_divergence})\n",
+             system_loss_db   {:.3} ± {:.3} dB; the scene has {}\n\
+             spot diameter    {:.3} ± {:.3} mm; the scene has {:.3} ({of_spot})\n\
+             divergence       {:.3} ± {:.3} mrad; the scene has {:.3} ({of_divergence})\n",
             self.target.shape.name(),
             self.target.name,
             system_loss_db.value,
-            significant(system_loss_db.sd, 2),
+            rounded_up(system_loss_db.sd),
             self.radar.system_loss_db,
             1e3 * spot.value,
-            significant(1e3 * spot.sd, 2),
+            rounded_up(1e3 * spot.sd),
             1e3 * self.radar.spot_diameter_m,
             1e3 * divergence.value,
-            significant(1e3 * divergence.sd, 2),
+            rounded_up(1e3 * divergence.sd),
             1e3 * self.scene_divergence_rad(),
         )
     }
+}
+
+/// A deviation to three decimals, never 0.000: what a model leaves out is as large.
+fn rounded_up(sd: f64) -> f64 {
+    1e-3 * (1e3 * sd).ceil()
 }
 
 /// An estimate beside what the scene has.
