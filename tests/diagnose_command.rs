@@ -19,6 +19,7 @@ seed = 3
 threshold_dbm = -90.0
 [radar.speckle]
 looks = 4
+form = \"independent\"
 [radar.noise]
 level_dbm = -110
 range_sd_m = 0.002

@@ -111,10 +111,13 @@ impl DatabaseCheck {
     }
 }
 
+/// What tells rendered laws apart: the hash of the model, and the bits of its range of angles.
+type RenderedLaw = (Option<[u8; 16]>, [u64; 2]);
+
 /// Materials of which scenes render a law that reflects more than it receives, a sentence each. What cannot be read is
 /// a finding already.
 fn too_much(store: &Store, outlines: &[OutlineEntry]) -> Vec<String> {
-    let mut known: HashMap<(Option<[u8; 16]>, [u64; 2]), Option<Excess>> = HashMap::new();
+    let mut known: HashMap<RenderedLaw, Option<Excess>> = HashMap::new();
     let mut notices = Vec::new();
     for OutlineEntry { slug, model_hash, theta_rad, .. } in outlines {
         let of_law = known.entry((*model_hash, theta_rad.map(f64::to_bits))).or_insert_with(|| {

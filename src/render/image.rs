@@ -165,8 +165,10 @@ impl Pixel {
     }
 }
 
+/// A part of an amplitude.
+type Part = fn(Complex<f64>) -> f64;
 /// The channels of a nearest detection's amplitude, for scans with phases.
-const AMPLITUDE: [(&str, fn(Complex<f64>) -> f64); 2] =
+const AMPLITUDE: [(&str, Part); 2] =
     [("real_sqrt_w", |amplitude| amplitude.re), ("imaginary_sqrt_w", |amplitude| amplitude.im)];
 
 fn channels(pixels: &[Pixel], with_phases: bool) -> Vec<Channel> {

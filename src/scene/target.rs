@@ -281,7 +281,7 @@ fn cut(mut mesh: Mesh, entry: &MeshEntry, scene: &Path) -> Result<Mesh, SceneErr
         value(scene, &format!("mesh `{}`: {key}", entry.name), problem, way_out)
     };
     if let Some(offset_m) = entry.offset_m {
-        if !(offset_m.abs() <= MOST_OFFSET_M) {
+        if offset_m.is_nan() || offset_m.abs() > MOST_OFFSET_M {
             let problem = format!("{offset_m} m is not within {MOST_OFFSET_M} m");
             return Err(refuse("offset_m", &problem, "cloth lies some millimetres above a body"));
         }

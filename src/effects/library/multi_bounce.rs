@@ -126,9 +126,10 @@ fn detour(
     let beam = stage.beam(shot);
     let pattern = beam.pattern(&shot.ray, 1, second.hit.point);
     // In the main lobe the antenna sees along the normal of its wavefront.
-    let back = match pattern > OUTSIDE_SPOT {
-        true => -beam.direction_at(&shot.ray, second.hit.point),
-        false => to_radar,
+    let back = if pattern > OUTSIDE_SPOT {
+        -beam.direction_at(&shot.ray, second.hit.point)
+    } else {
+        to_radar
     };
     let cos_exit = second.normal.dot(back.xyz());
     let back_m = second.hit.point.distance_m(radar);

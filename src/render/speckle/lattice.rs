@@ -51,8 +51,9 @@ impl Lattice {
             }
         }
         let sides = ends.map(|[low, high]| high - low + 1.0);
+        let values = sides[0] * sides[1] * looks as f64;
         // Also a side that is no number is too large.
-        if !(sides[0] * sides[1] * looks as f64 <= MOST_VALUES) {
+        if values.is_nan() || values > MOST_VALUES {
             return None;
         }
         let (first, size) = (ends.map(|end| end[0] as i64), sides.map(|side| side as usize));

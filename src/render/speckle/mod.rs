@@ -28,7 +28,7 @@ pub(super) enum Field<'a> {
     /// A Gaussian field with the correlation of the beams.
     Law(Law),
     /// Scatterers on the facets.
-    Scatterers(Scatterers<'a>),
+    Scatterers(Box<Scatterers<'a>>),
 }
 
 /// What the incoherent part of an echo is multiplied by.
@@ -55,7 +55,7 @@ impl<'a> Field<'a> {
     ) -> Result<Field<'a>, RenderError> {
         match setup.speckle_form(footprints.rays_per_chirp) {
             SpeckleForm::Scatterers => {
-                Ok(Field::Scatterers(Scatterers::new(setup, observer, looks)?))
+                Ok(Field::Scatterers(Box::new(Scatterers::new(setup, observer, looks)?)))
             }
             SpeckleForm::Law | SpeckleForm::Independent => {
                 let layers = 1 + footprints.behind.len();

@@ -159,8 +159,7 @@ impl OutsideTheta {
 
 impl<'a> ScanRecord<'a> {
     /// The record of a rendering. `views` and `images` are those of the radar and then of every receiver,
-    /// `crossed` those of the cross-polar channel; `all_hits` says that the clouds hold echoes below the threshold, too,
-    /// and `rays_ended` how many rays could have passed further sheets.
+    /// `crossed` those of the cross-polar channel; `all_hits` says that the clouds hold echoes below the threshold, too.
     ///
     /// # Panics
     /// When `views` or `images` is empty.
@@ -172,7 +171,6 @@ impl<'a> ScanRecord<'a> {
         images: &[Raster],
         validity: Vec<ValidityWarning>,
         all_hits: bool,
-        rays_ended: usize,
     ) -> ScanRecord<'a> {
         let scene = &ready.scene;
         let file = &scene.file;
@@ -221,7 +219,7 @@ impl<'a> ScanRecord<'a> {
                 .filter_map(|(view, image)| ReceiverRecord::new(scene, view, image))
                 .collect(),
             cross_polar: crossed.iter().map(CrossPolarRecord::new).collect(),
-            rays_ended,
+            rays_ended: 0,
             ready,
         }
     }

@@ -93,16 +93,9 @@ impl<'a> RenderRequest<'a> {
 
         progress(RenderProgress::Begin(RenderStage::Encode));
         let validity = ready.validity(&setup, &footprints);
-        let record = ScanRecord::new(
-            ready,
-            assembly.model(),
-            &views,
-            &crossed,
-            &images,
-            validity,
-            all_hits,
-            footprints.ended,
-        );
+        let mut record =
+            ScanRecord::new(ready, assembly.model(), &views, &crossed, &images, validity, all_hits);
+        record.rays_ended = footprints.ended;
         let mut files = encode(all_hits, self.packing, ready, &views, &images, &record)?;
         let images: Vec<Raster> = crossed.iter().map(|view| ready.image(&view.scan)).collect();
         files.extend(encode(all_hits, self.packing, ready, &crossed, &images, &record)?);
