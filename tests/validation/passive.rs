@@ -163,10 +163,9 @@ pub fn tables() -> Vec<Table> {
     let judged: Vec<Judged> =
         models.iter().map(|(name, _)| Judged { material: name.clone(), reflects: 1.0 }).collect();
     all.extend(rows(&Stage::with(&materials), &judged, "models"));
-    let text = "Nothing returns more than its law reflects. Plates, tilted by up to 1 rad, and spheres, tilted by up to \
-                0.02 rad, at all five distances from the focus: the largest power received over that sent, divided by the \
-                largest ∫ f cos θ_o dω_o of the law at incidences of 0, 20, 40 and 60 degrees. The models reflect all: they are \
-                divided by 1. A concave sphere of 1.2 m meets the wavefront at 0.5 m, so that a mirror returns nearly all. \
-                Half a per cent is for quadrature.";
+    let text = "The passive bound, over five distances from the focus, plates tilted by up to 1 rad and spheres by up to \
+                0.02 rad: the largest ratio of received to sent power, divided by what the law reflects. For a built-in material that is the \
+                largest ∫ f cos θ_o dω_o at 0, 20, 40 and 60 degrees; the models reflect everything. A concave sphere of \
+                1.2 m fits the wavefront at 0.5 m, so that a mirror returns nearly all. The tolerance covers quadrature.";
     vec![Table { text: text.to_owned(), rows: all }]
 }

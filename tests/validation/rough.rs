@@ -217,19 +217,20 @@ fn reported() -> Vec<Row> {
 }
 
 pub fn tables() -> Vec<Table> {
-    let chalk = "A white diffuse plate, extended: λ²·∫f·cos θ·u² by quadrature. A tilted spot runs through depth, which one \
-                 ray does not see: 0.02 dB at 60°. Its straight edge: −3.01 dB where it is met by the axis. N evenly spread \
-                 rays miss a share by at most N^(−3/4)/2, as above for sub-rays.";
-    let lobe = "Facing and tilted plates and the apex of spheres with a lobe of facets, P·δ_w²/m_eff²·exp(−tan²θ/m_eff²)/cos⁵θ \
-                with m_eff² = m² + δ₀²; GGX's slopes convolved with exp(−s²/δ₀²)/(πδ₀²) by quadrature here. One ray: 0.01 dB, \
-                what the program claims for its numeric convolution; 4000 rays: 0.05 dB, at up to 2.5 δ₀. Spheres: P·δ_w²/(m² + δ_w² + \
-                (w²/4)(1/a + 1/R_c)²), 10 000 rays, tolerated as above. A single ray does not know the curvature, which the \
-                program has to report.";
-    let drawn = "Surfaces of random heights with Gaussian correlation of the length l and slope m = 2·(rms height)/l: the fixture \
-                 draws them, integrates the beam over each, and asserts that the mean power is that of an integral over the \
-                 correlation, which is compared here. Its heights are along the beam and have no cosines: five of them are \
-                 tolerated, and 0.1 dB. The program's `kirchhoff` has coherent and incoherent part. Where the variance of the \
-                 phase is 25 the lobe of facets must hold as well, within another 0.2 dB; below ten geometric optics does not.";
+    let chalk = "An extended white diffuse plate against λ²·∫f·cos θ·u² by quadrature. At 60° one ray misses 0.02 dB, because the \
+                 beam's radius varies through the depth of the spot. The straight edge of such a plate, −3.01 dB on the axis: N evenly spread \
+                 rays misjudge a share by at most N^(−3/4)/2, as for sub-rays above.";
+    let lobe = "Plates with a lobe of facets against P·δ_w²/m_eff²·exp(−tan²θ/m_eff²)/cos⁵θ, m_eff² = m² + δ₀²; for GGX \
+                the slopes are convolved with exp(−s²/δ₀²)/(πδ₀²) by quadrature here. The tolerance is 0.01 dB for one ray, which \
+                the program claims for its own convolution, and 0.05 dB for 4000 rays at tilts up to 2.5 δ₀. The apex of rough spheres \
+                against P·δ_w²/(m² + δ_w² + (w²/4)(1/a + 1/R_c)²), with 10 000 rays and the tolerance of smooth spheres. A single ray \
+                does not resolve the curvature: the program has to report that once.";
+    let drawn = "Random heights with Gaussian correlation of length l and slope m = 2·(rms height)/l. The fixture draws \
+                 such surfaces and integrates the beam over each; it asserts that the mean power is that of an integral over the \
+                 correlation, which is the reference here. Its heights are along the beam, without cosines: the tolerance is 0.1 \
+                 dB plus five cosines. `kirchhoff` gives the coherent and the incoherent part. Where the \
+                 variance of the phase is 25, the lobe of facets must agree as well, within another 0.2 dB. Below 10 geometric \
+                 optics does not hold.";
     let mut lobes = lobes();
     lobes.extend(rough_spheres());
     lobes.extend(reported());

@@ -20,9 +20,7 @@ const EDGES_OFF_FOCUS_ARE_RIGHT: bool = false;
 const SPOTS_BESIDE_A_TARGET_KNOW_ITS_RANGE: bool = false;
 
 /// Why a row of a mirror's edge off the focus fails, if it does.
-const TAKEN_FROM_NEIGHBOURS: &str = "Off the focus the part of the beam beside a mirror is compared with rays on the mirror that the \
-     curved wavefront turns otherwise, and a spot whose axis misses the mirror has the flat wavefront of 8 m: between both sides of an edge the \
-     power jumps.";
+const TAKEN_FROM_NEIGHBOURS: &str = "The wave that misses the mirror is taken from the nearest rays on it. Where the axis misses, too, the spot is that at 8 m.";
 
 /// Why a row with the axis beside the target fails, if it does.
 const SPOT_AT_8_M: &str =
@@ -78,7 +76,7 @@ pub fn beside(edge_m: f64, z_m: f64) -> Option<&'static str> {
 pub fn differences(cases: &[Case], found_db: &[f64], kind: &str) -> Vec<Row> {
     let row = |(case, found_db): (&Case, &f64)| {
         let error_db = (found_db - case.expected_db).abs();
-        let allowed_db = 1e-3 * (1e3 * case.allowed_db).ceil();
+        let allowed_db = (1e3 * case.allowed_db).ceil() / 1e3;
         let row =
             Row::new(format!("{}: {kind}", case.what), error_db, Below(allowed_db)).unit("dB");
         match case.fails_because {
@@ -309,23 +307,24 @@ fn corners() -> Vec<Row> {
 }
 
 pub fn tables() -> Vec<Table> {
-    let flat = "Scenes that the compiled program renders; a row is the absolute difference, in dB, of received over sent \
-                power. `tests/validation/physical_optics.py` integrates the beam over the surface, independently of the \
-                program, and made `tests/validation/physical_optics.json`. A flat mirror at the distance z from the focus, \
-                tilted about the foot of the axis: the integral follows the beam through the depth of a tilted spot, the \
-                closed form does not, which is worth 3 mdB at 1.5 δ₀. Moved and turned: the same by the mesh in place of the \
-                ray. 4000 rays meet the flank of the lobe within 0.02 dB.";
-    let curved = "Smooth spheres and cylinders, convex for a > 0, facets of 2 mrad; cylinders with their axis tilted. \
-                  10 000 rays, of which the share that the highlight returns meets it: half of the standard error of so \
-                  many random ones is tolerated, and 0.05 dB for the facets.";
-    let corners = "The edge of two mirrors at right angles, at a distance from the axis. Images are exact there: the beam, \
-                   turned by half a turn about the edge, against itself. Far from the axis few rays have most of the weight: \
-                   half of the standard error of so many random ones is tolerated.";
-    let edges = "The edge of a facing mirror; the axis meets the mirror where the edge lies at negative w₀. At the middle of \
-                 the edge the integral has −6.02 dB, and by symmetry so it has at all distances from the focus: the rows \
-                 with 0.001 w₀. Tolerated: what 10 000 rays that are drawn from u² leave of the share of \
-                 the amplitude, half of its standard error where the axis meets the mirror and all of it beside; 0.02 dB; and \
-                 off the focus 1.2 times Fresnel's fringes, 0.07 to 0.14 dB, which a share of the beam does not have.";
+    let flat = "The compiled program renders scenes. Each row is the absolute difference, in dB, between its ratio of received \
+                to sent power and the reference. `tests/validation/physical_optics.py` shares no code with the program: it \
+                integrates the beam over each surface and writes `tests/validation/physical_optics.json`. z is the \
+                distance from the focus, δ₀ = λ/(2πw₀). A flat mirror is tilted about the foot of the beam's axis, by turning the \
+                ray or (\"moved and turned\") the mesh. The integral follows the beam through the depth of a tilted spot, which is worth 3 mdB at \
+                1.5 δ₀. 4000 rays sample the flank of the lobe within 0.02 dB.";
+    let curved = "Smooth spheres and cylinders with the radius a, convex for a > 0, in facets of 2 mrad. The axis of a cylinder is upright \
+                  or tilted. Only the share of the 10 000 rays that lies in the highlight counts: the tolerance is 0.05 \
+                  dB for the facets, plus half of the standard error of so many random rays.";
+    let corners = "Two mirrors at right angles, their edge at a distance from the axis. Images are exact there: the reference is the \
+                   overlap of the beam with itself, turned by half a turn about the edge. Far from the axis few rays carry \
+                   most of the weight. The tolerance is 0.05 dB plus half of the standard error of random rays with these \
+                   weights.";
+    let edges = "The straight edge of a facing mirror. The axis meets the mirror where the distance in w₀ is negative. With the \
+                 edge on the axis the integral gives −6.02 dB against the whole mirror, by symmetry at every z: these are the rows with \
+                 0.001 w₀. The tolerance is 0.02 dB, plus the standard error of the visible share of the amplitude \
+                 from 10 000 rays drawn from u² (half of it where the axis meets the mirror), plus off the focus 1.2 times the \
+                 Fresnel fringes of 0.07 to 0.14 dB, which a share of the beam does not have.";
     let mut round = spheres();
     round.extend(cylinders());
     let tables =
