@@ -167,6 +167,36 @@ fn a_flat_mirror_returns_all_of_the_beam_that_meets_itself() {
     }
 }
 
+/// Upright strips of a mirror, cut across at heights of their own, so that no corner of one is a corner of its neighbour.
+fn strips() -> Mesh {
+    const WIDTH_M: f64 = 0.005;
+    const HALF_M: f64 = 0.4;
+    let mut mesh = Mesh { vertices: Vec::new(), facets: Vec::new(), labels: Vec::new() };
+    for strip in -20i32..20 {
+        let sides = [strip, strip + 1].map(|side| WIDTH_M * f64::from(side));
+        let cut = 0.01 * f64::from(strip.rem_euclid(7)) + 0.003;
+        for [low, high] in [[-HALF_M, cut], [cut, HALF_M]] {
+            let corners = [(sides[0], low), (sides[1], low), (sides[1], high), (sides[0], high)];
+            let first = mesh.vertices.len() as u32;
+            mesh.vertices.extend(corners.map(|(x, y)| DVec3::new(x, y, 0.0)));
+            mesh.facets.extend([[0, 1, 2], [0, 2, 3]].map(|facet| facet.map(|i| first + i)));
+        }
+    }
+    mesh
+}
+
+#[test]
+fn a_mirror_in_pieces_returns_what_it_does_whole() {
+    for z_m in [0.0, 0.2] {
+        for rays in [16, 400] {
+            let [whole, pieces] =
+                [plate(), strips()].map(|mesh| returned(mesh, 0.0, z_m, rays, &MIRROR));
+            let error_db = db(pieces / whole);
+            assert!(error_db.abs() < LOBE_DB, "{z_m} m, {rays} rays: {error_db} dB");
+        }
+    }
+}
+
 #[test]
 fn a_smooth_sphere_returns_its_glint() {
     let (waist, radius_m) = (Waist::new(), 0.15);

@@ -270,6 +270,26 @@ fn another_pose_or_frequency_sees_another_field() {
     }
 }
 
+#[test]
+fn the_law_s_field_is_another_one_where_the_radar_has_moved_and_the_same_for_a_slightly_wider_beam()
+{
+    let radar = radar(lines(9, 0.03), SpeckleForm::Law, 1.0);
+    let mesh = plate();
+    let correlated = |other: &Radar| {
+        let (here, there) = (Scene::new(&radar, &mesh), Scene::new(other, &mesh));
+        shared(|seed| here.powers_w(seed), |seed| there.powers_w(seed))
+    };
+    for (axis, by_m) in [(0, 0.3), (1, 0.2), (2, 0.3)] {
+        let mut moved = radar.clone();
+        moved.primary_focus_m[axis] += by_m;
+        let [found, error] = correlated(&moved);
+        assert!(found.abs() < 4.0 * error.max(0.02), "axis {axis}: {found} +- {error}");
+    }
+    let wider = Radar { spot_diameter_m: 1.06 * radar.spot_diameter_m, ..radar.clone() };
+    let [found, _] = correlated(&wider);
+    assert!(found > 0.95, "{found}");
+}
+
 /// Intensity correlation of scatterers between two renderings, over seeds and over spots far apart.
 fn shared(a: impl Fn(u64) -> Vec<f64> + Sync, b: impl Fn(u64) -> Vec<f64> + Sync) -> [f64; 2] {
     let pairs: Vec<[f64; 2]> = (0..SEEDS)

@@ -132,8 +132,9 @@ impl Seen {
     /// surface's and the beam's together, the beam's own part δ²/m_eff² is coherent: all of it without
     /// roughness, 5 % at m = 0.05 for δ = 0.0117 rad.
     pub(super) fn facets(f_per_sr: f64, beam_rad: f64, [m_along, m_across]: [f64; 2]) -> Seen {
-        let widths = m_along.hypot(beam_rad) * m_across.hypot(beam_rad);
-        let coherent_share = if widths > 0.0 { beam_rad * beam_rad / widths } else { 1.0 };
+        let beam2 = beam_rad * beam_rad;
+        let widths2 = (m_along * m_along + beam2) * (m_across * m_across + beam2);
+        let coherent_share = if widths2 > 0.0 { beam2 / widths2.sqrt() } else { 1.0 };
         Seen { f_per_sr, specular_share: 1.0, coherent_share }
     }
 }

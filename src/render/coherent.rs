@@ -18,13 +18,19 @@ const SMOOTH: f64 = 0.866;
 /// Rays of a piece that rays beside it are compared with.
 const COMPARED: usize = 64;
 
-/// The smooth piece that each facet belongs to: facets joined by edges without a kink, of one region.
+/// Distance, m, below which two corners, or two parallel planes, are one.
+const ONE_M: f64 = 1e-6;
+/// Difference between the components of unit normals below which they are one: 1 mm at 1 m.
+const ONE_NORMAL: f64 = 1e-3;
+
+/// The smooth piece that each facet belongs to: facets of one region that are joined by edges without a kink, or that
+/// lie in one plane, whose echoes have one phase whether they touch or not.
 pub(super) fn smooth_pieces(mesh: &Mesh, region_of_facet: &[u16]) -> Vec<u32> {
     let facets = mesh.facets.len();
     let unit = |facet: u32| mesh.area_normal(facet as usize).normalize_or_zero();
-    let mut sides: Vec<([[u64; 3]; 2], u32)> = Vec::with_capacity(3 * facets);
+    let mut sides: Vec<([[i64; 3]; 2], u32)> = Vec::with_capacity(3 * facets);
     for facet in 0..facets {
-        let corners = mesh.corners(facet).map(bits);
+        let corners = mesh.corners(facet).map(|corner| rounded(corner, ONE_M));
         for side in 0..3 {
             let (a, b) = (corners[side], corners[(side + 1) % 3]);
             sides.push(([a.min(b), a.max(b)], facet as u32));
@@ -39,13 +45,33 @@ pub(super) fn smooth_pieces(mesh: &Mesh, region_of_facet: &[u16]) -> Vec<u32> {
             pieces.join(*a, *b);
         }
     }
+    let mut planes: Vec<(Plane, u32)> =
+        (0..facets as u32).into_par_iter().map(|facet| (plane(mesh, facet), facet)).collect();
+    planes.par_sort_unstable();
+    for pair in planes.windows(2) {
+        let [(plane, a), (other, b)] = pair else { continue };
+        if plane == other && region_of_facet[*a as usize] == region_of_facet[*b as usize] {
+            pieces.join(*a, *b);
+        }
+    }
     (0..facets as u32).map(|facet| pieces.root(facet)).collect()
 }
 
-/// A corner, told apart by its coordinates: meshes repeat their vertices.
-fn bits(corner: DVec3) -> [u64; 3] {
-    // Adding 0 makes one of both zeros.
-    corner.to_array().map(|x| (x + 0.0).to_bits())
+/// Coordinates in steps: meshes repeat their vertices, and programs round them.
+fn rounded(place: DVec3, step: f64) -> [i64; 3] {
+    place.to_array().map(|x| (x / step).round() as i64)
+}
+
+/// A plane by its normal and its distance from the origin, in steps.
+type Plane = ([i64; 3], i64);
+
+fn plane(mesh: &Mesh, facet: u32) -> Plane {
+    let normal = mesh.area_normal(facet as usize).normalize_or_zero();
+    let (steps, corner) = (rounded(normal, ONE_NORMAL), mesh.corners(facet as usize)[0]);
+    // Which side is outside does not matter.
+    let first = steps.into_iter().find(|&step| step != 0).unwrap_or(0);
+    let distance = (normal.dot(corner) / ONE_M).round() as i64;
+    if first < 0 { (steps.map(|step| -step), -distance) } else { (steps, distance) }
 }
 
 /// Disjoint sets of facets.
@@ -96,9 +122,9 @@ impl SpotRays<'_> {
             .copied()
             .collect();
         while let Some(first) = left.first() {
-            let (piece, sheets) = (paths[first.place].piece, paths[first.place].sheets);
+            let (pieces, sheets) = (paths[first.place].pieces, paths[first.place].sheets);
             let is_here = |ray: &RayPath| {
-                paths[ray.place].piece == piece && paths[ray.place].sheets == sheets
+                paths[ray.place].pieces == pieces && paths[ray.place].sheets == sheets
             };
             let (here, others) = left.iter().copied().partition::<Vec<_>, _>(is_here);
             if here.len() < self.places.len() {
@@ -168,5 +194,14 @@ mod tests {
         let plate = solids::plate(1.0, 1.0);
         assert_eq!(smooth_pieces(&plate, &[0, 1]), [0, 1]);
         assert_eq!(smooth_pieces(&plate, &[0, 0]), [0, 0]);
+        // A second plate in the same plane, turned over, is a part of the same mirror; one behind it is another one.
+        for (offset_m, expected) in [(0.0, [0, 0, 0, 0]), (-0.001, [0, 0, 2, 2])] {
+            let mut beside = plate.clone();
+            beside.vertices.iter_mut().for_each(|v| *v += glam::DVec3::new(3.0, 1e-12, offset_m));
+            beside.facets.iter_mut().for_each(|facet| facet.reverse());
+            let mut both = plate.clone();
+            both.append(&beside).unwrap();
+            assert_eq!(smooth_pieces(&both, &[0; 4]), expected, "{offset_m}");
+        }
     }
 }

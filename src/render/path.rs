@@ -22,8 +22,9 @@ pub(super) struct Path {
     pub passed_share: f64,
     /// What sheets on the path seem to add to its range, m.
     pub delay_m: f64,
-    /// Number of the smooth piece of the target that the hit lies on.
-    pub piece: u32,
+    /// Numbers of the smooth pieces of the target that the path meets, the smaller one first: there and back on the way round
+    /// two mirrors is one wave.
+    pub pieces: [u32; 2],
     /// Number of surfaces on the path, 1 or 2.
     pub surfaces: u8,
     /// Azimuth of the source about the normal of the first surface, from its grain, rad.
@@ -37,7 +38,7 @@ pub(super) struct Path {
 /// The paths of one echo, added up over all that is known of their phases.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Arrival {
-    /// Mean power over all phases, and the mean range.
+    /// Mean power over the phases of what speckles, and the mean range. Waves add up as amplitudes.
     pub mean: Detection,
     /// Power of the part that speckles, W.
     pub incoherent_w: f64,
@@ -54,17 +55,25 @@ impl Arrival {
 
     /// The sum of some paths. The coherent parts of the rays on one smooth piece are one wave, from their mean range.
     pub fn of(paths: &[Path], wavelength_m: f64) -> Arrival {
-        let mean = sum(paths);
+        let mut mean = sum(paths);
         if let [path] = paths {
             return Arrival::of_one_piece(mean, path.power_w * path.coherent_share);
         }
-        let waves = waves(paths).into_iter().map(|Detection { range_m, power_w }| {
-            let phase_rad = 2.0 * TAU / wavelength_m * (range_m - mean.range_m);
-            Complex::from_polar(power_w.sqrt(), phase_rad)
-        });
-        let coherent = waves.sum();
-        let incoherent_w =
-            paths.iter().map(|path| path.power_w * (1.0 - path.coherent_share)).sum();
+        let waves = waves(paths);
+        if let [] | [_] = waves[..] {
+            let coherent_w = waves.first().map_or(0.0, |wave| wave.power_w);
+            return Arrival::of_one_piece(mean, coherent_w);
+        }
+        let coherent: Complex<f64> = waves
+            .iter()
+            .map(|wave| {
+                let phase_rad = 2.0 * TAU / wavelength_m * (wave.range_m - mean.range_m);
+                Complex::from_polar(wave.power_w.sqrt(), phase_rad)
+            })
+            .sum();
+        let coherent_w: f64 = waves.iter().map(|wave| wave.power_w).sum();
+        let incoherent_w = (mean.power_w - coherent_w).max(0.0);
+        mean.power_w = coherent.norm_sqr() + incoherent_w;
         Arrival { mean, incoherent_w, coherent }
     }
 
@@ -74,7 +83,7 @@ impl Arrival {
     }
 }
 
-/// The waves of some paths: the coherent parts of those by way of one smooth piece, with their mean range.
+/// The waves of some paths: the coherent parts of those by way of the same smooth pieces, with their mean range.
 pub(super) fn waves(paths: &[Path]) -> Vec<Detection> {
     let mut pieces: Vec<(Surfaces, Detection)> = Vec::new();
     for path in paths {
@@ -96,11 +105,11 @@ pub(super) fn waves(paths: &[Path]) -> Vec<Detection> {
 }
 
 /// The surfaces that a path goes by, as far as they tell waves apart.
-type Surfaces = (u32, u8, u8);
+type Surfaces = ([u32; 2], u8, u8);
 
 impl Path {
     fn surfaces(&self) -> Surfaces {
-        (self.piece, self.surfaces, self.sheets)
+        (self.pieces, self.surfaces, self.sheets)
     }
 }
 

@@ -176,7 +176,10 @@ impl<'a> Paths<'a> {
         let axis = &self.setup.geometry.chirps.rays[number];
         let antenna = self.observer.position(axis.origin.xyz);
         let range_m = self.footprints.axis_range_m[number];
-        let spot = Spot::met(&self.link.beam, axis, range_m, number);
+        let spot = match hits.len() {
+            1 => Spot::of_one_ray(&self.link.beam, axis, range_m),
+            _ => Spot::met(&self.link.beam, axis, range_m, number),
+        };
         let tilts = self.effects.as_ref().map_or([0.0; 2], |effects| effects.tilts(number));
         let sent = Emission { paths: self, number, spot, antenna, rays: hits.len(), tilts };
         let has_pieces = !self.pieces.is_empty();
@@ -327,12 +330,17 @@ impl<'a> Emission<'a> {
             sheets: lit.inward.sheets,
             passed_share: polarised.passed,
             delay_m: apparent_m,
-            piece: self.paths.pieces.get(lit.hit.facet as usize).copied().unwrap_or(0),
+            pieces: [self.piece(&lit.hit); 2],
             surfaces: 1,
             azimuth_rad: y.atan2(x),
             specular_share: scattered.specular_share,
             coherent_share: scattered.coherent_share,
         }
+    }
+
+    /// Number of the smooth piece that a hit lies on.
+    fn piece(&self, hit: &Hit) -> u32 {
+        self.paths.pieces.get(hit.facet as usize).copied().unwrap_or(0)
     }
 
     /// Where a lit point sends power: into directions drawn at random, and exactly into that of the mirror by lobes
@@ -393,11 +401,13 @@ impl<'a> Emission<'a> {
                 let enhancement = self.enhancement(bounce, coherent_share);
                 let delay_m = delay_m(&ways);
                 let path_m = lit.hit.range_m + hit.range_m + second.antenna_m + delay_m;
+                let [a, b] = [&lit.hit, &hit].map(|hit| self.piece(hit));
                 paths.push(Path {
                     range_m: 0.5 * path_m,
                     power_w: power_w * polarised.share * enhancement,
                     passed_share: polarised.passed,
                     delay_m: 0.5 * delay_m,
+                    pieces: [a.min(b), a.max(b)],
                     surfaces: 2,
                     specular_share,
                     coherent_share: coherent_share / enhancement,

@@ -85,7 +85,7 @@ mod tests {
             sheets,
             passed_share: 1.0,
             delay_m: 0.0,
-            piece: 0,
+            pieces: [0; 2],
             surfaces: 1,
             azimuth_rad: 0.0,
             specular_share: 0.0,

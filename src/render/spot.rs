@@ -186,12 +186,18 @@ impl Spot {
     /// As wide as the beam where its axis meets the target, or at 8 m. The number of the chirp turns the
     /// pattern, so that neighbouring chirps do not repeat it.
     pub fn met(beam: &Beam, axis: &Ray<Global>, range_m: Option<f64>, chirp: usize) -> Spot {
-        let beam = beam.along(axis);
-        let section = beam.section(range_m.unwrap_or(PATTERN_RANGE_M));
+        let spot = Spot::of_one_ray(beam, axis, range_m);
         let (right, up) = across(axis.direction.xyz());
         let (sin, cos) = (TAU * (chirp as f64 * GOLDEN).fract()).sin_cos();
         let across = [cos * right + sin * up, cos * up - sin * right];
-        Spot { axis: *axis, beam, section, across_m: across.map(|unit| section.radius_m * unit) }
+        Spot { across_m: across.map(|unit| spot.section.radius_m * unit), ..spot }
+    }
+
+    /// As [`met`](Self::met), for the axis as its only ray.
+    pub fn of_one_ray(beam: &Beam, axis: &Ray<Global>, range_m: Option<f64>) -> Spot {
+        let beam = beam.along(axis);
+        let section = beam.section(range_m.unwrap_or(PATTERN_RANGE_M));
+        Spot { axis: *axis, beam, section, across_m: [DVec3::ZERO; 2] }
     }
 
     /// Divergence of the beam, rad, at a distance along it, m, for a spot of so many rays: many stand on the

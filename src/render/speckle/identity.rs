@@ -1,11 +1,11 @@
 //! What makes a surface's scatterers its own: the scan's seed, and the surface as it stands.
 
-use crate::frames::{Global, Point, Pose};
+use crate::frames::{Global, Point};
 use crate::radar::Channel;
 use crate::radar::random::{Draws, Key, Purpose};
 use crate::render::setup::Setup;
 
-/// Names the scatterers of a surface. The same surface in the same place has the same ones, whatever looks at it.
+/// Names the scatterers of a scene. The same meshes in the same place have the same ones; moving one changes all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Identity {
     /// The seed of everything that is fixed to the target.
@@ -15,18 +15,22 @@ pub(super) struct Identity {
 }
 
 impl Identity {
-    /// The identity of a setup's mesh in a pose, by frequency, channel and whatever `words` tells apart.
-    pub fn of(setup: &Setup, target: Pose<Global, Global>, words: [u64; 2]) -> Identity {
+    /// The identity of a setup's mesh with its vertices where `seen` has them, by frequency, channel and whatever
+    /// `words` tells apart.
+    pub fn of<Frame>(
+        setup: &Setup,
+        seen: impl Fn(Point<Global>) -> Point<Frame>,
+        words: [u64; 2],
+    ) -> Identity {
         let frequency = setup.geometry.radar.centre_frequency_ghz.to_bits();
         let cross_polar = u64::from(setup.channel == Channel::CrossPolar);
         let mut hasher = blake3::Hasher::new();
         for word in [frequency, cross_polar, words[0], words[1]] {
             hasher.update(&word.to_le_bytes());
         }
-        let is_moved = target != Pose::NONE;
         let mut bytes = Vec::with_capacity(24 * setup.geometry.bvh.mesh().vertices.len());
         for &vertex in &setup.geometry.bvh.mesh().vertices {
-            let vertex = if is_moved { (target * Point::from(vertex)).xyz } else { vertex };
+            let vertex = seen(Point::from(vertex)).xyz;
             bytes.extend(vertex.to_array().iter().flat_map(|coordinate| coordinate.to_le_bytes()));
         }
         hasher.update(&bytes);

@@ -12,8 +12,10 @@ use crate::radar::random::Purpose;
 
 /// Distance beyond which the kernel is cut off, in waists: 0.6 % of its middle.
 const REACH: f64 = 1.6;
-/// Nodes per waist. At two the field's power is the same at and between the nodes to 1e-4.
+/// Least nodes per waist. At two the field's power is the same at and between the nodes to 1e-4.
 const NODES_PER_WAIST: f64 = 2.0;
+/// Distances of nodes, m, are whole powers of this, so that a beam of nearly the same waist sees the same noise.
+const SPACINGS: f64 = std::f64::consts::SQRT_2;
 /// Nodes on a side of a block, whose noise has one key.
 const BLOCK: i64 = 32;
 /// Most values of a lattice, 2 GiB.
@@ -41,7 +43,7 @@ impl Lattice {
     /// The lattice under all aims; `None` where it would be larger than memory should hold.
     pub fn new(aims: &[Aim], identity: Identity, looks: usize) -> Option<Lattice> {
         let least_m = aims.iter().map(|aim| aim.waist_m).fold(f64::INFINITY, f64::min);
-        let spacing_m = least_m / NODES_PER_WAIST;
+        let spacing_m = SPACINGS.powf((least_m / NODES_PER_WAIST).log(SPACINGS).floor());
         let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
         for Aim { at_m, waist_m } in aims {
             for (end, at_m) in ends.iter_mut().zip(at_m) {
@@ -100,10 +102,10 @@ impl Lattice {
         amplitudes.clear();
         amplitudes.resize(self.looks, Complex::ZERO);
         let [across, along] = [0, 1].map(|axis| self.weights(aim, axis));
-        for (row, y_weight) in along.nodes() {
+        for (row, y_weight) in (along.first..).zip(&along.values) {
             let start = (row * self.size[0] + across.first) * self.looks;
             let nodes = self.values[start..].chunks_exact(self.looks);
-            for (x_weight, node) in across.weights().iter().zip(nodes) {
+            for (x_weight, node) in across.values.iter().zip(nodes) {
                 let weight = x_weight * y_weight;
                 amplitudes.iter_mut().zip(node).for_each(|(sum, value)| *sum += weight * value);
             }
@@ -112,44 +114,38 @@ impl Lattice {
         amplitudes.iter_mut().for_each(|amplitude| *amplitude *= norm);
     }
 
-    /// The kernel exp(−2d²/w₀²) along one axis.
+    /// The kernel exp(−2d²/w₀²) at the nodes along one axis.
     fn weights(&self, aim: &Aim, axis: usize) -> Weights {
         let (at_m, reach_m) = (aim.at_m[axis], REACH * aim.waist_m);
-        let low = ((at_m - reach_m) / self.spacing_m).ceil() as i64;
-        let high = ((at_m + reach_m) / self.spacing_m).floor() as i64;
-        let mut weights = Weights { first: (low - self.first[axis]) as usize, ..Weights::EMPTY };
-        for node in (low..=high).take(MOST_NODES) {
-            let off = (node as f64 * self.spacing_m - at_m) / aim.waist_m;
-            weights.values[weights.count] = (-2.0 * off * off).exp();
-            weights.count += 1;
+        let low = ((at_m - reach_m) / self.spacing_m).ceil();
+        let high = ((at_m + reach_m) / self.spacing_m).floor();
+        // From node to node a Gaussian changes by a ratio, and the ratio by the same factor each time.
+        let (off, step) =
+            ((low * self.spacing_m - at_m) / aim.waist_m, self.spacing_m / aim.waist_m);
+        let mut weight = (-2.0 * off * off).exp();
+        let mut ratio = (-2.0 * step * (2.0 * off + step)).exp();
+        let factor = (-4.0 * step * step).exp();
+        let count = (high - low) as usize + 1;
+        let mut values = Vec::with_capacity(count);
+        for _ in 0..count {
+            values.push(weight);
+            weight *= ratio;
+            ratio *= factor;
         }
-        weights
+        Weights { first: (low as i64 - self.first[axis]) as usize, values }
     }
 }
-
-/// Most nodes of the kernel along an axis: a beam twenty times as wide as the narrowest one of its scan.
-const MOST_NODES: usize = 128;
 
 /// Weights of the nodes along an axis.
 struct Weights {
+    /// Number of the first node along the axis.
     first: usize,
-    count: usize,
-    values: [f64; MOST_NODES],
+    values: Vec<f64>,
 }
 
 impl Weights {
-    const EMPTY: Weights = Weights { first: 0, count: 0, values: [0.0; MOST_NODES] };
-
-    fn weights(&self) -> &[f64] {
-        &self.values[..self.count]
-    }
-
-    fn nodes(&self) -> impl Iterator<Item = (usize, f64)> {
-        (self.first..).zip(self.weights().iter().copied())
-    }
-
     fn square_sum(&self) -> f64 {
-        self.weights().iter().map(|weight| weight * weight).sum()
+        self.values.iter().map(|weight| weight * weight).sum()
     }
 }
 

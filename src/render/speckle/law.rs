@@ -28,9 +28,13 @@ impl Law {
         target: Pose<Global, Global>,
         looks: usize,
     ) -> Result<Law, RenderError> {
-        let aims = aims(setup.geometry.radar, setup.geometry.chirps);
+        let radar = setup.geometry.radar;
+        let aims = aims(radar, setup.geometry.chirps);
+        // The field lies across the beams and not on the mesh: it must be another one as soon as either moves.
+        let target_from_global = radar.frames().global_from_target.inverse();
+        let seen = |vertex| target_from_global * (target * vertex);
         let layers = (0..layers as u64).map(|layer| {
-            let identity = Identity::of(setup, target, [observer.number(), layer]);
+            let identity = Identity::of(setup, seen, [observer.number(), layer]);
             Lattice::new(&aims, identity, looks).ok_or(RenderError::SpeckleField)
         });
         let layers = layers.collect::<Result<_, _>>()?;

@@ -115,7 +115,7 @@ impl<'a> Scatterers<'a> {
             Observer::Receiver { position, .. } => Some(position.xyz),
         };
         let beam = Beam::new(radar);
-        let identity = Identity::of(setup, Pose::NONE, [0, 0]);
+        let identity = Identity::of(setup, |vertex| vertex, [0, 0]);
         let (low, high) = seen_field(&beam, &view, axes);
         let sites = placement.sites(identity, |site| {
             let at = view.place_m(site.point);
