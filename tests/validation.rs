@@ -20,8 +20,10 @@ mod validation {
     pub mod rough;
     pub mod smooth;
     pub mod solids;
+    pub mod speckle;
     pub mod stage;
     pub mod sub_rays;
+    pub mod transmitter;
 }
 
 use validation::page::{self, Row, Section};

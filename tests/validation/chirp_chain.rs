@@ -6,6 +6,7 @@ use num_complex::Complex;
 use rayon::prelude::*;
 
 use super::page::{Row, Section, Table, Tolerance, Tolerance::Below, Tolerance::Within};
+use super::transmitter;
 
 /// Window; half-power width in bins (Harris 1978, table I); scalloping loss in dB and noise
 /// bandwidth in bins (Heinzel et al. 2002); largest errors of range (µm) and power (dB) that
@@ -49,7 +50,7 @@ const QUIET: Receiver = Receiver {
 /// c/2B by hand: 299 792 458/54e9 m.
 const CELL_M: f64 = 5.551_712_185_185_185e-3;
 
-fn around(centre: f64, half: f64) -> Tolerance {
+pub fn around(centre: f64, half: f64) -> Tolerance {
     let step = 10f64.powi(half.log10().floor() as i32 - 1);
     let rounded = |x: f64| format!("{:.*e}", 3, (x / step).round() * step).parse().unwrap();
     Within(rounded(centre - half), rounded(centre + half))
@@ -221,7 +222,7 @@ fn speckle_rows() -> Vec<Row> {
 
 pub fn section() -> Section {
     let table = |text: &str, rows| Table { text: text.to_owned(), rows };
-    let tables = vec![
+    let mut tables = vec![
         table(
             "Resolution: the half-power width of a return (27 GHz, c/2B = 5.55 mm, 256 samples) against Harris 1978 \
              (doi:10.1109/PROC.1978.10837, two figures), and the loss of a return midway between two bins of the unpadded \
@@ -244,8 +245,9 @@ pub fn section() -> Section {
             speckle_rows(),
         ),
     ];
+    tables.extend(transmitter::tables());
     let not_covered = vec![
-        "Imperfect chirps: phase noise, a curved sweep, leakage between transmitter and receiver.",
+        "Faults of a chirp other than leakage, phase noise that falls by 20 dB per decade, and a ripple of the sweep.",
     ];
     Section { title: "The chirp chain", tables, not_covered }
 }

@@ -138,7 +138,7 @@ fn materials() -> Stage {
     ])
 }
 
-const KEYS: Keys<'static> = Keys { rays: 1, radar: "returns = \"all\"", more: "" };
+const KEYS: Keys<'static> = Keys { top: "", rays: 1, radar: "returns = \"all\"", more: "" };
 const CLOTH_M: f64 = 0.5e-3;
 const METAL: Complex<f64> = Complex::new(1.0, -1e9);
 
@@ -241,7 +241,7 @@ fn corners() -> Vec<Row> {
     for (name, eps) in [("glass", glass), ("water", water), ("mirror", METAL)] {
         for (sent, field, what) in [("vertical", Field::S, "VV"), ("horizontal", Field::P, "HH")] {
             let radar = format!("polarisation.transmit = \"{sent}\"");
-            let keys = Keys { rays: MANY, radar: &radar, more: BOUNCE };
+            let keys = Keys { rays: MANY, radar: &radar, more: BOUNCE, ..KEYS };
             let parts = part(&file, "", name, "");
             let echo = stage.render(&parts, &[Aim::facing(0.0)], keys)[0][0];
             let expected = reflectance(eps, FRAC_PI_4.cos(), field).powi(2);
@@ -251,7 +251,7 @@ fn corners() -> Vec<Row> {
     }
     // S_vv = −S_hh: at 45° all is crossed.
     let radar = "polarisation.turn_deg = 45\npolarisation.receive = \"both\"";
-    let keys = Keys { rays: MANY, radar, more: BOUNCE };
+    let keys = Keys { rays: MANY, radar, more: BOUNCE, ..KEYS };
     let co = stage.render(&part(&file, "", "mirror", ""), &[Aim::facing(0.0)], keys);
     let cross = stage.cloud("out/cross-cloud.ply", 1);
     all.push(level(

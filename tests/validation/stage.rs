@@ -8,13 +8,13 @@ use tempfile::TempDir;
 use crate::support::{matdb, read_cloud};
 
 /// Range of the focus, m.
-const FOCUS_M: f64 = 8.0;
+pub const FOCUS_M: f64 = 8.0;
 
 /// The middle of the field of view, where targets stand.
 const CENTRE: DVec3 = DVec3::new(0.0, 1.1, 0.0);
 
 /// Sent through a radar without loss, W.
-const SENT_DBM: f64 = 30.0;
+pub const SENT_DBM: f64 = 30.0;
 
 /// A smooth metal without loss.
 pub const MIRROR: &str = r#"{"model":"fresnel","eps_real":1,"eps_imag":1e9}"#;
@@ -69,6 +69,8 @@ impl Echo {
 /// Keys of a scene besides its meshes and regions.
 #[derive(Clone, Copy, Default)]
 pub struct Keys<'a> {
+    /// At the start.
+    pub top: &'a str,
     /// Rays of a spot.
     pub rays: usize,
     /// Below `[radar]`.
@@ -165,9 +167,9 @@ impl Stage {
         self.cloud("out/cloud.ply", chirps)
     }
 
-    fn run(&self, scan: &str, parts: &str, Keys { rays, radar, more }: Keys) {
+    fn run(&self, scan: &str, parts: &str, Keys { top, rays, radar, more }: Keys) {
         let text = format!(
-            "[radar]\ntransmit_power_dbm = {SENT_DBM}\nsystem_loss_db = 0\nthreshold_dbm = -300\n\
+            "{top}\n[radar]\ntransmit_power_dbm = {SENT_DBM}\nsystem_loss_db = 0\nthreshold_dbm = -300\n\
              footprint = \"projected\"\nbeam.edge_growth = 1\n{radar}\n[radar.scan]\n{scan}\n[spot]\nrays = {rays}\n\
              {more}\n{parts}"
         );
@@ -181,6 +183,12 @@ impl Stage {
         let text = std::fs::read_to_string(self.folder.path().join("out/scan.json")).unwrap();
         let record: serde_json::Value = serde_json::from_str(&text).unwrap();
         record["validity"].as_array().map_or(0, Vec::len)
+    }
+
+    /// A column of the last run's cloud.
+    pub fn column(&self, name: &str) -> Vec<f64> {
+        let mut cloud = read_cloud(&self.folder.path().join("out/cloud.ply"));
+        cloud.remove(name).unwrap_or_else(|| panic!("the cloud has no {name}"))
     }
 
     /// What a cloud of the last run holds, by chirp.
