@@ -260,7 +260,7 @@ impl ReadyScene {
         })
     }
 
-    /// Sentences on materials that are withdrawn or superseded, make no claim at the radar's frequency, were reduced
+    /// Sentences on speckle as 0.1.0 had it, and on materials that are withdrawn or superseded, make no claim at the radar's frequency, were reduced
     /// with another footprint than the scene's, have a narrower lobe than its beam, or reflect more than they receive.
     pub fn notices(&self) -> Vec<String> {
         let mut notices = Vec::new();
@@ -271,6 +271,8 @@ impl ReadyScene {
             notices.extend(extrapolation_warning(&found.material, self.scene.radar()));
             notices.extend(polarisation_warning(&found.material));
         }
+        let earlier = self.scene.radar().speckle.and_then(|speckle| speckle.earlier);
+        notices.extend(earlier.map(|earlier| earlier.to_string()));
         if self.speckle_form() == Some(SpeckleForm::Law) && !self.scene.file.receiver.is_empty() {
             notices.push(INDEPENDENT_ANTENNAS.to_owned());
         }
@@ -460,7 +462,6 @@ fn too_much(material: &SceneMaterial) -> Option<String> {
     Some(format!("the law of `{}` {}; nothing is cut off", material.name, excess.words()))
 }
 
-/// That a material makes no claim at the radar's frequency.
 /// A curve that was measured across the polarisation that was sent says nothing of what a scene takes it for.
 fn polarisation_warning(material: &Material) -> Option<String> {
     let curve = material.rendered_curve()?;
@@ -475,6 +476,7 @@ fn polarisation_warning(material: &Material) -> Option<String> {
     })
 }
 
+/// That a material makes no claim at the radar's frequency.
 fn extrapolation_warning(material: &Material, radar: &Radar) -> Option<String> {
     let frequency_ghz = radar.centre_frequency_ghz;
     let outside_ghz = material.frequency_outside_hz(frequency_ghz * 1e9) / 1e9;
