@@ -12,6 +12,7 @@
 //! | speckle, a field fixed to the surface | `speckle/` |
 //! | echoes that part in range | `returns.rs` |
 //! | how far the target tilts within the spots | `curvature.rs` |
+//! | how far neighbouring facets turn | `facet_steps.rs` |
 //! | detection by the receiver, and the cause of each echo | `detect.rs`, `echo.rs` |
 //! | tones of a beat signal | `tones.rs` |
 //! | image and point cloud | `image.rs`, `cloud.rs` |
@@ -28,6 +29,7 @@ mod detect;
 mod echo;
 mod edges;
 mod error;
+mod facet_steps;
 mod image;
 mod jones;
 mod observer;
@@ -48,6 +50,7 @@ pub use cloud::cloud_table;
 pub use curvature::{SpotTilt, spot_tilts};
 pub use echo::{Echo, Truth};
 pub use error::RenderError;
+pub use facet_steps::facet_steps;
 pub use image::{CHANNELS, power_image};
 pub use observer::Observer;
 pub use scan::{Scan, beat_signals, shade, trace, trace_placed};
