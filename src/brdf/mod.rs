@@ -13,6 +13,7 @@
 
 mod albedo;
 mod backscatter;
+mod beyond_beam;
 mod kind;
 mod models;
 mod outline;
@@ -26,6 +27,7 @@ mod validity;
 
 pub use albedo::{Excess, albedo};
 pub use backscatter::{Facets, Term};
+pub use beyond_beam::BeyondBeam;
 pub use kind::{Key, Kind};
 pub use models::*;
 pub use outline::{DEGREES, Outline};

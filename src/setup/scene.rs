@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::materials::{MaterialRevision, find_material, status_warning};
-use crate::brdf::{Brdf, Excess, ScatteringModel};
+use crate::brdf::{BeyondBeam, Brdf, Excess, ScatteringModel};
 use crate::effects::{EffectList, Level, Model, Receiver, SceneEffects, resolve};
 use crate::error::Error;
 use crate::formats::EffectEntry;
@@ -260,8 +260,9 @@ impl ReadyScene {
         })
     }
 
-    /// Sentences on speckle as 0.1.0 had it, and on materials that are withdrawn or superseded, make no claim at the radar's frequency, were reduced
-    /// with another footprint than the scene's, have a narrower lobe than its beam, or reflect more than they receive.
+    /// Sentences on speckle as 0.1.0 had it, on materials that are withdrawn or superseded, make no claim at the radar's
+    /// frequency, were reduced with another footprint than the scene's, have a narrower lobe than its beam, or reflect
+    /// more than they receive or than a mirror.
     pub fn notices(&self) -> Vec<String> {
         let mut notices = Vec::new();
         for SceneMaterial { found, .. } in &self.materials {
@@ -280,8 +281,16 @@ impl ReadyScene {
             notices.extend(self.other_footprint(material));
             notices.extend(self.too_narrow(material));
             notices.extend(too_much(material));
+            notices.extend(self.beyond_beam(material));
         }
         notices
+    }
+
+    /// That a material's curve returns what no surface does through this radar's beam.
+    fn beyond_beam(&self, material: &SceneMaterial) -> Option<String> {
+        let beam_rad = Beam::new(self.scene.radar()).towards(0.0, 0.0).divergence_rad();
+        let beyond = BeyondBeam::of(&material.scattering, beam_rad)?;
+        Some(format!("the law of `{}` {}", material.name, beyond.words(beam_rad)))
     }
 
     /// How its speckle is made; none without speckle.
