@@ -25,7 +25,7 @@ mod slopes;
 mod through_beam;
 mod validity;
 
-pub use albedo::{Excess, albedo};
+pub use albedo::{ALBEDO_SLACK, Excess, albedo, incidences_rad};
 pub use backscatter::{Facets, Term};
 pub use beyond_beam::BeyondBeam;
 pub use kind::{Key, Kind};

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | intersections of the rays of each chirp with the target | `spot.rs`, equation (7) |
 //! | the surfaces of the target | `surface.rs` |
-//! | what the target lets through | `sheet.rs` |
+//! | what the target lets through | `sheet.rs`, `sheet_energy.rs` |
 //! | power that arrives at an antenna by single paths | `paths.rs`, equation (11) |
 //! | … and by second-order paths | `bounce.rs` |
 //! | … with declared physical effects | `effect_scan.rs` |
@@ -39,6 +39,7 @@ mod returns;
 mod scan;
 mod setup;
 mod sheet;
+mod sheet_energy;
 mod speckle;
 mod spot;
 mod surface;
@@ -56,6 +57,7 @@ pub use observer::Observer;
 pub use scan::{Scan, beat_signals, shade, trace, trace_placed};
 pub use setup::{MOST_SHEETS, Setup};
 pub use sheet::Sheet;
+pub use sheet_energy::SheetGain;
 pub use spot::{Behind, Footprints};
 pub use surface::{Orientation, Surface};
 pub use tones::Beats;

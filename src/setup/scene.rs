@@ -12,7 +12,7 @@ use crate::frames::{Global, Point, Pose};
 use crate::geometry::Raster;
 use crate::material::{Curve, Lobes, Material};
 use crate::radar::{Beam, Channel, Radar, SpeckleForm};
-use crate::render::{Bounce, RenderError, Scan, Setup, Sheet, Surface, power_image};
+use crate::render::{Bounce, RenderError, Scan, Setup, Sheet, SheetGain, Surface, power_image};
 use crate::scene::{Region, Scene};
 use crate::store::Store;
 use crate::trace::{Bvh, ScanGeometry};
@@ -262,7 +262,7 @@ impl ReadyScene {
 
     /// Sentences on speckle as 0.1.0 had it, on materials that are withdrawn or superseded, make no claim at the radar's
     /// frequency, were reduced with another footprint than the scene's, have a narrower lobe than its beam, or reflect
-    /// more than they receive or than a mirror.
+    /// more than they receive or than a mirror, and on sheets with gain.
     pub fn notices(&self) -> Vec<String> {
         let mut notices = Vec::new();
         for SceneMaterial { found, .. } in &self.materials {
@@ -283,6 +283,7 @@ impl ReadyScene {
             notices.extend(too_much(material));
             notices.extend(self.beyond_beam(material));
         }
+        notices.extend(self.gaining_sheets());
         notices
     }
 
@@ -291,6 +292,22 @@ impl ReadyScene {
         let beam_rad = Beam::new(self.scene.radar()).towards(0.0, 0.0).divergence_rad();
         let beyond = BeyondBeam::of(&material.scattering, beam_rad)?;
         Some(format!("the law of `{}` {}", material.name, beyond.words(beam_rad)))
+    }
+
+    /// Regions that return and let through more than they receive.
+    fn gaining_sheets(&self) -> Vec<String> {
+        let regions = self.scene.target.regions.iter().zip(&self.sheets);
+        let gaining = regions.zip(self.of_regions()).filter_map(|((region, sheet), material)| {
+            let gain = SheetGain::of(sheet.as_ref()?, material.found.material.theta_rad)?;
+            Some(format!(
+                "the sheet of region `{}`, the law of `{}` with what its permittivity lets through, {}; nothing is cut \
+                 off: give it a law that returns less, or a permittivity that passes less",
+                region.name,
+                material.name,
+                gain.words()
+            ))
+        });
+        gaining.collect()
     }
 
     /// How its speckle is made; none without speckle.
